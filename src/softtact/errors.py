@@ -1,0 +1,13 @@
+"""What softtact raises. Each message is one sentence that names the thing, its value and the remedy."""
+
+
+class SofttactError(Exception):
+    """Base of all errors that a user can act upon."""
+
+
+class InputError(SofttactError):
+    """A file, a field or an argument is not usable as given."""
+
+
+class ConvergenceError(SofttactError):
+    """A solver did not reach its tolerance; nothing of the unfinished step may be used."""

@@ -1,0 +1,83 @@
+"""Reading and writing: whole files or none, labelled, with their provenance inside."""
+
+import contextlib
+import hashlib
+import json
+import os
+import tempfile
+from pathlib import Path
+
+import softtact
+from softtact.errors import InputError
+
+
+@contextlib.contextmanager
+def atomic_path(path):
+    """Yield a temporary path beside `path`; rename it to `path` if the block succeeds, delete it otherwise."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        umask = os.umask(0)
+        os.umask(umask)
+        temporary.chmod(0o666 & ~umask)  # mkstemp makes private files; results are to be shared
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def digest(obj):
+    """Short, stable digest (16 hex digits) of a JSON-like object."""
+    text = json.dumps(obj, sort_keys=True, separators=(",", ":"), default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def write_json(path, obj):
+    """Write `obj` as indented JSON with sorted keys."""
+    with atomic_path(path) as temporary:
+        temporary.write_text(json.dumps(obj, indent=2, sort_keys=True) + "\n", encoding="utf-8")
+
+
+def read_json(path):
+    """Read a JSON file; an unreadable one raises `InputError` naming the file and the line."""
+    try:
+        return json.loads(Path(path).read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file.") from None
+    except (UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise InputError(f"{path}: not valid JSON ({error}); write the file again.") from None
+
+
+def write_csv(path, frame, *, float_format="%.6g"):
+    """Write a pandas data frame as CSV without its index."""
+    with atomic_path(path) as temporary:
+        frame.to_csv(temporary, index=False, float_format=float_format, lineterminator="\n")
+
+
+def write_dataset(path, dataset, *, seed, settings):
+    """Write an xarray dataset as NetCDF with version, settings digest and seed among its attributes.
+
+    The same data set gives the same bytes: no time stamp or path is stored.
+    """
+    provenance = {
+        "softtact_version": softtact.__version__,
+        "config_digest": digest(settings),
+        "seed": -1 if seed is None else int(seed),
+    }
+    with atomic_path(path) as temporary:
+        dataset.assign_attrs(provenance).to_netcdf(temporary, engine="h5netcdf")
+
+
+def read_dataset(path):
+    """Read a NetCDF file whole into memory."""
+    import xarray
+
+    try:
+        return xarray.load_dataset(path, engine="h5netcdf")
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file.") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: not a readable NetCDF file ({error}); delete it and make it again.") from None
