@@ -1,0 +1,96 @@
+"""The lower envelope of a rigid triangle mesh: what a sensor below it can touch, exact to the triangles.
+
+Vertical lines through query points are cut with the triangles found in a grid of bins; no sampling of the surface takes place.
+"""
+
+import numpy as np
+from numba import njit
+
+NO_CONTACT_MM = 1e3   # height reported where the object is not above the point
+
+
+class HeightField:
+    """Height z (mm) and unit normal of an object's underside over points (x, y) in the object's placed position."""
+
+    def __init__(self, mesh, *, bins=128):
+        triangles = np.ascontiguousarray(mesh.triangles, dtype=float)
+        cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        area = np.linalg.norm(cross, axis=1)
+        facing_down = cross[:, 2] < -1e-9 * np.maximum(area, 1e-300)   # walls and upper sides cannot be touched
+        self.triangles = triangles[facing_down]
+        self.normals = cross[facing_down] / area[facing_down, None]
+        self.lowest_mm = float(triangles[..., 2].min())
+        low, high = self._plan_bounds()
+        self._origin, self._size = low, np.maximum((high - low) / bins, 1e-6)
+        self._starts, self._members = _fill_bins(self.triangles, self._origin, self._size, bins)
+        self._bins = bins
+
+    def _plan_bounds(self):
+        if not len(self.triangles):
+            return np.zeros(2), np.ones(2)
+        points = self.triangles[..., :2].reshape(-1, 2)
+        return points.min(axis=0) - 1e-9, points.max(axis=0) + 1e-9
+
+    def __call__(self, x, y):
+        """Heights (n,) and normals (n, 3) pointing out of the object (downwards) for points (n,), (n,)."""
+        x, y = np.ascontiguousarray(x, dtype=float), np.ascontiguousarray(y, dtype=float)
+        height, index = _lowest_crossing(x, y, self.triangles, self._origin, self._size, self._bins,
+                                         self._starts, self._members)
+        normal = np.tile([0.0, 0.0, -1.0], (len(x), 1))
+        hit = index >= 0
+        normal[hit] = self.normals[index[hit]]
+        return height, normal
+
+
+def lowest_crossing_naive(x, y, mesh):
+    """The same heights by testing every triangle: the executable specification of `HeightField`."""
+    heights = np.full(len(x), NO_CONTACT_MM)
+    for triangle in mesh.triangles:
+        (ax, ay, az), (bx, by, bz), (cx, cy, cz) = triangle
+        double_area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        if abs(double_area) < 1e-14:
+            continue
+        u = ((x - ax) * (cy - ay) - (y - ay) * (cx - ax)) / double_area
+        v = ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / double_area
+        inside = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
+        heights[inside] = np.minimum(heights[inside], (az + u * (bz - az) + v * (cz - az))[inside])
+    return heights
+
+
+def _fill_bins(triangles, origin, size, bins):
+    """Triangles per bin in compressed rows: starts (bins^2 + 1,), members."""
+    if not len(triangles):
+        return np.zeros(bins * bins + 1, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    low = np.clip(((triangles[..., :2].min(axis=1) - 1e-9 - origin) / size).astype(int), 0, bins - 1)
+    high = np.clip(((triangles[..., :2].max(axis=1) + 1e-9 - origin) / size).astype(int), 0, bins - 1)
+    owner, cell = [], []
+    for t, ((i0, j0), (i1, j1)) in enumerate(zip(low, high, strict=True)):
+        cells = (np.arange(j0, j1 + 1)[:, None] * bins + np.arange(i0, i1 + 1)).ravel()
+        cell.append(cells)
+        owner.append(np.full(len(cells), t))
+    cell, owner = np.concatenate(cell), np.concatenate(owner)
+    order = np.argsort(cell, kind="stable")
+    starts = np.searchsorted(cell[order], np.arange(bins * bins + 1))
+    return starts.astype(np.int64), owner[order].astype(np.int64)
+
+
+@njit(cache=True, nogil=True)
+def _lowest_crossing(x, y, triangles, origin, size, bins, starts, members):
+    heights = np.full(len(x), NO_CONTACT_MM)
+    index = np.full(len(x), -1)
+    for n in range(len(x)):
+        i, j = int(np.floor((x[n] - origin[0]) / size[0])), int(np.floor((y[n] - origin[1]) / size[1]))
+        if i < 0 or j < 0 or i >= bins or j >= bins:
+            continue
+        for k in range(starts[j * bins + i], starts[j * bins + i + 1]):
+            t = triangles[members[k]]
+            bx, by = t[1, 0] - t[0, 0], t[1, 1] - t[0, 1]
+            cx, cy = t[2, 0] - t[0, 0], t[2, 1] - t[0, 1]
+            px, py = x[n] - t[0, 0], y[n] - t[0, 1]
+            double_area = bx * cy - by * cx
+            u, v = (px * cy - py * cx) / double_area, (bx * py - by * px) / double_area
+            if u >= -1e-9 and v >= -1e-9 and u + v <= 1 + 1e-9:
+                z = t[0, 2] + u * (t[1, 2] - t[0, 2]) + v * (t[2, 2] - t[0, 2])
+                if z < heights[n]:
+                    heights[n], index[n] = z, members[k]
+    return heights, index

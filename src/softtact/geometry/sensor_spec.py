@@ -1,0 +1,136 @@
+"""The sensor as its YAML file describes it: sizes in mm, layers, frusta, taxels. No mechanics."""
+
+from pathlib import Path
+
+import numpy as np
+import yaml
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PositiveFloat, PositiveInt, ValidationError
+from typing_extensions import Annotated
+
+from softtact.errors import InputError
+
+
+def _plain_value(field):
+    """Accept `{value, assumed, reason}` wherever a plain value stands."""
+    if isinstance(field, dict) and "value" in field:
+        extra = set(field) - {"value", "assumed", "reason"}
+        if extra:
+            raise ValueError(f"unknown key {sorted(extra)[0]!r} beside 'value'")
+        if field.get("assumed") and not field.get("reason"):
+            raise ValueError("an assumed value needs a reason")
+        return field["value"]
+    return field
+
+
+Length = Annotated[PositiveFloat, BeforeValidator(_plain_value)]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Frusta(_Strict):
+    """Conical frusta below the sheet, on a square lattice centred on the sensor."""
+
+    height_mm: Length
+    tip_diameter_mm: Length
+    root_diameter_mm: Length
+    pitch_mm: Length
+
+
+class Dielectric(_Strict):
+    """Sheet with frusta; `relative_permittivity` of its solid."""
+
+    material: str
+    frusta: Frusta
+    sheet_thickness_mm: Length
+    relative_permittivity: Length = 3.5
+
+
+class Cover(_Strict):
+    """Cover and conductive fabric as one layer."""
+
+    material: str
+    thickness_mm: Length
+
+
+class Taxels(_Strict):
+    """Grid of electrodes on the PCB: `rows` along y, `columns` along x."""
+
+    rows: PositiveInt
+    columns: PositiveInt
+
+
+class ElasticLayer(_Strict):
+    """Constants of the single linear layer that stands for all layers in the elastic model."""
+
+    young_mpa: PositiveFloat
+    poisson: Annotated[float, Field(gt=-1.0, lt=0.5)]
+
+
+class SensorSpec(_Strict):
+    """A layered sensor. Frame: origin at the centre of the sensing surface, x and y along the sides, z outwards."""
+
+    name: str
+    footprint_mm: tuple[PositiveFloat, PositiveFloat]
+    map_shape: tuple[PositiveInt, PositiveInt]
+    force_range_n: tuple[float, PositiveFloat]
+    taxels: Taxels
+    dielectric: Dielectric
+    cover: Cover
+    tips_held: Annotated[bool, BeforeValidator(_plain_value)] = True
+    elastic_layer: ElasticLayer
+
+    @property
+    def thickness_mm(self):
+        """Height of the sensing surface over the PCB."""
+        return self.dielectric_thickness_mm + self.cover.thickness_mm
+
+    @property
+    def dielectric_thickness_mm(self):
+        """Height of the electrode plane (top of the dielectric) over the PCB."""
+        return self.dielectric.frusta.height_mm + self.dielectric.sheet_thickness_mm
+
+    @property
+    def map_x_mm(self):
+        """Columns of the deformation map, (33,) for the paper's sensor."""
+        return np.linspace(-0.5, 0.5, self.map_shape[1]) * self.footprint_mm[0]
+
+    @property
+    def map_y_mm(self):
+        """Rows of the deformation map, (57,) for the paper's sensor."""
+        return np.linspace(-0.5, 0.5, self.map_shape[0]) * self.footprint_mm[1]
+
+    @property
+    def frusta_counts(self):
+        """How many frusta fit along x and y."""
+        pitch = self.dielectric.frusta.pitch_mm
+        return tuple(int(np.floor(side / pitch + 1e-9)) for side in self.footprint_mm)
+
+    @classmethod
+    def from_dict(cls, values, *, where="sensor"):
+        """Validate a mapping; the first fault becomes one sentence that names `where` and the field."""
+        try:
+            spec = cls.model_validate(values)
+        except ValidationError as error:
+            fault = error.errors()[0]
+            field = ".".join(str(part) for part in fault["loc"])
+            raise InputError(f"{where}: field '{field}' is not usable: {fault['msg']}; correct it.") from None
+        if min(spec.frusta_counts) < 1:
+            raise InputError(f"{where}: no frustum of pitch {spec.dielectric.frusta.pitch_mm} mm fits on the footprint "
+                             f"{spec.footprint_mm} mm; enlarge the footprint or reduce the pitch.")
+        return spec
+
+    @classmethod
+    def from_yaml(cls, path):
+        """Read a sensor file."""
+        path = Path(path)
+        try:
+            values = yaml.safe_load(path.read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            raise InputError(f"{path}: there is no such sensor file.") from None
+        except (yaml.YAMLError, UnicodeDecodeError) as error:
+            raise InputError(f"{path}: not valid YAML ({' '.join(str(error).split())}).") from None
+        if not isinstance(values, dict):
+            raise InputError(f"{path}: a sensor file must hold keys and values; see config/sensors/coro.yaml.")
+        return cls.from_dict(values, where=str(path))

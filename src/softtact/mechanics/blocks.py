@@ -1,0 +1,64 @@
+"""A block of hexahedra of one material: energy, internal force and tangent at finite strain.
+
+The volumetric energy K/2 (J-1)^2 sees J only through its projection on linear functions in each element
+(four modes: discontinuous linear pressure). The element does not lock for nearly incompressible rubber, the pressure needs
+no unknown of its own, and the tangent stays symmetric. 8-point quadrature, 20-node hexahedra.
+Sussman and Bathe, Computers & Structures 26 (1987) 357 (u/p formulation with condensed pressure).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from softtact.mechanics import kernels
+from softtact.mechanics.elements import gauss, hex20, reference_gradients
+
+_POINTS, _WEIGHTS = gauss(2, 3)
+_DERIVATIVES = hex20(_POINTS)[1]
+_PRESSURE_BASIS = np.column_stack([np.ones(len(_POINTS)), _POINTS])   # (8, 4): 1, xi, eta, zeta
+
+
+@dataclass(frozen=True)
+class BlockState:
+    """What one evaluation leaves for the tangent: energy (mJ), force (e, 60) in N, and the fields at the points."""
+
+    energy: float
+    force: np.ndarray
+    displacement: np.ndarray
+
+
+class HexBlock:
+    """Hexahedra given by coordinates (e, 20, 3) in mm with one law; displacements come per element (e, 20, 3)."""
+
+    def __init__(self, coordinates, law):
+        self.law = law
+        self.gradients, self.volumes = reference_gradients(coordinates, _DERIVATIVES, _WEIGHTS)
+        gram = np.einsum("eg,gp,gq->epq", self.volumes, _PRESSURE_BASIS, _PRESSURE_BASIS)
+        self.gram_inverse = np.linalg.inv(gram)
+
+    def evaluate(self, displacement):
+        """Energy and internal force; None if an element is turned inside out (J <= 0 at a quadrature point)."""
+        F, C, J = kernels.deformation(displacement, self.gradients)
+        if not J.min() > 0:
+            return None
+        response = self.law.isochoric(C, tangent=False)
+        modes, pressure = self._pressure(J, slice(None))
+        energy = float(self.volumes.ravel() @ response.energy + 0.5 * (modes[0] * modes[1]).sum())
+        force = kernels.internal_force(F, C, J, self.gradients, self.volumes, response.stress, pressure)
+        return BlockState(energy=energy, force=force, displacement=displacement)
+
+    def tangent(self, displacement, elements=slice(None)):
+        """Tangent (e, 60, 60) in N/mm of the chosen elements."""
+        gradients = self.gradients[elements]
+        volumes = self.volumes[elements]
+        F, C, J = kernels.deformation(displacement[elements], gradients)
+        response = self.law.isochoric(C, tangent=True)
+        _, pressure = self._pressure(J, elements)
+        return kernels.tangent(F, C, J, gradients, volumes, response.stress, response.tangent, pressure,
+                               _PRESSURE_BASIS, self.gram_inverse[elements], self.law.bulk_modulus)
+
+    def _pressure(self, J, elements):
+        """Modes of the volume change with their conjugate pressures, and the pressure (e, g) at the points."""
+        change = ((J - 1) * self.volumes[elements]) @ _PRESSURE_BASIS
+        conjugate = self.law.bulk_modulus * np.einsum("epq,eq->ep", self.gram_inverse[elements], change)
+        return (change, conjugate), conjugate @ _PRESSURE_BASIS.T

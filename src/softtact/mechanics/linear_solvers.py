@@ -1,0 +1,67 @@
+"""One small interface to sparse direct solvers for symmetric matrices: analyse once, factor often.
+
+PARDISO (MKL) where it installs (x86), SuperLU of scipy elsewhere. `solver.name` tells which one it was.
+"""
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spla
+
+
+def make_solver():
+    """The fastest direct solver that this machine offers."""
+    try:
+        return PardisoSolver()
+    except (ImportError, OSError):   # no MKL for this processor
+        return SuperLUSolver()
+
+
+class PardisoSolver:
+    """MKL PARDISO for symmetric, possibly indefinite matrices; the analysis is reused while the pattern stays."""
+
+    name = "pardiso"
+    _SYMMETRIC_INDEFINITE, _ANALYSE, _FACTOR, _SOLVE, _ANALYSE_AND_FACTOR = -2, 11, 22, 33, 12
+
+    def __init__(self):
+        from pypardiso import PyPardisoSolver
+
+        self._solver = PyPardisoSolver(mtype=self._SYMMETRIC_INDEFINITE)
+        self._upper = None
+
+    def factor(self, upper):
+        """Factor the matrix whose upper triangle (csr, sorted, with its diagonal) is given."""
+        same = self._upper is not None and self._upper.indptr is upper.indptr and self._upper.indices is upper.indices
+        self._upper = upper
+        self._solver.set_phase(self._FACTOR if same else self._ANALYSE_AND_FACTOR)
+        self._solver._call_pardiso(upper, np.zeros((upper.shape[0], 1)))
+
+    def solve(self, right):
+        """Solve for one (n,) or several (n, k) right-hand sides."""
+        self._solver.set_phase(self._SOLVE)
+        columns = np.asfortranarray(right.reshape(len(right), -1))
+        return self._solver._call_pardiso(self._upper, columns).reshape(right.shape)
+
+    def close(self):
+        """Free the factors, which live outside Python's memory."""
+        self._solver.free_memory(everything=True)
+        self._upper = None
+
+
+class SuperLUSolver:
+    """scipy's SuperLU: slower and without a reusable analysis, but everywhere."""
+
+    name = "superlu"
+
+    def factor(self, upper):
+        """Factor the matrix whose upper triangle (csr) is given."""
+        full = upper + sp.triu(upper, 1).T
+        self._lu = spla.splu(full.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.001,
+                             options={"SymmetricMode": True})
+
+    def solve(self, right):
+        """Solve for one (n,) or several (n, k) right-hand sides."""
+        return self._lu.solve(right)
+
+    def close(self):
+        """Forget the factors."""
+        self._lu = None
