@@ -1,0 +1,121 @@
+"""What every hyperelastic law offers: energy, stress and tangent at points, and the curves of simple tests.
+
+Symbols: C right Cauchy-Green tensor, J = sqrt(det C), l1 l2 l3 principal stretches, lb = J^(-1/3) l their isochoric
+parts, psi(lb) isochoric energy per reference volume (MPa), K bulk modulus (MPa).
+The whole energy is psi + U with U(J) = K/2 (J - 1)^2; `isochoric` never includes U.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from softtact.errors import InputError
+
+# Exponents (e1, e2, e3) of the incompressible test paths: l_k = stretch ** e_k. Direction 3 is always free of stress.
+TEST_PATHS = {
+    "uniaxial": (1.0, -0.5, -0.5),
+    "equibiaxial": (1.0, 1.0, -2.0),
+    "planar": (1.0, 0.0, -1.0),
+}
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A material constant: its name, its unit ("MPa" or "1") and where a fit looks for it.
+
+    `low` and `high` bound the fit; for unit "MPa" they are multiples of the initial shear modulus of the curves.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class IsochoricResponse:
+    """Isochoric energy, stress and tangent of n points (MPa); components in the order xx, yy, zz, xy, yz, zx.
+
+    energy: (n,) psi per reference volume
+    stress: (n, 6) second Piola-Kirchhoff stress S
+    tangent: (n, 6, 6) D in dS = D dE with E = [Exx, Eyy, Ezz, 2 Exy, 2 Eyz, 2 Ezx], or None
+    """
+
+    energy: np.ndarray
+    stress: np.ndarray
+    tangent: np.ndarray | None
+
+
+class Law:
+    """A law psi of the isochoric stretches, with the penalty U(J) = K/2 (J - 1)^2 on the volume."""
+
+    name: str
+    constants: tuple[Parameter, ...]
+
+    def __init__(self, parameters, *, bulk_modulus):
+        self.parameters = {constant.name: float(parameters[constant.name]) for constant in self.constants}
+        self.bulk_modulus = float(bulk_modulus)
+
+    def __repr__(self):
+        values = ", ".join(f"{name}={value:g}" for name, value in self.parameters.items())
+        return f"{type(self).__name__}({values}, bulk_modulus={self.bulk_modulus:g})"
+
+    @property
+    def mu0(self):
+        """Initial shear modulus, MPa."""
+        raise NotImplementedError
+
+    def isochoric(self, C6, *, tangent=True):
+        """`IsochoricResponse` for C6 (n, 6): the components xx, yy, zz, xy, yz, zx of C, not doubled."""
+        raise NotImplementedError
+
+    def principal_stress(self, stretches):
+        """t_a = l_a dpsi/dl_a (..., 3) in MPa at isochoric principal stretches (..., 3).
+
+        Its deviator is the Kirchhoff stress; the mean is not determined by psi.
+        """
+        raise NotImplementedError
+
+    def volumetric(self, J):
+        """U (MPa) and its first and second derivative by J."""
+        return self.bulk_modulus / 2 * (J - 1) ** 2, self.bulk_modulus * (J - 1), self.bulk_modulus * np.ones_like(J)
+
+    def nominal_stress(self, mode, stretch):
+        """Nominal stress (MPa) of the incompressible material in a `uniaxial`, `equibiaxial` or `planar` test."""
+        stretch = np.asarray(stretch, float)
+        stress = self.principal_stress(stretch[..., None] ** np.array(path_exponents(mode)))
+        return (stress[..., 0] - stress[..., 2]) / stretch
+
+    def uniaxial_compressible(self, stretch):
+        """Nominal stress (MPa) of the uniaxial test with the volume penalty: the lateral stress is solved to zero."""
+        axial = np.atleast_1d(np.asarray(stretch, float))
+        stress = np.array([self._axial_stress(value) for value in axial])
+        return stress.reshape(np.shape(stretch))
+
+    def _axial_stress(self, axial):
+        kirchhoff = self._kirchhoff_uniaxial(axial, _root(lambda J: self._kirchhoff_uniaxial(axial, J)[1]))
+        return kirchhoff[0] / axial
+
+    def _kirchhoff_uniaxial(self, axial, J):
+        """Principal Kirchhoff stresses (3,) at the axial stretch and the volume ratio J, lateral stretches equal."""
+        lateral = np.sqrt(J / axial)
+        stress = self.principal_stress(J ** (-1 / 3) * np.array([axial, lateral, lateral]))
+        return stress - stress.mean() + J * self.bulk_modulus * (J - 1)
+
+
+def path_exponents(mode):
+    """Exponents of the principal stretches on the path of a test mode."""
+    if mode not in TEST_PATHS:
+        raise InputError(f"Test mode {mode!r} is unknown; use one of {', '.join(TEST_PATHS)}.")
+    return TEST_PATHS[mode]
+
+
+def _root(function):
+    """Root of an increasing function of J > 0, bracketed outwards from J = 1."""
+    low, high = 0.9, 1.1
+    while function(low) > 0 and low > 1e-6:
+        low *= 0.7
+    while function(high) < 0 and high < 1e6:
+        high *= 1.4
+    return brentq(function, low, high, xtol=1e-15, rtol=1e-14)

@@ -1,0 +1,53 @@
+"""Ogden with one, two or three terms, in the convention of Abaqus.
+
+Symbols       mu_k (MPa), alpha_k (1, not zero); lb_a isochoric principal stretches
+Energy        psi = sum_k 2 mu_k/alpha_k^2 (lb_1^alpha_k + lb_2^alpha_k + lb_3^alpha_k - 3)
+Stress        g = lb dpsi/dlb = sum_k 2 mu_k/alpha_k lb^alpha_k; the deviator of g is the Kirchhoff stress
+Tangent       h = dg/dln lb = sum_k 2 mu_k lb^alpha_k, spectral form in stretches.py
+Small strain  mu0 = sum_k mu_k
+Reference     Ogden, Proc. R. Soc. A 326 (1972) 565-584; convention of the Abaqus Theory Guide, 4.6.1
+"""
+
+import numpy as np
+
+from softtact.materials.laws.base import IsochoricResponse, Law, Parameter
+from softtact.materials.laws.stretches import power_sum_response
+
+
+def _constants(terms):
+    pairs = [(Parameter(f"mu{k}", "MPa", -5.0, 5.0), Parameter(f"alpha{k}", "1", -20.0, 20.0)) for k in terms]
+    return tuple(constant for pair in pairs for constant in pair)
+
+
+class Ogden1(Law):
+    name = "ogden1"
+    constants = _constants([1])
+
+    def __init__(self, parameters, *, bulk_modulus):
+        super().__init__(parameters, bulk_modulus=bulk_modulus)
+        self._mu, self._alpha = np.array(list(self.parameters.values())).reshape(-1, 2).T.copy()
+
+    @property
+    def mu0(self):
+        return float(self._mu.sum())
+
+    def isochoric(self, C6, *, tangent=True):
+        C6 = np.ascontiguousarray(C6, dtype=float)
+        energy, stress = np.empty(len(C6)), np.empty((len(C6), 6))
+        moduli = np.empty((len(C6) if tangent else 0, 6, 6))
+        power_sum_response(C6, self._mu, self._alpha, energy, stress, moduli)
+        return IsochoricResponse(energy, stress, moduli if tangent else None)
+
+    def principal_stress(self, stretches):
+        powers = np.asarray(stretches, float)[..., None] ** self._alpha
+        return powers @ (2 * self._mu / self._alpha)
+
+
+class Ogden2(Ogden1):
+    name = "ogden2"
+    constants = _constants([1, 2])
+
+
+class Ogden3(Ogden1):
+    name = "ogden3"
+    constants = _constants([1, 2, 3])
