@@ -1,7 +1,7 @@
 """Laws in the isochoric principal stretches that are sums of powers: spectral stress and tangent.
 
 Symbols: c_a, N_a eigenvalues and eigenvectors of C, cb = J^(-2/3) c, lb = sqrt(cb),
-         g(cb) = lb dpsi/dlb = sum_k 2 mu_k/alpha_k lb^alpha_k,  h = dg/dln lb = sum_k 2 mu_k lb^alpha_k,  m = mean of g.
+         g = lb dpsi/dlb = sum_k 2 mu_k/alpha_k lb^alpha_k,  h = dg/dln lb = sum_k 2 mu_k lb^alpha_k,  m = mean of g.
 Stress:  S = sum_a (g_a - m)/c_a  N_a N_a
 Tangent: D = sum_ab (T_ab - 2 delta_ab (g_a - m))/(c_a c_b)  N_aN_a x N_bN_b  +  sum_a<b Q_ab W_ab x W_ab
          T_ab = delta_ab h_a - (h_a + h_b)/3 + sum h/9,  W_ab = N_a N_b + N_b N_a,
