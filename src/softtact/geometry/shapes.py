@@ -1,0 +1,227 @@
+"""The study's own objects, written as STL files: `python -m softtact.geometry.shapes --out config/objects`.
+
+The pipeline reads meshes and never calls this module: whatever is pressed lies on disk as an STL file, with one line
+in `catalogue.yaml`. Names of indenters that the published data set uses are kept; their drawings are not published,
+so the sizes are ours. Every pressing face is at least 90 mm2, wide enough to carry the sensor's full 50 N.
+"""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from softtact.files import atomic_path
+from softtact.geometry.solids import (
+    arc,
+    ball,
+    block,
+    dome,
+    pad,
+    path,
+    polygon,
+    raised,
+    ring,
+    to_mesh,
+    union,
+)
+
+FACE_HEIGHT = 4.0  # mm from the pressing face to the plate: the plate must not touch at the deepest press
+PLATE_HEIGHT = 4.0
+BAR_WIDTH = 3.5
+OVERLAP = 0.5  # mm that a part reaches into its plate, so that the union is one body
+LOW_FEATURE = 0.5  # mm by which the low features of objects 5 and 6 stay behind the others (paper, sec. 4.2)
+
+
+def bar(*points, width=BAR_WIDTH):
+    """Bar of an indenter along the line through `points`."""
+    return path(points, width=width, height=FACE_HEIGHT + OVERLAP)
+
+
+def disc(diameter, centre=(0.0, 0.0)):
+    """Round pad of an indenter."""
+    return pad(centre, radius=diameter / 2, height=FACE_HEIGHT + OVERLAP)
+
+
+def hoop(outer, inner, centre=(0.0, 0.0)):
+    """Ring of an indenter."""
+    return ring(outer=outer, inner=inner, height=FACE_HEIGHT + OVERLAP, centre=centre)
+
+
+def face(*corners):
+    """Convex polygonal pad of an indenter; corners counter-clockwise."""
+    return polygon(corners, height=FACE_HEIGHT + OVERLAP)
+
+
+def corner_points(count, radius, *, start_deg=90.0):
+    """Corners (count, 2) of a regular polygon."""
+    angle = np.radians(start_deg + 360.0 * np.arange(count) / count)
+    return radius * np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def star(*, points=5, outer=10.0, inner=5.0):
+    """Star as overlapping kites, each from a tip across the centre: the rounded edges meet on the outline only."""
+    tips = corner_points(points, outer)
+    valleys = corner_points(points, inner, start_deg=90.0 + 180.0 / points)
+    return union(face(tips[k], valleys[k], valleys[(k + 2) % points], valleys[k - 1]) for k in range(points))
+
+
+def corner_brackets(x=8.0, y=15.0, leg=5.0):
+    """An L in each of the four corners."""
+    return union(bar((sx * (x - leg), sy * y), (sx * x, sy * y), (sx * x, sy * (y - leg)))
+                 for sx in (-1, 1) for sy in (-1, 1))
+
+
+def ellipse(length=24.0, width=13.0):
+    """Elliptic pad with its long side along y."""
+    angle = 2 * np.pi * np.arange(48) / 48
+    return face(*np.column_stack([width / 2 * np.cos(angle), length / 2 * np.sin(angle)]))
+
+
+INDENTERS = {
+    "A Form": lambda: union([bar((-7, -12), (0, 12), (7, -12)), bar((-4, -3), (4, -3))]),
+    "Bordes H": lambda: union([bar((-8, 14), (8, 14)), bar((-8, -14), (8, -14))]),
+    "Bordes V": lambda: union([bar((-8, -14), (-8, 14)), bar((8, -14), (8, 14))]),
+    "Circle G": lambda: disc(18),
+    "Circle M": lambda: disc(15),
+    "Circle S": lambda: disc(13),
+    "Circle XS": lambda: disc(11),
+    "Corners": corner_brackets,
+    "Cruz": lambda: union([bar((0, -14), (0, 14)), bar((-8, 0), (8, 0))]),
+    "Diagonal": lambda: bar((-8, -14), (8, 14)),
+    "Diagonal Inver": lambda: bar((8, -14), (-8, 14)),
+    "Donut G": lambda: hoop(19, 11),
+    "Donut M": lambda: hoop(15, 7),
+    "Echo H": lambda: union([bar((-8, 9), (8, 9)), bar((-5, 0), (5, 0)), bar((-2, -9), (2, -9))]),
+    "Echo V": lambda: union([bar((-7, -14), (-7, 14)), bar((0, -9), (0, 9)), bar((7, -4), (7, 4))]),
+    "Echo X": lambda: union([bar((-7, -7), (7, 7)), bar((-7, 7), (7, -7)), bar((-4, 14), (4, 14)),
+                             bar((-4, -14), (4, -14))]),
+    "Glasses": lambda: union([hoop(14, 7, (0, 9)), hoop(14, 7, (0, -9)), bar((0, -3.4), (0, 3.4))]),
+    "Triangle": lambda: face(*corner_points(3, 11)),
+    "Square": lambda: face(*corner_points(4, 9, start_deg=45)),
+    "Sphere": lambda: dome(radius=20, base_diameter=20, height=FACE_HEIGHT + OVERLAP),
+    "Star": star,
+    "Rectangle": lambda: face((-5, -12), (5, -12), (5, 12), (-5, 12)),
+    "T Form": lambda: union([bar((-8, 10), (8, 10)), bar((0, 10), (0, -12))]),
+    "U Form": lambda: bar((-7, 11), (-7, -11), (7, -11), (7, 11)),
+}
+
+UNSEEN = {
+    "Hexagon": lambda: face(*corner_points(6, 8.5)),
+    "Ellipse": ellipse,
+    "L Form": lambda: bar((-6, 12), (-6, -12), (7, -12)),
+    "Two Dots": lambda: union([disc(8.5, (-3, 8)), disc(8.5, (3, -8))]),
+    "Ring Segment": lambda: arc(radius=8, width=4, start_deg=-30, end_deg=210, height=FACE_HEIGHT + OVERLAP),
+    "Z Form": lambda: bar((-6, 11), (6, 11), (-6, -11), (6, -11)),
+}
+
+
+def on_plate(pressing):
+    """Indenter: the pressing part under a plate as large as its bounding box."""
+    x0, y0, _, x1, y1, _ = pressing.bounding_box()
+    plate = block(x1 - x0, y1 - y0, PLATE_HEIGHT).translate(((x0 + x1) / 2, (y0 + y1) / 2, FACE_HEIGHT))
+    return union([pressing, plate])
+
+
+def object_1():
+    """Smooth rectangular prism."""
+    return block(14, 34, 18, corner_radius=2.0, edge=2.0, round_top=True)
+
+
+def object_2():
+    """Smooth sphere."""
+    return ball(radius=25.0)
+
+
+def object_3():
+    """Smooth circular prism on its flat end."""
+    return pad((0, 0), radius=10.0, height=30.0, edge=0.5, round_top=True)
+
+
+def object_4():
+    """Circular prism whose end carries a rim and a boss of one height."""
+    body = raised(pad((0, 0), radius=10.5, height=16.0, edge=0.5, round_top=True), 2.0)
+    reliefs = [ring(outer=20, inner=13, height=2.5), pad((0, 0), radius=3.5, height=2.5)]
+    return union([body, *reliefs])
+
+
+def object_5():
+    """Rectangular prism with four ridges, the second one 0.5 mm lower, and blind holes in the far side."""
+    floor, holes_floor, top = 3.0, 10.0, 18.0
+    body = raised(block(24, 42, top - floor, corner_radius=2.0), floor)
+    ridges = [ridge(y, lowered=LOW_FEATURE if y == -4.0 else 0.0) for y in (-12.0, -4.0, 4.0, 12.0)]
+    holes = [pad((x, y), radius=2.5, height=top).translate((0, 0, holes_floor))
+             for x in (-6.0, 6.0) for y in (-12.0, 0.0, 12.0)]
+    return union([body, *ridges]) - union(holes)
+
+
+def ridge(y, *, lowered, floor=3.0):
+    """Ridge of object 5, along x; `lowered` is how far it stays behind the contact plane."""
+    bar_ = path([(-6.5, y), (6.5, y)], width=3.5, height=floor + OVERLAP - lowered)
+    return raised(bar_, lowered)
+
+
+def object_6():
+    """Cylinder with 19 small bosses on its flat end, six of which are 0.5 mm lower."""
+    floor, pitch, boss_radius = 3.0, 5.0, 1.9
+    body = raised(pad((0, 0), radius=14.0, height=20.0, edge=0.5, round_top=True), floor)
+    inner = corner_points(6, pitch)
+    outer = [*corner_points(6, 2 * pitch), *corner_points(6, np.sqrt(3) * pitch, start_deg=120.0)]
+    high = [(0.0, 0.0), *outer]
+    bosses = [pad(centre, radius=boss_radius, height=floor + OVERLAP) for centre in high]
+    low = [raised(pad(centre, radius=boss_radius, height=floor + OVERLAP - LOW_FEATURE), LOW_FEATURE)
+           for centre in inner]
+    return union([body, *bosses, *low])
+
+
+GRASPED = {f"Object {number}": shape for number, shape in
+           enumerate([object_1, object_2, object_3, object_4, object_5, object_6], start=1)}
+
+# set -> (folder, shapes, what every shape of the set gets)
+SETS = {
+    "indenters": ("indenters", INDENTERS, on_plate),
+    "unseen": ("unseen", UNSEEN, on_plate),
+    "grasps": ("grasped", GRASPED, lambda solid: solid),
+}
+
+
+def file_name(label):
+    """Name of an item as it stands in paths: `Circle G` -> `circle_g`."""
+    return label.lower().replace(" ", "_")
+
+
+def make_mesh(set_name, label):
+    """Mesh of one object of the study in mm, as a `trimesh.Trimesh`."""
+    _, shapes, finish = SETS[set_name]
+    return to_mesh(finish(shapes[label]()))
+
+
+def write_objects(out):
+    """Write every STL file and `catalogue.yaml` below the folder `out`; return the catalogue's path."""
+    out = Path(out)
+    lines = ["# Objects of the study, one a line: name in paths, file beside this one, unit of the mesh, set, label.",
+             "# A new object is one STL file and one line."]
+    for set_name, (folder, shapes, _) in SETS.items():
+        for label in shapes:
+            file = f"{folder}/{file_name(label)}.stl"
+            _write_stl(out / file, make_mesh(set_name, label))
+            lines.append(f"- {{name: {file_name(label)}, file: {file}, unit: mm, set: {set_name}, label: {label}}}")
+    catalogue = out / "catalogue.yaml"
+    with atomic_path(catalogue) as temporary:
+        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return catalogue
+
+
+def _write_stl(file, mesh):
+    with atomic_path(file) as temporary:
+        temporary.write_bytes(mesh.export(file_type="stl"))
+
+
+def main(arguments=None):
+    """Command line."""
+    parser = argparse.ArgumentParser(description="Write the study's objects as STL files with their catalogue.")
+    parser.add_argument("--out", default="config/objects", type=Path, help="folder to write to")
+    print(write_objects(parser.parse_args(arguments).out))
+
+
+if __name__ == "__main__":
+    main()
