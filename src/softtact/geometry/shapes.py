@@ -27,6 +27,7 @@ from softtact.geometry.solids import (
 
 FACE_HEIGHT = 4.0  # mm from the pressing face to the plate: the plate must not touch at the deepest press
 PLATE_HEIGHT = 4.0
+PLATE_MARGIN = 0.1  # mm; sides that only touch would leave slivers in the union
 BAR_WIDTH = 3.5
 OVERLAP = 0.5  # mm that a part reaches into its plate, so that the union is one body
 LOW_FEATURE = 0.5  # mm by which the low features of objects 5 and 6 stay behind the others (paper, sec. 4.2)
@@ -98,7 +99,7 @@ INDENTERS = {
     "Glasses": lambda: union([hoop(14, 7, (0, 9)), hoop(14, 7, (0, -9)), bar((0, -3.4), (0, 3.4))]),
     "Triangle": lambda: face(*corner_points(3, 11)),
     "Square": lambda: face(*corner_points(4, 9, start_deg=45)),
-    "Sphere": lambda: dome(radius=20, base_diameter=20, height=FACE_HEIGHT + OVERLAP),
+    "Sphere": lambda: dome(radius=20, base_diameter=19, height=FACE_HEIGHT + OVERLAP),
     "Star": star,
     "Rectangle": lambda: face((-5, -12), (5, -12), (5, 12), (-5, 12)),
     "T Form": lambda: union([bar((-8, 10), (8, 10)), bar((0, 10), (0, -12))]),
@@ -110,15 +111,16 @@ UNSEEN = {
     "Ellipse": ellipse,
     "L Form": lambda: bar((-6, 12), (-6, -12), (7, -12)),
     "Two Dots": lambda: union([disc(8.5, (-3, 8)), disc(8.5, (3, -8))]),
-    "Ring Segment": lambda: arc(radius=8, width=4, start_deg=-30, end_deg=210, height=FACE_HEIGHT + OVERLAP),
+    "Ring Segment": lambda: arc(radius=7.8, width=4, start_deg=-30, end_deg=210, height=FACE_HEIGHT + OVERLAP),
     "Z Form": lambda: bar((-6, 11), (6, 11), (-6, -11), (6, -11)),
 }
 
 
 def on_plate(pressing):
-    """Indenter: the pressing part under a plate as large as its bounding box."""
+    """Indenter: the pressing part under a plate a little larger than its bounding box."""
     x0, y0, _, x1, y1, _ = pressing.bounding_box()
-    plate = block(x1 - x0, y1 - y0, PLATE_HEIGHT).translate(((x0 + x1) / 2, (y0 + y1) / 2, FACE_HEIGHT))
+    plate = block(x1 - x0 + 2 * PLATE_MARGIN, y1 - y0 + 2 * PLATE_MARGIN, PLATE_HEIGHT)
+    plate = plate.translate(((x0 + x1) / 2, (y0 + y1) / 2, FACE_HEIGHT))
     return union([pressing, plate])
 
 
