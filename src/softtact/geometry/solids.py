@@ -11,7 +11,7 @@ from manifold3d import CrossSection, Manifold, OpType
 EDGE_MM = 0.25  # radius of the rounded lower edge
 CHORD_ERROR_MM = 0.02  # how far a polygon may leave its circle
 _EDGE_STEPS = 3  # straight pieces of the rounded edge, seen from the side
-_SLIVER_MM = 1e-3  # unions leave slivers that single precision would collapse
+_DECIMALS = 4  # of a coordinate in mm; unions leave corners that differ by round-off
 
 
 def circle_segments(radius):
@@ -107,10 +107,16 @@ def to_mesh(solid):
 
     The order that the boolean operations leave depends on threads; sorted facets give the same file every time.
     """
-    raw = solid.simplify(_SLIVER_MM).to_mesh64()
-    triangles = np.float32(raw.vert_properties[:, :3])[raw.tri_verts]
-    triangles = triangles.astype(float) + 0.0  # no negative zeros
-    return trimesh.Trimesh(**trimesh.triangles.to_kwargs(_sorted_facets(triangles)), process=False)
+    raw = solid.to_mesh64()
+    corners = np.float32(np.round(raw.vert_properties[:, :3], _DECIMALS)).astype(float) + 0.0  # no negative zeros
+    facets = _sorted_facets(_without_collapsed(corners[raw.tri_verts]))
+    return trimesh.Trimesh(**trimesh.triangles.to_kwargs(facets), process=False)
+
+
+def _without_collapsed(triangles):
+    """Facets (n, 3, 3) without those that have two equal corners."""
+    equal = [np.all(triangles[:, i] == triangles[:, (i + 1) % 3], axis=1) for i in range(3)]
+    return triangles[~np.any(equal, axis=0)]
 
 
 def _sorted_facets(triangles):
