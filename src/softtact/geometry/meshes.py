@@ -1,0 +1,183 @@
+"""Meshes that users bring: read, checked, in mm, and placed over the sensor.
+
+What a solver would silently get wrong (open, inverted, overlapping or wrongly scaled meshes) is refused here, in one
+sentence with its remedy.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from softtact.errors import InputError
+from softtact.geometry.pose import Pose
+
+UNIT_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "inch": 25.4}
+FORMATS = (".stl", ".obj", ".ply")
+MIN_SIZE_MM = 1.0  # smaller than a taxel's resolution by far
+MAX_SIZE_MM = 500.0  # larger than any gripper holds
+_MERGE_DECIMALS = 5  # of a coordinate in mm: corners closer than 10 nm are one
+_FLAT = 1e-6  # thickness over size below which a mesh is no body
+_OVERLAP = 1e-6  # part of the volume by which closed pieces may intersect
+
+
+def read_triangles(path, *, unit, min_size_mm=MIN_SIZE_MM, max_size_mm=MAX_SIZE_MM):
+    """Facets (n, 3, 3) in mm as the file stores them, corners not merged; finite and of plausible size."""
+    path = Path(path)
+    triangles = _load_facets(path) * _unit_factor(path, unit)
+    _refuse_non_finite(path, triangles)
+    _refuse_implausible_size(path, triangles, unit, min_size_mm, max_size_mm)
+    return triangles
+
+
+def read_mesh(path, *, unit, min_size_mm=MIN_SIZE_MM, max_size_mm=MAX_SIZE_MM):
+    """Closed, outward-oriented mesh of a file, as a `trimesh.Trimesh` in mm in the file's own frame.
+
+    path : STL (binary or text), OBJ or PLY
+    unit : 'mm', 'cm', 'm' or 'inch'; the file itself does not say
+    min_size_mm, max_size_mm : range of a plausible largest side
+    """
+    path = Path(path)
+    triangles = read_triangles(path, unit=unit, min_size_mm=min_size_mm, max_size_mm=max_size_mm)
+    mesh = merge_facets(triangles)
+    _refuse_flat(path, mesh)
+    _refuse_open(path, mesh)
+    _refuse_inverted(path, mesh)
+    _refuse_overlapping(path, mesh)
+    return mesh
+
+
+def merge_facets(triangles):
+    """Mesh of facets (n, 3, 3) whose equal corners are joined; facets that collapse by it are left out."""
+    mesh = trimesh.Trimesh(**trimesh.triangles.to_kwargs(triangles), process=False)
+    mesh.merge_vertices(digits_vertex=_MERGE_DECIMALS)
+    a, b, c = mesh.faces.T
+    mesh.update_faces((a != b) & (b != c) & (c != a))
+    mesh.remove_unreferenced_vertices()
+    return mesh
+
+
+def place(mesh, *, pose=None):
+    """The mesh in the sensor frame.
+
+    pose : a `Pose`; None centres the bounding box over the origin, lowest point at z = 0 (just touching)
+    """
+    pose = pose if pose is not None else default_pose(mesh)
+    placed = mesh.copy()
+    placed.vertices = pose.apply(mesh.vertices)
+    return placed
+
+
+def default_pose(mesh):
+    """Pose that centres the mesh's bounding box over the sensor and lets its lowest point touch."""
+    (x0, y0, z0), (x1, y1, _) = mesh.bounds
+    return Pose(-np.array([(x0 + x1) / 2, (y0 + y1) / 2, z0]))
+
+
+def check_over_sensor(mesh, footprint_mm, *, name="The object"):
+    """Refuse a placed mesh of which no facet lies over the sensor's footprint (x, y sides in mm)."""
+    if np.any(facets_over(mesh.triangles, footprint_mm)):
+        return
+    (x0, y0, _), (x1, y1, _) = mesh.bounds
+    raise InputError(
+        f"{name} misses the sensor: it spans x {x0:.4g} to {x1:.4g} mm and y {y0:.4g} to {y1:.4g} mm, and no part of "
+        f"it is over the {footprint_mm[0]:g} x {footprint_mm[1]:g} mm footprint about the origin; correct its pose."
+    )
+
+
+def facets_over(triangles, footprint_mm):
+    """Which facets (n, 3, 3) overlap, seen from above, a rectangle of sides `footprint_mm` about the origin, (n,) bool.
+
+    Separating axes: two convex shapes are apart exactly if they are so along a side's normal of one of them.
+    """
+    xy = triangles[..., :2]  # (n, 3, 2)
+    half = np.asarray(footprint_mm, float) / 2
+    sides = np.roll(xy, -1, axis=1) - xy
+    normals = np.stack([-sides[..., 1], sides[..., 0]], axis=-1)
+    axes = np.concatenate([np.broadcast_to(np.eye(2), (len(xy), 2, 2)), normals], axis=1)  # (n, 5, 2)
+    along = np.einsum("nad,npd->nap", axes, xy)
+    reach = np.abs(axes) @ half
+    return np.all((along.min(axis=-1) <= reach) & (along.max(axis=-1) >= -reach), axis=1)
+
+
+def _load_facets(path):
+    """Facets (n, 3, 3) in the file's unit."""
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such mesh file.")
+    if path.suffix.lower() not in FORMATS:
+        raise InputError(f"{path}: the format '{path.suffix}' is not read; save the mesh as STL, OBJ or PLY.")
+    if path.stat().st_size == 0:
+        raise InputError(f"{path}: the file is empty; export the mesh again.")
+    try:
+        mesh = trimesh.load(path, force="mesh", process=False)
+        triangles = np.array(mesh.triangles, dtype=float)
+    except Exception as error:  # each format's reader fails in its own way
+        raise InputError(f"{path}: not readable as {path.suffix[1:].upper()} "
+                         f"({' '.join(str(error).split())[:120]}); export the mesh again.") from error
+    if triangles.size == 0:
+        raise InputError(f"{path}: the file holds no triangles; export a surface mesh, not points or curves.")
+    return triangles
+
+
+def _unit_factor(path, unit):
+    if unit not in UNIT_MM:
+        stated = "no unit is stated" if unit is None else f"the unit {unit!r} is not known"
+        raise InputError(f"{path}: {stated}, and a mesh file has none of its own; state one of {', '.join(UNIT_MM)}.")
+    return UNIT_MM[unit]
+
+
+def _refuse_non_finite(path, triangles):
+    bad = ~np.isfinite(triangles).all(axis=(1, 2))
+    if bad.any():
+        raise InputError(f"{path}: {bad.sum()} of {len(bad)} facets have coordinates that are not finite numbers "
+                         f"(the first is facet {np.argmax(bad)}); export the mesh again.")
+
+
+def _refuse_implausible_size(path, triangles, unit, smallest, largest):
+    size = float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
+    if smallest <= size <= largest:
+        return
+    sizes = {other: size / UNIT_MM[unit] * factor for other, factor in UNIT_MM.items() if other != unit}
+    plausible = [f"{other} ({value:.4g} mm)" for other, value in sizes.items() if smallest <= value <= largest]
+    remedy = f"perhaps its unit is {' or '.join(plausible)}" if plausible else "scale the mesh"
+    raise InputError(f"{path}: read in {unit}, its largest side is {size:.4g} mm, outside {smallest:g} to "
+                     f"{largest:g} mm; {remedy}.")
+
+
+def _refuse_flat(path, mesh):
+    centred = mesh.vertices - mesh.vertices.mean(axis=0) if len(mesh.faces) else np.zeros((3, 3))
+    spread = np.linalg.svd(centred, compute_uv=False)
+    if len(spread) < 3 or spread[2] <= _FLAT * spread[0]:
+        raise InputError(f"{path}: the mesh is degenerate, all its points lie in one plane or line; export a solid "
+                         "body.")
+
+
+def _refuse_open(path, mesh):
+    _, uses = np.unique(mesh.edges_sorted, axis=0, return_counts=True)
+    boundary, odd = int(np.sum(uses == 1)), int(np.sum((uses != 2) & (uses != 1)))
+    if boundary or odd:
+        raise InputError(f"{path}: the surface is not closed ({boundary} boundary edges, {odd} edges with more than "
+                         "two facets); repair it, for example with 'Make manifold' of Blender or MeshLab's hole "
+                         "closing.")
+    if not mesh.is_winding_consistent:
+        raise InputError(f"{path}: neighbouring facets face opposite ways, so inside and outside are undefined; "
+                         "make the normals consistent, for example with 'Recalculate outside' of Blender.")
+
+
+def _refuse_inverted(path, mesh):
+    if mesh.volume <= 0:
+        raise InputError(f"{path}: the facets' normals point inwards (volume {mesh.volume:.4g} mm3); flip them, for "
+                         "example with trimesh's mesh.invert() or 'Flip normals' of Blender.")
+
+
+def _refuse_overlapping(path, mesh):
+    """Closed pieces that overlap or share walls have facets inside the body, which no contact search expects."""
+    pieces = mesh.split(only_watertight=False)
+    if len(pieces) < 2:
+        return
+    bodies = [piece for piece in pieces if piece.volume > 0]  # the others are cavities
+    united = trimesh.boolean.union(bodies, engine="manifold") if len(bodies) > 1 else bodies[0]
+    total = sum(body.volume for body in bodies)
+    if united.body_count != len(bodies) or total - united.volume > _OVERLAP * total:
+        raise InputError(f"{path}: its {len(bodies)} closed pieces overlap or touch; unite them into one body, for "
+                         "example with trimesh.boolean.union or Blender's Boolean modifier.")
