@@ -24,7 +24,8 @@ TEST_PATHS = {
 class Parameter:
     """A material constant: its name, its unit ("MPa" or "1") and where a fit looks for it.
 
-    `low` and `high` bound the fit; for unit "MPa" they are multiples of the initial shear modulus of the curves.
+    `low` and `high` bound the fit; for unit "MPa" they are multiples of the curves' stiffness. psi must be linear in
+    its constants of unit "MPa": the fit solves them directly.
     """
 
     name: str
@@ -57,6 +58,11 @@ class Law:
         self.parameters = {constant.name: float(parameters[constant.name]) for constant in self.constants}
         self.bulk_modulus = float(bulk_modulus)
 
+    @classmethod
+    def in_order(cls, parameters):
+        """The same constants in their usual order, where terms can be exchanged."""
+        return parameters
+
     def __repr__(self):
         values = ", ".join(f"{name}={value:g}" for name, value in self.parameters.items())
         return f"{type(self).__name__}({values}, bulk_modulus={self.bulk_modulus:g})"
@@ -73,7 +79,8 @@ class Law:
     def principal_stress(self, stretches):
         """t_a = l_a dpsi/dl_a (..., 3) in MPa at isochoric principal stretches (..., 3).
 
-        Its deviator is the Kirchhoff stress; the mean is not determined by psi.
+        Its deviator is the Kirchhoff stress; the mean is not determined by psi. Complex stretches are allowed, so that
+        a derivative can be taken by a complex step, without cancellation.
         """
         raise NotImplementedError
 
@@ -83,8 +90,7 @@ class Law:
 
     def nominal_stress(self, mode, stretch):
         """Nominal stress (MPa) of the incompressible material in a `uniaxial`, `equibiaxial` or `planar` test."""
-        stretch = np.asarray(stretch, float)
-        stress = self.principal_stress(stretch[..., None] ** np.array(path_exponents(mode)))
+        stress = self.principal_stress(principal_stretches(mode, stretch))
         return (stress[..., 0] - stress[..., 2]) / stretch
 
     def uniaxial_compressible(self, stretch):
@@ -94,8 +100,8 @@ class Law:
         return stress.reshape(np.shape(stretch))
 
     def _axial_stress(self, axial):
-        kirchhoff = self._kirchhoff_uniaxial(axial, _root(lambda J: self._kirchhoff_uniaxial(axial, J)[1]))
-        return kirchhoff[0] / axial
+        J = _root(lambda J: self._kirchhoff_uniaxial(axial, J)[1])
+        return self._kirchhoff_uniaxial(axial, J)[0] / axial
 
     def _kirchhoff_uniaxial(self, axial, J):
         """Principal Kirchhoff stresses (3,) at the axial stretch and the volume ratio J, lateral stretches equal."""
@@ -104,11 +110,11 @@ class Law:
         return stress - stress.mean() + J * self.bulk_modulus * (J - 1)
 
 
-def path_exponents(mode):
-    """Exponents of the principal stretches on the path of a test mode."""
+def principal_stretches(mode, stretch):
+    """Principal stretches (..., 3) of the incompressible material at the stretch (...) of a test mode."""
     if mode not in TEST_PATHS:
         raise InputError(f"Test mode {mode!r} is unknown; use one of {', '.join(TEST_PATHS)}.")
-    return TEST_PATHS[mode]
+    return np.asarray(stretch, float)[..., None] ** np.array(TEST_PATHS[mode])
 
 
 def _root(function):

@@ -57,7 +57,7 @@ class InvariantLaw(Law):
         return IsochoricResponse(table[:, 0].copy(), stress, moduli if tangent else None)
 
     def principal_stress(self, stretches):
-        square = np.asarray(stretches, float) ** 2
+        square = np.asarray(stretches) ** 2
         i1 = square.sum(axis=-1)
         i2 = (i1**2 - (square**2).sum(axis=-1)) / 2
         law = self.derivatives(i1, i2)

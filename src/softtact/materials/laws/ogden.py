@@ -26,6 +26,14 @@ class Ogden1(Law):
     def __init__(self, parameters, *, bulk_modulus):
         super().__init__(parameters, bulk_modulus=bulk_modulus)
         self._mu, self._alpha = np.array(list(self.parameters.values())).reshape(-1, 2).T.copy()
+        self._alpha[self._alpha == 0] = 1e-9  # a search may touch 0, whose limit is finite; `make_law` refuses it
+
+    @classmethod
+    def in_order(cls, parameters):
+        """The terms by falling exponent."""
+        values = np.array([parameters[constant.name] for constant in cls.constants]).reshape(-1, 2)
+        values = values[np.argsort(-values[:, 1], kind="stable")].ravel().tolist()
+        return {constant.name: value for constant, value in zip(cls.constants, values, strict=True)}
 
     @property
     def mu0(self):
@@ -39,8 +47,8 @@ class Ogden1(Law):
         return IsochoricResponse(energy, stress, moduli if tangent else None)
 
     def principal_stress(self, stretches):
-        powers = np.asarray(stretches, float)[..., None] ** self._alpha
-        return powers @ (2 * self._mu / self._alpha)
+        excess = np.expm1(np.log(stretches)[..., None] * self._alpha)  # lb^alpha - 1: exact near alpha = 0
+        return excess @ (2 * self._mu / self._alpha)
 
 
 class Ogden2(Ogden1):

@@ -1,0 +1,187 @@
+"""The YAML file of a material: typed, described in place, and turned into the settings of its two stages.
+
+material: neoprene
+curves:   where the test curves come from: `kind: synthetic` (made from a law) or `kind: measured` (one's own files)
+fit:      how the laws are fitted
+printed:  constants published for it, {law: {parameters: ..., rmse_mpa: ...}}
+"""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import pydantic
+import yaml
+from pydantic import Field
+
+from softtact.errors import InputError
+from softtact.materials.laws.registry import law_class, make_law
+from softtact.materials.linear import LinearConstants
+
+Mode = Literal["uniaxial", "equibiaxial", "planar"]
+
+
+def _rising(window):
+    if not 0 < window[0] < window[1]:
+        raise ValueError("a window is [from, to] with 0 < from < to")
+    return window
+
+
+Window = Annotated[tuple[float, float], pydantic.AfterValidator(_rising)]
+
+
+class _Section(pydantic.BaseModel):
+    model_config = pydantic.ConfigDict(extra="forbid", frozen=True)
+
+
+class SyntheticCurves(_Section):
+    """Curves made from a law, with noise; for a study without test data."""
+
+    kind: Literal["synthetic"]
+    law: str = Field(description="law that the curves follow")
+    parameters: dict[str, float] | None = Field(None, description="its constants; those under `printed` by default")
+    noise: float = Field(ge=0, le=0.5, description="standard deviation as a share of a curve's largest stress")
+    points: int = Field(ge=3, description="points per curve")
+    seed: int = Field(ge=0)
+    modes: dict[Mode, Window] = Field(min_length=1, description="stretch from, to in each test mode")
+
+
+class MeasuredFile(_Section):
+    """One file of a user's own test; see `softtact.materials.readers`."""
+
+    file: str = Field(description="path, relative to the YAML file")
+    mode: Mode
+    layout: Literal["plain", "soro_db", "stress_stretch"] = "plain"
+    columns: dict[str, str] = Field(default_factory=dict, description="declared name -> the file's own header")
+    sort: bool = Field(False, description="order the rows by stretch")
+
+
+class MeasuredCurves(_Section):
+    """Curves from a user's own files."""
+
+    kind: Literal["measured"]
+    files: list[MeasuredFile] = Field(min_length=1)
+
+
+class FitSettings(_Section):
+    """How the laws are fitted; see `softtact.materials.cards.make_card`."""
+
+    laws: Literal["all"] | list[str] = "all"
+    choose: str = Field("best", description="law for the solvers, or best")
+    bulk_over_shear: float = Field(20.0, gt=2 / 3, description="K / mu0; 2/3 is Poisson's ratio 0")
+    poisson: float | None = Field(None, gt=-1, lt=0.5, description="of the linear constants; curves do not hold it")
+    small_strain: float = Field(0.1, gt=0, lt=1, description="strain up to which E is the slope")
+    window: dict[Mode, Window] = Field(default_factory=dict, description="stretch to use, all by default")
+    nonnegative: bool = Field(False, description="keep constants in MPa from being negative")
+    starts: int = Field(12, ge=1)
+    seed: int = Field(0, ge=0)
+
+
+class PrintedLaw(_Section):
+    """Constants as a publication prints them."""
+
+    parameters: dict[str, float]
+    rmse_mpa: float | None = None
+
+
+class MaterialConfig(_Section):
+    """One material."""
+
+    material: str = Field(pattern=r"^[a-z0-9_]+$")
+    description: str = ""
+    curves: Annotated[SyntheticCurves | MeasuredCurves, Field(discriminator="kind")]
+    fit: FitSettings = FitSettings()
+    source: str = Field("", description="where the printed constants stand")
+    printed: dict[str, PrintedLaw] = Field(default_factory=dict)
+
+    @property
+    def modes(self):
+        """Test modes of the curves: one curve file each."""
+        if self.curves.kind == "synthetic":
+            return list(self.curves.modes)
+        return list(dict.fromkeys(file.mode for file in self.curves.files))
+
+    @property
+    def measured_files(self):
+        """Paths of the user's own files, in order; none for synthetic curves."""
+        return [] if self.curves.kind == "synthetic" else [file.file for file in self.curves.files]
+
+    @property
+    def curve_settings(self):
+        """Settings of the stage make_curves."""
+        return {"material": self.material} | self.curves.model_dump(mode="json")
+
+    @property
+    def fit_settings(self):
+        """Settings of the stage fit_material."""
+        printed = {law: entry.model_dump(exclude_none=True) for law, entry in self.printed.items()}
+        return {"material": self.material, "printed": printed} | self.fit.model_dump(mode="json")
+
+
+def load_material(path):
+    """Read a material's YAML into a `MaterialConfig`; what is wrong is told in one sentence."""
+    path = Path(path)
+    try:
+        raw = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        known = ", ".join(sorted(file.stem for file in path.parent.glob("*.yaml"))) or "none"
+        raise InputError(f"{path}: there is no such material; known beside it: {known}.") from None
+    except (UnicodeDecodeError, yaml.YAMLError) as error:
+        raise InputError(f"{path}: not valid YAML ({' '.join(str(error).split())}); correct it.") from None
+    return _resolved(validated(MaterialConfig, raw, where=str(path)), path)
+
+
+def validated(model, raw, *, where):
+    """`model` from plain values; the first fault becomes an `InputError` that names the field and its value."""
+    try:
+        return model.model_validate(raw)
+    except pydantic.ValidationError as error:
+        fault = error.errors()[0]
+        field = ".".join(str(part) for part in fault["loc"] if part not in ("synthetic", "measured")) or "the file"
+        raise InputError(f"{where}: {_fault(field, fault)}") from None
+
+
+def _fault(field, fault):
+    """What is wrong with a field, and what to do."""
+    if fault["type"] == "extra_forbidden":
+        return f"the key {field} is unknown; remove it or correct its name."
+    if fault["type"] == "missing":
+        return f"the key {field} is missing; add it."
+    reason = fault["msg"].removeprefix("Value error, ")
+    return f"{field} is {fault['input']!r:.80}; {reason[0].lower()}{reason[1:]}."
+
+
+def law_from_printed(material_yaml, law):
+    """The `Law` with the constants that a material's YAML prints for it."""
+    config = load_material(material_yaml)
+    return make_law(law, _printed_parameters(config, law), bulk_over_shear=config.fit.bulk_over_shear)
+
+
+def _printed_parameters(config, law):
+    laws = [name for name in config.printed if name != "linear"]
+    if law not in laws:
+        raise InputError(
+            f"Material {config.material} has no printed constants of law {law!r}; it has {', '.join(laws) or 'none'}."
+        )
+    return config.printed[law].parameters
+
+
+def _resolved(config, path):
+    """The config with its curves' constants filled in, and file paths as seen from here."""
+    _check_laws(config)
+    curves = config.curves
+    if curves.kind == "measured":
+        files = [file.model_copy(update={"file": str(path.parent / file.file)}) for file in curves.files]
+        return config.model_copy(update={"curves": curves.model_copy(update={"files": files})})
+    parameters = curves.parameters or _printed_parameters(config, curves.law)
+    make_law(curves.law, parameters)
+    return config.model_copy(update={"curves": curves.model_copy(update={"parameters": parameters})})
+
+
+def _check_laws(config):
+    """Refuse unknown laws and constants now rather than in the middle of a study."""
+    for name in config.fit.laws if config.fit.laws != "all" else []:
+        law_class(name)
+    if config.fit.choose != "best":
+        law_class(config.fit.choose)
+    for name, entry in config.printed.items():
+        LinearConstants(**entry.parameters) if name == "linear" else make_law(name, entry.parameters)

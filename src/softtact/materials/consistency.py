@@ -1,0 +1,62 @@
+"""Do the laws of one material agree with each other? What a stability check cannot see.
+
+Two laws can both be stable and both fit "their" data, and still describe different materials: a shear modulus six times
+as large, or five times the stress in compression. Each disagreement becomes a sentence with its numbers.
+"""
+
+import numpy as np
+
+from softtact.materials.stability import is_stable
+
+# Where the laws are compared: states that the sensor's layers reach under a fingertip's load.
+PROBES = (("uniaxial", 0.5), ("uniaxial", 1.5), ("equibiaxial", 1.3), ("planar", 1.5))
+# Laws fitted to the same curves differ by tens of percent outside them; beyond this factor they are two materials.
+FACTOR = 1.5
+
+
+def disagreements(laws, *, linear=None, factor=FACTOR):
+    """Sentences on where laws {name: Law} of one material part by more than `factor`.
+
+    linear: `LinearConstants` of the same material, or None
+    """
+    found = [_parting("the initial shear modulus", {name: law.mu0 for name, law in laws.items()}, factor)]
+    for mode, stretch in PROBES:
+        stable = {name: law for name, law in laws.items() if is_stable(law, mode, np.array([stretch]))[0]}
+        stress = {name: float(law.nominal_stress(mode, stretch)) for name, law in stable.items()}
+        found.append(_parting(f"the nominal stress at {mode} stretch {stretch:g}", stress, factor))
+    found.append(_against_linear(laws, linear, factor))
+    return [sentence for sentence in found if sentence]
+
+
+def _parting(quantity, values, factor):
+    """The sentence on the two laws farthest apart, or None."""
+    if len(values) < 2:
+        return None
+    small, large = min(values, key=lambda name: abs(values[name])), max(values, key=lambda name: abs(values[name]))
+    ratio = abs(values[large] / values[small])
+    if ratio <= factor:
+        return None
+    return (
+        f"{large} and {small} disagree {ratio:.1f}-fold in {quantity}:"
+        f" {values[large]:.3g} against {values[small]:.3g} MPa."
+    )
+
+
+def _against_linear(laws, linear, factor):
+    """The sentence on linear constants whose moduli no law has, or None."""
+    if linear is None or not laws:
+        return None
+    own = linear.mu_mpa, linear.bulk_modulus_mpa
+    moduli = np.array([(law.mu0, law.bulk_modulus) for law in laws.values()])
+    if any(max(_ratio(a, b) for a, b in zip(pair, own, strict=True)) <= factor for pair in moduli):
+        return None
+    low, high = moduli.min(axis=0), moduli.max(axis=0)
+    return (
+        f"E {linear.young_mpa:.4g} MPa and nu {linear.poisson:.4g} mean the shear and bulk moduli {own[0]:.3g} and"
+        f" {own[1]:.3g} MPa, which none of {', '.join(laws)} has:"
+        f" theirs are {low[0]:.3g} to {high[0]:.3g} and {low[1]:.3g} to {high[1]:.3g} MPa."
+    )
+
+
+def _ratio(a, b):
+    return max(a / b, b / a)

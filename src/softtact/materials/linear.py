@@ -1,0 +1,56 @@
+"""Linear elastic constants of the small-strain model.
+
+Symbols: E Young's modulus (MPa), nu Poisson's ratio; mu = E / (2 (1 + nu)), K = E / (3 (1 - 2 nu)).
+E is the slope of the uniaxial curve at small strain. Stress curves alone hold nothing of nu: it has to be stated.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from softtact.errors import InputError
+
+
+@dataclass(frozen=True)
+class LinearConstants:
+    """E (MPa) and nu of an isotropic linear elastic material."""
+
+    young_mpa: float
+    poisson: float
+
+    def __post_init__(self):
+        if not self.young_mpa > 0:
+            raise InputError(f"Young's modulus is {self.young_mpa:g} MPa; give a positive one.")
+        if not -1 < self.poisson < 0.5:
+            raise InputError(f"Poisson's ratio is {self.poisson:g}; give one between -1 and 0.5.")
+
+    @property
+    def mu_mpa(self):
+        """Shear modulus, MPa."""
+        return self.young_mpa / (2 * (1 + self.poisson))
+
+    @property
+    def bulk_modulus_mpa(self):
+        """Bulk modulus, MPa."""
+        return self.young_mpa / (3 * (1 - 2 * self.poisson))
+
+
+def young_modulus(curves, *, small_strain):
+    """(E, its standard error, RMSE) in MPa: slope through the origin of the uniaxial points up to `small_strain`."""
+    strain, stress = _small_strain_points(curves, small_strain)
+    if len(strain) < 2 or not strain.any():
+        raise InputError(
+            f"{len(strain)} uniaxial point(s) lie within a strain of {small_strain:g}: too few for Young's modulus;"
+            " give a uniaxial curve or raise small_strain."
+        )
+    young = float(strain @ stress / (strain @ strain))
+    error = stress - young * strain
+    variance = float(error @ error) / (len(strain) - 1)
+    return young, float(np.sqrt(variance / (strain @ strain))), float(np.sqrt(np.mean(error**2)))
+
+
+def _small_strain_points(curves, small_strain):
+    """Engineering strain and nominal stress of the uniaxial points near the undeformed state."""
+    near = [c.within((1 - small_strain, 1 + small_strain)) for c in curves if c.mode == "uniaxial"]
+    strain = np.concatenate([np.empty(0)] + [curve.stretch - 1 for curve in near])
+    return strain, np.concatenate([np.empty(0)] + [curve.nominal_stress for curve in near])

@@ -1,0 +1,59 @@
+"""A material's curve files: made from a law, or gathered from the user's own files in one form."""
+
+import zlib
+from pathlib import Path
+
+from softtact.errors import InputError
+from softtact.materials.config import MeasuredCurves, SyntheticCurves, validated
+from softtact.materials.curves import join_by_mode, synthetic_curve, write_curve
+from softtact.materials.laws.registry import make_law
+from softtact.materials.readers import read_curve
+
+
+def make_curves(measured, curves, settings):
+    """Write one CSV per mode to the paths `curves`, whose names are the modes.
+
+    measured: paths of the user's files in the order of settings["files"], for kind "measured"
+    settings: `MaterialConfig.curve_settings`
+    """
+    settings = dict(settings)
+    material = settings.pop("material")
+    if settings.get("kind") == "measured":
+        made = _measured(material, _paths(measured), settings)
+    else:
+        made = _synthetic(material, settings)
+    by_mode = {curve.mode: curve for curve in made}
+    for path in _paths(curves):
+        if path.stem not in by_mode:
+            raise InputError(f"{path}: material {material} has no {path.stem} curve, only {', '.join(by_mode)}.")
+        write_curve(path, by_mode[path.stem])
+
+
+def _synthetic(material, settings):
+    """Curves from a law; each mode of each material has a noise of its own under the same seed."""
+    options = validated(SyntheticCurves, settings, where=f"material {material}, curves")
+    law = make_law(options.law, options.parameters or {})
+    return [
+        synthetic_curve(
+            law, mode, window, points=options.points, noise=options.noise, seed=[options.seed, _number(material + mode)]
+        )
+        for mode, window in options.modes.items()
+    ]
+
+
+def _measured(material, paths, settings):
+    """Curves from the user's files, those of one mode joined."""
+    files = validated(MeasuredCurves, settings, where=f"material {material}, curves").files
+    paths = paths or [Path(file.file) for file in files]
+    options = [file.model_dump(exclude={"file"}) for file in files]
+    return join_by_mode([read_curve(path, **option) for path, option in zip(paths, options, strict=True)])
+
+
+def _number(text):
+    """A number that stands for a text, the same in every process (Python's `hash` is not)."""
+    return zlib.crc32(text.encode())
+
+
+def _paths(paths):
+    """A list of paths from one or several."""
+    return [Path(path) for path in ([paths] if isinstance(paths, (str, Path)) else paths)]
