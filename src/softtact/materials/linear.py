@@ -36,17 +36,22 @@ class LinearConstants:
 
 
 def young_modulus(curves, *, small_strain):
-    """(E, its standard error, RMSE) in MPa: slope through the origin of the uniaxial points up to `small_strain`."""
+    """(E, its standard error, RMSE) in MPa from the uniaxial points with strain up to `small_strain`.
+
+    The stress is fitted by E e + b e^2: without the square, points on one side of zero bias the slope by some percent.
+    """
     strain, stress = _small_strain_points(curves, small_strain)
-    if len(strain) < 2 or not strain.any():
+    A = np.stack([strain, strain**2], axis=1)
+    if len(strain) < 3 or np.linalg.matrix_rank(A) < 2:
         raise InputError(
             f"{len(strain)} uniaxial point(s) lie within a strain of {small_strain:g}: too few for Young's modulus;"
             " give a uniaxial curve or raise small_strain."
         )
-    young = float(strain @ stress / (strain @ strain))
-    error = stress - young * strain
-    variance = float(error @ error) / (len(strain) - 1)
-    return young, float(np.sqrt(variance / (strain @ strain))), float(np.sqrt(np.mean(error**2)))
+    inverse = np.linalg.inv(A.T @ A)
+    young, curvature = inverse @ (A.T @ stress)
+    error = stress - A @ [young, curvature]
+    variance = float(error @ error) / (len(strain) - 2)
+    return float(young), float(np.sqrt(variance * inverse[0, 0])), float(np.sqrt(np.mean(error**2)))
 
 
 def _small_strain_points(curves, small_strain):

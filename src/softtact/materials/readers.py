@@ -84,27 +84,33 @@ def _notes(rows):
     return {key.strip(): value.strip() for key, value in pairs}
 
 
-def _cells(text):
-    separator = max(";\t,", key=text.count)
+def _separator(header):
+    """The header decides: below it a comma may be a decimal comma, which is then refused as such."""
+    return max(";\t,", key=header.count)
+
+
+def _cells(text, separator):
     return [cell.strip().strip('"') for cell in text.split(separator)]
 
 
 def _after_header(path, table, marker):
-    """The header's cells, and the (row, text) below it. The header is the first line, or the one that has `marker`."""
+    """The header, and the (row, text) below it. The header is the first line, or the one that has `marker`."""
     for index, (_, text) in enumerate(table):
         if marker is None or marker in text:
-            return _cells(text), table[index + 1 :]
+            return text, table[index + 1 :]
     raise InputError(f"{path}: no header with {marker!r} was found; is its layout soro_db?")
 
 
 def _points_by_name(path, header, table, columns):
     """[(row, stretch, stress in MPa)] from the columns whose names declare quantity and unit."""
+    separator = _separator(header)
+    header = _cells(header, separator)
     strain_name, strain_at = _find_column(path, header, STRETCH_COLUMNS, columns, "stretch")
     stress_name, stress_at = _find_column(path, header, STRESS_COLUMNS, columns, "nominal stress")
     factor, offset = STRETCH_COLUMNS[strain_name]
     points = []
     for row, text in table:
-        strain, stress = _numbers(path, row, _cells(text), (strain_at, stress_at))
+        strain, stress = _numbers(path, row, _cells(text, separator), (strain_at, stress_at))
         points.append((row, factor * strain + offset, STRESS_COLUMNS[stress_name] * stress))
     return points
 

@@ -1,0 +1,121 @@
+"""The YAML of a material: the paper's constants, and refusals in one sentence."""
+
+import pytest
+import yaml
+
+from softtact.errors import InputError
+from softtact.materials.cards import printed_warnings
+from softtact.materials.config import law_from_printed, load_material
+
+TABLE_1 = {
+    ("neoprene", "ogden2"): {"mu1": 0.0027, "alpha1": 8.74091, "mu2": 0.0551, "alpha2": 0.3889},
+    ("neoprene", "mooney_rivlin"): {"c10": 0.1786, "c01": 0.0022},
+    ("polyurethane", "ogden2"): {"mu1": 0.1351, "alpha1": 1.4538, "mu2": 0.2223, "alpha2": -4.9910},
+    ("polyurethane", "mooney_rivlin"): {"c10": 0.1706, "c01": 0.0040},
+}
+
+
+@pytest.mark.parametrize(("material", "law"), TABLE_1)
+def test_the_printed_laws_have_the_papers_constants(material_yaml, material, law):
+    made = law_from_printed(material_yaml(material), law)
+    assert made.parameters == TABLE_1[material, law]
+    assert made.bulk_modulus == pytest.approx(20 * made.mu0)
+
+
+@pytest.mark.parametrize("material", ["neoprene", "polyurethane"])
+def test_default_curves_are_synthetic_and_follow_a_printed_law(material_yaml, material):
+    config = load_material(material_yaml(material))
+    assert config.curve_settings["kind"] == "synthetic"
+    assert config.curve_settings["parameters"] == TABLE_1[material, config.curve_settings["law"]]
+    assert config.modes == ["uniaxial", "equibiaxial", "planar"]
+    assert config.printed["linear"].parameters == {"young_mpa": 1.289, "poisson": 0.1729}
+
+
+def test_neoprenes_printed_models_are_told_to_disagree_six_fold(material_yaml):
+    sentences = printed_warnings(load_material(material_yaml("neoprene")).fit_settings["printed"])
+    assert sentences[0] == (
+        "Printed constants: mooney_rivlin and ogden2 disagree 6.3-fold in the initial shear modulus:"
+        " 0.362 against 0.0578 MPa."
+    )
+
+
+def test_polyurethanes_printed_models_are_told_to_part_in_compression_only(material_yaml):
+    sentences = printed_warnings(load_material(material_yaml("polyurethane")).fit_settings["printed"])
+    assert not any("initial shear modulus" in sentence for sentence in sentences)
+    assert any("uniaxial stretch 0.5: -6.11 against -1.25 MPa" in sentence for sentence in sentences)
+
+
+def test_the_printed_linear_constants_are_told_to_fit_neither_model(material_yaml):
+    sentences = printed_warnings(load_material(material_yaml("neoprene")).fit_settings["printed"])
+    assert (
+        "mean the shear and bulk moduli 0.549 and 0.657 MPa, which none of ogden2, mooney_rivlin has" in sentences[-1]
+    )
+
+
+def test_a_law_that_is_not_printed_is_refused_with_those_that_are(material_yaml):
+    with pytest.raises(
+        InputError, match="neoprene has no printed constants of law 'yeoh'; it has ogden2, mooney_rivlin"
+    ):
+        law_from_printed(material_yaml("neoprene"), "yeoh")
+
+
+def test_an_unknown_material_is_refused_with_those_that_are_known(material_yaml):
+    with pytest.raises(InputError, match="no such material; known beside it: neoprene, polyurethane"):
+        load_material(material_yaml("silicone"))
+
+
+def test_a_users_own_files_are_found_beside_the_yaml(tmp_path):
+    files = [{"file": "a.csv", "mode": "uniaxial"}, {"file": "b.csv", "mode": "uniaxial"}]
+    text = yaml.safe_dump({"material": "mine", "curves": {"kind": "measured", "files": files}})
+    (tmp_path / "mine.yaml").write_text(text)
+    config = load_material(tmp_path / "mine.yaml")
+    assert config.measured_files == [str(tmp_path / "a.csv"), str(tmp_path / "b.csv")]
+    assert config.modes == ["uniaxial"]
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "sentence"),
+    [
+        (["curves", "nois"], 0.1, "the key curves.nois is unknown"),
+        (["curves", "noise"], -1, "curves.noise is -1; input should be greater than or equal to 0"),
+        (["curves", "kind"], "guessed", "curves is .*guessed"),
+        (["curves", "law"], "gent", "no printed constants of law 'gent'; it has ogden2, mooney_rivlin"),
+        (["curves", "parameters"], {"c11": 1.0}, "Law mooney_rivlin takes the constants c10, c01, not c11=1.0"),
+        (
+            ["curves", "modes"],
+            {"uniaxial": [1.6, 0.6]},
+            r"curves.modes.uniaxial is \[1.6, 0.6\]; a window is \[from, to\]",
+        ),
+        (["fit", "laws"], ["gent"], "Law 'gent' is unknown"),
+        (["fit", "choose"], "moony_rivlin", "Law 'moony_rivlin' is unknown"),
+        (["fit", "poisson"], 0.6, "fit.poisson is 0.6; input should be less than 0.5"),
+        (
+            ["printed", "mooney_rivlin"],
+            {"parameters": {"c10": "soft"}},
+            "printed.mooney_rivlin.parameters.c10 is 'soft'",
+        ),
+        (["material"], None, "material is None; input should be a valid string"),
+    ],
+)
+def test_a_wrong_key_or_value_is_refused_in_one_sentence(tmp_path, material_yaml, path, value, sentence):
+    config = yaml.safe_load(material_yaml("neoprene").read_text())
+    section = config
+    for key in path[:-1]:
+        section = section[key]
+    section[path[-1]] = value
+    (tmp_path / "wrong.yaml").write_text(yaml.safe_dump(config, sort_keys=False))
+    with pytest.raises(InputError, match=sentence) as refusal:
+        load_material(tmp_path / "wrong.yaml")
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_missing_key_is_named(tmp_path):
+    (tmp_path / "short.yaml").write_text("{material: mine}")
+    with pytest.raises(InputError, match="short.yaml: the key curves is missing; add it"):
+        load_material(tmp_path / "short.yaml")
+
+
+def test_text_that_is_no_yaml_is_refused(tmp_path):
+    (tmp_path / "broken.yaml").write_text("material: [")
+    with pytest.raises(InputError, match="broken.yaml: not valid YAML"):
+        load_material(tmp_path / "broken.yaml")

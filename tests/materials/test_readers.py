@@ -1,0 +1,146 @@
+"""Reading test curves: what is understood, and what is refused in which words."""
+
+import numpy as np
+import pytest
+
+from softtact.errors import InputError
+from softtact.materials.curves import Curve, join_by_mode, write_curve
+from softtact.materials.readers import read_curve, read_curves
+
+PLAIN = "stretch,nominal_stress_mpa\n0.8,-0.3\n1.0,0.0\n1.2,0.2\n"
+
+
+def test_a_plain_file_is_read_with_the_mode_of_its_name(write_file):
+    curve = read_curve(write_file(PLAIN, "planar.csv"))
+    assert (curve.mode, curve.kind, curve.source) == ("planar", "measured", "planar.csv")
+    assert curve.stretch.tolist() == [0.8, 1.0, 1.2]
+    assert curve.nominal_stress.tolist() == [-0.3, 0.0, 0.2]
+
+
+def test_notes_above_the_header_tell_mode_kind_and_source(write_file):
+    path = write_file("# mode: equibiaxial\n# kind: synthetic\n# source: made: by hand\n" + PLAIN, "x.csv")
+    curve = read_curve(path)
+    assert (curve.mode, curve.kind, curve.source) == ("equibiaxial", "synthetic", "made: by hand")
+
+
+def test_a_stated_mode_comes_before_the_files_own(write_file):
+    assert read_curve(write_file("# mode: planar\n" + PLAIN), mode="uniaxial").mode == "uniaxial"
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_percent_and_kilopascal_become_stretch_and_megapascal(write_file, separator):
+    rows = [["engineering_strain_percent", "time", "nominal_stress_kpa"], ["-20", "0", "-300"], ["50", "1", "200"]]
+    curve = read_curve(write_file("\n".join(separator.join(row) for row in rows)))
+    assert curve.stretch == pytest.approx([0.8, 1.5])
+    assert curve.nominal_stress == pytest.approx([-0.3, 0.2])
+
+
+def test_a_users_own_column_names_are_mapped(write_file):
+    path = write_file("Dehnung [%];Spannung [kPa]\n10;50\n20;90\n")
+    columns = {"engineering_strain_percent": "Dehnung [%]", "nominal_stress_kpa": "Spannung [kPa]"}
+    assert read_curve(path, columns=columns).nominal_stress == pytest.approx([0.05, 0.09])
+
+
+def test_a_falling_stretch_is_one_loading_branch(write_file):
+    curve = read_curve(write_file("stretch,nominal_stress_mpa\n1.0,0\n0.9,-0.1\n0.7,-0.4\n"))
+    assert curve.stretch.tolist() == [1.0, 0.9, 0.7]
+
+
+def test_rows_in_disorder_are_sorted_when_told(write_file):
+    path = write_file("stretch,nominal_stress_mpa\n1.0,0\n0.8,-0.3\n1.2,0.2\n")
+    assert read_curve(path, sort=True).stretch.tolist() == [0.8, 1.0, 1.2]
+
+
+def test_a_written_curve_reads_back(tmp_path):
+    curve = Curve("planar", np.array([1.0, 1.25]), np.array([0.0, 0.125]), "synthetic", "a law, seed 1")
+    write_curve(tmp_path / "any.csv", curve)
+    again = read_curve(tmp_path / "any.csv")
+    assert (again.mode, again.kind, again.source) == ("planar", "synthetic", "a law, seed 1")
+    assert np.array_equal(again.stretch, curve.stretch) and np.array_equal(again.nominal_stress, curve.nominal_stress)
+
+
+def test_curves_of_one_mode_are_joined_and_sorted(write_file):
+    tension = write_file("stretch,nominal_stress_mpa\n1.0,0\n1.2,0.2\n", "tension.csv")
+    compression = write_file("stretch,nominal_stress_mpa\n0.9,-0.1\n0.8,-0.3\n", "compression.csv")
+    (joined,) = join_by_mode(read_curves([tension, compression], mode="uniaxial"))
+    assert joined.stretch.tolist() == [0.8, 0.9, 1.0, 1.2]
+    assert joined.window == (0.8, 1.2)
+
+
+def test_one_synthetic_part_makes_the_whole_synthetic(write_file):
+    measured, made = write_file(PLAIN, "a.csv"), write_file("# kind: synthetic\n" + PLAIN, "b.csv")
+    assert join_by_mode(read_curves([measured, made], mode="uniaxial"))[0].kind == "synthetic"
+
+
+HEADER = "stretch,nominal_stress_mpa\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("", "the file is empty; give a test curve"),
+        (HEADER, r"0 point\(s\) make no curve; give at least two"),
+        (HEADER + "1.1,0.1\n", r"1 point\(s\) make no curve"),
+        (HEADER + "1.0,0\n1.1,nan\n", "row 3: the value 'nan' is not finite; correct it or remove the row"),
+        (HEADER + "1.0,0\n1.1,\n", "row 3: '' is not a number; correct it or remove the row"),
+        (HEADER + "1.0,0\nlong,0.1\n", "row 3: 'long' is not a number"),
+        (
+            "stretch;nominal_stress_mpa\n1,0;0,1\n1,1;0,2\n",
+            "row 2: '1,0' is not a number; write it with a decimal point",
+        ),
+        (HEADER + "0,0\n0.1,0.1\n", "row 2: the stretch 0 is not positive; .* name it engineering_strain"),
+        (HEADER + "1,0\n50,0.1\n", "row 3: the stretch 50 is above 25, .* name it engineering_strain_percent"),
+        ("engineering_strain,nominal_stress_mpa\n0,0\n85,1\n", "row 3: the stretch 86 .* engineering_strain_percent"),
+        (HEADER + "1,0\n1.5,350\n", "row 3: the stress 350 MPa is beyond 200 MPa, .* nominal_stress_kpa"),
+        (HEADER + "0.7,0.47\n1,0\n", "row 2: the stress 0.47 MPa has the wrong sign .* compression negative"),
+        (HEADER + "1,0\n1.2,0.2\n1.1,0.1\n", "row 4: the stretch turns back to 1.1; keep one loading branch"),
+        ("lambda,nominal_stress_mpa\n1,0\n", "no column holds the stretch among lambda, nominal_stress_mpa; name one"),
+        ("stretch,S11\n1,0\n", "no column holds the nominal stress among stretch, S11; .* map it under `columns`"),
+        ("stretch,engineering_strain,nominal_stress_mpa\n1,0,0\n", "several columns hold the stretch"),
+    ],
+)
+def test_a_file_that_cannot_be_trusted_is_refused_by_name_row_value_and_remedy(write_file, text, sentence):
+    path = write_file(text)
+    with pytest.raises(InputError, match=sentence) as refusal:
+        read_curve(path)
+    assert str(refusal.value).startswith(str(path))
+    assert str(refusal.value).endswith(".")
+
+
+def test_a_missing_file_is_refused(tmp_path):
+    with pytest.raises(InputError, match="uniaxial.csv: there is no such file"):
+        read_curve(tmp_path / "uniaxial.csv")
+
+
+def test_a_file_without_a_mode_is_refused(write_file):
+    with pytest.raises(InputError, match="the test mode is 'batch7'; state one of uniaxial, equibiaxial, planar"):
+        read_curve(write_file(PLAIN, "batch7.csv"))
+
+
+def test_an_unknown_layout_is_refused(write_file):
+    with pytest.raises(InputError, match="layout 'excel' is unknown; use one of plain, soro_db, stress_stretch"):
+        read_curve(write_file(PLAIN), layout="excel")
+
+
+def test_a_plain_file_is_not_taken_for_the_databases_layout(write_file):
+    with pytest.raises(InputError, match="no header with 'Engineering Strain' was found; is its layout soro_db"):
+        read_curve(write_file(PLAIN), layout="soro_db")
+
+
+def test_the_databases_files_are_read(published):
+    curve = read_curve(published / "soro_db" / "Dragon Skin 30.csv", layout="soro_db")
+    assert curve.mode == "uniaxial"
+    assert (curve.stretch[0], curve.nominal_stress[0]) == pytest.approx((1.0446, 0.01736))
+    assert (curve.stretch[-1], curve.nominal_stress[-1]) == pytest.approx((8.09091, 4.14551))
+
+
+def test_every_file_of_the_database_is_read(published):
+    files = sorted((published / "soro_db").glob("*.csv"))
+    assert len(files) == 6
+    assert all(len(curve.stretch) > 50 for curve in read_curves(files, layout="soro_db"))
+
+
+def test_two_bare_columns_are_stress_then_stretch(published):
+    folder = published / "literature" / "Treloar_1944" / "UT"
+    curve = read_curve(folder / "stress_stretch.txt", layout="stress_stretch", mode="uniaxial")
+    assert (curve.stretch[-1], curve.nominal_stress[-1], len(curve.stretch)) == (7.6, 6.3176, 24)

@@ -1,0 +1,67 @@
+"""Drucker stability against hand calculation."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from softtact.materials.config import law_from_printed
+from softtact.materials.laws.base import TEST_PATHS
+from softtact.materials.laws.registry import LAWS, make_law
+from softtact.materials.stability import is_stable, log_tangent, plane_tangent, stable_range, stable_ranges
+
+
+def test_at_rest_the_tangent_is_that_of_an_incompressible_plane():
+    """D = mu [[4, 2], [2, 4]]: uniaxial stress gives 3 mu, equibiaxial 6 mu."""
+    D = plane_tangent(make_law("neo_hooke", {"c10": 0.5}), "uniaxial", np.array([1.0]))
+    assert np.allclose(D[0], [[4, 2], [2, 4]])
+
+
+def test_the_complex_step_agrees_with_finite_differences():
+    law = make_law("ogden2", {"mu1": 0.1351, "alpha1": 1.4538, "mu2": 0.2223, "alpha2": -4.9910})
+    stretches, h = np.array([[1.3, 0.9, 0.8]]), 1e-6
+    numeric = [
+        (law.principal_stress(stretches * np.exp(d)) - law.principal_stress(stretches * np.exp(-d))) / (2 * h)
+        for d in h * np.eye(3)
+    ]
+    assert np.allclose(log_tangent(law, stretches), np.stack(numeric, axis=-1), rtol=1e-8)
+
+
+@pytest.mark.parametrize("ratio", [0.05, 0.2])
+def test_a_negative_c01_limits_equibiaxial_stretch_where_theory_says(ratio):
+    """With t_a = 2 c10 (l_a^2 + r l_a^-2), r = -c01/c10, the determinant of D falls to zero where T1 + 2 T3 does."""
+
+    def determinant(L):
+        T1, T3 = L**2 - ratio * L**-2, L**-4 - ratio * L**4
+        return T1 + 2 * T3
+
+    expected = brentq(determinant, 1.0, 10.0)
+    law = make_law("mooney_rivlin", {"c10": 0.2, "c01": -0.2 * ratio})
+    # The scan walks in steps of 1 %, and the last stable one counts.
+    assert expected / 1.011 < stable_range(law, "equibiaxial")[1] <= expected
+
+
+@pytest.mark.parametrize("mode", TEST_PATHS)
+def test_laws_with_nonnegative_constants_are_stable_everywhere(mode):
+    values = {"MPa": 0.2, "1": 3.0}
+    for name, kind in LAWS.items():
+        law = make_law(name, {constant.name: values[constant.unit] for constant in kind.constants})
+        assert stable_range(law, mode) == pytest.approx([0.1, 10.0]), name
+
+
+def test_a_law_without_stiffness_is_stable_nowhere():
+    law = LAWS["mooney_rivlin"]({"c10": 0.1, "c01": -0.2}, bulk_modulus=1.0)
+    assert stable_ranges(law) == {mode: [1.0, 1.0] for mode in TEST_PATHS}
+
+
+def test_a_softening_yeoh_is_unstable_beyond_the_peak_of_its_curve():
+    """Past the maximum of the Kirchhoff stress in planar tension, psi1 has fallen too far."""
+    law = make_law("yeoh", {"c10": 0.2, "c20": -0.02, "c30": 0.0})
+    low, high = stable_range(law, "planar")
+    assert low > 0.1 and high < 10
+    assert is_stable(law, "planar", np.array([high]))[0] and not is_stable(law, "planar", np.array([high * 1.02]))[0]
+
+
+@pytest.mark.parametrize("material", ["neoprene", "polyurethane"])
+def test_the_printed_ogden_constants_are_stable_over_the_sensors_range(material_yaml, material):
+    low, high = stable_range(law_from_printed(material_yaml(material), "ogden2"), "uniaxial")
+    assert low <= 0.2 and high >= 4

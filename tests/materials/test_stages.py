@@ -1,0 +1,105 @@
+"""The two stages on files, with the settings that the workflow gives them."""
+
+import json
+
+import pytest
+
+from softtact.errors import InputError
+from softtact.files import read_json
+from softtact.materials.cards import law_from_card, load_card
+from softtact.materials.config import load_material
+from softtact.materials.readers import read_curve
+from softtact.stages import fit_material, make_curves
+
+
+def as_passed(settings):
+    """Settings as they arrive through the command line."""
+    return json.loads(json.dumps(settings))
+
+
+def make(config, folder):
+    paths = [folder / f"{mode}.csv" for mode in config.modes]
+    make_curves.run(inputs={}, outputs={"curves": paths}, settings=as_passed(config.curve_settings))
+    return paths
+
+
+@pytest.fixture
+def polyurethane(material_yaml):
+    return load_material(material_yaml("polyurethane"))
+
+
+def test_synthetic_curves_say_in_the_file_that_they_are_and_how_they_were_made(polyurethane, tmp_path):
+    path = make(polyurethane, tmp_path)[0]
+    head = path.read_text().splitlines()[:4]
+    assert head[1] == "# kind: synthetic"
+    assert "mooney_rivlin (c10 0.1706, c01 0.004)" in head[2] and "noise of 0.01" in head[2] and "seed [1, " in head[2]
+    assert head[3] == "stretch,nominal_stress_mpa"
+
+
+def test_the_same_settings_give_the_same_bytes(polyurethane, tmp_path):
+    first, second = make(polyurethane, tmp_path / "a"), make(polyurethane, tmp_path / "b")
+    assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
+
+
+def test_two_materials_have_different_noise_under_one_seed(polyurethane, tmp_path):
+    other = polyurethane.model_copy(update={"material": "other"})
+    one, two = make(polyurethane, tmp_path / "a")[0], make(other, tmp_path / "b")[0]
+    assert one.read_text() != two.read_text()
+
+
+def test_the_default_materials_card_has_the_law_that_made_its_curves(polyurethane, tmp_path):
+    """Three standard errors of 1 % noise: the fit must not only be near, it must know how near."""
+    paths = make(polyurethane, tmp_path)
+    settings = as_passed(polyurethane.fit_settings)
+    fit_material.run(inputs={"curves": paths}, outputs={"card": tmp_path / "card.json"}, settings=settings)
+    card = load_card(tmp_path / "card.json")
+    entry = card["laws"]["mooney_rivlin"]
+    errors = {name: entry["covariance"][i][i] ** 0.5 for i, name in enumerate(entry["parameter_names"])}
+    assert (card["material"], card["kind"], card["chosen"]) == ("polyurethane", "synthetic", "mooney_rivlin")
+    assert abs(entry["parameters"]["c10"] - 0.1706) < 3 * errors["c10"]
+    assert abs(entry["parameters"]["c01"] - 0.0040) < 3 * errors["c01"]
+    assert law_from_card(card).mu0 == pytest.approx(0.3492, rel=0.02)
+    assert set(card["laws"]) >= {"neo_hooke", "yeoh", "ogden1", "ogden2", "ogden3", "linear"}
+    assert any("-6.11 against -1.25 MPa" in sentence for sentence in card["warnings"])
+
+
+def test_a_users_own_curves_become_a_measured_card(tmp_path, write_file):
+    write_file("strain,kPa\n0,0\n10,60\n20,110\n30,150\n", "tension.csv")
+    write_file("stretch,nominal_stress_mpa\n1.0,0\n0.9,-0.07\n0.8,-0.17\n", "compression.csv")
+    yaml_path = write_file(
+        """
+        material: mine
+        curves:
+          kind: measured
+          files:
+            - file: tension.csv
+              mode: uniaxial
+              columns: {engineering_strain_percent: strain, nominal_stress_kpa: kPa}
+            - {file: compression.csv, mode: uniaxial}
+        fit: {laws: [neo_hooke, mooney_rivlin], choose: neo_hooke}
+        """,
+        "mine.yaml",
+    )
+    config = load_material(yaml_path)
+    paths = make(config, tmp_path / "curves")
+    fit_material.run(
+        inputs={"curves": paths}, outputs={"card": tmp_path / "card.json"}, settings=as_passed(config.fit_settings)
+    )
+    card = read_json(tmp_path / "card.json")
+    assert read_curve(paths[0]).window == (0.8, 1.3)
+    assert (card["kind"], card["strain_window"]) == ("measured", {"uniaxial": [0.8, 1.3]})
+    assert card["curves"][0]["source"] == "tension.csv; compression.csv"
+
+
+def test_a_mode_without_a_curve_is_refused(polyurethane, tmp_path):
+    settings = as_passed(polyurethane.curve_settings)
+    with pytest.raises(
+        InputError, match="material polyurethane has no shear curve, only uniaxial, equibiaxial, planar"
+    ):
+        make_curves.run(inputs={}, outputs={"curves": tmp_path / "shear.csv"}, settings=settings)
+
+
+def test_an_unknown_setting_is_refused(polyurethane, tmp_path):
+    settings = as_passed(polyurethane.fit_settings) | {"lawz": "all"}
+    with pytest.raises(InputError, match="material polyurethane, fit: the key lawz is unknown"):
+        fit_material.run(inputs={"curves": []}, outputs={"card": tmp_path / "card.json"}, settings=settings)
