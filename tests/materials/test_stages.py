@@ -101,5 +101,17 @@ def test_a_mode_without_a_curve_is_refused(polyurethane, tmp_path):
 
 def test_an_unknown_setting_is_refused(polyurethane, tmp_path):
     settings = as_passed(polyurethane.fit_settings) | {"lawz": "all"}
-    with pytest.raises(InputError, match="material polyurethane, fit: the key lawz is unknown"):
+    with pytest.raises(InputError, match="settings of fit_material: the key lawz is unknown"):
         fit_material.run(inputs={"curves": []}, outputs={"card": tmp_path / "card.json"}, settings=settings)
+
+
+def test_settings_without_a_material_are_refused(polyurethane, tmp_path):
+    curves, fit = polyurethane.curve_settings, polyurethane.fit_settings
+    with pytest.raises(InputError, match="settings of make_curves: the key material is missing"):
+        make_curves.run(inputs={}, outputs={"curves": tmp_path / "planar.csv"}, settings=without_material(curves))
+    with pytest.raises(InputError, match="settings of fit_material: the key material is missing"):
+        fit_material.run(inputs={"curves": []}, outputs={"card": tmp_path / "x.json"}, settings=without_material(fit))
+
+
+def without_material(settings):
+    return {key: value for key, value in as_passed(settings).items() if key != "material"}

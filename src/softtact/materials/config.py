@@ -83,6 +83,13 @@ class PrintedLaw(_Section):
     rmse_mpa: float | None = None
 
 
+class FitStage(FitSettings):
+    """Settings of the stage fit_material."""
+
+    material: str
+    printed: dict[str, PrintedLaw] = Field(default_factory=dict)
+
+
 class MaterialConfig(_Section):
     """One material."""
 
@@ -113,8 +120,8 @@ class MaterialConfig(_Section):
     @property
     def fit_settings(self):
         """Settings of the stage fit_material."""
-        printed = {law: entry.model_dump(exclude_none=True) for law, entry in self.printed.items()}
-        return {"material": self.material, "printed": printed} | self.fit.model_dump(mode="json")
+        stage = FitStage(material=self.material, printed=self.printed, **self.fit.model_dump())
+        return stage.model_dump(mode="json", exclude_none=True)
 
 
 def load_material(path):

@@ -17,7 +17,9 @@ def make_curves(measured, curves, settings):
     settings: `MaterialConfig.curve_settings`
     """
     settings = dict(settings)
-    material = settings.pop("material")
+    material = settings.pop("material", None)
+    if material is None:
+        raise InputError("settings of make_curves: the key material is missing; add it.")
     if settings.get("kind") == "measured":
         made = _measured(material, _paths(measured), settings)
     else:

@@ -2,13 +2,11 @@
 
 from softtact.files import write_json
 from softtact.materials.cards import make_card
-from softtact.materials.config import FitSettings, validated
+from softtact.materials.config import FitStage, validated
 from softtact.materials.readers import read_curves
 
 
 def run(*, inputs, outputs, settings, threads=1):
     """inputs: curves (CSV, one per mode); outputs: card (JSON)."""
-    options = dict(settings)
-    material, printed = options.pop("material"), options.pop("printed", None)
-    options = validated(FitSettings, options, where=f"material {material}, fit").model_dump()
-    write_json(outputs["card"], make_card(read_curves(inputs["curves"]), material=material, printed=printed, **options))
+    options = validated(FitStage, settings, where="settings of fit_material").model_dump(exclude_none=True)
+    write_json(outputs["card"], make_card(read_curves(inputs["curves"]), **options))
