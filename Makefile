@@ -1,0 +1,34 @@
+# `make`: the default study.  `make tiny`: the smallest study.  `make test`: the tests.
+PYTHON ?= python3.11
+BIN := .venv/bin
+SNAKEMAKE = $(BIN)/snakemake --cores all
+
+.PHONY: study tiny test lint clean
+
+study: .venv/installed
+	$(SNAKEMAKE)
+	@echo "Open results/default/report.html"
+
+tiny: .venv/installed
+	$(SNAKEMAKE) --configfile config/tiny.yaml
+	@echo "Open results/tiny/report.html"
+
+test: .venv/tested
+	$(BIN)/python -m pytest
+
+lint: .venv/tested
+	$(BIN)/ruff check .
+	$(BIN)/snakemake --lint
+
+# The workflow finds its own interpreter; the environment need not be activated.
+.venv/installed: pyproject.toml constraints.txt
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e .
+	touch $@
+
+.venv/tested: .venv/installed
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[test]'
+	touch $@
+
+clean:
+	rm -rf results/*/ .snakemake

@@ -1,0 +1,318 @@
+"""The study's configuration: every key typed, described in place and checked before any work starts.
+
+`load_study` is the one way in. It also reads the files that the configuration names (sensor, materials, objects), so
+that rules hand their stages plain values, and a comment in a YAML file reruns nothing.
+"""
+
+import difflib
+import itertools
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import yaml
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, ValidationError
+from pydantic import model_validator
+
+from softtact.errors import InputError
+from softtact.geometry.sensor_spec import SensorSpec
+from softtact.materials.config import load_material
+from softtact.materials.laws.registry import LAWS
+
+SETS = ("indenters", "unseen", "grasps")
+CENTRED = "centred"  # the pose that gives an item its object's plain name
+
+
+def _check_name(name, known, *, kind):
+    """Raise ValueError naming the nearest right name unless `name` is known."""
+    if name in known:
+        return name
+    near = difflib.get_close_matches(str(name), [str(right) for right in known], n=1, cutoff=0.5)
+    remedy = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(map(str, known)) or 'none'}."
+    raise ValueError(f"there is no {kind} {name!r}; {remedy}")
+
+
+def _rising(values):
+    if any(low >= high for low, high in itertools.pairwise(values)):
+        raise ValueError("the values must rise from one to the next.")
+    return values
+
+
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
+Fraction = Annotated[float, Field(gt=0.0, lt=1.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+Forces = Annotated[list[PositiveFloat], Field(min_length=1), AfterValidator(_rising)]
+Law = Annotated[str, AfterValidator(lambda name: _check_name(name, LAWS, kind="law"))]
+Six = Annotated[list[float], Field(min_length=6, max_length=6)]
+
+
+class Section(BaseModel):
+    """A mapping of the configuration whose keys are all known."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _keys_are_known(cls, values):
+        for key in values if isinstance(values, dict) else ():
+            _check_name(key, cls.model_fields, kind="key")
+        return values
+
+    def plain(self):
+        """The section as JSON values."""
+        return self.model_dump(mode="json")
+
+
+class Camera(Section):
+    """The camera behind the acrylic plate of the contact-area test."""
+
+    pixel_mm: PositiveFloat
+    blur_mm: NotNegative
+    noise: NotNegative
+    falloff: NotNegative
+
+
+class Ftir(Section):
+    """The dielectric pressed on glass, as a model and as a virtual specimen, and the camera that looks at it."""
+
+    forces_n: Forces
+    law: Law
+    virtual_law: Law
+    camera: Camera
+    measured: str | None = Field(None, description="CSV with force_n, area_per_frustum_mm2 of one's own test")
+
+
+class Thresholds(Section):
+    """NPt >= total * CHt, NPo >= overlap * CHo."""
+
+    total: PositiveFloat
+    overlap: PositiveFloat
+
+
+class Complexity(Section):
+    """When an object asks for the hyperelastic model."""
+
+    rule: Literal["any", "all"]
+    thresholds: Thresholds
+
+
+class ItemSet(Section):
+    """Objects of the catalogue, by name or `all` of a set, and the poses in which each is pressed."""
+
+    names: list[Name] | Literal["all"]
+    poses: dict[Name, Six | None] = Field({CENTRED: None}, min_length=1, description="x, y, z in mm, then degrees")
+
+
+class Objects(Section):
+    """What is pressed: training indenters, indenters that training never sees, grasped objects."""
+
+    catalogue: str
+    indenters: ItemSet
+    unseen: ItemSet
+    grasps: ItemSet
+
+
+class CatalogueEntry(Section):
+    """One line of the catalogue: a mesh file beside it, the mesh's unit, and its set."""
+
+    name: Name
+    file: str
+    unit: str
+    set: Literal["indenters", "unseen", "grasps"]
+    label: str
+
+
+class Model(Section):
+    """One mechanical model of the sensor: its mesh, the law of each layer, and the files its presses start from."""
+
+    mesh: dict[str, float | int | list[float]]
+    laws: dict[Literal["dielectric", "cover"], Law] = {}
+    needs: list[Literal["mesh", "compliance", "card_dielectric", "card_cover"]] = []
+
+
+class Dataset(Section):
+    """How samples are split."""
+
+    train_fraction: Fraction
+
+
+class Search(Section):
+    """Hyperparameter search with Optuna's Hyperband pruner."""
+
+    trials: PositiveInt
+    max_epochs: PositiveInt
+
+
+class Training(Section):
+    """The networks' training."""
+
+    epochs: PositiveInt
+    patience: PositiveInt
+    threads: PositiveInt
+
+
+class Network(Section):
+    """The printed architecture, or the searched one."""
+
+    architecture: Literal["printed", "searched"]
+
+
+class Ssim(Section):
+    """Structural similarity of tactile maps: side of the window in taxels, and the range of the counts."""
+
+    window: PositiveInt
+    data_range: PositiveFloat
+
+
+class Values(Section):
+    """The whole configuration; `config/config.yaml` holds it with comments."""
+
+    study: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$")]
+    seed: Annotated[int, Field(ge=0)]
+    sensor: str
+    materials: list[Name]
+    objects: Objects
+    ftir: Ftir
+    complexity: Complexity
+    forces_n: Forces
+    models: dict[Name, Model]
+    tested: list[Name] = Field(min_length=1, description="models that a network is trained for")
+    reference: Name
+    virtual_sensor: dict
+    trials: PositiveInt
+    dataset: Dataset
+    search: Search
+    training: Training
+    network: Network
+    ssim: Ssim
+
+
+@dataclass(frozen=True)
+class Item:
+    """One object in one pose: what a press presses. `id` names it in paths."""
+
+    id: str
+    set: str
+    object: str
+    file: str
+    unit: str
+    label: str
+    pose: list[float] | None
+
+
+@dataclass(frozen=True)
+class Study:
+    """A checked configuration with the files that it names.
+
+    values: the configuration;  sensor: plain values of the sensor's file
+    materials: {name: MaterialConfig};  items_of: {set: {id: Item}} in the order of the configuration
+    """
+
+    values: Values
+    sensor: dict
+    materials: dict
+    items_of: dict
+
+    @property
+    def name(self):
+        """The study's name, and its folder below results/."""
+        return self.values.study
+
+    def items(self, sets=SETS):
+        """The items of some sets, in order."""
+        return [item for name in sets for item in self.items_of[name].values()]
+
+
+def load_study(values, *, folder="config"):
+    """The `Study` of a configuration mapping; the first fault becomes an `InputError` of one sentence.
+
+    folder: where sensors/ and materials/ lie
+    """
+    checked = _validated(Values, values, where="the configuration")
+    spec = SensorSpec.from_yaml(_existing(Path(folder, "sensors"), checked.sensor, kind="sensor"))
+    _check_forces(checked, spec)
+    materials = _materials(checked, spec, Path(folder, "materials"))
+    _check_models(checked)
+    catalogue = _read_catalogue(Path(checked.objects.catalogue))
+    items_of = {name: _items(name, getattr(checked.objects, name), catalogue) for name in SETS}
+    return Study(checked, spec.model_dump(mode="json"), materials, items_of)
+
+
+def _validated(model, values, *, where):
+    """`model` from plain values; the first fault becomes an `InputError` naming the field."""
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        fault = error.errors()[0]
+        field = ".".join(str(part) for part in fault["loc"])
+        sentence = fault["msg"].removeprefix("Value error, ").rstrip(".")
+        if fault["type"] == "missing":
+            raise InputError(f"{where}: the key {field!r} is missing; add it.") from None
+        given = "" if isinstance(fault["input"], dict) else f" (it is {fault['input']!r:.60})"
+        at = f", at {field!r}{given}" if field else ""
+        raise InputError(f"{where}{at}: {sentence}.") from None
+
+
+def _existing(folder, name, *, kind):
+    """The YAML file of `name` in a folder; an unknown name is refused with the nearest right one."""
+    _refuse_unknown(name, sorted(path.stem for path in folder.glob("*.yaml")), kind=kind, where=str(folder))
+    return folder / f"{name}.yaml"
+
+
+def _refuse_unknown(name, known, *, kind, where):
+    try:
+        _check_name(name, known, kind=kind)
+    except ValueError as error:
+        raise InputError(f"{where}: {str(error).rstrip('.')}.") from None
+
+
+def _check_forces(values, spec):
+    low, high = spec.force_range_n
+    for force in values.forces_n:
+        if not low < force <= high:
+            raise InputError(f"the configuration, at 'forces_n': {force:g} N is outside the range of sensor {spec.name}, "
+                             f"above {low:g} and up to {high:g} N; leave it out or change the sensor's force_range_n.")
+
+
+def _materials(values, spec, folder):
+    """{name: MaterialConfig} of the listed materials, among which the sensor's own must be."""
+    for layer in (spec.dielectric, spec.cover):
+        _refuse_unknown(layer.material, values.materials, kind="material", where="the configuration, at 'materials'")
+    return {name: load_material(_existing(folder, name, kind="material")) for name in values.materials}
+
+
+def _check_models(values):
+    for name in [*values.tested, values.reference]:
+        _refuse_unknown(name, list(values.models), kind="model", where="the configuration, at 'models'")
+
+
+def _read_catalogue(path):
+    """{name: CatalogueEntry} with the mesh files' paths as seen from here; a missing mesh is refused now."""
+    try:
+        lines = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such catalogue of objects; correct 'objects.catalogue'.") from None
+    except (UnicodeDecodeError, yaml.YAMLError) as error:
+        raise InputError(f"{path}: not valid YAML ({' '.join(str(error).split())}); correct it.") from None
+    entries = [_validated(CatalogueEntry, line, where=str(path)) for line in lines or []]
+    entries = [entry.model_copy(update={"file": str(path.parent / entry.file)}) for entry in entries]
+    return {entry.name: entry for entry in entries}
+
+
+def _items(set_name, chosen, catalogue):
+    """{id: Item} of one set: each object in each pose."""
+    known = [name for name, entry in catalogue.items() if entry.set == set_name]
+    names = known if chosen.names == "all" else chosen.names
+    for name in names:
+        _refuse_unknown(name, known, kind=f"object of set {set_name}", where=f"the configuration, at 'objects.{set_name}'")
+    pairs = itertools.product(names, chosen.poses.items())
+    items = [_item(catalogue[name], pose_name, pose) for name, (pose_name, pose) in pairs]
+    return {item.id: item for item in items}
+
+
+def _item(entry, pose_name, pose):
+    if not Path(entry.file).is_file():
+        raise InputError(f"{entry.file}: there is no such mesh, which the catalogue names for {entry.name!r}; "
+                         "put it there or correct the line.")
+    suffix = "" if pose_name == CENTRED else f"-{pose_name}"
+    return Item(entry.name + suffix, entry.set, entry.name, entry.file, entry.unit, entry.label + suffix, pose)

@@ -1,0 +1,71 @@
+"""Run one stage: `python -m softtact.stages NAME --in curves=a.csv --in curves=b.csv --out card=x.json --settings '{}'`."""
+
+import argparse
+import importlib
+import json
+import sys
+from pathlib import Path
+
+from softtact.errors import InputError, SofttactError
+
+
+def main(arguments=None):
+    """Run the stage that the command line names; return its exit status."""
+    options = add_arguments(argparse.ArgumentParser(prog="softtact stage", description=__doc__)).parse_args(arguments)
+    try:
+        run_stage(options)
+    except SofttactError as error:
+        print(f"softtact {options.stage}: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def add_arguments(parser):
+    """Declare a stage's command line on `parser`."""
+    parser.add_argument("stage", metavar="NAME", help="a module of softtact.stages, named as the workflow's rule")
+    parser.add_argument("--in", dest="inputs", action="append", default=[], metavar="NAME=PATH",
+                        help="an input file; the same name again, or NAME[]=PATH, makes a list")
+    parser.add_argument("--out", dest="outputs", action="append", default=[], metavar="NAME=PATH", help="an output file")
+    parser.add_argument("--settings", default="{}", metavar="JSON", help="the values that the stage uses")
+    parser.add_argument("--threads", type=int, default=1, metavar="N", help="cores that it may use (default: 1)")
+    return parser
+
+
+def run_stage(options):
+    """Import the stage module and call its `run`."""
+    run = find_stage(options.stage)
+    run(inputs=_named_paths(options.inputs, option="--in"), outputs=_named_paths(options.outputs, option="--out"),
+        settings=_settings(options.settings), threads=options.threads)
+
+
+def find_stage(name):
+    """The `run` function of stage `name`."""
+    stages = sorted(path.stem for path in Path(__file__).parent.glob("[!_]*.py"))
+    if name not in stages:
+        raise InputError(f"there is no stage {name!r}; the stages are {', '.join(stages)}.")
+    return importlib.import_module(f"softtact.stages.{name}").run
+
+
+def _named_paths(pairs, *, option):
+    """{name: Path} of NAME=PATH arguments; a repeated name or NAME[] gives a list in the order given."""
+    paths, lists = {}, set()
+    for pair in pairs:
+        key, _, path = pair.partition("=")
+        name = key.removesuffix("[]")
+        if not name or not path:
+            raise InputError(f"{option} {pair}: write it as NAME=PATH.")
+        if key != name or name in paths:
+            lists.add(name)
+        paths.setdefault(name, []).append(Path(path))
+    return {name: found if name in lists else found[0] for name, found in paths.items()}
+
+
+def _settings(text):
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError as error:
+        raise InputError(f"--settings is not valid JSON ({error}).") from None
+
+
+if __name__ == "__main__":
+    sys.exit(main())

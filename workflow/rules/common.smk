@@ -1,0 +1,105 @@
+# What all rules share: the checked study, where results lie, and the one command line that runs a stage.
+
+import fcntl
+import json
+import os
+import sys
+from pathlib import Path
+
+from softtact.code_closure import code_closure
+from softtact.config import load_study
+from softtact.errors import InputError
+
+try:
+    STUDY = load_study(config)
+except InputError as error:
+    sys.exit(f"softtact: {error}")
+
+RESULTS = f"results/{STUDY.name}"
+
+# Formatted when a job starts, so that neither a moved environment nor another runner is a reason to rerun.
+RUNNER = os.environ.get("SOFTTACT_RUNNER", f"{sys.executable} -m softtact.stages")
+
+STAGE = (
+    "OMP_NUM_THREADS={threads} MKL_NUM_THREADS={threads} OPENBLAS_NUM_THREADS={threads} NUMBA_NUM_THREADS={threads} "
+    "{RUNNER} {rule} {params.files:q} --settings {params.settings:q} --threads {threads} 2>&1 | tee {log:q} >&2"
+)
+
+
+wildcard_constraints:
+    set="|".join(STUDY.items_of),
+    item="[a-z0-9_-]+",
+    model="[a-z0-9_]+",
+    material="[a-z0-9_]+",
+
+
+def code(stage):
+    """The source files whose edit is a reason to run a stage again."""
+    return code_closure(f"softtact.stages.{stage}") if Path(f"src/softtact/stages/{stage}.py").exists() else []
+
+
+def log_of(stage, part="all"):
+    """Where a rule's jobs write what their stage says; `part` tells them apart."""
+    return f"{RESULTS}/logs/{stage}/{part}.log"
+
+
+def benchmark_of(stage, part="all"):
+    """Where Snakemake writes a job's time and memory."""
+    return f"{RESULTS}/benchmarks/{stage}/{part}.tsv"
+
+
+def files(wildcards, input, output):
+    """A job's named inputs and outputs as the runner takes them; `code` is a reason to run, not an input."""
+    named = {key: paths for key, paths in input.items() if key != "code"}
+    return _arguments("--in", named) + _arguments("--out", dict(output.items()))
+
+
+def _arguments(option, named):
+    """[option, name=path, ...]; a list of paths is marked as one, however short."""
+    arguments = []
+    for name, paths in named.items():
+        single = isinstance(paths, str)
+        for path in [paths] if single else paths:
+            arguments += [option, f"{name}={path}" if single else f"{name}[]={path}"]
+    return arguments
+
+
+def as_settings(**values):
+    """A stage's settings: JSON of just the values that it uses, for only their change reruns it."""
+    return json.dumps(values, sort_keys=True)
+
+
+def card_of(layer):
+    """The fitted card of the material of one of the sensor's layers."""
+    return f"{RESULTS}/materials/{STUDY.sensor[layer]['material']}.json"
+
+
+def model_files(wildcards):
+    """The prepared files that a model's presses start from, named as the configuration lists them under `needs`."""
+    prepared = {
+        "mesh": f"{RESULTS}/sensor/{wildcards.model}/mesh.vtu",
+        "compliance": f"{RESULTS}/sensor/{wildcards.model}/compliance.npz",
+        "card_dielectric": card_of("dielectric"),
+        "card_cover": card_of("cover"),
+    }
+    return {name: prepared[name] for name in STUDY.values.models[wildcards.model].needs}
+
+
+def press_settings(item):
+    """What a press uses of an item; its label, say, is none of a solver's business."""
+    return {"name": item.id, "set": item.set, "unit": item.unit, "pose": item.pose}
+
+
+def presses(model):
+    """The press files of one model in the study's order."""
+    return [f"{RESULTS}/presses/{item.set}/{item.id}/{model}.nc" for item in STUDY.items()]
+
+
+onstart:
+    # The system drops this lock when its holder dies, however it dies; Snakemake's own would stay behind.
+    Path(RESULTS).mkdir(parents=True, exist_ok=True)
+    RUNNING = open(f"{RESULTS}/.running", "w")
+    try:
+        fcntl.flock(RUNNING, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise WorkflowError(f"{RESULTS}: another run of this study is at work; wait for its end.") from None

@@ -1,0 +1,62 @@
+# The dielectric pressed on glass: contact area against force, by mechanics and from an image.
+
+rule press_on_glass:
+    input:
+        code=code("press_on_glass"),
+        card=card_of("dielectric"),
+    output:
+        state=f"{RESULTS}/ftir/contact_state.nc",
+        virtual=f"{RESULTS}/ftir/virtual_dielectric.nc",
+    params:
+        files=files,
+        settings=as_settings(
+            sensor=STUDY.sensor,
+            law=STUDY.values.ftir.law,
+            virtual_law=STUDY.values.ftir.virtual_law,
+            forces_n=STUDY.values.ftir.forces_n,
+            seed=STUDY.values.seed,
+        ),
+    log:
+        log_of("press_on_glass"),
+    benchmark:
+        benchmark_of("press_on_glass")
+    shell:
+        STAGE
+
+
+rule detect_discs:
+    input:
+        code=code("detect_discs"),
+        states=[rules.press_on_glass.output.virtual],
+    output:
+        images=directory(f"{RESULTS}/ftir/images"),
+        discs=f"{RESULTS}/ftir/discs.csv",
+    params:
+        files=files,
+        settings=as_settings(camera=STUDY.values.ftir.camera.plain(), seed=STUDY.values.seed),
+    log:
+        log_of("detect_discs"),
+    benchmark:
+        benchmark_of("detect_discs")
+    shell:
+        STAGE
+
+
+rule validate_ftir:
+    input:
+        code=code("validate_ftir"),
+        state=rules.press_on_glass.output.state,
+        virtual=rules.press_on_glass.output.virtual,
+        discs=[rules.detect_discs.output.discs],
+    output:
+        area=f"{RESULTS}/ftir/contact_area.csv",
+        summary=f"{RESULTS}/ftir/summary.json",
+    params:
+        files=files,
+        settings=as_settings(measured=STUDY.values.ftir.measured),
+    log:
+        log_of("validate_ftir"),
+    benchmark:
+        benchmark_of("validate_ftir")
+    shell:
+        STAGE

@@ -1,0 +1,21 @@
+# How complex each object is, and which model that asks for.
+
+rule score_complexity:
+    input:
+        code=code("score_complexity"),
+        meshes=[item.file for item in STUDY.items()],
+    output:
+        table=f"{RESULTS}/objects/complexity.csv",
+    params:
+        files=files,
+        settings=as_settings(
+            objects=[{"name": item.id, "unit": item.unit, "pose": item.pose} for item in STUDY.items()],
+            footprint_mm=STUDY.sensor["footprint_mm"],
+            **STUDY.values.complexity.plain(),
+        ),
+    log:
+        log_of("score_complexity"),
+    benchmark:
+        benchmark_of("score_complexity")
+    shell:
+        STAGE
