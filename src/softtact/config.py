@@ -11,8 +11,16 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import yaml
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, ValidationError
-from pydantic import model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    PositiveFloat,
+    PositiveInt,
+    ValidationError,
+    model_validator,
+)
 
 from softtact.errors import InputError
 from softtact.geometry.sensor_spec import SensorSpec
@@ -27,14 +35,14 @@ def _check_name(name, known, *, kind):
     """Raise ValueError naming the nearest right name unless `name` is known."""
     if name in known:
         return name
-    near = difflib.get_close_matches(str(name), [str(right) for right in known], n=1, cutoff=0.5)
-    remedy = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(map(str, known)) or 'none'}."
+    near = difflib.get_close_matches(str(name), [str(right) for right in known], n=1)
+    remedy = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(map(str, known)) or 'none'}"
     raise ValueError(f"there is no {kind} {name!r}; {remedy}")
 
 
 def _rising(values):
     if any(low >= high for low, high in itertools.pairwise(values)):
-        raise ValueError("the values must rise from one to the next.")
+        raise ValueError("the values must rise from one to the next")
     return values
 
 
@@ -245,12 +253,12 @@ def _validated(model, values, *, where):
     except ValidationError as error:
         fault = error.errors()[0]
         field = ".".join(str(part) for part in fault["loc"])
-        sentence = fault["msg"].removeprefix("Value error, ").rstrip(".")
+        sentence = fault["msg"].removeprefix("Value error, ")
         if fault["type"] == "missing":
             raise InputError(f"{where}: the key {field!r} is missing; add it.") from None
         given = "" if isinstance(fault["input"], dict) else f" (it is {fault['input']!r:.60})"
         at = f", at {field!r}{given}" if field else ""
-        raise InputError(f"{where}{at}: {sentence}.") from None
+        raise InputError(_sentence(f"{where}{at}: {sentence}")) from None
 
 
 def _existing(folder, name, *, kind):
@@ -263,21 +271,27 @@ def _refuse_unknown(name, known, *, kind, where):
     try:
         _check_name(name, known, kind=kind)
     except ValueError as error:
-        raise InputError(f"{where}: {str(error).rstrip('.')}.") from None
+        raise InputError(_sentence(f"{where}: {error}")) from None
+
+
+def _sentence(text):
+    return text if text.endswith(("?", ".")) else f"{text}."
 
 
 def _check_forces(values, spec):
     low, high = spec.force_range_n
     for force in values.forces_n:
         if not low < force <= high:
-            raise InputError(f"the configuration, at 'forces_n': {force:g} N is outside the range of sensor {spec.name}, "
-                             f"above {low:g} and up to {high:g} N; leave it out or change the sensor's force_range_n.")
+            raise InputError(f"the configuration, at 'forces_n': {force:g} N is out of the range of {spec.name}, above "
+                             f"{low:g} and up to {high:g} N; leave it out or change the sensor's force_range_n.")
 
 
 def _materials(values, spec, folder):
     """{name: MaterialConfig} of the listed materials, among which the sensor's own must be."""
     for layer in (spec.dielectric, spec.cover):
-        _refuse_unknown(layer.material, values.materials, kind="material", where="the configuration, at 'materials'")
+        if layer.material not in values.materials:
+            raise InputError(f"the configuration, at 'materials': sensor {spec.name} is made of {layer.material!r}, "
+                             "which is not in the list; add it.")
     return {name: load_material(_existing(folder, name, kind="material")) for name in values.materials}
 
 
@@ -303,8 +317,9 @@ def _items(set_name, chosen, catalogue):
     """{id: Item} of one set: each object in each pose."""
     known = [name for name, entry in catalogue.items() if entry.set == set_name]
     names = known if chosen.names == "all" else chosen.names
+    where = f"the configuration, at 'objects.{set_name}'"
     for name in names:
-        _refuse_unknown(name, known, kind=f"object of set {set_name}", where=f"the configuration, at 'objects.{set_name}'")
+        _refuse_unknown(name, known, kind=f"object of set {set_name}", where=where)
     pairs = itertools.product(names, chosen.poses.items())
     items = [_item(catalogue[name], pose_name, pose) for name, (pose_name, pose) in pairs]
     return {item.id: item for item in items}

@@ -25,7 +25,6 @@ STAGE = (
     "{RUNNER} {rule} {params.files:q} --settings {params.settings:q} --threads {threads} 2>&1 | tee {log:q} >&2"
 )
 
-
 wildcard_constraints:
     set="|".join(STUDY.items_of),
     item="[a-z0-9_-]+",
@@ -95,11 +94,21 @@ def presses(model):
     return [f"{RESULTS}/presses/{item.set}/{item.id}/{model}.nc" for item in STUDY.items()]
 
 
-onstart:
-    # The system drops this lock when its holder dies, however it dies; Snakemake's own would stay behind.
+HELD = []  # open as long as this process lives
+
+
+def hold_study():
+    """Keep a second run of this study out.
+
+    The system drops this lock when its holder dies, however it dies; Snakemake's own would stay behind.
+    """
     Path(RESULTS).mkdir(parents=True, exist_ok=True)
-    RUNNING = open(f"{RESULTS}/.running", "w")
+    HELD.append(open(f"{RESULTS}/.running", "w"))
     try:
-        fcntl.flock(RUNNING, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(HELD[-1], fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         raise WorkflowError(f"{RESULTS}: another run of this study is at work; wait for its end.") from None
+
+
+onstart:
+    hold_study()

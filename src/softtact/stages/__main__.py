@@ -1,4 +1,7 @@
-"""Run one stage: `python -m softtact.stages NAME --in curves=a.csv --in curves=b.csv --out card=x.json --settings '{}'`."""
+"""Run one stage on files, as the workflow does.
+
+Example: python -m softtact.stages fit_material --in curves=a.csv --in curves=b.csv --out card=x.json --settings '{...}'
+"""
 
 import argparse
 import importlib
@@ -25,7 +28,8 @@ def add_arguments(parser):
     parser.add_argument("stage", metavar="NAME", help="a module of softtact.stages, named as the workflow's rule")
     parser.add_argument("--in", dest="inputs", action="append", default=[], metavar="NAME=PATH",
                         help="an input file; the same name again, or NAME[]=PATH, makes a list")
-    parser.add_argument("--out", dest="outputs", action="append", default=[], metavar="NAME=PATH", help="an output file")
+    parser.add_argument("--out", dest="outputs", action="append", default=[], metavar="NAME=PATH",
+                        help="an output file; lists as for --in")
     parser.add_argument("--settings", default="{}", metavar="JSON", help="the values that the stage uses")
     parser.add_argument("--threads", type=int, default=1, metavar="N", help="cores that it may use (default: 1)")
     return parser

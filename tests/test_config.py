@@ -1,0 +1,107 @@
+"""Every mistake in a configuration gets one sentence that names the place and the remedy."""
+
+import copy
+from pathlib import Path
+
+import pytest
+import yaml
+
+from softtact.config import load_study
+from softtact.errors import InputError
+
+ROOT = Path(__file__).resolve().parents[1]
+DEFAULT = yaml.safe_load((ROOT / "config/config.yaml").read_text())
+
+
+@pytest.fixture(autouse=True)
+def in_project(monkeypatch):
+    monkeypatch.chdir(ROOT)
+
+
+def changed(path, value):
+    """The default configuration with the value at a dotted path replaced."""
+    values = copy.deepcopy(DEFAULT)
+    *parents, last = path.split(".")
+    section = values
+    for key in parents:
+        section = section[key]
+    section[last] = value
+    return values
+
+
+def merged(name):
+    """A study's configuration as Snakemake merges it over the default one."""
+
+    def merge(base, over):
+        return base | {key: merge(base[key], value) if isinstance(base.get(key), dict) and isinstance(value, dict)
+                       else value for key, value in over.items()}
+
+    return merge(DEFAULT, yaml.safe_load((ROOT / "config" / f"{name}.yaml").read_text()))
+
+
+def refusal(values):
+    with pytest.raises(InputError) as caught:
+        load_study(values)
+    sentence = str(caught.value)
+    assert sentence.endswith((".", "?")) and "\n" not in sentence
+    return sentence
+
+
+@pytest.mark.parametrize("name", ["tiny", "paper"])
+def test_the_studies_are_valid(name):
+    assert load_study(merged(name)).name == name
+
+
+def test_the_default_study_has_twenty_indenters_and_the_six_objects_of_fig_7():
+    study = load_study(DEFAULT)
+    assert len(study.items_of["indenters"]) >= 20
+    assert len(study.items_of["grasps"]) == 6
+    assert study.values.forces_n[-1] == study.sensor["force_range_n"][1] == 50
+
+
+def test_the_paper_study_has_twenty_levels_and_fifty_trials():
+    study = load_study(merged("paper"))
+    assert len(study.values.forces_n) == 20
+    assert study.values.trials == 50
+
+
+def test_an_item_is_named_by_its_object_and_its_pose():
+    poses = {"centred": None, "left": [-4, 0, 0, 0, 0, 0]}
+    study = load_study(changed("objects.indenters", {"names": ["square"], "poses": poses}))
+    assert list(study.items_of["indenters"]) == ["square", "square-left"]
+    assert study.items_of["indenters"]["square-left"].pose == [-4, 0, 0, 0, 0, 0]
+
+
+def test_assumed_values_and_their_reasons_reach_the_stages_as_plain_numbers():
+    assert load_study(DEFAULT).sensor["cover"] == {"material": "neoprene", "thickness_mm": 1.5}
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "said"),
+    [
+        ("forces_nn", [5], "there is no key 'forces_nn'; did you mean 'forces_n'?"),
+        ("ftir.camera.pixel_m", 1, "there is no key 'pixel_m'; did you mean 'pixel_mm'?"),
+        ("sensor", "cora", "there is no sensor 'cora'; did you mean 'coro'?"),
+        ("materials", ["polyurethane", "neoprene", "rubber"], "there is no material 'rubber'; known: "),
+        ("materials", ["polyurethane"], "sensor coro is made of 'neoprene', which is not in the list; add it."),
+        ("objects.unseen.names", ["hexagn"], "there is no object of set unseen 'hexagn'; did you mean 'hexagon'?"),
+        ("objects.unseen.names", ["square"], "there is no object of set unseen 'square'"),
+        ("objects.catalogue", "config/none.yaml", "config/none.yaml: there is no such catalogue"),
+        ("objects.indenters.poses", {"left": [1, 2]}, "at 'objects.indenters.poses.left"),
+        ("forces_n", [5, 60], "60 N is out of the range of coro, above 0 and up to 50 N"),
+        ("forces_n", [0, 5], "at 'forces_n.0' (it is 0): Input should be greater than 0"),
+        ("forces_n", [10, 5], "at 'forces_n' (it is [10, 5]): the values must rise"),
+        ("ftir.law", "ogden", "there is no law 'ogden'; did you mean 'ogden"),
+        ("complexity.rule", "either", "at 'complexity.rule' (it is 'either')"),
+        ("tested", ["elastic", "viscous"], "there is no model 'viscous'"),
+        ("dataset.train_fraction", 1.2, "at 'dataset.train_fraction' (it is 1.2)"),
+        ("trials", "five", "at 'trials' (it is 'five')"),
+    ],
+)
+def test_a_mistake_is_named_with_its_remedy(path, value, said):
+    assert said in refusal(changed(path, value))
+
+
+def test_a_missing_key_is_named():
+    values = {key: value for key, value in DEFAULT.items() if key != "forces_n"}
+    assert refusal(values) == "the configuration: the key 'forces_n' is missing; add it."

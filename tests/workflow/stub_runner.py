@@ -1,0 +1,43 @@
+"""Stands in for `python -m softtact.stages`: writes small outputs that follow from the command line alone.
+
+Usage: stub_runner.py NAME --in name=path ... --out name=path ... --settings JSON --threads N
+A press waits SOFTTACT_STUB_WAIT_S seconds, to be caught in the middle.
+"""
+
+import hashlib
+import os
+import sys
+import time
+from pathlib import Path
+
+
+def main(arguments):
+    stage, options = arguments[0], arguments[1:]
+    pairs = list(zip(options[::2], options[1::2], strict=True))
+    inputs = [value.partition("=")[2] for option, value in pairs if option == "--in"]
+    settings = dict(pairs)["--settings"]
+    digest = hashlib.sha256((stage + settings).encode())
+    for path in inputs:
+        digest.update(b"".join(content(Path(path))))
+    if stage == "simulate_press":
+        time.sleep(float(os.environ.get("SOFTTACT_STUB_WAIT_S", "0")))
+    for path in (Path(value.partition("=")[2]) for option, value in pairs if option == "--out"):
+        write(path, f"{stage} {path.name} {digest.hexdigest()}\n")
+
+
+def content(path):
+    """Bytes of a file, or of the files of a folder."""
+    return [file.read_bytes() for file in sorted(path.iterdir())] if path.is_dir() else [path.read_bytes()]
+
+
+def write(path, text):
+    """A file, or a folder with a file where the name has no ending."""
+    if not path.suffix:
+        path.mkdir(parents=True, exist_ok=True)
+        path = path / "content.txt"
+    temporary = path.with_name(path.name + ".part")
+    temporary.write_text(text)
+    temporary.replace(path)
+
+
+main(sys.argv[1:])

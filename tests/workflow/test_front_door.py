@@ -1,0 +1,42 @@
+"""What the front door takes and what it refuses before any work."""
+
+import pytest
+from project import Project
+
+
+@pytest.fixture(scope="module")
+def fresh(tmp_path_factory):
+    """The project without results."""
+    return Project.of_sources(tmp_path_factory.mktemp("fresh"))
+
+
+def refusal(project, *arguments):
+    """What Snakemake says of a configuration that it refuses."""
+    done = project.snakemake("--dry-run", *arguments, check=False)
+    assert done.returncode != 0
+    assert "Traceback" not in done.stdout
+    assert not (project.folder / "results").exists()
+    return done.stdout
+
+
+def test_the_papers_study_is_planned_whole(fresh):
+    paper = Project(fresh.folder, configfile="config/paper.yaml")
+    plan = paper.plan()
+    assert len(plan["simulate_press"]) == 3 * len(plan["read_virtual_sensor"]) > 200
+    assert [job["model"] for job in plan["train_cnn"]] == ["elastic", "hyperelastic"]
+
+
+def test_a_misspelt_key_is_answered_with_the_nearest_right_one(fresh):
+    said = refusal(fresh, "--config", "forces_nn=[5]")
+    assert "softtact: the configuration: there is no key 'forces_nn'; did you mean 'forces_n'?" in said
+
+
+def test_an_unknown_material_is_refused(fresh):
+    said = refusal(fresh, "--config", "materials=[polyurethane,neoprene,neopren]")
+    assert "there is no material 'neopren'; did you mean 'neoprene'?" in said
+
+
+def test_a_mesh_that_is_not_there_is_refused(fresh, tmp_path):
+    project = Project.of_sources(tmp_path)
+    (project.folder / "config/objects/indenters/square.stl").unlink()
+    assert "config/objects/indenters/square.stl: there is no such mesh" in refusal(project)
