@@ -1,5 +1,5 @@
 # `make`: the default study.  `make tiny`: the smallest study.  `make test`: the tests.
-PYTHON ?= python3.11
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
 BIN := .venv/bin
 SNAKEMAKE = $(BIN)/snakemake --cores all
 
