@@ -212,12 +212,12 @@ class Item:
 class Study:
     """A checked configuration with the files that it names.
 
-    values: the configuration;  sensor: plain values of the sensor's file
+    values: the configuration;  spec: the sensor
     materials: {name: MaterialConfig};  items_of: {set: {id: Item}} in the order of the configuration
     """
 
     values: Values
-    sensor: dict
+    spec: SensorSpec
     materials: dict
     items_of: dict
 
@@ -226,9 +226,14 @@ class Study:
         """The study's name, and its folder below results/."""
         return self.values.study
 
-    def items(self, sets=SETS):
-        """The items of some sets, in order."""
-        return [item for name in sets for item in self.items_of[name].values()]
+    @property
+    def sensor(self):
+        """The sensor's description as plain JSON values; what is assumed, and why, is left out."""
+        return self.spec.model_dump(mode="json")
+
+    def items(self):
+        """The items of all sets, in order."""
+        return [item for items in self.items_of.values() for item in items.values()]
 
 
 def load_study(values, *, folder="config"):
@@ -243,7 +248,7 @@ def load_study(values, *, folder="config"):
     _check_models(checked)
     catalogue = _read_catalogue(Path(checked.objects.catalogue))
     items_of = {name: _items(name, getattr(checked.objects, name), catalogue) for name in SETS}
-    return Study(checked, spec.model_dump(mode="json"), materials, items_of)
+    return Study(checked, spec, materials, items_of)
 
 
 def _validated(model, values, *, where):

@@ -10,7 +10,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PARTS = ("workflow", "profiles", "config", "src")
-STUB = f"{sys.executable} -S {Path(__file__).with_name('stub_runner.py')}"
+STUB = f"-S {Path(__file__).with_name('stub_runner.py')}"
 
 
 class Project:

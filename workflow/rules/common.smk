@@ -17,13 +17,11 @@ except InputError as error:
 
 RESULTS = f"results/{STUDY.name}"
 
-# Formatted when a job starts, so that neither a moved environment nor another runner is a reason to rerun.
-RUNNER = os.environ.get("SOFTTACT_RUNNER", f"{sys.executable} -m softtact.stages")
+# The running interpreter, activated or not. It reaches the shell by the environment, for where it lies is no reason to
+# run anything again.
+os.environ["SOFTTACT_PYTHON"] = sys.executable
+os.environ.setdefault("SOFTTACT_RUNNER", "-m softtact.stages")
 
-STAGE = (
-    "OMP_NUM_THREADS={threads} MKL_NUM_THREADS={threads} OPENBLAS_NUM_THREADS={threads} NUMBA_NUM_THREADS={threads} "
-    "{RUNNER} {rule} {params.files:q} --settings {params.settings:q} --threads {threads} 2>&1 | tee {log:q} >&2"
-)
 
 wildcard_constraints:
     set="|".join(STUDY.items_of),
@@ -45,6 +43,15 @@ def log_of(stage, part="all"):
 def benchmark_of(stage, part="all"):
     """Where Snakemake writes a job's time and memory."""
     return f"{RESULTS}/benchmarks/{stage}/{part}.tsv"
+
+
+def run_stage(stage):
+    """The shell line of a rule: its stage on the job's files, with its settings, heard on screen and in the log."""
+    libraries = ("OMP", "MKL", "OPENBLAS", "NUMBA")
+    threads = " ".join(f"{library}_NUM_THREADS={{threads}}" for library in libraries)
+    settings = "--settings {params.settings:q} --threads {threads}"
+    command = f'"$SOFTTACT_PYTHON" $SOFTTACT_RUNNER {stage}'
+    return f"{threads} {command} {{params.files:q}} {settings} 2>&1 | tee {{log:q}} >&2"
 
 
 def files(wildcards, input, output):

@@ -21,7 +21,7 @@ rule press_on_glass:
     benchmark:
         benchmark_of("press_on_glass")
     shell:
-        STAGE
+        run_stage("press_on_glass")
 
 
 rule detect_discs:
@@ -39,7 +39,7 @@ rule detect_discs:
     benchmark:
         benchmark_of("detect_discs")
     shell:
-        STAGE
+        run_stage("detect_discs")
 
 
 rule validate_ftir:
@@ -59,4 +59,4 @@ rule validate_ftir:
     benchmark:
         benchmark_of("validate_ftir")
     shell:
-        STAGE
+        run_stage("validate_ftir")

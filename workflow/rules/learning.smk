@@ -24,7 +24,7 @@ rule build_dataset:
     benchmark:
         benchmark_of("build_dataset", "{model}")
     shell:
-        STAGE
+        run_stage("build_dataset")
 
 
 rule search_hyperparameters:
@@ -44,7 +44,7 @@ rule search_hyperparameters:
     benchmark:
         benchmark_of("search_hyperparameters", "{model}")
     shell:
-        STAGE
+        run_stage("search_hyperparameters")
 
 
 rule train_cnn:
@@ -69,7 +69,7 @@ rule train_cnn:
     benchmark:
         benchmark_of("train_cnn", "{model}")
     shell:
-        STAGE
+        run_stage("train_cnn")
 
 
 rule evaluate:
@@ -92,4 +92,4 @@ rule evaluate:
     benchmark:
         benchmark_of("evaluate")
     shell:
-        STAGE
+        run_stage("evaluate")

@@ -14,7 +14,7 @@ rule make_curves:
     benchmark:
         benchmark_of("make_curves", "{material}/{mode}")
     shell:
-        STAGE
+        run_stage("make_curves")
 
 
 rule fit_material:
@@ -33,4 +33,4 @@ rule fit_material:
     benchmark:
         benchmark_of("fit_material", "{material}")
     shell:
-        STAGE
+        run_stage("fit_material")

@@ -10,7 +10,8 @@ rule score_complexity:
         files=files,
         settings=as_settings(
             objects=[{"name": item.id, "unit": item.unit, "pose": item.pose} for item in STUDY.items()],
-            footprint_mm=STUDY.sensor["footprint_mm"],
+            footprint_mm=STUDY.spec.footprint_mm,
+            reach_mm=STUDY.spec.thickness_mm,
             **STUDY.values.complexity.plain(),
         ),
     log:
@@ -18,4 +19,4 @@ rule score_complexity:
     benchmark:
         benchmark_of("score_complexity")
     shell:
-        STAGE
+        run_stage("score_complexity")

@@ -23,7 +23,7 @@ rule simulate_press:
         benchmark_of("simulate_press", "{set}/{item}/{model}")
     threads: 1
     shell:
-        STAGE
+        run_stage("simulate_press")
 
 
 rule read_virtual_sensor:
@@ -45,4 +45,4 @@ rule read_virtual_sensor:
     benchmark:
         benchmark_of("read_virtual_sensor", "{set}/{item}")
     shell:
-        STAGE
+        run_stage("read_virtual_sensor")

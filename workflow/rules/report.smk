@@ -14,4 +14,4 @@ rule report:
     benchmark:
         benchmark_of("report")
     shell:
-        STAGE
+        run_stage("report")

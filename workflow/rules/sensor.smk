@@ -13,7 +13,7 @@ rule mesh_sensor:
     benchmark:
         benchmark_of("mesh_sensor", "{model}")
     shell:
-        STAGE
+        run_stage("mesh_sensor")
 
 
 rule precompute_compliance:
@@ -31,4 +31,4 @@ rule precompute_compliance:
     benchmark:
         benchmark_of("precompute_compliance", "{model}")
     shell:
-        STAGE
+        run_stage("precompute_compliance")
