@@ -27,6 +27,7 @@ from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.config import load_material
 from softtact.materials.laws.registry import LAWS
 
+PROJECT = Path(__file__).resolve().parents[2]
 SETS = ("indenters", "unseen", "grasps")
 CENTRED = "centred"  # the pose that gives an item its object's plain name
 
@@ -236,13 +237,25 @@ class Study:
         return [item for items in self.items_of.values() for item in items.values()]
 
 
+def sensor_file(name, *, folder=None):
+    """The YAML file of a sensor, given by its path or by its name in `folder`/sensors.
+
+    folder: by default config/ where the command runs, else the project's own
+    """
+    if Path(name).suffix in (".yaml", ".yml"):
+        return Path(name)
+    here = Path("config")
+    folder = folder or (here if (here / "sensors").is_dir() else PROJECT / "config")
+    return _existing(Path(folder, "sensors"), name, kind="sensor")
+
+
 def load_study(values, *, folder="config"):
     """The `Study` of a configuration mapping; the first fault becomes an `InputError` of one sentence.
 
     folder: where sensors/ and materials/ lie
     """
     checked = _validated(Values, values, where="the configuration")
-    spec = SensorSpec.from_yaml(_existing(Path(folder, "sensors"), checked.sensor, kind="sensor"))
+    spec = SensorSpec.from_yaml(sensor_file(checked.sensor, folder=folder))
     _check_forces(checked, spec)
     materials = _materials(checked, spec, Path(folder, "materials"))
     _check_models(checked)

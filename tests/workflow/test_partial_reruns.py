@@ -1,5 +1,13 @@
 """What reruns after a change, read from Snakemake's own plan."""
 
+from pathlib import Path
+
+import pytest
+
+from softtact.code_closure import code_closure
+
+STAGES = Path(__file__).resolve().parents[2] / "src/softtact/stages"
+FIGURES = sorted(path.stem for path in STAGES.glob("draw_*.py"))
 SIMULATION = {"make_curves", "fit_material", "mesh_sensor", "precompute_compliance", "simulate_press"}
 LEARNING = {"search_hyperparameters", "train_cnn", "evaluate"}
 
@@ -40,3 +48,43 @@ def test_more_epochs_rerun_the_training_and_no_simulation(finished):
     plan = finished.plan()
     assert {"train_cnn", "evaluate", "report"} <= set(plan)
     assert not (SIMULATION | {"build_dataset", "search_hyperparameters"}) & set(plan)
+
+
+def test_an_edit_of_a_materials_law_reruns_the_fits_and_after(finished):
+    edit_source(finished, "src/softtact/materials/laws/yeoh.py")
+    plan = finished.plan()
+    assert {"fit_material", "press_on_glass", "simulate_press", "report"} <= set(plan)
+    assert not {"score_complexity", "precompute_compliance"} & set(plan)
+
+
+@pytest.mark.parametrize("stage", ["train_cnn", "search_hyperparameters"])
+def test_an_edit_of_the_networks_code_reruns_learning_and_no_simulation(finished, stage):
+    for path in own_files(finished, stage, but_not=["build_dataset"]):
+        edit_source(finished, path)
+    plan = finished.plan()
+    assert {stage, "evaluate", "report"} <= set(plan)
+    assert not (SIMULATION | {"read_virtual_sensor", "build_dataset", "detect_discs"}) & set(plan)
+
+
+@pytest.mark.parametrize("stage", FIGURES)
+def test_an_edit_of_a_figures_code_redraws_that_figure_only(finished, stage):
+    others = [figure for figure in FIGURES if figure != stage]
+    own = own_files(finished, stage, but_not=[*others, "report", "make_tables"])
+    for path in own:
+        edit_source(finished, path)
+    assert set(finished.plan()) == {stage, "report"}
+
+
+def edit_source(project, path):
+    """Change a source file's bytes; a new time alone is no edit."""
+    with (project.folder / path).open("a") as source:
+        source.write("\n# edited\n")
+
+
+def own_files(project, stage, *, but_not):
+    """Source files that a stage imports and the named other stages do not."""
+    folder = project.folder / "src"
+    if not (folder / f"softtact/stages/{stage}.py").exists():
+        pytest.skip(f"the stage {stage} is not there yet")
+    closures = [set(code_closure(f"softtact.stages.{name}", source=folder)) for name in [stage, *but_not]]
+    return sorted(closures[0].difference(*closures[1:]))

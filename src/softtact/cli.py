@@ -1,0 +1,220 @@
+"""The command `softtact`: press a mesh, score it, fit curves, run a stage.
+
+What the user can mend ends with one sentence on stderr: exit status 2 for a wrong command line, 1 for a refusal.
+Heavy imports stand inside the commands, so that `softtact --help` answers at once.
+"""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+import softtact
+from softtact.errors import InputError, SofttactError
+
+UNITS = ("mm", "cm", "m", "inch")
+MODELS = ("auto", "elastic", "hyperelastic")
+
+
+def main(arguments=None):
+    """Run one command; return its exit status."""
+    options = _parser().parse_args(arguments)
+    try:
+        options.run(options)
+    except SofttactError as error:
+        print(f"softtact {options.command}: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print(f"softtact {options.command}: interrupted; nothing was written.", file=sys.stderr)
+        return 130
+    return 0
+
+
+class _Parser(argparse.ArgumentParser):
+    """An argument parser whose complaint is one sentence."""
+
+    def error(self, message):
+        self.exit(2, f"{self.prog}: {message}; see {self.prog} --help.\n")
+
+
+def _parser():
+    parser = _Parser(prog="softtact", description=softtact.__doc__)
+    parser.add_argument("--version", action="version", version=f"softtact {softtact.__version__}")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for add in (_add_press, _add_complexity, _add_fit, _add_stage):
+        add(commands)
+    return parser
+
+
+def _add_command(commands, name, run, summary):
+    command = commands.add_parser(name, help=summary, description=summary)
+    command.set_defaults(run=run)
+    if name != "stage":
+        command.add_argument("--json", action="store_true", help="print the result as JSON")
+    return command
+
+
+def _add_mesh(command):
+    command.add_argument("mesh", metavar="MESH", type=Path, help="STL, OBJ or PLY file of a closed body")
+    command.add_argument("--unit", required=True, choices=UNITS, help="the mesh's unit; the file itself does not say")
+    command.add_argument("--pose", metavar="x,y,z,rx,ry,rz",
+                         help="the mesh's origin in the sensor's frame, mm and degrees (default: centred, touching); "
+                              "write --pose=-1,... where it begins with a minus")
+    command.add_argument("--sensor", default="coro", help="name or YAML file of a sensor (default: coro)")
+
+
+def _print(result, *, as_json, lines):
+    """`result` as JSON, or the lines for people."""
+    print(json.dumps(result, indent=2) if as_json else "\n".join(lines))
+
+
+def _add_press(commands):
+    command = _add_command(commands, "press", _press, "Press a mesh on the sensor: deformation map and taxels.")
+    _add_mesh(command)
+    command.add_argument("--force", type=float, action="append", required=True, metavar="N",
+                         help="force in N; repeat it for several levels")
+    command.add_argument("--model", choices=MODELS, default="auto",
+                         help="auto takes the one that the mesh's complexity asks for (default)")
+    command.add_argument("--out", type=Path, metavar="FILE.nc", help="write the maps as NetCDF")
+    command.add_argument("--plot", type=Path, metavar="FILE.png", help="draw deformation map and taxels")
+
+
+def _press(options):
+    from softtact.geometry.meshes import check_over_sensor, place, read_mesh
+
+    spec, forces, pose = _sensor_spec(options.sensor), sorted(set(options.force)), _pose(options)
+    _check_forces(forces, spec)
+    _check_folders(options.out, options.plot)
+    mesh = read_mesh(options.mesh, unit=options.unit)
+    check_over_sensor(place(mesh, pose=pose), spec.footprint_mm, name=str(options.mesh))
+    result = softtact.load_sensor(options.sensor).press(mesh, pose=pose, force_n=forces, model=options.model)
+    if options.out:
+        result.write(options.out)
+    if options.plot:
+        from softtact.reporting.press_plot import plot_press
+
+        plot_press(result, options.plot)
+    summary = _press_summary(result)
+    _print(summary, as_json=options.json, lines=_press_lines(summary))
+
+
+def _check_forces(forces, spec):
+    """Refuse a force that the sensor does not bear, before a mesh is read or a solver loaded."""
+    low, high = spec.force_range_n
+    for force in forces:
+        if not low < force <= high:
+            raise InputError(f"--force {force:g}: {force:g} N is out of the range of sensor {spec.name}; "
+                             f"give a force above {low:g} N and up to {high:g} N.")
+
+
+def _press_summary(result):
+    """What a press gave at each force, as plain JSON values."""
+    levels = {"force_n": result.force_n, "indentation_mm": result.indentation_mm,
+              "contact_area_mm2": result.contact_area_mm2,
+              "largest_deformation_mm": result.deformation_map_mm.max(axis=(1, 2)),
+              "tactile_map": result.tactile_map}
+    return {"model": result.model} | {name: values.tolist() for name, values in levels.items()}
+
+
+def _press_lines(summary):
+    yield f"model: {summary['model']}"
+    yield f"{'force, N':>10}{'indentation, mm':>18}{'contact, mm2':>15}{'deepest, mm':>14}{'counts, sum':>14}"
+    names = ("force_n", "indentation_mm", "contact_area_mm2", "largest_deformation_mm", "tactile_map")
+    for force, depth, area, deepest, counts in zip(*(summary[name] for name in names), strict=True):
+        yield f"{force:10.4g}{depth:18.4f}{area:15.1f}{deepest:14.4f}{sum(map(sum, counts)):14.0f}"
+
+
+def _pose(options):
+    from softtact.geometry.pose import Pose
+
+    return Pose.parse(options.pose) if options.pose else None
+
+
+def _check_folders(*paths):
+    """Refuse now what could not be written after a long press."""
+    for path in paths:
+        if path and not path.parent.is_dir():
+            raise InputError(f"{path}: there is no folder {path.parent}; make it first.")
+
+
+def _add_complexity(commands):
+    command = _add_command(commands, "complexity", _complexity, "Count a mesh's complexity and choose its model.")
+    _add_mesh(command)
+    command.add_argument("--rule", choices=("any", "all"), default="any",
+                         help="which of the two criteria the hyperelastic model takes (default: any)")
+
+
+def _complexity(options):
+    from softtact.geometry.complexity import choose_model, score_file
+
+    spec = _sensor_spec(options.sensor)
+    counts = score_file(options.mesh, unit=options.unit, footprint_mm=spec.footprint_mm, pose=_pose(options),
+                        reach_mm=spec.thickness_mm)
+    four = {"NPt": counts.NPt, "CHt": counts.CHt, "NPo": counts.NPo, "CHo": counts.CHo}
+    result = four | {"ratio_total": counts.ratio_total, "ratio_overlap": counts.ratio_overlap}
+    result["model"] = choose_model(**four, rule=options.rule)
+    _print(result, as_json=options.json, lines=[f"{name:14}{_short(value)}" for name, value in result.items()])
+
+
+def _add_fit(commands):
+    command = _add_command(commands, "fit", _fit, "Fit hyperelastic laws to test curves and write a material card.")
+    command.add_argument("curves", nargs="+", type=Path, metavar="CURVES", help="CSV files, one test each")
+    command.add_argument("--law", default="all", help="a law's name, several with commas, or all (default)")
+    command.add_argument("--choose", default="best", help="the law that solvers take (default: best of the ranking)")
+    command.add_argument("--mode", choices=("uniaxial", "equibiaxial", "planar"),
+                         help="test mode of all the files (default: as each file or its name says)")
+    command.add_argument("--layout", choices=("plain", "soro_db", "stress_stretch"), default="plain",
+                         help="how the files are laid out (default: plain, columns named in a header)")
+    command.add_argument("--material", default="material", help="the material's name in the card")
+    command.add_argument("--poisson", type=float, help="Poisson's ratio of the linear constants")
+    command.add_argument("--bulk-over-shear", type=float, default=20.0, metavar="RATIO", help="K / mu0 (default: 20)")
+    command.add_argument("--out", type=Path, required=True, metavar="CARD.json", help="the material card to write")
+
+
+def _fit(options):
+    from softtact.files import write_json
+    from softtact.materials.cards import make_card
+    from softtact.materials.readers import read_curves
+
+    _check_folders(options.out)
+    curves = read_curves(options.curves, mode=options.mode, layout=options.layout)
+    laws = "all" if options.law == "all" else options.law.split(",")
+    card = make_card(curves, material=options.material, laws=laws, choose=options.choose, poisson=options.poisson,
+                     bulk_over_shear=options.bulk_over_shear)
+    write_json(options.out, card)
+    _print(card, as_json=options.json, lines=[*_fit_lines(card), f"written: {options.out}"])
+
+
+def _fit_lines(card):
+    yield f"{'law':20}{'RMSE, MPa':>12}{'mu0, MPa':>12}  stable over the data"
+    for name in card["ranking"]:
+        law = card["laws"][name]
+        chosen = "  <- chosen" if name == card["chosen"] else ""
+        stable = "yes" if law["stable_over_data"] else "no"
+        yield f"{name:20}{law['rmse_mpa']:12.4g}{law['mu0_mpa']:12.4g}  {stable}{chosen}"
+    yield from card["warnings"]
+
+
+def _add_stage(commands):
+    from softtact.stages.__main__ import add_arguments
+
+    add_arguments(_add_command(commands, "stage", _stage, "Run one stage of the workflow on files, as its rule does."))
+
+
+def _stage(options):
+    from softtact.stages.__main__ import run_stage
+
+    run_stage(options)
+
+
+def _sensor_spec(name):
+    """The description of a sensor by its name or its YAML file, without its solvers."""
+    from softtact.config import sensor_file
+    from softtact.geometry.sensor_spec import SensorSpec
+
+    return SensorSpec.from_yaml(sensor_file(name))
+
+
+def _short(value):
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+

@@ -1,0 +1,106 @@
+"""The command line: what it answers, and how it refuses."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from softtact.cli import main
+
+ROOT = Path(__file__).resolve().parents[1]
+OBJECT = ROOT / "config/objects/grasped/object_5.stl"
+
+
+@pytest.fixture(autouse=True)
+def in_project(monkeypatch):
+    monkeypatch.chdir(ROOT)
+
+
+@pytest.fixture
+def refused(capsys):
+    """Run a command that must refuse; (exit status, its one sentence)."""
+
+    def run(*arguments):
+        try:
+            status = main([str(argument) for argument in arguments])
+        except SystemExit as stop:
+            status = stop.code
+        captured = capsys.readouterr()
+        assert captured.out == "" and captured.err.count("\n") == 1, captured
+        return status, captured.err
+
+    return run
+
+
+@pytest.fixture
+def answer(capsys):
+    """Run a command that must succeed; its output."""
+
+    def run(*arguments):
+        assert main([str(argument) for argument in arguments]) == 0
+        return capsys.readouterr().out
+
+    return run
+
+
+@pytest.mark.parametrize("command", [[], ["press"], ["complexity"], ["fit"], ["stage"]])
+def test_every_command_has_help(command, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main([*command, "--help"])
+    assert stop.value.code == 0
+    assert "usage: softtact" in capsys.readouterr().out
+
+
+def test_help_comes_without_loading_a_solver():
+    listed = "import sys, softtact.cli; print([m for m in ('torch', 'scipy', 'numba', 'pandas') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", listed], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "said"),
+    [
+        (["press", OBJECT, "--force", 20], 2, "--unit"),
+        (["press", OBJECT, "--unit", "mm"], 2, "--force"),
+        (["press", OBJECT, "--unit", "furlong", "--force", 20], 2, "furlong"),
+        (["press", OBJECT, "--unit", "mm", "--force", "much"], 2, "much"),
+        (["press", OBJECT, "--unit", "mm", "--force", 20, "--model", "plastic"], 2, "plastic"),
+        (["press", OBJECT, "--unit", "mm", "--force", 0], 1, "0 N"),
+        (["press", OBJECT, "--unit", "mm", "--force=-5"], 1, "-5 N"),
+        (["press", OBJECT, "--unit", "mm", "--force", 51], 1, "51 N"),
+        (["press", OBJECT, "--unit", "mm", "--force", 5, "--sensor", "cora"], 1, "cora"),
+        (["press", OBJECT, "--unit", "mm", "--force", 5, "--out", "no/such/folder.nc"], 1, "no/such"),
+        (["press", OBJECT, "--unit", "mm", "--force", 5, "--pose", "1,2,3"], 1, "six"),
+        (["press", OBJECT, "--unit", "mm", "--force", 5, "--pose", "100,0,0,0,0,0"], 1, "misses the sensor"),
+        (["press", OBJECT, "--unit", "m", "--force", 5], 1, "mm"),
+        (["press", "none.stl", "--unit", "mm", "--force", 5], 1, "none.stl"),
+        (["complexity", "none.stl", "--unit", "mm"], 1, "none.stl"),
+        (["fit", "none.csv", "--out", "card.json"], 1, "none.csv"),
+        (["stage", "no_such_stage"], 1, "no_such_stage"),
+        (["stage", "fit_material", "--in", "curves"], 1, "NAME=PATH"),
+        (["stage", "fit_material", "--settings", "{"], 1, "JSON"),
+        (["prss"], 2, "prss"),
+    ],
+)
+def test_a_refusal_is_one_sentence_and_a_status(arguments, status, said, refused):
+    got, sentence = refused(*arguments)
+    assert got == status
+    assert said in sentence
+
+
+def test_complexity_counts_and_chooses(answer):
+    told = json.loads(answer("complexity", OBJECT, "--unit", "mm", "--json"))
+    assert told["NPt"] % 3 == 0 and told["model"] == "hyperelastic"
+    assert "hyperelastic" in answer("complexity", OBJECT, "--unit", "mm")
+
+
+def test_fit_writes_a_card_and_ranks_the_laws(answer, tmp_path):
+    curve = tmp_path / "uniaxial.csv"
+    rows = [f"{x},{0.4 * (x - x**-2)}\n" for x in (0.8, 0.9, 1.1, 1.3)]  # neo-Hookean, 2 C10 = 0.4 MPa
+    curve.write_text("stretch,nominal_stress_mpa\n" + "".join(rows))
+    card = tmp_path / "card.json"
+    said = answer("fit", curve, "--law", "neo_hooke", "--out", card)
+    assert json.loads(card.read_text())["laws"]["neo_hooke"]["parameters"]["c10"] == pytest.approx(0.2, rel=1e-6)
+    assert "neo_hooke" in said and str(card) in said
