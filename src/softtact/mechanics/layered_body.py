@@ -1,0 +1,206 @@
+"""The layered sensor as one body: slab (sheet and cover) tied to the bed of frusta, and one Newton step of it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from softtact.contact.height_field import HeightField
+from softtact.mechanics.frustum_bed import BedGeometry, BedState, ContactSettings, FrustumBed
+from softtact.mechanics.linear_solvers import make_solver
+from softtact.mechanics.slab import Slab, SlabState
+
+
+@dataclass(frozen=True)
+class MeshSettings:
+    """Resolution of the layered body.
+
+    cells_per_pitch: slab elements along one pitch; sheet_layers, cover_layers: elements through each layer;
+    frustum_levels: heights of the frustum's element layers as shares of its height.
+    """
+
+    cells_per_pitch: int = 1
+    sheet_layers: int = 1
+    cover_layers: int = 2
+    frustum_levels: tuple = (0.0, 0.2, 0.6, 1.0)
+
+
+@dataclass(frozen=True)
+class BodyState:
+    """Slab and bed at one displacement, and the potential energy (mJ) of both with their contacts."""
+
+    slab: SlabState
+    bed: BedState
+    indentation: float
+
+    @property
+    def energy(self):
+        return self.slab.energy + self.bed.energy
+
+    @property
+    def force(self):
+        """Force (N) that the object exerts downwards."""
+        return self.slab.indentation_force
+
+
+@dataclass(frozen=True)
+class Step:
+    """A Newton step: slab (n, 3), frusta (f, nodes, 3) in mm, indentation in mm."""
+
+    slab: np.ndarray
+    bed: np.ndarray
+    indentation: float
+
+    def largest(self):
+        return max(np.abs(self.slab).max(), np.abs(self.bed).max(), abs(self.indentation))
+
+
+class LayeredBody:
+    """Slab on frusta on a rigid PCB, pressed from above by a rigid object. Lengths in mm, z = 0 at the top at rest."""
+
+    def __init__(self, slab, bed, *, sheet_layers):
+        self.slab, self.bed = slab, bed
+        self.electrode_plane = sheet_layers
+        self.tie_nodes, self.tie_weights = self._tie()
+        slab.build_pattern(self.tie_nodes)
+        self.solver = make_solver()
+        self.quasi_newton = 0
+
+    def _tie(self):
+        """Slab nodes (f, k) and weights (f, roots, k): each root node follows the sheet's lower side."""
+        bed, slab = self.bed, self.slab
+        roots = bed.coordinates[:, bed.root]
+        inward = roots[..., :2] + 1e-7 * (bed.geometry.centres[:, None] - roots[..., :2])
+        quads, values = slab.locate(inward.reshape(-1, 2))
+        nodes = slab.mesh.planes[0][slab.plan.quads[quads]].reshape(bed.count, -1, 8)
+        values = values.reshape(bed.count, -1, 8)
+        unique = [np.unique(n) for n in nodes]
+        width = max(map(len, unique))
+        tied = np.stack([np.pad(u, (0, width - len(u)), mode="edge") for u in unique])
+        weights = np.zeros((bed.count, nodes.shape[1], width))
+        for f, own in enumerate(unique):
+            rows = np.arange(nodes.shape[1])[:, None]
+            np.add.at(weights[f], (rows, np.searchsorted(own, nodes[f])), values[f])
+        return tied, weights
+
+    def rest(self):
+        """Displacements of slab (n, 3) and frusta (f, nodes, 3) at rest."""
+        return np.zeros((self.slab.nodes, 3)), np.zeros((self.bed.count, self.bed.nodes, 3))
+
+    def evaluate(self, slab_displacement, bed_displacement, indentation, planes):
+        """State at given displacements; None where an element is inside out."""
+        slab = self.slab.evaluate(slab_displacement, planes, indentation)
+        bed = self.bed.evaluate(bed_displacement) if slab is not None else None
+        return None if bed is None else BodyState(slab=slab, bed=bed, indentation=indentation)
+
+    def newton_step(self, state, force_n):
+        """The Newton step under a given force (N), or with the indentation kept where `force_n` is None."""
+        self.bed.refresh(state.bed)
+        root_force, correction = self.bed.condensed_residual(state.bed)
+        residual = state.slab.force.copy()
+        np.add.at(residual, self.tie_nodes.ravel(), self._roots_to_slab(root_force).reshape(-1, 3))
+        right = residual.ravel()[self.slab.free]
+        matrix, border, corner = self.slab.tangent(state.slab, self._tied_blocks())
+        self.solver.factor(matrix)
+        step, lowering = -self.solver.solve(right), 0.0
+        if force_n is not None:
+            along = self.solver.solve(border)
+            lowering = (force_n - state.force - border @ step) / (corner - border @ along)
+            step -= along * lowering
+        full = np.zeros(3 * self.slab.nodes)
+        full[self.slab.free] = step
+        full = full.reshape(-1, 3)
+        return Step(slab=full, bed=self.bed.inner_step(correction, self.roots_of(full).reshape(self.bed.count, -1)),
+                    indentation=lowering)
+
+    def residual_norm(self, state, force_n):
+        """Largest unbalanced nodal force in N, over slab, frusta and the object."""
+        root = state.bed.force[:, self.bed.root].reshape(self.bed.count, -1)
+        total = state.slab.force.copy()
+        np.add.at(total, self.tie_nodes.ravel(), self._roots_to_slab(root).reshape(-1, 3))
+        parts = [np.abs(total.ravel()[self.slab.free]).max(), np.abs(self.bed.inner_residual(state.bed)).max()]
+        if force_n is not None:
+            parts.append(abs(state.force - force_n))
+        return float(max(parts))
+
+    def roots_of(self, slab_field):
+        """A slab field (n, 3) at the frusta's root nodes (f, roots, 3)."""
+        return np.matmul(self.tie_weights, slab_field[self.tie_nodes])
+
+    def _roots_to_slab(self, root_force):
+        return np.matmul(self.tie_weights.transpose(0, 2, 1), root_force.reshape(self.bed.count, -1, 3))
+
+    def _tied_blocks(self):
+        """Condensed frusta (f, 60, 60) moved to the slab's nodes (f, 3 k, 3 k)."""
+        f, roots, width = self.tie_weights.shape
+        K = self.bed.condensed.reshape(f, roots, 3, roots, 3)
+        half = np.einsum("frisj,fsm->frimj", K, self.tie_weights, optimize=True)
+        return np.einsum("fri mj,frk->fkimj".replace(" ", ""), half, self.tie_weights,
+                         optimize=True).reshape(f, 3 * width, 3 * width)
+
+
+def _lines(side, count, pitch, cells):
+    """Grid lines: the frusta's lattice divided into `cells` per pitch, and a strip to each edge where one is left."""
+    half = 0.5 * count * pitch
+    inner = np.linspace(-half, half, count * cells + 1)
+    margin = 0.5 * side - half
+    return np.concatenate([[-0.5 * side], inner, [0.5 * side]]) if margin > 1e-6 else inner
+
+
+def _levels(bottom, heights, layers):
+    """Levels of height through consecutive layers, each divided evenly."""
+    out = [bottom]
+    for height, count in zip(heights, layers, strict=True):
+        out += list(out[-1] + height * np.arange(1, count + 1) / count)
+    return np.array(out)
+
+
+def lattice(counts, pitch):
+    """Centres (n, 2) of a frustum lattice around the origin and who has a neighbour in +x, +y, -x, -y (n, 4)."""
+    nx, ny = counts
+    i, j = (grid.ravel() for grid in np.meshgrid(np.arange(nx), np.arange(ny)))
+    centres = pitch * np.column_stack([i - 0.5 * (nx - 1), j - 0.5 * (ny - 1)])
+    return centres, np.column_stack([i < nx - 1, j < ny - 1, i > 0, j > 0])
+
+
+def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), scatter=None, contact=None):
+    """The whole sensor. `scatter`: None or (heights factor (n,), tip diameter factor (n,)) of its frusta."""
+    frusta, counts = spec.dielectric.frusta, spec.frusta_counts
+    bottom = -(spec.cover.thickness_mm + spec.dielectric.sheet_thickness_mm)
+    x_lines, y_lines = (_lines(side, count, frusta.pitch_mm, mesh.cells_per_pitch)
+                        for side, count in zip(spec.footprint_mm, counts, strict=True))
+    z = _levels(bottom, [spec.dielectric.sheet_thickness_mm, spec.cover.thickness_mm], [mesh.sheet_layers, mesh.cover_layers])
+    laws = [dielectric_law] * mesh.sheet_layers + [cover_law] * mesh.cover_layers
+    slab = Slab(x_lines, y_lines, z, laws, sides="held", contact=contact or ContactSettings(stiffness=500.0))
+    centres, neighbours = lattice(counts, frusta.pitch_mm)
+    bed = _bed(spec, centres, neighbours, dielectric_law, mesh, scatter, contact)
+    return LayeredBody(slab, bed, sheet_layers=mesh.sheet_layers)
+
+
+def build_unit_cell(spec, *, dielectric_law, mesh=MeshSettings(cells_per_pitch=2), height_factor=1.0, tip_factor=1.0):
+    """One frustum of an endless lattice with its share of the sheet, without a cover."""
+    frusta = spec.dielectric.frusta
+    lines = _lines(frusta.pitch_mm, 1, frusta.pitch_mm, mesh.cells_per_pitch)
+    bottom = -spec.dielectric.sheet_thickness_mm
+    slab = Slab(lines, lines, _levels(bottom, [-bottom], [mesh.sheet_layers]), [dielectric_law] * mesh.sheet_layers,
+                sides="symmetric", contact=ContactSettings(stiffness=500.0))
+    bed = _bed(spec, np.zeros((1, 2)), np.ones((1, 4), dtype=bool), dielectric_law, mesh,
+               (np.array([height_factor]), np.array([tip_factor])), None, bottom=bottom)
+    return LayeredBody(slab, bed, sheet_layers=mesh.sheet_layers)
+
+
+def _bed(spec, centres, neighbours, law, mesh, scatter, contact, *, bottom=None):
+    frusta = spec.dielectric.frusta
+    if bottom is None:
+        bottom = -(spec.cover.thickness_mm + spec.dielectric.sheet_thickness_mm)
+    height_factor, tip_factor = scatter or (np.ones(len(centres)), np.ones(len(centres)))
+    heights = frusta.height_mm * height_factor
+    # Every cone is built with the same root; where its printed readings are swapped the tip is the wide end.
+    geometry = BedGeometry(centres=centres, heights=heights, tip_diameters=frusta.tip_diameter_mm * tip_factor,
+                           root_diameter=frusta.root_diameter_mm, neighbours=neighbours)
+    return FrustumBed(geometry, law, levels=np.asarray(mesh.frustum_levels) * frusta.height_mm, root_z_mm=bottom,
+                      pcb_z_mm=bottom - heights.max(), tips_held=spec.tips_held, contact=contact or ContactSettings())
+
+
+def surface_of(mesh):
+    """The object's underside as the body asks for it."""
+    return HeightField(mesh)
