@@ -55,7 +55,7 @@ class Slab:
         for end in range(1, len(laws) + 1):
             if end == len(laws) or laws[end] is not laws[start]:
                 hexes = np.vstack([self.mesh.layer(k) for k in range(start, end)])
-                blocks.append((hexes, HexBlock(self.mesh.points[hexes], laws[start])))
+                blocks.append((hexes, HexBlock(self.mesh.points[hexes], laws[start], points_per_side=2)))
                 start = end
         return blocks
 

@@ -1,0 +1,54 @@
+"""What a press gives: maps and numbers per force level, with names and units."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from softtact.files import write_dataset
+
+
+@dataclass(frozen=True)
+class PressResult:
+    """One press through a list of forces.
+
+    deformation_map_mm (force, y, x): towards the PCB, positive;  tactile_map (force, row, column): ideal counts
+    force_n, indentation_mm, contact_area_mm2, penetration_mm, wall_time_s, iterations, converged, within_validity (force,)
+    frustum_compression_mm (force,): of the most compressed frustum, nan where the model has none
+    x_mm (x,), y_mm (y,): the map's grid;  model;  solver: the linear solver's name
+    """
+
+    deformation_map_mm: np.ndarray
+    tactile_map: np.ndarray
+    force_n: np.ndarray
+    indentation_mm: np.ndarray
+    contact_area_mm2: np.ndarray
+    penetration_mm: np.ndarray
+    frustum_compression_mm: np.ndarray
+    iterations: np.ndarray
+    converged: np.ndarray
+    within_validity: np.ndarray
+    wall_time_s: np.ndarray
+    x_mm: np.ndarray
+    y_mm: np.ndarray
+    model: str
+    sensor: str
+    solver: str
+    attributes: dict = field(default_factory=dict)
+
+    _PER_FORCE = ("indentation_mm", "contact_area_mm2", "penetration_mm", "frustum_compression_mm", "iterations",
+                  "converged", "within_validity", "wall_time_s")
+
+    def to_dataset(self):
+        """The result as an xarray dataset with dimensions force, y, x, row, column."""
+        import xarray
+
+        variables = {name: ("force", getattr(self, name)) for name in self._PER_FORCE}
+        variables["deformation_map_mm"] = (("force", "y", "x"), self.deformation_map_mm, {"units": "mm"})
+        variables["tactile_map"] = (("force", "row", "column"), self.tactile_map, {"units": "counts"})
+        variables["force_n"] = ("force", self.force_n, {"units": "N"})
+        attributes = {"model": self.model, "sensor": self.sensor, "solver": self.solver, **self.attributes}
+        return xarray.Dataset(variables, coords={"x": self.x_mm, "y": self.y_mm}, attrs=attributes)
+
+    def write(self, path, *, settings=None, seed=None):
+        """Write as NetCDF."""
+        write_dataset(path, self.to_dataset(), seed=seed, settings=settings or {})

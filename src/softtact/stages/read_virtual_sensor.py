@@ -1,0 +1,23 @@
+"""The virtual sensor's readings of a reference press.
+
+inputs: press;  outputs: tactile;  settings: sensor, virtual_sensor, trials, seed
+"""
+
+import xarray
+
+from softtact.files import read_dataset, write_dataset
+from softtact.geometry.sensor_spec import SensorSpec
+from softtact.sensing.virtual_sensor import VirtualSensorSettings, read_virtual_sensor
+
+
+def run(*, inputs, outputs, settings, threads=1):
+    """Read `trials` loadings and write their counts."""
+    press = read_dataset(inputs["press"])
+    item = f"{press.attrs['set']}/{press.attrs['item']}"
+    counts = read_virtual_sensor(SensorSpec.from_dict(settings["sensor"]), press.deformation_map_mm.values,
+                                 trials=settings["trials"], seed=settings["seed"], item=item,
+                                 settings=VirtualSensorSettings.from_dict(settings["virtual_sensor"]))
+    data = xarray.Dataset({"tactile_map": (("trial", "force", "row", "column"), counts, {"units": "counts"}),
+                           "force_n": ("force", press.force_n.values, {"units": "N"})},
+                          attrs={"source": "virtual sensor", "set": press.attrs["set"], "item": press.attrs["item"]})
+    write_dataset(outputs["tactile"], data, seed=settings["seed"], settings=settings)

@@ -1,0 +1,39 @@
+"""One item pressed with one model through all forces.
+
+inputs: object (STL), and of compliance, card_dielectric, card_cover what the model needs
+outputs: press;  settings: item {name, set, unit, pose}, sensor, model, laws {layer: law}, mesh, forces_n
+"""
+
+from softtact.errors import ConvergenceError
+from softtact.geometry.meshes import read_mesh
+from softtact.geometry.pose import Pose
+from softtact.geometry.sensor_spec import SensorSpec
+from softtact.materials.cards import law_from_card, load_card
+from softtact.mechanics.elastic import Compliance
+from softtact.mechanics.layered_mesh import frustum_scatter, mesh_settings
+from softtact.sensor import Sensor
+
+
+def run(*, inputs, outputs, settings, threads=1):
+    """Press, and write the maps; a press that does not converge fails with its name."""
+    item, mesh = settings["item"], settings["mesh"]
+    spec = SensorSpec.from_dict(settings["sensor"])
+    names = {"model": settings["model"], "set": item["set"], "item": item["name"]}
+    sensor = Sensor(spec, laws=_laws(inputs, settings["laws"]), attributes=names)
+    if "compliance" in inputs:
+        sensor.compliance, solver = Compliance.load(inputs["compliance"]), "elastic"
+    else:
+        sensor.mesh, sensor.scatter, solver = mesh_settings(mesh), frustum_scatter(spec, mesh), "hyperelastic"
+    pose = None if item["pose"] is None else Pose.from_values(item["pose"])
+    label = f"{item['set']}/{item['name']}/{settings['model']}"
+    try:
+        result = sensor.press(read_mesh(inputs["object"], unit=item["unit"]), pose=pose, force_n=settings["forces_n"],
+                              model=solver, label=label)
+    except ConvergenceError as error:
+        raise ConvergenceError(f"{label}: {error}") from None
+    result.write(outputs["press"], settings=settings)
+
+
+def _laws(inputs, laws):
+    """One law per layer from the fitted cards."""
+    return {layer: law_from_card(load_card(inputs[f"card_{layer}"]), law) for layer, law in laws.items()}
