@@ -101,9 +101,9 @@ class LayeredBody:
         right = residual.ravel()[self.slab.free]
         matrix, border, corner = self.slab.tangent(state.slab, self._tied_blocks())
         self.solver.factor(matrix)
-        step, lowering = -self.solver.solve(right), 0.0
+        solutions = self.solver.solve(np.column_stack([right, border]))
+        step, along, lowering = -solutions[:, 0], solutions[:, 1], 0.0
         if force_n is not None:
-            along = self.solver.solve(border)
             lowering = (force_n - state.force - border @ step) / (corner - border @ along)
             step -= along * lowering
         full = np.zeros(3 * self.slab.nodes)

@@ -17,34 +17,55 @@ def make_solver():
 
 
 class PardisoSolver:
-    """MKL PARDISO for symmetric, possibly indefinite matrices; the analysis is reused while the pattern stays."""
+    """MKL PARDISO: Cholesky, or Bunch-Kaufman where a matrix is indefinite; the analysis is reused while the pattern stays."""
 
     name = "pardiso"
-    _SYMMETRIC_INDEFINITE, _ANALYSE, _FACTOR, _SOLVE, _ANALYSE_AND_FACTOR = -2, 11, 22, 33, 12
+    _POSITIVE, _INDEFINITE = 2, -2
+    _FACTOR, _SOLVE, _ANALYSE_AND_FACTOR = 22, 33, 12
 
     def __init__(self):
+        self._solvers, self._patterns, self._upper = {}, {}, None
+        self._start(self._POSITIVE)
+
+    def _start(self, kind):
         from pypardiso import PyPardisoSolver
 
-        self._solver = PyPardisoSolver(mtype=self._SYMMETRIC_INDEFINITE)
-        self._upper = None
+        if kind not in self._solvers:
+            self._solvers[kind] = PyPardisoSolver(mtype=kind)
+        self._current = kind
 
     def factor(self, upper):
         """Factor the matrix whose upper triangle (csr, sorted, with its diagonal) is given."""
-        same = self._upper is not None and self._upper.indptr is upper.indptr and self._upper.indices is upper.indices
+        from pypardiso.pardiso_wrapper import PyPardisoError
+
         self._upper = upper
-        self._solver.set_phase(self._FACTOR if same else self._ANALYSE_AND_FACTOR)
-        self._solver._call_pardiso(upper, np.zeros((upper.shape[0], 1)))
+        self._start(self._POSITIVE)
+        try:
+            self._factor()
+        except PyPardisoError:
+            self._start(self._INDEFINITE)
+            self._factor()
+
+    def _factor(self):
+        known = self._patterns.get(self._current)
+        same = known is not None and known[0] is self._upper.indptr and known[1] is self._upper.indices
+        solver = self._solvers[self._current]
+        solver.set_phase(self._FACTOR if same else self._ANALYSE_AND_FACTOR)
+        solver._call_pardiso(self._upper, np.zeros((self._upper.shape[0], 1)))
+        self._patterns[self._current] = (self._upper.indptr, self._upper.indices)
 
     def solve(self, right):
         """Solve for one (n,) or several (n, k) right-hand sides."""
-        self._solver.set_phase(self._SOLVE)
+        solver = self._solvers[self._current]
+        solver.set_phase(self._SOLVE)
         columns = np.asfortranarray(right.reshape(len(right), -1))
-        return self._solver._call_pardiso(self._upper, columns).reshape(right.shape)
+        return solver._call_pardiso(self._upper, columns).reshape(right.shape)
 
     def close(self):
         """Free the factors, which live outside Python's memory."""
-        self._solver.free_memory(everything=True)
-        self._upper = None
+        for solver in self._solvers.values():
+            solver.free_memory(everything=True)
+        self._patterns, self._upper = {}, None
 
 
 class SuperLUSolver:
