@@ -1,0 +1,44 @@
+"""The lower envelope of an object: exact to its triangles, silent beside it."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from softtact.contact.height_field import NO_CONTACT_MM, HeightField, lowest_crossing_naive
+from softtact.contact.penalty import penalty
+
+
+def sphere(radius=3.0):
+    mesh = trimesh.creation.icosphere(subdivisions=2, radius=radius)
+    mesh.apply_translation([0.3, -0.2, radius])
+    return mesh
+
+
+def test_bins_give_what_testing_every_triangle_gives():
+    rng = np.random.default_rng(0)
+    x, y = rng.uniform(-4, 4, (2, 500))
+    fast, _ = HeightField(sphere())(x, y)
+    assert fast == pytest.approx(lowest_crossing_naive(x, y, sphere()), abs=1e-12)
+
+
+def test_beside_the_object_there_is_no_contact():
+    height, normal = HeightField(sphere())(np.array([10.0]), np.array([0.0]))
+    assert height[0] == NO_CONTACT_MM and normal[0] == pytest.approx([0, 0, -1])
+
+
+def test_a_flat_base_is_level_and_faces_down():
+    box = trimesh.creation.box((4, 4, 2))
+    box.apply_translation([0, 0, 1.5])
+    height, normal = HeightField(box)(np.array([0.1, 1.9]), np.array([0.3, -1.9]))
+    assert height == pytest.approx([0.5, 0.5]) and normal == pytest.approx(np.array([[0, 0, -1.0]] * 2))
+
+
+def test_penalty_pressure_and_slope_are_derivatives_of_its_energy():
+    gap, step = np.array([-5e-3, -1e-3, -4e-4, 1e-3]), 1e-8
+    options = {"stiffness": 2000.0, "smoothing": 1e-3}
+    energy = [penalty(gap + s * step, **options)[0] for s in (1, -1)]
+    pressure = [penalty(gap + s * step, **options)[1] for s in (1, -1)]
+    _, p, slope = penalty(gap, **options)
+    assert p == pytest.approx(-(energy[0] - energy[1]) / (2 * step), rel=1e-5, abs=1e-9)
+    away = np.array([True, False, True, True])   # at the smoothing depth itself the slope has a kink
+    assert slope[away] == pytest.approx((-(pressure[0] - pressure[1]) / (2 * step))[away], rel=1e-4, abs=1e-6)
