@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from softtact.geometry.sensor_spec import SensorSpec
-from softtact.sensing.capacitance import EPSILON_0_PF_PER_MM, capacitance_per_area, ideal_counts, layer_heights, taxel_means
+from softtact.sensing.capacitance import (
+    EPSILON_0_PF_PER_MM,
+    capacitance_per_area,
+    ideal_counts,
+    layer_heights,
+    taxel_means,
+)
 from softtact.sensing.virtual_sensor import VirtualSensorSettings, lagged, read_virtual_sensor
 
 SPEC = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")

@@ -1,11 +1,11 @@
 """The sensor as its YAML file describes it: sizes in mm, layers, frusta, taxels. No mechanics."""
 
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 import yaml
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PositiveFloat, PositiveInt, ValidationError
-from typing_extensions import Annotated
 
 from softtact.errors import InputError
 

@@ -1,6 +1,7 @@
 """The virtual sensor: what a real one would read of a reference press. A stand-in, and named so wherever it is used.
 
-Reference deformation -> capacitance per taxel -> hysteresis along the loading -> gain, offset and drift of the specimen -> the converter's noise
+Reference deformation -> capacitance per taxel -> hysteresis along the loading -> gain, offset and drift of the specimen ->
+the converter's noise
 and steps. One seed is one specimen; trials differ in contact noise, drift and converter noise.
 """
 

@@ -7,8 +7,8 @@ import meshio
 
 from softtact.files import atomic_path
 from softtact.geometry.sensor_spec import SensorSpec
-from softtact.mechanics.layered_mesh import layered_mesh
 from softtact.mechanics.elastic import layer_mesh
+from softtact.mechanics.layered_mesh import layered_mesh
 
 
 def run(*, inputs, outputs, settings, threads=1):

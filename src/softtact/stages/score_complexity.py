@@ -1,0 +1,14 @@
+"""STL files of objects -> table of complexity counts and the model that each asks for."""
+
+from softtact.files import write_csv
+from softtact.geometry.complexity import score_objects
+
+
+def run(*, inputs, outputs, settings, threads=1):
+    """meshes (one or more) -> table (complexity.csv).
+
+    settings: objects (list of {name, unit, pose}, in the order of the meshes), footprint_mm, and optionally rule,
+    thresholds {total, overlap}, reach_mm
+    """
+    meshes = inputs["meshes"] if isinstance(inputs["meshes"], list) else [inputs["meshes"]]
+    write_csv(outputs["table"], score_objects(meshes, **settings))

@@ -1,0 +1,87 @@
+"""The generated objects: closed, same bytes again, sized for the sensor and its full force."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from softtact.geometry.meshes import default_pose, place, read_mesh
+from softtact.geometry.shapes import LOW_FEATURE, make_mesh, object_5, object_6, write_objects
+from softtact.geometry.solids import to_mesh
+
+OBJECTS = Path(__file__).parents[2] / "config" / "objects"
+CATALOGUE = yaml.safe_load((OBJECTS / "catalogue.yaml").read_text())
+INDENTERS = [entry for entry in CATALOGUE if entry["set"] != "grasps"]
+by_name = pytest.mark.parametrize("entry", CATALOGUE, ids=lambda entry: entry["name"])
+by_indenter = pytest.mark.parametrize("entry", INDENTERS, ids=lambda entry: entry["name"])
+
+
+def mesh_of(entry):
+    return place(read_mesh(OBJECTS / entry["file"], unit=entry["unit"]))
+
+
+def area_within(mesh, depth):
+    """Area in mm2, seen from above, of the downward facets at most `depth` mm over the lowest point."""
+    low = (mesh.triangles_center[:, 2] <= depth) & (mesh.face_normals[:, 2] < 0)
+    return float(np.sum(mesh.area_faces[low] * -mesh.face_normals[low, 2]))
+
+
+def test_the_catalogue_holds_the_sets_and_no_name_twice():
+    sets = [entry["set"] for entry in CATALOGUE]
+    assert sets.count("indenters") >= 20 and sets.count("unseen") >= 5 and sets.count("grasps") == 6
+    assert len({entry["name"] for entry in CATALOGUE}) == len(CATALOGUE)
+
+
+def test_the_files_on_disk_are_what_the_code_draws(tmp_path):
+    write_objects(tmp_path)
+    files = sorted(path.relative_to(OBJECTS) for path in OBJECTS.rglob("*.stl"))
+    assert files == sorted(path.relative_to(tmp_path) for path in tmp_path.rglob("*.stl"))
+    changed = [str(file) for file in files if (OBJECTS / file).read_bytes() != (tmp_path / file).read_bytes()]
+    assert not changed
+    assert (tmp_path / "catalogue.yaml").read_text() == (OBJECTS / "catalogue.yaml").read_text()
+
+
+@by_name
+def test_each_file_is_one_closed_body_of_modest_size(entry):
+    mesh = mesh_of(entry)
+    assert mesh.body_count == 1
+    assert len(mesh.faces) <= 20_000
+    assert mesh.bounds[0, 2] == 0
+
+
+@by_name
+def test_each_object_carries_the_full_force_within_the_soft_layers(entry):
+    assert area_within(mesh_of(entry), depth=1.0) >= 90.0
+
+
+@by_indenter
+def test_each_indenter_fits_the_sensor_and_has_its_plate_out_of_reach(entry):
+    mesh = mesh_of(entry)
+    assert np.all(mesh.extents[:2] <= (20, 34))
+    assert mesh.extents[2] >= 3 + 2.5, "plate of 3 mm over the thickness of the soft layers"
+
+
+def heights_of_downward_faces(mesh):
+    """Heights in mm of the horizontal faces that look at the sensor, with their areas in mm2."""
+    flat = mesh.face_normals[:, 2] < -0.999
+    height = np.round(mesh.triangles_center[flat, 2], 3)
+    return {level: mesh.area_faces[flat][height == level].sum() for level in np.unique(height)}
+
+
+@pytest.mark.parametrize("draw", [object_5, object_6])
+def test_objects_5_and_6_have_features_half_a_millimetre_apart(draw):
+    areas = heights_of_downward_faces(to_mesh(draw()))
+    assert LOW_FEATURE == 0.5
+    assert areas[0.0] >= 90 and areas[LOW_FEATURE] >= 40
+    assert set(areas) <= {0.0, LOW_FEATURE, 3.0}
+
+
+def test_a_disc_has_the_area_of_its_circle_less_the_rounded_edge():
+    areas = heights_of_downward_faces(make_mesh("indenters", "Circle G"))
+    assert areas[0.0] == pytest.approx(np.pi * (9 - 0.25) ** 2, rel=0.01)  # polygon within 0.02 mm of its circle
+
+
+def test_the_default_pose_of_an_indenter_is_its_drawing():
+    mesh = read_mesh(OBJECTS / "indenters" / "diagonal.stl", unit="mm")
+    assert default_pose(mesh).translation_mm == pytest.approx([0, 0, 0], abs=1e-6)
