@@ -50,6 +50,10 @@ class Project:
         output = self.snakemake("--dry-run", *arguments).stdout
         return read_plan(output)
 
+    def presses(self):
+        """The press files that are there."""
+        return list(self.folder.glob("results/*/presses/*/*/*.nc"))
+
     def edit(self, path, old, new):
         """Replace one piece of text in a file of the project."""
         text = (self.folder / path).read_text()
