@@ -4,7 +4,6 @@ import meshio
 import numpy as np
 
 from softtact.errors import InputError
-from softtact.materials.laws.registry import make_law
 from softtact.mechanics.layered_body import MeshSettings, build_sensor_body
 
 _SCATTER_KEYS = ("height_scatter", "tip_scatter", "specimen")
@@ -33,9 +32,9 @@ def frustum_scatter(spec, values):
 
 def layered_mesh(spec, values):
     """Slab and frusta as one meshio mesh of 20-node hexahedra; cell data `layer`: 0 frusta, 1 sheet, 2 cover."""
-    law = make_law("neo_hooke", {"c10": 1.0})   # a mesh has no material: any law will do
     settings = mesh_settings(values)
-    body = build_sensor_body(spec, dielectric_law=law, cover_law=law, mesh=settings, scatter=frustum_scatter(spec, values))
+    body = build_sensor_body(spec, dielectric_law=None, cover_law=None, mesh=settings,   # a mesh has no material
+                             scatter=frustum_scatter(spec, values))
     frusta = body.bed.coordinates
     offsets = len(body.slab.mesh.points) + np.arange(body.bed.count) * body.bed.nodes
     frustum_hexes = (body.bed.mesh.hexes[None] + offsets[:, None, None]).reshape(-1, 20)
