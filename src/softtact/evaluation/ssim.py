@@ -1,0 +1,44 @@
+"""Structural similarity of small tactile maps.
+
+scikit-image's `structural_similarity` with a uniform window (gaussian_weights=False), sample covariance, and the mean
+over the windows that lie wholly inside. The usual sides of 7 or 11 do not fit on 7 x 4 taxels: 3 by default, with a
+data range of 2400 counts.
+"""
+
+import numpy as np
+
+from softtact.errors import InputError
+
+
+def map_ssim(predicted, measured, *, window, data_range):
+    """SSIM (n,) of predicted against measured tactile maps (n, row, column) in counts."""
+    from skimage.metrics import structural_similarity
+
+    check_maps(predicted, measured, window)
+    return np.array([
+        structural_similarity(a, b, win_size=window, data_range=data_range, gaussian_weights=False)
+        for a, b in zip(np.float64(predicted), np.float64(measured), strict=True)])
+
+
+def mean_absolute_counts(predicted, measured):
+    """Mean absolute difference (n,) of tactile maps (n, row, column) in counts."""
+    return np.abs(np.float64(predicted) - np.float64(measured)).mean(axis=(1, 2))
+
+
+def leave_one_out_ssim(trials, *, window, data_range):
+    """SSIM (trial,) of each reading (trial, row, column) against the mean of the others.
+
+    That is what a predictor could reach that knows the sensor perfectly but not the trial's noise.
+    """
+    count = len(trials)
+    others = (trials.sum(axis=0, keepdims=True) - trials) / (count - 1)
+    return map_ssim(others, trials, window=window, data_range=data_range)
+
+
+def check_maps(predicted, measured, window):
+    """Refuse maps of different shapes, and a window that does not fit on them."""
+    if predicted.shape != measured.shape:
+        raise InputError(f"SSIM: {predicted.shape} predicted and {measured.shape} measured values; give maps alike.")
+    smallest = min(predicted.shape[1:])
+    if window > smallest:
+        raise InputError(f"ssim.window is {window}; it must fit on the {smallest} taxels of the map's shorter side.")

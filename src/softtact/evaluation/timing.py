@@ -1,0 +1,40 @@
+"""How long a map takes: the solver's time from the press files, and the network's, measured here."""
+
+import statistics
+import time
+
+import pandas as pd
+
+TIMING_COLUMNS = ["model", "item", "set", "force_n", "solver_s", "network_s"]
+
+
+def time_presses(presses, networks, *, predict, repeats=3):
+    """A row per map: model, item, set, force_n, solver_s, network_s.
+
+    presses: data sets of `simulate_press`;  networks {model: network};  predict(network, maps (1, y, x))
+    network_s: median over `repeats` of one map alone through the network, as one press would use it
+    """
+    rows = []
+    for press in presses:
+        names = [press.attrs[name] for name in ("model", "item", "set")]
+        network = networks[names[0]]
+        predict(network, press.deformation_map_mm.values[:1])  # the first call allocates: it is no map's cost
+        for level, force in enumerate(press.force_n.values):
+            one = press.deformation_map_mm.values[level:level + 1]
+            network_s = statistics.median(seconds(predict, network, one) for _ in range(repeats))
+            rows.append((*names, float(force), float(press.wall_time_s.values[level]), network_s))
+    return pd.DataFrame(rows, columns=TIMING_COLUMNS)
+
+
+def seconds(call, *arguments):
+    """Wall time of one call, s."""
+    start = time.perf_counter()
+    call(*arguments)
+    return time.perf_counter() - start
+
+
+def summarise_times(timing):
+    """Time per map of solver and network together, s: model, maps, mean, min, max, sd."""
+    total = timing.assign(total_s=timing.solver_s + timing.network_s)
+    return total.groupby("model", sort=False).total_s.agg(
+        maps="size", mean="mean", min="min", max="max", sd="std").reset_index()

@@ -1,0 +1,226 @@
+"""Data sets: deformation maps of each model paired with the sensor's readings, split so that nothing leaks.
+
+A *level* is one press at one force. Levels of the set `indenters` are shuffled with the seed and split into train and
+validation; `unseen` and `grasps` are tests. All trials of a level are on one side, for they share its deformation map.
+All models share the split, and a level is used only where it is within every model's validity: the networks see the
+same samples.
+"""
+
+import numpy as np
+import pandas as pd
+import xarray
+
+from softtact.errors import ConvergenceError, InputError
+from softtact.files import read_dataset
+
+SPLITS = ("train", "validation", "unseen", "grasps")
+TRAINING_SET = "indenters"
+OUT_OF_RANGE = "out_of_range"
+MEAN = -1  # in place of a trial's number: the mean over the trials
+MANIFEST = ["set", "item", "model", "force_n", "trial", "split", "converged", "within_validity"]
+
+
+def build_datasets(presses, tactile, *, models, items, train_fraction, seed, training_trials="each"):
+    """Join and split presses and readings.
+
+    presses {(model, set, item): dataset};  tactile {(set, item): dataset};  items: [{"set", "item"}, ...]
+    training_trials: "each" makes every trial a training sample, "mean" the mean over a level's trials
+    Returns {(model, split): dataset} and the manifest, a row per model, level and trial.
+    """
+    _check_choices(train_fraction, training_trials)
+    items = [(entry["set"], entry["item"]) for entry in items]
+    check_items(items)
+    for key in items:
+        check_item(key, presses, tactile, models)
+    levels = assign_splits(list_levels(items, presses, models), train_fraction=train_fraction, seed=seed)
+    check_splits(levels)
+    check_no_map_leaks(levels, presses, models)
+    samples = {split: order_samples(levels, tactile, split, seed=seed, training_trials=training_trials)
+               for split in SPLITS}
+    datasets = {(model, split): gather(rows, presses, tactile, model=model, split=split)
+                for model in models for split, rows in samples.items()}
+    return datasets, manifest(levels, presses, tactile, models)
+
+
+def read_presses(paths):
+    """{(model, set, item): dataset} of press files; their attributes say what they are."""
+    presses = {}
+    for path in paths:
+        data = read_dataset(path)
+        check_converged(data, path)
+        _add(presses, tuple(_attribute(data, name, path) for name in ("model", "set", "item")), data, path)
+    return presses
+
+
+def read_tactile(paths):
+    """{(set, item): dataset} of the sensor's readings."""
+    tactile = {}
+    for path in paths:
+        data = read_dataset(path)
+        _add(tactile, tuple(_attribute(data, name, path) for name in ("set", "item")), data, path)
+    return tactile
+
+
+def check_converged(press, path):
+    """Refuse a press with a level that the solver did not finish: nothing of it may be used."""
+    failed = press.force_n.values[press.converged.values == 0]
+    if len(failed):
+        raise ConvergenceError(f"{path}: the press of {press.attrs.get('item')} with the model "
+                               f"{press.attrs.get('model')} did not converge at {failed[0]:g} N; "
+                               "press it again with smaller force steps, or leave it out.")
+
+
+def check_items(items):
+    """Refuse an item that stands in two sets, or twice in one: a test must not hold what training saw."""
+    seen = {}
+    for set_name, item in items:
+        if item in seen:
+            raise InputError(f"{item}: it is in the sets {seen[item]} and {set_name}; leave it in one of them.")
+        seen[item] = set_name
+
+
+def check_item(key, presses, tactile, models):
+    """Refuse an item whose press or reading is missing, not finite, or at other forces than the rest."""
+    name = "/".join(key)
+    if key not in tactile:
+        raise InputError(f"{name}: there is no reading of the sensor; add its tactile file.")
+    forces = tactile[key].force_n.values
+    _check_finite(tactile[key].tactile_map, f"the reading of {name}")
+    for model in models:
+        if (model, *key) not in presses:
+            raise InputError(f"{name}: there is no press with the model {model}; add its press file.")
+        press = presses[model, *key]
+        _check_finite(press.deformation_map_mm, f"the press of {name} with the model {model}")
+        if len(forces) != press.sizes["force"] or not np.allclose(forces, press.force_n.values, rtol=1e-3, atol=0):
+            raise InputError(f"{name}: the model {model} is pressed at {_list(press.force_n.values)} N and the sensor "
+                             f"read at {_list(forces)} N; make both at the same forces.")
+
+
+def list_levels(items, presses, models):
+    """Frame of all levels, in the order of set, item and force: set, item, level (index of the force), force_n, usable."""
+    rows = []
+    for key in sorted(items):
+        of_models = [presses[model, *key] for model in models]
+        usable = np.all([press.within_validity.values == 1 for press in of_models], axis=0)
+        for level, force in enumerate(of_models[0].force_n.values):
+            rows.append((*key, level, float(force), bool(usable[level])))
+    return pd.DataFrame(rows, columns=["set", "item", "level", "force_n", "usable"])
+
+
+def assign_splits(levels, *, train_fraction, seed):
+    """`levels` with the column split: train or validation by lot for indenters, else the level's set."""
+    levels = levels.assign(split=levels["set"].where(levels.usable, OUT_OF_RANGE))
+    candidates = np.flatnonzero(levels.usable & (levels["set"] == TRAINING_SET))
+    shuffled = np.random.default_rng([seed, 0]).permutation(candidates)
+    n_train = round(train_fraction * len(shuffled))
+    levels.loc[shuffled[:n_train], "split"] = "train"
+    levels.loc[shuffled[n_train:], "split"] = "validation"
+    return levels
+
+
+def check_splits(levels):
+    """Refuse a split without a level."""
+    for split in SPLITS:
+        if not (levels.split == split).any():
+            dropped = int((levels.split == OUT_OF_RANGE).sum())
+            raise InputError(f"the data set: no level is left for {split} ({dropped} of {len(levels)} lie outside a "
+                             "model's validity); add items or smaller forces.")
+
+
+def check_no_map_leaks(levels, presses, models):
+    """Refuse a test whose deformation map is one of the training set: the same shape under two names."""
+    usable = levels[levels.usable]
+    for model in models:
+        owners = {}
+        for row in usable[usable["set"] == TRAINING_SET].itertuples():
+            owners[_map_of(presses, model, row).tobytes()] = row.item
+        for row in usable[usable["set"] != TRAINING_SET].itertuples():
+            owner = owners.get(_map_of(presses, model, row).tobytes())
+            if owner is not None:
+                raise InputError(f"{row.set}/{row.item}: its deformation map at {row.force_n:g} N is that of the "
+                                 f"training indenter {owner}; leave one of the two out.")
+
+
+def order_samples(levels, tactile, split, *, seed, training_trials):
+    """Samples of one split as a frame set, item, level, force_n, trial; shuffled with the seed where a network trains."""
+    chosen = levels[levels.split == split]
+    mean = split == "train" and training_trials == "mean"
+    rows = [(row.set, row.item, row.level, row.force_n, trial) for row in chosen.itertuples()
+            for trial in ([MEAN] if mean else range(tactile[row.set, row.item].sizes["trial"]))]
+    samples = pd.DataFrame(rows, columns=["set", "item", "level", "force_n", "trial"])
+    if split in ("train", "validation"):
+        order = np.random.default_rng([seed, 1]).permutation(len(samples))
+        samples = samples.iloc[order].reset_index(drop=True)
+    return samples
+
+
+def gather(samples, presses, tactile, *, model, split):
+    """The data set (sample, ...) of one model and split, in the order of the frame `samples`."""
+    keys = list(zip(samples["set"], samples["item"], samples["level"], samples["trial"], strict=True))
+    maps = [presses[model, s, i].deformation_map_mm.values[level] for s, i, level, _ in keys]
+    counts = [_reading(tactile[s, i].tactile_map.values[:, level], trial) for s, i, level, trial in keys]
+    first = presses[model, *keys[0][:2]]
+    return xarray.Dataset(
+        {"deformation_map_mm": (("sample", "y", "x"), np.float32(maps), {"units": "mm"}),
+         "tactile_map": (("sample", "row", "column"), np.float32(counts), {"units": "counts"}),
+         "force_n": ("sample", samples.force_n.to_numpy(), {"units": "N"}),
+         "trial": ("sample", samples.trial.to_numpy(), {"note": f"{MEAN}: the mean over the trials"}),
+         "set": ("sample", samples["set"].to_numpy(dtype=object)),
+         "item": ("sample", samples["item"].to_numpy(dtype=object))},
+        coords={"y": first.y.values, "x": first.x.values},
+        attrs={"model": model, "split": split, "source": _one_source(tactile)})
+
+
+def manifest(levels, presses, tactile, models):
+    """A row per model, level and trial with the split that it went to; also of what was left out."""
+    rows = []
+    for model in models:
+        for row in levels.itertuples():
+            press = presses[model, row.set, row.item]
+            flags = int(press.converged.values[row.level]), int(press.within_validity.values[row.level])
+            rows += [(row.set, row.item, model, row.force_n, trial, row.split, *flags)
+                     for trial in range(tactile[row.set, row.item].sizes["trial"])]
+    return pd.DataFrame(rows, columns=MANIFEST)
+
+
+def _check_choices(train_fraction, training_trials):
+    if not 0 < train_fraction < 1:
+        raise InputError(f"train_fraction is {train_fraction}; it must lie between 0 and 1.")
+    if training_trials not in ("each", "mean"):
+        raise InputError(f"training_trials is {training_trials!r}; use 'each' or 'mean'.")
+
+
+def _check_finite(array, name):
+    if not np.isfinite(array.values).all():
+        raise InputError(f"{name}: it holds values that are not finite; make it again.")
+
+
+def _attribute(data, name, path):
+    if name not in data.attrs:
+        raise InputError(f"{path}: the attribute {name!r} is missing; make the file again.")
+    return data.attrs[name]
+
+
+def _add(found, key, data, path):
+    if key in found:
+        raise InputError(f"{path}: it is a second file of {' '.join(key)}; give one of them.")
+    found[key] = data
+
+
+def _map_of(presses, model, row):
+    return presses[model, row.set, row.item].deformation_map_mm.values[row.level]
+
+
+def _reading(trials, trial):
+    return trials.mean(axis=0) if trial == MEAN else trials[trial]
+
+
+def _one_source(tactile):
+    sources = sorted({data.attrs.get("source", "unknown") for data in tactile.values()})
+    if len(sources) > 1:
+        raise InputError(f"the tactile files come from {' and '.join(sources)}; do not mix them in one study.")
+    return sources[0]
+
+
+def _list(values):
+    return ", ".join(f"{value:g}" for value in values)

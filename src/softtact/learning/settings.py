@@ -1,0 +1,95 @@
+"""What a study may choose about its networks: typed, described in place, refused in one sentence when wrong.
+
+Defaults are what the paper prints; where it is silent the description says so.
+"""
+
+from typing import Annotated, Literal
+
+import pydantic
+from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
+
+from softtact.errors import InputError
+
+
+def _rising(bounds):
+    if bounds[0] > bounds[1]:
+        raise ValueError("a range is [smallest, largest]; swap the two")
+    return bounds
+
+
+Widths = Annotated[tuple[PositiveInt, PositiveInt], pydantic.AfterValidator(_rising)]
+Rates = Annotated[tuple[PositiveFloat, PositiveFloat], pydantic.AfterValidator(_rising)]
+
+
+class Section(pydantic.BaseModel):
+    """A mapping whose keys are all known."""
+
+    model_config = pydantic.ConfigDict(extra="forbid", frozen=True)
+
+    @classmethod
+    def from_dict(cls, values, *, where):
+        """The section from plain values; the first fault becomes an `InputError` naming the key and its value."""
+        try:
+            return cls.model_validate(values)
+        except pydantic.ValidationError as error:
+            fault = error.errors()[0]
+            key = ".".join([where, *map(str, fault["loc"])])
+            if fault["type"] == "extra_forbidden":
+                raise InputError(f"{key}: there is no such key; use one of {', '.join(cls.model_fields)}.") from None
+            reason = fault["msg"].removeprefix("Value error, ")
+            raise InputError(f"{key}: {reason} (it is {fault['input']!r:.60}).") from None
+
+
+class Network(Section):
+    """The network that is trained: the printed one, or the best of the search."""
+
+    architecture: Literal["printed", "searched"] = "printed"
+    filters: tuple[PositiveInt, ...] = Field((80, 95, 120), min_length=1, description="of each 2 x 2 convolution")
+    dense: PositiveInt = Field(570, description="neurons of the hidden layer")
+    activation: Literal["relu", "linear"] = Field("relu", description="after a convolution; the paper is silent")
+
+
+class SearchSpace(Section):
+    """Ranges that the search draws from, [smallest, largest]; equal ends hold a value fixed."""
+
+    filters: tuple[Widths, ...] = Field(((16, 128), (16, 128), (16, 160)), min_length=1, description="per convolution")
+    dense: Widths = Field((64, 768), description="drawn on a logarithmic scale")
+    learning_rate: Rates = Field((1e-4, 2e-3), description="drawn on a logarithmic scale")
+
+
+class Search(Section):
+    """Hyperparameter search: Optuna's sampler with its Hyperband pruner. The paper prints its result only."""
+
+    trials: PositiveInt = 30
+    max_epochs: PositiveInt = Field(27, description="of a trial that is never pruned")
+    batch: PositiveInt = 16
+    maps: PositiveInt | None = Field(None, description="training maps of a trial, drawn with the seed; all by default")
+    reduction_factor: int = Field(3, ge=2, description="of Hyperband: one in so many trials goes on")
+    space: SearchSpace = SearchSpace()
+
+
+class Training(Section):
+    """The training of one network. The paper is silent on all of it but the loss."""
+
+    epochs: PositiveInt = 60
+    batch: PositiveInt = Field(16, description="maps per step")
+    patience: PositiveInt = Field(10, description="epochs without a better validation loss before training ends")
+    learning_rate: PositiveFloat | Literal["searched"] = Field("searched", description="of the first epoch")
+    schedule: Literal["cosine", "constant"] = Field("cosine", description="of the learning rate over the epochs")
+    checkpoint_every_s: NonNegativeFloat = Field(120.0, description="least time between two checkpoints")
+    device: Literal["auto", "cpu", "cuda"] = Field("auto", description="auto: a GPU where there is one")
+    threads: PositiveInt = Field(2, description="cores that the workflow gives to a training")
+
+
+class Ssim(Section):
+    """Structural similarity of tactile maps."""
+
+    window: int = Field(3, ge=3, description="side of the window in taxels, odd")
+    data_range: PositiveFloat = Field(2400.0, description="counts from the least to the greatest possible reading")
+
+    @pydantic.field_validator("window")
+    @classmethod
+    def _odd(cls, window):
+        if window % 2 == 0:
+            raise ValueError("a window has a taxel at its centre; give an odd side")
+        return window

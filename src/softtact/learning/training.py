@@ -1,0 +1,170 @@
+"""The training loop: one network, from its first weights to its best ones.
+
+The order of the maps depends on the seed and the epoch only, and a checkpoint holds everything else: a training that
+was cut off ends with the same weights as one that was not. On a CPU, the same seed and the same number of threads give
+the same bytes.
+"""
+
+import math
+import os
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from softtact.errors import ConvergenceError
+from softtact.evaluation.ssim import map_ssim
+from softtact.files import digest
+from softtact.learning.network import TactileNetwork, load, predict, save, summed_l1
+from softtact.progress import progress
+
+
+@dataclass
+class Run:
+    """A network in training: all that a checkpoint holds.
+
+    history: a record per epoch;  best: epoch, validation_loss and weights of the best one so far
+    """
+
+    network: torch.nn.Module
+    optimiser: torch.optim.Optimizer
+    history: list = field(default_factory=list)
+    best: dict = field(default_factory=lambda: {"epoch": 0, "validation_loss": math.inf, "weights": {}})
+
+    @property
+    def epoch(self):
+        """Epochs done."""
+        return len(self.history)
+
+    def state(self):
+        """Tensors and plain values of the run."""
+        return {"network": self.network.state_dict(), "optimiser": self.optimiser.state_dict(),
+                "history": self.history, "best": self.best}
+
+    def load_state(self, state):
+        """Take up the run where `state` left it."""
+        self.network.load_state_dict(state["network"])
+        self.optimiser.load_state_dict(state["optimiser"])
+        self.history, self.best = state["history"], state["best"]
+
+
+def prepare_torch(*, threads, device="cpu"):
+    """Fix the number of threads and ask for deterministic kernels; returns the torch device."""
+    torch.set_num_threads(threads)
+    name = device if device != "auto" else "cuda" if torch.cuda.is_available() else "cpu"
+    os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # what CUDA's matrix products need to be deterministic
+    # On a GPU the pools' gradient has no deterministic kernel in every version: a warning there, an error on a CPU.
+    torch.use_deterministic_algorithms(True, warn_only=name == "cuda")
+    return torch.device(name)
+
+
+def start_run(train, *, network, learning_rate, seed, device):
+    """A `Run` with fresh weights; the training set's greatest map and count become the network's scales.
+
+    network: dict of filters, dense, activation
+    """
+    torch.manual_seed(seed)
+    model = TactileNetwork(map_shape=train.maps_mm.shape[1:], taxels=train.counts.shape[1:], **network,
+                           map_scale_mm=_largest(train.maps_mm), count_scale=_largest(train.counts)).to(device)
+    # The fused update is one pass over the 94 million weights; the plain one costs as much as the gradients.
+    return Run(model, torch.optim.Adam(model.parameters(), lr=learning_rate, fused=True))
+
+
+def train_network(run, train, validation, *, options, ssim, seed, checkpoint, label="training"):
+    """Train `run` to the end of `options` (a `Training`), or until patience ends; yields a record per epoch.
+
+    checkpoint: file to resume from, if it belongs to this training, and to write on the way; None: neither
+    ssim: window and data_range of the SSIM that the records carry
+    """
+    data = _tensors(train, run)
+    rate = run.optimiser.param_groups[0]["lr"]
+    owner = training_digest(run, train, validation, options, seed)
+    resume(run, checkpoint, owner)
+    saved = time.monotonic()
+    while run.epoch < options.epochs and not out_of_patience(run, options.patience):
+        start = time.monotonic()
+        record = {"epoch": run.epoch + 1, "learning_rate": scheduled_rate(rate, run.epoch, options)}
+        record["train_loss"] = train_epoch(run, *data, rate=record["learning_rate"], batch=options.batch, seed=seed,
+                                           label=epoch_label(label, run, options))
+        record |= validate(run.network, validation, ssim)
+        record["wall_time_s"] = time.monotonic() - start
+        keep_best(run, record)
+        run.history.append(record)
+        if checkpoint is not None and time.monotonic() - saved >= options.checkpoint_every_s:
+            save(checkpoint, {"owner": owner, **run.state()})
+            saved = time.monotonic()
+        yield record
+
+
+def train_epoch(run, maps_mm, counts, *, rate, batch, seed, label):
+    """One pass over the maps in the order of seed and epoch; returns the mean loss in counts before each step."""
+    run.network.train()
+    run.optimiser.param_groups[0]["lr"] = rate
+    order = torch.from_numpy(np.random.default_rng([seed, run.epoch]).permutation(len(maps_mm))).to(maps_mm.device)
+    total = 0.0
+    for chosen in progress(order.split(batch), label=label):
+        loss = summed_l1(run.network(maps_mm[chosen]), counts[chosen])
+        run.optimiser.zero_grad()
+        loss.backward()
+        run.optimiser.step()
+        total += loss.item() * len(chosen)
+    if not math.isfinite(total):
+        raise ConvergenceError(f"{label}: the loss is not finite at learning rate {rate:g}; lower the learning rate.")
+    return total / len(maps_mm)
+
+
+def epoch_label(label, run, options):
+    """What a line of progress says of the epoch under way."""
+    so_far = f", validation loss {run.history[-1]['validation_loss']:.0f} counts" if run.history else ""
+    return f"{label}, epoch {run.epoch + 1} of {options.epochs}{so_far}"
+
+
+def validate(network, samples, ssim):
+    """Loss in counts and mean SSIM of a network on `samples`."""
+    predicted = predict(network, samples.maps_mm)
+    loss = summed_l1(torch.from_numpy(predicted), torch.from_numpy(samples.counts)).item()
+    return {"validation_loss": loss, "validation_ssim": float(map_ssim(predicted, samples.counts, **ssim).mean())}
+
+
+def scheduled_rate(rate, epoch, options):
+    """Learning rate of an epoch, counted from 0: constant, or half a cosine from `rate` towards 0."""
+    return rate if options.schedule == "constant" else rate * 0.5 * (1 + math.cos(math.pi * epoch / options.epochs))
+
+
+def keep_best(run, record):
+    """Copy the weights if the epoch's validation loss is the smallest so far."""
+    if record["validation_loss"] < run.best["validation_loss"]:
+        weights = {name: tensor.detach().to("cpu", copy=True) for name, tensor in run.network.state_dict().items()}
+        run.best = {"epoch": record["epoch"], "validation_loss": record["validation_loss"], "weights": weights}
+
+
+def out_of_patience(run, patience):
+    """Whether the last `patience` epochs brought no better validation loss."""
+    return run.epoch - run.best["epoch"] >= patience
+
+
+def training_digest(run, train, validation, options, seed):
+    """Tells trainings apart: a checkpoint of other data or settings must not be taken up."""
+    choices = options.model_dump(exclude={"checkpoint_every_s", "threads"})
+    rate = run.optimiser.param_groups[0]["lr"]
+    return digest([choices, rate, seed, run.network.options, train.digest(), validation.digest(), torch.__version__])
+
+
+def resume(run, checkpoint, owner):
+    """Load `checkpoint` into `run` if it is there and is the owner's."""
+    if checkpoint is not None and Path(checkpoint).exists():
+        state = load(checkpoint)
+        if state["owner"] == owner:
+            run.load_state(state)
+
+
+def _tensors(samples, run):
+    device = next(run.network.parameters()).device
+    return torch.from_numpy(samples.maps_mm).to(device), torch.from_numpy(samples.counts).to(device)
+
+
+def _largest(array):
+    """Greatest magnitude, or 1 for an array of zeros."""
+    return float(np.abs(array).max()) or 1.0

@@ -1,0 +1,18 @@
+"""Data sets of all models under test, with one split for all.
+
+inputs: presses (every model and item), tactile (every item)
+outputs: train, validation, unseen, grasps (each a list, one file per model, in the order of `models`), manifest
+settings: models, items [{set, item}], train_fraction, seed, training_trials (each | mean)
+"""
+
+from softtact.files import write_csv, write_dataset
+from softtact.learning.dataset import SPLITS, build_datasets, read_presses, read_tactile
+
+
+def run(*, inputs, outputs, settings, threads=1):
+    """Join presses and readings, split them, write each model's splits and the manifest."""
+    datasets, manifest = build_datasets(read_presses(inputs["presses"]), read_tactile(inputs["tactile"]), **settings)
+    for split in SPLITS:
+        for model, path in zip(settings["models"], outputs[split], strict=True):
+            write_dataset(path, datasets[model, split], seed=settings["seed"], settings=settings)
+    write_csv(outputs["manifest"], manifest)

@@ -1,0 +1,34 @@
+"""Scores and times of all networks.
+
+inputs: networks (one per model), validation, unseen, grasps (one per model each), presses (of the models, for times)
+outputs: ssim, ceiling, timing (CSV), predictions (NetCDF);  settings: ssim, seed
+"""
+
+import pandas as pd
+
+from softtact.evaluation.scoring import predict_grasps, score_samples, score_sensor
+from softtact.evaluation.timing import time_presses
+from softtact.files import read_dataset, write_csv, write_dataset
+from softtact.learning.network import load_network, predict
+from softtact.learning.samples import read_samples
+from softtact.learning.settings import Ssim
+from softtact.learning.training import prepare_torch
+
+TESTS = ("validation", "unseen", "grasps")
+
+
+def run(*, inputs, outputs, settings, threads=1):
+    """Score every network on its three splits, score the sensor against itself, time every map."""
+    prepare_torch(threads=threads)
+    ssim = Ssim.from_dict(settings.get("ssim", {}), where="ssim").model_dump()
+    networks = {facts["model"]: network for network, facts in map(load_network, inputs["networks"])}
+    splits = {name: {samples.model: samples for samples in map(read_samples, inputs[name])} for name in TESTS}
+    scores = [score_samples(network, splits[name][model], ssim=ssim)
+              for model, network in networks.items() for name in TESTS]
+    ceilings = [score_sensor(next(iter(splits[name].values())), ssim=ssim) for name in TESTS]
+    write_csv(outputs["ssim"], pd.concat(scores))
+    write_csv(outputs["ceiling"], pd.concat(ceilings))
+    write_dataset(outputs["predictions"], predict_grasps(networks, splits["grasps"]), seed=settings.get("seed"),
+                  settings=settings)
+    presses = (read_dataset(path) for path in inputs["presses"])
+    write_csv(outputs["timing"], time_presses(presses, networks, predict=predict))

@@ -1,0 +1,54 @@
+"""The network of one model, trained.
+
+inputs: train, validation, best (of the search)
+outputs: model (the best epoch's weights), history, and timing where asked for; a checkpoint lies beside them meanwhile
+settings: training, network, ssim, seed
+"""
+
+import pandas as pd
+
+from softtact.files import digest, read_json, write_csv
+from softtact.learning.network import save_network
+from softtact.learning.samples import read_samples
+from softtact.learning.settings import Network, Ssim, Training
+from softtact.learning.training import prepare_torch, start_run, train_network
+
+HISTORY = ["epoch", "train_loss", "validation_loss", "validation_ssim", "learning_rate"]
+
+
+def run(*, inputs, outputs, settings, threads=1):
+    """Train, or go on with a training that was cut off, and write the best weights and the history."""
+    options = Training.from_dict(settings["training"], where="training")
+    ssim = Ssim.from_dict(settings.get("ssim", {}), where="ssim").model_dump()
+    train, validation = read_samples(inputs["train"]), read_samples(inputs["validation"])
+    best, seed = read_json(inputs["best"]), settings["seed"]
+    training = start_run(
+        train, network=chosen_network(settings["network"], best), seed=seed,
+        learning_rate=best["learning_rate"] if options.learning_rate == "searched" else options.learning_rate,
+        device=prepare_torch(threads=threads, device=options.device))
+    checkpoint = outputs["model"].with_name("checkpoint.pt")
+    for _ in train_network(training, train, validation, options=options, ssim=ssim, seed=seed, checkpoint=checkpoint,
+                           label=f"network of {train.model}"):
+        pass
+    write_results(outputs, training, facts={"model": train.model, "source": train.source, "seed": seed,
+                                            "config_digest": digest(settings)})
+    checkpoint.unlink(missing_ok=True)
+
+
+def chosen_network(values, best):
+    """filters, dense and activation: as printed, or as the search found them."""
+    network = Network.from_dict(values, where="network")
+    searched = {name: best[name] for name in ("filters", "dense")} if network.architecture == "searched" else {}
+    return {**network.model_dump(exclude={"architecture"}), **searched}
+
+
+def write_results(outputs, training, *, facts):
+    """Write the best weights and the history; wall times, which no two runs share, go to a file of their own."""
+    best = training.best
+    training.network.load_state_dict(best["weights"])
+    save_network(outputs["model"], training.network,
+                 facts={**facts, "epoch": best["epoch"], "validation_loss": best["validation_loss"]})
+    history = pd.DataFrame(training.history)
+    write_csv(outputs["history"], history[HISTORY])
+    if "timing" in outputs:
+        write_csv(outputs["timing"], history[["epoch", "wall_time_s"]])

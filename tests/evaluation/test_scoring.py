@@ -1,0 +1,122 @@
+"""Scores, ceilings, predictions and times."""
+
+import numpy as np
+import pandas as pd
+import pytest
+import torch
+import xarray
+
+from softtact.evaluation.scoring import predict_grasps, score_samples, score_sensor, summarise_ssim
+from softtact.evaluation.timing import summarise_times, time_presses
+from softtact.learning.samples import Samples
+
+SSIM = {"window": 3, "data_range": 2400}
+FORCES = [10.0, 20.0]
+
+
+class Echo(torch.nn.Module):
+    """Stands for a network: predicts `factor` times the taxels' mean depth, 3,000 counts per mm."""
+
+    def __init__(self, factor=1.0):
+        super().__init__()
+        self.factor = torch.nn.Parameter(torch.tensor(factor))
+
+    def forward(self, maps_mm):
+        return 3000 * self.factor * maps_mm[:, :56, :32].unflatten(1, (7, 8)).unflatten(3, (4, 8)).mean(dim=(2, 4))
+
+
+def make_samples(*, split="grasps", model="elastic", items=("object_1", "object_2"), trials=3, noise=0.0):
+    """Dents of growing depth; the reading is what `Echo(1)` predicts, and noise."""
+    labels = pd.DataFrame([(split, item, trial, force) for item in items for force in FORCES for trial in range(trials)],
+                          columns=["set", "item", "trial", "force_n"])
+    rng = np.random.default_rng(0)
+    shapes = {item: rng.uniform(0, 0.02, (57, 33)) for item in items}
+    maps = np.stack([shapes[row.item] * row.force_n for row in labels.itertuples()]).astype(np.float32)
+    counts = Echo()(torch.from_numpy(maps)).detach().numpy() + rng.normal(0, noise, (len(maps), 7, 4))
+    return Samples(maps, np.float32(counts), labels, model, split, "virtual sensor")
+
+
+def test_a_perfect_network_scores_one_with_no_error():
+    scores = score_samples(Echo(), make_samples(), ssim=SSIM)
+    assert scores.columns.tolist() == ["model", "set", "item", "trial", "force_n", "ssim", "mae_counts"]
+    assert scores.ssim.values == pytest.approx(np.ones(12)) and scores.mae_counts.values == pytest.approx(0, abs=1e-3)
+
+
+def test_a_worse_network_scores_lower_on_every_map():
+    samples = make_samples()
+    good, bad = (score_samples(Echo(factor), samples, ssim=SSIM) for factor in (0.9, 0.5))
+    assert (bad.ssim < good.ssim).all() and (bad.mae_counts > good.mae_counts).all()
+
+
+def test_a_row_per_map_in_an_order_that_the_samples_do_not_decide():
+    samples = make_samples(noise=30)
+    order = np.random.default_rng(0).permutation(len(samples))
+    mixed = Samples(samples.maps_mm[order], samples.counts[order], samples.labels.iloc[order].reset_index(drop=True),
+                    samples.model, samples.split, samples.source)
+    pd.testing.assert_frame_equal(score_samples(Echo(), samples, ssim=SSIM), score_samples(Echo(), mixed, ssim=SSIM))
+
+
+def test_validation_rows_are_named_so_though_their_items_are_indenters():
+    samples = make_samples(split="validation")
+    samples.labels["set"] = "indenters"
+    assert set(score_samples(Echo(), samples, ssim=SSIM)["set"]) == {"validation"}
+
+
+def test_the_sensors_ceiling_falls_with_its_noise():
+    quiet, noisy = (score_sensor(make_samples(noise=noise), ssim=SSIM) for noise in (0, 100))
+    assert quiet.columns.tolist() == ["set", "item", "force_n", "ssim"] and len(quiet) == 4
+    assert quiet.ssim.values == pytest.approx(np.ones(4)) and (noisy.ssim < 0.99).all()
+
+
+def test_a_sensor_read_once_has_no_ceiling():
+    assert score_sensor(make_samples(trials=1), ssim=SSIM).empty
+
+
+def test_predictions_are_labelled_and_stand_beside_the_sensors_mean():
+    grasps = {"elastic": make_samples(noise=20), "hyperelastic": make_samples(model="hyperelastic", noise=20)}
+    data = predict_grasps({"elastic": Echo(), "hyperelastic": Echo(0.5)}, grasps)
+    assert data.tactile_map.dims == ("model", "item", "force", "row", "column")
+    assert data.sel(model="hyperelastic").tactile_map.values == pytest.approx(
+        0.5 * data.sel(model="elastic").tactile_map.values)
+    chosen = (grasps["elastic"].labels["item"] == "object_2") & (grasps["elastic"].labels.force_n == 20)
+    assert data.sensor_map.sel(item="object_2").values[1] == pytest.approx(
+        grasps["elastic"].counts[chosen.to_numpy()].mean(axis=0))
+    assert data.force_n.values.tolist() == FORCES and data.attrs["source"] == "virtual sensor"
+
+
+def test_a_level_that_an_object_lacks_is_nan():
+    samples = make_samples()
+    kept = ~((samples.labels["item"] == "object_1") & (samples.labels.force_n == 20)).to_numpy()
+    fewer = Samples(samples.maps_mm[kept], samples.counts[kept], samples.labels[kept].reset_index(drop=True),
+                    samples.model, samples.split, samples.source)
+    data = predict_grasps({"elastic": Echo()}, {"elastic": fewer})
+    lacking = np.isnan(data.tactile_map.sel(model="elastic").values).all(axis=(2, 3))
+    assert lacking.tolist() == [[False, True], [False, False]]
+
+
+def test_a_summary_has_mean_min_max_and_deviation_per_model_and_set():
+    scores = pd.DataFrame({"model": "elastic", "set": "unseen", "ssim": [0.2, 0.4, 0.9]})
+    row = summarise_ssim(scores).iloc[0]
+    assert (row.maps, row["mean"], row["min"], row["max"]) == (3, 0.5, 0.2, 0.9)
+    assert row.sd == pytest.approx(np.std([0.2, 0.4, 0.9], ddof=1))
+
+
+@pytest.fixture
+def press():
+    return xarray.Dataset({"deformation_map_mm": (("force", "y", "x"), np.zeros((2, 57, 33))),
+                           "force_n": ("force", FORCES), "wall_time_s": ("force", [3.0, 1.0])},
+                          attrs={"model": "elastic", "item": "object_1", "set": "grasps"})
+
+
+def test_times_hold_the_solvers_from_the_press_and_the_networks_as_measured(press):
+    shapes = []
+    timing = time_presses([press], {"elastic": None}, predict=lambda network, maps: shapes.append(maps.shape), repeats=2)
+    assert timing.columns.tolist() == ["model", "item", "set", "force_n", "solver_s", "network_s"]
+    assert timing.solver_s.tolist() == [3.0, 1.0] and (timing.network_s >= 0).all()
+    assert set(shapes) == {(1, 57, 33)} and len(shapes) == 1 + 2 * 2
+
+
+def test_the_times_summary_adds_solver_and_network():
+    timing = pd.DataFrame({"model": "elastic", "solver_s": [1.0, 3.0], "network_s": [0.5, 0.5]})
+    row = summarise_times(timing).iloc[0]
+    assert (row.maps, row["mean"], row["min"], row["max"]) == (2, 2.5, 1.5, 3.5) and row.sd == pytest.approx(2**0.5)

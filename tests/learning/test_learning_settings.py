@@ -1,0 +1,25 @@
+"""Settings of the learning stages."""
+
+import pytest
+
+from softtact.errors import InputError
+from softtact.learning.settings import Network, Search, Ssim, Training
+
+
+def test_defaults_are_what_the_paper_prints():
+    network, ssim = Network(), Ssim()
+    assert (network.architecture, network.filters, network.dense) == ("printed", (80, 95, 120), 570)
+    assert (ssim.window, ssim.data_range) == (3, 2400)
+
+
+@pytest.mark.parametrize(("section", "values", "sentence"), [
+    (Training, {"epoch": 3}, "it.epoch: there is no such key; use one of epochs, batch"),
+    (Training, {"epochs": 0}, r"it.epochs: .*greater than 0 \(it is 0\)"),
+    (Training, {"learning_rate": "best"}, "it.learning_rate"),
+    (Search, {"space": {"dense": [64, 8]}}, r"it.space.dense: a range is \[smallest, largest\]"),
+    (Network, {"architecture": "drawn"}, "it.architecture: .*'printed' or 'searched'"),
+    (Ssim, {"window": 4}, "it.window: a window has a taxel at its centre"),
+])
+def test_a_wrong_setting_is_refused_with_its_key_and_value(section, values, sentence):
+    with pytest.raises(InputError, match=sentence):
+        section.from_dict(values, where="it")

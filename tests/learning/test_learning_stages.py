@@ -1,0 +1,152 @@
+"""Search, training and evaluation on files, with the settings that the workflow gives them."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from formula_study import MODELS, Study
+
+from softtact.errors import InputError
+from softtact.files import read_dataset, read_json
+from softtact.learning.dataset import SPLITS
+from softtact.learning.network import load_network, predict
+from softtact.learning.samples import read_samples
+from softtact.stages import build_dataset, evaluate, search_hyperparameters, train_cnn
+
+SPACE = {"filters": [[2, 4], [2, 4], [2, 4]], "dense": [8, 24], "learning_rate": [1e-3, 1e-2]}
+SETTINGS = {"search": {"trials": 2, "max_epochs": 2, "batch": 8, "space": SPACE},
+            "training": {"epochs": 3, "patience": 3, "batch": 8, "device": "cpu"},
+            "network": {"architecture": "printed", "filters": [3, 4, 5], "dense": 16},
+            "ssim": {"window": 3, "data_range": 2400}, "device": "cpu", "seed": 3}
+
+
+def settings_of(*keys, **changes):
+    """Settings as they arrive through the command line."""
+    return json.loads(json.dumps({**{key: SETTINGS[key] for key in keys}, **changes}))
+
+
+def run_search(folder, model):
+    outputs = {"search": folder / f"learning/{model}/search.csv", "best": folder / f"learning/{model}/best.json"}
+    search_hyperparameters.run(inputs=training_inputs(folder, model), outputs=outputs,
+                               settings=settings_of("search", "network", "ssim", "device", "seed"))
+    return outputs
+
+
+def run_training(folder, model, *, into="learning", **changes):
+    inputs = {**training_inputs(folder, model), "best": folder / f"learning/{model}/best.json"}
+    outputs = {name: folder / into / model / file for name, file in
+               {"model": "model.pt", "history": "history.csv", "timing": "timing.csv"}.items()}
+    train_cnn.run(inputs=inputs, outputs=outputs, settings=settings_of("training", "network", "ssim", "seed", **changes))
+    return outputs
+
+
+def training_inputs(folder, model):
+    return {split: folder / f"dataset/{model}/{split}.nc" for split in ("train", "validation")}
+
+
+def run_evaluation(folder, inputs):
+    outputs = {name: folder / "evaluation" / file for name, file in
+               {"ssim": "ssim.csv", "ceiling": "ceiling.csv", "timing": "timing.csv",
+                "predictions": "predictions.nc"}.items()}
+    evaluate.run(inputs=inputs, outputs=outputs, settings=settings_of("ssim", "seed"))
+    return outputs
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """Folder, inputs of the evaluation and its outputs, after all learning stages."""
+    folder, study = tmp_path_factory.mktemp("study"), Study()
+    inputs = study.write(folder)
+    datasets = {split: [folder / f"dataset/{model}/{split}.nc" for model in MODELS] for split in SPLITS}
+    build_dataset.run(inputs=inputs, outputs={**datasets, "manifest": folder / "dataset/manifest.csv"},
+                      settings=study.settings)
+    networks = []
+    for model in MODELS:
+        run_search(folder, model)
+        networks.append(run_training(folder, model)["model"])
+    tests = {split: datasets[split] for split in ("validation", "unseen", "grasps")}
+    inputs = {"networks": networks, "presses": inputs["presses"], **tests}
+    return folder, inputs, run_evaluation(folder, inputs)
+
+
+def test_the_history_has_a_row_per_epoch_and_no_wall_time(finished):
+    history = pd.read_csv(finished[0] / "learning/elastic/history.csv")
+    assert history.columns.tolist() == ["epoch", "train_loss", "validation_loss", "validation_ssim", "learning_rate"]
+    assert history.epoch.tolist() == [1, 2, 3]
+    assert pd.read_csv(finished[0] / "learning/elastic/timing.csv").columns.tolist() == ["epoch", "wall_time_s"]
+
+
+def test_the_model_file_holds_the_best_epochs_weights_and_the_learning_rate_is_the_searchs(finished):
+    folder = finished[0]
+    network, facts = load_network(folder / "learning/elastic/model.pt")
+    history = pd.read_csv(folder / "learning/elastic/history.csv")
+    assert facts["epoch"] == history.epoch[history.validation_loss.idxmin()] and facts["model"] == "elastic"
+    validation = read_samples(folder / "dataset/elastic/validation.nc")
+    loss = np.abs(predict(network, validation.maps_mm) - validation.counts).sum(axis=(1, 2)).mean()
+    assert loss == pytest.approx(facts["validation_loss"], rel=1e-5)
+    best = read_json(folder / "learning/elastic/best.json")
+    assert history.learning_rate[0] == pytest.approx(best["learning_rate"], rel=1e-5)
+
+
+def test_no_checkpoint_stays_behind(finished):
+    assert not list(finished[0].glob("learning/*/checkpoint.pt"))
+
+
+def test_the_same_settings_give_the_same_bytes(finished):
+    folder = finished[0]
+    again = run_training(folder, "elastic", into="again")
+    for name, file in (("model", "model.pt"), ("history", "history.csv")):
+        assert again[name].read_bytes() == (folder / "learning/elastic" / file).read_bytes()
+
+
+def test_the_printed_architecture_or_the_searched_one_is_trained(finished):
+    folder = finished[0]
+    best = read_json(folder / "learning/elastic/best.json")
+    searched = run_training(folder, "elastic", into="searched", network={"architecture": "searched"})["model"]
+    assert load_network(folder / "learning/elastic/model.pt")[0].options["filters"] == [3, 4, 5]
+    options = load_network(searched)[0].options
+    assert (options["filters"], options["dense"]) == (best["filters"], best["dense"])
+
+
+def test_a_given_learning_rate_is_used_instead_of_the_searchs(finished):
+    outputs = run_training(finished[0], "elastic", into="given",
+                           training={**SETTINGS["training"], "learning_rate": 0.004})
+    assert pd.read_csv(outputs["history"]).learning_rate[0] == 0.004
+
+
+def test_every_map_of_the_three_tests_is_scored_for_each_model(finished):
+    folder, inputs, outputs = finished
+    scores = pd.read_csv(outputs["ssim"])
+    assert scores.columns.tolist() == ["model", "set", "item", "trial", "force_n", "ssim", "mae_counts"]
+    for k, model in enumerate(MODELS):
+        for split in ("validation", "unseen", "grasps"):
+            rows = scores[(scores.model == model) & (scores["set"] == split)]
+            assert len(rows) == len(read_samples(inputs[split][k])) > 0
+    assert scores.ssim.between(-1, 1).all() and (scores.mae_counts > 0).all()
+
+
+def test_the_ceiling_lies_above_the_networks(finished):
+    ceiling, scores = (pd.read_csv(finished[2][name]) for name in ("ceiling", "ssim"))
+    assert set(ceiling["set"]) == {"validation", "unseen", "grasps"}
+    assert ceiling.ssim.mean() > scores.ssim.mean()
+
+
+def test_times_and_predictions_cover_the_presses_and_the_grasps(finished):
+    timing = pd.read_csv(finished[2]["timing"])
+    assert timing.columns.tolist() == ["model", "item", "set", "force_n", "solver_s", "network_s"]
+    assert len(timing) == 2 * 8 * 3 and (timing.solver_s == 1.5 * timing.force_n).all() and (timing.network_s > 0).all()
+    predictions = read_dataset(finished[2]["predictions"])
+    assert predictions.tactile_map.shape == (2, 1, 3, 7, 4) and predictions["model"].values.tolist() == MODELS
+
+
+def test_scores_and_predictions_are_the_same_bytes_again(finished):
+    folder, inputs, outputs = finished
+    again = run_evaluation(folder / "again", inputs)
+    for name in ("ssim", "ceiling", "predictions"):
+        assert again[name].read_bytes() == outputs[name].read_bytes()
+
+
+def test_a_file_that_is_no_data_set_is_refused(finished):
+    with pytest.raises(InputError, match="not a split of a data set"):
+        read_samples(finished[0] / "presses/unseen/hexagon/elastic.nc")
