@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from softtact.config import load_study
+from softtact.config import Mesh, load_study
 from softtact.errors import InputError
+from softtact.mechanics.layered_body import MeshSettings
 
 ROOT = Path(__file__).resolve().parents[1]
 DEFAULT = yaml.safe_load((ROOT / "config/config.yaml").read_text())
@@ -81,6 +82,9 @@ def test_assumed_values_and_their_reasons_reach_the_stages_as_plain_numbers():
     [
         ("forces_nn", [5], "there is no key 'forces_nn'; did you mean 'forces_n'?"),
         ("ftir.camera.pixel_m", 1, "there is no key 'pixel_m'; did you mean 'pixel_mm'?"),
+        ("training.epoch", 3, "at 'training': there is no key 'epoch'; did you mean 'epochs'?"),
+        ("models.elastic.mesh", {"edge_length": 1}, "at 'models.elastic.mesh': there is no key 'edge_length'; did you"),
+        ("virtual_sensor", {"noise_count": 1}, "there is no key 'noise_count'; did you mean 'noise_counts'?"),
         ("sensor", "cora", "there is no sensor 'cora'; did you mean 'coro'?"),
         ("materials", ["polyurethane", "neoprene", "rubber"], "there is no material 'rubber'; known: "),
         ("materials", ["polyurethane"], "sensor coro is made of 'neoprene', which is not in the list; add it."),
@@ -100,6 +104,10 @@ def test_assumed_values_and_their_reasons_reach_the_stages_as_plain_numbers():
 )
 def test_a_mistake_is_named_with_its_remedy(path, value, said):
     assert said in refusal(changed(path, value))
+
+
+def test_the_mesh_section_knows_the_keys_of_the_solver():
+    assert set(MeshSettings.__dataclass_fields__) <= set(Mesh.model_fields)
 
 
 def test_a_missing_key_is_named():

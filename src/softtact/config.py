@@ -8,7 +8,7 @@ import difflib
 import itertools
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 import yaml
 from pydantic import (
@@ -19,26 +19,36 @@ from pydantic import (
     PositiveFloat,
     PositiveInt,
     ValidationError,
-    model_validator,
 )
 
 from softtact.errors import InputError
 from softtact.geometry.sensor_spec import SensorSpec
+from softtact.learning.settings import Network, Search, Ssim, Training
 from softtact.materials.config import load_material
 from softtact.materials.laws.registry import LAWS
+from softtact.sensing.virtual_sensor import VirtualSensorSettings
 
 PROJECT = Path(__file__).resolve().parents[2]
 SETS = ("indenters", "unseen", "grasps")
 CENTRED = "centred"  # the pose that gives an item its object's plain name
 
 
-def _check_name(name, known, *, kind):
-    """Raise ValueError naming the nearest right name unless `name` is known."""
-    if name in known:
-        return name
+def _unknown(name, known, *, kind):
+    """What is to be said of a name that is not among the `known`."""
     near = difflib.get_close_matches(str(name), [str(right) for right in known], n=1)
     remedy = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(map(str, known)) or 'none'}"
-    raise ValueError(f"there is no {kind} {name!r}; {remedy}")
+    return f"there is no {kind} {name!r}; {remedy}"
+
+
+def _one_of(known, *, kind):
+    """A string among the `known` ones."""
+
+    def check(name):
+        if name not in known:
+            raise ValueError(_unknown(name, known, kind=kind))
+        return name
+
+    return Annotated[str, AfterValidator(check)]
 
 
 def _rising(values):
@@ -51,7 +61,8 @@ Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
 Fraction = Annotated[float, Field(gt=0.0, lt=1.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 Forces = Annotated[list[PositiveFloat], Field(min_length=1), AfterValidator(_rising)]
-Law = Annotated[str, AfterValidator(lambda name: _check_name(name, LAWS, kind="law"))]
+Law = _one_of(LAWS, kind="law")
+VirtualSensorKey = _one_of(VirtualSensorSettings.__dataclass_fields__, kind="key")
 Six = Annotated[list[float], Field(min_length=6, max_length=6)]
 
 
@@ -59,17 +70,6 @@ class Section(BaseModel):
     """A mapping of the configuration whose keys are all known."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _keys_are_known(cls, values):
-        for key in values if isinstance(values, dict) else ():
-            _check_name(key, cls.model_fields, kind="key")
-        return values
-
-    def plain(self):
-        """The section as JSON values."""
-        return self.model_dump(mode="json")
 
 
 class Camera(Section):
@@ -131,46 +131,33 @@ class CatalogueEntry(Section):
     label: str
 
 
+class Mesh(Section):
+    """Resolution of a model's mesh, and the scatter of its frusta; what is not said is the model's own default."""
+
+    edge_length_mm: PositiveFloat | None = Field(None, description="of tetrahedra; makes it a single plain layer")
+    cells_per_pitch: PositiveInt | None = Field(None, description="elements of sheet and cover along a frustum's pitch")
+    sheet_layers: PositiveInt | None = None
+    cover_layers: PositiveInt | None = None
+    frustum_levels: Annotated[list[float], AfterValidator(_rising)] | None = Field(
+        None, description="heights of a frustum's layers of elements, from 0 to 1")
+    height_scatter: NotNegative | None = Field(None, description="standard deviation, share of the height")
+    tip_scatter: NotNegative | None = Field(None, description="standard deviation, share of the tip's diameter")
+    specimen: Annotated[int, Field(ge=0)] | None = Field(None, description="seed of the scatter")
+
+
 class Model(Section):
     """One mechanical model of the sensor: its mesh, the law of each layer, and the files its presses start from."""
 
-    mesh: dict[str, float | int | list[float]]
+    mesh: Mesh
     laws: dict[Literal["dielectric", "cover"], Law] = {}
     needs: list[Literal["mesh", "compliance", "card_dielectric", "card_cover"]] = []
 
 
 class Dataset(Section):
-    """How samples are split."""
+    """How samples are made and split."""
 
     train_fraction: Fraction
-
-
-class Search(Section):
-    """Hyperparameter search with Optuna's Hyperband pruner."""
-
-    trials: PositiveInt
-    max_epochs: PositiveInt
-
-
-class Training(Section):
-    """The networks' training."""
-
-    epochs: PositiveInt
-    patience: PositiveInt
-    threads: PositiveInt
-
-
-class Network(Section):
-    """The printed architecture, or the searched one."""
-
-    architecture: Literal["printed", "searched"]
-
-
-class Ssim(Section):
-    """Structural similarity of tactile maps: side of the window in taxels, and the range of the counts."""
-
-    window: PositiveInt
-    data_range: PositiveFloat
+    training_trials: Literal["each", "mean"] = Field("each", description="a sample per trial, or one of their mean")
 
 
 class Values(Section):
@@ -187,7 +174,7 @@ class Values(Section):
     models: dict[Name, Model]
     tested: list[Name] = Field(min_length=1, description="models that a network is trained for")
     reference: Name
-    virtual_sensor: dict
+    virtual_sensor: dict[VirtualSensorKey, float]
     trials: PositiveInt
     dataset: Dataset
     search: Search
@@ -265,18 +252,32 @@ def load_study(values, *, folder="config"):
 
 
 def _validated(model, values, *, where):
-    """`model` from plain values; the first fault becomes an `InputError` naming the field."""
+    """`model` from plain values; the first fault becomes an `InputError` naming the field and the remedy."""
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        fault = error.errors()[0]
-        field = ".".join(str(part) for part in fault["loc"])
-        sentence = fault["msg"].removeprefix("Value error, ")
-        if fault["type"] == "missing":
-            raise InputError(f"{where}: the key {field!r} is missing; add it.") from None
-        given = "" if isinstance(fault["input"], dict) else f" (it is {fault['input']!r:.60})"
-        at = f", at {field!r}{given}" if field else ""
-        raise InputError(_sentence(f"{where}{at}: {sentence}")) from None
+        raise InputError(_fault_sentence(model, error.errors()[0], where=where)) from None
+
+
+def _fault_sentence(model, fault, *, where):
+    """One sentence for a fault of pydantic's."""
+    *parents, last = fault["loc"] or ("",)
+    section = f"{where}, at {'.'.join(map(str, parents))!r}" if parents else where
+    if fault["type"] == "missing":
+        return f"{section}: the key {last!r} is missing; add it."
+    if fault["type"] == "extra_forbidden":
+        return _sentence(f"{section}: {_unknown(last, _section_at(model, parents).model_fields, kind='key')}")
+    at = ".".join(str(part) for part in fault["loc"] if part != "[key]")
+    given = "" if isinstance(fault["input"], dict) else f" (it is {fault['input']!r:.60})"
+    return _sentence(f"{where}, at {at!r}{given}: {fault['msg'].removeprefix('Value error, ')}")
+
+
+def _section_at(kind, path):
+    """The section class that the keys `path` lead to from the type `kind`."""
+    for key in path:
+        values_of_dict = get_args(kind)[-1:]
+        kind = values_of_dict[0] if values_of_dict else kind.model_fields[key].annotation
+    return kind
 
 
 def _existing(folder, name, *, kind):
@@ -286,10 +287,8 @@ def _existing(folder, name, *, kind):
 
 
 def _refuse_unknown(name, known, *, kind, where):
-    try:
-        _check_name(name, known, kind=kind)
-    except ValueError as error:
-        raise InputError(_sentence(f"{where}: {error}")) from None
+    if name not in known:
+        raise InputError(_sentence(f"{where}: {_unknown(name, known, kind=kind)}"))
 
 
 def _sentence(text):

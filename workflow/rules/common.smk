@@ -96,9 +96,19 @@ def press_settings(item):
     return {"name": item.id, "set": item.set, "unit": item.unit, "pose": item.pose}
 
 
-def presses(model):
-    """The press files of one model in the study's order."""
-    return [f"{RESULTS}/presses/{item.set}/{item.id}/{model}.nc" for item in STUDY.items()]
+def mesh_of(model):
+    """Mesh settings of a model, as far as the configuration states them."""
+    return STUDY.values.models[model].mesh.model_dump(mode="json", exclude_none=True)
+
+
+def plain(section):
+    """A section of the configuration as JSON values."""
+    return section.model_dump(mode="json")
+
+
+def presses(models):
+    """The press files of some models, in the study's order."""
+    return [f"{RESULTS}/presses/{item.set}/{item.id}/{model}.nc" for model in models for item in STUDY.items()]
 
 
 HELD = []  # open as long as this process lives

@@ -33,7 +33,7 @@ rule detect_discs:
         discs=f"{RESULTS}/ftir/discs.csv",
     params:
         files=files,
-        settings=as_settings(camera=STUDY.values.ftir.camera.plain(), seed=STUDY.values.seed),
+        settings=as_settings(camera=plain(STUDY.values.ftir.camera), seed=STUDY.values.seed),
     log:
         log_of("detect_discs"),
     benchmark:

@@ -3,26 +3,32 @@
 SPLITS = ("train", "validation", "unseen", "grasps")
 
 
+def dataset(split):
+    """A split's files, one per tested model."""
+    return [f"{RESULTS}/dataset/{model}/{split}.nc" for model in STUDY.values.tested]
+
+
+
 rule build_dataset:
     input:
         code=code("build_dataset"),
-        presses=lambda w: presses(w.model),
+        presses=presses(STUDY.values.tested),
         tactile=[f"{RESULTS}/tactile/{item.set}/{item.id}.nc" for item in STUDY.items()],
     output:
-        **{split: f"{RESULTS}/dataset/{{model}}/{split}.nc" for split in SPLITS},
-        manifest=f"{RESULTS}/dataset/{{model}}/manifest.csv",
+        **{split: dataset(split) for split in SPLITS},
+        manifest=f"{RESULTS}/dataset/manifest.csv",
     params:
         files=files,
-        settings=lambda w: as_settings(
-            model=w.model,
+        settings=as_settings(
+            models=STUDY.values.tested,
             items=[{"set": item.set, "item": item.id} for item in STUDY.items()],
-            split=STUDY.values.dataset.train_fraction,
+            **plain(STUDY.values.dataset),
             seed=STUDY.values.seed,
         ),
     log:
-        log_of("build_dataset", "{model}"),
+        log_of("build_dataset"),
     benchmark:
-        benchmark_of("build_dataset", "{model}")
+        benchmark_of("build_dataset")
     shell:
         run_stage("build_dataset")
 
@@ -37,7 +43,13 @@ rule search_hyperparameters:
         best=f"{RESULTS}/learning/{{model}}/best.json",
     params:
         files=files,
-        settings=as_settings(search=STUDY.values.search.plain(), seed=STUDY.values.seed),
+        settings=as_settings(
+            search=plain(STUDY.values.search),
+            network=plain(STUDY.values.network),
+            ssim=plain(STUDY.values.ssim),
+            device=STUDY.values.training.device,
+            seed=STUDY.values.seed,
+        ),
     threads: STUDY.values.training.threads
     log:
         log_of("search_hyperparameters", "{model}"),
@@ -56,11 +68,13 @@ rule train_cnn:
     output:
         model=f"{RESULTS}/learning/{{model}}/model.pt",
         history=f"{RESULTS}/learning/{{model}}/history.csv",
+        timing=f"{RESULTS}/learning/{{model}}/timing.csv",
     params:
         files=files,
         settings=as_settings(
-            training=STUDY.values.training.plain(),
-            network=STUDY.values.network.plain(),
+            training=STUDY.values.training.model_dump(mode="json", exclude={"threads"}),
+            network=plain(STUDY.values.network),
+            ssim=plain(STUDY.values.ssim),
             seed=STUDY.values.seed,
         ),
     threads: STUDY.values.training.threads
@@ -76,17 +90,18 @@ rule evaluate:
     input:
         code=code("evaluate"),
         networks=[f"{RESULTS}/learning/{model}/model.pt" for model in STUDY.values.tested],
-        unseen=[f"{RESULTS}/dataset/{model}/unseen.nc" for model in STUDY.values.tested],
-        grasps=[f"{RESULTS}/dataset/{model}/grasps.nc" for model in STUDY.values.tested],
-        validation=[f"{RESULTS}/dataset/{model}/validation.nc" for model in STUDY.values.tested],
-        presses=[path for model in STUDY.values.tested for path in presses(model)],
+        validation=dataset("validation"),
+        unseen=dataset("unseen"),
+        grasps=dataset("grasps"),
+        presses=presses(STUDY.values.tested),
     output:
         ssim=f"{RESULTS}/evaluation/ssim.csv",
+        ceiling=f"{RESULTS}/evaluation/ceiling.csv",
         timing=f"{RESULTS}/evaluation/timing.csv",
         predictions=f"{RESULTS}/evaluation/predictions.nc",
     params:
         files=files,
-        settings=as_settings(ssim=STUDY.values.ssim.plain(), models=STUDY.values.tested),
+        settings=as_settings(ssim=plain(STUDY.values.ssim), seed=STUDY.values.seed),
     log:
         log_of("evaluate"),
     benchmark:

@@ -12,7 +12,7 @@ rule score_complexity:
             objects=[{"name": item.id, "unit": item.unit, "pose": item.pose} for item in STUDY.items()],
             footprint_mm=STUDY.spec.footprint_mm,
             reach_mm=STUDY.spec.thickness_mm,
-            **STUDY.values.complexity.plain(),
+            **plain(STUDY.values.complexity),
         ),
     log:
         log_of("score_complexity"),

@@ -14,7 +14,7 @@ rule simulate_press:
             sensor=STUDY.sensor,
             model=w.model,
             laws=STUDY.values.models[w.model].laws,
-            mesh=STUDY.values.models[w.model].mesh,
+            mesh=mesh_of(w.model),
             forces_n=STUDY.values.forces_n,
         ),
     log:

@@ -7,7 +7,7 @@ rule mesh_sensor:
         mesh=f"{RESULTS}/sensor/{{model}}/mesh.vtu",
     params:
         files=files,
-        settings=lambda w: as_settings(sensor=STUDY.sensor, model=w.model, mesh=STUDY.values.models[w.model].mesh),
+        settings=lambda w: as_settings(sensor=STUDY.sensor, model=w.model, mesh=mesh_of(w.model)),
     log:
         log_of("mesh_sensor", "{model}"),
     benchmark:
