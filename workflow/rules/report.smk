@@ -1,14 +1,135 @@
+# Tables, one rule per figure, and the page that gathers them.
+
+GRASPS = list(STUDY.items_of["grasps"].values())
+GRASP_UNITS = {item.id: item.unit for item in GRASPS}
+FIGURES = ("fig4_complexity", "fig5_ftir", "fig6_ssim", "fig7_maps")
+
+
+def figure_files(name):
+    """A figure's two files."""
+    return {kind: f"{RESULTS}/figures/{name}.{kind}" for kind in ("png", "svg")}
+
+
+rule make_tables:
+    input:
+        code=code("make_tables"),
+        cards=[f"{RESULTS}/materials/{name}.json" for name in STUDY.values.materials],
+        complexity=rules.score_complexity.output.table,
+        ftir=rules.validate_ftir.output.summary,
+        ssim=rules.evaluate.output.ssim,
+        timing=rules.evaluate.output.timing,
+    output:
+        table1=f"{RESULTS}/tables/table1_materials.csv",
+        table2=f"{RESULTS}/tables/table2_complexity.csv",
+        table3=f"{RESULTS}/tables/table3_timing.csv",
+        claims=f"{RESULTS}/tables/claims.csv",
+    params:
+        files=files,
+        settings=as_settings(**plain(STUDY.values.complexity)),
+    log:
+        log_of("make_tables"),
+    benchmark:
+        benchmark_of("make_tables")
+    shell:
+        run_stage("make_tables")
+
+
+rule draw_fig4_complexity:
+    input:
+        code=code("draw_fig4_complexity"),
+        complexity=rules.score_complexity.output.table,
+        objects=[item.file for item in GRASPS],
+    output:
+        **figure_files("fig4_complexity"),
+    params:
+        files=files,
+        settings=as_settings(thresholds=plain(STUDY.values.complexity)["thresholds"], units=list(GRASP_UNITS.items())),
+    log:
+        log_of("draw_fig4_complexity"),
+    benchmark:
+        benchmark_of("draw_fig4_complexity")
+    shell:
+        run_stage("draw_fig4_complexity")
+
+
+rule draw_fig5_ftir:
+    input:
+        code=code("draw_fig5_ftir"),
+        area=rules.validate_ftir.output.area,
+        summary=rules.validate_ftir.output.summary,
+    output:
+        **figure_files("fig5_ftir"),
+    params:
+        files=files,
+        settings=as_settings(),
+    log:
+        log_of("draw_fig5_ftir"),
+    benchmark:
+        benchmark_of("draw_fig5_ftir")
+    shell:
+        run_stage("draw_fig5_ftir")
+
+
+rule draw_fig6_ssim:
+    input:
+        code=code("draw_fig6_ssim"),
+        ssim=rules.evaluate.output.ssim,
+        ceiling=rules.evaluate.output.ceiling,
+    output:
+        **figure_files("fig6_ssim"),
+    params:
+        files=files,
+        settings=as_settings(),
+    log:
+        log_of("draw_fig6_ssim"),
+    benchmark:
+        benchmark_of("draw_fig6_ssim")
+    shell:
+        run_stage("draw_fig6_ssim")
+
+
+rule draw_fig7_maps:
+    input:
+        code=code("draw_fig7_maps"),
+        predictions=rules.evaluate.output.predictions,
+        complexity=rules.score_complexity.output.table,
+        objects=[item.file for item in GRASPS],
+        presses=[f"{RESULTS}/presses/grasps/{item.id}/{model}.nc" for item in GRASPS for model in STUDY.values.tested],
+    output:
+        **figure_files("fig7_maps"),
+    params:
+        files=files,
+        settings=as_settings(units=list(GRASP_UNITS.items())),
+    log:
+        log_of("draw_fig7_maps"),
+    benchmark:
+        benchmark_of("draw_fig7_maps")
+    shell:
+        run_stage("draw_fig7_maps")
+
+
 rule report:
     input:
         code=code("report"),
+        table1=rules.make_tables.output.table1,
+        table2=rules.make_tables.output.table2,
+        table3=rules.make_tables.output.table3,
+        claims=rules.make_tables.output.claims,
         ssim=rules.evaluate.output.ssim,
-        area=rules.validate_ftir.output.area,
-        complexity=rules.score_complexity.output.table,
+        ceiling=rules.evaluate.output.ceiling,
+        ftir=rules.validate_ftir.output.summary,
+        figures=[figure_files(name)["png"] for name in FIGURES],
     output:
         page=f"{RESULTS}/report.html",
     params:
         files=files,
-        settings=as_settings(),
+        settings=as_settings(
+            study=STUDY.name,
+            seed=STUDY.values.seed,
+            trials=STUDY.values.trials,
+            forces_n=STUDY.values.forces_n,
+            **{name: len(items) for name, items in STUDY.items_of.items()},
+        ),
     log:
         log_of("report"),
     benchmark:

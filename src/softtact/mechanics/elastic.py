@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import Delaunay
 
-from softtact.errors import ConvergenceError
+from softtact.errors import ConvergenceError, InputError
 from softtact.mechanics.linear_solvers import make_solver
 
 
@@ -38,16 +38,40 @@ class Compliance:
 
 
 def layer_mesh(footprint_mm, thickness_mm, *, edge_length_mm):
-    """Tetrahedra of a box with its top at z = 0, by fTetWild: points (n, 3) in mm, tetrahedra (t, 4)."""
+    """Tetrahedra of a box with its top at z = 0, by fTetWild: points (n, 3) in mm, tetrahedra (t, 4).
+
+    fTetWild has no seed that fixes its mesh (wildmeshing/fTetWild, issue 72): two calls differ in details. A study makes the
+    mesh once and keeps it as a file.
+    """
     import pytetwild
     import trimesh
 
-    box = trimesh.creation.box((*footprint_mm, thickness_mm))
+    size = np.array([*footprint_mm, thickness_mm])
+    box = trimesh.creation.box(size)
     box.apply_translation([0, 0, -0.5 * thickness_mm])
-    diagonal = float(np.linalg.norm([*footprint_mm, thickness_mm]))
+    diagonal = float(np.linalg.norm(size))
+    envelope = 1e-3   # of the diagonal: fTetWild's surface may leave the box's by so much
     points, tets = pytetwild.tetrahedralize(box.vertices, box.faces, edge_length_fac=edge_length_mm / diagonal,
-                                            num_threads=1)   # one thread: the same mesh every time
-    return _oriented(np.asarray(points, dtype=float), np.asarray(tets, dtype=np.int64))
+                                            epsilon=envelope, num_threads=1)
+    points, tets = _oriented(np.asarray(points, dtype=float), np.asarray(tets, dtype=np.int64))
+    return _snapped(points, tets, box.bounds, 1.01 * envelope * diagonal)
+
+
+def _snapped(points, tets, bounds, tolerance):
+    """The mesh with its surface put on the box's planes, which it leaves by up to the tolerance; flattened slivers dropped."""
+    faces = np.sort(tets[:, [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]].reshape(-1, 3), axis=1)
+    faces, count = np.unique(faces, axis=0, return_counts=True)
+    surface = np.unique(faces[count == 1])
+    snapped = points.copy()
+    for plane in bounds:
+        near = np.abs(points[surface] - plane) <= tolerance
+        snapped[surface] = np.where(near, plane, snapped[surface])
+    corners = snapped[tets]
+    on_plane = (corners == bounds[0][None, None]) | (corners == bounds[1][None, None])
+    tets = tets[~on_plane.all(axis=1).any(axis=1)]
+    if (np.linalg.det(snapped[tets[:, 1:]] - snapped[tets[:, :1]]) <= 0).any():
+        raise InputError("models.elastic.mesh.edge_length_mm: the layer's mesh has inverted tetrahedra; choose another length.")
+    return snapped, tets
 
 
 def _oriented(points, tets):

@@ -1,0 +1,95 @@
+"""report.html: one file, figures inside, links to the data beside it."""
+
+import base64
+import os
+
+import pandas as pd
+from jinja2 import Environment
+from markupsafe import Markup
+
+import softtact
+from softtact.files import read_json
+from softtact.reporting.tables import machine
+
+CAPTIONS = {
+    "fig4_complexity": "Figure 4. Mesh (grey) and convex hull (lines) of an object for each chosen model, and the ratios of all "
+                       "objects with the two thresholds.",
+    "fig5_ftir": "Figure 5. Contact area of the dielectric pressed on glass.",
+    "fig6_ssim": "Figure 6. SSIM of the networks' readings per item: bars are means, boxes quartiles over forces and trials; "
+                 "black dashes: the sensor's own repeated trials against each other, which no model can pass.",
+    "fig7_maps": "Figure 7. Objects from below, deformation maps of both models, tactile maps predicted from them, and the virtual "
+                 "sensor's (mean of its trials). Jet colours as printed; tactile maps 0 to 2400 counts.",
+}
+
+TEMPLATE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>softtact: {{ study }}</title>
+<style>body{font:16px/1.5 system-ui,sans-serif;max-width:1080px;margin:2em auto;padding:0 1em;color:#222}
+h1,h2{line-height:1.2}table{border-collapse:collapse;font-size:13px;margin:1em 0;display:block;overflow-x:auto}
+td,th{border-bottom:1px solid #ddd;padding:4px 8px;text-align:left;vertical-align:top}th{background:#f4f4f4}
+figure{margin:2em 0}img{max-width:100%}figcaption{font-size:14px;color:#444}.box{background:#fff6e0;border-left:4px solid #e0a000;
+padding:.6em 1em}.reproduced{background:#d9f0d9}.not{background:#f7d7d7}.contradicts{background:#ffe9c7}.needs{background:#e6e6f5}
+</style><h1>Simulating a soft tactile sensor: the study <i>{{ study }}</i></h1>
+<p>{{ facts }}</p>
+<p class="box"><b>What is synthetic here.</b> {{ synthetic }}</p>
+<h2>Result in one table</h2>{{ summary }}
+<h2>Figures</h2>{% for f in figures %}<figure><img alt="{{ f.caption }}" src="data:image/png;base64,{{ f.data }}">
+<figcaption>{{ f.caption }} <a href="{{ f.link }}">PNG</a>, <a href="{{ f.svg }}">SVG</a></figcaption></figure>{% endfor %}
+<h2>Tables</h2>{% for t in tables %}<h3>{{ t.title }}</h3>{{ t.html }}<p><a href="{{ t.link }}">CSV</a></p>{% endfor %}
+<h2>The paper's claims</h2><p>Each verdict is computed by the rule beside it.</p>
+<table><tr>{% for c in claim_columns %}<th>{{ c }}</th>
+{% endfor %}</tr>{% for row in claims %}<tr class="{{ row.verdict.split()[0] }}">{% for c in claim_columns %}<td>{{ row[c] }}</td>
+{% endfor %}</tr>{% endfor %}</table>
+<p>softtact {{ version }}; {{ machine }}. Files: <a href="presses">presses</a>, <a href="tactile">readings</a>,
+<a href="dataset">data sets</a>, <a href="learning">networks</a>, <a href="evaluation">evaluation</a>, 
+<a href="logs">logs</a>.</p></html>
+"""
+
+
+def render_page(inputs, settings, *, folder):
+    """The page as text; `inputs` as in the stage, links relative to `folder`."""
+    claims = pd.read_csv(inputs["claims"], keep_default_na=False)
+    titles = {"table1": "Table 1. Material laws (stress in MPa)", "table2": "Table 2. Complexity and choice of model",
+              "table3": "Table 3. Time per tactile map (s)"}
+    tables = [{"title": title, "html": _html(pd.read_csv(inputs[name])), "link": _link(inputs[name], folder)}
+              for name, title in titles.items()]
+    ftir = read_json(inputs["ftir"])
+    environment = Environment(autoescape=True)
+    for table in tables:
+        table["html"] = Markup(table["html"])
+    return environment.from_string(TEMPLATE).render(
+        study=settings["study"], facts=_facts(settings), synthetic=_synthetic(ftir), tables=tables,
+        summary=Markup(_html(_summary(pd.read_csv(inputs["ssim"]), pd.read_csv(inputs["ceiling"])))),
+        figures=[_figure(path, folder) for path in inputs["figures"]], claims=claims.to_dict("records"),
+        claim_columns=list(claims.columns), version=softtact.__version__, machine=machine())
+
+
+def _facts(settings):
+    return (f"{settings['indenters']} indenters, {settings['unseen']} unseen ones and {settings['grasps']} objects were pressed at "
+            f"{', '.join(f'{force:g}' for force in settings['forces_n'])} N with each model; the virtual sensor read each press "
+            f"{settings['trials']} times. Seed {settings['seed']}.")
+
+
+def _synthetic(ftir):
+    return ("The paper's curves, camera frames and taxel readings are not published here. Stress-strain curves are made from "
+            f"its printed constants with noise; the measured contact area is from: {ftir['source']}; the readings come from a "
+            "virtual sensor (another law, another mesh, scatter, hysteresis, noise). SSIM values below are against that virtual "
+            "sensor and are not the paper's.")
+
+
+def _summary(ssim, ceiling):
+    rows = ssim.groupby(["model", "set"], sort=False).agg(maps=("ssim", "size"), SSIM=("ssim", "mean"), sd=("ssim", "std"),
+                                                          mean_error_counts=("mae_counts", "mean")).reset_index()
+    own = ceiling.groupby("set", sort=False).ssim.mean()
+    return rows.assign(sensor_against_itself=rows.set.map(own))
+
+
+def _html(frame):
+    return frame.to_html(index=False, na_rep="", float_format=lambda value: f"{value:.4g}", border=0)
+
+
+def _link(path, folder):
+    return os.path.relpath(path, folder)
+
+
+def _figure(path, folder):
+    return {"caption": CAPTIONS[path.stem], "data": base64.b64encode(path.read_bytes()).decode(),
+            "link": _link(path, folder), "svg": _link(path.with_suffix(".svg"), folder)}

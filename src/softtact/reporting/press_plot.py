@@ -1,0 +1,26 @@
+"""A picture of one press: deformation map and taxels at every force."""
+
+from softtact.reporting.style import TACTILE_RANGE, pyplot, save
+
+
+def plot_press(result, path):
+    """Draw a `PressResult` to PNG or SVG: a column per force, the map in mm above, the 28 ideal counts below."""
+    plt = pyplot()
+    forces = result.force_n
+    half = [0.5 * (side[-1] - side[0]) for side in (result.x_mm, result.y_mm)]
+    extent = (-half[0], half[0], -half[1], half[1])
+    figure, axes = plt.subplots(2, len(forces), figsize=(1.2 + 2.3 * len(forces), 7.2), squeeze=False, layout="constrained")
+    top = float(result.deformation_map_mm.max())
+    for k, force in enumerate(forces):
+        image = axes[0, k].imshow(result.deformation_map_mm[k], origin="lower", extent=extent, vmin=0, vmax=top, cmap="viridis")
+        counts = axes[1, k].imshow(result.tactile_map[k], origin="lower", extent=extent, vmin=TACTILE_RANGE[0],
+                                   vmax=TACTILE_RANGE[1], cmap="viridis")
+        axes[0, k].set_title(f"{force:g} N, depth {result.indentation_mm[k]:.2f} mm")
+        for axis in axes[:, k]:
+            axis.set_xlabel("x (mm)")
+    for axis, name in zip(axes[:, 0], ("deformation", "taxels"), strict=True):
+        axis.set_ylabel(f"{name}: y (mm)")
+    figure.colorbar(image, ax=axes[0], label="towards the PCB (mm)")
+    figure.colorbar(counts, ax=axes[1], label="counts, ideal readout")
+    figure.suptitle(f"{result.model} model, sensor {result.sensor}")
+    save(figure, path)

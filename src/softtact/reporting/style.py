@@ -1,0 +1,44 @@
+"""How every figure looks and is written: legible sizes, two model colours that differ in grey too, files without dates."""
+
+from pathlib import Path
+
+from softtact.files import atomic_path
+
+MODEL_COLOURS = {"hyperelastic": "#1f4e79", "elastic": "#e08214"}   # dark blue and light orange: apart in grey as well
+MODEL_NAMES = {"hyperelastic": "hyperelastic", "elastic": "elastic"}
+TACTILE_RANGE = (0, 2400)   # counts; the colour scale of the paper's figure 7
+
+
+def pyplot():
+    """matplotlib's pyplot without a screen, with the project's settings."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    matplotlib.rcParams.update({"svg.hashsalt": "softtact", "font.size": 9, "axes.spines.top": False,
+                                "axes.spines.right": False, "figure.dpi": 100, "savefig.dpi": 160})
+    import matplotlib.pyplot as plt
+
+    return plt
+
+
+def colour(model):
+    """A model's colour; grey for one that has none of its own."""
+    return MODEL_COLOURS.get(model, "0.4")
+
+
+def save(figure, *paths):
+    """Write a figure to PNG and SVG files, whole or not at all, the same bytes for the same figure."""
+    plt = pyplot()
+    for path in map(Path, paths):
+        kind = path.suffix[1:]
+        metadata = {"Software": None} if kind == "png" else {"Date": None, "Creator": None}
+        with atomic_path(path) as temporary:
+            figure.savefig(temporary, format=kind, metadata=metadata, bbox_inches="tight")
+    plt.close(figure)
+
+
+def draw_map(axes, values, *, extent, limits, cmap="jet"):
+    """An image of a map (y, x), turned 90 degrees counter-clockwise as the paper prints it: y runs to the left."""
+    x0, x1, y0, y1 = extent
+    return axes.imshow(values.T[:, ::-1], origin="lower", extent=(y1, y0, x0, x1), vmin=limits[0], vmax=limits[1], cmap=cmap,
+                       interpolation="nearest", aspect="equal")

@@ -1,0 +1,62 @@
+"""Tables 1 to 3: what was fitted, what was chosen, how long it took, each beside the paper's numbers."""
+
+import platform
+
+import pandas as pd
+
+# Table 2 of the paper: NPt, CHt, NPo, CHo, and the pipeline that it chose.
+PRINTED_COUNTS = {"object_1": (1356, 231, 51, 36, "elastic"), "object_2": (13830, 15537, 1205, 3444, "elastic"),
+                  "object_3": (1932, 1348, 64, 105, "elastic"), "object_4": (5472, 1449, 164, 141, "elastic"),
+                  "object_5": (5628, 426, 242, 90, "hyperelastic"), "object_6": (28524, 1353, 984, 102, "hyperelastic")}
+# Table 3 of the paper, s: mean, min, max, sd.
+PRINTED_TIMES = {"hyperelastic": (162.1, 48.0, 1863.0, 110.9), "elastic": (37.4, 2.46, 157.6, 32.44)}
+
+
+def table1_materials(cards):
+    """A row per material and law: parameters, RMSE (MPa), stability, the paper's printed constants and RMSE."""
+    rows = []
+    for card in cards:
+        for law, fit in card["laws"].items():
+            printed = card.get("printed", {}).get(law, {})
+            rows.append({"material": card["material"], "law": law, "chosen": law == card["chosen"],
+                         "parameters": _listing(fit["parameters"]), "rmse_mpa": fit.get("rmse_mpa"),
+                         "mu0_mpa": fit.get("mu0_mpa"), "stable_over_data": fit.get("stable_over_data"),
+                         "printed_parameters": _listing(printed.get("parameters", {})),
+                         "printed_rmse": printed.get("rmse"), "data": card["kind"]})
+    return pd.DataFrame(rows)
+
+
+def table2_complexity(complexity, choose):
+    """Counts and choice per object, ours and the six printed rows; `choose(NPt, CHt, NPo, CHo)` is the rule."""
+    ours = complexity.assign(source="ours")
+    printed = pd.DataFrame([{"object": name, "NPt": a, "CHt": b, "NPo": c, "CHo": d, "model": choose(a, b, c, d),
+                             "model_in_paper": model, "source": "paper"}
+                            for name, (a, b, c, d, model) in PRINTED_COUNTS.items()])
+    return pd.concat([ours, printed], ignore_index=True)
+
+
+def table3_timing(timing):
+    """Seconds per map and model: ours with its machine, and the paper's."""
+    rows = []
+    for model, group in timing.assign(total_s=timing.solver_s + timing.network_s).groupby("model", sort=True):
+        t = group.total_s
+        rows.append({"model": model, "source": "ours", "maps": len(t), "mean_s": t.mean(), "min_s": t.min(), "max_s": t.max(),
+                     "sd_s": t.std(ddof=1), "machine": machine()})
+        if model in PRINTED_TIMES:
+            rows.append({"model": model, "source": "paper", "machine": "not printed",
+                         **dict(zip(("mean_s", "min_s", "max_s", "sd_s"), PRINTED_TIMES[model], strict=True))})
+    return pd.DataFrame(rows)
+
+
+def machine():
+    """Processor and system in words."""
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as lines:
+            names = {line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")}
+    except OSError:
+        names = {platform.processor() or platform.machine()}
+    return f"{', '.join(sorted(names))}; {platform.system()}; Python {platform.python_version()}"
+
+
+def _listing(parameters):
+    return " ".join(f"{name}={value:.4g}" for name, value in parameters.items())

@@ -1,0 +1,15 @@
+"""Figure 5.
+
+inputs: area, summary;  outputs: png, svg
+"""
+
+import pandas as pd
+
+from softtact.files import read_json
+from softtact.reporting.fig5_ftir import draw
+from softtact.reporting.style import save
+
+
+def run(*, inputs, outputs, settings, threads=1):
+    """Draw."""
+    save(draw(pd.read_csv(inputs["area"]), read_json(inputs["summary"])), outputs["png"], outputs["svg"])

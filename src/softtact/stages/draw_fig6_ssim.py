@@ -1,0 +1,14 @@
+"""Figure 6.
+
+inputs: ssim, ceiling;  outputs: png, svg
+"""
+
+import pandas as pd
+
+from softtact.reporting.fig6_ssim import draw
+from softtact.reporting.style import save
+
+
+def run(*, inputs, outputs, settings, threads=1):
+    """Draw."""
+    save(draw(pd.read_csv(inputs["ssim"]), pd.read_csv(inputs["ceiling"])), outputs["png"], outputs["svg"])

@@ -1,0 +1,33 @@
+"""Figure 7.
+
+inputs: predictions, complexity, objects (list of meshes), presses (list: every model of every object)
+outputs: png, svg;  settings: units [[object, unit], ...]
+"""
+
+import pandas as pd
+
+from softtact.files import read_dataset
+from softtact.geometry.meshes import read_mesh
+from softtact.reporting.fig7_maps import draw
+from softtact.reporting.style import save
+
+
+def run(*, inputs, outputs, settings, threads=1):
+    """Draw the grasped objects at the largest force."""
+    predictions = read_dataset(inputs["predictions"])
+    chosen = pd.read_csv(inputs["complexity"]).set_index("object").model
+    presses = {(press.attrs["item"], press.attrs["model"]): press for press in map(read_dataset, inputs["presses"])}
+    objects = [_object(name, read_mesh(path, unit=unit), chosen[name], presses, predictions)
+               for path, (name, unit) in zip(inputs["objects"], settings["units"], strict=True)]
+    save(draw(objects), outputs["png"], outputs["svg"])
+
+
+def _object(name, mesh, chosen, presses, predictions):
+    models = [str(model) for model in predictions.model.values]
+    first = presses[name, models[0]]
+    last = predictions.sel(item=name).isel(force=-1)
+    return {"name": name, "mesh": mesh, "chosen": chosen, "force": float(first.force_n.values[-1]),
+            "deformation": {model: presses[name, model].deformation_map_mm.values[-1] for model in models},
+            "tactile": {model: last.tactile_map.sel(model=model).values for model in models},
+            "sensor": last.sensor_map.values,
+            "extent": (*first.x.values[[0, -1]], *first.y.values[[0, -1]])}

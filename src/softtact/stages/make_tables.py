@@ -1,0 +1,27 @@
+"""Tables 1 to 3 and the claims.
+
+inputs: cards (list), complexity, ftir, ssim, timing;  outputs: table1, table2, table3, claims
+settings: rule, thresholds {total, overlap}
+"""
+
+import pandas as pd
+
+from softtact.evaluation.claims import claims
+from softtact.files import read_json, write_csv
+from softtact.geometry.complexity import choose_model
+from softtact.reporting.tables import PRINTED_COUNTS, table1_materials, table2_complexity, table3_timing
+
+
+def run(*, inputs, outputs, settings, threads=1):
+    """Read the study's results and write its tables."""
+    cards = [read_json(path) for path in inputs["cards"]]
+    complexity, ssim, timing = (pd.read_csv(inputs[name]) for name in ("complexity", "ssim", "timing"))
+
+    def choose(*counts, rule=settings["rule"]):
+        return choose_model(*counts, rule=rule, **settings["thresholds"])
+
+    write_csv(outputs["table1"], table1_materials(cards))
+    write_csv(outputs["table2"], table2_complexity(complexity, choose))
+    write_csv(outputs["table3"], table3_timing(timing))
+    write_csv(outputs["claims"], claims(cards=cards, complexity=complexity, ftir=read_json(inputs["ftir"]), ssim=ssim,
+                                        timing=timing, choose=choose, printed_counts=PRINTED_COUNTS))

@@ -1,0 +1,13 @@
+"""The report page.
+
+inputs: table1, table2, table3, claims, ssim, ceiling, ftir, figures (list of PNG);  outputs: page;  settings: study facts
+"""
+
+from softtact.files import atomic_path
+from softtact.reporting.page import render_page
+
+
+def run(*, inputs, outputs, settings, threads=1):
+    """Write the page, whole."""
+    with atomic_path(outputs["page"]) as temporary:
+        temporary.write_text(render_page(inputs, settings, folder=outputs["page"].parent), encoding="utf-8")
