@@ -33,6 +33,8 @@ def _draw_mesh(axes, mesh, row, name):
 
 
 def _draw_ratios(axes, complexity, thresholds):
+    from matplotlib.ticker import NullFormatter
+
     for model, rows in complexity.groupby("model"):
         x, y = rows.NPt / rows.CHt, rows.NPo / rows.CHo.clip(lower=1)
         axes.scatter(x, y.clip(lower=1e-2), color=colour(model), marker="o" if model == "elastic" else "s", s=18,
@@ -43,4 +45,10 @@ def _draw_ratios(axes, complexity, thresholds):
     axes.axvline(thresholds["total"], color="0.5", linestyle="--")
     axes.axhline(thresholds["overlap"], color="0.5", linestyle=":")
     axes.set(xscale="log", yscale="log", xlabel="NPt / CHt, whole object", ylabel="NPo / CHo, over the sensor")
-    axes.legend(title="chosen model", frameon=False)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter(NullFormatter())
+    axes.set(xlim=(1, None), ylim=(None, max(20, axes.get_ylim()[1])))
+    axes.annotate("threshold", (thresholds["total"], 1), xycoords=("data", "axes fraction"), xytext=(3, -10),
+                  textcoords="offset points", color="0.4")
+    axes.legend(title="chosen model", frameon=False, loc="upper left")

@@ -9,13 +9,13 @@ def draw(ssim, ceiling):
     """Figure from ssim.csv and ceiling.csv; one panel a set of test data."""
     plt = pyplot()
     sets = [name for name in ("validation", "unseen", "grasps") if (ssim.set == name).any()]
-    counts = [max(1, ssim[ssim.set == name].item.nunique()) for name in sets]
-    figure, axes = plt.subplots(1, len(sets), figsize=(3 + 0.42 * sum(counts), 4.2), sharey=True, squeeze=False,
-                                gridspec_kw={"width_ratios": [max(3, n) for n in counts]}, layout="constrained")
+    counts = [max(3, ssim[ssim.set == name].item.nunique()) for name in sets]
+    figure, axes = plt.subplots(1, len(sets), figsize=(2.5 + 0.5 * sum(counts), 4.4), sharey=True, squeeze=False,
+                                gridspec_kw={"width_ratios": counts}, layout="constrained")
     for axis, name in zip(axes[0], sets, strict=True):
         _draw_set(axis, ssim[ssim.set == name], ceiling[ceiling.set == name], name)
     axes[0, 0].set_ylabel("SSIM (window 3, range 2400 counts)")
-    axes[0, -1].legend(frameon=False, fontsize=8, loc="lower right")
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), frameon=False, ncols=3, loc="outside lower center")
     return figure
 
 
@@ -27,11 +27,13 @@ def _draw_set(axis, rows, ceiling, name):
         groups = [own[own.item == item].ssim.to_numpy() for item in items]
         at = np.arange(len(items)) + (m - 0.5 * (len(models) - 1)) * width
         axis.bar(at, [g.mean() if len(g) else 0 for g in groups], width, color=colour(model), alpha=0.55,
-                 label=f"{model}: mean {own.ssim.mean():.2f}")
+                 label=model)
         axis.boxplot(groups, positions=at, widths=0.6 * width, manage_ticks=False, showfliers=False,
                      medianprops={"color": "k"})
     own = [ceiling[ceiling.item == item].ssim.mean() for item in items]
     axis.plot(np.arange(len(items)), own, "k_", ms=14, label="sensor against itself")
     axis.set_xticks(range(len(items)), [i.replace("_", " ") for i in items], rotation=60, ha="right")
-    axis.set_title(f"{name} (n = {len(rows) // max(1, len(models))} maps)")
+    means = ", ".join(f"{rows[rows.model == model].ssim.mean():.2f}" for model in models)
+    axis.set_title(f"{name}\nn = {len(rows) // len(models)}, means {means}", fontsize=9)
+    axis.set_xlim(-0.6, len(items) - 0.4)
     axis.set_ylim(min(0.0, rows.ssim.min()), 1.02)

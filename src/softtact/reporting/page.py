@@ -27,6 +27,7 @@ h1,h2{line-height:1.2}table{border-collapse:collapse;font-size:13px;margin:1em 0
 td,th{border-bottom:1px solid #ddd;padding:4px 8px;text-align:left;vertical-align:top}th{background:#f4f4f4}
 figure{margin:2em 0}img{max-width:100%}figcaption{font-size:14px;color:#444}.box{background:#fff6e0;border-left:4px solid #e0a000;
 padding:.6em 1em}.reproduced{background:#d9f0d9}.not{background:#f7d7d7}.contradicts{background:#ffe9c7}.needs{background:#e6e6f5}
+.undecided{background:#eee}
 </style><h1>Simulating a soft tactile sensor: the study <i>{{ study }}</i></h1>
 <p>{{ facts }}</p>
 <p class="box"><b>What is synthetic here.</b> {{ synthetic }}</p>
@@ -39,7 +40,7 @@ padding:.6em 1em}.reproduced{background:#d9f0d9}.not{background:#f7d7d7}.contrad
 {% endfor %}</tr>{% for row in claims %}<tr class="{{ row.verdict.split()[0] }}">{% for c in claim_columns %}<td>{{ row[c] }}</td>
 {% endfor %}</tr>{% endfor %}</table>
 <p>softtact {{ version }}; {{ machine }}. Files: <a href="presses">presses</a>, <a href="tactile">readings</a>,
-<a href="dataset">data sets</a>, <a href="learning">networks</a>, <a href="evaluation">evaluation</a>, 
+<a href="dataset">data sets</a>, <a href="learning">networks</a>, <a href="evaluation">evaluation</a>,
 <a href="logs">logs</a>.</p></html>
 """
 
