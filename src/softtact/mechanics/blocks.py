@@ -1,10 +1,15 @@
 """A block of hexahedra of one material: energy, internal force and tangent at finite strain.
 
-The volumetric energy K/2 (J-1)^2 sees J only through its projection on linear functions in each element
+The volumetric energy (K - k)/2 (J-1)^2 sees J only through its projection on linear functions in each element
 (four modes: discontinuous linear pressure). The element does not lock for nearly incompressible rubber, the pressure needs
-no unknown of its own, and the tangent stays symmetric. Frusta want full quadrature (27 points): with 8 points they
-soften by spurious modes once they fold (13 % more compression at 0.4 MPa) and Newton's method stalls.
-Sussman and Bathe, Computers & Structures 26 (1987) 357 (u/p formulation with condensed pressure).
+no unknown of its own, and the tangent stays symmetric (Sussman and Bathe, Computers & Structures 26 (1987) 357).
+
+A small rest, k/4 (J^2 - 1 - 2 ln J), sees J at every point. Between the modes J is free otherwise, and the edges of frusta
+that fold onto the PCB snap to J = 0.1, where no further step converges. With k = mu this part is no stiffer in volume than
+in shear, so it cannot lock; it changes the indentation of a sphere by 0.1 to 0.3 %.
+
+Frusta want full quadrature (27 points): with 8 points they soften by spurious modes once they fold (13 % more compression
+at 0.4 MPa) and Newton's method stalls.
 """
 
 from dataclasses import dataclass
@@ -13,6 +18,8 @@ import numpy as np
 
 from softtact.mechanics import kernels
 from softtact.mechanics.elements import gauss, hex20, reference_gradients
+
+LOCAL_OVER_SHEAR = 1.0   # k / mu
 
 
 @dataclass(frozen=True)
@@ -27,8 +34,10 @@ class BlockState:
 class HexBlock:
     """Hexahedra given by coordinates (e, 20, 3) in mm with one law; displacements come per element (e, 20, 3)."""
 
-    def __init__(self, coordinates, law, *, points_per_side=3):
+    def __init__(self, coordinates, law, *, points_per_side=3, local_over_shear=LOCAL_OVER_SHEAR):
         self.law = law
+        self.local_modulus = min(local_over_shear * law.mu0, law.bulk_modulus)
+        self.projected_modulus = law.bulk_modulus - self.local_modulus
         points, weights = gauss(points_per_side, 3)
         self.gradients, self.volumes = reference_gradients(coordinates, hex20(points)[1], weights)
         self.basis = np.column_stack([np.ones(len(points)), points])   # (g, 4): 1, xi, eta, zeta
@@ -42,7 +51,8 @@ class HexBlock:
             return None
         response = self.law.isochoric(C, tangent=False)
         modes, pressure = self._pressure(J, slice(None))
-        energy = float(self.volumes.ravel() @ response.energy + 0.5 * (modes[0] * modes[1]).sum())
+        local = 0.25 * self.local_modulus * (J * J - 1 - 2 * np.log(J))
+        energy = float(self.volumes.ravel() @ (response.energy + local.ravel()) + 0.5 * (modes[0] * modes[1]).sum())
         force = kernels.internal_force(F, C, J, self.gradients, self.volumes, response.stress, pressure)
         return BlockState(energy=energy, force=force, displacement=displacement)
 
@@ -54,10 +64,10 @@ class HexBlock:
         response = self.law.isochoric(C, tangent=True)
         _, pressure = self._pressure(J, elements)
         return kernels.tangent(F, C, J, gradients, volumes, response.stress, response.tangent, pressure,
-                               self.basis, self.gram_inverse[elements], self.law.bulk_modulus)
+                               self.basis, self.gram_inverse[elements], self.projected_modulus, self.local_modulus)
 
     def _pressure(self, J, elements):
-        """Modes of the volume change with their conjugate pressures, and the pressure (e, g) at the points."""
+        """Modes of the volume change with their conjugate pressures, and the whole pressure (e, g) at the points."""
         change = ((J - 1) * self.volumes[elements]) @ self.basis
-        conjugate = self.law.bulk_modulus * np.einsum("epq,eq->ep", self.gram_inverse[elements], change)
-        return (change, conjugate), conjugate @ self.basis.T
+        conjugate = self.projected_modulus * np.einsum("epq,eq->ep", self.gram_inverse[elements], change)
+        return (change, conjugate), conjugate @ self.basis.T + 0.5 * self.local_modulus * (J - 1 / J)

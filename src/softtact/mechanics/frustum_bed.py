@@ -22,7 +22,7 @@ DIRECTIONS = ((0, 1.0), (1, 1.0), (0, -1.0), (1, -1.0))   # axis and sign of the
 _PLANE_POINTS = 9                   # nodes that a contact point depends on: eight of its face and one of the plane
 _REFRESH_MM = 1e-3                  # a frustum that moved less than this keeps its tangent (residuals stay exact)
 _REFRESH_SLOPE = 0.05               # ... unless a contact point's stiffness changed by this share of the penalty
-_FIRST_SHIFT = 0.02                 # N/mm, small against the 1 N/mm of a rubber element of this size
+_SMALLEST_STIFFNESS = 0.02          # N/mm of a mode of a folding frustum; the softest mode of one at rest has 0.03
 _CHUNK = 45                         # frusta whose element tangents are in memory at once
 
 
@@ -187,6 +187,11 @@ class FrustumBed:
             self._inner_by_root[frustum] = coupling
             self.condensed[frustum] = matrix[n:, n:] - matrix[n:, :n] @ coupling
 
+    def positive_condensed(self):
+        """The condensed tangents (n, roots, roots) without their modes of negative stiffness."""
+        values, vectors = np.linalg.eigh(self.condensed)
+        return np.matmul(vectors * np.maximum(values, 0.0)[:, None, :], vectors.transpose(0, 2, 1))
+
     def condensed_residual(self, state):
         """Root forces (n, 60) after the inner residual has been eliminated, and the inner correction (n, inner)."""
         flat = state.force.reshape(self.count, -1)
@@ -213,22 +218,19 @@ class FrustumBed:
 
 
 class _Factor:
-    """Cholesky factors of a frustum's inner matrix, shifted just enough where folding made it indefinite.
+    """Cholesky factors of a frustum's inner matrix; where folding made it indefinite, of |matrix|, its eigenvalues made positive.
 
-    With the shift every Newton step lowers the energy; at equilibrium the shift changes nothing but the rate.
+    With |matrix| every Newton step lowers the energy, and goes as far along a mode of negative stiffness as along one of
+    positive; at equilibrium only the rate of convergence depends on it. Nocedal and Wright, Numerical Optimization, sec. 3.4.
     """
 
     def __init__(self, matrix):
-        shift = 0.0
-        diagonal = np.arange(len(matrix))
-        while True:
-            self._cholesky, info = lapack.dpotrf(matrix, lower=1, clean=0)
-            if info == 0:
-                self.shifted = shift > 0
-                return
-            increase = max(shift, _FIRST_SHIFT)   # doubles: 1, 2, 4 ... times the first
-            matrix[diagonal, diagonal] += increase
-            shift += increase
+        self._cholesky, info = lapack.dpotrf(matrix, lower=1, clean=0)
+        self.modified = info != 0
+        if self.modified:
+            values, vectors = np.linalg.eigh(matrix)
+            matrix = (vectors * np.maximum(np.abs(values), _SMALLEST_STIFFNESS)) @ vectors.T
+            self._cholesky, _ = lapack.dpotrf(matrix, lower=1, clean=0)
 
     def solve(self, right):
         return lapack.dpotrs(self._cholesky, right, lower=1)[0]

@@ -10,14 +10,20 @@ from softtact.mechanics.layered_body import BodyState
 
 @dataclass(frozen=True)
 class NewtonSettings:
-    """Tolerance as a share of the force; iterations per step; the smallest share of a force level that is still tried."""
+    """Tolerance as a share of the force (at least of `smallest_scale_n`); iterations and largest movement per step;
 
-    relative_tolerance: float = 1e-5
-    max_iterations: int = 25
+    the smallest force increment that is still tried; how the first touch is found; the cut of the residual after which
+    a tangent is used again.
+    """
+
+    relative_tolerance: float = 1e-4   # of a nodal force; 1e-6 changes the indentation by 2e-6 of itself
+    max_iterations: int = 60
     largest_step_mm: float = 0.12
     smallest_increment_n: float = 0.02
     smallest_scale_n: float = 10.0
     first_touch_mm: float = 0.01
+    first_touch_tolerance_n: float = 0.01   # a start for the first level, not a result
+    good_reduction: float = 0.1
 
 
 @dataclass(frozen=True)
@@ -64,10 +70,10 @@ def press_levels(body, surface, forces_n, *, settings=NewtonSettings()):
 def _first_touch(body, surface, settings):
     """Equilibrium at a small given indentation: under force control alone the free object has no stiffness."""
     slab, bed = body.rest()
-    depth = settings.first_touch_mm + surface.lowest_mm
     planes = body.slab.facing(slab, surface)
+    depth = settings.first_touch_mm + planes.anchors[:, 2].min()   # a tip may lie between the points that feel contact
     start = body.evaluate(slab, bed, depth, planes)
-    state, _, _ = _newton(body, planes, start, None, 1e-4, settings)
+    state, _, _ = _newton(body, planes, start, None, settings.first_touch_tolerance_n, settings)
     if state is None:
         raise ConvergenceError("The first touch of the object did not converge.")
     return state
@@ -101,18 +107,22 @@ def _attempt(body, surface, path, force, settings):
 
 
 def _newton(body, planes, state, force, tolerance, settings):
-    """Equilibrium state (None if not reached), iterations, and the last residual in N."""
-    residual = np.inf
+    """Equilibrium state (None if not reached), iterations, and the last residual in N.
+
+    A step that cut the residual well is followed by one with the same tangent, which is cheap and nearly as good.
+    """
+    residual, reuse = body.residual_norm(state, force), False
     for iteration in range(settings.max_iterations):
-        residual = body.residual_norm(state, force)
         if residual <= tolerance:
             return state, iteration, residual
-        step = body.newton_step(state, force)
-        if not np.isfinite(step.largest()):
+        step = body.newton_step(state, force, same_tangent=reuse)
+        trial = _line_search(body, planes, state, step, force, residual, settings) if np.isfinite(step.largest()) else None
+        if trial is None and not reuse:
             return None, iteration, residual
-        state = _line_search(body, planes, state, step, force, residual, settings)
-        if state is None:
-            return None, iteration, residual
+        before = residual
+        if trial is not None:
+            state, residual = trial, body.residual_norm(trial, force)
+        reuse = trial is not None and residual < settings.good_reduction * before
     return None, settings.max_iterations, residual
 
 

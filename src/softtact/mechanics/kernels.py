@@ -102,10 +102,11 @@ def _strain_rows(B, f, gradients):
 
 
 @njit(cache=True, nogil=True)
-def tangent(F, C, J, gradients, volumes, stress, moduli, pressure, basis, gram_inverse, bulk_modulus):
-    """Tangent (e, 3 m, 3 m) of `internal_force` with the pressure projected on `basis` (g, p).
+def tangent(F, C, J, gradients, volumes, stress, moduli, pressure, basis, gram_inverse, bulk_modulus, local_modulus):
+    """Tangent (e, 3 m, 3 m) of `internal_force` with the pressure of `HexBlock`: a projected and a local part.
 
-    pressure = K * basis . gram_inverse . integral(basis (J - 1)): symmetric, rank p per element.
+    projected = bulk_modulus * basis . gram_inverse . integral(basis (J - 1)), basis (g, p): symmetric, rank p per element
+    local = local_modulus (J - 1/J) / 2
     """
     elements, points, nodes, _ = gradients.shape
     size = 3 * nodes
@@ -124,6 +125,7 @@ def tangent(F, C, J, gradients, volumes, stress, moduli, pressure, basis, gram_i
             n = e * points + g
             inverse = inverse_symmetric(C[n])
             w, pj = volumes[e, g], pressure[e, g] * J[e, g]
+            local = 0.5 * local_modulus * (J[e, g] * J[e, g] + 1.0)
             for k in range(6):
                 value = w * (stress[n, k] + pj * inverse[k])
                 S[_ROW[k], _COL[k]] = value
@@ -131,7 +133,7 @@ def tangent(F, C, J, gradients, volumes, stress, moduli, pressure, basis, gram_i
                 for m in range(6):
                     i, j, p, q = _ROW[k], _COL[k], _ROW[m], _COL[m]
                     ip, jq, iq, jp = _sym(inverse, i, p), _sym(inverse, j, q), _sym(inverse, i, q), _sym(inverse, j, p)
-                    D[k, m] = w * (moduli[n, k, m] + pj * (inverse[k] * inverse[m] - ip * jq - iq * jp))
+                    D[k, m] = w * (moduli[n, k, m] + (pj + local) * inverse[k] * inverse[m] - pj * (ip * jq + iq * jp))
             rows = B[6 * g:6 * g + 6]
             _strain_rows(rows, F[e, g], gradients[e, g])
             DB[6 * g:6 * g + 6] = D @ rows

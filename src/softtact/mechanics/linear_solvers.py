@@ -17,55 +17,41 @@ def make_solver():
 
 
 class PardisoSolver:
-    """MKL PARDISO: Cholesky, or Bunch-Kaufman where a matrix is indefinite; the analysis is reused while the pattern stays."""
+    """MKL PARDISO's Cholesky; the analysis is reused while the pattern stays."""
 
     name = "pardiso"
-    _POSITIVE, _INDEFINITE = 2, -2
-    _FACTOR, _SOLVE, _ANALYSE_AND_FACTOR = 22, 33, 12
+    _POSITIVE, _FACTOR, _SOLVE, _ANALYSE_AND_FACTOR = 2, 22, 33, 12
 
     def __init__(self):
-        self._solvers, self._patterns, self._upper = {}, {}, None
-        self._start(self._POSITIVE)
-
-    def _start(self, kind):
         from pypardiso import PyPardisoSolver
 
-        if kind not in self._solvers:
-            self._solvers[kind] = PyPardisoSolver(mtype=kind)
-        self._current = kind
+        self._solver, self._pattern, self._upper = PyPardisoSolver(mtype=self._POSITIVE), None, None
 
     def factor(self, upper):
-        """Factor the matrix whose upper triangle (csr, sorted, with its diagonal) is given."""
+        """Factor the matrix whose upper triangle (csr, sorted, with its diagonal) is given; False if not positive definite."""
         from pypardiso.pardiso_wrapper import PyPardisoError
 
         self._upper = upper
-        self._start(self._POSITIVE)
+        pattern = (upper.indptr, upper.indices)
+        same = self._pattern is not None and all(a is b for a, b in zip(pattern, self._pattern, strict=True))
+        self._solver.set_phase(self._FACTOR if same else self._ANALYSE_AND_FACTOR)
         try:
-            self._factor()
+            self._solver._call_pardiso(upper, np.zeros((upper.shape[0], 1)))
         except PyPardisoError:
-            self._start(self._INDEFINITE)
-            self._factor()
-
-    def _factor(self):
-        known = self._patterns.get(self._current)
-        same = known is not None and known[0] is self._upper.indptr and known[1] is self._upper.indices
-        solver = self._solvers[self._current]
-        solver.set_phase(self._FACTOR if same else self._ANALYSE_AND_FACTOR)
-        solver._call_pardiso(self._upper, np.zeros((self._upper.shape[0], 1)))
-        self._patterns[self._current] = (self._upper.indptr, self._upper.indices)
+            return False
+        self._pattern = pattern
+        return True
 
     def solve(self, right):
         """Solve for one (n,) or several (n, k) right-hand sides."""
-        solver = self._solvers[self._current]
-        solver.set_phase(self._SOLVE)
+        self._solver.set_phase(self._SOLVE)
         columns = np.asfortranarray(right.reshape(len(right), -1))
-        return solver._call_pardiso(self._upper, columns).reshape(right.shape)
+        return self._solver._call_pardiso(self._upper, columns).reshape(right.shape)
 
     def close(self):
         """Free the factors, which live outside Python's memory."""
-        for solver in self._solvers.values():
-            solver.free_memory(everything=True)
-        self._patterns, self._upper = {}, None
+        self._solver.free_memory(everything=True)
+        self._pattern, self._upper = None, None
 
 
 class SuperLUSolver:
@@ -74,10 +60,12 @@ class SuperLUSolver:
     name = "superlu"
 
     def factor(self, upper):
-        """Factor the matrix whose upper triangle (csr) is given."""
+        """Factor the matrix whose upper triangle (csr) is given; False if not positive definite."""
         full = upper + sp.triu(upper, 1).T
-        self._lu = spla.splu(full.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.001,
+        self._lu = spla.splu(full.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
                              options={"SymmetricMode": True})
+        # Pivots from the diagonal, whose signs are those of the eigenvalues (Sylvester's law of inertia).
+        return bool((self._lu.U.diagonal() > 0).all())
 
     def solve(self, right):
         """Solve for one (n,) or several (n, k) right-hand sides."""

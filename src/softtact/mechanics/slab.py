@@ -160,6 +160,10 @@ class Slab:
         _scatter(data, tied, self._slots[-1])
         return self._matrix, border, corner
 
+    def add_to_diagonal(self, matrix, value):
+        """Add `value` (N/mm) to each diagonal entry of what `tangent` gave."""
+        matrix.data[matrix.indptr[:-1]] += value   # sorted upper triangle: each row begins with its diagonal
+
     def _contact_tangent(self, state):
         _, _, slope = penalty(state.gaps, stiffness=self.contact.stiffness, smoothing=self.contact.smoothing)
         weight = (slope * self.top_area).reshape(-1, 9)
