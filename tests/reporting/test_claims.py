@@ -1,0 +1,105 @@
+"""Claims and tables: a verdict follows from the numbers, and changes with them."""
+
+import pandas as pd
+import pytest
+
+from softtact.evaluation.claims import claims
+from softtact.geometry.complexity import choose_model
+from softtact.reporting.tables import PRINTED_COUNTS, table2_complexity, table3_timing
+
+
+def choose(*counts, rule="any"):
+    return choose_model(*counts, rule=rule)
+
+
+def scores(gain, items=("object_1", "object_2", "object_3", "object_5", "object_6")):
+    """SSIM rows: the hyperelastic model better by `gain`, scattering by 0.001 from object to object."""
+    rows = [{"model": model, "set": name, "item": item, "trial": 0, "force_n": 10.0, "mae_counts": 5.0,
+             "ssim": 0.6 + (gain if model == "hyperelastic" else 0.0) + 0.001 * k * (model == "elastic")}
+            for name in ("validation", "unseen", "grasps") for k, item in enumerate(items) for model in ("elastic", "hyperelastic")]
+    return pd.DataFrame(rows)
+
+
+def card(*, kind="measured", laws=("ogden2", "mooney_rivlin"), rmse=0.005, warnings=()):
+    entries = {law: {"parameters": {}, "rmse_mpa": rmse, "stable_over_data": True} for law in laws}
+    return {"material": "rubber", "kind": kind, "chosen": laws[0], "laws": entries, "warnings": list(warnings)}
+
+
+def table(**changes):
+    timing = pd.DataFrame({"model": ["elastic", "hyperelastic"], "solver_s": [0.1, 100.0], "network_s": [0.01, 0.01]})
+    ftir = {"rmse_mm2_per_frustum": 0.005, "source": "measured curve"}
+    complexity = pd.DataFrame({"object": ["object_1", "object_5"], "model": ["elastic", "hyperelastic"]})
+    arguments = {"cards": [card()], "complexity": complexity, "ftir": ftir, "ssim": scores(0.1), "timing": timing,
+                 "choose": choose, "printed_counts": PRINTED_COUNTS} | changes
+    return claims(**arguments).set_index("claim")
+
+
+def verdict(frame, start):
+    found = frame[frame.index.str.startswith(start)]
+    assert len(found) == 1
+    return found.verdict.iloc[0]
+
+
+def test_a_measured_curve_decides_the_ftir_claim_and_a_virtual_one_does_not():
+    name = "Simulated and measured contact area"
+    assert verdict(table(), name) == "reproduced"
+    assert verdict(table(ftir={"rmse_mm2_per_frustum": 0.009, "source": "measured curve"}), name) == "not reproduced"
+    assert verdict(table(ftir={"rmse_mm2_per_frustum": 0.001, "source": "virtual dielectric"}), name) == "needs the archive"
+
+
+def test_a_fit_to_synthetic_curves_reproduces_nothing():
+    assert verdict(table(), "rubber: the fit's RMSE") == "reproduced"
+    assert verdict(table(cards=[card(rmse=0.02)]), "rubber: the fit's RMSE") == "not reproduced"
+    assert verdict(table(cards=[card(kind="synthetic")]), "rubber: the fit's RMSE") == "needs the archive"
+
+
+def test_another_stable_law_refutes_that_only_two_are_stable():
+    assert verdict(table(), "For rubber only") == "reproduced"
+    assert verdict(table(cards=[card(laws=("ogden2", "yeoh"))]), "For rubber only") == "not reproduced"
+
+
+def test_disagreeing_printed_constants_contradict_themselves():
+    name = "rubber: the printed laws"
+    assert verdict(table(), name) == "reproduced"
+    assert verdict(table(cards=[card(warnings=["yeoh: not determined."])]), name) == "reproduced"
+    assert verdict(table(cards=[card(warnings=["Printed constants: a and b disagree 6-fold."])]), name) == "contradicts itself"
+
+
+def test_the_printed_rule_fails_its_own_table_and_the_other_reading_holds():
+    row = table().loc["Hyperelastic where NPt >= 10 CHt and NPo >= 8 CHo"]
+    assert row.verdict == "contradicts itself"
+    assert "'and' gives all six: False; 'or' gives all six: True" in row.ours
+
+
+@pytest.mark.parametrize(("gain", "expected"), [(0.1, "reproduced"), (-0.1, "not reproduced"), (0.0, "not reproduced")])
+def test_the_better_model_is_named_where_the_difference_is_clear(gain, expected):
+    assert verdict(table(ssim=scores(gain)), "On grasped objects the hyperelastic") == expected
+
+
+def test_two_objects_decide_nothing():
+    few = scores(0.1, items=("object_1", "object_5"))
+    frame = table(ssim=few)
+    assert verdict(frame, "On grasped objects the hyperelastic") == "undecided"
+    assert verdict(frame, "On smooth objects") == "undecided"
+
+
+def test_times_decide_their_claims():
+    fast = pd.DataFrame({"model": ["elastic", "hyperelastic"], "solver_s": [1.0, 1.5], "network_s": [0.0, 0.0]})
+    assert verdict(table(), "The hyperelastic model costs") == "reproduced"
+    assert verdict(table(timing=fast), "The hyperelastic model costs") == "not reproduced"
+    assert verdict(table(timing=fast), "A hyperelastic map takes minutes") == "not reproduced"
+
+
+def test_table_2_gives_the_six_printed_choices_beside_ours():
+    ours = pd.DataFrame({"object": ["mine"], "NPt": [10], "CHt": [5], "NPo": [4], "CHo": [4], "model": ["elastic"]})
+    frame = table2_complexity(ours, choose)
+    printed = frame[frame.source == "paper"]
+    assert len(printed) == 6 and (printed.model == printed.model_in_paper).all()
+    assert list(frame[frame.source == "ours"].object) == ["mine"]
+
+
+def test_table_3_sums_solver_and_network():
+    timing = pd.DataFrame({"model": ["elastic"] * 2, "solver_s": [0.1, 0.3], "network_s": [0.1, 0.1]})
+    frame = table3_timing(timing)
+    assert frame[frame.source == "ours"].mean_s.iloc[0] == pytest.approx(0.3)
+    assert frame[frame.source == "paper"].mean_s.iloc[0] == 37.4

@@ -1,0 +1,85 @@
+"""Figures draw what they are given and are written whole, twice the same; the page holds them and links its data."""
+
+import numpy as np
+import pandas as pd
+import pytest
+import trimesh
+
+from softtact.files import write_csv, write_json
+from softtact.reporting import fig4_complexity, fig5_ftir, fig6_ssim, fig7_maps
+from softtact.reporting.page import render_page
+from softtact.reporting.style import draw_map, pyplot, save
+
+SSIM = pd.DataFrame([{"model": model, "set": name, "item": item, "trial": trial, "force_n": 10.0, "mae_counts": 9.0,
+                      "ssim": 0.5 + 0.1 * trial}
+                     for model in ("elastic", "hyperelastic") for name in ("validation", "unseen", "grasps")
+                     for item in ("object_1", "object_2") for trial in (0, 1)])
+CEILING = SSIM[SSIM.model == "elastic"][["set", "item", "force_n", "ssim"]]
+COMPLEXITY = pd.DataFrame({"object": ["object_1", "object_2"], "NPt": [100, 900], "CHt": [50, 50], "NPo": [20, 400],
+                           "CHo": [20, 20], "model": ["elastic", "hyperelastic"]})
+
+
+def test_a_map_is_printed_with_y_running_to_the_left():
+    values = np.zeros((57, 33))
+    values[50, 3] = 1.0                                    # large y, small x
+    _, axes = pyplot().subplots()
+    shown = draw_map(axes, values, extent=(-11, 11, -18.5, 18.5), limits=(0, 1)).get_array()
+    assert shown.shape == (33, 57)
+    assert shown[3, 56 - 50] == 1.0
+    assert axes.get_xlim() == (18.5, -18.5) and axes.get_ylim() == (-11, 11)
+
+
+def test_figure_6_shows_the_mean_of_every_item_and_model():
+    figure = fig6_ssim.draw(SSIM, CEILING)
+    assert len(figure.axes) == 3
+    heights = [bar.get_height() for bar in figure.axes[0].patches]
+    assert heights == pytest.approx([0.55] * 4)
+    assert "n = 4" in figure.axes[2].get_title()
+
+
+def test_figure_4_draws_one_object_for_each_chosen_model_and_all_ratios():
+    meshes = {name: trimesh.creation.box((4, 4, 4)) for name in COMPLEXITY.object}
+    figure = fig4_complexity.draw(COMPLEXITY, meshes, thresholds={"total": 10, "overlap": 8})
+    assert len(figure.axes) == 3
+    points = np.vstack([collection.get_offsets() for collection in figure.axes[-1].collections])
+    assert sorted(points[:, 0]) == pytest.approx([2, 18])
+
+
+def test_figure_7_outlines_only_the_chosen_model():
+    maps = {"elastic": np.ones((57, 33)), "hyperelastic": np.ones((57, 33))}
+    counts = {model: np.ones((7, 4)) for model in maps}
+    item = {"name": "object_5", "mesh": trimesh.creation.box((4, 4, 4)), "chosen": "elastic", "force": 50.0, "deformation": maps,
+            "tactile": counts, "sensor": np.ones((7, 4)), "extent": (-11, 11, -18.5, 18.5)}
+    figure = fig7_maps.draw([item])
+    red = [axes.get_ylabel().split("\n")[0] for axes in figure.axes
+           if "left" in axes.spines and axes.spines["left"].get_edgecolor()[:3] == (1.0, 0.0, 0.0)]
+    assert red == ["elastic"]
+
+
+def test_a_figure_is_written_the_same_twice(tmp_path):
+    area = pd.DataFrame({"force_n": [0.0, 10.0], "area_per_frustum_mm2": [0.1, 0.2], "area_measured_mm2": [0.1, 0.2],
+                         "area_image_mm2": [0.1, 0.2]})
+    summary = {"frusta": 540, "rmse_mm2_per_frustum": 0.001, "source": "virtual dielectric"}
+    for name in ("a", "b"):
+        save(fig5_ftir.draw(area, summary), tmp_path / f"{name}.png", tmp_path / f"{name}.svg")
+    for kind in ("png", "svg"):
+        assert (tmp_path / f"a.{kind}").read_bytes() == (tmp_path / f"b.{kind}").read_bytes()
+
+
+def test_the_page_holds_its_figures_and_links_its_data(tmp_path):
+    folder = tmp_path / "results"
+    inputs = {name: folder / "tables" / f"{name}.csv" for name in ("table1", "table2", "table3", "claims", "ssim", "ceiling")}
+    for name in ("table1", "table2", "table3"):
+        write_csv(inputs[name], COMPLEXITY)
+    write_csv(inputs["ssim"], SSIM)
+    write_csv(inputs["ceiling"], CEILING)
+    write_csv(inputs["claims"], pd.DataFrame({"claim": ["a < b"], "verdict": ["reproduced"]}))
+    inputs["ftir"] = folder / "summary.json"
+    write_json(inputs["ftir"], {"source": "virtual dielectric"})
+    inputs["figures"] = [folder / "figures" / "fig6_ssim.png"]
+    save(fig6_ssim.draw(SSIM, CEILING), inputs["figures"][0])
+    facts = {"study": "mine", "indenters": 3, "unseen": 1, "grasps": 2, "forces_n": [10.0], "trials": 2, "seed": 1}
+    page = render_page(inputs, facts, folder=folder)
+    assert page.count("data:image/png;base64,") == 1
+    assert 'href="figures/fig6_ssim.svg"' in page and 'href="tables/table2.csv"' in page
+    assert "a &lt; b" in page and "What is synthetic here" in page
