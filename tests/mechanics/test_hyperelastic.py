@@ -101,7 +101,7 @@ def test_the_unit_cell_meets_the_measured_law_of_a_refined_cell():
     Tolerance: 20-node hexahedra of this size were up to 6.5 % off in pressure. The coarser cell of the default study
     is stiffer by a fifth; that is what the refinement of its mesh has to mend.
     """
-    mesh = MeshSettings(cells_per_pitch=2, frustum_levels=(0.0, 0.1, 0.3, 0.6, 1.0))
+    mesh = MeshSettings(cells_per_pitch=2, frustum_levels=(0.0, 0.1, 0.3, 0.6, 1.0), local_over_shear=0.1)
     body = build_unit_cell(CORO, dielectric_law=LAWS["dielectric"], mesh=mesh)
     plate = HeightField(place(trimesh.creation.box((5.0, 5.0, 1.0)), pose=None))
     level, = press_levels(body, plate, [0.22 * 1.2**2], settings=NewtonSettings(smallest_scale_n=0.1))

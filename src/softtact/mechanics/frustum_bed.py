@@ -58,14 +58,14 @@ class ContactSettings:
 class FrustumBed:
     """All frusta of a sensor with one law. Local node numbers are those of `self.mesh`; roots are `self.root`."""
 
-    def __init__(self, geometry, law, *, levels, root_z_mm, pcb_z_mm, tips_held, contact):
+    def __init__(self, geometry, law, *, levels, root_z_mm, pcb_z_mm, tips_held, contact, local_over_shear):
         self.geometry, self.contact = geometry, contact
         self.mesh = extrude(disc_plan(), levels)
         self.count = len(geometry.heights)
         self.nodes = len(self.mesh.points)
         self.root, self.tip = self.mesh.planes[-1], self.mesh.planes[0]
         self.coordinates = self._place(levels, root_z_mm)
-        self.block = HexBlock(self._per_element(self.coordinates), law)
+        self.block = HexBlock(self._per_element(self.coordinates), law, local_over_shear=local_over_shear)
         self._contact_points(pcb_z_mm)
         self._number_unknowns(tips_held)
         self._tangent_at = None

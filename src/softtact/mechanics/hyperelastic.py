@@ -17,7 +17,7 @@ class NewtonSettings:
     """
 
     relative_tolerance: float = 1e-4   # of a nodal force; 1e-6 changes the indentation by 2e-6 of itself
-    max_iterations: int = 60
+    max_iterations: int = 40
     largest_step_mm: float = 0.12
     smallest_increment_n: float = 0.02
     smallest_scale_n: float = 10.0

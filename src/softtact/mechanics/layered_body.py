@@ -15,13 +15,15 @@ class MeshSettings:
     """Resolution of the layered body.
 
     cells_per_pitch: slab elements along one pitch; sheet_layers, cover_layers: elements through each layer;
-    frustum_levels: heights of the frustum's element layers as shares of its height.
+    frustum_levels: heights of the frustum's element layers as shares of its height; local_over_shear: the share of the
+    frusta's volumetric stiffness that acts at every point, over mu (see `blocks`): 0 is softest, 1 folds reliably.
     """
 
     cells_per_pitch: int = 1
     sheet_layers: int = 1
     cover_layers: int = 2
-    frustum_levels: tuple = (0.0, 0.2, 0.6, 1.0)
+    frustum_levels: tuple = (0.0, 0.35, 1.0)
+    local_over_shear: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -216,7 +218,8 @@ def _bed(spec, centres, neighbours, law, mesh, scatter, contact, *, bottom=None)
     geometry = BedGeometry(centres=centres, heights=heights, tip_diameters=frusta.tip_diameter_mm * tip_factor,
                            root_diameter=frusta.root_diameter_mm, neighbours=neighbours)
     return FrustumBed(geometry, law, levels=np.asarray(mesh.frustum_levels) * frusta.height_mm, root_z_mm=bottom,
-                      pcb_z_mm=bottom - heights.max(), tips_held=spec.tips_held, contact=contact or ContactSettings())
+                      pcb_z_mm=bottom - heights.max(), tips_held=spec.tips_held, contact=contact or ContactSettings(),
+                      local_over_shear=mesh.local_over_shear)
 
 
 def surface_of(mesh):
