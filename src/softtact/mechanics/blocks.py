@@ -19,6 +19,7 @@ import numpy as np
 from softtact.mechanics import kernels
 from softtact.mechanics.elements import gauss, hex20, reference_gradients
 
+
 @dataclass(frozen=True)
 class BlockState:
     """What one evaluation leaves for the tangent: energy (mJ), force (e, 60) in N, and the fields at the points."""
