@@ -19,6 +19,7 @@ from pydantic import (
     PositiveFloat,
     PositiveInt,
     ValidationError,
+    field_validator,
 )
 
 from softtact.errors import InputError
@@ -88,7 +89,14 @@ class Ftir(Section):
     law: Law
     virtual_law: Law
     camera: Camera
-    measured: str | None = Field(None, description="CSV with force_n, area_per_frustum_mm2 of one's own test")
+    measured: str | None = Field(None, description="CSV with force_n, area_mm2 (mean frustum) of one's own test")
+
+    @field_validator("measured")
+    @classmethod
+    def _exists(cls, path):
+        if path is not None and not Path(path).is_file():
+            raise ValueError(f"there is no file {path}; give the path of the CSV, or null for the virtual dielectric")
+        return path
 
 
 class Thresholds(Section):
@@ -140,6 +148,7 @@ class Mesh(Section):
     cover_layers: PositiveInt | None = None
     frustum_levels: Annotated[list[float], AfterValidator(_rising)] | None = Field(
         None, description="heights of a frustum's layers of elements, from 0 to 1")
+    local_over_shear: NotNegative | None = Field(None, description="volumetric stiffness of frusta at each point, over mu")
     height_scatter: NotNegative | None = Field(None, description="standard deviation, share of the height")
     tip_scatter: NotNegative | None = Field(None, description="standard deviation, share of the tip's diameter")
     specimen: Annotated[int, Field(ge=0)] | None = Field(None, description="seed of the scatter")

@@ -48,12 +48,13 @@ rule validate_ftir:
         state=rules.press_on_glass.output.state,
         virtual=rules.press_on_glass.output.virtual,
         discs=[rules.detect_discs.output.discs],
+        **({"measured": STUDY.values.ftir.measured} if STUDY.values.ftir.measured else {}),
     output:
         area=f"{RESULTS}/ftir/contact_area.csv",
         summary=f"{RESULTS}/ftir/summary.json",
     params:
         files=files,
-        settings=as_settings(measured=STUDY.values.ftir.measured),
+        settings=as_settings(),
     log:
         log_of("validate_ftir"),
     benchmark:
