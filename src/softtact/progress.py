@@ -14,3 +14,8 @@ def progress(iterable, *, label, total=None, interval_s=2.0):
         if now - shown >= interval_s:
             print(f"{label}: {done}/{total}, {now - start:.0f} s", file=sys.stderr, flush=True)
             shown = now
+
+
+def announce(text):
+    """Say on stderr what begins now and may take a while."""
+    print(text, file=sys.stderr, flush=True)

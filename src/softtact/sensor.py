@@ -22,7 +22,7 @@ from softtact.materials.config import law_from_printed
 from softtact.mechanics import elastic, hyperelastic
 from softtact.mechanics.layered_body import MeshSettings, build_sensor_body
 from softtact.press_result import PressResult
-from softtact.progress import progress
+from softtact.progress import announce, progress
 from softtact.sensing.capacitance import ideal_counts
 
 MODELS = ("auto", "elastic", "hyperelastic")
@@ -119,6 +119,7 @@ class Sensor:
                                  mesh=self.mesh, scatter=self.scatter)
         grid = np.stack(np.meshgrid(self.spec.map_x_mm, self.spec.map_y_mm), axis=-1).reshape(-1, 2)
         sampling = body.slab.sampling(grid, body.electrode_plane)
+        announce(f"{label}: {body.bed.count} frusta, {len(forces)} force levels of the hyperelastic model, some seconds each")
         record = []
         _, times = _timed((record.append(self._read_level(body, sampling, level))
                            for level in hyperelastic.press_levels(body, surface, forces)), forces, label)
@@ -173,6 +174,7 @@ def cached_compliance(spec):
     cache = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "softtact"
     path = cache / f"compliance-{digest([spec.model_dump(mode='json'), ELASTIC_EDGE_MM])}.npz"
     if not path.exists():
+        announce(f"{spec.name}: computing the elastic layer's flexibility, once for this sensor (about ten seconds)")
         with atomic_path(path) as temporary:
             compute_compliance(spec).save(temporary)
     return elastic.Compliance.load(path)
