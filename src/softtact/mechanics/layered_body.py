@@ -105,16 +105,21 @@ class LayeredBody:
         if not same_tangent:
             self.bed.refresh(state.bed)
             self._border, self._corner = self._factor_tangent(state)
-            self._along = self.solver.solve(self._border)
         root_force, correction = self.bed.condensed_residual(state.bed)
         residual = state.slab.force.copy()
         np.add.at(residual, self.tie_nodes.ravel(), self._roots_to_slab(root_force).reshape(-1, 3))
-        step, lowering = -self.solver.solve(residual.ravel()[self.slab.free]), 0.0
+        right = residual.ravel()[self.slab.free]
+        if same_tangent:
+            step = -self.solver.solve(right)
+        else:
+            minus_step, self._along = self.solver.solve(np.column_stack([right, self._border])).T
+            step = -minus_step
+        lowering = 0.0
         if force_n is not None:
             # Its sign would turn the step uphill where the body softens.
             stiffness = abs(self._corner - self._border @ self._along)
             lowering = (force_n - state.force - self._border @ step) / stiffness if stiffness > 0 else np.nan
-            step -= self._along * lowering
+            step = step - self._along * lowering
         full = np.zeros(3 * self.slab.nodes)
         full[self.slab.free] = step
         full = full.reshape(-1, 3)
