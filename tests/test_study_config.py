@@ -60,10 +60,10 @@ def test_the_default_study_has_twenty_indenters_and_the_six_objects_of_fig_7():
     assert study.values.forces_n[-1] == study.sensor["force_range_n"][1] == 50
 
 
-def test_the_paper_study_has_twenty_levels_and_fifty_trials():
+def test_the_paper_study_has_twenty_levels_and_twelve_thousand_readings_of_indenters():
     study = load_study(merged("paper"))
     assert len(study.values.forces_n) == 20
-    assert study.values.trials == 50
+    assert len(study.items_of["indenters"]) * len(study.values.forces_n) * study.values.trials == 12_000
 
 
 def test_an_item_is_named_by_its_object_and_its_pose():
