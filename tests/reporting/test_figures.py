@@ -39,10 +39,11 @@ def test_figure_6_shows_the_mean_of_every_item_and_model():
 
 def test_figure_4_draws_one_object_for_each_chosen_model_and_all_ratios():
     meshes = {name: trimesh.creation.box((4, 4, 4)) for name in COMPLEXITY.object}
-    figure = fig4_complexity.draw(COMPLEXITY, meshes, thresholds={"total": 10, "overlap": 8})
-    assert len(figure.axes) == 3
+    indenter = COMPLEXITY.iloc[:1].assign(object="square", NPt=150)     # comes first and has no mesh to draw
+    figure = fig4_complexity.draw(pd.concat([indenter, COMPLEXITY]), meshes, thresholds={"total": 10, "overlap": 8})
+    assert [axes.get_title().split(":")[0] for axes in figure.axes[:-1]] == ["object_1", "object_2"]
     points = np.vstack([collection.get_offsets() for collection in figure.axes[-1].collections])
-    assert sorted(points[:, 0]) == pytest.approx([2, 18])
+    assert sorted(points[:, 0]) == pytest.approx([2, 3, 18])
 
 
 def test_figure_7_outlines_only_the_chosen_model():

@@ -6,9 +6,9 @@ from softtact.reporting.style import colour, pyplot
 
 
 def draw(complexity, meshes, *, thresholds):
-    """Figure from the complexity table and {object: trimesh} (drawn: the first of each chosen model)."""
+    """Figure from the complexity table and {object: trimesh} (drawn: the first of each chosen model that has a mesh)."""
     plt = pyplot()
-    shown = [name for name in complexity.drop_duplicates("model").object if name in meshes]
+    shown = list(complexity[complexity.object.isin(list(meshes))].drop_duplicates("model").object)
     figure = plt.figure(figsize=(3.3 * len(shown) + 5.2, 3.8), layout="constrained")
     grid = figure.add_gridspec(1, len(shown) + 1, width_ratios=[1] * len(shown) + [1.5])
     for k, name in enumerate(shown):
@@ -39,16 +39,25 @@ def _draw_ratios(axes, complexity, thresholds):
         x, y = rows.NPt / rows.CHt, rows.NPo / rows.CHo.clip(lower=1)
         axes.scatter(x, y.clip(lower=1e-2), color=colour(model), marker="o" if model == "elastic" else "s", s=18,
                      label=f"{model} (n = {len(rows)})")
-        for name, a, b in zip(rows.object, x, y, strict=True):
-            if name.startswith("object"):
-                axes.annotate(name.removeprefix("object_"), (a, max(b, 1e-2)), textcoords="offset points", xytext=(4, 3))
+        _label_objects(axes, rows.object, x, y.clip(lower=1e-2))
     axes.axvline(thresholds["total"], color="0.5", linestyle="--")
     axes.axhline(thresholds["overlap"], color="0.5", linestyle=":")
     axes.set(xscale="log", yscale="log", xlabel="NPt / CHt, whole object", ylabel="NPo / CHo, over the sensor")
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_formatter("{x:g}")
         axis.set_minor_formatter(NullFormatter())
-    axes.set(xlim=(1, None), ylim=(None, max(20, axes.get_ylim()[1])))
-    axes.annotate("threshold", (thresholds["total"], 1), xycoords=("data", "axes fraction"), xytext=(3, -10),
+    axes.set(xlim=(1, None), ylim=(None, 1.3 * max(20, axes.get_ylim()[1])))
+    axes.annotate("thresholds", (thresholds["total"], 0), xycoords=("data", "axes fraction"), xytext=(3, 4),
                   textcoords="offset points", color="0.4")
     axes.legend(title="chosen model", frameon=False, loc="upper left")
+
+
+def _label_objects(axes, names, x, y):
+    """Number the objects of figure 7; those at the same place share one label."""
+    places = {}
+    for name, a, b in zip(names, x, y, strict=True):
+        if name.startswith("object_"):
+            places.setdefault((round(np.log10(a), 1), round(np.log10(b), 1)), []).append((name.removeprefix("object_"), a, b))
+    for here in places.values():
+        _, a, b = here[0]
+        axes.annotate(", ".join(label for label, _, _ in here), (a, b), textcoords="offset points", xytext=(4, 3))
