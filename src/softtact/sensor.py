@@ -118,7 +118,7 @@ class Sensor:
         body = build_sensor_body(self.spec, dielectric_law=self.laws["dielectric"], cover_law=self.laws["cover"],
                                  mesh=self.mesh, scatter=self.scatter)
         grid = np.stack(np.meshgrid(self.spec.map_x_mm, self.spec.map_y_mm), axis=-1).reshape(-1, 2)
-        sampling = body.slab.sampling(grid, body.electrode_plane)
+        sampling = body.slab.sampling(grid)
         announce(f"{label}: {body.bed.count} frusta, {len(forces)} force levels of the hyperelastic model, some seconds each")
         record = []
         _, times = _timed((record.append(self._read_level(body, sampling, level))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from softtact.geometry.hex_mesh import disc_plan, extrude, grid_plan
+from softtact.mechanics.hex_mesh import disc_plan, extrude, grid_plan
 from softtact.materials.laws.registry import make_law
 from softtact.mechanics.blocks import HexBlock
 from softtact.mechanics.elements import HEX20_NODES, gauss, hex20, reference_gradients

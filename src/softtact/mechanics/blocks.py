@@ -1,4 +1,4 @@
-"""A block of hexahedra of one material: energy, internal force and tangent at finite strain.
+"""A block of elements of one material: energy, internal force and tangent at finite strain.
 
 The volumetric energy (K - k)/2 (J-1)^2 sees J only through its projection on linear functions in each element
 (four modes: discontinuous linear pressure). The element does not lock for nearly incompressible rubber, the pressure needs
@@ -18,25 +18,28 @@ from dataclasses import dataclass
 import numpy as np
 
 from softtact.mechanics import kernels
-from softtact.mechanics.elements import gauss, hex20, reference_gradients
+from softtact.mechanics.elements import gauss, hex20, reference_gradients, wedge15, wedge_rule
 
 
 @dataclass(frozen=True)
 class BlockState:
-    """What one evaluation leaves for the tangent: energy (mJ), force (e, 60) in N, and the fields at the points."""
+    """What one evaluation leaves for the tangent: energy (mJ), force (e, 3 m) in N, and the fields at the points."""
 
     energy: float
     force: np.ndarray
     displacement: np.ndarray
 
 
-class HexBlock:
-    """Hexahedra given by coordinates (e, 20, 3) in mm with one law; displacements come per element (e, 20, 3)."""
+class SolidBlock:
+    """Elements of one kind and one law, by their shape functions' gradients.
 
-    def __init__(self, coordinates, law, *, points_per_side=3, local_over_shear=0.0):
+    gradients (e, g, m, 3) in 1/mm, volumes (e, g) in mm3, points (g, 3) of the quadrature in parent coordinates.
+    Displacements come per element (e, m, 3) in mm.
+    """
+
+    def __init__(self, gradients, volumes, points, law, *, local_over_shear=0.0):
         self.law, self._local_over_shear = law, local_over_shear
-        points, weights = gauss(points_per_side, 3)
-        self.gradients, self.volumes = reference_gradients(coordinates, hex20(points)[1], weights)
+        self.gradients, self.volumes = gradients, volumes
         self.basis = np.column_stack([np.ones(len(points)), points])   # (g, 4): 1, xi, eta, zeta
         gram = np.einsum("eg,gp,gq->epq", self.volumes, self.basis, self.basis, optimize=True)
         self.gram_inverse = np.linalg.inv(gram)
@@ -64,7 +67,7 @@ class HexBlock:
         return BlockState(energy=energy, force=force, displacement=displacement)
 
     def tangent(self, displacement, elements=slice(None)):
-        """Tangent (e, 60, 60) in N/mm of the chosen elements."""
+        """Tangent (e, 3 m, 3 m) in N/mm of the chosen elements."""
         gradients = self.gradients[elements]
         volumes = self.volumes[elements]
         F, C, J = kernels.deformation(displacement[elements], gradients)
@@ -78,3 +81,21 @@ class HexBlock:
         change = ((J - 1) * self.volumes[elements]) @ self.basis
         conjugate = self.projected_modulus * np.einsum("epq,eq->ep", self.gram_inverse[elements], change)
         return (change, conjugate), conjugate @ self.basis.T + 0.5 * self.local_modulus * (J - 1 / J)
+
+
+class HexBlock(SolidBlock):
+    """20-node hexahedra given by coordinates (e, 20, 3) in mm."""
+
+    def __init__(self, coordinates, law, *, points_per_side=3, local_over_shear=0.0):
+        points, weights = gauss(points_per_side, 3)
+        gradients, volumes = reference_gradients(coordinates, hex20(points)[1], weights)
+        super().__init__(gradients, volumes, points, law, local_over_shear=local_over_shear)
+
+
+class WedgeBlock(SolidBlock):
+    """15-node wedges given by coordinates (e, 15, 3) in mm."""
+
+    def __init__(self, coordinates, law, *, local_over_shear=0.0):
+        points, weights = wedge_rule()
+        gradients, volumes = reference_gradients(coordinates, wedge15(points)[1], weights)
+        super().__init__(gradients, volumes, points, law, local_over_shear=local_over_shear)

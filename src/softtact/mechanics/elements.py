@@ -1,4 +1,4 @@
-"""Shape functions and quadrature of the elements in use: 20-node hexahedron, its 8-node face, 4-node tetrahedron."""
+"""Shape functions and quadrature of the elements in use: 20-node hexahedron, 15-node wedge, and their faces."""
 
 import numpy as np
 
@@ -64,6 +64,65 @@ def hex20(points):
 def quad8(points):
     """Values (n, 8) and parent derivatives (n, 8, 2) of the 8-node quadrilateral."""
     return serendipity(points, QUAD8_NODES)
+
+
+# Parent coordinates of the 6-node triangle, corners then mid-sides, and of the 15-node wedge over it.
+TRI6_NODES = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0], [0.5, 0.5], [0, 0.5]], dtype=float)
+WEDGE15_NODES = np.vstack([_at_height(TRI6_NODES[:3], -1), _at_height(TRI6_NODES[:3], 1), _at_height(TRI6_NODES[3:], -1),
+                           _at_height(TRI6_NODES[3:], 1), _at_height(TRI6_NODES[:3], 0)])
+_SIDES = np.array([[0, 1], [1, 2], [2, 0]])
+WEDGE15_TOP = np.array([3, 4, 5, 9, 10, 11])   # in the order of TRI6_NODES
+
+
+def _area_coordinates(points):
+    """Values (n, 3) and derivatives (3, 2) of the triangle's linear shape functions."""
+    r, s = np.asarray(points, dtype=float).T[:2]
+    return np.column_stack([1 - r - s, r, s]), np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
+
+
+def tri6(points):
+    """Values (n, 6) and parent derivatives (n, 6, 2) of the 6-node triangle."""
+    L, dL = _area_coordinates(points)
+    a, b = _SIDES.T
+    values = np.hstack([L * (2 * L - 1), 4 * L[:, a] * L[:, b]])
+    slopes = np.concatenate([(4 * L - 1)[..., None] * dL,
+                             4 * (L[:, a, None] * dL[b] + L[:, b, None] * dL[a])], axis=1)
+    return values, slopes
+
+
+def wedge15(points):
+    """Values (n, 15) and parent derivatives (n, 15, 3) of the 15-node wedge."""
+    L, dL = _area_coordinates(points)
+    t = np.asarray(points, dtype=float)[:, 2:]
+    a, b = _SIDES.T
+    bubble = 1 - t**2
+    product = 2 * L[:, a] * L[:, b]
+    product_slope = 2 * (L[:, a, None] * dL[b] + L[:, b, None] * dL[a])
+    values, in_plane, upwards = [], [], []
+    for sign in (-1, 1):
+        values.append(0.5 * L * ((2 * L - 1) * (1 + sign * t) - bubble))
+        in_plane.append((0.5 * ((4 * L - 1) * (1 + sign * t) - bubble))[..., None] * dL)
+        upwards.append(0.5 * L * (sign * (2 * L - 1) + 2 * t))
+    for sign in (-1, 1):
+        values.append(product * (1 + sign * t))
+        in_plane.append(product_slope * (1 + sign * t)[..., None])
+        upwards.append(sign * product)
+    values.append(L * bubble)
+    in_plane.append(bubble[..., None] * dL[None])
+    upwards.append(-2 * L * t)
+    slopes = np.concatenate([np.concatenate(in_plane, axis=1), np.concatenate(upwards, axis=1)[..., None]], axis=2)
+    return np.hstack(values), slopes
+
+
+def wedge_rule():
+    """Quadrature of the wedge: six points of the triangle (degree 4, Dunavant) times two: points (12, 3), weights (12,)."""
+    near, far = (0.445948490915965, 0.223381589678011), (0.091576213509771, 0.109951743655322)
+    plane = np.array([[c, c] for c, _ in (near, far)] + [[1 - 2 * c, c] for c, _ in (near, far)]
+                     + [[c, 1 - 2 * c] for c, _ in (near, far)])
+    weight = 0.5 * np.array([w for _, w in (near, far)] * 3)
+    z, wz = np.polynomial.legendre.leggauss(2)
+    points = np.column_stack([np.tile(plane, (2, 1)), np.repeat(z, 6)])
+    return points, np.tile(weight, 2) * np.repeat(wz, 6)
 
 
 def reference_gradients(coordinates, derivatives, weights):

@@ -13,11 +13,10 @@ from numba import njit
 from scipy.linalg import lapack
 
 from softtact.contact.penalty import penalty
-from softtact.geometry.hex_mesh import disc_plan, extrude
+from softtact.mechanics.hex_mesh import disc_plan, extrude
 from softtact.mechanics.blocks import HexBlock
 from softtact.mechanics.elements import HEX20_BOTTOM, HEX20_SIDES, gauss, quad8
 
-OUTER_SIDE = 1                      # the side xi = 1 of the ring's hexahedra
 DIRECTIONS = ((0, 1.0), (1, 1.0), (0, -1.0), (1, -1.0))   # axis and sign of the four neighbours: +x, +y, -x, -y
 _PLANE_POINTS = 9                   # nodes that a contact point depends on: eight of its face and one of the plane
 _REFRESH_MM = 1e-3                  # a frustum that moved less than this keeps its tangent (residuals stay exact)
@@ -58,9 +57,11 @@ class ContactSettings:
 class FrustumBed:
     """All frusta of a sensor with one law. Local node numbers are those of `self.mesh`; roots are `self.root`."""
 
-    def __init__(self, geometry, law, *, levels, root_z_mm, pcb_z_mm, tips_held, contact, local_over_shear):
+    def __init__(self, geometry, law, *, levels, root_z_mm, pcb_z_mm, tips_held, contact, local_over_shear, refinement=0):
         self.geometry, self.contact = geometry, contact
-        self.mesh = extrude(disc_plan(), levels)
+        plan = disc_plan(refinement)
+        self.mesh = extrude(plan, levels)
+        self.outer_faces = self._outer_faces(plan)
         self.count = len(geometry.heights)
         self.nodes = len(self.mesh.points)
         self.root, self.tip = self.mesh.planes[-1], self.mesh.planes[0]
@@ -82,17 +83,23 @@ class FrustumBed:
     def _per_element(self, field):
         return np.ascontiguousarray(field[:, self.mesh.hexes].reshape(-1, 20, 3))
 
+    def _outer_faces(self, plan):
+        """Nodes (layers * sides, 8) of the cone's faces."""
+        quads, sides = plan.outer_sides()
+        return np.vstack([self.mesh.layer(k)[quads[:, None], HEX20_SIDES[sides]] for k in range(self.mesh.layers)])
+
     def _contact_points(self, pcb_z):
         """Points with their nodes, weights, axis: gap = gap0 + sum(weights * displacement[nodes, axis])."""
         points, weights = gauss(3, 2)
         values, slopes = quad8(points)
-        ring = self.mesh.hexes.reshape(self.mesh.layers, 5, 20)[:, 1:]
-        outer = ring[..., HEX20_SIDES[OUTER_SIDE]]                       # (layers, 4, 8)
-        on_pcb = np.vstack([self.mesh.layer(0)[:, HEX20_BOTTOM], outer.reshape(-1, 8)])
+        on_pcb = np.vstack([self.mesh.layer(0)[:, HEX20_BOTTOM], self.outer_faces])
         records = [(face, value, 2, 1.0, face[0], 0.0, -1) for face in on_pcb for value in values]
+        root_xy = self.mesh.points[self.root, :2]
         for k, (axis, sign) in enumerate(DIRECTIONS):
-            plane_node = self.root[12 + k]
-            records += [(face, -sign * value, axis, sign, plane_node, sign, k) for face in outer[:, k] for value in values]
+            plane_node = self.root[np.argmax(sign * root_xy[:, axis])]
+            facing = sign * self.mesh.points[self.outer_faces][..., axis].mean(axis=1) > 1e-6
+            records += [(face, -sign * value, axis, sign, plane_node, sign, k)
+                        for face in self.outer_faces[facing] for value in values]
         self.point_nodes = np.array([[*r[0], r[4]] for r in records])
         self.point_weights = np.array([[*r[1], r[5]] for r in records])
         self.point_axis = np.array([r[2] for r in records])

@@ -6,14 +6,13 @@ import numpy as np
 import trimesh
 
 from softtact.contact.height_field import HeightField
-from softtact.mechanics.elements import HEX20_BOTTOM, HEX20_SIDES, quad8
-from softtact.mechanics.frustum_bed import OUTER_SIDE
+from softtact.mechanics.elements import HEX20_BOTTOM, quad8
 from softtact.mechanics.hyperelastic import NewtonSettings, press_levels
 from softtact.mechanics.layered_body import MeshSettings, build_unit_cell
 
 _TOUCH_MM = 2e-3     # a surface point this near to the glass is dark to total reflection: a wavelength or two and the penalty
 # Coarser levels ripple at the tip.
-_MESH = MeshSettings(cells_per_pitch=2, frustum_levels=(0.0, 0.1, 0.3, 0.6, 1.0), local_over_shear=0.1)
+_MESH = MeshSettings(frustum_levels=(0.0, 0.1, 0.3, 0.6, 1.0), local_over_shear=0.1)
 _SAMPLES = 24        # points a side of a face at which contact is asked for
 
 
@@ -43,8 +42,7 @@ def press_cell_on_glass(spec, law, forces_n, *, mesh=None, height_factor=1.0, ti
 def contact_area(bed, displacement):
     """Projected area (mm2) of the first frustum's surface that lies on the PCB or glass."""
     position = bed.coordinates[0] + displacement[0]
-    outer = bed.mesh.hexes.reshape(bed.mesh.layers, 5, 20)[:, 1:][..., HEX20_SIDES[OUTER_SIDE]].reshape(-1, 8)
-    faces = np.vstack([bed.mesh.layer(0)[:, HEX20_BOTTOM], outer])
+    faces = np.vstack([bed.mesh.layer(0)[:, HEX20_BOTTOM], bed.outer_faces])
     side = (np.arange(_SAMPLES) + 0.5) * 2 / _SAMPLES - 1
     points = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
     values, slopes = quad8(points)

@@ -6,25 +6,27 @@ import numpy as np
 
 from softtact.contact.height_field import HeightField
 from softtact.mechanics.frustum_bed import BedGeometry, BedState, ContactSettings, FrustumBed
+from softtact.mechanics.hex_mesh import sheet_plan
 from softtact.mechanics.linear_solvers import make_solver
-from softtact.mechanics.slab import Slab, SlabState
+from softtact.mechanics.slab import Layer, Slab, SlabState
 
 
 @dataclass(frozen=True)
 class MeshSettings:
     """Resolution of the layered body.
 
-    cells_per_pitch: slab elements along one pitch; sheet_layers, cover_layers: elements through each layer;
+    cells_per_pitch: cover elements along one pitch; sheet_layers, cover_layers: elements through each layer;
     frustum_levels: heights of the frustum's element layers as shares of its height; local_over_shear: the share of the
     frusta's volumetric stiffness that acts at every point, over mu (see `blocks`): 0 is softest, 4 folds reliably (1 %
-    stiffer; with 1 a sphere does not pass 40 N).
+    stiffer; with 1 a sphere does not pass 40 N). refinement: how often the elements of sheet and frusta are split in plan.
     """
 
     cells_per_pitch: int = 1
     sheet_layers: int = 1
     cover_layers: int = 2
-    frustum_levels: tuple = (0.0, 0.35, 1.0)
+    frustum_levels: tuple = (0.0, 0.2, 0.6, 1.0)
     local_over_shear: float = 4.0
+    refinement: int = 0
 
 
 @dataclass(frozen=True)
@@ -63,29 +65,11 @@ _FIRST_SHIFT = 0.01   # N/mm on every free unknown of the slab, doubled until th
 class LayeredBody:
     """Slab on frusta on a rigid PCB, pressed from above by a rigid object. Lengths in mm, z = 0 at the top at rest."""
 
-    def __init__(self, slab, bed, *, sheet_layers):
-        self.slab, self.bed = slab, bed
-        self.electrode_plane = sheet_layers
-        self.tie_nodes, self.tie_weights = self._tie()
-        slab.build_pattern(self.tie_nodes)
+    def __init__(self, slab, bed, roots):
+        """`roots` (f, k): the slab's nodes that are the frusta's root nodes."""
+        self.slab, self.bed, self.roots = slab, bed, roots
+        slab.build_pattern(roots)
         self.solver = make_solver()
-
-    def _tie(self):
-        """Slab nodes (f, k) and weights (f, roots, k): each root node follows the sheet's lower side."""
-        bed, slab = self.bed, self.slab
-        roots = bed.coordinates[:, bed.root]
-        inward = roots[..., :2] + 1e-7 * (bed.geometry.centres[:, None] - roots[..., :2])
-        quads, values = slab.locate(inward.reshape(-1, 2))
-        nodes = slab.mesh.planes[0][slab.plan.quads[quads]].reshape(bed.count, -1, 8)
-        values = values.reshape(bed.count, -1, 8)
-        unique = [np.unique(n) for n in nodes]
-        width = max(map(len, unique))
-        tied = np.stack([np.pad(u, (0, width - len(u)), mode="edge") for u in unique])
-        weights = np.zeros((bed.count, nodes.shape[1], width))
-        for f, own in enumerate(unique):
-            rows = np.arange(nodes.shape[1])[:, None]
-            np.add.at(weights[f], (rows, np.searchsorted(own, nodes[f])), values[f])
-        return tied, weights
 
     def rest(self):
         """Displacements of slab (n, 3) and frusta (f, nodes, 3) at rest."""
@@ -108,7 +92,7 @@ class LayeredBody:
             self._border, self._corner = self._factor_tangent(state)
         root_force, correction = self.bed.condensed_residual(state.bed)
         residual = state.slab.force.copy()
-        np.add.at(residual, self.tie_nodes.ravel(), self._roots_to_slab(root_force).reshape(-1, 3))
+        np.add.at(residual, self.roots.ravel(), root_force.reshape(-1, 3))
         right = residual.ravel()[self.slab.free]
         if same_tangent:
             step = -self.solver.solve(right)
@@ -124,14 +108,14 @@ class LayeredBody:
         full = np.zeros(3 * self.slab.nodes)
         full[self.slab.free] = step
         full = full.reshape(-1, 3)
-        return Step(slab=full, bed=self.bed.inner_step(correction, self.roots_of(full).reshape(self.bed.count, -1)),
+        return Step(slab=full, bed=self.bed.inner_step(correction, full[self.roots].reshape(self.bed.count, -1)),
                     indentation=lowering)
 
     def _factor_tangent(self, state):
         """Factor the tangent, made positive definite where it is not, so that every step lowers the energy."""
-        matrix, border, corner = self.slab.tangent(state.slab, self._tied_blocks(self.bed.condensed))
+        matrix, border, corner = self.slab.tangent(state.slab, self.bed.condensed)
         if not self.solver.factor(matrix):
-            matrix, border, corner = self.slab.tangent(state.slab, self._tied_blocks(self.bed.positive_condensed()))
+            matrix, border, corner = self.slab.tangent(state.slab, self.bed.positive_condensed())
             shift = 0.0
             while not self.solver.factor(matrix):
                 shift = max(2 * shift, _FIRST_SHIFT)
@@ -140,28 +124,16 @@ class LayeredBody:
 
     def residual_norm(self, state, force_n):
         """Largest unbalanced nodal force in N, over slab, frusta and the object."""
-        root = state.bed.force[:, self.bed.root].reshape(self.bed.count, -1)
-        total = state.slab.force.copy()
-        np.add.at(total, self.tie_nodes.ravel(), self._roots_to_slab(root).reshape(-1, 3))
-        parts = [np.abs(total.ravel()[self.slab.free]).max(), np.abs(self.bed.inner_residual(state.bed)).max()]
+        parts = [np.abs(self.slab_force(state).ravel()[self.slab.free]).max(), np.abs(self.bed.inner_residual(state.bed)).max()]
         if force_n is not None:
             parts.append(abs(state.force - force_n))
         return float(max(parts))
 
-    def roots_of(self, slab_field):
-        """A slab field (n, 3) at the frusta's root nodes (f, roots, 3)."""
-        return np.matmul(self.tie_weights, slab_field[self.tie_nodes])
-
-    def _roots_to_slab(self, root_force):
-        return np.matmul(self.tie_weights.transpose(0, 2, 1), root_force.reshape(self.bed.count, -1, 3))
-
-    def _tied_blocks(self, condensed):
-        """Condensed frusta (f, 60, 60) moved to the slab's nodes (f, 3 k, 3 k)."""
-        f, roots, width = self.tie_weights.shape
-        K = condensed.reshape(f, roots, 3, roots, 3)
-        half = np.einsum("frisj,fsm->frimj", K, self.tie_weights, optimize=True)
-        return np.einsum("fri mj,frk->fkimj".replace(" ", ""), half, self.tie_weights,
-                         optimize=True).reshape(f, 3 * width, 3 * width)
+    def slab_force(self, state):
+        """Forces (n, 3) on the slab's nodes, those of the frusta's roots among them."""
+        total = state.slab.force.copy()
+        np.add.at(total, self.roots.ravel(), state.bed.force[:, self.bed.root].reshape(-1, 3))
+        return total
 
 
 def _lines(side, count, pitch, cells):
@@ -170,14 +142,6 @@ def _lines(side, count, pitch, cells):
     inner = np.linspace(-half, half, count * cells + 1)
     margin = 0.5 * side - half
     return np.concatenate([[-0.5 * side], inner, [0.5 * side]]) if margin > 1e-6 else inner
-
-
-def _levels(bottom, heights, layers):
-    """Levels of height through consecutive layers, each divided evenly."""
-    out = [bottom]
-    for height, count in zip(heights, layers, strict=True):
-        out += list(out[-1] + height * np.arange(1, count + 1) / count)
-    return np.array(out)
 
 
 def lattice(counts, pitch):
@@ -194,24 +158,26 @@ def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), s
     bottom = -(spec.cover.thickness_mm + spec.dielectric.sheet_thickness_mm)
     x_lines, y_lines = (_lines(side, count, frusta.pitch_mm, mesh.cells_per_pitch)
                         for side, count in zip(spec.footprint_mm, counts, strict=True))
-    z = _levels(bottom, [spec.dielectric.sheet_thickness_mm, spec.cover.thickness_mm], [mesh.sheet_layers, mesh.cover_layers])
-    laws = [dielectric_law] * mesh.sheet_layers + [cover_law] * mesh.cover_layers
-    slab = Slab(x_lines, y_lines, z, laws, sides="held", contact=contact or ContactSettings(stiffness=500.0))
+    sheet = Layer(np.linspace(bottom, -spec.cover.thickness_mm, mesh.sheet_layers + 1), dielectric_law)
+    cover = Layer(np.linspace(-spec.cover.thickness_mm, 0.0, mesh.cover_layers + 1), cover_law)
     centres, neighbours = lattice(counts, frusta.pitch_mm)
-    bed = _bed(spec, centres, neighbours, dielectric_law, mesh, scatter, contact)
-    return LayeredBody(slab, bed, sheet_layers=mesh.sheet_layers)
+    plan = sheet_plan(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, spec.footprint_mm, refinement=mesh.refinement)
+    slab = Slab(sheet, cover, plan.plan, x_lines, y_lines, sides="held", contact=contact or ContactSettings(stiffness=500.0))
+    return LayeredBody(slab, _bed(spec, centres, neighbours, dielectric_law, mesh, scatter, contact), slab.bottom[plan.roots])
 
 
-def build_unit_cell(spec, *, dielectric_law, mesh=MeshSettings(cells_per_pitch=2), height_factor=1.0, tip_factor=1.0):
+def build_unit_cell(spec, *, dielectric_law, mesh=MeshSettings(), height_factor=1.0, tip_factor=1.0):
     """One frustum of an endless lattice with its share of the sheet, without a cover."""
     frusta = spec.dielectric.frusta
     lines = _lines(frusta.pitch_mm, 1, frusta.pitch_mm, mesh.cells_per_pitch)
     bottom = -spec.dielectric.sheet_thickness_mm
-    slab = Slab(lines, lines, _levels(bottom, [-bottom], [mesh.sheet_layers]), [dielectric_law] * mesh.sheet_layers,
-                sides="symmetric", contact=ContactSettings(stiffness=500.0))
-    bed = _bed(spec, np.zeros((1, 2)), np.ones((1, 4), dtype=bool), dielectric_law, mesh,
+    sheet = Layer(np.linspace(bottom, 0.0, mesh.sheet_layers + 1), dielectric_law)
+    centre = np.zeros((1, 2))
+    plan = sheet_plan(centre, (1, 1), frusta.pitch_mm, frusta.root_diameter_mm, (frusta.pitch_mm,) * 2, refinement=mesh.refinement)
+    slab = Slab(sheet, Layer(np.zeros(1), None), plan.plan, lines, lines, sides="symmetric", contact=ContactSettings(stiffness=500.0))
+    bed = _bed(spec, centre, np.ones((1, 4), dtype=bool), dielectric_law, mesh,
                (np.array([height_factor]), np.array([tip_factor])), None, bottom=bottom)
-    return LayeredBody(slab, bed, sheet_layers=mesh.sheet_layers)
+    return LayeredBody(slab, bed, slab.bottom[plan.roots])
 
 
 def _bed(spec, centres, neighbours, law, mesh, scatter, contact, *, bottom=None):
@@ -225,7 +191,7 @@ def _bed(spec, centres, neighbours, law, mesh, scatter, contact, *, bottom=None)
                            root_diameter=frusta.root_diameter_mm, neighbours=neighbours)
     return FrustumBed(geometry, law, levels=np.asarray(mesh.frustum_levels) * frusta.height_mm, root_z_mm=bottom,
                       pcb_z_mm=bottom - heights.max(), tips_held=spec.tips_held, contact=contact or ContactSettings(),
-                      local_over_shear=mesh.local_over_shear)
+                      local_over_shear=mesh.local_over_shear, refinement=mesh.refinement)
 
 
 def surface_of(mesh):

@@ -1,4 +1,8 @@
-"""Sheet and cover as one slab of 20-node hexahedra over the frusta, with the contact of a rigid object on its top."""
+"""Sheet and cover as one slab over the frusta, with the contact of a rigid object on its top.
+
+The sheet's elements meet the frusta's roots node by node. The cover knows nothing of the frusta, so its hexahedra may be
+coarser in plan: the sheet's upper nodes follow the cover's lower side.
+"""
 
 from dataclasses import dataclass
 
@@ -7,9 +11,9 @@ import scipy.sparse as sp
 from numba import njit
 
 from softtact.contact.penalty import penalty
-from softtact.geometry.hex_mesh import extrude, grid_plan
-from softtact.mechanics.blocks import HexBlock
-from softtact.mechanics.elements import HEX20_TOP, gauss, quad8
+from softtact.mechanics.blocks import HexBlock, WedgeBlock
+from softtact.mechanics.elements import HEX20_TOP, WEDGE15_TOP, gauss, quad8
+from softtact.mechanics.hex_mesh import extrude, grid_plan
 
 
 @dataclass(frozen=True)
@@ -36,32 +40,80 @@ class FacingPlanes:
     normals: np.ndarray
 
 
-class Slab:
-    """Hexahedra between grid lines; `laws` holds one law per element layer, from below."""
+@dataclass(frozen=True)
+class Layer:
+    """One material's layer: increasing heights z of its element layers (mm), and its law."""
 
-    def __init__(self, x_lines, y_lines, z_levels, laws, *, sides, contact):
+    levels: np.ndarray
+    law: object
+
+
+class Slab:
+    """Sheet (its plan a `SheetPlan`) under a cover on a grid; a cover of one level is the sheet's top without a cover.
+
+    Nodes: the cover's first, then the sheet's without its top. `bottom` are the nodes under the sheet, in the plan's order.
+    """
+
+    def __init__(self, sheet, cover, plan, x_lines, y_lines, *, sides, contact):
         self.plan = grid_plan(np.asarray(x_lines), np.asarray(y_lines))
         self.x_lines, self.y_lines = np.asarray(x_lines), np.asarray(y_lines)
-        self.mesh = extrude(self.plan, z_levels)
         self.contact = contact
-        self.nodes = len(self.mesh.points)
-        self.blocks = self._blocks(laws)
+        self.cover_mesh = extrude(self.plan, cover.levels)
+        self.sheet_mesh = extrude(plan, sheet.levels)
+        self._number_nodes(plan)
+        self.groups = []
+        if self.cover_mesh.layers:
+            self.groups.append((self.cover_mesh.hexes, HexBlock(self.points[self.cover_mesh.hexes], cover.law, points_per_side=2)))
+        self._add_sheet(sheet.law)
         self._number_unknowns(sides)
         self._top_points()
 
-    def _blocks(self, laws):
-        """One block per run of layers of the same law: (hexes, block)."""
-        blocks, start = [], 0
-        for end in range(1, len(laws) + 1):
-            if end == len(laws) or laws[end] is not laws[start]:
-                hexes = np.vstack([self.mesh.layer(k) for k in range(start, end)])
-                blocks.append((hexes, HexBlock(self.mesh.points[hexes], laws[start], points_per_side=2)))
-                start = end
-        return blocks
+    def _number_nodes(self, plan):
+        """Own nodes of the sheet are all but its top; those follow the cover's lowest plane: masters and weights (p, 8)."""
+        mesh, first = self.sheet_mesh, len(self.cover_mesh.points)
+        top = mesh.planes[-1]
+        own = np.setdiff1d(np.arange(len(mesh.points)), top)
+        self._sheet_number = np.full(len(mesh.points), -1, dtype=np.int64)
+        self._sheet_number[own] = first + np.arange(len(own))
+        quads, weights = self.locate(plan.points)
+        self._masters = np.full((len(mesh.points), 8), -1, dtype=np.int64)
+        self._weights = np.zeros((len(mesh.points), 8))
+        self._masters[top], self._weights[top] = self.cover_mesh.planes[0][self.plan.quads[quads]], weights
+        self.points = np.vstack([self.cover_mesh.points, mesh.points[own]])
+        self.nodes = len(self.points)
+        self.bottom = self._sheet_number[mesh.planes[0]]
+
+    def _add_sheet(self, law):
+        mesh, last = self.sheet_mesh, self.sheet_mesh.layers - 1
+        kinds = ((mesh.layer, HEX20_TOP, lambda c: HexBlock(c, law, points_per_side=2)),
+                 (mesh.wedge_layer, WEDGE15_TOP, lambda c: WedgeBlock(c, law)))
+        for layer, top, make in kinds:
+            for k in range(mesh.layers):
+                elements = layer(k)
+                if len(elements):
+                    block = make(mesh.points[elements])
+                    self.groups.append(self._follow_cover(elements, top, block) if k == last
+                                       else (self._sheet_number[elements], block))
+
+    def _follow_cover(self, elements, top, block):
+        """Elements (e, m) whose upper nodes follow the cover: nodes (e, own + masters), and the block in terms of these."""
+        own = np.setdiff1d(np.arange(elements.shape[1]), top)
+        masters, weights = self._masters[elements[:, top]], self._weights[elements[:, top]]
+        needed = [np.unique(m[np.abs(w) > 1e-12]) for m, w in zip(masters, weights, strict=True)]
+        width = max(map(len, needed))
+        nodes = np.stack([np.pad(n, (0, width - len(n)), mode="edge") for n in needed])
+        follow = np.zeros((len(elements), len(top), width))
+        for e, unique in enumerate(needed):
+            rows, columns = np.nonzero(np.abs(weights[e]) > 1e-12)
+            np.add.at(follow[e], (rows, np.searchsorted(unique, masters[e][rows, columns])), weights[e][rows, columns])
+        gradients = np.concatenate([block.gradients[:, :, own], np.einsum("egtd,etw->egwd", block.gradients[:, :, top], follow)],
+                                   axis=2)
+        block.gradients = np.ascontiguousarray(gradients)
+        return np.hstack([self._sheet_number[elements[:, own]], nodes]), block
 
     def _number_unknowns(self, sides):
         """Free unknowns: all but the sides, which are `held` (sensor shell) or `symmetric` (unit cell)."""
-        x, y, _ = self.mesh.points.T
+        x, y, _ = self.points.T
         on_x = (np.abs(x - self.x_lines[0]) < 1e-9) | (np.abs(x - self.x_lines[-1]) < 1e-9)
         on_y = (np.abs(y - self.y_lines[0]) < 1e-9) | (np.abs(y - self.y_lines[-1]) < 1e-9)
         held = np.zeros((self.nodes, 3), dtype=bool)
@@ -79,12 +131,12 @@ class Slab:
         """Quadrature points of the top faces: 3 x 3 a face, flattened (t * 9)."""
         points, weights = gauss(3, 2)
         values, slopes = quad8(points)
-        self.top_faces = self.mesh.layer(self.mesh.layers - 1)[:, HEX20_TOP]
-        xy = self.mesh.points[self.top_faces][..., :2]
+        self.top_faces = self.cover_mesh.planes[-1][self.plan.quads]
+        xy = self.points[self.top_faces][..., :2]
         edges = np.einsum("tad,gai->tgdi", xy, slopes)
         self.top_values = values
         self.top_area = (np.linalg.det(edges) * weights).ravel()
-        self.top_reference = self._at_top(self.mesh.points)
+        self.top_reference = self._at_top(self.points)
 
     def _at_top(self, field):
         """A nodal field (n, 3) at the top's quadrature points (t * 9, 3)."""
@@ -100,12 +152,12 @@ class Slab:
         """Energy, forces and contact with the object lowered by `indentation` mm; None if an element is inside out."""
         force = np.zeros((self.nodes, 3))
         energy = 0.0
-        for hexes, block in self.blocks:
-            state = block.evaluate(displacement[hexes])
+        for nodes, block in self.groups:
+            state = block.evaluate(displacement[nodes])
             if state is None:
                 return None
             energy += state.energy
-            np.add.at(force, hexes.ravel(), state.force.reshape(-1, 3))
+            np.add.at(force, nodes.ravel(), state.force.reshape(-1, 3))
         gaps, normals = self.gaps(displacement, planes, indentation), planes.normals
         density, pressure, _ = penalty(gaps, stiffness=self.contact.stiffness, smoothing=self.contact.smoothing)
         push = (pressure * self.top_area)[:, None] * normals      # on the slab: along the object's outward normal
@@ -119,48 +171,28 @@ class Slab:
         offset = self.top_reference + self._at_top(displacement) - planes.anchors
         return np.einsum("pd,pd->p", planes.normals, offset) + indentation * planes.normals[:, 2]
 
-    def build_pattern(self, ties):
-        """Fix the matrix's sparsity for slab elements and `ties` (f, k) = slab nodes that each frustum hangs on."""
-        groups = [self._dofs(hexes) for hexes, _ in self.blocks] + [self._dofs(ties)]
-        n = len(self.free)
-        keys = [self._keys(dofs, n) for dofs in groups]
-        unique, slots = np.unique(np.concatenate([k.ravel() for k in keys]), return_inverse=True)
-        offset = int(unique[0] == -1)          # key -1: lower triangle or held
-        unique, slots = unique[offset:], slots - offset
-        sizes = np.cumsum([k.size for k in keys])[:-1]
-        self._slots = [part.reshape(k.shape).astype(np.int32)
-                       for part, k in zip(np.split(slots, sizes), keys, strict=True)]
-        indptr = np.searchsorted(unique // n, np.arange(n + 1)).astype(np.int32)
-        self._pattern = ((unique % n).astype(np.int32), indptr, (n, n))
-        self._matrix = sp.csr_matrix((np.zeros(len(unique)), *self._pattern[:2]), shape=self._pattern[2])
+    def build_pattern(self, roots):
+        """Fix the matrix's sparsity for the slab's elements, its top faces, and `roots` (f, k) = nodes of each frustum's root."""
+        self._members = [nodes for nodes, _ in self.groups] + [self.top_faces, roots]
+        indptr, indices = _upper_pattern(self._members, self.number.reshape(-1, 3), len(self.free))
+        self._dofs = [self.number[(3 * nodes[..., None] + np.arange(3)).reshape(len(nodes), -1)] for nodes in self._members]
+        self._matrix = sp.csr_matrix((np.zeros(len(indices)), indices, indptr), shape=(len(self.free),) * 2)
 
-    def _dofs(self, nodes):
-        return self.number[(3 * nodes[..., None] + np.arange(3)).reshape(len(nodes), -1)]
-
-    @staticmethod
-    def _keys(dofs, n):
-        rows, columns = dofs[:, :, None], dofs[:, None, :]
-        return np.where((rows >= 0) & (columns >= rows), rows * n + columns, -1)
-
-    def tangent(self, state, tied):
-        """Upper triangle (csr) of the tangent with the frusta's condensed blocks `tied` (f, 3 k, 3 k), and its border.
+    def tangent(self, state, condensed):
+        """Upper triangle (csr) of the tangent with the frusta's condensed blocks (f, 3 k, 3 k), and its border.
 
         The border is the derivative (n_free,) of the residual by the indentation; the corner its own second derivative.
         """
-        data = self._matrix.data
-        data[:] = 0.0
-        face_blocks, border, corner = self._contact_tangent(state)
-        for k, (hexes, block) in enumerate(self.blocks):
-            matrices = block.tangent(state.displacement[hexes])
-            if k == len(self.blocks) - 1:       # the top faces belong to the last elements
-                top = matrices[-len(self.top_faces):]
-                dofs = (3 * HEX20_TOP[:, None] + np.arange(3)).ravel()
-                top[:, dofs[:, None], dofs[None, :]] += face_blocks
-            _scatter(data, matrices, self._slots[k])
-        _scatter(data, tied, self._slots[-1])
-        return self._matrix, border, corner
+        matrix = self._matrix
+        matrix.data[:] = 0.0
+        faces, border, corner = self._contact_tangent(state)
+        parts = [block.tangent(state.displacement[nodes]) for nodes, block in self.groups] + [faces, condensed]
+        for part, dofs in zip(parts, self._dofs, strict=True):
+            _add_upper(matrix.data, matrix.indptr, matrix.indices, part, dofs)
+        return matrix, border, corner
 
-    def add_to_diagonal(self, matrix, value):
+    @staticmethod
+    def add_to_diagonal(matrix, value):
         """Add `value` (N/mm) to each diagonal entry of what `tangent` gave."""
         matrix.data[matrix.indptr[:-1]] += value   # sorted upper triangle: each row begins with its diagonal
 
@@ -180,25 +212,74 @@ class Slab:
     def locate(self, points):
         """Plan quads (p,) and shape values (p, 8) at points (p, 2); points on a line belong to the lower side."""
         def cell(value, lines):
-            k = np.clip(np.searchsorted(lines, value) - 1, 0, len(lines) - 2)
+            k = np.clip(np.searchsorted(lines, value - 1e-9) - 1, 0, len(lines) - 2)
             return k, 2 * (value - lines[k]) / (lines[k + 1] - lines[k]) - 1
 
         i, xi = cell(points[:, 0], self.x_lines)
         j, eta = cell(points[:, 1], self.y_lines)
         return j * (len(self.x_lines) - 1) + i, quad8(np.column_stack([xi, eta]))[0]
 
-    def sampling(self, points, plane):
-        """Sparse matrix (p, nodes) that interpolates a nodal field of one horizontal plane of nodes at points (p, 2)."""
+    def sampling(self, points):
+        """Sparse matrix (p, nodes) that interpolates a nodal field of the plane between sheet and cover at points (p, 2)."""
         quads, values = self.locate(points)
-        columns = self.mesh.planes[plane][self.plan.quads[quads]]
+        columns = self.cover_mesh.planes[0][self.plan.quads[quads]]
         rows = np.repeat(np.arange(len(points)), 8)
         return sp.csr_matrix((values.ravel(), (rows, columns.ravel())), shape=(len(points), self.nodes))
 
 
+def _upper_pattern(members, number, size):
+    """indptr, indices of the upper triangle of all unknowns that meet in an element; `number` (nodes, 3), -1 where held."""
+    adjacency = sp.csr_matrix((len(number), len(number)), dtype=np.int8)
+    for nodes in members:
+        rows = np.repeat(np.arange(len(nodes)), nodes.shape[1])
+        incidence = sp.csr_matrix((np.ones(nodes.size, dtype=bool), (rows, nodes.ravel())), shape=(len(nodes), len(number)))
+        adjacency = adjacency + (incidence.T @ incidence)
+    adjacency.sort_indices()
+    return _expand(adjacency.indptr, adjacency.indices, number, size)
+
+
+@njit(cache=True)
+def _expand(node_indptr, node_indices, number, size):
+    """From nodes to unknowns, upper triangle, columns sorted (numbers rise with nodes)."""
+    counts = np.zeros(size + 1, dtype=np.int64)
+    for turn in range(2):
+        if turn == 1:
+            indptr = np.cumsum(counts)
+            indices = np.empty(indptr[-1], dtype=np.int32)
+        for node in range(len(number)):
+            for i in range(3):
+                row = number[node, i]
+                if row < 0:
+                    continue
+                count = 0
+                for k in range(node_indptr[node], node_indptr[node + 1]):
+                    for j in range(3):
+                        column = number[node_indices[k], j]
+                        if column >= row:
+                            if turn == 1:
+                                indices[indptr[row] + count] = column
+                            count += 1
+                counts[row + 1] = count
+    return indptr.astype(np.int32), indices
+
+
 @njit(cache=True, nogil=True)
-def _scatter(data, matrices, slots):
+def _add_upper(data, indptr, indices, matrices, dofs):
+    """Add element matrices (e, k, k) into the upper triangle; dofs (e, k), -1 where held."""
+    size = dofs.shape[1]
     for e in range(matrices.shape[0]):
-        for i in range(matrices.shape[1]):
-            for j in range(matrices.shape[2]):
-                if slots[e, i, j] >= 0:
-                    data[slots[e, i, j]] += matrices[e, i, j]
+        for i in range(size):
+            row = dofs[e, i]
+            if row < 0:
+                continue
+            for j in range(size):
+                column = dofs[e, j]
+                if column >= row:
+                    low, high = indptr[row], indptr[row + 1]
+                    while high - low > 1:
+                        middle = (low + high) // 2
+                        if indices[middle] <= column:
+                            low = middle
+                        else:
+                            high = middle
+                    data[low] += matrices[e, i, j]

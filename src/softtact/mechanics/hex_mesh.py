@@ -1,0 +1,223 @@
+"""Meshes made by lifting a plan of quadratic quadrilaterals and triangles through levels of height."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from softtact.mechanics.elements import QUAD8_NODES, TRI6_NODES, quad8, tri6
+
+_SAME = 1e-7   # mm: nodes nearer than this are one
+
+
+@dataclass(frozen=True)
+class PlanMesh:
+    """points (n, 2), of which the first `corners` are element corners; quads (q, 8), triangles (t, 6): corners, mid-sides."""
+
+    points: np.ndarray
+    quads: np.ndarray
+    corners: int
+    triangles: np.ndarray = field(default_factory=lambda: np.zeros((0, 6), dtype=np.int64))
+
+    def outer_sides(self):
+        """Quads (k,) and their sides (k,), in the order eta=-1, xi=1, eta=1, xi=-1, that belong to no other element."""
+        sides = np.sort(np.stack([self.quads[:, [k, (k + 1) % 4]] for k in range(4)], axis=1), axis=2)
+        others = np.sort(np.stack([self.triangles[:, [k, (k + 1) % 3]] for k in range(3)], axis=1), axis=2)
+        _, where, counts = np.unique(np.vstack([sides.reshape(-1, 2), others.reshape(-1, 2)]), axis=0, return_inverse=True,
+                                     return_counts=True)
+        return np.nonzero(counts[where.ravel()[:sides[..., 0].size]].reshape(-1, 4) == 1)
+
+
+@dataclass(frozen=True)
+class HexMesh:
+    """points (n, 3) in mm; hexes (e, 20), wedges (w, 15), layer by layer from below; `planes` (levels, plan points): node numbers."""
+
+    points: np.ndarray
+    hexes: np.ndarray
+    planes: np.ndarray
+    wedges: np.ndarray
+
+    @property
+    def layers(self):
+        """Number of element layers."""
+        return len(self.planes) - 1
+
+    def layer(self, index):
+        """Hexes of one layer (q, 20)."""
+        return self.hexes.reshape(self.layers, -1, 20)[index]
+
+    def wedge_layer(self, index):
+        """Wedges of one layer (t, 15)."""
+        return self.wedges.reshape(self.layers, -1, 15)[index]
+
+
+def extrude(plan, levels, *, scale=None):
+    """Lift a plan mesh through `levels` (increasing z in mm); `scale(z)` multiplies the plan's coordinates."""
+    levels = np.asarray(levels, dtype=float)
+    scale = scale or (lambda z: 1.0)
+    middles = 0.5 * (levels[:-1] + levels[1:])
+
+    def lifted(points, z):
+        return np.column_stack([points * scale(z), np.full(len(points), z)])
+
+    count = len(plan.points)
+    planes = np.arange(len(levels) * count).reshape(len(levels), count)
+    between = planes.size + np.arange(len(middles) * plan.corners).reshape(len(middles), plan.corners)
+    points = np.vstack([lifted(plan.points, z) for z in levels]
+                       + [lifted(plan.points[: plan.corners], z) for z in middles])
+
+    def lift(elements, corners):
+        corner, mid = elements[:, :corners], elements[:, corners:]
+        layers = [np.hstack([low[corner], high[corner], low[mid], high[mid], edge[corner]])
+                  for low, high, edge in zip(planes[:-1], planes[1:], between, strict=True)]
+        return np.vstack(layers) if layers else np.zeros((0, 5 * corners), dtype=np.int64)
+
+    return HexMesh(points=points, hexes=lift(plan.quads, 4), planes=planes, wedges=lift(plan.triangles, 3))
+
+
+def grid_plan(x_lines, y_lines):
+    """Rectangles between grid lines (increasing, mm), numbered x fastest."""
+    nx, ny = len(x_lines), len(y_lines)
+    corner = np.arange(nx * ny).reshape(ny, nx)
+    along_x = nx * ny + np.arange((nx - 1) * ny).reshape(ny, nx - 1)
+    along_y = nx * ny + (nx - 1) * ny + np.arange(nx * (ny - 1)).reshape(ny - 1, nx)
+    xm, ym = 0.5 * (x_lines[:-1] + x_lines[1:]), 0.5 * (y_lines[:-1] + y_lines[1:])
+
+    def points(x, y):
+        gx, gy = np.meshgrid(x, y)
+        return np.column_stack([gx.ravel(), gy.ravel()])
+
+    quads = np.stack([corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1],
+                      along_x[:-1], along_y[:, 1:], along_x[1:], along_y[:, :-1]], axis=-1).reshape(-1, 8)
+    return PlanMesh(np.vstack([points(x_lines, y_lines), points(xm, y_lines), points(x_lines, ym)]), quads, nx * ny)
+
+
+def merge(quads, triangles=np.zeros((0, 6, 2))):
+    """Plan mesh of elements given by their nodes' coordinates, quads (q, 8, 2) and triangles (t, 6, 2) in mm."""
+    corners = np.vstack([quads[:, :4].reshape(-1, 2), triangles[:, :3].reshape(-1, 2)])
+    mids = np.vstack([quads[:, 4:].reshape(-1, 2), triangles[:, 3:].reshape(-1, 2)])
+    corner_points, corner = _unique(corners)
+    mid_points, mid = _unique(mids)
+    mid = mid + len(corner_points)
+    ends = (4 * len(quads), 3 * len(triangles))
+    quad = np.hstack([corner[:ends[0]].reshape(-1, 4), mid[:ends[0]].reshape(-1, 4)])
+    triangle = np.hstack([corner[ends[0]:].reshape(-1, 3), mid[ends[0]:].reshape(-1, 3)])
+    return PlanMesh(np.vstack([corner_points, mid_points]), quad, len(corner_points), triangle)
+
+
+def _unique(points):
+    _, first, where = np.unique(np.round(points / _SAME).astype(np.int64), axis=0, return_index=True, return_inverse=True)
+    return points[first], where.ravel()
+
+
+def refine(plan, times=1):
+    """Split every element of a plan mesh into four, on the same curves."""
+    for _ in range(times):
+        plan = merge(_split(plan.points[plan.quads], quad8, QUAD8_NODES, _QUAD_CHILDREN),
+                     _split(plan.points[plan.triangles], tri6, TRI6_NODES, _TRIANGLE_CHILDREN))
+    return plan
+
+
+_QUAD_CHILDREN = [(0.5 * np.eye(2), np.array([0.5 * x, 0.5 * y])) for y in (-1, 1) for x in (-1, 1)]
+_TRIANGLE_CHILDREN = ([(0.5 * np.eye(2), np.array(shift)) for shift in ((0.0, 0.0), (0.5, 0.0), (0.0, 0.5))]
+                      + [(-0.5 * np.eye(2), np.array([0.5, 0.5]))])
+
+
+def _split(nodes, shape, parent, children):
+    """Nodes (4 e, m, 2) of the children of elements (e, m, 2): the parent's map at each child's parent coordinates."""
+    parts = [np.einsum("pa,ead->epd", shape(parent @ matrix.T + shift)[0], nodes) for matrix, shift in children]
+    return np.stack(parts, axis=1).reshape(-1, len(parent), 2)
+
+
+_AXES = np.deg2rad([0, 90, 180, 270])
+_DIAGONALS = _AXES + np.pi / 4
+_CORE_RADIUS = 0.5   # of the inner square's corners: all five quads of similar size
+# A quadratic arc over 90 degrees with its mid-side node on the circle encloses 1.2 % too little. The ends stay on the circle, where
+# frusta touch; the middle moves out to this radius, so that the disc's area is exactly pi: 8/3 sqrt(2) m - 2/3 = pi.
+DISC_MIDDLE_RADIUS = (np.pi + 2 / 3) * 3 / (8 * np.sqrt(2))
+
+
+def _ring(radius, angles):
+    return radius * np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+def _ring_quads(inner, inner_mid, outer, outer_mid):
+    """The four quads between two closed curves, each given by corners (4, 2) and the mid-sides (4, 2) after them."""
+    quads = []
+    for k in range(4):
+        n = (k + 1) % 4
+        quads.append([inner[k], outer[k], outer[n], inner[n],
+                      0.5 * (inner[k] + outer[k]), outer_mid[k], 0.5 * (inner[n] + outer[n]), inner_mid[k]])
+    return np.array(quads)
+
+
+def disc_quads():
+    """Unit disc as an O-grid of five quads (5, 8, 2); corners of its outer sides lie at 0, 90, 180 and 270 degrees."""
+    inner = _ring(_CORE_RADIUS, _AXES)
+    inner_mid = _ring(0.5 * (_CORE_RADIUS * np.cos(np.pi / 4) + 0.5 * _CORE_RADIUS), _DIAGONALS)
+    core = np.array([[*inner, *inner_mid]])
+    return np.vstack([core, _ring_quads(inner, inner_mid, _ring(1.0, _AXES), _ring(DISC_MIDDLE_RADIUS, _DIAGONALS))])
+
+
+def disc_plan(refinement=0):
+    """Unit disc as an O-grid of 5 quads, each split into four `refinement` times."""
+    return refine(merge(disc_quads()), refinement)
+
+
+def cell_plan(pitch, diameter):
+    """One cell of a lattice of discs: quads (q, 8, 2) and triangles (4, 6, 2) in mm, the first five quads being the disc.
+
+    Along each side of the cell lie two elements. Where the discs of neighbours do not touch a ring of quads surrounds the disc.
+    """
+    half, radius = 0.5 * pitch, 0.5 * diameter
+    quads = [radius * disc_quads()]
+    if radius < half * (1 - 1e-9):
+        quads.append(_ring_quads(*(r * _ring(1.0, a) if a is _AXES else r * _ring(DISC_MIDDLE_RADIUS, a)
+                                   for r in (radius, half) for a in (_AXES, _DIAGONALS))))
+    touch, arc = half * _ring(1.0, _AXES), half * _ring(DISC_MIDDLE_RADIUS, _DIAGONALS)
+    corner = half * np.sqrt(2) * _ring(1.0, _DIAGONALS)
+    triangles = []
+    for k in range(4):
+        n = (k + 1) % 4
+        triangles.append([touch[k], corner[k], touch[n], 0.5 * (touch[k] + corner[k]), 0.5 * (corner[k] + touch[n]), arc[k]])
+    return np.vstack(quads), np.array(triangles)
+
+
+@dataclass(frozen=True)
+class SheetPlan:
+    """Plan of the sheet over a lattice of frusta; `roots` (f, disc nodes): each frustum's own, in the order of `disc_plan`."""
+
+    plan: PlanMesh
+    roots: np.ndarray
+
+
+def sheet_plan(centres, counts, pitch, diameter, footprint, *, refinement=0):
+    """Cells at `centres` (f, 2) of a lattice `counts`, and strips of quads to the edges of the footprint (mm)."""
+    quads, triangles = cell_plan(pitch, diameter)
+    strips = _strips(counts, pitch, footprint)
+    plan = refine(merge(np.vstack([(quads[None] + centres[:, None, None]).reshape(-1, 8, 2), strips]),
+                        (triangles[None] + centres[:, None, None]).reshape(-1, 6, 2)), refinement)
+    disc = 0.5 * diameter * disc_plan(refinement).points
+    return SheetPlan(plan, _find(plan.points, (centres[:, None] + disc).reshape(-1, 2)).reshape(len(centres), -1))
+
+
+def _find(points, wanted):
+    """Numbers (n,) of the points that lie at the wanted places."""
+    from scipy.spatial import cKDTree
+
+    distance, index = cKDTree(points).query(wanted)
+    if distance.max() > 1e-6:
+        raise ValueError("The disc's nodes are not nodes of the plan.")
+    return index
+
+
+def _strips(counts, pitch, footprint):
+    """Quads (q, 8, 2) between the lattice and the footprint's edges, two along each pitch; none where there is no room."""
+    lines = []
+    for side, count in zip(footprint, counts, strict=True):
+        inner = 0.5 * pitch * (np.arange(2 * count + 1) - count)
+        room = 0.5 * side - 0.5 * pitch * count > 1e-6
+        lines.append(np.concatenate([[-0.5 * side], inner, [0.5 * side]]) if room else inner)
+    plan = grid_plan(*lines)
+    middle = plan.points[plan.quads[:, :4]].mean(axis=1)
+    outside = (np.abs(middle) > 0.5 * pitch * np.asarray(counts)).any(axis=1)
+    return plan.points[plan.quads[outside]]
