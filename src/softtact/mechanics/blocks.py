@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from softtact.mechanics import kernels
-from softtact.mechanics.elements import gauss, hex20, reference_gradients, wedge15, wedge_rule
+from softtact.mechanics.elements import gauss, hex20, hex27, reference_gradients, wedge18, wedge_rule
 
 
 @dataclass(frozen=True)
@@ -84,18 +84,19 @@ class SolidBlock:
 
 
 class HexBlock(SolidBlock):
-    """20-node hexahedra given by coordinates (e, 20, 3) in mm."""
+    """Hexahedra of 20 or 27 nodes given by coordinates (e, 20 or 27, 3) in mm."""
 
     def __init__(self, coordinates, law, *, points_per_side=3, local_over_shear=0.0):
         points, weights = gauss(points_per_side, 3)
-        gradients, volumes = reference_gradients(coordinates, hex20(points)[1], weights)
+        shape = {20: hex20, 27: hex27}[coordinates.shape[1]]
+        gradients, volumes = reference_gradients(coordinates, shape(points)[1], weights)
         super().__init__(gradients, volumes, points, law, local_over_shear=local_over_shear)
 
 
 class WedgeBlock(SolidBlock):
-    """15-node wedges given by coordinates (e, 15, 3) in mm."""
+    """18-node wedges given by coordinates (e, 18, 3) in mm."""
 
     def __init__(self, coordinates, law, *, local_over_shear=0.0):
         points, weights = wedge_rule()
-        gradients, volumes = reference_gradients(coordinates, wedge15(points)[1], weights)
+        gradients, volumes = reference_gradients(coordinates, wedge18(points)[1], weights)
         super().__init__(gradients, volumes, points, law, local_over_shear=local_over_shear)

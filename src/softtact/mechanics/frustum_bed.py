@@ -15,10 +15,9 @@ from scipy.linalg import lapack
 from softtact.contact.penalty import penalty
 from softtact.mechanics.hex_mesh import disc_plan, extrude
 from softtact.mechanics.blocks import HexBlock
-from softtact.mechanics.elements import HEX20_BOTTOM, HEX20_SIDES, gauss, quad8
+from softtact.mechanics.elements import HEX27_BOTTOM, HEX27_SIDES, gauss, quad9
 
 DIRECTIONS = ((0, 1.0), (1, 1.0), (0, -1.0), (1, -1.0))   # axis and sign of the four neighbours: +x, +y, -x, -y
-_PLANE_POINTS = 9                   # nodes that a contact point depends on: eight of its face and one of the plane
 _REFRESH_MM = 1e-3                  # a frustum that moved less than this keeps its tangent (residuals stay exact)
 _REFRESH_SLOPE = 0.05               # ... unless a contact point's stiffness changed by this share of the penalty
 _SMALLEST_STIFFNESS = 0.02          # N/mm of a mode of a folding frustum; the softest mode of one at rest has 0.03
@@ -81,18 +80,18 @@ class FrustumBed:
         return np.concatenate([plan, z[..., None]], axis=2)
 
     def _per_element(self, field):
-        return np.ascontiguousarray(field[:, self.mesh.hexes].reshape(-1, 20, 3))
+        return np.ascontiguousarray(field[:, self.mesh.hexes].reshape(-1, 27, 3))
 
     def _outer_faces(self, plan):
-        """Nodes (layers * sides, 8) of the cone's faces."""
+        """Nodes (layers * sides, 9) of the cone's faces."""
         quads, sides = plan.outer_sides()
-        return np.vstack([self.mesh.layer(k)[quads[:, None], HEX20_SIDES[sides]] for k in range(self.mesh.layers)])
+        return np.vstack([self.mesh.layer(k)[quads[:, None], HEX27_SIDES[sides]] for k in range(self.mesh.layers)])
 
     def _contact_points(self, pcb_z):
         """Points with their nodes, weights, axis: gap = gap0 + sum(weights * displacement[nodes, axis])."""
         points, weights = gauss(3, 2)
-        values, slopes = quad8(points)
-        on_pcb = np.vstack([self.mesh.layer(0)[:, HEX20_BOTTOM], self.outer_faces])
+        values, slopes = quad9(points)
+        on_pcb = np.vstack([self.mesh.layer(0)[:, HEX27_BOTTOM], self.outer_faces])
         records = [(face, value, 2, 1.0, face[0], 0.0, -1) for face in on_pcb for value in values]
         root_xy = self.mesh.points[self.root, :2]
         for k, (axis, sign) in enumerate(DIRECTIONS):
@@ -106,7 +105,7 @@ class FrustumBed:
         self.point_neighbour = np.array([r[6] for r in records])
         offset = np.where(self.point_neighbour < 0, -pcb_z, 0.0)
         self.gap0 = self._along(self.coordinates) + offset
-        self.point_area = self._areas(np.array([r[0] for r in records]).reshape(-1, 9, 8)[:, 0], slopes, weights)
+        self.point_area = self._areas(np.array([r[0] for r in records]).reshape(-1, 9, 9)[:, 0], slopes, weights)
         absent = (self.point_neighbour[None] >= 0) & ~self.geometry.neighbours[:, self.point_neighbour]
         self.point_area[absent] = 0.0
 
@@ -142,7 +141,7 @@ class FrustumBed:
         gaps = self.gap0 + self._along(displacement)
         energy, pressure, _ = penalty(gaps, stiffness=self.contact.stiffness, smoothing=self.contact.smoothing)
         force = np.zeros((self.count, self.nodes, 3))
-        per_element = body.force.reshape(self.count, -1, 20, 3)
+        per_element = body.force.reshape(self.count, -1, 27, 3)
         for k, nodes in enumerate(self.mesh.hexes):
             force[:, nodes] += per_element[:, k]
         _scatter_contact(force, -pressure * self.point_area, self.point_nodes, self.point_weights, self.point_axis)

@@ -6,7 +6,7 @@ import numpy as np
 import trimesh
 
 from softtact.contact.height_field import HeightField
-from softtact.mechanics.elements import HEX20_BOTTOM, quad8
+from softtact.mechanics.elements import HEX27_BOTTOM, quad9
 from softtact.mechanics.hyperelastic import NewtonSettings, press_levels
 from softtact.mechanics.layered_body import MeshSettings, build_unit_cell
 
@@ -42,10 +42,10 @@ def press_cell_on_glass(spec, law, forces_n, *, mesh=None, height_factor=1.0, ti
 def contact_area(bed, displacement):
     """Projected area (mm2) of the first frustum's surface that lies on the PCB or glass."""
     position = bed.coordinates[0] + displacement[0]
-    faces = np.vstack([bed.mesh.layer(0)[:, HEX20_BOTTOM], bed.outer_faces])
+    faces = np.vstack([bed.mesh.layer(0)[:, HEX27_BOTTOM], bed.outer_faces])
     side = (np.arange(_SAMPLES) + 0.5) * 2 / _SAMPLES - 1
     points = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
-    values, slopes = quad8(points)
+    values, slopes = quad9(points)
     nodes = position[faces]                                                     # (f, 8, 3)
     z = np.einsum("pa,fa->fp", values, nodes[..., 2])
     edges = np.einsum("fad,pai->fpdi", nodes[..., :2], slopes)

@@ -4,14 +4,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from softtact.mechanics.elements import QUAD8_NODES, TRI6_NODES, quad8, tri6
+from softtact.mechanics.elements import QUAD9_NODES, TRI6_NODES, quad8, quad9, tri6
 
 _SAME = 1e-7   # mm: nodes nearer than this are one
 
 
 @dataclass(frozen=True)
 class PlanMesh:
-    """points (n, 2), of which the first `corners` are element corners; quads (q, 8), triangles (t, 6): corners, mid-sides."""
+    """points (n, 2), of which the first `corners` are element corners; quads (q, 8 or 9), triangles (t, 6).
+
+    Elements list corners, mid-sides, and the 9-node quad its centre.
+    """
 
     points: np.ndarray
     quads: np.ndarray
@@ -29,7 +32,10 @@ class PlanMesh:
 
 @dataclass(frozen=True)
 class HexMesh:
-    """points (n, 3) in mm; hexes (e, 20), wedges (w, 15), layer by layer from below; `planes` (levels, plan points): node numbers."""
+    """points (n, 3) in mm; hexes (e, 20 or 27), wedges (w, 18), layer by layer from below.
+
+    `planes` (levels, plan points): node numbers between the layers.
+    """
 
     points: np.ndarray
     hexes: np.ndarray
@@ -42,36 +48,44 @@ class HexMesh:
         return len(self.planes) - 1
 
     def layer(self, index):
-        """Hexes of one layer (q, 20)."""
-        return self.hexes.reshape(self.layers, -1, 20)[index]
+        """Hexes of one layer (q, 20 or 27)."""
+        return self.hexes.reshape(self.layers, -1, self.hexes.shape[1])[index]
 
     def wedge_layer(self, index):
-        """Wedges of one layer (t, 15)."""
-        return self.wedges.reshape(self.layers, -1, 15)[index]
+        """Wedges of one layer (t, 18)."""
+        return self.wedges.reshape(self.layers, -1, 18)[index]
 
 
-def extrude(plan, levels, *, scale=None):
-    """Lift a plan mesh through `levels` (increasing z in mm); `scale(z)` multiplies the plan's coordinates."""
+def extrude(plan, levels):
+    """Lift a plan mesh through `levels` (increasing z in mm): 8-node quads to 20-node hexahedra, 9-node ones to 27, triangles to 18."""
     levels = np.asarray(levels, dtype=float)
-    scale = scale or (lambda z: 1.0)
     middles = 0.5 * (levels[:-1] + levels[1:])
+    full = plan.quads.shape[1] == 9
+    count, upright = len(plan.points), len(plan.points) if full else plan.corners
 
     def lifted(points, z):
-        return np.column_stack([points * scale(z), np.full(len(points), z)])
+        return np.column_stack([points, np.full(len(points), z)])
 
-    count = len(plan.points)
     planes = np.arange(len(levels) * count).reshape(len(levels), count)
-    between = planes.size + np.arange(len(middles) * plan.corners).reshape(len(middles), plan.corners)
-    points = np.vstack([lifted(plan.points, z) for z in levels]
-                       + [lifted(plan.points[: plan.corners], z) for z in middles])
+    between = planes.size + np.arange(len(middles) * upright).reshape(len(middles), upright)
+    points = np.vstack([lifted(plan.points, z) for z in levels] + [lifted(plan.points[:upright], z) for z in middles])
 
-    def lift(elements, corners):
-        corner, mid = elements[:, :corners], elements[:, corners:]
-        layers = [np.hstack([low[corner], high[corner], low[mid], high[mid], edge[corner]])
+    def lift(elements):
+        layers = [_full_element(low, high, edge, elements) if full else _serendipity(low, high, edge, elements)
                   for low, high, edge in zip(planes[:-1], planes[1:], between, strict=True)]
-        return np.vstack(layers) if layers else np.zeros((0, 5 * corners), dtype=np.int64)
+        return np.vstack([np.zeros((0, 3 * elements.shape[1] if full else 20), dtype=np.int64), *layers])
 
-    return HexMesh(points=points, hexes=lift(plan.quads, 4), planes=planes, wedges=lift(plan.triangles, 3))
+    return HexMesh(points=points, hexes=lift(plan.quads), planes=planes,
+                   wedges=lift(plan.triangles) if len(plan.triangles) else np.zeros((0, 18), dtype=np.int64))
+
+
+def _full_element(low, high, middle, elements):
+    return np.hstack([low[elements], high[elements], middle[elements]])
+
+
+def _serendipity(low, high, middle, quads):
+    corner, mid = quads[:, :4], quads[:, 4:]
+    return np.hstack([low[corner], high[corner], low[mid], high[mid], middle[corner]])
 
 
 def grid_plan(x_lines, y_lines):
@@ -92,16 +106,22 @@ def grid_plan(x_lines, y_lines):
 
 
 def merge(quads, triangles=np.zeros((0, 6, 2))):
-    """Plan mesh of elements given by their nodes' coordinates, quads (q, 8, 2) and triangles (t, 6, 2) in mm."""
+    """Plan mesh of elements given by their nodes' coordinates, quads (q, 9, 2) and triangles (t, 6, 2) in mm."""
     corners = np.vstack([quads[:, :4].reshape(-1, 2), triangles[:, :3].reshape(-1, 2)])
-    mids = np.vstack([quads[:, 4:].reshape(-1, 2), triangles[:, 3:].reshape(-1, 2)])
+    others = np.vstack([quads[:, 4:].reshape(-1, 2), triangles[:, 3:].reshape(-1, 2)])
     corner_points, corner = _unique(corners)
-    mid_points, mid = _unique(mids)
-    mid = mid + len(corner_points)
-    ends = (4 * len(quads), 3 * len(triangles))
-    quad = np.hstack([corner[:ends[0]].reshape(-1, 4), mid[:ends[0]].reshape(-1, 4)])
-    triangle = np.hstack([corner[ends[0]:].reshape(-1, 3), mid[ends[0]:].reshape(-1, 3)])
-    return PlanMesh(np.vstack([corner_points, mid_points]), quad, len(corner_points), triangle)
+    other_points, other = _unique(others)
+    other = other + len(corner_points)
+    ends = (4 * len(quads), 5 * len(quads))
+    quad = np.hstack([corner[:ends[0]].reshape(-1, 4), other[:ends[1]].reshape(-1, 5)])
+    triangle = np.hstack([corner[ends[0]:].reshape(-1, 3), other[ends[1]:].reshape(-1, 3)])
+    return PlanMesh(np.vstack([corner_points, other_points]), quad, len(corner_points), triangle)
+
+
+def with_centres(quads):
+    """8-node quads (q, 8, 2) with their centres as ninth nodes (the 8-node map's centre, so that the shape is the same)."""
+    centre = quad8(np.zeros((1, 2)))[0] @ quads
+    return np.concatenate([quads, centre], axis=1)
 
 
 def _unique(points):
@@ -112,7 +132,7 @@ def _unique(points):
 def refine(plan, times=1):
     """Split every element of a plan mesh into four, on the same curves."""
     for _ in range(times):
-        plan = merge(_split(plan.points[plan.quads], quad8, QUAD8_NODES, _QUAD_CHILDREN),
+        plan = merge(_split(plan.points[plan.quads], quad9, QUAD9_NODES, _QUAD_CHILDREN),
                      _split(plan.points[plan.triangles], tri6, TRI6_NODES, _TRIANGLE_CHILDREN))
     return plan
 
@@ -151,11 +171,12 @@ def _ring_quads(inner, inner_mid, outer, outer_mid):
 
 
 def disc_quads():
-    """Unit disc as an O-grid of five quads (5, 8, 2); corners of its outer sides lie at 0, 90, 180 and 270 degrees."""
+    """Unit disc as an O-grid of five quads (5, 9, 2); corners of its outer sides lie at 0, 90, 180 and 270 degrees."""
     inner = _ring(_CORE_RADIUS, _AXES)
     inner_mid = _ring(0.5 * (_CORE_RADIUS * np.cos(np.pi / 4) + 0.5 * _CORE_RADIUS), _DIAGONALS)
     core = np.array([[*inner, *inner_mid]])
-    return np.vstack([core, _ring_quads(inner, inner_mid, _ring(1.0, _AXES), _ring(DISC_MIDDLE_RADIUS, _DIAGONALS))])
+    ring = _ring_quads(inner, inner_mid, _ring(1.0, _AXES), _ring(DISC_MIDDLE_RADIUS, _DIAGONALS))
+    return with_centres(np.vstack([core, ring]))
 
 
 def disc_plan(refinement=0):
@@ -164,15 +185,15 @@ def disc_plan(refinement=0):
 
 
 def cell_plan(pitch, diameter):
-    """One cell of a lattice of discs: quads (q, 8, 2) and triangles (4, 6, 2) in mm, the first five quads being the disc.
+    """One cell of a lattice of discs: quads (q, 9, 2) and triangles (4, 6, 2) in mm, the first five quads being the disc.
 
     Along each side of the cell lie two elements. Where the discs of neighbours do not touch a ring of quads surrounds the disc.
     """
     half, radius = 0.5 * pitch, 0.5 * diameter
     quads = [radius * disc_quads()]
     if radius < half * (1 - 1e-9):
-        quads.append(_ring_quads(*(r * _ring(1.0, a) if a is _AXES else r * _ring(DISC_MIDDLE_RADIUS, a)
-                                   for r in (radius, half) for a in (_AXES, _DIAGONALS))))
+        quads.append(with_centres(_ring_quads(*(r * _ring(1.0, a) if a is _AXES else r * _ring(DISC_MIDDLE_RADIUS, a)
+                                                for r in (radius, half) for a in (_AXES, _DIAGONALS)))))
     touch, arc = half * _ring(1.0, _AXES), half * _ring(DISC_MIDDLE_RADIUS, _DIAGONALS)
     corner = half * np.sqrt(2) * _ring(1.0, _DIAGONALS)
     triangles = []
@@ -194,7 +215,7 @@ def sheet_plan(centres, counts, pitch, diameter, footprint, *, refinement=0):
     """Cells at `centres` (f, 2) of a lattice `counts`, and strips of quads to the edges of the footprint (mm)."""
     quads, triangles = cell_plan(pitch, diameter)
     strips = _strips(counts, pitch, footprint)
-    plan = refine(merge(np.vstack([(quads[None] + centres[:, None, None]).reshape(-1, 8, 2), strips]),
+    plan = refine(merge(np.vstack([(quads[None] + centres[:, None, None]).reshape(-1, 9, 2), strips]),
                         (triangles[None] + centres[:, None, None]).reshape(-1, 6, 2)), refinement)
     disc = 0.5 * diameter * disc_plan(refinement).points
     return SheetPlan(plan, _find(plan.points, (centres[:, None] + disc).reshape(-1, 2)).reshape(len(centres), -1))
@@ -211,7 +232,7 @@ def _find(points, wanted):
 
 
 def _strips(counts, pitch, footprint):
-    """Quads (q, 8, 2) between the lattice and the footprint's edges, two along each pitch; none where there is no room."""
+    """Quads (q, 9, 2) between the lattice and the footprint's edges, two along each pitch; none where there is no room."""
     lines = []
     for side, count in zip(footprint, counts, strict=True):
         inner = 0.5 * pitch * (np.arange(2 * count + 1) - count)
@@ -220,4 +241,4 @@ def _strips(counts, pitch, footprint):
     plan = grid_plan(*lines)
     middle = plan.points[plan.quads[:, :4]].mean(axis=1)
     outside = (np.abs(middle) > 0.5 * pitch * np.asarray(counts)).any(axis=1)
-    return plan.points[plan.quads[outside]]
+    return with_centres(plan.points[plan.quads[outside]])

@@ -12,7 +12,7 @@ from numba import njit
 
 from softtact.contact.penalty import penalty
 from softtact.mechanics.blocks import HexBlock, WedgeBlock
-from softtact.mechanics.elements import HEX20_TOP, WEDGE15_TOP, gauss, quad8
+from softtact.mechanics.elements import HEX27_TOP, WEDGE18_TOP, gauss, quad8
 from softtact.mechanics.hex_mesh import extrude, grid_plan
 
 
@@ -85,8 +85,8 @@ class Slab:
 
     def _add_sheet(self, law):
         mesh, last = self.sheet_mesh, self.sheet_mesh.layers - 1
-        kinds = ((mesh.layer, HEX20_TOP, lambda c: HexBlock(c, law, points_per_side=2)),
-                 (mesh.wedge_layer, WEDGE15_TOP, lambda c: WedgeBlock(c, law)))
+        kinds = ((mesh.layer, HEX27_TOP, lambda c: HexBlock(c, law)),
+                 (mesh.wedge_layer, WEDGE18_TOP, lambda c: WedgeBlock(c, law)))
         for layer, top, make in kinds:
             for k in range(mesh.layers):
                 elements = layer(k)
