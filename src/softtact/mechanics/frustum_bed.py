@@ -10,17 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from scipy.linalg import lapack
 
 from softtact.contact.penalty import penalty
 from softtact.mechanics.hex_mesh import disc_plan, extrude
 from softtact.mechanics.blocks import HexBlock
+from softtact.mechanics.condensation import Condensation
 from softtact.mechanics.elements import HEX27_BOTTOM, HEX27_SIDES, gauss, quad9
 
 DIRECTIONS = ((0, 1.0), (1, 1.0), (0, -1.0), (1, -1.0))   # axis and sign of the four neighbours: +x, +y, -x, -y
-_REFRESH_MM = 1e-3                  # a frustum that moved less than this keeps its tangent (residuals stay exact)
-_REFRESH_SLOPE = 0.05               # ... unless a contact point's stiffness changed by this share of the penalty
-_SMALLEST_STIFFNESS = 0.02          # N/mm of a mode of a folding frustum; the softest mode of one at rest has 0.03
 _CHUNK = 45                         # frusta whose element tangents are in memory at once
 
 
@@ -68,7 +65,7 @@ class FrustumBed:
         self.block = HexBlock(self._per_element(self.coordinates), law, local_over_shear=local_over_shear)
         self._contact_points(pcb_z_mm)
         self._number_unknowns(tips_held)
-        self._tangent_at = None
+        self.condensed = Condensation(self.count, self.inner_count, len(self.root_dofs))
 
     def _place(self, levels, root_z):
         """Nodal coordinates (n, nodes, 3): the unit disc scaled by the cone's radius, the height by each frustum's own."""
@@ -148,32 +145,13 @@ class FrustumBed:
         return BedState(energy=body.energy + float((energy * self.point_area).sum()), force=force, gaps=gaps,
                         displacement=displacement)
 
-    def refresh(self, state):
-        """Recompute the condensed tangents of the frusta that moved or changed contact since their last one.
+    def refresh(self, state, frusta):
+        """Recompute the condensed tangents of the given frusta (numbers)."""
+        for start in range(0, len(frusta), _CHUNK):
+            self._condense(state, frusta[start:start + _CHUNK])
 
-        Returns how many were recomputed. Keeping the others is a quasi-Newton step: forces are always exact.
-        """
-        stale = self._stale(state)
-        for start in range(0, len(stale), _CHUNK):
-            self._condense(state, stale[start:start + _CHUNK])
-        return len(stale)
-
-    def _stale(self, state):
-        slope = self._contact_slope(state.gaps)
-        if self._tangent_at is None:
-            root = len(self.root_dofs)
-            self._factors = [None] * self.count
-            self._inner_by_root = np.empty((self.count, self.inner_count, root))
-            self.condensed = np.empty((self.count, root, root))
-            self._tangent_at, self._slope_at = state.displacement.copy(), slope
-            return np.arange(self.count)
-        moved = np.abs(state.displacement - self._tangent_at).reshape(self.count, -1).max(axis=1) > _REFRESH_MM
-        touched = np.abs(slope - self._slope_at).max(axis=1) > _REFRESH_SLOPE * self.contact.stiffness
-        stale = np.flatnonzero(moved | touched)
-        self._tangent_at[stale], self._slope_at[stale] = state.displacement[stale], slope[stale]
-        return stale
-
-    def _contact_slope(self, gaps):
+    def contact_slope(self, gaps):
+        """Stiffness (n, p) of the contact points in N/mm3."""
         return penalty(gaps, stiffness=self.contact.stiffness, smoothing=self.contact.smoothing)[2]
 
     def _condense(self, state, frusta):
@@ -181,36 +159,23 @@ class FrustumBed:
         elements = (frusta[:, None] * layers + np.arange(layers)).ravel()
         dense = np.zeros((len(frusta), self.inner_count + len(self.root_dofs), self.inner_count + len(self.root_dofs)))
         tangents = self.block.tangent(self._per_element(state.displacement), elements)
-        slope = self._contact_slope(state.gaps[frusta])
+        slope = self.contact_slope(state.gaps[frusta])
         _assemble_dense(dense, tangents, self.mesh.hexes, self.order)
         _contact_tangent(dense, slope * self.point_area[frusta], self.point_nodes, self.point_weights, self.point_axis,
                          self.order)
-        n = self.inner_count
         for matrix, frustum in zip(dense, frusta, strict=True):
-            factor = _Factor(matrix[:n, :n])
-            coupling = factor.solve(matrix[:n, n:])
-            self._factors[frustum] = factor
-            self._inner_by_root[frustum] = coupling
-            self.condensed[frustum] = matrix[n:, n:] - matrix[n:, :n] @ coupling
-
-    def positive_condensed(self):
-        """The condensed tangents (n, roots, roots) without their modes of negative stiffness."""
-        values, vectors = np.linalg.eigh(self.condensed)
-        return np.matmul(vectors * np.maximum(values, 0.0)[:, None, :], vectors.transpose(0, 2, 1))
+            self.condensed.set(frustum, matrix)
 
     def condensed_residual(self, state):
-        """Root forces (n, 60) after the inner residual has been eliminated, and the inner correction (n, inner)."""
+        """Root forces (n, 75) after the inner residual has been eliminated, and what `inner_step` needs again."""
         flat = state.force.reshape(self.count, -1)
-        inner = flat[:, self.inner]
-        correction = np.stack([factor.solve(r) for factor, r in zip(self._factors, inner, strict=True)])
-        # K_ri K_ii^-1 r_i = (K_ii^-1 K_ir)^T r_i: the matrix is symmetric
-        root = flat[:, self.root_dofs] - np.einsum("nir,ni->nr", self._inner_by_root, inner, optimize=True)
-        return root, correction
+        passed_on, half = self.condensed.residual(flat[:, self.inner])
+        return flat[:, self.root_dofs] + passed_on, half
 
-    def inner_step(self, correction, root_step):
-        """Newton step (n, nodes, 3) of the frusta for the roots' step (n, 60)."""
+    def inner_step(self, half, root_step):
+        """Newton step (n, nodes, 3) of the frusta for the roots' step (n, 75)."""
         step = np.zeros((self.count, 3 * self.nodes))
-        step[:, self.inner] = -correction - np.matmul(self._inner_by_root, root_step[..., None])[..., 0]
+        step[:, self.inner] = self.condensed.recover(half, root_step)
         step[:, self.root_dofs] = root_step
         return step.reshape(self.count, self.nodes, 3)
 
@@ -221,25 +186,6 @@ class FrustumBed:
     def compression(self, displacement):
         """Mean shortening (n,) of each frustum in mm: root against tip."""
         return displacement[:, self.tip, 2].mean(axis=1) - displacement[:, self.root, 2].mean(axis=1)
-
-
-class _Factor:
-    """Cholesky factors of a frustum's inner matrix; where folding made it indefinite, of |matrix|, its eigenvalues made positive.
-
-    With |matrix| every Newton step lowers the energy, and goes as far along a mode of negative stiffness as along one of
-    positive; at equilibrium only the rate of convergence depends on it. Nocedal and Wright, Numerical Optimization, sec. 3.4.
-    """
-
-    def __init__(self, matrix):
-        self._cholesky, info = lapack.dpotrf(matrix, lower=1, clean=0)
-        self.modified = info != 0
-        if self.modified:
-            values, vectors = np.linalg.eigh(matrix)
-            matrix = (vectors * np.maximum(np.abs(values), _SMALLEST_STIFFNESS)) @ vectors.T
-            self._cholesky, _ = lapack.dpotrf(matrix, lower=1, clean=0)
-
-    def solve(self, right):
-        return lapack.dpotrs(self._cholesky, right, lower=1)[0]
 
 
 @njit(cache=True, nogil=True)

@@ -205,10 +205,14 @@ def cell_plan(pitch, diameter):
 
 @dataclass(frozen=True)
 class SheetPlan:
-    """Plan of the sheet over a lattice of frusta; `roots` (f, disc nodes): each frustum's own, in the order of `disc_plan`."""
+    """Plan of the sheet over a lattice of frusta: its quads and triangles cell by cell, then the strips at the edges.
+
+    roots (f, disc nodes): each frustum's own, in the order of `disc_plan`; cell_quads: how many quads a cell has.
+    """
 
     plan: PlanMesh
     roots: np.ndarray
+    cell_quads: int
 
 
 def sheet_plan(centres, counts, pitch, diameter, footprint, *, refinement=0):
@@ -218,7 +222,8 @@ def sheet_plan(centres, counts, pitch, diameter, footprint, *, refinement=0):
     plan = refine(merge(np.vstack([(quads[None] + centres[:, None, None]).reshape(-1, 9, 2), strips]),
                         (triangles[None] + centres[:, None, None]).reshape(-1, 6, 2)), refinement)
     disc = 0.5 * diameter * disc_plan(refinement).points
-    return SheetPlan(plan, _find(plan.points, (centres[:, None] + disc).reshape(-1, 2)).reshape(len(centres), -1))
+    roots = _find(plan.points, (centres[:, None] + disc).reshape(-1, 2)).reshape(len(centres), -1)
+    return SheetPlan(plan, roots, len(quads) * 4**refinement)
 
 
 def _find(points, wanted):

@@ -8,6 +8,7 @@ from softtact.contact.height_field import HeightField
 from softtact.mechanics.frustum_bed import BedGeometry, BedState, ContactSettings, FrustumBed
 from softtact.mechanics.hex_mesh import sheet_plan
 from softtact.mechanics.linear_solvers import make_solver
+from softtact.mechanics.sheet_cells import SheetCells
 from softtact.mechanics.slab import Layer, Slab, SlabState
 
 
@@ -67,8 +68,9 @@ class LayeredBody:
 
     def __init__(self, slab, bed, roots):
         """`roots` (f, k): the slab's nodes that are the frusta's root nodes."""
-        self.slab, self.bed, self.roots = slab, bed, roots
-        slab.build_pattern(roots)
+        self.slab, self.bed = slab, bed
+        self.cells = SheetCells(slab, bed, roots)
+        slab.build_pattern(self.cells.inner_dofs, self.cells.outer_dofs)
         self.solver = make_solver()
 
     def rest(self):
@@ -88,12 +90,10 @@ class LayeredBody:
         Where nothing touches, a force finds no stiffness: the step is then not finite.
         """
         if not same_tangent:
-            self.bed.refresh(state.bed)
+            self.cells.refresh(state)
             self._border, self._corner = self._factor_tangent(state)
-        root_force, correction = self.bed.condensed_residual(state.bed)
-        residual = state.slab.force.copy()
-        np.add.at(residual, self.roots.ravel(), root_force.reshape(-1, 3))
-        right = residual.ravel()[self.slab.free]
+        residual, kept = self.cells.condensed_residual(state)
+        right = residual.ravel()[self.slab.unknowns]
         if same_tangent:
             step = -self.solver.solve(right)
         else:
@@ -106,16 +106,15 @@ class LayeredBody:
             lowering = (force_n - state.force - self._border @ step) / stiffness if stiffness > 0 else np.nan
             step = step - self._along * lowering
         full = np.zeros(3 * self.slab.nodes)
-        full[self.slab.free] = step
-        full = full.reshape(-1, 3)
-        return Step(slab=full, bed=self.bed.inner_step(correction, full[self.roots].reshape(self.bed.count, -1)),
-                    indentation=lowering)
+        full[self.slab.unknowns] = step
+        slab, bed = self.cells.recover(kept, full.reshape(-1, 3))
+        return Step(slab=slab, bed=bed, indentation=lowering)
 
     def _factor_tangent(self, state):
         """Factor the tangent, made positive definite where it is not, so that every step lowers the energy."""
-        matrix, border, corner = self.slab.tangent(state.slab, self.bed.condensed)
+        matrix, border, corner = self.slab.tangent(state.slab, self.cells.condensed.outer)
         if not self.solver.factor(matrix):
-            matrix, border, corner = self.slab.tangent(state.slab, self.bed.positive_condensed())
+            matrix, border, corner = self.slab.tangent(state.slab, self.cells.condensed.positive_outer())
             shift = 0.0
             while not self.solver.factor(matrix):
                 shift = max(2 * shift, _FIRST_SHIFT)
@@ -132,7 +131,7 @@ class LayeredBody:
     def slab_force(self, state):
         """Forces (n, 3) on the slab's nodes, those of the frusta's roots among them."""
         total = state.slab.force.copy()
-        np.add.at(total, self.roots.ravel(), state.bed.force[:, self.bed.root].reshape(-1, 3))
+        np.add.at(total, self.cells.roots.ravel(), state.bed.force[:, self.bed.root].reshape(-1, 3))
         return total
 
 
@@ -162,7 +161,7 @@ def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), s
     cover = Layer(np.linspace(-spec.cover.thickness_mm, 0.0, mesh.cover_layers + 1), cover_law)
     centres, neighbours = lattice(counts, frusta.pitch_mm)
     plan = sheet_plan(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, spec.footprint_mm, refinement=mesh.refinement)
-    slab = Slab(sheet, cover, plan.plan, x_lines, y_lines, sides="held", contact=contact or ContactSettings(stiffness=500.0))
+    slab = Slab(sheet, cover, plan, x_lines, y_lines, sides="held", contact=contact or ContactSettings(stiffness=500.0))
     return LayeredBody(slab, _bed(spec, centres, neighbours, dielectric_law, mesh, scatter, contact), slab.bottom[plan.roots])
 
 
@@ -174,7 +173,7 @@ def build_unit_cell(spec, *, dielectric_law, mesh=MeshSettings(), height_factor=
     sheet = Layer(np.linspace(bottom, 0.0, mesh.sheet_layers + 1), dielectric_law)
     centre = np.zeros((1, 2))
     plan = sheet_plan(centre, (1, 1), frusta.pitch_mm, frusta.root_diameter_mm, (frusta.pitch_mm,) * 2, refinement=mesh.refinement)
-    slab = Slab(sheet, Layer(np.zeros(1), None), plan.plan, lines, lines, sides="symmetric", contact=ContactSettings(stiffness=500.0))
+    slab = Slab(sheet, Layer(np.zeros(1), None), plan, lines, lines, sides="symmetric", contact=ContactSettings(stiffness=500.0))
     bed = _bed(spec, centre, np.ones((1, 4), dtype=bool), dielectric_law, mesh,
                (np.array([height_factor]), np.array([tip_factor])), None, bottom=bottom)
     return LayeredBody(slab, bed, slab.bottom[plan.roots])

@@ -54,17 +54,17 @@ class Slab:
     Nodes: the cover's first, then the sheet's without its top. `bottom` are the nodes under the sheet, in the plan's order.
     """
 
-    def __init__(self, sheet, cover, plan, x_lines, y_lines, *, sides, contact):
+    def __init__(self, sheet, cover, sheet_plan, x_lines, y_lines, *, sides, contact):
         self.plan = grid_plan(np.asarray(x_lines), np.asarray(y_lines))
         self.x_lines, self.y_lines = np.asarray(x_lines), np.asarray(y_lines)
         self.contact = contact
         self.cover_mesh = extrude(self.plan, cover.levels)
-        self.sheet_mesh = extrude(plan, sheet.levels)
-        self._number_nodes(plan)
-        self.groups = []
+        self.sheet_mesh = extrude(sheet_plan.plan, sheet.levels)
+        self._number_nodes(sheet_plan.plan)
+        self.groups, self.cell_groups = [], []
         if self.cover_mesh.layers:
             self.groups.append((self.cover_mesh.hexes, HexBlock(self.points[self.cover_mesh.hexes], cover.law, points_per_side=2)))
-        self._add_sheet(sheet.law)
+        self._add_sheet(sheet_plan, sheet.law)
         self._number_unknowns(sides)
         self._top_points()
 
@@ -83,17 +83,19 @@ class Slab:
         self.nodes = len(self.points)
         self.bottom = self._sheet_number[mesh.planes[0]]
 
-    def _add_sheet(self, law):
-        mesh, last = self.sheet_mesh, self.sheet_mesh.layers - 1
-        kinds = ((mesh.layer, HEX27_TOP, lambda c: HexBlock(c, law)),
-                 (mesh.wedge_layer, WEDGE18_TOP, lambda c: WedgeBlock(c, law)))
-        for layer, top, make in kinds:
-            for k in range(mesh.layers):
-                elements = layer(k)
+    def _add_sheet(self, plan, law):
+        """Groups of like elements (nodes, block): those of the frusta's cells, cell by cell, and those of the strips."""
+        mesh = self.sheet_mesh
+        in_cells = len(plan.roots) * plan.cell_quads
+        for k in range(mesh.layers):
+            hexes, wedges = mesh.layer(k), mesh.wedge_layer(k)
+            last = k == mesh.layers - 1
+            for target, elements, top, make in ((self.cell_groups, hexes[:in_cells], HEX27_TOP, HexBlock),
+                                                (self.cell_groups, wedges, WEDGE18_TOP, WedgeBlock),
+                                                (self.groups, hexes[in_cells:], HEX27_TOP, HexBlock)):
                 if len(elements):
-                    block = make(mesh.points[elements])
-                    self.groups.append(self._follow_cover(elements, top, block) if k == last
-                                       else (self._sheet_number[elements], block))
+                    block = make(mesh.points[elements], law)
+                    target.append(self._follow_cover(elements, top, block) if last else (self._sheet_number[elements], block))
 
     def _follow_cover(self, elements, top, block):
         """Elements (e, m) whose upper nodes follow the cover: nodes (e, own + masters), and the block in terms of these."""
@@ -152,7 +154,7 @@ class Slab:
         """Energy, forces and contact with the object lowered by `indentation` mm; None if an element is inside out."""
         force = np.zeros((self.nodes, 3))
         energy = 0.0
-        for nodes, block in self.groups:
+        for nodes, block in self.groups + self.cell_groups:
             state = block.evaluate(displacement[nodes])
             if state is None:
                 return None
@@ -171,17 +173,22 @@ class Slab:
         offset = self.top_reference + self._at_top(displacement) - planes.anchors
         return np.einsum("pd,pd->p", planes.normals, offset) + indentation * planes.normals[:, 2]
 
-    def build_pattern(self, roots):
-        """Fix the matrix's sparsity for the slab's elements, its top faces, and `roots` (f, k) = nodes of each frustum's root."""
-        self._members = [nodes for nodes, _ in self.groups] + [self.top_faces, roots]
-        indptr, indices = _upper_pattern(self._members, self.number.reshape(-1, 3), len(self.free))
-        self._dofs = [self.number[(3 * nodes[..., None] + np.arange(3)).reshape(len(nodes), -1)] for nodes in self._members]
-        self._matrix = sp.csr_matrix((np.zeros(len(indices)), indices, indptr), shape=(len(self.free),) * 2)
+    def build_pattern(self, eliminated, cells):
+        """Fix the global matrix: its unknowns are the free ones but the `eliminated`; `cells` (f, k) are the cells' outer ones."""
+        keep = np.setdiff1d(self.free, eliminated.ravel())
+        self.unknowns = keep
+        number = np.full(3 * self.nodes, -1, dtype=np.int64)
+        number[keep] = np.arange(len(keep))
+        members = [(3 * nodes[..., None] + np.arange(3)).reshape(len(nodes), -1)
+                   for nodes in [*(nodes for nodes, _ in self.groups), self.top_faces]] + [cells]
+        self._dofs = [number[dofs] for dofs in members]
+        indptr, indices = _upper_pattern(self._dofs, len(keep))
+        self._matrix = sp.csr_matrix((np.zeros(len(indices)), indices, indptr), shape=(len(keep),) * 2)
 
     def tangent(self, state, condensed):
-        """Upper triangle (csr) of the tangent with the frusta's condensed blocks (f, 3 k, 3 k), and its border.
+        """Upper triangle (csr) of the tangent with the cells' condensed blocks (f, k, k), and its border.
 
-        The border is the derivative (n_free,) of the residual by the indentation; the corner its own second derivative.
+        The border is the derivative (unknowns,) of the residual by the indentation; the corner its own second derivative.
         """
         matrix = self._matrix
         matrix.data[:] = 0.0
@@ -207,7 +214,7 @@ class Slab:
         border = np.zeros(3 * self.nodes)
         dofs = (3 * self.top_faces[..., None] + np.arange(3)).reshape(len(weight), 24)
         np.add.at(border, dofs.ravel(), np.einsum("tg,tgk->tk", weight * lowering, shape).ravel())
-        return blocks, border[self.free], float((weight * lowering**2).sum())
+        return blocks, border[self.unknowns], float((weight * lowering**2).sum())
 
     def locate(self, points):
         """Plan quads (p,) and shape values (p, 8) at points (p, 2); points on a line belong to the lower side."""
@@ -227,40 +234,16 @@ class Slab:
         return sp.csr_matrix((values.ravel(), (rows, columns.ravel())), shape=(len(points), self.nodes))
 
 
-def _upper_pattern(members, number, size):
-    """indptr, indices of the upper triangle of all unknowns that meet in an element; `number` (nodes, 3), -1 where held."""
-    adjacency = sp.csr_matrix((len(number), len(number)), dtype=np.int8)
-    for nodes in members:
-        rows = np.repeat(np.arange(len(nodes)), nodes.shape[1])
-        incidence = sp.csr_matrix((np.ones(nodes.size, dtype=bool), (rows, nodes.ravel())), shape=(len(nodes), len(number)))
-        adjacency = adjacency + (incidence.T @ incidence)
-    adjacency.sort_indices()
-    return _expand(adjacency.indptr, adjacency.indices, number, size)
-
-
-@njit(cache=True)
-def _expand(node_indptr, node_indices, number, size):
-    """From nodes to unknowns, upper triangle, columns sorted (numbers rise with nodes)."""
-    counts = np.zeros(size + 1, dtype=np.int64)
-    for turn in range(2):
-        if turn == 1:
-            indptr = np.cumsum(counts)
-            indices = np.empty(indptr[-1], dtype=np.int32)
-        for node in range(len(number)):
-            for i in range(3):
-                row = number[node, i]
-                if row < 0:
-                    continue
-                count = 0
-                for k in range(node_indptr[node], node_indptr[node + 1]):
-                    for j in range(3):
-                        column = number[node_indices[k], j]
-                        if column >= row:
-                            if turn == 1:
-                                indices[indptr[row] + count] = column
-                            count += 1
-                counts[row + 1] = count
-    return indptr.astype(np.int32), indices
+def _upper_pattern(members, size):
+    """indptr, indices of the upper triangle of all unknowns that meet in an element; members (e, k), -1 where held."""
+    pattern = sp.csr_matrix((size, size), dtype=bool)
+    for dofs in members:
+        here = dofs >= 0
+        rows = np.repeat(np.arange(len(dofs)), dofs.shape[1]).reshape(dofs.shape)[here]
+        incidence = sp.csr_matrix((np.ones(len(rows), dtype=bool), (rows, dofs[here])), shape=(len(dofs), size))
+        pattern = pattern + sp.triu(incidence.T @ incidence, format="csr")
+    pattern.sort_indices()
+    return pattern.indptr, pattern.indices
 
 
 @njit(cache=True, nogil=True)
