@@ -67,10 +67,10 @@ class SolidBlock:
         return BlockState(energy=energy, force=force, displacement=displacement)
 
     def tangent(self, displacement, elements=slice(None)):
-        """Tangent (e, 3 m, 3 m) in N/mm of the chosen elements."""
+        """Tangent (e, 3 m, 3 m) in N/mm of the chosen elements, whose displacement (e, m, 3) is given."""
         gradients = self.gradients[elements]
         volumes = self.volumes[elements]
-        F, C, J = kernels.deformation(displacement[elements], gradients)
+        F, C, J = kernels.deformation(displacement, gradients)
         response = self.law.isochoric(C, tangent=True)
         _, pressure = self._pressure(J, elements)
         return kernels.tangent(F, C, J, gradients, volumes, response.stress, response.tangent, pressure,

@@ -158,7 +158,7 @@ class FrustumBed:
         layers = len(self.mesh.hexes)
         elements = (frusta[:, None] * layers + np.arange(layers)).ravel()
         dense = np.zeros((len(frusta), self.inner_count + len(self.root_dofs), self.inner_count + len(self.root_dofs)))
-        tangents = self.block.tangent(self._per_element(state.displacement), elements)
+        tangents = self.block.tangent(self._per_element(state.displacement[frusta]), elements)
         slope = self.contact_slope(state.gaps[frusta])
         _assemble_dense(dense, tangents, self.mesh.hexes, self.order)
         _contact_tangent(dense, slope * self.point_area[frusta], self.point_nodes, self.point_weights, self.point_axis,

@@ -8,6 +8,7 @@ from numba import njit
 
 _ROW = np.array([0, 1, 2, 0, 1, 2])
 _COL = np.array([0, 1, 2, 1, 2, 0])
+_VOIGT = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
 
 
 @njit(cache=True, nogil=True)
@@ -73,54 +74,48 @@ def internal_force(F, C, J, gradients, volumes, stress, pressure):
 
 
 @njit(cache=True, nogil=True)
-def _add_geometric(K, gradients, S):
-    """Add (grad N_a . S grad N_b) to the diagonal of each nodal 3 x 3 block."""
-    nodes = gradients.shape[0]
-    for a in range(nodes):
-        s0 = gradients[a, 0] * S[0, 0] + gradients[a, 1] * S[1, 0] + gradients[a, 2] * S[2, 0]
-        s1 = gradients[a, 0] * S[0, 1] + gradients[a, 1] * S[1, 1] + gradients[a, 2] * S[2, 1]
-        s2 = gradients[a, 0] * S[0, 2] + gradients[a, 1] * S[1, 2] + gradients[a, 2] * S[2, 2]
-        for b in range(nodes):
-            value = s0 * gradients[b, 0] + s1 * gradients[b, 1] + s2 * gradients[b, 2]
-            for i in range(3):
-                K[3 * a + i, 3 * b + i] += value
-
-
-@njit(cache=True, nogil=True)
-def _strain_rows(B, f, gradients):
-    """Rows of the strain-displacement matrix B (6, 3 m): dE (engineering shear) per nodal displacement."""
-    for a in range(gradients.shape[0]):
-        x, y, z = gradients[a, 0], gradients[a, 1], gradients[a, 2]
-        for i in range(3):
-            column = 3 * a + i
-            B[0, column] = f[i, 0] * x
-            B[1, column] = f[i, 1] * y
-            B[2, column] = f[i, 2] * z
-            B[3, column] = f[i, 0] * y + f[i, 1] * x
-            B[4, column] = f[i, 1] * z + f[i, 2] * y
-            B[5, column] = f[i, 2] * x + f[i, 0] * z
+def _elasticity(A, f, S, D):
+    """First elasticity tensor A (i, k, j, l) = F_ip F_jq D_pkql + delta_ij S_kl from the material one D (6, 6)."""
+    half = np.empty((3, 3, 6))
+    for i in range(3):
+        for k in range(3):
+            for m in range(6):
+                total = 0.0
+                for p in range(3):
+                    total += f[i, p] * D[_VOIGT[p, k], m]
+                half[i, k, m] = total
+    for i in range(3):
+        for k in range(3):
+            for j in range(3):
+                for l in range(3):
+                    total = S[k, l] if i == j else 0.0
+                    for q in range(3):
+                        total += half[i, k, _VOIGT[q, l]] * f[j, q]
+                    A[i, k, j, l] = total
 
 
 @njit(cache=True, nogil=True)
 def tangent(F, C, J, gradients, volumes, stress, moduli, pressure, basis, gram_inverse, bulk_modulus, local_modulus):
-    """Tangent (e, 3 m, 3 m) of `internal_force` with the pressure of `HexBlock`: a projected and a local part.
+    """Tangent (e, 3 m, 3 m) of `internal_force` with the pressure of `SolidBlock`: a projected and a local part.
 
     projected = bulk_modulus * basis . gram_inverse . integral(basis (J - 1)), basis (g, p): symmetric, rank p per element
     local = local_modulus (J - 1/J) / 2
+
+    The products run over blocks of components (i, j >= i): K_ij = G^T A_ij G with the gradients G (3 g, m), three large
+    products an element instead of one with the strain-displacement matrix, which has a third of zeros.
     """
     elements, points, nodes, _ = gradients.shape
-    size = 3 * nodes
     modes = basis.shape[1]
-    out = np.empty((elements, size, size))
-    B = np.empty((6 * points, size))
-    DB = np.empty((6 * points, size))
-    volume_change = np.empty((modes, size))
+    out = np.empty((elements, 3 * nodes, 3 * nodes))
+    G = np.empty((nodes, 3 * points))
+    # A_ij G for each i, columns j >= i side by side
+    rights = (np.empty((3 * points, 3 * nodes)), np.empty((3 * points, 2 * nodes)), np.empty((3 * points, nodes)))
+    volume_change = np.empty((modes, 3 * nodes))
+    A = np.empty((3, 3, 3, 3))
     D = np.empty((6, 6))
     S = np.empty((3, 3))
     for e in range(elements):
         volume_change[:] = 0.0
-        K = out[e]
-        K[:] = 0.0
         for g in range(points):
             n = e * points + g
             inverse = inverse_symmetric(C[n])
@@ -134,16 +129,31 @@ def tangent(F, C, J, gradients, volumes, stress, moduli, pressure, basis, gram_i
                     i, j, p, q = _ROW[k], _COL[k], _ROW[m], _COL[m]
                     ip, jq, iq, jp = _sym(inverse, i, p), _sym(inverse, j, q), _sym(inverse, i, q), _sym(inverse, j, p)
                     D[k, m] = w * (moduli[n, k, m] + (pj + local) * inverse[k] * inverse[m] - pj * (ip * jq + iq * jp))
-            rows = B[6 * g:6 * g + 6]
-            _strain_rows(rows, F[e, g], gradients[e, g])
-            DB[6 * g:6 * g + 6] = D @ rows
-            for m in range(modes):
-                factor = w * basis[g, m] * J[e, g]
-                for k in range(6):
-                    for column in range(size):
-                        volume_change[m, column] += factor * inverse[k] * rows[k, column]
-            _add_geometric(K, gradients[e, g], S)
-        K += B.T @ DB
+            f = F[e, g]
+            _elasticity(A, f, S, D)
+            for a in range(nodes):
+                x, y, z = gradients[e, g, a, 0], gradients[e, g, a, 1], gradients[e, g, a, 2]
+                G[a, 3 * g], G[a, 3 * g + 1], G[a, 3 * g + 2] = x, y, z
+                for i in range(3):
+                    # row i of the cofactor J F^-T = J F C^-1, times the gradient: dJ by displacement i of node a
+                    cofactor = 0.0
+                    for k in range(3):
+                        along = f[i, 0] * _sym(inverse, 0, k) + f[i, 1] * _sym(inverse, 1, k) + f[i, 2] * _sym(inverse, 2, k)
+                        cofactor += along * gradients[e, g, a, k]
+                    for m in range(modes):
+                        volume_change[m, 3 * a + i] += w * basis[g, m] * J[e, g] * cofactor
+                    right = rights[i]
+                    for j in range(i, 3):
+                        for k in range(3):
+                            right[3 * g + k, (j - i) * nodes + a] = A[i, k, j, 0] * x + A[i, k, j, 1] * y + A[i, k, j, 2] * z
+        K = out[e]
+        for i in range(3):
+            block = G @ rights[i]
+            for a in range(nodes):
+                for j in range(i, 3):
+                    for b in range(nodes):
+                        K[3 * a + i, 3 * b + j] = block[a, (j - i) * nodes + b]
+                        K[3 * b + j, 3 * a + i] = block[a, (j - i) * nodes + b]
         K += bulk_modulus * (volume_change.T @ (gram_inverse[e] @ volume_change))
     return out
 
