@@ -19,12 +19,13 @@ class Condensation:
         self.outer = np.zeros((bodies, outer, outer))
 
     def set(self, body, matrix):
-        """Factor the inner part of one body's matrix and condense."""
+        """Factor the inner part of one body's matrix, given by its upper triangle, and condense."""
         n = self.inner
         factor = Factor(matrix[:n, :n])
         coupling = factor.forward(matrix[:n, n:])
         self._factors[body], self._coupling[body] = factor, coupling
-        self.outer[body] = matrix[n:, n:] - coupling.T @ coupling
+        outer = matrix[n:, n:]
+        self.outer[body] = np.triu(outer) + np.triu(outer, 1).T - coupling.T @ coupling
 
     def residual(self, inner):
         """What the inner residuals (bodies, n) leave on the outer unknowns (bodies, m), and the part to keep for `recover`."""
@@ -55,10 +56,11 @@ class Factor:
     """
 
     def __init__(self, matrix):
+        """From the upper triangle of a matrix stored row by row."""
         self._lower, info = lapack.dpotrf(matrix.T, lower=1, clean=0)   # .T: column by column, without a copy in between
         self.modified = info != 0
         if self.modified:
-            values, vectors = np.linalg.eigh(matrix)
+            values, vectors = np.linalg.eigh(matrix, UPLO="U")
             matrix = (vectors * np.maximum(np.abs(values), _SMALLEST_STIFFNESS)) @ vectors.T
             self._lower, _ = lapack.dpotrf(matrix, lower=1, clean=0)
 

@@ -209,6 +209,7 @@ def _scatter_contact(force, magnitude, nodes, weights, axis):
 
 @njit(cache=True, nogil=True)
 def _assemble_dense(dense, tangents, hexes, order):
+    """Add element matrices into the upper triangles of dense (f, n, n)."""
     layers, size = hexes.shape[0], 3 * hexes.shape[1]
     for f in range(dense.shape[0]):
         for e in range(layers):
@@ -218,7 +219,7 @@ def _assemble_dense(dense, tangents, hexes, order):
                 if row >= 0:
                     for j in range(size):
                         column = order[3 * hexes[e, j // 3] + j % 3]
-                        if column >= 0:
+                        if column >= row:
                             dense[f, row, column] += K[i, j]
 
 
@@ -232,5 +233,5 @@ def _contact_tangent(dense, slope, nodes, weights, axis, order):
                     if row >= 0:
                         for j in range(nodes.shape[1]):
                             column = order[3 * nodes[p, j] + axis[p]]
-                            if column >= 0:
+                            if column >= row:
                                 dense[f, row, column] += slope[f, p] * weights[p, i] * weights[p, j]

@@ -115,10 +115,11 @@ def _same_in_all(members):
 
 @njit(cache=True, nogil=True)
 def _add_dense(dense, matrices, dofs):
-    """Add element matrices (c, k, m, m) of k elements a cell into dense (c, n, n) at dofs (k, m)."""
+    """Add element matrices (c, k, m, m) of k elements a cell into the upper triangles of dense (c, n, n) at dofs (k, m)."""
     for c in range(dense.shape[0]):
         for e in range(dofs.shape[0]):
             for i in range(dofs.shape[1]):
                 row = dofs[e, i]
                 for j in range(dofs.shape[1]):
-                    dense[c, row, dofs[e, j]] += matrices[c, e, i, j]
+                    if dofs[e, j] >= row:
+                        dense[c, row, dofs[e, j]] += matrices[c, e, i, j]
