@@ -47,6 +47,16 @@ class HexMesh:
         """Number of element layers."""
         return len(self.planes) - 1
 
+    @property
+    def inner_planes(self):
+        """Node numbers (2 layers, plan points) of the planes below the top, those in the middle of layers among them.
+
+        Only of a mesh whose layers have all the plan's points in their middle.
+        """
+        first = self.planes.size
+        middles = first + np.arange(self.layers * self.planes.shape[1]).reshape(self.layers, -1)
+        return np.vstack([self.planes[:-1], middles])
+
     def layer(self, index):
         """Hexes of one layer (q, 20 or 27)."""
         return self.hexes.reshape(self.layers, -1, self.hexes.shape[1])[index]
@@ -208,11 +218,14 @@ class SheetPlan:
     """Plan of the sheet over a lattice of frusta: its quads and triangles cell by cell, then the strips at the edges.
 
     roots (f, disc nodes): each frustum's own, in the order of `disc_plan`; cell_quads: how many quads a cell has.
+    quarters: nodes (k, 4) at the quarters of the cells' walls, each with the nearer corner, the middle and the farther
+    corner, and the three weights of a quadratic curve through these; none in a refined plan.
     """
 
     plan: PlanMesh
     roots: np.ndarray
     cell_quads: int
+    quarters: tuple
 
 
 def sheet_plan(centres, counts, pitch, diameter, footprint, *, refinement=0):
@@ -223,7 +236,17 @@ def sheet_plan(centres, counts, pitch, diameter, footprint, *, refinement=0):
                         (triangles[None] + centres[:, None, None]).reshape(-1, 6, 2)), refinement)
     disc = 0.5 * diameter * disc_plan(refinement).points
     roots = _find(plan.points, (centres[:, None] + disc).reshape(-1, 2)).reshape(len(centres), -1)
-    return SheetPlan(plan, roots, len(quads) * 4**refinement)
+    return SheetPlan(plan, roots, len(quads) * 4**refinement, _quarters(plan, centres, pitch, refinement))
+
+
+def _quarters(plan, centres, pitch, refinement):
+    weights = np.array([0.375, 0.75, -0.125])
+    if refinement:
+        return np.zeros((0, 4), dtype=np.int64), weights
+    walls = 0.5 * pitch * np.array([[[c, side * 0.5], [c, side], [c, 0.0], [c, -side]] for c in (-1, 1) for side in (-1, 1)])
+    walls = np.concatenate([walls, walls[..., ::-1]])                        # (8, 4, 2): quarter, near corner, middle, far corner
+    nodes = _find(plan.points, (centres[:, None, None] + walls).reshape(-1, 2)).reshape(-1, 4)
+    return np.unique(nodes, axis=0), weights
 
 
 def _find(points, wanted):

@@ -28,6 +28,7 @@ class MeshSettings:
     frustum_levels: tuple = (0.0, 0.2, 0.6, 1.0)
     local_over_shear: float = 4.0
     refinement: int = 0
+    coarse_walls: bool = True
 
 
 @dataclass(frozen=True)
@@ -161,7 +162,8 @@ def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), s
     cover = Layer(np.linspace(-spec.cover.thickness_mm, 0.0, mesh.cover_layers + 1), cover_law)
     centres, neighbours = lattice(counts, frusta.pitch_mm)
     plan = sheet_plan(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, spec.footprint_mm, refinement=mesh.refinement)
-    slab = Slab(sheet, cover, plan, x_lines, y_lines, sides="held", contact=contact or ContactSettings(stiffness=500.0))
+    slab = Slab(sheet, cover, plan, x_lines, y_lines, sides="held", contact=contact or ContactSettings(stiffness=500.0),
+                coarse_walls=mesh.coarse_walls)
     return LayeredBody(slab, _bed(spec, centres, neighbours, dielectric_law, mesh, scatter, contact), slab.bottom[plan.roots])
 
 
@@ -173,7 +175,8 @@ def build_unit_cell(spec, *, dielectric_law, mesh=MeshSettings(), height_factor=
     sheet = Layer(np.linspace(bottom, 0.0, mesh.sheet_layers + 1), dielectric_law)
     centre = np.zeros((1, 2))
     plan = sheet_plan(centre, (1, 1), frusta.pitch_mm, frusta.root_diameter_mm, (frusta.pitch_mm,) * 2, refinement=mesh.refinement)
-    slab = Slab(sheet, Layer(np.zeros(1), None), plan, lines, lines, sides="symmetric", contact=ContactSettings(stiffness=500.0))
+    slab = Slab(sheet, Layer(np.zeros(1), None), plan, lines, lines, sides="symmetric", contact=ContactSettings(stiffness=500.0),
+                coarse_walls=mesh.coarse_walls)
     bed = _bed(spec, centre, np.ones((1, 4), dtype=bool), dielectric_law, mesh,
                (np.array([height_factor]), np.array([tip_factor])), None, bottom=bottom)
     return LayeredBody(slab, bed, slab.bottom[plan.roots])

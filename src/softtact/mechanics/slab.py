@@ -12,7 +12,7 @@ from numba import njit
 
 from softtact.contact.penalty import penalty
 from softtact.mechanics.blocks import HexBlock, WedgeBlock
-from softtact.mechanics.elements import HEX27_TOP, WEDGE18_TOP, gauss, quad8
+from softtact.mechanics.elements import gauss, quad8
 from softtact.mechanics.hex_mesh import extrude, grid_plan
 
 
@@ -54,13 +54,14 @@ class Slab:
     Nodes: the cover's first, then the sheet's without its top. `bottom` are the nodes under the sheet, in the plan's order.
     """
 
-    def __init__(self, sheet, cover, sheet_plan, x_lines, y_lines, *, sides, contact):
+    def __init__(self, sheet, cover, sheet_plan, x_lines, y_lines, *, sides, contact, coarse_walls=True):
         self.plan = grid_plan(np.asarray(x_lines), np.asarray(y_lines))
         self.x_lines, self.y_lines = np.asarray(x_lines), np.asarray(y_lines)
         self.contact = contact
         self.cover_mesh = extrude(self.plan, cover.levels)
         self.sheet_mesh = extrude(sheet_plan.plan, sheet.levels)
-        self._number_nodes(sheet_plan.plan)
+        self._coarse_walls = coarse_walls
+        self._number_nodes(sheet_plan)
         self.groups, self.cell_groups = [], []
         if self.cover_mesh.layers:
             self.groups.append((self.cover_mesh.hexes, HexBlock(self.points[self.cover_mesh.hexes], cover.law, points_per_side=2)))
@@ -69,19 +70,31 @@ class Slab:
         self._top_points()
 
     def _number_nodes(self, plan):
-        """Own nodes of the sheet are all but its top; those follow the cover's lowest plane: masters and weights (p, 8)."""
+        """Masters (p, 8) and weights (p, 8) of the sheet's nodes: its top follows the cover, the rest its own unknowns.
+
+        Along the walls between cells, two elements a side, the sheet moves as one quadratic curve: the nodes at the quarters
+        follow the corner, the middle and the next corner. (Free quarters: half as many unknowns again, and 1 % softer.)
+        """
         mesh, first = self.sheet_mesh, len(self.cover_mesh.points)
         top = mesh.planes[-1]
-        own = np.setdiff1d(np.arange(len(mesh.points)), top)
-        self._sheet_number = np.full(len(mesh.points), -1, dtype=np.int64)
-        self._sheet_number[own] = first + np.arange(len(own))
-        quads, weights = self.locate(plan.points)
-        self._masters = np.full((len(mesh.points), 8), -1, dtype=np.int64)
-        self._weights = np.zeros((len(mesh.points), 8))
+        curve, curve_weights = plan.quarters if self._coarse_walls else (np.zeros((0, 4), dtype=np.int64), np.zeros(3))
+        follows = np.zeros(len(mesh.points), dtype=bool)
+        follows[top] = True
+        planes = mesh.inner_planes
+        follows[planes[:, curve[:, 0]]] = True
+        own = np.flatnonzero(~follows)
+        number = np.full(len(mesh.points), -1, dtype=np.int64)
+        number[own] = first + np.arange(len(own))
+        self._masters, self._weights = np.zeros((len(mesh.points), 8), dtype=np.int64), np.zeros((len(mesh.points), 8))
+        self._masters[own, 0], self._weights[own, 0] = number[own], 1.0
+        quads, weights = self.locate(plan.plan.points)
         self._masters[top], self._weights[top] = self.cover_mesh.planes[0][self.plan.quads[quads]], weights
+        for plane in planes:
+            self._masters[plane[curve[:, 0]], :3] = number[plane[curve[:, 1:]]]
+            self._weights[plane[curve[:, 0]], :3] = curve_weights
         self.points = np.vstack([self.cover_mesh.points, mesh.points[own]])
         self.nodes = len(self.points)
-        self.bottom = self._sheet_number[mesh.planes[0]]
+        self.bottom = number[mesh.planes[0]]
 
     def _add_sheet(self, plan, law):
         """Groups of like elements (nodes, block): those of the frusta's cells, cell by cell, and those of the strips."""
@@ -89,29 +102,24 @@ class Slab:
         in_cells = len(plan.roots) * plan.cell_quads
         for k in range(mesh.layers):
             hexes, wedges = mesh.layer(k), mesh.wedge_layer(k)
-            last = k == mesh.layers - 1
-            for target, elements, top, make in ((self.cell_groups, hexes[:in_cells], HEX27_TOP, HexBlock),
-                                                (self.cell_groups, wedges, WEDGE18_TOP, WedgeBlock),
-                                                (self.groups, hexes[in_cells:], HEX27_TOP, HexBlock)):
+            for target, elements, make in ((self.cell_groups, hexes[:in_cells], HexBlock), (self.cell_groups, wedges, WedgeBlock),
+                                           (self.groups, hexes[in_cells:], HexBlock)):
                 if len(elements):
-                    block = make(mesh.points[elements], law)
-                    target.append(self._follow_cover(elements, top, block) if last else (self._sheet_number[elements], block))
+                    target.append(self._of_masters(elements, make(mesh.points[elements], law)))
 
-    def _follow_cover(self, elements, top, block):
-        """Elements (e, m) whose upper nodes follow the cover: nodes (e, own + masters), and the block in terms of these."""
-        own = np.setdiff1d(np.arange(elements.shape[1]), top)
-        masters, weights = self._masters[elements[:, top]], self._weights[elements[:, top]]
-        needed = [np.unique(m[np.abs(w) > 1e-12]) for m, w in zip(masters, weights, strict=True)]
+    def _of_masters(self, elements, block):
+        """Nodes (e, w) that elements (e, m) of the sheet hang on, and the block in terms of these."""
+        masters, weights = self._masters[elements], self._weights[elements]
+        used = np.abs(weights) > 1e-12
+        needed = [np.unique(m[u]) for m, u in zip(masters, used, strict=True)]
         width = max(map(len, needed))
         nodes = np.stack([np.pad(n, (0, width - len(n)), mode="edge") for n in needed])
-        follow = np.zeros((len(elements), len(top), width))
+        follow = np.zeros((*elements.shape, width))
         for e, unique in enumerate(needed):
-            rows, columns = np.nonzero(np.abs(weights[e]) > 1e-12)
+            rows, columns = np.nonzero(used[e])
             np.add.at(follow[e], (rows, np.searchsorted(unique, masters[e][rows, columns])), weights[e][rows, columns])
-        gradients = np.concatenate([block.gradients[:, :, own], np.einsum("egtd,etw->egwd", block.gradients[:, :, top], follow)],
-                                   axis=2)
-        block.gradients = np.ascontiguousarray(gradients)
-        return np.hstack([self._sheet_number[elements[:, own]], nodes]), block
+        block.gradients = np.ascontiguousarray(np.einsum("egmd,emw->egwd", block.gradients, follow, optimize=True))
+        return nodes, block
 
     def _number_unknowns(self, sides):
         """Free unknowns: all but the sides, which are `held` (sensor shell) or `symmetric` (unit cell)."""
