@@ -70,17 +70,22 @@ def small_strain(body, held, prescribed, load=0.0):
 
 
 def equilibrium(body, held, prescribed, load=0.0, *, start=None, tolerance=1e-13, iterations=30):
-    """Displacement (n, 3) at finite strain by Newton's method with whole steps; tolerance (N) on free nodal forces."""
+    """Displacement (n, 3) at finite strain by Newton's method with whole steps; tolerance (N) on free nodal forces.
+
+    The first step moves the held nodes from `start` to where they belong, and the free ones along with them linearly.
+    """
     free = ~held.ravel()
     displacement = np.zeros_like(body.points) if start is None else start.copy()
-    displacement[held] = np.broadcast_to(prescribed, held.shape)[held]
+    jump = np.where(held, prescribed - displacement, 0.0).ravel()
     for _ in range(iterations):
-        residual = (body.energy_and_force(displacement)[1] - load).ravel()[free]
-        if np.abs(residual).max() < tolerance:
+        residual = (body.energy_and_force(displacement)[1] - load).ravel()
+        if np.abs(residual[free]).max() < tolerance and not jump.any():
             return displacement
-        matrix = body.stiffness(displacement)[free][:, free]
-        displacement.ravel()[free] -= solve_linear(matrix, residual)
-    raise ArithmeticError(f"no equilibrium after {iterations} iterations; residual {np.abs(residual).max():.1e} N")
+        matrix = body.stiffness(displacement)[free]
+        step = jump.copy()
+        step[free] = -solve_linear(matrix[:, free], residual[free] + matrix @ jump)
+        displacement, jump = displacement + step.reshape(-1, 3), np.zeros_like(jump)
+    raise ArithmeticError(f"no equilibrium after {iterations} iterations; residual {np.abs(residual[free]).max():.1e} N")
 
 
 def face_load(points, quads, traction):
