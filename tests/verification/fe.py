@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from softtact.geometry.hex_mesh import PlanMesh, disc_plan
 from softtact.mechanics.blocks import HexBlock
 from softtact.mechanics.elements import gauss, quad8
-from softtact.mechanics.linear_solvers import make_solver
+from softtact.mechanics.linear_solvers import SuperLUSolver, make_solver
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def assemble(matrices, hexes, nodes):
 
 def solve_linear(matrix, right):
     """Solution of a symmetric positive definite sparse system; right (n,) or (n, k)."""
-    solver = make_solver()
+    solver = SuperLUSolver() if matrix.shape[0] < 2000 else make_solver()   # small: PARDISO's start costs more
     upper = sp.triu(matrix, format="csr")
     upper.sort_indices()
     if not solver.factor(upper):

@@ -9,6 +9,7 @@ import pytest
 from scipy import sparse
 from slabs import HeldSlab, flat_punch, graded, interpolate, layer_compliance, mirrored, paraboloid
 
+from softtact.contact.penalty import penalty
 from softtact.materials.laws.registry import make_law
 from softtact.mechanics.elastic import Compliance, press_elastic
 
@@ -196,6 +197,18 @@ def test_a_layered_half_space_lies_between_its_materials_and_equals_each_in_its_
     assert (np.diff(forces) < -0.1 * FORCE).all()      # the thicker the soft layer, the softer: all lie between the limits
 
 
+def test_the_contact_pressure_is_the_slope_of_its_energy_and_its_slope_that_of_the_pressure(record):
+    gap, step, k = np.array([-3.3e-3, -1.7e-3, -0.6e-3, -0.1e-3, 0.2e-3]), 1e-7, {"stiffness": 500.0, "smoothing": 1e-3}
+    (above, p_above, _), (below, p_below, _) = penalty(gap + step, **k), penalty(gap - step, **k)
+    _, pressure, slope = penalty(gap, **k)
+    source = "central differences"
+    for name, got, expected in (("pressure", pressure, (below - above) / (2 * step)),
+                                ("stiffness", slope, (p_below - p_above) / (2 * step))):
+        deviation = np.abs(got - expected).max() / np.abs(expected).max()
+        record(f"contact {name}: relative deviation", expected=0.0, source=source, got=deviation)
+        assert deviation < 1e-8      # the law is piecewise cubic: differences err by step^2 and round-off over step
+
+
 # --- thin layers ---
 
 
@@ -211,6 +224,9 @@ def test_a_wide_smooth_punch_on_a_thin_layer_compresses_it_as_if_confined(record
     got = level.nodal_force[middle].sum() / (middle.sum() * 0.25) / (level.indentation / thickness)
     error = record("elastic model, wide punch on a thin layer: modulus in the middle", expected=expected, source=source, got=got)
     assert error < 5e-3      # three thicknesses from the edge its influence has died away
+    error = record("elastic model, wide punch on a thin layer: contact area", expected=17**2 * 0.5**2,
+                   source="17 x 17 pressed nodes, 0.5 mm apart", got=compliance.area[level.nodal_force > 0].sum())
+    assert error < 0.03      # the triangles' diagonals share out the cells of the rim unevenly
     quarter = lines[lines >= 0]
     slab = HeldSlab(quarter, quarter, z, [linear_law(young, poisson)] * 4, sides="symmetric", stiffness=1e5)
     press = slab.press(flat_punch(4.0), 1e-4, tolerance=1e-6)

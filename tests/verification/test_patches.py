@@ -148,9 +148,10 @@ def error_at_nodes(cells, law, points):
 @POINTS
 @pytest.mark.parametrize("ratio", [20.0, 1e4])
 def test_a_smooth_solution_is_approached_at_the_elements_order(ratio, points, record):
-    expected, source = 3.0, "quadratic elements: error of displacement ~ h^3 (order; more is better)"
+    expected, source = 3.0, "quadratic elements: error of displacement ~ h^3"
     law = make_law("neo_hooke", {"c10": 0.5}, bulk_over_shear=ratio)
     coarse, fine = (error_at_nodes(cells, law, points) for cells in (3, 6))
     got = np.log2(coarse / fine)
-    record(f"observed order of convergence, K/mu = {ratio:g}, {points}^3 points", expected=expected, source=source, got=got)
-    assert got > expected - 0.3      # the asymptotic order shows itself from below on such coarse meshes
+    record(f"observed order of convergence, K/mu = {ratio:g}, {points}^3 points", expected=expected, source=source, got=got,
+           at_least=True)
+    assert got > expected      # at nodes of such smooth meshes it is better than at other points
