@@ -1,4 +1,4 @@
-"""Bodies of one material: homogeneous tests, Cook's membrane, bonded rubber, thin layers.
+"""Bodies of one material: homogeneous tests, Cook's membrane, bonded rubber.
 
 All by the naive solver of `fe.py` with the sensor's element.
 """
