@@ -19,6 +19,10 @@ _NO_TERM = 0.0
 _PARABOLA_STEPS, _LINE_MM = 8, 1.0   # of the contact law: points on its parabola, length of its straight line
 _FIRST_INCREMENT, _LARGEST_INCREMENT, _SMALLEST_INCREMENT = 0.1, 0.25, 1e-6
 
+_OUTPUT = ("*OUTPUT, FIELD, FREQUENCY=1000", "*NODE OUTPUT", "U, RF", "*ELEMENT OUTPUT", "S, LE", "*CONTACT OUTPUT", "CSTRESS",
+           "*OUTPUT, HISTORY, FREQUENCY=1", "*NODE OUTPUT, NSET=OBJECT_REFERENCE", "U3, RF3",
+           "*NODE PRINT, NSET=INTERFACE, FREQUENCY=1000", "U3")
+
 
 def deck_lines(model, *, slab_element="C3D20RH", frustum_element="C3D20H"):
     """The deck's lines."""
@@ -71,5 +75,4 @@ def _step(step, reference, fixed, *, first):
         lines += [f"{reference}, 3, 3, {keywords.number(-step.value)}"]
     else:
         lines += ["*CLOAD", f"{reference}, 3, {keywords.number(-step.value)}"]
-    return [*lines, "*OUTPUT, FIELD, FREQUENCY=1000", "*NODE OUTPUT", "U, RF", "*ELEMENT OUTPUT", "S, LE", "*CONTACT OUTPUT", "CSTRESS",
-            "*OUTPUT, HISTORY, FREQUENCY=1", "*NODE OUTPUT, NSET=OBJECT_REFERENCE", "U3, RF3", "*NODE PRINT, NSET=INTERFACE, FREQUENCY=1000", "U3", "*END STEP"]
+    return [*lines, *_OUTPUT, "*END STEP"]

@@ -25,9 +25,18 @@ _STIFF = "1000, 0.3"         # of the rigid bodies' elements, whose nodes are al
 _FIRST_INCREMENT, _LARGEST_INCREMENT, _SMALLEST_INCREMENT = 0.1, 0.25, 1e-6
 _DEPTH_MM = 1.0              # of the tetrahedra behind facets
 
+_TABLES = ("*NODE PRINT, NSET=OBJECT_REFERENCE, FREQUENCY=1000", "U",
+           "*NODE PRINT, NSET=OBJECT_NODES, TOTALS=ONLY, FREQUENCY=1000", "RF",
+           "*NODE PRINT, NSET=BOARD_NODES, TOTALS=ONLY, FREQUENCY=1000", "RF",
+           "*NODE PRINT, NSET=INTERFACE, FREQUENCY=1000", "U")
+_FIELDS = ("*NODE FILE, FREQUENCY=1000", "U, RF", "*EL FILE, FREQUENCY=1000", "S", "*CONTACT FILE, FREQUENCY=1000", "CDIS, CSTR")
 
-def deck_lines(model, *, slab_element="C3D20R", frustum_element="C3D20R", rubber_force_only=False):
-    """The deck's lines. `rubber_force_only`: no fields in the .frd file, only the tables of the .dat file."""
+
+def deck_lines(model, *, slab_element="C3D20R", frustum_element="C3D20R", fields=True):
+    """The deck's lines.
+
+    `fields`: displacements, stresses and contact in the .frd file too, not only the tables of the .dat file
+    """
     kinds = {part.name: frustum_element if part.name == "FRUSTA" else slab_element for part in model.parts}
     cards = {part.name: law_card(part.law, no_term=_NO_TERM, dialect=PROGRAM) for part in model.parts}
     lines = keywords.heading(model, PROGRAM) + keywords.rubber(model, kinds, cards) + keywords.equations(model.ties)
@@ -35,7 +44,7 @@ def deck_lines(model, *, slab_element="C3D20R", frustum_element="C3D20R", rubber
     lines += rigid + keywords.contacts(model, _linear)
     fixed = keywords.held(model) + fixed
     for k, step in enumerate(model.steps):
-        lines += _step(step, reference, fixed, first=k == 0, fields=not rubber_force_only)
+        lines += _step(step, reference, fixed, first=k == 0, fields=fields)
     return lines
 
 
@@ -89,10 +98,4 @@ def _step(step, reference, fixed, *, first, fields):
         lines += [f"{reference}, 3, 3, {keywords.number(-step.value)}"]
     else:
         lines += ["*CLOAD", f"{reference}, 3, {keywords.number(-step.value)}"]
-    lines += ["*NODE PRINT, NSET=OBJECT_REFERENCE, FREQUENCY=1000", "U",
-              "*NODE PRINT, NSET=OBJECT_NODES, TOTALS=ONLY, FREQUENCY=1000", "RF",
-              "*NODE PRINT, NSET=BOARD_NODES, TOTALS=ONLY, FREQUENCY=1000", "RF",
-              "*NODE PRINT, NSET=INTERFACE, FREQUENCY=1000", "U"]
-    if fields:
-        lines += ["*NODE FILE, FREQUENCY=1000", "U, RF", "*EL FILE, FREQUENCY=1000", "S", "*CONTACT FILE, FREQUENCY=1000", "CDIS, CSTR"]
-    return [*lines, "*END STEP"]
+    return [*lines, *_TABLES, *(_FIELDS if fields else ()), "*END STEP"]

@@ -1,6 +1,7 @@
 """A press as any finite-element program understands it: nodes, elements, laws, constraints, surfaces, contacts and steps.
 
-Nothing here is written in a program's dialect. Numbers count from 0; the writers add 1. Lengths in mm, forces in N, stresses in MPa.
+Nothing here is written in a program's dialect. Numbers count from 0; the writers add 1. Lengths in mm, forces in N, stresses
+in MPa.
 """
 
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ from softtact.geometry.meshes import facets_over
 from softtact.mechanics.frustum_bed import DIRECTIONS, ContactSettings
 
 BOTTOM, TOP, OUTER = 1, 2, 4      # faces S1, S2 and S4 (xi = 1) of a 20-node hexahedron, in Abaqus and in CalculiX alike
-TOUCH_MM = 0.01                   # overlap of object and cover after the first step: under a force alone nothing holds a free object
+TOUCH_MM = 0.01                   # overlap of object and cover after the first step: a force alone holds no free object
 _NO_WEIGHT = 1e-10
 _BOARD_MARGIN_MM = 1.0
 
