@@ -1,0 +1,51 @@
+"""What the deck tests share: a small sensor's body, a unit cell, and a run of ccx."""
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from softtact.geometry.sensor_spec import SensorSpec
+from softtact.materials.laws.registry import make_law
+
+CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
+POLYURETHANE = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492)
+NEOPRENE = make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)
+
+needs_ccx = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
+
+
+class Tables:
+    """The tables of a .dat file: `of(name)` gives one array (rows, columns) per step, in the order of the steps."""
+
+    def __init__(self, path):
+        self._tables = {}
+        for block in re.split(r"\n(?= (?:displacements|total force|forces))", path.read_text()):
+            head, *rows = block.strip().splitlines() or [""]
+            name = re.search(r"for set (\S+) and time", head)
+            if name:
+                values = np.array([[float(text) for text in row.split()] for row in rows if row.strip()])
+                self._tables.setdefault(name[1], []).append(values)
+
+    def of(self, name):
+        return self._tables[name]
+
+    @property
+    def force(self):
+        """Force (N) on the object after each step."""
+        return np.array([-table[0, 2] for table in self.of("OBJECT_NODES")])
+
+    @property
+    def indentation(self):
+        """Lowering (mm) of the object after each step."""
+        return np.array([-table[0, 3] for table in self.of("OBJECT_REFERENCE")])
+
+
+def run_ccx(path):
+    """Run ccx on a deck and return its `Tables`."""
+    done = subprocess.run(["ccx", path.stem], cwd=path.parent, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stdout[-2000:]
+    return Tables(path.with_suffix(".dat"))
