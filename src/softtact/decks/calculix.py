@@ -63,8 +63,7 @@ def _rigid_bodies(model):
         if body.moves:
             reference, last = last, last + 1
             lines += keywords.nodes([points.mean(axis=0)], reference, name=f"{body.name}_REFERENCE")
-            for moved in range(node, reference):
-                lines += ["*EQUATION", "2", f"{moved}, 3, 1, {reference}, 3, -1"]
+            lines += keywords.moving_along(range(node, reference), reference, 3)
             fixed += [f"{body.name}_NODES, 1, 2", f"{reference}, 1, 2"]
         else:
             fixed += [f"{body.name}_NODES, 1, 3"]

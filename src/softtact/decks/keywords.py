@@ -46,15 +46,23 @@ def surface(name, faces):
 
 
 def equations(ties):
-    """*EQUATION for each component of each tie: 0 = -slave + sum(weights * masters); four terms a line."""
-    lines = []
-    for tie in ties:
-        for component in (1, 2, 3):
-            terms = [f"{tie.slave + 1}, {component}, -1"]
-            terms += [f"{master + 1}, {component}, {number(weight)}"
-                      for master, weight in zip(tie.masters, tie.weights, strict=True)]
-            grouped = [", ".join(terms[k:k + 4]) for k in range(0, len(terms), 4)]
-            lines += ["*EQUATION", str(len(terms)), ",\n".join(grouped)]
+    """One *EQUATION for all ties: for each component 0 = -slave + sum(weights * masters)."""
+    return _equation([[(tie.slave + 1, component, -1.0), *((master + 1, component, weight)
+                                                           for master, weight in zip(tie.masters, tie.weights, strict=True))]
+                      for tie in ties for component in (1, 2, 3)])
+
+
+def moving_along(nodes, reference, component):
+    """One *EQUATION by which each node moves along a component (1..3) as the reference node does."""
+    return _equation([[(node, component, -1.0), (reference, component, 1.0)] for node in nodes])
+
+
+def _equation(sums):
+    """*EQUATION of sums [(node, component, factor)] that are zero; the first node is eliminated. Four terms a line."""
+    lines = ["*EQUATION"] if sums else []
+    for terms in sums:
+        texts = [f"{node}, {component}, {number(factor)}" for node, component, factor in terms]
+        lines += [str(len(terms)), ",\n".join(", ".join(texts[k:k + 4]) for k in range(0, len(texts), 4))]
     return lines
 
 

@@ -135,11 +135,13 @@ def _section(deck, options, data, current):
 
 
 def _equation(deck, options, data, current):
-    values = [float(text) for line in data[1:] for text in _fields(line)]
-    terms = list(zip(map(int, values[0::3]), map(int, values[1::3]), values[2::3], strict=True))
-    if len(terms) != int(data[0]):
-        raise InputError(f"An equation announces {data[0]} terms and has {len(terms)}.")
-    deck.equations.append(terms)
+    lines = iter(_joined(data))
+    for count in lines:
+        values = _floats(next(lines, ""))
+        terms = list(zip(map(int, values[0::3]), map(int, values[1::3]), values[2::3], strict=True))
+        if len(terms) != int(count):
+            raise InputError(f"An equation announces {count} terms and has {len(terms)}; write the deck again.")
+        deck.equations.append(terms)
 
 
 def _interaction(deck, options, data, current):
