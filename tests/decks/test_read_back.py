@@ -192,6 +192,19 @@ def test_an_object_beside_the_body_is_refused():
         deck_model(SENSOR.body(), far, forces_n=[1.0])
 
 
+def test_a_sliver_among_the_facets_is_left_out():
+    plate = trimesh.creation.box((3.0, 3.0, 1.0))
+    below = np.flatnonzero(plate.face_normals[:, 2] < -0.5)[0]
+    a, b, c = plate.faces[below]
+    middle = len(plate.vertices)                 # a corner 0.001 mm from a side cuts off a facet that is no wider
+    side = 0.5 * (plate.vertices[a] + plate.vertices[b])
+    towards = plate.vertices[c] - side
+    points = np.vstack([plate.vertices, side + 1e-3 * towards / np.linalg.norm(towards)])
+    faces = np.vstack([np.delete(plate.faces, below, axis=0), [[a, b, middle], [b, c, middle], [c, a, middle]]])
+    model = deck_model(SENSOR.body(), place(trimesh.Trimesh(points, faces, process=False)), forces_n=[1.0])
+    assert len(model.rigid[0].facets) == 3        # of four that look down
+
+
 def test_the_same_press_gives_the_same_bytes(dialect):
     model = deck_model(SENSOR.body(), place(SPHERE), forces_n=[1.0])
     assert deck_text(model, dialect=dialect) == deck_text(deck_model(SENSOR.body(), place(SPHERE), forces_n=[1.0]), dialect=dialect)

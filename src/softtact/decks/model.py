@@ -15,6 +15,7 @@ from softtact.mechanics.frustum_bed import DIRECTIONS, ContactSettings
 
 BOTTOM, TOP, OUTER = 1, 2, 4      # faces S1, S2 and S4 (xi = 1) of a 20-node hexahedron, in Abaqus and in CalculiX alike
 TOUCH_MM = 0.01                   # overlap of object and cover after the first step: a force alone holds no free object
+SLIVER_MM = 0.01                  # facets narrower than this are left out: the contact search of CalculiX never ends on them
 _NO_WEIGHT = 1e-10
 _BOARD_MARGIN_MM = 1.0
 
@@ -229,15 +230,23 @@ def _odd(centres):
 
 
 def _object(body, surface):
-    """The object's facets that look down, lie over the slab and are as near as the sensor is thick."""
+    """The object's facets that look down, lie over the slab and are as near as the sensor is thick, slivers left out."""
     lowest = surface.triangles[..., 2].min(axis=1) if len(surface.triangles) else np.zeros(0)
     footprint = [2 * max(abs(lines[0]), abs(lines[-1])) for lines in (body.slab.x_lines, body.slab.y_lines)]
     reach = -body.bed.coordinates[..., 2].min()
     near = facets_over(surface.triangles, footprint) & (lowest <= lowest.min(initial=np.inf) + reach)
+    near &= _widths(surface.triangles) > SLIVER_MM
     if not near.any():
         raise InputError("The object misses the sensor: none of its facets that look down lies over it; correct its pose.")
     points, facets = np.unique(surface.triangles[near].reshape(-1, 3), axis=0, return_inverse=True)
     return RigidSurface("OBJECT", points, facets.reshape(-1, 3), moves=True)
+
+
+def _widths(triangles):
+    """Smallest height (n,) in mm of triangles (n, 3, 3)."""
+    sides = np.roll(triangles, -1, axis=1) - triangles
+    double_area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    return double_area / np.linalg.norm(sides, axis=2).max(axis=1, initial=1e-300)
 
 
 def _rectangle(name, corners):
@@ -298,6 +307,7 @@ def _remarks(body):
     return ("units: mm, N, MPa",
             "Frusta hang on the sheet by *EQUATION: each root node follows the sheet's lower side.",
             "Contacts: object on the top, frusta (tip and sides) on the board, frusta on their neighbours. Left out, as in "
-            "softtact: the sheet's underside on the frusta's sides, friction, the object's steep walls.",
+            "softtact: the sheet's underside on the frusta's sides, friction, the object's steep walls and upper sides.",
+            f"Facets of the object narrower than {SLIVER_MM} mm are left out.",
             f"softtact lets the share {share} of the frusta's bulk modulus act at every point and projects the rest on linear "
             "functions; these elements have one volumetric energy.")
