@@ -15,7 +15,7 @@ from softtact.mechanics.frustum_bed import DIRECTIONS, ContactSettings
 
 BOTTOM, TOP, OUTER = 1, 2, 4      # faces S1, S2 and S4 (xi = 1) of a 20-node hexahedron, in Abaqus and in CalculiX alike
 TOUCH_MM = 0.01                   # overlap of object and cover after the first step: a force alone holds no free object
-SLIVER_MM = 0.01                  # facets narrower than this are left out: the contact search of CalculiX never ends on them
+SLIVER_MM = 0.01                  # narrower facets are left out: the contact search of CalculiX does not end on them
 _NO_WEIGHT = 1e-10
 _BOARD_MARGIN_MM = 1.0
 
