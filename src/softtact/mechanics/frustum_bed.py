@@ -99,7 +99,7 @@ class FrustumBed:
         self.point_neighbour = np.array([r[6] for r in records])
         offset = np.where(self.point_neighbour < 0, -pcb_z, 0.0)
         self.gap0 = self._along(self.coordinates) + offset
-        self.point_area = self._areas(np.array([r[0] for r in records]).reshape(-1, 9, 8)[:, 0], slopes, weights)
+        self.point_area = self._areas(np.array([r[0] for r in records]).reshape(-1, len(weights), 8)[:, 0], slopes, weights)
         absent = (self.point_neighbour[None] >= 0) & ~self.geometry.neighbours[:, self.point_neighbour]
         self.point_area[absent] = 0.0
 

@@ -109,7 +109,7 @@ class Slab:
         gaps, normals = self.gaps(displacement, planes, indentation), planes.normals
         density, pressure, _ = penalty(gaps, stiffness=self.contact.stiffness, smoothing=self.contact.smoothing)
         push = (pressure * self.top_area)[:, None] * normals      # on the slab: along the object's outward normal
-        nodal = np.einsum("tgd,ga->tad", push.reshape(-1, 9, 3), self.top_values, optimize=True)
+        nodal = np.einsum("tgd,ga->tad", push.reshape(len(self.top_faces), -1, 3), self.top_values, optimize=True)
         np.add.at(force, self.top_faces.ravel(), -nodal.reshape(-1, 3))
         return SlabState(energy=energy + float(density @ self.top_area), force=force, gaps=gaps, normals=normals,
                          displacement=displacement, indentation_force=float(-push[:, 2].sum()))
@@ -166,9 +166,9 @@ class Slab:
 
     def _contact_tangent(self, state):
         _, _, slope = penalty(state.gaps, stiffness=self.contact.stiffness, smoothing=self.contact.smoothing)
-        weight = (slope * self.top_area).reshape(-1, 9)
-        normal = state.normals.reshape(-1, 9, 3)
-        shape = np.einsum("ga,tgd->tgad", self.top_values, normal).reshape(len(weight), 9, 24)
+        weight = (slope * self.top_area).reshape(len(self.top_faces), -1)
+        normal = state.normals.reshape(*weight.shape, 3)
+        shape = np.einsum("ga,tgd->tgad", self.top_values, normal).reshape(*weight.shape, 24)
         blocks = np.matmul((shape * weight[..., None]).transpose(0, 2, 1), shape)
         # gap = n.(x - surface): raising the indentation by 1 closes it by -n_z, which is positive downwards
         lowering = normal[..., 2]
