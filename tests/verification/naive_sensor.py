@@ -66,10 +66,11 @@ class NaiveSensor:
         slab = self.body.slab
         B = sp.lil_matrix((len(slab.top_area), 3 * self.nodes))
         for t, face in enumerate(slab.top_faces):
-            for g in range(9):
-                for node, value in zip(face, slab.top_values[g], strict=True):
+            for g, values in enumerate(slab.top_values):
+                point = len(slab.top_values) * t + g
+                for node, value in zip(face, values, strict=True):
                     for i in range(3):
-                        B[9 * t + g, 3 * node + i] += value * self.planes.normals[9 * t + g, i]
+                        B[point, 3 * node + i] += value * self.planes.normals[point, i]
         return B.tocsr(), slab.top_area
 
     def _contacts(self, u, depth):

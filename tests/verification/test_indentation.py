@@ -160,10 +160,10 @@ def test_the_slabs_contact_radius_and_pressure_are_hertzs(record):
     block = block_of(uniform(linear_law(YOUNG)), cells=4, far=12.0, growing=4)
     press = block.press(paraboloid(RADIUS), DEPTH, tolerance=1e-6)
     a = (3 * 4 * press.force * RADIUS / (4 * MODULUS)) ** (1 / 3)
-    area = block.slab.top_area.reshape(-1, 9)
+    area = block.slab.top_area.reshape(len(block.slab.top_faces), -1)
     r = np.hypot(*block.slab.top_reference[:, :2].T)
-    hertz = 2 * MODULUS / (np.pi * RADIUS) * np.sqrt(np.maximum(a**2 - r**2, 0)).reshape(-1, 9)
-    expected, got = ((p * area).sum(axis=1)[0] / area[0].sum() for p in (hertz, press.pressure.reshape(-1, 9)))
+    hertz = 2 * MODULUS / (np.pi * RADIUS) * np.sqrt(np.maximum(a**2 - r**2, 0)).reshape(area.shape)
+    expected, got = ((p * area).sum(axis=1)[0] / area[0].sum() for p in (hertz, press.pressure.reshape(area.shape)))
     assert record("slab, sphere: mean pressure on the innermost face", expected=expected, source=HERTZ, got=got) < 0.02
     got = np.sqrt(4 * block.slab.top_area[press.pressure > 0].sum() / np.pi)
     assert record("slab, sphere: contact radius", expected=a, source=HERTZ, got=got) < 0.05      # a point every a/12
