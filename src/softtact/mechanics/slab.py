@@ -11,7 +11,6 @@ from softtact.geometry.hex_mesh import extrude, grid_plan
 from softtact.mechanics.blocks import HexBlock
 from softtact.mechanics.elements import HEX20_TOP, gauss, quad8
 
-
 # Contact points along a side of a top face, which is a pitch wide. With 3 a punch's edge between them goes unnoticed: a cylinder
 # of 1.8 mm went 0.073 mm deep instead of 0.048 mm, and maps were up to a tenth of their maximum off (docs/decks.md).
 TOP_POINTS = 8
