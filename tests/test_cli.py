@@ -45,7 +45,7 @@ def answer(capsys):
     return run
 
 
-@pytest.mark.parametrize("command", [[], ["press"], ["complexity"], ["fit"], ["stage"]])
+@pytest.mark.parametrize("command", [[], ["press"], ["complexity"], ["fit"], ["export-deck"], ["stage"]])
 def test_every_command_has_help(command, capsys):
     with pytest.raises(SystemExit) as stop:
         main([*command, "--help"])
@@ -78,6 +78,14 @@ def test_help_comes_without_loading_a_solver():
         (["press", "none.stl", "--unit", "mm", "--force", 5], 1, "none.stl"),
         (["complexity", "none.stl", "--unit", "mm"], 1, "none.stl"),
         (["fit", "none.csv", "--out", "card.json"], 1, "none.csv"),
+        (["export-deck", OBJECT, "--unit", "mm", "--force", 5, "--out", "deck.inp"], 2, "--format"),
+        (["export-deck", OBJECT, "--unit", "mm", "--force", 5, "--format", "calculix"], 2, "--out"),
+        (["export-deck", OBJECT, "--unit", "mm", "--force", 5, "--format", "nastran", "--out", "deck.inp"], 2, "nastran"),
+        (["export-deck", OBJECT, "--unit", "mm", "--force", 51, "--format", "abaqus", "--out", "deck.inp"], 1, "51 N"),
+        (["export-deck", OBJECT, "--unit", "mm", "--force", 5, "--format", "abaqus", "--out", "no/such/deck.inp"], 1, "no/such"),
+        (["export-deck", OBJECT, "--unit", "mm", "--force", 5, "--format", "abaqus", "--out", "deck.inp", "--pose",
+          "100,0,0,0,0,0"], 1, "misses the sensor"),
+        (["export-deck", "none.stl", "--unit", "mm", "--force", 5, "--format", "abaqus", "--out", "deck.inp"], 1, "none.stl"),
         (["stage", "no_such_stage"], 1, "no_such_stage"),
         (["stage", "fit_material", "--in", "curves"], 1, "NAME=PATH"),
         (["stage", "fit_material", "--settings", "{"], 1, "JSON"),
@@ -104,3 +112,13 @@ def test_fit_writes_a_card_and_ranks_the_laws(answer, tmp_path):
     said = answer("fit", curve, "--law", "neo_hooke", "--out", card)
     assert json.loads(card.read_text())["laws"]["neo_hooke"]["parameters"]["c10"] == pytest.approx(0.2, rel=1e-6)
     assert "neo_hooke" in said and str(card) in said
+
+
+@pytest.mark.parametrize("dialect", ["calculix", "abaqus"])
+def test_export_deck_writes_the_whole_sensor_with_a_step_per_force(answer, tmp_path, dialect):
+    deck = tmp_path / "deck.inp"
+    told = json.loads(answer("export-deck", OBJECT, "--unit", "mm", "--force", 20, "--force", 5, "--format", dialect,
+                             "--out", deck, "--json"))
+    assert told["steps"] == ["TOUCH", "FORCE_1", "FORCE_2"] and told["tied_nodes"] == 540 * 20
+    text = deck.read_text()
+    assert "units: mm, N, MPa" in text and text.index(", 3, -5\n") < text.index(", 3, -20\n")

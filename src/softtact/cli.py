@@ -1,4 +1,4 @@
-"""The command `softtact`: press a mesh, score it, fit curves, run a stage.
+"""The command `softtact`: press a mesh, score it, fit curves, export a deck, run a stage.
 
 What the user can mend ends with one sentence on stderr: exit status 2 for a wrong command line, 1 for a refusal.
 Heavy imports stand inside the commands, so that `softtact --help` answers at once.
@@ -14,6 +14,7 @@ from softtact.errors import InputError, SofttactError
 
 UNITS = ("mm", "cm", "m", "inch")
 MODELS = ("auto", "elastic", "hyperelastic")
+DECK_FORMATS = ("calculix", "abaqus")
 
 
 def main(arguments=None):
@@ -41,7 +42,7 @@ def _parser():
     parser = _Parser(prog="softtact", description=softtact.__doc__)
     parser.add_argument("--version", action="version", version=f"softtact {softtact.__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for add in (_add_press, _add_complexity, _add_fit, _add_stage):
+    for add in (_add_press, _add_complexity, _add_fit, _add_export_deck, _add_stage):
         add(commands)
     return parser
 
@@ -193,6 +194,38 @@ def _fit_lines(card):
         stable = "yes" if law["stable_over_data"] else "no"
         yield f"{name:20}{law['rmse_mpa']:12.4g}{law['mu0_mpa']:12.4g}  {stable}{chosen}"
     yield from card["warnings"]
+
+
+def _add_export_deck(commands):
+    command = _add_command(commands, "export-deck", _export_deck,
+                           "Write the hyperelastic press of a mesh as an input deck for another solver.")
+    _add_mesh(command)
+    command.add_argument("--force", type=float, action="append", required=True, metavar="N",
+                         help="force in N; repeat it for several steps")
+    command.add_argument("--format", choices=DECK_FORMATS, required=True, help="the solver that is to read the deck")
+    command.add_argument("--control", choices=("force", "indentation"), default="force",
+                         help="push with the forces (default), or follow the indentations that softtact finds at them, "
+                              "which it solves first")
+    command.add_argument("--out", type=Path, required=True, metavar="DECK.inp", help="the deck to write")
+
+
+def _export_deck(options):
+    from softtact.geometry.meshes import check_over_sensor, place, read_mesh
+
+    spec, forces, pose = _sensor_spec(options.sensor), sorted(set(options.force)), _pose(options)
+    _check_forces(forces, spec)
+    _check_folders(options.out)
+    mesh = read_mesh(options.mesh, unit=options.unit)
+    check_over_sensor(place(mesh, pose=pose), spec.footprint_mm, name=str(options.mesh))
+    from softtact.decks.export import export_press
+
+    model = export_press(softtact.load_sensor(options.sensor), mesh, pose=pose, force_n=forces, control=options.control,
+                         dialect=options.format, path=options.out, name=options.mesh.name)
+    result = {"deck": str(options.out), "format": options.format, "nodes": len(model.points),
+              "elements": {part.name: len(part.elements) for part in model.parts}, "tied_nodes": len(model.ties),
+              "facets": {body.name: len(body.facets) for body in model.rigid}, "steps": [step.name for step in model.steps]}
+    lines = [f"{name}: {value}" for name, value in result.items() if name != "deck"]
+    _print(result, as_json=options.json, lines=[*lines, f"written: {options.out}"])
 
 
 def _add_stage(commands):

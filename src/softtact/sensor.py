@@ -73,7 +73,7 @@ class Sensor:
         """
         if model not in MODELS:
             raise InputError(f"Model {model!r} is unknown; use one of {', '.join(MODELS)}.")
-        forces = self._checked(force_n)
+        forces = self.checked_forces(force_n)
         placed = place(mesh, pose=pose)
         check_over_sensor(placed, self.spec.footprint_mm)
         if model == "auto":
@@ -84,12 +84,18 @@ class Sensor:
         with threadpool_limits(limits=1):
             return press(surface, forces, label)
 
+    def body(self):
+        """The `LayeredBody` that the hyperelastic model presses on."""
+        return build_sensor_body(self.spec, dielectric_law=self.laws["dielectric"], cover_law=self.laws["cover"],
+                                 mesh=self.mesh, scatter=self.scatter)
+
     def choose(self, placed):
         """The model that the contact of a placed mesh asks for (PAPER section 3.3.1)."""
         counts = score(placed.triangles, footprint_mm=self.spec.footprint_mm, reach_mm=self.spec.thickness_mm)
         return choose_model(counts.NPt, counts.CHt, counts.NPo, counts.CHo)
 
-    def _checked(self, force_n):
+    def checked_forces(self, force_n):
+        """Forces (N) as an increasing array within the sensor's range; others are refused."""
         forces = np.atleast_1d(np.asarray(force_n, dtype=float))
         low, high = self.spec.force_range_n
         outside = forces[~((forces > low) & (forces <= high))]
@@ -115,8 +121,7 @@ class Sensor:
                             compression=np.full(len(levels), np.nan), iterations=[level.iterations for level in levels])
 
     def _press_hyperelastic(self, surface, forces, label):
-        body = build_sensor_body(self.spec, dielectric_law=self.laws["dielectric"], cover_law=self.laws["cover"],
-                                 mesh=self.mesh, scatter=self.scatter)
+        body = self.body()
         grid = np.stack(np.meshgrid(self.spec.map_x_mm, self.spec.map_y_mm), axis=-1).reshape(-1, 2)
         sampling = body.slab.sampling(grid)
         announce(f"{label}: {body.bed.count} frusta, {len(forces)} force levels of the hyperelastic model, some seconds each")

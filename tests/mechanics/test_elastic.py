@@ -1,10 +1,9 @@
-"""The elastic layer: against Hertz, conditions of contact, force balance."""
+"""The elastic layer: conditions of contact, force balance; tests/verification has Hertz."""
 
 import numpy as np
 import pytest
-from scipy import sparse
 
-from softtact.mechanics.elastic import Compliance, layer_mesh, linear_stiffness, press_elastic, surface_compliance
+from softtact.mechanics.elastic import layer_mesh, linear_stiffness, press_elastic, surface_compliance
 
 
 @pytest.fixture(scope="module")
@@ -43,21 +42,3 @@ def test_forces_in_one_go_or_one_by_one_give_the_same(layer):
     together = list(press_elastic(layer, gap0, [1.0, 5.0]))[-1]
     alone = list(press_elastic(layer, gap0, [5.0]))[-1]
     assert together.indentation == pytest.approx(alone.indentation, rel=1e-10)
-
-
-def test_a_sphere_on_a_half_space_indents_as_hertz_says():
-    """Boussinesq flexibility of a half-space stands for a thick layer: depth = (9 F^2 / (16 R E*^2))^(1/3)."""
-    young, poisson, radius, force = 1.0, 0.3, 10.0, 0.1   # contact radius 0.88 mm in a grid of 1.2 mm
-    modulus, h = young / (1 - poisson**2), 0.04
-    side = np.arange(-1.2, 1.2 + h / 2, h)
-    points = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
-    distance = np.linalg.norm(points[:, None] - points[None], axis=2)
-    # the mean of 1/r over a square of side h, seen from its centre, is 4 ln(1 + sqrt 2) / h = 3.5255 / h
-    np.fill_diagonal(distance, h / 3.5255)
-    compliance = Compliance(points, 1 / (np.pi * modulus * distance), np.full(len(points), h * h),
-                            sparse.csr_matrix((1, len(points))))
-    level = next(press_elastic(compliance, (points**2).sum(axis=1) / (2 * radius), [force]))
-    a = (3 * force * radius / (4 * modulus)) ** (1 / 3)
-    assert level.indentation == pytest.approx(a**2 / radius, rel=0.015)   # 22 nodes along the contact's radius
-    touching = level.nodal_force.reshape(len(side), -1) > 0
-    assert np.sqrt(touching.sum() * h * h / np.pi) == pytest.approx(a, rel=0.03)

@@ -12,10 +12,10 @@ import numpy as np
 from numba import njit
 
 from softtact.contact.penalty import penalty
-from softtact.mechanics.hex_mesh import disc_plan, extrude
 from softtact.mechanics.blocks import HexBlock
 from softtact.mechanics.condensation import Condensation
 from softtact.mechanics.elements import HEX27_BOTTOM, HEX27_SIDES, gauss, quad9
+from softtact.mechanics.hex_mesh import disc_plan, extrude
 
 DIRECTIONS = ((0, 1.0), (1, 1.0), (0, -1.0), (1, -1.0))   # axis and sign of the four neighbours: +x, +y, -x, -y
 _CHUNK = 45                         # frusta whose element tangents are in memory at once
@@ -102,7 +102,7 @@ class FrustumBed:
         self.point_neighbour = np.array([r[6] for r in records])
         offset = np.where(self.point_neighbour < 0, -pcb_z, 0.0)
         self.gap0 = self._along(self.coordinates) + offset
-        self.point_area = self._areas(np.array([r[0] for r in records]).reshape(-1, 9, 9)[:, 0], slopes, weights)
+        self.point_area = self._areas(np.array([r[0] for r in records]).reshape(-1, len(weights), 9)[:, 0], slopes, weights)
         absent = (self.point_neighbour[None] >= 0) & ~self.geometry.neighbours[:, self.point_neighbour]
         self.point_area[absent] = 0.0
 

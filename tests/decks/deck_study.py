@@ -1,0 +1,80 @@
+"""What the deck tests share: a small sensor's body, a unit cell, and a run of ccx."""
+
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from softtact.geometry.sensor_spec import SensorSpec
+from softtact.materials.laws.registry import make_law
+from softtact.mechanics import frustum_bed, slab
+from softtact.mechanics.blocks import HexBlock
+from softtact.mechanics.elements import gauss
+
+CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
+POLYURETHANE = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492)
+NEOPRENE = make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)
+
+needs_ccx = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
+
+
+class Tables:
+    """The tables of a .dat file: `of(name)` gives one array (rows, columns) per step, in the order of the steps."""
+
+    def __init__(self, path):
+        self._tables = {}
+        for block in re.split(r"\n(?= (?:displacements|total force|forces))", path.read_text()):
+            head, *rows = block.strip().splitlines() or [""]
+            name = re.search(r"for set (\S+) and time", head)
+            if name:
+                values = np.array([[float(text) for text in row.split()] for row in rows if row.strip()])
+                self._tables.setdefault(name[1], []).append(values)
+
+    def of(self, name):
+        return self._tables[name]
+
+    @property
+    def force(self):
+        """Force (N) on the object after each step."""
+        return np.array([-table[0, 2] for table in self.of("OBJECT_NODES")])
+
+    @property
+    def indentation(self):
+        """Lowering (mm) of the object after each step."""
+        return np.array([-table[0, 3] for table in self.of("OBJECT_REFERENCE")])
+
+
+def run_ccx(path):
+    """Run ccx on a deck and return its `Tables`."""
+    done = subprocess.run(["ccx", path.stem], cwd=path.parent, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stdout[-2000:]
+    return Tables(path.with_suffix(".dat"))
+
+
+def gaussian_chains(shear_modulus):
+    """neo-Hooke written as Arruda-Boyce of hardly limited chains, K = 20 mu.
+
+    It is the one law whose volumetric energy in Abaqus and ccx, K/2 ((J^2 - 1)/2 - ln J), is that of our pointwise share.
+    """
+    return make_law("arruda_boyce", {"mu": shear_modulus, "lambda_m": 100.0}, bulk_modulus=20 * shear_modulus)
+
+
+def as_in_ccx(monkeypatch, build, *, top_points=10, side_points=8):
+    """The body of `build()` with the numerics of ccx: all volumetric energy at the points, a sharp contact law, many points.
+
+    Frusta then are C3D20 (27 points) and the slab C3D20R (8). ccx cuts the touching faces with each other and has points
+    enough in each piece; our 3 x 3 points a face are raised to resolve the contact's edge as well.
+    """
+    monkeypatch.setattr(frustum_bed, "gauss", lambda points, dimension: gauss(side_points, dimension))
+    monkeypatch.setattr(slab, "gauss", lambda points, dimension: gauss(top_points, dimension))
+    body = build()
+    body.bed.contact, body.slab.contact = (replace(part.contact, smoothing=2e-5) for part in (body.bed, body.slab))
+    law = body.bed.block.law
+    body.bed.block = HexBlock(body.bed.coordinates[:, body.bed.mesh.hexes].reshape(-1, 20, 3), law, local_over_shear=20.0)
+    body.slab.blocks = [(hexes, HexBlock(body.slab.mesh.points[hexes], block.law, points_per_side=2, local_over_shear=20.0))
+                        for hexes, block in body.slab.blocks]
+    return body

@@ -1,0 +1,210 @@
+"""A deck read back holds what was meant: nodes, elements, laws, constraints, surfaces, contacts and steps."""
+
+import numpy as np
+import pytest
+import trimesh
+from deck_study import CORO, NEOPRENE, POLYURETHANE
+
+from softtact.contact.penalty import penalty
+from softtact.decks.export import deck_text, export_press, write_deck
+from softtact.decks.laws import law_card
+from softtact.decks.model import Tie, deck_model, without_chains
+from softtact.decks.read import read_deck
+from softtact.errors import InputError
+from softtact.geometry.meshes import place
+from softtact.mechanics.elements import HEX20_BOTTOM, HEX20_SIDES, HEX20_TOP
+from softtact.mechanics.layered_body import MeshSettings, build_unit_cell
+from softtact.sensor import Sensor
+
+SMALL = CORO.model_copy(update={"footprint_mm": (2.4, 3.6), "map_shape": (7, 5)})   # 2 x 3 frusta
+SENSOR = Sensor(SMALL, {"dielectric": POLYURETHANE, "cover": NEOPRENE}, mesh=MeshSettings(cover_layers=1))
+SPHERE = trimesh.creation.icosphere(subdivisions=2, radius=2.0)
+# Corner nodes of the faces of a 20-node brick: Abaqus Elements Guide, "Three-dimensional solid element library"; ccx has the same.
+ABAQUS_FACES = {1: {1, 2, 3, 4}, 2: {5, 8, 7, 6}, 3: {1, 5, 6, 2}, 4: {2, 6, 7, 3}, 5: {3, 7, 8, 4}, 6: {4, 8, 5, 1}}
+
+
+@pytest.fixture(scope="module", params=["calculix", "abaqus"])
+def dialect(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def pair(dialect, tmp_path_factory):
+    """The model meant, and the deck read back."""
+    path = tmp_path_factory.mktemp("decks") / "press.inp"
+    model = export_press(SENSOR, SPHERE, force_n=[1.0, 2.5], dialect=dialect, path=path, name="sphere")
+    return model, read_deck(path)
+
+
+def test_the_heading_states_the_units(pair):
+    assert pair[1].title == "sphere on sensor coro; units: mm, N, MPa"
+
+
+def test_nodes_and_elements_come_back(pair, dialect):
+    model, deck = pair
+    rubber = np.array([deck.nodes[n + 1] for n in range(len(model.points))])
+    assert rubber == pytest.approx(model.points, abs=1e-11)       # 12 digits are written
+    kinds = {"calculix": ("C3D20R", "C3D20R"), "abaqus": ("C3D20RH", "C3D20H")}[dialect]
+    for part in model.parts:
+        kind, elements = deck.elements[part.name]
+        assert kind == kinds[part.name == "FRUSTA"]
+        assert list(elements) == (part.elements + 1).tolist()
+        assert np.array(list(elements.values())).tolist() == (part.hexes + 1).tolist()
+        assert deck.node_sets[part.name] == (part.nodes + 1).tolist()
+
+
+def test_laws_come_back(pair, dialect):
+    model, deck = pair
+    for part in model.parts:
+        form, constants = deck.materials[deck.sections[part.name]]
+        card = law_card(part.law, no_term=0.0, dialect=dialect)
+        assert form == card.form and constants == pytest.approx(card.constants, rel=1e-11)
+    assert [part.law for part in model.parts] == [POLYURETHANE, NEOPRENE, POLYURETHANE]
+
+
+def test_constraints_come_back_and_carry_a_linear_field(pair):
+    model, deck = pair
+    ours = [eq for eq in deck.equations if eq[0][2] == -1 and len(eq) > 2]
+    assert len(ours) == 3 * len(model.ties) == 3 * 6 * 20
+    for k, tie in enumerate(model.ties):
+        for component in (1, 2, 3):
+            slave, *masters = ours[3 * k + component - 1]
+            assert slave == (tie.slave + 1, component, -1.0)
+            assert [m[:2] for m in masters] == [(n + 1, component) for n in tie.masters]
+            assert [m[2] for m in masters] == pytest.approx(tie.weights, rel=1e-11)
+        # A tied node stands where its masters put it (the search moves it inwards by 1e-7 of the frustum's radius).
+        assert tie.weights @ model.points[tie.masters] == pytest.approx(model.points[tie.slave], abs=1e-6)
+
+
+def test_steps_and_supports_come_back(pair):
+    model, deck = pair
+    assert [step.name for step in deck.steps] == ["TOUCH", "FORCE_1", "FORCE_2"]
+    touch, *pushed = deck.steps
+    driven = [row for row in touch.boundary if row[3] != 0]
+    (reference, first, last, depth), = driven
+    assert (first, last, depth) == (3, 3, pytest.approx(-model.steps[0].value))
+    assert [step.loads for step in pushed] == [[(reference, 3, -1.0)], [(reference, 3, -2.5)]]
+    held = {(node + 1, component + 1) for node, component in model.held.tolist()}
+    for step in deck.steps:
+        rows = {(int(node), first) for node, first, last, _ in step.boundary if node.isdigit() and first == last}
+        assert held <= rows
+    for step in pushed:
+        assert not any(node == reference and first <= 3 <= last for node, first, last, _ in step.boundary)
+
+
+def test_surfaces_name_the_faces_that_touch(pair):
+    model, deck = pair
+    for name, faces in model.surfaces.items():
+        assert deck.surfaces[name] == [(str(element + 1), f"S{face}") for element, face in faces]
+    hexes = {n: row for part in model.parts for n, row in zip(part.elements.tolist(), part.hexes, strict=True)}
+
+    def corners(name):
+        rows = [[model.points[hexes[e][n - 1]] for n in sorted(ABAQUS_FACES[face])] for e, face in model.surfaces[name].tolist()]
+        return np.array(rows).reshape(-1, 3)
+
+    assert corners("TOP")[:, 2] == pytest.approx(0.0, abs=1e-12)
+    assert corners("FRUSTA_TIPS")[:, 2] == pytest.approx(-2.5)
+    centres = SENSOR.body().bed.geometry.centres
+    sides = corners("FRUSTA_SIDES")
+    radius = np.linalg.norm(sides[:, None, :2] - centres, axis=2).min(axis=1)
+    share = (sides[:, 2] + 2.5) / 0.5
+    assert radius == pytest.approx(0.3 + 0.3 * share, rel=0.03)    # corners of a quadratic circle lie 2.3 % outside
+    even, odd = ({tuple(face) for face in model.surfaces[f"FRUSTA_SIDES_{half}"].tolist()} for half in ("EVEN", "ODD"))
+    assert not even & odd and even | odd == {tuple(face) for face in model.surfaces["FRUSTA_SIDES"].tolist()}
+
+
+def test_contacts_have_the_penalty_of_the_press(pair, dialect):
+    model, deck = pair
+    assert [(slave, master) for slave, master, *_ in deck.contacts] == [
+        ("TOP", "OBJECT_SURFACE"), ("FRUSTA_FOOT", "BOARD_SURFACE"), ("FRUSTA_SIDES_EVEN", "FRUSTA_SIDES_ODD")]
+    for (_, _, behaviour, table), stiffness in zip(deck.contacts, (500.0, 2000.0, 2000.0), strict=True):
+        if dialect == "calculix":
+            assert (behaviour, table) == ("LINEAR", [[stiffness]])
+        else:
+            pressure, overlap = np.array(table).T
+            assert behaviour == "TABULAR"
+            assert pressure == pytest.approx(penalty(-overlap, stiffness=stiffness, smoothing=1e-3)[1])
+
+
+def test_the_objects_facets_look_at_the_rubber(pair, dialect):
+    model, deck = pair
+    body, = (rigid for rigid in model.rigid if rigid.name == "OBJECT")
+    kind, elements = deck.elements["OBJECT"]
+    corners = np.array([[deck.nodes[n] for n in nodes] for nodes in elements.values()])
+    if dialect == "calculix":
+        assert kind == "C3D4" and deck.surfaces["OBJECT_SURFACE"][0][1] == "S1"
+        edges = corners[:, 1:] - corners[:, :1]
+        assert (np.linalg.det(edges) > 0).all()                   # not inside out
+        facets = corners[:, [2, 1, 0]]                            # a first face's outward normal: nodes 1, 3, 2
+    else:
+        assert kind == "R3D3" and deck.surfaces["OBJECT_SURFACE"] == [("OBJECT", "SPOS")]
+        assert deck.rigid_bodies["OBJECT"] in deck.node_sets["OBJECT_REFERENCE"]
+        facets = corners
+    assert facets == pytest.approx(body.points[body.facets], abs=1e-11)
+    assert (np.cross(facets[:, 1] - facets[:, 0], facets[:, 2] - facets[:, 0])[:, 2] < 0).all()
+
+
+def test_our_faces_are_those_of_abaqus():
+    """S1 bottom, S2 top, S3 to S6 the sides eta = -1, xi = 1, eta = 1, xi = -1."""
+    ours = [HEX20_BOTTOM, HEX20_TOP, *HEX20_SIDES]
+    assert [set((face[:4] + 1).tolist()) for face in ours] == list(ABAQUS_FACES.values())
+
+
+def test_a_master_that_is_tied_itself_is_replaced_by_its_masters():
+    ties = [Tie(5, np.array([1, 2]), np.array([0.5, 0.5])), Tie(7, np.array([5, 3]), np.array([0.4, 0.6]))]
+    resolved = without_chains(ties)[1]
+    assert dict(zip(resolved.masters.tolist(), resolved.weights.tolist(), strict=True)) == pytest.approx({1: 0.2, 2: 0.2, 3: 0.6})
+
+
+def test_a_ring_of_ties_is_an_error():
+    with pytest.raises(ValueError, match="tied to itself"):
+        without_chains([Tie(1, np.array([2]), np.ones(1)), Tie(2, np.array([1]), np.ones(1))])
+
+
+def test_a_unit_cell_has_walls_for_the_neighbours_it_lacks(tmp_path, dialect):
+    body = build_unit_cell(CORO, dielectric_law=POLYURETHANE)
+    model = deck_model(body, place(trimesh.creation.box((5.0, 5.0, 1.0))), indentations_mm=[0.02, 0.05])
+    write_deck(tmp_path / "cell.inp", model, dialect=dialect)
+    deck = read_deck(tmp_path / "cell.inp")
+    assert [part.name for part in model.parts] == ["SHEET", "FRUSTA"]
+    assert [contact[:2] for contact in deck.contacts][-1] == ("FRUSTA_SIDES", "WALLS_SURFACE")
+    assert [step.boundary[-1][1:] for step in deck.steps] == [(3, 3, -0.02), (3, 3, -0.05)]
+    walls, = (rigid for rigid in model.rigid if rigid.name == "WALLS")
+    corners = walls.points[walls.facets]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert (np.einsum("fi,fi->f", normal, corners.mean(axis=1) * [1, 1, 0]) < 0).all()    # inwards
+
+
+def test_a_refusal_leaves_no_file(tmp_path):
+    path = tmp_path / "press.inp"
+    for arguments, said in (({"dialect": "nastran"}, "'nastran' is unknown; use one of calculix, abaqus"),
+                            ({"dialect": "calculix", "frustum_element": "C3D20RH"}, "none for CalculiX; use one of C3D20R, C3D20"),
+                            ({"dialect": "abaqus", "control": "pressure"}, "'pressure' is unknown")):
+        with pytest.raises(InputError, match=said):
+            export_press(SENSOR, SPHERE, force_n=1.0, path=path, **arguments)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_object_beside_the_body_is_refused():
+    far = place(SPHERE)
+    far.apply_translation([50.0, 0, 0])
+    with pytest.raises(InputError, match="misses the sensor"):
+        deck_model(SENSOR.body(), far, forces_n=[1.0])
+
+
+def test_a_sliver_among_the_facets_is_left_out():
+    plate = trimesh.creation.box((3.0, 3.0, 1.0))
+    below = np.flatnonzero(plate.face_normals[:, 2] < -0.5)[0]
+    a, b, c = plate.faces[below]
+    middle = len(plate.vertices)                 # a corner 0.001 mm from a side cuts off a facet that is no wider
+    side = 0.5 * (plate.vertices[a] + plate.vertices[b])
+    towards = plate.vertices[c] - side
+    points = np.vstack([plate.vertices, side + 1e-3 * towards / np.linalg.norm(towards)])
+    faces = np.vstack([np.delete(plate.faces, below, axis=0), [[a, b, middle], [b, c, middle], [c, a, middle]]])
+    model = deck_model(SENSOR.body(), place(trimesh.Trimesh(points, faces, process=False)), forces_n=[1.0])
+    assert len(model.rigid[0].facets) == 3        # of four that look down
+
+
+def test_the_same_press_gives_the_same_bytes(dialect):
+    model = deck_model(SENSOR.body(), place(SPHERE), forces_n=[1.0])
+    assert deck_text(model, dialect=dialect) == deck_text(deck_model(SENSOR.body(), place(SPHERE), forces_n=[1.0]), dialect=dialect)

@@ -1,0 +1,115 @@
+"""Contact on simple bodies for the verification: graded lines, structured tetrahedra, and a slab pressed without frusta."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from softtact.mechanics.elastic import surface_compliance
+from softtact.mechanics.frustum_bed import ContactSettings
+from softtact.mechanics.linear_solvers import make_solver
+from softtact.mechanics.slab import Slab
+
+
+def graded(fine, cells, far, count):
+    """Lines from 0: `cells` equal cells up to `fine`, then `count` cells growing in a constant ratio up to `far` (mm)."""
+    growth = fine * (far / fine) ** (np.arange(1, count + 1) / count)
+    return np.concatenate([np.linspace(0, fine, cells + 1), growth])
+
+
+def mirrored(lines):
+    """Lines on both sides of 0."""
+    return np.concatenate([-lines[:0:-1], lines])
+
+
+def tetrahedra(x, y, z):
+    """A box of grid lines cut into six tetrahedra a cell (Kuhn): points (n, 3), tetrahedra (t, 4). z ends at 0."""
+    gz, gy, gx = np.meshgrid(z, y, x, indexing="ij")
+    points = np.column_stack([gx.ravel(), gy.ravel(), gz.ravel()])
+    number = np.arange(len(points)).reshape(gx.shape)
+    corner = [number[k:len(z) - 1 + k, j:len(y) - 1 + j, i:len(x) - 1 + i].ravel()
+              for k in (0, 1) for j in (0, 1) for i in (0, 1)]
+    paths = [(0, 1, 3, 7), (0, 3, 2, 7), (0, 2, 6, 7), (0, 6, 4, 7), (0, 4, 5, 7), (0, 5, 1, 7)]
+    return points, np.vstack([np.stack([corner[c] for c in path], axis=1) for path in paths])
+
+
+def layer_compliance(x, y, z, *, young, poisson):
+    """Compliance of the elastic model for a box of grid lines, held at base and sides as the model has it."""
+    return surface_compliance(*tetrahedra(x, y, z), young_mpa=young, poisson=poisson, map_x_mm=x[1:-1], map_y_mm=y[1:-1])
+
+
+def paraboloid(radius):
+    """Underside of a smooth ball near its tip: heights (n,) and outward normals (n, 3), as `HeightField` gives them."""
+
+    def surface(x, y):
+        normals = np.column_stack([x / radius, y / radius, -np.ones_like(x)])
+        return (x**2 + y**2) / (2 * radius), normals / np.linalg.norm(normals, axis=1)[:, None]
+
+    return surface
+
+
+def flat_punch(radius):
+    """Underside of a flat cylinder; beside it there is nothing."""
+
+    def surface(x, y):
+        heights = np.where(x**2 + y**2 < radius**2, 0.0, 1e3)
+        return heights, np.tile([0.0, 0.0, -1.0], (len(x), 1))
+
+    return surface
+
+
+@dataclass(frozen=True)
+class SlabPress:
+    """One equilibrium: displacement (n, 3) of the slab's nodes, pressure (p,) in MPa at the top's points, depth, energy."""
+
+    displacement: np.ndarray
+    pressure: np.ndarray
+    force: float
+    depth: float
+
+
+class HeldSlab:
+    """The hyperelastic model's slab alone: its elements and its contact, base held, no frusta, no bordered system."""
+
+    def __init__(self, x, y, z, laws, *, sides, stiffness, smoothing=1e-9):
+        self.slab = Slab(x, y, z, laws, sides=sides, contact=ContactSettings(stiffness=stiffness, smoothing=smoothing))
+        self._hold_the_base()
+        self.slab.build_pattern(self.slab.mesh.planes[0][None, :8])      # held nodes: ties that tie nothing
+
+    def _hold_the_base(self):
+        slab = self.slab
+        free = np.zeros(3 * slab.nodes, dtype=bool)
+        free[slab.free] = True
+        free.reshape(-1, 3)[slab.mesh.planes[0]] = False
+        slab.free = np.flatnonzero(free)
+        slab.number[:] = -1
+        slab.number[slab.free] = np.arange(len(slab.free))
+
+    def press(self, surface, depth, *, tolerance=1e-9, iterations=40):
+        """Equilibrium with the object lowered by `depth` mm, by whole Newton steps; tolerance relative to the force."""
+        slab, displacement = self.slab, np.zeros((self.slab.nodes, 3))
+        solver = make_solver()
+        for _ in range(iterations):
+            planes = slab.facing(displacement, surface)
+            state = slab.evaluate(displacement, planes, depth)
+            residual = state.force.ravel()[slab.free]
+            if np.abs(residual).max() < tolerance * abs(state.indentation_force):
+                solver.close()
+                return SlabPress(displacement, self._pressure(state), state.indentation_force, depth)
+            matrix, _, _ = slab.tangent(state, np.zeros((1, 24, 24)))
+            if not solver.factor(matrix):
+                raise ArithmeticError("the slab's tangent is not positive definite")
+            displacement = displacement.copy()
+            displacement.ravel()[slab.free] -= solver.solve(residual)
+        raise ArithmeticError(f"no equilibrium after {iterations} iterations")
+
+    def _pressure(self, state):
+        c = self.slab.contact
+        depth = np.maximum(-state.gaps, 0.0)
+        return c.stiffness * np.where(depth > c.smoothing, depth - c.smoothing / 2, depth**2 / (2 * c.smoothing))
+
+
+def interpolate(slab, field, points):
+    """A nodal field (n, 3) of the top at points (p, 2)."""
+    matrix: sp.csr_matrix = slab.sampling(points, slab.mesh.layers)
+    return matrix @ field
