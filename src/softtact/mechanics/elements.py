@@ -84,61 +84,7 @@ def _side(a, b, middle):
 
 
 HEX27_SIDES = np.array([_side(k, (k + 1) % 4, 4 + k) for k in range(4)])   # eta=-1, xi=1, eta=1, xi=-1
-_SIDES = np.array([[0, 1, 5, 4, 8, 17, 12, 16],   # the sides eta=-1, xi=1, eta=1, xi=-1
-                        [1, 2, 6, 5, 9, 18, 13, 17],
-                        [2, 3, 7, 6, 10, 19, 14, 18],
-                        [3, 0, 4, 7, 11, 16, 15, 19]])
-
-
-def gauss(points, dimension):
-    """Gauss rule on [-1, 1]^dimension: points (n, dimension) and weights (n,)."""
-    x, w = np.polynomial.legendre.leggauss(points)
-    grids = np.meshgrid(*[x] * dimension, indexing="ij")
-    weights = np.meshgrid(*[w] * dimension, indexing="ij")
-    return np.column_stack([g.ravel() for g in grids]), np.prod([g.ravel() for g in weights], axis=0)
-
-
-def serendipity(points, nodes):
-    """Quadratic serendipity shape functions in 2 or 3 dimensions.
-
-    points (n, d) parent coordinates; nodes (m, d) parent coordinates of the nodes (0 marks a mid-side direction).
-    Returns values (n, m) and derivatives (n, m, d). (Zienkiewicz and Taylor, vol. 1, ch. 8.)
-    """
-    points, nodes = np.asarray(points, dtype=float), np.asarray(nodes, dtype=float)
-    dimension = nodes.shape[1]
-    linear = 1 + points[:, None, :] * nodes                       # factors of the directions in which a node is a corner
-    bubble = 1 - points[:, None, :] ** 2 + 0 * nodes              # factor of the direction in which it is mid-side
-    mid = nodes == 0
-    factor = np.where(mid, bubble, linear)
-    slope = np.where(mid, -2 * points[:, None, :], nodes)
-    corner = ~mid.any(axis=1)
-    extra = (points[:, None, :] * nodes).sum(axis=2) - (dimension - 1)
-    scale = np.where(corner, 0.5**dimension, 0.5 ** (dimension - 1))
-    product = factor.prod(axis=2)
-    values = scale * product * np.where(corner, extra, 1.0)
-    derivatives = np.empty(points.shape[:1] + nodes.shape)
-    for i in range(dimension):
-        others = np.delete(factor, i, axis=2).prod(axis=2)
-        derivatives[..., i] = scale * (slope[..., i] * others * np.where(corner, extra, 1.0)
-                                       + np.where(corner, product * nodes[:, i], 0.0))
-    return values, derivatives
-
-
-def hex20(points):
-    """Values (n, 20) and parent derivatives (n, 20, 3) of the 20-node hexahedron."""
-    return serendipity(points, HEX20_NODES)
-
-
-def quad8(points):
-    """Values (n, 8) and parent derivatives (n, 8, 2) of the 8-node quadrilateral."""
-    return serendipity(points, QUAD8_NODES)
-
-
-# Parent coordinates of the 6-node triangle, corners then mid-sides, and of the 15-node wedge over it.
-TRI6_NODES = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0], [0.5, 0.5], [0, 0.5]], dtype=float)
-WEDGE15_NODES = np.vstack([_at_height(TRI6_NODES[:3], -1), _at_height(TRI6_NODES[:3], 1), _at_height(TRI6_NODES[3:], -1),
-                           _at_height(TRI6_NODES[3:], 1), _at_height(TRI6_NODES[:3], 0)])
-_SIDES = np.array([[0, 1], [1, 2], [2, 0]])
+_TRIANGLE_SIDES = np.array([[0, 1], [1, 2], [2, 0]])
 
 
 def _area_coordinates(points):
@@ -150,7 +96,7 @@ def _area_coordinates(points):
 def tri6(points):
     """Values (n, 6) and parent derivatives (n, 6, 2) of the 6-node triangle."""
     L, dL = _area_coordinates(points)
-    a, b = _SIDES.T
+    a, b = _TRIANGLE_SIDES.T
     values = np.hstack([L * (2 * L - 1), 4 * L[:, a] * L[:, b]])
     slopes = np.concatenate([(4 * L - 1)[..., None] * dL,
                              4 * (L[:, a, None] * dL[b] + L[:, b, None] * dL[a])], axis=1)

@@ -7,6 +7,7 @@ import numpy as np
 from softtact.mechanics.elements import QUAD9_NODES, TRI6_NODES, quad8, quad9, tri6
 
 _SAME = 1e-7   # mm: nodes nearer than this are one
+NO_TRIANGLES = np.zeros((0, 6, 2))
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,10 @@ class HexMesh:
 
 
 def extrude(plan, levels):
-    """Lift a plan mesh through `levels` (increasing z in mm): 8-node quads to 20-node hexahedra, 9-node ones to 27, triangles to 18."""
+    """Lift a plan mesh through `levels` (increasing z in mm).
+
+    8-node quads become 20-node hexahedra, 9-node quads 27-node ones, triangles 18-node wedges.
+    """
     levels = np.asarray(levels, dtype=float)
     middles = 0.5 * (levels[:-1] + levels[1:])
     full = plan.quads.shape[1] == 9
@@ -115,7 +119,7 @@ def grid_plan(x_lines, y_lines):
     return PlanMesh(np.vstack([points(x_lines, y_lines), points(xm, y_lines), points(x_lines, ym)]), quads, nx * ny)
 
 
-def merge(quads, triangles=np.zeros((0, 6, 2))):
+def merge(quads, triangles=NO_TRIANGLES):
     """Plan mesh of elements given by their nodes' coordinates, quads (q, 9, 2) and triangles (t, 6, 2) in mm."""
     corners = np.vstack([quads[:, :4].reshape(-1, 2), triangles[:, :3].reshape(-1, 2)])
     others = np.vstack([quads[:, 4:].reshape(-1, 2), triangles[:, 3:].reshape(-1, 2)])

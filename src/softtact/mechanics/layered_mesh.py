@@ -6,6 +6,9 @@ import numpy as np
 from softtact.errors import InputError
 from softtact.mechanics.layered_body import MeshSettings, build_sensor_body
 
+# VTK's order of the nodes, by ours (bottom, top, middle of a plan of corners, mid-sides and centre).
+_VTK_HEX27 = np.array([0, 1, 2, 3, 9, 10, 11, 12, 4, 5, 6, 7, 13, 14, 15, 16, 18, 19, 20, 21, 25, 23, 22, 24, 8, 17, 26])
+_VTK_WEDGE18 = np.array([0, 1, 2, 6, 7, 8, 3, 4, 5, 9, 10, 11, 12, 13, 14, 15, 16, 17])
 _SCATTER_KEYS = ("height_scatter", "tip_scatter", "specimen")
 
 
@@ -31,14 +34,15 @@ def frustum_scatter(spec, values):
 
 
 def layered_mesh(spec, values):
-    """Slab and frusta as one meshio mesh of 20-node hexahedra; cell data `layer`: 0 frusta, 1 sheet, 2 cover."""
+    """Sheet, cover and frusta as one meshio mesh; cell data `layer`: 0 frusta, 1 sheet, 2 cover."""
     settings = mesh_settings(values)
     body = build_sensor_body(spec, dielectric_law=None, cover_law=None, mesh=settings,   # a mesh has no material
                              scatter=frustum_scatter(spec, values))
-    frusta = body.bed.coordinates
-    offsets = len(body.slab.mesh.points) + np.arange(body.bed.count) * body.bed.nodes
-    frustum_hexes = (body.bed.mesh.hexes[None] + offsets[:, None, None]).reshape(-1, 20)
-    slab_layers = np.repeat(np.arange(body.slab.mesh.layers), len(body.slab.mesh.hexes) // body.slab.mesh.layers)
-    layer = np.concatenate([np.where(slab_layers < settings.sheet_layers, 1, 2), np.zeros(len(frustum_hexes), dtype=int)])
-    return meshio.Mesh(np.vstack([body.slab.mesh.points, frusta.reshape(-1, 3)]),
-                       [("hexahedron20", np.vstack([body.slab.mesh.hexes, frustum_hexes]))], cell_data={"layer": [layer]})
+    sheet, cover, bed = body.slab.sheet_mesh, body.slab.cover_mesh, body.bed
+    first = np.cumsum([0, len(sheet.points), len(cover.points)])
+    frusta = (bed.mesh.hexes[None] + first[2] + (np.arange(bed.count) * bed.nodes)[:, None, None]).reshape(-1, 27)
+    cells = [("hexahedron27", frusta[:, _VTK_HEX27], 0), ("hexahedron27", sheet.hexes[:, _VTK_HEX27], 1),
+             ("wedge18", sheet.wedges[:, _VTK_WEDGE18], 1), ("hexahedron20", cover.hexes + first[1], 2)]
+    return meshio.Mesh(np.vstack([sheet.points, cover.points, bed.coordinates.reshape(-1, 3)]),
+                       [(kind, nodes) for kind, nodes, _ in cells],
+                       cell_data={"layer": [np.full(len(nodes), number) for _, nodes, number in cells]})
