@@ -67,8 +67,8 @@ class HexMesh:
         return self.wedges.reshape(self.layers, -1, 18)[index]
 
 
-def extrude(plan, levels):
-    """Lift a plan mesh through `levels` (increasing z in mm).
+def extrude(plan, levels, *, scale=None):
+    """Lift a plan mesh through `levels` (increasing z in mm); `scale(z)` multiplies the plan's coordinates.
 
     8-node quads become 20-node hexahedra, 9-node quads 27-node ones, triangles 18-node wedges.
     """
@@ -78,7 +78,7 @@ def extrude(plan, levels):
     count, upright = len(plan.points), len(plan.points) if full else plan.corners
 
     def lifted(points, z):
-        return np.column_stack([points, np.full(len(points), z)])
+        return np.column_stack([points * (scale(z) if scale else 1.0), np.full(len(points), z)])
 
     planes = np.arange(len(levels) * count).reshape(len(levels), count)
     between = planes.size + np.arange(len(middles) * upright).reshape(len(middles), upright)

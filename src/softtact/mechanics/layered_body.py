@@ -167,15 +167,17 @@ def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), s
     return LayeredBody(slab, _bed(spec, centres, neighbours, dielectric_law, mesh, scatter, contact), slab.bottom[plan.roots])
 
 
-def build_unit_cell(spec, *, dielectric_law, mesh=MeshSettings(), height_factor=1.0, tip_factor=1.0):
-    """One frustum of an endless lattice with its share of the sheet, without a cover."""
+def build_unit_cell(spec, *, dielectric_law, cover_law=None, mesh=MeshSettings(), height_factor=1.0, tip_factor=1.0):
+    """One frustum of an endless lattice with its share of the sheet, and of the cover where a law for it is given."""
     frusta = spec.dielectric.frusta
     lines = _lines(frusta.pitch_mm, 1, frusta.pitch_mm, mesh.cells_per_pitch)
-    bottom = -spec.dielectric.sheet_thickness_mm
-    sheet = Layer(np.linspace(bottom, 0.0, mesh.sheet_layers + 1), dielectric_law)
+    cover_mm = 0.0 if cover_law is None else spec.cover.thickness_mm
+    bottom = -(cover_mm + spec.dielectric.sheet_thickness_mm)
+    sheet = Layer(np.linspace(bottom, -cover_mm, mesh.sheet_layers + 1), dielectric_law)
+    cover = Layer(np.linspace(-cover_mm, 0.0, (mesh.cover_layers if cover_mm else 0) + 1), cover_law)
     centre = np.zeros((1, 2))
     plan = sheet_plan(centre, (1, 1), frusta.pitch_mm, frusta.root_diameter_mm, (frusta.pitch_mm,) * 2, refinement=mesh.refinement)
-    slab = Slab(sheet, Layer(np.zeros(1), None), plan, lines, lines, sides="symmetric", contact=ContactSettings(stiffness=500.0),
+    slab = Slab(sheet, cover, plan, lines, lines, sides="symmetric", contact=ContactSettings(stiffness=500.0),
                 coarse_walls=mesh.coarse_walls)
     bed = _bed(spec, centre, np.ones((1, 4), dtype=bool), dielectric_law, mesh,
                (np.array([height_factor]), np.array([tip_factor])), None, bottom=bottom)

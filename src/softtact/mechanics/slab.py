@@ -61,7 +61,7 @@ class Slab:
     def __init__(self, sheet, cover, sheet_plan, x_lines, y_lines, *, sides, contact, coarse_walls=True):
         self.plan = grid_plan(np.asarray(x_lines), np.asarray(y_lines))
         self.x_lines, self.y_lines = np.asarray(x_lines), np.asarray(y_lines)
-        self.contact = contact
+        self.layers, self.sheet_plan, self.contact = (sheet, cover), sheet_plan, contact
         self.cover_mesh = extrude(self.plan, cover.levels)
         self.sheet_mesh = extrude(sheet_plan.plan, sheet.levels)
         self._coarse_walls = coarse_walls
