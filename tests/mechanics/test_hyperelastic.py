@@ -11,7 +11,6 @@ from softtact.errors import ConvergenceError
 from softtact.geometry.meshes import place
 from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.laws.registry import make_law
-from softtact.mechanics.elements import gauss, hex20, reference_gradients
 from softtact.mechanics.hyperelastic import NewtonSettings, press_levels
 from softtact.mechanics.layered_body import MeshSettings, build_sensor_body
 from softtact.mechanics.layered_mesh import layered_mesh
@@ -57,13 +56,14 @@ def test_a_press_that_stalls_says_between_which_forces_and_gives_no_level():
         next(levels)
 
 
-def test_the_mesh_file_holds_the_volume_of_all_layers():
-    mesh = layered_mesh(SMALL, {"cover_layers": 1, "frustum_levels": [0.0, 0.35, 1.0]})
-    hexes = mesh.cells_dict["hexahedron20"]
-    points, weights = gauss(3, 3)
-    _, volumes = reference_gradients(mesh.points[hexes], hex20(points)[1], weights)
-    volumes = volumes.sum(axis=1)
-    layer = mesh.cell_data["layer"][0]
+def test_the_mesh_file_holds_the_volume_of_sheet_and_cover_and_of_the_frusta():
+    """As VTK sees it, which cuts curved elements into tetrahedra: cones of eight sides, with a tenth less volume."""
+    import pyvista
+
+    grid = pyvista.from_meshio(layered_mesh(SMALL, {"cover_layers": 1, "frustum_levels": [0.0, 0.35, 1.0]}))
+    volumes = grid.compute_cell_sizes(length=False, area=False)["Volume"]
+    assert volumes.min() > 0
+    octagon = 8 * np.sin(np.pi / 4) / 2 / np.pi
     frusta = 35 * np.pi * 0.5 / 3 * (0.3**2 + 0.3 * 0.6 + 0.6**2)
-    for number, expected in ((0, frusta), (1, 6.0 * 8.4 * 0.5), (2, 6.0 * 8.4 * 1.5)):
-        assert volumes[layer == number].sum() == pytest.approx(expected, rel=1e-9)
+    for number, expected, tolerance in ((0, octagon * frusta, 0.02), (1, 6.0 * 8.4 * 0.5, 1e-9), (2, 6.0 * 8.4 * 1.5, 1e-9)):
+        assert volumes[grid["layer"] == number].sum() == pytest.approx(expected, rel=tolerance)

@@ -1,7 +1,7 @@
 """The layered sensor without any device: every unknown in one sparse matrix, contact as plain sums, whole Newton steps.
 
-It takes from the fast sensor what defines the problem (elements, contact points with their weights and areas, ties) and solves
-that problem by itself.
+It takes from the fast sensor what defines the problem (elements and the nodes they hang on, contact points with their weights and
+areas) and solves that problem by itself.
 """
 
 import numpy as np
@@ -29,7 +29,7 @@ class NaiveSensor:
         return self.body.slab.nodes + frustum * self.body.bed.nodes + node
 
     def _unknowns_to_nodes(self):
-        """Sparse matrix (3 nodes, unknowns): free slab nodes, inner frustum nodes, and roots that hang on the slab."""
+        """Sparse matrix (3 nodes, unknowns): free slab nodes, inner frustum nodes, and roots that are slab nodes."""
         body, bed = self.body, self.body.bed
         full = sp.lil_matrix((3 * self.nodes, 3 * self.nodes))
         full.setdiag(1.0)
@@ -38,17 +38,16 @@ class NaiveSensor:
                 for i in range(3):
                     row = 3 * self._frustum_node(f, root) + i
                     full[row, row] = 0.0
-                    for node, weight in zip(body.tie_nodes[f], body.tie_weights[f, r], strict=True):
-                        full[row, 3 * node + i] += weight
+                    full[row, 3 * body.cells.roots[f, r] + i] = 1.0
         inner = [3 * self._frustum_node(f, 0) + dof for f in range(bed.count) for dof in bed.inner]
         self.unknowns = np.concatenate([body.slab.free, inner]).astype(int)      # the third of three is vertical
         return full.tocsc()[:, self.unknowns].tocsr()
 
     def _elements(self):
-        """(node numbers (e, 20), block) of slab and frusta."""
+        """(node numbers (e, m), block) of slab and frusta."""
         bed = self.body.bed
         frusta = np.concatenate([self._frustum_node(f, bed.mesh.hexes) for f in range(bed.count)])
-        return [*self.body.slab.blocks, (frusta, bed.block)]
+        return [*self.body.slab.groups, *self.body.slab.cell_groups, (frusta, bed.block)]
 
     def _board_points(self):
         """Matrix (points, 3 nodes) of the gaps at the frusta, gaps at rest, areas (mm2)."""
@@ -166,8 +165,7 @@ class NaiveSensor:
         total = np.concatenate([state.slab.force, state.bed.force.reshape(-1, 3)]).ravel()
         spread = total[:3 * body.slab.nodes].reshape(-1, 3).copy()
         roots = total[3 * body.slab.nodes:].reshape(body.bed.count, -1, 3)[:, body.bed.root]
-        for f in range(body.bed.count):
-            np.add.at(spread, body.tie_nodes[f], body.tie_weights[f].T @ roots[f])
+        np.add.at(spread, body.cells.roots.ravel(), roots.reshape(-1, 3))
         held = np.ones(3 * body.slab.nodes, dtype=bool)
         held[body.slab.free] = False
         return float(spread.ravel()[held].reshape(-1, 3)[:, 2].sum())

@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 
 from softtact.mechanics.elastic import surface_compliance
 from softtact.mechanics.frustum_bed import ContactSettings
+from softtact.mechanics.hex_mesh import SheetPlan, grid_plan, merge, with_centres
 from softtact.mechanics.linear_solvers import make_solver
-from softtact.mechanics.slab import Slab
+from softtact.mechanics.slab import Layer, Slab
 
 
 def graded(fine, cells, far, count):
@@ -72,18 +72,20 @@ class HeldSlab:
     """The hyperelastic model's slab alone: its elements and its contact, base held, no frusta, no bordered system."""
 
     def __init__(self, x, y, z, laws, *, sides, stiffness, smoothing=1e-9):
-        self.slab = Slab(x, y, z, laws, sides=sides, contact=ContactSettings(stiffness=stiffness, smoothing=smoothing))
+        """Grid lines x, y, z and a law for each layer of elements: of one law, or of one below and another above."""
+        above = next((k for k, law in enumerate(laws) if law is not laws[0]), 1)
+        layers = Layer(np.asarray(z)[:above + 1], laws[0]), Layer(np.asarray(z)[above:], laws[-1])
+        self.slab = Slab(*layers, _without_frusta(x, y), x, y, sides=sides,
+                         contact=ContactSettings(stiffness=stiffness, smoothing=smoothing))
         self._hold_the_base()
-        self.slab.build_pattern(self.slab.mesh.planes[0][None, :8])      # held nodes: ties that tie nothing
+        self.slab.build_pattern(np.zeros(0, dtype=int), np.zeros((0, 1), dtype=int))
 
     def _hold_the_base(self):
         slab = self.slab
         free = np.zeros(3 * slab.nodes, dtype=bool)
         free[slab.free] = True
-        free.reshape(-1, 3)[slab.mesh.planes[0]] = False
+        free.reshape(-1, 3)[slab.bottom] = False
         slab.free = np.flatnonzero(free)
-        slab.number[:] = -1
-        slab.number[slab.free] = np.arange(len(slab.free))
 
     def press(self, surface, depth, *, tolerance=1e-9, iterations=40):
         """Equilibrium with the object lowered by `depth` mm, by whole Newton steps; tolerance relative to the force."""
@@ -96,7 +98,7 @@ class HeldSlab:
             if np.abs(residual).max() < tolerance * abs(state.indentation_force):
                 solver.close()
                 return SlabPress(displacement, self._pressure(state), state.indentation_force, depth)
-            matrix, _, _ = slab.tangent(state, np.zeros((1, 24, 24)))
+            matrix, _, _ = slab.tangent(state, np.zeros((0, 1, 1)))
             if not solver.factor(matrix):
                 raise ArithmeticError("the slab's tangent is not positive definite")
             displacement = displacement.copy()
@@ -109,7 +111,14 @@ class HeldSlab:
         return c.stiffness * np.where(depth > c.smoothing, depth - c.smoothing / 2, depth**2 / (2 * c.smoothing))
 
 
+def _without_frusta(x, y):
+    """Plan of a sheet on a grid, without cells."""
+    grid = grid_plan(x, y)
+    none = np.zeros((0, 4), dtype=int)
+    return SheetPlan(merge(with_centres(grid.points[grid.quads])), np.zeros((0, 25), dtype=int), 0, (none, np.zeros(3)))
+
+
 def interpolate(slab, field, points):
     """A nodal field (n, 3) of the top at points (p, 2)."""
-    matrix: sp.csr_matrix = slab.sampling(points, slab.mesh.layers)
-    return matrix @ field
+    quads, values = slab.locate(points)
+    return np.einsum("pa,pad->pd", values, field[slab.top_faces[quads]])

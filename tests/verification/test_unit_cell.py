@@ -1,8 +1,7 @@
-"""Unit cell: the tie of frustum and sheet under refinement.
+"""Unit cell under refinement: stiffness at small strain of one frustum of an endless lattice with its sheet.
 
-Stiffness at small strain of one frustum of an endless lattice with its sheet, pressed by a smooth plate, tip held on the board.
-The frustum's root follows the sheet node by node. That is right where the root's mesh is finer than the sheet's; where it is
-coarser, the sheet sinks into the root between the nodes that are tied, and refining the sheet alone makes it ever softer.
+A smooth plate presses it, the tip is held on the board. The sensor's sheet meets the frustum node by node. The reference is
+another discretisation: 20-node hexahedra, a square grid for the sheet, and a much finer root that is tied to it.
 """
 
 from pathlib import Path
@@ -26,14 +25,14 @@ LAYERS, SHEET_LAYERS = 3, 2
 SOURCE = "naive solver, sheet of 8 x 8 elements on a root of 320"
 
 
-def cell_stiffness(cells):
-    """MPa/mm of the sensor's own unit cell with `cells` sheet elements along the pitch."""
-    mesh = MeshSettings(cells_per_pitch=cells, sheet_layers=SHEET_LAYERS, local_over_shear=0.0,
-                        frustum_levels=tuple(np.linspace(0, 1, LAYERS + 1)))
+def cell_stiffness(refinement, **options):
+    """MPa/mm of the sensor's own unit cell, its elements split so often."""
+    mesh = MeshSettings(cells_per_pitch=2**refinement, sheet_layers=SHEET_LAYERS, local_over_shear=0.0,
+                        frustum_levels=tuple(np.linspace(0, 1, LAYERS + 1)), refinement=refinement, **options)
     body = build_unit_cell(CORO, dielectric_law=LAW, mesh=mesh)
     naive = NaiveSensor(body, lambda x, y: (0 * x, np.tile([0.0, 0.0, -1.0], (len(x), 1))))
-    matrix = sum(assemble(block.tangent(np.zeros((len(hexes), 20, 3))), hexes, naive.nodes) for hexes, block in naive.parts)
-    top = 3 * body.slab.mesh.planes[-1] + 2
+    matrix = sum(assemble(block.tangent(np.zeros((*nodes.shape, 3))), nodes, naive.nodes) for nodes, block in naive.parts)
+    top = 3 * body.slab.cover_mesh.planes[-1] + 2
     tips = 3 * (body.slab.nodes + body.bed.tip) + 2
     return _lowered(naive.T.T @ matrix @ naive.T, np.isin(naive.unknowns, top), np.isin(naive.unknowns, tips))
 
@@ -98,16 +97,9 @@ def test_the_reference_has_converged(converged, record):
     assert errors[1] < 0.01 and errors[1] < 0.5 * errors[0]      # first order at least: a jump of material at the root's edge
 
 
-@pytest.mark.parametrize(("cells", "bound"), [(1, 0.10), (2, 0.08)])
-def test_the_sensors_cell_is_as_near_to_the_converged_one_as_its_mesh_allows(cells, bound, converged, record):
-    """One sheet element a pitch is 9 % too stiff, two are 7 % too soft: the root has five faces only."""
-    error = record(f"unit cell, sensor's mesh with {cells} sheet elements a pitch: stiffness, MPa/mm", expected=converged,
-                   source=SOURCE, got=cell_stiffness(cells))
+@pytest.mark.parametrize(("refinement", "bound"), [(0, 0.03), (1, 0.01)])
+def test_the_sensors_cell_converges_to_the_same_stiffness(refinement, bound, converged, record):
+    """The bounds are those of the reference's own refinement, at a tenth of its unknowns."""
+    error = record(f"unit cell, sensor's mesh split {refinement} times: stiffness, MPa/mm", expected=converged, source=SOURCE,
+                   got=cell_stiffness(refinement, coarse_walls=False))
     assert error < bound
-
-
-@pytest.mark.xfail(strict=True, reason="the sheet sinks into a root that is coarser than itself: tied at 20 nodes only")
-def test_four_sheet_elements_a_pitch_are_nearer_than_two(converged, record):
-    error = record("unit cell, sensor's mesh with 4 sheet elements a pitch (known defect): stiffness, MPa/mm", expected=converged,
-                   source=SOURCE, got=cell_stiffness(4))
-    assert error < abs(cell_stiffness(2) / converged - 1)
