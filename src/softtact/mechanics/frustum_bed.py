@@ -3,7 +3,8 @@
 A frustum touches the rest of the sensor only through its root. So its inner unknowns are eliminated frustum by frustum
 (static condensation, exact within Newton's method), and the global matrix knows the roots only. Contact, all unilateral:
 tip and folding side on the PCB; the side on the symmetric plane towards each neighbour, attached to the root's outermost node,
-which the two neighbours share when they touch.
+which the two neighbours share when they touch. The sheet's lower side on the frusta's sides is left out: in the unit cell
+they come no nearer than 0.01 mm up to 1 MPa.
 """
 
 from dataclasses import dataclass
