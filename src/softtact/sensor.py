@@ -130,7 +130,7 @@ class Sensor:
                            for level in hyperelastic.press_levels(body, surface, forces)), forces, label)
         body.solver.close()
         maps, indentation, area, penetration, compression, iterations = zip(*record, strict=True)
-        # Above four fifths of its height a frustum's pocket is full, and contacts that the model leaves out begin.
+        # A guard, not a measured bound: the void between frusta is used up earlier, at 0.27 mm of an evenly pressed default sensor.
         valid = np.array(compression) < 0.8 * self.spec.dielectric.frusta.height_mm
         return self._result("hyperelastic", body.solver.name, np.stack(maps), forces, np.array(indentation),
                             np.array(area), times, valid, penetration=penetration, compression=compression,

@@ -67,7 +67,7 @@ def as_in_ccx(monkeypatch, build, *, top_points=10, side_points=8):
     """The body of `build()` with the numerics of ccx: all volumetric energy at the points, a sharp contact law, many points.
 
     Frusta then are C3D20 (27 points) and the slab C3D20R (8). ccx cuts the touching faces with each other and has points
-    enough in each piece; our 3 x 3 points a face are raised to resolve the contact's edge as well.
+    enough in each piece; ours are raised to resolve the contact's edge as well.
     """
     monkeypatch.setattr(frustum_bed, "gauss", lambda points, dimension: gauss(side_points, dimension))
     monkeypatch.setattr(slab, "gauss", lambda points, dimension: gauss(top_points, dimension))
