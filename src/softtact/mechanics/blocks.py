@@ -19,6 +19,9 @@ import numpy as np
 
 from softtact.mechanics import kernels
 from softtact.mechanics.elements import gauss, hex20, hex27, reference_gradients, wedge18, wedge_rule
+from softtact.mechanics.parallel import SERIAL, slices, unique_rows
+
+_AT_ONCE = 400   # elements whose fields at the points are in memory at once, mostly in the processor's cache
 
 
 @dataclass(frozen=True)
@@ -33,13 +36,14 @@ class BlockState:
 class SolidBlock:
     """Elements of one kind and one law, by their shape functions' gradients.
 
-    gradients (e, g, m, 3) in 1/mm, volumes (e, g) in mm3, points (g, 3) of the quadrature in parent coordinates.
-    Displacements come per element (e, m, 3) in mm.
+    gradients (u, g, m, 3) in 1/mm and volumes (u, g) in mm3 of the shapes that occur; shapes (e,): which is an element's, by
+    default each its own; points (g, 3) of the quadrature in parent coordinates. Displacements come per element (e, m, 3) in mm.
     """
 
-    def __init__(self, gradients, volumes, points, law, *, local_over_shear=0.0):
+    def __init__(self, gradients, volumes, points, law, *, shapes=None, local_over_shear=0.0):
         self.law, self._local_over_shear = law, local_over_shear
-        self.gradients, self.volumes = gradients, volumes
+        self.gradients, self.volumes = np.ascontiguousarray(gradients), np.ascontiguousarray(volumes)
+        self.shapes = np.arange(len(gradients)) if shapes is None else shapes
         self.basis = np.column_stack([np.ones(len(points)), points])   # (g, 4): 1, xi, eta, zeta
         gram = np.einsum("eg,gp,gq->epq", self.volumes, self.basis, self.basis, optimize=True)
         self.gram_inverse = np.linalg.inv(gram)
@@ -54,33 +58,43 @@ class SolidBlock:
         """K - k in MPa."""
         return self.law.bulk_modulus - self.local_modulus
 
-    def evaluate(self, displacement):
+    def evaluate(self, displacement, *, workers=SERIAL):
         """Energy and internal force; None if an element is turned inside out (J <= 0 at a quadrature point)."""
-        F, C, J = kernels.deformation(displacement, self.gradients)
+        parts = workers.map(lambda part: self._evaluate(displacement[part], self.shapes[part]), slices(len(self.shapes), _AT_ONCE))
+        if any(part is None for part in parts):
+            return None
+        energies, forces = zip(*parts, strict=True)
+        return BlockState(energy=sum(energies), force=np.concatenate(forces), displacement=displacement)
+
+    def _evaluate(self, displacement, shapes):
+        F, C, J = kernels.deformation(displacement, self.gradients, shapes)
         if not J.min() > 0:
             return None
         response = self.law.isochoric(C, tangent=False)
-        modes, pressure = self._pressure(J, slice(None))
+        modes, pressure = self._pressure(J, shapes)
         local = 0.25 * self.local_modulus * (J * J - 1 - 2 * np.log(J))
-        energy = float(self.volumes.ravel() @ (response.energy + local.ravel()) + 0.5 * (modes[0] * modes[1]).sum())
-        force = kernels.internal_force(F, C, J, self.gradients, self.volumes, response.stress, pressure)
-        return BlockState(energy=energy, force=force, displacement=displacement)
+        energy = float(self.volumes[shapes].ravel() @ (response.energy + local.ravel()) + 0.5 * (modes[0] * modes[1]).sum())
+        return energy, kernels.internal_force(F, C, J, self.gradients, self.volumes, shapes, response.stress, pressure)
 
     def tangent(self, displacement, elements=slice(None)):
         """Tangent (e, 3 m, 3 m) in N/mm of the chosen elements, whose displacement (e, m, 3) is given."""
-        gradients = self.gradients[elements]
-        volumes = self.volumes[elements]
-        F, C, J = kernels.deformation(displacement, gradients)
+        shapes = self.shapes[elements]
+        F, C, J = kernels.deformation(displacement, self.gradients, shapes)
         response = self.law.isochoric(C, tangent=True)
-        _, pressure = self._pressure(J, elements)
-        return kernels.tangent(F, C, J, gradients, volumes, response.stress, response.tangent, pressure,
-                               self.basis, self.gram_inverse[elements], self.projected_modulus, self.local_modulus)
+        _, pressure = self._pressure(J, shapes)
+        return kernels.tangent(F, C, J, self.gradients, self.volumes, shapes, response.stress, response.tangent, pressure,
+                               self.basis, self.gram_inverse, self.projected_modulus, self.local_modulus)
 
-    def _pressure(self, J, elements):
+    def _pressure(self, J, shapes):
         """Modes of the volume change with their conjugate pressures, and the whole pressure (e, g) at the points."""
-        change = ((J - 1) * self.volumes[elements]) @ self.basis
-        conjugate = self.projected_modulus * np.einsum("epq,eq->ep", self.gram_inverse[elements], change)
+        change = ((J - 1) * self.volumes[shapes]) @ self.basis
+        conjugate = self.projected_modulus * np.einsum("epq,eq->ep", self.gram_inverse[shapes], change)
         return (change, conjugate), conjugate @ self.basis.T + 0.5 * self.local_modulus * (J - 1 / J)
+
+
+def _unlike(coordinates):
+    """Elements (u,) of all different shapes among coordinates (e, m, 3), and for each (e,) which of these is its own."""
+    return unique_rows((coordinates - coordinates[:, :1]).reshape(len(coordinates), -1))
 
 
 class HexBlock(SolidBlock):
@@ -89,8 +103,9 @@ class HexBlock(SolidBlock):
     def __init__(self, coordinates, law, *, points_per_side=3, local_over_shear=0.0):
         points, weights = gauss(points_per_side, 3)
         shape = {20: hex20, 27: hex27}[coordinates.shape[1]]
-        gradients, volumes = reference_gradients(coordinates, shape(points)[1], weights)
-        super().__init__(gradients, volumes, points, law, local_over_shear=local_over_shear)
+        first, shapes = _unlike(coordinates)
+        gradients, volumes = reference_gradients(coordinates[first], shape(points)[1], weights)
+        super().__init__(gradients, volumes, points, law, shapes=shapes, local_over_shear=local_over_shear)
 
 
 class WedgeBlock(SolidBlock):
@@ -98,5 +113,6 @@ class WedgeBlock(SolidBlock):
 
     def __init__(self, coordinates, law, *, local_over_shear=0.0):
         points, weights = wedge_rule()
-        gradients, volumes = reference_gradients(coordinates, wedge18(points)[1], weights)
-        super().__init__(gradients, volumes, points, law, local_over_shear=local_over_shear)
+        first, shapes = _unlike(coordinates)
+        gradients, volumes = reference_gradients(coordinates[first], wedge18(points)[1], weights)
+        super().__init__(gradients, volumes, points, law, shapes=shapes, local_over_shear=local_over_shear)

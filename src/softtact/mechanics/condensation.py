@@ -1,41 +1,65 @@
-"""Static condensation: inner unknowns of many small bodies eliminated one body at a time, exact within Newton's method."""
+"""Static condensation: inner unknowns of many small bodies eliminated one body at a time, exact within Newton's method.
+
+The matrix (n + m, n + m) of a body lists n inner unknowns first, then m outer ones that others share. Only its upper triangle is
+filled, row by row; to Fortran that is a lower triangle column by column.
+"""
+
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import blas, lapack
+from numba import njit
+
+from softtact.mechanics import lapack
 
 _SMALLEST_STIFFNESS = 0.02   # N/mm of a mode of a folding body; the softest mode of a frustum at rest has 0.03
 
 
-class Condensation:
-    """Bodies whose matrix (n + m, n + m) lists n inner unknowns first, then m outer ones that others share.
+@dataclass(frozen=True)
+class Springs:
+    """Stiffness (b, s) in N/mm of weighted sums of unknowns: places (s, c) in the matrix, -1 where held, weights (s, c)."""
 
-    `outer` (bodies, m, m) are the condensed matrices.
+    stiffness: np.ndarray
+    places: np.ndarray
+    weights: np.ndarray
+
+
+class Condensation:
+    """Bodies of n inner and m outer unknowns; `outer` (bodies, m, m) are their condensed matrices.
+
+    element_dofs: for each group of like elements the places (k, w) of their unknowns in a body's matrix, -1 where held.
     """
 
-    def __init__(self, bodies, inner, outer):
-        self.inner = inner
-        self._factors = [None] * bodies
-        self._coupling = np.zeros((bodies, inner, outer), order="C")
+    def __init__(self, bodies, inner, outer, element_dofs):
+        self._dofs = tuple(np.ascontiguousarray(dofs) for dofs in element_dofs)
+        self._rows = np.zeros((bodies, inner, inner + outer))   # factor L' and the coupling L^-1 K_inner,outer side by side
         self.outer = np.zeros((bodies, outer, outer))
+        self._modified = np.zeros(bodies, dtype=bool)
 
-    def set(self, body, matrix):
-        """Factor the inner part of one body's matrix, given by its upper triangle, and condense."""
-        n = self.inner
-        factor = Factor(matrix[:n, :n])
-        coupling = factor.forward(matrix[:n, n:])
-        self._factors[body], self._coupling[body] = factor, coupling
-        outer = matrix[n:, n:]
-        self.outer[body] = np.triu(outer) + np.triu(outer, 1).T - coupling.T @ coupling
+    def set(self, bodies, tangents, springs=None):
+        """Assemble, factor and condense the matrices of the given bodies (b,).
+
+        tangents: for each group of elements (b, k, w, w) in N/mm;  springs: `Springs` of these bodies.
+
+        Where folding made a matrix indefinite its eigenvalues are made positive: with |matrix| every Newton step lowers the
+        energy, and goes as far along a mode of negative stiffness as along one of positive; at equilibrium only the rate
+        of convergence depends on it. Nocedal and Wright, Numerical Optimization, sec. 3.4.
+        """
+        springs = springs or Springs(np.zeros((len(bodies), 0)), np.zeros((0, 1), dtype=np.int64), np.zeros((0, 1)))
+        _set(bodies, tuple(tangents), self._dofs, springs.stiffness, springs.places, springs.weights, self._rows, self.outer,
+             self._modified, _SMALLEST_STIFFNESS, lapack.LETTERS, lapack.FACTORS, lapack.POTRF, lapack.TRSM, lapack.SYRK)
 
     def residual(self, inner):
         """What the inner residuals (bodies, n) leave on the outer unknowns (bodies, m), and the part to keep for `recover`."""
-        half = np.stack([factor.forward(r) for factor, r in zip(self._factors, inner, strict=True)])
-        return -np.matmul(half[:, None, :], self._coupling)[:, 0], half
+        half = np.array(inner, order="C")
+        passed_on = np.empty(self.outer.shape[:2])
+        _reduce(self._rows, half, passed_on, lapack.LETTERS, lapack.FACTORS, lapack.TRSV, lapack.GEMV)
+        return passed_on, half
 
     def recover(self, half, outer_step):
         """Newton step (bodies, n) of the inner unknowns for that of the outer ones (bodies, m)."""
-        right = half + np.matmul(self._coupling, outer_step[..., None])[..., 0]
-        return -np.stack([factor.backward(r) for factor, r in zip(self._factors, right, strict=True)])
+        step = half.copy()
+        _recover(self._rows, step, np.ascontiguousarray(outer_step), lapack.LETTERS, lapack.FACTORS, lapack.TRSV, lapack.GEMV)
+        return -step
 
     def positive_outer(self):
         """The condensed matrices without their modes of negative stiffness."""
@@ -45,29 +69,108 @@ class Condensation:
     @property
     def modified(self):
         """How many bodies had modes of negative stiffness."""
-        return sum(factor is not None and factor.modified for factor in self._factors)
+        return int(self._modified.sum())
 
 
-class Factor:
-    """Cholesky factor L of a matrix; where folding made it indefinite, of |matrix|, its eigenvalues made positive.
+@njit(cache=True, nogil=True)
+def _set(bodies, tangents, dofs, stiffness, places, weights, rows, outer, modified, smallest, letters, factors, potrf, trsm, syrk):
+    n, m = rows.shape[1], outer.shape[1]
+    matrix = np.empty((n + m, n + m))
+    for b in range(len(bodies)):
+        for i in range(n + m):
+            matrix[i, i:] = 0.0
+        for group in range(len(dofs)):
+            for element in range(len(dofs[group])):
+                _add_element(matrix, tangents[group][b, element], dofs[group][element])
+        _add_springs(matrix, stiffness[b], places, weights)
+        body = bodies[b]
+        modified[body] = _condense(matrix, rows[body], outer[body], smallest, letters, factors, potrf, trsm, syrk)
 
-    With |matrix| every Newton step lowers the energy, and goes as far along a mode of negative stiffness as along one of
-    positive; at equilibrium only the rate of convergence depends on it. Nocedal and Wright, Numerical Optimization, sec. 3.4.
-    """
 
-    def __init__(self, matrix):
-        """From the upper triangle of a matrix stored row by row."""
-        self._lower, info = lapack.dpotrf(matrix.T, lower=1, clean=0)   # .T: column by column, without a copy in between
-        self.modified = info != 0
-        if self.modified:
-            values, vectors = np.linalg.eigh(matrix, UPLO="U")
-            matrix = (vectors * np.maximum(np.abs(values), _SMALLEST_STIFFNESS)) @ vectors.T
-            self._lower, _ = lapack.dpotrf(matrix, lower=1, clean=0)
+@njit(cache=True, nogil=True)
+def _add_element(matrix, tangent, dofs):
+    for i in range(len(dofs)):
+        row = dofs[i]
+        if row >= 0:
+            for j in range(len(dofs)):
+                if dofs[j] >= row:
+                    matrix[row, dofs[j]] += tangent[i, j]
 
-    def forward(self, right):
-        """Solve L x = right."""
-        return blas.dtrsm(1.0, self._lower, right, lower=1) if right.ndim == 2 else blas.dtrsv(self._lower, right, lower=1)
 
-    def backward(self, right):
-        """Solve L^T x = right."""
-        return blas.dtrsv(self._lower, right, lower=1, trans=1)
+@njit(cache=True, nogil=True)
+def _add_springs(matrix, stiffness, places, weights):
+    for s in range(len(stiffness)):
+        if stiffness[s] == 0.0:
+            continue
+        for i in range(places.shape[1]):
+            row = places[s, i]
+            if row < 0:
+                continue
+            for j in range(places.shape[1]):
+                if places[s, j] >= row:
+                    matrix[row, places[s, j]] += stiffness[s] * weights[s, i] * weights[s, j]
+
+
+@njit(cache=True, nogil=True)
+def _condense(matrix, rows, outer, smallest, letters, factors, potrf, trsm, syrk):
+    """Fill a body's rows and outer matrix; True where its inner matrix was not positive definite."""
+    n, m = len(rows), len(outer)
+    size = np.array([n, m, n + m, 0], dtype=np.int32)
+    (L, N, R, T), (one, minus_one, _, _) = _addresses(letters, 1), _addresses(factors, 8)
+    _n, _m, _lead, info = _addresses(size, 4)
+    rows[:] = matrix[:n]
+    outer[:] = matrix[n:, n:]
+    potrf(L, _n, rows.ctypes.data, _lead, info)
+    modified = size[3] != 0
+    if modified:
+        rows[:, :n] = _made_positive(matrix[:n, :n].copy(), smallest)
+        potrf(L, _n, rows.ctypes.data, _lead, info)
+    coupling = rows[:, n:].ctypes.data
+    trsm(R, L, T, N, _m, _n, one, rows.ctypes.data, _lead, coupling, _lead)
+    syrk(L, N, _m, _n, minus_one, coupling, _lead, one, outer.ctypes.data, _m)
+    for i in range(m):
+        for j in range(i):
+            outer[i, j] = outer[j, i]
+    return modified and size[0] > 0      # `size` is pointed at: alive until here
+
+
+@njit(cache=True, nogil=True)
+def _made_positive(matrix, smallest):
+    for i in range(len(matrix)):
+        for j in range(i):
+            matrix[i, j] = matrix[j, i]
+    values, vectors = np.linalg.eigh(matrix)
+    return (vectors * np.maximum(np.abs(values), smallest)) @ vectors.T
+
+
+@njit(cache=True, nogil=True)
+def _reduce(rows, half, passed_on, letters, factors, trsv, gemv):
+    n, m = rows.shape[1], passed_on.shape[1]
+    size = np.array([n, m, n + m, 1], dtype=np.int32)
+    (L, N, _, _), (_, minus_one, zero, _) = _addresses(letters, 1), _addresses(factors, 8)
+    _n, _m, _lead, _one = _addresses(size, 4)
+    for body in range(len(rows)):
+        A, h = rows[body], half[body].ctypes.data
+        trsv(L, N, N, _n, A.ctypes.data, _lead, h, _one)
+        gemv(N, _m, _n, minus_one, A[:, n:].ctypes.data, _lead, h, _one, zero, passed_on[body].ctypes.data, _one)
+    return size[0]
+
+
+@njit(cache=True, nogil=True)
+def _recover(rows, step, outer_step, letters, factors, trsv, gemv):
+    n, m = rows.shape[1], outer_step.shape[1]
+    size = np.array([n, m, n + m, 1], dtype=np.int32)
+    (L, N, _, T), (one, _, _, _) = _addresses(letters, 1), _addresses(factors, 8)
+    _n, _m, _lead, _one = _addresses(size, 4)
+    for body in range(len(rows)):
+        A, s = rows[body], step[body].ctypes.data
+        gemv(T, _m, _n, one, A[:, n:].ctypes.data, _lead, outer_step[body].ctypes.data, _one, one, s, _one)
+        trsv(L, T, N, _n, A.ctypes.data, _lead, s, _one)
+    return size[0]
+
+
+@njit(cache=True, nogil=True)
+def _addresses(array, size):
+    """Where the first four entries of an array stand, each of `size` bytes."""
+    start = np.uintp(array.ctypes.data)
+    return start, start + np.uintp(size), start + np.uintp(2 * size), start + np.uintp(3 * size)

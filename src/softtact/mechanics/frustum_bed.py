@@ -1,7 +1,8 @@
 """The bed of frusta between the sheet and the PCB: every frustum a finite-strain body of its own, tied to the sheet.
 
-A frustum touches the rest of the sensor only through its root. So its inner unknowns are eliminated frustum by frustum
-(static condensation, exact within Newton's method), and the global matrix knows the roots only. Contact, all unilateral:
+A frustum touches the rest of the sensor only through its root. So its inner unknowns are eliminated frustum by frustum, in
+each from the tip upwards layer by layer (static condensation, exact within Newton's method), and the global matrix
+knows the roots only. Contact, all unilateral:
 tip and folding side on the PCB; the side on the symmetric plane towards each neighbour, attached to the root's outermost node,
 which the two neighbours share when they touch. The sheet's lower side on the frusta's sides is left out: in the unit cell
 they come no nearer than 0.01 mm up to 1 MPa.
@@ -14,12 +15,12 @@ from numba import njit
 
 from softtact.contact.penalty import penalty
 from softtact.mechanics.blocks import HexBlock
-from softtact.mechanics.condensation import Condensation
+from softtact.mechanics.condensation import Condensation, Springs
 from softtact.mechanics.elements import HEX27_BOTTOM, HEX27_SIDES, gauss, quad9
 from softtact.mechanics.hex_mesh import disc_plan, extrude
+from softtact.mechanics.parallel import SERIAL
 
 DIRECTIONS = ((0, 1.0), (1, 1.0), (0, -1.0), (1, -1.0))   # axis and sign of the four neighbours: +x, +y, -x, -y
-_CHUNK = 45                         # frusta whose element tangents are in memory at once
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,22 @@ class ContactSettings:
     smoothing: float = 1e-3
 
 
+@dataclass(frozen=True)
+class Layer:
+    """A layer of a frustum's elements and the unknowns that are eliminated with it; the same in all frusta.
+
+    hexes (h, 27): its elements' nodes;  inner, outer: unknowns of a frustum that are eliminated, and that are left
+    points (p,): the contact points on it, places (p, 10): their unknowns in the layer's matrix, -1 where held
+    """
+
+    hexes: np.ndarray
+    inner: np.ndarray
+    outer: np.ndarray
+    points: np.ndarray
+    places: np.ndarray
+    condensed: Condensation
+
+
 class FrustumBed:
     """All frusta of a sensor with one law. Local node numbers are those of `self.mesh`; roots are `self.root`."""
 
@@ -66,7 +83,7 @@ class FrustumBed:
         self.block = HexBlock(self._per_element(self.coordinates), law, local_over_shear=local_over_shear)
         self._contact_points(pcb_z_mm)
         self._number_unknowns(tips_held)
-        self.condensed = Condensation(self.count, self.inner_count, len(self.root_dofs))
+        self.layers = [self._layer(k) for k in range(self.mesh.layers)]
 
     def _place(self, levels, root_z):
         """Nodal coordinates (n, nodes, 3): the unit disc scaled by the cone's radius, the height by each frustum's own."""
@@ -101,6 +118,8 @@ class FrustumBed:
         self.point_weights = np.array([[*r[1], r[5]] for r in records])
         self.point_axis = np.array([r[2] for r in records])
         self.point_neighbour = np.array([r[6] for r in records])
+        in_layer = [np.isin(self.point_nodes[:, 8], self.mesh.layer(k)) for k in range(self.mesh.layers)]   # by the face's centre
+        self.point_layer = np.argmax(in_layer, axis=0)
         offset = np.where(self.point_neighbour < 0, -pcb_z, 0.0)
         self.gap0 = self._along(self.coordinates) + offset
         self.point_area = self._areas(np.array([r[0] for r in records]).reshape(-1, len(weights), 9)[:, 0], slopes, weights)
@@ -123,17 +142,32 @@ class FrustumBed:
         if tips_held:
             number[self.tip, :2] = -1
         number[self.root] = -1
-        inner = number.ravel() == 0
-        self.inner_count = int(inner.sum())
-        order = np.full(3 * self.nodes, -1, dtype=np.int64)
-        order[inner] = np.arange(self.inner_count)
-        root = (3 * self.root[:, None] + np.arange(3)).ravel()
-        order[root] = self.inner_count + np.arange(len(root))
-        self.order, self.inner, self.root_dofs = order, np.flatnonzero(inner), root
+        self.inner = np.flatnonzero(number.ravel() == 0)
+        self.root_dofs = (3 * self.root[:, None] + np.arange(3)).ravel()
 
-    def evaluate(self, displacement):
+    def _layer(self, k):
+        """What is eliminated with the k-th layer of elements: its lower nodes and those in its middle.
+
+        It leaves the nodes above, and those of the root that carry the planes towards the neighbours.
+        """
+        below = np.concatenate([self.mesh.middle(k), self.mesh.planes[k]])
+        inner = np.intersect1d(self.inner, _dofs(below))
+        above = _dofs(self.mesh.planes[k + 1])
+        sideways = self.point_neighbour >= 0
+        planes = 3 * self.point_nodes[sideways, -1] + self.point_axis[sideways]
+        outer = np.concatenate([above, np.setdiff1d(planes, above)])
+        place = np.full(3 * self.nodes, -1, dtype=np.int64)
+        place[inner], place[outer] = np.arange(len(inner)), len(inner) + np.arange(len(outer))
+        points = np.flatnonzero(self.point_layer == k)
+        carried = [place[self._left_below[None]]] if k else []
+        self._left_below = outer
+        return Layer(hexes=self.mesh.layer(k), inner=inner, outer=outer, points=points,
+                     places=place[3 * self.point_nodes[points] + self.point_axis[points, None]],
+                     condensed=Condensation(self.count, len(inner), len(outer), [place[_dofs(self.mesh.layer(k))], *carried]))
+
+    def evaluate(self, displacement, *, workers=SERIAL):
         """Energy, nodal forces and gaps for displacement (n, nodes, 3); None if an element is inside out."""
-        body = self.block.evaluate(self._per_element(displacement))
+        body = self.block.evaluate(self._per_element(displacement), workers=workers)
         if body is None:
             return None
         gaps = self.gap0 + self._along(displacement)
@@ -146,38 +180,44 @@ class FrustumBed:
         return BedState(energy=body.energy + float((energy * self.point_area).sum()), force=force, gaps=gaps,
                         displacement=displacement)
 
-    def refresh(self, state, frusta):
-        """Recompute the condensed tangents of the given frusta (numbers)."""
-        for start in range(0, len(frusta), _CHUNK):
-            self._condense(state, frusta[start:start + _CHUNK])
-
     def contact_slope(self, gaps):
         """Stiffness (n, p) of the contact points in N/mm3."""
         return penalty(gaps, stiffness=self.contact.stiffness, smoothing=self.contact.smoothing)[2]
 
-    def _condense(self, state, frusta):
-        layers = len(self.mesh.hexes)
-        elements = (frusta[:, None] * layers + np.arange(layers)).ravel()
-        dense = np.zeros((len(frusta), self.inner_count + len(self.root_dofs), self.inner_count + len(self.root_dofs)))
-        tangents = self.block.tangent(self._per_element(state.displacement[frusta]), elements)
-        slope = self.contact_slope(state.gaps[frusta])
-        _assemble_dense(dense, tangents, self.mesh.hexes, self.order)
-        _contact_tangent(dense, slope * self.point_area[frusta], self.point_nodes, self.point_weights, self.point_axis,
-                         self.order)
-        for matrix, frustum in zip(dense, frusta, strict=True):
-            self.condensed.set(frustum, matrix)
+    def condense(self, state, frusta):
+        """Recompute the condensed tangents of the given frusta (k,); returns those of their roots (k, 1, 75, 75)."""
+        slope = self.contact_slope(state.gaps[frusta]) * self.point_area[frusta]
+        displacement = state.displacement[frusta]
+        left = []
+        for k, layer in enumerate(self.layers):
+            springs = Springs(slope[:, layer.points], layer.places, self.point_weights[layer.points])
+            layer.condensed.set(frusta, [self._layer_tangents(k, displacement, frusta), *left], springs)
+            left = [layer.condensed.outer[frusta][:, None]]
+        return left[0]
+
+    def _layer_tangents(self, k, displacement, frusta):
+        """Tangents (b, h, 81, 81) of the k-th layer's h elements in frusta (b,)."""
+        hexes = self.layers[k].hexes
+        elements = frusta[:, None] * len(self.mesh.hexes) + k * len(hexes) + np.arange(len(hexes))
+        tangents = self.block.tangent(displacement[:, hexes].reshape(-1, 27, 3), elements.ravel())
+        return tangents.reshape(*elements.shape, 81, 81)
 
     def condensed_residual(self, state):
         """Root forces (n, 75) after the inner residual has been eliminated, and what `inner_step` needs again."""
-        flat = state.force.reshape(self.count, -1)
-        passed_on, half = self.condensed.residual(flat[:, self.inner])
-        return flat[:, self.root_dofs] + passed_on, half
+        force = state.force.reshape(self.count, -1).copy()
+        halves = []
+        for layer in self.layers:
+            passed_on, half = layer.condensed.residual(force[:, layer.inner])
+            force[:, layer.outer] += passed_on
+            halves.append(half)
+        return force[:, self.root_dofs], halves
 
-    def inner_step(self, half, root_step):
+    def inner_step(self, halves, root_step):
         """Newton step (n, nodes, 3) of the frusta for the roots' step (n, 75)."""
         step = np.zeros((self.count, 3 * self.nodes))
-        step[:, self.inner] = self.condensed.recover(half, root_step)
         step[:, self.root_dofs] = root_step
+        for layer, half in zip(self.layers[::-1], halves[::-1], strict=True):
+            step[:, layer.inner] = layer.condensed.recover(half, step[:, layer.outer])
         return step.reshape(self.count, self.nodes, 3)
 
     def inner_residual(self, state):
@@ -208,31 +248,6 @@ def _scatter_contact(force, magnitude, nodes, weights, axis):
                     force[f, nodes[p, k], axis[p]] += magnitude[f, p] * weights[p, k]
 
 
-@njit(cache=True, nogil=True)
-def _assemble_dense(dense, tangents, hexes, order):
-    """Add element matrices into the upper triangles of dense (f, n, n)."""
-    layers, size = hexes.shape[0], 3 * hexes.shape[1]
-    for f in range(dense.shape[0]):
-        for e in range(layers):
-            K = tangents[f * layers + e]
-            for i in range(size):
-                row = order[3 * hexes[e, i // 3] + i % 3]
-                if row >= 0:
-                    for j in range(size):
-                        column = order[3 * hexes[e, j // 3] + j % 3]
-                        if column >= row:
-                            dense[f, row, column] += K[i, j]
-
-
-@njit(cache=True, nogil=True)
-def _contact_tangent(dense, slope, nodes, weights, axis, order):
-    for f in range(dense.shape[0]):
-        for p in range(nodes.shape[0]):
-            if slope[f, p] != 0.0:
-                for i in range(nodes.shape[1]):
-                    row = order[3 * nodes[p, i] + axis[p]]
-                    if row >= 0:
-                        for j in range(nodes.shape[1]):
-                            column = order[3 * nodes[p, j] + axis[p]]
-                            if column >= row:
-                                dense[f, row, column] += slope[f, p] * weights[p, i] * weights[p, j]
+def _dofs(nodes):
+    """Unknowns (..., 3 k) of nodes (..., k)."""
+    return (3 * nodes[..., None] + np.arange(3)).reshape(*nodes.shape[:-1], -1)

@@ -54,9 +54,12 @@ class HexMesh:
 
         Only of a mesh whose layers have all the plan's points in their middle.
         """
-        first = self.planes.size
-        middles = first + np.arange(self.layers * self.planes.shape[1]).reshape(self.layers, -1)
-        return np.vstack([self.planes[:-1], middles])
+        return np.vstack([self.planes[:-1], *(self.middle(k) for k in range(self.layers))])
+
+    def middle(self, index):
+        """Node numbers (plan points,) in the middle of one layer, of a mesh that has them all."""
+        count = self.planes.shape[1]
+        return self.planes.size + index * count + np.arange(count)
 
     def layer(self, index):
         """Hexes of one layer (q, 20 or 27)."""

@@ -1,6 +1,8 @@
 """Compiled loops over elements: kinematics, internal forces and tangents. Plain arrays in, plain arrays out.
 
-Symmetric tensors are stored as xx, yy, zz, xy, yz, zx. All kernels run on one core and release the GIL.
+Symmetric tensors are stored as xx, yy, zz, xy, yz, zx. Many elements are translations of each other: gradients (u, g, m, 3)
+and volumes (u, g) are kept once for each shape, `shapes` (e,) tells which is an element's. All kernels run on one core and
+release the GIL.
 """
 
 import numpy as np
@@ -12,27 +14,36 @@ _VOIGT = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
 
 
 @njit(cache=True, nogil=True)
-def deformation(displacement, gradients):
+def deformation(displacement, gradients, shapes):
     """Deformation gradient F (e, g, 3, 3), C (e*g, 6) and J (e, g) from nodal displacement (e, m, 3)."""
-    elements, points, nodes, _ = gradients.shape
+    elements, nodes, _ = displacement.shape
+    points = gradients.shape[1]
     F = np.empty((elements, points, 3, 3))
     C = np.empty((elements * points, 6))
     J = np.empty((elements, points))
     for e in range(elements):
         for g in range(points):
+            xx, xy, xz, yx, yy, yz, zx, zy, zz = 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0
+            for a in range(nodes):
+                x, y, z = gradients[shapes[e], g, a, 0], gradients[shapes[e], g, a, 1], gradients[shapes[e], g, a, 2]
+                u, v, w = displacement[e, a, 0], displacement[e, a, 1], displacement[e, a, 2]
+                xx += u * x
+                xy += u * y
+                xz += u * z
+                yx += v * x
+                yy += v * y
+                yz += v * z
+                zx += w * x
+                zy += w * y
+                zz += w * z
             f = F[e, g]
-            for i in range(3):
-                for j in range(3):
-                    total = 1.0 if i == j else 0.0
-                    for a in range(nodes):
-                        total += displacement[e, a, i] * gradients[e, g, a, j]
-                    f[i, j] = total
-            for k in range(6):
-                i, j = _ROW[k], _COL[k]
-                C[e * points + g, k] = f[0, i] * f[0, j] + f[1, i] * f[1, j] + f[2, i] * f[2, j]
-            J[e, g] = (f[0, 0] * (f[1, 1] * f[2, 2] - f[1, 2] * f[2, 1])
-                       - f[0, 1] * (f[1, 0] * f[2, 2] - f[1, 2] * f[2, 0])
-                       + f[0, 2] * (f[1, 0] * f[2, 1] - f[1, 1] * f[2, 0]))
+            f[0, 0], f[0, 1], f[0, 2] = xx, xy, xz
+            f[1, 0], f[1, 1], f[1, 2] = yx, yy, yz
+            f[2, 0], f[2, 1], f[2, 2] = zx, zy, zz
+            c = C[e * points + g]
+            c[0], c[1], c[2] = xx * xx + yx * yx + zx * zx, xy * xy + yy * yy + zy * zy, xz * xz + yz * yz + zz * zz
+            c[3], c[4], c[5] = xx * xy + yx * yy + zx * zy, xy * xz + yy * yz + zy * zz, xz * xx + yz * yx + zz * zx
+            J[e, g] = xx * (yy * zz - yz * zy) - xy * (yx * zz - yz * zx) + xz * (yx * zy - yy * zx)
     return F, C, J
 
 
@@ -52,24 +63,30 @@ def inverse_symmetric(c):
 
 
 @njit(cache=True, nogil=True)
-def internal_force(F, C, J, gradients, volumes, stress, pressure):
+def internal_force(F, C, J, gradients, volumes, shapes, stress, pressure):
     """Nodal forces (e, 3 m): isochoric second Piola-Kirchhoff stress (e*g, 6) plus pressure (e, g) J C^-1."""
-    elements, points, nodes, _ = gradients.shape
+    elements, points = J.shape
+    nodes = gradients.shape[2]
     force = np.zeros((elements, 3 * nodes))
     S = np.empty((3, 3))
+    P = np.empty((3, 3))
     for e in range(elements):
         for g in range(points):
             n = e * points + g
+            w, pj = volumes[shapes[e], g], pressure[e, g] * J[e, g]
             inverse = inverse_symmetric(C[n])
             for k in range(6):
-                value = volumes[e, g] * (stress[n, k] + pressure[e, g] * J[e, g] * inverse[k])
+                value = w * (stress[n, k] + pj * inverse[k])
                 S[_ROW[k], _COL[k]] = value
                 S[_COL[k], _ROW[k]] = value
-            P = F[e, g] @ S
+            for i in range(3):
+                for j in range(3):
+                    P[i, j] = F[e, g, i, 0] * S[0, j] + F[e, g, i, 1] * S[1, j] + F[e, g, i, 2] * S[2, j]
             for a in range(nodes):
-                for i in range(3):
-                    force[e, 3 * a + i] += (P[i, 0] * gradients[e, g, a, 0] + P[i, 1] * gradients[e, g, a, 1]
-                                            + P[i, 2] * gradients[e, g, a, 2])
+                x, y, z = gradients[shapes[e], g, a, 0], gradients[shapes[e], g, a, 1], gradients[shapes[e], g, a, 2]
+                force[e, 3 * a] += P[0, 0] * x + P[0, 1] * y + P[0, 2] * z
+                force[e, 3 * a + 1] += P[1, 0] * x + P[1, 1] * y + P[1, 2] * z
+                force[e, 3 * a + 2] += P[2, 0] * x + P[2, 1] * y + P[2, 2] * z
     return force
 
 
@@ -95,7 +112,7 @@ def _elasticity(A, f, S, D):
 
 
 @njit(cache=True, nogil=True)
-def tangent(F, C, J, gradients, volumes, stress, moduli, pressure, basis, gram_inverse, bulk_modulus, local_modulus):
+def tangent(F, C, J, gradients, volumes, shapes, stress, moduli, pressure, basis, gram_inverse, bulk_modulus, local_modulus):
     """Tangent (e, 3 m, 3 m) of `internal_force` with the pressure of `SolidBlock`: a projected and a local part.
 
     projected = bulk_modulus * basis . gram_inverse . integral(basis (J - 1)), basis (g, p): symmetric, rank p per element
@@ -104,57 +121,66 @@ def tangent(F, C, J, gradients, volumes, stress, moduli, pressure, basis, gram_i
     The products run over blocks of components (i, j >= i): K_ij = G^T A_ij G with the gradients G (3 g, m), three large
     products an element instead of one with the strain-displacement matrix, which has a third of zeros.
     """
-    elements, points, nodes, _ = gradients.shape
-    modes = basis.shape[1]
+    elements, points = J.shape
+    nodes, modes = gradients.shape[2], basis.shape[1]
     out = np.empty((elements, 3 * nodes, 3 * nodes))
-    G = np.empty((nodes, 3 * points))
+    G = np.empty((3 * points, nodes))
     # A_ij G for each i, columns j >= i side by side
     rights = (np.empty((3 * points, 3 * nodes)), np.empty((3 * points, 2 * nodes)), np.empty((3 * points, nodes)))
     volume_change = np.empty((modes, 3 * nodes))
     A = np.empty((3, 3, 3, 3))
     D = np.empty((6, 6))
     S = np.empty((3, 3))
+    cofactor = np.empty((3, 3))
     for e in range(elements):
         volume_change[:] = 0.0
         for g in range(points):
             n = e * points + g
             inverse = inverse_symmetric(C[n])
-            w, pj = volumes[e, g], pressure[e, g] * J[e, g]
+            w, pj = volumes[shapes[e], g], pressure[e, g] * J[e, g]
             local = 0.5 * local_modulus * (J[e, g] * J[e, g] + 1.0)
             for k in range(6):
                 value = w * (stress[n, k] + pj * inverse[k])
                 S[_ROW[k], _COL[k]] = value
                 S[_COL[k], _ROW[k]] = value
-                for m in range(6):
+                for m in range(k, 6):
                     i, j, p, q = _ROW[k], _COL[k], _ROW[m], _COL[m]
                     ip, jq, iq, jp = _sym(inverse, i, p), _sym(inverse, j, q), _sym(inverse, i, q), _sym(inverse, j, p)
                     D[k, m] = w * (moduli[n, k, m] + (pj + local) * inverse[k] * inverse[m] - pj * (ip * jq + iq * jp))
-            f = F[e, g]
+                    D[m, k] = D[k, m]
+            f, gradient = F[e, g], gradients[shapes[e], g]
             _elasticity(A, f, S, D)
+            for i in range(3):      # J F^-T = J F C^-1
+                for k in range(3):
+                    cofactor[i, k] = w * J[e, g] * (f[i, 0] * _sym(inverse, 0, k) + f[i, 1] * _sym(inverse, 1, k)
+                                                    + f[i, 2] * _sym(inverse, 2, k))
+            x, y, z = G[3 * g], G[3 * g + 1], G[3 * g + 2]
             for a in range(nodes):
-                x, y, z = gradients[e, g, a, 0], gradients[e, g, a, 1], gradients[e, g, a, 2]
-                G[a, 3 * g], G[a, 3 * g + 1], G[a, 3 * g + 2] = x, y, z
+                x[a], y[a], z[a] = gradient[a, 0], gradient[a, 1], gradient[a, 2]
                 for i in range(3):
-                    # row i of the cofactor J F^-T = J F C^-1, times the gradient: dJ by displacement i of node a
-                    cofactor = 0.0
-                    for k in range(3):
-                        along = f[i, 0] * _sym(inverse, 0, k) + f[i, 1] * _sym(inverse, 1, k) + f[i, 2] * _sym(inverse, 2, k)
-                        cofactor += along * gradients[e, g, a, k]
+                    change = cofactor[i, 0] * x[a] + cofactor[i, 1] * y[a] + cofactor[i, 2] * z[a]
                     for m in range(modes):
-                        volume_change[m, 3 * a + i] += w * basis[g, m] * J[e, g] * cofactor
-                    right = rights[i]
+                        volume_change[m, 3 * a + i] += basis[g, m] * change
+            for i in range(3):
+                for k in range(3):
+                    row = rights[i][3 * g + k]
                     for j in range(i, 3):
-                        for k in range(3):
-                            right[3 * g + k, (j - i) * nodes + a] = A[i, k, j, 0] * x + A[i, k, j, 1] * y + A[i, k, j, 2] * z
+                        first, ax, ay, az = (j - i) * nodes, A[i, k, j, 0], A[i, k, j, 1], A[i, k, j, 2]
+                        for a in range(nodes):
+                            row[first + a] = ax * x[a] + ay * y[a] + az * z[a]
         K = out[e]
+        K[:] = bulk_modulus * (volume_change.T @ (gram_inverse[shapes[e]] @ volume_change))
         for i in range(3):
-            block = G @ rights[i]
+            block = G.T @ rights[i]
             for a in range(nodes):
-                for j in range(i, 3):
+                for b in range(nodes):
+                    K[3 * a + i, 3 * b + i] += block[a, b]
+            for j in range(i + 1, 3):
+                for a in range(nodes):
                     for b in range(nodes):
-                        K[3 * a + i, 3 * b + j] = block[a, (j - i) * nodes + b]
-                        K[3 * b + j, 3 * a + i] = block[a, (j - i) * nodes + b]
-        K += bulk_modulus * (volume_change.T @ (gram_inverse[e] @ volume_change))
+                        value = block[a, (j - i) * nodes + b]
+                        K[3 * a + i, 3 * b + j] += value
+                        K[3 * b + j, 3 * a + i] += value
     return out
 
 

@@ -8,6 +8,7 @@ from softtact.contact.height_field import HeightField
 from softtact.mechanics.frustum_bed import BedGeometry, BedState, ContactSettings, FrustumBed
 from softtact.mechanics.hex_mesh import sheet_plan
 from softtact.mechanics.linear_solvers import make_solver
+from softtact.mechanics.parallel import Workers
 from softtact.mechanics.sheet_cells import SheetCells
 from softtact.mechanics.slab import Layer, Slab, SlabState
 
@@ -67,12 +68,13 @@ _FIRST_SHIFT = 0.01   # N/mm on every free unknown of the slab, doubled until th
 class LayeredBody:
     """Slab on frusta on a rigid PCB, pressed from above by a rigid object. Lengths in mm, z = 0 at the top at rest."""
 
-    def __init__(self, slab, bed, roots):
+    def __init__(self, slab, bed, roots, *, threads=1):
         """`roots` (f, k): the slab's nodes that are the frusta's root nodes."""
         self.slab, self.bed = slab, bed
+        self.workers = Workers(threads)
         self.cells = SheetCells(slab, bed, roots)
         slab.build_pattern(self.cells.inner_dofs, self.cells.outer_dofs)
-        self.solver = make_solver()
+        self.solver = make_solver(threads=threads)
 
     def rest(self):
         """Displacements of slab (n, 3) and frusta (f, nodes, 3) at rest."""
@@ -80,8 +82,8 @@ class LayeredBody:
 
     def evaluate(self, slab_displacement, bed_displacement, indentation, planes):
         """State at given displacements; None where an element is inside out."""
-        slab = self.slab.evaluate(slab_displacement, planes, indentation)
-        bed = self.bed.evaluate(bed_displacement) if slab is not None else None
+        slab = self.slab.evaluate(slab_displacement, planes, indentation, workers=self.workers)
+        bed = self.bed.evaluate(bed_displacement, workers=self.workers) if slab is not None else None
         return None if bed is None else BodyState(slab=slab, bed=bed, indentation=indentation)
 
     def newton_step(self, state, force_n, *, same_tangent=False):
@@ -91,7 +93,7 @@ class LayeredBody:
         Where nothing touches, a force finds no stiffness: the step is then not finite.
         """
         if not same_tangent:
-            self.cells.refresh(state)
+            self.cells.refresh(state, workers=self.workers)
             self._border, self._corner = self._factor_tangent(state)
         residual, kept = self.cells.condensed_residual(state)
         right = residual.ravel()[self.slab.unknowns]
@@ -113,7 +115,7 @@ class LayeredBody:
 
     def _factor_tangent(self, state):
         """Factor the tangent, made positive definite where it is not, so that every step lowers the energy."""
-        matrix, border, corner = self.slab.tangent(state.slab, self.cells.condensed.outer)
+        matrix, border, corner = self.slab.tangent(state.slab, self.cells.condensed.outer, workers=self.workers)
         if not self.solver.factor(matrix):
             matrix, border, corner = self.slab.tangent(state.slab, self.cells.condensed.positive_outer())
             shift = 0.0
@@ -152,7 +154,7 @@ def lattice(counts, pitch):
     return centres, np.column_stack([i < nx - 1, j < ny - 1, i > 0, j > 0])
 
 
-def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), scatter=None, contact=None):
+def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), scatter=None, contact=None, threads=1):
     """The whole sensor. `scatter`: None or (heights factor (n,), tip diameter factor (n,)) of its frusta."""
     frusta, counts = spec.dielectric.frusta, spec.frusta_counts
     bottom = -(spec.cover.thickness_mm + spec.dielectric.sheet_thickness_mm)
@@ -164,7 +166,8 @@ def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), s
     plan = sheet_plan(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, spec.footprint_mm, refinement=mesh.refinement)
     slab = Slab(sheet, cover, plan, x_lines, y_lines, sides="held", contact=contact or ContactSettings(stiffness=500.0),
                 coarse_walls=mesh.coarse_walls)
-    return LayeredBody(slab, _bed(spec, centres, neighbours, dielectric_law, mesh, scatter, contact), slab.bottom[plan.roots])
+    return LayeredBody(slab, _bed(spec, centres, neighbours, dielectric_law, mesh, scatter, contact), slab.bottom[plan.roots],
+                       threads=threads)
 
 
 def build_unit_cell(spec, *, dielectric_law, cover_law=None, mesh=MeshSettings(), height_factor=1.0, tip_factor=1.0):

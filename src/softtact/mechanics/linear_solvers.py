@@ -8,10 +8,10 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 
-def make_solver():
+def make_solver(*, threads=1):
     """The fastest direct solver that this machine offers."""
     try:
-        return PardisoSolver()
+        return PardisoSolver(threads=threads)
     except (ImportError, OSError):   # no MKL for this processor
         return SuperLUSolver()
 
@@ -22,10 +22,11 @@ class PardisoSolver:
     name = "pardiso"
     _POSITIVE, _FACTOR, _SOLVE, _ANALYSE_AND_FACTOR = 2, 22, 33, 12
 
-    def __init__(self):
+    def __init__(self, *, threads=1):
         from pypardiso import PyPardisoSolver
 
         self._solver, self._pattern, self._upper = PyPardisoSolver(mtype=self._POSITIVE), None, None
+        self._threads = threads
 
     def factor(self, upper):
         """Factor the matrix whose upper triangle (csr, sorted, with its diagonal) is given; False if not positive definite."""
@@ -36,7 +37,7 @@ class PardisoSolver:
         same = self._pattern is not None and all(a is b for a, b in zip(pattern, self._pattern, strict=True))
         self._solver.set_phase(self._FACTOR if same else self._ANALYSE_AND_FACTOR)
         try:
-            self._solver._call_pardiso(upper, np.zeros((upper.shape[0], 1)))
+            self._call(upper, np.zeros((upper.shape[0], 1)))
         except PyPardisoError:
             return False
         self._pattern = pattern
@@ -46,7 +47,15 @@ class PardisoSolver:
         """Solve for one (n,) or several (n, k) right-hand sides."""
         self._solver.set_phase(self._SOLVE)
         columns = np.asfortranarray(right.reshape(len(right), -1))
-        return self._solver._call_pardiso(self._upper, columns).reshape(right.shape)
+        return self._call(self._upper, columns).reshape(right.shape)
+
+    def _call(self, upper, columns):
+        """PARDISO on its own number of threads, whatever limit holds for the small products around it."""
+        before = self._solver.libmkl.MKL_Set_Num_Threads_Local(self._threads)
+        try:
+            return self._solver._call_pardiso(upper, columns)
+        finally:
+            self._solver.libmkl.MKL_Set_Num_Threads_Local(before)
 
     def close(self):
         """Free the factors, which live outside Python's memory."""

@@ -5,11 +5,11 @@ matrix are the cells' walls and the cover.
 """
 
 import numpy as np
-from numba import njit
 
 from softtact.mechanics.condensation import Condensation
+from softtact.mechanics.parallel import SERIAL, chunks
 
-_CHUNK = 60                         # cells whose element tangents are in memory at once
+_CHUNK = 8                          # cells that one thread condenses at once
 _REFRESH_MM = 1e-3                  # a cell that moved less than this keeps its tangent (residuals stay exact)
 _REFRESH_SLOPE = 0.05               # ... unless a contact point's stiffness changed by this share of the penalty
 
@@ -24,11 +24,11 @@ class SheetCells:
         ends = np.cumsum([m.shape[1] for m in members])
         *groups, root = np.split(local, ends)
         self._number_dofs()
-        self._group_dofs = [self._place[_dofs(g.reshape(-1, nodes.shape[1]))]
-                            for g, (nodes, _) in zip(groups, slab.cell_groups, strict=True)]
-        self._root_dofs = self._place[_dofs(root[None])[0]]
+        widths = [nodes.shape[1] for nodes, _ in slab.cell_groups]
+        element_nodes = [root[None], *(group.reshape(-1, width) for group, width in zip(groups, widths, strict=True))]
         self._tangent_at = None
-        self.condensed = Condensation(self.count, self.inner_dofs.shape[1], self.outer_dofs.shape[1])
+        self.condensed = Condensation(self.count, self.inner_dofs.shape[1], self.outer_dofs.shape[1],
+                                      [self._place[_dofs(nodes)] for nodes in element_nodes])
 
     def _number_dofs(self):
         """Inner unknowns: of nodes in one cell only and in every cell; the others stay global (-1 where held)."""
@@ -46,15 +46,13 @@ class SheetCells:
         self._place[~inner] = inner.sum() + np.arange((~inner).sum())
         self.inner_dofs, self.outer_dofs = dofs[:, inner], dofs[:, ~inner]
 
-    def refresh(self, state):
+    def refresh(self, state, *, workers=SERIAL):
         """Recompute the condensed tangents of the cells that moved or changed contact since their last one; their number.
 
         Keeping the others is a quasi-Newton step: forces are always exact.
         """
         stale = self._stale(state)
-        self.bed.refresh(state.bed, stale)
-        for start in range(0, len(stale), _CHUNK):
-            self._condense(state, stale[start:start + _CHUNK])
+        workers.map(lambda cells: self._condense(state, cells), chunks(stale, _CHUNK))
         return len(stale)
 
     def _stale(self, state):
@@ -71,15 +69,13 @@ class SheetCells:
         return stale
 
     def _condense(self, state, cells):
-        size = self._place.size
-        dense = np.zeros((len(cells), size, size))
-        for (nodes, block), dofs in zip(self.slab.cell_groups, self._group_dofs, strict=True):
-            chosen = (cells[:, None] * len(dofs) + np.arange(len(dofs))).ravel()
-            tangents = block.tangent(state.slab.displacement[nodes[chosen]], chosen)
-            _add_dense(dense, tangents.reshape(len(cells), len(dofs), *tangents.shape[1:]), dofs)
-        dense[:, self._root_dofs[:, None], self._root_dofs] += self.bed.condensed.outer[cells]
-        for matrix, cell in zip(dense, cells, strict=True):
-            self.condensed.set(cell, matrix)
+        tangents = [self.bed.condense(state.bed, cells)]
+        for nodes, block in self.slab.cell_groups:
+            per_cell = len(nodes) // self.count
+            elements = (cells[:, None] * per_cell + np.arange(per_cell)).ravel()
+            each = block.tangent(state.slab.displacement[nodes[elements]], elements)
+            tangents.append(each.reshape(len(cells), per_cell, *each.shape[1:]))
+        self.condensed.set(cells, tangents)
 
     def condensed_residual(self, state):
         """Residual (n, 3) of the slab with all inner unknowns eliminated, and what `recover` needs again."""
@@ -111,15 +107,3 @@ def _same_in_all(members):
     if (nodes[:, local] != members).any():
         raise ValueError("The cells of the sheet are not alike.")
     return nodes, local
-
-
-@njit(cache=True, nogil=True)
-def _add_dense(dense, matrices, dofs):
-    """Add element matrices (c, k, m, m) of k elements a cell into the upper triangles of dense (c, n, n) at dofs (k, m)."""
-    for c in range(dense.shape[0]):
-        for e in range(dofs.shape[0]):
-            for i in range(dofs.shape[1]):
-                row = dofs[e, i]
-                for j in range(dofs.shape[1]):
-                    if dofs[e, j] >= row:
-                        dense[c, row, dofs[e, j]] += matrices[c, e, i, j]

@@ -14,6 +14,7 @@ from softtact.contact.penalty import penalty
 from softtact.mechanics.blocks import HexBlock, WedgeBlock
 from softtact.mechanics.elements import gauss, quad8
 from softtact.mechanics.hex_mesh import extrude, grid_plan
+from softtact.mechanics.parallel import SERIAL, unique_rows
 
 # Contact points along a side of a top face, which is a pitch wide. With 3 a punch's edge between them goes unnoticed: a cylinder
 # of 1.8 mm went 0.073 mm deep instead of 0.048 mm, and maps were up to a tenth of their maximum off (docs/decks.md).
@@ -122,7 +123,11 @@ class Slab:
         for e, unique in enumerate(needed):
             rows, columns = np.nonzero(used[e])
             np.add.at(follow[e], (rows, np.searchsorted(unique, masters[e][rows, columns])), weights[e][rows, columns])
-        block.gradients = np.ascontiguousarray(np.einsum("egmd,emw->egwd", block.gradients, follow, optimize=True))
+        table = np.hstack([block.shapes[:, None], follow.reshape(len(follow), -1)])
+        first, block.shapes = unique_rows(table)
+        own = table[first, 0].astype(int)
+        block.gradients = np.ascontiguousarray(np.einsum("egmd,emw->egwd", block.gradients[own], follow[first], optimize=True))
+        block.volumes, block.gram_inverse = block.volumes[own], block.gram_inverse[own]
         return nodes, block
 
     def _number_unknowns(self, sides):
@@ -162,12 +167,12 @@ class Slab:
         height, normals = surface(position[:, 0], position[:, 1])
         return FacingPlanes(anchors=np.column_stack([position[:, :2], height]), normals=normals)
 
-    def evaluate(self, displacement, planes, indentation):
+    def evaluate(self, displacement, planes, indentation, *, workers=SERIAL):
         """Energy, forces and contact with the object lowered by `indentation` mm; None if an element is inside out."""
         force = np.zeros((self.nodes, 3))
         energy = 0.0
         for nodes, block in self.groups + self.cell_groups:
-            state = block.evaluate(displacement[nodes])
+            state = block.evaluate(displacement[nodes], workers=workers)
             if state is None:
                 return None
             energy += state.energy
@@ -197,7 +202,7 @@ class Slab:
         indptr, indices = _upper_pattern(self._dofs, len(keep))
         self._matrix = sp.csr_matrix((np.zeros(len(indices)), indices, indptr), shape=(len(keep),) * 2)
 
-    def tangent(self, state, condensed):
+    def tangent(self, state, condensed, *, workers=SERIAL):
         """Upper triangle (csr) of the tangent with the cells' condensed blocks (f, k, k), and its border.
 
         The border is the derivative (unknowns,) of the residual by the indentation; the corner its own second derivative.
@@ -205,7 +210,8 @@ class Slab:
         matrix = self._matrix
         matrix.data[:] = 0.0
         faces, border, corner = self._contact_tangent(state)
-        parts = [block.tangent(state.displacement[nodes]) for nodes, block in self.groups] + [faces, condensed]
+        blocks = workers.map(lambda group: group[1].tangent(state.displacement[group[0]]), self.groups)
+        parts = [*blocks, faces, condensed]
         for part, dofs in zip(parts, self._dofs, strict=True):
             _add_upper(matrix.data, matrix.indptr, matrix.indices, part, dofs)
         return matrix, border, corner

@@ -1,0 +1,34 @@
+"""LAPACK and BLAS routines of scipy that compiled loops can call: thousands of small matrices without Python in between.
+
+A compiled function takes the routines it needs as arguments: numba caches it then, which it would not with an address in it.
+"""
+
+import numba.experimental.function_type  # noqa: F401  teaches numba the type of such arguments
+import numpy as np
+from numba import types
+from numba.extending import get_cython_function_address
+
+
+class Routine(types.WrapperAddressProtocol):
+    """A routine of scipy.linalg.cython_lapack or cython_blas; every argument is an address, as in Fortran."""
+
+    def __init__(self, module, name, arguments):
+        self._address = get_cython_function_address(f"scipy.linalg.{module}", name)
+        self._arguments = arguments
+
+    def __wrapper_address__(self):
+        return self._address
+
+    def signature(self):
+        return types.void(*[types.uintp] * self._arguments)
+
+
+POTRF = Routine("cython_lapack", "dpotrf", 5)
+TRSM = Routine("cython_blas", "dtrsm", 11)
+SYRK = Routine("cython_blas", "dsyrk", 10)
+TRSV = Routine("cython_blas", "dtrsv", 8)
+GEMV = Routine("cython_blas", "dgemv", 11)
+
+# What the routines are told, as memory that they can point at.
+LETTERS = np.array([ord(letter) for letter in "LNRT"], dtype=np.uint8)
+FACTORS = np.array([1.0, -1.0, 0.0])

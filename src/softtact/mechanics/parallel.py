@@ -1,0 +1,47 @@
+"""Work on slices of many like things, on as many threads as were asked for. The kernels release Python's lock."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+
+class Workers:
+    """Runs a function over items in order; with one thread in the caller's own."""
+
+    def __init__(self, threads=1):
+        self.threads = threads
+        self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
+
+    def map(self, function, items):
+        """The function's results, in the items' order."""
+        return [function(item) for item in items] if self._pool is None else list(self._pool.map(function, items))
+
+    def close(self):
+        """End the threads."""
+        if self._pool is not None:
+            self._pool.shutdown()
+
+
+SERIAL = Workers()
+
+
+def slices(count, size):
+    """Slices of at most `size` that cover `count` things."""
+    return [slice(start, min(start + size, count)) for start in range(0, count, size)]
+
+
+def chunks(numbers, size):
+    """Arrays of at most `size` of the given numbers (n,)."""
+    return [numbers[part] for part in slices(len(numbers), size)]
+
+
+def unique_rows(table):
+    """Numbers (u,) of rows of a table (n, k) that stand for all, and for each row (n,) which of these it equals.
+
+    Equal to 1e-9 of the largest entry; told apart by two random projections, which like rows share.
+    """
+    scale = max(np.abs(table).max(), 1e-300)
+    directions = np.random.default_rng(0).standard_normal((table.shape[1], 2))
+    keys = np.round(table @ directions / scale * 1e9 / np.sqrt(table.shape[1])).astype(np.int64)
+    _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    return first, which.ravel()
