@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import softtact
-from softtact.errors import InputError, SofttactError
+from softtact.errors import ConvergenceError, InputError, SofttactError
 
 UNITS = ("mm", "cm", "m", "inch")
 MODELS = ("auto", "elastic", "hyperelastic")
@@ -88,7 +88,17 @@ def _press(options):
     _check_folders(options.out, options.plot)
     mesh = read_mesh(options.mesh, unit=options.unit)
     check_over_sensor(place(mesh, pose=pose), spec.footprint_mm, name=str(options.mesh))
-    result = softtact.load_sensor(options.sensor).press(mesh, pose=pose, force_n=forces, model=options.model)
+    try:
+        result = softtact.load_sensor(options.sensor).press(mesh, pose=pose, force_n=forces, model=options.model)
+    except ConvergenceError as error:
+        if error.result is not None:
+            _show_press(error.result, options)
+        raise
+    _show_press(result, options)
+
+
+def _show_press(result, options):
+    """Write and print what a press gave, be it the levels before one that was not reached."""
     if options.out:
         result.write(options.out)
     if options.plot:
@@ -114,15 +124,33 @@ def _press_summary(result):
               "contact_area_mm2": result.contact_area_mm2,
               "largest_deformation_mm": result.deformation_map_mm.max(axis=(1, 2)),
               "tactile_map": result.tactile_map}
-    return {"model": result.model} | {name: values.tolist() for name, values in levels.items()}
+    names = ("penetration_mm", "frustum_compression_mm", "residual_n", "outside_card", "iterations", "wall_time_s")
+    levels |= {name: getattr(result, name) for name in names}
+    return {"model": result.model, "solver": result.solver} | {name: _or_none(values) for name, values in levels.items()}
+
+
+def _or_none(values):
+    """Numbers as lists; what a model does not tell, nan, as null: JSON has no nan."""
+    return [None if value != value else value for value in values.tolist()] if values.ndim == 1 else values.tolist()
 
 
 def _press_lines(summary):
-    yield f"model: {summary['model']}"
+    yield f"model: {summary['model']}, linear solver: {summary['solver']}"
     yield f"{'force, N':>10}{'indentation, mm':>18}{'contact, mm2':>15}{'deepest, mm':>14}{'counts, sum':>14}"
     names = ("force_n", "indentation_mm", "contact_area_mm2", "largest_deformation_mm", "tactile_map")
     for force, depth, area, deepest, counts in zip(*(summary[name] for name in names), strict=True):
         yield f"{force:10.4g}{depth:18.4f}{area:15.1f}{deepest:14.4f}{sum(map(sum, counts)):14.0f}"
+    yield from _quality_lines(summary)
+
+
+def _quality_lines(summary):
+    """How well the levels were solved, by the worst of them."""
+    yield f"iterations: {sum(summary['iterations'])}; deepest overlap in a contact: {1e3 * max(summary['penetration_mm']):.2g} um"
+    if None not in summary["residual_n"]:
+        yield (f"largest unbalanced nodal force: {max(summary['residual_n']):.2g} N; "
+               f"most compressed frustum: {max(summary['frustum_compression_mm']):.3f} mm")
+    if None not in summary["outside_card"]:
+        yield f"strained beyond the data behind its law: {max(summary['outside_card']):.1%} of a layer"
 
 
 def _pose(options):

@@ -10,4 +10,11 @@ class InputError(SofttactError):
 
 
 class ConvergenceError(SofttactError):
-    """A solver did not reach its tolerance; nothing of the unfinished step may be used."""
+    """A solver did not reach its tolerance; nothing of the unfinished step may be used.
+
+    result: what was reached before (a `PressResult` of the lower forces), or None
+    """
+
+    def __init__(self, message, *, result=None):
+        super().__init__(message)
+        self.result = result

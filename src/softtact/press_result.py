@@ -13,7 +13,9 @@ class PressResult:
 
     deformation_map_mm (force, y, x): towards the PCB, positive;  tactile_map (force, row, column): ideal counts
     force_n, indentation_mm, contact_area_mm2, penetration_mm, wall_time_s, iterations, converged, within_validity (force,)
-    frustum_compression_mm (force,): of the most compressed frustum, nan where the model has none
+    frustum_compression_mm (force,): of the most compressed frustum;  residual_n (force,): largest unbalanced nodal force
+    outside_card (force,): share of a layer's volume strained beyond the data its law was fitted to, the larger of the layers'
+    The last three are nan where the model, or the law, does not tell.
     x_mm (x,), y_mm (y,): the map's grid;  model;  solver: the linear solver's name
     """
 
@@ -24,6 +26,8 @@ class PressResult:
     contact_area_mm2: np.ndarray
     penetration_mm: np.ndarray
     frustum_compression_mm: np.ndarray
+    residual_n: np.ndarray
+    outside_card: np.ndarray
     iterations: np.ndarray
     converged: np.ndarray
     within_validity: np.ndarray
@@ -35,7 +39,8 @@ class PressResult:
     solver: str
     attributes: dict = field(default_factory=dict)
 
-    _PER_FORCE = ("indentation_mm", "contact_area_mm2", "penetration_mm", "frustum_compression_mm", "iterations",
+    _PER_FORCE = ("indentation_mm", "contact_area_mm2", "penetration_mm", "frustum_compression_mm", "residual_n",
+                  "outside_card", "iterations",
                   "converged", "within_validity", "wall_time_s")
 
     def to_dataset(self):

@@ -13,7 +13,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
-from softtact.errors import InputError
+from softtact.errors import ConvergenceError, InputError
 from softtact.files import atomic_path, digest
 from softtact.geometry.complexity import choose_model, score
 from softtact.geometry.meshes import check_over_sensor, place
@@ -65,11 +65,13 @@ class Sensor:
     scatter: tuple | None = None
     attributes: dict = field(default_factory=dict)
 
-    def press(self, mesh, *, pose=None, force_n, model="auto", label="press"):
+    def press(self, mesh, *, pose=None, force_n, model="auto", label="press", threads=None):
         """Press a mesh (trimesh, mm) through forces (N, one or an increasing list) and return a `PressResult`.
 
         pose: `Pose` of the mesh in the sensor frame; by default its bounding box is centred over the sensor, its lowest
-        side down. model: elastic, hyperelastic, or auto (chosen by the complexity of the contact).
+        side down. model: elastic, hyperelastic, or auto (chosen by the complexity of the contact). threads: of the
+        hyperelastic model, by default one for each core. Raises ConvergenceError at a force that is not reached; its
+        `result` holds the forces before.
         """
         if model not in MODELS:
             raise InputError(f"Model {model!r} is unknown; use one of {', '.join(MODELS)}.")
@@ -79,15 +81,16 @@ class Sensor:
         if model == "auto":
             model = self.choose(placed)
         surface = HeightField(placed)
-        press = self._press_elastic if model == "elastic" else self._press_hyperelastic
-        # Hundreds of small dense solves: on more threads they wait for each other, five times as long in all.
+        # Hundreds of small dense products: on more threads they wait for each other, five times as long in all.
         with threadpool_limits(limits=1):
-            return press(surface, forces, label)
+            if model == "elastic":
+                return self._press_elastic(surface, forces, label)
+            return self._press_hyperelastic(surface, forces, label, threads or _cores())
 
-    def body(self):
+    def body(self, *, threads=1):
         """The `LayeredBody` that the hyperelastic model presses on."""
         return build_sensor_body(self.spec, dielectric_law=self.laws["dielectric"], cover_law=self.laws["cover"],
-                                 mesh=self.mesh, scatter=self.scatter)
+                                 mesh=self.mesh, scatter=self.scatter, threads=threads)
 
     def choose(self, placed):
         """The model that the contact of a placed mesh asks for (PAPER section 3.3.1)."""
@@ -111,59 +114,77 @@ class Sensor:
         gap0, _ = surface(*compliance.points.T)
         if gap0.min() >= NO_CONTACT_MM:
             raise InputError("The object misses every free point of the sensor's surface; move it over the sensor.")
-        levels, times = _timed(elastic.press_elastic(compliance, gap0, forces), forces, label)
+        times = []
+        levels = _timed(elastic.press_elastic(compliance, gap0, forces), forces, label, times)
         maps = np.stack([compliance.sampling @ level.displacement for level in levels])
         touching = np.array([compliance.area[level.nodal_force > 0].sum() for level in levels])
         indentation = np.array([level.indentation for level in levels])
         valid = maps.max(axis=1) < 0.5 * self.spec.thickness_mm
-        return self._result("elastic", "dense", maps, forces, indentation, touching, times, valid,
-                            penetration=[level.penetration for level in levels],
-                            compression=np.full(len(levels), np.nan), iterations=[level.iterations for level in levels])
+        unknown = np.full(len(levels), np.nan)
+        return self._result("elastic", "dense", maps, forces, np.array(times), indentation_mm=indentation,
+                            contact_area_mm2=touching, within_validity=valid, penetration_mm=[level.penetration for level in levels],
+                            frustum_compression_mm=unknown, residual_n=unknown, outside_card=unknown,
+                            iterations=[level.iterations for level in levels])
 
-    def _press_hyperelastic(self, surface, forces, label):
-        body = self.body()
+    def _press_hyperelastic(self, surface, forces, label, threads):
+        body = self.body(threads=threads)
         grid = np.stack(np.meshgrid(self.spec.map_x_mm, self.spec.map_y_mm), axis=-1).reshape(-1, 2)
         sampling = body.slab.sampling(grid)
         announce(f"{label}: {body.bed.count} frusta, {len(forces)} force levels of the hyperelastic model, some seconds each")
-        record = []
-        _, times = _timed((record.append(self._read_level(body, sampling, level))
-                           for level in hyperelastic.press_levels(body, surface, forces)), forces, label)
-        body.solver.close()
-        maps, indentation, area, penetration, compression, iterations = zip(*record, strict=True)
-        # A guard, not a measured bound: the void between frusta is used up earlier, at 0.27 mm of an evenly pressed default sensor.
-        valid = np.array(compression) < 0.8 * self.spec.dielectric.frusta.height_mm
-        return self._result("hyperelastic", body.solver.name, np.stack(maps), forces, np.array(indentation),
-                            np.array(area), times, valid, penetration=penetration, compression=compression,
-                            iterations=iterations)
+        record, times = [], []
+        levels = (record.append(self._read_level(body, sampling, level))
+                  for level in hyperelastic.press_levels(body, surface, forces))
+        try:
+            _timed(levels, forces, label, times)
+        except ConvergenceError as error:
+            error.result = self._of_record(body, record, forces, times) if record else None
+            raise
+        finally:
+            body.close()
+        return self._of_record(body, record, forces, times)
+
+    def _of_record(self, body, record, forces, times):
+        maps, *numbers = zip(*record, strict=True)
+        names = ("indentation_mm", "contact_area_mm2", "penetration_mm", "frustum_compression_mm", "residual_n", "outside_card",
+                 "iterations")
+        numbers = dict(zip(names, map(np.array, numbers), strict=True))
+        # Above four fifths of its height a frustum's pocket is full, and contacts that the model leaves out begin.
+        valid = numbers["frustum_compression_mm"] < 0.8 * self.spec.dielectric.frusta.height_mm
+        return self._result("hyperelastic", body.solver.name, np.stack(maps), forces[:len(maps)], np.array(times),
+                            within_validity=valid, **numbers)
 
     @staticmethod
     def _read_level(body, sampling, level):
         slab, bed = level.state.slab, level.state.bed
-        penetration = max(0.0, -slab.gaps.min(), -bed.gaps.min())
         return (-(sampling @ slab.displacement[:, 2]), level.state.indentation,
-                float(body.slab.top_area[slab.gaps < 0].sum()), penetration,
-                float(body.bed.compression(bed.displacement).max()), level.iterations)
+                float(body.slab.top_area[slab.gaps < 0].sum()), level.penetration_mm,
+                float(body.bed.compression(bed.displacement).max()), level.residual_n,
+                body.share_outside_window(level.state), level.iterations)
 
-    def _result(self, model, solver, maps, forces, indentation, area, times, valid, *, penetration, compression, iterations):
+    def _result(self, model, solver, maps, forces, times, **numbers):
         maps = maps.reshape(len(forces), *self.spec.map_shape)
-        return PressResult(
-            deformation_map_mm=maps, tactile_map=ideal_counts(self.spec, maps), force_n=forces,
-            indentation_mm=indentation, contact_area_mm2=area, penetration_mm=np.asarray(penetration, dtype=float),
-            frustum_compression_mm=np.asarray(compression, dtype=float), iterations=np.asarray(iterations),
-            converged=np.ones(len(forces), dtype=np.int8), within_validity=np.asarray(valid, dtype=np.int8),
-            wall_time_s=times, x_mm=self.spec.map_x_mm, y_mm=self.spec.map_y_mm, model=model, sensor=self.spec.name,
-            solver=solver, attributes=dict(self.attributes))
+        flags = {"converged": np.ones(len(forces), dtype=np.int8),
+                 "within_validity": np.asarray(numbers.pop("within_validity"), dtype=np.int8)}
+        return PressResult(deformation_map_mm=maps, tactile_map=ideal_counts(self.spec, maps), force_n=forces,
+                           wall_time_s=times, x_mm=self.spec.map_x_mm, y_mm=self.spec.map_y_mm, model=model,
+                           sensor=self.spec.name, solver=solver, attributes=dict(self.attributes), **flags,
+                           **{name: np.asarray(values) for name, values in numbers.items()})
 
 
-def _timed(levels, forces, label):
-    """The levels as a list, and the seconds that each took; the solver's preparation counts to the first."""
-    out, times, start = [], [], time.perf_counter()
+def _cores():
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+
+
+def _timed(levels, forces, label, times):
+    """The levels as a list, and into `times` the seconds that each took; the solver's preparation counts to the first."""
+    out, start = [], time.perf_counter()
     for level in progress(levels, label=label, total=len(forces)):
         now = time.perf_counter()
         out.append(level)
         times.append(now - start)
         start = now
-    return out, np.array(times)
+    return out
 
 
 def compute_compliance(spec, *, edge_length_mm=ELASTIC_EDGE_MM, mesh=None):

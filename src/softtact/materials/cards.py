@@ -7,6 +7,7 @@ from softtact.files import read_json
 from softtact.materials.consistency import disagreements
 from softtact.materials.curves import common_kind, join_by_mode
 from softtact.materials.fitting import STARTS, fit_family
+from softtact.materials.laws.base import TEST_PATHS
 from softtact.materials.laws.registry import make_law
 from softtact.materials.linear import LinearConstants, young_modulus
 from softtact.materials.stability import stable_ranges
@@ -79,7 +80,16 @@ def law_from_card(card, law=None):
             f"The card of material {card['material']} has no hyperelastic law {name!r}; it has {', '.join(available)}."
         )
     entry = card["laws"][name]
-    return make_law(name, entry["parameters"], bulk_modulus=entry["bulk_modulus_mpa"])
+    law = make_law(name, entry["parameters"], bulk_modulus=entry["bulk_modulus_mpa"])
+    law.stretch_window = principal_window(card.get("strain_window", {}))
+    return law
+
+
+def principal_window(windows):
+    """Lowest and highest principal stretch over {mode: [min, max] stretch along the loading}; None without a known mode."""
+    stretches = [stretch**exponent for mode, window in windows.items() if mode in TEST_PATHS
+                 for stretch in window for exponent in TEST_PATHS[mode]]
+    return (min(stretches), max(stretches)) if stretches else None
 
 
 def linear_from_card(card):

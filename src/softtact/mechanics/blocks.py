@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from softtact.materials.laws.stretches import stretch_range
 from softtact.mechanics import kernels
 from softtact.mechanics.elements import gauss, hex20, hex27, reference_gradients, wedge18, wedge_rule
 from softtact.mechanics.parallel import SERIAL, slices, unique_rows
@@ -84,6 +85,17 @@ class SolidBlock:
         _, pressure = self._pressure(J, shapes)
         return kernels.tangent(F, C, J, self.gradients, self.volumes, shapes, response.stress, response.tangent, pressure,
                                self.basis, self.gram_inverse, self.projected_modulus, self.local_modulus)
+
+    @property
+    def volume(self):
+        """Volume of all elements in mm3."""
+        return float(self.volumes.sum(axis=1)[self.shapes].sum())
+
+    def volume_outside(self, displacement, window):
+        """Volume (mm3) in which an isochoric principal stretch lies outside of `window` (lowest, highest)."""
+        _, C, _ = kernels.deformation(displacement, self.gradients, self.shapes)
+        low, high = stretch_range(C)
+        return float(self.volumes[self.shapes].ravel() @ ((low < window[0]) | (high > window[1])))
 
     def _pressure(self, J, shapes):
         """Modes of the volume change with their conjugate pressures, and the whole pressure (e, g) at the points."""

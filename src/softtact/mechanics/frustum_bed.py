@@ -48,7 +48,7 @@ class BedState:
 class ContactSettings:
     """Penalty stiffness in N/mm3 and smoothing depth in mm."""
 
-    stiffness: float = 2000.0
+    stiffness: float = 3000.0
     smoothing: float = 1e-3
 
 
@@ -80,7 +80,7 @@ class FrustumBed:
         self.nodes = len(self.mesh.points)
         self.root, self.tip = self.mesh.planes[-1], self.mesh.planes[0]
         self.coordinates = self._place(levels, root_z_mm)
-        self.block = HexBlock(self._per_element(self.coordinates), law, local_over_shear=local_over_shear)
+        self.block = HexBlock(self.per_element(self.coordinates), law, local_over_shear=local_over_shear)
         self._contact_points(pcb_z_mm)
         self._number_unknowns(tips_held)
         self.layers = [self._layer(k) for k in range(self.mesh.layers)]
@@ -94,7 +94,8 @@ class FrustumBed:
         z = root_z - g.heights[:, None] * (1 - fraction)
         return np.concatenate([plan, z[..., None]], axis=2)
 
-    def _per_element(self, field):
+    def per_element(self, field):
+        """A nodal field (n, nodes, 3) at the elements' nodes (n * elements, 27, 3)."""
         return np.ascontiguousarray(field[:, self.mesh.hexes].reshape(-1, 27, 3))
 
     def _outer_faces(self, plan):
@@ -167,7 +168,7 @@ class FrustumBed:
 
     def evaluate(self, displacement, *, workers=SERIAL):
         """Energy, nodal forces and gaps for displacement (n, nodes, 3); None if an element is inside out."""
-        body = self.block.evaluate(self._per_element(displacement), workers=workers)
+        body = self.block.evaluate(self.per_element(displacement), workers=workers)
         if body is None:
             return None
         gaps = self.gap0 + self._along(displacement)

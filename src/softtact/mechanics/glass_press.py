@@ -35,7 +35,7 @@ def press_cell_on_glass(spec, law, forces_n, *, mesh=None, height_factor=1.0, ti
     levels = list(press_levels(body, HeightField(plate), forces_n, settings=settings))
     area = [contact_area(body.bed, level.state.bed.displacement) for level in levels]
     compression = [level.state.indentation for level in levels]
-    body.solver.close()
+    body.close()
     return GlassCurve(np.asarray(forces_n, dtype=float), np.array(area), np.array(compression))
 
 

@@ -10,30 +10,37 @@ from softtact.mechanics.layered_body import BodyState
 
 @dataclass(frozen=True)
 class NewtonSettings:
-    """Tolerance as a share of the force (at least of `smallest_scale_n`); iterations and largest movement per step;
+    """When a level counts as reached, and how Newton's method goes there.
 
-    the smallest force increment that is still tried; how the first touch is found; the cut of the residual after which
-    a tangent is used again.
+    relative_tolerance: largest unbalanced nodal force as a share of the force, at least of smallest_scale_n
+    largest_penetration_mm: beyond it the contacts are made stiffer and the level is solved again
+    largest_step_mm: largest movement of a node in one iteration;  smallest_increment_n: force steps are halved down to this
+    first_touch_mm, first_touch_tolerance_n: overlap at which the press begins, and the residual that is good enough there
+    good_reduction: a tangent that cut the residual to this share is used again
+    refacing_iterations: iterations that look anew which facet each point faces
     """
 
     relative_tolerance: float = 1e-4   # of a nodal force; 1e-6 changes the indentation by 2e-6 of itself
+    largest_penetration_mm: float = 1e-3
     max_iterations: int = 40
     largest_step_mm: float = 0.12
     smallest_increment_n: float = 0.02
     smallest_scale_n: float = 10.0
     first_touch_mm: float = 0.01
     first_touch_tolerance_n: float = 0.01   # a start for the first level, not a result
-    good_reduction: float = 0.1
+    good_reduction: float = 0.35
+    refacing_iterations: int = 12
 
 
 @dataclass(frozen=True)
 class Level:
-    """One converged force level."""
+    """One converged force level; residual_n is the largest unbalanced nodal force."""
 
     force_n: float
     state: BodyState
     iterations: int
     residual_n: float
+    penetration_mm: float
 
 
 @dataclass
@@ -63,8 +70,7 @@ def press_levels(body, surface, forces_n, *, settings=NewtonSettings()):
     path = Path()
     path.append(0.0, _first_touch(body, surface, settings))
     for force in forces_n:
-        level = _advance(body, surface, path, float(force), settings)
-        yield level
+        yield _advance(body, surface, path, float(force), settings)
 
 
 def _first_touch(body, surface, settings):
@@ -73,7 +79,7 @@ def _first_touch(body, surface, settings):
     planes = body.slab.facing(slab, surface)
     depth = settings.first_touch_mm + planes.anchors[:, 2].min()   # a tip may lie between the points that feel contact
     start = body.evaluate(slab, bed, depth, planes)
-    state, _, _ = _newton(body, planes, start, None, settings.first_touch_tolerance_n, settings)
+    state, _, _ = _newton(body, surface, start, None, settings.first_touch_tolerance_n, settings)
     if state is None:
         raise ConvergenceError("The first touch of the object did not converge.")
     return state
@@ -86,15 +92,42 @@ def _advance(body, surface, path, target, settings):
         force = min(target, path.forces[-1] + increment)
         state, spent, residual = _attempt(body, surface, path, force, settings)
         iterations += spent
-        if state is not None:
-            path.append(force, state)
-            increment *= 2
-            if force >= target:
-                return Level(force_n=target, state=state, iterations=iterations, residual_n=residual)
-        else:
+        if state is not None and force >= target:
+            state, spent, residual = _press_apart(body, surface, state, residual, force, settings)
+            iterations += spent
+        if state is None:
             increment = 0.5 * (force - path.forces[-1])
             if increment < settings.smallest_increment_n:
-                raise ConvergenceError(f"The press did not converge between {path.forces[-1]:.3g} N and {force:.3g} N.")
+                raise ConvergenceError(_failure(body, path, force, target, residual))
+            continue
+        path.append(force, state)
+        increment *= 2
+        if force >= target:
+            return Level(force_n=target, state=state, iterations=iterations, residual_n=residual,
+                         penetration_mm=body.penetration(state))
+
+
+def _failure(body, path, force, target, residual):
+    reached, state = path.forces[-1], path.states[-1]
+    x, y, share = body.most_compressed(state)
+    return (f"The level of {target:g} N was not reached: from {reached:.4g} N on no step towards {force:.4g} N lowers the "
+            f"energy (unbalanced force {residual:.2g} N); the frustum at x {x:.1f}, y {y:.1f} mm is compressed by {share:.0%} "
+            "of its height. Ask for smaller forces or for levels nearer to each other.")
+
+
+def _press_apart(body, surface, state, residual, force, settings):
+    """The level once more with stiffer contacts, as long as something penetrates deeper than allowed."""
+    iterations = 0
+    while state is not None and body.penetration(state) > settings.largest_penetration_mm:
+        body.stiffen_contacts(state, settings.largest_penetration_mm)
+        stiffer = body.evaluate(state.slab.displacement, state.bed.displacement, state.indentation, state.slab.planes)
+        state, spent, residual = _newton(body, surface, stiffer, force, _tolerance(force, settings), settings)
+        iterations += spent
+    return state, iterations, residual
+
+
+def _tolerance(force, settings):
+    return settings.relative_tolerance * max(force, settings.smallest_scale_n)
 
 
 def _attempt(body, surface, path, force, settings):
@@ -103,26 +136,30 @@ def _attempt(body, surface, path, force, settings):
     start = body.evaluate(*path.predict(force), planes)
     if start is None:
         start = body.evaluate(last.slab.displacement, last.bed.displacement, last.indentation, planes)
-    return _newton(body, planes, start, force, settings.relative_tolerance * max(force, settings.smallest_scale_n), settings)
+    return _newton(body, surface, start, force, _tolerance(force, settings), settings)
 
 
-def _newton(body, planes, state, force, tolerance, settings):
+def _newton(body, surface, state, force, tolerance, settings):
     """Equilibrium state (None if not reached), iterations, and the last residual in N.
 
+    The points' facing planes are found anew before each of the first steps. A point that slides to and fro past an edge
+    sees the object's height jump each time; so the planes are kept later on.
     A step that cut the residual well is followed by one with the same tangent, which is cheap and nearly as good.
     """
-    residual, reuse = body.residual_norm(state, force), False
+    reuse, before = False, np.inf
     for iteration in range(settings.max_iterations):
+        if iteration < settings.refacing_iterations:
+            planes = body.slab.facing(state.slab.displacement, surface)
+            state = body.reface(state, planes)
+        residual = body.residual_norm(state, force)
         if residual <= tolerance:
             return state, iteration, residual
+        reuse = reuse and residual < settings.good_reduction * before
         step = body.newton_step(state, force, same_tangent=reuse)
         trial = _line_search(body, planes, state, step, force, residual, settings) if np.isfinite(step.largest()) else None
         if trial is None and not reuse:
             return None, iteration, residual
-        before = residual
-        if trial is not None:
-            state, residual = trial, body.residual_norm(trial, force)
-        reuse = trial is not None and residual < settings.good_reduction * before
+        before, reuse, state = residual, trial is not None, trial or state
     return None, settings.max_iterations, residual
 
 

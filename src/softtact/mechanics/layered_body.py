@@ -1,6 +1,6 @@
 """The layered sensor as one body: slab (sheet and cover) tied to the bed of frusta, and one Newton step of it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -75,6 +75,12 @@ class LayeredBody:
         self.cells = SheetCells(slab, bed, roots)
         slab.build_pattern(self.cells.inner_dofs, self.cells.outer_dofs)
         self.solver = make_solver(threads=threads)
+        self.has_tangent = False
+
+    def close(self):
+        """Free the factors, and end the threads."""
+        self.solver.close()
+        self.workers.close()
 
     def rest(self):
         """Displacements of slab (n, 3) and frusta (f, nodes, 3) at rest."""
@@ -86,6 +92,10 @@ class LayeredBody:
         bed = self.bed.evaluate(bed_displacement, workers=self.workers) if slab is not None else None
         return None if bed is None else BodyState(slab=slab, bed=bed, indentation=indentation)
 
+    def reface(self, state, planes):
+        """The same state with the object's contact on other planes."""
+        return replace(state, slab=self.slab.reface(state.slab, planes, state.indentation))
+
     def newton_step(self, state, force_n, *, same_tangent=False):
         """The Newton step under a given force (N), or with the indentation kept where `force_n` is None.
 
@@ -95,6 +105,7 @@ class LayeredBody:
         if not same_tangent:
             self.cells.refresh(state, workers=self.workers)
             self._border, self._corner = self._factor_tangent(state)
+            self.has_tangent = True
         residual, kept = self.cells.condensed_residual(state)
         right = residual.ravel()[self.slab.unknowns]
         if same_tangent:
@@ -124,6 +135,33 @@ class LayeredBody:
                 self.slab.add_to_diagonal(matrix, shift)
         return border, corner
 
+    def penetration(self, state):
+        """Deepest penetration in mm, of the object into the cover or of frusta into the board or each other."""
+        return float(max(0.0, -state.slab.gaps.min(), -state.bed.gaps.min()))
+
+    def stiffen_contacts(self, state, largest_mm):
+        """Raise the penalty of a contact that is penetrated deeper than `largest_mm`, half as far again as in proportion."""
+        for part, gaps in ((self.slab, state.slab.gaps), (self.bed, state.bed.gaps)):
+            if -gaps.min() > largest_mm:
+                part.contact = replace(part.contact, stiffness=part.contact.stiffness * 1.5 * -gaps.min() / largest_mm)
+
+    def most_compressed(self, state):
+        """Place x, y (mm) of the most compressed frustum, and its compression as a share of its height."""
+        share = self.bed.compression(state.bed.displacement) / self.bed.geometry.heights
+        worst = int(np.argmax(share))
+        return *self.bed.geometry.centres[worst], float(share[worst])
+
+    def share_outside_window(self, state):
+        """Share of a law's volume that is strained beyond what the law was fitted to, the largest over the laws.
+
+        nan where no law knows what it was fitted to.
+        """
+        volumes = {}
+        for nodes, block in [*self.slab.groups, *self.slab.cell_groups]:
+            _add_volumes(volumes, block, state.slab.displacement[nodes])
+        _add_volumes(volumes, self.bed.block, self.bed.per_element(state.bed.displacement))
+        return max((outside / whole for outside, whole in volumes.values()), default=np.nan)
+
     def residual_norm(self, state, force_n):
         """Largest unbalanced nodal force in N, over slab, frusta and the object."""
         parts = [np.abs(self.slab_force(state).ravel()[self.slab.free]).max(), np.abs(self.bed.inner_residual(state.bed)).max()]
@@ -136,6 +174,13 @@ class LayeredBody:
         total = state.slab.force.copy()
         np.add.at(total, self.cells.roots.ravel(), state.bed.force[:, self.bed.root].reshape(-1, 3))
         return total
+
+
+def _add_volumes(volumes, block, displacement):
+    """Add a block's volume outside its law's window, and its whole volume, to those of the same law."""
+    if block.law.stretch_window is not None:
+        outside, whole = volumes.get(id(block.law), (0.0, 0.0))
+        volumes[id(block.law)] = outside + block.volume_outside(displacement, block.law.stretch_window), whole + block.volume
 
 
 def _lines(side, count, pitch, cells):
@@ -164,7 +209,7 @@ def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), s
     cover = Layer(np.linspace(-spec.cover.thickness_mm, 0.0, mesh.cover_layers + 1), cover_law)
     centres, neighbours = lattice(counts, frusta.pitch_mm)
     plan = sheet_plan(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, spec.footprint_mm, refinement=mesh.refinement)
-    slab = Slab(sheet, cover, plan, x_lines, y_lines, sides="held", contact=contact or ContactSettings(stiffness=500.0),
+    slab = Slab(sheet, cover, plan, x_lines, y_lines, sides="held", contact=contact or ContactSettings(),
                 coarse_walls=mesh.coarse_walls)
     return LayeredBody(slab, _bed(spec, centres, neighbours, dielectric_law, mesh, scatter, contact), slab.bottom[plan.roots],
                        threads=threads)
@@ -180,7 +225,7 @@ def build_unit_cell(spec, *, dielectric_law, cover_law=None, mesh=MeshSettings()
     cover = Layer(np.linspace(-cover_mm, 0.0, (mesh.cover_layers if cover_mm else 0) + 1), cover_law)
     centre = np.zeros((1, 2))
     plan = sheet_plan(centre, (1, 1), frusta.pitch_mm, frusta.root_diameter_mm, (frusta.pitch_mm,) * 2, refinement=mesh.refinement)
-    slab = Slab(sheet, cover, plan, lines, lines, sides="symmetric", contact=ContactSettings(stiffness=500.0),
+    slab = Slab(sheet, cover, plan, lines, lines, sides="symmetric", contact=ContactSettings(),
                 coarse_walls=mesh.coarse_walls)
     bed = _bed(spec, centre, np.ones((1, 4), dtype=bool), dielectric_law, mesh,
                (np.array([height_factor]), np.array([tip_factor])), None, bottom=bottom)

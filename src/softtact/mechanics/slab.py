@@ -23,12 +23,16 @@ TOP_POINTS = 8
 
 @dataclass(frozen=True)
 class SlabState:
-    """energy (mJ), force (n, 3) in N without the object's, contact quantities at the top's points, displacement (n, 3)."""
+    """energy (mJ), force (n, 3) in N, contact quantities at the top's points, displacement (n, 3).
 
+    elastic: energy and force of the rubber alone; planes: what the points face; indentation_force: the object's, N downwards.
+    """
+
+    elastic: tuple
     energy: float
     force: np.ndarray
     gaps: np.ndarray
-    normals: np.ndarray
+    planes: "FacingPlanes"
     displacement: np.ndarray
     indentation_force: float
 
@@ -37,8 +41,7 @@ class SlabState:
 class FacingPlanes:
     """The planes of the object's facets that points face: anchors (p, 3) in mm at no indentation, outward normals (p, 3).
 
-    A point keeps its plane during a load step: one that slides past an edge would otherwise see the height jump, and
-    Newton's method cycle. The planes are found anew before every step.
+    A point keeps its plane during a step of Newton's method, so that each step lowers one potential.
     """
 
     anchors: np.ndarray
@@ -162,7 +165,7 @@ class Slab:
         return np.einsum("ga,tad->tgd", self.top_values, field[self.top_faces], optimize=True).reshape(-1, 3)
 
     def facing(self, displacement, surface):
-        """The object's facets above the top's points, kept through a load step (see `FacingPlanes`)."""
+        """The object's facets above the top's points (see `FacingPlanes`)."""
         position = self.top_reference + self._at_top(displacement)
         height, normals = surface(position[:, 0], position[:, 1])
         return FacingPlanes(anchors=np.column_stack([position[:, :2], height]), normals=normals)
@@ -177,13 +180,21 @@ class Slab:
                 return None
             energy += state.energy
             np.add.at(force, nodes.ravel(), state.force.reshape(-1, 3))
+        return self._with_contact(displacement, (energy, force), planes, indentation)
+
+    def reface(self, state, planes, indentation):
+        """The same displacements in front of other planes."""
+        return self._with_contact(state.displacement, state.elastic, planes, indentation)
+
+    def _with_contact(self, displacement, elastic, planes, indentation):
         gaps, normals = self.gaps(displacement, planes, indentation), planes.normals
         density, pressure, _ = penalty(gaps, stiffness=self.contact.stiffness, smoothing=self.contact.smoothing)
         push = (pressure * self.top_area)[:, None] * normals      # on the slab: along the object's outward normal
         nodal = np.einsum("tgd,ga->tad", push.reshape(len(self.top_faces), -1, 3), self.top_values, optimize=True)
+        force = elastic[1].copy()
         np.add.at(force, self.top_faces.ravel(), -nodal.reshape(-1, 3))
-        return SlabState(energy=energy + float(density @ self.top_area), force=force, gaps=gaps, normals=normals,
-                         displacement=displacement, indentation_force=float(-push[:, 2].sum()))
+        return SlabState(elastic=elastic, energy=elastic[0] + float(density @ self.top_area), force=force, gaps=gaps,
+                         planes=planes, displacement=displacement, indentation_force=float(-push[:, 2].sum()))
 
     def gaps(self, displacement, planes, indentation):
         """Normal gaps (p,) in mm between the top's points and the planes they face."""
@@ -224,7 +235,7 @@ class Slab:
     def _contact_tangent(self, state):
         _, _, slope = penalty(state.gaps, stiffness=self.contact.stiffness, smoothing=self.contact.smoothing)
         weight = (slope * self.top_area).reshape(len(self.top_faces), -1)
-        normal = state.normals.reshape(*weight.shape, 3)
+        normal = state.planes.normals.reshape(*weight.shape, 3)
         shape = np.einsum("ga,tgd->tgad", self.top_values, normal).reshape(*weight.shape, 24)
         blocks = np.matmul((shape * weight[..., None]).transpose(0, 2, 1), shape)
         # gap = n.(x - surface): raising the indentation by 1 closes it by -n_z, which is positive downwards

@@ -28,9 +28,9 @@ def run(*, inputs, outputs, settings, threads=1):
     label = f"{item['set']}/{item['name']}/{settings['model']}"
     try:
         result = sensor.press(read_mesh(inputs["object"], unit=item["unit"]), pose=pose, force_n=settings["forces_n"],
-                              model=solver, label=label)
+                              model=solver, label=label, threads=threads)
     except ConvergenceError as error:
-        raise ConvergenceError(f"{label}: {error}") from None
+        raise ConvergenceError(f"{label}: {error}", result=error.result) from None
     result.write(outputs["press"], settings=settings)
 
 

@@ -49,8 +49,12 @@ class IsochoricResponse:
 
 
 class Law:
-    """A law psi of the isochoric stretches, with the penalty U(J) = K/2 (J - 1)^2 on the volume."""
+    """A law psi of the isochoric stretches, with the penalty U(J) = K/2 (J - 1)^2 on the volume.
 
+    stretch_window: lowest and highest principal stretch of the data it was fitted to; None where that is not known
+    """
+
+    stretch_window: tuple | None = None
     name: str
     constants: tuple[Parameter, ...]
 

@@ -138,3 +138,19 @@ def _dyads(V, N, W):
             i, j = ROW[k], COLUMN[k]
             N[a, k] = V[i, a] * V[j, a]
             W[a, k] = V[i, a] * V[j, b] + V[j, a] * V[i, b]
+
+
+def stretch_range(C6):
+    """Smallest and largest isochoric principal stretch (n,) at points given by C6 (n, 6).
+
+    Eigenvalues of a symmetric 3 x 3 matrix in closed form (Smith, Comm. ACM 4 (1961) 168).
+    """
+    xx, yy, zz, xy, yz, zx = C6.T
+    mean = (xx + yy + zz) / 3
+    a, b, c = xx - mean, yy - mean, zz - mean
+    spread = np.sqrt(np.maximum((a * a + b * b + c * c + 2 * (xy * xy + yz * yz + zx * zx)) / 6, 1e-30))
+    deviator = a * (b * c - yz * yz) - xy * (xy * c - yz * zx) + zx * (xy * yz - b * zx)
+    angle = np.arccos(np.clip(deviator / (2 * spread**3), -1.0, 1.0)) / 3
+    high, low = mean + 2 * spread * np.cos(angle), mean + 2 * spread * np.cos(angle + 2 * np.pi / 3)
+    volume = (high * low * (3 * mean - high - low)) ** (1 / 3)
+    return np.sqrt(low / volume), np.sqrt(high / volume)
