@@ -122,7 +122,8 @@ class Sensor:
         valid = maps.max(axis=1) < 0.5 * self.spec.thickness_mm
         unknown = np.full(len(levels), np.nan)
         return self._result("elastic", "dense", maps, forces, np.array(times), indentation_mm=indentation,
-                            contact_area_mm2=touching, within_validity=valid, penetration_mm=[level.penetration for level in levels],
+                            contact_area_mm2=touching, within_validity=valid,
+                            penetration_mm=[level.penetration for level in levels],
                             frustum_compression_mm=unknown, residual_n=unknown, outside_card=unknown,
                             iterations=[level.iterations for level in levels])
 

@@ -9,8 +9,6 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 from fe import assemble
 
-from softtact.contact.penalty import penalty
-
 
 class NaiveSensor:
     """One object over the sensor; its planes are those at rest, so it has to be a plane itself."""
@@ -90,7 +88,7 @@ class NaiveSensor:
             energy += state.energy
             np.add.at(gradient.reshape(-1, 3), hexes.ravel(), state.force.reshape(-1, 3))
         for B, gaps, area, contact, lowering in self._contacts(u, depth):
-            density, pressure, _ = penalty(gaps, stiffness=contact.stiffness, smoothing=contact.smoothing)
+            density, pressure, _ = contact.response(gaps)
             energy += density @ area
             gradient -= B.T @ (pressure * area)
             by_depth -= lowering @ (pressure * area)
@@ -102,7 +100,7 @@ class NaiveSensor:
         for hexes, block in self.parts:
             K = K + assemble(block.tangent(u.reshape(-1, 3)[hexes]), hexes, self.nodes)
         for B, gaps, area, contact, lowering in self._contacts(u, depth):
-            weight = penalty(gaps, stiffness=contact.stiffness, smoothing=contact.smoothing)[2] * area
+            weight = contact.response(gaps)[2] * area
             K = K + B.T @ sp.diags(weight) @ B
             border = border + B.T @ (weight * lowering)
             corner += weight @ lowering**2
@@ -156,7 +154,7 @@ class NaiveSensor:
     def board_force(self, bed_state):
         """Force (N) of a bed's frusta on the board."""
         bed = self.body.bed
-        pressure = penalty(bed_state.gaps, stiffness=bed.contact.stiffness, smoothing=bed.contact.smoothing)[1]
+        pressure = bed.contact.response(bed_state.gaps)[1]
         return float((pressure * bed.point_area)[:, bed.point_neighbour < 0].sum())
 
     def side_reaction(self, state):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from softtact.mechanics.elastic import surface_compliance
-from softtact.mechanics.frustum_bed import ContactSettings
+from softtact.mechanics.frustum_bed import Contact
 from softtact.mechanics.hex_mesh import SheetPlan, grid_plan, merge, with_centres
 from softtact.mechanics.linear_solvers import make_solver
 from softtact.mechanics.slab import Layer, Slab
@@ -76,7 +76,7 @@ class HeldSlab:
         above = next((k for k, law in enumerate(laws) if law is not laws[0]), 1)
         layers = Layer(np.asarray(z)[:above + 1], laws[0]), Layer(np.asarray(z)[above:], laws[-1])
         self.slab = Slab(*layers, _without_frusta(x, y), x, y, sides=sides,
-                         contact=ContactSettings(stiffness=stiffness, smoothing=smoothing))
+                         contact=Contact(stiffness=stiffness, smoothing=smoothing))
         self._hold_the_base()
         self.slab.build_pattern(np.zeros(0, dtype=int), np.zeros((0, 1), dtype=int))
 

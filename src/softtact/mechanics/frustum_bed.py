@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from softtact.contact.penalty import penalty
 from softtact.mechanics.blocks import HexBlock
 from softtact.mechanics.condensation import Condensation, Springs
 from softtact.mechanics.elements import HEX27_BOTTOM, HEX27_SIDES, gauss, quad9
@@ -42,14 +41,6 @@ class BedState:
     force: np.ndarray
     gaps: np.ndarray
     displacement: np.ndarray
-
-
-@dataclass(frozen=True)
-class ContactSettings:
-    """Penalty stiffness in N/mm3 and smoothing depth in mm."""
-
-    stiffness: float = 3000.0
-    smoothing: float = 1e-3
 
 
 @dataclass(frozen=True)
@@ -172,7 +163,7 @@ class FrustumBed:
         if body is None:
             return None
         gaps = self.gap0 + self._along(displacement)
-        energy, pressure, _ = penalty(gaps, stiffness=self.contact.stiffness, smoothing=self.contact.smoothing)
+        energy, pressure, _ = self.contact.response(gaps)
         force = np.zeros((self.count, self.nodes, 3))
         per_element = body.force.reshape(self.count, -1, 27, 3)
         for k, nodes in enumerate(self.mesh.hexes):
@@ -183,11 +174,11 @@ class FrustumBed:
 
     def contact_slope(self, gaps):
         """Stiffness (n, p) of the contact points in N/mm3."""
-        return penalty(gaps, stiffness=self.contact.stiffness, smoothing=self.contact.smoothing)[2]
+        return self.contact.response(gaps)[2]
 
     def condense(self, state, frusta):
         """Recompute the condensed tangents of the given frusta (k,); returns those of their roots (k, 1, 75, 75)."""
-        slope = self.contact_slope(state.gaps[frusta]) * self.point_area[frusta]
+        slope = self.contact_slope(state.gaps)[frusta] * self.point_area[frusta]
         displacement = state.displacement[frusta]
         left = []
         for k, layer in enumerate(self.layers):

@@ -13,7 +13,7 @@ class NewtonSettings:
     """When a level counts as reached, and how Newton's method goes there.
 
     relative_tolerance: largest unbalanced nodal force as a share of the force, at least of smallest_scale_n
-    largest_penetration_mm: beyond it the contacts are made stiffer and the level is solved again
+    largest_penetration_mm, contact_passes: with deeper overlaps they are pressed apart and the level is solved again, so often
     largest_step_mm: largest movement of a node in one iteration;  smallest_increment_n: force steps are halved down to this
     first_touch_mm, first_touch_tolerance_n: overlap at which the press begins, and the residual that is good enough there
     good_reduction: a tangent that cut the residual to this share is used again
@@ -22,6 +22,7 @@ class NewtonSettings:
 
     relative_tolerance: float = 1e-4   # of a nodal force; 1e-6 changes the indentation by 2e-6 of itself
     largest_penetration_mm: float = 1e-3
+    contact_passes: int = 10
     max_iterations: int = 40
     largest_step_mm: float = 0.12
     smallest_increment_n: float = 0.02
@@ -116,12 +117,14 @@ def _failure(body, path, force, target, residual):
 
 
 def _press_apart(body, surface, state, residual, force, settings):
-    """The level once more with stiffer contacts, as long as something penetrates deeper than allowed."""
+    """The level once more with its overlaps pressed apart, as long as they are deeper than allowed."""
     iterations = 0
-    while state is not None and body.penetration(state) > settings.largest_penetration_mm:
-        body.stiffen_contacts(state, settings.largest_penetration_mm)
-        stiffer = body.evaluate(state.slab.displacement, state.bed.displacement, state.indentation, state.slab.planes)
-        state, spent, residual = _newton(body, surface, stiffer, force, _tolerance(force, settings), settings)
+    for _ in range(settings.contact_passes):
+        if state is None or body.contact_error(state) <= settings.largest_penetration_mm:
+            break
+        body.press_apart(state)
+        again = body.evaluate(state.slab.displacement, state.bed.displacement, state.indentation, state.slab.planes)
+        state, spent, residual = _newton(body, surface, body.let_down(again, force), force, _tolerance(force, settings), settings)
         iterations += spent
     return state, iterations, residual
 

@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from softtact.contact.height_field import HeightField
-from softtact.mechanics.frustum_bed import BedGeometry, BedState, ContactSettings, FrustumBed
+from softtact.contact.penalty import Contact
+from softtact.mechanics.frustum_bed import BedGeometry, BedState, FrustumBed
 from softtact.mechanics.hex_mesh import sheet_plan
 from softtact.mechanics.linear_solvers import make_solver
 from softtact.mechanics.parallel import Workers
@@ -96,6 +97,11 @@ class LayeredBody:
         """The same state with the object's contact on other planes."""
         return replace(state, slab=self.slab.reface(state.slab, planes, state.indentation))
 
+    def let_down(self, state, force_n):
+        """The state with the object at the depth where its force is `force_n`: the least energy over the indentation."""
+        depth = self.slab.balanced(state.slab, state.indentation, force_n)
+        return replace(state, slab=self.slab.reface(state.slab, state.slab.planes, depth), indentation=depth)
+
     def newton_step(self, state, force_n, *, same_tangent=False):
         """The Newton step under a given force (N), or with the indentation kept where `force_n` is None.
 
@@ -139,11 +145,14 @@ class LayeredBody:
         """Deepest penetration in mm, of the object into the cover or of frusta into the board or each other."""
         return float(max(0.0, -state.slab.gaps.min(), -state.bed.gaps.min()))
 
-    def stiffen_contacts(self, state, largest_mm):
-        """Raise the penalty of a contact that is penetrated deeper than `largest_mm`, half as far again as in proportion."""
-        for part, gaps in ((self.slab, state.slab.gaps), (self.bed, state.bed.gaps)):
-            if -gaps.min() > largest_mm:
-                part.contact = replace(part.contact, stiffness=part.contact.stiffness * 1.5 * -gaps.min() / largest_mm)
+    def contact_error(self, state):
+        """Deepest overlap, or widest gap under pressure, in mm."""
+        return max(self.slab.contact.error(state.slab.gaps), self.bed.contact.error(state.bed.gaps))
+
+    def press_apart(self, state):
+        """Hold the points that overlap where their surfaces just touch."""
+        self.slab.contact = self.slab.contact.pressed_apart(state.slab.gaps)
+        self.bed.contact = self.bed.contact.pressed_apart(state.bed.gaps)
 
     def most_compressed(self, state):
         """Place x, y (mm) of the most compressed frustum, and its compression as a share of its height."""
@@ -209,7 +218,7 @@ def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), s
     cover = Layer(np.linspace(-spec.cover.thickness_mm, 0.0, mesh.cover_layers + 1), cover_law)
     centres, neighbours = lattice(counts, frusta.pitch_mm)
     plan = sheet_plan(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, spec.footprint_mm, refinement=mesh.refinement)
-    slab = Slab(sheet, cover, plan, x_lines, y_lines, sides="held", contact=contact or ContactSettings(),
+    slab = Slab(sheet, cover, plan, x_lines, y_lines, sides="held", contact=contact or Contact(),
                 coarse_walls=mesh.coarse_walls)
     return LayeredBody(slab, _bed(spec, centres, neighbours, dielectric_law, mesh, scatter, contact), slab.bottom[plan.roots],
                        threads=threads)
@@ -225,7 +234,7 @@ def build_unit_cell(spec, *, dielectric_law, cover_law=None, mesh=MeshSettings()
     cover = Layer(np.linspace(-cover_mm, 0.0, (mesh.cover_layers if cover_mm else 0) + 1), cover_law)
     centre = np.zeros((1, 2))
     plan = sheet_plan(centre, (1, 1), frusta.pitch_mm, frusta.root_diameter_mm, (frusta.pitch_mm,) * 2, refinement=mesh.refinement)
-    slab = Slab(sheet, cover, plan, lines, lines, sides="symmetric", contact=ContactSettings(),
+    slab = Slab(sheet, cover, plan, lines, lines, sides="symmetric", contact=Contact(),
                 coarse_walls=mesh.coarse_walls)
     bed = _bed(spec, centre, np.ones((1, 4), dtype=bool), dielectric_law, mesh,
                (np.array([height_factor]), np.array([tip_factor])), None, bottom=bottom)
@@ -242,7 +251,7 @@ def _bed(spec, centres, neighbours, law, mesh, scatter, contact, *, bottom=None)
     geometry = BedGeometry(centres=centres, heights=heights, tip_diameters=frusta.tip_diameter_mm * tip_factor,
                            root_diameter=frusta.root_diameter_mm, neighbours=neighbours)
     return FrustumBed(geometry, law, levels=np.asarray(mesh.frustum_levels) * frusta.height_mm, root_z_mm=bottom,
-                      pcb_z_mm=bottom - heights.max(), tips_held=spec.tips_held, contact=contact or ContactSettings(),
+                      pcb_z_mm=bottom - heights.max(), tips_held=spec.tips_held, contact=contact or Contact(),
                       local_over_shear=mesh.local_over_shear, refinement=mesh.refinement)
 
 

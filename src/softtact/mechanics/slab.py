@@ -10,7 +10,6 @@ import numpy as np
 import scipy.sparse as sp
 from numba import njit
 
-from softtact.contact.penalty import penalty
 from softtact.mechanics.blocks import HexBlock, WedgeBlock
 from softtact.mechanics.elements import gauss, quad8
 from softtact.mechanics.hex_mesh import extrude, grid_plan
@@ -19,6 +18,7 @@ from softtact.mechanics.parallel import SERIAL, unique_rows
 # Contact points along a side of a top face, which is a pitch wide. With 3 a punch's edge between them goes unnoticed: a cylinder
 # of 1.8 mm went 0.073 mm deep instead of 0.048 mm, and maps were up to a tenth of their maximum off (docs/decks.md).
 TOP_POINTS = 8
+_NEAR_MM, _LARGEST_SHIFT_MM = 0.2, 0.02   # points that may touch when the object is let down on the cover, and how far at once
 
 
 @dataclass(frozen=True)
@@ -186,9 +186,26 @@ class Slab:
         """The same displacements in front of other planes."""
         return self._with_contact(state.displacement, state.elastic, planes, indentation)
 
+    def balanced(self, state, indentation, force_n):
+        """The indentation (mm) at which the object's force is `force_n` on the cover as it is.
+
+        The force grows with the depth, from a square root's slope on: Newton's method with bounded steps.
+        """
+        near = np.flatnonzero(state.gaps < _NEAR_MM)
+        down, area = -state.planes.normals[near, 2], self.top_area[near]
+        contact, gaps, shift = self.contact.at(near), state.gaps[near], 0.0
+        for _ in range(50):
+            _, pressure, slope = contact.response(gaps - shift * down)
+            excess = pressure @ (down * area) - force_n
+            if abs(excess) <= 1e-9 * force_n:
+                break
+            stiffness = slope @ (down**2 * area)
+            shift -= np.clip(excess / max(stiffness, 1e-12), -_LARGEST_SHIFT_MM, _LARGEST_SHIFT_MM)
+        return indentation + shift
+
     def _with_contact(self, displacement, elastic, planes, indentation):
         gaps, normals = self.gaps(displacement, planes, indentation), planes.normals
-        density, pressure, _ = penalty(gaps, stiffness=self.contact.stiffness, smoothing=self.contact.smoothing)
+        density, pressure, _ = self.contact.response(gaps)
         push = (pressure * self.top_area)[:, None] * normals      # on the slab: along the object's outward normal
         nodal = np.einsum("tgd,ga->tad", push.reshape(len(self.top_faces), -1, 3), self.top_values, optimize=True)
         force = elastic[1].copy()
@@ -233,7 +250,7 @@ class Slab:
         matrix.data[matrix.indptr[:-1]] += value   # sorted upper triangle: each row begins with its diagonal
 
     def _contact_tangent(self, state):
-        _, _, slope = penalty(state.gaps, stiffness=self.contact.stiffness, smoothing=self.contact.smoothing)
+        _, _, slope = self.contact.response(state.gaps)
         weight = (slope * self.top_area).reshape(len(self.top_faces), -1)
         normal = state.planes.normals.reshape(*weight.shape, 3)
         shape = np.einsum("ga,tgd->tgad", self.top_values, normal).reshape(*weight.shape, 24)
