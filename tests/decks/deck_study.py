@@ -11,9 +11,6 @@ import pytest
 
 from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.laws.registry import make_law
-from softtact.mechanics import frustum_bed, slab
-from softtact.mechanics.blocks import HexBlock
-from softtact.mechanics.elements import gauss
 
 CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
 POLYURETHANE = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492)
@@ -63,18 +60,7 @@ def gaussian_chains(shear_modulus):
     return make_law("arruda_boyce", {"mu": shear_modulus, "lambda_m": 100.0}, bulk_modulus=20 * shear_modulus)
 
 
-def as_in_ccx(monkeypatch, build, *, top_points=10, side_points=8):
-    """The body of `build()` with the numerics of ccx: all volumetric energy at the points, a sharp contact law, many points.
-
-    Frusta then are C3D20 (27 points) and the slab C3D20R (8). ccx cuts the touching faces with each other and has points
-    enough in each piece; ours are raised to resolve the contact's edge as well.
-    """
-    monkeypatch.setattr(frustum_bed, "gauss", lambda points, dimension: gauss(side_points, dimension))
-    monkeypatch.setattr(slab, "gauss", lambda points, dimension: gauss(top_points, dimension))
-    body = build()
+def sharp(body):
+    """The body with the contact law of a CalculiX deck: no smooth start of 0.001 mm."""
     body.bed.contact, body.slab.contact = (replace(part.contact, smoothing=2e-5) for part in (body.bed, body.slab))
-    law = body.bed.block.law
-    body.bed.block = HexBlock(body.bed.coordinates[:, body.bed.mesh.hexes].reshape(-1, 20, 3), law, local_over_shear=20.0)
-    body.slab.blocks = [(hexes, HexBlock(body.slab.mesh.points[hexes], block.law, points_per_side=2, local_over_shear=20.0))
-                        for hexes, block in body.slab.blocks]
     return body

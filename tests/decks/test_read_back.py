@@ -8,7 +8,7 @@ from deck_study import CORO, NEOPRENE, POLYURETHANE
 from softtact.contact.penalty import penalty
 from softtact.decks.export import deck_text, export_press, write_deck
 from softtact.decks.laws import law_card
-from softtact.decks.model import Tie, deck_model, without_chains
+from softtact.decks.model import deck_model
 from softtact.decks.read import read_deck
 from softtact.errors import InputError
 from softtact.geometry.meshes import place
@@ -19,8 +19,12 @@ from softtact.sensor import Sensor
 SMALL = CORO.model_copy(update={"footprint_mm": (2.4, 3.6), "map_shape": (7, 5)})   # 2 x 3 frusta
 SENSOR = Sensor(SMALL, {"dielectric": POLYURETHANE, "cover": NEOPRENE}, mesh=MeshSettings(cover_layers=1))
 SPHERE = trimesh.creation.icosphere(subdivisions=2, radius=2.0)
-# Corner nodes of the faces of a 20-node brick: Abaqus Elements Guide, "Three-dimensional solid element library"; ccx has the same.
+# Corner nodes of faces, and ends of the edges that the further nodes halve: Abaqus Elements Guide, "Three-dimensional solid element
+# library"; ccx has the same.
 ABAQUS_FACES = {1: {1, 2, 3, 4}, 2: {5, 8, 7, 6}, 3: {1, 5, 6, 2}, 4: {2, 6, 7, 3}, 5: {3, 7, 8, 4}, 6: {4, 8, 5, 1}}
+WEDGE_FACES = {1: {1, 2, 3}, 2: {4, 5, 6}}
+BRICK_EDGES = [(1, 2), (2, 3), (3, 4), (4, 1), (5, 6), (6, 7), (7, 8), (8, 5), (1, 5), (2, 6), (3, 7), (4, 8)]
+WEDGE_EDGES = [(1, 2), (2, 3), (3, 1), (4, 5), (5, 6), (6, 4), (1, 4), (2, 5), (3, 6)]
 
 
 @pytest.fixture(scope="module", params=["calculix", "abaqus"])
@@ -44,13 +48,37 @@ def test_nodes_and_elements_come_back(pair, dialect):
     model, deck = pair
     rubber = np.array([deck.nodes[n + 1] for n in range(len(model.points))])
     assert rubber == pytest.approx(model.points, abs=1e-11)       # 12 digits are written
-    kinds = {"calculix": ("C3D20R", "C3D20R"), "abaqus": ("C3D20RH", "C3D20H")}[dialect]
+    kinds = {"calculix": ("C3D20R", "C3D20R", "C3D15"), "abaqus": ("C3D20RH", "C3D20H", "C3D15H")}[dialect]
     for part in model.parts:
-        kind, elements = deck.elements[part.name]
-        assert kind == kinds[part.name == "FRUSTA"]
-        assert list(elements) == (part.elements + 1).tolist()
-        assert np.array(list(elements.values())).tolist() == (part.hexes + 1).tolist()
+        expected = {kinds[part.name == "FRUSTA"]: (part.hex_elements, part.hexes)}
+        if part.name == "SHEET":
+            expected[kinds[2]] = (part.wedge_elements, part.wedges)
+        assert list(deck.elements[part.name]) == list(expected)
+        for kind, (numbers, nodes) in expected.items():
+            elements = deck.elements[part.name][kind]
+            assert list(elements) == (numbers + 1).tolist()
+            assert list(elements.values()) == (nodes + 1).tolist()
         assert deck.node_sets[part.name] == (part.nodes + 1).tolist()
+
+
+def test_nodes_beyond_the_corners_halve_the_edges_that_abaqus_says(pair):
+    """An arc of a quarter circle is 0.21 of its chord away from it; a node of another edge would be half an edge away."""
+    model, _ = pair
+    for part in model.parts:
+        for elements, edges in ((part.hexes, BRICK_EDGES), (part.wedges, WEDGE_EDGES)):
+            corners = model.points[elements]
+            for middle, (a, b) in enumerate(edges, start=elements.shape[1] - len(edges)):
+                length = np.linalg.norm(corners[:, b - 1] - corners[:, a - 1], axis=1)
+                off = np.linalg.norm(corners[:, middle] - 0.5 * (corners[:, a - 1] + corners[:, b - 1]), axis=1)
+                assert (off < 0.22 * length).all()
+
+
+def test_sheet_and_frusta_share_the_roots_and_no_node_is_idle(pair):
+    model, _ = pair
+    sheet, cover, frusta = (set(part.nodes.tolist()) for part in model.parts)
+    assert len(sheet & frusta) == 6 * 20 - 7        # a root of five quads; the seven pairs of neighbours touch in one node
+    assert len(sheet & cover) > 0
+    assert sheet | cover | frusta == set(range(len(model.points)))
 
 
 def test_laws_come_back(pair, dialect):
@@ -62,18 +90,31 @@ def test_laws_come_back(pair, dialect):
     assert [part.law for part in model.parts] == [POLYURETHANE, NEOPRENE, POLYURETHANE]
 
 
-def test_constraints_come_back_and_carry_a_linear_field(pair):
+def test_constraints_come_back_and_carry_a_quadratic_field(pair):
+    """The sheet's top follows 8-node faces, quarters of walls follow parabolas: both hold a quadratic field in the plane."""
     model, deck = pair
     ours = [eq for eq in deck.equations if eq[0][2] == -1 and len(eq) > 2]
-    assert len(ours) == 3 * len(model.ties) == 3 * 6 * 20
+    assert len(ours) == 3 * len(model.ties) > 0
+    x, y = model.points[:, :2].T
+    field = 1 + 2 * x - y + 3 * x**2 - 2 * x * y + 0.5 * y**2
     for k, tie in enumerate(model.ties):
         for component in (1, 2, 3):
             slave, *masters = ours[3 * k + component - 1]
             assert slave == (tie.slave + 1, component, -1.0)
             assert [m[:2] for m in masters] == [(n + 1, component) for n in tie.masters]
             assert [m[2] for m in masters] == pytest.approx(tie.weights, rel=1e-11)
-        # A tied node stands where its masters put it (the search moves it inwards by 1e-7 of the frustum's radius).
-        assert tie.weights @ model.points[tie.masters] == pytest.approx(model.points[tie.slave], abs=1e-6)
+        assert model.points[tie.masters, 2] == pytest.approx(model.points[tie.slave, 2])
+        assert tie.weights @ field[tie.masters] == pytest.approx(field[tie.slave], abs=1e-9)
+
+
+def test_a_node_that_follows_others_is_no_master_and_is_not_held(pair):
+    """Both programs eliminate it, and refuse chains and further conditions on it."""
+    model, deck = pair
+    slaves = {tie.slave + 1 for tie in model.ties}
+    assert slaves == set(deck.node_sets["TIED"]) and len(slaves) == len(model.ties)
+    assert not slaves & {master + 1 for tie in model.ties for master in tie.masters.tolist()}
+    assert not slaves & set(deck.node_sets["HELD"])
+    assert {node + 1 for node in model.held[:, 0].tolist()} == set(deck.node_sets["HELD"])
 
 
 def test_steps_and_supports_come_back(pair):
@@ -96,21 +137,33 @@ def test_surfaces_name_the_faces_that_touch(pair):
     model, deck = pair
     for name, faces in model.surfaces.items():
         assert deck.surfaces[name] == [(str(element + 1), f"S{face}") for element, face in faces]
-    hexes = {n: row for part in model.parts for n, row in zip(part.elements.tolist(), part.hexes, strict=True)}
 
     def corners(name):
-        rows = [[model.points[hexes[e][n - 1]] for n in sorted(ABAQUS_FACES[face])] for e, face in model.surfaces[name].tolist()]
-        return np.array(rows).reshape(-1, 3)
+        return np.vstack(face_corners(model, name))
 
     assert corners("TOP")[:, 2] == pytest.approx(0.0, abs=1e-12)
     assert corners("FRUSTA_TIPS")[:, 2] == pytest.approx(-2.5)
     centres = SENSOR.body().bed.geometry.centres
     sides = corners("FRUSTA_SIDES")
-    radius = np.linalg.norm(sides[:, None, :2] - centres, axis=2).min(axis=1)
-    share = (sides[:, 2] + 2.5) / 0.5
-    assert radius == pytest.approx(0.3 + 0.3 * share, rel=0.03)    # corners of a quadratic circle lie 2.3 % outside
+    assert np.linalg.norm(sides[:, None, :2] - centres, axis=2).min(axis=1) == pytest.approx(cone_radius(sides), rel=1e-6)
     even, odd = ({tuple(face) for face in model.surfaces[f"FRUSTA_SIDES_{half}"].tolist()} for half in ("EVEN", "ODD"))
     assert not even & odd and even | odd == {tuple(face) for face in model.surfaces["FRUSTA_SIDES"].tolist()}
+
+
+def face_corners(model, name):
+    """Corners (3 or 4, 3) of each face of a surface, by the numbering of Abaqus."""
+    elements = {}
+    for part in model.parts:
+        for numbers, rows, table in ((part.hex_elements, part.hexes, ABAQUS_FACES),
+                                     (part.wedge_elements, part.wedges, WEDGE_FACES)):
+            elements |= {n: (row, table) for n, row in zip(numbers.tolist(), rows, strict=True)}
+    return [np.array([model.points[elements[e][0][n - 1]] for n in sorted(elements[e][1][face])])
+            for e, face in model.surfaces[name].tolist()]
+
+
+def cone_radius(points):
+    """Radius (n,) in mm of a frustum at points (n, 3) of a sensor."""
+    return 0.3 + 0.3 * (points[:, 2] + 2.5) / 0.5
 
 
 def test_contacts_have_the_penalty_of_the_press(pair, dialect):
@@ -129,7 +182,7 @@ def test_contacts_have_the_penalty_of_the_press(pair, dialect):
 def test_the_objects_facets_look_at_the_rubber(pair, dialect):
     model, deck = pair
     body, = (rigid for rigid in model.rigid if rigid.name == "OBJECT")
-    kind, elements = deck.elements["OBJECT"]
+    (kind, elements), = deck.elements["OBJECT"].items()
     corners = np.array([[deck.nodes[n] for n in nodes] for nodes in elements.values()])
     if dialect == "calculix":
         assert kind == "C3D4" and deck.surfaces["OBJECT_SURFACE"][0][1] == "S1"
@@ -150,29 +203,29 @@ def test_our_faces_are_those_of_abaqus():
     assert [set((face[:4] + 1).tolist()) for face in ours] == list(ABAQUS_FACES.values())
 
 
-def test_a_master_that_is_tied_itself_is_replaced_by_its_masters():
-    ties = [Tie(5, np.array([1, 2]), np.array([0.5, 0.5])), Tie(7, np.array([5, 3]), np.array([0.4, 0.6]))]
-    resolved = without_chains(ties)[1]
-    assert dict(zip(resolved.masters.tolist(), resolved.weights.tolist(), strict=True)) == pytest.approx({1: 0.2, 2: 0.2, 3: 0.6})
-
-
-def test_a_ring_of_ties_is_an_error():
-    with pytest.raises(ValueError, match="tied to itself"):
-        without_chains([Tie(1, np.array([2]), np.ones(1)), Tie(2, np.array([1]), np.ones(1))])
-
-
 def test_a_unit_cell_has_walls_for_the_neighbours_it_lacks(tmp_path, dialect):
     body = build_unit_cell(CORO, dielectric_law=POLYURETHANE)
     model = deck_model(body, place(trimesh.creation.box((5.0, 5.0, 1.0))), indentations_mm=[0.02, 0.05])
     write_deck(tmp_path / "cell.inp", model, dialect=dialect)
     deck = read_deck(tmp_path / "cell.inp")
     assert [part.name for part in model.parts] == ["SHEET", "FRUSTA"]
+    top = face_corners(model, "TOP")                              # without a cover: the sheet's bricks and wedges
+    assert sorted(map(len, top)) == 4 * [3] + 5 * [4] and np.vstack(top)[:, 2] == pytest.approx(0.0)
     assert [contact[:2] for contact in deck.contacts][-1] == ("FRUSTA_SIDES", "WALLS_SURFACE")
     assert [step.boundary[-1][1:] for step in deck.steps] == [(3, 3, -0.02), (3, 3, -0.05)]
     walls, = (rigid for rigid in model.rigid if rigid.name == "WALLS")
     corners = walls.points[walls.facets]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert (np.einsum("fi,fi->f", normal, corners.mean(axis=1) * [1, 1, 0]) < 0).all()    # inwards
+
+
+def test_a_refined_cell_has_its_finer_sides_and_no_coarse_walls(dialect):
+    body = build_unit_cell(CORO, dielectric_law=POLYURETHANE, mesh=MeshSettings(refinement=1, cells_per_pitch=2))
+    model = deck_model(body, place(trimesh.creation.box((5.0, 5.0, 1.0))), indentations_mm=[0.02])
+    sides = np.vstack(face_corners(model, "FRUSTA_SIDES")) - [0, 0, 1.5]      # no cover: 1.5 mm higher than in a sensor
+    assert len(sides) == 4 * 8 * body.bed.mesh.layers
+    assert np.linalg.norm(sides[:, :2], axis=1) == pytest.approx(cone_radius(sides), rel=0.01)   # parabolic arcs: 0.8 %
+    assert {model.points[tie.slave, 2] for tie in model.ties} == {0.0}
 
 
 def test_a_refusal_leaves_no_file(tmp_path):

@@ -49,6 +49,7 @@ def test_a_second_run_beside_a_running_one_is_refused(tmp_path):
     run = project.start(environment=SLOW_PRESSES)
     try:
         wait_for_presses(project, 1)
+        os.killpg(run.pid, signal.SIGSTOP)         # at work, however long the second run takes to start
         refused = project.snakemake(check=False)
         assert refused.returncode != 0
         assert "another run of this study is at work" in refused.stdout

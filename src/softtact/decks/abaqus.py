@@ -15,6 +15,7 @@ from softtact.decks.laws import law_card
 
 PROGRAM = "Abaqus"
 ELEMENTS = ("C3D20RH", "C3D20H")
+WEDGE = "C3D15H"
 _NO_TERM = 0.0
 _PARABOLA_STEPS, _LINE_MM = 8, 1.0   # of the contact law: points on its parabola, length of its straight line
 _FIRST_INCREMENT, _LARGEST_INCREMENT, _SMALLEST_INCREMENT = 0.1, 0.25, 1e-6
@@ -28,7 +29,7 @@ def deck_lines(model, *, slab_element="C3D20RH", frustum_element="C3D20H"):
     """The deck's lines."""
     kinds = {part.name: frustum_element if part.name == "FRUSTA" else slab_element for part in model.parts}
     cards = {part.name: law_card(part.law, no_term=_NO_TERM, dialect=PROGRAM) for part in model.parts}
-    lines = keywords.heading(model, PROGRAM) + keywords.rubber(model, kinds, cards) + keywords.equations(model.ties)
+    lines = keywords.heading(model, PROGRAM) + keywords.rubber(model, kinds, WEDGE, cards) + keywords.equations(model.ties)
     rigid, reference, fixed = _rigid_bodies(model)
     lines += rigid + keywords.contacts(model, _table)
     fixed = keywords.held(model) + fixed

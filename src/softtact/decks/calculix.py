@@ -20,6 +20,7 @@ from softtact.decks.laws import law_card
 
 PROGRAM = "CalculiX"
 ELEMENTS = ("C3D20R", "C3D20")
+WEDGE = "C3D15"
 _NO_TERM = 1e20              # a zero D_i would be replaced by a default
 _STIFF = "1000, 0.3"         # of the rigid bodies' elements, whose nodes are all prescribed
 _FIRST_INCREMENT, _LARGEST_INCREMENT, _SMALLEST_INCREMENT = 0.1, 0.25, 1e-6
@@ -39,7 +40,7 @@ def deck_lines(model, *, slab_element="C3D20R", frustum_element="C3D20R", fields
     """
     kinds = {part.name: frustum_element if part.name == "FRUSTA" else slab_element for part in model.parts}
     cards = {part.name: law_card(part.law, no_term=_NO_TERM, dialect=PROGRAM) for part in model.parts}
-    lines = keywords.heading(model, PROGRAM) + keywords.rubber(model, kinds, cards) + keywords.equations(model.ties)
+    lines = keywords.heading(model, PROGRAM) + keywords.rubber(model, kinds, WEDGE, cards) + keywords.equations(model.ties)
     rigid, reference, fixed = _rigid_bodies(model)
     lines += rigid + keywords.contacts(model, _linear)
     fixed = keywords.held(model) + fixed

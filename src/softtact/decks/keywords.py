@@ -76,11 +76,16 @@ def material(name, card):
     return [f"*MATERIAL, NAME={name}", f"*HYPERELASTIC, {card.form}", rows(card.constants, per_line=8)]
 
 
-def rubber(model, kinds, cards):
-    """Nodes, elements, sets, laws and surfaces of the rubber. `kinds`: element type by part; `cards`: `LawCard` by part."""
+def rubber(model, kinds, wedge, cards):
+    """Nodes, elements, sets, laws and surfaces of the rubber.
+
+    kinds: type of the bricks by part;  wedge: type of the wedges;  cards: `LawCard` by part
+    """
     lines = nodes(model.points, 1, name="RUBBER")
     for part in model.parts:
-        lines += elements(kinds[part.name], part.name, part.elements + 1, part.hexes + 1)
+        lines += elements(kinds[part.name], part.name, part.hex_elements + 1, part.hexes + 1)
+        if len(part.wedges):
+            lines += elements(wedge, part.name, part.wedge_elements + 1, part.wedges + 1)
     for name, members in model.node_sets.items():
         lines += node_set(name, np.asarray(members) + 1)
     for part in model.parts:

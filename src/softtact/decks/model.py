@@ -9,38 +9,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
+from softtact.decks.mesh import body_mesh
 from softtact.errors import InputError
 from softtact.geometry.meshes import facets_over
+from softtact.mechanics.elements import HEX27_BOTTOM
 from softtact.mechanics.frustum_bed import DIRECTIONS, ContactSettings
+from softtact.mechanics.hex_mesh import PlanMesh
 
-BOTTOM, TOP, OUTER = 1, 2, 4      # faces S1, S2 and S4 (xi = 1) of a 20-node hexahedron, in Abaqus and in CalculiX alike
+# Faces of a brick in Abaqus and CalculiX alike: S1 bottom, S2 top, S3 to S6 the sides eta = -1, xi = 1, eta = 1, xi = -1. A wedge
+# has the same first two.
+BOTTOM, TOP, FIRST_SIDE = 1, 2, 3
 TOUCH_MM = 0.01                   # overlap of object and cover after the first step: a force alone holds no free object
 SLIVER_MM = 0.01                  # narrower facets are left out: the contact search of CalculiX does not end on them
-_NO_WEIGHT = 1e-10
 _BOARD_MARGIN_MM = 1.0
-
-
-@dataclass(frozen=True)
-class Part:
-    """Hexahedra of one law: `elements` (e,) their numbers, `hexes` (e, 20) their nodes, `nodes` all of these once."""
-
-    name: str
-    elements: np.ndarray
-    hexes: np.ndarray
-    law: object
-
-    @property
-    def nodes(self):
-        return np.unique(self.hexes)
-
-
-@dataclass(frozen=True)
-class Tie:
-    """Every component of the displacement of node `slave` is sum(weights * the masters')."""
-
-    slave: int
-    masters: np.ndarray
-    weights: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -102,11 +83,8 @@ def deck_model(body, placed, *, forces_n=None, indentations_mm=None, title="pres
     Either `forces_n` (N, increasing), after a first step that lowers the object until it overlaps by `touch_mm`, or
     `indentations_mm` (increasing), which the object follows.
     """
-    surface = HeightField(placed)
-    offset = body.slab.nodes
-    frusta = body.bed.mesh.hexes[None] + offset + np.arange(body.bed.count)[:, None, None] * body.bed.nodes
-    parts = _parts(body, frusta)
-    surfaces = _surfaces(body, parts)
+    surface, mesh = HeightField(placed), body_mesh(body)
+    surfaces = _surfaces(body, mesh)
     rigid, contacts = [_object(body, surface), _board(body)], _contacts(body)
     if "FRUSTA_SIDES_ODD" in surfaces:
         contacts.append(ContactPair("NEIGHBOURS", "FRUSTA_SIDES_EVEN", "FRUSTA_SIDES_ODD", body.bed.contact))
@@ -114,76 +92,22 @@ def deck_model(body, placed, *, forces_n=None, indentations_mm=None, title="pres
     if walls is not None:
         rigid.append(walls)
         contacts.append(ContactPair("WALLS", "FRUSTA_SIDES", "WALLS", body.bed.contact))
-    ties = without_chains(_tied_roots(body))
-    held = _held(body)
-    interface = body.slab.mesh.planes[min(body.electrode_plane, body.slab.mesh.layers)]
-    node_sets = {part.name: part.nodes for part in parts}
-    node_sets |= {"INTERFACE": interface, "TIPS": (offset + _frustum_nodes(body, body.bed.tip)).ravel(),
-                  "TIED": np.array(sorted(tie.slave for tie in ties), dtype=int), "HELD": np.unique(held[:, 0])}
-    return DeckModel(title=title, points=np.vstack([body.slab.mesh.points, body.bed.coordinates.reshape(-1, 3)]), parts=parts,
-                     ties=ties, held=held, node_sets=node_sets, surfaces=surfaces, rigid=rigid, contacts=contacts,
+    held = _held(body, mesh)
+    return DeckModel(title=title, points=mesh.points, parts=mesh.parts, ties=mesh.ties, held=held,
+                     node_sets=_node_sets(body, mesh, held), surfaces=surfaces, rigid=rigid, contacts=contacts,
                      steps=_steps(body, surface, forces_n, indentations_mm, touch_mm), remarks=_remarks(body))
 
 
-def _parts(body, frusta):
-    """Sheet and cover by the slab's layers, then the frusta."""
-    mesh, laws = body.slab.mesh, _layer_laws(body.slab)
-    per_layer = len(mesh.hexes) // mesh.layers
-    cut = min(body.electrode_plane, mesh.layers)
-    parts = []
-    for name, layers in (("SHEET", range(cut)), ("COVER", range(cut, mesh.layers))):
-        if len(layers):
-            elements = np.arange(layers[0] * per_layer, (layers[-1] + 1) * per_layer)
-            parts.append(Part(name, elements, mesh.hexes[elements], laws[layers[0]]))
-    count = body.bed.count * len(body.bed.mesh.hexes)
-    parts.append(Part("FRUSTA", len(mesh.hexes) + np.arange(count), frusta.reshape(-1, 20), body.bed.block.law))
-    return parts
+def _node_sets(body, mesh, held):
+    """Sets by name: nodes of each part, the plane under the cover, tips, nodes that follow others, held ones."""
+    sets = {part.name: part.nodes for part in mesh.parts}
+    sets["INTERFACE"] = np.sort(mesh.slab[body.slab.cover_mesh.planes[0]])
+    tips = mesh.frusta[:, body.bed.tip]
+    return sets | {"TIPS": tips[tips >= 0], "TIED": np.array([tie.slave for tie in mesh.ties], dtype=int),
+                   "HELD": np.unique(held[:, 0])}
 
 
-def _layer_laws(slab):
-    """The law of each element layer, from below."""
-    per_layer = len(slab.mesh.hexes) // slab.mesh.layers
-    return [block.law for hexes, block in slab.blocks for _ in range(len(hexes) // per_layer)]
-
-
-def _frustum_nodes(body, local):
-    """Numbers (f, k) of local nodes (k,) of every frustum, counted from the first frustum's first node."""
-    return np.arange(body.bed.count)[:, None] * body.bed.nodes + np.asarray(local)
-
-
-def _tied_roots(body):
-    """The frusta's root nodes follow the sheet's lower side."""
-    slaves = body.slab.nodes + _frustum_nodes(body, body.bed.root)
-    ties = []
-    for own, nodes, weights in zip(slaves, body.tie_nodes, body.tie_weights, strict=True):
-        for slave, row in zip(own, weights, strict=True):
-            used = np.abs(row) > _NO_WEIGHT
-            ties.append(Tie(int(slave), nodes[used], row[used]))
-    return ties
-
-
-def without_chains(ties):
-    """The same ties where no master is itself tied: both programs remove the slave's unknowns and refuse chains."""
-    by_slave = {tie.slave: tie for tie in ties}
-
-    def ends(tie, depth=0):
-        if depth > len(by_slave):
-            raise ValueError(f"node {tie.slave} is tied to itself")
-        total = {}
-        for master, weight in zip(tie.masters.tolist(), tie.weights.tolist(), strict=True):
-            inner = ends(by_slave[master], depth + 1) if master in by_slave else {master: 1.0}
-            for node, share in inner.items():
-                total[node] = total.get(node, 0.0) + weight * share
-        return total
-
-    out = []
-    for tie in ties:
-        total = ends(tie)
-        out.append(Tie(tie.slave, np.array(list(total), dtype=int), np.array(list(total.values()))))
-    return out
-
-
-def _held(body):
+def _held(body, mesh):
     """Pairs (node, component) that do not move: the slab's sides as it has them, and held tips."""
     slab = np.ones(3 * body.slab.nodes, dtype=bool)
     slab[body.slab.free] = False
@@ -191,36 +115,39 @@ def _held(body):
     free = np.zeros(3 * body.bed.nodes, dtype=bool)
     free[body.bed.inner], free[body.bed.root_dofs] = True, True
     local, axis = np.divmod(np.flatnonzero(~free), 3)
-    frusta = body.slab.nodes + _frustum_nodes(body, local)
-    return np.vstack([np.column_stack([node, component]),
-                      np.column_stack([frusta.ravel(), np.tile(axis, body.bed.count)])])
+    pairs = np.vstack([np.column_stack([mesh.slab[node], component]),
+                       np.column_stack([mesh.frusta[:, local].ravel(), np.tile(axis, body.bed.count)])])
+    return pairs[pairs[:, 0] >= 0]
 
 
-def _surfaces(body, parts):
+def _surfaces(body, mesh):
     """Faces that may touch something: the slab's top, and per frustum its tip and its sides."""
-    slab, bed = body.slab.mesh, body.bed
-    per_layer = len(slab.hexes) // slab.layers
-    local = np.arange(len(bed.mesh.hexes)).reshape(bed.mesh.layers, -1)
-    tips = _faces(_frustum_elements(body, local[0]), BOTTOM)
-    sides = _frustum_elements(body, local[:, 1:].ravel())       # the first of each layer is the core
-    surfaces = {"TOP": _faces(np.arange(len(slab.hexes) - per_layer, len(slab.hexes)), TOP),
-                "FRUSTA_TIPS": tips, "FRUSTA_SIDES": _faces(sides, OUTER)}
-    surfaces["FRUSTA_FOOT"] = np.vstack([tips, surfaces["FRUSTA_SIDES"]])
+    bed = body.bed
+    plan = PlanMesh(bed.mesh.points[:, :2], bed.mesh.layer(0)[:, HEX27_BOTTOM], 0)
+    quads, sides = plan.outer_sides()
+    elements = mesh.parts[-1].elements.reshape(bed.count, bed.mesh.layers, -1)
+    tips, around = _faces(elements[:, 0], BOTTOM), _faces(elements[:, :, quads], FIRST_SIDE + sides)
+    surfaces = {"TOP": _top_faces(body, mesh.parts), "FRUSTA_TIPS": tips, "FRUSTA_SIDES": around,
+                "FRUSTA_FOOT": np.vstack([tips, around])}
     if bed.count > 1 and bed.geometry.neighbours.any():
         odd = _odd(bed.geometry.centres)
-        surfaces["FRUSTA_SIDES_EVEN"] = _faces(sides[~odd], OUTER)
-        surfaces["FRUSTA_SIDES_ODD"] = _faces(sides[odd], OUTER)
+        surfaces["FRUSTA_SIDES_EVEN"] = _faces(elements[~odd][:, :, quads], FIRST_SIDE + sides)
+        surfaces["FRUSTA_SIDES_ODD"] = _faces(elements[odd][:, :, quads], FIRST_SIDE + sides)
     return surfaces
 
 
-def _frustum_elements(body, local):
-    """Numbers (f, k) of local elements (k,) of every frustum."""
-    return len(body.slab.mesh.hexes) + np.arange(body.bed.count)[:, None] * len(body.bed.mesh.hexes) + local
+def _top_faces(body, parts):
+    """The uppermost elements' upper faces: the cover's, or the sheet's where there is no cover."""
+    part = parts[-2]
+    layers = (body.slab.cover_mesh if part.name == "COVER" else body.slab.sheet_mesh).layers
+    numbers = (part.hex_elements, part.wedge_elements)
+    return _faces(np.concatenate([kind[len(kind) - len(kind) // layers:] for kind in numbers]), TOP)
 
 
 def _faces(elements, face):
-    elements = np.asarray(elements).ravel()
-    return np.column_stack([elements, np.full(len(elements), face)])
+    """Pairs (f, 2) of element and face; `face` one for all, or one for each along the last axis of `elements`."""
+    elements = np.asarray(elements)
+    return np.column_stack([elements.ravel(), np.broadcast_to(face, elements.shape).ravel()])
 
 
 def _odd(centres):
@@ -278,7 +205,7 @@ def _walls(body):
         if not bed.geometry.neighbours[0, k]:
             continue
         corners = np.zeros((4, 3))
-        corners[:, axis] = bed.coordinates[0, bed.root[12 + k], axis]
+        corners[:, axis] = bed.geometry.centres[0, axis] + 0.5 * sign * bed.geometry.root_diameter
         corners[:, 1 - axis] = bed.geometry.centres[0, 1 - axis] + reach * np.array([-1, -1, 1, 1])
         corners[:, 2] = [bottom, top, top, bottom]
         if np.cross(corners[1] - corners[0], corners[2] - corners[0])[axis] * sign > 0:   # the normal looks at the frustum
@@ -305,9 +232,11 @@ def _remarks(body):
     block = body.bed.block
     share = f"{block.local_modulus / block.law.bulk_modulus:.2g}"
     return ("units: mm, N, MPa",
-            "Frusta hang on the sheet by *EQUATION: each root node follows the sheet's lower side.",
+            "*EQUATION: the sheet's upper nodes follow the cover's lower side; where walls between cells are coarse, nodes at "
+            "their quarters follow the curve through the corner, the middle and the next corner.",
             "Contacts: object on the top, frusta (tip and sides) on the board, frusta on their neighbours. Left out, as in "
             "softtact: the sheet's underside on the frusta's sides, friction, the object's steep walls and upper sides.",
             f"Facets of the object narrower than {SLIVER_MM} mm are left out.",
             f"softtact lets the share {share} of the frusta's bulk modulus act at every point and projects the rest on linear "
-            "functions; these elements have one volumetric energy.")
+            "functions; these elements have one volumetric energy. Its bricks and wedges under the cover have nodes in faces and "
+            "bodies, too.")

@@ -9,7 +9,7 @@ from softtact.errors import InputError
 class Deck:
     """What a deck says, with its own numbers (from 1).
 
-    nodes {number: (x, y, z)}; elements {set: (type, {number: nodes})}; node_sets {name: numbers}; materials {name: (form,
+    nodes {number: (x, y, z)}; elements {set: {type: {number: nodes}}}; node_sets {name: numbers}; materials {name: (form,
     constants)}; sections {element set: material}; surfaces {name: entries}; equations [[(node, component, factor)]];
     contacts [(slave, master, behaviour, table)]; rigid_bodies {element set: reference node}; steps [DeckStep]
     """
@@ -109,7 +109,8 @@ def _node(deck, options, data, current):
 
 def _element(deck, options, data, current):
     rows = [[int(text) for text in _fields(line)] for line in _joined(data)]
-    deck.elements[options["ELSET"]] = (options["TYPE"], {number: nodes for number, *nodes in rows})
+    kinds = deck.elements.setdefault(options["ELSET"], {})
+    kinds.setdefault(options["TYPE"], {}).update({number: nodes for number, *nodes in rows})
 
 
 def _nset(deck, options, data, current):

@@ -104,6 +104,11 @@ class Slab:
         self.nodes = len(self.points)
         self.bottom = number[mesh.planes[0]]
 
+    @property
+    def sheet_nodes(self):
+        """Masters (p, 8) and weights (p, 8) of the nodes of `sheet_mesh`: numbers of the slab's nodes that each follows."""
+        return self._masters, self._weights
+
     def _add_sheet(self, plan, law):
         """Groups of like elements (nodes, block): those of the frusta's cells, cell by cell, and those of the strips."""
         mesh = self.sheet_mesh

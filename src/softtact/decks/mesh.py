@@ -1,0 +1,128 @@
+"""A layered body's mesh in elements that CalculiX and Abaqus have: 20-node bricks and 15-node wedges.
+
+Our 27-node bricks and 18-node wedges have nodes in the middle of faces and bodies, too. Without these the element has the same
+shape, for its sides are curves through three nodes and its faces are spanned by them. Numbers count from 0.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+HEX20_OF_27 = np.array([0, 1, 2, 3, 9, 10, 11, 12, 4, 5, 6, 7, 13, 14, 15, 16, 18, 19, 20, 21])
+WEDGE15_OF_18 = np.array([0, 1, 2, 6, 7, 8, 3, 4, 5, 9, 10, 11, 12, 13, 14])
+_NO_WEIGHT = 1e-10
+
+
+@dataclass(frozen=True)
+class Part:
+    """Elements of one law: `elements` (h + w,) their numbers, nodes of `hexes` (h, 20), then of `wedges` (w, 15)."""
+
+    name: str
+    elements: np.ndarray
+    hexes: np.ndarray
+    wedges: np.ndarray
+    law: object
+
+    @property
+    def hex_elements(self):
+        """Numbers (h,) of the bricks."""
+        return self.elements[:len(self.hexes)]
+
+    @property
+    def wedge_elements(self):
+        """Numbers (w,) of the wedges."""
+        return self.elements[len(self.hexes):]
+
+    @property
+    def nodes(self):
+        """Every node once."""
+        return np.unique(np.concatenate([self.hexes.ravel(), self.wedges.ravel()]))
+
+
+@dataclass(frozen=True)
+class Tie:
+    """Every component of the displacement of node `slave` is sum(weights * the masters')."""
+
+    slave: int
+    masters: np.ndarray
+    weights: np.ndarray
+
+
+@dataclass(frozen=True)
+class BodyMesh:
+    """points (n, 3) in mm; parts SHEET, COVER where there is one, FRUSTA; ties of nodes that follow others.
+
+    slab (s,), frusta (f, nodes): the number here of each node of the slab and of each frustum, -1 where it is left out.
+    """
+
+    points: np.ndarray
+    parts: list
+    ties: list
+    slab: np.ndarray
+    frusta: np.ndarray
+
+
+def body_mesh(body):
+    """The `BodyMesh` of a `LayeredBody`."""
+    slab, bed = body.slab, body.bed
+    sheet, followers = _sheet_numbers(slab)
+    own = slab.nodes + len(followers) + np.arange(bed.count * bed.nodes).reshape(bed.count, bed.nodes)
+    own[:, bed.root] = body.cells.roots
+    points = np.vstack([slab.points, slab.sheet_mesh.points[followers], bed.coordinates.reshape(-1, 3)])
+    ties = _ties(slab, followers)
+    number = _numbers_in_use([sheet[_hexes(slab.sheet_mesh)], sheet[_wedges(slab.sheet_mesh)], slab.cover_mesh.hexes,
+                              own[:, _hexes(bed.mesh)], *(tie.masters for tie in ties)], len(points))
+    ties = [Tie(int(number[tie.slave]), number[tie.masters], tie.weights) for tie in ties if number[tie.slave] >= 0]
+    frusta = number[own]
+    return BodyMesh(points[number >= 0], _parts(body, number[sheet], number, frusta), ties, number[:slab.nodes], frusta)
+
+
+def _hexes(mesh):
+    return mesh.hexes[:, HEX20_OF_27]
+
+
+def _wedges(mesh):
+    return mesh.wedges[:, WEDGE15_OF_18]
+
+
+def _sheet_numbers(slab):
+    """Number of each node of the sheet's mesh, and which of them follow others.
+
+    A node that follows one other with weight 1 is that one. Followers are numbered after the slab's own nodes.
+    """
+    masters, weights = slab.sheet_nodes
+    first = np.argmax(weights, axis=1)
+    rows = np.arange(len(masters))
+    followers = np.flatnonzero(np.abs(weights[rows, first] - 1) > _NO_WEIGHT)
+    sheet = masters[rows, first]
+    sheet[followers] = slab.nodes + np.arange(len(followers))
+    return sheet, followers
+
+
+def _ties(slab, followers):
+    """What the sheet's followers follow: the cover's lower side, and along coarse walls the curve through three nodes."""
+    masters, weights = slab.sheet_nodes
+    used = np.abs(weights) > _NO_WEIGHT
+    return [Tie(slab.nodes + k, masters[node, used[node]], weights[node, used[node]]) for k, node in enumerate(followers)]
+
+
+def _numbers_in_use(members, count):
+    """New number (count,) of each node that occurs among the members, -1 for the others."""
+    used = np.zeros(count, dtype=bool)
+    for nodes in members:
+        used[nodes] = True
+    return np.where(used, np.cumsum(used) - 1, -1)
+
+
+def _parts(body, sheet, number, frusta):
+    slab, bed = body.slab, body.bed
+    none = np.zeros((0, 15), dtype=np.int64)
+    pieces = [("SHEET", sheet[_hexes(slab.sheet_mesh)], sheet[_wedges(slab.sheet_mesh)], slab.layers[0].law),
+              ("COVER", number[slab.cover_mesh.hexes], none, slab.layers[1].law),
+              ("FRUSTA", frusta[:, _hexes(bed.mesh)].reshape(-1, 20), none, bed.block.law)]
+    parts, first = [], 0
+    for name, hexes, wedges, law in pieces:
+        if len(hexes):
+            parts.append(Part(name, first + np.arange(len(hexes) + len(wedges)), hexes, wedges, law))
+            first = parts[-1].elements[-1] + 1
+    return parts
