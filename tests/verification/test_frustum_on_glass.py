@@ -12,16 +12,17 @@ import subprocess
 import numpy as np
 import pytest
 
+from softtact.contact.penalty import Contact
 from softtact.decks import keywords
 from softtact.decks.laws import law_card
 from softtact.materials.laws.registry import make_law
-from softtact.mechanics.frustum_bed import BedGeometry, ContactSettings, FrustumBed
+from softtact.mechanics.frustum_bed import BedGeometry, FrustumBed
 from softtact.mechanics.hex_mesh import grid_plan
 from softtact.mechanics.layered_body import MeshSettings
 
 TIP, ROOT, HEIGHT = 0.3, 0.6, 0.5        # radii and height in mm
 LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492)
-HARD = ContactSettings(stiffness=2e4, smoothing=1e-5)    # overlaps of 0.0001 mm: as good as none
+HARD = Contact(stiffness=2e4, smoothing=1e-5)    # overlaps of 0.0001 mm: as good as none
 PARTS = 16
 DEPTHS = (0.02, 0.05, 0.1, 0.15, 0.2)    # mm
 FORCES = (0.026937, 0.071022, 0.161370, 0.298741, 0.541182)    # N, CalculiX 2.20 on the deck below

@@ -104,7 +104,7 @@ def element_count(model):
 def contacts(model, behaviour):
     """Contact laws and pairs, slave surface first. A rigid body NAME has the surface NAME_SURFACE.
 
-    behaviour(settings): the lines of *SURFACE BEHAVIOR for a pair's `ContactSettings`
+    behaviour(settings): the lines of *SURFACE BEHAVIOR for a pair's `Contact`
     """
     lines, rigid = [], {body.name for body in model.rigid}
     for pair in model.contacts:
