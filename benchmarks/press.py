@@ -1,34 +1,65 @@
-"""Seconds per press of each model, on one core: `python benchmarks/press.py [OBJECT.stl ...]` from the project's folder.
+"""Seconds of a press to 50 N on each mesh: `python benchmarks/press.py [OBJECT.stl ...]` from the project's folder.
 
-Preparation that is done once per sensor (the elastic layer's flexibility) or once per process (compiled kernels) is made
-before the clock starts. Times depend on the machine and on what else it does: compare the ratios of one run.
+Preparation that is done once per process (compiled kernels) is made before the clock starts; building the body belongs to the press.
+Each press runs in a process of its own, whose peak memory is told. Times depend on the machine and on what else it does:
+compare the ratios of one run.
 """
 
+import itertools
+import json
+import resource
+import subprocess
 import sys
 import time
 from pathlib import Path
 
+import numpy as np
+import record
+
 import softtact
 from softtact.geometry.meshes import read_mesh
+from softtact.mechanics.layered_body import MeshSettings
 
-FORCES_N = [5, 10, 20, 35, 50]
-OBJECTS = ["config/objects/indenters/circle_m.stl", "config/objects/grasped/object_5.stl"]
+OBJECTS = ["config/objects/indenters/circle_m.stl", "config/objects/indenters/sphere.stl"]
+MESHES = {"production": MeshSettings(), "draft": MeshSettings.draft()}
+LEVELS, THREADS = (5, 20), (1, 2)
+LARGEST_N = 50.0
+
+
+def measure(file, mesh, levels, threads):
+    """One press in this process: seconds, iterations, memory, and where it went."""
+    sensor, body = softtact.load_sensor("coro"), read_mesh(file, unit="mm")
+    sensor.mesh = MESHES[mesh]
+    sensor.press(body, force_n=[0.5], model="hyperelastic", threads=threads)
+    start = time.perf_counter()
+    result = sensor.press(body, force_n=np.linspace(LARGEST_N / levels, LARGEST_N, levels), model="hyperelastic", threads=threads)
+    return {"object": Path(file).stem, "mesh": mesh, "levels": levels, "threads": threads, "solver": result.solver,
+            "seconds": round(time.perf_counter() - start, 2), "iterations": int(result.iterations.sum()),
+            "indentation_mm": round(float(result.indentation_mm[-1]), 5), "residual_n": float(result.residual_n.max()),
+            "overlap_um": round(1e3 * float(result.penetration_mm.max()), 3),
+            "memory_gb": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6, 2)}
 
 
 def main(files):
-    """Print a row per object and model."""
-    sensor = softtact.load_sensor("coro")
-    for model in ("elastic", "hyperelastic"):   # compile and fill the cache
-        sensor.press(read_mesh(files[0], unit="mm"), force_n=[1.0], model=model)
-    print(f"{'object':20}{'model':15}{'levels':>8}{'seconds':>10}{'iterations':>12}")
-    for file in files:
-        mesh = read_mesh(file, unit="mm")
-        for model in ("elastic", "hyperelastic"):
-            start = time.perf_counter()
-            result = sensor.press(mesh, force_n=FORCES_N, model=model)
-            seconds = time.perf_counter() - start
-            print(f"{Path(file).stem:20}{model:15}{len(FORCES_N):8}{seconds:10.2f}{result.iterations.sum():12}", flush=True)
+    """Print a row per object, mesh, number of levels and threads, and write benchmarks/results/press.json."""
+    rows = []
+    print(f"{'object':12}{'mesh':12}{'levels':>7}{'threads':>8}{'seconds':>9}{'iterations':>11}{'memory, GB':>11}")
+    for case in itertools.product(files, MESHES, map(str, LEVELS), map(str, THREADS)):
+        run = subprocess.run([sys.executable, __file__, "--one", *case], capture_output=True, text=True, env=record.threads_of(1),
+                             check=False)
+        if run.returncode:
+            print(*case, run.stderr.strip().splitlines()[-1], flush=True)
+            continue
+        row = json.loads(run.stdout)
+        rows.append(row)
+        print(f"{row['object']:12}{row['mesh']:12}{row['levels']:7}{row['threads']:8}{row['seconds']:9.1f}{row['iterations']:11}"
+              f"{row['memory_gb']:11.2f}", flush=True)
+    print(record.write("press", rows=rows))
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:] or OBJECTS)
+    if sys.argv[1:2] == ["--one"]:
+        file, mesh, levels, threads = sys.argv[2:]
+        print(json.dumps(measure(file, mesh, int(levels), int(threads))))
+    else:
+        main(sys.argv[1:] or OBJECTS)

@@ -56,11 +56,12 @@ def _config_file(kind, name):
 
 @dataclass
 class Sensor:
-    """A sensor with one law per layer; `mesh` sets the layered body's resolution."""
+    """A sensor with one law per layer; `mesh` sets the layered body's resolution, `solver` what counts as solved."""
 
     spec: SensorSpec
     laws: dict
     mesh: MeshSettings = MeshSettings()
+    solver: hyperelastic.NewtonSettings = hyperelastic.NewtonSettings()
     compliance: elastic.Compliance | None = None
     scatter: tuple | None = None
     attributes: dict = field(default_factory=dict)
@@ -134,7 +135,7 @@ class Sensor:
         announce(f"{label}: {body.bed.count} frusta, {len(forces)} force levels of the hyperelastic model, some seconds each")
         record, times = [], []
         levels = (record.append(self._read_level(body, sampling, level))
-                  for level in hyperelastic.press_levels(body, surface, forces))
+                  for level in hyperelastic.press_levels(body, surface, forces, settings=self.solver))
         try:
             _timed(levels, forces, label, times)
         except ConvergenceError as error:

@@ -32,6 +32,11 @@ class MeshSettings:
     refinement: int = 0
     coarse_walls: bool = True
 
+    @classmethod
+    def draft(cls):
+        """For quick studies: a layer less in each frustum, walls as one curve, frusta that fold without fail."""
+        return cls(frustum_levels=(0.0, 0.35, 1.0), local_over_shear=4.0, coarse_walls=True)
+
 
 @dataclass(frozen=True)
 class BodyState:

@@ -55,6 +55,10 @@ class SheetCells:
         workers.map(lambda cells: self._condense(state, cells), chunks(stale, _CHUNK))
         return len(stale)
 
+    def forget(self):
+        """Let the next `refresh` recompute all cells."""
+        self._tangent_at = None
+
     def _stale(self, state):
         slope = self.bed.contact_slope(state.bed.gaps)
         place = np.hstack([state.slab.displacement[self._nodes].reshape(self.count, -1),

@@ -1,0 +1,66 @@
+"""Error of the hyperelastic press's meshes: `python benchmarks/mesh_error.py` from the project's folder, about half an hour.
+
+A sensor of 6 x 6 frusta is pressed with a flat punch, a sphere and a ridged block on each mesh and on finer ones; the error is
+the largest difference of the deformation map over the map's maximum. The reference has all elements of sheet and frusta split
+in plan, the cover's pitch halved, and more layers.
+"""
+
+import sys
+import time
+
+import numpy as np
+import trimesh
+
+import softtact
+from softtact.mechanics.hyperelastic import NewtonSettings
+from softtact.mechanics.layered_body import MeshSettings
+from softtact.sensor import Sensor
+
+FORCES_N = [2.0, 4.0, 8.0]
+FRUSTA = (6, 6)
+FINE = {"frustum_levels": (0.0, 0.1, 0.3, 0.6, 1.0), "sheet_layers": 2, "cover_layers": 3, "coarse_walls": False}
+MESHES = {
+    "draft": MeshSettings.draft(),
+    "production": MeshSettings(),
+    "finer layers": MeshSettings(**FINE),
+    "reference": MeshSettings(refinement=1, cells_per_pitch=2, **FINE),
+}
+
+
+def objects():
+    """{name: mesh} of the three pressed bodies, in mm, over the sensor's centre."""
+    ridges = trimesh.util.concatenate([trimesh.creation.box((0.6, 5.0, 2.0), trimesh.transformations.translation_matrix((x, 0, 1)))
+                                       for x in (-1.5, 0.0, 1.5)])
+    return {"flat punch": trimesh.creation.cylinder(radius=3.0, height=2.0, sections=96),
+            "sphere": trimesh.creation.icosphere(subdivisions=5, radius=4.0), "ridges": ridges}
+
+
+def small_sensor(mesh):
+    """The default sensor cut to FRUSTA, its map as dense as ever, solved to tight overlaps."""
+    full = softtact.load_sensor("coro")
+    side = tuple(count * full.spec.dielectric.frusta.pitch_mm for count in FRUSTA)
+    spec = full.spec.model_copy(update={"footprint_mm": side, "map_shape": (25, 25)})
+    return Sensor(spec, full.laws, mesh=mesh, solver=NewtonSettings(largest_penetration_mm=1e-3))
+
+
+def main(names):
+    """Press everything on every mesh; a table of errors."""
+    maps = {}
+    for name in names:
+        for body, mesh in objects().items():
+            start = time.perf_counter()
+            result = small_sensor(MESHES[name]).press(mesh, force_n=FORCES_N, model="hyperelastic")
+            maps[name, body] = result.deformation_map_mm
+            print(f"{name:14}{body:12}{result.iterations.sum():4d} iterations {time.perf_counter() - start:8.1f} s  "
+                  f"indentation {np.round(result.indentation_mm, 4)} mm", flush=True)
+    print("\nlargest error of the map, % of its maximum")
+    print(f"{'mesh':14}{'object':12}" + "".join(f"{force:>9.0f} N" for force in FORCES_N))
+    for name in names[:-1]:
+        for body in objects():
+            truth = maps[names[-1], body]
+            error = np.abs(maps[name, body] - truth).max(axis=(1, 2)) / truth.max(axis=(1, 2))
+            print(f"{name:14}{body:12}" + "".join(f"{100 * e:11.2f}" for e in error), flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:] or list(MESHES))
