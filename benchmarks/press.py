@@ -1,6 +1,6 @@
 """Seconds of a press to 50 N on each mesh: `python benchmarks/press.py [OBJECT.stl ...]` from the project's folder.
 
-Preparation that is done once per process (compiled kernels) is made before the clock starts; building the body belongs to the press.
+Preparation that is done once per process (compiled kernels) is made before the clock starts; building the body belongs to it.
 Each press runs in a process of its own, whose peak memory is told. Times depend on the machine and on what else it does:
 compare the ratios of one run.
 """
