@@ -38,7 +38,8 @@ class SolidBlock:
     """Elements of one kind and one law, by their shape functions' gradients.
 
     gradients (u, g, m, 3) in 1/mm and volumes (u, g) in mm3 of the shapes that occur; shapes (e,): which is an element's, by
-    default each its own; points (g, 3) of the quadrature in parent coordinates. Displacements come per element (e, m, 3) in mm.
+    default each its own; points (g, 3) of the quadrature in parent coordinates; local_over_shear: k / mu, one or of each shape (u,).
+    Displacements come per element (e, m, 3) in mm.
     """
 
     def __init__(self, gradients, volumes, points, law, *, shapes=None, local_over_shear=0.0):
@@ -51,12 +52,12 @@ class SolidBlock:
 
     @property
     def local_modulus(self):
-        """k in MPa."""
-        return min(self._local_over_shear * self.law.mu0, self.law.bulk_modulus)
+        """k of each shape (u,) in MPa."""
+        return np.minimum(self._local_over_shear * self.law.mu0, self.law.bulk_modulus) * np.ones(len(self.volumes))
 
     @property
     def projected_modulus(self):
-        """K - k in MPa."""
+        """K - k of each shape (u,) in MPa."""
         return self.law.bulk_modulus - self.local_modulus
 
     def evaluate(self, displacement, *, workers=SERIAL):
@@ -73,7 +74,7 @@ class SolidBlock:
             return None
         response = self.law.isochoric(C, tangent=False)
         modes, pressure = self._pressure(J, shapes)
-        local = 0.25 * self.local_modulus * (J * J - 1 - 2 * np.log(J))
+        local = 0.25 * self.local_modulus[shapes, None] * (J * J - 1 - 2 * np.log(J))
         energy = float(self.volumes[shapes].ravel() @ (response.energy + local.ravel()) + 0.5 * (modes[0] * modes[1]).sum())
         return energy, kernels.internal_force(F, C, J, self.gradients, self.volumes, shapes, response.stress, pressure)
 
@@ -100,8 +101,8 @@ class SolidBlock:
     def _pressure(self, J, shapes):
         """Modes of the volume change with their conjugate pressures, and the whole pressure (e, g) at the points."""
         change = ((J - 1) * self.volumes[shapes]) @ self.basis
-        conjugate = self.projected_modulus * np.einsum("epq,eq->ep", self.gram_inverse[shapes], change)
-        return (change, conjugate), conjugate @ self.basis.T + 0.5 * self.local_modulus * (J - 1 / J)
+        conjugate = self.projected_modulus[shapes, None] * np.einsum("epq,eq->ep", self.gram_inverse[shapes], change)
+        return (change, conjugate), conjugate @ self.basis.T + 0.5 * self.local_modulus[shapes, None] * (J - 1 / J)
 
 
 def _unlike(coordinates):
@@ -110,13 +111,15 @@ def _unlike(coordinates):
 
 
 class HexBlock(SolidBlock):
-    """Hexahedra of 20 or 27 nodes given by coordinates (e, 20 or 27, 3) in mm."""
+    """Hexahedra of 20 or 27 nodes given by coordinates (e, 20 or 27, 3) in mm; local_over_shear: one, or of each (e,)."""
 
     def __init__(self, coordinates, law, *, points_per_side=3, local_over_shear=0.0):
         points, weights = gauss(points_per_side, 3)
         shape = {20: hex20, 27: hex27}[coordinates.shape[1]]
         first, shapes = _unlike(coordinates)
         gradients, volumes = reference_gradients(coordinates[first], shape(points)[1], weights)
+        if np.ndim(local_over_shear):
+            local_over_shear = np.asarray(local_over_shear)[first]
         super().__init__(gradients, volumes, points, law, shapes=shapes, local_over_shear=local_over_shear)
 
 

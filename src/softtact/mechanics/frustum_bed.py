@@ -71,7 +71,9 @@ class FrustumBed:
         self.nodes = len(self.mesh.points)
         self.root, self.tip = self.mesh.planes[-1], self.mesh.planes[0]
         self.coordinates = self._place(levels, root_z_mm)
-        self.block = HexBlock(self.per_element(self.coordinates), law, local_over_shear=local_over_shear)
+        per_layer = np.broadcast_to(local_over_shear, self.mesh.layers)
+        self.block = HexBlock(self.per_element(self.coordinates), law,
+                              local_over_shear=np.tile(per_layer.repeat(len(self.mesh.layer(0))), self.count))
         self._contact_points(pcb_z_mm)
         self._number_unknowns(tips_held)
         self.layers = [self._layer(k) for k in range(self.mesh.layers)]

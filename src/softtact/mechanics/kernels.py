@@ -116,7 +116,7 @@ def tangent(F, C, J, gradients, volumes, shapes, stress, moduli, pressure, basis
     """Tangent (e, 3 m, 3 m) of `internal_force` with the pressure of `SolidBlock`: a projected and a local part.
 
     projected = bulk_modulus * basis . gram_inverse . integral(basis (J - 1)), basis (g, p): symmetric, rank p per element
-    local = local_modulus (J - 1/J) / 2
+    local = local_modulus (J - 1/J) / 2;  both moduli (u,) in MPa
 
     The products run over blocks of components (i, j >= i): K_ij = G^T A_ij G with the gradients G (3 g, m), three large
     products an element instead of one with the strain-displacement matrix, which has a third of zeros.
@@ -138,7 +138,7 @@ def tangent(F, C, J, gradients, volumes, shapes, stress, moduli, pressure, basis
             n = e * points + g
             inverse = inverse_symmetric(C[n])
             w, pj = volumes[shapes[e], g], pressure[e, g] * J[e, g]
-            local = 0.5 * local_modulus * (J[e, g] * J[e, g] + 1.0)
+            local = 0.5 * local_modulus[shapes[e]] * (J[e, g] * J[e, g] + 1.0)
             for k in range(6):
                 value = w * (stress[n, k] + pj * inverse[k])
                 S[_ROW[k], _COL[k]] = value
@@ -169,7 +169,7 @@ def tangent(F, C, J, gradients, volumes, shapes, stress, moduli, pressure, basis
                         for a in range(nodes):
                             row[first + a] = ax * x[a] + ay * y[a] + az * z[a]
         K = out[e]
-        K[:] = bulk_modulus * (volume_change.T @ (gram_inverse[shapes[e]] @ volume_change))
+        K[:] = bulk_modulus[shapes[e]] * (volume_change.T @ (gram_inverse[shapes[e]] @ volume_change))
         for i in range(3):
             block = G.T @ rights[i]
             for a in range(nodes):
