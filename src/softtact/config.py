@@ -149,6 +149,7 @@ class Mesh(Section):
     frustum_levels: Annotated[list[float], AfterValidator(_rising)] | None = Field(
         None, description="heights of a frustum's layers of elements, from 0 to 1")
     local_over_shear: NotNegative | None = Field(None, description="volumetric stiffness of frusta at each point, over mu")
+    tip_over_shear: NotNegative | None = Field(None, description="the same in the lowest layer of each frustum")
     refinement: Annotated[int, Field(ge=0)] | None = Field(
         None, description="how often the elements of sheet and frusta are split into four in plan")
     coarse_walls: bool | None = Field(

@@ -38,8 +38,8 @@ class SolidBlock:
     """Elements of one kind and one law, by their shape functions' gradients.
 
     gradients (u, g, m, 3) in 1/mm and volumes (u, g) in mm3 of the shapes that occur; shapes (e,): which is an element's, by
-    default each its own; points (g, 3) of the quadrature in parent coordinates; local_over_shear: k / mu, one or of each shape (u,).
-    Displacements come per element (e, m, 3) in mm.
+    default each its own; points (g, 3) of the quadrature in parent coordinates; local_over_shear: k / mu, one or of each
+    shape (u,). Displacements come per element (e, m, 3) in mm.
     """
 
     def __init__(self, gradients, volumes, points, law, *, shapes=None, local_over_shear=0.0):

@@ -12,7 +12,7 @@ from softtact.mechanics.layered_body import MeshSettings, build_unit_cell
 
 _TOUCH_MM = 2e-3     # a surface point this near to the glass is dark to total reflection: a wavelength or two and the penalty
 # Coarser levels ripple at the tip.
-_MESH = MeshSettings(frustum_levels=(0.0, 0.1, 0.3, 0.6, 1.0), local_over_shear=0.1)
+_MESH = MeshSettings(frustum_levels=(0.0, 0.1, 0.3, 0.6, 1.0), local_over_shear=0.1, tip_over_shear=0.1)
 _SAMPLES = 24        # points a side of a face at which contact is asked for
 
 

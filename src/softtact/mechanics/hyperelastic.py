@@ -54,16 +54,18 @@ class Path:
     def append(self, force, state):
         self.forces, self.states = [*self.forces[-1:], force], [*self.states[-1:], state]
 
-    def predict(self, force):
-        """Displacements extrapolated linearly in force; from one state alone, that state."""
-        last = self.states[-1]
-        now = (last.slab.displacement, last.bed.displacement, last.indentation)
+    def predictions(self, force):
+        """Displacements to start from: the last ones, and these extrapolated linearly in force, whole and by half."""
+        now = _displacements(self.states[-1])
         if len(self.states) < 2 or self.forces[1] <= self.forces[0]:
-            return now
-        first = self.states[0]
-        before = (first.slab.displacement, first.bed.displacement, first.indentation)
+            return [now]
+        before = _displacements(self.states[0])
         ratio = min(1.0, (force - self.forces[1]) / (self.forces[1] - self.forces[0]))
-        return tuple(b + ratio * (b - a) for a, b in zip(before, now, strict=True))
+        return [tuple(b + share * ratio * (b - a) for a, b in zip(before, now, strict=True)) for share in (1.0, 0.5, 0.0)]
+
+
+def _displacements(state):
+    return state.slab.displacement, state.bed.displacement, state.indentation
 
 
 def press_levels(body, surface, forces_n, *, settings=NewtonSettings()):
@@ -134,12 +136,21 @@ def _tolerance(force, settings):
 
 
 def _attempt(body, surface, path, force, settings):
-    last = path.states[-1]
-    planes = body.slab.facing(last.slab.displacement, surface)
-    start = body.evaluate(*path.predict(force), planes)
-    if start is None:
-        start = body.evaluate(last.slab.displacement, last.bed.displacement, last.indentation, planes)
+    starts = [_start(body, surface, displacements, force) for displacements in path.predictions(force)]
+    start = min((state for state in starts if state is not None), key=lambda state: _potential(state, force))
     return _newton(body, surface, start, force, _tolerance(force, settings), settings)
+
+
+def _start(body, surface, displacements, force):
+    """The state at given displacements; None where an element is inside out.
+
+    What is extrapolated may press the object hundreds of newtons deep: it is then lifted. Not to the force itself,
+    where a few points would carry all of it: a tangent with too many points in contact is the better start.
+    """
+    state = body.evaluate(*displacements, body.slab.facing(displacements[0], surface))
+    if state is None or 0.5 * force < state.force < 2 * force:
+        return state
+    return body.let_down(state, np.clip(state.force, 0.5 * force, 2 * force))
 
 
 def _newton(body, surface, state, force, tolerance, settings):
