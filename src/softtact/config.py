@@ -155,6 +155,7 @@ class Mesh(Section):
     coarse_walls: bool | None = Field(
         None, description="along a wall between cells the sheet moves as one quadratic curve: half the unknowns, 1 % stiffer; "
                           "without effect in a refined plan")
+    largest_penetration_mm: PositiveFloat | None = Field(None, description="deeper overlaps in contacts are pressed apart")
     height_scatter: NotNegative | None = Field(None, description="standard deviation, share of the height")
     tip_scatter: NotNegative | None = Field(None, description="standard deviation, share of the tip's diameter")
     specimen: Annotated[int, Field(ge=0)] | None = Field(None, description="seed of the scatter")

@@ -4,23 +4,30 @@ import meshio
 import numpy as np
 
 from softtact.errors import InputError
+from softtact.mechanics.hyperelastic import NewtonSettings
 from softtact.mechanics.layered_body import MeshSettings, build_sensor_body
 
 # VTK's order of the nodes, by ours (bottom, top, middle of a plan of corners, mid-sides and centre).
 _VTK_HEX27 = np.array([0, 1, 2, 3, 9, 10, 11, 12, 4, 5, 6, 7, 13, 14, 15, 16, 18, 19, 20, 21, 25, 23, 22, 24, 8, 17, 26])
 _VTK_WEDGE18 = np.array([0, 1, 2, 6, 7, 8, 3, 4, 5, 9, 10, 11, 12, 13, 14, 15, 16, 17])
 _SCATTER_KEYS = ("height_scatter", "tip_scatter", "specimen")
+_SOLVER_KEYS = ("largest_penetration_mm",)
 
 
 def mesh_settings(values):
-    """`MeshSettings` from a mapping; the scatter's keys are passed over, an unknown key is refused."""
-    own = {key: value for key, value in values.items() if key not in _SCATTER_KEYS}
+    """`MeshSettings` from a mapping; the scatter's and the solver's keys are passed over, an unknown key is refused."""
+    own = {key: value for key, value in values.items() if key not in _SCATTER_KEYS + _SOLVER_KEYS}
     unknown = sorted(set(own) - set(MeshSettings.__dataclass_fields__))
     if unknown:
         raise InputError(f"mesh: key {unknown[0]!r} is unknown; use one of {', '.join(MeshSettings.__dataclass_fields__)}.")
     if "frustum_levels" in own:
         own["frustum_levels"] = tuple(own["frustum_levels"])
     return MeshSettings(**own)
+
+
+def newton_settings(values):
+    """`NewtonSettings` from the same mapping."""
+    return NewtonSettings(**{key: values[key] for key in _SOLVER_KEYS if key in values})
 
 
 def frustum_scatter(spec, values):

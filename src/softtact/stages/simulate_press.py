@@ -10,7 +10,7 @@ from softtact.geometry.pose import Pose
 from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.cards import law_from_card, load_card
 from softtact.mechanics.elastic import Compliance
-from softtact.mechanics.layered_mesh import frustum_scatter, mesh_settings
+from softtact.mechanics.layered_mesh import frustum_scatter, mesh_settings, newton_settings
 from softtact.sensor import Sensor
 
 
@@ -23,7 +23,8 @@ def run(*, inputs, outputs, settings, threads=1):
     if "compliance" in inputs:
         sensor.compliance, solver = Compliance.load(inputs["compliance"]), "elastic"
     else:
-        sensor.mesh, sensor.scatter, solver = mesh_settings(mesh), frustum_scatter(spec, mesh), "hyperelastic"
+        sensor.mesh, sensor.solver = mesh_settings(mesh), newton_settings(mesh)
+        sensor.scatter, solver = frustum_scatter(spec, mesh), "hyperelastic"
     pose = None if item["pose"] is None else Pose.from_values(item["pose"])
     label = f"{item['set']}/{item['name']}/{settings['model']}"
     try:
