@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from softtact.contact.penalty import Contact
 from softtact.mechanics.elastic import surface_compliance
-from softtact.mechanics.frustum_bed import Contact
 from softtact.mechanics.hex_mesh import SheetPlan, grid_plan, merge, with_centres
 from softtact.mechanics.linear_solvers import make_solver
 from softtact.mechanics.slab import Layer, Slab
