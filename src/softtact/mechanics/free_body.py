@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from softtact.contact.penalty import penalty
+from softtact.mechanics.contact_correction import ContactCorrection
 from softtact.mechanics.linear_solvers import make_solver
 from softtact.mechanics.sparsity import SymmetricPattern, add_upper
 
@@ -41,45 +42,66 @@ class RigidContact:
     """Frictionless penalty contact of faces (f, m) with a rigid surface, at points given by shape values (g, m) and areas (f, g).
 
     surface(x, y) gives heights and normals out of the object over points, in the object's place at d = 0; `moves`: down with d. A
-    point keeps its plane until `face` looks anew.
+    point keeps its plane until `face` looks anew. What is "near" is numbered by `near_nodes`, the faces' own nodes.
     """
 
     def __init__(self, points, faces, values, areas, surface, *, moves, stiffness, smoothing):
         self.nodes, self.values, self.areas = np.ascontiguousarray(faces), values, areas
+        self.near_nodes, faces = np.unique(self.nodes, return_inverse=True)
+        self._faces = faces.reshape(self.nodes.shape)
         self.surface, self.moves, self._law = surface, moves, {"stiffness": stiffness, "smoothing": smoothing}
-        self._reference = self._at(points)
+        self._reference = self._at(points[self.near_nodes])
         self.face(np.zeros_like(points))
 
     def _at(self, field):
-        return np.einsum("gm,fmd->fgd", self.values, field[self.nodes], optimize=True)
+        return np.matmul(self.values, field[self._faces])
 
     def face(self, displacement):
         """Take the planes of the object that the points (f, g) face now."""
-        place = self._reference + self._at(displacement)
+        place = self._reference + self._at(displacement[self.near_nodes])
         height, normals = self.surface(place[..., 0].ravel(), place[..., 1].ravel())
-        self._anchors = np.concatenate([place[..., :2], height.reshape(*place.shape[:2], 1)], axis=2)
+        anchors = np.concatenate([place[..., :2], height.reshape(*place.shape[:2], 1)], axis=2)
         self._normals = normals.reshape(place.shape)
+        self._gap0 = ((self._reference - anchors) * self._normals).sum(axis=2)
 
-    def _gaps(self, displacement, indentation):
-        lowered = indentation if self.moves else 0.0
-        offset = self._reference + self._at(displacement) - self._anchors
-        return np.einsum("fgd,fgd->fg", self._normals, offset) + lowered * self._normals[..., 2]
+    def _gaps(self, near, indentation):
+        gaps = self._gap0 + (self._normals * self._at(near)).sum(axis=2)
+        return gaps + indentation * self._normals[..., 2] if self.moves else gaps
 
     def add_force(self, displacement, indentation, force):
         """Add nodal forces (n, 3); returns the contact's energy (mJ) and the downward force (N) of a moving object."""
-        density, pressure, _ = penalty(self._gaps(displacement, indentation), **self._law)
-        push = (pressure * self.areas)[..., None] * self._normals
+        near = displacement[self.near_nodes]
+        density, _, _ = penalty(self._gaps(near, indentation), **self._law)
+        nodal = self.near_force(near, indentation)
+        force[self.near_nodes] += nodal
+        return float((density * self.areas).sum()), float(nodal[:, 2].sum()) if self.moves else 0.0
+
+    def near_force(self, near, indentation):
+        """Nodal forces (c, 3) of the near nodes' displacement (c, 3): those of the residual, against what the object exerts."""
+        _, pressure, _ = penalty(self._gaps(near, indentation), **self._law)
         active = pressure.any(axis=1)
-        nodal = np.einsum("fgd,gm->fmd", push[active], self.values, optimize=True)
-        np.add.at(force, self.nodes[active].ravel(), -nodal.reshape(-1, 3))
-        return float((density * self.areas).sum()), float(-push[..., 2].sum()) if self.moves else 0.0
+        push = (pressure[active] * self.areas[active])[..., None] * self._normals[active]
+        force = np.zeros_like(near)
+        np.add.at(force, self._faces[active].ravel(), -np.matmul(self.values.T, push).reshape(-1, 3))
+        return force
 
     def add_tangent(self, displacement, indentation, values, positions):
         """Add the entries of faces in contact."""
-        slope = penalty(self._gaps(displacement, indentation), **self._law)[2] * self.areas
+        near = displacement[self.near_nodes]
+        active = penalty(self._gaps(near, indentation), **self._law)[2].any(axis=1)
+        _, shape, slope = self.near_touching(near, indentation)
+        shape = shape.reshape(*slope.shape, 3 * self.nodes.shape[1])
+        add_upper(values, np.matmul((shape * slope[..., None]).transpose(0, 2, 1), shape), positions[active])
+
+    def near_touching(self, near, indentation):
+        """The faces that touch, in near nodes (t, m); the gaps' derivatives (t, g, m, 3); the points' stiffness (t, g) in N/mm."""
+        slope = penalty(self._gaps(near, indentation), **self._law)[2] * self.areas
         active = slope.any(axis=1)
-        shape = np.einsum("gm,fgd->fgmd", self.values, self._normals[active]).reshape(*slope[active].shape, -1)
-        add_upper(values, np.matmul((shape * slope[active][..., None]).transpose(0, 2, 1), shape), positions[active])
+        return self._faces[active], self.values[..., None] * self._normals[active][:, :, None], slope[active]
+
+    def node_normals(self, points):
+        """The object's normals over nodes at rest (n, 3)."""
+        return self.surface(points[:, 0], points[:, 1])[1]
 
 
 def flat_surface(height, radius=np.inf):
@@ -116,9 +138,11 @@ class FreeBody:
     """Elements and contacts on one set of nodes.
 
     parts: `SolidElements` or `LinearTetrahedra`; held (n, 3): components that are given: zero, or -d times `follows` (n, 3).
+    apart: keep the moving contact out of the factor (see `contact_correction`): worth it for some hundred touching nodes of a
+    body that stands without the object.
     """
 
-    def __init__(self, points, parts, *, held, contacts=(), follows=None, solver=None):
+    def __init__(self, points, parts, *, held, contacts=(), follows=None, solver=None, apart=False):
         self.points, self.parts, self.contacts = points, parts, contacts
         self._follows = np.zeros(points.shape) if follows is None else -np.where(held, follows, 0.0)
         used = np.zeros(len(points), dtype=bool)
@@ -131,6 +155,9 @@ class FreeBody:
         self._positions = [pattern.positions(part.nodes) for part in (*parts, *contacts)]
         self._components = sum(3 * part.nodes.size for part in parts)
         self.solver = solver or make_solver()
+        self._apart = next((c for c in contacts if c.moves), None) if apart else None
+        if self._apart:
+            self._correction = ContactCorrection(self.solver, pattern.number, self._apart, self._apart.node_normals(points))
 
     def rest(self):
         """The state without displacement."""
@@ -171,12 +198,18 @@ class FreeBody:
         for part, positions in zip(self.parts, self._positions, strict=False):
             part.add_tangent(state.displacement, matrix.data, positions)
         for contact, positions in zip(self.contacts, self._positions[len(self.parts):], strict=True):
+            if contact is self._apart:
+                continue
             contact.add_tangent(state.displacement, state.indentation, matrix.data, positions)
         shift, diagonal = 0.0, matrix.indptr[:-1]
         while not self.solver.factor(matrix):
             more = max(shift, 1e-3 * float(np.abs(matrix.data[diagonal]).mean()))
             matrix.data[diagonal] += more
             shift += more
+    def step(self, state):
+        """Newton's step (unknowns,) in mm with the last factor, at the state's indentation."""
+        residual = self.residual(state)
+        return self._correction.step(state, residual) if self._apart else -self.solver.solve(residual)
 
     def border(self, state):
         """Derivative (unknowns,) of the residual by the indentation, and that of the object's force (N/mm), by a difference."""

@@ -19,7 +19,7 @@ class FreeSettings:
 
     relative_residual: float = 1e-5
     relative_correction: float = 1e-2
-    good_reduction: float = 0.5
+    good_reduction: float = 0.4
     max_iterations: int = 40
     largest_step_mm: float = 0.2
     first_touch_mm: float = 0.01
@@ -55,7 +55,7 @@ class _Press:
 
     def __init__(self, body, settings):
         self.body, self.settings = body, settings
-        self.states, self.factored = [body.rest()], False
+        self.states, self.factored, self._slope = [body.rest()], False, None
 
     def advance(self, indentation, force):
         """Equilibrium at an indentation or, if given, at a force."""
@@ -63,27 +63,39 @@ class _Press:
         body.face(last.displacement)
         start = self._start(indentation) if force is None else body.evaluate(last.displacement, last.indentation)
         level = self._newton(start, force)
-        self.states = [*self.states[-2:], level.state]
+        self.states = [*self.states[-3:], level.state]
         return level
 
     def _start(self, indentation):
-        """Displacements continued to the next indentation: by the tangent at first, then by the curve through the last three."""
+        """Displacements continued to the next indentation: along the tangent at first, then by a curve through the last states."""
         body, states = self.body, self.states
         if len(states) == 1:
             return self._along_the_tangent(states[-1], indentation)
-        guess = _continued([s.indentation for s in states], [s.displacement for s in states], indentation)
+        guess = self._continued(indentation)
         return (body.evaluate(body.carried(guess, indentation), indentation)
                 or body.evaluate(body.carried(states[-1].displacement, indentation), indentation))
 
     def _along_the_tangent(self, state, indentation):
+        """The first guess, from the state at rest; a first touch has no slope to follow."""
         body = self.body
+        if any(contact.moves for contact in body.contacts):
+            return body.evaluate(state.displacement, indentation)
         border, _ = body.border(state)
-        lowering = indentation - state.indentation
-        if not border.any():
-            return body.moved(state, np.zeros_like(border), lowering)
         body.factor(state)
         self.factored = True
-        return body.moved(state, -lowering * body.solver.solve(border), lowering)
+        start = body.moved(state, -indentation * body.solver.solve(border), indentation)
+        self._slope = start.displacement / indentation if start is not None else None
+        return start
+
+    def _continued(self, indentation):
+        """u(d) through the last states; as long as they begin at rest, with the slope there: u = d u'(0) + d^2 w(d)."""
+        states = self.states
+        if self._slope is not None and states[0].indentation == 0:
+            d = [s.indentation for s in states[1:]]
+            w = [(s.displacement - s.indentation * self._slope) / s.indentation**2 for s in states[1:]]
+            return indentation * self._slope + indentation**2 * _interpolated(d, w, indentation)
+        states = states[-3:]
+        return _interpolated([s.indentation for s in states], [s.displacement for s in states], indentation)
 
     def _newton(self, state, force):
         body, settings = self.body, self.settings
@@ -99,7 +111,7 @@ class _Press:
                 body.factor(state)
                 self.factored, factorisations, memory = True, factorisations + 1, _Memory()
             step, lowering = self._step(state, force, reuse)
-            if force is None:
+            if force is None and not body.contacts:   # a mean of steps would not fulfil the contact
                 step = memory.improved(step)
             trial = self._line_search(state, step, lowering, force, residual)
             if trial is None and not reuse:
@@ -112,9 +124,9 @@ class _Press:
     def _step(self, state, force, reuse):
         """Step (unknowns,) and lowering of the object (mm)."""
         body = self.body
-        residual = body.residual(state)
         if force is None:
-            return -body.solver.solve(residual), 0.0
+            return body.step(state), 0.0
+        residual = body.residual(state)
         if not reuse:
             self._border, self._corner = body.border(state)
             step, self._along = -body.solver.solve(np.column_stack([residual, self._border])).T
@@ -165,7 +177,7 @@ class _Memory:
         return better
 
 
-def _continued(places, values, place):
+def _interpolated(places, values, place):
     """Lagrange's polynomial through values at places, continued to `place`."""
     total = 0.0
     for x, value in zip(places, values, strict=True):

@@ -25,28 +25,27 @@ class LinearTetrahedra:
         if self.volumes.min() <= 0:
             raise ValueError(f"tetrahedron {int(np.argmin(self.volumes))} is inverted")
         bounds = np.linspace(0, len(self.nodes), threads + 1).astype(int)
+        self._constants = _constant_derivatives(law)
         self._shares = [slice(a, b) for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
 
     def add_force(self, displacement, force):
         """Add nodal forces (n, 3) in N for displacement (n, 3) in mm.
 
-        Returns the energy (mJ) and the sum of the magnitudes of all elements' force components (N); None where J <= 0.
+        Returns the energy (mJ) and the sum of the magnitudes of all elements' force components (N); None where a J <= 0.
         """
         def share(part):
             own = force if part.start == 0 else np.zeros_like(force)
-            table = self._table(displacement, part)
-            if table is None:
-                return None
-            return own, *_forces(displacement, self.nodes[part], self.gradients[part], self.volumes[part], table,
-                                 self.law.bulk_modulus, own)
+            return own, *_forces(displacement, self.nodes[part], self.gradients[part], self.volumes[part],
+                                 self._table(displacement, part), self.law.bulk_modulus, own)
 
         results = self._map(share)
-        if any(result is None for result in results):
+        energy = sum(energy for _, energy, _ in results)
+        if not np.isfinite(energy):
             return None
         for own, _, _ in results[1:]:
             force += own
-        return sum(energy for _, energy, _ in results), sum(size for _, _, size in results)
+        return energy, sum(size for _, _, size in results)
 
     def add_tangent(self, displacement, values, positions):
         """Add the tangent's entries (i, j >= i) to the matrix's values at `positions` (e, 78)."""
@@ -63,14 +62,25 @@ class LinearTetrahedra:
         return list((self._pool.map if self._pool else map)(function, self._shares))
 
     def _table(self, displacement, part):
-        """psi and its five derivatives (e, 6), see `materials.laws.invariants`; None where an element is inside out."""
+        """psi and its five derivatives (e, 6), see `materials.laws.invariants`; (1, 6) where the derivatives are constant."""
+        if self._constants is not None:
+            return self._constants
         i1, i2 = _invariants(displacement, self.nodes[part], self.gradients[part])
-        if not np.isfinite(i1).all():
-            return None
-        table = np.empty((len(i1), 6))
-        for column, value in enumerate(self.law.derivatives(i1, i2)):
-            table[:, column] = value
-        return table
+        return _as_table(self.law.derivatives(i1, i2), len(i1))
+
+
+def _as_table(derivatives, count):
+    table = np.empty((count, 6))
+    for column, value in enumerate(derivatives):
+        table[:, column] = value
+    return table
+
+
+def _constant_derivatives(law):
+    """The derivatives (1, 6) of a psi that is linear in the invariants, None for any other law."""
+    derivatives = law.derivatives(np.array([3.0, 4.0]), np.array([3.0, 5.0]))
+    linear = all(np.ndim(value) == 0 for value in derivatives[1:])
+    return _as_table(derivatives._replace(psi=0.0), 1) if linear else None
 
 
 @njit(cache=True, nogil=True)
@@ -159,10 +169,12 @@ def _forces(displacement, nodes, gradients, volumes, table, bulk_modulus, force)
         _deformation(displacement, nodes[e], gradients[e], f)
         J = _cofactor(f, h)
         I1, I2 = _left_cauchy_green(f, b)
-        s1 = J ** (-2 / 3)
-        p1, p2 = volumes[e] * s1 * table[e, 1], volumes[e] * s1 * s1 * table[e, 2]
+        s1 = J ** (-2 / 3) if J > 0 else np.nan
+        t = table[e] if len(table) > 1 else table[0]
+        psi = t[0] if len(table) > 1 else t[1] * (s1 * I1 - 3) + t[2] * (s1 * s1 * I2 - 3)
+        p1, p2 = volumes[e] * s1 * t[1], volumes[e] * s1 * s1 * t[2]
         ch = -2 / 3 * I1 / J * p1 - 4 / 3 * I2 / J * p2 + volumes[e] * bulk_modulus * (J - 1)
-        energy += volumes[e] * (table[e, 0] + 0.5 * bulk_modulus * (J - 1) ** 2)
+        energy += volumes[e] * (psi + 0.5 * bulk_modulus * (J - 1) ** 2)
         _node_vectors(f, h, b, I1, gradients[e], fa, ga, ha)
         for a in range(4):
             for i in range(3):
@@ -187,8 +199,9 @@ def _tangents(displacement, nodes, gradients, volumes, table, bulk_modulus, posi
         s1 = J ** (-2 / 3)
         s2 = s1 * s1
         r1, r2 = -2 / 3 * I1 / J, -4 / 3 * I2 / J
-        p1, p2 = V * table[e, 1] * s1, V * table[e, 2] * s2
-        p11, p12, p22 = V * table[e, 3] * s1 * s1, V * table[e, 4] * s1 * s2, V * table[e, 5] * s2 * s2
+        t = table[e] if len(table) > 1 else table[0]
+        p1, p2 = V * t[1] * s1, V * t[2] * s2
+        p11, p12, p22 = V * t[3] * s1 * s1, V * t[4] * s1 * s2, V * t[5] * s2 * s2
         c_ff, c_fg, c_gg = 4 * p11 + 4 * p2, 2 * p12, p22
         c_fh = 2 * p11 * r1 + 2 * p12 * r2 - 4 / 3 * p1 / J
         c_gh = p12 * r1 + p22 * r2 - 4 / 3 * p2 / J
