@@ -138,8 +138,8 @@ class FreeBody:
     """Elements and contacts on one set of nodes.
 
     parts: `SolidElements` or `LinearTetrahedra`; held (n, 3): components that are given: zero, or -d times `follows` (n, 3).
-    apart: keep the moving contact out of the factor (see `contact_correction`): worth it for some hundred touching nodes of a
-    body that stands without the object.
+    apart: keep the moving contact out of the factor (see `contact_correction`): worth it for some hundred touching nodes, as long
+    as the rubber alone, under the pressure it has, is stable.
     """
 
     def __init__(self, points, parts, *, held, contacts=(), follows=None, solver=None, apart=False):
@@ -206,6 +206,11 @@ class FreeBody:
             more = max(shift, 1e-3 * float(np.abs(matrix.data[diagonal]).mean()))
             matrix.data[diagonal] += more
             shift += more
+    def join_contact(self):
+        """Take a contact kept apart back into the factor, where the rubber alone hardly stands; False if there is none."""
+        apart, self._apart = self._apart, None
+        return apart is not None
+
     def step(self, state):
         """Newton's step (unknowns,) in mm with the last factor, at the state's indentation."""
         residual = self.residual(state)

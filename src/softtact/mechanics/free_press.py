@@ -114,7 +114,7 @@ class _Press:
             if force is None and not body.contacts:   # a mean of steps would not fulfil the contact
                 step = memory.improved(step)
             trial = self._line_search(state, step, lowering, force, residual)
-            if trial is None and not reuse:
+            if trial is None and not reuse and not body.join_contact():
                 break
             reuse = trial is not None and self._norm(trial, force) < settings.good_reduction * residual
             if trial is not None:
