@@ -19,7 +19,8 @@ class LayeredMesh:
     """points (n, 3) in mm, z = 0 at the top; by material ("dielectric", "cover") hexahedra (e, 27) and wedges (w, 18).
 
     top, tips, cone_sides: dicts of faces by their number of nodes, 9 (quads) or 6 (triangles), in plan order;
-    interface: corner nodes of the coarsest plan between sheet and cover; extent: half sides of the footprint (mm).
+    interface: corner nodes of the coarsest plan between sheet and cover; extent: half sides of the footprint (mm);
+    z_root: height of the cones' roots (mm).
     """
 
     points: np.ndarray
@@ -30,6 +31,7 @@ class LayeredMesh:
     cone_sides: dict
     interface: np.ndarray
     extent: np.ndarray
+    z_root: float
 
 
 @dataclass(frozen=True)
@@ -135,17 +137,19 @@ def _joined(slab, cone, plan, disc, centres, coarse, z_root, height, sheet_layer
     top = {9: slab.planes[-1][plan.quads], 6: slab.planes[-1][plan.triangles]}
     seen = _find(plan.points, coarse.points[:coarse.corners])
     return LayeredMesh(np.vstack([slab.points, *placed]), hexes, wedges, top, tips, _cone_sides(cone, disc, placed_cone),
-                       slab.planes[sheet_layers][seen], extent)
+                       slab.planes[sheet_layers][seen], extent, z_root)
 
 
 def _cone_sides(cone, disc, placed_cone):
-    """Side faces (f, 9) of the cones, of those made of hexahedra."""
-    from softtact.mechanics.elements import HEX27_SIDES
-
-    if not len(disc.quads):
-        return {}
-    quads, sides = disc.outer_sides()
-    return {9: placed_cone(np.vstack([cone.layer(k)[quads[:, None], HEX27_SIDES[sides]] for k in range(cone.layers)]))}
+    """Side faces (f, 9) of the cones: those over the plan's outer edges."""
+    edges = np.vstack([disc.quads[:, [[k, (k + 1) % 4, 4 + k] for k in range(4)]].reshape(-1, 3),
+                       disc.triangles[:, [[k, (k + 1) % 3, 3 + k] for k in range(3)]].reshape(-1, 3)])
+    _, first, counts = np.unique(np.sort(edges[:, :2], axis=1), axis=0, return_index=True, return_counts=True)
+    a, b, m = edges[first[counts == 1]].T
+    middles = cone.planes.size + np.arange(cone.layers * cone.planes.shape[1]).reshape(cone.layers, -1)
+    faces = [np.column_stack([low[a], low[b], high[b], high[a], low[m], middle[b], high[m], middle[a], middle[m]])
+             for low, high, middle in zip(cone.planes[:-1], cone.planes[1:], middles, strict=True)]
+    return {9: placed_cone(np.vstack(faces))}
 
 
 def _find(points, wanted):

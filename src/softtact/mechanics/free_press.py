@@ -1,6 +1,6 @@
 """Presses of a `FreeBody` to given indentations or forces: Newton's method with line search, one factor for several steps."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,7 +36,7 @@ class FreeLevel:
 
 
 def press_to_indentations(body, indentations_mm, *, settings=FreeSettings()):
-    """Yield a `FreeLevel` for each indentation (mm, increasing); each is reached in one increment."""
+    """Yield a `FreeLevel` for each indentation (mm, increasing)."""
     press = _Press(body, settings)
     for indentation in indentations_mm:
         yield press.advance(float(indentation), None)
@@ -57,8 +57,24 @@ class _Press:
         self.body, self.settings = body, settings
         self.states, self.factored, self._slope = [body.rest()], False, None
 
-    def advance(self, indentation, force):
-        """Equilibrium at an indentation or, if given, at a force."""
+    def advance(self, indentation, force, *, halvings=5):
+        """Equilibrium at an indentation or, if given, at a force; where Newton's method fails, in two halves of the increment."""
+        try:
+            return self._increment(indentation, force)
+        except ConvergenceError:
+            if not halvings:
+                raise
+        last = self.states[-1]
+        self.factored = False
+        if force is None:
+            first = self.advance(0.5 * (last.indentation + indentation), None, halvings=halvings - 1)
+        else:
+            first = self.advance(last.indentation, 0.5 * (last.object_force + force), halvings=halvings - 1)
+        second = self.advance(indentation, force, halvings=halvings - 1)
+        return replace(second, iterations=first.iterations + second.iterations,
+                       factorisations=first.factorisations + second.factorisations)
+
+    def _increment(self, indentation, force):
         body, last = self.body, self.states[-1]
         body.face(last.displacement)
         start = self._start(indentation) if force is None else body.evaluate(last.displacement, last.indentation)
