@@ -146,8 +146,10 @@ KINDS = {
                   hex=(_HEX20, hex20, gauss(2, 3)), wedge=(_WEDGE15, wedge15, small_wedge_rule(3))),
     "hex27": Kind("27-node hexahedra and 18-node wedges, linear pressure", "brick", modes=_linear,
                   hex=(_ALL27, hex27, gauss(3, 3)), wedge=(_ALL18, wedge18, wedge_rule())),
-    "hex27local": Kind("the same, a share 4 mu at every point (production)", "brick", modes=_linear, local_over_shear=4.0,
+    "hex27local": Kind("the same, a share 4 mu of K at every point", "brick", modes=_linear, local_over_shear=4.0,
                        hex=(_ALL27, hex27, gauss(3, 3)), wedge=(_ALL18, wedge18, wedge_rule())),
+    "reference": Kind("the same, a share mu of K at every point", "brick", modes=_linear, local_over_shear=1.0,
+                      hex=(_ALL27, hex27, gauss(3, 3)), wedge=(_ALL18, wedge18, wedge_rule())),
 }
 
 
