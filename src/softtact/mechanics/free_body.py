@@ -11,6 +11,7 @@ import numpy as np
 from softtact.contact.penalty import penalty
 from softtact.mechanics.contact_correction import ContactCorrection
 from softtact.mechanics.linear_solvers import make_solver
+from softtact.mechanics.rough_solver import point_at_mkl
 from softtact.mechanics.sparsity import SymmetricPattern, add_upper
 
 _CHUNK = 400      # elements whose dense tangents are in memory at once
@@ -154,6 +155,7 @@ class FreeBody:
         self._matrix = pattern.matrix()
         self._positions = [pattern.positions(part.nodes) for part in (*parts, *contacts)]
         self._components = sum(3 * part.nodes.size for part in parts)
+        point_at_mkl()
         self.solver = solver or make_solver()
         self._apart = next((c for c in contacts if c.moves), None) if apart else None
         if self._apart:

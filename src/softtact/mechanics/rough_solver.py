@@ -21,7 +21,7 @@ class RoughSolver(PardisoSolver):
     name = "pardiso, single precision"
 
     def __init__(self):
-        _point_at_mkl()
+        point_at_mkl()
         super().__init__()
         for parameter, value in ((_OWN_PARAMETERS, 1), (_ORDERING, _MINIMUM_DEGREE), (_REFINEMENTS, 0), (_SINGLE, 1)):
             self._solver.set_iparm(parameter, value)
@@ -40,7 +40,7 @@ class RoughSolver(PardisoSolver):
         return size * super().solve((right / size).astype(np.float32)).astype(float)
 
 
-def _point_at_mkl():
+def point_at_mkl():
     """Tell pypardiso where MKL is: its own search through the installation takes half a second for every solver."""
     if "PYPARDISO_MKL_RT" not in os.environ:
         files = importlib.metadata.files("mkl") or []
