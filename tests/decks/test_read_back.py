@@ -5,7 +5,7 @@ import pytest
 import trimesh
 from deck_study import CORO, NEOPRENE, POLYURETHANE
 
-from softtact.contact.penalty import penalty
+from softtact.contact.penalty import Contact, penalty
 from softtact.decks.export import deck_text, export_press, write_deck
 from softtact.decks.laws import law_card
 from softtact.decks.model import deck_model
@@ -170,7 +170,7 @@ def test_contacts_have_the_penalty_of_the_press(pair, dialect):
     model, deck = pair
     assert [(slave, master) for slave, master, *_ in deck.contacts] == [
         ("TOP", "OBJECT_SURFACE"), ("FRUSTA_FOOT", "BOARD_SURFACE"), ("FRUSTA_SIDES_EVEN", "FRUSTA_SIDES_ODD")]
-    for (_, _, behaviour, table), stiffness in zip(deck.contacts, (500.0, 2000.0, 2000.0), strict=True):
+    for (_, _, behaviour, table), stiffness in zip(deck.contacts, 3 * [Contact().stiffness], strict=True):
         if dialect == "calculix":
             assert (behaviour, table) == ("LINEAR", [[stiffness]])
         else:

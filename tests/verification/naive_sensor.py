@@ -4,6 +4,8 @@ It takes from the fast sensor what defines the problem (elements and the nodes t
 areas) and solves that problem by itself.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
@@ -75,7 +77,8 @@ class NaiveSensor:
         body = self.body
         rest = np.einsum("pd,pd->p", self.planes.normals, body.slab.top_reference - self.planes.anchors)
         lowering = self.planes.normals[:, 2]
-        return [(self.board, self.board_gap0 + self.board @ u, self.board_area, body.bed.contact, 0.0 * self.board_gap0),
+        below = replace(body.bed.contact, offset=np.ravel(body.bed.contact.offset))
+        return [(self.board, self.board_gap0 + self.board @ u, self.board_area, below, 0.0 * self.board_gap0),
                 (self.top, rest + self.top @ u + depth * lowering, self.top_area, body.slab.contact, lowering)]
 
     def _potential(self, u, depth):

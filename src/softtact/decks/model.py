@@ -231,7 +231,7 @@ def _steps(body, surface, forces_n, indentations_mm, touch_mm):
 
 def _remarks(body):
     block = body.bed.block
-    share = f"{block.local_modulus / block.law.bulk_modulus:.2g}"
+    share = f"{block.local_modulus.min() / block.law.bulk_modulus:.2g} to {block.local_modulus.max() / block.law.bulk_modulus:.2g}"
     return ("units: mm, N, MPa",
             "*EQUATION: the sheet's upper nodes follow the cover's lower side; where walls between cells are coarse, nodes at "
             "their quarters follow the curve through the corner, the middle and the next corner.",
