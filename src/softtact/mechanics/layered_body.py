@@ -35,6 +35,11 @@ class MeshSettings:
     refinement: int = 0
     coarse_walls: bool = False
 
+    @property
+    def over_shear_of_layers(self):
+        """The pointwise share over mu of each layer of a frustum, from the tip upwards."""
+        return [self.tip_over_shear] + [self.local_over_shear] * (len(self.frustum_levels) - 2)
+
     @classmethod
     def draft(cls):
         """For quick studies: a layer less in each frustum, and walls as one curve."""
@@ -258,10 +263,9 @@ def _bed(spec, centres, neighbours, law, mesh, scatter, contact, *, bottom=None)
     # Every cone is built with the same root; where its printed readings are swapped the tip is the wide end.
     geometry = BedGeometry(centres=centres, heights=heights, tip_diameters=frusta.tip_diameter_mm * tip_factor,
                            root_diameter=frusta.root_diameter_mm, neighbours=neighbours)
-    upper = len(mesh.frustum_levels) - 2
     return FrustumBed(geometry, law, levels=np.asarray(mesh.frustum_levels) * frusta.height_mm, root_z_mm=bottom,
                       pcb_z_mm=bottom - heights.max(), tips_held=spec.tips_held, contact=contact or Contact(),
-                      local_over_shear=[mesh.tip_over_shear] + upper * [mesh.local_over_shear], refinement=mesh.refinement)
+                      local_over_shear=mesh.over_shear_of_layers, refinement=mesh.refinement)
 
 
 def surface_of(mesh):
