@@ -3,7 +3,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 BIN := .venv/bin
 SNAKEMAKE = $(BIN)/snakemake --cores all
 
-.PHONY: study tiny test lint clean
+.PHONY: study tiny test lint bench clean
 
 study: .venv/installed
 	$(SNAKEMAKE)
@@ -15,6 +15,9 @@ tiny: .venv/installed
 
 test: .venv/tested
 	$(BIN)/python -m pytest
+
+bench: .venv/installed
+	for benchmark in press scaling mesh_error against_calculix discretisation; do $(BIN)/python benchmarks/$$benchmark.py || exit 1; done
 
 lint: .venv/tested
 	$(BIN)/ruff check .
