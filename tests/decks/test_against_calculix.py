@@ -28,7 +28,8 @@ SPHERE = place(trimesh.creation.icosphere(subdivisions=4, radius=3.0))
 
 
 def press(body, placed, forces):
-    return list(press_levels(body, HeightField(placed), forces, settings=NewtonSettings(smallest_scale_n=0.1, smallest_increment_n=1e-3)))
+    settings = NewtonSettings(smallest_scale_n=0.1, smallest_increment_n=1e-3)
+    return list(press_levels(body, HeightField(placed), forces, settings=settings))
 
 
 def interface_error(body, levels, tables):
