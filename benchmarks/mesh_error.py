@@ -18,12 +18,12 @@ from softtact.sensor import Sensor
 
 FORCES_N = [2.0, 4.0, 8.0]
 FRUSTA = (6, 6)
-FINE = {"frustum_levels": (0.0, 0.1, 0.3, 0.6, 1.0), "sheet_layers": 2, "cover_layers": 3, "coarse_walls": False}
+FINE = {"frustum_levels": (0.0, 0.1, 0.3, 0.6, 1.0), "sheet_layers": 2, "cover_levels": (0.0, 0.25, 0.5, 0.75, 1.0)}
 MESHES = {
     "draft": MeshSettings.draft(),
     "production": MeshSettings(),
-    "finer layers": MeshSettings(**FINE),
-    "reference": MeshSettings(refinement=1, cells_per_pitch=2, **FINE),
+    "finer layers": MeshSettings(cover_splits=(1, 1, 2, 2), **FINE),
+    "reference": MeshSettings(cover_splits=(1, 1, 2, 2), refinement=1, **FINE),
 }
 
 

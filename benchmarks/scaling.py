@@ -44,7 +44,7 @@ def least(function, repeats=3):
 def parts_of_iteration(counts, threads):
     """Seconds of each part of an iteration, with the number of unknowns."""
     start = time.perf_counter()
-    body = sensor_of(counts).body(threads=threads)
+    body = sensor_of(counts).body(threads=threads, surface=HeightField(place(PUNCH, pose=None)))
     built = time.perf_counter() - start
     level, = press_levels(body, HeightField(place(PUNCH, pose=None)), [FORCE_N])
     state, cells, slab = level.state, body.cells, body.slab
@@ -54,13 +54,13 @@ def parts_of_iteration(counts, threads):
         cells.forget()
         cells.refresh(state, workers=body.workers)
 
-    matrix, _, _ = slab.tangent(state.slab, cells.condensed.outer, workers=body.workers)
+    matrix, _, _ = slab.tangent(state.slab, cells.outer, workers=body.workers)
     right = np.ones((len(slab.unknowns), 2))
     row = {"frusta": len(everyone), "threads": threads, "solver": body.solver.name, "iterations": level.iterations,
            "unknowns_global": len(slab.unknowns),
            "unknowns_all": len(slab.free) + cells.count * (len(body.bed.inner)),
            "build_s": built, "condense_s": least(condense),
-           "assemble_s": least(lambda: slab.tangent(state.slab, cells.condensed.outer, workers=body.workers)),
+           "assemble_s": least(lambda: slab.tangent(state.slab, cells.outer, workers=body.workers)),
            "factor_s": least(lambda: body.solver.factor(matrix)), "solve_s": least(lambda: body.solver.solve(right)),
            "residual_s": least(lambda: body.evaluate(state.slab.displacement, state.bed.displacement, state.indentation,
                                                      state.slab.planes)),

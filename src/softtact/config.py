@@ -143,15 +143,18 @@ class Mesh(Section):
     """Resolution of a model's mesh, and the scatter of its frusta; what is not said is the model's own default."""
 
     edge_length_mm: PositiveFloat | None = Field(None, description="of tetrahedra; makes it a single plain layer")
-    cells_per_pitch: PositiveInt | None = Field(None, description="elements of the cover along a frustum's pitch")
     sheet_layers: PositiveInt | None = None
-    cover_layers: PositiveInt | None = None
+    cover_levels: Annotated[list[float], AfterValidator(_rising)] | None = Field(
+        None, description="heights of the cover's layers of elements, from 0 to 1")
+    cover_splits: list[Annotated[int, Field(ge=0, le=4)]] | None = Field(
+        None, description="how often each of these layers' elements, a pitch wide, are split under the object and at its edges")
+    far_pitches: Literal[1, 2, 4] | None = Field(None, description="pitches that an element of the cover spans far from the object")
     frustum_levels: Annotated[list[float], AfterValidator(_rising)] | None = Field(
         None, description="heights of a frustum's layers of elements, from 0 to 1")
     local_over_shear: NotNegative | None = Field(None, description="volumetric stiffness of frusta at each point, over mu")
     tip_over_shear: NotNegative | None = Field(None, description="the same in the lowest layer of each frustum")
     refinement: Annotated[int, Field(ge=0)] | None = Field(
-        None, description="how often the elements of sheet and frusta are split into four in plan")
+        None, description="how often all elements are split into four in plan")
     coarse_walls: bool | None = Field(
         None, description="along a wall between cells the sheet moves as one quadratic curve: half the unknowns, 1 % stiffer; "
                           "without effect in a refined plan")

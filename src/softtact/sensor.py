@@ -88,10 +88,10 @@ class Sensor:
                 return self._press_elastic(surface, forces, label)
             return self._press_hyperelastic(surface, forces, label, threads or _cores())
 
-    def body(self, *, threads=1):
+    def body(self, *, threads=1, surface=None):
         """The `LayeredBody` that the hyperelastic model presses on."""
         return build_sensor_body(self.spec, dielectric_law=self.laws["dielectric"], cover_law=self.laws["cover"],
-                                 mesh=self.mesh, scatter=self.scatter, threads=threads)
+                                 mesh=self.mesh, scatter=self.scatter, threads=threads, surface=surface)
 
     def choose(self, placed):
         """The model that the contact of a placed mesh asks for (PAPER section 3.3.1)."""
@@ -129,7 +129,7 @@ class Sensor:
                             iterations=[level.iterations for level in levels])
 
     def _press_hyperelastic(self, surface, forces, label, threads):
-        body = self.body(threads=threads)
+        body = self.body(threads=threads, surface=surface)
         grid = np.stack(np.meshgrid(self.spec.map_x_mm, self.spec.map_y_mm), axis=-1).reshape(-1, 2)
         sampling = body.slab.sampling(grid)
         announce(f"{label}: {body.bed.count} frusta, {len(forces)} force levels of the hyperelastic model, some seconds each")
@@ -159,7 +159,7 @@ class Sensor:
     def _read_level(body, sampling, level):
         slab, bed = level.state.slab, level.state.bed
         return (-(sampling @ slab.displacement[:, 2]), level.state.indentation,
-                float(body.slab.top_area[slab.gaps < 0].sum()), level.penetration_mm,
+                float((body.slab.top_area * slab.planes.covered)[slab.gaps < 0].sum()), level.penetration_mm,
                 float(body.bed.compression(bed.displacement).max()), level.residual_n,
                 body.share_outside_window(level.state), level.iterations)
 

@@ -34,7 +34,7 @@ def press(body, placed, forces):
 
 def interface_error(body, levels, tables):
     """Largest and root mean square difference (levels, 2) of the interface's deflection, as shares of its largest."""
-    plane = np.sort(body.slab.cover_mesh.planes[0])      # the cover's nodes come first in a deck, too
+    plane = np.sort(body.slab.cover_mesh.bottom_nodes)      # the cover's nodes come first in a deck, too
     errors = []
     for level, table in zip(levels, tables, strict=True):
         assert (table[:, 0] == plane + 1).all()
@@ -88,7 +88,7 @@ def test_what_the_elements_differ_by_halves_with_every_element_split(solve):
     forces = np.array([0.05])
     soft = {"local_over_shear": 0.1, "tip_over_shear": 0.1}
     coarse = cell_error(MeshSettings(coarse_walls=True, **soft), forces, solve)
-    fine = cell_error(MeshSettings(**soft, refinement=1, cells_per_pitch=2, sheet_layers=2,
+    fine = cell_error(MeshSettings(**soft, refinement=1, sheet_layers=2,
                                    frustum_levels=(0.0, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)), forces, solve)
     assert (coarse > 0).all() and (np.abs(fine) < 0.6 * coarse).all()
 
@@ -97,13 +97,18 @@ def test_what_the_elements_differ_by_halves_with_every_element_split(solve):
 def test_a_small_sensor_gives_way_as_in_calculix(solve):
     """A sphere on 16 frusta. Left: the elements, and our facing planes against the projections of CalculiX.
 
-    Indentation -0.5 and -0.7 %, the interface 2.9 % of its maximum (1 % in the mean) measured.
+    The cover's lower side a pitch wide: the nodes of a finer one meet the middles of the sheet's faces, where 20-node elements
+    have no node, and would hang freely there (10 % of the interface's maximum).
+
+    Indentation within 2 %, the interface 1.5 % of its maximum in the mean and 5.9 % where four cells meet under the sphere: the
+    wedges there have 15 nodes in CalculiX, which then lose an order.
     """
     forces = [2.0, 4.0]
-    body = sharp(build_sensor_body(PATCH, dielectric_law=POLYURETHANE, cover_law=NEOPRENE))
+    body = sharp(build_sensor_body(PATCH, dielectric_law=POLYURETHANE, cover_law=NEOPRENE, surface=HeightField(SPHERE),
+                                   mesh=MeshSettings(cover_splits=(0, 1, 2))))
     levels = press(body, SPHERE, forces)
     tables = solve(deck_model(body, SPHERE, forces_n=forces))
     assert tables.force[1:] == pytest.approx(forces, rel=1e-4)
     assert tables.indentation[1:] == pytest.approx([level.state.indentation for level in levels], rel=0.02)
     largest, rms = interface_error(body, levels, tables.of("INTERFACE")[1:]).T
-    assert largest.max() < 0.05 and rms.max() < 0.02
+    assert largest.max() < 0.07 and rms.max() < 0.02

@@ -17,7 +17,7 @@ from softtact.mechanics.layered_body import MeshSettings, build_unit_cell
 from softtact.sensor import Sensor
 
 SMALL = CORO.model_copy(update={"footprint_mm": (2.4, 3.6), "map_shape": (7, 5)})   # 2 x 3 frusta
-SENSOR = Sensor(SMALL, {"dielectric": POLYURETHANE, "cover": NEOPRENE}, mesh=MeshSettings(cover_layers=1))
+SENSOR = Sensor(SMALL, {"dielectric": POLYURETHANE, "cover": NEOPRENE}, mesh=MeshSettings(cover_levels=(0.0, 1.0), cover_splits=(0,), far_pitches=1))
 SPHERE = trimesh.creation.icosphere(subdivisions=2, radius=2.0)
 # Corner nodes of faces, and ends of the edges that the further nodes halve: Abaqus Elements Guide, "Three-dimensional solid element
 # library"; ccx has the same.
@@ -176,7 +176,7 @@ def test_contacts_have_the_penalty_of_the_press(pair, dialect):
         else:
             pressure, overlap = np.array(table).T
             assert behaviour == "TABULAR"
-            assert pressure == pytest.approx(penalty(-overlap, stiffness=stiffness, smoothing=1e-3)[1])
+            assert pressure == pytest.approx(penalty(-overlap, stiffness=stiffness, smoothing=Contact().smoothing)[1])
 
 
 def test_the_objects_facets_look_at_the_rubber(pair, dialect):
@@ -220,7 +220,7 @@ def test_a_unit_cell_has_walls_for_the_neighbours_it_lacks(tmp_path, dialect):
 
 
 def test_a_refined_cell_has_its_finer_sides_and_no_coarse_walls(dialect):
-    body = build_unit_cell(CORO, dielectric_law=POLYURETHANE, mesh=MeshSettings(refinement=1, cells_per_pitch=2))
+    body = build_unit_cell(CORO, dielectric_law=POLYURETHANE, mesh=MeshSettings(refinement=1))
     model = deck_model(body, place(trimesh.creation.box((5.0, 5.0, 1.0))), indentations_mm=[0.02])
     sides = np.vstack(face_corners(model, "FRUSTA_SIDES")) - [0, 0, 1.5]      # no cover: 1.5 mm higher than in a sensor
     assert len(sides) == 4 * 8 * body.bed.mesh.layers

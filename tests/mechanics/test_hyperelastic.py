@@ -20,7 +20,7 @@ CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yam
 SMALL = CORO.model_copy(update={"footprint_mm": (6.0, 8.4), "map_shape": (15, 11)})   # 5 x 7 frusta
 LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492),
         "cover": make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)}
-COARSE = MeshSettings(cover_layers=1, frustum_levels=(0.0, 0.35, 1.0))
+COARSE = MeshSettings(cover_levels=(0.0, 1.0), cover_splits=(0,), far_pitches=1, frustum_levels=(0.0, 0.35, 1.0))
 
 
 def small_body():
@@ -60,7 +60,7 @@ def test_the_mesh_file_holds_the_volume_of_sheet_and_cover_and_of_the_frusta():
     """As VTK sees it, which cuts curved elements into tetrahedra: cones of eight sides, with a tenth less volume."""
     import pyvista
 
-    grid = pyvista.from_meshio(layered_mesh(SMALL, {"cover_layers": 1, "frustum_levels": [0.0, 0.35, 1.0]}))
+    grid = pyvista.from_meshio(layered_mesh(SMALL, {"cover_levels": [0.0, 1.0], "cover_splits": [0], "frustum_levels": [0.0, 0.35, 1.0]}))
     volumes = grid.compute_cell_sizes(length=False, area=False)["Volume"]
     assert volumes.min() > 0
     octagon = 8 * np.sin(np.pi / 4) / 2 / np.pi

@@ -47,7 +47,7 @@ class NaiveSensor:
         """(node numbers (e, m), block) of slab and frusta."""
         bed = self.body.bed
         frusta = np.concatenate([self._frustum_node(f, bed.mesh.hexes) for f in range(bed.count)])
-        return [*self.body.slab.groups, *self.body.slab.cell_groups, (frusta, bed.block)]
+        return [*self.body.slab.solids, (frusta, bed.block)]
 
     def _board_points(self):
         """Matrix (points, 3 nodes) of the gaps at the frusta, gaps at rest, areas (mm2)."""
@@ -65,12 +65,12 @@ class NaiveSensor:
         slab = self.body.slab
         B = sp.lil_matrix((len(slab.top_area), 3 * self.nodes))
         for t, face in enumerate(slab.top_faces):
-            for g, values in enumerate(slab.top_values):
-                point = len(slab.top_values) * t + g
+            for g, values in enumerate(slab.top_values[t]):
+                point = slab.top_values.shape[1] * t + g
                 for node, value in zip(face, values, strict=True):
                     for i in range(3):
                         B[point, 3 * node + i] += value * self.planes.normals[point, i]
-        return B.tocsr(), slab.top_area
+        return B.tocsr(), slab.top_area * self.planes.covered
 
     def _contacts(self, u, depth):
         """(matrix, gaps, areas, settings, gap's slope by depth) of board and object."""

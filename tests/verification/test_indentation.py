@@ -171,17 +171,15 @@ def test_the_slabs_contact_radius_and_pressure_are_hertzs(record):
 
 def test_a_flat_punch_on_the_slab_follows_the_closed_form_and_better_on_a_finer_grid(record):
     source, errors = PUNCH, []
-    for cells in (2, 3):
-        block = block_of(uniform(linear_law(YOUNG)), cells=cells, far=12.0, growing=4)
-        inside = np.hypot(*block.slab.top_reference[:, :2].T) < A
-        expected = 2 * np.sqrt(4 * block.slab.top_area[inside].sum() / np.pi) * MODULUS * DEPTH
+    for cells in (2, 4):
+        expected = 2 * A * MODULUS * DEPTH
 
         def force(block):
             return 4 * block.press(flat_punch(A), DEPTH, tolerance=1e-6).force
 
         got = on_a_half_space(force, uniform(linear_law(YOUNG)), cells=cells)
         errors.append(record(f"slab, flat punch, {cells} cells along a: force", expected=expected, source=source, got=got))
-    assert errors[1] < errors[0] and errors[1] < 0.04
+    assert errors[1] < 0.6 * errors[0] and errors[1] < 0.05      # first order: the stress is singular at the punch's edge
 
 
 def test_a_layered_half_space_lies_between_its_materials_and_equals_each_in_its_limit(record):

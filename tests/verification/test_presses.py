@@ -24,7 +24,7 @@ from softtact.sensor import Sensor
 CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
 LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492),
         "cover": make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)}
-COARSE = MeshSettings(cover_layers=1, frustum_levels=(0.0, 0.35, 1.0))
+COARSE = MeshSettings(cover_levels=(0.0, 1.0), cover_splits=(0,), far_pitches=1, frustum_levels=(0.0, 0.35, 1.0))
 TIGHT = NewtonSettings(relative_tolerance=1e-8)
 
 

@@ -30,7 +30,7 @@ SOURCE = "naive solver, limit of a sheet of 4 x 4 x 2 and 8 x 8 x 4 elements, ti
 def refined(refinement):
     """Settings of the sensor's mesh with every element split so often in all directions."""
     finer = 2**refinement
-    return MeshSettings(cells_per_pitch=finer, sheet_layers=finer * SHEET_LAYERS, local_over_shear=0.0, tip_over_shear=0.0,
+    return MeshSettings(sheet_layers=finer * SHEET_LAYERS, local_over_shear=0.0, tip_over_shear=0.0,
                         frustum_levels=tuple(np.linspace(0, 1, finer * LAYERS + 1)), refinement=refinement)
 
 
@@ -39,7 +39,7 @@ def cell_stiffness(mesh):
     body = build_unit_cell(CORO, dielectric_law=LAW, mesh=mesh)
     naive = NaiveSensor(body, lambda x, y: (0 * x, np.tile([0.0, 0.0, -1.0], (len(x), 1))))
     matrix = sum(assemble(block.tangent(np.zeros((*nodes.shape, 3))), nodes, naive.nodes) for nodes, block in naive.parts)
-    top = 3 * body.slab.cover_mesh.planes[-1] + 2
+    top = 3 * body.slab.cover_mesh.top_nodes + 2
     tips = 3 * (body.slab.nodes + body.bed.tip) + 2
     return _lowered(naive.T.T @ matrix @ naive.T, np.isin(naive.unknowns, top), np.isin(naive.unknowns, tips))
 

@@ -31,8 +31,8 @@ class Contact:
     Newton's method would have to follow in smaller steps. Simo and Laursen, Computers & Structures 42 (1992) 97.
     """
 
-    stiffness: float = 1000.0
-    smoothing: float = 1e-3
+    stiffness: float = 3000.0
+    smoothing: float = 3e-4
     offset: float | np.ndarray = 0.0
 
     def response(self, gaps):

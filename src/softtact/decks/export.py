@@ -4,6 +4,7 @@
     write_deck("cell.inp", deck_model(body, placed, forces_n=[0.1]), dialect="abaqus")
 """
 
+from softtact.contact.height_field import HeightField
 from softtact.decks import abaqus, calculix
 from softtact.decks.model import deck_model
 from softtact.errors import InputError
@@ -47,7 +48,7 @@ def export_press(sensor, mesh, *, force_n, dialect, path, pose=None, control="fo
     if control == "indentation":
         result = sensor.press(mesh, pose=pose, force_n=forces, model="hyperelastic", label="export-deck")
         steps = {"indentations_mm": result.indentation_mm}
-    model = deck_model(sensor.body(), placed, title=f"{_ascii(name)} on sensor {_ascii(sensor.spec.name)}", **steps)
+    model = deck_model(sensor.body(surface=HeightField(placed)), placed, title=f"{_ascii(name)} on sensor {_ascii(sensor.spec.name)}", **steps)
     write_deck(path, model, dialect=dialect, **elements)
     return model
 

@@ -65,16 +65,17 @@ class BodyMesh:
 def body_mesh(body):
     """The `BodyMesh` of a `LayeredBody`."""
     slab, bed = body.slab, body.bed
-    sheet, followers = _sheet_numbers(slab)
-    own = slab.nodes + len(followers) + np.arange(bed.count * bed.nodes).reshape(bed.count, bed.nodes)
+    cover, hanging = _cover_numbers(slab)
+    sheet, followers = _sheet_numbers(slab, slab.nodes + len(hanging))
+    own = slab.nodes + len(hanging) + len(followers) + np.arange(bed.count * bed.nodes).reshape(bed.count, bed.nodes)
     own[:, bed.root] = body.cells.roots
-    points = np.vstack([slab.points, slab.sheet_mesh.points[followers], bed.coordinates.reshape(-1, 3)])
-    ties = _ties(slab, followers)
-    number = _numbers_in_use([sheet[_hexes(slab.sheet_mesh)], sheet[_wedges(slab.sheet_mesh)], slab.cover_mesh.hexes,
+    points = np.vstack([slab.points, slab.cover_mesh.points[hanging], slab.sheet_mesh.points[followers], bed.coordinates.reshape(-1, 3)])
+    ties = [*_ties(slab.nodes, hanging, *slab.cover_mesh.masters()), *_ties(slab.nodes + len(hanging), followers, *slab.sheet_nodes)]
+    number = _numbers_in_use([sheet[_hexes(slab.sheet_mesh)], sheet[_wedges(slab.sheet_mesh)], cover,
                               own[:, _hexes(bed.mesh)], *(tie.masters for tie in ties)], len(points))
     ties = [Tie(int(number[tie.slave]), number[tie.masters], tie.weights) for tie in ties if number[tie.slave] >= 0]
     frusta = number[own]
-    return BodyMesh(points[number >= 0], _parts(body, number[sheet], number, frusta), ties, number[:slab.nodes], frusta)
+    return BodyMesh(points[number >= 0], _parts(body, number[sheet], number[cover], frusta), ties, number[:slab.nodes], frusta)
 
 
 def _hexes(mesh):
@@ -85,25 +86,31 @@ def _wedges(mesh):
     return mesh.wedges[:, WEDGE15_OF_18]
 
 
-def _sheet_numbers(slab):
-    """Number of each node of the sheet's mesh, and which of them follow others.
+def _cover_numbers(slab):
+    """Nodes of the cover's hexahedra (e, 20), and which of its points follow others: those are numbered after the slab's own."""
+    mesh = slab.cover_mesh
+    hexes = np.where(mesh.hexes < mesh.free, mesh.hexes, slab.nodes + mesh.hexes - mesh.free)
+    return hexes, np.arange(mesh.free, len(mesh.points))
 
-    A node that follows one other with weight 1 is that one. Followers are numbered after the slab's own nodes.
+
+def _sheet_numbers(slab, first_follower):
+    """Number of each node of the sheet's mesh, and which of them follow others, numbered from `first_follower` on.
+
+    A node that follows one other with weight 1 is that one.
     """
     masters, weights = slab.sheet_nodes
     first = np.argmax(weights, axis=1)
     rows = np.arange(len(masters))
     followers = np.flatnonzero(np.abs(weights[rows, first] - 1) > _NO_WEIGHT)
     sheet = masters[rows, first]
-    sheet[followers] = slab.nodes + np.arange(len(followers))
+    sheet[followers] = first_follower + np.arange(len(followers))
     return sheet, followers
 
 
-def _ties(slab, followers):
-    """What the sheet's followers follow: the cover's lower side, and along coarse walls the curve through three nodes."""
-    masters, weights = slab.sheet_nodes
+def _ties(first, followers, masters, weights):
+    """What followers, numbered from `first` on, follow: larger elements of the cover; its lower side; curves along coarse walls."""
     used = np.abs(weights) > _NO_WEIGHT
-    return [Tie(slab.nodes + k, masters[node, used[node]], weights[node, used[node]]) for k, node in enumerate(followers)]
+    return [Tie(first + k, masters[node, used[node]], weights[node, used[node]]) for k, node in enumerate(followers)]
 
 
 def _numbers_in_use(members, count):
@@ -114,11 +121,11 @@ def _numbers_in_use(members, count):
     return np.where(used, np.cumsum(used) - 1, -1)
 
 
-def _parts(body, sheet, number, frusta):
+def _parts(body, sheet, cover, frusta):
     slab, bed = body.slab, body.bed
     none = np.zeros((0, 15), dtype=np.int64)
     pieces = [("SHEET", sheet[_hexes(slab.sheet_mesh)], sheet[_wedges(slab.sheet_mesh)], slab.layers[0].law),
-              ("COVER", number[slab.cover_mesh.hexes], none, slab.layers[1].law),
+              ("COVER", cover, none, slab.layers[1].law),
               ("FRUSTA", frusta[:, _hexes(bed.mesh)].reshape(-1, 20), none, bed.block.law)]
     parts, first = [], 0
     for name, hexes, wedges, law in pieces:

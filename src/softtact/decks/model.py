@@ -102,7 +102,7 @@ def deck_model(body, placed, *, forces_n=None, indentations_mm=None, title="pres
 def _node_sets(body, mesh, held):
     """Sets by name: nodes of each part, the plane under the cover, tips, nodes that follow others, held ones."""
     sets = {part.name: part.nodes for part in mesh.parts}
-    sets["INTERFACE"] = np.sort(mesh.slab[body.slab.cover_mesh.planes[0]])
+    sets["INTERFACE"] = np.sort(mesh.slab[body.slab.cover_mesh.bottom_nodes])
     tips = mesh.frusta[:, body.bed.tip]
     return sets | {"TIPS": tips[tips >= 0], "TIED": np.array([tie.slave for tie in mesh.ties], dtype=int),
                    "HELD": np.unique(held[:, 0])}
@@ -140,8 +140,9 @@ def _surfaces(body, mesh):
 def _top_faces(body, parts):
     """The uppermost elements' upper faces: the cover's, or the sheet's where there is no cover."""
     part = parts[-2]
-    layers = (body.slab.cover_mesh if part.name == "COVER" else body.slab.sheet_mesh).layers
-    numbers = (part.hex_elements, part.wedge_elements)
+    if part.name == "COVER":
+        return _faces(part.hex_elements[-len(body.slab.cover_mesh.top):], TOP)
+    layers, numbers = body.slab.sheet_mesh.layers, (part.hex_elements, part.wedge_elements)
     return _faces(np.concatenate([kind[len(kind) - len(kind) // layers:] for kind in numbers]), TOP)
 
 
@@ -234,7 +235,7 @@ def _remarks(body):
     share = f"{block.local_modulus.min() / block.law.bulk_modulus:.2g} to {block.local_modulus.max() / block.law.bulk_modulus:.2g}"
     return ("units: mm, N, MPa",
             "*EQUATION: the sheet's upper nodes follow the cover's lower side; where walls between cells are coarse, nodes at "
-            "their quarters follow the curve through the corner, the middle and the next corner.",
+            "their quarters follow the curve through the corner, the middle and the next corner; small elements follow larger ones' faces.",
             "Contacts: object on the top, frusta (tip and sides) on the board, frusta on their neighbours. Left out, as in "
             "softtact: the sheet's underside on the frusta's sides, friction, the object's steep walls and upper sides.",
             f"Facets of the object narrower than {SLIVER_MM} mm are left out.",

@@ -180,7 +180,7 @@ class FrustumBed:
 
     def condense(self, state, frusta):
         """Recompute the condensed tangents of the given frusta (k,); returns those of their roots (k, 1, 75, 75)."""
-        slope = self.contact_slope(state.gaps)[frusta] * self.point_area[frusta]
+        slope = self.contact.at(frusta).response(state.gaps[frusta])[2] * self.point_area[frusta]
         displacement = state.displacement[frusta]
         left = []
         for k, layer in enumerate(self.layers):

@@ -10,6 +10,7 @@ from softtact.mechanics.frustum_bed import BedGeometry, BedState, FrustumBed
 from softtact.mechanics.hex_mesh import sheet_plan
 from softtact.mechanics.linear_solvers import make_solver
 from softtact.mechanics.parallel import Workers
+from softtact.mechanics.refinement import NEAR, levels_of, zones
 from softtact.mechanics.sheet_cells import SheetCells
 from softtact.mechanics.slab import Layer, Slab, SlabState
 
@@ -18,22 +19,29 @@ from softtact.mechanics.slab import Layer, Slab, SlabState
 class MeshSettings:
     """Resolution of the layered body.
 
-    cells_per_pitch: cover elements along one pitch; sheet_layers, cover_layers: elements through each layer;
+    cover_levels: heights of the cover's element layers as shares of its thickness; cover_splits: how often the elements of
+    each layer, a pitch wide, are split in plan: the lowest under the object, the others at its edges (see `refinement`);
+    far_pitches: pitches (1, 2, 4) that an element far from the object spans; sheet_layers: elements through the sheet;
     frustum_levels: heights of the frustum's element layers as shares of its height; local_over_shear: the share of the
     frusta's volumetric stiffness that acts at every point, over mu (see `blocks`), tip_over_shear: the same in the lowest
     layer, whose edges fold (with 1 a sphere does not pass 40 N); the smaller the softer, by 2 % in all. refinement: how often
-    the elements of sheet and frusta are split in plan. coarse_walls: along the walls between cells the sheet moves as one
+    all elements are split in plan. coarse_walls: along the walls between cells the sheet moves as one
     quadratic curve, 3 % stiffer and a third faster; without effect where refined.
     """
 
-    cells_per_pitch: int = 1
     sheet_layers: int = 1
-    cover_layers: int = 2
     frustum_levels: tuple = (0.0, 0.2, 0.6, 1.0)
     local_over_shear: float = 0.5
     tip_over_shear: float = 4.0
     refinement: int = 0
     coarse_walls: bool = False
+    cover_levels: tuple = (0.0, 0.45, 0.8, 1.0)
+    cover_splits: tuple = (1, 1, 2)
+    far_pitches: int = 2
+
+    def __post_init__(self):
+        if len(self.cover_splits) != len(self.cover_levels) - 1:
+            raise ValueError(f"cover_splits has {len(self.cover_splits)} entries for {len(self.cover_levels) - 1} layers of the cover")
 
     @property
     def over_shear_of_layers(self):
@@ -42,8 +50,9 @@ class MeshSettings:
 
     @classmethod
     def draft(cls):
-        """For quick studies: a layer less in each frustum, and walls as one curve."""
-        return cls(frustum_levels=(0.0, 0.35, 1.0), local_over_shear=4.0, coarse_walls=True)
+        """For quick studies: a layer less in the cover and in each frustum, and walls as one curve."""
+        return cls(frustum_levels=(0.0, 0.35, 1.0), local_over_shear=4.0, coarse_walls=True, cover_levels=(0.0, 0.55, 1.0),
+                   cover_splits=(1, 2))
 
 
 @dataclass(frozen=True)
@@ -87,7 +96,7 @@ class LayeredBody:
         self.slab, self.bed = slab, bed
         self.workers = Workers(threads)
         self.cells = SheetCells(slab, bed, roots)
-        slab.build_pattern(self.cells.inner_dofs, self.cells.outer_dofs)
+        slab.build_pattern(self.cells.eliminated, self.cells.outer_dofs)
         self.solver = make_solver(threads=threads)
         self.has_tangent = False
 
@@ -145,9 +154,9 @@ class LayeredBody:
 
     def _factor_tangent(self, state):
         """Factor the tangent, made positive definite where it is not, so that every step lowers the energy."""
-        matrix, border, corner = self.slab.tangent(state.slab, self.cells.condensed.outer, workers=self.workers)
+        matrix, border, corner = self.slab.tangent(state.slab, self.cells.outer, workers=self.workers)
         if not self.solver.factor(matrix):
-            matrix, border, corner = self.slab.tangent(state.slab, self.cells.condensed.positive_outer())
+            matrix, border, corner = self.slab.tangent(state.slab, self.cells.positive_outer())
             shift = 0.0
             while not self.solver.factor(matrix):
                 shift = max(2 * shift, _FIRST_SHIFT)
@@ -156,11 +165,11 @@ class LayeredBody:
 
     def penetration(self, state):
         """Deepest penetration in mm, of the object into the cover or of frusta into the board or each other."""
-        return float(max(0.0, -state.slab.gaps.min(), -state.bed.gaps.min()))
+        return float(max(0.0, -self.slab.own_gaps(state.slab).min(), -state.bed.gaps.min()))
 
     def contact_error(self, state):
         """Deepest overlap, or widest gap under pressure, in mm."""
-        return max(self.slab.contact.error(state.slab.gaps), self.bed.contact.error(state.bed.gaps))
+        return max(self.slab.contact.error(self.slab.own_gaps(state.slab)), self.bed.contact.error(state.bed.gaps))
 
     def press_apart(self, state):
         """Hold the points that overlap where their surfaces just touch."""
@@ -179,7 +188,7 @@ class LayeredBody:
         nan where no law knows what it was fitted to.
         """
         volumes = {}
-        for nodes, block in [*self.slab.groups, *self.slab.cell_groups]:
+        for nodes, block in self.slab.solids:
             _add_volumes(volumes, block, state.slab.displacement[nodes])
         _add_volumes(volumes, self.bed.block, self.bed.per_element(state.bed.displacement))
         return max((outside / whole for outside, whole in volumes.values()), default=np.nan)
@@ -205,10 +214,10 @@ def _add_volumes(volumes, block, displacement):
         volumes[id(block.law)] = outside + block.volume_outside(displacement, block.law.stretch_window), whole + block.volume
 
 
-def _lines(side, count, pitch, cells):
-    """Grid lines: the frusta's lattice divided into `cells` per pitch, and a strip to each edge where one is left."""
+def _lines(side, count, pitch, pitches):
+    """Grid lines: the frusta's lattice, one for `pitches` of them, and a strip to each edge where one is left."""
     half = 0.5 * count * pitch
-    inner = np.linspace(-half, half, count * cells + 1)
+    inner = pitch * np.append(np.arange(0, count, pitches), count) - half
     margin = 0.5 * side - half
     return np.concatenate([[-0.5 * side], inner, [0.5 * side]]) if margin > 1e-6 else inner
 
@@ -221,34 +230,56 @@ def lattice(counts, pitch):
     return centres, np.column_stack([i < nx - 1, j < ny - 1, i > 0, j > 0])
 
 
-def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), scatter=None, contact=None, threads=1):
-    """The whole sensor. `scatter`: None or (heights factor (n,), tip diameter factor (n,)) of its frusta."""
+def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), scatter=None, contact=None, threads=1, surface=None):
+    """The whole sensor. `scatter`: None or (heights factor (n,), tip diameter factor (n,)) of its frusta.
+
+    surface: the underside of the object that is to be pressed, where the cover's mesh is to be fine; without it a pitch everywhere
+    """
     frusta, counts = spec.dielectric.frusta, spec.frusta_counts
     bottom = -(spec.cover.thickness_mm + spec.dielectric.sheet_thickness_mm)
-    x_lines, y_lines = (_lines(side, count, frusta.pitch_mm, mesh.cells_per_pitch)
+    x_lines, y_lines = (_lines(side, count, frusta.pitch_mm, mesh.far_pitches)
                         for side, count in zip(spec.footprint_mm, counts, strict=True))
     sheet = Layer(np.linspace(bottom, -spec.cover.thickness_mm, mesh.sheet_layers + 1), dielectric_law)
-    cover = Layer(np.linspace(-spec.cover.thickness_mm, 0.0, mesh.cover_layers + 1), cover_law)
+    cover = Layer(spec.cover.thickness_mm * (np.asarray(mesh.cover_levels) - 1), cover_law)
+    splits, zone = _cover_splits(mesh, surface, x_lines, y_lines, frusta.pitch_mm)
     centres, neighbours = lattice(counts, frusta.pitch_mm)
     plan = sheet_plan(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, spec.footprint_mm, refinement=mesh.refinement)
     slab = Slab(sheet, cover, plan, x_lines, y_lines, sides="held", contact=contact or Contact(),
-                coarse_walls=mesh.coarse_walls)
+                coarse_walls=mesh.coarse_walls, splits=splits)
     return LayeredBody(slab, _bed(spec, centres, neighbours, dielectric_law, mesh, scatter, contact), slab.bottom[plan.roots],
                        threads=threads)
+
+
+def _cover_splits(mesh, surface, x_lines, y_lines, pitch):
+    """How often the cover's elements are split, layer by layer from below (layers, ny 2^m, nx 2^m), and its zones.
+
+    The sheet follows the cover's lower side, which must not be finer than the sheet: it would move freely between the sheet's nodes.
+    """
+    far = int(np.log2(mesh.far_pitches)) + mesh.refinement
+    most = far + max(mesh.cover_splits)
+    shape = (len(x_lines) - 1, len(y_lines) - 1)
+    zone = np.full((shape[1] << most, shape[0] << most), NEAR) if surface is None else zones(surface, x_lines, y_lines, most)
+    narrow = [np.round(np.log2(mesh.far_pitches * pitch / np.diff(lines))).astype(int).clip(0) for lines in (x_lines, y_lines)]
+    narrow = np.maximum(*np.meshgrid(*narrow)).repeat(1 << most, axis=0).repeat(1 << most, axis=1)
+    levels = []
+    for k, splits in enumerate(mesh.cover_splits):
+        of_zone = far + np.array([mesh.refinement - far, 0, splits if k == 0 else 0, min(splits, 1), splits])
+        levels.append(levels_of(np.maximum(of_zone[zone] - narrow, 0), shape, most))
+    return np.stack(levels), zone
 
 
 def build_unit_cell(spec, *, dielectric_law, cover_law=None, mesh=MeshSettings(), height_factor=1.0, tip_factor=1.0):
     """One frustum of an endless lattice with its share of the sheet, and of the cover where a law for it is given."""
     frusta = spec.dielectric.frusta
-    lines = _lines(frusta.pitch_mm, 1, frusta.pitch_mm, mesh.cells_per_pitch)
+    lines = 0.5 * frusta.pitch_mm * np.linspace(-1, 1, 2**mesh.refinement + 1)
+    splits = np.minimum(mesh.cover_splits, 1)[:, None, None] * np.ones((2 * len(lines) - 2,) * 2, dtype=int) if cover_law else None
     cover_mm = 0.0 if cover_law is None else spec.cover.thickness_mm
     bottom = -(cover_mm + spec.dielectric.sheet_thickness_mm)
     sheet = Layer(np.linspace(bottom, -cover_mm, mesh.sheet_layers + 1), dielectric_law)
-    cover = Layer(np.linspace(-cover_mm, 0.0, (mesh.cover_layers if cover_mm else 0) + 1), cover_law)
+    cover = Layer(cover_mm * (np.asarray(mesh.cover_levels) - 1) if cover_mm else np.zeros(1), cover_law)
     centre = np.zeros((1, 2))
     plan = sheet_plan(centre, (1, 1), frusta.pitch_mm, frusta.root_diameter_mm, (frusta.pitch_mm,) * 2, refinement=mesh.refinement)
-    slab = Slab(sheet, cover, plan, lines, lines, sides="symmetric", contact=Contact(),
-                coarse_walls=mesh.coarse_walls)
+    slab = Slab(sheet, cover, plan, lines, lines, sides="symmetric", contact=Contact(), coarse_walls=mesh.coarse_walls, splits=splits)
     bed = _bed(spec, centre, np.ones((1, 4), dtype=bool), dielectric_law, mesh,
                (np.array([height_factor]), np.array([tip_factor])), None, bottom=bottom)
     return LayeredBody(slab, bed, slab.bottom[plan.roots])

@@ -20,9 +20,10 @@ def mesh_settings(values):
     unknown = sorted(set(own) - set(MeshSettings.__dataclass_fields__))
     if unknown:
         raise InputError(f"mesh: key {unknown[0]!r} is unknown; use one of {', '.join(MeshSettings.__dataclass_fields__)}.")
-    if "frustum_levels" in own:
-        own["frustum_levels"] = tuple(own["frustum_levels"])
-    return MeshSettings(**own)
+    try:
+        return MeshSettings(**{key: tuple(value) if isinstance(value, list) else value for key, value in own.items()})
+    except ValueError as problem:
+        raise InputError(f"mesh: {problem}; give one number for each layer.") from None
 
 
 def newton_settings(values):

@@ -5,19 +5,23 @@ coarser in plan: the sheet's upper nodes follow the cover's lower side.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 from numba import njit
 
+from softtact.contact.coverage import continues, covered
+from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.mechanics.blocks import HexBlock, WedgeBlock
+from softtact.mechanics.cover_mesh import cover_mesh
 from softtact.mechanics.elements import gauss, quad8
-from softtact.mechanics.hex_mesh import extrude, grid_plan
+from softtact.mechanics.hex_mesh import extrude
 from softtact.mechanics.parallel import SERIAL, unique_rows
 
-# Contact points along a side of a top face, which is a pitch wide. With 3 a punch's edge between them goes unnoticed: a cylinder
-# of 1.8 mm went 0.073 mm deep instead of 0.048 mm, and maps were up to a tenth of their maximum off (docs/decks.md).
-TOP_POINTS = 8
+# Contact points along a side of a top face. More of them hold a face flat that lies half under a punch's edge: with 8 the punch acts
+# up to half a face wider (benchmarks/mesh_error.py).
+TOP_POINTS = 3
 _NEAR_MM, _LARGEST_SHIFT_MM = 0.2, 0.02   # points that may touch when the object is let down on the cover, and how far at once
 
 
@@ -41,11 +45,14 @@ class SlabState:
 class FacingPlanes:
     """The planes of the object's facets that points face: anchors (p, 3) in mm at no indentation, outward normals (p, 3).
 
+    covered (p,): share of a point's own area that the object covers;  beside (p,): points that lie beside the object themselves
     A point keeps its plane during a step of Newton's method, so that each step lowers one potential.
     """
 
     anchors: np.ndarray
     normals: np.ndarray
+    covered: np.ndarray
+    beside: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -56,23 +63,32 @@ class Layer:
     law: object
 
 
+@dataclass(frozen=True)
+class CellGroup:
+    """Cells (c,) of the sheet under equal pieces of the cover; parts: nodes (c * elements, w), cell by cell, and their block."""
+
+    cells: np.ndarray
+    parts: list
+
+
 class Slab:
     """Sheet (its plan a `SheetPlan`) under a cover on a grid; a cover of one level is the sheet's top without a cover.
 
     Nodes: the cover's first, then the sheet's without its top. `bottom` are the nodes under the sheet, in the plan's order.
     """
 
-    def __init__(self, sheet, cover, sheet_plan, x_lines, y_lines, *, sides, contact, coarse_walls=True):
-        self.plan = grid_plan(np.asarray(x_lines), np.asarray(y_lines))
+    def __init__(self, sheet, cover, sheet_plan, x_lines, y_lines, *, sides, contact, coarse_walls=True, splits=None):
+        """splits (cover's layers, ny 2^m, nx 2^m): how often the cover is split where (see `cover_mesh`); None: nowhere."""
+        if splits is None:
+            splits = np.zeros((len(cover.levels) - 1, len(y_lines) - 1, len(x_lines) - 1), dtype=np.int64)
         self.x_lines, self.y_lines = np.asarray(x_lines), np.asarray(y_lines)
         self.layers, self.sheet_plan, self.contact = (sheet, cover), sheet_plan, contact
-        self.cover_mesh = extrude(self.plan, cover.levels)
+        self.cover_mesh = cover_mesh(x_lines, y_lines, cover.levels, splits)
         self.sheet_mesh = extrude(sheet_plan.plan, sheet.levels)
         self._coarse_walls = coarse_walls
         self._number_nodes(sheet_plan)
-        self.groups, self.cell_groups = [], []
-        if self.cover_mesh.layers:
-            self.groups.append((self.cover_mesh.hexes, HexBlock(self.points[self.cover_mesh.hexes], cover.law, points_per_side=2)))
+        self.groups, self.cell_groups = [], []   # (nodes, block) outside of cells; a `CellGroup` for each kind of cell
+        self._add_cover(cover.law)
         self._add_sheet(sheet_plan, sheet.law)
         self._number_unknowns(sides)
         self._top_points()
@@ -83,7 +99,7 @@ class Slab:
         Along the walls between cells, two elements a side, the sheet moves as one quadratic curve: the nodes at the quarters
         follow the corner, the middle and the next corner. (Free quarters: half as many unknowns again, and 1 % softer.)
         """
-        mesh, first = self.sheet_mesh, len(self.cover_mesh.points)
+        mesh, first = self.sheet_mesh, self.cover_mesh.free
         top = mesh.planes[-1]
         curve, curve_weights = plan.quarters if self._coarse_walls else (np.zeros((0, 4), dtype=np.int64), np.zeros(3))
         follows = np.zeros(len(mesh.points), dtype=bool)
@@ -93,50 +109,76 @@ class Slab:
         own = np.flatnonzero(~follows)
         number = np.full(len(mesh.points), -1, dtype=np.int64)
         number[own] = first + np.arange(len(own))
-        self._masters, self._weights = np.zeros((len(mesh.points), 8), dtype=np.int64), np.zeros((len(mesh.points), 8))
+        above = self._under_cover(plan.plan.points)
+        width = max(int(np.diff(above.indptr).max()), 3)
+        self._masters, self._weights = np.zeros((len(mesh.points), width), dtype=np.int64), np.zeros((len(mesh.points), width))
         self._masters[own, 0], self._weights[own, 0] = number[own], 1.0
-        quads, weights = self.locate(plan.plan.points)
-        self._masters[top], self._weights[top] = self.cover_mesh.planes[0][self.plan.quads[quads]], weights
+        row = np.repeat(np.arange(len(top)), np.diff(above.indptr))
+        place = np.arange(above.nnz) - above.indptr[row]
+        self._masters[top[row], place], self._weights[top[row], place] = above.indices, above.data
         for plane in planes:
             self._masters[plane[curve[:, 0]], :3] = number[plane[curve[:, 1:]]]
             self._weights[plane[curve[:, 0]], :3] = curve_weights
-        self.points = np.vstack([self.cover_mesh.points, mesh.points[own]])
+        self.points = np.vstack([self.cover_mesh.points[:first], mesh.points[own]])
         self.nodes = len(self.points)
         self.bottom = number[mesh.planes[0]]
+
+    @cached_property
+    def uses(self):
+        """In how many cells, groups of other elements and top faces each node occurs (n,); 1: a cell's own."""
+        cells = [np.unique(np.hstack([nodes.reshape(len(group.cells), -1) for nodes, _ in group.parts])[k])
+                 for group in self.cell_groups for k in range(len(group.cells))]
+        others = [np.unique(nodes) for nodes, _ in self.groups] + [np.unique(self.top_faces)]
+        return np.bincount(np.concatenate([*cells, *others]), minlength=self.nodes)
 
     @property
     def sheet_nodes(self):
         """Masters (p, 8) and weights (p, 8) of the nodes of `sheet_mesh`: numbers of the slab's nodes that each follows."""
         return self._masters, self._weights
 
-    def _add_sheet(self, plan, law):
-        """Groups of like elements (nodes, block): those of the frusta's cells, cell by cell, and those of the strips."""
-        mesh = self.sheet_mesh
-        in_cells = len(plan.roots) * plan.cell_quads
-        for k in range(mesh.layers):
-            hexes, wedges = mesh.layer(k), mesh.wedge_layer(k)
-            for target, elements, make in ((self.cell_groups, hexes[:in_cells], HexBlock), (self.cell_groups, wedges, WedgeBlock),
-                                           (self.groups, hexes[in_cells:], HexBlock)):
-                if len(elements):
-                    target.append(self._of_masters(elements, make(mesh.points[elements], law)))
+    def _add_cover(self, law):
+        """Groups of the cover's elements, those among larger ones apart: they hang on more nodes than their own."""
+        mesh = self.cover_mesh
+        if not len(mesh.hexes):
+            return
+        alone = (mesh.hexes < mesh.free).all(axis=1)
+        block = HexBlock(mesh.points[mesh.hexes[alone]], law, points_per_side=2)
+        self.groups.append((mesh.hexes[alone], block))
+        if not alone.all():
+            hanging = mesh.hexes[~alone]
+            self.groups.append(_of_masters(*mesh.masters(), hanging, HexBlock(mesh.points[hanging], law, points_per_side=2)))
 
-    def _of_masters(self, elements, block):
-        """Nodes (e, w) that elements (e, m) of the sheet hang on, and the block in terms of these."""
-        masters, weights = self._masters[elements], self._weights[elements]
-        used = np.abs(weights) > 1e-12
-        needed = [np.unique(m[u]) for m, u in zip(masters, used, strict=True)]
-        width = max(map(len, needed))
-        nodes = np.stack([np.pad(n, (0, width - len(n)), mode="edge") for n in needed])
-        follow = np.zeros((*elements.shape, width))
-        for e, unique in enumerate(needed):
-            rows, columns = np.nonzero(used[e])
-            np.add.at(follow[e], (rows, np.searchsorted(unique, masters[e][rows, columns])), weights[e][rows, columns])
-        table = np.hstack([block.shapes[:, None], follow.reshape(len(follow), -1)])
-        first, block.shapes = unique_rows(table)
-        own = table[first, 0].astype(int)
-        block.gradients = np.ascontiguousarray(np.einsum("egmd,emw->egwd", block.gradients[own], follow[first], optimize=True))
-        block.volumes, block.gram_inverse = block.volumes[own], block.gram_inverse[own]
-        return nodes, block
+    def _add_sheet(self, plan, law):
+        """Like elements (nodes, block): those of the strips around, and those of each kind of cell, cell by cell."""
+        mesh, cells = self.sheet_mesh, len(plan.roots)
+        in_cells = cells * plan.cell_quads
+        layers = [(mesh.layer(k), mesh.wedge_layer(k)) for k in range(mesh.layers)]
+        self.groups += [self._following(hexes[in_cells:], HexBlock, law) for hexes, _ in layers if len(hexes) > in_cells]
+        if not cells:
+            return
+        pieces = [(hexes[:in_cells].reshape(cells, -1, 27), HexBlock) for hexes, _ in layers]
+        pieces += [(wedges.reshape(cells, -1, 18), WedgeBlock) for _, wedges in layers if len(wedges)]
+        for same in self._like_cells(np.hstack([elements.reshape(cells, -1) for elements, _ in pieces])):
+            parts = [self._following(elements[same].reshape(-1, elements.shape[2]), make, law) for elements, make in pieces]
+            self.cell_groups.append(CellGroup(same, parts))
+
+    def _following(self, elements, make, law):
+        return _of_masters(self._masters, self._weights, elements, make(self.sheet_mesh.points[elements], law))
+
+    def _like_cells(self, nodes):
+        """Numbers of like cells, kind by kind, of cells with nodes (c, k): those whose nodes follow others in the same way."""
+        used = np.abs(self._weights) > 1e-12
+        signatures = []
+        for cell in nodes:
+            _, local = np.unique(np.where(used[cell], self._masters[cell], -1), return_inverse=True)
+            signatures.append(local.tobytes() + np.round(self._weights[cell] * used[cell], 9).tobytes())
+        _, kinds = np.unique(np.array([hash(signature) for signature in signatures]), return_inverse=True)
+        return [np.flatnonzero(kinds == kind) for kind in range(kinds.max() + 1)]
+
+    @property
+    def solids(self):
+        """All elements with their nodes: [(nodes (e, w), block)]."""
+        return self.groups + [part for group in self.cell_groups for part in group.parts]
 
     def _number_unknowns(self, sides):
         """Free unknowns: all but the sides, which are `held` (sensor shell) or `symmetric` (unit cell)."""
@@ -158,28 +200,56 @@ class Slab:
         """Quadrature points of the top faces, flattened (t * points)."""
         points, weights = gauss(TOP_POINTS, 2)
         values, slopes = quad8(points)
-        self.top_faces = self.cover_mesh.planes[-1][self.plan.quads]
-        xy = self.points[self.top_faces][..., :2]
-        edges = np.einsum("tad,gai->tgdi", xy, slopes)
-        self.top_values = values
+        mesh = self.cover_mesh
+        edges = np.einsum("tad,gai->tgdi", mesh.points[mesh.top][..., :2], slopes)
+        self.top_faces, self.top_values = self._at_faces(mesh.top, np.broadcast_to(values, (len(mesh.top), *values.shape)))
         self.top_area = (np.linalg.det(edges) * weights).ravel()
         self.top_reference = self._at_top(self.points)
 
+        # Each point's own area: the rectangle whose sides are as long as the weights of Gauss's rule along a line.
+        half = 0.5 * np.ptp(mesh.points[mesh.top[:, :4]][..., :2], axis=1)
+        ends = np.concatenate([[-1.0], np.cumsum(np.polynomial.legendre.leggauss(TOP_POINTS)[1]) - 1.0])
+        i, j = (g.ravel() for g in np.meshgrid(np.arange(TOP_POINTS), np.arange(TOP_POINTS), indexing="ij"))
+        places = np.stack([np.column_stack([ends[i + a], ends[j + b]]) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))], axis=1)
+        self._own_area = (half[:, None, None] * (places - points[:, None])).reshape(-1, 4, 2)
+
     def _at_top(self, field):
         """A nodal field (n, 3) at the top's quadrature points (t * points, 3)."""
-        return np.einsum("ga,tad->tgd", self.top_values, field[self.top_faces], optimize=True).reshape(-1, 3)
+        return np.matmul(self.top_values, field[self.top_faces]).reshape(-1, 3)
+
+    def _at_faces(self, faces, values):
+        """Free nodes (t, w) that faces (t, 8) of the cover hang on, and values (t, g, 8) in terms of these (t, g, w)."""
+        follow = self.cover_mesh.follow
+        if (faces < follow.shape[1]).all():
+            return faces, values
+        rows = [follow[face] for face in faces]
+        needed = [np.unique(row.indices) for row in rows]
+        width = max(map(len, needed))
+        nodes = np.stack([np.pad(n, (0, width - len(n)), mode="edge") for n in needed])
+        out = np.zeros((*values.shape[:2], width))
+        for t, (row, used) in enumerate(zip(rows, needed, strict=True)):
+            out[t, :, :len(used)] = values[t] @ row[:, used].toarray()
+        return nodes, out
 
     def facing(self, displacement, surface):
         """The object's facets above the top's points (see `FacingPlanes`)."""
         position = self.top_reference + self._at_top(displacement)
         height, normals = surface(position[:, 0], position[:, 1])
-        return FacingPlanes(anchors=np.column_stack([position[:, :2], height]), normals=normals)
+        anchors = np.column_stack([position[:, :2], height])
+        share, foot = covered(position[:, None, :2] + self._own_area, surface)
+        # A point beside the object whose area reaches under it faces the plane there.
+        base, foot_normals = surface(*foot.T)
+        beside = ~continues(height, position[:, :2], base, foot)
+        anchors[beside] = np.column_stack([foot, base])[beside]
+        normals[beside] = foot_normals[beside]
+        share[anchors[:, 2] >= NO_CONTACT_MM] = 0.0
+        return FacingPlanes(anchors=anchors, normals=normals, covered=share, beside=beside)
 
     def evaluate(self, displacement, planes, indentation, *, workers=SERIAL):
         """Energy, forces and contact with the object lowered by `indentation` mm; None if an element is inside out."""
         force = np.zeros((self.nodes, 3))
         energy = 0.0
-        for nodes, block in self.groups + self.cell_groups:
+        for nodes, block in self.solids:
             state = block.evaluate(displacement[nodes], workers=workers)
             if state is None:
                 return None
@@ -197,7 +267,7 @@ class Slab:
         The force grows with the depth, from a square root's slope on: Newton's method with bounded steps.
         """
         near = np.flatnonzero(state.gaps < _NEAR_MM)
-        down, area = -state.planes.normals[near, 2], self.top_area[near]
+        down, area = -state.planes.normals[near, 2], (self.top_area * state.planes.covered)[near]
         contact, gaps, shift = self.contact.at(near), state.gaps[near], 0.0
         for _ in range(50):
             _, pressure, slope = contact.response(gaps - shift * down)
@@ -211,11 +281,12 @@ class Slab:
     def _with_contact(self, displacement, elastic, planes, indentation):
         gaps, normals = self.gaps(displacement, planes, indentation), planes.normals
         density, pressure, _ = self.contact.response(gaps)
-        push = (pressure * self.top_area)[:, None] * normals      # on the slab: along the object's outward normal
-        nodal = np.einsum("tgd,ga->tad", push.reshape(len(self.top_faces), -1, 3), self.top_values, optimize=True)
+        area = self.top_area * planes.covered
+        push = (pressure * area)[:, None] * normals      # on the slab: along the object's outward normal
+        nodal = np.matmul(self.top_values.transpose(0, 2, 1), push.reshape(len(self.top_faces), -1, 3))
         force = elastic[1].copy()
         np.add.at(force, self.top_faces.ravel(), -nodal.reshape(-1, 3))
-        return SlabState(elastic=elastic, energy=elastic[0] + float(density @ self.top_area), force=force, gaps=gaps,
+        return SlabState(elastic=elastic, energy=elastic[0] + float(density @ area), force=force, gaps=gaps,
                          planes=planes, displacement=displacement, indentation_force=float(-push[:, 2].sum()))
 
     def gaps(self, displacement, planes, indentation):
@@ -223,20 +294,25 @@ class Slab:
         offset = self.top_reference + self._at_top(displacement) - planes.anchors
         return np.einsum("pd,pd->p", planes.normals, offset) + indentation * planes.normals[:, 2]
 
+    @staticmethod
+    def own_gaps(state):
+        """Gaps (p,) of the points that lie under the object; of those beside it a gap that says so."""
+        return np.where(state.planes.beside, NO_CONTACT_MM, state.gaps)
+
     def build_pattern(self, eliminated, cells):
-        """Fix the global matrix: its unknowns are the free ones but the `eliminated`; `cells` (f, k) are the cells' outer ones."""
-        keep = np.setdiff1d(self.free, eliminated.ravel())
+        """Fix the global matrix: its unknowns are the free ones but the `eliminated`; `cells` [(f, k)] are the cells' outer ones."""
+        keep = np.setdiff1d(self.free, eliminated)
         self.unknowns = keep
         number = np.full(3 * self.nodes, -1, dtype=np.int64)
         number[keep] = np.arange(len(keep))
         members = [(3 * nodes[..., None] + np.arange(3)).reshape(len(nodes), -1)
-                   for nodes in [*(nodes for nodes, _ in self.groups), self.top_faces]] + [cells]
+                   for nodes in [*(nodes for nodes, _ in self.groups), self.top_faces]] + cells
         self._dofs = [number[dofs] for dofs in members]
         indptr, indices = _upper_pattern(self._dofs, len(keep))
         self._matrix = sp.csr_matrix((np.zeros(len(indices)), indices, indptr), shape=(len(keep),) * 2)
 
     def tangent(self, state, condensed, *, workers=SERIAL):
-        """Upper triangle (csr) of the tangent with the cells' condensed blocks (f, k, k), and its border.
+        """Upper triangle (csr) of the tangent with the cells' condensed blocks [(f, k, k)], and its border.
 
         The border is the derivative (unknowns,) of the residual by the indentation; the corner its own second derivative.
         """
@@ -244,7 +320,7 @@ class Slab:
         matrix.data[:] = 0.0
         faces, border, corner = self._contact_tangent(state)
         blocks = workers.map(lambda group: group[1].tangent(state.displacement[group[0]]), self.groups)
-        parts = [*blocks, faces, condensed]
+        parts = [*blocks, faces, *condensed]
         for part, dofs in zip(parts, self._dofs, strict=True):
             _add_upper(matrix.data, matrix.indptr, matrix.indices, part, dofs)
         return matrix, border, corner
@@ -256,33 +332,70 @@ class Slab:
 
     def _contact_tangent(self, state):
         _, _, slope = self.contact.response(state.gaps)
-        weight = (slope * self.top_area).reshape(len(self.top_faces), -1)
+        weight = (slope * self.top_area * state.planes.covered).reshape(len(self.top_faces), -1)
         normal = state.planes.normals.reshape(*weight.shape, 3)
-        shape = np.einsum("ga,tgd->tgad", self.top_values, normal).reshape(*weight.shape, 24)
+        shape = np.einsum("tga,tgd->tgad", self.top_values, normal).reshape(*weight.shape, -1)
         blocks = np.matmul((shape * weight[..., None]).transpose(0, 2, 1), shape)
         # gap = n.(x - surface): raising the indentation by 1 closes it by -n_z, which is positive downwards
         lowering = normal[..., 2]
         border = np.zeros(3 * self.nodes)
-        dofs = (3 * self.top_faces[..., None] + np.arange(3)).reshape(len(weight), 24)
+        dofs = (3 * self.top_faces[..., None] + np.arange(3)).reshape(len(weight), -1)
         np.add.at(border, dofs.ravel(), np.einsum("tg,tgk->tk", weight * lowering, shape).ravel())
         return blocks, border[self.unknowns], float((weight * lowering**2).sum())
 
     def locate(self, points):
-        """Plan quads (p,) and shape values (p, 8) at points (p, 2); points on a line belong to the lower side."""
-        def cell(value, lines):
-            k = np.clip(np.searchsorted(lines, value - 1e-9) - 1, 0, len(lines) - 2)
-            return k, 2 * (value - lines[k]) / (lines[k + 1] - lines[k]) - 1
+        """Faces (p,) under the cover and shape values (p, 8) at points (p, 2); points on a line belong to the lower side."""
+        cells = self.cover_mesh.bottom_cells
+        fine = cells.shape[0] // (len(self.y_lines) - 1)
+        i, j = (_place(value, lines, fine) for value, lines in zip(points.T, (self.x_lines, self.y_lines), strict=True))
+        faces = cells[j, i]
+        low, _, high, _ = self.cover_mesh.points[self.cover_mesh.bottom[faces, :4], :2].transpose(1, 0, 2)
+        return faces, quad8(2 * (points - low) / (high - low) - 1)[0]
 
-        i, xi = cell(points[:, 0], self.x_lines)
-        j, eta = cell(points[:, 1], self.y_lines)
-        return j * (len(self.x_lines) - 1) + i, quad8(np.column_stack([xi, eta]))[0]
+    def _under_cover(self, points):
+        """Sparse matrix (p, free nodes of the cover) that interpolates on the cover's lower side at points (p, 2)."""
+        mesh = self.cover_mesh
+        faces, values = self.locate(points)
+        rows = np.repeat(np.arange(len(points)), 8)
+        all_nodes = sp.csr_matrix((values.ravel(), (rows, mesh.bottom[faces].ravel())), shape=(len(points), len(mesh.points)))
+        return _without_zeros(all_nodes @ mesh.follow)
 
     def sampling(self, points):
         """Sparse matrix (p, nodes) that interpolates a nodal field of the plane between sheet and cover at points (p, 2)."""
-        quads, values = self.locate(points)
-        columns = self.cover_mesh.planes[0][self.plan.quads[quads]]
-        rows = np.repeat(np.arange(len(points)), 8)
-        return sp.csr_matrix((values.ravel(), (rows, columns.ravel())), shape=(len(points), self.nodes))
+        at = self._under_cover(points)
+        at.resize(len(points), self.nodes)
+        return at
+
+
+def _place(value, lines, fine):
+    """Which interval of lines, each cut into `fine` equal parts, values (p,) lie in."""
+    grid = np.interp(np.arange(fine * (len(lines) - 1) + 1), fine * np.arange(len(lines)), lines)
+    return np.clip(np.searchsorted(grid, value - 1e-9) - 1, 0, len(grid) - 2)
+
+
+def _without_zeros(matrix):
+    matrix.data[np.abs(matrix.data) < 1e-12] = 0.0
+    matrix.eliminate_zeros()
+    return matrix.tocsr()
+
+
+def _of_masters(masters, weights, elements, block):
+    """Nodes (e, w) that elements (e, m) hang on, and the block in terms of these."""
+    masters, weights = masters[elements], weights[elements]
+    used = np.abs(weights) > 1e-12
+    needed = [np.unique(m[u]) for m, u in zip(masters, used, strict=True)]
+    width = max(map(len, needed))
+    nodes = np.stack([np.pad(n, (0, width - len(n)), mode="edge") for n in needed])
+    follow = np.zeros((*elements.shape, width))
+    for e, unique in enumerate(needed):
+        rows, columns = np.nonzero(used[e])
+        np.add.at(follow[e], (rows, np.searchsorted(unique, masters[e][rows, columns])), weights[e][rows, columns])
+    table = np.hstack([block.shapes[:, None], follow.reshape(len(follow), -1)])
+    first, block.shapes = unique_rows(table)
+    own = table[first, 0].astype(int)
+    block.gradients = np.ascontiguousarray(np.einsum("egmd,emw->egwd", block.gradients[own], follow[first], optimize=True))
+    block.volumes, block.gram_inverse = block.volumes[own], block.gram_inverse[own]
+    return nodes, block
 
 
 def _upper_pattern(members, size):

@@ -1,0 +1,56 @@
+"""Where the cover's mesh is fine: in steps from far from the object to under it, and finest at its edges.
+
+A flat punch's edge that falls into an element holds the whole element flat: with faces of a pitch the punch acts up to half a pitch
+wider, and the map is 20 % low. And the sheet bulges into the pockets between frusta, which a face of a pitch cannot follow: 6 %
+of the map. Both are needed where the object presses, and nowhere else (benchmarks/mesh_error.py).
+"""
+
+import numpy as np
+from scipy.ndimage import maximum_filter, minimum_filter
+
+from softtact.mechanics.cover_mesh import split_levels
+
+REACH_MM = 1.0        # what stands higher above the object's lowest point is taken to stay off the cover
+AROUND_MM = 0.3       # the zone under the object ends so far from it
+NEAR_MM = 2.4         # and elements have at most the pitch's size so far around
+_STEEP = 0.6          # rise over run within an element above which there is an edge in it
+_FLAT_MM = 0.02       # the underside rises less than this over a smallest element where it is flat
+_SAMPLES = 4          # heights along each side of the smallest element
+FAR, NEAR, FLAT, CURVED, EDGE = range(5)
+
+
+def zones(surface, x_lines, y_lines, most):
+    """FAR, NEAR, FLAT, CURVED or EDGE for each place of a grid (ny 2^most, nx 2^most) whose cells are split `most` times."""
+    x, y = (_sampled(lines, _SAMPLES << most) for lines in (x_lines, y_lines))
+    gx, gy = np.meshgrid(x, y)
+    height = surface(gx.ravel(), gy.ravel())[0].reshape(gx.shape)
+    height = np.minimum(height - height.min(), 2 * REACH_MM)
+    blocks = height.reshape(len(y) // _SAMPLES, _SAMPLES, len(x) // _SAMPLES, _SAMPLES)
+    low, high = blocks.min(axis=(1, 3)), blocks.max(axis=(1, 3))
+    side = min(np.diff(lines).max() for lines in (x_lines, y_lines)) / (1 << most)
+    # An edge on the line between two elements concerns both: heights of the neighbours' nearer halves count.
+    low_around, high_around = minimum_filter(height, _SAMPLES), maximum_filter(height, _SAMPLES)
+    rise = high_around - low_around
+    edge = (rise.reshape(blocks.shape).max(axis=(1, 3)) > _STEEP * 2 * side) & (low_around.reshape(blocks.shape).min(axis=(1, 3)) < REACH_MM)
+    curved = (rise.reshape(blocks.shape).max(axis=(1, 3)) > _FLAT_MM) & (low_around.reshape(blocks.shape).min(axis=(1, 3)) < REACH_MM)
+    touched = low < REACH_MM
+    under, near = (maximum_filter(touched, 2 * int(np.ceil(far / side - 1e-9)) + 1) for far in (AROUND_MM, NEAR_MM))
+    return np.max([NEAR * near, FLAT * under, CURVED * curved, EDGE * edge], axis=0)
+
+
+def _sampled(lines, parts):
+    """Middles of equal parts of the intervals between lines."""
+    fine = np.interp(np.arange(2 * parts * (len(lines) - 1) + 1), 2 * parts * np.arange(len(lines)), lines)
+    return fine[1::2]
+
+
+def levels_of(zone, shape, most):
+    """How often each place is split for wanted levels (ny 2^most, nx 2^most), in a grid of `shape` (nx, ny)."""
+
+    def wanted(low, size, level):
+        block = int(size * (1 << most))
+        i, j = (low * (1 << most)).astype(int).T
+        whole = zone.reshape(zone.shape[0] // block, block, zone.shape[1] // block, block).max(axis=(1, 3))
+        return whole[j // block, i // block] > level
+
+    return split_levels(shape, wanted, most)
