@@ -155,6 +155,7 @@ class Mesh(Section):
     tip_over_shear: NotNegative | None = Field(None, description="the same in the lowest layer of each frustum")
     refinement: Annotated[int, Field(ge=0)] | None = Field(
         None, description="how often all elements are split into four in plan")
+    contact_stiffness: PositiveFloat | None = Field(None, description="N/mm3 of the contacts' penalty")
     coarse_walls: bool | None = Field(
         None, description="along a wall between cells the sheet moves as one quadratic curve: half the unknowns, 1 % stiffer; "
                           "without effect in a refined plan")

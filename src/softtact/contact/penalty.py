@@ -32,7 +32,7 @@ class Contact:
     """
 
     stiffness: float = 3000.0
-    smoothing: float = 3e-4
+    smoothing: float = 1.0 / 3000.0
     offset: float | np.ndarray = 0.0
 
     def response(self, gaps):
