@@ -120,7 +120,7 @@ def test_export_deck_writes_the_whole_sensor_with_a_step_per_force(answer, tmp_p
     told = json.loads(answer("export-deck", OBJECT, "--unit", "mm", "--force", 20, "--force", 5, "--format", dialect,
                              "--out", deck, "--json"))
     assert told["steps"] == ["TOUCH", "FORCE_1", "FORCE_2"]
-    # The sheet's upper side follows the cover's: 16 nodes inside each cell and 2 on each wall at least; where the cover is coarse, more.
+    # The sheet's upper side follows the cover's: 16 nodes inside each cell and 2 on each wall, more where the cover is coarse.
     assert told["tied_nodes"] > 540 * 16 + (18 * 31 + 19 * 30) * 2
     text = deck.read_text()
     assert "units: mm, N, MPa" in text and text.index(", 3, -5\n") < text.index(", 3, -20\n")

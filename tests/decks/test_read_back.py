@@ -17,7 +17,8 @@ from softtact.mechanics.layered_body import MeshSettings, build_unit_cell
 from softtact.sensor import Sensor
 
 SMALL = CORO.model_copy(update={"footprint_mm": (2.4, 3.6), "map_shape": (7, 5)})   # 2 x 3 frusta
-SENSOR = Sensor(SMALL, {"dielectric": POLYURETHANE, "cover": NEOPRENE}, mesh=MeshSettings(cover_levels=(0.0, 1.0), cover_splits=(0,), far_pitches=1))
+SENSOR = Sensor(SMALL, {"dielectric": POLYURETHANE, "cover": NEOPRENE},
+                mesh=MeshSettings(cover_levels=(0.0, 1.0), cover_splits=(0,), far_pitches=1))
 SPHERE = trimesh.creation.icosphere(subdivisions=2, radius=2.0)
 # Corner nodes of faces, and ends of the edges that the further nodes halve: Abaqus Elements Guide, "Three-dimensional solid element
 # library"; ccx has the same.

@@ -60,7 +60,8 @@ def test_the_mesh_file_holds_the_volume_of_sheet_and_cover_and_of_the_frusta():
     """As VTK sees it, which cuts curved elements into tetrahedra: cones of eight sides, with a tenth less volume."""
     import pyvista
 
-    grid = pyvista.from_meshio(layered_mesh(SMALL, {"cover_levels": [0.0, 1.0], "cover_splits": [0], "frustum_levels": [0.0, 0.35, 1.0]}))
+    grid = pyvista.from_meshio(layered_mesh(SMALL, {"cover_levels": [0.0, 1.0], "cover_splits": [0],
+                                                   "frustum_levels": [0.0, 0.35, 1.0]}))
     volumes = grid.compute_cell_sizes(length=False, area=False)["Volume"]
     assert volumes.min() > 0
     octagon = 8 * np.sin(np.pi / 4) / 2 / np.pi

@@ -48,7 +48,8 @@ def export_press(sensor, mesh, *, force_n, dialect, path, pose=None, control="fo
     if control == "indentation":
         result = sensor.press(mesh, pose=pose, force_n=forces, model="hyperelastic", label="export-deck")
         steps = {"indentations_mm": result.indentation_mm}
-    model = deck_model(sensor.body(surface=HeightField(placed)), placed, title=f"{_ascii(name)} on sensor {_ascii(sensor.spec.name)}", **steps)
+    title = f"{_ascii(name)} on sensor {_ascii(sensor.spec.name)}"
+    model = deck_model(sensor.body(surface=HeightField(placed)), placed, title=title, **steps)
     write_deck(path, model, dialect=dialect, **elements)
     return model
 

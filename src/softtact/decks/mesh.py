@@ -69,8 +69,10 @@ def body_mesh(body):
     sheet, followers = _sheet_numbers(slab, slab.nodes + len(hanging))
     own = slab.nodes + len(hanging) + len(followers) + np.arange(bed.count * bed.nodes).reshape(bed.count, bed.nodes)
     own[:, bed.root] = body.cells.roots
-    points = np.vstack([slab.points, slab.cover_mesh.points[hanging], slab.sheet_mesh.points[followers], bed.coordinates.reshape(-1, 3)])
-    ties = [*_ties(slab.nodes, hanging, *slab.cover_mesh.masters()), *_ties(slab.nodes + len(hanging), followers, *slab.sheet_nodes)]
+    points = np.vstack([slab.points, slab.cover_mesh.points[hanging], slab.sheet_mesh.points[followers],
+                        bed.coordinates.reshape(-1, 3)])
+    ties = _ties(slab.nodes, hanging, *slab.cover_mesh.masters())
+    ties += _ties(slab.nodes + len(hanging), followers, *slab.sheet_nodes)
     number = _numbers_in_use([sheet[_hexes(slab.sheet_mesh)], sheet[_wedges(slab.sheet_mesh)], cover,
                               own[:, _hexes(bed.mesh)], *(tie.masters for tie in ties)], len(points))
     ties = [Tie(int(number[tie.slave]), number[tie.masters], tie.weights) for tie in ties if number[tie.slave] >= 0]

@@ -235,7 +235,8 @@ def _remarks(body):
     share = f"{block.local_modulus.min() / block.law.bulk_modulus:.2g} to {block.local_modulus.max() / block.law.bulk_modulus:.2g}"
     return ("units: mm, N, MPa",
             "*EQUATION: the sheet's upper nodes follow the cover's lower side; where walls between cells are coarse, nodes at "
-            "their quarters follow the curve through the corner, the middle and the next corner; small elements follow larger ones' faces.",
+            "their quarters follow the curve through the corner, the middle and the next corner; small elements of the "
+            "cover follow larger ones' faces.",
             "Contacts: object on the top, frusta (tip and sides) on the board, frusta on their neighbours. Left out, as in "
             "softtact: the sheet's underside on the frusta's sides, friction, the object's steep walls and upper sides.",
             f"Facets of the object narrower than {SLIVER_MM} mm are left out.",

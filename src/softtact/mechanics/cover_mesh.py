@@ -74,8 +74,9 @@ def split_levels(shape, wanted, most):
 
 
 def cover_mesh(x_lines, y_lines, heights, levels):
-    """Hexahedra between `heights` (k + 1,) in mm over a grid; levels (k, ny 2^m, nx 2^m): how often split, layer by layer from below.
+    """Hexahedra between `heights` (k + 1,) in mm over a grid.
 
+    levels (k, ny 2^m, nx 2^m): how often the cells are split where, layer by layer from below.
     Of a single height a mesh of faces alone.
     """
     if len(heights) == 1:
@@ -94,7 +95,7 @@ def cover_mesh(x_lines, y_lines, heights, levels):
     order = np.concatenate([np.flatnonzero(free), np.flatnonzero(~free)])
     number = np.empty(len(order), dtype=np.int64)
     number[order] = np.arange(len(order))
-    lines = [_subdivided(np.asarray(axis, dtype=float), 2 << most) for axis in (x_lines, y_lines)] + [_subdivided(np.asarray(heights, dtype=float), 2)]
+    lines = [_subdivided(x_lines, 2 << most), _subdivided(y_lines, 2 << most), _subdivided(heights, 2)]
     points = np.column_stack([line[places[order, axis]] for axis, line in enumerate(lines)])
     layer = low[:, 2] // 2
     return CoverMesh(points=points, hexes=number[hexes], follow=follow[order].tocsr(),
@@ -120,6 +121,7 @@ def _owners(leaves, shape):
 
 def _subdivided(lines, parts):
     """Each interval between lines cut into equal parts."""
+    lines = np.asarray(lines, dtype=float)
     return np.interp(np.arange(parts * (len(lines) - 1) + 1), parts * np.arange(len(lines)), lines)
 
 
@@ -134,7 +136,7 @@ def _leaves(level, most):
 
 
 def _hanging(places, hexes, low, half, cells):
-    """Nodes that lie on an element whose node they are not: rows (h,), the largest such element's nodes (h, 20) and weights (h, 20)."""
+    """Nodes (h,) that lie on an element without being its nodes; the largest such element's nodes (h, 20) and weights (h, 20)."""
     starts = np.cumsum([0, *map(len, cells)])
     extent = (low + 2 * half).max(axis=0)
     owner = np.stack([starts[k] + _owners(leaves, (extent[1] // 2, extent[0] // 2)) for k, leaves in enumerate(cells)])

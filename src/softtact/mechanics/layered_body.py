@@ -43,7 +43,8 @@ class MeshSettings:
 
     def __post_init__(self):
         if len(self.cover_splits) != len(self.cover_levels) - 1:
-            raise ValueError(f"cover_splits has {len(self.cover_splits)} entries for {len(self.cover_levels) - 1} layers of the cover")
+            raise ValueError(f"cover_splits has {len(self.cover_splits)} entries for the {len(self.cover_levels) - 1} layers "
+                             "of cover_levels")
 
     @property
     def over_shear_of_layers(self):
@@ -260,7 +261,7 @@ def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), s
 def _cover_splits(mesh, surface, x_lines, y_lines, pitch):
     """How often the cover's elements are split, layer by layer from below (layers, ny 2^m, nx 2^m), and its zones.
 
-    The sheet follows the cover's lower side, which must not be finer than the sheet: it would move freely between the sheet's nodes.
+    The sheet follows the cover's lower side, which must not be finer than the sheet: it would hang freely between its nodes.
     """
     far = int(np.log2(mesh.far_pitches)) + mesh.refinement
     most = far + max(mesh.cover_splits)
@@ -286,7 +287,8 @@ def build_unit_cell(spec, *, dielectric_law, cover_law=None, mesh=MeshSettings()
     cover = Layer(cover_mm * (np.asarray(mesh.cover_levels) - 1) if cover_mm else np.zeros(1), cover_law)
     centre = np.zeros((1, 2))
     plan = sheet_plan(centre, (1, 1), frusta.pitch_mm, frusta.root_diameter_mm, (frusta.pitch_mm,) * 2, refinement=mesh.refinement)
-    slab = Slab(sheet, cover, plan, lines, lines, sides="symmetric", contact=mesh.contact, coarse_walls=mesh.coarse_walls, splits=splits)
+    slab = Slab(sheet, cover, plan, lines, lines, sides="symmetric", contact=mesh.contact, coarse_walls=mesh.coarse_walls,
+                splits=splits)
     bed = _bed(spec, centre, np.ones((1, 4), dtype=bool), dielectric_law, mesh,
                (np.array([height_factor]), np.array([tip_factor])), None, bottom=bottom)
     return LayeredBody(slab, bed, slab.bottom[plan.roots])

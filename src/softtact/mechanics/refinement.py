@@ -13,7 +13,7 @@ from softtact.mechanics.cover_mesh import split_levels
 REACH_MM = 1.0        # what stands higher above the object's lowest point is taken to stay off the cover
 AROUND_MM = 0.3       # the zone under the object ends so far from it
 NEAR_MM = 2.4         # and elements have at most the pitch's size so far around
-_STEEP = 0.6          # rise over run within an element above which there is an edge in it
+_STEEP = 1.2          # rise over run within an element above which there is an edge in it
 _FLAT_MM = 0.02       # the underside rises less than this over a smallest element where it is flat
 _SAMPLES = 4          # heights along each side of the smallest element
 FAR, NEAR, FLAT, CURVED, EDGE = range(5)
@@ -21,21 +21,30 @@ FAR, NEAR, FLAT, CURVED, EDGE = range(5)
 
 def zones(surface, x_lines, y_lines, most):
     """FAR, NEAR, FLAT, CURVED or EDGE for each place of a grid (ny 2^most, nx 2^most) whose cells are split `most` times."""
-    x, y = (_sampled(lines, _SAMPLES << most) for lines in (x_lines, y_lines))
+    height = _heights(surface, x_lines, y_lines, _SAMPLES << most)
+    side = min(np.diff(lines).max() for lines in (x_lines, y_lines)) / (1 << most)
+    # An edge on the line between two elements concerns both, so heights around each sample are compared.
+    low = minimum_filter(height, _SAMPLES)
+    rise = _in_places(maximum_filter(height, _SAMPLES) - low, np.max)
+    reached = _in_places(low, np.min) < REACH_MM
+    touched = _in_places(height, np.min) < REACH_MM
+    under, near = (maximum_filter(touched, 2 * int(np.ceil(far / side - 1e-9)) + 1) for far in (AROUND_MM, NEAR_MM))
+    curved, edge = reached & (rise > _FLAT_MM), reached & (rise > _STEEP * side)
+    return np.max([NEAR * near, FLAT * under, CURVED * curved, EDGE * edge], axis=0)
+
+
+def _heights(surface, x_lines, y_lines, parts):
+    """Heights (y, x) in mm above the object's lowest point, in the middles of parts of the grid's cells."""
+    x, y = (_sampled(lines, parts) for lines in (x_lines, y_lines))
     gx, gy = np.meshgrid(x, y)
     height = surface(gx.ravel(), gy.ravel())[0].reshape(gx.shape)
-    height = np.minimum(height - height.min(), 2 * REACH_MM)
-    blocks = height.reshape(len(y) // _SAMPLES, _SAMPLES, len(x) // _SAMPLES, _SAMPLES)
-    low, high = blocks.min(axis=(1, 3)), blocks.max(axis=(1, 3))
-    side = min(np.diff(lines).max() for lines in (x_lines, y_lines)) / (1 << most)
-    # An edge on the line between two elements concerns both: heights of the neighbours' nearer halves count.
-    low_around, high_around = minimum_filter(height, _SAMPLES), maximum_filter(height, _SAMPLES)
-    rise = high_around - low_around
-    edge = (rise.reshape(blocks.shape).max(axis=(1, 3)) > _STEEP * 2 * side) & (low_around.reshape(blocks.shape).min(axis=(1, 3)) < REACH_MM)
-    curved = (rise.reshape(blocks.shape).max(axis=(1, 3)) > _FLAT_MM) & (low_around.reshape(blocks.shape).min(axis=(1, 3)) < REACH_MM)
-    touched = low < REACH_MM
-    under, near = (maximum_filter(touched, 2 * int(np.ceil(far / side - 1e-9)) + 1) for far in (AROUND_MM, NEAR_MM))
-    return np.max([NEAR * near, FLAT * under, CURVED * curved, EDGE * edge], axis=0)
+    return np.minimum(height - height.min(), 2 * REACH_MM)
+
+
+def _in_places(samples, choose):
+    """The least or largest of the samples in each smallest cell."""
+    rows, columns = samples.shape
+    return choose(samples.reshape(rows // _SAMPLES, _SAMPLES, columns // _SAMPLES, _SAMPLES), axis=(1, 3))
 
 
 def _sampled(lines, parts):

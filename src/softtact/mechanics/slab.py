@@ -19,8 +19,8 @@ from softtact.mechanics.elements import gauss, quad8
 from softtact.mechanics.hex_mesh import extrude
 from softtact.mechanics.parallel import SERIAL, unique_rows
 
-# Contact points along a side of a top face. More of them hold a face flat that lies half under a punch's edge: with 8 the punch acts
-# up to half a face wider (benchmarks/mesh_error.py).
+# Contact points along a side of a top face. More of them hold a face flat that lies half under a punch's edge: with 8 the punch
+# acts up to half a face wider (docs/discretisation.md).
 TOP_POINTS = 3
 _NEAR_MM, _LARGEST_SHIFT_MM = 0.2, 0.02   # points that may touch when the object is let down on the cover, and how far at once
 
@@ -300,7 +300,7 @@ class Slab:
         return np.where(state.planes.beside, NO_CONTACT_MM, state.gaps)
 
     def build_pattern(self, eliminated, cells):
-        """Fix the global matrix: its unknowns are the free ones but the `eliminated`; `cells` [(f, k)] are the cells' outer ones."""
+        """Fix the global matrix: its unknowns are the free but the `eliminated` ones; `cells` [(c, k)]: what kinds of cells leave."""
         keep = np.setdiff1d(self.free, eliminated)
         self.unknowns = keep
         number = np.full(3 * self.nodes, -1, dtype=np.int64)
