@@ -2,7 +2,7 @@
 
 A sensor of 6 x 6 frusta is pressed with a flat punch, a sphere and a ridged block on each mesh and on finer ones; the error is
 the largest difference of the deformation map over the map's maximum, against the last mesh asked for. "finer cover" splits the
-production mesh's cover once more in height and towards the edges, some minutes; "reference" splits all elements in plan and has more
+production mesh's cover once more in height and towards edges, some minutes; "reference" splits all elements in plan and has more
 layers everywhere, half an hour.
 """
 

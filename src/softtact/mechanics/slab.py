@@ -168,12 +168,12 @@ class Slab:
     def _like_cells(self, nodes):
         """Numbers of like cells, kind by kind, of cells with nodes (c, k): those whose nodes follow others in the same way."""
         used = np.abs(self._weights) > 1e-12
-        signatures = []
-        for cell in nodes:
+        kinds = {}
+        for number, cell in enumerate(nodes):
             _, local = np.unique(np.where(used[cell], self._masters[cell], -1), return_inverse=True)
-            signatures.append(local.tobytes() + np.round(self._weights[cell] * used[cell], 9).tobytes())
-        _, kinds = np.unique(np.array([hash(signature) for signature in signatures]), return_inverse=True)
-        return [np.flatnonzero(kinds == kind) for kind in range(kinds.max() + 1)]
+            signature = local.tobytes() + np.round(self._weights[cell] * used[cell], 9).tobytes()
+            kinds.setdefault(signature, []).append(number)
+        return [np.array(cells) for cells in kinds.values()]
 
     @property
     def solids(self):
@@ -300,7 +300,7 @@ class Slab:
         return np.where(state.planes.beside, NO_CONTACT_MM, state.gaps)
 
     def build_pattern(self, eliminated, cells):
-        """Fix the global matrix: its unknowns are the free but the `eliminated` ones; `cells` [(c, k)]: what kinds of cells leave."""
+        """Fix the global matrix: its unknowns are the free but the `eliminated` ones; `cells` [(c, k)]: what cells leave."""
         keep = np.setdiff1d(self.free, eliminated)
         self.unknowns = keep
         number = np.full(3 * self.nodes, -1, dtype=np.int64)
