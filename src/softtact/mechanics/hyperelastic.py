@@ -160,7 +160,7 @@ def _newton(body, surface, state, force, tolerance, settings):
     sees the object's height jump each time; so the planes are kept later on.
     A step that cut the residual well is followed by one with the same tangent, which is cheap and nearly as good.
     """
-    reuse, before = False, np.inf
+    reuse, before, fresh = False, np.inf, False
     for iteration in range(settings.max_iterations):
         if iteration < settings.refacing_iterations:
             planes = body.slab.facing(state.slab.displacement, surface)
@@ -172,7 +172,10 @@ def _newton(body, surface, state, force, tolerance, settings):
         step = body.newton_step(state, force, same_tangent=reuse)
         trial = _line_search(body, planes, state, step, force, residual, settings) if np.isfinite(step.largest()) else None
         if trial is None and not reuse:
-            return None, iteration, residual
+            if fresh:
+                return None, iteration, residual
+            body.cells.forget()     # of cells that hardly moved the tangents were kept
+        fresh = trial is None and not reuse
         before, reuse, state = residual, trial is not None, trial or state
     return None, settings.max_iterations, residual
 
