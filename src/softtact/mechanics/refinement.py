@@ -1,8 +1,8 @@
 """Where the cover's mesh is fine: in steps from far from the object to under it, and finest at its edges.
 
 A flat punch's edge that falls into an element holds the whole element flat: with faces of a pitch the punch acts up to half a pitch
-wider, and the map of one of 3 mm radius is 10 % low. And the sheet bulges into the pockets between frusta, which a face of a pitch cannot follow: 6 %
-of the map. Both are needed where the object presses, and nowhere else (benchmarks/mesh_error.py).
+wider, and the map of one of 3 mm radius is 10 % low. And the sheet bulges into the pockets between frusta, which a face of a
+pitch cannot follow: 6 % of the map. Both are needed where the object presses, and nowhere else (benchmarks/mesh_error.py).
 """
 
 import numpy as np
