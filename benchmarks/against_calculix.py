@@ -116,7 +116,7 @@ def press(mesh, load, threads):
         values, areas = _triangle_points(mesh.points[mesh.near])
         contacts = [RigidContact(mesh.points, mesh.near, values, areas, HeightField(mesh.sphere), moves=True,
                                  stiffness=CONTACT_STIFFNESS, smoothing=SHARP_MM)]
-    body = FreeBody(mesh.points, parts, held=held, contacts=contacts, follows=follows, solver=RoughSolver(),
+    body = FreeBody(mesh.points, parts, held=held, contacts=contacts, follows=follows, solver=RoughSolver(quick_analysis=True),
                     apart=True)
     settings = FreeSettings(relative_residual=5e-3, relative_correction=1e-2)
     levels = list(press_to_indentations(body, depths(), settings=settings))

@@ -54,7 +54,7 @@ def parts_of_iteration(counts, threads):
         cells.forget()
         cells.refresh(state, workers=body.workers)
 
-    matrix, _, _ = slab.tangent(state.slab, cells.outer, workers=body.workers)
+    matrix = slab.tangent(state.slab, cells.outer, workers=body.workers)
     right = np.ones((len(slab.unknowns), 2))
     row = {"frusta": len(everyone), "threads": threads, "solver": body.solver.name, "iterations": level.iterations,
            "unknowns_global": len(slab.unknowns),

@@ -98,7 +98,7 @@ class HeldSlab:
             if np.abs(residual).max() < tolerance * abs(state.indentation_force):
                 solver.close()
                 return SlabPress(displacement, self._pressure(state), state.indentation_force, depth)
-            matrix, _, _ = slab.tangent(state, [])
+            matrix = slab.tangent(state, [])
             if not solver.factor(matrix):
                 raise ArithmeticError("the slab's tangent is not positive definite")
             displacement = displacement.copy()

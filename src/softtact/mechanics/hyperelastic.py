@@ -7,6 +7,8 @@ import numpy as np
 from softtact.errors import ConvergenceError
 from softtact.mechanics.layered_body import BodyState
 
+_WORTH_A_PASS = 0.8    # of the overlap, to which pressing apart must have brought it to be done again
+
 
 @dataclass(frozen=True)
 class NewtonSettings:
@@ -16,7 +18,6 @@ class NewtonSettings:
     largest_penetration_mm, contact_passes: with deeper overlaps they are pressed apart and the level is solved again, so often
     largest_step_mm: largest movement of a node in one iteration;  smallest_increment_n: force steps are halved down to this
     first_touch_mm, first_touch_tolerance_n: overlap at which the press begins, and the residual that is good enough there
-    good_reduction: a tangent that cut the residual to this share is used again
     refacing_iterations: iterations that look anew which facet each point faces
     """
 
@@ -29,7 +30,6 @@ class NewtonSettings:
     smallest_scale_n: float = 10.0
     first_touch_mm: float = 0.01
     first_touch_tolerance_n: float = 0.1   # a start for the first level, not a result
-    good_reduction: float = 0.01   # contacts change: with 0.35 a wide flat punch takes half as many iterations again
     refacing_iterations: int = 12
 
 
@@ -119,15 +119,16 @@ def _failure(body, path, force, target, residual):
 
 
 def _press_apart(body, surface, state, residual, force, settings):
-    """The level once more with its overlaps pressed apart, as long as they are deeper than allowed."""
-    iterations = 0
+    """The level once more with its overlaps pressed apart, as long as they are deeper than allowed and become less."""
+    iterations, before = 0, np.inf
     for _ in range(settings.contact_passes):
-        if state is None or body.contact_error(state) <= settings.largest_penetration_mm:
+        overlap = body.contact_error(state) if state is not None else 0.0
+        if overlap <= settings.largest_penetration_mm or overlap > _WORTH_A_PASS * before:
             break
-        body.press_apart(state)
+        body.press_apart(state, allowed_mm=settings.largest_penetration_mm)
         again = body.evaluate(state.slab.displacement, state.bed.displacement, state.indentation, state.slab.planes)
         state, spent, residual = _newton(body, surface, body.let_down(again, force), force, _tolerance(force, settings), settings)
-        iterations += spent
+        iterations, before = iterations + spent, overlap
     return state, iterations, residual
 
 
@@ -158,9 +159,8 @@ def _newton(body, surface, state, force, tolerance, settings):
 
     The points' facing planes are found anew before each of the first steps. A point that slides to and fro past an edge
     sees the object's height jump each time; so the planes are kept later on.
-    A step that cut the residual well is followed by one with the same tangent, which is cheap and nearly as good.
     """
-    reuse, before, fresh = False, np.inf, False
+    fresh = False
     for iteration in range(settings.max_iterations):
         if iteration < settings.refacing_iterations:
             planes = body.slab.facing(state.slab.displacement, surface)
@@ -168,15 +168,13 @@ def _newton(body, surface, state, force, tolerance, settings):
         residual = body.residual_norm(state, force)
         if residual <= tolerance:
             return state, iteration, residual
-        reuse = reuse and residual < settings.good_reduction * before
-        step = body.newton_step(state, force, same_tangent=reuse)
+        step = body.newton_step(state, force)
         trial = _line_search(body, planes, state, step, force, residual, settings) if np.isfinite(step.largest()) else None
-        if trial is None and not reuse:
-            if fresh:
-                return None, iteration, residual
+        if trial is None and fresh:
+            return None, iteration, residual
+        if trial is None:
             body.cells.forget()     # of cells that hardly moved the tangents were kept
-        fresh = trial is None and not reuse
-        before, reuse, state = residual, trial is not None, trial or state
+        fresh, state = trial is None, trial or state
     return None, settings.max_iterations, residual
 
 

@@ -1,16 +1,18 @@
 """The layered sensor as one body: slab (sheet and cover) tied to the bed of frusta, and one Newton step of it."""
 
+import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from softtact.contact.height_field import HeightField
 from softtact.contact.penalty import Contact
+from softtact.mechanics.contact_step import ContactStepper
 from softtact.mechanics.frustum_bed import BedGeometry, BedState, FrustumBed
 from softtact.mechanics.hex_mesh import sheet_plan
 from softtact.mechanics.linear_solvers import make_solver
 from softtact.mechanics.parallel import Workers
-from softtact.mechanics.refinement import NEAR, levels_of, zones
+from softtact.mechanics.refinement import FAR, NEAR, levels_of, zones
 from softtact.mechanics.sheet_cells import SheetCells
 from softtact.mechanics.slab import Layer, Slab, SlabState
 
@@ -96,6 +98,14 @@ class Step:
 _FIRST_SHIFT = 0.01   # N/mm on every free unknown of the slab, doubled until the tangent is positive definite
 
 
+def _shifts():
+    """What is tried, one after the other, until a tangent is positive definite, so that every step lowers the energy."""
+    yield None
+    yield 0.0
+    for doubling in itertools.count():
+        yield _FIRST_SHIFT * 2**doubling
+
+
 class LayeredBody:
     """Slab on frusta on a rigid PCB, pressed from above by a rigid object. Lengths in mm, z = 0 at the top at rest."""
 
@@ -105,8 +115,8 @@ class LayeredBody:
         self.workers = Workers(threads)
         self.cells = SheetCells(slab, bed, roots)
         slab.build_pattern(self.cells.eliminated, self.cells.outer_dofs)
-        self.solver = make_solver(threads=threads)
-        self.has_tangent = False
+        self.solver = make_solver(threads=threads, rough=True)
+        self.stepper = ContactStepper(self.solver)
 
     def close(self):
         """Free the factors, and end the threads."""
@@ -132,44 +142,37 @@ class LayeredBody:
         depth = self.slab.balanced(state.slab, state.indentation, force_n)
         return replace(state, slab=self.slab.reface(state.slab, state.slab.planes, depth), indentation=depth)
 
-    def newton_step(self, state, force_n, *, same_tangent=False):
+    def newton_step(self, state, force_n):
         """The Newton step under a given force (N), or with the indentation kept where `force_n` is None.
 
-        With `same_tangent` the last step's tangent serves again (a chord step: a fifth of the time, linear convergence).
         Where nothing touches, a force finds no stiffness: the step is then not finite.
         """
-        if not same_tangent:
-            self.cells.refresh(state, workers=self.workers)
-            self._border, self._corner = self._factor_tangent(state)
-            self.has_tangent = True
+        self.cells.refresh(state, workers=self.workers)
         residual, kept = self.cells.condensed_residual(state)
-        right = residual.ravel()[self.slab.unknowns]
-        if same_tangent:
-            step = -self.solver.solve(right)
-        else:
-            minus_step, self._along = self.solver.solve(np.column_stack([right, self._border])).T
-            step = -minus_step
-        lowering = 0.0
-        if force_n is not None:
-            # Its sign would turn the step uphill where the body softens.
-            stiffness = abs(self._corner - self._border @ self._along)
-            lowering = (force_n - state.force - self._border @ step) / stiffness if stiffness > 0 else np.nan
-            step = step - self._along * lowering
+        step, lowering = self._step_of_unknowns(state, residual.ravel()[self.slab.unknowns], force_n)
         full = np.zeros(3 * self.slab.nodes)
         full[self.slab.unknowns] = step
         slab, bed = self.cells.recover(kept, full.reshape(-1, 3))
         return Step(slab=slab, bed=bed, indentation=lowering)
 
-    def _factor_tangent(self, state):
-        """Factor the tangent, made positive definite where it is not, so that every step lowers the energy."""
-        matrix, border, corner = self.slab.tangent(state.slab, self.cells.outer, workers=self.workers)
-        if not self.solver.factor(matrix):
-            matrix, border, corner = self.slab.tangent(state.slab, self.cells.positive_outer())
-            shift = 0.0
-            while not self.solver.factor(matrix):
-                shift = max(2 * shift, _FIRST_SHIFT)
-                self.slab.add_to_diagonal(matrix, shift)
-        return border, corner
+    def _step_of_unknowns(self, state, residual, force_n):
+        """Step of the global unknowns, and how far the object goes down; the tangent is made positive definite where it is not."""
+        touch = self.slab.touch(state.slab)
+        excess = None if force_n is None else state.force - force_n
+        for shift in _shifts():
+            rubber = self._rubber_tangent(state, shift)
+            step = self.stepper.step(rubber, residual, touch, excess=excess,
+                                     pressed=lambda slope, rubber=rubber: self.slab.pressed(rubber, slope, state.slab.planes))
+            if step is not None:
+                return step
+
+    def _rubber_tangent(self, state, shift):
+        """The rubber's tangent as it is (None), or without the cells' modes of negative stiffness and stiffened by a shift."""
+        if shift is None:
+            return self.slab.rubber_tangent(state.slab, self.cells.outer, workers=self.workers)
+        rubber = self.slab.rubber_tangent(state.slab, self.cells.positive_outer(), workers=self.workers)
+        self.slab.add_to_diagonal(rubber, shift)
+        return rubber
 
     def penetration(self, state):
         """Deepest penetration in mm, of the object into the cover or of frusta into the board or each other."""
@@ -179,10 +182,12 @@ class LayeredBody:
         """Deepest overlap, or widest gap under pressure, in mm."""
         return max(self.slab.contact.error(self.slab.own_gaps(state.slab)), self.bed.contact.error(state.bed.gaps))
 
-    def press_apart(self, state):
-        """Hold the points that overlap where their surfaces just touch."""
-        self.slab.contact = self.slab.contact.pressed_apart(state.slab.gaps)
-        self.bed.contact = self.bed.contact.pressed_apart(state.bed.gaps)
+    def press_apart(self, state, *, allowed_mm):
+        """Hold the points that overlap where their surfaces just touch, on the object or in the bed, wherever it is too much."""
+        if self.slab.contact.error(self.slab.own_gaps(state.slab)) > allowed_mm:
+            self.slab.contact = self.slab.contact.pressed_apart(state.slab.gaps)
+        if self.bed.contact.error(state.bed.gaps) > allowed_mm:
+            self.bed.contact = self.bed.contact.pressed_apart(state.bed.gaps)
 
     def most_compressed(self, state):
         """Place x, y (mm) of the most compressed frustum, and its compression as a share of its height."""
@@ -253,7 +258,7 @@ def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), s
     centres, neighbours = lattice(counts, frusta.pitch_mm)
     plan = sheet_plan(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, spec.footprint_mm, refinement=mesh.refinement)
     slab = Slab(sheet, cover, plan, x_lines, y_lines, sides="held", contact=contact or mesh.contact,
-                coarse_walls=mesh.coarse_walls, splits=splits)
+                coarse_walls=mesh.coarse_walls or _far(zone, x_lines, y_lines), splits=splits)
     return LayeredBody(slab, _bed(spec, centres, neighbours, dielectric_law, mesh, scatter, contact), slab.bottom[plan.roots],
                        threads=threads)
 
@@ -274,6 +279,22 @@ def _cover_splits(mesh, surface, x_lines, y_lines, pitch):
         of_zone = far + np.array([mesh.refinement - far, 0, splits if k == 0 else 0, min(splits, 1), splits])
         levels.append(levels_of(np.maximum(of_zone[zone] - narrow, 0), shape, most))
     return np.stack(levels), zone
+
+
+def _far(zone, x_lines, y_lines):
+    """A function of places (n, 2) that tells (n,) which lie among FAR places of the grid only."""
+    x, y = (np.interp(np.arange(size + 1), np.linspace(0, size, len(lines)), lines)
+            for size, lines in zip(zone.shape[::-1], (x_lines, y_lines), strict=True))
+
+    def far(places):
+        around = np.zeros(len(places), dtype=int)
+        for dx, dy in itertools.product((-1e-6, 1e-6), repeat=2):
+            i, j = (np.clip(np.searchsorted(lines, value) - 1, 0, len(lines) - 2)
+                    for lines, value in ((x, places[:, 0] + dx), (y, places[:, 1] + dy)))
+            around = np.maximum(around, zone[j, i])
+        return around == FAR
+
+    return far
 
 
 def build_unit_cell(spec, *, dielectric_law, cover_law=None, mesh=MeshSettings(), height_factor=1.0, tip_factor=1.0):

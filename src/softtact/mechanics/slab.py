@@ -14,6 +14,7 @@ from numba import njit
 from softtact.contact.coverage import continues, covered
 from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.mechanics.blocks import HexBlock, WedgeBlock
+from softtact.mechanics.contact_step import Touch
 from softtact.mechanics.cover_mesh import cover_mesh
 from softtact.mechanics.elements import gauss, quad8
 from softtact.mechanics.hex_mesh import extrude
@@ -78,7 +79,10 @@ class Slab:
     """
 
     def __init__(self, sheet, cover, sheet_plan, x_lines, y_lines, *, sides, contact, coarse_walls=True, splits=None):
-        """splits (cover's layers, ny 2^m, nx 2^m): how often the cover is split where (see `cover_mesh`); None: nowhere."""
+        """splits (cover's layers, ny 2^m, nx 2^m): how often the cover is split where (see `cover_mesh`); None: nowhere.
+
+        coarse_walls: everywhere (True), nowhere (False), or where a function of places (n, 2) says so (n,)
+        """
         if splits is None:
             splits = np.zeros((len(cover.levels) - 1, len(y_lines) - 1, len(x_lines) - 1), dtype=np.int64)
         self.x_lines, self.y_lines = np.asarray(x_lines), np.asarray(y_lines)
@@ -101,7 +105,9 @@ class Slab:
         """
         mesh, first = self.sheet_mesh, self.cover_mesh.free
         top = mesh.planes[-1]
-        curve, curve_weights = plan.quarters if self._coarse_walls else (np.zeros((0, 4), dtype=np.int64), np.zeros(3))
+        curve, curve_weights = plan.quarters
+        coarse = self._coarse_walls(plan.plan.points[curve[:, 0]]) if callable(self._coarse_walls) else self._coarse_walls
+        curve = curve[np.broadcast_to(coarse, len(curve))]
         follows = np.zeros(len(mesh.points), dtype=bool)
         follows[top] = True
         planes = mesh.inner_planes
@@ -305,43 +311,55 @@ class Slab:
         self.unknowns = keep
         number = np.full(3 * self.nodes, -1, dtype=np.int64)
         number[keep] = np.arange(len(keep))
-        members = [(3 * nodes[..., None] + np.arange(3)).reshape(len(nodes), -1)
-                   for nodes in [*(nodes for nodes, _ in self.groups), self.top_faces]] + cells
-        self._dofs = [number[dofs] for dofs in members]
-        indptr, indices = _upper_pattern(self._dofs, len(keep))
-        self._matrix = sp.csr_matrix((np.zeros(len(indices)), indices, indptr), shape=(len(keep),) * 2)
+        *groups, top = [(3 * nodes[..., None] + np.arange(3)).reshape(len(nodes), -1)
+                        for nodes in [*(nodes for nodes, _ in self.groups), self.top_faces]]
+        self._dofs, self._top_dofs = [number[dofs] for dofs in [*groups, *cells]], number[top]
+        indptr, indices = _upper_pattern([*self._dofs, self._top_dofs], len(keep))
+        self._matrix, self._pressed = (sp.csr_matrix((np.zeros(len(indices)), indices, indptr), shape=(len(keep),) * 2)
+                                       for _ in range(2))
 
     def tangent(self, state, condensed, *, workers=SERIAL):
-        """Upper triangle (csr) of the tangent with the cells' condensed blocks [(f, k, k)], and its border.
+        """Upper triangle (csr) of the tangent with the cells' condensed blocks [(f, k, k)] and the object's contact."""
+        _, _, slope = self.contact.response(state.gaps)
+        rubber = self.rubber_tangent(state, condensed, workers=workers)
+        return self.pressed(rubber, slope * self.top_area * state.planes.covered, state.planes)
 
-        The border is the derivative (unknowns,) of the residual by the indentation; the corner its own second derivative.
-        """
+    def rubber_tangent(self, state, condensed, *, workers=SERIAL):
+        """Upper triangle (csr) of the tangent without the object's contact; valid until the next call."""
         matrix = self._matrix
         matrix.data[:] = 0.0
-        faces, border, corner = self._contact_tangent(state)
         blocks = workers.map(lambda group: group[1].tangent(state.displacement[group[0]]), self.groups)
-        parts = [*blocks, faces, *condensed]
-        for part, dofs in zip(parts, self._dofs, strict=True):
+        for part, dofs in zip([*blocks, *condensed], self._dofs, strict=True):
             _add_upper(matrix.data, matrix.indptr, matrix.indices, part, dofs)
-        return matrix, border, corner
+        return matrix
+
+    def pressed(self, rubber, stiffness, planes):
+        """The rubber's tangent and that of contact points of given stiffness (p,) in N/mm; valid until the next call."""
+        shape = self._normal_shapes(planes)
+        blocks = np.matmul((shape * stiffness.reshape(len(shape), -1, 1)).transpose(0, 2, 1), shape)
+        self._pressed.data[:] = rubber.data
+        _add_upper(self._pressed.data, rubber.indptr, rubber.indices, blocks, self._top_dofs)
+        return self._pressed
+
+    def _normal_shapes(self, planes):
+        """Change (t, g, k) of the gap of each top face's points by the face's unknowns."""
+        normal = planes.normals.reshape(*self.top_values.shape[:2], 3)
+        return np.einsum("tga,tgd->tgad", self.top_values, normal).reshape(*normal.shape[:2], -1)
+
+    def touch(self, state):
+        """The object's contact points as they depend on a step of the global unknowns, a `Touch`."""
+        shape, here = self._normal_shapes(state.planes), self._top_dofs >= 0
+        rows = np.broadcast_to(np.arange(len(state.gaps)).reshape(*shape.shape[:2], 1), shape.shape)
+        kept = np.broadcast_to(here[:, None], shape.shape)
+        columns = np.broadcast_to(self._top_dofs[:, None], shape.shape)
+        rows = sp.csr_matrix((shape[kept], (rows[kept], columns[kept])), shape=(len(state.gaps), len(self.unknowns)))
+        return Touch(gaps=state.gaps, rows=rows, lowering=state.planes.normals[:, 2], area=self.top_area * state.planes.covered,
+                     contact=self.contact)
 
     @staticmethod
     def add_to_diagonal(matrix, value):
-        """Add `value` (N/mm) to each diagonal entry of what `tangent` gave."""
+        """Add `value` (N/mm) to each diagonal entry of an upper triangle."""
         matrix.data[matrix.indptr[:-1]] += value   # sorted upper triangle: each row begins with its diagonal
-
-    def _contact_tangent(self, state):
-        _, _, slope = self.contact.response(state.gaps)
-        weight = (slope * self.top_area * state.planes.covered).reshape(len(self.top_faces), -1)
-        normal = state.planes.normals.reshape(*weight.shape, 3)
-        shape = np.einsum("tga,tgd->tgad", self.top_values, normal).reshape(*weight.shape, -1)
-        blocks = np.matmul((shape * weight[..., None]).transpose(0, 2, 1), shape)
-        # gap = n.(x - surface): raising the indentation by 1 closes it by -n_z, which is positive downwards
-        lowering = normal[..., 2]
-        border = np.zeros(3 * self.nodes)
-        dofs = (3 * self.top_faces[..., None] + np.arange(3)).reshape(len(weight), -1)
-        np.add.at(border, dofs.ravel(), np.einsum("tg,tgk->tk", weight * lowering, shape).ravel())
-        return blocks, border[self.unknowns], float((weight * lowering**2).sum())
 
     def locate(self, points):
         """Faces (p,) under the cover and shape values (p, 8) at points (p, 2); points on a line belong to the lower side."""

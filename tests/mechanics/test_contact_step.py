@@ -1,0 +1,128 @@
+"""Steps that are exact in the contact: against a general minimiser, and what a factor serves for."""
+
+import numpy as np
+import pytest
+import scipy.optimize
+import scipy.sparse as sp
+
+from softtact.contact.penalty import Contact, penalty
+from softtact.mechanics import contact_step
+from softtact.mechanics.contact_step import ContactStepper, Touch
+
+UNKNOWNS, POINTS = 12, 8
+CONTACT = Contact(stiffness=3000.0, smoothing=1 / 3000)
+
+
+class DenseSolver:
+    """Cholesky of numpy behind the interface of the sparse solvers; counts its solves."""
+
+    def __init__(self):
+        self.solves = 0
+
+    def factor(self, upper):
+        whole = (upper + sp.triu(upper, 1).T).toarray()
+        try:
+            np.linalg.cholesky(whole)
+        except np.linalg.LinAlgError:
+            return False
+        self._inverse = np.linalg.inv(whole)
+        return True
+
+    def solve(self, right):
+        self.solves += 1
+        return self._inverse @ right
+
+
+class Scene:
+    """A random positive definite body under a free object, its points between 2 um in the object and 2 um away."""
+
+    def __init__(self, seed, *, stiffness=5.0):
+        rng = np.random.default_rng(seed)
+        root = rng.normal(size=(UNKNOWNS, UNKNOWNS))
+        self.matrix = stiffness * (np.eye(UNKNOWNS) + root @ root.T / UNKNOWNS)
+        self.rows = rng.normal(size=(POINTS, UNKNOWNS))
+        self.touch = Touch(gaps=rng.uniform(-2e-3, 2e-3, POINTS), rows=sp.csr_matrix(self.rows),
+                           lowering=-rng.uniform(0.7, 1, POINTS), area=rng.uniform(0.01, 0.03, POINTS), contact=CONTACT)
+        self.residual, self.excess = rng.normal(scale=1e-2, size=UNKNOWNS), -0.05
+
+    def step(self, stepper, **changes):
+        arguments = {"excess": self.excess, **changes}
+        return stepper.step(sp.csr_matrix(np.triu(self.matrix)), self.residual, self.touch, pressed=self._pressed, **arguments)
+
+    def _pressed(self, slope):
+        return sp.csr_matrix(np.triu(self.matrix + self.rows.T @ (slope[:, None] * self.rows)))
+
+    def energy(self, x):
+        """The step's energy (mJ) over that of no step: linear and quadratic in the rubber, exact in the contact."""
+        step, lowering = x[:UNKNOWNS], x[UNKNOWNS]
+        gaps = self.touch.gaps + self.rows @ step + self.touch.lowering * lowering
+        after, before = (penalty(g, stiffness=CONTACT.stiffness, smoothing=CONTACT.smoothing)[0] for g in (gaps, self.touch.gaps))
+        held = self.touch.pressure(0.0)      # the residual holds the contact's present forces already
+        linear = self.residual @ step + self.excess * lowering + held @ (self.rows @ step + self.touch.lowering * lowering)
+        return linear + 0.5 * step @ self.matrix @ step + self.touch.area @ (after - before)
+
+
+@pytest.fixture
+def exact(monkeypatch):
+    """Steps solved to the last digit, where the press asks for less."""
+    for name, value in (("_INNER_TOLERANCE", 1e-9), ("_FORCING", 1e-6), ("_INNER_STEPS", 60)):
+        monkeypatch.setattr(contact_step, name, value)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_step_is_the_least_energy_that_a_general_minimiser_finds(exact, seed):
+    scene = Scene(seed)
+    step, lowering = scene.step(ContactStepper(DenseSolver()))
+    found = np.append(step, lowering)
+    general = scipy.optimize.minimize(scene.energy, np.zeros(UNKNOWNS + 1), method="BFGS", options={"gtol": 1e-9, "maxiter": 4000})
+    scale = abs(general.fun)
+    assert scene.energy(found) <= general.fun + 1e-9 * scale
+    assert np.abs(scipy.optimize.approx_fprime(found, scene.energy, 1e-9)).max() < 1e-4    # the differences' own rounding
+
+
+def test_an_object_that_is_held_is_not_lowered():
+    step, lowering = Scene(1).step(ContactStepper(DenseSolver()), excess=None)
+    assert lowering == 0.0 and np.abs(step).max() > 0
+
+
+def test_a_point_that_would_fly_into_the_object_is_stopped_within_one_step(exact):
+    # One unknown, pulled up by 1 N against 1 N/mm, a point 1 um under the object: Newton's tangent does not know of it.
+    touch = Touch(gaps=np.array([1e-3]), rows=sp.csr_matrix([[-1.0]]), lowering=np.array([-1.0]), area=np.array([0.02]),
+                  contact=CONTACT)
+    body = sp.csr_matrix([[1.0]])
+    step, _ = ContactStepper(DenseSolver()).step(body, np.array([-1.0]), touch,
+                                                 pressed=lambda slope: sp.csr_matrix([[1.0 + slope[0]]]))
+    depth = step[0] - 1e-3
+    # 1 N = step + area k (depth - t / 2): by hand, depth = (1 - 1e-3 + 60 t / 2) / 61
+    assert depth == pytest.approx((1 - 1e-3 + 60 / 6000) / 61, rel=1e-6)
+
+
+def test_a_free_object_that_touches_nothing_is_told_by_nan():
+    scene = Scene(2)
+    away = Touch(**{**scene.touch.__dict__, "gaps": np.full(POINTS, 0.1)})
+    _, lowering = ContactStepper(DenseSolver()).step(sp.csr_matrix(np.triu(scene.matrix)), scene.residual, away,
+                                                     pressed=scene._pressed, excess=-1.0)
+    assert np.isnan(lowering)
+
+
+def test_a_factor_serves_the_next_step_too():
+    scene, stepper = Scene(3), ContactStepper(DenseSolver())
+    scene.step(stepper)
+    factors = stepper.factors
+    scene.matrix = 1.02 * scene.matrix     # rubber that has stiffened a little
+    scene.step(stepper)
+    assert stepper.factors == factors
+
+
+def test_a_step_with_an_old_factor_is_the_same_step(exact):
+    scene, other, stepper = Scene(3), Scene(4), ContactStepper(DenseSolver())
+    new = scene.step(ContactStepper(DenseSolver()))
+    other.step(stepper)
+    old = scene.step(stepper)
+    assert np.abs(new[0] - old[0]).max() < 1e-6 * np.abs(new[0]).max() and old[1] == pytest.approx(new[1], rel=1e-6)
+
+
+def test_a_body_that_is_not_stable_has_no_step():
+    scene = Scene(5)
+    scene.matrix = scene.matrix - 3 * np.linalg.eigvalsh(scene.matrix)[-1] * np.eye(UNKNOWNS)
+    assert scene.step(ContactStepper(DenseSolver())) is None
