@@ -191,7 +191,7 @@ def _board(body):
 
 
 def _contacts(body):
-    return [ContactPair("OBJECT_ON_TOP", "TOP", "OBJECT", body.slab.contact),
+    return [ContactPair("OBJECT_ON_TOP", "TOP", "OBJECT", body.slab.top.contact),
             ContactPair("FRUSTA_ON_BOARD", "FRUSTA_FOOT", "BOARD", body.bed.contact)]
 
 

@@ -129,7 +129,7 @@ class LayeredBody:
 
     def let_down(self, state, force_n):
         """The state with the object at the depth where its force is `force_n`: the least energy over the indentation."""
-        depth = self.slab.balanced(state.slab, state.indentation, force_n)
+        depth = self.slab.top.balanced(state.slab, state.indentation, force_n)
         return replace(state, slab=self.slab.reface(state.slab, state.slab.planes, depth), indentation=depth)
 
     def newton_step(self, state, force_n, *, same_tangent=False):
@@ -173,15 +173,15 @@ class LayeredBody:
 
     def penetration(self, state):
         """Deepest penetration in mm, of the object into the cover or of frusta into the board or each other."""
-        return float(max(0.0, -self.slab.own_gaps(state.slab).min(), -state.bed.gaps.min()))
+        return float(max(0.0, -self.slab.top.own_gaps(state.slab).min(), -state.bed.gaps.min()))
 
     def contact_error(self, state):
         """Deepest overlap, or widest gap under pressure, in mm."""
-        return max(self.slab.contact.error(self.slab.own_gaps(state.slab)), self.bed.contact.error(state.bed.gaps))
+        return max(self.slab.top.contact.error(self.slab.top.own_gaps(state.slab)), self.bed.contact.error(state.bed.gaps))
 
     def press_apart(self, state):
         """Hold the points that overlap where their surfaces just touch."""
-        self.slab.contact = self.slab.contact.pressed_apart(state.slab.gaps)
+        self.slab.top.contact = self.slab.top.contact.pressed_apart(state.slab.gaps)
         self.bed.contact = self.bed.contact.pressed_apart(state.bed.gaps)
 
     def most_compressed(self, state):

@@ -1,4 +1,4 @@
-"""Sheet and cover as one slab over the frusta, with the contact of a rigid object on its top.
+"""Sheet and cover as one slab over the frusta, with the contact of a rigid object on its top (`TopContact`).
 
 The sheet's elements meet the frusta's roots node by node. The cover knows nothing of the frusta, so its hexahedra may be
 coarser in plan: the sheet's upper nodes follow the cover's lower side.
@@ -11,18 +11,12 @@ import numpy as np
 import scipy.sparse as sp
 from numba import njit
 
-from softtact.contact.coverage import continues, covered
-from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.mechanics.blocks import HexBlock, WedgeBlock
 from softtact.mechanics.cover_mesh import cover_mesh
-from softtact.mechanics.elements import gauss, quad8
+from softtact.mechanics.elements import quad8
 from softtact.mechanics.hex_mesh import extrude
 from softtact.mechanics.parallel import SERIAL, unique_rows
-
-# Contact points along a side of a top face. More of them hold a face flat that lies half under a punch's edge: with 8 the punch
-# acts up to half a face wider (docs/discretisation.md).
-TOP_POINTS = 3
-_NEAR_MM, _LARGEST_SHIFT_MM = 0.2, 0.02   # points that may touch when the object is let down on the cover, and how far at once
+from softtact.mechanics.top_contact import FacingPlanes, TopContact
 
 
 @dataclass(frozen=True)
@@ -36,23 +30,9 @@ class SlabState:
     energy: float
     force: np.ndarray
     gaps: np.ndarray
-    planes: "FacingPlanes"
+    planes: FacingPlanes
     displacement: np.ndarray
     indentation_force: float
-
-
-@dataclass(frozen=True)
-class FacingPlanes:
-    """The planes of the object's facets that points face: anchors (p, 3) in mm at no indentation, outward normals (p, 3).
-
-    covered (p,): share of a point's own area that the object covers;  beside (p,): points that lie beside the object themselves
-    A point keeps its plane during a step of Newton's method, so that each step lowers one potential.
-    """
-
-    anchors: np.ndarray
-    normals: np.ndarray
-    covered: np.ndarray
-    beside: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -82,7 +62,7 @@ class Slab:
         if splits is None:
             splits = np.zeros((len(cover.levels) - 1, len(y_lines) - 1, len(x_lines) - 1), dtype=np.int64)
         self.x_lines, self.y_lines = np.asarray(x_lines), np.asarray(y_lines)
-        self.layers, self.sheet_plan, self.contact = (sheet, cover), sheet_plan, contact
+        self.layers, self.sheet_plan = (sheet, cover), sheet_plan
         self.cover_mesh = cover_mesh(x_lines, y_lines, cover.levels, splits)
         self.sheet_mesh = extrude(sheet_plan.plan, sheet.levels)
         self._coarse_walls = coarse_walls
@@ -91,7 +71,7 @@ class Slab:
         self._add_cover(cover.law)
         self._add_sheet(sheet_plan, sheet.law)
         self._number_unknowns(sides)
-        self._top_points()
+        self.top = TopContact(self.cover_mesh, contact)
 
     def _number_nodes(self, plan):
         """Masters (p, 8) and weights (p, 8) of the sheet's nodes: its top follows the cover, the rest its own unknowns.
@@ -128,7 +108,7 @@ class Slab:
         """In how many cells, groups of other elements and top faces each node occurs (n,); 1: a cell's own."""
         cells = [np.unique(np.hstack([nodes.reshape(len(group.cells), -1) for nodes, _ in group.parts])[k])
                  for group in self.cell_groups for k in range(len(group.cells))]
-        others = [np.unique(nodes) for nodes, _ in self.groups] + [np.unique(self.top_faces)]
+        others = [np.unique(nodes) for nodes, _ in self.groups] + [np.unique(self.top.faces)]
         return np.bincount(np.concatenate([*cells, *others]), minlength=self.nodes)
 
     @property
@@ -196,54 +176,9 @@ class Slab:
         self.number = np.full(held.size, -1, dtype=np.int64)
         self.number[self.free] = np.arange(len(self.free))
 
-    def _top_points(self):
-        """Quadrature points of the top faces, flattened (t * points)."""
-        points, weights = gauss(TOP_POINTS, 2)
-        values, slopes = quad8(points)
-        mesh = self.cover_mesh
-        edges = np.einsum("tad,gai->tgdi", mesh.points[mesh.top][..., :2], slopes)
-        self.top_faces, self.top_values = self._at_faces(mesh.top, np.broadcast_to(values, (len(mesh.top), *values.shape)))
-        self.top_area = (np.linalg.det(edges) * weights).ravel()
-        self.top_reference = self._at_top(self.points)
-
-        # Each point's own area: the rectangle whose sides are as long as the weights of Gauss's rule along a line.
-        half = 0.5 * np.ptp(mesh.points[mesh.top[:, :4]][..., :2], axis=1)
-        ends = np.concatenate([[-1.0], np.cumsum(np.polynomial.legendre.leggauss(TOP_POINTS)[1]) - 1.0])
-        i, j = (g.ravel() for g in np.meshgrid(np.arange(TOP_POINTS), np.arange(TOP_POINTS), indexing="ij"))
-        places = np.stack([np.column_stack([ends[i + a], ends[j + b]]) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))], axis=1)
-        self._own_area = (half[:, None, None] * (places - points[:, None])).reshape(-1, 4, 2)
-
-    def _at_top(self, field):
-        """A nodal field (n, 3) at the top's quadrature points (t * points, 3)."""
-        return np.matmul(self.top_values, field[self.top_faces]).reshape(-1, 3)
-
-    def _at_faces(self, faces, values):
-        """Free nodes (t, w) that faces (t, 8) of the cover hang on, and values (t, g, 8) in terms of these (t, g, w)."""
-        follow = self.cover_mesh.follow
-        if (faces < follow.shape[1]).all():
-            return faces, values
-        rows = [follow[face] for face in faces]
-        needed = [np.unique(row.indices) for row in rows]
-        width = max(map(len, needed))
-        nodes = np.stack([np.pad(n, (0, width - len(n)), mode="edge") for n in needed])
-        out = np.zeros((*values.shape[:2], width))
-        for t, (row, used) in enumerate(zip(rows, needed, strict=True)):
-            out[t, :, :len(used)] = values[t] @ row[:, used].toarray()
-        return nodes, out
-
     def facing(self, displacement, surface):
         """The object's facets above the top's points (see `FacingPlanes`)."""
-        position = self.top_reference + self._at_top(displacement)
-        height, normals = surface(position[:, 0], position[:, 1])
-        anchors = np.column_stack([position[:, :2], height])
-        share, foot = covered(position[:, None, :2] + self._own_area, surface)
-        # A point beside the object whose area reaches under it faces the plane there.
-        base, foot_normals = surface(*foot.T)
-        beside = ~continues(height, position[:, :2], base, foot)
-        anchors[beside] = np.column_stack([foot, base])[beside]
-        normals[beside] = foot_normals[beside]
-        share[anchors[:, 2] >= NO_CONTACT_MM] = 0.0
-        return FacingPlanes(anchors=anchors, normals=normals, covered=share, beside=beside)
+        return self.top.facing(displacement, surface)
 
     def evaluate(self, displacement, planes, indentation, *, workers=SERIAL):
         """Energy, forces and contact with the object lowered by `indentation` mm; None if an element is inside out."""
@@ -261,43 +196,12 @@ class Slab:
         """The same displacements in front of other planes."""
         return self._with_contact(state.displacement, state.elastic, planes, indentation)
 
-    def balanced(self, state, indentation, force_n):
-        """The indentation (mm) at which the object's force is `force_n` on the cover as it is.
-
-        The force grows with the depth, from a square root's slope on: Newton's method with bounded steps.
-        """
-        near = np.flatnonzero(state.gaps < _NEAR_MM)
-        down, area = -state.planes.normals[near, 2], (self.top_area * state.planes.covered)[near]
-        contact, gaps, shift = self.contact.at(near), state.gaps[near], 0.0
-        for _ in range(50):
-            _, pressure, slope = contact.response(gaps - shift * down)
-            excess = pressure @ (down * area) - force_n
-            if abs(excess) <= 1e-9 * force_n:
-                break
-            stiffness = slope @ (down**2 * area)
-            shift -= np.clip(excess / max(stiffness, 1e-12), -_LARGEST_SHIFT_MM, _LARGEST_SHIFT_MM)
-        return indentation + shift
-
     def _with_contact(self, displacement, elastic, planes, indentation):
-        gaps, normals = self.gaps(displacement, planes, indentation), planes.normals
-        density, pressure, _ = self.contact.response(gaps)
-        area = self.top_area * planes.covered
-        push = (pressure * area)[:, None] * normals      # on the slab: along the object's outward normal
-        nodal = np.matmul(self.top_values.transpose(0, 2, 1), push.reshape(len(self.top_faces), -1, 3))
-        force = elastic[1].copy()
-        np.add.at(force, self.top_faces.ravel(), -nodal.reshape(-1, 3))
-        return SlabState(elastic=elastic, energy=elastic[0] + float(density @ area), force=force, gaps=gaps,
-                         planes=planes, displacement=displacement, indentation_force=float(-push[:, 2].sum()))
-
-    def gaps(self, displacement, planes, indentation):
-        """Normal gaps (p,) in mm between the top's points and the planes they face."""
-        offset = self.top_reference + self._at_top(displacement) - planes.anchors
-        return np.einsum("pd,pd->p", planes.normals, offset) + indentation * planes.normals[:, 2]
-
-    @staticmethod
-    def own_gaps(state):
-        """Gaps (p,) of the points that lie under the object; of those beside it a gap that says so."""
-        return np.where(state.planes.beside, NO_CONTACT_MM, state.gaps)
+        energy, force = elastic[0], elastic[1].copy()
+        touch = self.top.touch(displacement, planes, indentation)
+        np.add.at(force, self.top.faces.ravel(), touch.force.reshape(-1, 3))
+        return SlabState(elastic=elastic, energy=energy + touch.energy, force=force, gaps=touch.gaps, planes=planes,
+                         displacement=displacement, indentation_force=touch.indentation_force)
 
     def build_pattern(self, eliminated, cells):
         """Fix the global matrix: its unknowns are the free but the `eliminated` ones; `cells` [(c, k)]: what cells leave."""
@@ -306,7 +210,7 @@ class Slab:
         number = np.full(3 * self.nodes, -1, dtype=np.int64)
         number[keep] = np.arange(len(keep))
         members = [(3 * nodes[..., None] + np.arange(3)).reshape(len(nodes), -1)
-                   for nodes in [*(nodes for nodes, _ in self.groups), self.top_faces]] + cells
+                   for nodes in [*(nodes for nodes, _ in self.groups), self.top.faces]] + cells
         self._dofs = [number[dofs] for dofs in members]
         indptr, indices = _upper_pattern(self._dofs, len(keep))
         self._matrix = sp.csr_matrix((np.zeros(len(indices)), indices, indptr), shape=(len(keep),) * 2)
@@ -318,30 +222,19 @@ class Slab:
         """
         matrix = self._matrix
         matrix.data[:] = 0.0
-        faces, border, corner = self._contact_tangent(state)
+        faces, face_border, corner = self.top.tangent(state)
+        border = np.zeros(3 * self.nodes)
+        np.add.at(border, (3 * self.top.faces[..., None] + np.arange(3)).ravel(), face_border.ravel())
         blocks = workers.map(lambda group: group[1].tangent(state.displacement[group[0]]), self.groups)
         parts = [*blocks, faces, *condensed]
         for part, dofs in zip(parts, self._dofs, strict=True):
             _add_upper(matrix.data, matrix.indptr, matrix.indices, part, dofs)
-        return matrix, border, corner
+        return matrix, border[self.unknowns], corner
 
     @staticmethod
     def add_to_diagonal(matrix, value):
         """Add `value` (N/mm) to each diagonal entry of what `tangent` gave."""
         matrix.data[matrix.indptr[:-1]] += value   # sorted upper triangle: each row begins with its diagonal
-
-    def _contact_tangent(self, state):
-        _, _, slope = self.contact.response(state.gaps)
-        weight = (slope * self.top_area * state.planes.covered).reshape(len(self.top_faces), -1)
-        normal = state.planes.normals.reshape(*weight.shape, 3)
-        shape = np.einsum("tga,tgd->tgad", self.top_values, normal).reshape(*weight.shape, -1)
-        blocks = np.matmul((shape * weight[..., None]).transpose(0, 2, 1), shape)
-        # gap = n.(x - surface): raising the indentation by 1 closes it by -n_z, which is positive downwards
-        lowering = normal[..., 2]
-        border = np.zeros(3 * self.nodes)
-        dofs = (3 * self.top_faces[..., None] + np.arange(3)).reshape(len(weight), -1)
-        np.add.at(border, dofs.ravel(), np.einsum("tg,tgk->tk", weight * lowering, shape).ravel())
-        return blocks, border[self.unknowns], float((weight * lowering**2).sum())
 
     def locate(self, points):
         """Faces (p,) under the cover and shape values (p, 8) at points (p, 2); points on a line belong to the lower side."""

@@ -1,0 +1,148 @@
+"""Contact of a rigid object with the slab's top: quadrature points of the top faces, each before a plane of the object."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from softtact.contact.coverage import continues, covered
+from softtact.contact.height_field import NO_CONTACT_MM
+from softtact.mechanics.elements import gauss, quad8
+
+# Contact points along a side of a top face. More of them hold a face flat that lies half under a punch's edge: with 8 the punch
+# acts up to half a face wider (docs/discretisation.md).
+TOP_POINTS = 3
+_NEAR_MM, _LARGEST_SHIFT_MM = 0.2, 0.02   # points that may touch when the object is let down on the cover, and how far at once
+
+
+@dataclass(frozen=True)
+class FacingPlanes:
+    """The planes of the object's facets that points face: anchors (p, 3) in mm at no indentation, outward normals (p, 3).
+
+    covered (p,): share of a point's own area that the object covers;  beside (p,): points that lie beside the object themselves
+    A point keeps its plane during a step of Newton's method, so that each step lowers one potential.
+    """
+
+    anchors: np.ndarray
+    normals: np.ndarray
+    covered: np.ndarray
+    beside: np.ndarray
+
+
+@dataclass(frozen=True)
+class Touch:
+    """Contact at one displacement: energy (mJ), forces (t, w, 3) in N on the faces' nodes, gaps (p,) in mm of the points.
+
+    indentation_force: the object's, N downwards
+    """
+
+    energy: float
+    force: np.ndarray
+    gaps: np.ndarray
+    indentation_force: float
+
+
+class TopContact:
+    """The points of a `CoverMesh`'s top faces, flattened (p = t * points): areas (p,) in mm2, places (p, 3) in mm at rest.
+
+    faces (t, w): the free nodes that a face hangs on, values (t, points, w): their shape values at its points.
+    """
+
+    def __init__(self, mesh, contact):
+        """contact: `Contact`, the law of the points."""
+        self.contact = contact
+        points, weights = gauss(TOP_POINTS, 2)
+        values, slopes = quad8(points)
+        edges = np.einsum("tad,gai->tgdi", mesh.points[mesh.top][..., :2], slopes)
+        self.faces, self.values = _of_free_nodes(mesh.follow, mesh.top, np.broadcast_to(values, (len(mesh.top), *values.shape)))
+        self.area = (np.linalg.det(edges) * weights).ravel()
+        self.reference = self.at_points(mesh.points)
+
+        # Each point's own area: the rectangle whose sides are as long as the weights of Gauss's rule along a line.
+        half = 0.5 * np.ptp(mesh.points[mesh.top[:, :4]][..., :2], axis=1)
+        ends = np.concatenate([[-1.0], np.cumsum(np.polynomial.legendre.leggauss(TOP_POINTS)[1]) - 1.0])
+        i, j = (g.ravel() for g in np.meshgrid(np.arange(TOP_POINTS), np.arange(TOP_POINTS), indexing="ij"))
+        places = np.stack([np.column_stack([ends[i + a], ends[j + b]]) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))], axis=1)
+        self._own_area = (half[:, None, None] * (places - points[:, None])).reshape(-1, 4, 2)
+
+    def at_points(self, field):
+        """A nodal field (n, 3) at the points (p, 3)."""
+        return np.matmul(self.values, field[self.faces]).reshape(-1, 3)
+
+    def facing(self, displacement, surface):
+        """The object's facets above the points (see `FacingPlanes`)."""
+        position = self.reference + self.at_points(displacement)
+        height, normals = surface(position[:, 0], position[:, 1])
+        anchors = np.column_stack([position[:, :2], height])
+        share, foot = covered(position[:, None, :2] + self._own_area, surface)
+        # A point beside the object whose area reaches under it faces the plane there.
+        base, foot_normals = surface(*foot.T)
+        beside = ~continues(height, position[:, :2], base, foot)
+        anchors[beside] = np.column_stack([foot, base])[beside]
+        normals[beside] = foot_normals[beside]
+        share[anchors[:, 2] >= NO_CONTACT_MM] = 0.0
+        return FacingPlanes(anchors=anchors, normals=normals, covered=share, beside=beside)
+
+    def gaps(self, displacement, planes, indentation):
+        """Normal gaps (p,) in mm between the points and the planes they face."""
+        offset = self.reference + self.at_points(displacement) - planes.anchors
+        return np.einsum("pd,pd->p", planes.normals, offset) + indentation * planes.normals[:, 2]
+
+    @staticmethod
+    def own_gaps(state):
+        """Gaps (p,) of the points that lie under the object; of those beside it a gap that says so."""
+        return np.where(state.planes.beside, NO_CONTACT_MM, state.gaps)
+
+    def touch(self, displacement, planes, indentation):
+        """The contact with the object lowered by `indentation` mm."""
+        gaps, normals = self.gaps(displacement, planes, indentation), planes.normals
+        density, pressure, _ = self.contact.response(gaps)
+        area = self.area * planes.covered
+        push = (pressure * area)[:, None] * normals      # on the slab: along the object's outward normal
+        nodal = np.matmul(self.values.transpose(0, 2, 1), push.reshape(len(self.faces), -1, 3))
+        return Touch(energy=float(density @ area), force=-nodal, gaps=gaps, indentation_force=float(-push[:, 2].sum()))
+
+    def balanced(self, state, indentation, force_n):
+        """The indentation (mm) at which the object's force is `force_n` on the cover as it is.
+
+        The force grows with the depth, from a square root's slope on: Newton's method with bounded steps.
+        """
+        near = np.flatnonzero(state.gaps < _NEAR_MM)
+        down, area = -state.planes.normals[near, 2], (self.area * state.planes.covered)[near]
+        contact, gaps, shift = self.contact.at(near), state.gaps[near], 0.0
+        for _ in range(50):
+            _, pressure, slope = contact.response(gaps - shift * down)
+            excess = pressure @ (down * area) - force_n
+            if abs(excess) <= 1e-9 * force_n:
+                break
+            stiffness = slope @ (down**2 * area)
+            shift -= np.clip(excess / max(stiffness, 1e-12), -_LARGEST_SHIFT_MM, _LARGEST_SHIFT_MM)
+        return indentation + shift
+
+    def tangent(self, state):
+        """The contact's part of the tangent: blocks (t, 3 w, 3 w) of the faces, border (t, 3 w) and corner.
+
+        The border is the derivative of the forces by the indentation, the corner the energy's second derivative by it.
+        """
+        _, _, slope = self.contact.response(state.gaps)
+        weight = (slope * self.area * state.planes.covered).reshape(len(self.faces), -1)
+        normal = state.planes.normals.reshape(*weight.shape, 3)
+        shape = np.einsum("tga,tgd->tgad", self.values, normal).reshape(*weight.shape, -1)
+        blocks = np.matmul((shape * weight[..., None]).transpose(0, 2, 1), shape)
+        # gap = n.(x - surface): raising the indentation by 1 closes it by -n_z, which is positive downwards
+        lowering = normal[..., 2]
+        border = np.einsum("tg,tgk->tk", weight * lowering, shape)
+        return blocks, border, float((weight * lowering**2).sum())
+
+
+def _of_free_nodes(follow, faces, values):
+    """Free nodes (t, w) that faces (t, 8) hang on, and values (t, g, 8) in terms of these (t, g, w)."""
+    if (faces < follow.shape[1]).all():
+        return faces, values
+    rows = [follow[face] for face in faces]
+    needed = [np.unique(row.indices) for row in rows]
+    width = max(map(len, needed))
+    nodes = np.stack([np.pad(n, (0, width - len(n)), mode="edge") for n in needed])
+    out = np.zeros((*values.shape[:2], width))
+    for t, (row, used) in enumerate(zip(rows, needed, strict=True)):
+        out[t, :, :len(used)] = values[t] @ row[:, used].toarray()
+    return nodes, out
