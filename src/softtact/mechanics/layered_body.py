@@ -4,8 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from softtact.contact.friction import coulomb
 from softtact.contact.height_field import HeightField
 from softtact.contact.penalty import Contact
+from softtact.mechanics.body_friction import BodyFriction
 from softtact.mechanics.frustum_bed import BedGeometry, BedState, FrustumBed
 from softtact.mechanics.hex_mesh import sheet_plan
 from softtact.mechanics.linear_solvers import make_solver
@@ -65,7 +67,7 @@ class MeshSettings:
 
 @dataclass(frozen=True)
 class BodyState:
-    """Slab and bed at one displacement, and the potential energy (mJ) of both with their contacts."""
+    """Slab and bed at one displacement, and the potential energy (mJ) of both with their contacts and friction."""
 
     slab: SlabState
     bed: BedState
@@ -103,6 +105,7 @@ class LayeredBody:
         """`roots` (f, k): the slab's nodes that are the frusta's root nodes."""
         self.slab, self.bed = slab, bed
         self.workers = Workers(threads)
+        self.friction = BodyFriction(slab.top, bed)
         self.cells = SheetCells(slab, bed, roots)
         slab.build_pattern(self.cells.eliminated, self.cells.outer_dofs)
         self.solver = make_solver(threads=threads)
@@ -139,6 +142,7 @@ class LayeredBody:
         Where nothing touches, a force finds no stiffness: the step is then not finite.
         """
         if not same_tangent:
+            state = self.friction.for_tangent(state)
             self.cells.refresh(state, workers=self.workers)
             self._border, self._corner = self._factor_tangent(state)
             self.has_tangent = True
@@ -253,7 +257,7 @@ def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), s
     centres, neighbours = lattice(counts, frusta.pitch_mm)
     plan = sheet_plan(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, spec.footprint_mm, refinement=mesh.refinement)
     slab = Slab(sheet, cover, plan, x_lines, y_lines, sides="held", contact=contact or mesh.contact,
-                coarse_walls=mesh.coarse_walls, splits=splits)
+                coarse_walls=mesh.coarse_walls, splits=splits, friction=coulomb(spec.friction.object))
     return LayeredBody(slab, _bed(spec, centres, neighbours, dielectric_law, mesh, scatter, contact), slab.bottom[plan.roots],
                        threads=threads)
 
@@ -288,7 +292,7 @@ def build_unit_cell(spec, *, dielectric_law, cover_law=None, mesh=MeshSettings()
     centre = np.zeros((1, 2))
     plan = sheet_plan(centre, (1, 1), frusta.pitch_mm, frusta.root_diameter_mm, (frusta.pitch_mm,) * 2, refinement=mesh.refinement)
     slab = Slab(sheet, cover, plan, lines, lines, sides="symmetric", contact=mesh.contact, coarse_walls=mesh.coarse_walls,
-                splits=splits)
+                splits=splits, friction=coulomb(spec.friction.object))
     bed = _bed(spec, centre, np.ones((1, 4), dtype=bool), dielectric_law, mesh,
                (np.array([height_factor]), np.array([tip_factor])), None, bottom=bottom)
     return LayeredBody(slab, bed, slab.bottom[plan.roots])
@@ -305,7 +309,8 @@ def _bed(spec, centres, neighbours, law, mesh, scatter, contact, *, bottom=None)
                            root_diameter=frusta.root_diameter_mm, neighbours=neighbours)
     return FrustumBed(geometry, law, levels=np.asarray(mesh.frustum_levels) * frusta.height_mm, root_z_mm=bottom,
                       pcb_z_mm=bottom - heights.max(), tips_held=spec.tips_held, contact=contact or mesh.contact,
-                      local_over_shear=mesh.over_shear_of_layers, refinement=mesh.refinement)
+                      local_over_shear=mesh.over_shear_of_layers, refinement=mesh.refinement,
+                      friction=coulomb(spec.friction.board))
 
 
 def surface_of(mesh):

@@ -12,6 +12,7 @@ from softtact.mechanics.parallel import SERIAL, chunks
 _CHUNK = 8                          # cells that one thread condenses at once
 _REFRESH_MM = 4e-3                  # a cell that moved less than this keeps its tangent (residuals stay exact)
 _REFRESH_SLOPE = 0.2                # ... unless a contact point's stiffness changed by this share of the penalty
+_REFRESH_FRICTION = 100.0           # ... or its friction's by this many N/mm3
 
 
 class SheetCells:
@@ -56,7 +57,7 @@ class SheetCells:
         self._tangent_at = None
 
     def _stale(self, state):
-        slope = self.bed.contact_slope(state.bed.gaps)
+        slope = self._slope(state.bed)
         roots = state.slab.displacement[self.roots].reshape(self.count, -1)
         place = np.hstack([roots, state.bed.displacement.reshape(self.count, -1)])
         above = [state.slab.displacement[kind.nodes].reshape(len(kind.cells), -1) for kind in self.kinds]
@@ -70,6 +71,14 @@ class SheetCells:
             before[stale[kind.cells]] = now[stale[kind.cells]]
         self._tangent_at[stale], self._slope_at[stale] = place[stale], slope[stale]
         return stale
+
+    def _slope(self, state):
+        """Stiffnesses (f, q) in N/mm3 of a `BedState`'s contacts, friction's weighed as much as its smaller limit asks for."""
+        slope = self.bed.contact_slope(state.gaps)
+        if state.drag is None:
+            return slope
+        weight = _REFRESH_SLOPE * self.bed.contact.stiffness / _REFRESH_FRICTION
+        return np.hstack([slope, weight * state.drag.stiffness().reshape(self.count, -1)])
 
     def condensed_residual(self, state):
         """Residual (n, 3) of the slab with all inner unknowns eliminated, and what `recover` needs again."""

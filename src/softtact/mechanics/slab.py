@@ -11,6 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 from numba import njit
 
+from softtact.contact.friction import Drag
 from softtact.mechanics.blocks import HexBlock, WedgeBlock
 from softtact.mechanics.cover_mesh import cover_mesh
 from softtact.mechanics.elements import quad8
@@ -23,7 +24,8 @@ from softtact.mechanics.top_contact import FacingPlanes, TopContact
 class SlabState:
     """energy (mJ), force (n, 3) in N, contact quantities at the top's points, displacement (n, 3).
 
-    elastic: energy and force of the rubber alone; planes: what the points face; indentation_force: the object's, N downwards.
+    elastic: energy and force of the rubber alone; planes: what the points face; indentation_force: the object's, N downwards;
+    drag: friction at the points, None without.
     """
 
     elastic: tuple
@@ -33,6 +35,7 @@ class SlabState:
     planes: FacingPlanes
     displacement: np.ndarray
     indentation_force: float
+    drag: Drag | None = None
 
 
 @dataclass(frozen=True)
@@ -57,8 +60,12 @@ class Slab:
     Nodes: the cover's first, then the sheet's without its top. `bottom` are the nodes under the sheet, in the plan's order.
     """
 
-    def __init__(self, sheet, cover, sheet_plan, x_lines, y_lines, *, sides, contact, coarse_walls=True, splits=None):
-        """splits (cover's layers, ny 2^m, nx 2^m): how often the cover is split where (see `cover_mesh`); None: nowhere."""
+    def __init__(self, sheet, cover, sheet_plan, x_lines, y_lines, *, sides, contact, coarse_walls=True, splits=None,
+                 friction=None):
+        """splits (cover's layers, ny 2^m, nx 2^m): how often the cover is split where (see `cover_mesh`); None: nowhere.
+
+        friction: `Coulomb` of the object on the top, or None
+        """
         if splits is None:
             splits = np.zeros((len(cover.levels) - 1, len(y_lines) - 1, len(x_lines) - 1), dtype=np.int64)
         self.x_lines, self.y_lines = np.asarray(x_lines), np.asarray(y_lines)
@@ -71,7 +78,7 @@ class Slab:
         self._add_cover(cover.law)
         self._add_sheet(sheet_plan, sheet.law)
         self._number_unknowns(sides)
-        self.top = TopContact(self.cover_mesh, contact)
+        self.top = TopContact(self.cover_mesh, contact, friction)
 
     def _number_nodes(self, plan):
         """Masters (p, 8) and weights (p, 8) of the sheet's nodes: its top follows the cover, the rest its own unknowns.
@@ -201,7 +208,7 @@ class Slab:
         touch = self.top.touch(displacement, planes, indentation)
         np.add.at(force, self.top.faces.ravel(), touch.force.reshape(-1, 3))
         return SlabState(elastic=elastic, energy=energy + touch.energy, force=force, gaps=touch.gaps, planes=planes,
-                         displacement=displacement, indentation_force=touch.indentation_force)
+                         displacement=displacement, indentation_force=touch.indentation_force, drag=touch.drag)
 
     def build_pattern(self, eliminated, cells):
         """Fix the global matrix: its unknowns are the free but the `eliminated` ones; `cells` [(c, k)]: what cells leave."""

@@ -1,10 +1,11 @@
 """Contact of a rigid object with the slab's top: quadrature points of the top faces, each before a plane of the object."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from softtact.contact.coverage import continues, covered
+from softtact.contact.friction import Drag, Grip
 from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.mechanics.elements import gauss, quad8
 
@@ -32,24 +33,26 @@ class FacingPlanes:
 class Touch:
     """Contact at one displacement: energy (mJ), forces (t, w, 3) in N on the faces' nodes, gaps (p,) in mm of the points.
 
-    indentation_force: the object's, N downwards
+    indentation_force: the object's, N downwards;  drag: friction at the points, None without
     """
 
     energy: float
     force: np.ndarray
     gaps: np.ndarray
     indentation_force: float
+    drag: Drag | None = None
 
 
 class TopContact:
     """The points of a `CoverMesh`'s top faces, flattened (p = t * points): areas (p,) in mm2, places (p, 3) in mm at rest.
 
     faces (t, w): the free nodes that a face hangs on, values (t, points, w): their shape values at its points.
+    grip: how friction holds the points during a step, None without.
     """
 
-    def __init__(self, mesh, contact):
-        """contact: `Contact`, the law of the points."""
-        self.contact = contact
+    def __init__(self, mesh, contact, friction=None):
+        """contact: `Contact`, the law of the points;  friction: `Coulomb` of the object on them, or None."""
+        self.contact, self.friction, self.grip = contact, friction, None
         points, weights = gauss(TOP_POINTS, 2)
         values, slopes = quad8(points)
         edges = np.einsum("tad,gai->tgdi", mesh.points[mesh.top][..., :2], slopes)
@@ -98,11 +101,42 @@ class TopContact:
         density, pressure, _ = self.contact.response(gaps)
         area = self.area * planes.covered
         push = (pressure * area)[:, None] * normals      # on the slab: along the object's outward normal
-        nodal = np.matmul(self.values.transpose(0, 2, 1), push.reshape(len(self.faces), -1, 3))
-        return Touch(energy=float(density @ area), force=-nodal, gaps=gaps, indentation_force=float(-push[:, 2].sum()))
+        touch = Touch(energy=float(density @ area), force=-self._on_nodes(push), gaps=gaps,
+                      indentation_force=float(-push[:, 2].sum()))
+        return touch if self.grip is None else self._with_friction(touch, displacement, planes, indentation)
+
+    def _with_friction(self, touch, displacement, planes, indentation):
+        """The contact with friction's energy and forces, on the covered share of area as the pressure's."""
+        area = self.area * planes.covered
+        drag = self.grip.drag(self._in_object(displacement, indentation), planes.normals)
+        pull = drag.traction * area[:, None]
+        # Raising the indentation lifts the points in the object's frame, so the slips' vertical part resists it.
+        return replace(touch, energy=touch.energy + float(drag.energy @ area), force=touch.force + self._on_nodes(pull),
+                       indentation_force=touch.indentation_force + float(pull[:, 2].sum()), drag=drag)
+
+    def _on_nodes(self, forces):
+        """Forces (p, 3) in N at the points as forces (t, w, 3) on the faces' nodes."""
+        return np.matmul(self.values.transpose(0, 2, 1), forces.reshape(len(self.faces), -1, 3))
+
+    def _in_object(self, displacement, indentation):
+        """Places (p, 3) of the points in the frame of the object, which goes down by `indentation`."""
+        return self.reference + self.at_points(displacement) + [0.0, 0.0, indentation]
+
+    def begin_step(self, state, indentation):
+        """Let friction hold the points as where a step starts from a `SlabState`."""
+        if self.friction is None:
+            return
+        if state.drag is None:
+            self.grip = Grip.first(self.friction, self._in_object(state.displacement, indentation), state.gaps)
+        else:
+            self.grip = state.drag.next_step(state.gaps)
+
+    def renewed_grip(self, state):
+        """The grip with the pressures of a `SlabState`."""
+        return state.drag.next_pass(state.gaps, self.contact.response(state.gaps)[1])
 
     def balanced(self, state, indentation, force_n):
-        """The indentation (mm) at which the object's force is `force_n` on the cover as it is.
+        """The indentation (mm) at which the object's force, friction aside, is `force_n` on the cover as it is.
 
         The force grows with the depth, from a square root's slope on: Newton's method with bounded steps.
         """
@@ -130,8 +164,20 @@ class TopContact:
         blocks = np.matmul((shape * weight[..., None]).transpose(0, 2, 1), shape)
         # gap = n.(x - surface): raising the indentation by 1 closes it by -n_z, which is positive downwards
         lowering = normal[..., 2]
-        border = np.einsum("tg,tgk->tk", weight * lowering, shape)
-        return blocks, border, float((weight * lowering**2).sum())
+        border, corner = np.einsum("tg,tgk->tk", weight * lowering, shape), float((weight * lowering**2).sum())
+        if state.drag is None:
+            return blocks, border, corner
+        by_friction = self._friction_tangent(state)
+        return blocks + by_friction[0], border + by_friction[1], corner + by_friction[2]
+
+    def _friction_tangent(self, state):
+        """Friction's part of what `tangent` gives."""
+        area = (self.area * state.planes.covered)[:, None, None]
+        slope = (state.drag.stiffness() * area).reshape(*self.values.shape[:2], 3, 3)
+        along = np.einsum("tga,tgij->tgaij", self.values, slope)
+        blocks = np.einsum("tgaij,tgb->taibj", along, self.values, optimize=True)
+        size = 3 * self.values.shape[2]
+        return blocks.reshape(-1, size, size), along[..., 2].sum(axis=1).reshape(-1, size), float(slope[..., 2, 2].sum())
 
 
 def _of_free_nodes(follow, faces, values):
