@@ -162,8 +162,8 @@ def test_tips_with_much_friction_do_as_held_tips_do(record):
 
 @pytest.fixture(scope="module")
 def rough_press():
-    """Sensor and levels of a ball on 3 x 3 frusta, friction above and below."""
-    body = body_with(board=0.2, on_object=0.3, columns=3, rows=3)
+    """Sensor and levels of a ball on 3 x 3 frusta, friction above and below (with 0.3 above, all of its 29 points would stick)."""
+    body = body_with(board=0.2, on_object=0.1, columns=3, rows=3)
     return body, list(ball_on(body, np.linspace(0.5, 4.0, 15)))
 
 
@@ -208,7 +208,7 @@ def test_work_is_stored_or_dissipated(record):
                              got=work))
         assert (lost > 0).all()
     assert errors[0] > 3 * errors[1] > 9 * errors[2]                    # second order in the step, as the trapezoidal rule
-    assert lost.sum() / work > 100 * errors[2]                           # without the loss the balance would be far off
+    assert lost.sum() / work > 50 * errors[2]      # the loss is 1 % of the work, so without it the balance would be far off
 
 
 def elastic(body, state):

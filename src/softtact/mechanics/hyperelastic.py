@@ -1,6 +1,6 @@
 """Presses under force control: Newton's method with line search, prediction along the force path, adaptive steps."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -178,6 +178,8 @@ def _settle(body, surface, state, force, tolerance, settings):
         return _newton(body, surface, state, force, tolerance, settings)
     tolerance, iterations = settings.friction_tolerance * tolerance, 0
     for k in range(settings.friction_passes):
+        if k == 1:     # a point at an edge would face now one facet, now the other, and no pass agree with the one before
+            settings = replace(settings, refacing_iterations=0)
         state, spent, residual = _newton(body, surface, state, force, tolerance, settings)
         iterations += spent
         if state is None:
@@ -206,7 +208,7 @@ def _newton(body, surface, state, force, tolerance, settings):
     sees the object's height jump each time; so the planes are kept later on.
     A step that cut the residual well is followed by one with the same tangent, which is cheap and nearly as good.
     """
-    reuse, before, fresh = False, np.inf, False
+    planes, reuse, before, fresh = state.slab.planes, False, np.inf, False
     for iteration in range(settings.max_iterations):
         if iteration < settings.refacing_iterations:
             planes = body.slab.facing(state.slab.displacement, surface)
