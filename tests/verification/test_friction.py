@@ -66,10 +66,13 @@ def test_the_traction_is_the_slope_of_the_energy_and_the_stiffness_that_of_the_t
     assert np.linalg.eigvalsh(stiffness).min() > -1e-9      # convex
 
 
-def test_forces_and_newton_steps_are_the_slopes_of_the_potential_of_a_press_with_friction(record):
+@pytest.mark.parametrize(("under", "surface"), [("plate", tilted_plate), ("punch that covers points in part", flat_punch(1.0))])
+def test_forces_and_newton_steps_are_the_slopes_of_the_potential_of_a_press_with_friction(under, surface, record):
     """Along a Newton step s the potential falls at the rate residual . s, and the residual at its own size."""
     body, h = body_with(board=0.3, on_object=0.3), 1e-6
-    level = last_level(body, [0.5, 1.0])
+    level = last_level(body, [0.5, 1.0], surface=surface)
+    covered = level.state.slab.planes.covered[level.state.slab.gaps < 0]
+    assert (covered < 1).any() == ("punch" in under)
     body.friction.begin_step(level.state)
     moved = shifted(body, level.state, random_step(body, 6e-4), 1.0)
     body.friction.renew(moved)
@@ -80,11 +83,12 @@ def test_forces_and_newton_steps_are_the_slopes_of_the_potential_of_a_press_with
     up, down = (shifted(body, state, step, sign * h) for sign in (1, -1))
     expected = (potential(up, 1.1) - potential(down, 1.1)) / (2 * h)
     got = residual(body, state, 1.1) @ flat(body, step)
-    assert record("press with friction: slope of the potential along a step, mJ", expected=expected, source="central differences",
-                  got=got) < 1e-6
+    error = record(f"{under} with friction: slope of the potential along a step, mJ", expected=expected,
+                   source="central differences", got=got)
+    assert error < 1e-6
     change = (residual(body, up, 1.1) - residual(body, down, 1.1)) / (2 * h)
     got = np.abs(change + residual(body, state, 1.1)).max() / np.abs(residual(body, state, 1.1)).max()
-    record("press with friction: what is left of the residual's slope after a Newton step, over the residual", expected=0.0,
+    record(f"{under} with friction: what is left of the residual's slope after a Newton step, over the residual", expected=0.0,
            source="central differences", got=got)
     assert got < 1e-4
 
@@ -283,6 +287,22 @@ def teeth(slope):
         return np.zeros_like(x), np.tile(normal, (len(x), 1))
 
     return surface
+
+
+def test_friction_acts_on_the_share_of_area_that_the_object_covers_as_the_pressure_does(record):
+    """A punch whose edge cuts points' areas, on a block shifted as a whole: every point slides, and the sums obey Coulomb's law."""
+    mu, depth, x = 0.3, 1e-3, np.linspace(-1.5, 1.5, 7)
+    slab = RoughSlab(x, x, np.linspace(-1.0, 0.0, 2), [BLOCK_LAW], sides="held", stiffness=100.0, law=Coulomb(mu)).slab
+    u = np.zeros((slab.nodes, 3))
+    planes = slab.facing(u, flat_punch(1.0))
+    assert ((planes.covered > 0) & (planes.covered < 1)).any()
+    slab.top.begin_step(slab.evaluate(u, planes, depth), depth)
+    slab.top.grip = slab.top.renewed_grip(slab.evaluate(u, planes, depth))
+    state = slab.evaluate(u + [10 * SLIP_TOLERANCE_MM, 0.0, 0.0], planes, depth)
+    expected, got = mu * state.indentation_force, state.force[:, 0].sum()
+    assert expected > 0.05
+    error = record("punch that slides over the edge of points' areas: friction, N", expected=expected, source=COULOMB, got=got)
+    assert error < 1e-9
 
 
 @pytest.mark.parametrize("mu", [0.05, 0.1, 0.3])
