@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 # Points slide by 10 to 100 micrometres in a press. Half a micrometre lies well below, and makes sticking at 0.3 MPa and
-# mu = 0.3 as stiff (2 mu p / e = 360 N/mm3) as the contacts' penalties, so that the tangent's condition does not suffer.
+# mu = 0.3 less stiff (2 mu p / e = 360 N/mm3) than the contacts' penalties, so that the tangent's condition does not suffer.
 SLIP_TOLERANCE_MM = 5e-4
 
 

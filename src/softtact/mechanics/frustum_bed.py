@@ -226,11 +226,12 @@ class FrustumBed:
         """Recompute the condensed tangents of the given frusta (k,); returns those of their roots (k, 1, 75, 75)."""
         slope = self.contact.at(frusta).response(state.gaps[frusta])[2] * self.point_area[frusta]
         displacement = state.displacement[frusta]
+        friction = None if state.drag is None else state.drag.stiffness(frusta)
         left = []
         for k, layer in enumerate(self.layers):
             springs = self._springs(layer, slope)
-            if state.drag is not None:
-                springs = springs.with_others(self._friction_springs(layer, state.drag.stiffness(frusta), frusta))
+            if friction is not None:
+                springs = springs.with_others(self._friction_springs(layer, friction, frusta))
             layer.condensed.set(frusta, [self._layer_tangents(k, displacement, frusta), *left], springs)
             left = [layer.condensed.outer[frusta][:, None]]
         return left[0]
