@@ -159,7 +159,7 @@ class Sensor:
     def _read_level(body, sampling, level):
         slab, bed = level.state.slab, level.state.bed
         return (-(sampling @ slab.displacement[:, 2]), level.state.indentation,
-                float((body.slab.top_area * slab.planes.covered)[slab.gaps < 0].sum()), level.penetration_mm,
+                float((body.slab.top.area * slab.planes.covered)[slab.gaps < 0].sum()), level.penetration_mm,
                 float(body.bed.compression(bed.displacement).max()), level.residual_n,
                 body.share_outside_window(level.state), level.iterations)
 
@@ -169,8 +169,15 @@ class Sensor:
                  "within_validity": np.asarray(numbers.pop("within_validity"), dtype=np.int8)}
         return PressResult(deformation_map_mm=maps, tactile_map=ideal_counts(self.spec, maps), force_n=forces,
                            wall_time_s=times, x_mm=self.spec.map_x_mm, y_mm=self.spec.map_y_mm, model=model,
-                           sensor=self.spec.name, solver=solver, attributes=dict(self.attributes), **flags,
+                           sensor=self.spec.name, solver=solver, attributes={**self._friction(model), **self.attributes}, **flags,
                            **{name: np.asarray(values) for name, values in numbers.items()})
+
+    def _friction(self, model):
+        """Attributes that state the friction of a result."""
+        if model == "elastic":
+            return {"friction": "none: the elastic model knows no friction"}
+        friction = self.spec.friction
+        return {"friction_object": friction.object, "friction_board": friction.board, "tips_held": int(self.spec.tips_held)}
 
 
 def _cores():

@@ -1,5 +1,7 @@
 """A deck read back holds what was meant: nodes, elements, laws, constraints, surfaces, contacts and steps."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -12,6 +14,7 @@ from softtact.decks.model import deck_model
 from softtact.decks.read import read_deck
 from softtact.errors import InputError
 from softtact.geometry.meshes import place
+from softtact.geometry.sensor_spec import Friction
 from softtact.mechanics.elements import HEX20_BOTTOM, HEX20_SIDES, HEX20_TOP
 from softtact.mechanics.layered_body import MeshSettings, build_unit_cell
 from softtact.sensor import Sensor
@@ -178,6 +181,18 @@ def test_contacts_have_the_penalty_of_the_press(pair, dialect):
             pressure, overlap = np.array(table).T
             assert behaviour == "TABULAR"
             assert pressure == pytest.approx(penalty(-overlap, stiffness=stiffness, smoothing=Contact().smoothing)[1])
+
+
+def test_a_deck_has_the_friction_of_the_sensor_and_none_without(pair, dialect, tmp_path):
+    """Abaqus: elastic slip and coefficient;  CalculiX: coefficient and stick slope, mu times 1 MPa over our slip tolerance."""
+    assert pair[1].friction == {}
+    rough = replace(SENSOR, spec=SMALL.model_copy(update={"tips_held": False, "friction": Friction(object=0.2, board=0.3)}))
+    export_press(rough, SPHERE, force_n=[1.0], dialect=dialect, path=tmp_path / "rough.inp")
+    deck = read_deck(tmp_path / "rough.inp")
+    numbers = {"abaqus": lambda mu: [5e-4, mu], "calculix": lambda mu: [mu, mu / 5e-4]}[dialect]
+    assert deck.friction == {("TOP", "OBJECT_SURFACE"): pytest.approx(numbers(0.2)),
+                             ("FRUSTA_FOOT", "BOARD_SURFACE"): pytest.approx(numbers(0.3))}
+    assert len(deck.contacts) == 3                                # neighbouring frusta glide on each other
 
 
 def test_the_objects_facets_look_at_the_rubber(pair, dialect):

@@ -7,7 +7,7 @@ import scipy.sparse as sp
 
 from softtact.contact.penalty import Contact, penalty
 from softtact.mechanics import contact_step
-from softtact.mechanics.contact_step import ContactStepper, Touch
+from softtact.mechanics.contact_step import ContactStepper, LinearGaps
 
 UNKNOWNS, POINTS = 12, 8
 CONTACT = Contact(stiffness=3000.0, smoothing=1 / 3000)
@@ -41,13 +41,13 @@ class Scene:
         root = rng.normal(size=(UNKNOWNS, UNKNOWNS))
         self.matrix = stiffness * (np.eye(UNKNOWNS) + root @ root.T / UNKNOWNS)
         self.rows = rng.normal(size=(POINTS, UNKNOWNS))
-        self.touch = Touch(gaps=rng.uniform(-2e-3, 2e-3, POINTS), rows=sp.csr_matrix(self.rows),
+        self.points = LinearGaps(gaps=rng.uniform(-2e-3, 2e-3, POINTS), rows=sp.csr_matrix(self.rows),
                            lowering=-rng.uniform(0.7, 1, POINTS), area=rng.uniform(0.01, 0.03, POINTS), contact=CONTACT)
         self.residual, self.excess = rng.normal(scale=1e-2, size=UNKNOWNS), -0.05
 
     def step(self, stepper, **changes):
         arguments = {"excess": self.excess, **changes}
-        return stepper.step(sp.csr_matrix(np.triu(self.matrix)), self.residual, self.touch, pressed=self._pressed, **arguments)
+        return stepper.step(sp.csr_matrix(np.triu(self.matrix)), self.residual, self.points, pressed=self._pressed, **arguments)
 
     def _pressed(self, slope):
         return sp.csr_matrix(np.triu(self.matrix + self.rows.T @ (slope[:, None] * self.rows)))
@@ -55,11 +55,11 @@ class Scene:
     def energy(self, x):
         """The step's energy (mJ) over that of no step: linear and quadratic in the rubber, exact in the contact."""
         step, lowering = x[:UNKNOWNS], x[UNKNOWNS]
-        gaps = self.touch.gaps + self.rows @ step + self.touch.lowering * lowering
-        after, before = (penalty(g, stiffness=CONTACT.stiffness, smoothing=CONTACT.smoothing)[0] for g in (gaps, self.touch.gaps))
-        held = self.touch.pressure(0.0)      # the residual holds the contact's present forces already
-        linear = self.residual @ step + self.excess * lowering + held @ (self.rows @ step + self.touch.lowering * lowering)
-        return linear + 0.5 * step @ self.matrix @ step + self.touch.area @ (after - before)
+        gaps = self.points.gaps + self.rows @ step + self.points.lowering * lowering
+        after, before = (penalty(g, stiffness=CONTACT.stiffness, smoothing=CONTACT.smoothing)[0] for g in (gaps, self.points.gaps))
+        held = self.points.pressure(0.0)      # the residual holds the contact's present forces already
+        linear = self.residual @ step + self.excess * lowering + held @ (self.rows @ step + self.points.lowering * lowering)
+        return linear + 0.5 * step @ self.matrix @ step + self.points.area @ (after - before)
 
 
 @pytest.fixture
@@ -87,10 +87,10 @@ def test_an_object_that_is_held_is_not_lowered():
 
 def test_a_point_that_would_fly_into_the_object_is_stopped_within_one_step(exact):
     # One unknown, pulled up by 1 N against 1 N/mm, a point 1 um under the object: Newton's tangent does not know of it.
-    touch = Touch(gaps=np.array([1e-3]), rows=sp.csr_matrix([[-1.0]]), lowering=np.array([-1.0]), area=np.array([0.02]),
+    points = LinearGaps(gaps=np.array([1e-3]), rows=sp.csr_matrix([[-1.0]]), lowering=np.array([-1.0]), area=np.array([0.02]),
                   contact=CONTACT)
     body = sp.csr_matrix([[1.0]])
-    step, _ = ContactStepper(DenseSolver()).step(body, np.array([-1.0]), touch,
+    step, _ = ContactStepper(DenseSolver()).step(body, np.array([-1.0]), points,
                                                  pressed=lambda slope: sp.csr_matrix([[1.0 + slope[0]]]))
     depth = step[0] - 1e-3
     # 1 N = step + area k (depth - t / 2): by hand, depth = (1 - 1e-3 + 60 t / 2) / 61
@@ -99,7 +99,7 @@ def test_a_point_that_would_fly_into_the_object_is_stopped_within_one_step(exact
 
 def test_a_free_object_that_touches_nothing_is_told_by_nan():
     scene = Scene(2)
-    away = Touch(**{**scene.touch.__dict__, "gaps": np.full(POINTS, 0.1)})
+    away = LinearGaps(**{**scene.points.__dict__, "gaps": np.full(POINTS, 0.1)})
     _, lowering = ContactStepper(DenseSolver()).step(sp.csr_matrix(np.triu(scene.matrix)), scene.residual, away,
                                                      pressed=scene._pressed, excess=-1.0)
     assert np.isnan(lowering)

@@ -63,23 +63,23 @@ class NaiveSensor:
     def _top_points(self):
         """Matrix (points, 3 nodes) of the gaps to the object, areas (mm2)."""
         slab = self.body.slab
-        B = sp.lil_matrix((len(slab.top_area), 3 * self.nodes))
-        for t, face in enumerate(slab.top_faces):
-            for g, values in enumerate(slab.top_values[t]):
-                point = slab.top_values.shape[1] * t + g
+        B = sp.lil_matrix((len(slab.top.area), 3 * self.nodes))
+        for t, face in enumerate(slab.top.faces):
+            for g, values in enumerate(slab.top.values[t]):
+                point = slab.top.values.shape[1] * t + g
                 for node, value in zip(face, values, strict=True):
                     for i in range(3):
                         B[point, 3 * node + i] += value * self.planes.normals[point, i]
-        return B.tocsr(), slab.top_area * self.planes.covered
+        return B.tocsr(), slab.top.area * self.planes.covered
 
     def _contacts(self, u, depth):
         """(matrix, gaps, areas, settings, gap's slope by depth) of board and object."""
         body = self.body
-        rest = np.einsum("pd,pd->p", self.planes.normals, body.slab.top_reference - self.planes.anchors)
+        rest = np.einsum("pd,pd->p", self.planes.normals, body.slab.top.reference - self.planes.anchors)
         lowering = self.planes.normals[:, 2]
         below = replace(body.bed.contact, offset=np.ravel(body.bed.contact.offset))
         return [(self.board, self.board_gap0 + self.board @ u, self.board_area, below, 0.0 * self.board_gap0),
-                (self.top, rest + self.top @ u + depth * lowering, self.top_area, body.slab.contact, lowering)]
+                (self.top, rest + self.top @ u + depth * lowering, self.top_area, body.slab.top.contact, lowering)]
 
     def _potential(self, u, depth):
         """Energy (mJ), its gradient by u and depth; energy infinite where an element is inside out."""

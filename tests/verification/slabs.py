@@ -106,7 +106,7 @@ class HeldSlab:
         raise ArithmeticError(f"no equilibrium after {iterations} iterations")
 
     def _pressure(self, state):
-        c = self.slab.contact
+        c = self.slab.top.contact
         depth = np.maximum(-state.gaps, 0.0)
         return c.stiffness * np.where(depth > c.smoothing, depth - c.smoothing / 2, depth**2 / (2 * c.smoothing))
 
@@ -121,4 +121,4 @@ def _without_frusta(x, y):
 def interpolate(slab, field, points):
     """A nodal field (n, 3) of the top at points (p, 2)."""
     quads, values = slab.locate(points)
-    return np.einsum("pa,pad->pd", values, field[slab.top_faces[quads]])
+    return np.einsum("pa,pad->pd", values, field[slab.top.faces[quads]])

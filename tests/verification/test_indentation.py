@@ -160,12 +160,12 @@ def test_the_slabs_contact_radius_and_pressure_are_hertzs(record):
     block = block_of(uniform(linear_law(YOUNG)), cells=4, far=12.0, growing=4)
     press = block.press(paraboloid(RADIUS), DEPTH, tolerance=1e-6)
     a = (3 * 4 * press.force * RADIUS / (4 * MODULUS)) ** (1 / 3)
-    area = block.slab.top_area.reshape(len(block.slab.top_faces), -1)
-    r = np.hypot(*block.slab.top_reference[:, :2].T)
+    area = block.slab.top.area.reshape(len(block.slab.top.faces), -1)
+    r = np.hypot(*block.slab.top.reference[:, :2].T)
     hertz = 2 * MODULUS / (np.pi * RADIUS) * np.sqrt(np.maximum(a**2 - r**2, 0)).reshape(area.shape)
     expected, got = ((p * area).sum(axis=1)[0] / area[0].sum() for p in (hertz, press.pressure.reshape(area.shape)))
     assert record("slab, sphere: mean pressure on the innermost face", expected=expected, source=HERTZ, got=got) < 0.02
-    got = np.sqrt(4 * block.slab.top_area[press.pressure > 0].sum() / np.pi)
+    got = np.sqrt(4 * block.slab.top.area[press.pressure > 0].sum() / np.pi)
     assert record("slab, sphere: contact radius", expected=a, source=HERTZ, got=got) < 0.05      # a point every a/12
 
 
@@ -228,8 +228,8 @@ def test_a_wide_smooth_punch_on_a_thin_layer_compresses_it_as_if_confined(record
     quarter = lines[lines >= 0]
     slab = HeldSlab(quarter, quarter, z, [linear_law(young, poisson)] * 4, sides="symmetric", stiffness=1e5)
     press = slab.press(flat_punch(4.0), 1e-4, tolerance=1e-6)
-    middle = slab.slab.top_reference[:, :2].max(axis=1) < 1.0
-    area = slab.slab.top_area[middle]
+    middle = slab.slab.top.reference[:, :2].max(axis=1) < 1.0
+    area = slab.slab.top.area[middle]
     got = (press.pressure[middle] @ area) / area.sum() / (press.depth / thickness)
     error = record("slab, wide punch on a thin layer: modulus in the middle", expected=expected, source=source, got=got)
     assert error < 5e-3

@@ -57,7 +57,7 @@ def folding_body():
     """2 x 2 frusta whose slab glides on its sides, so that the frusta take the whole force and fold."""
     body = build_sensor_body(small_spec(2, 2, margin=0.0), dielectric_law=LAWS["dielectric"], cover_law=LAWS["cover"], mesh=COARSE)
     fixed = body.slab
-    slab = Slab(*fixed.layers, fixed.sheet_plan, fixed.x_lines, fixed.y_lines, sides="symmetric", contact=fixed.contact,
+    slab = Slab(*fixed.layers, fixed.sheet_plan, fixed.x_lines, fixed.y_lines, sides="symmetric", contact=fixed.top.contact,
                 coarse_walls=COARSE.coarse_walls)
     return LayeredBody(slab, body.bed, body.cells.roots)
 

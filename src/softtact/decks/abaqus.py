@@ -3,7 +3,8 @@
 Elements   C3D20RH: 20 nodes, 2 x 2 x 2 points and a linear pressure of its own, four unknowns an element, as our projected pressure
            has. In the frusta we take 27 points: C3D20H has as many, and the same pressure. (CalculiX has neither.)
 Object     discrete rigid facets (R3D3) with a reference node that may only move along z.
-Contact    *CONTACT PAIR, TYPE=SURFACE TO SURFACE with our smooth penalty as a table of pressure over overlap, frictionless.
+Contact    *CONTACT PAIR, TYPE=SURFACE TO SURFACE with our smooth penalty as a table of pressure over overlap.
+Friction   *FRICTION with our slip tolerance as elastic slip, where the sensor has friction.
 Steps      NAME on *STEP; each repeats what is held, so that a force step can release the reference node.
 """
 
@@ -31,7 +32,7 @@ def deck_lines(model, *, slab_element="C3D20RH", frustum_element="C3D20H"):
     cards = {part.name: law_card(part.law, no_term=_NO_TERM, dialect=PROGRAM) for part in model.parts}
     lines = keywords.heading(model, PROGRAM) + keywords.rubber(model, kinds, WEDGE, cards) + keywords.equations(model.ties)
     rigid, reference, fixed = _rigid_bodies(model)
-    lines += rigid + keywords.contacts(model, _table)
+    lines += rigid + keywords.contacts(model, _table, _friction)
     fixed = keywords.held(model) + fixed
     for k, step in enumerate(model.steps):
         lines += _step(step, reference, fixed, first=k == 0)
@@ -66,6 +67,10 @@ def _table(settings):
     pressures = penalty(-overlaps, stiffness=settings.stiffness, smoothing=depth)[1]
     rows = [f"{keywords.number(p)}, {keywords.number(s)}" for p, s in zip(pressures, overlaps, strict=True)]
     return ["*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR", *rows]
+
+
+def _friction(law):
+    return [f"*FRICTION, ELASTIC SLIP={keywords.number(law.slip_tolerance_mm)}", keywords.number(law.coefficient)]
 
 
 def _step(step, reference, fixed, *, first):

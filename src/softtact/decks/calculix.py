@@ -10,6 +10,8 @@ Object     ccx shifts shells by their thickness, so every facet becomes a tetrah
 Contact    *CONTACT PAIR, TYPE=SURFACE TO SURFACE with a linear pressure-overclosure of our penalty stiffness. Our smooth
            start (a parabola over 0.001 mm) is left out, so overlaps are up to 0.0005 mm smaller: as a table it would give
            a touching pair no stiffness, and the sheet of a unit cell would fall through. Pressure counts per deformed area.
+Friction   *FRICTION where the sensor has friction. Its stick slope does not grow with the pressure, as our stiffness does: it is
+           such that a point slides off after our slip tolerance at 1 MPa, earlier at less.
 Steps      *STEP has no name in ccx, so a comment before it gives one.
 """
 
@@ -25,6 +27,7 @@ _NO_TERM = 1e20              # a zero D_i would be replaced by a default
 _STIFF = "1000, 0.3"         # of the rigid bodies' elements, whose nodes are all prescribed
 _FIRST_INCREMENT, _LARGEST_INCREMENT, _SMALLEST_INCREMENT = 0.1, 0.25, 1e-6
 _DEPTH_MM = 1.0              # of the tetrahedra behind facets
+_STICK_PRESSURE_MPA = 1.0    # at which friction is as stiff as ours
 
 _TABLES = ("*NODE PRINT, NSET=OBJECT_REFERENCE, FREQUENCY=1000", "U",
            "*NODE PRINT, NSET=OBJECT_NODES, TOTALS=ONLY, FREQUENCY=1000", "RF",
@@ -42,7 +45,7 @@ def deck_lines(model, *, slab_element="C3D20R", frustum_element="C3D20R", fields
     cards = {part.name: law_card(part.law, no_term=_NO_TERM, dialect=PROGRAM) for part in model.parts}
     lines = keywords.heading(model, PROGRAM) + keywords.rubber(model, kinds, WEDGE, cards) + keywords.equations(model.ties)
     rigid, reference, fixed = _rigid_bodies(model)
-    lines += rigid + keywords.contacts(model, _linear)
+    lines += rigid + keywords.contacts(model, _linear, _friction)
     fixed = keywords.held(model) + fixed
     for k, step in enumerate(model.steps):
         lines += _step(step, reference, fixed, first=k == 0, fields=fields)
@@ -87,6 +90,11 @@ def _tetrahedra(body):
 
 def _linear(settings):
     return ["*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", keywords.number(settings.stiffness)]
+
+
+def _friction(law):
+    slope = law.coefficient * _STICK_PRESSURE_MPA / law.slip_tolerance_mm
+    return ["*FRICTION", f"{keywords.number(law.coefficient)}, {keywords.number(slope)}"]
 
 
 def _step(step, reference, fixed, *, first, fields):

@@ -101,14 +101,15 @@ def element_count(model):
     return sum(len(part.elements) for part in model.parts)
 
 
-def contacts(model, behaviour):
+def contacts(model, behaviour, friction):
     """Contact laws and pairs, slave surface first. A rigid body NAME has the surface NAME_SURFACE.
 
-    behaviour(settings): the lines of *SURFACE BEHAVIOR for a pair's `Contact`
+    behaviour(settings): the lines of *SURFACE BEHAVIOR for a pair's `Contact`;  friction(law): of *FRICTION for its `Coulomb`
     """
     lines, rigid = [], {body.name for body in model.rigid}
     for pair in model.contacts:
         master = f"{pair.master}_SURFACE" if pair.master in rigid else pair.master
         lines += [f"*SURFACE INTERACTION, NAME={pair.name}", *behaviour(pair.contact),
+                  *(friction(pair.friction) if pair.friction else ()),
                   f"*CONTACT PAIR, INTERACTION={pair.name}, TYPE=SURFACE TO SURFACE", f"{pair.slave}, {master}"]
     return lines

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from softtact.contact.friction import Coulomb
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
 from softtact.contact.penalty import Contact
 from softtact.decks.mesh import body_mesh
@@ -37,15 +38,16 @@ class RigidSurface:
 
 @dataclass(frozen=True)
 class ContactPair:
-    """Surface `slave` may not pass surface `master` (a rigid one or one of a part), without friction.
+    """Surface `slave` may not pass surface `master` (a rigid one or one of a part).
 
-    `contact`: the penalty's stiffness (N/mm3) and smoothing depth (mm).
+    `contact`: the penalty's stiffness (N/mm3) and smoothing depth (mm);  `friction`: the law along the surface, None without.
     """
 
     name: str
     slave: str
     master: str
     contact: Contact
+    friction: Coulomb | None = None
 
 
 @dataclass(frozen=True)
@@ -191,8 +193,8 @@ def _board(body):
 
 
 def _contacts(body):
-    return [ContactPair("OBJECT_ON_TOP", "TOP", "OBJECT", body.slab.contact),
-            ContactPair("FRUSTA_ON_BOARD", "FRUSTA_FOOT", "BOARD", body.bed.contact)]
+    return [ContactPair("OBJECT_ON_TOP", "TOP", "OBJECT", body.slab.top.contact, body.slab.top.friction),
+            ContactPair("FRUSTA_ON_BOARD", "FRUSTA_FOOT", "BOARD", body.bed.contact, body.bed.friction)]
 
 
 def _walls(body):
@@ -238,7 +240,8 @@ def _remarks(body):
             "their quarters follow the curve through the corner, the middle and the next corner; small elements of the "
             "cover follow larger ones' faces.",
             "Contacts: object on the top, frusta (tip and sides) on the board, frusta on their neighbours. Left out, as in "
-            "softtact: the sheet's underside on the frusta's sides, friction, the object's steep walls and upper sides.",
+            "softtact: the sheet's underside on the frusta's sides, friction of frusta on each other, the object's steep walls and "
+            "upper sides.",
             f"Facets of the object narrower than {SLIVER_MM} mm are left out.",
             f"softtact lets the share {share} of the frusta's bulk modulus act at every point and projects the rest on linear "
             "functions; these elements have one volumetric energy. Its bricks and wedges under the cover have nodes in faces and "

@@ -11,7 +11,8 @@ class Deck:
 
     nodes {number: (x, y, z)}; elements {set: {type: {number: nodes}}}; node_sets {name: numbers}; materials {name: (form,
     constants)}; sections {element set: material}; surfaces {name: entries}; equations [[(node, component, factor)]];
-    contacts [(slave, master, behaviour, table)]; rigid_bodies {element set: reference node}; steps [DeckStep]
+    contacts [(slave, master, behaviour, table)]; friction {(slave, master): elastic slip where given, numbers};
+    rigid_bodies {element set: reference node}; steps [DeckStep]
     """
 
     title: str = ""
@@ -23,6 +24,7 @@ class Deck:
     surfaces: dict = field(default_factory=dict)
     equations: list = field(default_factory=list)
     contacts: list = field(default_factory=list)
+    friction: dict = field(default_factory=dict)
     rigid_bodies: dict = field(default_factory=dict)
     steps: list = field(default_factory=list)
 
@@ -38,7 +40,7 @@ class DeckStep:
 
 def read_deck(path):
     """The `Deck` of a file."""
-    deck, behaviours, comment = Deck(), {}, ""
+    deck, behaviours, frictions, comment = Deck(), {}, {}, ""
     current = {"material": "", "interaction": ""}
     for keyword, options, data, before in _blocks(path):
         comment = before or comment
@@ -47,8 +49,12 @@ def read_deck(path):
             reader(deck, options, data, current)
         elif keyword == "SURFACE BEHAVIOR":
             behaviours[current["interaction"]] = (options["PRESSURE-OVERCLOSURE"], [_floats(line) for line in data])
+        elif keyword == "FRICTION":
+            frictions[current["interaction"]] = [*_floats(options.get("ELASTIC SLIP", "")), *_floats(data[0])]
         elif keyword == "CONTACT PAIR":
             slave, master = _fields(data[0])
+            if options["INTERACTION"] in frictions:
+                deck.friction[slave, master] = frictions[options["INTERACTION"]]
             deck.contacts.append((slave, master, *behaviours[options["INTERACTION"]]))
         elif keyword == "STEP":
             deck.steps.append(DeckStep(options.get("NAME") or comment))

@@ -23,6 +23,7 @@ def _plain_value(field):
 
 
 Length = Annotated[PositiveFloat, BeforeValidator(_plain_value)]
+Coefficient = Annotated[float, Field(ge=0.0, allow_inf_nan=False), BeforeValidator(_plain_value)]
 
 
 class _Strict(BaseModel):
@@ -61,6 +62,13 @@ class Taxels(_Strict):
     columns: PositiveInt
 
 
+class Friction(_Strict):
+    """Coefficients of Coulomb friction of the object on the cover and of the frusta on the board, in the hyperelastic model."""
+
+    object: Coefficient = 0.0
+    board: Coefficient = 0.0
+
+
 class ElasticLayer(_Strict):
     """Constants of the single linear layer that stands for all layers in the elastic model."""
 
@@ -79,6 +87,7 @@ class SensorSpec(_Strict):
     dielectric: Dielectric
     cover: Cover
     tips_held: Annotated[bool, BeforeValidator(_plain_value)] = True
+    friction: Friction = Friction()
     elastic_layer: ElasticLayer
 
     @property
@@ -119,6 +128,9 @@ class SensorSpec(_Strict):
         if min(spec.frusta_counts) < 1:
             raise InputError(f"{where}: no frustum of pitch {spec.dielectric.frusta.pitch_mm} mm fits on the footprint "
                              f"{spec.footprint_mm} mm; enlarge the footprint or reduce the pitch.")
+        if spec.tips_held and spec.friction.board > 0:
+            raise InputError(f"{where}: tips that are held cannot slide with a friction of {spec.friction.board:g} on the board; "
+                             "set 'tips_held' to false, or 'friction.board' to 0.")
         return spec
 
     @classmethod

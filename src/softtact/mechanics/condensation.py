@@ -22,6 +22,13 @@ class Springs:
     places: np.ndarray
     weights: np.ndarray
 
+    def with_others(self, others):
+        """These springs and the others, which act on as many unknowns or more."""
+        more = ((0, 0), (0, others.places.shape[1] - self.places.shape[1]))
+        return Springs(np.hstack([self.stiffness, others.stiffness]),
+                       np.vstack([np.pad(self.places, more, constant_values=-1), others.places]),
+                       np.vstack([np.pad(self.weights, more), others.weights]))
+
 
 class Condensation:
     """Bodies of n inner and m outer unknowns; `outer` (bodies, m, m) are their condensed matrices.

@@ -21,7 +21,7 @@ _MOST_CHANGED = 0.05         # share of the points in contact that may have chan
 
 
 @dataclass(frozen=True)
-class Touch:
+class LinearGaps:
     """Contact points (p,) as they depend on a step: gaps (mm) at none, rows (p, n) of their change by each unknown.
 
     lowering (p,): their change when the object is lowered by 1 mm;  area (p,) in mm2;  contact: a `Contact`
@@ -50,16 +50,18 @@ class ContactStepper:
         self.factors, self.iterations = 0, 0     # so far, of the matrix and of conjugate gradients
         self._along = None                       # the factored matrix's solution for the object's lowering
 
-    def step(self, rubber, residual, touch, *, pressed, excess=None):
+    def step(self, rubber, residual, points, *, pressed, drag=(0.0, 0.0), excess=None):
         """Step (n,) in mm of the unknowns, and how far the object is lowered with it; None if A is not positive definite.
 
-        rubber: A, upper triangle (csr); residual (n,) in N; pressed(slope): upper triangle of A + B'.W.B, slope (p,) in N/mm
+        rubber: A, upper triangle (csr), with friction;  residual (n,) in N;  points: `LinearGaps`
+        pressed(slope): upper triangle of A + B'.W.B, slope (p,) in N/mm
+        drag: friction's border (n,) and corner in N/mm, between the unknowns and the object's lowering
         excess: the object's force less the wanted one in N; None holds the object where it is. A free object that touches
         nothing finds no stiffness: it is lowered by nan.
         """
-        problem = _Problem(rubber, touch, residual, excess)
+        problem = _Problem(rubber, points, residual, drag, excess)
         x = problem.rest()
-        if problem.free and not touch.slope(0.0).any():
+        if problem.free and not points.slope(0.0).any():
             return problem.parts(np.append(x[:-1], np.nan))
         enough = _INNER_TOLERANCE * np.abs(problem.residual).max()
         for number in range(_INNER_STEPS):
@@ -74,7 +76,7 @@ class ContactStepper:
 
     def _direction(self, problem, x, gradient, pressed, *, first):
         """Newton's step of the convex problem, with the present factor if it still serves."""
-        slope = problem.touch.slope(problem.change(x))
+        slope = problem.points.slope(problem.change(x))
         if self._along is not None and not (first and self._outdated(slope)):
             direction, good = self._conjugate_gradients(problem, slope, -gradient)
             if good:
@@ -94,11 +96,11 @@ class ContactStepper:
         if not self.solver.factor(pressed(slope)):
             self._along = None
             return False
-        touch = problem.touch
+        lowering, (border, corner) = problem.points.lowering, problem.drag
         self._touching = slope > 0
-        self._border = touch.rows.T @ (slope * touch.lowering)
+        self._border = problem.points.rows.T @ (slope * lowering) + border
         self._along = self.solver.solve(self._border)
-        self._corner = max(slope @ touch.lowering**2 - self._border @ self._along, _LEAST_CORNER)
+        self._corner = max(slope @ lowering**2 + corner - self._border @ self._along, _LEAST_CORNER)
         return True
 
     def _precondition(self, right):
@@ -136,11 +138,12 @@ class ContactStepper:
 class _Problem:
     """The convex problem of one step, in the unknowns and, where the object is free, its lowering behind them."""
 
-    def __init__(self, rubber, touch, residual, excess):
-        self.rubber, self.lower, self.touch, self.diagonal = rubber, rubber.T, touch, rubber.diagonal()
+    def __init__(self, rubber, points, residual, drag, excess):
+        self.rubber, self.lower, self.diagonal = rubber, rubber.T, rubber.diagonal()
+        self.points, self.drag = points, drag
         self.size, self.free = len(residual), excess is not None
         self.residual = np.append(residual, excess) if self.free else residual
-        self.before = touch.pressure(0.0)
+        self.before = points.pressure(0.0)
 
     def rest(self):
         return np.zeros(self.size + self.free)
@@ -150,21 +153,24 @@ class _Problem:
 
     def change(self, x):
         """Change (p,) of the gaps."""
-        change = self.touch.rows @ x[:self.size]
-        return change + self.touch.lowering * x[-1] if self.free else change
+        change = self.points.rows @ x[:self.size]
+        return change + self.points.lowering * x[-1] if self.free else change
 
     def _spread(self, forces):
         """Forces (p,) of the points on the unknowns."""
-        spread = self.touch.rows.T @ forces
-        return np.append(spread, self.touch.lowering @ forces) if self.free else spread
+        spread = self.points.rows.T @ forces
+        return np.append(spread, self.points.lowering @ forces) if self.free else spread
 
     def _elastic(self, x):
         u = x[:self.size]
         product = self.rubber @ u + self.lower @ u - self.diagonal * u
-        return np.append(product, 0.0) if self.free else product
+        if not self.free:
+            return product
+        border, corner = self.drag
+        return np.append(product + border * x[-1], np.sum(border * u) + corner * x[-1])
 
     def gradient(self, x):
-        return self.residual + self._elastic(x) - self._spread(self.touch.pressure(self.change(x)) - self.before)
+        return self.residual + self._elastic(x) - self._spread(self.points.pressure(self.change(x)) - self.before)
 
     def product(self, slope, x):
         return self._elastic(x) + self._spread(slope * self.change(x))
@@ -175,7 +181,7 @@ class _Problem:
         linear, curvature = self.residual @ direction + self._elastic(x) @ direction, direction @ self._elastic(direction)
 
         def slope(share):
-            return linear + share * curvature - along @ (self.touch.pressure(now + share * along) - self.before)
+            return linear + share * curvature - along @ (self.points.pressure(now + share * along) - self.before)
 
         start, end = slope(0.0), slope(1.0)
         low, high, share = 0.0, 1.0, 1.0

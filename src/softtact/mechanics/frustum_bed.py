@@ -8,11 +8,12 @@ which the two neighbours share when they touch. The sheet's lower side on the fr
 they come no nearer than 0.01 mm up to 1 MPa.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
 
+from softtact.contact.friction import Drag, Grip
 from softtact.mechanics.blocks import HexBlock
 from softtact.mechanics.condensation import Condensation, Springs
 from softtact.mechanics.elements import HEX27_BOTTOM, HEX27_SIDES, gauss, quad9
@@ -35,12 +36,16 @@ class BedGeometry:
 
 @dataclass(frozen=True)
 class BedState:
-    """energy (mJ), force (n, nodes, 3) on the frusta's nodes, gaps (n, p) at the contact points, displacement."""
+    """energy (mJ), force (n, nodes, 3) on the frusta's nodes, gaps (n, p) at the contact points, displacement.
+
+    drag: friction at the points on the board (n, b), None without.
+    """
 
     energy: float
     force: np.ndarray
     gaps: np.ndarray
     displacement: np.ndarray
+    drag: Drag | None = None
 
 
 @dataclass(frozen=True)
@@ -48,22 +53,27 @@ class Layer:
     """A layer of a frustum's elements and the unknowns that are eliminated with it; the same in all frusta.
 
     hexes (h, 27): its elements' nodes;  inner, outer: unknowns of a frustum that are eliminated, and that are left
-    points (p,): the contact points on it, places (p, 10): their unknowns in the layer's matrix, -1 where held
+    points (p,): the contact points on it;  place (3 nodes,): where unknowns stand in the layer's matrix, -1: held or elsewhere
     """
 
     hexes: np.ndarray
     inner: np.ndarray
     outer: np.ndarray
     points: np.ndarray
-    places: np.ndarray
+    place: np.ndarray
     condensed: Condensation
 
 
 class FrustumBed:
-    """All frusta of a sensor with one law. Local node numbers are those of `self.mesh`; roots are `self.root`."""
+    """All frusta of a sensor with one law. Local node numbers are those of `self.mesh`; roots are `self.root`.
 
-    def __init__(self, geometry, law, *, levels, root_z_mm, pcb_z_mm, tips_held, contact, local_over_shear, refinement=0):
-        self.geometry, self.contact = geometry, contact
+    grip: how friction holds the points on the board during a step, None without.
+    """
+
+    def __init__(self, geometry, law, *, levels, root_z_mm, pcb_z_mm, tips_held, contact, local_over_shear, refinement=0,
+                 friction=None):
+        """friction: `Coulomb` of the frusta on the board, or None."""
+        self.geometry, self.contact, self.friction, self.grip = geometry, contact, friction, None
         plan = disc_plan(refinement)
         self.mesh = extrude(plan, levels)
         self.outer_faces = self._outer_faces(plan)
@@ -112,6 +122,7 @@ class FrustumBed:
         self.point_weights = np.array([[*r[1], r[5]] for r in records])
         self.point_axis = np.array([r[2] for r in records])
         self.point_neighbour = np.array([r[6] for r in records])
+        self.board_points = len(on_pcb) * len(values)     # the first ones
         in_layer = [np.isin(self.point_nodes[:, 8], self.mesh.layer(k)) for k in range(self.mesh.layers)]   # by the face's centre
         self.point_layer = np.argmax(in_layer, axis=0)
         offset = np.where(self.point_neighbour < 0, -pcb_z, 0.0)
@@ -155,8 +166,7 @@ class FrustumBed:
         points = np.flatnonzero(self.point_layer == k)
         carried = [place[self._left_below[None]]] if k else []
         self._left_below = outer
-        return Layer(hexes=self.mesh.layer(k), inner=inner, outer=outer, points=points,
-                     places=place[3 * self.point_nodes[points] + self.point_axis[points, None]],
+        return Layer(hexes=self.mesh.layer(k), inner=inner, outer=outer, points=points, place=place,
                      condensed=Condensation(self.count, len(inner), len(outer), [place[_dofs(self.mesh.layer(k))], *carried]))
 
     def evaluate(self, displacement, *, workers=SERIAL):
@@ -171,8 +181,42 @@ class FrustumBed:
         for k, nodes in enumerate(self.mesh.hexes):
             force[:, nodes] += per_element[:, k]
         _scatter_contact(force, -pressure * self.point_area, self.point_nodes, self.point_weights, self.point_axis)
-        return BedState(energy=body.energy + float((energy * self.point_area).sum()), force=force, gaps=gaps,
-                        displacement=displacement)
+        state = BedState(energy=body.energy + float((energy * self.point_area).sum()), force=force, gaps=gaps,
+                         displacement=displacement)
+        return state if self.grip is None else self._with_friction(state)
+
+    def _with_friction(self, state):
+        """The state with friction's energy and forces."""
+        drag, area = self.grip.drag(self._on_board(state.displacement)), self.point_area[:, :self.board_points]
+        force = state.force.copy()
+        for axis in (0, 1):
+            _scatter_contact(force, drag.traction[..., axis] * area, *self._board_points(axis))
+        return replace(state, energy=state.energy + float((drag.energy * area).sum()), force=force, drag=drag)
+
+    def _board_points(self, axis):
+        """Nodes, weights and axis of the points on the board for a field's component `axis`."""
+        b = self.board_points
+        return self.point_nodes[:b], self.point_weights[:b], np.full(b, axis)
+
+    def _on_board(self, displacement):
+        """Places (n, b, 2) of the points in the board's plane."""
+        position = self.coordinates + displacement
+        return np.stack([_weighted_component(position, *self._board_points(axis)) for axis in (0, 1)], axis=-1)
+
+    def begin_step(self, state):
+        """Let friction hold the points as where a step starts from a `BedState`."""
+        if self.friction is None:
+            return
+        gaps = state.gaps[:, :self.board_points]
+        if state.drag is None:
+            self.grip = Grip.first(self.friction, self._on_board(state.displacement), gaps)
+        else:
+            self.grip = state.drag.next_step(gaps)
+
+    def renewed_grip(self, state):
+        """The grip with the pressures of a `BedState`."""
+        b = self.board_points
+        return state.drag.next_pass(state.gaps[:, :b], self.contact.response(state.gaps)[1][:, :b])
 
     def contact_slope(self, gaps):
         """Stiffness (n, p) of the contact points in N/mm3."""
@@ -182,12 +226,34 @@ class FrustumBed:
         """Recompute the condensed tangents of the given frusta (k,); returns those of their roots (k, 1, 75, 75)."""
         slope = self.contact.at(frusta).response(state.gaps[frusta])[2] * self.point_area[frusta]
         displacement = state.displacement[frusta]
+        friction = None if state.drag is None else state.drag.stiffness(frusta)
         left = []
         for k, layer in enumerate(self.layers):
-            springs = Springs(slope[:, layer.points], layer.places, self.point_weights[layer.points])
+            springs = self._springs(layer, slope)
+            if friction is not None:
+                springs = springs.with_others(self._friction_springs(layer, friction, frusta))
             layer.condensed.set(frusta, [self._layer_tangents(k, displacement, frusta), *left], springs)
             left = [layer.condensed.outer[frusta][:, None]]
         return left[0]
+
+    def _springs(self, layer, slope):
+        """The layer's contact points with stiffnesses from `slope` (b, p) in N/mm."""
+        at = layer.points
+        return Springs(slope[:, at], layer.place[3 * self.point_nodes[at] + self.point_axis[at, None]], self.point_weights[at])
+
+    def _friction_springs(self, layer, stiffness, frusta):
+        """Friction at the layer's points on the board, of stiffness (b, all points on the board, 2, 2) in N/mm3.
+
+        Three springs a point make its symmetric 2 x 2 matrix: along x, along y, and on the sum of both components.
+        """
+        at = layer.points[layer.points < self.board_points]
+        K = stiffness[:, at] * self.point_area[frusta][:, at, None, None]
+        both = K[..., 0, 1]
+        x, y = (layer.place[3 * self.point_nodes[at] + axis] for axis in (0, 1))
+        weights, held = self.point_weights[at], np.full(x.shape, -1)
+        return Springs(np.hstack([K[..., 0, 0] - both, K[..., 1, 1] - both, both]),
+                       np.vstack([np.hstack([x, held]), np.hstack([held, y]), np.hstack([x, y])]),
+                       np.tile(weights, (3, 2)))
 
     def _layer_tangents(self, k, displacement, frusta):
         """Tangents (b, h, 81, 81) of the k-th layer's h elements in frusta (b,)."""

@@ -5,8 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from softtact.contact.friction import coulomb
 from softtact.contact.height_field import HeightField
 from softtact.contact.penalty import Contact
+from softtact.mechanics.body_friction import BodyFriction
 from softtact.mechanics.contact_step import ContactStepper
 from softtact.mechanics.frustum_bed import BedGeometry, BedState, FrustumBed
 from softtact.mechanics.hex_mesh import sheet_plan
@@ -67,7 +69,7 @@ class MeshSettings:
 
 @dataclass(frozen=True)
 class BodyState:
-    """Slab and bed at one displacement, and the potential energy (mJ) of both with their contacts."""
+    """Slab and bed at one displacement, and the potential energy (mJ) of both with their contacts and friction."""
 
     slab: SlabState
     bed: BedState
@@ -113,6 +115,7 @@ class LayeredBody:
         """`roots` (f, k): the slab's nodes that are the frusta's root nodes."""
         self.slab, self.bed = slab, bed
         self.workers = Workers(threads)
+        self.friction = BodyFriction(slab.top, bed)
         self.cells = SheetCells(slab, bed, roots)
         slab.build_pattern(self.cells.eliminated, self.cells.outer_dofs)
         self.solver = make_solver(threads=threads, rough=True)
@@ -139,7 +142,7 @@ class LayeredBody:
 
     def let_down(self, state, force_n):
         """The state with the object at the depth where its force is `force_n`: the least energy over the indentation."""
-        depth = self.slab.balanced(state.slab, state.indentation, force_n)
+        depth = self.slab.top.balanced(state.slab, state.indentation, force_n)
         return replace(state, slab=self.slab.reface(state.slab, state.slab.planes, depth), indentation=depth)
 
     def newton_step(self, state, force_n):
@@ -147,6 +150,7 @@ class LayeredBody:
 
         Where nothing touches, a force finds no stiffness: the step is then not finite.
         """
+        state = self.friction.for_tangent(state)
         self.cells.refresh(state, workers=self.workers)
         residual, kept = self.cells.condensed_residual(state)
         step, lowering = self._step_of_unknowns(state, residual.ravel()[self.slab.unknowns], force_n)
@@ -157,11 +161,11 @@ class LayeredBody:
 
     def _step_of_unknowns(self, state, residual, force_n):
         """Step of the global unknowns, and how far the object goes down; the tangent is made positive definite where it is not."""
-        touch = self.slab.touch(state.slab)
+        gaps, drag = self.slab.linear_gaps(state.slab), self.slab.friction_border(state.slab)
         excess = None if force_n is None else state.force - force_n
         for shift in _shifts():
             rubber = self._rubber_tangent(state, shift)
-            step = self.stepper.step(rubber, residual, touch, excess=excess,
+            step = self.stepper.step(rubber, residual, gaps, drag=drag, excess=excess,
                                      pressed=lambda slope, rubber=rubber: self.slab.pressed(rubber, slope, state.slab.planes))
             if step is not None:
                 return step
@@ -176,16 +180,16 @@ class LayeredBody:
 
     def penetration(self, state):
         """Deepest penetration in mm, of the object into the cover or of frusta into the board or each other."""
-        return float(max(0.0, -self.slab.own_gaps(state.slab).min(), -state.bed.gaps.min()))
+        return float(max(0.0, -self.slab.top.own_gaps(state.slab).min(), -state.bed.gaps.min()))
 
     def contact_error(self, state):
         """Deepest overlap, or widest gap under pressure, in mm."""
-        return max(self.slab.contact.error(self.slab.own_gaps(state.slab)), self.bed.contact.error(state.bed.gaps))
+        return max(self.slab.top.contact.error(self.slab.top.own_gaps(state.slab)), self.bed.contact.error(state.bed.gaps))
 
     def press_apart(self, state, *, allowed_mm):
         """Hold the points that overlap where their surfaces just touch, on the object or in the bed, wherever it is too much."""
-        if self.slab.contact.error(self.slab.own_gaps(state.slab)) > allowed_mm:
-            self.slab.contact = self.slab.contact.pressed_apart(state.slab.gaps)
+        if self.slab.top.contact.error(self.slab.top.own_gaps(state.slab)) > allowed_mm:
+            self.slab.top.contact = self.slab.top.contact.pressed_apart(state.slab.gaps)
         if self.bed.contact.error(state.bed.gaps) > allowed_mm:
             self.bed.contact = self.bed.contact.pressed_apart(state.bed.gaps)
 
@@ -258,7 +262,8 @@ def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), s
     centres, neighbours = lattice(counts, frusta.pitch_mm)
     plan = sheet_plan(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, spec.footprint_mm, refinement=mesh.refinement)
     slab = Slab(sheet, cover, plan, x_lines, y_lines, sides="held", contact=contact or mesh.contact,
-                coarse_walls=mesh.coarse_walls or _far(zone, x_lines, y_lines), splits=splits)
+                coarse_walls=mesh.coarse_walls or _far(zone, x_lines, y_lines), splits=splits,
+                friction=coulomb(spec.friction.object))
     return LayeredBody(slab, _bed(spec, centres, neighbours, dielectric_law, mesh, scatter, contact), slab.bottom[plan.roots],
                        threads=threads)
 
@@ -309,7 +314,7 @@ def build_unit_cell(spec, *, dielectric_law, cover_law=None, mesh=MeshSettings()
     centre = np.zeros((1, 2))
     plan = sheet_plan(centre, (1, 1), frusta.pitch_mm, frusta.root_diameter_mm, (frusta.pitch_mm,) * 2, refinement=mesh.refinement)
     slab = Slab(sheet, cover, plan, lines, lines, sides="symmetric", contact=mesh.contact, coarse_walls=mesh.coarse_walls,
-                splits=splits)
+                splits=splits, friction=coulomb(spec.friction.object))
     bed = _bed(spec, centre, np.ones((1, 4), dtype=bool), dielectric_law, mesh,
                (np.array([height_factor]), np.array([tip_factor])), None, bottom=bottom)
     return LayeredBody(slab, bed, slab.bottom[plan.roots])
@@ -326,7 +331,8 @@ def _bed(spec, centres, neighbours, law, mesh, scatter, contact, *, bottom=None)
                            root_diameter=frusta.root_diameter_mm, neighbours=neighbours)
     return FrustumBed(geometry, law, levels=np.asarray(mesh.frustum_levels) * frusta.height_mm, root_z_mm=bottom,
                       pcb_z_mm=bottom - heights.max(), tips_held=spec.tips_held, contact=contact or mesh.contact,
-                      local_over_shear=mesh.over_shear_of_layers, refinement=mesh.refinement)
+                      local_over_shear=mesh.over_shear_of_layers, refinement=mesh.refinement,
+                      friction=coulomb(spec.friction.board))
 
 
 def surface_of(mesh):

@@ -12,6 +12,7 @@ from softtact.mechanics.parallel import SERIAL, chunks
 _CHUNK = 8                          # cells that one thread condenses at once
 _REFRESH_MM = 4e-3                  # a cell that moved less than this keeps its tangent (residuals stay exact)
 _REFRESH_SLOPE = 0.2                # ... unless a contact point's stiffness changed by this share of the penalty
+_REFRESH_WITH_FRICTION = 20.0       # ... or, with friction, by this many N/mm3: with 100 light presses creep and fail
 
 
 class SheetCells:
@@ -56,7 +57,7 @@ class SheetCells:
         self._tangent_at = None
 
     def _stale(self, state):
-        slope = self.bed.contact_slope(state.bed.gaps)
+        slope, limit = self._slope(state)
         roots = state.slab.displacement[self.roots].reshape(self.count, -1)
         place = np.hstack([roots, state.bed.displacement.reshape(self.count, -1)])
         above = [state.slab.displacement[kind.nodes].reshape(len(kind.cells), -1) for kind in self.kinds]
@@ -64,12 +65,20 @@ class SheetCells:
             self._tangent_at, self._above, self._slope_at = place, above, slope
             return np.ones(self.count, dtype=bool)
         stale = np.abs(place - self._tangent_at).max(axis=1) > _REFRESH_MM
-        stale |= np.abs(slope - self._slope_at).max(axis=1) > _REFRESH_SLOPE * self.bed.contact.stiffness
+        stale |= np.abs(slope - self._slope_at).max(axis=1) > limit
         for kind, now, before in zip(self.kinds, above, self._above, strict=True):
             stale[kind.cells] |= np.abs(now - before).max(axis=1) > _REFRESH_MM
             before[stale[kind.cells]] = now[stale[kind.cells]]
         self._tangent_at[stale], self._slope_at[stale] = place[stale], slope[stale]
         return stale
+
+    def _slope(self, state):
+        """Stiffnesses (f, q) in N/mm3 of the contact points with friction's, and by how much they may change."""
+        slope, drag = self.bed.contact_slope(state.bed.gaps), state.bed.drag
+        if drag is not None:
+            slope = np.hstack([slope, drag.stiffness().reshape(self.count, -1)])
+        without = state.slab.drag is None and drag is None
+        return slope, _REFRESH_SLOPE * self.bed.contact.stiffness if without else _REFRESH_WITH_FRICTION
 
     def condensed_residual(self, state):
         """Residual (n, 3) of the slab with all inner unknowns eliminated, and what `recover` needs again."""

@@ -1,4 +1,4 @@
-"""Sheet and cover as one slab over the frusta, with the contact of a rigid object on its top.
+"""Sheet and cover as one slab over the frusta, with the contact of a rigid object on its top (`TopContact`).
 
 The sheet's elements meet the frusta's roots node by node. The cover knows nothing of the frusta, so its hexahedra may be
 coarser in plan: the sheet's upper nodes follow the cover's lower side.
@@ -11,49 +11,32 @@ import numpy as np
 import scipy.sparse as sp
 from numba import njit
 
-from softtact.contact.coverage import continues, covered
-from softtact.contact.height_field import NO_CONTACT_MM
+from softtact.contact.friction import Drag
 from softtact.mechanics.blocks import HexBlock, WedgeBlock
-from softtact.mechanics.contact_step import Touch
+from softtact.mechanics.contact_step import LinearGaps
 from softtact.mechanics.cover_mesh import cover_mesh
-from softtact.mechanics.elements import gauss, quad8
+from softtact.mechanics.elements import quad8
 from softtact.mechanics.hex_mesh import extrude
 from softtact.mechanics.parallel import SERIAL, unique_rows
-
-# Contact points along a side of a top face. More of them hold a face flat that lies half under a punch's edge: with 8 the punch
-# acts up to half a face wider (docs/discretisation.md).
-TOP_POINTS = 3
-_NEAR_MM, _LARGEST_SHIFT_MM = 0.2, 0.02   # points that may touch when the object is let down on the cover, and how far at once
+from softtact.mechanics.top_contact import FacingPlanes, TopContact
 
 
 @dataclass(frozen=True)
 class SlabState:
     """energy (mJ), force (n, 3) in N, contact quantities at the top's points, displacement (n, 3).
 
-    elastic: energy and force of the rubber alone; planes: what the points face; indentation_force: the object's, N downwards.
+    elastic: energy and force of the rubber alone; planes: what the points face; indentation_force: the object's, N downwards;
+    drag: friction at the points, None without.
     """
 
     elastic: tuple
     energy: float
     force: np.ndarray
     gaps: np.ndarray
-    planes: "FacingPlanes"
+    planes: FacingPlanes
     displacement: np.ndarray
     indentation_force: float
-
-
-@dataclass(frozen=True)
-class FacingPlanes:
-    """The planes of the object's facets that points face: anchors (p, 3) in mm at no indentation, outward normals (p, 3).
-
-    covered (p,): share of a point's own area that the object covers;  beside (p,): points that lie beside the object themselves
-    A point keeps its plane during a step of Newton's method, so that each step lowers one potential.
-    """
-
-    anchors: np.ndarray
-    normals: np.ndarray
-    covered: np.ndarray
-    beside: np.ndarray
+    drag: Drag | None = None
 
 
 @dataclass(frozen=True)
@@ -78,15 +61,17 @@ class Slab:
     Nodes: the cover's first, then the sheet's without its top. `bottom` are the nodes under the sheet, in the plan's order.
     """
 
-    def __init__(self, sheet, cover, sheet_plan, x_lines, y_lines, *, sides, contact, coarse_walls=True, splits=None):
+    def __init__(self, sheet, cover, sheet_plan, x_lines, y_lines, *, sides, contact, coarse_walls=True, splits=None,
+                 friction=None):
         """splits (cover's layers, ny 2^m, nx 2^m): how often the cover is split where (see `cover_mesh`); None: nowhere.
 
         coarse_walls: everywhere (True), nowhere (False), or where a function of places (n, 2) says so (n,)
+        friction: `Coulomb` of the object on the top, or None
         """
         if splits is None:
             splits = np.zeros((len(cover.levels) - 1, len(y_lines) - 1, len(x_lines) - 1), dtype=np.int64)
         self.x_lines, self.y_lines = np.asarray(x_lines), np.asarray(y_lines)
-        self.layers, self.sheet_plan, self.contact = (sheet, cover), sheet_plan, contact
+        self.layers, self.sheet_plan = (sheet, cover), sheet_plan
         self.cover_mesh = cover_mesh(x_lines, y_lines, cover.levels, splits)
         self.sheet_mesh = extrude(sheet_plan.plan, sheet.levels)
         self._coarse_walls = coarse_walls
@@ -95,7 +80,7 @@ class Slab:
         self._add_cover(cover.law)
         self._add_sheet(sheet_plan, sheet.law)
         self._number_unknowns(sides)
-        self._top_points()
+        self.top = TopContact(self.cover_mesh, contact, friction)
 
     def _number_nodes(self, plan):
         """Masters (p, 8) and weights (p, 8) of the sheet's nodes: its top follows the cover, the rest its own unknowns.
@@ -134,7 +119,7 @@ class Slab:
         """In how many cells, groups of other elements and top faces each node occurs (n,); 1: a cell's own."""
         cells = [np.unique(np.hstack([nodes.reshape(len(group.cells), -1) for nodes, _ in group.parts])[k])
                  for group in self.cell_groups for k in range(len(group.cells))]
-        others = [np.unique(nodes) for nodes, _ in self.groups] + [np.unique(self.top_faces)]
+        others = [np.unique(nodes) for nodes, _ in self.groups] + [np.unique(self.top.faces)]
         return np.bincount(np.concatenate([*cells, *others]), minlength=self.nodes)
 
     @property
@@ -202,54 +187,9 @@ class Slab:
         self.number = np.full(held.size, -1, dtype=np.int64)
         self.number[self.free] = np.arange(len(self.free))
 
-    def _top_points(self):
-        """Quadrature points of the top faces, flattened (t * points)."""
-        points, weights = gauss(TOP_POINTS, 2)
-        values, slopes = quad8(points)
-        mesh = self.cover_mesh
-        edges = np.einsum("tad,gai->tgdi", mesh.points[mesh.top][..., :2], slopes)
-        self.top_faces, self.top_values = self._at_faces(mesh.top, np.broadcast_to(values, (len(mesh.top), *values.shape)))
-        self.top_area = (np.linalg.det(edges) * weights).ravel()
-        self.top_reference = self._at_top(self.points)
-
-        # Each point's own area: the rectangle whose sides are as long as the weights of Gauss's rule along a line.
-        half = 0.5 * np.ptp(mesh.points[mesh.top[:, :4]][..., :2], axis=1)
-        ends = np.concatenate([[-1.0], np.cumsum(np.polynomial.legendre.leggauss(TOP_POINTS)[1]) - 1.0])
-        i, j = (g.ravel() for g in np.meshgrid(np.arange(TOP_POINTS), np.arange(TOP_POINTS), indexing="ij"))
-        places = np.stack([np.column_stack([ends[i + a], ends[j + b]]) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))], axis=1)
-        self._own_area = (half[:, None, None] * (places - points[:, None])).reshape(-1, 4, 2)
-
-    def _at_top(self, field):
-        """A nodal field (n, 3) at the top's quadrature points (t * points, 3)."""
-        return np.matmul(self.top_values, field[self.top_faces]).reshape(-1, 3)
-
-    def _at_faces(self, faces, values):
-        """Free nodes (t, w) that faces (t, 8) of the cover hang on, and values (t, g, 8) in terms of these (t, g, w)."""
-        follow = self.cover_mesh.follow
-        if (faces < follow.shape[1]).all():
-            return faces, values
-        rows = [follow[face] for face in faces]
-        needed = [np.unique(row.indices) for row in rows]
-        width = max(map(len, needed))
-        nodes = np.stack([np.pad(n, (0, width - len(n)), mode="edge") for n in needed])
-        out = np.zeros((*values.shape[:2], width))
-        for t, (row, used) in enumerate(zip(rows, needed, strict=True)):
-            out[t, :, :len(used)] = values[t] @ row[:, used].toarray()
-        return nodes, out
-
     def facing(self, displacement, surface):
         """The object's facets above the top's points (see `FacingPlanes`)."""
-        position = self.top_reference + self._at_top(displacement)
-        height, normals = surface(position[:, 0], position[:, 1])
-        anchors = np.column_stack([position[:, :2], height])
-        share, foot = covered(position[:, None, :2] + self._own_area, surface)
-        # A point beside the object whose area reaches under it faces the plane there.
-        base, foot_normals = surface(*foot.T)
-        beside = ~continues(height, position[:, :2], base, foot)
-        anchors[beside] = np.column_stack([foot, base])[beside]
-        normals[beside] = foot_normals[beside]
-        share[anchors[:, 2] >= NO_CONTACT_MM] = 0.0
-        return FacingPlanes(anchors=anchors, normals=normals, covered=share, beside=beside)
+        return self.top.facing(displacement, surface)
 
     def evaluate(self, displacement, planes, indentation, *, workers=SERIAL):
         """Energy, forces and contact with the object lowered by `indentation` mm; None if an element is inside out."""
@@ -267,43 +207,12 @@ class Slab:
         """The same displacements in front of other planes."""
         return self._with_contact(state.displacement, state.elastic, planes, indentation)
 
-    def balanced(self, state, indentation, force_n):
-        """The indentation (mm) at which the object's force is `force_n` on the cover as it is.
-
-        The force grows with the depth, from a square root's slope on: Newton's method with bounded steps.
-        """
-        near = np.flatnonzero(state.gaps < _NEAR_MM)
-        down, area = -state.planes.normals[near, 2], (self.top_area * state.planes.covered)[near]
-        contact, gaps, shift = self.contact.at(near), state.gaps[near], 0.0
-        for _ in range(50):
-            _, pressure, slope = contact.response(gaps - shift * down)
-            excess = pressure @ (down * area) - force_n
-            if abs(excess) <= 1e-9 * force_n:
-                break
-            stiffness = slope @ (down**2 * area)
-            shift -= np.clip(excess / max(stiffness, 1e-12), -_LARGEST_SHIFT_MM, _LARGEST_SHIFT_MM)
-        return indentation + shift
-
     def _with_contact(self, displacement, elastic, planes, indentation):
-        gaps, normals = self.gaps(displacement, planes, indentation), planes.normals
-        density, pressure, _ = self.contact.response(gaps)
-        area = self.top_area * planes.covered
-        push = (pressure * area)[:, None] * normals      # on the slab: along the object's outward normal
-        nodal = np.matmul(self.top_values.transpose(0, 2, 1), push.reshape(len(self.top_faces), -1, 3))
-        force = elastic[1].copy()
-        np.add.at(force, self.top_faces.ravel(), -nodal.reshape(-1, 3))
-        return SlabState(elastic=elastic, energy=elastic[0] + float(density @ area), force=force, gaps=gaps,
-                         planes=planes, displacement=displacement, indentation_force=float(-push[:, 2].sum()))
-
-    def gaps(self, displacement, planes, indentation):
-        """Normal gaps (p,) in mm between the top's points and the planes they face."""
-        offset = self.top_reference + self._at_top(displacement) - planes.anchors
-        return np.einsum("pd,pd->p", planes.normals, offset) + indentation * planes.normals[:, 2]
-
-    @staticmethod
-    def own_gaps(state):
-        """Gaps (p,) of the points that lie under the object; of those beside it a gap that says so."""
-        return np.where(state.planes.beside, NO_CONTACT_MM, state.gaps)
+        energy, force = elastic[0], elastic[1].copy()
+        touch = self.top.touch(displacement, planes, indentation)
+        np.add.at(force, self.top.faces.ravel(), touch.force.reshape(-1, 3))
+        return SlabState(elastic=elastic, energy=energy + touch.energy, force=force, gaps=touch.gaps, planes=planes,
+                         displacement=displacement, indentation_force=touch.indentation_force, drag=touch.drag)
 
     def build_pattern(self, eliminated, cells):
         """Fix the global matrix: its unknowns are the free but the `eliminated` ones; `cells` [(c, k)]: what cells leave."""
@@ -312,7 +221,7 @@ class Slab:
         number = np.full(3 * self.nodes, -1, dtype=np.int64)
         number[keep] = np.arange(len(keep))
         *groups, top = [(3 * nodes[..., None] + np.arange(3)).reshape(len(nodes), -1)
-                        for nodes in [*(nodes for nodes, _ in self.groups), self.top_faces]]
+                        for nodes in [*(nodes for nodes, _ in self.groups), self.top.faces]]
         self._dofs, self._top_dofs = [number[dofs] for dofs in [*groups, *cells]], number[top]
         indptr, indices = _upper_pattern([*self._dofs, self._top_dofs], len(keep))
         self._matrix, self._pressed = (sp.csr_matrix((np.zeros(len(indices)), indices, indptr), shape=(len(keep),) * 2)
@@ -320,41 +229,46 @@ class Slab:
 
     def tangent(self, state, condensed, *, workers=SERIAL):
         """Upper triangle (csr) of the tangent with the cells' condensed blocks [(f, k, k)] and the object's contact."""
-        _, _, slope = self.contact.response(state.gaps)
         rubber = self.rubber_tangent(state, condensed, workers=workers)
-        return self.pressed(rubber, slope * self.top_area * state.planes.covered, state.planes)
+        return self.pressed(rubber, self.top.stiffness(state), state.planes)
 
     def rubber_tangent(self, state, condensed, *, workers=SERIAL):
-        """Upper triangle (csr) of the tangent without the object's contact; valid until the next call."""
+        """Upper triangle (csr) of the tangent with friction, but without the object's pressure; valid until the next call."""
         matrix = self._matrix
         matrix.data[:] = 0.0
         blocks = workers.map(lambda group: group[1].tangent(state.displacement[group[0]]), self.groups)
         for part, dofs in zip([*blocks, *condensed], self._dofs, strict=True):
             _add_upper(matrix.data, matrix.indptr, matrix.indices, part, dofs)
+        if state.drag is not None:
+            _add_upper(matrix.data, matrix.indptr, matrix.indices, self.top.friction_tangent(state)[0], self._top_dofs)
         return matrix
 
     def pressed(self, rubber, stiffness, planes):
         """The rubber's tangent and that of contact points of given stiffness (p,) in N/mm; valid until the next call."""
-        shape = self._normal_shapes(planes)
-        blocks = np.matmul((shape * stiffness.reshape(len(shape), -1, 1)).transpose(0, 2, 1), shape)
+        shapes = self.top.normal_shapes(planes)
+        blocks = np.matmul((shapes * stiffness.reshape(len(shapes), -1, 1)).transpose(0, 2, 1), shapes)
         self._pressed.data[:] = rubber.data
         _add_upper(self._pressed.data, rubber.indptr, rubber.indices, blocks, self._top_dofs)
         return self._pressed
 
-    def _normal_shapes(self, planes):
-        """Change (t, g, k) of the gap of each top face's points by the face's unknowns."""
-        normal = planes.normals.reshape(*self.top_values.shape[:2], 3)
-        return np.einsum("tga,tgd->tgad", self.top_values, normal).reshape(*normal.shape[:2], -1)
+    def linear_gaps(self, state):
+        """The gaps of the object's contact points as they depend on a step of the global unknowns, a `LinearGaps`."""
+        shapes = self.top.normal_shapes(state.planes)
+        free = np.broadcast_to(self._top_dofs[:, None] >= 0, shapes.shape)
+        points = np.broadcast_to(np.arange(len(state.gaps)).reshape(*shapes.shape[:2], 1), shapes.shape)[free]
+        columns = np.broadcast_to(self._top_dofs[:, None], shapes.shape)[free]
+        rows = sp.csr_matrix((shapes[free], (points, columns)), shape=(len(state.gaps), len(self.unknowns)))
+        return LinearGaps(gaps=state.gaps, rows=rows, lowering=state.planes.normals[:, 2],
+                          area=self.top.area * state.planes.covered, contact=self.top.contact)
 
-    def touch(self, state):
-        """The object's contact points as they depend on a step of the global unknowns, a `Touch`."""
-        shape, here = self._normal_shapes(state.planes), self._top_dofs >= 0
-        rows = np.broadcast_to(np.arange(len(state.gaps)).reshape(*shape.shape[:2], 1), shape.shape)
-        kept = np.broadcast_to(here[:, None], shape.shape)
-        columns = np.broadcast_to(self._top_dofs[:, None], shape.shape)
-        rows = sp.csr_matrix((shape[kept], (rows[kept], columns[kept])), shape=(len(state.gaps), len(self.unknowns)))
-        return Touch(gaps=state.gaps, rows=rows, lowering=state.planes.normals[:, 2], area=self.top_area * state.planes.covered,
-                     contact=self.contact)
+    def friction_border(self, state):
+        """How friction ties the unknowns to the object's lowering: derivative (unknowns,) of their residual by it, and its own."""
+        if state.drag is None:
+            return np.zeros(len(self.unknowns)), 0.0
+        _, of_faces, corner = self.top.friction_tangent(state)
+        border, here = np.zeros(len(self.unknowns)), self._top_dofs >= 0
+        np.add.at(border, self._top_dofs[here], of_faces[here])
+        return border, corner
 
     @staticmethod
     def add_to_diagonal(matrix, value):

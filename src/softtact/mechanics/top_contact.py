@@ -1,0 +1,188 @@
+"""Contact of a rigid object with the slab's top: quadrature points of the top faces, each before a plane of the object."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from softtact.contact.coverage import continues, covered
+from softtact.contact.friction import Drag, Grip
+from softtact.contact.height_field import NO_CONTACT_MM
+from softtact.mechanics.elements import gauss, quad8
+
+# Contact points along a side of a top face. More of them hold a face flat that lies half under a punch's edge: with 8 the punch
+# acts up to half a face wider (docs/discretisation.md).
+TOP_POINTS = 3
+_NEAR_MM, _LARGEST_SHIFT_MM = 0.2, 0.02   # points that may touch when the object is let down on the cover, and how far at once
+
+
+@dataclass(frozen=True)
+class FacingPlanes:
+    """The planes of the object's facets that points face: anchors (p, 3) in mm at no indentation, outward normals (p, 3).
+
+    covered (p,): share of a point's own area that the object covers;  beside (p,): points that lie beside the object themselves
+    A point keeps its plane during a step of Newton's method, so that each step lowers one potential.
+    """
+
+    anchors: np.ndarray
+    normals: np.ndarray
+    covered: np.ndarray
+    beside: np.ndarray
+
+
+@dataclass(frozen=True)
+class Touch:
+    """Contact at one displacement: energy (mJ), forces (t, w, 3) in N on the faces' nodes, gaps (p,) in mm of the points.
+
+    indentation_force: the object's, N downwards;  drag: friction at the points, None without
+    """
+
+    energy: float
+    force: np.ndarray
+    gaps: np.ndarray
+    indentation_force: float
+    drag: Drag | None = None
+
+
+class TopContact:
+    """The points of a `CoverMesh`'s top faces, flattened (p = t * points): areas (p,) in mm2, places (p, 3) in mm at rest.
+
+    faces (t, w): the free nodes that a face hangs on, values (t, points, w): their shape values at its points.
+    grip: how friction holds the points during a step, None without.
+    """
+
+    def __init__(self, mesh, contact, friction=None):
+        """contact: `Contact`, the law of the points;  friction: `Coulomb` of the object on them, or None."""
+        self.contact, self.friction, self.grip = contact, friction, None
+        points, weights = gauss(TOP_POINTS, 2)
+        values, slopes = quad8(points)
+        edges = np.einsum("tad,gai->tgdi", mesh.points[mesh.top][..., :2], slopes)
+        self.faces, self.values = _of_free_nodes(mesh.follow, mesh.top, np.broadcast_to(values, (len(mesh.top), *values.shape)))
+        self.area = (np.linalg.det(edges) * weights).ravel()
+        self.reference = self.at_points(mesh.points)
+
+        # Each point's own area: the rectangle whose sides are as long as the weights of Gauss's rule along a line.
+        half = 0.5 * np.ptp(mesh.points[mesh.top[:, :4]][..., :2], axis=1)
+        ends = np.concatenate([[-1.0], np.cumsum(np.polynomial.legendre.leggauss(TOP_POINTS)[1]) - 1.0])
+        i, j = (g.ravel() for g in np.meshgrid(np.arange(TOP_POINTS), np.arange(TOP_POINTS), indexing="ij"))
+        places = np.stack([np.column_stack([ends[i + a], ends[j + b]]) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))], axis=1)
+        self._own_area = (half[:, None, None] * (places - points[:, None])).reshape(-1, 4, 2)
+
+    def at_points(self, field):
+        """A nodal field (n, 3) at the points (p, 3)."""
+        return np.matmul(self.values, field[self.faces]).reshape(-1, 3)
+
+    def facing(self, displacement, surface):
+        """The object's facets above the points (see `FacingPlanes`)."""
+        position = self.reference + self.at_points(displacement)
+        height, normals = surface(position[:, 0], position[:, 1])
+        anchors = np.column_stack([position[:, :2], height])
+        share, foot = covered(position[:, None, :2] + self._own_area, surface)
+        # A point beside the object whose area reaches under it faces the plane there.
+        base, foot_normals = surface(*foot.T)
+        beside = ~continues(height, position[:, :2], base, foot)
+        anchors[beside] = np.column_stack([foot, base])[beside]
+        normals[beside] = foot_normals[beside]
+        share[anchors[:, 2] >= NO_CONTACT_MM] = 0.0
+        return FacingPlanes(anchors=anchors, normals=normals, covered=share, beside=beside)
+
+    def gaps(self, displacement, planes, indentation):
+        """Normal gaps (p,) in mm between the points and the planes they face."""
+        offset = self.reference + self.at_points(displacement) - planes.anchors
+        return np.einsum("pd,pd->p", planes.normals, offset) + indentation * planes.normals[:, 2]
+
+    @staticmethod
+    def own_gaps(state):
+        """Gaps (p,) of the points that lie under the object; of those beside it a gap that says so."""
+        return np.where(state.planes.beside, NO_CONTACT_MM, state.gaps)
+
+    def touch(self, displacement, planes, indentation):
+        """The contact with the object lowered by `indentation` mm."""
+        gaps, normals = self.gaps(displacement, planes, indentation), planes.normals
+        density, pressure, _ = self.contact.response(gaps)
+        area = self.area * planes.covered
+        push = (pressure * area)[:, None] * normals      # on the slab: along the object's outward normal
+        touch = Touch(energy=float(density @ area), force=-self._on_nodes(push), gaps=gaps,
+                      indentation_force=float(-push[:, 2].sum()))
+        return touch if self.grip is None else self._with_friction(touch, displacement, planes, indentation)
+
+    def _with_friction(self, touch, displacement, planes, indentation):
+        """The contact with friction's energy and forces, on the covered share of area as the pressure's."""
+        area = self.area * planes.covered
+        drag = self.grip.drag(self._in_object(displacement, indentation), planes.normals)
+        pull = drag.traction * area[:, None]
+        # Raising the indentation lifts the points in the object's frame, so the slips' vertical part resists it.
+        return replace(touch, energy=touch.energy + float(drag.energy @ area), force=touch.force + self._on_nodes(pull),
+                       indentation_force=touch.indentation_force + float(pull[:, 2].sum()), drag=drag)
+
+    def _on_nodes(self, forces):
+        """Forces (p, 3) in N at the points as forces (t, w, 3) on the faces' nodes."""
+        return np.matmul(self.values.transpose(0, 2, 1), forces.reshape(len(self.faces), -1, 3))
+
+    def _in_object(self, displacement, indentation):
+        """Places (p, 3) of the points in the frame of the object, which goes down by `indentation`."""
+        return self.reference + self.at_points(displacement) + [0.0, 0.0, indentation]
+
+    def begin_step(self, state, indentation):
+        """Let friction hold the points as where a step starts from a `SlabState`."""
+        if self.friction is None:
+            return
+        if state.drag is None:
+            self.grip = Grip.first(self.friction, self._in_object(state.displacement, indentation), state.gaps)
+        else:
+            self.grip = state.drag.next_step(state.gaps)
+
+    def renewed_grip(self, state):
+        """The grip with the pressures of a `SlabState`."""
+        return state.drag.next_pass(state.gaps, self.contact.response(state.gaps)[1])
+
+    def balanced(self, state, indentation, force_n):
+        """The indentation (mm) at which the object's force, friction aside, is `force_n` on the cover as it is.
+
+        The force grows with the depth, from a square root's slope on: Newton's method with bounded steps.
+        """
+        near = np.flatnonzero(state.gaps < _NEAR_MM)
+        down, area = -state.planes.normals[near, 2], (self.area * state.planes.covered)[near]
+        contact, gaps, shift = self.contact.at(near), state.gaps[near], 0.0
+        for _ in range(50):
+            _, pressure, slope = contact.response(gaps - shift * down)
+            excess = pressure @ (down * area) - force_n
+            if abs(excess) <= 1e-9 * force_n:
+                break
+            stiffness = slope @ (down**2 * area)
+            shift -= np.clip(excess / max(stiffness, 1e-12), -_LARGEST_SHIFT_MM, _LARGEST_SHIFT_MM)
+        return indentation + shift
+
+    def stiffness(self, state):
+        """Stiffness (p,) in N/mm of the points along their normals."""
+        return self.contact.response(state.gaps)[2] * self.area * state.planes.covered
+
+    def normal_shapes(self, planes):
+        """Change (t, points, 3 w) of the points' gaps by the faces' unknowns."""
+        normal = planes.normals.reshape(*self.values.shape[:2], 3)
+        return np.einsum("tga,tgd->tgad", self.values, normal).reshape(*normal.shape[:2], -1)
+
+    def friction_tangent(self, state):
+        """Friction's blocks (t, 3 w, 3 w) of the faces, border (t, 3 w) and corner.
+
+        The border is the derivative of the forces by the indentation, the corner the energy's second derivative by it.
+        """
+        area = (self.area * state.planes.covered)[:, None, None]
+        slope = (state.drag.stiffness() * area).reshape(*self.values.shape[:2], 3, 3)
+        along = np.einsum("tga,tgij->tgaij", self.values, slope)
+        blocks = np.einsum("tgaij,tgb->taibj", along, self.values, optimize=True)
+        size = 3 * self.values.shape[2]
+        return blocks.reshape(-1, size, size), along[..., 2].sum(axis=1).reshape(-1, size), float(slope[..., 2, 2].sum())
+
+
+def _of_free_nodes(follow, faces, values):
+    """Free nodes (t, w) that faces (t, 8) hang on, and values (t, g, 8) in terms of these (t, g, w)."""
+    if (faces < follow.shape[1]).all():
+        return faces, values
+    rows = [follow[face] for face in faces]
+    needed = [np.unique(row.indices) for row in rows]
+    width = max(map(len, needed))
+    nodes = np.stack([np.pad(n, (0, width - len(n)), mode="edge") for n in needed])
+    out = np.zeros((*values.shape[:2], width))
+    for t, (row, used) in enumerate(zip(rows, needed, strict=True)):
+        out[t, :, :len(used)] = values[t] @ row[:, used].toarray()
+    return nodes, out

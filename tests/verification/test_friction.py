@@ -1,0 +1,455 @@
+"""Friction: law, tangent, stick and slip, dissipation, a plate of teeth, a rough punch.
+
+Coulomb's law as a lagged and regularised potential, on the slab alone and on small sensors of a few frusta.
+"""
+
+import re
+import shutil
+import subprocess
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from slabs import HeldSlab, flat_punch, graded, mirrored
+from test_presses import COARSE, LAWS, TIGHT, sides_touch, small_spec, sphere, tilted_plate
+
+from softtact.contact.friction import SLIP_TOLERANCE_MM, Coulomb
+from softtact.contact.height_field import HeightField
+from softtact.decks import keywords
+from softtact.decks.laws import law_card
+from softtact.errors import InputError
+from softtact.geometry.meshes import place
+from softtact.geometry.sensor_spec import Friction, SensorSpec
+from softtact.materials.laws.registry import make_law
+from softtact.mechanics import contact_step
+from softtact.mechanics.hex_mesh import extrude, grid_plan
+from softtact.mechanics.hyperelastic import NewtonSettings, press_levels
+from softtact.mechanics.layered_body import build_sensor_body
+from softtact.mechanics.linear_solvers import make_solver
+from softtact.sensor import Sensor
+
+COULOMB = "Coulomb's law"
+FINE = NewtonSettings(relative_tolerance=1e-6)
+
+
+def body_with(*, board=0.0, on_object=0.0, held=False, columns=2, rows=2):
+    """A small sensor with coefficients of friction; tips slide unless `held`."""
+    options = {"tips_held": held, "friction": Friction(object=on_object, board=board)}
+    spec = small_spec(columns, rows, margin=0.4).model_copy(update=options)
+    return build_sensor_body(spec, dielectric_law=LAWS["dielectric"], cover_law=LAWS["cover"], mesh=COARSE)
+
+
+def last_level(body, forces, *, surface=tilted_plate, settings=FINE):
+    return list(press_levels(body, surface, forces, settings=settings))[-1]
+
+
+# --- the law ---
+
+
+def test_the_traction_is_the_slope_of_the_energy_and_the_stiffness_that_of_the_traction(record):
+    """Sticking and sliding points in a tilted plane; differences err by step^2 and by round-off over the step."""
+    source, rng, law, h = "central differences", np.random.default_rng(0), Coulomb(0.4), 1e-8
+    normal = rng.standard_normal((8, 3))
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    plane = np.eye(3) - normal[:, :, None] * normal[:, None, :]
+    pressure = rng.uniform(0.1, 1.0, 8)
+    way = np.einsum("pij,pj->pi", plane, rng.standard_normal((8, 3)))
+    size = SLIP_TOLERANCE_MM * np.array([0.1, 0.4, 0.7, 0.95, 1.05, 2, 10, 50])
+    slip = way / np.linalg.norm(way, axis=1)[:, None] * size[:, None]
+    steps = [np.einsum("pij,j->pi", plane, h * np.eye(3)[i]) for i in range(3)]
+    slope = np.stack([(law.energy(slip + s, pressure) - law.energy(slip - s, pressure)) / (2 * h) for s in steps], axis=-1)
+    curvature = np.stack([(law.traction(slip + s, pressure) - law.traction(slip - s, pressure)) / (2 * h) for s in steps], axis=-1)
+    stiffness = law.stiffness(slip, pressure, plane, law.share(slip))
+    for name, got, expected in (("traction", law.traction(slip, pressure), slope), ("stiffness", stiffness, curvature)):
+        deviation = np.abs(got - expected).max() / np.abs(expected).max()
+        record(f"friction's {name}: relative deviation", expected=0.0, source=source, got=deviation)
+        assert deviation < 1e-6
+    assert np.linalg.eigvalsh(stiffness).min() > -1e-9      # convex
+
+
+@pytest.mark.parametrize(("under", "surface"), [("plate", tilted_plate), ("punch that covers points in part", flat_punch(1.0))])
+def test_forces_and_newton_steps_are_the_slopes_of_the_potential_of_a_press_with_friction(under, surface, record, monkeypatch):
+    """Along a Newton step s the potential falls at the rate residual . s, and the residual at its own size."""
+    # A press goes on from there, to a step that is exact in the contact, and solves less exactly.
+    monkeypatch.setattr(contact_step, "_INNER_STEPS", 1)
+    monkeypatch.setattr(contact_step, "_FORCING", 1e-9)
+    monkeypatch.setattr(contact_step._Problem, "best_share", lambda *_: 1.0)
+    body, h = body_with(board=0.3, on_object=0.3), 1e-6
+    level = last_level(body, [0.5, 1.0], surface=surface)
+    covered = level.state.slab.planes.covered[level.state.slab.gaps < 0]
+    assert (covered < 1).any() == ("punch" in under)
+    body.friction.begin_step(level.state)
+    moved = shifted(body, level.state, random_step(body, 6e-4), 1.0)
+    body.friction.renew(moved)
+    state = shifted(body, moved, random_step(body, 0.0), 0.0)
+    assert (np.linalg.norm(state.bed.drag.slip, axis=-1) > SLIP_TOLERANCE_MM)[state.bed.drag.grip.pressure > 0].mean() > 0.1
+    body.cells.forget()                                # every cell's tangent anew
+    step = body.newton_step(state, 1.1)
+    up, down = (shifted(body, state, step, sign * h) for sign in (1, -1))
+    expected = (potential(up, 1.1) - potential(down, 1.1)) / (2 * h)
+    got = residual(body, state, 1.1) @ flat(body, step)
+    error = record(f"{under} with friction: slope of the potential along a step, mJ", expected=expected,
+                   source="central differences", got=got)
+    assert error < 1e-6
+    change = (residual(body, up, 1.1) - residual(body, down, 1.1)) / (2 * h)
+    got = np.abs(change + residual(body, state, 1.1)).max() / np.abs(residual(body, state, 1.1)).max()
+    record(f"{under} with friction: what is left of the residual's slope after a Newton step, over the residual", expected=0.0,
+           source="central differences", got=got)
+    assert got < 1e-4
+
+
+def random_step(body, size):
+    rng = np.random.default_rng(5)
+    slab, bed = (size * rng.standard_normal(zero.shape) for zero in body.rest())
+    slab.ravel()[np.setdiff1d(np.arange(slab.size), body.slab.free)] = 0.0
+    bed[:, body.bed.root] = slab[body.cells.roots]
+    return Step(slab, bed, 0.5 * size)
+
+
+@dataclass(frozen=True)
+class Step:
+    slab: np.ndarray
+    bed: np.ndarray
+    indentation: float
+
+
+def shifted(body, state, step, share):
+    return body.evaluate(state.slab.displacement + share * step.slab, state.bed.displacement + share * step.bed,
+                         state.indentation + share * step.indentation, state.slab.planes)
+
+
+def potential(state, force):
+    return state.energy - force * state.indentation
+
+
+def residual(body, state, force):
+    """Unbalanced forces on the slab's free unknowns, inside the frusta, and on the object."""
+    return np.concatenate([body.slab_force(state).ravel()[body.slab.free], body.bed.inner_residual(state.bed).ravel(),
+                           [state.force - force]])
+
+
+def flat(body, step):
+    inner = step.bed.reshape(body.bed.count, -1)[:, body.bed.inner]
+    return np.concatenate([step.slab.ravel()[body.slab.free], inner.ravel(), [step.indentation]])
+
+
+# --- small sensors ---
+
+
+def test_a_coefficient_of_nothing_changes_nothing(record):
+    """The friction's own path through the program with mu = 0, against the press without friction."""
+    expected, source = 0.0, "the press without friction"
+    free, none = body_with(), body_with()
+    none.slab.top.friction = none.bed.friction = Coulomb(0.0)
+    states = [last_level(body, [0.5, 2.0], settings=TIGHT).state for body in (free, none)]
+    got = np.abs(states[1].slab.displacement - states[0].slab.displacement).max()
+    record("coefficients 0: largest deviation of a displacement, mm", expected=expected, source=source, got=got)
+    assert got < 1e-6      # unbalanced forces of up to 1e-7 N over the softest stiffness
+
+
+def ball_on(body, forces):
+    ball, pose = sphere(3.0, at=(0.3, -0.2))
+    return press_levels(body, HeightField(place(ball, pose=pose)), forces, settings=FINE)
+
+
+def test_tips_with_much_friction_do_as_held_tips_do(record):
+    """Where nothing slides only the slip that builds the traction up is left, less than its tolerance."""
+    source, forces = "tips that are held", [0.4, 0.8]
+    bodies = {"held": body_with(held=True, columns=3, rows=3), "rough": body_with(board=2.0, columns=3, rows=3),
+              "free": body_with(columns=3, rows=3)}
+    states = {name: list(ball_on(body, forces))[-1].state for name, body in bodies.items()}
+    assert not sides_touch(bodies["held"], states["held"].bed)      # held tips say nothing about folded sides
+    expected, got = states["held"].indentation, states["rough"].indentation
+    error = record("ball on 3 x 3 frusta, board mu = 2, 0.8 N: indentation", expected=expected, source=source, got=got)
+    deviation = np.abs(states["rough"].slab.displacement - states["held"].slab.displacement).max()
+    record("ball on 3 x 3 frusta, board mu = 2, 0.8 N: largest deviation in the slab, mm", expected=0.0, source=source,
+           got=deviation)
+    assert error * expected < SLIP_TOLERANCE_MM and deviation < SLIP_TOLERANCE_MM
+    tips = bodies["free"].bed.tip
+    assert np.abs(states["free"].bed.displacement[:, tips, :2]).max() > 50 * SLIP_TOLERANCE_MM      # without friction they slide
+
+
+@pytest.fixture(scope="module")
+def rough_press():
+    """Sensor and levels of a ball on 3 x 3 frusta, friction above and below (with 0.3 above, all of its 29 points would stick)."""
+    body = body_with(board=0.2, on_object=0.1, columns=3, rows=3)
+    return body, list(ball_on(body, np.linspace(0.5, 4.0, 15)))
+
+
+def test_no_point_carries_more_than_coulomb_allows_and_sliding_ones_carry_all_of_it(rough_press, record):
+    body, levels = rough_press
+    for name, part, state in (("top", body.slab.top, levels[-1].state.slab), ("board", body.bed, levels[-1].state.bed)):
+        drag = state.drag
+        pressure = part.contact.response(state.gaps)[1][..., :drag.slip.shape[-2]]      # of the frusta's points those on the board
+        pressed = pressure > 1e-4
+        ratio = np.linalg.norm(drag.traction[pressed], axis=-1) / (part.friction.coefficient * pressure[pressed])
+        sliding = np.linalg.norm(drag.slip[pressed], axis=-1) > SLIP_TOLERANCE_MM
+        error = record(f"ball on 3 x 3 frusta, {name}: largest traction over mu times pressure", expected=1.0, source=COULOMB,
+                       got=ratio.max())
+        assert error < 1e-9                            # the friction is that of the state's own pressure, to round-off
+        assert ratio[sliding] == pytest.approx(1.0, abs=1e-9)
+        assert 0.02 < sliding.mean() < 0.98            # some slide, some stick
+
+
+def dissipated(body, levels):
+    """Work (mJ) of friction between successive levels, by the trapezoidal rule on every point's way."""
+    areas = {"slab": body.slab.top.area, "bed": body.bed.point_area[:, :body.bed.board_points]}     # the plate covers all points
+    work = []
+    for a, b in zip(levels[:-1], levels[1:], strict=True):
+        work.append(0.0)
+        for name, area in areas.items():
+            before, after = getattr(a.state, name).drag, getattr(b.state, name).drag
+            way = after.position - before.position
+            work[-1] += 0.5 * (((before.traction + after.traction) * way).sum(axis=-1) * area).sum()
+    return np.array(work)
+
+
+def test_work_is_stored_or_dissipated(record):
+    """Conservation of energy between two states that friction has already shaped."""
+    source, errors = "energy stored in rubber and contacts, and friction's work: conservation of energy", []
+    for steps in (6, 12, 24):
+        body, forces = body_with(board=0.2, on_object=0.2), np.linspace(2.0, 6.0, steps + 1)
+        levels = list(press_levels(body, tilted_plate, forces, settings=replace(FINE, contact_passes=0)))   # its potential stays
+        work = np.trapezoid(forces, [level.state.indentation for level in levels])
+        lost = dissipated(body, levels)
+        expected = elastic(body, levels[-1].state) - elastic(body, levels[0].state) + lost.sum()
+        errors.append(record(f"friction: work between 2 N and 6 N in {steps} steps, mJ", expected=expected, source=source,
+                             got=work))
+        assert (lost > 0).all()
+    assert errors[0] > 3 * errors[1] > 9 * errors[2]                    # second order in the step, as the trapezoidal rule
+    assert lost.sum() / work > 50 * errors[2]      # the loss is 1 % of the work, so without it the balance would be far off
+
+
+def elastic(body, state):
+    """Energy (mJ) in rubber and contacts, without friction's potential."""
+    top = (state.slab.drag.energy * body.slab.top.area).sum()
+    board = (state.bed.drag.energy * body.bed.point_area[:, :body.bed.board_points]).sum()
+    return state.energy - float(top + board)
+
+
+def test_the_more_friction_the_smaller_the_indentation_between_free_and_held_tips(record):
+    source, forces, coefficients = "the press with less friction", [1.0, 2.0], (0.0, 0.1, 0.2, 0.4, 0.8)
+    bodies = [*(body_with(board=mu, columns=3, rows=3) for mu in coefficients), body_with(held=True, columns=3, rows=3)]
+    *depths, held = (list(ball_on(body, forces))[-1].state.indentation for body in bodies)
+    for mu, depth, before in zip(coefficients[1:], depths[1:], depths[:-1], strict=True):
+        record(f"ball on 3 x 3 frusta, 2 N, board mu = {mu:g}: what the indentation falls short of that with less friction, mm",
+               expected=0.0, source=source, got=before - depth, at_least=True)
+    assert (np.diff(depths) < 0).all()
+    assert depths[-1] > held - SLIP_TOLERANCE_MM
+
+
+# --- the slab alone, against closed forms ---
+
+
+class RoughSlab(HeldSlab):
+    """A held slab under an object with friction, by whole Newton steps."""
+
+    def __init__(self, *args, law, **options):
+        super().__init__(*args, **options)
+        self.slab.top.friction = law
+
+    def slide(self, surface, depths, *, tolerance=1e-9, passes=60):
+        """Friction's `SlabState` after the object was lowered to each depth (mm), and its force (N)."""
+        slab, top, u = self.slab, self.slab.top, np.zeros((self.slab.nodes, 3))
+        state, last = slab.evaluate(u, slab.facing(u, surface), 0.0), 0.0
+        for depth in depths:
+            planes = slab.facing(state.displacement, surface)
+            top.begin_step(slab.reface(state, planes, last), last)
+            for k in range(passes):
+                state = self._balance(state.displacement, planes, depth, tolerance)
+                before, top.grip = top.grip, top.renewed_grip(state)
+                state = slab.reface(state, planes, depth)
+                if np.abs(state.force.ravel()[slab.free]).max() < tolerance * abs(state.indentation_force):
+                    break
+                if k >= 3:
+                    top.grip = before.halfway(top.grip)
+            else:
+                raise ArithmeticError("friction does not settle")
+            last = depth
+        return state
+
+    def _balance(self, u, planes, depth, tolerance, iterations=60):
+        slab, solver, drag = self.slab, make_solver(), None
+        for _ in range(iterations):
+            state = slab.evaluate(u, planes, depth)
+            state = replace(state, drag=state.drag.after(drag))
+            residual, drag = state.force.ravel()[slab.free], state.drag
+            if np.abs(residual).max() < 0.1 * tolerance * abs(state.indentation_force):
+                solver.close()
+                return state
+            if not solver.factor(slab.tangent(state, [])):
+                raise ArithmeticError("the slab's tangent is not positive definite")
+            u = u.copy()
+            u.ravel()[slab.free] -= solver.solve(residual)
+        raise ArithmeticError(f"no equilibrium after {iterations} iterations")
+
+
+def teeth(slope):
+    """A level plate whose underside is everywhere inclined by `slope`: teeth too fine to see, all leaning towards x."""
+    normal = np.array([np.sin(slope), 0.0, -np.cos(slope)])
+
+    def surface(x, y):
+        return np.zeros_like(x), np.tile(normal, (len(x), 1))
+
+    return surface
+
+
+def test_friction_acts_on_the_share_of_area_that_the_object_covers_as_the_pressure_does(record):
+    """A punch whose edge cuts points' areas, on a block shifted as a whole: every point slides, and the sums obey Coulomb's law."""
+    mu, depth, x = 0.3, 1e-3, np.linspace(-1.5, 1.5, 7)
+    slab = RoughSlab(x, x, np.linspace(-1.0, 0.0, 2), [BLOCK_LAW], sides="held", stiffness=100.0, law=Coulomb(mu)).slab
+    u = np.zeros((slab.nodes, 3))
+    planes = slab.facing(u, flat_punch(1.0))
+    assert ((planes.covered > 0) & (planes.covered < 1)).any()
+    slab.top.begin_step(slab.evaluate(u, planes, depth), depth)
+    slab.top.grip = slab.top.renewed_grip(slab.evaluate(u, planes, depth))
+    state = slab.evaluate(u + [10 * SLIP_TOLERANCE_MM, 0.0, 0.0], planes, depth)
+    expected, got = mu * state.indentation_force, state.force[:, 0].sum()
+    assert expected > 0.05
+    error = record("punch that slides over the edge of points' areas: friction, N", expected=expected, source=COULOMB, got=got)
+    assert error < 1e-9
+
+
+@pytest.mark.parametrize("mu", [0.05, 0.1, 0.3])
+def test_teeth_push_a_layer_aside_until_friction_holds_them(mu, record):
+    """A wide layer of thickness h under teeth inclined by a: with slip v along them and pressure p,
+
+        v cos a = h p (sin a - mu cos a) / G,   depth - v sin a = h p (cos a + mu sin a) / M,
+
+    G and M = K + 4 G/3 the layer's moduli. From tan a < mu on they stick, and the layer goes straight down: v = 0.
+    """
+    angle, thickness, depth = 0.2, 1.0, 1e-3
+    law = make_law("neo_hooke", {"c10": 0.25}, bulk_modulus=2.0)
+    G, M = 0.5, 2.0 + 2.0 / 3
+    lean, press = max(np.sin(angle) - mu * np.cos(angle), 0.0), np.cos(angle) + mu * np.sin(angle)
+    p = depth / (thickness * (lean * np.tan(angle) / G + press / M))
+    aside, source = thickness * p * lean / G, "closed form: shear and confined compression of a wide layer, Coulomb's law"
+    straight = M * depth / thickness
+    x = mirrored(graded(2.0, 4, 9.0, 5))
+    slab = RoughSlab(x, np.array([-0.5, 0.5]), np.linspace(-thickness, 0, 3), [law] * 2, sides="symmetric", stiffness=1e5,
+                     law=Coulomb(mu, slip_tolerance_mm=1e-6))
+    # Points as stiff as 2 mu p / 1e-6 turn the displacements' rounding into 2e-10 of the force.
+    state = slab.slide(teeth(angle), [depth], tolerance=1e-8)
+    middle = np.abs(slab.slab.top.reference[:, 0]) < 0.5
+    expected = p * press if lean > 0 else straight
+    push = -slab.slab.top.contact.response(state.gaps)[1][:, None] * state.planes.normals + state.drag.traction
+    got = push[middle, 2].mean()
+    error = record(f"layer under teeth of slope 0.2, mu = {mu:g}: downward traction, MPa", expected=expected, source=source,
+                   got=got)
+    assert error < 2e-3
+    top = slab.slab.top.at_points(state.displacement)[middle, 0].mean()
+    error = record(f"layer under teeth of slope 0.2, mu = {mu:g}: way aside, mm", expected=aside, source=source, got=top)
+    assert abs(top - aside) < 2e-3 * depth
+
+
+def test_a_rough_punch_needs_more_force_than_a_smooth_one(record):
+    """Poisson's ratio 0, where it is most: 4 G a depth ln(3 - 4 nu) / (1 - 2 nu) against 4 G a depth / (1 - nu)."""
+    expected, source = np.log(3.0), "Mossakovskii 1954; Johnson, Contact Mechanics, eq. (3.104)"
+    law = make_law("neo_hooke", {"c10": 0.25}, bulk_modulus=1.0 / 3)
+    x, z = graded(1.5, 4, 10.0, 3), -graded(1.5, 4, 10.0, 3)[::-1]
+    depth, forces = 1e-3, []
+    for mu in (1e-9, 0.3, 20.0):
+        slab = RoughSlab(x, x, z, [law] * (len(z) - 1), sides="symmetric", stiffness=3000.0,
+                         law=Coulomb(mu, slip_tolerance_mm=1e-3 * depth))
+        forces.append(slab.slide(flat_punch(1.0), [depth], tolerance=1e-6).indentation_force)
+    assert (np.diff(forces) > 0).all()
+    error = record("punch that sticks over one that slides: force", expected=expected, source=source, got=forces[-1] / forces[0])
+    assert error < 0.02
+
+
+# --- a block under a rough plate, against another program ---
+
+BLOCK_HEIGHT, BLOCK_DEPTH, BLOCK_PENALTY, BLOCK_MU = 0.5, 0.1, 1e3, 0.2
+BLOCK_LAW = make_law("neo_hooke", {"c10": 0.175}, bulk_modulus=1.75)
+BLOCK_LINES, BLOCK_LEVELS = np.linspace(0, 1, 4), np.linspace(-BLOCK_HEIGHT, 0, 3)
+CORNERS = {"under the plate": [1.0, 0.0, 0.0], "on the ground": [1.0, 0.0, -BLOCK_HEIGHT]}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
+def test_a_block_under_a_rough_plate_resists_and_spreads_as_in_another_program(tmp_path, record):
+    """A quarter of a block of 2 x 2 x 0.5 mm on smooth ground, a fifth lower under a plate with mu = 0.2, which takes 20 % more
+    force than a smooth one. There C3D20R and 20 increments or more, here our elements and four levels.
+    """
+    source = "CalculiX 2.20, 3 x 3 x 2 C3D20R"
+    force, ways = block_in_calculix(tmp_path)
+    ours, our_ways = block_here()
+    error = record("block under a plate with mu = 0.2: force on a quarter", expected=force, source=source, got=ours)
+    assert error < 1e-3
+    # The pressure is singular at the plate's edge: there the nodes' ways differ, and change by 15 % with the mesh in both.
+    for place_, bound in (("on the ground", 1e-3), ("under the plate", 0.07)):
+        error = record(f"block under a plate with mu = 0.2: way of its side {place_}, mm", expected=ways[place_], source=source,
+                       got=our_ways[place_])
+        assert error < bound
+
+
+def nearest(points, field):
+    """The way along x of the nodes at CORNERS."""
+    return {name: field[np.argmin(np.abs(points - corner).sum(axis=1)), 0] for name, corner in CORNERS.items()}
+
+
+def block_here():
+    """Force (N) and ways (mm) of the sides by our slab, its outer sides let go."""
+    rough = RoughSlab(BLOCK_LINES, BLOCK_LINES, BLOCK_LEVELS, [BLOCK_LAW] * 2, sides="symmetric", stiffness=BLOCK_PENALTY,
+                      law=Coulomb(BLOCK_MU, slip_tolerance_mm=1e-4))
+    slab = rough.slab
+    held = np.abs(slab.points) < [1e-9, 1e-9, -1.0]
+    held[slab.bottom, 2] = True
+    slab.free = np.flatnonzero(~held.ravel())
+    slab.build_pattern(np.zeros(0, dtype=int), [])
+    state = rough.slide(teeth(0.0), np.linspace(0, BLOCK_DEPTH, 5)[1:], tolerance=1e-5)
+    return state.indentation_force, nearest(slab.points, state.displacement)
+
+
+def block_in_calculix(folder):
+    """The same by ccx; the plate is one stiff element whose nodes are all prescribed."""
+    mesh = extrude(grid_plan(BLOCK_LINES, BLOCK_LINES), BLOCK_LEVELS)
+    count, n = len(mesh.hexes), len(mesh.points)
+    square = np.array([[-0.5, -0.5], [2.0, -0.5], [2.0, 2.0], [-0.5, 2.0]])
+    plate = np.vstack([np.column_stack([square, np.full(4, z)]) for z in (0.0, 1.0)])
+    faces = [(count - len(mesh.hexes) // mesh.layers + k + 1, 2) for k in range(len(mesh.hexes) // mesh.layers)]
+    lines = keywords.nodes(mesh.points, 1, name="RUBBER_NODES") + keywords.nodes(plate, n + 1, name="PLATE_NODES")
+    lines += keywords.elements("C3D20R", "RUBBER", np.arange(count) + 1, mesh.hexes + 1)
+    lines += keywords.elements("C3D8", "PLATE", [count + 1], [np.arange(8) + n + 1])
+    lines += keywords.material("RUBBER", law_card(BLOCK_LAW, no_term=1e20, dialect="CalculiX"))
+    lines += ["*SOLID SECTION, ELSET=RUBBER, MATERIAL=RUBBER", "*MATERIAL, NAME=STIFF", "*ELASTIC", "1000, 0.3",
+              "*SOLID SECTION, ELSET=PLATE, MATERIAL=STIFF"]
+    lines += keywords.surface("TOP", faces) + keywords.surface("PLATE_FACE", [(count + 1, 1)])
+    lines += ["*SURFACE INTERACTION, NAME=ROUGH", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", f"{BLOCK_PENALTY}",
+              "*FRICTION", f"{BLOCK_MU}, 1000", "*CONTACT PAIR, INTERACTION=ROUGH, TYPE=SURFACE TO SURFACE", "TOP, PLATE_FACE"]
+    for name, axis, value in (("X0", 0, 0.0), ("Y0", 1, 0.0), ("Z0", 2, -BLOCK_HEIGHT)):
+        lines += keywords.node_set(name, np.flatnonzero(np.abs(mesh.points[:, axis] - value) < 1e-9) + 1)
+    lines += ["*STEP, NLGEOM, INC=1000", "*STATIC", "0.05, 1, 1e-7, 0.05", "*BOUNDARY", "X0, 1", "Y0, 2", "Z0, 3",
+              "PLATE_NODES, 1, 2", f"PLATE_NODES, 3, 3, {-BLOCK_DEPTH}",
+              "*NODE PRINT, NSET=PLATE_NODES, TOTALS=ONLY, FREQUENCY=1000", "RF",
+              "*NODE PRINT, NSET=RUBBER_NODES, FREQUENCY=1000", "U", "*END STEP"]
+    (folder / "block.inp").write_text("\n".join(lines) + "\n")
+    subprocess.run(["ccx", "block"], cwd=folder, capture_output=True, check=True, timeout=300)
+    numbers = [line.split() for line in (folder / "block.dat").read_text().splitlines() if re.match(r"[\s\d.E+-]+$", line)]
+    total, = (row for row in numbers if len(row) == 3)
+    displacement = np.array([row for row in numbers if len(row) == 4], dtype=float)
+    return -float(total[2]), nearest(mesh.points, displacement[:, 1:])
+
+
+# --- the description ---
+
+
+def test_friction_under_held_tips_is_refused():
+    values = small_spec(2, 2, margin=0.4).model_dump(mode="json") | {"friction": {"object": 0.0, "board": 0.3}}
+    with pytest.raises(InputError, match="tips that are held cannot slide .* set 'tips_held' to false"):
+        SensorSpec.from_dict(values)
+    assert SensorSpec.from_dict(values | {"tips_held": False}).friction.board == 0.3
+
+
+@pytest.mark.parametrize("value", [-0.1, float("inf"), "much", {"value": 0.3, "assumed": True}])
+def test_a_coefficient_is_a_number_from_zero_on_and_an_assumed_one_has_a_reason(value):
+    values = small_spec(2, 2, margin=0.4).model_dump(mode="json") | {"friction": {"object": value}}
+    with pytest.raises(InputError, match="field 'friction.object' is not usable"):
+        SensorSpec.from_dict(values)
+
+
+def test_a_result_states_its_friction():
+    ball, pose = sphere(2.5)
+    spec = small_spec(2, 2, margin=0.4).model_copy(update={"friction": Friction(object=0.3)})
+    result = Sensor(spec, LAWS, mesh=COARSE).press(ball, pose=pose, force_n=1.0, model="hyperelastic")
+    assert result.attributes == {"friction_object": 0.3, "friction_board": 0.0, "tips_held": 1}
