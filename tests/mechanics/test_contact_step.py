@@ -1,5 +1,7 @@
 """Steps that are exact in the contact: against a general minimiser, and what a factor serves for."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.optimize
@@ -47,10 +49,14 @@ class Scene:
 
     def step(self, stepper, **changes):
         arguments = {"excess": self.excess, **changes}
-        return stepper.step(sp.csr_matrix(np.triu(self.matrix)), self.residual, self.points, pressed=self._pressed, **arguments)
+        return stepper.step(sp.csr_matrix(np.triu(self.matrix)), self.residual, self, **arguments)
 
-    def _pressed(self, slope):
-        return sp.csr_matrix(np.triu(self.matrix + self.rows.T @ (slope[:, None] * self.rows)))
+    def pressed(self, rubber, slope):
+        return rubber + sp.csr_matrix(np.triu(self.rows.T @ (slope[:, None] * self.rows)))
+
+    def follow(self, step, lowering):
+        """The object is plain: the points always face the same."""
+        return False
 
     def energy(self, x):
         """The step's energy (mJ) over that of no step: linear and quadratic in the rubber, exact in the contact."""
@@ -87,11 +93,11 @@ def test_an_object_that_is_held_is_not_lowered():
 
 def test_a_point_that_would_fly_into_the_object_is_stopped_within_one_step(exact):
     # One unknown, pulled up by 1 N against 1 N/mm, a point 1 um under the object: Newton's tangent does not know of it.
-    points = LinearGaps(gaps=np.array([1e-3]), rows=sp.csr_matrix([[-1.0]]), lowering=np.array([-1.0]), area=np.array([0.02]),
-                  contact=CONTACT)
-    body = sp.csr_matrix([[1.0]])
-    step, _ = ContactStepper(DenseSolver()).step(body, np.array([-1.0]), points,
-                                                 pressed=lambda slope: sp.csr_matrix([[1.0 + slope[0]]]))
+    scene = Scene(0)
+    scene.matrix, scene.rows, scene.residual = np.eye(1), np.array([[-1.0]]), np.array([-1.0])
+    scene.points = LinearGaps(gaps=np.array([1e-3]), rows=sp.csr_matrix(scene.rows), lowering=np.array([-1.0]),
+                              area=np.array([0.02]), contact=CONTACT)
+    step, _ = scene.step(ContactStepper(DenseSolver()), excess=None)
     depth = step[0] - 1e-3
     # 1 N = step + area k (depth - t / 2): by hand, depth = (1 - 1e-3 + 60 t / 2) / 61
     assert depth == pytest.approx((1 - 1e-3 + 60 / 6000) / 61, rel=1e-6)
@@ -99,9 +105,8 @@ def test_a_point_that_would_fly_into_the_object_is_stopped_within_one_step(exact
 
 def test_a_free_object_that_touches_nothing_is_told_by_nan():
     scene = Scene(2)
-    away = LinearGaps(**{**scene.points.__dict__, "gaps": np.full(POINTS, 0.1)})
-    _, lowering = ContactStepper(DenseSolver()).step(sp.csr_matrix(np.triu(scene.matrix)), scene.residual, away,
-                                                     pressed=scene._pressed, excess=-1.0)
+    scene.points = replace(scene.points, gaps=np.full(POINTS, 0.1))
+    _, lowering = scene.step(ContactStepper(DenseSolver()), excess=-1.0)
     assert np.isnan(lowering)
 
 
@@ -126,3 +131,22 @@ def test_a_body_that_is_not_stable_has_no_step():
     scene = Scene(5)
     scene.matrix = scene.matrix - 3 * np.linalg.eigvalsh(scene.matrix)[-1] * np.eye(UNKNOWNS)
     assert scene.step(ContactStepper(DenseSolver())) is None
+
+
+class SlidingScene(Scene):
+    """The same, but half the points' areas leave the object as soon as a step is taken."""
+
+    def follow(self, step, lowering):
+        self.points = replace(self.points, area=np.where(np.arange(POINTS) % 2, 0.0, self.points.area))
+        return True
+
+
+def test_a_step_is_in_balance_with_what_the_points_face_where_it_leads(exact):
+    scene = SlidingScene(6)
+    before, rows, lowering = scene.points.pressure(0.0), scene.points.rows, scene.points.lowering
+    step, down = scene.step(ContactStepper(DenseSolver()))
+    carried = scene.points.pressure(rows @ step + lowering * down)
+    left = scene.residual + scene.matrix @ step - rows.T @ (carried - before)
+    assert np.abs(left).max() < 1e-8 * np.abs(scene.residual).max()
+    assert abs(scene.excess - lowering @ (carried - before)) < 1e-8 * abs(scene.excess)
+    assert not carried[1::2].any()

@@ -12,6 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 
 _INNER_STEPS = 12
+_FACINGS = 4                 # lookups of what the points face; an edge that slides over them moves forces from point to point
 _INNER_TOLERANCE = 0.1       # of the residual that the step is to cut
 _FORCING = 0.1               # conjugate gradients end when the preconditioned residual has fallen to this share
 _MOST_ITERATIONS = 25        # ... or when they would take more than so many; then a new factor follows
@@ -50,38 +51,49 @@ class ContactStepper:
         self.factors, self.iterations = 0, 0     # so far, of the matrix and of conjugate gradients
         self._along = None                       # the factored matrix's solution for the object's lowering
 
-    def step(self, rubber, residual, points, *, pressed, drag=(0.0, 0.0), excess=None):
+    def step(self, rubber, residual, contact, *, drag=(0.0, 0.0), excess=None):
         """Step (n,) in mm of the unknowns, and how far the object is lowered with it; None if A is not positive definite.
 
-        rubber: A, upper triangle (csr), with friction;  residual (n,) in N;  points: `LinearGaps`
-        pressed(slope): upper triangle of A + B'.W.B, slope (p,) in N/mm
+        rubber: A, upper triangle (csr), with friction;  residual (n,) in N
+        contact: its `points` are `LinearGaps`, its `pressed(rubber, slope)` the upper triangle of A + B'.W.B for slope (p,) in
+        N/mm, its `follow(step, lowering)` looks up what the points face where a step leads, and says whether that was done
         drag: friction's border (n,) and corner in N/mm, between the unknowns and the object's lowering
         excess: the object's force less the wanted one in N; None holds the object where it is. A free object that touches
         nothing finds no stiffness: it is lowered by nan.
         """
-        problem = _Problem(rubber, points, residual, drag, excess)
+        problem = _Problem(rubber, contact, residual, drag, excess)
         x = problem.rest()
-        if problem.free and not points.slope(0.0).any():
+        if problem.free and not contact.points.slope(0.0).any():
             return problem.parts(np.append(x[:-1], np.nan))
-        enough = _INNER_TOLERANCE * np.abs(problem.residual).max()
+        enough = _INNER_TOLERANCE * np.abs(problem.gradient(x)).max()
+        for number in range(_FACINGS):
+            x = self._least(problem, x, enough, first=number == 0)
+            if x is None or number == _FACINGS - 1 or not contact.follow(*problem.parts(x)):
+                break
+            if np.abs(problem.gradient(x)).max() <= enough:
+                break
+        return None if x is None else problem.parts(x)
+
+    def _least(self, problem, x, enough, *, first):
+        """The step of least energy, from x on, until its gradient is small enough; None if A is not positive definite."""
         for number in range(_INNER_STEPS):
             gradient = problem.gradient(x)
             if np.abs(gradient).max() <= enough:
                 break
-            direction = self._direction(problem, x, gradient, pressed, first=number == 0)
+            direction = self._direction(problem, x, gradient, first=first and number == 0)
             if direction is None:
                 return None
             x = x + problem.best_share(x, direction) * direction
-        return problem.parts(x)
+        return x
 
-    def _direction(self, problem, x, gradient, pressed, *, first):
+    def _direction(self, problem, x, gradient, *, first):
         """Newton's step of the convex problem, with the present factor if it still serves."""
         slope = problem.points.slope(problem.change(x))
         if self._along is not None and not (first and self._outdated(slope)):
             direction, good = self._conjugate_gradients(problem, slope, -gradient)
             if good:
                 return direction
-        if not self._factor(problem, slope, pressed):
+        if not self._factor(problem, slope):
             return None
         direction, good = self._conjugate_gradients(problem, slope, -gradient)
         return direction if good or direction.any() else None
@@ -91,9 +103,9 @@ class ContactStepper:
         touching = slope > 0
         return np.count_nonzero(touching != self._touching) > _MOST_CHANGED * np.count_nonzero(touching)
 
-    def _factor(self, problem, slope, pressed):
+    def _factor(self, problem, slope):
         self.factors += 1
-        if not self.solver.factor(pressed(slope)):
+        if not self.solver.factor(problem.contact.pressed(problem.rubber, slope)):
             self._along = None
             return False
         lowering, (border, corner) = problem.points.lowering, problem.drag
@@ -138,12 +150,17 @@ class ContactStepper:
 class _Problem:
     """The convex problem of one step, in the unknowns and, where the object is free, its lowering behind them."""
 
-    def __init__(self, rubber, points, residual, drag, excess):
+    def __init__(self, rubber, contact, residual, drag, excess):
         self.rubber, self.lower, self.diagonal = rubber, rubber.T, rubber.diagonal()
-        self.points, self.drag = points, drag
+        self.contact, self.drag = contact, drag
         self.size, self.free = len(residual), excess is not None
-        self.residual = np.append(residual, excess) if self.free else residual
-        self.before = points.pressure(0.0)
+        # What the points face may change under way: the residual less the contact's share in it stays.
+        residual = np.append(residual, excess) if self.free else residual
+        self.residual = residual + self._spread(self.points.pressure(0.0))
+
+    @property
+    def points(self):
+        return self.contact.points
 
     def rest(self):
         return np.zeros(self.size + self.free)
@@ -170,7 +187,7 @@ class _Problem:
         return np.append(product + border * x[-1], np.sum(border * u) + corner * x[-1])
 
     def gradient(self, x):
-        return self.residual + self._elastic(x) - self._spread(self.points.pressure(self.change(x)) - self.before)
+        return self.residual + self._elastic(x) - self._spread(self.points.pressure(self.change(x)))
 
     def product(self, slope, x):
         return self._elastic(x) + self._spread(slope * self.change(x))
@@ -181,7 +198,7 @@ class _Problem:
         linear, curvature = self.residual @ direction + self._elastic(x) @ direction, direction @ self._elastic(direction)
 
         def slope(share):
-            return linear + share * curvature - along @ (self.points.pressure(now + share * along) - self.before)
+            return linear + share * curvature - along @ self.points.pressure(now + share * along)
 
         start, end = slope(0.0), slope(1.0)
         low, high, share = 0.0, 1.0, 1.0

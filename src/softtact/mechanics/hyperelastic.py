@@ -205,19 +205,20 @@ def _again(body, state):
 def _newton(body, surface, state, force, tolerance, settings):
     """Equilibrium state (None if not reached), iterations, and the last residual in N.
 
-    The points' facing planes are found anew before each of the first steps. A point that slides to and fro past an edge
-    sees the object's height jump each time; so the planes are kept later on.
+    The points' facing planes are found anew before and within each of the first steps. A point that slides to and fro past an
+    edge sees the object's height jump each time; so the planes are kept later on.
     """
-    planes, fresh = state.slab.planes, False
+    fresh = False
     for iteration in range(settings.max_iterations):
-        if iteration < settings.refacing_iterations:
-            planes = body.slab.facing(state.slab.displacement, surface)
-            state = body.reface(state, planes)
+        looks = surface if iteration < settings.refacing_iterations else None
+        if looks is not None:
+            state = body.reface(state, body.slab.facing(state.slab.displacement, surface))
         residual = body.residual_norm(state, force)
         if residual <= tolerance:
             return state, iteration, residual
-        step = body.newton_step(state, force)
-        trial = _line_search(body, planes, state, step, force, residual, settings) if np.isfinite(step.largest()) else None
+        step = body.newton_step(state, force, looks)
+        state = body.reface(state, step.planes)
+        trial = _line_search(body, state, step, force, residual, settings) if np.isfinite(step.largest()) else None
         if trial is None and fresh:
             return None, iteration, residual
         if trial is None:
@@ -230,7 +231,7 @@ def _potential(state, force):
     return state.energy - (force or 0.0) * state.indentation
 
 
-def _line_search(body, planes, state, step, force, residual, settings):
+def _line_search(body, state, step, force, residual, settings):
     """The first of the shares 1, 1/2, 1/4 ... of the step that lowers the potential.
 
     Close to equilibrium the potential no longer resolves the difference; there a smaller residual decides.
@@ -240,7 +241,7 @@ def _line_search(body, planes, state, step, force, residual, settings):
     resolution = 1e-11 * (abs(state.energy) + abs(before))
     for _ in range(10):
         trial = body.evaluate(state.slab.displacement + share * step.slab, state.bed.displacement + share * step.bed,
-                              state.indentation + share * step.indentation, planes)
+                              state.indentation + share * step.indentation, step.planes)
         if trial is not None:
             change = _potential(trial, force) - before
             if change < -resolution or (change <= resolution and body.residual_norm(trial, force) < residual):

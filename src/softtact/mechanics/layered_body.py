@@ -16,7 +16,8 @@ from softtact.mechanics.linear_solvers import make_solver
 from softtact.mechanics.parallel import Workers
 from softtact.mechanics.refinement import FAR, NEAR, levels_of, zones
 from softtact.mechanics.sheet_cells import SheetCells
-from softtact.mechanics.slab import Layer, Slab, SlabState
+from softtact.mechanics.slab import Layer, Slab, SlabState, StepContact
+from softtact.mechanics.top_contact import FacingPlanes
 
 
 @dataclass(frozen=True)
@@ -87,11 +88,12 @@ class BodyState:
 
 @dataclass(frozen=True)
 class Step:
-    """A Newton step: slab (n, 3), frusta (f, nodes, 3) in mm, indentation in mm."""
+    """A Newton step: slab (n, 3), frusta (f, nodes, 3) in mm, indentation in mm, and what the object's contact faces in it."""
 
     slab: np.ndarray
     bed: np.ndarray
     indentation: float
+    planes: FacingPlanes
 
     def largest(self):
         return max(np.abs(self.slab).max(), np.abs(self.bed).max(), abs(self.indentation))
@@ -145,28 +147,27 @@ class LayeredBody:
         depth = self.slab.top.balanced(state.slab, state.indentation, force_n)
         return replace(state, slab=self.slab.reface(state.slab, state.slab.planes, depth), indentation=depth)
 
-    def newton_step(self, state, force_n):
+    def newton_step(self, state, force_n, surface=None):
         """The Newton step under a given force (N), or with the indentation kept where `force_n` is None.
 
+        With a surface the step's contact is with the facets that the points face where it leads, else with those of the state.
         Where nothing touches, a force finds no stiffness: the step is then not finite.
         """
         state = self.friction.for_tangent(state)
         self.cells.refresh(state, workers=self.workers)
         residual, kept = self.cells.condensed_residual(state)
-        step, lowering = self._step_of_unknowns(state, residual.ravel()[self.slab.unknowns], force_n)
+        contact = StepContact(self.slab, state.slab, state.indentation, surface)
+        step, lowering = self._step_of_unknowns(state, residual.ravel()[self.slab.unknowns], contact, force_n)
         full = np.zeros(3 * self.slab.nodes)
         full[self.slab.unknowns] = step
         slab, bed = self.cells.recover(kept, full.reshape(-1, 3))
-        return Step(slab=slab, bed=bed, indentation=lowering)
+        return Step(slab=slab, bed=bed, indentation=lowering, planes=contact.planes)
 
-    def _step_of_unknowns(self, state, residual, force_n):
+    def _step_of_unknowns(self, state, residual, contact, force_n):
         """Step of the global unknowns, and how far the object goes down; the tangent is made positive definite where it is not."""
-        gaps, drag = self.slab.linear_gaps(state.slab), self.slab.friction_border(state.slab)
-        excess = None if force_n is None else state.force - force_n
+        excess, drag = None if force_n is None else state.force - force_n, self.slab.friction_border(state.slab)
         for shift in _shifts():
-            rubber = self._rubber_tangent(state, shift)
-            step = self.stepper.step(rubber, residual, gaps, drag=drag, excess=excess,
-                                     pressed=lambda slope, rubber=rubber: self.slab.pressed(rubber, slope, state.slab.planes))
+            step = self.stepper.step(self._rubber_tangent(state, shift), residual, contact, drag=drag, excess=excess)
             if step is not None:
                 return step
 

@@ -251,15 +251,15 @@ class Slab:
         _add_upper(self._pressed.data, rubber.indptr, rubber.indices, blocks, self._top_dofs)
         return self._pressed
 
-    def linear_gaps(self, state):
+    def linear_gaps(self, displacement, planes, indentation):
         """The gaps of the object's contact points as they depend on a step of the global unknowns, a `LinearGaps`."""
-        shapes = self.top.normal_shapes(state.planes)
+        shapes, gaps = self.top.normal_shapes(planes), self.top.gaps(displacement, planes, indentation)
         free = np.broadcast_to(self._top_dofs[:, None] >= 0, shapes.shape)
-        points = np.broadcast_to(np.arange(len(state.gaps)).reshape(*shapes.shape[:2], 1), shapes.shape)[free]
+        points = np.broadcast_to(np.arange(len(gaps)).reshape(*shapes.shape[:2], 1), shapes.shape)[free]
         columns = np.broadcast_to(self._top_dofs[:, None], shapes.shape)[free]
-        rows = sp.csr_matrix((shapes[free], (points, columns)), shape=(len(state.gaps), len(self.unknowns)))
-        return LinearGaps(gaps=state.gaps, rows=rows, lowering=state.planes.normals[:, 2],
-                          area=self.top.area * state.planes.covered, contact=self.top.contact)
+        rows = sp.csr_matrix((shapes[free], (points, columns)), shape=(len(gaps), len(self.unknowns)))
+        return LinearGaps(gaps=gaps, rows=rows, lowering=planes.normals[:, 2], area=self.top.area * planes.covered,
+                          contact=self.top.contact)
 
     def friction_border(self, state):
         """How friction ties the unknowns to the object's lowering: derivative (unknowns,) of their residual by it, and its own."""
@@ -297,6 +297,33 @@ class Slab:
         at = self._under_cover(points)
         at.resize(len(points), self.nodes)
         return at
+
+
+class StepContact:
+    """The object's contact in the course of a step from a `SlabState`; `planes` and `points` are what it is at present.
+
+    surface: looked up anew where the step leads; None: the points keep the planes that they face
+    """
+
+    def __init__(self, slab, state, indentation, surface=None):
+        self._slab, self._state, self._indentation, self._surface = slab, state, indentation, surface
+        self._face(state.planes)
+
+    def _face(self, planes):
+        self.planes, self.points = planes, self._slab.linear_gaps(self._state.displacement, planes, self._indentation)
+
+    def pressed(self, rubber, stiffness):
+        """The rubber's tangent with points of a stiffness (p,) in N/mm."""
+        return self._slab.pressed(rubber, stiffness, self.planes)
+
+    def follow(self, step, lowering):
+        """Look up what the points face after a step (unknowns,) in mm of the slab; True if there is a surface to ask."""
+        if self._surface is None:
+            return False
+        displacement = self._state.displacement.copy()
+        displacement.ravel()[self._slab.unknowns] += step
+        self._face(self._slab.facing(displacement, self._surface))
+        return True
 
 
 def _place(value, lines, fine):
