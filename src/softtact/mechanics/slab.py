@@ -18,6 +18,7 @@ from softtact.mechanics.cover_mesh import cover_mesh
 from softtact.mechanics.elements import quad8
 from softtact.mechanics.hex_mesh import extrude
 from softtact.mechanics.parallel import SERIAL, unique_rows
+from softtact.mechanics.sparsity import add_upper
 from softtact.mechanics.top_contact import FacingPlanes, TopContact
 
 
@@ -222,8 +223,10 @@ class Slab:
         number[keep] = np.arange(len(keep))
         *groups, top = [(3 * nodes[..., None] + np.arange(3)).reshape(len(nodes), -1)
                         for nodes in [*(nodes for nodes, _ in self.groups), self.top.faces]]
-        self._dofs, self._top_dofs = [number[dofs] for dofs in [*groups, *cells]], number[top]
-        indptr, indices = _upper_pattern([*self._dofs, self._top_dofs], len(keep))
+        members, self._top_dofs = [number[dofs] for dofs in [*groups, *cells]], number[top]
+        indptr, indices = _upper_pattern([*members, self._top_dofs], len(keep))
+        self._positions = [_upper_positions(indptr, indices, dofs) for dofs in members]
+        self._top_positions = _upper_positions(indptr, indices, self._top_dofs)
         self._matrix, self._pressed = (sp.csr_matrix((np.zeros(len(indices)), indices, indptr), shape=(len(keep),) * 2)
                                        for _ in range(2))
 
@@ -237,10 +240,10 @@ class Slab:
         matrix = self._matrix
         matrix.data[:] = 0.0
         blocks = workers.map(lambda group: group[1].tangent(state.displacement[group[0]]), self.groups)
-        for part, dofs in zip([*blocks, *condensed], self._dofs, strict=True):
-            _add_upper(matrix.data, matrix.indptr, matrix.indices, part, dofs)
+        for part, positions in zip([*blocks, *condensed], self._positions, strict=True):
+            add_upper(matrix.data, part, positions)
         if state.drag is not None:
-            _add_upper(matrix.data, matrix.indptr, matrix.indices, self.top.friction_tangent(state)[0], self._top_dofs)
+            add_upper(matrix.data, self.top.friction_tangent(state)[0], self._top_positions)
         return matrix
 
     def pressed(self, rubber, stiffness, planes):
@@ -248,7 +251,7 @@ class Slab:
         shapes = self.top.normal_shapes(planes)
         blocks = np.matmul((shapes * stiffness.reshape(len(shapes), -1, 1)).transpose(0, 2, 1), shapes)
         self._pressed.data[:] = rubber.data
-        _add_upper(self._pressed.data, rubber.indptr, rubber.indices, blocks, self._top_dofs)
+        add_upper(self._pressed.data, blocks, self._top_positions)
         return self._pressed
 
     def linear_gaps(self, displacement, planes, indentation):
@@ -370,17 +373,20 @@ def _upper_pattern(members, size):
 
 
 @njit(cache=True, nogil=True)
-def _add_upper(data, indptr, indices, matrices, dofs):
-    """Add element matrices (e, k, k) into the upper triangle; dofs (e, k), -1 where held."""
-    size = dofs.shape[1]
-    for e in range(matrices.shape[0]):
+def _upper_positions(indptr, indices, dofs):
+    """Places (e, k (k + 1) / 2) in the values of the upper triangle for entries (i, j >= i) of matrices of unknowns (e, k).
+
+    -1 where one is held.
+    """
+    elements, size = dofs.shape
+    out = np.full((elements, size * (size + 1) // 2), -1, np.int32)
+    for e in range(elements):
+        n = -1
         for i in range(size):
-            row = dofs[e, i]
-            if row < 0:
-                continue
-            for j in range(size):
-                column = dofs[e, j]
-                if column >= row:
+            for j in range(i, size):
+                n += 1
+                row, column = min(dofs[e, i], dofs[e, j]), max(dofs[e, i], dofs[e, j])
+                if row >= 0:
                     low, high = indptr[row], indptr[row + 1]
                     while high - low > 1:
                         middle = (low + high) // 2
@@ -388,4 +394,5 @@ def _add_upper(data, indptr, indices, matrices, dofs):
                             low = middle
                         else:
                             high = middle
-                    data[low] += matrices[e, i, j]
+                    out[e, n] = low
+    return out
