@@ -7,7 +7,7 @@ import pytest
 import trimesh
 from deck_study import CORO, NEOPRENE, POLYURETHANE
 
-from softtact.contact.penalty import Contact, penalty
+from softtact.contact.penalty import penalty
 from softtact.decks.export import deck_text, export_press, write_deck
 from softtact.decks.laws import law_card
 from softtact.decks.model import deck_model
@@ -174,13 +174,14 @@ def test_contacts_have_the_penalty_of_the_press(pair, dialect):
     model, deck = pair
     assert [(slave, master) for slave, master, *_ in deck.contacts] == [
         ("TOP", "OBJECT_SURFACE"), ("FRUSTA_FOOT", "BOARD_SURFACE"), ("FRUSTA_SIDES_EVEN", "FRUSTA_SIDES_ODD")]
-    for (_, _, behaviour, table), stiffness in zip(deck.contacts, 3 * [Contact().stiffness], strict=True):
+    laws = MeshSettings().object_contact, MeshSettings().contact, MeshSettings().contact
+    for (_, _, behaviour, table), law in zip(deck.contacts, laws, strict=True):
         if dialect == "calculix":
-            assert (behaviour, table) == ("LINEAR", [[stiffness]])
+            assert (behaviour, table) == ("LINEAR", [[law.stiffness]])
         else:
             pressure, overlap = np.array(table).T
             assert behaviour == "TABULAR"
-            assert pressure == pytest.approx(penalty(-overlap, stiffness=stiffness, smoothing=Contact().smoothing)[1])
+            assert pressure == pytest.approx(penalty(-overlap, stiffness=law.stiffness, smoothing=law.smoothing)[1])
 
 
 def test_a_deck_has_the_friction_of_the_sensor_and_none_without(pair, dialect, tmp_path):
