@@ -95,7 +95,7 @@ def loose(board):
 
 
 def cases():
-    """All of them, the default first, those with friction, which take longest, last."""
+    """All of them, the default first."""
     both, ratios = tuple(LAYERS), (1.0, 2.0, 5.0, 10.0)
     swapped = {"dielectric.frusta.tip_diameter_mm": 1.2, "dielectric.frusta.root_diameter_mm": 0.6}
     return [Case(DEFAULT, "", "all assumptions as in config/sensors/coro.yaml"),
@@ -103,9 +103,8 @@ def cases():
             *(thickness("sheet", "dielectric.sheet_thickness_mm", value, 0.5) for value in (0.25, 1.0)),
             *(thickness("cover", "cover.thickness_mm", value, 1.5) for value in (1.0, 2.0)),
             Case("swapped", "frusta, tip 0.6 and root 1.2 mm by default", "tip 1.2, root 0.6 mm, as printed", swapped),
-            loose(0.0),
-            Case("object_0.3", "friction of the object, none by default", "0.3", {"friction.object": 0.3}),
-            loose(0.1), loose(0.3)]
+            *(loose(board) for board in (0.0, 0.1, 0.3)),
+            Case("object_0.3", "friction of the object, none by default", "0.3", {"friction.object": 0.3})]
 
 
 # Presses ----------------------------------------------------------------------------------------------------------------------
@@ -114,8 +113,10 @@ def cases():
 @contextmanager
 def limited(seconds):
     """Give a `with` block so many processor seconds; then a press in it ends as if it did not converge, with what it reached."""
+    start = time.process_time()
+
     def stop(*_):
-        raise ConvergenceError(f"The next level was given up: {seconds:g} processor seconds were spent.")
+        raise ConvergenceError(f"The next level was given up after {time.process_time() - start:.0f} processor seconds in all.")
 
     signal.signal(signal.SIGPROF, stop)
     signal.setitimer(signal.ITIMER_PROF, seconds)
@@ -146,6 +147,7 @@ def measure(case, name, mesh, limit_s, default_maps=None):
     difference = np.abs(maps - (maps if default_maps is None else default_maps[:len(maps)]))
     numbers = {"indentation_mm": result.indentation_mm, "map_maximum_mm": maps.max(axis=(1, 2)),
                "largest_difference_mm": difference.max(axis=(1, 2)), "mean_difference_mm": difference.mean(axis=(1, 2)),
+               "map_minimum_mm": maps.min(axis=(1, 2)),
                "frustum_compression_mm": result.frustum_compression_mm, "overlap_mm": result.penetration_mm}
     whole = {"force_n": result.force_n.tolist(), "iterations": result.iterations.tolist(),
              "within_validity": result.within_validity.tolist()}
@@ -214,12 +216,12 @@ def _pair(values, form):
 
 def table(rows):
     """An object's table in Markdown."""
-    default = rows[0]
-    lines = [HEAD]
-    for before, row in zip([{}, *rows], rows, strict=False):
-        repeated = row["assumption"] == before.get("assumption")
-        lines.append(f"| {'' if repeated else row['assumption'] or 'default'} | " + " | ".join(cells(row, default)) + " |")
-    lines[2] = "| " + " | ".join(["default", "", *cells(default, default)[1:2], "", cells(default, default)[3], "", "", ""]) + " |"
+    default, *changed = rows
+    _, indentation, _, maximum, *_ = cells(default, default)
+    lines = [HEAD, f"| default | | {indentation} | | {maximum} | | | |"]
+    for before, row in zip(rows, changed, strict=False):
+        name = "" if row["assumption"] == before["assumption"] else row["assumption"]
+        lines.append(f"| {name} | " + " | ".join(cells(row, default)) + " |")
     return "\n".join(lines)
 
 
@@ -228,11 +230,17 @@ def ranking(rows):
     default, ranges = rows[0], {}
     for row in rows[1:]:
         share = shares(row, default)
-        ranges.setdefault(row["assumption"], []).append([share[key][-1] for key in ("indentation", "maximum", "largest")])
+        ranges.setdefault(row["assumption"], []).append([_last(share[key]) for key in ("indentation", "maximum", "largest")])
     spans = {name: np.array(values) for name, values in ranges.items() if not np.isnan(values).all()}
     order = sorted(spans, key=lambda name: -np.nanmax(np.abs(spans[name][:, 0])))
     return "\n".join(f"{place}. {name}: indentation {_range(spans[name][:, 0])} %, map's maximum {_range(spans[name][:, 1])} %, "
                      f"map up to {np.nanmax(spans[name][:, 2]):.0f} %" for place, name in enumerate(order, start=1))
+
+
+def _last(values):
+    """The value at the largest of the told forces that was reached."""
+    there = values[~np.isnan(values)]
+    return there[-1] if len(there) else np.nan
 
 
 def _range(values):
@@ -263,8 +271,11 @@ def in_order(rows):
 
 def section(name, rows):
     """What the page holds of an object."""
-    return "\n\n".join([f"## {name}", table(rows), f"By the largest change of the indentation at {TOLD_N[-1]:g} N:", ranking(rows),
-                        troubles(rows)])
+    forces = f"{TOLD_N[-1]:g} N (at {TOLD_N[0]:g} N where a press did not come so far)"
+    missing = [case.name for case in cases() if case.name not in {row["case"] for row in rows}]
+    absent = [f"Not pressed yet (`--resume` does): {', '.join(missing)}."] if missing else []
+    return "\n\n".join([f"## {name}", table(rows), f"By the largest change of the indentation at {forces}:", ranking(rows),
+                        troubles(rows), *absent])
 
 
 def write_page(rows):
