@@ -203,13 +203,14 @@ def _walls(body):
     if bed.count > 1 or not bed.geometry.neighbours.any():
         return None
     bottom, top = bed.coordinates[..., 2].min() - 0.1, bed.coordinates[..., 2].max()
-    reach = bed.geometry.root_diameter
+    half = 0.5 * bed.geometry.root_diameter + bed.geometry.wall_mm
+    reach = 2 * half
     points, facets = [], []
     for k, (axis, sign) in enumerate(DIRECTIONS):
         if not bed.geometry.neighbours[0, k]:
             continue
         corners = np.zeros((4, 3))
-        corners[:, axis] = bed.geometry.centres[0, axis] + 0.5 * sign * bed.geometry.root_diameter
+        corners[:, axis] = bed.geometry.centres[0, axis] + sign * half
         corners[:, 1 - axis] = bed.geometry.centres[0, 1 - axis] + reach * np.array([-1, -1, 1, 1])
         corners[:, 2] = [bottom, top, top, bottom]
         if np.cross(corners[1] - corners[0], corners[2] - corners[0])[axis] * sign > 0:   # the normal looks at the frustum

@@ -3,8 +3,8 @@
 A frustum touches the rest of the sensor only through its root. So its inner unknowns are eliminated frustum by frustum, in
 each from the tip upwards layer by layer (static condensation, exact within Newton's method), and the global matrix
 knows the roots only. Contact, all unilateral:
-tip and folding side on the PCB; the side on the symmetric plane towards each neighbour, attached to the root's outermost node,
-which the two neighbours share when they touch. The sheet's lower side on the frusta's sides is left out: in the unit cell
+tip and folding side on the PCB; the side on the symmetric plane towards each neighbour, which moves with the root's outermost
+node: the two neighbours share it when their roots touch. The sheet's lower side on the frusta's sides is left out: in the unit cell
 they come no nearer than 0.01 mm up to 1 MPa.
 """
 
@@ -25,13 +25,17 @@ DIRECTIONS = ((0, 1.0), (1, 1.0), (0, -1.0), (1, -1.0))   # axis and sign of the
 
 @dataclass(frozen=True)
 class BedGeometry:
-    """Frusta by their centres (n, 2), heights (n,), tip diameters (n,) in mm, and `neighbours` (n, 4) in DIRECTIONS."""
+    """Frusta by their centres (n, 2), heights (n,), tip diameters (n,) in mm, and `neighbours` (n, 4) in DIRECTIONS.
+
+    wall_mm: from the roots' outermost nodes to the planes towards the neighbours, at rest
+    """
 
     centres: np.ndarray
     heights: np.ndarray
     tip_diameters: np.ndarray
     root_diameter: float
     neighbours: np.ndarray
+    wall_mm: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -125,7 +129,7 @@ class FrustumBed:
         self.board_points = len(on_pcb) * len(values)     # the first ones
         in_layer = [np.isin(self.point_nodes[:, 8], self.mesh.layer(k)) for k in range(self.mesh.layers)]   # by the face's centre
         self.point_layer = np.argmax(in_layer, axis=0)
-        offset = np.where(self.point_neighbour < 0, -pcb_z, 0.0)
+        offset = np.where(self.point_neighbour < 0, -pcb_z, self.geometry.wall_mm)
         self.gap0 = self._along(self.coordinates) + offset
         self.point_area = self._areas(np.array([r[0] for r in records]).reshape(-1, len(weights), 9)[:, 0], slopes, weights)
         absent = (self.point_neighbour[None] >= 0) & ~self.geometry.neighbours[:, self.point_neighbour]

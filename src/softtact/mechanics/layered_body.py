@@ -336,7 +336,8 @@ def _bed(spec, centres, neighbours, law, mesh, scatter, contact, *, bottom=None)
     heights = frusta.height_mm * height_factor
     # Every cone is built with the same root; where its printed readings are swapped the tip is the wide end.
     geometry = BedGeometry(centres=centres, heights=heights, tip_diameters=frusta.tip_diameter_mm * tip_factor,
-                           root_diameter=frusta.root_diameter_mm, neighbours=neighbours)
+                           root_diameter=frusta.root_diameter_mm, neighbours=neighbours,
+                           wall_mm=0.5 * (frusta.pitch_mm - frusta.root_diameter_mm))
     return FrustumBed(geometry, law, levels=np.asarray(mesh.frustum_levels) * frusta.height_mm, root_z_mm=bottom,
                       pcb_z_mm=bottom - heights.max(), tips_held=spec.tips_held, contact=contact or mesh.contact,
                       local_over_shear=mesh.over_shear_of_layers, refinement=mesh.refinement,
