@@ -33,7 +33,7 @@ class NewtonSettings:
     smallest_scale_n: float = 10.0
     first_touch_mm: float = 0.01
     first_touch_tolerance_n: float = 0.1   # a start for the first level, not a result
-    refacing_iterations: int = 12
+    refacing_iterations: int = 6
     friction_tolerance: float = 0.3    # sliding is soft: with 1 the indentation is 0.4 % off at 1 N on 20 frusta, with this 0.01 %
     friction_growth: float = 2.0       # a single step to 4 N is 1.8 % off, two are less than 0.1 %
     friction_passes: int = 30
@@ -175,11 +175,11 @@ def _newton(body, surface, state, force, tolerance, settings):
     """Equilibrium state (None if not reached), iterations, and the last residual in N.
 
     The points' facing planes are found anew before and within each of the first steps. A point that slides to and fro past an
-    edge sees the object's height jump each time; so the planes are kept later on.
+    edge sees the object's height jump each time; so the planes are kept later on, and where no step lowers the potential.
     """
-    fresh = False
+    looking, fresh = True, False
     for iteration in range(settings.max_iterations):
-        looks = surface if iteration < settings.refacing_iterations else None
+        looks = surface if looking and iteration < settings.refacing_iterations else None
         if looks is not None:
             state = body.reface(state, body.slab.facing(state.slab.displacement, surface))
         residual = body.residual_norm(state, force)
@@ -188,10 +188,11 @@ def _newton(body, surface, state, force, tolerance, settings):
         step = body.newton_step(state, force, looks)
         state = body.reface(state, step.planes)
         trial = _line_search(body, state, step, force, residual, settings) if np.isfinite(step.largest()) else None
-        if trial is None and fresh:
+        if trial is None and fresh and looks is None:
             return None, iteration, residual
         if trial is None:
             body.cells.forget()     # of cells that hardly moved the tangents were kept
+            looking = False         # and a step that looks elsewhere need not lower the energy from here
         fresh, state = trial is None, trial or state
     return None, settings.max_iterations, residual
 
