@@ -159,7 +159,7 @@ class Sensor:
     def _read_level(body, sampling, level):
         slab, bed = level.state.slab, level.state.bed
         return (-(sampling @ slab.displacement[:, 2]), level.state.indentation,
-                float((body.slab.top.area * slab.planes.covered)[slab.gaps < 0].sum()), level.penetration_mm,
+                body.slab.top.area_under_pressure(slab), level.penetration_mm,
                 float(body.bed.compression(bed.displacement).max()), level.residual_n,
                 body.share_outside_window(level.state), level.iterations)
 

@@ -42,6 +42,17 @@ def test_a_deeper_press_needs_more_force_and_stays_out_of_the_object(cylinder_pr
     assert (cylinder_press.converged == 1).all()
 
 
+def test_the_contact_area_does_not_depend_on_how_far_overlaps_were_pressed_apart():
+    """To a point or two of 0.1 mm2: touching points were once told by their gaps, which are of either sign when pressed apart."""
+    cylinder, areas = trimesh.creation.cylinder(radius=1.8, height=3, sections=64), []
+    for allowed in (1.0, 2e-4):
+        sensor = Sensor(SMALL, LAWS, mesh=COARSE, solver=NewtonSettings(largest_penetration_mm=allowed))
+        result = sensor.press(cylinder, force_n=[0.5, 1.5], model="hyperelastic")
+        areas.append(result.contact_area_mm2)
+    assert result.penetration_mm.max() < 2e-4       # the second was pressed apart
+    np.testing.assert_allclose(areas[1], areas[0], rtol=0.02)
+
+
 def test_a_tip_between_the_contact_points_finds_its_first_touch():
     """The cap of a small sphere on a corner of the grid is nearer to the surface than any point that feels contact."""
     result = press_small(trimesh.creation.icosphere(subdivisions=4, radius=2.0), [0.2, 1.0])

@@ -33,8 +33,8 @@ class MeshSettings:
     frustum_levels: heights of the frustum's element layers as shares of its height; local_over_shear: the share of the
     frusta's volumetric stiffness that acts at every point, over mu (see `blocks`), tip_over_shear: the same in the lowest
     layer, whose edges fold (with 1 a sphere does not pass 40 N); the smaller the softer, by 2 % in all. refinement: how often
-    all elements are split in plan. coarse_walls: along the walls between cells the sheet moves as one
-    quadratic curve, 3 % stiffer and a third faster; without effect where refined.
+    all elements are split in plan. coarse_walls: along all walls between cells, not only far from the object, the
+    sheet moves as one quadratic curve: half a factor's operations, and 2 to 2.5 % of the map; without effect where refined.
     """
 
     sheet_layers: int = 1

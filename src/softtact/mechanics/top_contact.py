@@ -156,6 +156,13 @@ class TopContact:
         """Stiffness (p,) in N/mm of the points along their normals."""
         return self.contact.response(state.gaps)[2] * self.area * state.planes.covered
 
+    def area_under_pressure(self, state):
+        """Area in mm2 of the points that carry pressure under the contact as it is now, as far as the object covers it.
+
+        By the pressure, not by the gap: where overlaps were pressed apart, touching points have gaps near zero of either sign.
+        """
+        return float((self.area * state.planes.covered)[self.contact.response(state.gaps)[1] > 0].sum())
+
     def normal_shapes(self, planes):
         """Change (t, points, 3 w) of the points' gaps by the faces' unknowns."""
         normal = planes.normals.reshape(*self.values.shape[:2], 3)
