@@ -13,7 +13,7 @@ import softtact
 from softtact.errors import ConvergenceError, InputError, SofttactError
 
 UNITS = ("mm", "cm", "m", "inch")
-MODELS = ("auto", "elastic", "hyperelastic")
+MODELS = ("auto", "elastic", "foundation", "hyperelastic")
 DECK_FORMATS = ("calculix", "abaqus")
 
 

@@ -142,7 +142,6 @@ class CatalogueEntry(Section):
 class Mesh(Section):
     """Resolution of a model's mesh, and the scatter of its frusta; what is not said is the model's own default."""
 
-    edge_length_mm: PositiveFloat | None = Field(None, description="of tetrahedra; makes it a single plain layer")
     sheet_layers: PositiveInt | None = None
     cover_levels: Annotated[list[float], AfterValidator(_rising)] | None = Field(
         None, description="heights of the cover's layers of elements, from 0 to 1")
@@ -166,11 +165,17 @@ class Mesh(Section):
 
 
 class Model(Section):
-    """One mechanical model of the sensor: its mesh, the law of each layer, and the files its presses start from."""
+    """One mechanical model of the sensor: its kind, its mesh, the law of each layer, and the files its presses start from."""
 
-    mesh: Mesh
+    kind: Literal["elastic", "foundation", "hyperelastic"] = "hyperelastic"
+    mesh: Mesh = Mesh()
     laws: dict[Literal["dielectric", "cover"], Law] = {}
     needs: list[Literal["mesh", "compliance", "card_dielectric", "card_cover"]] = []
+
+    @property
+    def prepared_from(self):
+        """What its compliance is computed from."""
+        return ["frustum_law", "card_dielectric", "card_cover"] if self.kind == "foundation" else []
 
 
 class Dataset(Section):

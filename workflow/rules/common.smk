@@ -81,14 +81,25 @@ def card_of(layer):
 
 
 def model_files(wildcards):
-    """The prepared files that a model's presses start from, named as the configuration lists them under `needs`."""
+    """The prepared files that a model's presses start from, as the configuration lists them under `needs`."""
+    return _prepared(wildcards, STUDY.values.models[wildcards.model].needs)
+
+
+def compliance_files(wildcards):
+    """The prepared files that a model's compliance is computed from."""
+    return _prepared(wildcards, STUDY.values.models[wildcards.model].prepared_from)
+
+
+def _prepared(wildcards, names):
+    """Prepared files of a model by their names."""
     prepared = {
         "mesh": f"{RESULTS}/sensor/{wildcards.model}/mesh.vtu",
+        "frustum_law": f"{RESULTS}/sensor/{wildcards.model}/frustum_law.npz",
         "compliance": f"{RESULTS}/sensor/{wildcards.model}/compliance.npz",
         "card_dielectric": card_of("dielectric"),
         "card_cover": card_of("cover"),
     }
-    return {name: prepared[name] for name in STUDY.values.models[wildcards.model].needs}
+    return {name: prepared[name] for name in names}
 
 
 def press_settings(item):

@@ -13,6 +13,7 @@ rule simulate_press:
             item=press_settings(STUDY.items_of[w.set][w.item]),
             sensor=STUDY.sensor,
             model=w.model,
+            kind=STUDY.values.models[w.model].kind,
             laws=STUDY.values.models[w.model].laws,
             mesh=mesh_of(w.model),
             forces_n=STUDY.values.forces_n,

@@ -7,7 +7,9 @@ rule mesh_sensor:
         mesh=f"{RESULTS}/sensor/{{model}}/mesh.vtu",
     params:
         files=files,
-        settings=lambda w: as_settings(sensor=STUDY.sensor, model=w.model, mesh=mesh_of(w.model)),
+        settings=lambda w: as_settings(
+            sensor=STUDY.sensor, model=w.model, kind=STUDY.values.models[w.model].kind, mesh=mesh_of(w.model)
+        ),
     log:
         log_of("mesh_sensor", "{model}"),
     benchmark:
@@ -16,15 +18,36 @@ rule mesh_sensor:
         run_stage("mesh_sensor")
 
 
+rule frustum_law:
+    input:
+        code=code("frustum_law"),
+        card_dielectric=card_of("dielectric"),
+    output:
+        law=f"{RESULTS}/sensor/{{model}}/frustum_law.npz",
+    params:
+        files=files,
+        settings=lambda w: as_settings(
+            sensor=STUDY.sensor, law=STUDY.values.models[w.model].laws.get("dielectric"), mesh=mesh_of(w.model)
+        ),
+    log:
+        log_of("frustum_law", "{model}"),
+    benchmark:
+        benchmark_of("frustum_law", "{model}")
+    shell:
+        run_stage("frustum_law")
+
+
 rule precompute_compliance:
     input:
+        unpack(compliance_files),
         code=code("precompute_compliance"),
-        mesh=f"{RESULTS}/sensor/{{model}}/mesh.vtu",
     output:
         compliance=f"{RESULTS}/sensor/{{model}}/compliance.npz",
     params:
         files=files,
-        settings=as_settings(sensor=STUDY.sensor),
+        settings=lambda w: as_settings(
+            sensor=STUDY.sensor, kind=STUDY.values.models[w.model].kind, laws=STUDY.values.models[w.model].laws
+        ),
     threads: 2
     log:
         log_of("precompute_compliance", "{model}"),

@@ -4,6 +4,9 @@ import meshio
 import numpy as np
 
 from softtact.errors import InputError
+from softtact.materials.laws.neo_hooke import NeoHooke
+from softtact.mechanics.elastic import elastic_slab, map_cells
+from softtact.mechanics.foundation import foundation_slab
 from softtact.mechanics.hyperelastic import NewtonSettings
 from softtact.mechanics.layered_body import MeshSettings, build_sensor_body
 
@@ -54,3 +57,18 @@ def layered_mesh(spec, values):
     return meshio.Mesh(np.vstack([sheet.points, cover.points, bed.coordinates.reshape(-1, 3)]),
                        [(kind, nodes) for kind, nodes, _ in cells],
                        cell_data={"layer": [np.full(len(nodes), number) for _, nodes, number in cells]})
+
+
+def slab_mesh(spec, kind):
+    """Layer of the elastic model, or sheet and cover of the foundation model, as meshio meshes; `layer` counts from below."""
+    double = spec.model_copy(update={"footprint_mm": tuple(2 * side for side in spec.footprint_mm)})     # its quarter is the whole
+    cells = tuple(2 * count for count in map_cells(spec))
+    slab = elastic_slab(double, cells=cells) if kind == "elastic" else foundation_slab(double, _NO_LAW, _NO_LAW, cells=cells)
+    points = slab.points - [*(0.5 * side for side in spec.footprint_mm), 0.0]
+    layer = np.repeat(np.arange(len(slab.hexes)), slab.hexes.shape[1])
+    return meshio.Mesh(points, [("hexahedron27", slab.hexes.reshape(-1, 27)[:, _VTK_HEX27])], cell_data={"layer": [layer]})
+
+
+_NO_LAW = NeoHooke({"c10": 1.0}, bulk_modulus=1.0)     # a mesh has no material
+MESHES = {"elastic": lambda spec, mesh: slab_mesh(spec, "elastic"), "foundation": lambda spec, mesh: slab_mesh(spec, "foundation"),
+          "hyperelastic": layered_mesh}

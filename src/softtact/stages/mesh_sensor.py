@@ -1,23 +1,15 @@
-"""Mesh of a model's sensor, for ParaView and for what follows.
+"""Mesh of a model's sensor, for ParaView.
 
-outputs: mesh;  settings: sensor, model, mesh (edge_length_mm makes it the elastic layer's tetrahedra)
+outputs: mesh;  settings: sensor, model, kind, mesh (its resolution, where the kind asks for one)
 """
-
-import meshio
 
 from softtact.files import atomic_path
 from softtact.geometry.sensor_spec import SensorSpec
-from softtact.mechanics.elastic import layer_mesh
-from softtact.mechanics.layered_mesh import layered_mesh
+from softtact.mechanics.layered_mesh import MESHES
 
 
 def run(*, inputs, outputs, settings, threads=1):
     """Write the mesh as VTU."""
-    spec, mesh = SensorSpec.from_dict(settings["sensor"]), settings["mesh"]
-    if "edge_length_mm" in mesh:
-        points, tets = layer_mesh(spec.footprint_mm, spec.thickness_mm, edge_length_mm=mesh["edge_length_mm"])
-        out = meshio.Mesh(points, [("tetra", tets)])
-    else:
-        out = layered_mesh(spec, mesh)
+    mesh = MESHES[settings["kind"]](SensorSpec.from_dict(settings["sensor"]), settings["mesh"])
     with atomic_path(outputs["mesh"]) as temporary:
-        out.write(temporary, file_format="vtu")
+        mesh.write(temporary, file_format="vtu")

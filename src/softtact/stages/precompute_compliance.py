@@ -1,21 +1,24 @@
-"""Surface flexibility of the elastic layer, once per sensor.
+"""What a fast model's presses start from, once per sensor: the elastic layer's flexibility, or the slab's on its frusta.
 
-inputs: mesh;  outputs: compliance;  settings: sensor
+inputs: for a foundation frustum_law, card_dielectric, card_cover;  outputs: compliance;  settings: sensor, kind, laws {layer: law}
 """
-
-import meshio
 
 from softtact.files import atomic_path
 from softtact.geometry.sensor_spec import SensorSpec
-from softtact.mechanics.elastic import surface_compliance
+from softtact.materials.cards import law_from_card, load_card
+from softtact.mechanics.elastic import elastic_compliance
+from softtact.mechanics.foundation import foundation_flexibility
+from softtact.mechanics.frustum_law import FrustumLaw
 
 
 def run(*, inputs, outputs, settings, threads=1):
-    """Factor the layer and solve for a unit load at each surface node."""
+    """Condense a quarter of the layers four times, and write what is left."""
     spec = SensorSpec.from_dict(settings["sensor"])
-    mesh = meshio.read(inputs["mesh"])
-    layer = spec.elastic_layer
-    compliance = surface_compliance(mesh.points, mesh.cells_dict["tetra"].astype("int64"), young_mpa=layer.young_mpa,
-                                    poisson=layer.poisson, map_x_mm=spec.map_x_mm, map_y_mm=spec.map_y_mm)
+    if settings["kind"] == "elastic":
+        compliance = elastic_compliance(spec, threads=threads)
+    else:
+        laws = {layer: law_from_card(load_card(inputs[f"card_{layer}"]), law) for layer, law in settings["laws"].items()}
+        compliance = foundation_flexibility(spec, dielectric_law=laws["dielectric"], cover_law=laws["cover"],
+                                            frustum=FrustumLaw.load(inputs["frustum_law"]), threads=threads)
     with atomic_path(outputs["compliance"]) as temporary:
         compliance.save(temporary)

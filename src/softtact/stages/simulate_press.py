@@ -1,7 +1,7 @@
 """One item pressed with one model through all forces.
 
-inputs: object (STL), and of compliance, card_dielectric, card_cover what the model needs
-outputs: press;  settings: item {name, set, unit, pose}, sensor, model, laws {layer: law}, mesh, forces_n
+inputs: object (STL), and of mesh, compliance, card_dielectric, card_cover what the model needs
+outputs: press;  settings: item {name, set, unit, pose}, sensor, model, kind, laws {layer: law}, mesh, forces_n
 """
 
 from softtact.errors import ConvergenceError
@@ -10,8 +10,11 @@ from softtact.geometry.pose import Pose
 from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.cards import law_from_card, load_card
 from softtact.mechanics.elastic import Compliance
+from softtact.mechanics.foundation import FoundationFlexibility
 from softtact.mechanics.layered_mesh import frustum_scatter, mesh_settings, newton_settings
 from softtact.sensor import Sensor
+
+COMPLIANCES = {"elastic": Compliance, "foundation": FoundationFlexibility}
 
 
 def run(*, inputs, outputs, settings, threads=1):
@@ -19,17 +22,17 @@ def run(*, inputs, outputs, settings, threads=1):
     item, mesh = settings["item"], settings["mesh"]
     spec = SensorSpec.from_dict(settings["sensor"])
     names = {"model": settings["model"], "set": item["set"], "item": item["name"]}
-    sensor = Sensor(spec, laws=_laws(inputs, settings["laws"]), attributes=names)
-    if "compliance" in inputs:
-        sensor.compliance, solver = Compliance.load(inputs["compliance"]), "elastic"
+    kind = settings["kind"]
+    if kind in COMPLIANCES:     # a press needs no laws then: the compliance knows them
+        sensor = Sensor(spec, laws={}, files={kind: COMPLIANCES[kind].load(inputs["compliance"])}, attributes=names)
     else:
-        sensor.mesh, sensor.solver = mesh_settings(mesh), newton_settings(mesh)
-        sensor.scatter, solver = frustum_scatter(spec, mesh), "hyperelastic"
+        sensor = Sensor(spec, laws=_laws(inputs, settings["laws"]), mesh=mesh_settings(mesh), solver=newton_settings(mesh),
+                        scatter=frustum_scatter(spec, mesh), attributes=names)
     pose = None if item["pose"] is None else Pose.from_values(item["pose"])
     label = f"{item['set']}/{item['name']}/{settings['model']}"
     try:
         result = sensor.press(read_mesh(inputs["object"], unit=item["unit"]), pose=pose, force_n=settings["forces_n"],
-                              model=solver, label=label, threads=threads)
+                              model=kind, label=label, threads=threads)
     except ConvergenceError as error:
         raise ConvergenceError(f"{label}: {error}", result=error.result) from None
     result.write(outputs["press"], settings=settings)

@@ -1,0 +1,128 @@
+"""What one frustum does to the sheet above it: its unit cell's nonlinear law, and its linear stiffness against all else.
+
+The cell is the hyperelastic one: any law and geometry; board, folding sides and neighbours included. Of the stiffness K of the
+root's nodes (tip held, at rest) the part that a straight descent meets is taken out and replaced by the cell's force:
+    K 1 = k b,  1.b = 1:    forces on the root = (K - k b b') u + b p(w),   w = b.u
+so that small displacements of any kind meet the frustum's own linear stiffness, and a compression w meets the cell's force p(w).
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import trimesh
+from scipy.interpolate import PchipInterpolator
+
+from softtact.contact.height_field import HeightField
+from softtact.errors import ConvergenceError
+from softtact.mechanics.hyperelastic import NewtonSettings, press_levels
+from softtact.mechanics.layered_body import MeshSettings, build_unit_cell
+
+_FIRST_N, _LEVELS_A_DECADE = 2e-3, 9
+_PRESSURE_MPA = 2.0      # on the cell, up to which the law is asked for: about five times that of 50 N on a flat punch of 11 mm
+
+
+@dataclass(frozen=True)
+class FrustumLaw:
+    """force_n (f,) of one frustum at compressions compression_mm (f,), both from 0 on; beyond, the last slope goes on.
+
+    root_xy (m, 2) in mm: the root's nodes about the axis;  rest (3 m, 3 m) in N/mm: stiffness against all else;  descent (3 m,): b
+    """
+
+    force_n: np.ndarray
+    compression_mm: np.ndarray
+    root_xy: np.ndarray
+    rest: np.ndarray
+    descent: np.ndarray
+
+    @cached_property
+    def _curve(self):
+        return PchipInterpolator(self.force_n, self.compression_mm)
+
+    @cached_property
+    def _curve_slope(self):
+        return self._curve.derivative()
+
+    @property
+    def limit_mm(self):
+        """Largest compression that the cell reached."""
+        return float(self.compression_mm[-1])
+
+    def extension(self, force):
+        """Compression in mm under forces >= 0 in N, of any shape."""
+        inside = np.minimum(force, self.force_n[-1])
+        return self._curve(inside) + self._last_slope * (force - inside)
+
+    def slope(self, force):
+        """Derivative of `extension` in mm/N."""
+        return np.where(force < self.force_n[-1], self._curve_slope(np.minimum(force, self.force_n[-1])), self._last_slope)
+
+    @cached_property
+    def _last_slope(self):
+        return float(self._curve_slope(self.force_n[-1]))
+
+    def save(self, path):
+        """Write as a NumPy archive."""
+        np.savez(path, **self.arrays())
+
+    @classmethod
+    def load(cls, path):
+        """Read what `save` wrote."""
+        with np.load(path, allow_pickle=False) as data:
+            return cls(**dict(data))
+
+    def arrays(self):
+        """All fields by name, to be saved."""
+        return {name: getattr(self, name) for name in ("force_n", "compression_mm", "root_xy", "rest", "descent")}
+
+
+def frustum_law(spec, law, *, mesh=None, pressure_mpa=_PRESSURE_MPA):
+    """The `FrustumLaw` of a sensor's frusta of a hyperelastic law, from its unit cell up to a pressure, or as far as it goes."""
+    body = build_unit_cell(spec, dielectric_law=law, mesh=mesh or MeshSettings())
+    bed = body.bed
+    root_xy = bed.coordinates[0][bed.root, :2] - bed.geometry.centres[0]
+    stiffness = _root_stiffness(bed)
+    straight = np.zeros((len(root_xy), 3))
+    straight[:, 2] = 1.0
+    straight = straight.ravel()
+    along = stiffness @ straight
+    k = float(straight @ along)
+    descent = along / k
+    force, compression = _cell_curve(spec, body, descent, pressure_mpa * spec.dielectric.frusta.pitch_mm**2)
+    body.close()
+    return FrustumLaw(force_n=force, compression_mm=compression, root_xy=root_xy, descent=descent,
+                      rest=stiffness - k * np.outer(descent, descent))
+
+
+def _root_stiffness(bed):
+    """Stiffness (3 m, 3 m) of a frustum's root nodes at rest, the tip standing on the board."""
+    size = 3 * bed.nodes
+    tangents = bed.block.tangent(bed.per_element(np.zeros((1, bed.nodes, 3))))
+    stiffness = np.zeros((size, size))
+    for element, nodes in zip(tangents, bed.mesh.hexes, strict=True):
+        dofs = (3 * nodes[:, None] + np.arange(3)).ravel()
+        stiffness[np.ix_(dofs, dofs)] += element
+    inner = np.setdiff1d(bed.inner, 3 * bed.tip + 2)
+    outer = bed.root_dofs
+    coupling = stiffness[np.ix_(inner, outer)]
+    return stiffness[np.ix_(outer, outer)] - coupling.T @ np.linalg.solve(stiffness[np.ix_(inner, inner)], coupling)
+
+
+def _cell_curve(spec, body, descent, largest_n):
+    """Forces and compressions (f,) of the cell under a plate, from 0 up to `largest_n`, or as far as it can be pressed."""
+    plate = trimesh.creation.box((4 * spec.dielectric.frusta.pitch_mm,) * 2 + (1.0,))
+    plate.apply_translation([0, 0, 0.5])
+    forces = np.geomspace(_FIRST_N, largest_n, int(np.ceil(_LEVELS_A_DECADE * np.log10(largest_n / _FIRST_N))))
+    settings = NewtonSettings(contact_passes=0, first_touch_mm=1e-3, smallest_scale_n=0.05, smallest_increment_n=1e-3)
+    reached = [(0.0, 0.0)]
+    try:
+        for level in press_levels(body, HeightField(plate), forces, settings=settings):
+            root = level.state.bed.displacement[0][body.bed.root].ravel()
+            compression = -float(descent @ root)
+            if compression <= reached[-1][1]:
+                break
+            reached.append((level.force_n, compression))
+    except ConvergenceError:
+        if len(reached) < 10:
+            raise
+    return tuple(np.array(reached).T)

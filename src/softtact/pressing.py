@@ -1,0 +1,150 @@
+"""A press of a placed object with one model: from the object's underside and forces to a `PressResult`."""
+
+import time
+
+import numpy as np
+
+from softtact.contact.height_field import HeightField
+from softtact.contact.object_points import Underside
+from softtact.errors import ConvergenceError
+from softtact.mechanics import hyperelastic
+from softtact.mechanics.elastic import press_layer
+from softtact.mechanics.foundation_press import FoundationMaps, press_foundation
+from softtact.press_result import PressResult
+from softtact.progress import announce, progress
+from softtact.sensing.capacitance import ideal_counts
+
+_DEEPEST_LINEAR = 0.5     # of the layer's thickness: a linear layer does not know that it ends
+_FULL_POCKET = 0.8        # of a frustum's height: above, its pocket is full and contacts begin that the models leave out
+_MARGIN, _LEAST_MARGIN_MM = 1.3, 0.1     # of the depth on springs, within which points are looked for at first
+_RISE = 1.15              # of the object's depth: points within may touch
+
+
+def press_elastic(sensor, placed, forces, *, label, threads):
+    """All levels at once with the elastic model."""
+    start, compliance = time.perf_counter(), sensor.prepared("elastic", threads)
+    underside = Underside(HeightField(placed), compliance.grid)
+    points, press = _within_reach(underside, compliance.bedding, forces, sensor.spec.thickness_mm,
+                                  lambda points: press_layer(compliance, points, forces), lambda press: press.contact.depth[-1])
+    contact = press.contact
+    area = points.covered * np.prod(compliance.grid.step)
+    unknown = np.full(len(forces), np.nan)
+    seconds = np.full(len(forces), (time.perf_counter() - start) / len(forces))
+    return make_result(sensor, "elastic", "conjugate gradients", press.maps, forces, seconds, indentation_mm=contact.depth,
+                       contact_area_mm2=area @ (contact.force > 0), penetration_mm=contact.penetration,
+                       within_validity=contact.depth - underside.lowest_mm < _DEEPEST_LINEAR * sensor.spec.thickness_mm,
+                       frustum_compression_mm=unknown, residual_n=unknown, outside_card=unknown, iterations=contact.iterations)
+
+
+def press_on_foundation(sensor, placed, forces, *, label, threads):
+    """Level by level with the foundation model."""
+    start, flexibility = time.perf_counter(), sensor.prepared("foundation", threads)
+    underside = Underside(HeightField(placed), flexibility.grid)
+    levels, times = [], []
+
+    def solve(points):
+        levels.clear()
+        times.clear()
+        found = press_foundation(flexibility, points, forces)
+        levels.extend(_timed(found, forces, label, times, start=start))
+        return points
+
+    try:
+        points, _ = _within_reach(underside, flexibility.bedding, forces, sensor.spec.thickness_mm, solve,
+                                  lambda _: levels[-1].depth)
+    except ConvergenceError as error:
+        error.result = None
+        raise
+    area = points.covered * np.prod(flexibility.grid.step)
+    compression = np.array([level.compression.max() for level in levels])
+    deepest = min(flexibility.law.limit_mm, _FULL_POCKET * sensor.spec.dielectric.frusta.height_mm)
+    unknown = np.full(len(levels), np.nan)
+    numbers = {"indentation_mm": [level.depth for level in levels], "penetration_mm": [level.penetration for level in levels],
+               "contact_area_mm2": [area[level.touching].sum() for level in levels],
+               "iterations": [level.iterations for level in levels], "frustum_compression_mm": compression}
+    return make_result(sensor, "foundation", "dense", FoundationMaps(flexibility, points)(levels), forces, np.array(times),
+                       within_validity=compression < deepest, residual_n=unknown, outside_card=unknown, **numbers)
+
+
+def _within_reach(underside, bedding, forces, deepest, solve, depth_of):
+    """Points as far as the object may come down, and what `solve` makes of them; again with more where it came down further.
+
+    Beside the object the surface rises, so points a little above its depth can touch, too.
+    """
+    reach = _MARGIN * underside.depth_on_springs(forces[-1], bedding) + _LEAST_MARGIN_MM
+    while True:
+        reach = min(reach, deepest)
+        points = underside.points(reach)
+        found = solve(points)
+        if reach == deepest or _RISE * (depth_of(found) - underside.lowest_mm) <= reach:
+            return points, found
+        reach *= _MARGIN
+
+
+def press_hyperelastic(sensor, placed, forces, *, label, threads):
+    """Level by level with the hyperelastic model; a ConvergenceError holds the levels before."""
+    surface = HeightField(placed)
+    body = sensor.body(threads=threads, surface=surface)
+    grid = np.stack(np.meshgrid(sensor.spec.map_x_mm, sensor.spec.map_y_mm), axis=-1).reshape(-1, 2)
+    sampling = body.slab.sampling(grid)
+    announce(f"{label}: {body.bed.count} frusta, {len(forces)} force levels of the hyperelastic model, some seconds each")
+    record, times = [], []
+    levels = (record.append(_read_level(body, sampling, level))
+              for level in hyperelastic.press_levels(body, surface, forces, settings=sensor.solver))
+    try:
+        _timed(levels, forces, label, times)
+    except ConvergenceError as error:
+        error.result = _of_record(sensor, body, record, forces, times) if record else None
+        raise
+    finally:
+        body.close()
+    return _of_record(sensor, body, record, forces, times)
+
+
+def _of_record(sensor, body, record, forces, times):
+    maps, *numbers = zip(*record, strict=True)
+    names = ("indentation_mm", "contact_area_mm2", "penetration_mm", "frustum_compression_mm", "residual_n", "outside_card",
+             "iterations")
+    numbers = dict(zip(names, map(np.array, numbers), strict=True))
+    valid = numbers["frustum_compression_mm"] < _FULL_POCKET * sensor.spec.dielectric.frusta.height_mm
+    return make_result(sensor, "hyperelastic", body.solver.name, np.stack(maps), forces[:len(maps)], np.array(times),
+                       within_validity=valid, **numbers)
+
+
+def _read_level(body, sampling, level):
+    slab, bed = level.state.slab, level.state.bed
+    return (-(sampling @ slab.displacement[:, 2]), level.state.indentation, body.slab.top.area_under_pressure(slab),
+            level.penetration_mm, float(body.bed.compression(bed.displacement).max()), level.residual_n,
+            body.share_outside_window(level.state), level.iterations)
+
+
+PRESSES = {"elastic": press_elastic, "foundation": press_on_foundation, "hyperelastic": press_hyperelastic}
+
+
+def make_result(sensor, model, solver, maps, forces, times, **numbers):
+    """A `PressResult` of maps (l, points) or (l, ny, nx) and numbers by the result's names."""
+    spec, maps = sensor.spec, maps.reshape(len(forces), *sensor.spec.map_shape)
+    flags = {"converged": np.ones(len(forces), dtype=np.int8),
+             "within_validity": np.asarray(numbers.pop("within_validity"), dtype=np.int8)}
+    return PressResult(deformation_map_mm=maps, tactile_map=ideal_counts(spec, maps), force_n=forces, wall_time_s=times,
+                       x_mm=spec.map_x_mm, y_mm=spec.map_y_mm, model=model, sensor=spec.name, solver=solver,
+                       attributes={**_friction(spec, model), **sensor.attributes}, **flags,
+                       **{name: np.asarray(values) for name, values in numbers.items()})
+
+
+def _friction(spec, model):
+    """Attributes that state the friction of a result."""
+    if model != "hyperelastic":
+        return {"friction": f"none: the {model} model knows no friction"}
+    return {"friction_object": spec.friction.object, "friction_board": spec.friction.board, "tips_held": int(spec.tips_held)}
+
+
+def _timed(levels, forces, label, times, *, start=None):
+    """The levels as a list, and into `times` the seconds that each took; the solver's preparation counts to the first."""
+    out, start = [], start or time.perf_counter()
+    for level in progress(levels, label=label, total=len(forces)):
+        now = time.perf_counter()
+        out.append(level)
+        times.append(now - start)
+        start = now
+    return out

@@ -1,0 +1,19 @@
+"""The nonlinear law of one frustum, from its hyperelastic unit cell, for the foundation model.
+
+inputs: card_dielectric;  outputs: law;  settings: sensor, law, mesh (of the cell, as for the hyperelastic model)
+"""
+
+from softtact.files import atomic_path
+from softtact.geometry.sensor_spec import SensorSpec
+from softtact.materials.cards import law_from_card, load_card
+from softtact.mechanics.frustum_law import frustum_law
+from softtact.mechanics.layered_mesh import mesh_settings
+
+
+def run(*, inputs, outputs, settings, threads=1):
+    """Press the cell as far as it goes, and keep force against compression."""
+    spec = SensorSpec.from_dict(settings["sensor"])
+    law = law_from_card(load_card(inputs["card_dielectric"]), settings["law"])
+    found = frustum_law(spec, law, mesh=mesh_settings(settings["mesh"]))
+    with atomic_path(outputs["law"]) as temporary:
+        found.save(temporary)
