@@ -75,7 +75,11 @@ def _add_press(commands):
     command.add_argument("--force", type=float, action="append", required=True, metavar="N",
                          help="force in N; repeat it for several levels")
     command.add_argument("--model", choices=MODELS, default="auto",
-                         help="auto takes the one that the mesh's complexity asks for (default)")
+                         help="auto takes the one that the policy asks for (default)")
+    command.add_argument("--policy", choices=("paper", "error"), default="paper",
+                         help="of auto: the mesh's complexity as in the paper (default), or the error to expect")
+    command.add_argument("--tolerance", type=float, default=0.01, metavar="MM",
+                         help="of --policy error: root mean square over the map, in mm (default: 0.01)")
     command.add_argument("--out", type=Path, metavar="FILE.nc", help="write the maps as NetCDF")
     command.add_argument("--plot", type=Path, metavar="FILE.png", help="draw deformation map and taxels")
 
@@ -89,7 +93,8 @@ def _press(options):
     mesh = read_mesh(options.mesh, unit=options.unit)
     check_over_sensor(place(mesh, pose=pose), spec.footprint_mm, name=str(options.mesh))
     try:
-        result = softtact.load_sensor(options.sensor).press(mesh, pose=pose, force_n=forces, model=options.model)
+        result = softtact.load_sensor(options.sensor).press(mesh, pose=pose, force_n=forces, model=options.model,
+                                                              policy=options.policy, tolerance_mm=options.tolerance)
     except ConvergenceError as error:
         if error.result is not None:
             _show_press(error.result, options)
@@ -124,9 +129,11 @@ def _press_summary(result):
               "contact_area_mm2": result.contact_area_mm2,
               "largest_deformation_mm": result.deformation_map_mm.max(axis=(1, 2)),
               "tactile_map": result.tactile_map}
-    names = ("penetration_mm", "frustum_compression_mm", "residual_n", "outside_card", "iterations", "wall_time_s")
+    names = ("penetration_mm", "frustum_compression_mm", "residual_n", "outside_card", "expected_error_mm", "within_validity",
+             "iterations", "wall_time_s")
     levels |= {name: getattr(result, name) for name in names}
-    return {"model": result.model, "solver": result.solver} | {name: _or_none(values) for name, values in levels.items()}
+    facts = {name: getattr(result, name) for name in ("model", "solver", "why")}
+    return facts | {name: _or_none(values) for name, values in levels.items()}
 
 
 def _or_none(values):
@@ -136,6 +143,8 @@ def _or_none(values):
 
 def _press_lines(summary):
     yield f"model: {summary['model']}, linear solver: {summary['solver']}"
+    if summary["why"]:
+        yield f"chosen because: {summary['why']}"
     yield f"{'force, N':>10}{'indentation, mm':>18}{'contact, mm2':>15}{'deepest, mm':>14}{'counts, sum':>14}"
     names = ("force_n", "indentation_mm", "contact_area_mm2", "largest_deformation_mm", "tactile_map")
     for force, depth, area, deepest, counts in zip(*(summary[name] for name in names), strict=True):
@@ -147,8 +156,15 @@ def _quality_lines(summary):
     """How well the levels were solved, by the worst of them."""
     yield f"iterations: {sum(summary['iterations'])}; deepest overlap in a contact: {1e3 * max(summary['penetration_mm']):.2g} um"
     if None not in summary["residual_n"]:
-        yield (f"largest unbalanced nodal force: {max(summary['residual_n']):.2g} N; "
-               f"most compressed frustum: {max(summary['frustum_compression_mm']):.3f} mm")
+        yield f"largest unbalanced nodal force: {max(summary['residual_n']):.2g} N"
+    if None not in summary["frustum_compression_mm"]:
+        yield f"most compressed frustum: {max(summary['frustum_compression_mm']):.3f} mm"
+    if None not in summary["expected_error_mm"]:
+        yield f"error to expect against the hyperelastic model: {1e3 * max(summary['expected_error_mm']):.2g} um, root mean square"
+    if not all(summary["within_validity"]):
+        forces = ", ".join(f"{force:g}" for force, valid in zip(summary["force_n"], summary["within_validity"], strict=True)
+                           if not valid)
+        yield f"beyond what the model is valid for: {forces} N"
     if None not in summary["outside_card"]:
         yield f"strained beyond the data behind its law: {max(summary['outside_card']):.1%} of a layer"
 

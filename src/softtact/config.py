@@ -113,6 +113,14 @@ class Complexity(Section):
     thresholds: Thresholds
 
 
+class Choice(Section):
+    """How the policies that choose a model are compared."""
+
+    models: dict[Literal["elastic", "foundation", "hyperelastic"], Name] = Field(description="the study's model of each kind")
+    tolerances_mm: Annotated[list[PositiveFloat], Field(min_length=1), AfterValidator(_rising)] = Field(
+        description="errors that a user would accept, root mean square over the map")
+
+
 class ItemSet(Section):
     """Objects of the catalogue, by name or `all` of a set, and the poses in which each is pressed."""
 
@@ -195,6 +203,7 @@ class Values(Section):
     objects: Objects
     ftir: Ftir
     complexity: Complexity
+    choice: Choice
     forces_n: Forces
     models: dict[Name, Model]
     tested: list[Name] = Field(min_length=1, description="models that a network is trained for")
@@ -338,7 +347,7 @@ def _materials(values, spec, folder):
 
 
 def _check_models(values):
-    for name in [*values.tested, values.reference]:
+    for name in [*values.tested, values.reference, *values.choice.models.values()]:
         _refuse_unknown(name, list(values.models), kind="model", where="the configuration, at 'models'")
 
 

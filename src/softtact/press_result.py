@@ -15,7 +15,9 @@ class PressResult:
     force_n, indentation_mm, contact_area_mm2, penetration_mm, wall_time_s, iterations, converged, within_validity (force,)
     frustum_compression_mm (force,): of the most compressed frustum;  residual_n (force,): largest unbalanced nodal force
     outside_card (force,): share of a layer's volume strained beyond the data its law was fitted to, the larger of the layers'
-    The last three are nan where the model, or the law, does not tell.
+    expected_error_mm (force,): root mean square over the map, against the hyperelastic model, where the model was chosen by it
+    The last four are nan where the model, the law or the policy does not tell.
+    why: what made the choice of the model, where it was not the user's
     x_mm (x,), y_mm (y,): the map's grid;  model;  solver: the linear solver's name
     """
 
@@ -37,11 +39,16 @@ class PressResult:
     model: str
     sensor: str
     solver: str
+    expected_error_mm: np.ndarray | None = None
+    why: str = ""
     attributes: dict = field(default_factory=dict)
 
+    def __post_init__(self):
+        if self.expected_error_mm is None:
+            object.__setattr__(self, "expected_error_mm", np.full(len(self.force_n), np.nan))
+
     _PER_FORCE = ("indentation_mm", "contact_area_mm2", "penetration_mm", "frustum_compression_mm", "residual_n",
-                  "outside_card", "iterations",
-                  "converged", "within_validity", "wall_time_s")
+                  "outside_card", "expected_error_mm", "iterations", "converged", "within_validity", "wall_time_s")
 
     def to_dataset(self):
         """The result as an xarray dataset with dimensions force, y, x, row, column."""
@@ -51,7 +58,7 @@ class PressResult:
         variables["deformation_map_mm"] = (("force", "y", "x"), self.deformation_map_mm, {"units": "mm"})
         variables["tactile_map"] = (("force", "row", "column"), self.tactile_map, {"units": "counts"})
         variables["force_n"] = ("force", self.force_n, {"units": "N"})
-        attributes = {"model": self.model, "sensor": self.sensor, "solver": self.solver, **self.attributes}
+        attributes = {"model": self.model, "sensor": self.sensor, "solver": self.solver, "why": self.why, **self.attributes}
         return xarray.Dataset(variables, coords={"x": self.x_mm, "y": self.y_mm}, attrs=attributes)
 
     def write(self, path, *, settings=None, seed=None):

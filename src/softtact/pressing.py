@@ -45,25 +45,29 @@ def press_on_foundation(sensor, placed, forces, *, label, threads):
     def solve(points):
         levels.clear()
         times.clear()
-        found = press_foundation(flexibility, points, forces)
-        levels.extend(_timed(found, forces, label, times, start=start))
-        return points
+        record = (levels.append(level) for level in press_foundation(flexibility, points, forces))
+        try:
+            _timed(record, forces, label, times, start=start)
+        except ConvergenceError as error:
+            error.result = _of_levels(sensor, flexibility, points, levels, forces, times) if levels else None
+            raise
 
-    try:
-        points, _ = _within_reach(underside, flexibility.bedding, forces, sensor.spec.thickness_mm, solve,
-                                  lambda _: levels[-1].depth)
-    except ConvergenceError as error:
-        error.result = None
-        raise
-    area = points.covered * np.prod(flexibility.grid.step)
+    points, _ = _within_reach(underside, flexibility.bedding, forces, sensor.spec.thickness_mm, solve, lambda _: levels[-1].depth)
+    return _of_levels(sensor, flexibility, points, levels, forces, times)
+
+
+def _of_levels(sensor, flexibility, points, levels, forces, times):
+    """The result of a foundation press' levels, be it those before one that was not reached."""
+    area, count = points.covered * np.prod(flexibility.grid.step), len(levels)
     compression = np.array([level.compression.max() for level in levels])
     deepest = min(flexibility.law.limit_mm, _FULL_POCKET * sensor.spec.dielectric.frusta.height_mm)
-    unknown = np.full(len(levels), np.nan)
+    unknown = np.full(count, np.nan)
     numbers = {"indentation_mm": [level.depth for level in levels], "penetration_mm": [level.penetration for level in levels],
                "contact_area_mm2": [area[level.touching].sum() for level in levels],
                "iterations": [level.iterations for level in levels], "frustum_compression_mm": compression}
-    return make_result(sensor, "foundation", "dense", FoundationMaps(flexibility, points)(levels), forces, np.array(times),
-                       within_validity=compression < deepest, residual_n=unknown, outside_card=unknown, **numbers)
+    return make_result(sensor, "foundation", "dense", FoundationMaps(flexibility, points)(levels), forces[:count],
+                       np.array(times[:count]), within_validity=compression < deepest, residual_n=unknown, outside_card=unknown,
+                       **numbers)
 
 
 def _within_reach(underside, bedding, forces, deepest, solve, depth_of):

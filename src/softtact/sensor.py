@@ -11,10 +11,11 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from softtact.choice import TOLERANCE_MM, press_auto
 from softtact.errors import InputError
-from softtact.geometry.complexity import choose_model, score
 from softtact.geometry.meshes import check_over_sensor, place
 from softtact.geometry.sensor_spec import SensorSpec
+from softtact.many import press_many, raise_first
 from softtact.materials.config import law_from_printed
 from softtact.mechanics import hyperelastic
 from softtact.mechanics.layered_body import MeshSettings, build_sensor_body
@@ -64,24 +65,44 @@ class Sensor:
     scatter: tuple | None = None
     attributes: dict = field(default_factory=dict)
 
-    def press(self, mesh, *, pose=None, force_n, model="auto", label="press", threads=None):
+    def press(self, mesh, *, pose=None, force_n, model="auto", policy="paper", tolerance_mm=TOLERANCE_MM, label="press",
+              threads=None):
         """Press a mesh (trimesh, mm) through forces (N, one or an increasing list) and return a `PressResult`.
 
         pose: `Pose` of the mesh in the sensor frame; by default its bounding box is centred over the sensor, its lowest
-        side down. model: elastic, foundation, hyperelastic, or auto (chosen by the complexity of the contact). threads: by
-        default one for each core. Raises ConvergenceError at a force that is not reached; its `result` holds the forces before.
+        side down. model: elastic, foundation, hyperelastic, or auto: chosen by a policy, `paper` (complexity of the contact)
+        or `error` (the cheapest model that is expected to be within `tolerance_mm` of the hyperelastic one; see `choice`).
+        threads: by default one for each core.
+        Raises ConvergenceError at a force that is not reached; its `result` holds the forces before.
         """
         if model not in MODELS:
             raise InputError(f"Model {model!r} is unknown; use one of {', '.join(MODELS)}.")
         forces = self.checked_forces(force_n)
         placed = place(mesh, pose=pose)
         check_over_sensor(placed, self.spec.footprint_mm)
-        if model == "auto":
-            model = self.choose(placed)
         threads = threads or _cores()
         # Dense products of some hundred rows would wait for each other on more threads, up to five times as long.
         with threadpool_limits(limits=threads if model == "elastic" else 1):
+            if model == "auto":
+                return press_auto(self, placed, forces, label=label, threads=threads, policy=policy, tolerance_mm=tolerance_mm)
             return PRESSES[model](self, placed, forces, label=label, threads=threads)
+
+    def press_many(self, meshes, poses=None, *, force_n, model="auto", workers=None, failures="raise", label="presses", **options):
+        """Press each of `meshes` in its pose, all through the same forces; a list of `PressResult`s in their order.
+
+        meshes: one for each press, or a single one for all poses;  poses: a `Pose` or None (centred) for each press
+        workers: processes, by default one for each core;  failures: `raise` the first, after all are done, or `keep` each
+        error in its press' place;  options: policy, tolerance_mm, as for `press`
+        """
+        meshes = list(meshes) if isinstance(meshes, (list, tuple)) else [meshes] * len(poses)
+        poses = list(poses) if poses is not None else [None] * len(meshes)
+        if len(meshes) != len(poses):
+            raise InputError(f"There are {len(meshes)} meshes and {len(poses)} poses; give one pose for each mesh, or one mesh.")
+        if failures not in ("raise", "keep"):
+            raise InputError(f"failures={failures!r} is unknown; write 'raise' or 'keep'.")
+        results = press_many(self, meshes, poses, self.checked_forces(force_n), model=model, workers=workers or _cores(),
+                             label=label, options=options)
+        return raise_first(results) if failures == "raise" else results
 
     def prepared(self, model, threads=1):
         """What a fast model starts from: `Compliance` or `FoundationFlexibility`, computed on first use."""
@@ -94,11 +115,6 @@ class Sensor:
         """The `LayeredBody` that the hyperelastic model presses on."""
         return build_sensor_body(self.spec, dielectric_law=self.laws["dielectric"], cover_law=self.laws["cover"],
                                  mesh=self.mesh, scatter=self.scatter, threads=threads, surface=surface)
-
-    def choose(self, placed):
-        """The model that the contact of a placed mesh asks for (PAPER section 3.3.1)."""
-        counts = score(placed.triangles, footprint_mm=self.spec.footprint_mm, reach_mm=self.spec.thickness_mm)
-        return choose_model(counts.NPt, counts.CHt, counts.NPo, counts.CHo)
 
     def checked_forces(self, force_n):
         """Forces (N) as an increasing array within the sensor's range; others are refused."""

@@ -2,7 +2,7 @@
 
 GRASPS = list(STUDY.items_of["grasps"].values())
 GRASP_UNITS = {item.id: item.unit for item in GRASPS}
-FIGURES = ("fig4_complexity", "fig5_ftir", "fig6_ssim", "fig7_maps")
+FIGURES = ("fig4_complexity", "fig5_ftir", "fig6_ssim", "fig7_maps", "fig8_policies")
 
 
 def figure_files(name):
@@ -50,6 +50,27 @@ rule draw_fig4_complexity:
         benchmark_of("draw_fig4_complexity")
     shell:
         run_stage("draw_fig4_complexity")
+
+
+rule compare_policies:
+    input:
+        code=code("compare_policies"),
+        complexity=rules.score_complexity.output.table,
+        **{kind: presses([model]) for kind, model in STUDY.values.choice.models.items()},
+    output:
+        presses=f"{RESULTS}/choice/presses.csv",
+        policies=f"{RESULTS}/tables/policies.csv",
+        calibration=f"{RESULTS}/choice/calibration.json",
+        **figure_files("fig8_policies"),
+    params:
+        files=files,
+        settings=as_settings(sensor=STUDY.sensor, tolerances_mm=STUDY.values.choice.tolerances_mm),
+    log:
+        log_of("compare_policies"),
+    benchmark:
+        benchmark_of("compare_policies")
+    shell:
+        run_stage("compare_policies")
 
 
 rule draw_fig5_ftir:
@@ -118,6 +139,7 @@ rule report:
         ssim=rules.evaluate.output.ssim,
         ceiling=rules.evaluate.output.ceiling,
         ftir=rules.validate_ftir.output.summary,
+        policies=rules.compare_policies.output.policies,
         figures=[figure_files(name)["png"] for name in FIGURES],
     output:
         page=f"{RESULTS}/report.html",

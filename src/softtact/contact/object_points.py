@@ -17,6 +17,7 @@ from softtact.errors import InputError
 _SAMPLES = 8              # a side of a rectangle with an edge
 _SMOOTH, _LOWEST = 0.6, 0.15    # of a rectangle's side: range of heights without an edge; of those beside one that count
 _LEAST_COVERED = 0.1
+_FURTHEST = 0.8           # of a step, that a point may move from its node: at the next one it would be that one's point
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ class ObjectPoints:
         """Weights (e, 4) of the supports, the points at edges moved by `shift` (e, 2) in shares of a step."""
         offset = np.abs(self.offset)
         if shift is not None:
-            offset = np.clip(offset + shift * self.toward, 0.0, 1.0) * (self.toward != 0)
+            offset = np.clip(offset + shift * self.toward, 0.0, _FURTHEST) * (self.toward != 0)
         a, b = offset.T
         return np.stack([(1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b], axis=1)
 

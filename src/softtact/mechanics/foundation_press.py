@@ -25,6 +25,7 @@ import scipy.sparse as sp
 
 from softtact.errors import ConvergenceError
 
+_PATIENCE = 8        # iterations, after which loads that swing are followed half of the way only
 _LEVEL_MM = 0.02     # range of heights among the points of a patch
 
 
@@ -129,17 +130,20 @@ class _Press:
             if iteration <= 2:      # the movement is known well enough after one step; following it on would let points swing
                 spread, gap0 = self._contact(state.moved)
                 matrix = spread @ np.ascontiguousarray((spread @ self.flexibility).T)
-            f, q, depth = self._solve(matrix, gap0, state, force)
+            try:
+                f, q, depth = self._solve(matrix, gap0, state, force)
+            except sla.LinAlgError:
+                break
             forces = np.concatenate([f, q + state.r])
             displacement = (matrix @ forces.astype(np.float32)).astype(float)
             gap, down, load = gap0 - depth + displacement[:c], -displacement[c:], spread.T @ forces
-            change = max(self._take(state, q), self._follow(state, load, down))
+            change = max(self._take(state, q), self._follow(state, load, down, share=1.0 if iteration <= _PATIENCE else 0.5))
             if self._same_sets(state, f, q, gap, down) and change <= self.settings.tolerance * force:
                 touched = self.patch.T @ (state.touching * 1.0) > 0
                 return FoundationLevel(force_n=force, depth=depth, load=load, touching=touched, iterations=iteration,
                                        compression=down, penetration=float(max(0.0, -gap.min())))
-        raise ConvergenceError(f"The foundation model did not reach {force:g} N in {self.settings.max_iterations} iterations ({c} "
-                               "patches in reach); ask for smaller forces, or for the hyperelastic model.")
+        raise ConvergenceError(f"The foundation model did not reach {force:g} N in {iteration} iterations: its corrections for "
+                               "finite displacement run away; ask for smaller forces, or for the hyperelastic model.")
 
     def _contact(self, moved):
         """Matrix (c + b, n + b) from the slab's displacements to those of patches and, upwards, of frusta; gaps (c,)."""
@@ -184,14 +188,14 @@ class _Press:
         state.touching, state.standing = touching, standing
         return same
 
-    def _follow(self, state, load, down):
-        """Bring loads and movement up to date; the largest change of a load in N."""
+    def _follow(self, state, load, down, *, share):
+        """Bring loads and movement up to date, or go a share of the way; the largest change of a load in N."""
         if not self.settings.follow:
             return 0.0
         load = load.astype(np.float32)
         loads = rotating_loads(down.reshape(self.lattice), (self.membrane @ load).reshape(3, *self.lattice)).ravel()
         change = float(np.abs(loads - state.r).max())
-        state.r, state.moved = loads, self.sideways(load)
+        state.r, state.moved = state.r + share * (loads - state.r), self.sideways(load)
         return change
 
 

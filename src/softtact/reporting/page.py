@@ -19,6 +19,8 @@ CAPTIONS = {
                  "black dashes: the sensor's own repeated trials against each other, which no model can pass.",
     "fig7_maps": "Figure 7. Objects from below, deformation maps of both models, tactile maps predicted from them, and the virtual "
                  "sensor's (mean of its trials). Jet colours as printed; tactile maps 0 to 2400 counts.",
+    "fig8_policies": "Figure 8. Left: what each policy costs and which error it accepts, against the study's hyperelastic model. "
+                     "Right: the error that was expected before the costly model ran, against the true one.",
 }
 
 TEMPLATE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>softtact: {{ study }}</title>
@@ -49,7 +51,8 @@ def render_page(inputs, settings, *, folder):
     """The page as text; `inputs` as in the stage, links relative to `folder`."""
     claims = pd.read_csv(inputs["claims"], keep_default_na=False)
     titles = {"table1": "Table 1. Material laws (stress in MPa)", "table2": "Table 2. Complexity and choice of model",
-              "table3": "Table 3. Time per tactile map (s)"}
+              "table3": "Table 3. Time per tactile map (s)",
+              "policies": "Policies that choose a model, on the presses that the expected error was not calibrated on"}
     tables = [{"title": title, "html": _html(pd.read_csv(inputs[name])), "link": _link(inputs[name], folder)}
               for name, title in titles.items()]
     ftir = read_json(inputs["ftir"])

@@ -4,8 +4,9 @@ from pathlib import Path
 
 from softtact.files import atomic_path
 
-MODEL_COLOURS = {"hyperelastic": "#1f4e79", "elastic": "#e08214"}   # dark blue and light orange: apart in grey as well
-MODEL_NAMES = {"hyperelastic": "hyperelastic", "elastic": "elastic"}
+# Dark blue, light orange and a green between: apart in grey as well.
+MODEL_COLOURS = {"hyperelastic": "#1f4e79", "elastic": "#e08214", "foundation": "#3f9c6d"}
+MODEL_NAMES = {name: name for name in MODEL_COLOURS}
 TACTILE_RANGE = (0, 2400)   # counts; the colour scale of the paper's figure 7
 
 

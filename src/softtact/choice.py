@@ -1,0 +1,108 @@
+"""Which model a press takes: the paper's count of mesh points, or the error that each cheaper model is expected to make.
+
+`paper`: the hyperelastic model for an object with fine details, else the elastic one (`geometry.complexity`).
+`error`: both cheap models are pressed first, in about a second. What they disagree by is the elastic model's error, for the
+foundation model is nearer to the hyperelastic one by an order of magnitude; the foundation model's own error grows with how far
+the frusta are compressed, and is read from presses of indenters (`calibrate`). The cheapest model within the tolerance is taken.
+Errors are root mean squares over the map, in mm, against the hyperelastic model; the largest of a press' levels counts.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from softtact.errors import ConvergenceError, InputError
+from softtact.geometry.complexity import choose_model, score
+from softtact.pressing import PRESSES
+
+POLICIES = ("paper", "error")
+TOLERANCE_MM = 0.01
+
+
+@dataclass(frozen=True)
+class FoundationError:
+    """Expected error of the foundation model over its map's root mean square: `at_rest` + `growth` * compression / height.
+
+    compression: of the most compressed frustum. The values given here: {PROVENANCE}
+    """
+
+    at_rest: float = 0.0245
+    growth: float = 0.09
+
+    def __call__(self, maps_mm, compression_mm, height_mm):
+        """Errors (l,) in mm of maps (l, y, x) with largest compressions (l,) in mm."""
+        return (self.at_rest + self.growth * np.asarray(compression_mm) / height_mm) * rms(maps_mm)
+
+
+def rms(maps_mm):
+    """Root mean square over the maps (..., y, x)."""
+    return np.sqrt((np.asarray(maps_mm) ** 2).mean(axis=(-2, -1)))
+
+
+def calibrate(maps_mm, compression_mm, true_mm, *, height_mm):
+    """`FoundationError` from presses: maps (n, y, x), largest compressions (n,), true errors (n,), all in mm.
+
+    Least squares of the relative error with weights that make it relative, too; neither constant is below zero.
+    """
+    from scipy.optimize import nnls
+
+    scale = rms(maps_mm)
+    measured = np.asarray(true_mm) / scale
+    features = np.column_stack([np.ones(len(measured)), np.asarray(compression_mm) / height_mm])
+    (at_rest, growth), _ = nnls(features / measured[:, None], np.ones(len(measured)))
+    return FoundationError(at_rest=float(at_rest), growth=float(growth))
+
+
+def expected_errors(elastic, foundation, *, height_mm, model=FoundationError()):
+    """{model: errors (l,) in mm} of two `PressResult`s, or data sets with their names, of the same press."""
+    ours = model(foundation.deformation_map_mm, foundation.frustum_compression_mm, height_mm)
+    apart = rms(np.asarray(elastic.deformation_map_mm) - np.asarray(foundation.deformation_map_mm))
+    return {"elastic": np.hypot(apart, ours), "foundation": ours}
+
+
+def cheapest(errors, valid, tolerance_mm):
+    """The first of elastic, foundation whose errors are all within the tolerance and its validity, else hyperelastic."""
+    for name in ("elastic", "foundation"):
+        if errors[name].max() <= tolerance_mm and np.all(valid[name]):
+            return name
+    return "hyperelastic"
+
+
+def press_auto(sensor, placed, forces, *, label, threads, policy, tolerance_mm):
+    """A press with the model that a policy takes; the result tells which, why, and with what error to expect."""
+    if policy not in POLICIES:
+        raise InputError(f"The policy {policy!r} is unknown; use one of {', '.join(POLICIES)}.")
+    if policy == "paper":
+        return _by_counts(sensor, placed, forces, label, threads)
+    if not tolerance_mm > 0:
+        raise InputError(f"The tolerance {tolerance_mm:g} mm is not positive; give the largest error of a map in mm.")
+    return _by_error(sensor, placed, forces, label, threads, tolerance_mm)
+
+
+def _by_counts(sensor, placed, forces, label, threads):
+    counts = score(placed.triangles, footprint_mm=sensor.spec.footprint_mm, reach_mm=sensor.spec.thickness_mm)
+    model = choose_model(counts.NPt, counts.CHt, counts.NPo, counts.CHo)
+    result = PRESSES[model](sensor, placed, forces, label=label, threads=threads)
+    return replace(result, why=f"the paper's rule: NPt / CHt = {counts.ratio_total:.3g} (10 asks for the hyperelastic model), "
+                               f"NPo / CHo = {counts.ratio_overlap:.3g} (8)")
+
+
+def _by_error(sensor, placed, forces, label, threads, tolerance_mm):
+    elastic = PRESSES["elastic"](sensor, placed, forces, label=label, threads=threads)
+    try:
+        foundation = PRESSES["foundation"](sensor, placed, forces, label=label, threads=threads)
+    except ConvergenceError as error:
+        result = PRESSES["hyperelastic"](sensor, placed, forces, label=label, threads=threads)
+        return replace(result, why=f"the foundation model tells no error: {error}", expected_error_mm=np.zeros(len(forces)))
+    errors = expected_errors(elastic, foundation, height_mm=sensor.spec.dielectric.frusta.height_mm)
+    model = cheapest(errors, {"elastic": True, "foundation": foundation.within_validity}, tolerance_mm)
+    told = "; ".join(f"{name} {1e3 * values.max():.3g} um" for name, values in errors.items())
+    why = f"expected errors: {told}; asked for {1e3 * tolerance_mm:.3g} um"
+    if not np.all(foundation.within_validity):
+        why += "; frusta are compressed further than the foundation model's law goes"
+    if model == "hyperelastic":
+        result = PRESSES[model](sensor, placed, forces, label=label, threads=threads)
+        return replace(result, why=why, expected_error_mm=np.zeros(len(result.force_n)))
+    result = {"elastic": elastic, "foundation": foundation}[model]
+    spent = result.wall_time_s + (foundation if model == "elastic" else elastic).wall_time_s
+    return replace(result, why=why, expected_error_mm=errors[model], wall_time_s=spent)

@@ -1,0 +1,94 @@
+"""What choosing a model costs and what error it accepts: the paper's rule, the expected error, and always the same model.
+
+The error of a press is the root mean square of a map's difference from the hyperelastic model's in mm, of the worst of its levels;
+its time is that of all levels together, under the `error` policy with both cheap models, which that policy presses first. The
+error to expect is calibrated on one set of presses (the indenters) and tested on the others.
+"""
+
+import numpy as np
+import pandas as pd
+
+from softtact.choice import calibrate, cheapest, expected_errors, rms
+
+MODELS = ("elastic", "foundation", "hyperelastic")
+CALIBRATION_SET = "indenters"
+
+
+def press_table(presses, paper_choice, *, height_mm):
+    """A row per press and its worst level: set, item, paper's model, time and error of each model, errors to expect.
+
+    presses: list of {model: data set of `simulate_press`};  paper_choice: {item: model};  height_mm: of a frustum
+    Returns the table and the calibrated `FoundationError`.
+    """
+    calibrated = _calibrated([press for press in presses if press["elastic"].attrs["set"] == CALIBRATION_SET], height_mm)
+    return pd.DataFrame([_row(press, paper_choice, calibrated, height_mm) for press in presses]), calibrated
+
+
+def _calibrated(presses, height_mm):
+    maps = np.concatenate([press["foundation"].deformation_map_mm.values for press in presses])
+    compression = np.concatenate([press["foundation"].frustum_compression_mm.values for press in presses])
+    errors = np.concatenate([_errors(press)["foundation"] for press in presses])
+    return calibrate(maps, compression, errors, height_mm=height_mm)
+
+
+def _errors(press):
+    """{model: true errors (levels,) in mm}."""
+    truth = press["hyperelastic"].deformation_map_mm.values
+    return {model: rms(press[model].deformation_map_mm.values - truth) for model in MODELS}
+
+
+def _row(press, paper_choice, calibrated, height_mm):
+    errors = _errors(press)
+    told = expected_errors(press["elastic"], press["foundation"], height_mm=height_mm, model=calibrated)
+    name = press["elastic"].attrs["item"]
+    row = {"set": press["elastic"].attrs["set"], "item": name, "paper_model": paper_choice[name],
+           "largest_mm": float(press["hyperelastic"].deformation_map_mm.max()),
+           "foundation_valid": bool(press["foundation"].within_validity.values.all())}
+    for model in MODELS:
+        row[f"{model}_error_mm"] = float(errors[model].max())
+        row[f"{model}_time_s"] = float(press[model].wall_time_s.sum())
+    return row | {f"{model}_expected_mm": float(values.max()) for model, values in told.items()}
+
+
+def choices(table, tolerance_mm):
+    """{policy: series of models} over a table's presses."""
+    def by_error(row):
+        told = {model: np.array([row[f"{model}_expected_mm"]]) for model in MODELS[:2]}
+        return cheapest(told, {"elastic": True, "foundation": row.foundation_valid}, tolerance_mm)
+
+    return {**{f"always {model}": pd.Series(model, index=table.index) for model in MODELS}, "paper": table.paper_model,
+            f"error, {1e3 * tolerance_mm:g} um": table.apply(by_error, axis=1)}
+
+
+def policy_table(table, tolerances_mm, *, sets):
+    """A row per policy over the presses of some sets: shares of the models, errors accepted, time, and how well errors are told."""
+    table = table[table.set.isin(sets)]
+    rows = {}
+    for tolerance in tolerances_mm:
+        for policy, chosen in choices(table, tolerance).items():
+            rows.setdefault(policy, _summary(table, policy, chosen, tolerance))
+    return pd.DataFrame(rows.values())
+
+
+def _summary(table, policy, chosen, tolerance):
+    error = _of_chosen(table, chosen, "error_mm")
+    time = _of_chosen(table, chosen, "time_s")
+    by_error = policy.startswith("error")
+    if by_error:     # both cheap models are pressed first
+        time = table.elastic_time_s + table.foundation_time_s + np.where(chosen == "hyperelastic", table.hyperelastic_time_s, 0.0)
+    summary = {"policy": policy, "presses": len(table)}
+    summary |= {f"share_{model}": float((chosen == model).mean()) for model in MODELS}
+    summary |= {"mean_error_mm": error.mean(), "largest_error_mm": error.max(), "time_per_press_s": time.mean(),
+                "time_in_all_s": time.sum()}
+    return summary | {"over_tolerance": float((error > tolerance).mean()) if by_error else np.nan}
+
+
+def _of_chosen(table, chosen, quantity):
+    return pd.Series([row[f"{model}_{quantity}"] for (_, row), model in zip(table.iterrows(), chosen, strict=True)],
+                     index=table.index)
+
+
+def told_over_true(table, model):
+    """Expected over true error of a model's presses: median, lowest and highest."""
+    ratio = table[f"{model}_expected_mm"] / table[f"{model}_error_mm"]
+    return {"median": ratio.median(), "lowest": ratio.min(), "highest": ratio.max()}

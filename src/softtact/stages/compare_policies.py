@@ -1,0 +1,33 @@
+"""How the policies that choose a model do on presses made with all models.
+
+inputs: elastic, foundation, hyperelastic (lists of presses, in the same order), complexity
+outputs: presses (a row per press), policies (a row per policy), calibration, png, svg
+settings: sensor, tolerances_mm
+"""
+
+from dataclasses import asdict
+
+import pandas as pd
+
+from softtact.evaluation.policies import CALIBRATION_SET, MODELS, policy_table, press_table, told_over_true
+from softtact.files import read_dataset, write_csv, write_json
+from softtact.geometry.sensor_spec import SensorSpec
+from softtact.reporting.fig8_policies import draw
+from softtact.reporting.style import save
+
+
+def run(*, inputs, outputs, settings, threads=1):
+    """Calibrate on the indenters, and compare on all other sets."""
+    paths = zip(*(inputs[model] for model in MODELS), strict=True)
+    presses = [dict(zip(MODELS, map(read_dataset, three), strict=True)) for three in paths]
+    paper = pd.read_csv(inputs["complexity"]).set_index("object").model.to_dict()
+    height = SensorSpec.from_dict(settings["sensor"]).dielectric.frusta.height_mm
+    table, calibrated = press_table(presses, paper, height_mm=height)
+    others = [name for name in table.set.unique() if name != CALIBRATION_SET] or [CALIBRATION_SET]
+    policies = policy_table(table, settings["tolerances_mm"], sets=others)
+    write_csv(outputs["presses"], table)
+    write_csv(outputs["policies"], policies)
+    unseen = table[table.set.isin(others)]
+    write_json(outputs["calibration"], {"foundation": asdict(calibrated), "tested_on": others,
+                                        "expected_over_true": {model: told_over_true(unseen, model) for model in MODELS[:2]}})
+    save(draw(policies, table), outputs["png"], outputs["svg"])
