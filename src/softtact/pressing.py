@@ -15,6 +15,7 @@ from softtact.progress import announce, progress
 from softtact.sensing.capacitance import ideal_counts
 
 _DEEPEST_LINEAR = 0.5     # of the layer's thickness: a linear layer does not know that it ends
+_HARDLY_COMPRESSED = 0.27    # of a frustum's height: below, the foundation model's map is within 2 % (docs/fast_models.md)
 _FULL_POCKET = 0.8        # of a frustum's height: above, its pocket is full and contacts begin that the models leave out
 _MARGIN, _LEAST_MARGIN_MM = 1.3, 0.1     # of the depth on springs, within which points are looked for at first
 _RISE = 1.15              # of the object's depth: points within may touch
@@ -60,7 +61,7 @@ def _of_levels(sensor, flexibility, points, levels, forces, times):
     """The result of a foundation press' levels, be it those before one that was not reached."""
     area, count = points.covered * np.prod(flexibility.grid.step), len(levels)
     compression = np.array([level.compression.max() for level in levels])
-    deepest = min(flexibility.law.limit_mm, _FULL_POCKET * sensor.spec.dielectric.frusta.height_mm)
+    deepest = min(flexibility.law.limit_mm, _HARDLY_COMPRESSED * sensor.spec.dielectric.frusta.height_mm)
     unknown = np.full(count, np.nan)
     numbers = {"indentation_mm": [level.depth for level in levels], "penetration_mm": [level.penetration for level in levels],
                "contact_area_mm2": [area[level.touching].sum() for level in levels],

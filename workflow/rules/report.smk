@@ -61,7 +61,6 @@ rule compare_policies:
         presses=f"{RESULTS}/choice/presses.csv",
         policies=f"{RESULTS}/tables/policies.csv",
         calibration=f"{RESULTS}/choice/calibration.json",
-        **figure_files("fig8_policies"),
     params:
         files=files,
         settings=as_settings(sensor=STUDY.sensor, tolerances_mm=STUDY.values.choice.tolerances_mm),
@@ -127,6 +126,24 @@ rule draw_fig7_maps:
         benchmark_of("draw_fig7_maps")
     shell:
         run_stage("draw_fig7_maps")
+
+
+rule draw_fig8_policies:
+    input:
+        code=code("draw_fig8_policies"),
+        policies=rules.compare_policies.output.policies,
+        presses=rules.compare_policies.output.presses,
+    output:
+        **figure_files("fig8_policies"),
+    params:
+        files=files,
+        settings=as_settings(),
+    log:
+        log_of("draw_fig8_policies"),
+    benchmark:
+        benchmark_of("draw_fig8_policies")
+    shell:
+        run_stage("draw_fig8_policies")
 
 
 rule report:

@@ -53,8 +53,7 @@ def _row(press, paper_choice, calibrated, height_mm):
 def choices(table, tolerance_mm):
     """{policy: series of models} over a table's presses."""
     def by_error(row):
-        told = {model: np.array([row[f"{model}_expected_mm"]]) for model in MODELS[:2]}
-        return cheapest(told, {"elastic": True, "foundation": row.foundation_valid}, tolerance_mm)
+        return cheapest({model: np.array([row[f"{model}_expected_mm"]]) for model in MODELS[:2]}, tolerance_mm)
 
     return {**{f"always {model}": pd.Series(model, index=table.index) for model in MODELS}, "paper": table.paper_model,
             f"error, {1e3 * tolerance_mm:g} um": table.apply(by_error, axis=1)}

@@ -26,6 +26,7 @@ import scipy.sparse as sp
 from softtact.errors import ConvergenceError
 
 _PATIENCE = 8        # iterations, after which loads that swing are followed half of the way only
+_ABSURD_MM = 100.0
 _LEVEL_MM = 0.02     # range of heights among the points of a patch
 
 
@@ -133,6 +134,8 @@ class _Press:
             try:
                 f, q, depth = self._solve(matrix, gap0, state, force)
             except sla.LinAlgError:
+                break
+            if not abs(depth) < _ABSURD_MM:
                 break
             forces = np.concatenate([f, q + state.r])
             displacement = (matrix @ forces.astype(np.float32)).astype(float)

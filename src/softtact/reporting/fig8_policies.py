@@ -1,8 +1,10 @@
 """Figure 8: error against time of the policies that choose a model, and the error that was expected against the true one."""
 
-from softtact.evaluation.policies import CALIBRATION_SET
+import numpy as np
+
 from softtact.reporting.style import MODEL_COLOURS, pyplot
 
+CALIBRATION_SET = "indenters"
 _MARKS = {"always": "s", "paper": "D", "error": "o"}
 
 
@@ -20,12 +22,21 @@ def _draw_policies(axes, policies):
         rows = policies[policies.policy.str.startswith(kind)]
         axes.plot(rows.time_per_press_s, 1e3 * rows.mean_error_mm.clip(lower=1e-5), mark, ms=6,
                   color={"always": "0.55", "paper": "#b22222", "error": "#1f7a4d"}[kind], ls="-" if kind == "error" else "none")
-        for _, row in rows.iterrows():
-            axes.annotate(row.policy, (row.time_per_press_s, 1e3 * max(row.mean_error_mm, 1e-5)), xytext=(6, 4),
-                          textcoords="offset points", fontsize=8)
     axes.set(xscale="log", xlabel="time per press, s", ylabel="mean error of the maps, um", ylim=(0, None),
              title=f"{policies.presses.iloc[0]} presses that were not calibrated on")
-    axes.margins(x=0.25)
+    axes.margins(x=0.35, y=0.1)
+    for (time, error), names in _places(policies, width=0.05 * 1e3 * policies.mean_error_mm.max()).items():
+        axes.annotate("\n".join(names), (time, error), xytext=(8, 2), textcoords="offset points", fontsize=8)
+
+
+def _places(policies, *, width):
+    """{(time, error in um): names} of the policies, those that would print over each other at one place."""
+    places = {}
+    for _, row in policies.sort_values("mean_error_mm").iterrows():
+        time, error = row.time_per_press_s, 1e3 * row.mean_error_mm
+        here = next((place for place in places if abs(np.log(place[0] / time)) < 0.7 and abs(place[1] - error) < width), None)
+        places.setdefault(here or (time, error), []).append(row.policy)
+    return places
 
 
 def _draw_expected(axes, presses):

@@ -1,7 +1,7 @@
 """How the policies that choose a model do on presses made with all models.
 
 inputs: elastic, foundation, hyperelastic (lists of presses, in the same order), complexity
-outputs: presses (a row per press), policies (a row per policy), calibration, png, svg
+outputs: presses (a row per press), policies (a row per policy), calibration
 settings: sensor, tolerances_mm
 """
 
@@ -12,8 +12,6 @@ import pandas as pd
 from softtact.evaluation.policies import CALIBRATION_SET, MODELS, policy_table, press_table, told_over_true
 from softtact.files import read_dataset, write_csv, write_json
 from softtact.geometry.sensor_spec import SensorSpec
-from softtact.reporting.fig8_policies import draw
-from softtact.reporting.style import save
 
 
 def run(*, inputs, outputs, settings, threads=1):
@@ -30,4 +28,3 @@ def run(*, inputs, outputs, settings, threads=1):
     unseen = table[table.set.isin(others)]
     write_json(outputs["calibration"], {"foundation": asdict(calibrated), "tested_on": others,
                                         "expected_over_true": {model: told_over_true(unseen, model) for model in MODELS[:2]}})
-    save(draw(policies, table), outputs["png"], outputs["svg"])

@@ -1,0 +1,97 @@
+"""Seconds of twenty levels to 50 N with the fast models, and presses per second: `python benchmarks/fast_models.py` from the
+project's folder; `--many N` presses as many random poses of ten indenters (default 200, of one level each).
+
+Preparation that is made once per sensor, and compiled kernels, are made before the clock starts. Times depend on the machine and on
+what else it does: compare the ratios of one run.
+"""
+
+import argparse
+import resource
+import time
+from pathlib import Path
+
+import numpy as np
+import record
+
+import softtact
+from softtact.geometry.meshes import default_pose, read_mesh
+from softtact.geometry.pose import Pose
+
+MODELS = ("elastic", "foundation")
+FORCES = np.linspace(2.5, 50.0, 20)
+MANY = ("circle_m", "circle_xs", "square", "star", "cruz", "donut_m", "triangle", "sphere", "bordes_h", "echo_x")
+
+
+def twenty_levels(sensor, files):
+    """Seconds of each model and object; the better of two, since the first may wait for others."""
+    rows = []
+    for file in files:
+        mesh, row = read_mesh(file, unit="mm"), {"object": file.stem}
+        for model in MODELS:
+            row[model] = round(min(_seconds(sensor, mesh, model) for _ in range(2)), 3)
+        rows.append(row)
+        print(f"{row['object']:16}" + "".join(f"{row[model]:12.3f}" for model in MODELS), flush=True)
+    return rows
+
+
+def _seconds(sensor, mesh, model):
+    start = time.perf_counter()
+    sensor.press(mesh, force_n=FORCES, model=model, label="")
+    return time.perf_counter() - start
+
+
+def many(sensor, count, *, seed=1):
+    """Presses per second of random poses, by model and processes."""
+    rng = np.random.default_rng(seed)
+    meshes = [read_mesh(f"config/objects/indenters/{MANY[k % len(MANY)]}.stl", unit="mm") for k in range(count)]
+    poses = [_random_pose(mesh, rng) for mesh in meshes]
+    rows = []
+    for model in MODELS:
+        for workers in (1, 2):
+            for batch in sorted({min(batch, count) for batch in (10, 50, count)}):
+                start = time.perf_counter()
+                results = sensor.press_many(meshes[:batch], poses[:batch], force_n=[20.0], model=model, workers=workers,
+                                            failures="keep", label="")
+                seconds = time.perf_counter() - start
+                failed = sum(isinstance(result, Exception) for result in results)
+                rows.append({"model": model, "workers": workers, "batch": batch, "per_second": round(batch / seconds, 2),
+                             "failed": failed, "memory_gb": _memory_gb()})
+                print(rows[-1], flush=True)
+    return rows
+
+
+def _random_pose(mesh, rng):
+    """Tilted by up to 5 degrees, turned about z, and moved by up to 4 mm; its lowest point touches."""
+    angles = (*rng.uniform(-5, 5, 2), rng.uniform(-180, 180))
+    turned = mesh.copy()
+    turned.vertices = Pose.from_values((0, 0, 0, *angles)).apply(mesh.vertices)
+    move = default_pose(turned).translation_mm + np.array([*rng.uniform(-4, 4, 2), 0.0])
+    return Pose.from_values((*move, *angles))
+
+
+def _memory_gb():
+    """Largest resident memory of this process and of the largest of those it started."""
+    return round(sum(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)) / 1e6, 2)
+
+
+def main():
+    """Measure, print, and write benchmarks/results/fast_models.json."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--many", type=int, default=200, metavar="N", help="random poses (default: 200)")
+    options = parser.parse_args()
+    sensor, prepared = softtact.load_sensor("coro"), {}
+    for model in MODELS:
+        start = time.perf_counter()
+        sensor.prepared(model)
+        prepared[model] = round(time.perf_counter() - start, 1)
+    files = sorted(Path("config/objects/indenters").glob("*.stl"))
+    _seconds(sensor, read_mesh(files[0], unit="mm"), "foundation"), _seconds(sensor, read_mesh(files[0], unit="mm"), "elastic")
+    rows = twenty_levels(sensor, files)
+    median = {model: float(np.median([row[model] for row in rows])) for model in MODELS}
+    print("median", median)
+    record.write("fast_models", prepared_or_loaded_s=prepared, levels=len(FORCES), seconds=rows, median_s=median,
+                 many=many(sensor, options.many))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,58 @@
+"""Policies that choose a model, compared on presses whose errors are known."""
+
+import numpy as np
+import pytest
+import xarray
+
+from softtact.evaluation.policies import choices, policy_table, press_table, told_over_true
+
+FORCES = np.array([10.0, 20.0])
+BUMP = np.exp(-np.linspace(-2, 2, 9)[:, None] ** 2 - np.linspace(-2, 2, 7) ** 2)
+SIZE = np.sqrt((BUMP**2).mean())
+
+
+def data_set(item, of_set, amplitude, *, time, compression=0.1):
+    return xarray.Dataset({"deformation_map_mm": (("force", "y", "x"), amplitude * (FORCES / 20)[:, None, None] * BUMP),
+                           "frustum_compression_mm": ("force", compression * FORCES / 20), "wall_time_s": ("force", [time, time]),
+                           "within_validity": ("force", [1, 1])}, attrs={"item": item, "set": of_set})
+
+
+def press(item, of_set, *, apart):
+    """A press in which elastic and foundation maps are off by 100 % and by `apart`."""
+    return {"elastic": data_set(item, of_set, 0.4, time=0.1), "foundation": data_set(item, of_set, 0.2 * (1 + apart), time=1.0),
+            "hyperelastic": data_set(item, of_set, 0.2, time=100.0)}
+
+
+@pytest.fixture(scope="module")
+def table():
+    presses = [press("ring", "indenters", apart=0.03), press("star", "indenters", apart=0.03), press("cup", "grasps", apart=0.03)]
+    return press_table(presses, {"ring": "elastic", "star": "elastic", "cup": "hyperelastic"}, height_mm=0.5)[0]
+
+
+def test_a_press_counts_with_its_worst_level_and_the_time_of_all(table):
+    cup = table[table.item == "cup"].iloc[0]
+    assert cup.foundation_error_mm == pytest.approx(0.2 * 0.03 * SIZE)
+    assert cup.elastic_error_mm == pytest.approx(0.2 * SIZE)
+    assert (cup.elastic_time_s, cup.hyperelastic_time_s) == (0.2, 200.0)
+
+
+def test_an_error_that_is_the_same_everywhere_is_told_exactly(table):
+    assert told_over_true(table, "foundation")["median"] == pytest.approx(1.0, rel=1e-6)
+
+
+def test_the_expected_error_sends_a_press_to_the_cheapest_model_that_will_do(table):
+    of_cup = table.index[table.item == "cup"][0]
+    taken = [choices(table, tolerance)[f"error, {1e3 * tolerance:g} um"][of_cup] for tolerance in (0.5, 0.01, 1e-5)]
+    assert taken == ["elastic", "foundation", "hyperelastic"]
+
+
+def test_the_error_policy_pays_for_both_cheap_models_and_others_for_their_own(table):
+    rows = policy_table(table, [0.01], sets=["grasps"]).set_index("policy")
+    assert rows.loc["always elastic", "time_in_all_s"] == pytest.approx(0.2)
+    assert rows.loc["paper", "time_in_all_s"] == pytest.approx(200.0)
+    assert rows.loc["error, 10 um", "time_in_all_s"] == pytest.approx(2.2)
+    assert rows.loc["error, 10 um", "share_foundation"] == 1.0 and rows.loc["error, 10 um", "over_tolerance"] == 0.0
+
+
+def test_only_the_sets_asked_for_are_counted(table):
+    assert set(policy_table(table, [0.01], sets=["grasps"]).presses) == {1}
