@@ -83,7 +83,7 @@ def test_assumed_values_and_their_reasons_reach_the_stages_as_plain_numbers():
         ("forces_nn", [5], "there is no key 'forces_nn'; did you mean 'forces_n'?"),
         ("ftir.camera.pixel_m", 1, "there is no key 'pixel_m'; did you mean 'pixel_mm'?"),
         ("training.epoch", 3, "at 'training': there is no key 'epoch'; did you mean 'epochs'?"),
-        ("models.elastic.mesh", {"edge_length": 1}, "at 'models.elastic.mesh': there is no key 'edge_length'; did you"),
+        ("models.hyperelastic.mesh", {"sheet_layer": 1}, "there is no key 'sheet_layer'; did you mean 'sheet_layers'?"),
         ("models.hyperelastic.mesh.refinement", -1, "at 'models.hyperelastic.mesh.refinement' (it is -1)"),
         ("models.hyperelastic.mesh.coarse_walls", "some", "at 'models.hyperelastic.mesh.coarse_walls' (it is 'some')"),
         ("models.hyperelastic.mesh.coarse_wall", True, "there is no key 'coarse_wall'; did you mean 'coarse_walls'?"),

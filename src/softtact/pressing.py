@@ -25,7 +25,7 @@ def press_elastic(sensor, placed, forces, *, label, threads):
     """All levels at once with the elastic model."""
     start, compliance = time.perf_counter(), sensor.prepared("elastic", threads)
     underside = Underside(HeightField(placed), compliance.grid)
-    points, press = _within_reach(underside, compliance.bedding, forces, sensor.spec.thickness_mm,
+    points, press = _within_reach(underside, underside.nodes, compliance.bedding, forces, sensor.spec.thickness_mm,
                                   lambda points: press_layer(compliance, points, forces), lambda press: press.contact.depth[-1])
     contact = press.contact
     area = points.covered * np.prod(compliance.grid.step)
@@ -53,7 +53,8 @@ def press_on_foundation(sensor, placed, forces, *, label, threads):
             error.result = _of_levels(sensor, flexibility, points, levels, forces, times) if levels else None
             raise
 
-    points, _ = _within_reach(underside, flexibility.bedding, forces, sensor.spec.thickness_mm, solve, lambda _: levels[-1].depth)
+    points, _ = _within_reach(underside, underside.points, flexibility.bedding, forces, sensor.spec.thickness_mm, solve,
+                              lambda _: levels[-1].depth)
     return _of_levels(sensor, flexibility, points, levels, forces, times)
 
 
@@ -71,7 +72,7 @@ def _of_levels(sensor, flexibility, points, levels, forces, times):
                        **numbers)
 
 
-def _within_reach(underside, bedding, forces, deepest, solve, depth_of):
+def _within_reach(underside, points_within, bedding, forces, deepest, solve, depth_of):
     """Points as far as the object may come down, and what `solve` makes of them; again with more where it came down further.
 
     Beside the object the surface rises, so points a little above its depth can touch, too.
@@ -79,7 +80,7 @@ def _within_reach(underside, bedding, forces, deepest, solve, depth_of):
     reach = _MARGIN * underside.depth_on_springs(forces[-1], bedding) + _LEAST_MARGIN_MM
     while True:
         reach = min(reach, deepest)
-        points = underside.points(reach)
+        points = points_within(reach)
         found = solve(points)
         if reach == deepest or _RISE * (depth_of(found) - underside.lowest_mm) <= reach:
             return points, found

@@ -1,11 +1,10 @@
-"""Contact on simple bodies for the verification: graded lines, structured tetrahedra, and a slab pressed without frusta."""
+"""Contact on simple bodies for the verification: graded lines, undersides of objects, and a slab pressed without frusta."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from softtact.contact.penalty import Contact
-from softtact.mechanics.elastic import surface_compliance
 from softtact.mechanics.hex_mesh import SheetPlan, grid_plan, merge, with_centres
 from softtact.mechanics.linear_solvers import make_solver
 from softtact.mechanics.slab import Layer, Slab
@@ -20,22 +19,6 @@ def graded(fine, cells, far, count):
 def mirrored(lines):
     """Lines on both sides of 0."""
     return np.concatenate([-lines[:0:-1], lines])
-
-
-def tetrahedra(x, y, z):
-    """A box of grid lines cut into six tetrahedra a cell (Kuhn): points (n, 3), tetrahedra (t, 4). z ends at 0."""
-    gz, gy, gx = np.meshgrid(z, y, x, indexing="ij")
-    points = np.column_stack([gx.ravel(), gy.ravel(), gz.ravel()])
-    number = np.arange(len(points)).reshape(gx.shape)
-    corner = [number[k:len(z) - 1 + k, j:len(y) - 1 + j, i:len(x) - 1 + i].ravel()
-              for k in (0, 1) for j in (0, 1) for i in (0, 1)]
-    paths = [(0, 1, 3, 7), (0, 3, 2, 7), (0, 2, 6, 7), (0, 6, 4, 7), (0, 4, 5, 7), (0, 5, 1, 7)]
-    return points, np.vstack([np.stack([corner[c] for c in path], axis=1) for path in paths])
-
-
-def layer_compliance(x, y, z, *, young, poisson):
-    """Compliance of the elastic model for a box of grid lines, held at base and sides as the model has it."""
-    return surface_compliance(*tetrahedra(x, y, z), young_mpa=young, poisson=poisson, map_x_mm=x[1:-1], map_y_mm=y[1:-1])
 
 
 def paraboloid(radius):

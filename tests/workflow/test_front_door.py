@@ -22,8 +22,15 @@ def refusal(project, *arguments):
 def test_the_papers_study_is_planned_whole(fresh):
     paper = Project(fresh.folder, configfile="config/paper.yaml")
     plan = paper.plan()
-    assert len(plan["simulate_press"]) == 3 * len(plan["read_virtual_sensor"]) > 200
+    assert len(plan["simulate_press"]) == 4 * len(plan["read_virtual_sensor"]) > 200
     assert {job["model"] for job in plan["train_cnn"]} == {"elastic", "hyperelastic"}
+
+
+def test_a_tested_foundation_model_asks_for_its_frustum_law_first(fresh):
+    plan = Project(fresh.folder).plan("--config", "tested=[foundation,hyperelastic]")
+    assert plan["frustum_law"] == [{"model": "foundation"}]
+    for rule in ("precompute_compliance", "simulate_press", "train_cnn"):
+        assert "foundation" in {job["model"] for job in plan[rule]}
 
 
 def test_a_misspelt_key_is_answered_with_the_nearest_right_one(fresh):

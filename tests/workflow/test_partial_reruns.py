@@ -24,7 +24,7 @@ def test_a_new_indenter_is_the_only_one_simulated(finished):
     finished.edit("config/tiny.yaml", "names: [circle_m,", "names: [new_form, circle_m,")
     plan = finished.plan()
     assert {job["item"] for job in plan["simulate_press"]} == {"new_form"}
-    assert {job["model"] for job in plan["simulate_press"]} == {"elastic", "hyperelastic", "reference"}
+    assert {job["model"] for job in plan["simulate_press"]} == {"elastic", "foundation", "hyperelastic", "reference"}
     assert plan["read_virtual_sensor"] == [{"item": "new_form", "set": "indenters"}]
     assert not {"fit_material", "mesh_sensor", "precompute_compliance", "press_on_glass"} & set(plan)
     assert LEARNING <= set(plan)
@@ -54,7 +54,7 @@ def test_an_edit_of_a_materials_law_reruns_the_fits_and_after(finished):
     edit_source(finished, "src/softtact/materials/laws/yeoh.py")
     plan = finished.plan()
     assert {"fit_material", "press_on_glass", "simulate_press", "report"} <= set(plan)
-    assert not {"score_complexity", "precompute_compliance"} & set(plan)
+    assert "score_complexity" not in plan
 
 
 @pytest.mark.parametrize("stage", ["train_cnn", "search_hyperparameters"])

@@ -133,9 +133,20 @@ class Underside:
         """The `ObjectPoints` as far as the object is lower than `reach_mm` over its lowest point."""
         return _object_points(self._surface, self._grid, self.heights, self.covered, self._centre, self._uneven, reach_mm)
 
+    def nodes(self, reach_mm):
+        """The same with points at nodes only, each for its whole rectangle: blunter, but no node comes down below the object."""
+        height, normal = self._surface(*self._grid.points.T)
+        kept = np.flatnonzero(height < self.lowest_mm + reach_mm)
+        if not len(kept):
+            raise InputError("The object touches between the nodes of the sensor's surface only; take the foundation model.")
+        none = np.zeros((0, 2))
+        return ObjectPoints(nodes=kept, gap=height[kept], slope=-normal[kept, :2] / normal[kept, 2:], covered=np.ones(len(kept)),
+                            edge=np.zeros(0, dtype=np.int64), offset=none, toward=none.astype(np.int64),
+                            support=np.zeros((0, 4), dtype=np.int64), others=np.zeros(0, dtype=np.int64))
+
 
 def _object_points(surface, grid, heights, covered, centre, uneven, reach_mm):
-    kept = np.flatnonzero((covered > _LEAST_COVERED) & (heights < heights.min() + reach_mm))
+    kept = np.flatnonzero(((covered > _LEAST_COVERED) | _tips(heights, grid)) & (heights < heights.min() + reach_mm))
     gap, slope = _gap_and_slope(surface, grid, kept, heights[kept], centre[kept])
     at_edge = uneven[kept] | _beside_nothing(grid, kept, heights)
     edge = np.flatnonzero(at_edge)
@@ -162,6 +173,14 @@ def _rectangles(surface, grid):
     return heights, covered, centre, uneven
 
 
+def _tips(heights, grid):
+    """Which rectangles hold a tip: something lower than in all their neighbours, however small."""
+    around = np.pad(heights.reshape(grid.shape), 1, constant_values=NO_CONTACT_MM)
+    rows, columns = grid.shape
+    beside = [around[dj:dj + rows, di:di + columns] for dj in range(3) for di in range(3) if (dj, di) != (1, 1)]
+    return heights < np.min(beside, axis=0).ravel() - 1e-9
+
+
 def _places(samples):
     """Sample places (samples^2, 2) in a rectangle, in shares of its sides from its centre; of three samples on its sides."""
     side = np.linspace(-0.5, 0.5, 3) if samples == 3 else (np.arange(samples) + 0.5) / samples - 0.5
@@ -170,7 +189,7 @@ def _places(samples):
 
 def _sampled(surface, points, step, samples):
     where = points[:, None] + _places(samples) * step * (1 - 1e-9)
-    return surface(*where.reshape(-1, 2).T)[0].reshape(len(points), -1)
+    return surface(*where.reshape(-1, 2).T)[0].reshape(len(points), samples**2)
 
 
 def _gap_and_slope(surface, grid, nodes, lowest, centre):

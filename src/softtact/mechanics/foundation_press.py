@@ -4,9 +4,9 @@ Unknown are the object's forces f >= 0 on patches of the cover and the frusta's 
     gap  = gap0 - depth + E u >= 0,     f gap = 0,  sum f = F
     w    = extension(q),                w <= 0 where q = 0       (w: how far the slab comes down on a frustum)
     u, w = G [E' f; -(q + r)]
-Active sets and Newton's method, each step solved directly: of the points that the object covers whole, four share a patch and its
-uniform pressure, which leaves some hundred unknowns, at 0.1 to 0.4 % of the map. Three effects of finite displacement that the
-linear slab lacks follow the deformation from step to step:
+Active sets and Newton's method, each step solved directly. Where the contact is large, four points that the object covers whole
+share a patch and its uniform pressure, which leaves some hundred unknowns, at 0.1 to 0.4 % of the map (docs/fast_models.md).
+Three effects of finite displacement that the linear slab lacks follow the deformation from step to step:
 - pieces of the slab that rotate carry their membrane forces and the pressure between object and board with them: loads r =
   -div(N grad w) on the frusta, N the integrals over the height of s_xx + s_zz, s_yy + s_zz, s_xy (initial stress; von Karman's
   plate has the first terms). They press the deepest parts deeper and lift the slab beside;
@@ -28,6 +28,7 @@ from softtact.errors import ConvergenceError
 _PATIENCE = 8        # iterations, after which loads that swing are followed half of the way only
 _ABSURD_MM = 100.0
 _LEVEL_MM = 0.02     # range of heights among the points of a patch
+_MANY_POINTS = 800   # from which on patches save time; a small contact wants all of its points
 
 
 @dataclass(frozen=True)
@@ -174,7 +175,6 @@ class _Press:
         return forces[:c], forces[c:], depth
 
     @staticmethod
-    @staticmethod
     def _take(state, q):
         """Take over the frusta's forces; the largest change of one in N."""
         pressing = np.maximum(q, 0.0)
@@ -210,19 +210,24 @@ def _solve_positive(system, right):
 
 
 def _patches(points, grid, shared):
-    """Matrix (patches, c) of the points' shares in patches: four whole points of a square, level with each other, or one alone."""
+    """Matrix (patches, c) of the points' shares in patches: four whole points of a square, level with each other, or one alone.
+
+    Squares are counted from the middle, where a row's and a column's points go in pairs, so that a symmetric contact stays so.
+    """
     label = np.arange(points.count)
-    if shared:
-        j, i = np.divmod(points.nodes, grid.shape[1])
-        square = (j + 1) // 2 * grid.shape[1] + (i + 1) // 2
-        _, square = np.unique(square, return_inverse=True)
+    if shared and points.count > _MANY_POINTS:
+        from_middle = [place - size // 2 for place, size in zip(np.divmod(points.nodes, grid.shape[1]), grid.shape, strict=True)]
+        pair = [np.sign(place) * ((np.abs(place) + 1) // 2) for place in from_middle]
+        full = np.prod([np.where(place == 0, 1, 2) for place in from_middle], axis=0)
+        _, square = np.unique(np.stack(pair, axis=1), axis=0, return_inverse=True)
+        square = square.ravel()
         whole = np.ones(points.count, dtype=bool)
         whole[points.edge] = False
         count = np.bincount(square, weights=whole)
         low, high = np.full(len(count), np.inf), np.full(len(count), -np.inf)
         np.minimum.at(low, square, points.gap)
         np.maximum.at(high, square, points.gap)
-        together = (count[square] == 4) & (high - low <= _LEVEL_MM)[square]
+        together = (count[square] == full) & (high - low <= _LEVEL_MM)[square]
         label = np.where(together, points.count + square, label)
     _, label, size = np.unique(label, return_inverse=True, return_counts=True)
     return sp.csr_matrix((1.0 / size[label], (label, np.arange(points.count))))

@@ -1,0 +1,136 @@
+"""Unilateral contact: the fast method against the plain one, the conditions of contact over random objects, and its levels."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.distance import cdist
+from small_layer import ball, flat_box, layer_flexibility, object_points, placed, punch
+
+from softtact.contact.unilateral import ContactSettings, active_set, press_elastic
+from softtact.errors import ConvergenceError
+
+TOLERANCE_MM = 1e-6      # of a gap: the fast method's own criterion
+FORCES = [0.3, 1.0, 3.0, 6.0]
+SHAPES = {
+    "sphere": placed(ball(6.0)),
+    "punch": placed(punch(3.0)),
+    "flat box": placed(flat_box(5.0, 3.5)),
+    "tilted box": placed(flat_box(5.0, 3.5), (1, -2, 0, 8, 5, 30)),
+    "tilted plate over the sides": placed(flat_box(30.0, 30.0), (0, 0, 0, 3, 0, 0)),
+    "sphere near a corner": placed(ball(3.0), (4.5, 4.5, 0, 0, 0, 0)),
+}
+
+
+def layer_contact(mesh):
+    """Flexibility (c, c) and gaps (c,) of a placed mesh's points on the small layer."""
+    grid, flexibility = layer_flexibility()
+    points = object_points(mesh, grid)
+    at = points.interpolation(points.weights())
+    return at @ (at @ flexibility[np.ix_(points.all_nodes, points.all_nodes)]).T, points.gap
+
+
+# --- against the plain method ---
+
+
+def assert_both_methods_agree(flexibility, gap0, forces):
+    fast, plain = press_elastic(flexibility, gap0, forces), list(active_set(flexibility, gap0, forces))
+    for number, level in enumerate(plain):
+        assert fast.depth[number] == pytest.approx(level.indentation, abs=TOLERANCE_MM)
+        # a gap of 1e-6 mm, on depths of a millimetre, shifts forces by some 1e-6 of the whole
+        assert np.abs(fast.force[:, number] - level.nodal_force).max() < 1e-5 * level.force_n
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_fast_method_equals_the_plain_one_on_random_decaying_flexibilities(seed):
+    """exp(-r / length) is positive definite at any places (Matern's covariance), and so is it when rows are scaled."""
+    rng = np.random.default_rng(seed)
+    places = rng.uniform(0, 10, (150, 2))
+    scale = np.exp(0.3 * rng.standard_normal(len(places)))
+    flexibility = np.outer(scale, scale) * np.exp(-cdist(places, places) / rng.uniform(0.5, 3.0))
+    assert_both_methods_agree(flexibility, rng.uniform(0, 2, len(places)), [0.5, 3.0, 20.0, 100.0])
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_the_fast_method_equals_the_plain_one_on_an_elastic_layer(shape):
+    assert_both_methods_agree(*layer_contact(SHAPES[shape]), FORCES)
+
+
+# --- what holds for any object ---
+
+
+@st.composite
+def placed_objects(draw):
+    """Spheres, boxes and cylinders, tilted up to 15 degrees, standing or lying anywhere over the layer's middle."""
+    size = st.floats(0.8, 8.0)
+    kind = draw(st.sampled_from(["sphere", "box", "cylinder", "lying cylinder"]))
+    if kind == "sphere":
+        mesh = ball(draw(size))
+    elif kind == "box":
+        mesh = flat_box(draw(size), draw(size))
+    else:
+        mesh = punch(draw(size), sections=64)
+    turned = 90.0 if kind == "lying cylinder" else 0.0
+    tilt, place = st.floats(-15.0, 15.0), st.floats(-4.0, 4.0)
+    return placed(mesh, (draw(place), draw(place), 0, turned + draw(tilt), draw(tilt), draw(st.floats(0, 90))))
+
+
+@st.composite
+def rising_forces(draw):
+    return np.array(sorted(draw(st.lists(st.floats(0.05, 8.0), min_size=1, max_size=6, unique=True))))
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(mesh=placed_objects(), forces=rising_forces())
+def test_the_conditions_of_contact_hold_under_any_object(mesh, forces):
+    flexibility, gap0 = layer_contact(mesh)
+    levels = press_elastic(flexibility, gap0, forces)
+    gap = gap0[:, None] - levels.depth + flexibility @ levels.force
+    assert levels.gap == pytest.approx(gap, abs=1e-12)          # what it states is what its forces make
+    assert levels.penetration.max() <= TOLERANCE_MM and gap.min() >= -TOLERANCE_MM - 1e-12
+    assert levels.force.min() >= 0
+    np.testing.assert_allclose(levels.force.sum(axis=0), forces, rtol=1e-8)
+    assert np.abs(gap[levels.force > 0]).max() <= TOLERANCE_MM + 1e-12      # force only where it touches
+
+
+@settings(max_examples=30, deadline=None, derandomize=True)
+@given(mesh=placed_objects(), forces=rising_forces())
+def test_a_growing_force_never_lets_the_object_rise(mesh, forces):
+    depth = press_elastic(*layer_contact(mesh), forces).depth
+    assert (np.diff(depth) >= -2 * TOLERANCE_MM).all()
+    assert depth[0] > 0
+
+
+@settings(max_examples=30, deadline=None, derandomize=True)
+@given(mesh=placed_objects(), forces=rising_forces())
+def test_a_level_does_not_depend_on_which_others_are_asked_for(mesh, forces):
+    flexibility, gap0 = layer_contact(mesh)
+    together = press_elastic(flexibility, gap0, forces)
+    for number, force in enumerate(forces):
+        alone = press_elastic(flexibility, gap0, [force])
+        assert alone.depth[0] == pytest.approx(together.depth[number], abs=2 * TOLERANCE_MM)
+        assert np.abs(alone.force[:, 0] - together.force[:, number]).max() < 2e-5 * force
+
+
+# --- first guess, preconditioner, refusal ---
+
+
+def test_first_guess_and_preconditioner_change_the_way_and_not_the_end():
+    flexibility, gap0 = layer_contact(SHAPES["tilted box"])
+    plain = press_elastic(flexibility, gap0, FORCES)
+    diagonal = 1 / np.diag(flexibility)[:, None].astype(np.float32)
+    other = press_elastic(flexibility, gap0, FORCES, area=np.linspace(0.2, 1.0, len(gap0)), bedding=30.0,
+                          precondition=lambda x: diagonal * x)
+    np.testing.assert_allclose(other.depth, plain.depth, atol=2 * TOLERANCE_MM)
+    assert np.abs(other.force - plain.force).max() < 2e-5 * FORCES[-1]
+
+
+def test_one_point_carries_everything():
+    levels = press_elastic(np.array([[0.5]]), np.array([0.1]), [1.0, 2.0])
+    np.testing.assert_allclose(levels.depth, [0.6, 1.1])
+    np.testing.assert_allclose(levels.force, [[1.0, 2.0]])
+
+
+def test_a_level_that_does_not_settle_is_named():
+    with pytest.raises(ConvergenceError, match="at 6 N in 1 iterations"):
+        press_elastic(*layer_contact(SHAPES["sphere"]), FORCES, settings=ContactSettings(max_iterations=1))

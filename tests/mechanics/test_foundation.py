@@ -1,0 +1,289 @@
+"""The foundation model on a small sensor: a frustum's law, the slab's blocks against the whole, and its presses."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from whole_foundation import WholeFoundation
+
+from softtact.contact.height_field import HeightField
+from softtact.contact.object_points import Underside
+from softtact.errors import InputError
+from softtact.geometry.meshes import place
+from softtact.geometry.pose import Pose
+from softtact.geometry.sensor_spec import SensorSpec
+from softtact.materials.laws.registry import make_law
+from softtact.mechanics.foundation import FoundationFlexibility, foundation_flexibility
+from softtact.mechanics.foundation_press import (
+    FoundationMaps,
+    FoundationSettings,
+    _Places,
+    lattice_places,
+    press_foundation,
+    rotating_loads,
+)
+from softtact.mechanics.frustum_law import FrustumLaw, _root_stiffness, frustum_law
+from softtact.mechanics.layered_body import build_unit_cell
+from softtact.sensor import Sensor
+
+CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
+SMALL = CORO.model_copy(update={"footprint_mm": (7.2, 7.2), "map_shape": (13, 13)})      # 6 x 6 frusta
+LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492),
+        "cover": make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)}
+PUNCH = trimesh.creation.cylinder(radius=1.8, height=3.0, sections=96)
+BOX = trimesh.creation.box((3.1, 2.2, 2.0))
+TILTED = (0.3, -0.4, 0, 4.0, -3.0, 20.0)
+
+
+@pytest.fixture(scope="module")
+def law():
+    return frustum_law(SMALL, LAWS["dielectric"])
+
+
+@pytest.fixture(scope="module")
+def flexibility(law):
+    return foundation_flexibility(SMALL, dielectric_law=LAWS["dielectric"], cover_law=LAWS["cover"], frustum=law)
+
+
+@pytest.fixture(scope="module")
+def whole(law):
+    return WholeFoundation(SMALL, LAWS, law)
+
+
+def points_of(mesh, flexibility, values=(0, 0, 0, 0, 0, 0)):
+    mesh = place(mesh, pose=Pose.from_values(values))
+    mesh.apply_translation([0, 0, -mesh.bounds[0, 2]])
+    return Underside(HeightField(mesh), flexibility.grid).points(1.0)
+
+
+def force_of(law, compression):
+    """Forces of frusta of given compressions, by bisection on the law."""
+    low, high = np.zeros_like(compression), np.full_like(compression, 2 * law.force_n[-1])
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        above = law.extension(middle) > compression
+        low, high = np.where(above, low, middle), np.where(above, middle, high)
+    return np.where(compression > 0, low, 0.0)
+
+
+# --- one frustum ---
+
+
+def test_a_frustum_takes_more_force_the_more_it_is_compressed(law):
+    assert law.force_n[0] == law.compression_mm[0] == 0.0
+    assert (np.diff(law.force_n) > 0).all() and (np.diff(law.compression_mm) > 0).all()
+    assert 0.5 < law.limit_mm / SMALL.dielectric.frusta.height_mm < 1.0
+    stiffness = np.diff(law.force_n) / np.diff(law.compression_mm)
+    assert stiffness[-1] > 5 * stiffness[0]      # the pocket beside it fills
+
+
+def test_the_first_slope_is_the_linear_stiffness_of_a_frustum_at_rest(law):
+    body = build_unit_cell(SMALL, dielectric_law=LAWS["dielectric"])
+    stiffness = _root_stiffness(body.bed)
+    body.close()
+    straight = np.tile([0.0, 0.0, 1.0], len(law.root_xy))
+    expected = straight @ stiffness @ straight      # N/mm: the root comes down as a plane, the tip stands
+    # Up to 2e-3 N the tip sinks into the board's smoothed penalty by sqrt(2 p / 3000**2 mm2/MPa), 3 % of the first level.
+    slope = (law.force_n[3] - law.force_n[1]) / (law.compression_mm[3] - law.compression_mm[1])
+    assert slope == pytest.approx(expected, rel=0.02)
+    assert law.force_n[1] / law.compression_mm[1] == pytest.approx(expected, rel=0.04)
+
+
+def test_the_slope_is_the_derivative_of_the_extension(law):
+    forces = np.concatenate([np.geomspace(1e-3, 0.99 * law.force_n[-1], 25), [1.5 * law.force_n[-1]]])
+    step = 1e-6 * forces
+    difference = (law.extension(forces + step) - law.extension(forces - step)) / (2 * step)
+    np.testing.assert_allclose(law.slope(forces), difference, rtol=1e-6)      # cubics: step^2, and round-off over the step
+    assert (law.slope(forces) > 0).all()
+
+
+def test_the_extension_passes_through_the_cells_levels_and_goes_on_straight(law):
+    np.testing.assert_allclose(law.extension(law.force_n), law.compression_mm, atol=1e-12)
+    ends = law.extension(law.force_n[-1] * np.array([1.0, 1.5, 2.0]))
+    assert np.diff(ends)[0] == pytest.approx(np.diff(ends)[1], rel=1e-12)
+    assert law.slope(law.force_n[-1:] * 3) == pytest.approx(law.slope(law.force_n[-1:] * (1 - 1e-9)), rel=1e-4)
+
+
+def test_the_rest_stiffness_takes_a_straight_descent_without_force_and_all_else_with_some(law):
+    straight = np.tile([0.0, 0.0, 1.0], len(law.root_xy))
+    size = np.abs(law.rest).max()
+    np.testing.assert_allclose(law.rest, law.rest.T, atol=1e-9 * size)
+    np.testing.assert_allclose(law.rest @ straight, 0.0, atol=1e-9 * size)
+    eigenvalues = np.linalg.eigvalsh(law.rest)
+    assert eigenvalues[0] > -1e-9 * size and eigenvalues[1] > 1e-4 * size      # the tip is held: nothing else is free
+    assert law.descent @ straight == pytest.approx(1.0, rel=1e-12)
+    assert law.descent.reshape(-1, 3)[:, :2].sum(axis=0) == pytest.approx([0, 0], abs=1e-9)
+
+
+def test_a_law_is_read_as_it_was_written(law, tmp_path):
+    law.save(tmp_path / "law.npz")
+    loaded = FrustumLaw.load(tmp_path / "law.npz")
+    for name, values in law.arrays().items():
+        np.testing.assert_array_equal(getattr(loaded, name), values)
+
+
+# --- the slab's blocks ---
+
+
+def test_every_frustum_is_found_from_its_number_in_the_quarter_and_its_signs():
+    numbers, signs = lattice_places((6, 4))
+    x, y = (np.arange(count // 2) + 0.5 for count in (6, 4))
+    quarter = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    whole = np.stack(np.meshgrid(np.arange(6) - 2.5, np.arange(4) - 1.5), axis=-1).reshape(-1, 2)
+    np.testing.assert_array_equal(quarter[numbers] * signs, whole)
+
+
+@pytest.fixture(scope="module")
+def loaded(flexibility, whole):
+    """A press' places, a load without symmetry on nodes and frusta, and the whole slab's displacement under it."""
+    points = points_of(BOX, flexibility, TILTED)
+    load = np.random.default_rng(3).uniform(0.0, 1.0, len(points.all_nodes) + 36)
+    load[-36:] *= -0.3
+    return _Places(flexibility, points), load, whole.displacement(whole.forces(points.all_nodes, load))
+
+
+def assert_close(got, expected, relative):
+    np.testing.assert_allclose(got, expected, rtol=0, atol=relative * np.abs(expected).max())
+
+
+# Blocks are kept in single precision, and the springs that tie the frusta's descents, 20 N/mm, are taken off again.
+
+
+def test_maps_and_compressions_are_those_of_the_whole_slab(loaded, whole):
+    places, load, moved = loaded
+    assert_close(places.maps(load[:, None])[0, 1:-1, 1:-1], -moved[3 * whole.electrode + 2], 1e-5)
+    assert_close((places.surface() @ load)[-36:], -(whole.descents @ moved), 1e-5)
+
+
+def test_movements_sideways_are_those_of_the_whole_slab(loaded, whole, flexibility):
+    places, load, moved = loaded
+    coarse = flexibility.grid.every_second
+    got = (places.sideways(np.arange(coarse.count)) @ load).reshape(2, *coarse.shape)
+    top = whole.slab.numbers[-1][2:-2:2, 2:-2:2]
+    for axis in (0, 1):
+        assert_close(got[axis], moved[3 * top + axis], 1e-5)
+
+
+def test_membrane_forces_are_those_of_the_whole_slab(loaded, whole):
+    places, load, moved = loaded
+    assert_close((places.membrane() @ load).reshape(3, -1), whole.membrane(moved), 1e-5)
+
+
+def test_rotating_loads_are_the_gradient_of_their_energy():
+    """1/2 sum N_ab w_a w_b with slopes over two pitches, w = 0 beyond the lattice: by central differences."""
+    rng = np.random.default_rng(1)
+    down, forces = rng.standard_normal((5, 7)), rng.standard_normal((3, 5, 7))
+
+    def energy(down):
+        padded = np.pad(down, 1)
+        x, y = 0.5 * (padded[1:-1, 2:] - padded[1:-1, :-2]), 0.5 * (padded[2:, 1:-1] - padded[:-2, 1:-1])
+        return 0.5 * (forces[0] * x**2 + forces[1] * y**2 + 2 * forces[2] * x * y).sum()
+
+    loads = rotating_loads(down, forces)
+    for place_ in [(0, 0), (2, 3), (4, 6), (1, 5)]:
+        step = np.zeros_like(down)
+        step[place_] = 1e-4
+        # the energy is quadratic, so only round-off is left
+        assert loads[place_] == pytest.approx((energy(down + step) - energy(down - step)) / 2e-4, abs=1e-9)
+
+
+def test_a_flexibility_is_read_as_it_was_written(flexibility, tmp_path):
+    flexibility.save(tmp_path / "foundation.npz")
+    again = FoundationFlexibility.load(tmp_path / "foundation.npz")
+    assert (tuple(again.counts), again.pitch, again.bedding) == (flexibility.counts, flexibility.pitch, flexibility.bedding)
+    points = points_of(PUNCH, flexibility)
+    first, second = (FoundationMaps(f, points)(list(press_foundation(f, points, [0.5, 2.0]))) for f in (flexibility, again))
+    np.testing.assert_array_equal(first, second)
+
+
+def test_a_lattice_with_a_row_in_the_middle_is_refused(law):
+    odd = SMALL.model_copy(update={"footprint_mm": (6.0, 7.2)})
+    with pytest.raises(InputError, match="lattice of 5 x 6 frusta has a row in the middle"):
+        foundation_flexibility(odd, dielectric_law=LAWS["dielectric"], cover_law=LAWS["cover"], frustum=law)
+
+
+# --- presses ---
+
+POSES = {"punch": (PUNCH, (0, 0, 0, 0, 0, 0)), "tilted box": (BOX, TILTED),
+         "sphere": (trimesh.creation.icosphere(subdivisions=4, radius=6.0), (0.4, 0.1, 0, 0, 0, 0))}
+
+
+@pytest.mark.parametrize("name", POSES)
+@pytest.mark.parametrize("follow", [False, True])
+def test_the_conditions_of_contact_hold_for_object_and_frusta(name, follow, flexibility):
+    mesh, values = POSES[name]
+    points = points_of(mesh, flexibility, values)
+    for level in press_foundation(flexibility, points, [0.3, 1.5, 4.0], settings=FoundationSettings(follow=follow)):
+        nodes = level.load[:-36]
+        assert nodes.min() >= 0
+        assert nodes.sum() == pytest.approx(level.force_n, rel=1e-6)      # weights in single precision
+        assert level.penetration <= 1e-6
+        assert level.touching.any() and level.iterations > 0
+
+
+@pytest.mark.parametrize("name", POSES)
+def test_the_frusta_and_the_held_sides_carry_the_objects_force(name, flexibility, whole):
+    """The whole slab under the press' loads comes down on the frusta as the press says, and these push back by their law."""
+    mesh, values = POSES[name]
+    points = points_of(mesh, flexibility, values)
+    level, = press_foundation(flexibility, points, [3.0], settings=FoundationSettings(follow=False))
+    forces = whole.forces(points.all_nodes, level.load)
+    moved = whole.displacement(forces)
+    pushed = -level.load[-36:]
+    assert_close(level.compression, -(whole.descents @ moved), 1e-4)
+    assert_close(pushed, force_of(flexibility.law, level.compression), 1e-4)
+    assert pushed.min() >= 0
+    assert pushed.sum() + whole.sides_carry(moved, forces) == pytest.approx(3.0, rel=1e-4)
+    assert 0.9 * 3.0 < pushed.sum() < 1.1 * 3.0      # the held sides push or hold down only a little
+
+
+def test_small_forces_give_a_map_in_proportion(flexibility):
+    """A flat punch, nothing followed; the first 1e-3 N of 36 frusta lie where their law is straight."""
+    points = points_of(PUNCH, flexibility)
+    levels = list(press_foundation(flexibility, points, [1e-3, 2e-3], settings=FoundationSettings(follow=False, gap_mm=1e-10)))
+    small, large = FoundationMaps(flexibility, points)(levels)
+    assert_close(large, 2 * small, 2e-3)
+    assert levels[1].depth == pytest.approx(2 * levels[0].depth, rel=2e-3)
+
+
+def test_what_follows_the_deformation_vanishes_with_the_force(flexibility):
+    """Membrane forces times slopes, and movements times slopes, are of second order: a tenth of the force, a tenth of the share."""
+    points, shares = points_of(PUNCH, flexibility), []
+    for force in (0.05, 0.5):
+        maps = [FoundationMaps(flexibility, points)(list(press_foundation(flexibility, points, [force],
+                settings=FoundationSettings(follow=follow))))[0] for follow in (False, True)]
+        shares.append(np.abs(maps[1] - maps[0]).max() / maps[0].max())
+    assert shares[0] < 0.2 * shares[1]
+    assert 1e-4 < shares[1] < 0.1
+
+
+@pytest.mark.parametrize("name", ["punch", "sphere"])
+def test_a_centred_object_of_two_symmetries_gives_a_map_that_has_them(name, flexibility):
+    points = points_of(POSES[name][0], flexibility)
+    map_, = FoundationMaps(flexibility, points)(list(press_foundation(flexibility, points, [1.0])))
+    for mirrored in (map_[::-1], map_[:, ::-1]):
+        assert_close(map_, mirrored, 1e-3)
+
+
+@pytest.mark.parametrize("name", ["punch", "sphere"])
+def test_without_patches_a_centred_object_of_two_symmetries_gives_a_map_that_has_them(name, flexibility):
+    points = points_of(POSES[name][0], flexibility)
+    levels = list(press_foundation(flexibility, points, [1.0], settings=FoundationSettings(patches=False)))
+    map_, = FoundationMaps(flexibility, points)(levels)
+    for mirrored in (map_[::-1], map_[:, ::-1]):
+        assert_close(map_, mirrored, 1e-3)
+
+
+def test_at_a_small_force_the_foundation_gives_the_hyperelastic_models_map(flexibility):
+    """Both start from the same cell and laws; at 1 N strains are a few per cent.
+
+    What is left is the punch's edge, where the pressure is singular and both models' contact has steps of 0.3 and 0.1 mm: each acts
+    as a punch smaller by a share of that, a tenth of the radius or less, and depth and map go with it.
+    """
+    sensor = Sensor(SMALL, LAWS, files={"foundation": flexibility})
+    punch = trimesh.creation.cylinder(radius=1.7, height=3.0, sections=96)
+    fast, full = (sensor.press(punch, force_n=1.0, model=model, threads=1) for model in ("foundation", "hyperelastic"))
+    difference, largest = np.abs(fast.deformation_map_mm - full.deformation_map_mm), full.deformation_map_mm.max()
+    assert difference.max() < 0.06 * largest and difference.mean() < 0.01 * largest
+    assert fast.indentation_mm[0] == pytest.approx(full.indentation_mm[0], rel=0.1)
