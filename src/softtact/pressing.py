@@ -15,7 +15,7 @@ from softtact.progress import announce, progress
 from softtact.sensing.capacitance import ideal_counts
 
 _DEEPEST_LINEAR = 0.5     # of the layer's thickness: a linear layer does not know that it ends
-_HARDLY_COMPRESSED = 0.27    # of a frustum's height: below, the foundation model's map is within 2 % (docs/fast_models.md)
+_HARDLY_COMPRESSED = 0.27    # of a frustum's height: below, the foundation model is within 2 % (docs/fast_models.md)
 _FULL_POCKET = 0.8        # of a frustum's height: above, its pocket is full and contacts begin that the models leave out
 _MARGIN, _LEAST_MARGIN_MM = 1.3, 0.1     # of the depth on springs, within which points are looked for at first
 _RISE = 1.15              # of the object's depth: points within may touch
