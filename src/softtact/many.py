@@ -1,7 +1,6 @@
 """Many presses at once, over processes: each core presses on its own, on what the sensor prepared once."""
 
 import multiprocessing
-import os
 from concurrent.futures import ProcessPoolExecutor
 from itertools import repeat
 
@@ -30,7 +29,6 @@ def press_many(sensor, meshes, poses, force_n, *, model, workers, label, options
 def _begin(sensor):
     global _sensor     # one for each process, which presses with nothing else
     _sensor = sensor
-    os.environ["OMP_NUM_THREADS"] = "1"
 
 
 def _in_process(job, force_n, model, options):

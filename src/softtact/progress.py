@@ -5,13 +5,16 @@ import time
 
 
 def progress(iterable, *, label, total=None, interval_s=2.0):
-    """Yield the items of `iterable`; write `label: 3/20, 12 s` on stderr at most every `interval_s` seconds."""
+    """Yield the items of `iterable`; write `label: 3/20, 12 s` on stderr at most every `interval_s` seconds.
+
+    An empty label writes nothing: the work is part of some other that tells its progress.
+    """
     total = total if total is not None else len(iterable)
     start = shown = time.monotonic()
     for done, item in enumerate(iterable, start=1):
         yield item
         now = time.monotonic()
-        if now - shown >= interval_s:
+        if label and now - shown >= interval_s:
             print(f"{label}: {done}/{total}, {now - start:.0f} s", file=sys.stderr, flush=True)
             shown = now
 
