@@ -41,7 +41,7 @@ def _one(sensor, job, force_n, model, options):
     try:
         return sensor.press(mesh, pose=pose, force_n=force_n, model=model, threads=1, label="", **options)
     except (ConvergenceError, InputError) as error:
-        return error
+        return error.with_traceback(None)     # its frames hold the press' matrices
 
 
 def raise_first(results):

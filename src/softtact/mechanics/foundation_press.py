@@ -26,7 +26,8 @@ import scipy.sparse as sp
 from softtact.errors import ConvergenceError
 
 _PATIENCE = 8        # iterations, after which loads that swing are followed half of the way only
-_ABSURD_MM = 100.0
+_ABSURD_MM = 1e6     # where an iteration has run away; on its first few points an object may be thought to sink by metres
+_FIRST_PATCHES = 30
 _LEVEL_MM = 0.02     # range of heights among the points of a patch
 _MANY_POINTS = 800   # from which on patches save time; a small contact wants all of its points
 
@@ -119,7 +120,7 @@ class _Press:
     def first(self):
         """Where a press begins: the lowest patches touch."""
         gap = self.patch @ self.points.gap
-        return _State(gap <= gap.min() + 1e-9, np.ones(self.frusta, dtype=bool), *self.nothing())
+        return _State(gap <= np.sort(gap)[:_FIRST_PATCHES][-1], np.ones(self.frusta, dtype=bool), *self.nothing())
 
     def nothing(self):
         """q, r and moved of the unloaded sensor."""
