@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from softtact.errors import ConvergenceError, InputError
-from softtact.geometry.complexity import choose_model, score
+from softtact.geometry.complexity import OVERLAP_THRESHOLD, TOTAL_THRESHOLD, choose_model, score
 from softtact.pressing import PRESSES
 
 POLICIES = ("paper", "error")
 TOLERANCE_MM = 0.01
-_KNOWN = 0.5     # of a frustum's height: compression in the presses that the foundation model's error was calibrated on, about
+_KNOWN = 0.5     # of a frustum's height: the error was calibrated up to a compression of 0.36, and is not told much beyond
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def calibrate(maps_mm, compression_mm, true_mm, *, height_mm):
 def expected_errors(elastic, foundation, *, height_mm, model=FoundationError()):
     """{model: errors (l,) in mm} of two `PressResult`s, or data sets with their names, of the same press.
 
-    Infinite where frusta are compressed further than any press that the error is known of.
+    Infinite where frusta are compressed much further than in any press that the error was calibrated on.
     """
     compression = np.asarray(foundation.frustum_compression_mm)
     known = compression < _KNOWN * height_mm
@@ -87,8 +87,9 @@ def _by_counts(sensor, placed, forces, label, threads):
     counts = score(placed.triangles, footprint_mm=sensor.spec.footprint_mm, reach_mm=sensor.spec.thickness_mm)
     model = choose_model(counts.NPt, counts.CHt, counts.NPo, counts.CHo)
     result = PRESSES[model](sensor, placed, forces, label=label, threads=threads)
-    return replace(result, why=f"the paper's rule: NPt / CHt = {counts.ratio_total:.3g} (10 asks for the hyperelastic model), "
-                               f"NPo / CHo = {counts.ratio_overlap:.3g} (8)")
+    why = (f"the paper's rule: NPt / CHt = {counts.ratio_total:.3g} ({TOTAL_THRESHOLD:g} asks for the hyperelastic model), "
+           f"NPo / CHo = {counts.ratio_overlap:.3g} ({OVERLAP_THRESHOLD:g})")
+    return replace(result, why=why)
 
 
 def _by_error(sensor, placed, forces, label, threads, tolerance_mm):
@@ -104,7 +105,7 @@ def _by_error(sensor, placed, forces, label, threads, tolerance_mm):
     why = f"expected errors: {told}; asked for {1e3 * tolerance_mm:.3g} um"
     if model == "hyperelastic":
         result = PRESSES[model](sensor, placed, forces, label=label, threads=threads)
-        return replace(result, why=why, expected_error_mm=np.zeros(len(result.force_n)))
+        spent = result.wall_time_s + elastic.wall_time_s + foundation.wall_time_s
+        return replace(result, why=why, expected_error_mm=np.zeros(len(forces)), wall_time_s=spent)
     result = {"elastic": elastic, "foundation": foundation}[model]
-    spent = result.wall_time_s + (foundation if model == "elastic" else elastic).wall_time_s
-    return replace(result, why=why, expected_error_mm=errors[model], wall_time_s=spent)
+    return replace(result, why=why, expected_error_mm=errors[model], wall_time_s=elastic.wall_time_s + foundation.wall_time_s)

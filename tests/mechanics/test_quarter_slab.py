@@ -83,15 +83,6 @@ def test_the_flexibility_is_symmetric_and_positive():
     np.testing.assert_allclose(whole, whole[::-1, ::-1], atol=ROUND_OFF * whole.max())      # turned by half a turn
 
 
-def test_single_precision_keeps_seven_digits():
-    slab = QuarterSlab(FOOTPRINT, [STIFF], CELLS, base_held=True)
-    grid, blocks = surface_grid(slab), blocks_of(slab, dofs(slab.top, 2))
-    places = grid.quarter(np.arange(grid.count))
-    single = blocks.single.between(*places, *places)
-    assert single.dtype == np.float32
-    np.testing.assert_allclose(single, blocks.between(*places, *places), atol=2e-7 * blocks.blocks.max())
-
-
 # --- mechanics ---
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from softtact.contact.height_field import NO_CONTACT_MM
+from softtact.contact.unilateral import depth_on_springs
 from softtact.errors import InputError
 
 _SAMPLES = 8              # a side of a rectangle with an edge
@@ -122,12 +123,8 @@ class Underside:
     def depth_on_springs(self, force_n, bedding):
         """How far (mm) the object sinks from its first touch into a bed of springs of `bedding` N/mm3: a first guess."""
         kept = self.heights < NO_CONTACT_MM
-        order = np.argsort(self.heights[kept])
-        gap = self.heights[kept][order] - self.lowest_mm
-        area = self.covered[kept][order] * np.prod(self._grid.step)
-        weight, moment = np.cumsum(area), np.cumsum(area * gap)
-        last = np.searchsorted(gap * weight - moment, force_n / bedding, side="left") - 1
-        return (force_n / bedding + moment[last]) / weight[last]
+        area = self.covered[kept] * np.prod(self._grid.step)
+        return depth_on_springs(self.heights[kept] - self.lowest_mm, area, force_n / bedding)
 
     def points(self, reach_mm):
         """The `ObjectPoints` as far as the object is lower than `reach_mm` over its lowest point."""
@@ -168,7 +165,7 @@ def _rectangles(surface, grid):
     part = (fine <= lowest[:, None] + _LOWEST * step.min()) & (fine < NO_CONTACT_MM)
     covered[uneven] = part.mean(axis=1)
     centre[uneven] = part @ _places(_SAMPLES) / np.maximum(part.sum(axis=1), 1)[:, None]
-    heights = np.where(uneven, low, heights)
+    heights = heights.copy()
     heights[uneven] = lowest
     return heights, covered, centre, uneven
 

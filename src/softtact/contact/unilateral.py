@@ -3,7 +3,7 @@
 Unknown are the forces f >= 0 at the contact points:  gap = gap0 - depth + A f >= 0,  f gap = 0,  sum f = F,
 with the flexibility A among the points. Primal-dual active sets, that is a semismooth Newton method: points that penetrate join,
 points that pull leave. The equations of a set are solved by conjugate gradients on the plane sum f = const, in single precision
-with the residual in double (iterative refinement). A product with A for twenty levels takes three times as long as for one,
+with the residual in double (iterative refinement). A product with A for twenty levels takes seven times as long as for one,
 which is what makes the levels cheap. Many points that settle together suit this; few and changing ones `active_set`, which is the
 plain method and its specification.
 References: Hintermueller, Ito and Kunisch, SIAM J. Optim. 13 (2003) 865; Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23
@@ -82,10 +82,7 @@ class _Press:
     def _first(self, area, bedding):
         """Forces of springs side by side under the object, as deep as each force asks for."""
         gap = self.gap0[:, 0] - self.gap0.min()
-        order = np.argsort(gap)
-        weight, moment = np.cumsum(area[order]), np.cumsum((area * gap)[order])
-        last = np.searchsorted(gap[order] * weight - moment, self.forces / bedding, side="left") - 1
-        depth = (self.forces / bedding + moment[last]) / weight[last]
+        depth = depth_on_springs(gap, area, self.forces / bedding)
         pressed = np.maximum(0.0, depth - gap[:, None]) * area[:, None]
         return _State(f=pressed * (self.forces / pressed.sum(axis=0)), active=pressed > 0, depth=depth,
                       gap=np.zeros_like(pressed), iterations=np.zeros(len(self.forces), dtype=int))
@@ -129,6 +126,17 @@ class _Press:
         f += active * ((self.forces[levels] - f.sum(axis=0)) / active.sum(axis=0))     # what single precision lost
         state.f[:, levels] = f
         state.iterations[levels] += 1
+
+
+def depth_on_springs(gap, area, force_over_bedding):
+    """Depth at which springs side by side, under gaps (c,) >= 0 that begin at 0 and of areas (c,), take a force over their bedding.
+
+    force_over_bedding: area times depth, a number or (l,); a first guess for what an object does on a surface.
+    """
+    order = np.argsort(gap)
+    weight, moment = np.cumsum(area[order]), np.cumsum((area * gap)[order])
+    last = np.searchsorted(gap[order] * weight - moment, force_over_bedding, side="left") - 1     # the last one that is pressed
+    return (force_over_bedding + moment[last]) / weight[last]
 
 
 def projected_conjugate_gradients(apply, precondition, mask, right, total, settings):

@@ -28,12 +28,11 @@ class FoundationFlexibility:
     surface: among the grid's nodes in the quarter (a,), the frusta (b,) and the electrode plane at the map's points (c,)
     sideways: of the grid's every second node, in x and in y (2 c,), from the nodes and frusta (a + b,)
     membrane: forces N_x, N_y, N_xy of the frusta's cells (3 b,) in N/mm, from the same
-    grid: the nodes;  counts: frusta along x and y;  pitch in mm;  bedding: pressure per depth in N/mm3 of the layer at rest
+    grid: the nodes;  counts: frusta along x and y;  bedding: pressure per depth in N/mm3 of the layer at rest
     """
 
     grid: NodeGrid
     counts: tuple
-    pitch: float
     bedding: float
     law: FrustumLaw
     surface: ParityBlocks
@@ -42,7 +41,7 @@ class FoundationFlexibility:
 
     def save(self, path):
         """Write as a NumPy archive."""
-        arrays = {"x": self.grid.x, "y": self.grid.y, "counts": self.counts, "pitch": self.pitch, "bedding": self.bedding}
+        arrays = {"x": self.grid.x, "y": self.grid.y, "counts": self.counts, "bedding": self.bedding}
         arrays |= {f"law_{name}": values for name, values in self.law.arrays().items()}
         arrays |= {name: getattr(self, name).blocks for name in ("surface", "sideways", "membrane")}
         np.savez(path, **arrays)
@@ -53,7 +52,7 @@ class FoundationFlexibility:
         with np.load(path, allow_pickle=False) as data:
             law = FrustumLaw(**{name.removeprefix("law_"): data[name] for name in data.files if name.startswith("law_")})
             blocks = {name: ParityBlocks(data[name]) for name in ("surface", "sideways", "membrane")}
-            return cls(grid=NodeGrid(data["x"], data["y"]), counts=tuple(data["counts"]), pitch=float(data["pitch"]),
+            return cls(grid=NodeGrid(data["x"], data["y"]), counts=tuple(data["counts"]),
                        bedding=float(data["bedding"]), law=law, **blocks)
 
 
@@ -74,10 +73,8 @@ def foundation_flexibility(spec, *, dielectric_law, cover_law, frustum=None, thr
                            *(3 * slab.top[::2, ::2].ravel() + axis for axis in (0, 1))])
     parts = [_of_parity(slab, stiffness, descents, membrane, rows, len(columns), parity, threads) for parity in PARITIES]
     surface, sideways, forces = (ParityBlocks(np.stack(blocks).astype(np.float32)) for blocks in zip(*parts, strict=True))
-    return FoundationFlexibility(grid=surface_grid(slab),
-                                 counts=spec.frusta_counts, pitch=spec.dielectric.frusta.pitch_mm,
-                                 bedding=_bedding(spec, frustum, cover_law), law=frustum, surface=surface, sideways=sideways,
-                                 membrane=forces)
+    return FoundationFlexibility(grid=surface_grid(slab), counts=spec.frusta_counts, bedding=_bedding(spec, frustum, cover_law),
+                                 law=frustum, surface=surface, sideways=sideways, membrane=forces)
 
 
 def foundation_slab(spec, dielectric_law, cover_law, *, cells=None):

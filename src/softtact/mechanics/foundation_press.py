@@ -52,7 +52,7 @@ class FoundationLevel:
     """One force level.
 
     load (n + b,): N at nodes and frusta;  touching (c,): points under pressure
-    compression (b,): of frusta in mm, negative where one is lifted;  penetration in mm
+    compression (b,): of frusta in mm, negative where one is lifted;  penetration in mm: of patches as a whole
     """
 
     force_n: float

@@ -184,11 +184,6 @@ class ParityBlocks:
         args = [np.ascontiguousarray(values) for values in (rows, row_signs < 0, columns, column_signs < 0)]
         return _between(self.blocks, *args)
 
-    @cached_property
-    def single(self):
-        """The same in single precision."""
-        return ParityBlocks(self.blocks.astype(np.float32))
-
 
 @njit(cache=True, nogil=True)
 def _between(blocks, rows, row_negative, columns, column_negative):
