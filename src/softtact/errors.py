@@ -18,3 +18,7 @@ class ConvergenceError(SofttactError):
     def __init__(self, message, *, result=None):
         super().__init__(message)
         self.result = result
+
+
+class OutsideCardWarning(UserWarning):
+    """A law is used where the data behind its material card do not reach."""

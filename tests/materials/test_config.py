@@ -86,7 +86,7 @@ def test_a_users_own_files_are_found_beside_the_yaml(tmp_path):
             {"uniaxial": [1.6, 0.6]},
             r"curves.modes.uniaxial is \[1.6, 0.6\]; a window is \[from, to\]",
         ),
-        (["fit", "laws"], ["gent"], "Law 'gent' is unknown"),
+        (["fit", "laws"], ["gents"], "Law 'gents' is unknown"),
         (["fit", "choose"], "moony_rivlin", "Law 'moony_rivlin' is unknown"),
         (["fit", "poisson"], 0.6, "fit.poisson is 0.6; input should be less than 0.5"),
         (

@@ -17,6 +17,7 @@ TRUTH = {
     "yeoh": {"c10": 0.18, "c20": -0.02, "c30": 0.01},
     "reduced_polynomial2": {"c10": 0.18, "c20": 0.03},
     "arruda_boyce": {"mu": 0.3, "lambda_m": 2.5},
+    "gent": {"mu": 0.3, "jm": 6.0},
     "ogden1": {"mu1": 0.35, "alpha1": 3.3},
     "ogden2": {"mu1": 0.1351, "alpha1": 1.4538, "mu2": 0.2223, "alpha2": -4.9910},
 }
@@ -127,8 +128,8 @@ def test_curves_that_soften_from_the_start_are_refused():
 
 
 def test_an_unknown_law_is_refused(curves_of):
-    with pytest.raises(InputError, match="Law 'gent' is unknown; use one of neo_hooke"):
-        fit_family(curves_of("neo_hooke", {"c10": 0.2}), laws=["gent"])
+    with pytest.raises(InputError, match="Law 'gents' is unknown; use one of neo_hooke"):
+        fit_family(curves_of("neo_hooke", {"c10": 0.2}), laws=["gents"])
 
 
 def test_treloars_rubber_ranks_the_laws_as_the_literature_does(published):

@@ -95,7 +95,7 @@ HEADER = "stretch,nominal_stress_mpa\n"
         (HEADER + "0.7,0.47\n1,0\n", "row 2: the stress 0.47 MPa has the wrong sign .* compression negative"),
         (HEADER + "1,0\n1.2,0.2\n1.1,0.1\n", "row 4: the stretch turns back to 1.1; keep one loading branch"),
         ("lambda,nominal_stress_mpa\n1,0\n", "no column holds the stretch among lambda, nominal_stress_mpa; name one"),
-        ("stretch,S11\n1,0\n", "no column holds the nominal stress among stretch, S11; .* map it under `columns`"),
+        ("stretch,S11\n1,0\n", "no column holds the stress among stretch, S11; .* map it under `columns`"),
         ("stretch,engineering_strain,nominal_stress_mpa\n1,0,0\n", "several columns hold the stretch"),
     ],
 )

@@ -1,64 +1,99 @@
-"""Material cards: everything known of a material after its fit, as JSON, and the laws made from it."""
+"""Material cards: everything known of a material after its fit, as JSON, and the laws made from it (docs/materials.md)."""
+
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from softtact.errors import InputError
 from softtact.files import read_json
-from softtact.materials.consistency import disagreements
-from softtact.materials.curves import common_kind, join_by_mode
-from softtact.materials.fitting import STARTS, fit_family
-from softtact.materials.laws.base import TEST_PATHS
+from softtact.materials.agreement import THRESHOLD, differences, partings, paths_inside, paths_outside
+from softtact.materials.bulk import bulk_modulus, poisson_ratio, small_strain_constants
+from softtact.materials.checks import refuse_mixed_units
+from softtact.materials.consistency import against_linear, disagreements
+from softtact.materials.curves import VOLUMETRIC, common_kind, join_by_mode, principal_window
+from softtact.materials.fitting import STARTS, FitOptions, fit_law, law_names
 from softtact.materials.laws.registry import make_law
 from softtact.materials.linear import LinearConstants, young_modulus
-from softtact.materials.stability import stable_ranges
+from softtact.materials.prediction import predict_left_out
+from softtact.materials.stability import covers, stable_ranges
+from softtact.progress import progress
+
+_SYSTEMATIC = 0.7   # neighbouring residuals so alike are the law's misfit; noise gives 0 +- 1/sqrt(points)
 
 
-def make_card(
-    curves,
-    *,
-    material="material",
-    laws="all",
-    choose="best",
-    bulk_over_shear=20.0,
-    poisson=None,
-    small_strain=0.1,
-    window=None,
-    nonnegative=False,
-    starts=STARTS,
-    seed=0,
-    printed=None,
-):
-    """Fit the laws to the curves and return the card as a dict, ready for `write_json`.
+@dataclass(frozen=True)
+class CardOptions:
+    """What a card is made with.
 
     laws: list of names, or "all"
     choose: the law that the solvers take, or "best": the first of the ranking
-    bulk_over_shear: K / mu0, which curves of stress against stretch do not determine
-    poisson: Poisson's ratio of the linear constants; without it the card has none
+    bulk_over_shear: K / mu0, for want of a volumetric test
+    poisson: Poisson's ratio of the linear constants; without it, it follows from a volumetric test, or the card has none
     small_strain: strain up to which E is the slope of the uniaxial curve
-    window: {mode: [min, max]} stretch to use, all by default
-    nonnegative, starts, seed: see `fit_law`
+    window: {mode: [min, max]} stretch (volume ratio) to use, all by default
+    residual, weights, nonnegative, starts, seed: see `softtact.materials.fitting.FitOptions`
+    predict_left_out: fit each law also to all modes but one, and tell how it meets that one
+    disagreement: difference of two laws' stresses, as a share, beyond which they are named
+    """
+
+    laws: str | list = "all"
+    choose: str = "best"
+    bulk_over_shear: float = 20.0
+    poisson: float | None = None
+    small_strain: float = 0.1
+    window: dict = field(default_factory=dict)
+    residual: str = "absolute"
+    weights: dict = field(default_factory=dict)
+    nonnegative: bool = False
+    starts: int = STARTS
+    seed: int = 0
+    predict_left_out: bool = True
+    disagreement: float = THRESHOLD
+
+    @property
+    def fit(self):
+        """The part that `FitOptions` takes."""
+        return {name: getattr(self, name) for name in FitOptions.__dataclass_fields__}
+
+
+def make_card(curves, *, material="material", printed=None, **options):
+    """Fit the laws to the curves and return the card as a dict, ready for `write_json`.
+
+    curves: list of `Curve` and `VolumetricCurve`;  options: those of `CardOptions`
     printed: constants published for the material, {law: {"parameters": {...}}}, checked against each other
     """
-    curves = _windowed(join_by_mode(curves), window or {})
-    fits = fit_family(curves, laws=laws, nonnegative=nonnegative, starts=starts, seed=seed)
-    entries = {name: _law_entry(fit, curves, bulk_over_shear) for name, fit in fits.items()}
+    options = CardOptions(**options)
+    refuse_mixed_units(curves)
+    curves = _windowed(join_by_mode(curves), options.window)
+    shape = [curve for curve in curves if curve.mode != VOLUMETRIC]
+    volumetric = next((curve for curve in curves if curve.mode == VOLUMETRIC), None)
+    bulk = bulk_modulus(volumetric, bulk_over_shear=options.bulk_over_shear)
+    if not shape:
+        raise InputError("There is only a volumetric curve; give a uniaxial, equibiaxial or planar one for the shape.")
+    fits, entries = {}, {}
+    for name in progress(law_names(options.laws), label="laws"):
+        fits[name] = fit_law(name, shape, **options.fit)
+        entries[name] = _law_entry(fits[name], shape, bulk, options)
     ranking = sorted(entries, key=lambda name: (not entries[name]["stable_over_data"], entries[name]["aicc"]))
-    warnings = [sentence for name, fit in fits.items() for sentence in _fit_warnings(fit, entries[name])]
-    linear, linear_warnings = _linear_entry(curves, poisson, small_strain)
+    chosen = _choose(options.choose, ranking, entries)
+    linear, linear_warnings = _linear_entry(shape, bulk, options)
     card = {
         "material": material,
         "kind": common_kind(curves),
         "curves": [_curve_entry(curve) for curve in curves],
         "strain_window": {curve.mode: list(curve.window) for curve in curves},
-        "chosen": _choose(choose, ranking),
+        "bulk_source": bulk.source,
+        "chosen": chosen,
         "ranking": ranking,
         "laws": entries | linear,
-        "warnings": warnings + linear_warnings,
+        "agreement": _agreement(entries, shape),
+        "warnings": [remark for curve in curves for remark in curve.remarks] + [*bulk.warnings],
     }
-    card["warnings"] += _consistency_warnings(card)
+    card["warnings"] += [sentence for name, fit in fits.items() for sentence in _fit_warnings(fit, entries[name])]
+    card["warnings"] += linear_warnings + _consistency_warnings(card, options.disagreement)
     if printed:
         card["printed"] = printed
-        card["warnings"] += printed_warnings(printed, bulk_over_shear=bulk_over_shear)
+        card["warnings"] += printed_warnings(printed, bulk_over_shear=options.bulk_over_shear)
     return card
 
 
@@ -72,24 +107,16 @@ def load_card(path):
 
 
 def law_from_card(card, law=None):
-    """The `Law` of a card: the chosen one, or the one named."""
+    """The `Law` of a card: the chosen one, or the one named. It warns where it is used outside the card's strain window."""
     name = law or card["chosen"]
     available = [key for key in card["laws"] if key != "linear"]
     if name not in available:
         raise InputError(
             f"The card of material {card['material']} has no hyperelastic law {name!r}; it has {', '.join(available)}."
         )
-    entry = card["laws"][name]
-    law = make_law(name, entry["parameters"], bulk_modulus=entry["bulk_modulus_mpa"])
-    law.stretch_window = principal_window(card.get("strain_window", {}))
-    return law
-
-
-def principal_window(windows):
-    """Lowest and highest principal stretch over {mode: [min, max] stretch along the loading}; None without a known mode."""
-    stretches = [stretch**exponent for mode, window in windows.items() if mode in TEST_PATHS
-                 for stretch in window for exponent in TEST_PATHS[mode]]
-    return (min(stretches), max(stretches)) if stretches else None
+    made = _law_of(name, card["laws"][name])
+    made.stretch_window = principal_window(card.get("strain_window", {}))
+    return made
 
 
 def linear_from_card(card):
@@ -113,69 +140,106 @@ def printed_warnings(printed, *, bulk_over_shear=20.0):
     return [f"Printed constants: {sentence}" for sentence in disagreements(laws, linear=linear)]
 
 
+def _law_of(name, entry):
+    return make_law(name, entry["parameters"], bulk_modulus=entry["bulk_modulus_mpa"])
+
+
 def _windowed(curves, window):
     """The curves cut to the windows of their modes."""
     kept = [curve.within(window[curve.mode]) if curve.mode in window else curve for curve in curves]
     for curve in kept:
-        if len(curve.stretch) < 2:
+        if len(next(iter(curve.columns.values()))) < 2:
             raise InputError(f"The window {window[curve.mode]} leaves no {curve.mode} curve; widen it.")
     return kept
 
 
-def _choose(choose, ranking):
-    if choose == "best":
-        return ranking[0]
-    if choose not in ranking:
+def _choose(choose, ranking, entries):
+    """The name of the law to take: never one that is unstable where its data are."""
+    if choose not in (*ranking, "best"):
         raise InputError(f"Law {choose!r} is to be chosen but is not fitted; choose one of {', '.join(ranking)}.")
-    return choose
+    name = ranking[0] if choose == "best" else choose
+    if not entries[name]["stable_over_data"]:
+        what = "No law" if choose == "best" else f"Law {name} is to be chosen, but it"
+        raise InputError(f"{what} is stable over the strains of these curves ({_ranges(entries[name])}); narrow the window, keep"
+                         f" the constants from being negative (nonnegative), or choose {_stable_names(ranking, entries)}.")
+    return name
+
+
+def _stable_names(ranking, entries):
+    return " or ".join(name for name in ranking if entries[name]["stable_over_data"]) or "other laws"
 
 
 def _curve_entry(curve):
-    return {"mode": curve.mode, "kind": curve.kind, "source": curve.source, "points": len(curve.stretch)}
+    points = len(next(iter(curve.columns.values())))
+    return {"mode": curve.mode, "kind": curve.kind, "source": curve.source, "points": points}
 
 
-def _law_entry(fit, curves, bulk_over_shear):
+def _law_entry(fit, curves, bulk, options):
+    """What the card says of one law."""
     law = fit.make()
-    bulk_modulus = bulk_over_shear * law.mu0
+    modulus = bulk.of(law.mu0)
     stable = stable_ranges(law)
     return {
         "parameters": fit.parameters,
         "parameter_names": list(fit.parameters),
-        "covariance": None if fit.covariance is None else fit.covariance.tolist(),
+        "covariance": _listed(fit.covariance),
+        "correlation": _listed(fit.correlation),
+        "standard_error": None if fit.covariance is None else _named_errors(fit),
+        "not_identifiable": fit.not_identifiable,
         "rmse_mpa": fit.rmse_mpa,
         "rmse_by_mode_mpa": fit.rmse_by_mode_mpa,
+        "relative_error": fit.relative_error,
+        "relative_error_by_mode": fit.relative_error_by_mode,
         "aicc": fit.aicc,
+        "autocorrelation": fit.autocorrelation,
+        "left_out": predict_left_out(fit.law, curves, **options.fit) if options.predict_left_out else {},
         "mu0_mpa": law.mu0,
-        "bulk_modulus_mpa": bulk_modulus,
-        "d_per_mpa": [2 / bulk_modulus] if bulk_modulus else [],
+        "bulk_modulus_mpa": modulus,
+        "d_per_mpa": [2 / modulus] if modulus else [],
+        "d_source": bulk.source,
+        "small_strain": small_strain_constants(law.mu0, modulus),
         "stable_range": stable,
-        "stable_over_data": all(_covers(stable[curve.mode], curve.window) for curve in curves),
+        "stable_over_data": law.mu0 > 0 and all(covers(stable[curve.mode], curve.window) for curve in curves),
         "fit": fit.record,
     }
 
 
-def _covers(outer, inner):
-    """Whether a range covers another, up to the 1 % steps of the stability scan."""
-    return outer[0] <= inner[0] * 1.01 and outer[1] >= inner[1] / 1.01
+def _listed(matrix):
+    return None if matrix is None else matrix.tolist()
 
 
-def _linear_entry(curves, poisson, small_strain):
+def _named_errors(fit):
+    return dict(zip(fit.parameters, np.sqrt(np.diag(fit.covariance)).tolist(), strict=True))
+
+
+def _agreement(entries, curves):
+    """Differences of the laws' stresses within the data and just outside."""
+    windows = {curve.mode: curve.window for curve in curves}
+    laws = {name: _law_of(name, entry) for name, entry in entries.items() if entry["mu0_mpa"] > 0}
+    return {"inside": differences(laws, paths_inside(windows)),
+            "outside": differences(laws, paths_outside(principal_window(windows)))}
+
+
+def _linear_entry(curves, bulk, options):
     """({"linear": entry}, warnings), or ({}, why there is none)."""
-    if poisson is None:
-        return {}, ["No linear constants: curves do not hold Poisson's ratio, and none was stated (`poisson`)."]
+    if options.poisson is None and bulk.modulus_mpa is None:
+        return {}, ["No linear constants: curves do not hold Poisson's ratio, and none was stated (`poisson`), nor a volumetric"
+                    " curve given."]
     try:
-        young, error, rmse = young_modulus(curves, small_strain=small_strain)
+        young, error, rmse = young_modulus(curves, small_strain=options.small_strain)
     except InputError as refusal:
         return {}, [f"No linear constants: {refusal}"]
-    linear = LinearConstants(young, poisson)
+    stated = options.poisson is not None
+    linear = LinearConstants(young, options.poisson if stated else poisson_ratio(young, bulk.modulus_mpa))
     entry = {
-        "parameters": {"young_mpa": young, "poisson": poisson},
+        "parameters": {"young_mpa": young, "poisson": linear.poisson},
         "young_standard_error_mpa": error,
         "rmse_mpa": rmse,
         "mu0_mpa": linear.mu_mpa,
         "bulk_modulus_mpa": linear.bulk_modulus_mpa,
-        "small_strain": small_strain,
-        "poisson_source": "stated in the settings, not fitted: curves of stress against stretch do not hold it",
+        "small_strain": options.small_strain,
+        "poisson_source": "stated in the settings, not fitted: curves of stress against stretch do not hold it" if stated
+        else f"from E and K of the {bulk.source}",
     }
     return {"linear": entry}, []
 
@@ -185,26 +249,22 @@ def _fit_warnings(fit, entry):
     if not entry["mu0_mpa"] > 0:
         yield f"{fit.law}: the initial shear modulus is {entry['mu0_mpa']:.3g} MPa; do not use this law."
     if not entry["stable_over_data"]:
-        ranges = ", ".join(f"{mode} {low:.2f} to {high:.2f}" for mode, (low, high) in entry["stable_range"].items())
-        yield f"{fit.law}: not stable over the whole range of the curves, only at stretches {ranges}."
-    loose = _undetermined(fit)
-    if loose:
-        yield f"{fit.law}: these curves do not determine {', '.join(loose)} (standard error above 100 %)."
+        yield f"{fit.law}: not stable over the whole range of the curves, only at stretches {_ranges(entry)}."
+    if fit.not_identifiable:
+        yield f"{fit.law}: these curves do not determine {', '.join(fit.not_identifiable)} (standard error above 100 %)."
     if fit.at_bound:
         yield f"{fit.law}: {', '.join(fit.at_bound)} ended on a bound of the search."
+    if fit.autocorrelation > _SYSTEMATIC and fit.relative_error > 0.01:
+        yield (f"{fit.law}: its errors are systematic (neighbours correlate by {fit.autocorrelation:.2f}); the standard errors"
+               " cover noise, not that the law does not follow the material.")
 
 
-def _undetermined(fit):
-    """Names of the constants whose standard error exceeds them; all where the covariance does not exist."""
-    if fit.covariance is None:
-        return list(fit.parameters)
-    error = np.sqrt(np.diag(fit.covariance))
-    return [name for name, e in zip(fit.parameters, error, strict=True) if e > abs(fit.parameters[name])]
+def _ranges(entry):
+    return ", ".join(f"{mode} {low:.2f} to {high:.2f}" for mode, (low, high) in entry["stable_range"].items())
 
 
-def _consistency_warnings(card):
-    """Disagreements among the laws of the card that are stable over its data."""
-    usable = [name for name in card["ranking"] if card["laws"][name]["stable_over_data"]]
-    laws = {name: law_from_card(card, name) for name in usable}
+def _consistency_warnings(card, threshold):
+    """Laws that part from the chosen one, and linear constants that no stable law has."""
+    usable = {name: _law_of(name, card["laws"][name]) for name in card["ranking"] if card["laws"][name]["stable_over_data"]}
     linear = linear_from_card(card) if "linear" in card["laws"] else None
-    return disagreements(laws, linear=linear)
+    return [*partings(card["chosen"], card["agreement"], threshold=threshold), *against_linear(usable, linear)]

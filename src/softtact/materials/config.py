@@ -17,7 +17,7 @@ from softtact.errors import InputError
 from softtact.materials.laws.registry import law_class, make_law
 from softtact.materials.linear import LinearConstants
 
-Mode = Literal["uniaxial", "equibiaxial", "planar"]
+Mode = Literal["uniaxial", "equibiaxial", "planar", "volumetric"]
 
 
 def _rising(window):
@@ -42,7 +42,8 @@ class SyntheticCurves(_Section):
     noise: float = Field(ge=0, le=0.5, description="standard deviation as a share of a curve's largest stress")
     points: int = Field(ge=3, description="points per curve")
     seed: int = Field(ge=0)
-    modes: dict[Mode, Window] = Field(min_length=1, description="stretch from, to in each test mode")
+    modes: dict[Mode, Window] = Field(min_length=1, description="stretch (volume ratio) from, to in each test mode")
+    bulk_over_shear: float = Field(20.0, gt=2 / 3, description="K / mu0 behind a volumetric curve")
 
 
 class MeasuredFile(_Section):
@@ -53,6 +54,7 @@ class MeasuredFile(_Section):
     layout: Literal["plain", "soro_db", "stress_stretch"] = "plain"
     columns: dict[str, str] = Field(default_factory=dict, description="declared name -> the file's own header")
     sort: bool = Field(False, description="order the rows by stretch")
+    compression: bool = Field(False, description="a compression test written without a minus")
 
 
 class MeasuredCurves(_Section):
@@ -63,16 +65,20 @@ class MeasuredCurves(_Section):
 
 
 class FitSettings(_Section):
-    """How the laws are fitted; see `softtact.materials.cards.make_card`."""
+    """How the laws are fitted; see `softtact.materials.cards.CardOptions`."""
 
     laws: Literal["all"] | list[str] = "all"
     choose: str = Field("best", description="law for the solvers, or best")
-    bulk_over_shear: float = Field(20.0, gt=2 / 3, description="K / mu0; 2/3 is Poisson's ratio 0")
+    bulk_over_shear: float = Field(20.0, gt=2 / 3, description="K / mu0 without a volumetric curve; 2/3 is Poisson's ratio 0")
     poisson: float | None = Field(None, gt=-1, lt=0.5, description="of the linear constants; curves do not hold it")
     small_strain: float = Field(0.1, gt=0, lt=1, description="strain up to which E is the slope")
     window: dict[Mode, Window] = Field(default_factory=dict, description="stretch to use, all by default")
+    residual: Literal["absolute", "relative"] = Field("absolute", description="errors in MPa, or over the stress")
+    weights: dict[Mode, Annotated[float, Field(gt=0)]] = Field(default_factory=dict, description="of squared residuals, else 1")
     nonnegative: bool = Field(False, description="keep constants in MPa from being negative")
-    starts: int = Field(12, ge=1)
+    predict_left_out: bool = Field(True, description="fit also without each mode in turn, and predict it")
+    disagreement: float = Field(0.2, gt=0, description="difference of two laws' stresses, as a share, that is named")
+    starts: int = Field(24, ge=1)
     seed: int = Field(0, ge=0)
 
 

@@ -24,8 +24,7 @@ def disagreements(laws, *, linear=None, factor=FACTOR):
         stable = {name: law for name, law in laws.items() if is_stable(law, mode, np.array([stretch]))[0]}
         stress = {name: float(law.nominal_stress(mode, stretch)) for name, law in stable.items()}
         found.append(_parting(f"the nominal stress at {mode} stretch {stretch:g}", stress, factor))
-    found.append(_against_linear(laws, linear, factor))
-    return [sentence for sentence in found if sentence]
+    return [sentence for sentence in found if sentence] + against_linear(laws, linear, factor=factor)
 
 
 def _parting(quantity, values, factor):
@@ -42,20 +41,20 @@ def _parting(quantity, values, factor):
     )
 
 
-def _against_linear(laws, linear, factor):
-    """The sentence on linear constants whose moduli no law has, or None."""
+def against_linear(laws, linear, *, factor=FACTOR):
+    """A sentence on linear constants whose moduli no law has, in a list that is empty otherwise."""
     if linear is None or not laws:
-        return None
+        return []
     own = linear.mu_mpa, linear.bulk_modulus_mpa
     moduli = np.array([(law.mu0, law.bulk_modulus) for law in laws.values()])
     if any(max(_ratio(a, b) for a, b in zip(pair, own, strict=True)) <= factor for pair in moduli):
-        return None
+        return []
     low, high = moduli.min(axis=0), moduli.max(axis=0)
-    return (
+    return [
         f"E {linear.young_mpa:.4g} MPa and nu {linear.poisson:.4g} mean the shear and bulk moduli {own[0]:.3g} and"
         f" {own[1]:.3g} MPa, which none of {', '.join(laws)} has:"
         f" theirs are {low[0]:.3g} to {high[0]:.3g} and {low[1]:.3g} to {high[1]:.3g} MPa."
-    )
+    ]
 
 
 def _ratio(a, b):

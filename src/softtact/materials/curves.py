@@ -1,22 +1,27 @@
-"""Test curves: nominal stress against stretch in one test mode, and the project's own CSV form of them."""
+"""Test curves: nominal stress against stretch, or pressure against volume, and the project's own CSV form of them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from softtact.files import atomic_path
+from softtact.materials.laws.base import TEST_PATHS
+
+VOLUMETRIC = "volumetric"
+MODES = (*TEST_PATHS, VOLUMETRIC)
 
 
 @dataclass(frozen=True)
 class Curve:
-    """One test.
+    """One test of shape at constant volume.
 
     mode: "uniaxial", "equibiaxial" or "planar"
     stretch: (n,) stretch of the loaded direction, below 1 in compression
     nominal_stress: (n,) force over undeformed area in MPa, negative in compression
     kind: "measured" or "synthetic"
     source: file or making, for the record
+    remarks: sentences on what is odd in it, for the card's warnings
     """
 
     mode: str
@@ -24,6 +29,7 @@ class Curve:
     nominal_stress: np.ndarray
     kind: str = "measured"
     source: str = ""
+    remarks: tuple = ()
 
     @property
     def window(self):
@@ -33,20 +39,59 @@ class Curve:
     def within(self, window):
         """The part of the curve inside a window [min, max] of stretch."""
         keep = (self.stretch >= window[0]) & (self.stretch <= window[1])
-        return Curve(self.mode, self.stretch[keep], self.nominal_stress[keep], self.kind, self.source)
+        return replace(self, stretch=self.stretch[keep], nominal_stress=self.nominal_stress[keep])
+
+    @property
+    def columns(self):
+        """{name in a file: values (n,)}"""
+        return {"stretch": self.stretch, "nominal_stress_mpa": self.nominal_stress}
+
+
+@dataclass(frozen=True)
+class VolumetricCurve:
+    """One test of volume under pressure from all sides.
+
+    volume_ratio: (n,) J, volume over undeformed volume, below 1 in compression
+    pressure: (n,) in MPa, positive in compression
+    kind, source, remarks: as of a `Curve`
+    """
+
+    volume_ratio: np.ndarray
+    pressure: np.ndarray
+    kind: str = "measured"
+    source: str = ""
+    remarks: tuple = ()
+    mode = VOLUMETRIC
+
+    @property
+    def window(self):
+        """Smallest and largest volume ratio."""
+        return float(self.volume_ratio.min()), float(self.volume_ratio.max())
+
+    def within(self, window):
+        """The part of the curve inside a window [min, max] of the volume ratio."""
+        keep = (self.volume_ratio >= window[0]) & (self.volume_ratio <= window[1])
+        return replace(self, volume_ratio=self.volume_ratio[keep], pressure=self.pressure[keep])
+
+    @property
+    def columns(self):
+        """{name in a file: values (n,)}"""
+        return {"volume_ratio": self.volume_ratio, "pressure_mpa": self.pressure}
 
 
 def join_by_mode(curves):
-    """One curve per mode, its points sorted by stretch: say, a tension and a compression test of the same material."""
+    """One curve per mode, its points sorted: say, a tension and a compression test of the same material."""
     return [_join([curve for curve in curves if curve.mode == mode]) for mode in dict.fromkeys(c.mode for c in curves)]
 
 
 def _join(curves):
-    stretch = np.concatenate([curve.stretch for curve in curves])
-    stress = np.concatenate([curve.nominal_stress for curve in curves])
-    order = np.argsort(stretch, kind="stable")
-    source = "; ".join(curve.source for curve in curves)
-    return Curve(curves[0].mode, stretch[order], stress[order], common_kind(curves), source)
+    names = list(curves[0].columns)
+    x, y = (np.concatenate([curve.columns[name] for curve in curves]) for name in names)
+    order = np.argsort(x, kind="stable")
+    fields = ("volume_ratio", "pressure") if curves[0].mode == VOLUMETRIC else ("stretch", "nominal_stress")
+    return replace(curves[0], **dict(zip(fields, (x[order], y[order]), strict=True)), kind=common_kind(curves),
+                   source="; ".join(curve.source for curve in curves),
+                   remarks=tuple(remark for curve in curves for remark in curve.remarks))
 
 
 def common_kind(curves):
@@ -54,24 +99,42 @@ def common_kind(curves):
     return "measured" if all(curve.kind == "measured" for curve in curves) else "synthetic"
 
 
+def principal_window(windows):
+    """Lowest and highest principal stretch over {mode: [min, max] stretch along the loading}; None without a test of shape."""
+    stretches = [stretch**exponent for mode, window in windows.items() if mode in TEST_PATHS
+                 for stretch in window for exponent in TEST_PATHS[mode]]
+    return (min(stretches), max(stretches)) if stretches else None
+
+
+def path_window(principal, mode):
+    """(min, max) stretch on the path of a mode along which every principal stretch stays in the window `principal`."""
+    low, high = principal
+    ends = [sorted((low ** (1 / e), high ** (1 / e))) for e in TEST_PATHS[mode] if e]
+    return max(end[0] for end in ends), min(end[1] for end in ends)
+
+
 def synthetic_curve(law, mode, window, *, points, noise, seed):
-    """A `Curve` of `law` at `points` even stretches in `window`, with normal noise.
+    """A `Curve` (or `VolumetricCurve`) of `law` at `points` even stretches (volume ratios) in `window`, with normal noise.
 
     noise: standard deviation as a share of the curve's largest stress, like a load cell's share of full scale
     seed: int or sequence of int for numpy's generator
     """
-    stretch = np.linspace(*window, points)
-    stress = law.nominal_stress(mode, stretch)
+    x = np.linspace(*window, points)
+    stress = -law.volumetric(x)[1] if mode == VOLUMETRIC else law.nominal_stress(mode, x)
     error = noise * np.abs(stress).max() * np.random.default_rng(seed).standard_normal(points)
     values = ", ".join(f"{name} {value:g}" for name, value in law.parameters.items())
-    making = f"{law.name} ({values}), incompressible, normal noise of {noise:.3g} of the largest stress, seed {seed}"
-    return Curve(mode, stretch, stress + error, "synthetic", making)
+    volume = f"bulk modulus {law.bulk_modulus:g}" if mode == VOLUMETRIC else "incompressible"
+    making = f"{law.name} ({values}), {volume}, normal noise of {noise:.3g} of the largest stress, seed {seed}"
+    if mode == VOLUMETRIC:
+        return VolumetricCurve(x, stress + error, "synthetic", making)
+    return Curve(mode, x, stress + error, "synthetic", making)
 
 
 def write_curve(path, curve):
-    """Write a curve as CSV: `# key: value` lines with mode, kind and source, then stretch, nominal_stress_mpa."""
+    """Write a curve as CSV: `# key: value` lines with mode, kind, source and remarks, then its two columns."""
     lines = [f"# mode: {curve.mode}", f"# kind: {curve.kind}", f"# source: {curve.source}"]
-    lines.append("stretch,nominal_stress_mpa")
-    lines += [f"{x:.6g},{y:.6g}" for x, y in zip(curve.stretch, curve.nominal_stress, strict=True)]
+    lines += [f"# remark: {remark}" for remark in curve.remarks]
+    lines.append(",".join(curve.columns))
+    lines += [f"{x:.6g},{y:.6g}" for x, y in zip(*curve.columns.values(), strict=True)]
     with atomic_path(path) as temporary:
         Path(temporary).write_text("\n".join(lines) + "\n", encoding="utf-8")

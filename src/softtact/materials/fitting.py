@@ -14,7 +14,39 @@ from softtact.errors import InputError
 from softtact.materials.laws.base import principal_stretches
 from softtact.materials.laws.registry import LAWS, law_class
 
-STARTS = 12
+STARTS = 24
+RESIDUALS = ("absolute", "relative")
+# Relative residuals divide by the stress, and near stretch 1 by this share of the curve's largest one.
+_RELATIVE_FLOOR = 0.01
+# Most starts end in a few valleys: some steps show which, and only the best of them are followed to the ground.
+_ROUGH, _PROMISING, _FINAL = 10, 6, 100     # steps, starts, steps
+_SINGULAR = 1e-7        # of the largest singular value: the constants' columns depend on each other
+_TAKES_PART = 0.1       # component of a unit vector of constants that the curves do not see
+_LOOSE_SHARE = 0.05     # of the initial shear modulus: a constant in MPa that is known so well is known, be it zero
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """How a law is fitted.
+
+    residual: "absolute" (MPa) or "relative" (over the stress, or 1 % of the curve's largest where that is more)
+    weights: {mode: factor on the squared residuals}, 1 where not said
+    nonnegative: keep the constants of unit MPa from being negative, which makes any law here stable everywhere
+    starts: how many guesses of the nonlinear constants;  seed: of these guesses
+    """
+
+    residual: str = "absolute"
+    weights: dict = field(default_factory=dict)
+    nonnegative: bool = False
+    starts: int = STARTS
+    seed: int = 0
+
+    def __post_init__(self):
+        if self.residual not in RESIDUALS:
+            raise InputError(f"The residual {self.residual!r} is unknown; use one of {', '.join(RESIDUALS)}.")
+        for mode, weight in self.weights.items():
+            if not weight > 0:
+                raise InputError(f"The weight of the {mode} curve is {weight:g}; give a positive one, or leave the curve out.")
 
 
 @dataclass(frozen=True)
@@ -22,18 +54,26 @@ class LawFit:
     """A fitted law.
 
     law: name;  parameters: {name: MPa or 1}
-    covariance: (p, p) of the parameters in their order, or None where the curves do not determine them
+    covariance, correlation: (p, p) of the parameters in their order, or None where the curves do not determine them
+    not_identifiable: names of the constants that these curves do not determine
     rmse_mpa: over all points;  rmse_by_mode_mpa: {mode: MPa}
+    relative_error: root mean square of error over stress;  relative_error_by_mode: {mode: 1}
+    autocorrelation: of neighbouring residuals in a curve; near 1 the law's own misfit, near 0 the test's noise
     aicc: Akaike's criterion corrected for few points; lower is better, constants without use cost
     at_bound: names of constants that ended on a bound of the search
-    record: the optimiser's own account: points, starts, starts_agreeing, evaluations
+    record: the optimiser's own account: points, starts, those finished and agreeing, evaluations
     """
 
     law: str
     parameters: dict
     covariance: np.ndarray | None
+    correlation: np.ndarray | None
+    not_identifiable: list
     rmse_mpa: float
     rmse_by_mode_mpa: dict
+    relative_error: float
+    relative_error_by_mode: dict
+    autocorrelation: float
     aicc: float
     at_bound: list = field(default_factory=list)
     record: dict = field(default_factory=dict)
@@ -45,73 +85,105 @@ class LawFit:
 
 @dataclass(frozen=True)
 class Points:
-    """All points of the curves: principal stretches (n, 3), stress in MPa (n,), and the mode of each (n,)."""
+    """All points of the curves.
+
+    stretches: (n, 3) principal stretches;  stress: (n,) nominal, MPa;  mode: (n,) of each
+    floor: (n,) the stress in MPa below which relative errors are taken over this
+    """
 
     stretches: np.ndarray
     stress: np.ndarray
     mode: np.ndarray
+    floor: np.ndarray
 
     def predict(self, law):
         """Nominal stress (n,) of a law in MPa."""
         t = law.principal_stress(self.stretches)
         return (t[:, 0] - t[:, 2]) / self.stretches[:, 0]
 
+    @property
+    def size(self):
+        """(n,) what relative errors are relative to, MPa."""
+        return np.maximum(np.abs(self.stress), self.floor)
+
+    def by_mode(self, measure, values):
+        """{mode: measure(values of its points)}"""
+        return {str(mode): measure(values[self.mode == mode]) for mode in dict.fromkeys(self.mode)}
+
 
 def collect(curves):
     """`Points` of a list of curves."""
+    largest = [np.full(len(curve.stretch), np.abs(curve.nominal_stress).max()) for curve in curves]
     return Points(
         stretches=np.concatenate([principal_stretches(curve.mode, curve.stretch) for curve in curves]),
         stress=np.concatenate([curve.nominal_stress for curve in curves]),
         mode=np.concatenate([np.full(len(curve.stretch), curve.mode) for curve in curves]),
+        floor=_RELATIVE_FLOOR * np.concatenate(largest),
     )
 
 
-def fit_family(curves, *, laws="all", nonnegative=False, starts=STARTS, seed=0):
-    """{law: LawFit} for a list of law names or "all"."""
-    names = list(LAWS) if laws in ("all", ["all"]) else [laws] if isinstance(laws, str) else list(laws)
-    return {name: fit_law(name, curves, nonnegative=nonnegative, starts=starts, seed=seed) for name in names}
+def errors_of(law, curves):
+    """(RMSE in MPa, root mean square relative error) of a law on curves."""
+    points = collect(curves)
+    error = points.predict(law) - points.stress
+    return rms(error), rms(error / points.size)
 
 
-def fit_law(name, curves, *, nonnegative=False, starts=STARTS, seed=0):
-    """Fit one law to all curves at once: every point counts equally, residuals in MPa.
+def fit_family(curves, *, laws="all", **options):
+    """{law: LawFit} for a list of law names or "all"; options are those of `FitOptions`."""
+    return {name: fit_law(name, curves, **options) for name in law_names(laws)}
 
-    nonnegative: keep the constants of unit MPa from being negative, which makes any law here stable everywhere
-    """
-    kind, points = law_class(name), collect(curves)
+
+def law_names(laws):
+    """Names of laws from a list of them, one name, or "all"."""
+    return list(LAWS) if laws in ("all", ["all"]) else [laws] if isinstance(laws, str) else list(laws)
+
+
+def fit_law(name, curves, **options):
+    """Fit one law to all curves at once; options are those of `FitOptions`."""
+    kind, points, options = law_class(name), collect(curves), FitOptions(**options)
     if len(points.stress) <= len(kind.constants):
         raise InputError(
             f"Law {name} has {len(kind.constants)} constants and the curves only {len(points.stress)} points;"
             " give more points or choose a law with fewer constants."
         )
-    problem = _Problem(kind, points, nonnegative=nonnegative)
-    solutions = [problem.polish(problem.start(guess)) for guess in _guesses(problem, starts, seed)]
-    best = min(solutions, key=lambda solution: solution.cost)
-    agreeing = int(sum(solution.cost < best.cost * 1.001 + 1e-15 for solution in solutions))
-    evaluations = int(sum(solution.nfev for solution in solutions))
-    record = {"points": len(points.stress), "starts": len(solutions), "starts_agreeing": agreeing}
-    return _report(problem, best.x, record | {"evaluations": evaluations})
+    problem = _Problem(kind, points, options)
+    rough = [problem.polish(problem.start(guess), _ROUGH) for guess in _guesses(problem, options)]
+    promising = sorted(rough, key=lambda solution: solution.cost)[:_PROMISING]
+    final = [problem.polish(solution.x, _FINAL) for solution in promising]
+    best = min(final, key=lambda solution: solution.cost)
+    record = {
+        "points": len(points.stress), "starts": len(rough), "finished": len(final),
+        "finished_agreeing": int(sum(solution.cost < best.cost * 1.001 + 1e-15 for solution in final)),
+        "evaluations": int(sum(solution.nfev for solution in rough + final)), "residual": options.residual,
+    }  # fmt: skip
+    return _report(problem, best.x, record)
 
 
 class _Problem:
     """Least squares of one law in scaled unknowns: constants of unit MPa in multiples of the curves' stiffness."""
 
-    def __init__(self, kind, points, *, nonnegative):
+    def __init__(self, kind, points, options):
         self.kind, self.points = kind, points
         self.linear = np.array([constant.unit == "MPa" for constant in kind.constants])
         self.stiffness = _stiffness(points)
         self.scale = np.where(self.linear, self.stiffness, 1.0)
-        self.low = np.array([constant.low for constant in kind.constants])
+        lowest = kind.lowest(points.stretches)
+        self.low = np.array([max(constant.low, lowest.get(constant.name, -np.inf)) for constant in kind.constants])
         self.high = np.array([constant.high for constant in kind.constants])
-        if nonnegative:
+        if options.nonnegative:
             self.low = np.where(self.linear, 0.0, self.low)
+        weight = np.array([options.weights.get(str(mode), 1.0) for mode in points.mode])
+        size = points.size if options.residual == "relative" else np.abs(points.stress).max()
+        self.per_mpa = np.sqrt(weight) / size
 
     def law(self, x):
         names = [constant.name for constant in self.kind.constants]
         return self.kind(dict(zip(names, (x * self.scale).tolist(), strict=True)), bulk_modulus=1.0)
 
     def residual(self, x):
-        """(n,) in multiples of the largest stress."""
-        return (self.points.predict(self.law(x)) - self.points.stress) / np.abs(self.points.stress).max()
+        """(n,) errors in stress, weighted, over what they are relative to."""
+        return (self.points.predict(self.law(x)) - self.points.stress) * self.per_mpa
 
     def start(self, guess):
         """Unknowns with the nonlinear ones guessed and the linear ones solved for."""
@@ -120,12 +192,11 @@ class _Problem:
         A = self._columns(x)
         size = np.linalg.norm(A, axis=0)
         bounds = self.low[self.linear] * size, self.high[self.linear] * size
-        target = self.points.stress / np.abs(self.points.stress).max()
-        x[self.linear] = lsq_linear(A / size, target, bounds=bounds).x / size
+        x[self.linear] = lsq_linear(A / size, self.points.stress * self.per_mpa, bounds=bounds).x / size
         return np.clip(x, self.low, self.high)
 
     def _columns(self, x):
-        """(n, linear unknowns): the stress that each of them causes alone at 1."""
+        """(n, linear unknowns): the residual that each of them causes alone at 1."""
         zero = -self.residual(x)
         columns = []
         for k in np.flatnonzero(self.linear):
@@ -134,15 +205,18 @@ class _Problem:
             columns.append(self.residual(alone) + zero)
         return np.stack(columns, axis=1)
 
-    def polish(self, x):
+    def polish(self, x, steps):
         bounds = (self.low, self.high)
-        return least_squares(self.residual, x, bounds=bounds, x_scale="jac", jac="3-point", max_nfev=100)
+        return least_squares(self.residual, x, bounds=bounds, x_scale="jac", jac="3-point", max_nfev=steps)
 
     def jacobian(self, x):
-        """d stress / d constants (n, p), MPa per unit of each constant."""
+        """d residual / d constants (n, p), per unit of each constant; one-sided at a bound, beyond which psi may not exist."""
         steps = 1e-6 * np.maximum(np.abs(x), 1e-2)
-        columns = [(self.residual(x + d) - self.residual(x - d)) / (2 * d.sum()) for d in np.diag(steps)]
-        return np.stack(columns, axis=1) * np.abs(self.points.stress).max() / self.scale
+        columns = []
+        for step in np.diag(steps):
+            up, down = np.minimum(x + step, self.high), np.maximum(x - step, self.low)
+            columns.append((self.residual(up) - self.residual(down)) / (up - down).sum())
+        return np.stack(columns, axis=1) / self.scale
 
 
 def _stiffness(points):
@@ -157,43 +231,98 @@ def _stiffness(points):
     return modulus
 
 
-def _guesses(problem, starts, seed):
-    """Starts (m, nonlinear unknowns) spread over their bounds; one is enough where there are none."""
+def _guesses(problem, options):
+    """Starts (m, nonlinear unknowns) spread over their bounds, from the logarithm where these span decades; one without any."""
     nonlinear = ~problem.linear
     if not nonlinear.any():
         return np.empty((1, 0))
-    cube = qmc.LatinHypercube(d=int(nonlinear.sum()), rng=seed).random(starts)
-    return qmc.scale(cube, problem.low[nonlinear], problem.high[nonlinear])
+    low, high = problem.low[nonlinear], problem.high[nonlinear]
+    cube = qmc.LatinHypercube(d=int(nonlinear.sum()), rng=options.seed).random(options.starts)
+    decades = (low > 0) & (high > 10 * np.abs(low))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(decades, low * (high / low) ** cube, low + (high - low) * cube)
 
 
 def _report(problem, x, record):
     law = problem.law(x)
     x = np.array(list(problem.kind.in_order(law.parameters).values())) / problem.scale
     law, points = problem.law(x), problem.points
-    error = points.predict(law) - points.stress
+    error, residual, jacobian = points.predict(law) - points.stress, problem.residual(x), problem.jacobian(x)
+    relative = error / points.size
     n, p = len(error), len(x)
-    width = problem.high - problem.low
-    on_bound = np.minimum(x - problem.low, problem.high - x) < 1e-6 * width
+    covariance = _covariance(jacobian, float(residual @ residual) / (n - p))
     return LawFit(
         law=problem.kind.name,
         parameters=law.parameters,
-        covariance=_covariance(problem.jacobian(x), float(error @ error) / (n - p)),
-        rmse_mpa=_rms(error),
-        rmse_by_mode_mpa={str(mode): _rms(error[points.mode == mode]) for mode in dict.fromkeys(points.mode)},
-        aicc=float(n * np.log(max(error @ error, 1e-30) / n) + 2 * p * n / max(n - p - 1, 0.5)),
-        at_bound=[c.name for c, stuck in zip(problem.kind.constants, on_bound, strict=True) if stuck],
+        covariance=covariance,
+        correlation=None if covariance is None else _correlation(covariance),
+        not_identifiable=_not_identifiable(law, jacobian, covariance),
+        rmse_mpa=rms(error),
+        rmse_by_mode_mpa=points.by_mode(rms, error),
+        relative_error=rms(relative),
+        relative_error_by_mode=points.by_mode(rms, relative),
+        autocorrelation=_autocorrelation(residual, points.mode),
+        aicc=_aicc(residual, p),
+        at_bound=_at_bound(problem, x),
         record=record,
     )
 
 
-def _rms(error):
-    return float(np.sqrt(np.mean(error**2)))
+def rms(values):
+    """Root mean square."""
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def _aicc(residual, constants):
+    """n ln(SS/n) + 2k n/(n - k - 1); k counts the constants and the variance (Burnham and Anderson 2002, section 7.7.6)."""
+    n, k = len(residual), constants + 1
+    return float(n * np.log(max(residual @ residual, 1e-30) / n) + 2 * k * n / max(n - k - 1, 0.5))
+
+
+def _at_bound(problem, x):
+    """Names of the constants on a bound of the search."""
+    width = problem.high - problem.low
+    stuck = np.minimum(x - problem.low, problem.high - x) < 1e-6 * width
+    return [constant.name for constant, at in zip(problem.kind.constants, stuck, strict=True) if at]
+
+
+def _autocorrelation(residual, mode):
+    """Correlation of neighbouring residuals of the same curve."""
+    same = mode[1:] == mode[:-1]
+    return float((residual[1:] @ (residual[:-1] * same)) / max(residual @ residual, 1e-300))
 
 
 def _covariance(jacobian, variance):
     """variance (J^T J)^-1, or None where columns of J depend on each other."""
     size = np.linalg.norm(jacobian, axis=0)
-    if not (size > 0).all() or np.linalg.cond(jacobian / size) > 1e7:
+    if not (size > 0).all() or np.linalg.cond(jacobian / size) > 1 / _SINGULAR:
         return None
     scaled = np.linalg.inv((jacobian / size).T @ (jacobian / size))
     return variance * scaled / np.outer(size, size)
+
+
+def _correlation(covariance):
+    deviation = np.sqrt(np.diag(covariance))
+    with np.errstate(divide="ignore", invalid="ignore"):   # a fit without any error has no deviations
+        correlation = covariance / np.outer(deviation, deviation)
+    return np.where(np.isfinite(correlation), correlation, np.eye(len(deviation)))
+
+
+def _not_identifiable(law, jacobian, covariance):
+    """Constants whose standard error exceeds them, or that can move together without the curves' notice."""
+    values = np.array(list(law.parameters.values()))
+    if covariance is None:
+        loose = _unseen(jacobian)
+    else:
+        known = [max(abs(value), _LOOSE_SHARE * law.mu0 if constant.unit == "MPa" else 0.0)
+                 for value, constant in zip(values, law.constants, strict=True)]
+        loose = np.sqrt(np.diag(covariance)) > known
+    return [name for name, bad in zip(law.parameters, loose, strict=True) if bad]
+
+
+def _unseen(jacobian):
+    """Whether each constant takes part in a change of all of them that the curves do not see."""
+    size = np.linalg.norm(jacobian, axis=0)
+    _, singular, directions = np.linalg.svd(jacobian / np.where(size > 0, size, 1.0), full_matrices=False)
+    unseen = directions[singular <= _SINGULAR * singular.max()]
+    return (size == 0) | (np.abs(unseen) > _TAKES_PART).any(axis=0)

@@ -34,7 +34,7 @@ def make_curves(measured, curves, settings):
 def _synthetic(material, settings):
     """Curves from a law; each mode of each material has a noise of its own under the same seed."""
     options = validated(SyntheticCurves, settings, where=f"material {material}, curves")
-    law = make_law(options.law, options.parameters or {})
+    law = make_law(options.law, options.parameters or {}, bulk_over_shear=options.bulk_over_shear)
     return [
         synthetic_curve(
             law, mode, window, points=options.points, noise=options.noise, seed=[options.seed, _number(material + mode)]

@@ -1,11 +1,12 @@
 """Readers of test curves. Each refuses what it cannot trust with a sentence naming file, row, value and remedy.
 
 Layouts:
-  plain          CSV (, ; or tab) with a header. The names of the columns declare quantity and unit: one of
-                 STRETCH_COLUMNS and one of STRESS_COLUMNS; `columns` maps these names to the file's own.
-                 `# key: value` lines may stand above (mode, kind, source).
+  plain          CSV (, ; or tab) with a header. The names of the columns declare quantity and unit: one of `STRETCHES` and one
+                 of `STRESSES`, or of `VOLUMES` and `PRESSURES`; `columns` maps these names to the file's own.
+                 `# key: value` lines may stand above (mode, kind, source, remark).
   soro_db        the Soft Robotics Materials Database: metadata lines, then `;`-separated columns. Uniaxial.
   stress_stretch two bare columns, nominal stress in MPa first, then stretch (digitised literature data)
+  literature     a folder with UT, ET and PS (uniaxial, equibiaxial, planar), each with a stress_stretch.txt
 """
 
 import math
@@ -14,54 +15,77 @@ from pathlib import Path
 import numpy as np
 
 from softtact.errors import InputError
-from softtact.materials.curves import Curve
-from softtact.materials.laws.base import TEST_PATHS
+from softtact.materials.checks import checked, order
+from softtact.materials.curves import MODES, VOLUMETRIC, Curve, VolumetricCurve
 
-# Name of a column -> (factor, offset) to the stretch, or factor to the nominal stress in MPa.
-STRETCH_COLUMNS = {
-    "stretch": (1.0, 0.0),
-    "engineering_strain": (1.0, 1.0),
-    "engineering_strain_percent": (0.01, 1.0),
+# Name of a column -> its value as stretch, nominal stress in MPa at a stretch, volume ratio, pressure in MPa.
+STRETCHES = {
+    "stretch": lambda value: value,
+    "engineering_strain": lambda value: 1 + value,
+    "engineering_strain_percent": lambda value: 1 + value / 100,
+    "true_strain": math.exp,
 }
-STRESS_COLUMNS = {"nominal_stress_mpa": 1.0, "nominal_stress_kpa": 1e-3, "nominal_stress_pa": 1e-6}
-LAYOUTS = ("plain", "soro_db", "stress_stretch")
-SORO_COLUMNS = {"engineering_strain": "Engineering Strain", "nominal_stress_mpa": "Engineering Stress (MPa)"}
+_PER_MPA = {"mpa": 1.0, "kpa": 1e-3, "pa": 1e-6}
+STRESSES = {f"nominal_stress_{unit}": lambda value, stretch, factor=factor: factor * value for unit, factor in _PER_MPA.items()}
+# Constant volume: the loaded section of a bar, a strip or a sheet has shrunk by the stretch, in each of the three tests.
+STRESSES |= {f"true_stress_{unit}": lambda value, stretch, factor=factor: factor * value / stretch
+             for unit, factor in _PER_MPA.items()}
+VOLUMES = {"volume_ratio": lambda value: value, "volumetric_strain": lambda value: 1 + value,
+           "volumetric_strain_percent": lambda value: 1 + value / 100}
+PRESSURES = {f"pressure_{unit}": lambda value, ratio, factor=factor: factor * value for unit, factor in _PER_MPA.items()}
 
-# No elastomer goes beyond these; values beyond are percent or another unit.
-LARGEST_STRETCH = 25.0
-LARGEST_STRESS_MPA = 200.0
-# Stress may have the wrong sign by this share of the largest one (zero drift of a load cell) before it is refused.
-SIGN_TOLERANCE = 0.05
+LAYOUTS = ("plain", "soro_db", "stress_stretch", "literature")
+_SORO = {"engineering_strain": "Engineering Strain", "nominal_stress_mpa": "Engineering Stress (MPa)"}
+_FOLDERS = {"UT": "uniaxial", "ET": "equibiaxial", "PS": "planar"}
 
 
-def read_curve(path, *, mode=None, layout="plain", columns=None, sort=False):
-    """Read one `Curve`.
+def read_curve(path, *, mode=None, layout="plain", columns=None, sort=False, compression=False):
+    """Read one `Curve`, or `VolumetricCurve`.
 
     mode: test mode; else taken from the file's `# mode:` line or from a file name such as uniaxial.csv
     columns: {"engineering_strain_percent": "Dehnung [%]", ...} for a plain file with other names in its header
-    sort: order the rows by stretch, for a file with several loading branches
+    sort: order the rows, for a file with several loading branches
+    compression: a compression test whose strains and stresses are written without a minus
     """
-    if layout not in LAYOUTS:
-        raise InputError(f"{path}: layout {layout!r} is unknown; use one of {', '.join(LAYOUTS)}.")
+    if layout not in LAYOUTS[:-1]:
+        raise InputError(f"{path}: layout {layout!r} is unknown; use one of {', '.join(LAYOUTS[:-1])} for a file.")
     rows = _read_rows(path)
     notes = _notes(rows)
     table = [row for row in rows if not row[1].startswith("#")]
-    if layout == "soro_db":
-        header, table = _after_header(path, table, "Engineering Strain")
-        points = _points_by_name(path, header, table, SORO_COLUMNS)
-        mode = mode or "uniaxial"
-    elif layout == "plain":
-        header, table = _after_header(path, table, None)
-        points = _points_by_name(path, header, table, columns or {})
-    else:
-        points = [(row, *_numbers(path, row, text.split(), (1, 0))) for row, text in table]
-    return _checked_curve(path, _mode(path, mode, notes), points, notes, sort=sort)
+    mode = _mode(path, mode or ("uniaxial" if layout == "soro_db" else None), notes)
+    numbers, values, raw = _columns(path, table, layout, mode, columns or {}, compression=compression)
+    remarks = checked(path, numbers, *values, mode=mode, raw=raw)
+    x, y = order(path, numbers, *values, mode=mode, sort=sort)
+    # A file that names its source is one of the project's own: what was odd in its origin is noted in it.
+    record = {"kind": notes.get("kind", "measured"), "source": notes.get("source", Path(path).name),
+              "remarks": _remarks(rows) if "source" in notes else remarks}
+    return VolumetricCurve(x, y, **record) if mode == VOLUMETRIC else Curve(mode, x, y, **record)
 
 
-def read_curves(paths, **options):
-    """Read one or several files with the same options of `read_curve`."""
+def read_curves(paths, *, mode=None, layout="plain", **options):
+    """Read one or several files with the same options of `read_curve`; a path MODE=FILE states a file's own mode.
+
+    In the layout `literature` each path is a folder with a file per mode.
+    """
     paths = [paths] if isinstance(paths, (str, Path)) else paths
-    return [read_curve(path, **options) for path in paths]
+    found = [pair for path in paths for pair in (_in_folder(path) if layout == "literature" else [_stated_mode(path, mode)])]
+    layout = "stress_stretch" if layout == "literature" else layout
+    return [read_curve(path, mode=own, layout=layout, **options) for path, own in found]
+
+
+def _stated_mode(path, mode):
+    """(path, mode) of MODE=FILE, or of a plain path with the mode stated for all."""
+    head, equals, tail = str(path).partition("=")
+    return (Path(tail), head) if equals and head in MODES else (Path(path), mode)
+
+
+def _in_folder(folder):
+    """(path, mode) of the files in a folder of the layout `literature`."""
+    found = [(Path(folder) / name / "stress_stretch.txt", mode) for name, mode in _FOLDERS.items()]
+    found = [pair for pair in found if pair[0].is_file()]
+    if not found:
+        raise InputError(f"{folder}: the folder holds no UT, ET or PS with a stress_stretch.txt; name a folder of that layout.")
+    return found
 
 
 def _read_rows(path):
@@ -84,6 +108,54 @@ def _notes(rows):
     return {key.strip(): value.strip() for key, value in pairs}
 
 
+def _remarks(rows):
+    """The texts of the `# remark: ` lines."""
+    return tuple(text.removeprefix("# remark: ") for _, text in rows if text.startswith("# remark: "))
+
+
+def _mode(path, mode, notes):
+    """The stated mode, else the file's note, else its name."""
+    mode = mode or notes.get("mode") or Path(path).stem
+    if mode not in MODES:
+        raise InputError(
+            f"{path}: the test mode is {mode!r}; state one of {', '.join(MODES)}"
+            " with the file, in a line `# mode: uniaxial` at its top, or in its name."
+        )
+    return mode
+
+
+def _columns(path, table, layout, mode, columns, *, compression):
+    """Rows' numbers (n,); stretch and stress, or volume ratio and pressure (2, n); and the file's own numbers (2, n)."""
+    if layout == "stress_stretch":
+        raw = [(row, *_numbers(path, row, text.split(), (1, 0))) for row, text in table]
+        declared = ("stretch", "nominal_stress_mpa")
+    else:
+        header, below = _after_header(path, table, "Engineering Strain" if layout == "soro_db" else None)
+        declared, raw = _named(path, header, below, _SORO if layout == "soro_db" else columns, mode)
+    if len(raw) < 2:
+        raise InputError(f"{path}: {len(raw)} point(s) make no curve; give at least two.")
+    rows, x, y = (np.array(column) for column in zip(*raw, strict=True))
+    if compression:
+        x, y = _with_minus(x, y, declared[0])
+    to_x, to_y = (STRETCHES | VOLUMES)[declared[0]], (STRESSES | PRESSURES)[declared[1]]
+    ratio = np.array([_value(path, row, value, to_x) for row, value in zip(rows, x, strict=True)])
+    with np.errstate(divide="ignore"):
+        return rows, np.stack([ratio, to_y(y, ratio)]), np.stack([x, y])
+
+
+def _value(path, row, value, convert):
+    try:
+        return convert(value)
+    except OverflowError:
+        raise InputError(f"{path}, row {row}: the true strain {value:g} is beyond any elastomer; if the column holds percent,"
+                         " name it engineering_strain_percent.") from None
+
+
+def _with_minus(x, y, name):
+    """A compression test written with positive numbers, with its signs."""
+    return (x if name == "stretch" else -np.abs(x)), -np.abs(y)
+
+
 def _separator(header):
     """The header decides: below it a comma may be a decimal comma, which is then refused as such."""
     return max(";\t,", key=header.count)
@@ -101,22 +173,24 @@ def _after_header(path, table, marker):
     raise InputError(f"{path}: no header with {marker!r} was found; is its layout soro_db?")
 
 
-def _points_by_name(path, header, table, columns):
-    """[(row, stretch, stress in MPa)] from the columns whose names declare quantity and unit."""
+def _named(path, header, table, columns, mode):
+    """The two declared names, and [(row, x, y)] as the file has them."""
     separator = _separator(header)
     header = _cells(header, separator)
-    strain_name, strain_at = _find_column(path, header, STRETCH_COLUMNS, columns, "stretch")
-    stress_name, stress_at = _find_column(path, header, STRESS_COLUMNS, columns, "nominal stress")
-    factor, offset = STRETCH_COLUMNS[strain_name]
-    points = []
-    for row, text in table:
-        strain, stress = _numbers(path, row, _cells(text, separator), (strain_at, stress_at))
-        points.append((row, factor * strain + offset, STRESS_COLUMNS[stress_name] * stress))
-    return points
+    wanted = ((VOLUMES, "volume"), (PRESSURES, "pressure")) if mode == VOLUMETRIC else (
+        (STRETCHES, "stretch"), (STRESSES, "stress"))
+    found = [_find_column(path, header, known, columns, quantity) for known, quantity in wanted]
+    places = [place for _, place in found]
+    raw = [(row, *_numbers(path, row, _cells(text, separator), places)) for row, text in table]
+    return [name for name, _ in found], raw
 
 
 def _find_column(path, header, known, columns, quantity):
     """Name (a key of `known`) and position of the one column that holds the quantity."""
+    unknown = sorted(set(columns) - set(STRETCHES | STRESSES | VOLUMES | PRESSURES))
+    if unknown:
+        raise InputError(f"{path}: `columns` maps {unknown[0]!r}, which is no quantity with a unit; map one of"
+                         f" {', '.join(known)}.")
     found = [name for name in known if columns.get(name, name) in header]
     if len(found) != 1:
         problem = "several columns hold" if found else "no column holds"
@@ -141,72 +215,3 @@ def _numbers(path, row, cells, positions):
             raise InputError(f"{path}, row {row}: the value {cell!r} is not finite; correct it or remove the row.")
         values.append(value)
     return values
-
-
-def _mode(path, mode, notes):
-    """The stated mode, else the file's note, else its name."""
-    mode = mode or notes.get("mode") or Path(path).stem
-    if mode not in TEST_PATHS:
-        raise InputError(
-            f"{path}: the test mode is {mode!r}; state one of {', '.join(TEST_PATHS)}"
-            " with the file, in a line `# mode: uniaxial` at its top, or in its name."
-        )
-    return mode
-
-
-def _checked_curve(path, mode, points, notes, *, sort):
-    if len(points) < 2:
-        raise InputError(f"{path}: {len(points)} point(s) make no curve; give at least two.")
-    rows, stretch, stress = (np.array(column) for column in zip(*points, strict=True))
-    _check_magnitude(path, rows, stretch, stress)
-    _check_sign(path, rows, stretch, stress)
-    if sort:
-        order = np.argsort(stretch, kind="stable")
-        stretch, stress = stretch[order], stress[order]
-    else:
-        _check_order(path, rows, stretch)
-    return Curve(mode, stretch, stress, notes.get("kind", "measured"), notes.get("source", Path(path).name))
-
-
-def _refuse_first(path, rows, values, bad, sentence):
-    """Raise for the first bad value, if there is one; `sentence` takes {value}."""
-    if bad.any():
-        first = int(np.argmax(bad))
-        raise InputError(f"{path}, row {rows[first]}: " + sentence.format(value=f"{values[first]:.6g}"))
-
-
-def _check_magnitude(path, rows, stretch, stress):
-    _refuse_first(
-        path, rows, stretch, stretch <= 0,
-        "the stretch {value} is not positive; if the column holds strain, name it engineering_strain"
-        " or engineering_strain_percent.",
-    )  # fmt: skip
-    _refuse_first(
-        path, rows, stretch, stretch > LARGEST_STRETCH,
-        f"the stretch {{value}} is above {LARGEST_STRETCH:g}, which no elastomer reaches;"
-        " if the column holds percent, name it engineering_strain_percent.",
-    )  # fmt: skip
-    _refuse_first(
-        path, rows, stress, np.abs(stress) > LARGEST_STRESS_MPA,
-        f"the stress {{value}} MPa is beyond {LARGEST_STRESS_MPA:g} MPa, which no elastomer bears;"
-        " if the column holds kPa or Pa, name it nominal_stress_kpa or nominal_stress_pa.",
-    )  # fmt: skip
-
-
-def _check_sign(path, rows, stretch, stress):
-    wrong = stress * np.sign(stretch - 1) < -SIGN_TOLERANCE * np.abs(stress).max()
-    _refuse_first(
-        path, rows, stress, wrong,
-        "the stress {value} MPa has the wrong sign for its stretch;"
-        " tension is positive and compression negative, in strain and in stress.",
-    )  # fmt: skip
-
-
-def _check_order(path, rows, stretch):
-    """A stretch that turns back is unloading or a second branch: a fit of both at once means nothing."""
-    steps = np.diff(stretch)
-    forward = np.sign(stretch[-1] - stretch[0])
-    _refuse_first(
-        path, rows[1:], stretch[1:], steps * forward < 0 if forward else steps != 0,
-        "the stretch turns back to {value}; keep one loading branch, or say `sort: true` if its rows are in disorder.",
-    )  # fmt: skip

@@ -13,6 +13,7 @@ from softtact.materials.laws.base import TEST_PATHS, principal_stretches
 
 SCAN = (0.1, 10.0)
 SCAN_POINTS = 461  # 1 % steps of stretch each way from 1
+_BISECTIONS = 12   # of such a step: an end of the range is good to 3e-6
 
 
 def stable_ranges(law, *, scan=SCAN):
@@ -25,6 +26,11 @@ def stable_range(law, mode, *, scan=SCAN):
     if not is_stable(law, mode, np.array([1.0]))[0]:
         return [1.0, 1.0]
     return [_last_stable(law, mode, end) for end in scan]
+
+
+def covers(outer, inner):
+    """Whether a range covers another, up to the last digits."""
+    return outer[0] <= inner[0] * (1 + 1e-5) and outer[1] >= inner[1] * (1 - 1e-5)
 
 
 def is_stable(law, mode, stretch):
@@ -49,8 +55,14 @@ def log_tangent(law, stretches, *, step=1e-30):
 
 
 def _last_stable(law, mode, end):
-    """The stretch between 1 and `end` up to which every scanned stretch is stable."""
+    """The stretch between 1 and `end` up to which the law is stable."""
     stretch = np.geomspace(1.0, end, SCAN_POINTS // 2 + 1)
     stable = is_stable(law, mode, stretch)
-    last = len(stretch) if stable.all() else int(np.argmin(stable))
-    return float(stretch[last - 1])
+    if stable.all():
+        return float(stretch[-1])
+    first = int(np.argmin(stable))
+    good, bad = stretch[first - 1], stretch[first]
+    for _ in range(_BISECTIONS):
+        middle = np.sqrt(good * bad)
+        good, bad = (middle, bad) if is_stable(law, mode, np.array([middle]))[0] else (good, middle)
+    return float(good)

@@ -5,12 +5,13 @@ parts, psi(lb) isochoric energy per reference volume (MPa), K bulk modulus (MPa)
 The whole energy is psi + U with U(J) = K/2 (J - 1)^2; `isochoric` never includes U.
 """
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import brentq
 
-from softtact.errors import InputError
+from softtact.errors import InputError, OutsideCardWarning
 
 # Exponents (e1, e2, e3) of the incompressible test paths: l_k = stretch ** e_k. Direction 3 is always free of stress.
 TEST_PATHS = {
@@ -67,6 +68,11 @@ class Law:
         """The same constants in their usual order, where terms can be exchanged."""
         return parameters
 
+    @classmethod
+    def lowest(cls, stretches):
+        """{constant: least value} for which psi exists at principal stretches (n, 3); a fit searches above it."""
+        return {}
+
     def __repr__(self):
         values = ", ".join(f"{name}={value:g}" for name, value in self.parameters.items())
         return f"{type(self).__name__}({values}, bulk_modulus={self.bulk_modulus:g})"
@@ -93,9 +99,22 @@ class Law:
         return self.bulk_modulus / 2 * (J - 1) ** 2, self.bulk_modulus * (J - 1), self.bulk_modulus * np.ones_like(J)
 
     def nominal_stress(self, mode, stretch):
-        """Nominal stress (MPa) of the incompressible material in a `uniaxial`, `equibiaxial` or `planar` test."""
-        stress = self.principal_stress(principal_stretches(mode, stretch))
+        """Nominal stress (MPa) of the incompressible material in a `uniaxial`, `equibiaxial` or `planar` test.
+
+        A law with a `stretch_window` warns (`OutsideCardWarning`) of stretches outside of it.
+        """
+        stretches = principal_stretches(mode, stretch)
+        self._warn_outside(stretches)
+        stress = self.principal_stress(stretches)
         return (stress[..., 0] - stress[..., 2]) / stretch
+
+    def _warn_outside(self, stretches):
+        if self.stretch_window is None:
+            return
+        low, high = self.stretch_window
+        if stretches.min() < low * (1 - 1e-9) or stretches.max() > high * (1 + 1e-9):
+            warnings.warn(f"Law {self.name} is used at principal stretches {stretches.min():.3g} to {stretches.max():.3g}; its card"
+                          f" rests on data from {low:.3g} to {high:.3g}.", OutsideCardWarning, stacklevel=3)
 
     def uniaxial_compressible(self, stretch):
         """Nominal stress (MPa) of the uniaxial test with the volume penalty: the lateral stress is solved to zero."""

@@ -4,6 +4,7 @@ import math
 
 from softtact.errors import InputError
 from softtact.materials.laws.arruda_boyce import ArrudaBoyce
+from softtact.materials.laws.gent import Gent
 from softtact.materials.laws.mooney_rivlin import MooneyRivlin
 from softtact.materials.laws.neo_hooke import NeoHooke
 from softtact.materials.laws.ogden import Ogden1, Ogden2, Ogden3
@@ -11,7 +12,7 @@ from softtact.materials.laws.reduced_polynomial2 import ReducedPolynomial2
 from softtact.materials.laws.yeoh import Yeoh
 
 LAWS = {
-    law.name: law for law in (NeoHooke, MooneyRivlin, Yeoh, ReducedPolynomial2, ArrudaBoyce, Ogden1, Ogden2, Ogden3)
+    law.name: law for law in (NeoHooke, MooneyRivlin, Yeoh, ReducedPolynomial2, ArrudaBoyce, Gent, Ogden1, Ogden2, Ogden3)
 }
 
 
@@ -46,7 +47,7 @@ def _check(kind, parameters):
     for name, value in parameters.items():
         if not isinstance(value, (int, float)) or not math.isfinite(value):
             raise InputError(f"Law {kind.name}: constant {name} is {value!r}; give a finite number.")
-        if name.startswith("alpha") and value == 0 or name == "lambda_m" and value <= 0:
+        if name.startswith("alpha") and value == 0 or name in ("lambda_m", "jm") and value <= 0:
             raise InputError(
                 f"Law {kind.name}: constant {name} is {value!r}, where the energy is undefined; change it."
             )
