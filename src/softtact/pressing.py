@@ -1,12 +1,13 @@
 """A press of a placed object with one model: from the object's underside and forces to a `PressResult`."""
 
 import time
+import warnings
 
 import numpy as np
 
 from softtact.contact.height_field import HeightField
 from softtact.contact.object_points import Underside
-from softtact.errors import ConvergenceError
+from softtact.errors import ConvergenceError, OutsideCardWarning
 from softtact.mechanics import hyperelastic
 from softtact.mechanics.elastic import press_layer
 from softtact.mechanics.foundation_press import FoundationMaps, press_foundation
@@ -17,6 +18,7 @@ from softtact.sensing.capacitance import ideal_counts
 _DEEPEST_LINEAR = 0.5     # of the layer's thickness: a linear layer does not know that it ends
 _HARDLY_COMPRESSED = 0.27    # of a frustum's height: below, the foundation model is within 2 % (docs/fast_models.md)
 _FULL_POCKET = 0.8        # of a frustum's height: above, its pocket is full and contacts begin that the models leave out
+_CORNER = 0.01            # share of a layer: strains at an edge of the object go beyond any data
 _MARGIN, _LEAST_MARGIN_MM = 1.3, 0.1     # of the depth on springs, within which points are looked for at first
 _RISE = 1.15              # of the object's depth: points within may touch
 
@@ -112,9 +114,19 @@ def _of_record(sensor, body, record, forces, times):
     names = ("indentation_mm", "contact_area_mm2", "penetration_mm", "frustum_compression_mm", "residual_n", "outside_card",
              "iterations")
     numbers = dict(zip(names, map(np.array, numbers), strict=True))
+    _warn_outside_card(numbers["outside_card"], forces)
     valid = numbers["frustum_compression_mm"] < _FULL_POCKET * sensor.spec.dielectric.frusta.height_mm
     return make_result(sensor, "hyperelastic", body.solver.name, np.stack(maps), forces[:len(maps)], np.array(times),
                        within_validity=valid, **numbers)
+
+
+def _warn_outside_card(shares, forces):
+    """Warn of the first level at which a layer is strained beyond the data behind its card in more than a corner."""
+    outside = [(force, share) for force, share in zip(forces, shares, strict=False) if share > _CORNER]
+    if outside:
+        force, share = outside[0]
+        warnings.warn(f"At {force:g} N {share:.1%} of a layer is strained beyond the data behind its material card"
+                      " (`result.outside_card`): what its law says there is extrapolated.", OutsideCardWarning, stacklevel=5)
 
 
 def _read_level(body, sampling, level):

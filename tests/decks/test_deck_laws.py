@@ -49,7 +49,7 @@ def abaqus_energy(card, stretches):
     return psi + sum((J - 1) ** (2 * (k + 1)) / value for k, value in enumerate(d) if value)
 
 
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("name", CONSTANTS)
 def test_the_card_has_our_energy_by_the_formulas_of_abaqus(name):
     law = make_law(name, CONSTANTS[name])
     stretches = np.array([0.8, 1.05, 1.2])
@@ -62,13 +62,13 @@ def test_the_card_has_our_energy_by_the_formulas_of_abaqus(name):
 
 
 def test_every_law_of_ours_has_its_card_and_another_is_refused():
-    assert set(CONSTANTS) == set(LAWS)
+    assert set(CONSTANTS) == set(LAWS) - {"gent"}    # neither program has it
     with pytest.raises(InputError, match="'gent' cannot be written for Abaqus; use one of neo_hooke"):
         law_card(SimpleNamespace(name="gent"), no_term=0.0, dialect="Abaqus")
 
 
 @needs_ccx
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("name", CONSTANTS)
 def test_one_hexahedron_of_ccx_in_tension_and_compression_has_our_stress(name, tmp_path):
     """Expected: `Law.uniaxial_compressible`, a root of the lateral stress, without finite elements."""
     law = make_law(name, CONSTANTS[name])

@@ -11,7 +11,7 @@ from softtact.materials.curves import path_window
 from softtact.materials.laws.base import TEST_PATHS
 
 THRESHOLD = 0.2     # laws that part by more are named
-MARGIN = 0.25       # "just outside": so much farther, as a share of the window's extent in log stretch
+MARGIN = 0.1        # "just outside": so much farther, as a share of the window's extent in log stretch
 _POINTS = 33
 
 
@@ -44,7 +44,7 @@ def _difference(one, other, mode, stretch):
 
 
 def differences(laws, paths):
-    """{law: {other: {"difference": 1 or None where one does not exist there, "mode": ...}}} of laws {name: Law}, each pair twice."""
+    """{law: {other: {"difference": share, or None where one does not exist, "mode": ...}}} of laws {name: Law}, each pair twice."""
     table = {name: {} for name in laws}
     for one, other in itertools.combinations(laws, 2):
         value, mode = difference(laws[one], laws[other], paths)
@@ -53,11 +53,11 @@ def differences(laws, paths):
     return table
 
 
-def partings(chosen, agreement, *, threshold=THRESHOLD):
-    """Sentences on the laws that part from the chosen one by more than `threshold` just outside the data, or within."""
+def partings(chosen, agreement, *, among, threshold=THRESHOLD):
+    """Sentences on the laws of the list `among` that part from the chosen one by more than `threshold`."""
     for place, where in (("inside", "within the data"), ("outside", "just outside the data")):
         named = [f"{name} by {_share(entry)} ({entry['mode']})" for name, entry in agreement[place].get(chosen, {}).items()
-                 if entry["difference"] is None or entry["difference"] > threshold]
+                 if name in among and (entry["difference"] is None or entry["difference"] > threshold)]
         if named:
             remedy = "the curves do not say which is right there" if place == "outside" else "the others do not fit"
             yield f"{chosen} and other laws part {where}: {', '.join(named)}; {remedy}."

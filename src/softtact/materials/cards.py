@@ -15,10 +15,11 @@ from softtact.materials.fitting import STARTS, FitOptions, fit_law, law_names
 from softtact.materials.laws.registry import make_law
 from softtact.materials.linear import LinearConstants, young_modulus
 from softtact.materials.prediction import predict_left_out
-from softtact.materials.stability import covers, stable_ranges
+from softtact.materials.stability import SCAN, covers, stable_ranges
 from softtact.progress import progress
 
 _SYSTEMATIC = 0.7   # neighbouring residuals so alike are the law's misfit; noise gives 0 +- 1/sqrt(points)
+_NOTABLE = 0.01     # relative error from which that is worth saying
 
 
 @dataclass(frozen=True)
@@ -90,6 +91,7 @@ def make_card(curves, *, material="material", printed=None, **options):
         "warnings": [remark for curve in curves for remark in curve.remarks] + [*bulk.warnings],
     }
     card["warnings"] += [sentence for name, fit in fits.items() for sentence in _fit_warnings(fit, entries[name])]
+    card["warnings"] += [*_systematic(fits.values())]
     card["warnings"] += linear_warnings + _consistency_warnings(card, options.disagreement)
     if printed:
         card["printed"] = printed
@@ -114,7 +116,7 @@ def law_from_card(card, law=None):
         raise InputError(
             f"The card of material {card['material']} has no hyperelastic law {name!r}; it has {', '.join(available)}."
         )
-    made = _law_of(name, card["laws"][name])
+    made = law_of_entry(name, card["laws"][name])
     made.stretch_window = principal_window(card.get("strain_window", {}))
     return made
 
@@ -140,7 +142,8 @@ def printed_warnings(printed, *, bulk_over_shear=20.0):
     return [f"Printed constants: {sentence}" for sentence in disagreements(laws, linear=linear)]
 
 
-def _law_of(name, entry):
+def law_of_entry(name, entry):
+    """The `Law` of one entry of a card, without a window of its own."""
     return make_law(name, entry["parameters"], bulk_modulus=entry["bulk_modulus_mpa"])
 
 
@@ -178,7 +181,9 @@ def _law_entry(fit, curves, bulk, options):
     """What the card says of one law."""
     law = fit.make()
     modulus = bulk.of(law.mu0)
-    stable = stable_ranges(law)
+    low, high = SCAN
+    windows = [curve.window for curve in curves]
+    stable = stable_ranges(law, scan=(min(low, *(w[0] for w in windows)), max(high, *(w[1] for w in windows))))
     return {
         "parameters": fit.parameters,
         "parameter_names": list(fit.parameters),
@@ -215,7 +220,7 @@ def _named_errors(fit):
 def _agreement(entries, curves):
     """Differences of the laws' stresses within the data and just outside."""
     windows = {curve.mode: curve.window for curve in curves}
-    laws = {name: _law_of(name, entry) for name, entry in entries.items() if entry["mu0_mpa"] > 0}
+    laws = {name: law_of_entry(name, entry) for name, entry in entries.items() if entry["mu0_mpa"] > 0}
     return {"inside": differences(laws, paths_inside(windows)),
             "outside": differences(laws, paths_outside(principal_window(windows)))}
 
@@ -254,8 +259,14 @@ def _fit_warnings(fit, entry):
         yield f"{fit.law}: these curves do not determine {', '.join(fit.not_identifiable)} (standard error above 100 %)."
     if fit.at_bound:
         yield f"{fit.law}: {', '.join(fit.at_bound)} ended on a bound of the search."
-    if fit.autocorrelation > _SYSTEMATIC and fit.relative_error > 0.01:
-        yield (f"{fit.law}: its errors are systematic (neighbours correlate by {fit.autocorrelation:.2f}); the standard errors"
+
+
+def _systematic(fits):
+    """One sentence on the laws whose errors are no noise."""
+    named = [f"{fit.law} ({fit.autocorrelation:.2f})" for fit in fits
+             if fit.autocorrelation > _SYSTEMATIC and fit.relative_error > _NOTABLE]
+    if named:
+        yield (f"The errors of {', '.join(named)} are systematic: neighbours correlate as the numbers say. Their standard errors"
                " cover noise, not that the law does not follow the material.")
 
 
@@ -265,6 +276,7 @@ def _ranges(entry):
 
 def _consistency_warnings(card, threshold):
     """Laws that part from the chosen one, and linear constants that no stable law has."""
-    usable = {name: _law_of(name, card["laws"][name]) for name in card["ranking"] if card["laws"][name]["stable_over_data"]}
+    usable = {name: law_of_entry(name, card["laws"][name]) for name in card["ranking"] if card["laws"][name]["stable_over_data"]}
     linear = linear_from_card(card) if "linear" in card["laws"] else None
-    return [*partings(card["chosen"], card["agreement"], threshold=threshold), *against_linear(usable, linear)]
+    parted = partings(card["chosen"], card["agreement"], among=list(usable), threshold=threshold)
+    return [*parted, *against_linear(usable, linear)]

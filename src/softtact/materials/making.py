@@ -16,19 +16,22 @@ def make_curves(measured, curves, settings):
     measured: paths of the user's files in the order of settings["files"], for kind "measured"
     settings: `MaterialConfig.curve_settings`
     """
+    by_mode = {curve.mode: curve for curve in curves_of(settings, measured=measured)}
+    for path in _paths(curves):
+        if path.stem not in by_mode:
+            raise InputError(f"{path}: material {settings['material']} has no {path.stem} curve, only {', '.join(by_mode)}.")
+        write_curve(path, by_mode[path.stem])
+
+
+def curves_of(settings, *, measured=()):
+    """The curves, one per mode, that `MaterialConfig.curve_settings` describe; `measured`: where the user's files are now."""
     settings = dict(settings)
     material = settings.pop("material", None)
     if material is None:
         raise InputError("settings of make_curves: the key material is missing; add it.")
     if settings.get("kind") == "measured":
-        made = _measured(material, _paths(measured), settings)
-    else:
-        made = _synthetic(material, settings)
-    by_mode = {curve.mode: curve for curve in made}
-    for path in _paths(curves):
-        if path.stem not in by_mode:
-            raise InputError(f"{path}: material {material} has no {path.stem} curve, only {', '.join(by_mode)}.")
-        write_curve(path, by_mode[path.stem])
+        return _measured(material, _paths(measured), settings)
+    return _synthetic(material, settings)
 
 
 def _synthetic(material, settings):
