@@ -15,11 +15,11 @@ MODES = {"uniaxial": (0.6, 1.6), "equibiaxial": (1.0, 1.4), "planar": (1.0, 1.6)
 def curves_of():
     """Function: law and constants -> curves in the three modes, without noise unless told."""
 
-    def make(law, parameters, *, noise=0.0, points=25, modes=MODES):
+    def make(law, parameters, *, noise=0.0, points=25, modes=MODES, seed=3):
         law = make_law(law, parameters)
         windows = modes.items()
         return [
-            synthetic_curve(law, mode, w, points=points, noise=noise, seed=[3, i])
+            synthetic_curve(law, mode, w, points=points, noise=noise, seed=[seed, i])
             for i, (mode, w) in enumerate(windows)
         ]
 

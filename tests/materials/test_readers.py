@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from softtact.errors import InputError
-from softtact.materials.curves import Curve, join_by_mode, write_curve
+from softtact.materials.checks import refuse_mixed_units
+from softtact.materials.curves import Curve, VolumetricCurve, join_by_mode, write_curve
 from softtact.materials.readers import read_curve, read_curves
 
 PLAIN = "stretch,nominal_stress_mpa\n0.8,-0.3\n1.0,0.0\n1.2,0.2\n"
@@ -144,3 +145,119 @@ def test_two_bare_columns_are_stress_then_stretch(published):
     folder = published / "literature" / "Treloar_1944" / "UT"
     curve = read_curve(folder / "stress_stretch.txt", layout="stress_stretch", mode="uniaxial")
     assert (curve.stretch[-1], curve.nominal_stress[-1], len(curve.stretch)) == (7.6, 6.3176, 24)
+
+
+@pytest.mark.parametrize("unit", ["mpa", "kpa", "pa"])
+def test_true_stress_and_true_strain_become_nominal_stress_and_stretch(write_file, unit):
+    """Constant volume: the section shrinks by the stretch. ln 2 = 0.693147; 3 MPa over a stretch of 2 is 1.5 MPa."""
+    stress = {"mpa": "3", "kpa": "3000", "pa": "3000000"}[unit]
+    curve = read_curve(write_file(f"true_strain,true_stress_{unit}\n0,0\n{np.log(2)},{stress}\n"))
+    assert curve.stretch == pytest.approx([1, 2])
+    assert curve.nominal_stress == pytest.approx([0, 1.5])
+
+
+def test_a_volumetric_test_is_pressure_against_volume(write_file):
+    curve = read_curve(write_file("volumetric_strain_percent,pressure_kpa\n0,0\n-2,140\n", "volumetric.csv"))
+    assert curve.mode == "volumetric"
+    assert curve.volume_ratio == pytest.approx([1, 0.98]) and curve.pressure == pytest.approx([0, 0.14])
+
+
+def test_a_volumetric_curve_reads_back(tmp_path):
+    curve = VolumetricCurve(np.array([0.9, 1.0]), np.array([0.7, 0.0]), "synthetic", "a law, seed 1")
+    write_curve(tmp_path / "any.csv", curve)
+    again = read_curve(tmp_path / "any.csv")
+    assert (again.mode, again.kind, again.source) == ("volumetric", "synthetic", "a law, seed 1")
+    assert np.array_equal(again.volume_ratio, curve.volume_ratio) and np.array_equal(again.pressure, curve.pressure)
+
+
+def test_a_path_can_state_its_own_mode(write_file):
+    path = write_file(PLAIN, "specimen_7.csv")
+    assert [curve.mode for curve in read_curves([f"planar={path}", f"uniaxial={path}"])] == ["planar", "uniaxial"]
+
+
+@pytest.mark.parametrize("text", ["engineering_strain,nominal_stress_mpa\n0.1,0.1\n0.3,0.5\n",
+                                  "stretch,nominal_stress_mpa\n0.9,0.1\n0.7,0.5\n"])
+def test_a_compression_test_without_a_minus_is_read_when_told(write_file, text):
+    curve = read_curve(write_file(text), compression=True)
+    assert curve.stretch == pytest.approx([0.9, 0.7]) and curve.nominal_stress == pytest.approx([-0.1, -0.5])
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "sentence"),
+    [
+        ("volumetric", "volume_ratio,pressure_mpa\n1,0\n0.98,-0.1\n", "row 3: the pressure -0.1 MPa has the wrong sign"),
+        ("volumetric", "volume_ratio,pressure_mpa\n1,0\n0.02,0.1\n", "row 3: the volume ratio 0.02 .* volumetric_strain"),
+        ("volumetric", HEADER + "1,0\n0.9,-0.1\n", "no column holds the volume among stretch, nominal_stress_mpa"),
+        ("uniaxial", HEADER + "1.1,0.05\n1.2,0.09\n1.3,130\n1.4,160\n", "row 4: the stress jumps to 130 MPa.*are units mixed"),
+        ("uniaxial", HEADER + "0.02,1.1\n0.1,1.3\n0.2,2\n", "row 2: the stress 1.1 MPa has the wrong sign.*are they swapped"),
+        ("uniaxial", HEADER + "-0.1,0.9\n0.2,1.2\n", "row 2: the stretch -0.1 is not positive.*are they swapped"),
+        ("uniaxial", HEADER + "0.9,0.1\n0.8,0.3\n", "say `compression: true` for a compression test written without a minus"),
+        ("uniaxial", HEADER + "1.2,0.1\n1.2,0.3\n", "every row has the stretch 1.2; give a curve over a range"),
+        ("uniaxial", "true_strain,nominal_stress_mpa\n0,0\n900,1\n", "row 3: the true strain 900 is beyond any elastomer"),
+    ],
+)
+def test_more_that_cannot_be_trusted_is_refused(write_file, name, text, sentence):
+    with pytest.raises(InputError, match=sentence):
+        read_curve(write_file(text, f"{name}.csv"))
+
+
+def test_a_mapped_name_that_is_no_quantity_is_refused(write_file):
+    with pytest.raises(InputError, match="`columns` maps 'force', which is no quantity with a unit"):
+        read_curve(write_file("F,e\n1,0\n"), columns={"force": "F"})
+
+
+def test_curves_in_different_units_are_refused_with_both_names(write_file):
+    mpa = write_file(HEADER + "1.1,0.1\n1.3,0.3\n", "uniaxial.csv")
+    kpa = write_file(HEADER + "1.1,130\n1.3,180\n", "planar.csv")
+    with pytest.raises(InputError, match=r"planar.csv \(planar\) is .* times as stiff as uniaxial.csv .* another unit"):
+        refuse_mixed_units(read_curves([mpa, kpa]))
+
+
+def neo_hooke_rows(stretches, *, minus=True):
+    """CSV of a neo-Hookean uniaxial test, with or without its minus signs."""
+    stress = 0.35 * (stretches - stretches**-2)
+    strain = stretches - 1
+    rows = zip(strain, stress, strict=True) if minus else zip(np.abs(strain), np.abs(stress), strict=True)
+    return "engineering_strain,nominal_stress_mpa\n" + "".join(f"{e:.6f},{s:.6f}\n" for e, s in rows)
+
+
+def test_a_compression_test_that_looks_like_tension_is_remarked_upon(write_file):
+    (remark,) = read_curve(write_file(neo_hooke_rows(np.linspace(1, 0.5, 11), minus=False))).remarks
+    assert "steepens from the start" in remark and "`compression: true`" in remark
+
+
+@pytest.mark.parametrize("end", [0.5, 1.9])
+def test_a_test_with_its_signs_is_not_remarked_upon(write_file, end):
+    assert read_curve(write_file(neo_hooke_rows(np.linspace(1, end, 11)))).remarks == ()
+
+
+@pytest.mark.parametrize(("header", "rows", "remark"), [
+    ("engineering_strain", "1,0.01\n5,0.05\n10,0.09\n", "if the column holds percent"),
+    ("engineering_strain_percent", "0.1,0.03\n0.3,0.09\n0.5,0.14\n", "if the column holds a ratio"),
+])
+def test_strains_that_may_be_in_another_unit_are_remarked_upon(write_file, header, rows, remark):
+    (said,) = read_curve(write_file(f"{header},nominal_stress_mpa\n{rows}")).remarks
+    assert remark in said
+
+
+def test_a_remark_stays_with_the_curve_in_the_projects_own_file(write_file, tmp_path):
+    curve = read_curve(write_file(neo_hooke_rows(np.linspace(1, 0.5, 11), minus=False)))
+    write_curve(tmp_path / "copy.csv", curve)
+    assert read_curve(tmp_path / "copy.csv").remarks == curve.remarks
+
+
+def test_no_published_test_is_remarked_upon_or_refused(published):
+    curves = read_curves(sorted((published / "soro_db").glob("*.csv")), layout="soro_db")
+    for name in ("Treloar_1944", "Kawabata_1981"):
+        curves += read_curves(published / "literature" / name, layout="literature")
+    assert [curve.remarks for curve in curves] == [()] * 12
+
+
+def test_a_literature_folder_is_read_with_its_three_modes(published):
+    curves = read_curves(published / "literature" / "Treloar_1944", layout="literature")
+    assert [(curve.mode, len(curve.stretch)) for curve in curves] == [("uniaxial", 24), ("equibiaxial", 16), ("planar", 13)]
+
+
+def test_a_folder_without_that_layout_is_refused(tmp_path):
+    with pytest.raises(InputError, match="holds no UT, ET or PS with a stress_stretch.txt"):
+        read_curves(tmp_path, layout="literature")

@@ -69,9 +69,9 @@ def test_a_figure_is_written_the_same_twice(tmp_path):
 
 def test_the_page_holds_its_figures_and_links_its_data(tmp_path):
     folder = tmp_path / "results"
-    names = ("table1", "table2", "table3", "policies", "claims", "ssim", "ceiling")
+    names = ("table1", "contradictions", "table2", "table3", "policies", "claims", "ssim", "ceiling")
     inputs = {name: folder / "tables" / f"{name}.csv" for name in names}
-    for name in ("table1", "table2", "table3", "policies"):
+    for name in ("table1", "contradictions", "table2", "table3", "policies"):
         write_csv(inputs[name], COMPLEXITY)
     write_csv(inputs["ssim"], SSIM)
     write_csv(inputs["ceiling"], CEILING)

@@ -34,3 +34,22 @@ rule fit_material:
         benchmark_of("fit_material", "{material}")
     shell:
         run_stage("fit_material")
+
+
+rule draw_material:
+    input:
+        code=code("draw_material"),
+        card=rules.fit_material.output.card,
+        curves=rules.fit_material.input.curves,
+    output:
+        png=f"{RESULTS}/figures/material_{{material}}.png",
+        svg=f"{RESULTS}/figures/material_{{material}}.svg",
+    params:
+        files=files,
+        settings=as_settings(),
+    log:
+        log_of("draw_material", "{material}"),
+    benchmark:
+        benchmark_of("draw_material", "{material}")
+    shell:
+        run_stage("draw_material")

@@ -20,6 +20,7 @@ rule make_tables:
         timing=rules.evaluate.output.timing,
     output:
         table1=f"{RESULTS}/tables/table1_materials.csv",
+        contradictions=f"{RESULTS}/tables/table1_contradictions.csv",
         table2=f"{RESULTS}/tables/table2_complexity.csv",
         table3=f"{RESULTS}/tables/table3_timing.csv",
         claims=f"{RESULTS}/tables/claims.csv",
@@ -150,6 +151,7 @@ rule report:
     input:
         code=code("report"),
         table1=rules.make_tables.output.table1,
+        contradictions=rules.make_tables.output.contradictions,
         table2=rules.make_tables.output.table2,
         table3=rules.make_tables.output.table3,
         claims=rules.make_tables.output.claims,
@@ -157,7 +159,10 @@ rule report:
         ceiling=rules.evaluate.output.ceiling,
         ftir=rules.validate_ftir.output.summary,
         policies=rules.compare_policies.output.policies,
-        figures=[figure_files(name)["png"] for name in FIGURES],
+        figures=[
+            *(f"{RESULTS}/figures/material_{name}.png" for name in STUDY.values.materials),
+            *(figure_files(name)["png"] for name in FIGURES),
+        ],
     output:
         page=f"{RESULTS}/report.html",
     params:

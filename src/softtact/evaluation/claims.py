@@ -3,6 +3,8 @@
 import numpy as np
 import pandas as pd
 
+from softtact.materials.consistency import PRINTED
+
 REPRODUCED, NOT, CONTRADICTION, ARCHIVE = "reproduced", "not reproduced", "contradicts itself", "needs the archive"
 UNDECIDED = "undecided"
 COLUMNS = ["claim", "where", "paper", "ours", "verdict", "rule", "evidence"]
@@ -40,8 +42,7 @@ def _materials(cards):
 
 
 def _printed_constants(card):
-    prefix = "Printed constants: "
-    found = [text.removeprefix(prefix) for text in card.get("warnings", ()) if text.startswith(prefix)]
+    found = [text.removeprefix(PRINTED) for text in card.get("warnings", ()) if text.startswith(PRINTED)]
     return _row(f"{card['material']}: the printed laws were fitted to the same test", "table 1", "one test, three models",
                 " ".join(found) or "no two laws part by more than half", CONTRADICTION if found else REPRODUCED,
                 "no two printed laws part by more than a factor of 1.5 in modulus or stress",

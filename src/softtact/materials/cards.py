@@ -9,7 +9,7 @@ from softtact.files import read_json
 from softtact.materials.agreement import THRESHOLD, differences, partings, paths_inside, paths_outside
 from softtact.materials.bulk import bulk_modulus, poisson_ratio, small_strain_constants
 from softtact.materials.checks import refuse_mixed_units
-from softtact.materials.consistency import against_linear, disagreements
+from softtact.materials.consistency import PRINTED, against_linear, disagreements
 from softtact.materials.curves import VOLUMETRIC, common_kind, join_by_mode, principal_window
 from softtact.materials.fitting import STARTS, FitOptions, fit_law, law_names
 from softtact.materials.laws.registry import make_law
@@ -139,7 +139,7 @@ def printed_warnings(printed, *, bulk_over_shear=20.0):
         if name != "linear"
     }
     linear = LinearConstants(**printed["linear"]["parameters"]) if "linear" in printed else None
-    return [f"Printed constants: {sentence}" for sentence in disagreements(laws, linear=linear)]
+    return [f"{PRINTED}{sentence}" for sentence in disagreements(laws, linear=linear)]
 
 
 def law_of_entry(name, entry):

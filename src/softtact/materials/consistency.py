@@ -8,6 +8,7 @@ import numpy as np
 
 from softtact.materials.stability import is_stable
 
+PRINTED = "Printed constants: "    # begins a card's sentences on what a publication prints
 # Where the laws are compared: states that the sensor's layers reach under a fingertip's load.
 PROBES = (("uniaxial", 0.5), ("uniaxial", 1.5), ("equibiaxial", 1.3), ("planar", 1.5))
 # Laws fitted to the same curves differ by tens of percent outside them; beyond this factor they are two materials.

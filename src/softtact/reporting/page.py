@@ -50,7 +50,9 @@ padding:.6em 1em}.reproduced{background:#d9f0d9}.not{background:#f7d7d7}.contrad
 def render_page(inputs, settings, *, folder):
     """The page as text; `inputs` as in the stage, links relative to `folder`."""
     claims = pd.read_csv(inputs["claims"], keep_default_na=False)
-    titles = {"table1": "Table 1. Material laws (stress in MPa)", "table2": "Table 2. Complexity and choice of model",
+    titles = {"table1": "Table 1. Material laws (stress in MPa)",
+              "contradictions": "Where the paper's table 1 contradicts itself",
+              "table2": "Table 2. Complexity and choice of model",
               "table3": "Table 3. Time per tactile map (s)",
               "policies": "Policies that choose a model, on the presses that the expected error was not calibrated on"}
     tables = [{"title": title, "html": _html(pd.read_csv(inputs[name])), "link": _link(inputs[name], folder)}
@@ -95,5 +97,8 @@ def _link(path, folder):
 
 
 def _figure(path, folder):
-    return {"caption": CAPTIONS[path.stem], "data": base64.b64encode(path.read_bytes()).decode(),
+    material = path.stem.removeprefix("material_")
+    caption = CAPTIONS.get(path.stem) or (f"Material {material}: test curves and the laws fitted to them, what they leave, and the "
+                                          "stretches over which each law is stable.")
+    return {"caption": caption, "data": base64.b64encode(path.read_bytes()).decode(),
             "link": _link(path, folder), "svg": _link(path.with_suffix(".svg"), folder)}

@@ -4,6 +4,8 @@ import platform
 
 import pandas as pd
 
+from softtact.materials.consistency import PRINTED
+
 # Table 2 of the paper: NPt, CHt, NPo, CHo, and the pipeline that it chose.
 PRINTED_COUNTS = {"object_1": (1356, 231, 51, 36, "elastic"), "object_2": (13830, 15537, 1205, 3444, "elastic"),
                   "object_3": (1932, 1348, 64, 105, "elastic"), "object_4": (5472, 1449, 164, 141, "elastic"),
@@ -13,17 +15,27 @@ PRINTED_TIMES = {"hyperelastic": (162.1, 48.0, 1863.0, 110.9), "elastic": (37.4,
 
 
 def table1_materials(cards):
-    """A row per material and law: parameters, RMSE (MPa), stability, the paper's printed constants and RMSE."""
+    """A row per material and law: parameters, errors, stability, what the data leave open, the paper's constants and RMSE."""
     rows = []
     for card in cards:
         for law, fit in card["laws"].items():
             printed = card.get("printed", {}).get(law, {})
+            ranges = {f"stable_{mode}": f"{low:.3g} to {high:.3g}" for mode, (low, high) in fit.get("stable_range", {}).items()}
             rows.append({"material": card["material"], "law": law, "chosen": law == card["chosen"],
                          "parameters": _listing(fit["parameters"]), "rmse_mpa": fit.get("rmse_mpa"),
-                         "mu0_mpa": fit.get("mu0_mpa"), "stable_over_data": fit.get("stable_over_data"),
+                         "relative_error": fit.get("relative_error"), "mu0_mpa": fit.get("mu0_mpa"),
+                         "bulk_modulus_mpa": fit.get("bulk_modulus_mpa"), "stable_over_data": fit.get("stable_over_data"), **ranges,
+                         "not_identifiable": " ".join(fit.get("not_identifiable", ())),
                          "printed_parameters": _listing(printed.get("parameters", {})),
-                         "printed_rmse": printed.get("rmse"), "data": card["kind"]})
+                         "printed_rmse": printed.get("rmse_mpa"), "data": card["kind"]})
     return pd.DataFrame(rows)
+
+
+def contradictions(cards):
+    """A row per contradiction among the constants that a publication prints, with its numbers."""
+    rows = [{"material": card["material"], "contradiction": text.removeprefix(PRINTED)}
+            for card in cards for text in card["warnings"] if text.startswith(PRINTED)]
+    return pd.DataFrame(rows, columns=["material", "contradiction"])
 
 
 def table2_complexity(complexity, choose):

@@ -1,6 +1,6 @@
 """Tables 1 to 3 and the claims.
 
-inputs: cards (list), complexity, ftir, ssim, timing;  outputs: table1, table2, table3, claims
+inputs: cards (list), complexity, ftir, ssim, timing;  outputs: table1, contradictions, table2, table3, claims
 settings: rule, thresholds {total, overlap}
 """
 
@@ -9,7 +9,7 @@ import pandas as pd
 from softtact.evaluation.claims import claims
 from softtact.files import read_json, write_csv
 from softtact.geometry.complexity import choose_model
-from softtact.reporting.tables import PRINTED_COUNTS, table1_materials, table2_complexity, table3_timing
+from softtact.reporting.tables import PRINTED_COUNTS, contradictions, table1_materials, table2_complexity, table3_timing
 
 
 def run(*, inputs, outputs, settings, threads=1):
@@ -21,6 +21,7 @@ def run(*, inputs, outputs, settings, threads=1):
         return choose_model(*counts, rule=rule, **settings["thresholds"])
 
     write_csv(outputs["table1"], table1_materials(cards))
+    write_csv(outputs["contradictions"], contradictions(cards))
     write_csv(outputs["table2"], table2_complexity(complexity, choose))
     write_csv(outputs["table3"], table3_timing(timing))
     write_csv(outputs["claims"], claims(cards=cards, complexity=complexity, ftir=read_json(inputs["ftir"]), ssim=ssim,
