@@ -114,6 +114,67 @@ def test_fit_writes_a_card_and_ranks_the_laws(answer, tmp_path):
     assert "neo_hooke" in said and str(card) in said
 
 
+def neo_hooke_file(path, stretches, *, header="stretch,nominal_stress_mpa", exponents=(1, -2)):
+    """A test of a neo-Hookean rubber with a shear modulus of 0.4 MPa."""
+    rows = [f"{x},{0.4 * (x ** exponents[0] - x ** exponents[1]):.6f}\n" for x in stretches]
+    path.write_text(f"{header}\n" + "".join(rows))
+    return path
+
+
+def test_fit_joins_modes_and_a_volumetric_test_and_draws_the_card(answer, tmp_path):
+    tension = neo_hooke_file(tmp_path / "a.csv", (0.8, 0.9, 1.1, 1.3, 1.5))
+    planar = neo_hooke_file(tmp_path / "b.csv", (1.1, 1.3, 1.5), exponents=(1, -3))
+    (tmp_path / "volumetric.csv").write_text("volume_ratio,pressure_mpa\n0.98,0.16\n0.99,0.08\n1,0\n")
+    said = json.loads(answer("fit", f"uniaxial={tension}", f"planar={planar}", tmp_path / "volumetric.csv",
+                             "--law", "neo_hooke,gent", "--window", "uniaxial=0.7:1.4", "--weight", "planar=2", "--residual", "relative", "--plot",
+                             tmp_path / "card.png", "--out", tmp_path / "card.json", "--json"))
+    assert said["strain_window"] == {"uniaxial": [0.8, 1.3], "planar": [1.1, 1.5], "volumetric": [0.98, 1.0]}
+    assert said["laws"]["neo_hooke"]["bulk_modulus_mpa"] == pytest.approx(8.0)
+    assert said["laws"]["neo_hooke"]["fit"]["residual"] == "relative"
+    assert (tmp_path / "card.png").stat().st_size > 20_000
+
+
+def test_fit_takes_a_materials_yaml_with_what_the_command_line_adds(answer, tmp_path):
+    neo_hooke_file(tmp_path / "mine.csv", (0.8, 1.2, 1.4), header="lambda,P")
+    (tmp_path / "mine.yaml").write_text("""
+material: mine
+curves:
+  kind: measured
+  files: [{file: mine.csv, mode: uniaxial, columns: {stretch: lambda, nominal_stress_mpa: P}}]
+fit: {laws: [neo_hooke], poisson: 0.45, small_strain: 0.5}
+""")
+    said = json.loads(answer("fit", tmp_path / "mine.yaml", "--poisson", "0.4", "--out", tmp_path / "card.json", "--json"))
+    assert said["material"] == "mine" and list(said["laws"]) == ["neo_hooke", "linear"]
+    assert said["laws"]["linear"]["parameters"]["poisson"] == 0.4
+
+
+@pytest.mark.parametrize(("options", "sentence"), [
+    (["--window", "uniaxial=2:1"], "'2:1' is not two rising numbers with a colon between them"),
+    (["--window", "0.7:1.4"], "--window 0.7:1.4: write it as NAME=VALUE"),
+    (["--weight", "uniaxial=heavy"], "'heavy' is not a number"),
+    (["--column", "force=F"], "`columns` maps 'force', which is no quantity with a unit"),
+    (["--law", "gents"], "Law 'gents' is unknown; use one of neo_hooke"),
+    (["--choose", "yeoh", "--law", "gent"], "Law 'yeoh' is to be chosen but is not fitted"),
+])
+def test_fit_refuses_options_without_meaning_and_writes_no_card(refused, tmp_path, options, sentence):
+    curve = neo_hooke_file(tmp_path / "uniaxial.csv", (0.8, 0.9, 1.1, 1.3))
+    status, said = refused("fit", curve, *options, "--out", tmp_path / "card.json")
+    assert status == 1 and sentence in said
+    assert not (tmp_path / "card.json").exists()
+
+
+def test_a_materials_yaml_is_given_alone(refused, tmp_path):
+    status, said = refused("fit", "config/materials/neoprene.yaml", "--mode", "uniaxial", "--out", tmp_path / "card.json")
+    assert status == 1 and "says itself what its files are; give it alone" in said
+
+
+@pytest.mark.parametrize(("card", "sentence"), [("lid=card.json", "the layer is 'lid'; give dielectric or cover"),
+                                               ("cover=none.json", "none.json: there is no such file")])
+def test_press_refuses_a_card_that_it_cannot_use(refused, card, sentence):
+    status, said = refused("press", OBJECT, "--unit", "mm", "--force", 5, "--model", "hyperelastic", "--card", card)
+    assert status == 1 and sentence in said
+
+
 @pytest.mark.parametrize("dialect", ["calculix", "abaqus"])
 def test_export_deck_writes_the_whole_sensor_with_a_step_per_force(answer, tmp_path, dialect):
     deck = tmp_path / "deck.inp"

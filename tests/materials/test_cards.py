@@ -15,6 +15,7 @@ from softtact.materials.curves import VolumetricCurve, synthetic_curve
 from softtact.materials.laws.registry import make_law
 from softtact.materials.linear import LinearConstants, young_modulus
 from softtact.materials.readers import read_curve, read_curves
+from softtact.pressing import _warn_outside_card
 
 TRUTH = {"c10": 0.1706, "c01": 0.0040}
 
@@ -309,3 +310,11 @@ def test_three_terms_fit_best_and_predict_worst(published):
     one, three = (card["laws"][name] for name in ("ogden1", "ogden3"))
     assert three["relative_error"] < one["relative_error"]
     assert three["left_out"]["equibiaxial"]["relative_error"] > 10 > one["left_out"]["equibiaxial"]["relative_error"]
+
+
+def test_a_press_warns_of_the_first_force_at_which_more_than_a_corner_is_outside_the_card(recwarn):
+    _warn_outside_card(np.array([0.0, 0.005]), [5.0, 10.0])
+    _warn_outside_card(np.array([np.nan, np.nan]), [5.0, 10.0])      # laws without a card
+    assert not recwarn.list
+    with pytest.warns(OutsideCardWarning, match="At 20 N 3.0% of a layer is strained beyond the data behind its material card"):
+        _warn_outside_card(np.array([0.0, 0.03, 0.2]), [5.0, 20.0, 50.0])

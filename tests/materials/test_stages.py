@@ -9,7 +9,7 @@ from softtact.files import read_json
 from softtact.materials.cards import law_from_card, load_card
 from softtact.materials.config import load_material
 from softtact.materials.readers import read_curve
-from softtact.stages import fit_material, make_curves
+from softtact.stages import draw_material, fit_material, make_curves
 
 
 def as_passed(settings):
@@ -115,3 +115,15 @@ def test_settings_without_a_material_are_refused(polyurethane, tmp_path):
 
 def without_material(settings):
     return {key: value for key, value in as_passed(settings).items() if key != "material"}
+
+
+def test_the_picture_of_a_card_is_drawn_from_its_files(tmp_path, write_file):
+    write_file("stretch,nominal_stress_mpa\n0.7,-0.5\n0.9,-0.13\n1.1,0.11\n1.4,0.36\n", "uniaxial.csv")
+    write_file("volume_ratio,pressure_mpa\n0.98,0.16\n1,0\n", "volumetric.csv")
+    curves = [tmp_path / "uniaxial.csv", tmp_path / "volumetric.csv"]
+    settings = {"material": "mine", "laws": ["neo_hooke", "yeoh"]}
+    fit_material.run(inputs={"curves": curves}, outputs={"card": tmp_path / "card.json"}, settings=settings)
+    pictures = {kind: tmp_path / f"card.{kind}" for kind in ("png", "svg")}
+    draw_material.run(inputs={"card": tmp_path / "card.json", "curves": curves}, outputs=pictures, settings={})
+    assert all(path.stat().st_size > 10_000 for path in pictures.values())
+    assert all(word in pictures["svg"].read_text() for word in ("<svg", "</svg>"))
