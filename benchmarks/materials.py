@@ -59,7 +59,8 @@ def silicone(path):
     law = card["laws"][card["chosen"]]
     largest = float(np.abs(curve.within(WINDOW).nominal_stress).max())
     return {"material": path.stem, "points": law["fit"]["points"], "chosen": card["chosen"],
-            "rmse_over_largest": law["rmse_mpa"] / largest, "largest_mpa": largest, "mu0_mpa": law["mu0_mpa"], "stable_range": law["stable_range"],
+            "rmse_over_largest": law["rmse_mpa"] / largest, "largest_mpa": largest, "mu0_mpa": law["mu0_mpa"],
+            "stable_range": law["stable_range"],
             "unstable": [name for name in card["ranking"] if not card["laws"][name]["stable_over_data"]]}
 
 

@@ -126,8 +126,8 @@ def test_fit_joins_modes_and_a_volumetric_test_and_draws_the_card(answer, tmp_pa
     planar = neo_hooke_file(tmp_path / "b.csv", (1.1, 1.3, 1.5), exponents=(1, -3))
     (tmp_path / "volumetric.csv").write_text("volume_ratio,pressure_mpa\n0.98,0.16\n0.99,0.08\n1,0\n")
     said = json.loads(answer("fit", f"uniaxial={tension}", f"planar={planar}", tmp_path / "volumetric.csv",
-                             "--law", "neo_hooke,gent", "--window", "uniaxial=0.7:1.4", "--weight", "planar=2", "--residual", "relative", "--plot",
-                             tmp_path / "card.png", "--out", tmp_path / "card.json", "--json"))
+                             "--law", "neo_hooke,gent", "--window", "uniaxial=0.7:1.4", "--weight", "planar=2",
+                             "--residual", "relative", "--plot", tmp_path / "card.png", "--out", tmp_path / "card.json", "--json"))
     assert said["strain_window"] == {"uniaxial": [0.8, 1.3], "planar": [1.1, 1.5], "volumetric": [0.98, 1.0]}
     assert said["laws"]["neo_hooke"]["bulk_modulus_mpa"] == pytest.approx(8.0)
     assert said["laws"]["neo_hooke"]["fit"]["residual"] == "relative"
