@@ -1,69 +1,212 @@
-"""Bright contact discs in a camera frame: found by threshold, measured by their summed light."""
-
-from pathlib import Path
+"""Bright contact discs in a camera frame: found by their edges, measured by an outline fitted to their light."""
 
 import numpy as np
 import pandas as pd
-from scipy.ndimage import gaussian_filter
-from skimage import io
-from skimage.filters import threshold_otsu
-from skimage.measure import label, regionprops
+from scipy.ndimage import binary_erosion
+from skimage.measure import regionprops
 from skimage.segmentation import expand_labels
 
-from softtact.errors import InputError
+from softtact.optics.outline import (
+    COLUMN,
+    NAMES,
+    ROW,
+    A,
+    B,
+    R,
+    S,
+    box,
+    contrast_light,
+    fit_outline,
+    inside,
+)
+from softtact.optics.pooling import first_priors, pooled_priors
+from softtact.optics.regions import EDGE_SCALE, FAINTEST, find_regions, noise_of, smooth_surface
 
-COLUMNS = ["disc", "x_mm", "y_mm", "area_mm2"]
-SMALLEST_PIXELS = 12   # a smaller bright spot is taken for noise
-_RIM_PIXELS = 4        # light that the lens has spread beyond the threshold belongs to the disc
-_CONTRAST = 0.15       # of full scale; a frame with less holds no disc
+DTYPES = {"disc": int, "x_mm": float, "y_mm": float, "area_mm2": float, "area_sd_mm2": float, "diameter_mm": float,
+          "signal_to_noise": float, "clipped": bool, "touching": bool, "measured_by": str}
+COLUMNS = list(DTYPES)
+SMALLEST_PIXELS = 6      # area; what is smaller is noise or a hot pixel
+_MISFIT, _RESIDUAL = 1.5, 0.08   # over noise and over contrast: beyond both, the contact has no such outline
+_PASSES = 3              # fits of every disc: alone, with what the others tell, and once more beside its neighbours' light
 
 
-def detect_discs(frame, *, pixel_mm):
-    """Table (disc, x_mm, y_mm, area_mm2) of the bright discs in a grey frame (rows, columns), origin at its centre.
+def detect_discs(frame, *, pixel_mm, smallest_mm=0.0):
+    """Table of the bright discs in a frame (rows, columns) or (rows, columns, channels), one row each in order of reading.
 
-    The area is the light above the background divided by the light of the disc's own core, so it does not
-    depend on the threshold, on blur, or on where the disc lies under uneven light. An empty frame gives an empty table.
+    disc (number), x_mm, y_mm (from the frame's centre; y grows downwards), area_mm2 and its standard deviation area_sd_mm2,
+    diameter_mm (of the circle of that area), signal_to_noise (contrast over the noise of one pixel there),
+    clipped (cut by the frame's border: position and area are of the visible part), touching (it and a neighbour were one
+    bright region: each has its own share), measured_by (outline, or light where the contact has no simple outline).
+    smallest_mm: discs of a smaller diameter are left out. A frame without discs gives an empty table.
     """
-    image = np.asarray(frame, dtype=float) / (np.iinfo(frame.dtype).max if frame.dtype.kind == "u" else 1.0)
-    smooth = gaussian_filter(image, 1.0)
-    if np.ptp(smooth) < _CONTRAST:
-        return pd.DataFrame(columns=COLUMNS)
-    labels = label(smooth > threshold_otsu(smooth))
-    background = float(np.median(image[labels == 0]))
-    grown = expand_labels(labels, _RIM_PIXELS)
-    rows = [_measure(region, smooth, image, grown, background) for region in regionprops(labels)
-            if region.area >= SMALLEST_PIXELS]
-    centre = 0.5 * (np.array(image.shape) - 1)
-    return pd.DataFrame([(k, (c - centre[1]) * pixel_mm, (r - centre[0]) * pixel_mm, pixels * pixel_mm**2)
-                         for k, (r, c, pixels) in enumerate(rows)], columns=COLUMNS)
+    return discs_and_outlines(frame, pixel_mm=pixel_mm, smallest_mm=smallest_mm)[0]
 
 
-def _measure(region, smooth, image, grown, background):
-    """Centre (row, column) and area in pixels of one disc."""
-    r0, c0, r1, c1 = region.bbox
-    window = (slice(max(0, r0 - _RIM_PIXELS), r1 + _RIM_PIXELS), slice(max(0, c0 - _RIM_PIXELS), c1 + _RIM_PIXELS))
-    own = grown[window] == region.label
-    core = np.percentile(smooth[region.slice][region.image], 75) - background
-    return (*region.centroid, float((image[window] - background)[own].sum() / core))
+def discs_and_outlines(frame, *, pixel_mm, smallest_mm=0.0):
+    """The table of `detect_discs` and the frame's labels (rows, columns), 0 on glass and the disc's number + 1 elsewhere."""
+    image = grey(frame)
+    scene = Scene(image)
+    rows = [row for row in (scene.measure(k) for k in range(len(scene.fits))) if row["pixels"] >= SMALLEST_PIXELS]
+    rows = [row for row in rows if 2 * np.sqrt(row["pixels"] / np.pi) * pixel_mm >= smallest_mm]
+    numbers = np.zeros(len(scene.fits) + 1, dtype=int)
+    numbers[[row["label"] for row in rows]] = 1 + np.arange(len(rows))
+    return _table(rows, image.shape, pixel_mm), numbers[scene.regions.labels]
 
 
-def read_frames(path):
-    """Pairs (name, grey frame) of an image file, or of a folder's PNG, TIFF and JPEG files in order of name."""
-    path = Path(path)
-    files = sorted(p for p in path.iterdir() if p.suffix.lower() in (".png", ".tif", ".tiff", ".jpg", ".jpeg")) \
-        if path.is_dir() else [path]
-    if not files:
-        raise InputError(f"{path}: the folder holds no PNG, TIFF or JPEG file; name the folder with the frames.")
-    for file in files:
-        yield file.name, read_frame(file)
+def grey(frame):
+    """A frame of any depth as grey values (rows, columns) whose full scale is 1; colours count alike, alpha does not."""
+    frame = np.asarray(frame)
+    scale = np.iinfo(frame.dtype).max if frame.dtype.kind in "ui" else 1.0
+    if frame.ndim == 3:
+        frame = frame[..., :3].mean(axis=2) if frame.shape[2] > 2 else frame[..., 0]
+    return np.asarray(frame, dtype=float) / scale
 
 
-def read_frame(file):
-    """One frame as grey values (rows, columns)."""
-    try:
-        frame = io.imread(file)
-    except FileNotFoundError:
-        raise InputError(f"{file}: there is no such file.") from None
-    except (OSError, ValueError, SyntaxError) as error:
-        raise InputError(f"{file}: not a readable image ({error}).") from None
-    return frame if frame.ndim == 2 else np.asarray(frame[..., :3].mean(axis=2), dtype=np.uint8)
+def _table(rows, shape, pixel_mm):
+    middle = 0.5 * (np.array(shape) - 1)
+    table = pd.DataFrame({name: [row.get(name) for row in rows] for name in DTYPES})
+    table["disc"] = np.arange(len(rows))
+    for name, axis in (("y_mm", 0), ("x_mm", 1)):
+        table[name] = [(row["centre"][axis] - middle[axis]) * pixel_mm for row in rows]
+    table["area_mm2"] = [row["pixels"] * pixel_mm**2 for row in rows]
+    table["area_sd_mm2"] = [row["pixels_sd"] * pixel_mm**2 for row in rows]
+    table["diameter_mm"] = 2 * np.sqrt(table.area_mm2.to_numpy(dtype=float) / np.pi)
+    return table.astype(DTYPES)
+
+
+class Scene:
+    """All the discs of one frame, fitted beside each other.
+
+    Light and blur change slowly over a frame, so each disc's contrast, glass and blur are known from all the others as well,
+    as far as these agree: discs that differ in brightness keep their own.
+    """
+
+    def __init__(self, image):
+        self.image, noise = image, noise_of(image)
+        self.regions = find_regions(image, noise=noise)
+        self.props = regionprops(self.regions.labels)
+        self.noise, self.limits = _inner_noise(image, self.regions.labels, noise), _limits(image)
+        self.fits = []
+        if self.props:
+            self._fit()
+
+    def _fit(self):
+        self.start = self._starts()
+        self.margin = int(np.ceil(3 * np.median(self.start[:, S]) + 3))
+        self.own = expand_labels(self.regions.labels, self.margin)
+        prior, values = first_priors(self.start), self.start
+        self.light = np.zeros_like(self.image)
+        for number in range(_PASSES):
+            self.fits = [self._fit_one(k, values[k], prior[k], alone=number == 0) for k in range(len(values))]
+            values = np.array([fit.values for fit in self.fits])
+            prior = pooled_priors(self.fits, prior, shape=self.image.shape)
+            self.light = self._all_light(values)
+
+    def _starts(self):
+        """Parameters (discs, parameters) to begin with, from the regions."""
+        centres = np.array([region.centroid for region in self.props])
+        glass = self._glass()(*centres.T)
+        at = tuple(np.round(centres).astype(int).T)
+        contrast = np.maximum(2 * (self.regions.threshold[at] - glass), FAINTEST)
+        start = np.zeros((len(centres), len(NAMES)))
+        start[:, A], start[:, B], start[:, [ROW, COLUMN]] = contrast, glass, centres
+        start[:, S] = self._blur(contrast)
+        start[:, R] = np.sqrt([region.area / np.pi + 1 for region in self.props])
+        return start
+
+    def _glass(self):
+        """Brightness without contact, a function of (rows, columns)."""
+        away = expand_labels(self.regions.labels, 3) == 0
+        if away.sum() < 100:
+            away = self.regions.labels == 0
+        if not away.any():
+            return lambda rows, columns: np.full(np.shape(rows), self.image.min())
+        return smooth_surface(np.nonzero(away), self.image[away], weights=np.ones(away.sum()), shape=self.image.shape)
+
+    def _blur(self, contrast):
+        """Blur in pixels to begin with, from the steepest slope in each region."""
+        from scipy.ndimage import gaussian_gradient_magnitude, maximum
+
+        steepest = maximum(gaussian_gradient_magnitude(self.image, EDGE_SCALE), self.regions.labels,
+                           np.arange(1, len(contrast) + 1))
+        wide = np.median(contrast / (np.sqrt(2 * np.pi) * steepest))
+        return np.sqrt(max(wide**2 - EDGE_SCALE**2, 0.25))
+
+    def _fit_one(self, k, values, prior, *, alone):
+        window, mask = self._pixels(k, values, alone=alone)
+        rows, columns = (index[mask] for index in np.mgrid[window].astype(float))
+        other = 0.0 if alone else (self.light[window] - contrast_light(values, window))[mask]
+        return fit_outline(rows, columns, self.image[window][mask], start=values, prior=prior, noise=self.noise, other=other,
+                           limits=self.limits)
+
+    def _pixels(self, k, values, *, alone):
+        """Window of the frame around a disc and the mask of the pixels in it that tell of this disc."""
+        top, left, bottom, right = self.props[k].bbox
+        window = (slice(max(top - self.margin, 0), bottom + self.margin), slice(max(left - self.margin, 0), right + self.margin))
+        labels = (self.own if alone else self.regions.labels)[window]
+        return window, (labels == 0) | (labels == k + 1)
+
+    def _all_light(self, values):
+        """Light (rows, columns) of all discs above the glass."""
+        light = np.zeros_like(self.image)
+        for one in values:
+            window = box(one, shape=self.image.shape, margin=5 * one[S])
+            light[window] += contrast_light(one, window)
+        return light
+
+    def measure(self, k):
+        """One row of the table, in pixels."""
+        fit, region = self.fits[k], self.props[k]
+        row = {"label": k + 1, "touching": bool(self.regions.touching[k]), "clipped": self._clipped(k),
+               "signal_to_noise": fit.values[A] / self.noise, "centre": fit.values[[ROW, COLUMN]], "measured_by": "outline",
+               "pixels": fit.area, "pixels_sd": fit.area_sd * max(1.0, fit.misfit)}
+        if self._has_no_outline(fit, region):
+            row |= {"measured_by": "light", "centre": region.centroid} | self._by_light(k)
+        elif row["clipped"] or row["touching"]:
+            row["pixels"] = self._share(fit)
+        return row
+
+    def _clipped(self, k):
+        """Whether the frame's border cuts a disc."""
+        (top, left, bottom, right), (rows, columns) = self.props[k].bbox, self.image.shape
+        return top == 0 or left == 0 or bottom == rows or right == columns
+
+    def _has_no_outline(self, fit, region):
+        moved = np.hypot(*(fit.values[[ROW, COLUMN]] - region.centroid))
+        lost = moved > max(fit.values[R], 2.0) or not np.isfinite(fit.area_sd)
+        return lost or (fit.misfit > _MISFIT and fit.residual > _RESIDUAL)
+
+    def _by_light(self, k):
+        """Area from the summed light, whatever the contact's shape."""
+        values = self.fits[k].values
+        window, mask = self._pixels(k, values, alone=True)
+        inner = self.image[window][self.props_mask(k, window)]
+        contrast = np.median(inner) - values[B]
+        pixels = float(((self.image[window] - values[B])[mask]).sum() / contrast)
+        return {"pixels": pixels, "pixels_sd": float(np.sqrt(mask.sum()) * self.noise / contrast)}
+
+    def props_mask(self, k, window):
+        return self.regions.labels[window] == k + 1
+
+    def _share(self, fit):
+        """Pixels in the frame that lie in this outline; what lies in several is shared."""
+        window = box(fit.values, shape=self.image.shape, margin=2)
+        own, whole = inside(fit.values, window), np.zeros([s.stop - s.start for s in window])
+        for other in self.fits:
+            if np.hypot(*(other.values - fit.values)[[ROW, COLUMN]]) < other.values[R] + fit.values[R] + 4:
+                whole += inside(other.values, window)
+        return float((own / np.maximum(whole, 1.0)).sum())
+
+
+def _inner_noise(image, labels, noise):
+    """Noise of a pixel where light is far from black: in a dark frame the camera cuts half of the glass's noise off."""
+    within = binary_erosion(labels > 0, iterations=3)
+    if within.sum() < 50:
+        return noise
+    return max(noise, noise_of(image, within))
+
+
+def _limits(image):
+    """Darkest and brightest value, where so many pixels have them that the camera must have cut light off."""
+    return tuple(edge if (image == edge).mean() > 1e-3 else far
+                 for edge, far in ((image.min(), -1e6), (image.max(), 1e6)))
