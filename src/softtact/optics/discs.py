@@ -1,8 +1,10 @@
 """Bright contact discs in a camera frame: found by their edges, measured by an outline fitted to their light."""
 
+from functools import cached_property
+
 import numpy as np
 import pandas as pd
-from scipy.ndimage import binary_erosion
+from scipy.ndimage import binary_erosion, distance_transform_edt, gaussian_gradient_magnitude, maximum
 from skimage.measure import regionprops
 from skimage.segmentation import expand_labels
 
@@ -20,12 +22,13 @@ from softtact.optics.outline import (
     inside,
 )
 from softtact.optics.pooling import first_priors, pooled_priors
-from softtact.optics.regions import EDGE_SCALE, FAINTEST, find_regions, noise_of, smooth_surface
+from softtact.optics.regions import EDGE_SCALE, FAINTEST, find_regions, is_ring, noise_of, smooth_surface
 
 DTYPES = {"disc": int, "x_mm": float, "y_mm": float, "area_mm2": float, "area_sd_mm2": float, "diameter_mm": float,
           "signal_to_noise": float, "clipped": bool, "touching": bool, "measured_by": str}
 COLUMNS = list(DTYPES)
 SMALLEST_PIXELS = 6      # area; what is smaller is noise or a hot pixel
+SURE = 3.0               # standard deviations of its area; what has less is not told from noise
 _MISFIT, _RESIDUAL = 1.5, 0.08   # over noise and over contrast: beyond both, the contact has no such outline
 _PASSES = 3              # fits of every disc: alone, with what the others tell, and once more beside its neighbours' light
 
@@ -35,7 +38,7 @@ def detect_discs(frame, *, pixel_mm, smallest_mm=0.0):
 
     disc (number), x_mm, y_mm (from the frame's centre; y grows downwards), area_mm2 and its standard deviation area_sd_mm2,
     diameter_mm (of the circle of that area), signal_to_noise (contrast over the noise of one pixel there),
-    clipped (cut by the frame's border: position and area are of the visible part), touching (it and a neighbour were one
+    clipped (cut by the frame's border: the area is what is visible, the position that of the whole outline as far as it tells), touching (it and a neighbour were one
     bright region: each has its own share), measured_by (outline, or light where the contact has no simple outline).
     smallest_mm: discs of a smaller diameter are left out. A frame without discs gives an empty table.
     """
@@ -46,8 +49,9 @@ def discs_and_outlines(frame, *, pixel_mm, smallest_mm=0.0):
     """The table of `detect_discs` and the frame's labels (rows, columns), 0 on glass and the disc's number + 1 elsewhere."""
     image = grey(frame)
     scene = Scene(image)
-    rows = [row for row in (scene.measure(k) for k in range(len(scene.fits))) if row["pixels"] >= SMALLEST_PIXELS]
-    rows = [row for row in rows if 2 * np.sqrt(row["pixels"] / np.pi) * pixel_mm >= smallest_mm]
+    least = max(SMALLEST_PIXELS, np.pi * (0.5 * smallest_mm / pixel_mm) ** 2)
+    rows = [row for row in map(scene.measure, range(len(scene.fits)))
+            if row["pixels"] >= least and row["contrast"] >= FAINTEST and row["pixels"] > SURE * row["pixels_sd"]]
     numbers = np.zeros(len(scene.fits) + 1, dtype=int)
     numbers[[row["label"] for row in rows]] = 1 + np.arange(len(rows))
     return _table(rows, image.shape, pixel_mm), numbers[scene.regions.labels]
@@ -85,7 +89,8 @@ class Scene:
         self.image, noise = image, noise_of(image)
         self.regions = find_regions(image, noise=noise)
         self.props = regionprops(self.regions.labels)
-        self.noise, self.limits = _inner_noise(image, self.regions.labels, noise), _limits(image)
+        self.limits = _limits(image)
+        self.noise = self._whole_noise(noise)
         self.fits = []
         if self.props:
             self._fit()
@@ -105,7 +110,7 @@ class Scene:
     def _starts(self):
         """Parameters (discs, parameters) to begin with, from the regions."""
         centres = np.array([region.centroid for region in self.props])
-        glass = self._glass()(*centres.T)
+        glass = self._glass(*centres.T)
         at = tuple(np.round(centres).astype(int).T)
         contrast = np.maximum(2 * (self.regions.threshold[at] - glass), FAINTEST)
         start = np.zeros((len(centres), len(NAMES)))
@@ -114,6 +119,7 @@ class Scene:
         start[:, R] = np.sqrt([region.area / np.pi + 1 for region in self.props])
         return start
 
+    @cached_property
     def _glass(self):
         """Brightness without contact, a function of (rows, columns)."""
         away = expand_labels(self.regions.labels, 3) == 0
@@ -123,26 +129,36 @@ class Scene:
             return lambda rows, columns: np.full(np.shape(rows), self.image.min())
         return smooth_surface(np.nonzero(away), self.image[away], weights=np.ones(away.sum()), shape=self.image.shape)
 
+    def _whole_noise(self, noise):
+        """Noise of a pixel as it was before the camera cut off what was darker than black: larger than what is seen."""
+        labels = self.regions.labels
+        within, away = binary_erosion(labels > 0, iterations=3), expand_labels(labels, 3) == 0
+        if within.sum() > 50:
+            noise = max(noise, noise_of(self.image, within))
+        if self.limits[0] < 0 or away.sum() < 100:
+            return noise
+        middle, above = np.percentile((self.image - self._glass(*np.indices(self.image.shape)))[away], [50.0, 84.13])
+        return max(noise, above - middle)
+
     def _blur(self, contrast):
         """Blur in pixels to begin with, from the steepest slope in each region."""
-        from scipy.ndimage import gaussian_gradient_magnitude, maximum
-
         steepest = maximum(gaussian_gradient_magnitude(self.image, EDGE_SCALE), self.regions.labels,
                            np.arange(1, len(contrast) + 1))
         wide = np.median(contrast / (np.sqrt(2 * np.pi) * steepest))
         return np.sqrt(max(wide**2 - EDGE_SCALE**2, 0.25))
 
     def _fit_one(self, k, values, prior, *, alone):
-        window, mask = self._pixels(k, values, alone=alone)
+        window, mask = self._pixels(k, alone=alone)
         rows, columns = (index[mask] for index in np.mgrid[window].astype(float))
         other = 0.0 if alone else (self.light[window] - contrast_light(values, window))[mask]
         return fit_outline(rows, columns, self.image[window][mask], start=values, prior=prior, noise=self.noise, other=other,
                            limits=self.limits)
 
-    def _pixels(self, k, values, *, alone):
+    def _pixels(self, k, *, alone):
         """Window of the frame around a disc and the mask of the pixels in it that tell of this disc."""
         top, left, bottom, right = self.props[k].bbox
-        window = (slice(max(top - self.margin, 0), bottom + self.margin), slice(max(left - self.margin, 0), right + self.margin))
+        window = tuple(slice(max(first - self.margin, 0), min(last + self.margin, size))
+                       for first, last, size in zip((top, left), (bottom, right), self.image.shape, strict=True))
         labels = (self.own if alone else self.regions.labels)[window]
         return window, (labels == 0) | (labels == k + 1)
 
@@ -158,12 +174,15 @@ class Scene:
         """One row of the table, in pixels."""
         fit, region = self.fits[k], self.props[k]
         row = {"label": k + 1, "touching": bool(self.regions.touching[k]), "clipped": self._clipped(k),
-               "signal_to_noise": fit.values[A] / self.noise, "centre": fit.values[[ROW, COLUMN]], "measured_by": "outline",
+               "contrast": fit.values[A], "signal_to_noise": fit.values[A] / self.noise,
+               "centre": fit.values[[ROW, COLUMN]], "measured_by": "outline",
                "pixels": fit.area, "pixels_sd": fit.area_sd * max(1.0, fit.misfit)}
         if self._has_no_outline(fit, region):
             row |= {"measured_by": "light", "centre": region.centroid} | self._by_light(k)
         elif row["clipped"] or row["touching"]:
-            row["pixels"] = self._share(fit)
+            row["pixels"] = self._share(fit.values)
+        if row["clipped"] and row["measured_by"] == "outline":
+            row["pixels_sd"] = fit.sd_of(self._share) * max(1.0, fit.misfit)
         return row
 
     def _clipped(self, k):
@@ -174,36 +193,29 @@ class Scene:
     def _has_no_outline(self, fit, region):
         moved = np.hypot(*(fit.values[[ROW, COLUMN]] - region.centroid))
         lost = moved > max(fit.values[R], 2.0) or not np.isfinite(fit.area_sd)
-        return lost or (fit.misfit > _MISFIT and fit.residual > _RESIDUAL)
+        return lost or is_ring(region) or (fit.misfit > _MISFIT and fit.residual > _RESIDUAL)
 
     def _by_light(self, k):
-        """Area from the summed light, whatever the contact's shape."""
-        values = self.fits[k].values
-        window, mask = self._pixels(k, values, alone=True)
-        inner = self.image[window][self.props_mask(k, window)]
-        contrast = np.median(inner) - values[B]
-        pixels = float(((self.image[window] - values[B])[mask]).sum() / contrast)
-        return {"pixels": pixels, "pixels_sd": float(np.sqrt(mask.sum()) * self.noise / contrast)}
+        """Area from the summed light, whatever the contact's shape; its brightness is that of its innermost pixels."""
+        window, mask = self._pixels(k, alone=True)
+        depth = distance_transform_edt(self.regions.labels[window] == k + 1)
+        light = self.image[window] - self._glass(*self.props[k].centroid)
+        contrast = light[depth > 0.75 * depth.max()].mean()
+        return {"pixels": float(light[mask].sum() / contrast), "pixels_sd": float(np.sqrt(mask.sum()) * self.noise / contrast)}
 
-    def props_mask(self, k, window):
-        return self.regions.labels[window] == k + 1
+    def _share(self, values):
+        """Pixels in the frame that lie in an outline; what lies in several is shared."""
+        window = box(values, shape=self.image.shape, margin=2)
+        return float((inside(values, window) / np.maximum(self._cover[window], 1.0)).sum())
 
-    def _share(self, fit):
-        """Pixels in the frame that lie in this outline; what lies in several is shared."""
-        window = box(fit.values, shape=self.image.shape, margin=2)
-        own, whole = inside(fit.values, window), np.zeros([s.stop - s.start for s in window])
-        for other in self.fits:
-            if np.hypot(*(other.values - fit.values)[[ROW, COLUMN]]) < other.values[R] + fit.values[R] + 4:
-                whole += inside(other.values, window)
-        return float((own / np.maximum(whole, 1.0)).sum())
-
-
-def _inner_noise(image, labels, noise):
-    """Noise of a pixel where light is far from black: in a dark frame the camera cuts half of the glass's noise off."""
-    within = binary_erosion(labels > 0, iterations=3)
-    if within.sum() < 50:
-        return noise
-    return max(noise, noise_of(image, within))
+    @cached_property
+    def _cover(self):
+        """Number (rows, columns) of outlines that each pixel lies in."""
+        cover = np.zeros_like(self.image)
+        for fit in self.fits:
+            window = box(fit.values, shape=cover.shape, margin=2)
+            cover[window] += inside(fit.values, window)
+        return cover
 
 
 def _limits(image):

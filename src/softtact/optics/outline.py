@@ -55,7 +55,17 @@ class Outline:
         """Standard deviation of the area in pixels."""
         slope = np.zeros(len(self.values))
         slope[R], slope[SHAPE] = 2 * np.pi * self.values[R], np.pi * self.values[SHAPE]
-        return float(np.sqrt(slope @ self.covariance @ slope))
+        return float(np.sqrt(max(slope @ self.covariance @ slope, 0.0)))
+
+    def sd_of(self, measure):
+        """Standard deviation of `measure` (a function of the parameters), from its slopes."""
+        slope = np.zeros(len(self.values))
+        for k in range(ROW, len(slope)):
+            ends = [self.values.copy() for _ in range(2)]
+            ends[0][k] -= 0.05
+            ends[1][k] += 0.05
+            slope[k] = (measure(ends[1]) - measure(ends[0])) / 0.1
+        return float(np.sqrt(max(slope @ self.covariance @ slope, 0.0)))
 
 
 def fit_outline(rows, columns, light, *, start, prior, noise, other=0.0, limits=(-1e6, 1e6)):
@@ -104,10 +114,11 @@ def _share(values, rows, columns):
 def _polar(values, rows, columns):
     """Outline's radius (n,) in the direction of each pixel, the harmonics, and (rows, columns, rho) from the centre."""
     dr, dc = rows - values[ROW], columns - values[COLUMN]
-    phi = np.arctan2(dr, dc)
-    angles = np.stack([f(m * phi) for m in HARMONICS for f in (np.cos, np.sin)])
+    rho = np.maximum(np.hypot(dr, dc), 1e-6)
+    turn = (dc + 1j * dr) / rho
+    angles = np.stack([part for m in HARMONICS for part in ((turn**m).real, (turn**m).imag)])   # cos(m phi), sin(m phi)
     radius = np.maximum(values[R] + np.tensordot(values[SHAPE], angles, axes=1), 0.2)
-    return radius, angles, (dr, dc, np.maximum(np.hypot(dr, dc), 1e-6))
+    return radius, angles, (dr, dc, rho)
 
 
 def blurred_disc(radius, rho, s):

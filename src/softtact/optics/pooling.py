@@ -14,6 +14,7 @@ SHAPE_SD = np.repeat([0.15, 0.08, 0.08], 2)   # of the radius: harmonics 2 (an e
 FEWEST = 4            # discs; fewer tell nothing of each other
 UNKNOWN = 1e6         # standard deviation of what is not known
 _SHARED = slice(0, 3)  # contrast, glass, blur
+_TOLD = 0.2           # of the contrast: a disc that knows its own to that much tells whether discs differ
 _CHANGE = 0.3         # of the contrast and of the blur: by how much each term of the polynomial may change them
 
 
@@ -50,7 +51,7 @@ def _with_shape(mean, sd):
 def _own(fits, priors):
     """What each disc's own pixels tell: precision (discs, 3, 3) and precision times value (discs, 3)."""
     before = np.array([np.diag(prior.sd[_SHARED] ** -2.0) for prior in priors])
-    after = np.array([np.linalg.inv(fit.covariance[_SHARED, _SHARED]) for fit in fits])
+    after = np.array([np.linalg.pinv(fit.covariance[_SHARED, _SHARED]) for fit in fits])
     pull = np.einsum("kij,kj->ki", after, [fit.values[_SHARED] for fit in fits])
     return after - before, pull - np.einsum("kij,kj->ki", before, [prior.mean[_SHARED] for prior in priors])
 
@@ -69,7 +70,10 @@ def _excess(precision, pull, shared):
     """Standard deviation (3,) by which discs differ from the polynomials beyond their own errors."""
     own = np.linalg.pinv(precision, hermitian=True)
     variance = np.maximum(np.diagonal(own, axis1=1, axis2=2), 1e-12)
-    z = (np.einsum("kij,kj->ki", own, pull) - shared) / np.sqrt(variance)
+    told = np.sqrt(variance[:, 0]) < _TOLD * np.abs(shared[:, 0])
+    if told.sum() < FEWEST:
+        return np.zeros(3)   # discs so small that none tells its own contrast
+    z = (np.einsum("kij,kj->ki", own, pull) - shared)[told] / np.sqrt(variance[told])
     spread = (1.4826 * np.median(np.abs(z), axis=0)) ** 2
     by_chance = 1 + 2.3 / np.sqrt(len(z))   # one sd of that estimate above what errors alone give
-    return np.sqrt(np.maximum(spread - by_chance, 0.0) * np.median(variance, axis=0))
+    return np.sqrt(np.maximum(spread - by_chance, 0.0) * np.median(variance[told], axis=0))

@@ -2,7 +2,7 @@
 
 Light that only varies slowly, however bright, has no edges, so an empty frame has no regions whatever its unevenness. The
 brightness to cut at is read off the edges themselves (Yanowitz and Bruckstein, 1989): a smooth surface through them lies
-halfway between glass and disc in every part of an uneven frame.
+halfway between glass and disc in every part of an uneven frame; close to edges it follows them, so dim discs beside bright ones count.
 """
 
 from typing import NamedTuple
@@ -14,11 +14,13 @@ from skimage.morphology import dilation, disk, h_maxima
 from skimage.segmentation import find_boundaries, watershed
 
 EDGE_SCALE = 1.5        # pixels; sd of the filter that looks for edges
-EDGE_SIGNIFICANCE = 6.0  # sd of the noise: one pixel in 7e7 of an empty frame
+EDGE_SIGNIFICANCE = 6.5  # sd of the noise: one pixel in 1e9 of an empty frame; skewed noise at black has a longer tail
 WIDEST_EDGE = 8.0       # pixels; sd of the widest blur at which contact is told from uneven light
 FAINTEST = 0.02         # of full scale; less contrast is compression or striped electronics, not a disc
+_NEARBY = 6.0           # pixels; sd of the neighbourhood in which edges belong to one disc
 _SMOOTH = 1.0           # pixels; sd of the filter before the cut
 _FEWEST_PIXELS = 4      # above the cut; what has fewer cannot be measured
+_CONVEX = 0.93          # of the convex hull's area; a region that fills more of it has no waist
 _EDGED = 0.3            # share of a region's rim that must be a significant edge
 _COUNT = 1 / 255 / 12**0.5   # rounding to 8 bits is noise too
 
@@ -43,22 +45,44 @@ def noise_of(image, where=None):
 
 def find_regions(image, *, noise):
     """The `Regions` of a frame (rows, columns) whose full scale is 1."""
-    slope = gaussian_gradient_magnitude(image, EDGE_SCALE)
+    slope = _slope(image)
     smooth = gaussian_filter(image, _SMOOTH)
     edges = slope > _least_slope(smooth, noise)
     if not edges.any():
         return Regions(np.zeros(image.shape, dtype=int), np.full(image.shape, np.inf), np.zeros(0, dtype=bool))
-    threshold = smooth_surface(np.nonzero(edges), smooth[edges], weights=slope[edges] ** 2, shape=image.shape)(*np.indices(image.shape))
+    threshold = _threshold(smooth, np.where(edges, slope**2, 0.0))
     whole = _edged(label(smooth > threshold), edges)
     labels, touching = _split(whole)
     return Regions(labels, threshold, touching)
 
 
+def _threshold(smooth, weights):
+    """Brightness (rows, columns) halfway between glass and disc: near an edge the edge's own, elsewhere a smooth surface's."""
+    where = np.nonzero(weights)
+    surface = smooth_surface(where, smooth[where], weights=weights[where], shape=smooth.shape)(*np.indices(smooth.shape))
+    near = gaussian_filter(weights * (smooth - surface), _NEARBY)
+    return surface + near / (gaussian_filter(weights, _NEARBY) + 1e-3 * weights[where].mean())
+
+
+def _slope(image):
+    """Change of brightness per pixel (rows, columns). At the border, where the filter sees only half, less of it counts."""
+    slope = gaussian_gradient_magnitude(image, EDGE_SCALE)
+    reach = int(2 * EDGE_SCALE)
+    for border in (slope[:reach], slope[-reach:], slope[:, :reach], slope[:, -reach:]):
+        border *= np.sqrt(0.5)
+    return slope
+
+
 def _least_slope(smooth, noise):
-    """Per pixel: what noise does not reach, and light that changes over a wide distance does not either."""
-    of_noise = noise / (np.sqrt(8 * np.pi) * EDGE_SCALE**2)
-    contrast = max(float(np.ptp(smooth)), FAINTEST)
-    return max(EDGE_SIGNIFICANCE * of_noise, contrast / (np.sqrt(2 * np.pi) * (WIDEST_EDGE**2 + EDGE_SCALE**2) ** 0.5))
+    """Change of brightness per pixel that neither noise reaches, nor the steps of 8 bits, nor light that changes over a wide
+    distance."""
+    of_noise = EDGE_SIGNIFICANCE * noise / (np.sqrt(8 * np.pi) * EDGE_SCALE**2)
+    return max(of_noise, _steepest(FAINTEST, blur=0.0), _steepest(float(np.ptp(smooth)), blur=WIDEST_EDGE))
+
+
+def _steepest(contrast, *, blur):
+    """Slope in the middle of a blurred edge, seen by the filter that looks for it."""
+    return contrast / np.sqrt(2 * np.pi * (blur**2 + EDGE_SCALE**2))
 
 
 def smooth_surface(where, values, *, weights, shape, stiffness=1e-3):
@@ -106,12 +130,17 @@ def _split(labels):
 
 def _seeds(region):
     """One label per part of a region, on its bounding box. What is nearly convex is one part."""
-    whole = np.zeros(region.image.shape, dtype=int)
-    if region.solidity > 0.93 or region.area < 30:
+    if region.solidity > _CONVEX or region.area < 30 or is_ring(region):
+        whole = np.zeros(region.image.shape, dtype=int)
         whole[tuple(region.coords[0] - region.bbox[:2])] = 1
         return whole
     depth = distance_transform_edt(np.pad(region.image, 1))[1:-1, 1:-1]
-    return label(h_maxima(depth, 0.5 + 0.1 * np.median(_peaks(depth))))
+    return label(h_maxima(depth, 0.75 + 0.1 * np.median(_peaks(depth))))
+
+
+def is_ring(region):
+    """Whether a region is one contact with a dark middle, and not touching discs around a gap."""
+    return region.euler_number == 0 and region.area_filled > _CONVEX * region.area_convex
 
 
 def _peaks(depth):
