@@ -5,9 +5,10 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 from scipy.ndimage import binary_erosion, distance_transform_edt, gaussian_gradient_magnitude, maximum
-from skimage.measure import regionprops
+from skimage.measure import find_contours, regionprops
 from skimage.segmentation import expand_labels
 
+from softtact.errors import InputError
 from softtact.optics.outline import (
     COLUMN,
     NAMES,
@@ -18,6 +19,7 @@ from softtact.optics.outline import (
     S,
     box,
     contrast_light,
+    corners,
     fit_outline,
     inside,
 )
@@ -27,6 +29,7 @@ from softtact.optics.regions import EDGE_SCALE, FAINTEST, find_regions, is_ring,
 DTYPES = {"disc": int, "x_mm": float, "y_mm": float, "area_mm2": float, "area_sd_mm2": float, "diameter_mm": float,
           "signal_to_noise": float, "clipped": bool, "touching": bool, "measured_by": str}
 COLUMNS = list(DTYPES)
+SMALLEST_SIDE = 16       # pixels of a frame
 SMALLEST_PIXELS = 6      # area; what is smaller is noise or a hot pixel
 SURE = 3.0               # standard deviations of its area; what has less is not told from noise
 _MISFIT, _RESIDUAL = 1.5, 0.08   # over noise and over contrast: beyond both, the contact has no such outline
@@ -34,40 +37,60 @@ _PASSES = 3              # fits of every disc: alone, with what the others tell,
 
 
 def detect_discs(frame, *, pixel_mm, smallest_mm=0.0):
-    """Table of the bright discs in a frame (rows, columns) or (rows, columns, channels), one row each in order of reading.
+    """Table of the bright discs in a frame (rows, columns) or (rows, columns, channels), one row each.
 
-    disc (number), x_mm, y_mm (from the frame's centre; y grows downwards), area_mm2 and its standard deviation area_sd_mm2,
-    diameter_mm (of the circle of that area), signal_to_noise (contrast over the noise of one pixel there),
-    clipped (cut by the frame's border: the area is what is visible, the position that of the whole outline as far as it tells), touching (it and a neighbour were one
-    bright region: each has its own share), measured_by (outline, or light where the contact has no simple outline).
+    disc             number, from 0, from top to bottom
+    x_mm, y_mm       centre, from the frame's; y grows downwards
+    area_mm2         of the contact; area_sd_mm2: the standard deviation that noise gives it
+    diameter_mm      of the circle of that area
+    signal_to_noise  contrast over the noise of one pixel, at the disc
+    clipped          cut by the frame's border: the area is what is visible, the centre that of the whole outline
+    touching         it and a neighbour were one bright region: what lies in both outlines is shared
+    measured_by      outline, or light (summed) where the contact has no simple outline
+
     smallest_mm: discs of a smaller diameter are left out. A frame without discs gives an empty table.
     """
     return discs_and_outlines(frame, pixel_mm=pixel_mm, smallest_mm=smallest_mm)[0]
 
 
 def discs_and_outlines(frame, *, pixel_mm, smallest_mm=0.0):
-    """The table of `detect_discs` and the frame's labels (rows, columns), 0 on glass and the disc's number + 1 elsewhere."""
+    """The table of `detect_discs`, and the outline of each disc: x_mm and y_mm of its corners (corners, 2)."""
     image = grey(frame)
     scene = Scene(image)
     least = max(SMALLEST_PIXELS, np.pi * (0.5 * smallest_mm / pixel_mm) ** 2)
     rows = [row for row in map(scene.measure, range(len(scene.fits)))
             if row["pixels"] >= least and row["contrast"] >= FAINTEST and row["pixels"] > SURE * row["pixels_sd"]]
-    numbers = np.zeros(len(scene.fits) + 1, dtype=int)
-    numbers[[row["label"] for row in rows]] = 1 + np.arange(len(rows))
-    return _table(rows, image.shape, pixel_mm), numbers[scene.regions.labels]
+    middle = 0.5 * (np.array(image.shape) - 1)
+    outlines = [(scene.corners(row) - middle)[:, ::-1] * pixel_mm for row in rows]
+    return _table(rows, middle, pixel_mm), outlines
 
 
 def grey(frame):
-    """A frame of any depth as grey values (rows, columns) whose full scale is 1; colours count alike, alpha does not."""
+    """A frame of any depth as grey values (rows, columns) whose full scale is 1; colours count alike, alpha does not.
+
+    The full scale of integers is that of the fewest bits that hold them, at least 8: cameras store 10 or 12 bits in 16.
+    That of floating-point numbers is 1, or their largest where it is above.
+    """
     frame = np.asarray(frame)
-    scale = np.iinfo(frame.dtype).max if frame.dtype.kind in "ui" else 1.0
+    if frame.ndim not in (2, 3) or min(frame.shape[:2]) < SMALLEST_SIDE:
+        raise InputError(f"a frame of shape {frame.shape} is no picture of at least {SMALLEST_SIDE} x {SMALLEST_SIDE} pixels; "
+                         "give (rows, columns) or (rows, columns, channels).")
+    whole = frame.dtype.kind in "ui"
     if frame.ndim == 3:
-        frame = frame[..., :3].mean(axis=2) if frame.shape[2] > 2 else frame[..., 0]
-    return np.asarray(frame, dtype=float) / scale
+        frame = frame[..., :3].mean(axis=2, dtype=float) if frame.shape[2] > 2 else frame[..., 0]
+    light = np.asarray(frame, dtype=float)
+    if not np.isfinite(light).all():
+        raise InputError("a frame holds values that are not numbers; save it without them.")
+    return light / _full_scale(light, whole=whole)
 
 
-def _table(rows, shape, pixel_mm):
-    middle = 0.5 * (np.array(shape) - 1)
+def _full_scale(light, *, whole):
+    if whole:
+        return 2.0 ** max(int(np.ceil(light.max())).bit_length(), 8) - 1
+    return max(float(light.max()), 1.0)
+
+
+def _table(rows, middle, pixel_mm):
     table = pd.DataFrame({name: [row.get(name) for row in rows] for name in DTYPES})
     table["disc"] = np.arange(len(rows))
     for name, axis in (("y_mm", 0), ("x_mm", 1)):
@@ -184,6 +207,14 @@ class Scene:
         if row["clipped"] and row["measured_by"] == "outline":
             row["pixels_sd"] = fit.sd_of(self._share) * max(1.0, fit.misfit)
         return row
+
+    def corners(self, row):
+        """Outline (corners, 2) of one disc in rows and columns."""
+        k = row["label"] - 1
+        if row["measured_by"] == "outline":
+            return corners(self.fits[k].values)
+        padded = np.pad(self.props[k].image, 1).astype(float)
+        return max(find_contours(padded, 0.5), key=len) + self.props[k].bbox[:2] - 1.0
 
     def _clipped(self, k):
         """Whether the frame's border cuts a disc."""

@@ -162,3 +162,11 @@ def inside(values, window):
     """Share (rows, columns) of each pixel that lies in the outline, without blur."""
     radius, _, (_, _, rho) = _polar(values, *np.mgrid[window].astype(float))
     return np.clip(radius - rho + 0.5, 0.0, 1.0)
+
+
+def corners(values, *, count=72):
+    """Points (count + 1, 2) in rows and columns along an outline, closed."""
+    phi = np.linspace(0, 2 * np.pi, count + 1)
+    angles = np.stack([f(m * phi) for m in HARMONICS for f in (np.cos, np.sin)])
+    radius = values[R] + values[SHAPE] @ angles
+    return np.stack([values[ROW] + radius * np.sin(phi), values[COLUMN] + radius * np.cos(phi)], axis=1)

@@ -2,7 +2,8 @@
 
 Light that only varies slowly, however bright, has no edges, so an empty frame has no regions whatever its unevenness. The
 brightness to cut at is read off the edges themselves (Yanowitz and Bruckstein, 1989): a smooth surface through them lies
-halfway between glass and disc in every part of an uneven frame; close to edges it follows them, so dim discs beside bright ones count.
+halfway between glass and disc in every part of an uneven frame; close to edges it follows them, so that dim discs beside bright
+ones count.
 """
 
 from typing import NamedTuple
