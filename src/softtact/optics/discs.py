@@ -33,7 +33,7 @@ SMALLEST_SIDE = 16       # pixels of a frame
 SMALLEST_PIXELS = 6      # area; what is smaller is noise or a hot pixel
 SURE = 3.0               # standard deviations of its area; what has less is not told from noise
 _MISFIT, _RESIDUAL = 1.5, 0.08   # over noise and over contrast: beyond both, the contact has no such outline
-_PASSES = 3              # fits of every disc: alone, with what the others tell, and once more beside its neighbours' light
+PASSES = 3               # fits of every disc: alone, with what the others tell, and once more beside its neighbours' light
 
 
 def detect_discs(frame, *, pixel_mm, smallest_mm=0.0):
@@ -105,11 +105,11 @@ class Scene:
     """All the discs of one frame, fitted beside each other.
 
     Light and blur change slowly over a frame, so each disc's contrast, glass and blur are known from all the others as well,
-    as far as these agree: discs that differ in brightness keep their own.
+    as far as these agree: discs that differ in brightness keep their own. passes: 1 fits every disc alone.
     """
 
-    def __init__(self, image):
-        self.image, noise = image, noise_of(image)
+    def __init__(self, image, *, passes=PASSES):
+        self.image, self.passes, noise = image, passes, noise_of(image)
         self.regions = find_regions(image, noise=noise)
         self.props = regionprops(self.regions.labels)
         self.limits = _limits(image)
@@ -124,7 +124,7 @@ class Scene:
         self.own = expand_labels(self.regions.labels, self.margin)
         prior, values = first_priors(self.start), self.start
         self.light = np.zeros_like(self.image)
-        for number in range(_PASSES):
+        for number in range(self.passes):
             self.fits = [self._fit_one(k, values[k], prior[k], alone=number == 0) for k in range(len(values))]
             values = np.array([fit.values for fit in self.fits])
             prior = pooled_priors(self.fits, prior, shape=self.image.shape)

@@ -27,8 +27,13 @@ def render_frame(x_mm, y_mm, area_mm2, *, footprint_mm, pixel_mm, blur_mm, noise
     blur = blur_mm / pixel_mm
     beyond = int(np.ceil(4 * blur)) + 1   # what lies just outside also shines into the frame
     cover = coverage(x_mm, y_mm, area_mm2, shape=(rows + 2 * beyond, columns + 2 * beyond), pixel_mm=pixel_mm)
-    cover = gaussian_filter(cover, blur)[beyond:-beyond, beyond:-beyond]
-    light = illumination((rows, columns), falloff) * (background + (brightness - background) * cover)
+    return expose(gaussian_filter(cover, blur)[beyond:-beyond, beyond:-beyond], noise=noise, falloff=falloff, seed=seed,
+                  background=background, brightness=brightness)
+
+
+def expose(cover, *, noise, falloff, seed, background=BACKGROUND, brightness=BRIGHTNESS):
+    """The 8-bit frame of a blurred coverage (rows, columns) of contacts of any shape; the rest as in `render_frame`."""
+    light = illumination(cover.shape, falloff) * (background + (brightness - background) * cover)
     light += noise * np.random.default_rng(seed).standard_normal(light.shape)
     return np.round(255 * np.clip(light, 0, 1)).astype(np.uint8)
 

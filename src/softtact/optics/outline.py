@@ -22,7 +22,8 @@ HARMONICS = (2, 3, 4)
 NAMES = ("a", "b", "s", "row", "column", "R", *(f"{part}{m}" for m in HARMONICS for part in "cs"))
 A, B, S, ROW, COLUMN, R = range(6)
 SHAPE = slice(6, 6 + 2 * len(HARMONICS))
-STEPS = 8
+STEPS = 12
+_STILL = 0.004  # pixels; a tenth of what noise leaves open at best
 _FAR = 5.0     # blurs from the outline: beyond, the light is that of glass or of the disc's middle
 _FLAT = 8.0    # blurs: a larger radius is locally straight, to 1e-3 of the contrast
 
@@ -78,7 +79,7 @@ def fit_outline(rows, columns, light, *, start, prior, noise, other=0.0, limits=
         normal = slopes @ slopes.T / noise**2 + np.diag(weight)
         step = np.linalg.lstsq(normal, slopes @ (light - model) / noise**2 + weight * (prior.mean - values), rcond=1e-12)[0]
         values = _bounded(values, step)
-        if abs(step[R]) < 2e-3 * values[R]:
+        if np.abs(step[S:]).max() < _STILL:
             break
     residual = float(np.sqrt(np.mean((light - model) ** 2)))
     return Outline(values, np.linalg.pinv(normal), residual / noise, residual / max(abs(values[A]), 1e-9))

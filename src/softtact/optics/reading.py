@@ -82,7 +82,8 @@ def _reader(kind):
 def _tiff(file):
     with tifffile.TiffFile(file) as stack:
         for page in stack.pages:
-            yield page.asarray()
+            colours_first = page.axes.startswith("S")   # planes of colour, one after the other
+            yield page.asarray().transpose(1, 2, 0) if colours_first else page.asarray()
 
 
 def _pages(file):
