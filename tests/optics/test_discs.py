@@ -136,6 +136,12 @@ def test_an_ellipse_is_not_taken_for_the_circle_of_its_width():
     assert abs(np.mean(relative)) < 0.01 and np.sqrt(np.mean(np.square(relative))) < 0.022
 
 
+def test_a_long_ellipse_has_an_outline_of_its_own():
+    picture, area = shapes(lambda x, y: (x + 0.3 * y) ** 2 / 1.7 + y**2 * 1.7 < 144, noise=0.02)
+    disc = detect_discs(picture, pixel_mm=1.0).iloc[0]
+    assert disc.measured_by == "outline" and disc.area_mm2 == pytest.approx(area, rel=0.01)
+
+
 @pytest.mark.parametrize("corner", [0, 3])
 def test_a_square_contact_has_its_own_area(corner):
     def square(x, y):
