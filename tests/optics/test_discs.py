@@ -1,5 +1,6 @@
 """Discs rendered with known areas are found again, with the camera's faults; what is no disc is not found."""
 
+import imageio.v3 as iio
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -110,6 +111,14 @@ def test_an_empty_frame_has_no_discs_whatever_its_noise_and_light(noise, falloff
     empty = render_frame([], [], [], footprint_mm=(200, 150), pixel_mm=1.0, blur_mm=1.0, noise=noise, falloff=falloff, seed=seed,
                          background=background)
     assert detect_discs(empty, pixel_mm=1.0).empty
+
+
+@pytest.mark.parametrize("quality", [75, 95])
+@pytest.mark.parametrize("noise", [0.02, 0.1])
+def test_the_blotches_of_a_compressed_empty_frame_are_no_discs(noise, quality):
+    empty = render_frame([], [], [], footprint_mm=(320, 240), pixel_mm=1.0, blur_mm=1.0, noise=noise, falloff=0.5, seed=[0, 0])
+    packed = iio.imwrite("<bytes>", empty, extension=".jpg", quality=quality)
+    assert detect_discs(iio.imread(packed, extension=".jpg"), pixel_mm=1.0).empty
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.02])

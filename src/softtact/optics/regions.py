@@ -9,7 +9,7 @@ ones count.
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import convolve, distance_transform_edt, gaussian_filter, gaussian_gradient_magnitude
+from scipy.ndimage import convolve, distance_transform_edt, gaussian_filter, gaussian_gradient_magnitude, maximum
 from skimage.measure import label, regionprops
 from skimage.morphology import dilation, disk, h_maxima
 from skimage.segmentation import find_boundaries, watershed
@@ -21,6 +21,7 @@ FAINTEST = 0.02         # of full scale; less contrast is compression or striped
 _NEARBY = 6.0           # pixels; sd of the neighbourhood in which edges belong to one disc
 _SMOOTH = 1.0           # pixels; sd of the filter before the cut
 _FEWEST_PIXELS = 4      # above the cut; what has fewer cannot be measured
+_FAR, _ENOUGH = 4.0, 300   # pixels from any region, and how many of these tell the noise
 _CONVEX = 0.93          # of the convex hull's area; a region that fills more of it has no waist
 _EDGED = 0.3            # share of a region's rim that must be a significant edge
 _COUNT = 1 / 255 / 12**0.5   # rounding to 8 bits is noise too
@@ -53,7 +54,7 @@ def find_regions(image, *, noise):
         return Regions(np.zeros(image.shape, dtype=int), np.full(image.shape, np.inf), np.zeros(0, dtype=bool))
     threshold = _threshold(smooth, np.where(edges, slope**2, 0.0))
     whole = _edged(label(smooth > threshold), edges)
-    labels, touching = _split(whole)
+    labels, touching = _split(_above_glass(whole, slope))
     return Regions(labels, threshold, touching)
 
 
@@ -111,6 +112,19 @@ def _edged(labels, edges):
     edged = np.bincount(labels[rim & near], minlength=len(length))
     keep = (size >= _FEWEST_PIXELS) & (edged > _EDGED * np.maximum(length, 1))
     keep[0] = False
+    return (np.cumsum(keep) * keep)[labels]
+
+
+def _above_glass(labels, slope):
+    """The labels of regions with steeper edges than the glass far from them has by chance, numbered anew.
+
+    Compression takes the finest noise away and leaves the coarse: then `noise_of` is too low, but the glass shows it.
+    """
+    far = distance_transform_edt(labels == 0) >= _FAR
+    if not labels.any() or far.sum() < _ENOUGH:
+        return labels
+    by_chance = np.percentile(slope[far], 25) / np.sqrt(-2 * np.log(0.75))   # the slope's size has a Rayleigh distribution
+    keep = np.append(False, maximum(slope, labels, np.arange(1, labels.max() + 1)) > EDGE_SIGNIFICANCE * by_chance)
     return (np.cumsum(keep) * keep)[labels]
 
 
