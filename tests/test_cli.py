@@ -45,7 +45,7 @@ def answer(capsys):
     return run
 
 
-@pytest.mark.parametrize("command", [[], ["press"], ["complexity"], ["fit"], ["export-deck"], ["stage"]])
+@pytest.mark.parametrize("command", [[], ["press"], ["complexity"], ["fit"], ["export-deck"], ["detect-discs"], ["stage"]])
 def test_every_command_has_help(command, capsys):
     with pytest.raises(SystemExit) as stop:
         main([*command, "--help"])

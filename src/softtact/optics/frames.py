@@ -1,42 +1,70 @@
-"""Camera frames of frustrated total internal reflection: contact shines where rubber touches the glass."""
+"""Camera frames of frustrated total internal reflection: contact shines where rubber touches the glass.
+
+    light = illumination * (background + (disc - background) * (coverage blurred by the lens)) + noise,  cut to 0 ... 1, in 8 bits
+
+Rows run along y, columns along x; the frame's centre is the origin. Coverage is the share of a pixel that lies in a disc.
+"""
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
 BACKGROUND = 0.05   # of full scale: light that leaks where nothing touches
 BRIGHTNESS = 0.85   # of full scale: a contact at the frame's centre
+_SUBROWS = 16       # lines per pixel along which a disc's chord is exact: coverage to 1e-4 of a disc of 4 pixels
 
 
-def render_frame(x_mm, y_mm, area_mm2, *, footprint_mm, pixel_mm, blur_mm, noise, falloff, seed):
+def render_frame(x_mm, y_mm, area_mm2, *, footprint_mm, pixel_mm, blur_mm, noise, falloff, seed,
+                 background=BACKGROUND, brightness=BRIGHTNESS):
     """An 8-bit frame (rows along y, columns along x) of discs with given centres (n,) and areas (n,).
 
-    blur_mm: standard deviation of the lens' blur; noise: standard deviation as a share of full scale;
-    falloff: share of light lost from the centre to the corners
+    footprint_mm: sides (along x, along y) of what the camera sees; blur_mm: standard deviation of the lens' blur;
+    noise: standard deviation as a share of full scale, the same in every pixel;
+    falloff: share of light lost from the centre to the corners;
+    background, brightness: share of full scale at the frame's centre, without and with contact.
+    Noise that reaches below 0 or above 1 is cut off, as in a camera; `signal_to_noise` tells the ratio before that.
     """
     columns, rows = (int(round(side / pixel_mm)) for side in footprint_mm)
-    cover = _coverage((rows, columns), x_mm, y_mm, area_mm2, footprint_mm, pixel_mm)
-    light = gaussian_filter(BACKGROUND + (BRIGHTNESS - BACKGROUND) * cover, blur_mm / pixel_mm)
-    light *= _illumination((rows, columns), falloff)
+    blur = blur_mm / pixel_mm
+    beyond = int(np.ceil(4 * blur)) + 1   # what lies just outside also shines into the frame
+    cover = coverage(x_mm, y_mm, area_mm2, shape=(rows + 2 * beyond, columns + 2 * beyond), pixel_mm=pixel_mm)
+    return expose(gaussian_filter(cover, blur)[beyond:-beyond, beyond:-beyond], noise=noise, falloff=falloff, seed=seed,
+                  background=background, brightness=brightness)
+
+
+def expose(cover, *, noise, falloff, seed, background=BACKGROUND, brightness=BRIGHTNESS):
+    """The 8-bit frame of a blurred coverage (rows, columns) of contacts of any shape; the rest as in `render_frame`."""
+    light = illumination(cover.shape, falloff) * (background + (brightness - background) * cover)
     light += noise * np.random.default_rng(seed).standard_normal(light.shape)
     return np.round(255 * np.clip(light, 0, 1)).astype(np.uint8)
 
 
-def _coverage(shape, x_mm, y_mm, area_mm2, footprint_mm, pixel_mm):
-    """Share of each pixel that lies in a disc: a linear ramp over one pixel across the rim."""
+def signal_to_noise(*, noise, background=BACKGROUND, brightness=BRIGHTNESS):
+    """Contrast of a disc over the background at the frame's centre, before blur, over the noise of one pixel."""
+    return (brightness - background) / noise
+
+
+def coverage(x_mm, y_mm, area_mm2, *, shape, pixel_mm):
+    """Share (rows, columns) of each pixel that lies in a disc; touching discs share a pixel, overlapping ones count once."""
     cover = np.zeros(shape)
+    middle = 0.5 * (np.array(shape) - 1)
     for x, y, area in zip(x_mm, y_mm, area_mm2, strict=True):
-        radius = np.sqrt(area / np.pi) / pixel_mm
-        column, row = (x + 0.5 * footprint_mm[0]) / pixel_mm - 0.5, (y + 0.5 * footprint_mm[1]) / pixel_mm - 0.5
-        rows = slice(max(0, int(row - radius - 2)), int(row + radius + 3))
-        columns = slice(max(0, int(column - radius - 2)), int(column + radius + 3))
-        r, c = np.mgrid[rows, columns]
-        inside = (r < shape[0]) & (c < shape[1])
-        disc = np.clip(radius + 0.5 - np.hypot(r - row, c - column), 0, 1)
-        part = cover[rows, columns]
-        np.maximum(part, disc[:part.shape[0], :part.shape[1]], out=part, where=inside[:part.shape[0], :part.shape[1]])
-    return cover
+        _add_disc(cover, y / pixel_mm + middle[0], x / pixel_mm + middle[1], np.sqrt(area / np.pi) / pixel_mm)
+    return np.minimum(cover, 1.0)
 
 
-def _illumination(shape, falloff):
-    r, c = np.mgrid[-1:1:shape[0] * 1j, -1:1:shape[1] * 1j]
+def _add_disc(cover, row, column, radius):
+    """Add the coverage of one disc, in pixels: along x exactly, along y by the middles of thin strips."""
+    (top, bottom), (left, right) = (
+        np.clip((int(np.floor(m - radius)), int(np.ceil(m + radius)) + 2), 0, n)
+        for m, n in zip((row, column), cover.shape, strict=True))
+    strips = (np.arange((bottom - top) * _SUBROWS) + 0.5) / _SUBROWS + top - 0.5 - row
+    half = np.sqrt(np.maximum(radius**2 - strips**2, 0.0))[:, None]
+    pixel = np.arange(left, right) - column
+    chord = np.clip(np.minimum(pixel + 0.5, half) - np.maximum(pixel - 0.5, -half), 0.0, 1.0)
+    cover[top:bottom, left:right] += chord.reshape(bottom - top, _SUBROWS, right - left).mean(axis=1)
+
+
+def illumination(shape, falloff):
+    """Light (rows, columns) relative to the centre: it falls with the square of the distance."""
+    r, c = np.ogrid[-1:1:shape[0] * 1j, -1:1:shape[1] * 1j]
     return 1 - 0.5 * falloff * (r**2 + c**2)

@@ -8,8 +8,9 @@ import pandas as pd
 from skimage import io
 
 from softtact.files import read_dataset, write_csv
-from softtact.optics.discs import detect_discs, read_frame
+from softtact.optics.discs import COLUMNS, detect_discs
 from softtact.optics.frames import render_frame
+from softtact.optics.reading import read_frame
 from softtact.progress import progress
 
 MARGIN_MM = 1.0   # of glass seen around the outermost frusta's centres
@@ -28,4 +29,4 @@ def run(*, inputs, outputs, settings, threads=1):
         io.imsave(file, frame, check_contrast=False)
         found = detect_discs(read_frame(file), pixel_mm=camera["pixel_mm"])
         tables.append(found.assign(force_n=force, frame=file.name))
-    write_csv(outputs["discs"], pd.concat(tables)[["force_n", "frame", "disc", "x_mm", "y_mm", "area_mm2"]])
+    write_csv(outputs["discs"], pd.concat(tables)[["force_n", "frame", *COLUMNS]])

@@ -1,0 +1,173 @@
+"""The outline of one disc, fitted to the light of its pixels.
+
+Symbols (lengths in pixels)
+    rho, phi     polar coordinates of a pixel about the disc's centre
+    r(phi)       outline: R + sum over m = 2 ... 4 of c_m cos(m phi) + s_m sin(m phi); m = 1 is the centre
+    b, a         brightness of the glass, and contrast of the disc above it
+    s            standard deviation of the blur
+Light            b + a P(r / s, rho / s), P the share of a disc of radius r that the blur leaves at rho: a noncentral
+                 chi-square distribution; cut off at the camera's black and white as the noise is
+Area             integral of r^2 / 2 = pi (R^2 + sum (c_m^2 + s_m^2) / 2)
+Fit              Gauss-Newton on the squared residuals over the noise, plus what is known beforehand (`Prior`)
+
+The harmonics cost a disc's area nothing: to first order its error does not depend on theirs.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import chndtr, i0e, i1e, ndtr
+
+HARMONICS = (2, 3, 4)
+NAMES = ("a", "b", "s", "row", "column", "R", *(f"{part}{m}" for m in HARMONICS for part in "cs"))
+A, B, S, ROW, COLUMN, R = range(6)
+SHAPE = slice(6, 6 + 2 * len(HARMONICS))
+STEPS = 12
+_STILL = 0.004  # pixels; a tenth of what noise leaves open at best
+_FAR = 5.0     # blurs from the outline: beyond, the light is that of glass or of the disc's middle
+_FLAT = 8.0    # blurs: a larger radius is locally straight, to 1e-3 of the contrast
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What is known of the parameters before a fit: means and standard deviations (parameters,); infinite: nothing."""
+
+    mean: np.ndarray
+    sd: np.ndarray
+
+
+@dataclass(frozen=True)
+class Outline:
+    """A fitted disc."""
+
+    values: np.ndarray       # (parameters,) in the order of NAMES
+    covariance: np.ndarray   # (parameters, parameters)
+    misfit: float            # rms of the residual over the noise of a pixel
+    residual: float          # rms of the residual over the contrast
+
+    @property
+    def area(self):
+        """Area in pixels; the mean square that noise adds to each squared parameter is taken off."""
+        squares = self.values**2 - np.diag(self.covariance)
+        return np.pi * (squares[R] + 0.5 * squares[SHAPE].sum())
+
+    @property
+    def area_sd(self):
+        """Standard deviation of the area in pixels."""
+        slope = np.zeros(len(self.values))
+        slope[R], slope[SHAPE] = 2 * np.pi * self.values[R], np.pi * self.values[SHAPE]
+        return float(np.sqrt(max(slope @ self.covariance @ slope, 0.0)))
+
+    def sd_of(self, measure):
+        """Standard deviation of `measure` (a function of the parameters), from its slopes."""
+        slope = np.zeros(len(self.values))
+        for k in range(ROW, len(slope)):
+            ends = [self.values.copy() for _ in range(2)]
+            ends[0][k] -= 0.05
+            ends[1][k] += 0.05
+            slope[k] = (measure(ends[1]) - measure(ends[0])) / 0.1
+        return float(np.sqrt(max(slope @ self.covariance @ slope, 0.0)))
+
+
+def fit_outline(rows, columns, light, *, start, prior, noise, other=0.0, limits=(-1e6, 1e6)):
+    """The `Outline` of the disc in pixels (n,) of brightness `light` (n,); `other`: light of its neighbours (n,)."""
+    values, weight = start.copy(), 1.0 / prior.sd**2
+    for _ in range(STEPS):
+        model, slopes = _light(values, rows, columns, other)
+        model, passed = clipped(model, noise=noise, limits=limits)
+        slopes *= passed
+        normal = slopes @ slopes.T / noise**2 + np.diag(weight)
+        step = np.linalg.lstsq(normal, slopes @ (light - model) / noise**2 + weight * (prior.mean - values), rcond=1e-12)[0]
+        values = _bounded(values, step)
+        if np.abs(step[S:]).max() < _STILL:
+            break
+    residual = float(np.sqrt(np.mean((light - model) ** 2)))
+    return Outline(values, np.linalg.pinv(normal), residual / noise, residual / max(abs(values[A]), 1e-9))
+
+
+def _bounded(values, step):
+    """A step no longer than a quarter of the radius, to a radius and a blur above zero."""
+    most = 0.25 * values[R]
+    moved = values + np.concatenate([step[:S], np.clip(step[S:], -most, most)])
+    moved[S], moved[R] = np.clip(moved[S], 0.3, 20.0), max(moved[R], 0.3)
+    return moved
+
+
+def _light(values, rows, columns, other):
+    """Brightness (n,) and its slopes (parameters, n)."""
+    share, by_radius, by_rho, angles, (dr, dc, rho) = _share(values, rows, columns)
+    a, s = values[A], values[S]
+    slopes = np.empty((len(values), len(rows)))
+    slopes[A], slopes[B] = share, 1.0
+    slopes[S] = -a * (values[R] * by_radius + rho * by_rho) / s
+    slopes[ROW], slopes[COLUMN] = -a * by_rho * dr / rho, -a * by_rho * dc / rho
+    slopes[R] = a * by_radius
+    slopes[SHAPE] = a * by_radius * angles
+    return values[B] + a * share + other, slopes
+
+
+def _share(values, rows, columns):
+    """P (n,), its slopes along r and rho, the harmonics (2 len(HARMONICS), n), and (rows, columns, rho) from the centre."""
+    radius, angles, (dr, dc, rho) = _polar(values, rows, columns)
+    return *blurred_disc(radius, rho, values[S]), angles, (dr, dc, rho)
+
+
+def _polar(values, rows, columns):
+    """Outline's radius (n,) in the direction of each pixel, the harmonics, and (rows, columns, rho) from the centre."""
+    dr, dc = rows - values[ROW], columns - values[COLUMN]
+    rho = np.maximum(np.hypot(dr, dc), 1e-6)
+    turn = (dc + 1j * dr) / rho
+    angles = np.stack([part for m in HARMONICS for part in ((turn**m).real, (turn**m).imag)])   # cos(m phi), sin(m phi)
+    radius = np.maximum(values[R] + np.tensordot(values[SHAPE], angles, axes=1), 0.2)
+    return radius, angles, (dr, dc, rho)
+
+
+def blurred_disc(radius, rho, s):
+    """Share of light at distance rho (n,) from the centre of a disc of radius (n,), and its slopes along radius and rho."""
+    share, by_radius, by_rho = (rho < radius).astype(float), np.zeros_like(rho), np.zeros_like(rho)
+    near = np.abs(rho - radius) < _FAR * s
+    r, d = radius[near] / s, rho[near] / s
+    share[near] = chndtr(r * r, 2.0, d * d) if r.size and r.min() < _FLAT else ndtr(np.sqrt(np.maximum(r * r - 1, 0)) - d)
+    bell = np.exp(-0.5 * (r - d) ** 2) * r / s
+    by_radius[near], by_rho[near] = bell * i0e(r * d), -bell * i1e(r * d)
+    return share, by_radius, by_rho
+
+
+def clipped(light, *, noise, limits):
+    """Mean (n,) of brightness plus noise once a camera has cut it off at its limits, and its slope along the brightness."""
+    low, high = ((limit - light) / noise for limit in limits)
+    passed = ndtr(high) - ndtr(low)
+    return light + noise * (_excess(low) - _excess(-high)), passed
+
+
+def _excess(z):
+    """Mean of max(z - n, 0) over normal n."""
+    return z * ndtr(z) + np.exp(-0.5 * z**2) / np.sqrt(2 * np.pi)
+
+
+def box(values, *, shape, margin):
+    """Slices of the pixels around an outline, as far as they lie in the frame."""
+    reach = values[R] + np.abs(values[SHAPE]).sum() + margin
+    return tuple(slice(int(np.clip(np.floor(m - reach), 0, n)), int(np.clip(np.ceil(m + reach) + 1, 0, n)))
+                 for m, n in zip(values[[ROW, COLUMN]], shape, strict=True))
+
+
+def contrast_light(values, window):
+    """Light (rows, columns) of a disc above the glass in a window of the frame."""
+    rows, columns = np.mgrid[window].astype(float)
+    radius, _, (_, _, rho) = _polar(values, rows, columns)
+    return values[A] * blurred_disc(radius, rho, values[S])[0]
+
+
+def inside(values, window):
+    """Share (rows, columns) of each pixel that lies in the outline, without blur."""
+    radius, _, (_, _, rho) = _polar(values, *np.mgrid[window].astype(float))
+    return np.clip(radius - rho + 0.5, 0.0, 1.0)
+
+
+def corners(values, *, count=72):
+    """Points (count + 1, 2) in rows and columns along an outline, closed."""
+    phi = np.linspace(0, 2 * np.pi, count + 1)
+    angles = np.stack([f(m * phi) for m in HARMONICS for f in (np.cos, np.sin)])
+    radius = values[R] + values[SHAPE] @ angles
+    return np.stack([values[ROW] + radius * np.sin(phi), values[COLUMN] + radius * np.cos(phi)], axis=1)

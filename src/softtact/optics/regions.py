@@ -1,0 +1,164 @@
+"""Where a frame shines: regions of pixels, one per disc, found by the edges around them.
+
+Light that only varies slowly, however bright, has no edges, so an empty frame has no regions whatever its unevenness. The
+brightness to cut at is read off the edges themselves (Yanowitz and Bruckstein, 1989): a smooth surface through them lies
+halfway between glass and disc in every part of an uneven frame; close to edges it follows them, so that dim discs beside bright
+ones count.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import convolve, distance_transform_edt, gaussian_filter, gaussian_gradient_magnitude, maximum
+from skimage.measure import label, regionprops
+from skimage.morphology import dilation, disk, h_maxima
+from skimage.segmentation import find_boundaries, watershed
+
+EDGE_SCALE = 1.5        # pixels; sd of the filter that looks for edges
+EDGE_SIGNIFICANCE = 6.5  # sd of the noise: one pixel in 1e9 of an empty frame; skewed noise at black has a longer tail
+WIDEST_EDGE = 8.0       # pixels; sd of the widest blur at which contact is told from uneven light
+FAINTEST = 0.02         # of full scale; less contrast is compression or striped electronics, not a disc
+_NEARBY = 6.0           # pixels; sd of the neighbourhood in which edges belong to one disc
+_SMOOTH = 1.0           # pixels; sd of the filter before the cut
+_FEWEST_PIXELS = 4      # above the cut; what has fewer cannot be measured
+_FAR, _ENOUGH = 4.0, 300   # pixels from any region, and how many of these tell the noise
+_CONVEX = 0.93          # of the convex hull's area; a region that fills more of it has no waist
+_EDGED = 0.3            # share of a region's rim that must be a significant edge
+_COUNT = 1 / 255 / 12**0.5   # rounding to 8 bits is noise too
+
+
+class Regions(NamedTuple):
+    """What was found."""
+
+    labels: np.ndarray      # (rows, columns) int: 0 is glass, k the k-th disc
+    threshold: np.ndarray   # (rows, columns): brightness halfway between glass and disc
+    touching: np.ndarray    # (discs,) bool: split from a neighbour
+
+
+def noise_of(image, where=None):
+    """Standard deviation of the noise of one pixel, from differences that are blind to slopes and few of which meet an edge.
+
+    where: pixels (rows, columns) bool that count; default all. Median form of J. Immerkaer, Computer Vision and Image
+    Understanding 64 (1996) 300.
+    """
+    cross = convolve(image, np.outer([1, -2, 1], [1, -2, 1]) / 6.0)
+    return max(1.4826 * float(np.median(np.abs(cross if where is None else cross[where]))), _COUNT)
+
+
+def find_regions(image, *, noise):
+    """The `Regions` of a frame (rows, columns) whose full scale is 1."""
+    slope = _slope(image)
+    smooth = gaussian_filter(image, _SMOOTH)
+    edges = slope > _least_slope(smooth, noise)
+    if not edges.any():
+        return Regions(np.zeros(image.shape, dtype=int), np.full(image.shape, np.inf), np.zeros(0, dtype=bool))
+    threshold = _threshold(smooth, np.where(edges, slope**2, 0.0))
+    whole = _edged(label(smooth > threshold), edges)
+    labels, touching = _split(_above_glass(whole, slope))
+    return Regions(labels, threshold, touching)
+
+
+def _threshold(smooth, weights):
+    """Brightness (rows, columns) halfway between glass and disc: near an edge the edge's own, elsewhere a smooth surface's."""
+    where = np.nonzero(weights)
+    surface = smooth_surface(where, smooth[where], weights=weights[where], shape=smooth.shape)(*np.indices(smooth.shape))
+    near = gaussian_filter(weights * (smooth - surface), _NEARBY)
+    return surface + near / (gaussian_filter(weights, _NEARBY) + 1e-3 * weights[where].mean())
+
+
+def _slope(image):
+    """Change of brightness per pixel (rows, columns). At the border, where the filter sees only half, less of it counts."""
+    slope = gaussian_gradient_magnitude(image, EDGE_SCALE)
+    reach = int(2 * EDGE_SCALE)
+    for border in (slope[:reach], slope[-reach:], slope[:, :reach], slope[:, -reach:]):
+        border *= np.sqrt(0.5)
+    return slope
+
+
+def _least_slope(smooth, noise):
+    """Change of brightness per pixel that neither noise reaches, nor the steps of 8 bits, nor light that changes over a wide
+    distance."""
+    of_noise = EDGE_SIGNIFICANCE * noise / (np.sqrt(8 * np.pi) * EDGE_SCALE**2)
+    return max(of_noise, _steepest(FAINTEST, blur=0.0), _steepest(float(np.ptp(smooth)), blur=WIDEST_EDGE))
+
+
+def _steepest(contrast, *, blur):
+    """Slope in the middle of a blurred edge, seen by the filter that looks for it."""
+    return contrast / np.sqrt(2 * np.pi * (blur**2 + EDGE_SCALE**2))
+
+
+def smooth_surface(where, values, *, weights, shape, stiffness=1e-3):
+    """A function of (rows, columns): the polynomial of second order through `values` (n,) at the places `where` ((n,), (n,)).
+
+    stiffness: what keeps it flat where the values tell nothing, relative to the weights' sum
+    """
+    basis, mean = terms(*where, shape), np.average(values, weights=weights)
+    normal = (basis * weights) @ basis.T + stiffness * weights.sum() * np.diag([0, 1, 1, 1, 1, 1])
+    factors = np.linalg.solve(normal, basis @ (weights * (values - mean)))
+    return lambda rows, columns: mean + np.tensordot(factors, terms(rows, columns, shape), axes=1)
+
+
+def terms(rows, columns, shape):
+    """Polynomials of second order (6, ...) of the place in a frame of `shape`, each side of which runs from -1 to 1."""
+    r, c = (2 * np.asarray(index) / max(size - 1, 1) - 1 for index, size in zip((rows, columns), shape, strict=True))
+    return np.stack([np.ones_like(r), r, c, r * r, r * c, c * c])
+
+
+def _edged(labels, edges):
+    """The labels of regions that are large enough and have an edge for a rim, numbered anew."""
+    near = dilation(edges, disk(1))
+    rim = find_boundaries(labels, mode="inner") & (labels > 0)
+    size, length = np.bincount(labels.ravel()), np.bincount(labels[rim], minlength=labels.max() + 1)
+    edged = np.bincount(labels[rim & near], minlength=len(length))
+    keep = (size >= _FEWEST_PIXELS) & (edged > _EDGED * np.maximum(length, 1))
+    keep[0] = False
+    return (np.cumsum(keep) * keep)[labels]
+
+
+def _above_glass(labels, slope):
+    """The labels of regions with steeper edges than the glass far from them has by chance, numbered anew.
+
+    Compression takes the finest noise away and leaves the coarse: then `noise_of` is too low, but the glass shows it.
+    """
+    far = distance_transform_edt(labels == 0) >= _FAR
+    if not labels.any() or far.sum() < _ENOUGH:
+        return labels
+    by_chance = np.percentile(slope[far], 25) / np.sqrt(-2 * np.log(0.75))   # the slope's size has a Rayleigh distribution
+    keep = np.append(False, maximum(slope, labels, np.arange(1, labels.max() + 1)) > EDGE_SIGNIFICANCE * by_chance)
+    return (np.cumsum(keep) * keep)[labels]
+
+
+def _split(labels):
+    """(labels, touching): regions with a waist cut there, by a watershed of the distance to their rim."""
+    seeds, touching, count = np.zeros_like(labels), [], 0
+    for region in regionprops(labels):
+        inside = _seeds(region)
+        own = inside.max()
+        seeds[region.slice] += np.where(inside > 0, inside + count, 0)
+        count += own
+        touching += [own > 1] * own
+    if not any(touching):
+        return labels, np.zeros(len(touching), dtype=bool)
+    depth = distance_transform_edt(np.pad(labels > 0, 1, mode="edge"))[1:-1, 1:-1]
+    return watershed(-depth, seeds, mask=labels > 0), np.array(touching)
+
+
+def _seeds(region):
+    """One label per part of a region, on its bounding box. What is nearly convex is one part."""
+    if region.solidity > _CONVEX or region.area < 30 or is_ring(region):
+        whole = np.zeros(region.image.shape, dtype=int)
+        whole[tuple(region.coords[0] - region.bbox[:2])] = 1
+        return whole
+    depth = distance_transform_edt(np.pad(region.image, 1))[1:-1, 1:-1]
+    return label(h_maxima(depth, 0.75 + 0.1 * np.median(_peaks(depth))))
+
+
+def is_ring(region):
+    """Whether a region is one contact with a dark middle, and not touching discs around a gap."""
+    return region.euler_number == 0 and region.area_filled > _CONVEX * region.area_convex
+
+
+def _peaks(depth):
+    """Depths of the clear maxima; their median is a disc's radius even where one region is much larger."""
+    tops = depth[h_maxima(depth, 1.0) > 0]
+    return tops if len(tops) else np.array([depth.max()])

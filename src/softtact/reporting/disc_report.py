@@ -1,0 +1,89 @@
+"""The discs of a user's frames: one table, an annotated picture of each frame, a summary."""
+
+import itertools
+import os
+import shutil
+import tempfile
+from contextlib import contextmanager
+from pathlib import Path
+
+import pandas as pd
+
+from softtact.errors import InputError
+from softtact.files import write_csv
+from softtact.optics.discs import discs_and_outlines
+from softtact.optics.reading import read_frames
+from softtact.progress import progress
+from softtact.reporting.disc_picture import draw_discs
+
+
+def report_discs(frames, out, *, picture, pixel_mm, smallest_mm=0.0, every=1):
+    """Write the table `out` (CSV) of all discs in the frames of a file or folder and their pictures; return the summary.
+
+    picture: None for none; a PNG for a single frame, a folder for several; without an ending it becomes the one that fits
+    """
+    stream = read_frames(frames, every=every)
+    first = list(itertools.islice(stream, 2))   # tells one frame from several without reading them all
+    target = _picture_path(picture, single=len(first) == 1)
+    tables, rows = [], []
+    with _pictures(target) as drawn:
+        for name, frame in progress(itertools.chain(first, stream), label="discs in frames", total="?"):
+            table, outlines = _detect(name, frame, pixel_mm=pixel_mm, smallest_mm=smallest_mm)
+            if drawn:
+                draw_discs(frame, table, outlines, drawn / _file_name(name), pixel_mm=pixel_mm, title=name)
+            tables.append(table)
+            rows.append(_row(name, table))
+        write_csv(out, pd.concat(tables))
+    return {"pixel_mm": pixel_mm, "frames": rows, "table": str(out), "picture": target and str(target)}
+
+
+def _detect(name, frame, *, pixel_mm, smallest_mm):
+    try:
+        table, outlines = discs_and_outlines(frame, pixel_mm=pixel_mm, smallest_mm=smallest_mm)
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None
+    table.insert(0, "frame", name)
+    return table, outlines
+
+
+def _row(name, table):
+    """A frame's line of the summary."""
+    return {"frame": name, "discs": len(table), "mean_area_mm2": float(table.area_mm2.mean()) if len(table) else None,
+            "total_area_mm2": float(table.area_mm2.sum()), "clipped": int(table.clipped.sum()),
+            "touching": int(table.touching.sum())}
+
+
+def _picture_path(picture, *, single):
+    """Where the pictures go: a file for a single frame, a folder for several."""
+    if picture is None:
+        return None
+    picture = Path(picture)
+    if single:
+        return picture if picture.suffix.lower() == ".png" else picture.with_name(f"{picture.name}.png")
+    if picture.suffix.lower() == ".png":
+        raise InputError(f"{picture}: there are several frames, each with its picture; give --picture a folder.")
+    if picture.is_file():
+        raise InputError(f"{picture}: is a file where the folder of the pictures goes; give --picture another name.")
+    return picture
+
+
+def _file_name(name):
+    """A picture's file name: the frame's, with its ending, since a.png and a.tif may lie side by side."""
+    return f"{name.replace(':', '_')}.png" if ":" in name or not name.lower().endswith(".png") else name
+
+
+@contextmanager
+def _pictures(target):
+    """A folder to draw in, whose pictures move to the target when all is done; None where there is no target."""
+    if target is None:
+        yield None
+        return
+    with tempfile.TemporaryDirectory(prefix=f".{target.stem}-", dir=target.parent) as folder:
+        yield Path(folder)
+        drawn = sorted(Path(folder).iterdir())
+        if target.suffix.lower() == ".png":
+            os.replace(drawn[0], target)
+            return
+        target.mkdir(exist_ok=True)
+        for file in drawn:
+            shutil.move(file, target / file.name)
