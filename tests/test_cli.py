@@ -1,5 +1,6 @@
 """The command line: what it answers, and how it refuses."""
 
+import argparse
 import json
 import subprocess
 import sys
@@ -7,7 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from softtact.choice import TOLERANCE_MM
 from softtact.cli import main
+from softtact.commands import press as press_command
+from softtact.commands.fit import LAYOUTS as LAYOUTS_OFFERED
+from softtact.materials.readers import LAYOUTS
+from softtact.sensor import MODELS
 
 ROOT = Path(__file__).resolve().parents[1]
 OBJECT = ROOT / "config/objects/grasped/object_5.stl"
@@ -51,6 +57,15 @@ def test_every_command_has_help(command, capsys):
         main([*command, "--help"])
     assert stop.value.code == 0
     assert "usage: softtact" in capsys.readouterr().out
+
+
+def test_the_command_line_offers_what_the_package_has():
+    """It keeps its own copies, so that --help loads no solver."""
+    assert press_command.MODELS == MODELS
+    assert LAYOUTS_OFFERED == LAYOUTS
+    options = argparse.ArgumentParser().add_subparsers()
+    press_command.add(options)
+    assert options.choices["press"].get_default("tolerance") == TOLERANCE_MM
 
 
 def test_help_comes_without_loading_a_solver():

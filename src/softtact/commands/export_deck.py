@@ -1,0 +1,41 @@
+"""`softtact export-deck`: a press as another solver's input."""
+
+from pathlib import Path
+
+import softtact
+from softtact.commands.common import add_command, add_mesh, check_folders, check_forces, pose_of, sensor_spec, show
+
+DECK_FORMATS = ("calculix", "abaqus")
+
+
+def add(commands):
+    """Add the command to the parser."""
+    command = add_command(commands, "export-deck", _export_deck,
+                           "Write the hyperelastic press of a mesh as an input deck for another solver.")
+    add_mesh(command)
+    command.add_argument("--force", type=float, action="append", required=True, metavar="N",
+                         help="force in N; repeat it for several steps")
+    command.add_argument("--format", choices=DECK_FORMATS, required=True, help="the solver that is to read the deck")
+    command.add_argument("--control", choices=("force", "indentation"), default="force",
+                         help="push with the forces (default), or follow the indentations that softtact finds at them, "
+                              "which it solves first")
+    command.add_argument("--out", type=Path, required=True, metavar="DECK.inp", help="the deck to write")
+
+
+def _export_deck(options):
+    from softtact.geometry.meshes import check_over_sensor, place, read_mesh
+
+    spec, forces, pose = sensor_spec(options.sensor), sorted(set(options.force)), pose_of(options)
+    check_forces(forces, spec)
+    check_folders(options.out)
+    mesh = read_mesh(options.mesh, unit=options.unit)
+    check_over_sensor(place(mesh, pose=pose), spec.footprint_mm, name=str(options.mesh))
+    from softtact.decks.export import export_press
+
+    model = export_press(softtact.load_sensor(options.sensor), mesh, pose=pose, force_n=forces, control=options.control,
+                         dialect=options.format, path=options.out, name=options.mesh.name)
+    result = {"deck": str(options.out), "format": options.format, "nodes": len(model.points),
+              "elements": {part.name: len(part.elements) for part in model.parts}, "tied_nodes": len(model.ties),
+              "facets": {body.name: len(body.facets) for body in model.rigid}, "steps": [step.name for step in model.steps]}
+    lines = [f"{name}: {value}" for name, value in result.items() if name != "deck"]
+    show(result, as_json=options.json, lines=[*lines, f"written: {options.out}"])

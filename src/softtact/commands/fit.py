@@ -1,0 +1,102 @@
+"""`softtact fit`: test curves to a material card."""
+
+from pathlib import Path
+
+from softtact.commands.common import add_command, check_folders, numbers, pairs, show
+from softtact.errors import InputError
+
+LAYOUTS = ("plain", "soro_db", "stress_stretch", "literature")
+
+
+def add(commands):
+    """Add the command to the parser."""
+    command = add_command(commands, "fit", _fit, "Fit hyperelastic laws to test curves and write a material card.")
+    command.add_argument("curves", nargs="+", metavar="CURVES",
+                         help="CSV files, one test each, MODE=FILE to state a file's mode; or one YAML file of a material")
+    command.add_argument("--law", help="a law's name, several with commas, or all (default)")
+    command.add_argument("--choose", help="the law that solvers take (default: best of the ranking)")
+    command.add_argument("--material", help="the material's name in the card")
+    command.add_argument("--poisson", type=float, help="Poisson's ratio of the linear constants (default: from a volumetric curve)")
+    command.add_argument("--bulk-over-shear", type=float, metavar="RATIO",
+                         help="K / mu0 where no volumetric curve is given (default: 20)")
+    command.add_argument("--window", action="append", metavar="MODE=FROM:TO", help="stretches of a mode to use; repeat it")
+    command.add_argument("--residual", choices=("absolute", "relative"), help="errors in MPa (default) or over the stress")
+    command.add_argument("--weight", action="append", metavar="MODE=W", help="weight of a mode's squared errors; repeat it")
+    command.add_argument("--nonnegative", action="store_true", default=None, help="keep constants in MPa from being negative")
+    command.add_argument("--small-strain", type=float, metavar="E", help="strain up to which E is the slope (default: 0.1)")
+    reading = command.add_argument_group("how the files are read")
+    reading.add_argument("--mode", choices=("uniaxial", "equibiaxial", "planar", "volumetric"),
+                         help="test mode of all the files (default: as each file or its name says)")
+    reading.add_argument("--layout", choices=LAYOUTS, default="plain",
+                         help="how the files are laid out (default: plain, columns named in a header; literature: a folder)")
+    reading.add_argument("--column", action="append", metavar="NAME=HEADER",
+                         help="a column's quantity and unit, and the file's own name of it; repeat it")
+    reading.add_argument("--sort", action="store_true", help="order the rows by stretch")
+    reading.add_argument("--compression", action="store_true", help="a compression test written without a minus")
+    command.add_argument("--plot", type=Path, metavar="FILE.png", help="draw data, fits, residuals and stable ranges")
+    command.add_argument("--out", type=Path, required=True, metavar="CARD.json", help="the material card to write")
+
+
+def _fit(options):
+    from softtact.files import write_json
+    from softtact.materials.cards import make_card
+    from softtact.materials.readers import read_curves
+
+    check_folders(options.out, options.plot)
+    if Path(options.curves[0]).suffix in (".yaml", ".yml"):
+        curves, settings = _yaml_curves(options)
+    else:
+        curves, settings = read_curves(options.curves, **_reading(options)), {}
+    card = make_card(curves, **settings | _fit_settings(options))
+    write_json(options.out, card)
+    if options.plot:
+        from softtact.reporting.material_plot import plot_material
+
+        plot_material(card, curves, options.plot)
+    show(card, as_json=options.json, lines=[*_fit_lines(card), f"written: {options.out}"])
+
+
+def _reading(options):
+    """How the files are read, as `read_curves` takes it."""
+    return {"mode": options.mode, "layout": options.layout, "columns": dict(pairs("--column", options.column)),
+            "sort": options.sort, "compression": options.compression}
+
+
+def _yaml_curves(options):
+    """Curves and fit settings of a material's YAML."""
+    from softtact.materials.config import load_material
+    from softtact.materials.making import curves_of
+
+    if len(options.curves) > 1 or any(_reading(options)[key] for key in ("mode", "columns", "sort", "compression")):
+        raise InputError(f"{options.curves[0]}: a material's YAML says itself what its files are; give it alone.")
+    config = load_material(options.curves[0])
+    return curves_of(config.curve_settings), config.fit_settings
+
+
+def _fit_settings(options):
+    """What the command line says of the fit, as `make_card` takes it."""
+    stated = {name: getattr(options, name) for name in ("choose", "material", "poisson", "bulk_over_shear", "residual",
+                                                        "nonnegative", "small_strain")}
+    stated["laws"] = options.law if options.law in (None, "all") else options.law.split(",")
+    stated["window"] = {mode: numbers("--window", text, 2) for mode, text in pairs("--window", options.window)} or None
+    stated["weights"] = {mode: numbers("--weight", text, 1)[0] for mode, text in pairs("--weight", options.weight)} or None
+    return {name: value for name, value in stated.items() if value is not None}
+
+
+def _fit_lines(card):
+    yield (f"{'law':20}{'RMSE, MPa':>11}{'relative':>10}{'left out':>10}{'mu0, MPa':>10}"
+           "  stable in uniaxial, equibiaxial, planar stretch")
+    for name in card["ranking"]:
+        law = card["laws"][name]
+        ranges = ", ".join(f"{low:.2f}-{high:.3g}" for low, high in law["stable_range"].values())
+        note = "  <- chosen" if name == card["chosen"] else "" if law["stable_over_data"] else "  UNSTABLE over the data"
+        yield (f"{name:20}{law['rmse_mpa']:11.4g}{law['relative_error']:10.1%}{_left_out(law):>10}{law['mu0_mpa']:10.4g}"
+               f"  {ranges}{note}")
+    yield f"bulk modulus: {card['bulk_source']}"
+    yield from card["warnings"]
+
+
+def _left_out(law):
+    """The worst relative error on a mode that the law did not see."""
+    errors = [entry["relative_error"] if entry else float("inf") for entry in law["left_out"].values()]
+    return f"{max(errors):.0%}" if errors else "-"

@@ -1,0 +1,116 @@
+"""`softtact press`: a mesh on the sensor, its maps and a summary."""
+
+from pathlib import Path
+
+import softtact
+from softtact.commands.common import add_command, add_mesh, check_folders, check_forces, pairs, pose_of, sensor_spec, show
+from softtact.errors import ConvergenceError, InputError
+
+MODELS = ("auto", "elastic", "foundation", "hyperelastic")
+
+
+def add(commands):
+    """Add the command to the parser."""
+    command = add_command(commands, "press", _press, "Press a mesh on the sensor: deformation map and taxels.")
+    add_mesh(command)
+    command.add_argument("--force", type=float, action="append", required=True, metavar="N",
+                         help="force in N; repeat it for several levels")
+    command.add_argument("--model", choices=MODELS, default="auto",
+                         help="auto takes the one that the policy asks for (default)")
+    command.add_argument("--policy", choices=("paper", "error"), default="paper",
+                         help="of auto: the mesh's complexity as in the paper (default), or the error to expect")
+    command.add_argument("--tolerance", type=float, default=0.01, metavar="MM",
+                         help="of --policy error: root mean square over the map, in mm (default: 0.01)")
+    command.add_argument("--card", action="append", metavar="LAYER=CARD.json",
+                         help="a card of `softtact fit` for the dielectric or the cover, in place of the printed constants")
+    command.add_argument("--out", type=Path, metavar="FILE.nc", help="write the maps as NetCDF")
+    command.add_argument("--plot", type=Path, metavar="FILE.png", help="draw deformation map and taxels")
+
+
+def _press(options):
+    from softtact.geometry.meshes import check_over_sensor, place, read_mesh
+
+    spec, forces, pose = sensor_spec(options.sensor), sorted(set(options.force)), pose_of(options)
+    check_forces(forces, spec)
+    check_folders(options.out, options.plot)
+    mesh = read_mesh(options.mesh, unit=options.unit)
+    check_over_sensor(place(mesh, pose=pose), spec.footprint_mm, name=str(options.mesh))
+    try:
+        sensor = softtact.load_sensor(options.sensor, materials=_cards(options))
+        result = sensor.press(mesh, pose=pose, force_n=forces, model=options.model,
+                                                              policy=options.policy, tolerance_mm=options.tolerance)
+    except ConvergenceError as error:
+        if error.result is not None:
+            _show_press(error.result, options)
+        raise
+    _show_press(result, options)
+
+
+def _show_press(result, options):
+    """Write and print what a press gave, be it the levels before one that was not reached."""
+    if options.out:
+        result.write(options.out)
+    if options.plot:
+        from softtact.reporting.press_plot import plot_press
+
+        plot_press(result, options.plot)
+    summary = _press_summary(result)
+    show(summary, as_json=options.json, lines=_press_lines(summary))
+
+
+def _cards(options):
+    """{layer: Law} of the cards given on the command line."""
+    from softtact.materials.cards import law_from_card, load_card
+
+    laws = {}
+    for layer, path in pairs("--card", options.card):
+        if layer not in ("dielectric", "cover"):
+            raise InputError(f"--card {layer}={path}: the layer is {layer!r}; give dielectric or cover.")
+        laws[layer] = law_from_card(load_card(path))
+    return laws
+
+
+def _press_summary(result):
+    """What a press gave at each force, as plain JSON values."""
+    levels = {"force_n": result.force_n, "indentation_mm": result.indentation_mm,
+              "contact_area_mm2": result.contact_area_mm2,
+              "largest_deformation_mm": result.deformation_map_mm.max(axis=(1, 2)),
+              "tactile_map": result.tactile_map}
+    names = ("penetration_mm", "frustum_compression_mm", "residual_n", "outside_card", "expected_error_mm", "within_validity",
+             "iterations", "wall_time_s")
+    levels |= {name: getattr(result, name) for name in names}
+    facts = {name: getattr(result, name) for name in ("model", "solver", "why")}
+    return facts | {name: _or_none(values) for name, values in levels.items()}
+
+
+def _or_none(values):
+    """Numbers as lists; what a model does not tell, nan, as null: JSON has no nan."""
+    return [None if value != value else value for value in values.tolist()] if values.ndim == 1 else values.tolist()
+
+
+def _press_lines(summary):
+    yield f"model: {summary['model']}, linear solver: {summary['solver']}"
+    if summary["why"]:
+        yield f"chosen because: {summary['why']}"
+    yield f"{'force, N':>10}{'indentation, mm':>18}{'contact, mm2':>15}{'deepest, mm':>14}{'counts, sum':>14}"
+    names = ("force_n", "indentation_mm", "contact_area_mm2", "largest_deformation_mm", "tactile_map")
+    for force, depth, area, deepest, counts in zip(*(summary[name] for name in names), strict=True):
+        yield f"{force:10.4g}{depth:18.4f}{area:15.1f}{deepest:14.4f}{sum(map(sum, counts)):14.0f}"
+    yield from _quality_lines(summary)
+
+
+def _quality_lines(summary):
+    """How well the levels were solved, by the worst of them."""
+    yield f"iterations: {sum(summary['iterations'])}; deepest overlap in a contact: {1e3 * max(summary['penetration_mm']):.2g} um"
+    if None not in summary["residual_n"]:
+        yield f"largest unbalanced nodal force: {max(summary['residual_n']):.2g} N"
+    if None not in summary["frustum_compression_mm"]:
+        yield f"most compressed frustum: {max(summary['frustum_compression_mm']):.3f} mm"
+    if None not in summary["expected_error_mm"]:
+        yield f"error to expect against the hyperelastic model: {1e3 * max(summary['expected_error_mm']):.2g} um, root mean square"
+    if not all(summary["within_validity"]):
+        forces = ", ".join(f"{force:g}" for force, valid in zip(summary["force_n"], summary["within_validity"], strict=True)
+                           if not valid)
+        yield f"beyond what the model is valid for: {forces} N"
+    if None not in summary["outside_card"]:
+        yield f"strained beyond the data behind its law: {max(summary['outside_card']):.1%} of a layer"
