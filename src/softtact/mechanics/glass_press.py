@@ -14,9 +14,9 @@ from softtact.mechanics.layered_body import MeshSettings, build_unit_cell
 # A gap this wide ends total reflection: the evanescent wave's intensity falls to 1/e in lambda / (4 pi sqrt(n^2 sin^2 theta - 1)),
 # for green light (0.53 um) in acrylic (n = 1.49) 0.13 um at 45 degrees and 0.05 um at 60 degrees.
 DARK_GAP_MM = 1e-4
-# Where tips are narrow their sides fold onto the glass: thin layers in the lowest quarter and thin rings at the rim (docs/ftir.md).
-GLASS_MESH = MeshSettings(frustum_levels=(*np.linspace(0, 0.25, 13), 0.5, 0.75, 1.0), frustum_rings=4, local_over_shear=0.1,
-                          tip_over_shear=0.1)
+# Where tips are narrow their sides fold onto the glass: thin layers in the lowest third and thin rings at the rim (docs/ftir.md).
+GLASS_MESH = MeshSettings(frustum_levels=(*np.linspace(0, 0.2, 11), 0.24, 0.28, 0.33, 0.4, 0.5, 0.7, 1.0), frustum_rings=4,
+                          local_over_shear=0.1, tip_over_shear=0.1)
 # Where tips are wide the sides fold onto the sheet, and thin layers there turn inside out before the paper's 140 N.
 WIDE_TIP_MESH = MeshSettings(frustum_levels=(0.0, 0.1, 0.3, 0.6, 0.9, 1.0), local_over_shear=0.1, tip_over_shear=0.1)
 # Overlaps that are pressed apart ripple by as much as they are allowed to, and the dark area with them.
@@ -70,9 +70,9 @@ def _plate(spec):
     return plate
 
 
-def contact_area(bed, displacement, *, gap_mm=DARK_GAP_MM):
-    """Projected area (mm2) of the first frustum's surface that is nearer to the glass than `gap_mm`."""
-    position = bed.coordinates[0] + displacement[0]
+def contact_area(bed, displacement, *, frustum=0, gap_mm=DARK_GAP_MM):
+    """Projected area (mm2) of one frustum's surface that is nearer to the glass than `gap_mm`."""
+    position = bed.coordinates[frustum] + displacement[frustum]
     faces = np.vstack([bed.mesh.layer(0)[:, HEX27_BOTTOM], bed.outer_faces])
     side = (np.arange(_SAMPLES) + 0.5) * 2 / _SAMPLES - 1
     points = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
@@ -81,5 +81,5 @@ def contact_area(bed, displacement, *, gap_mm=DARK_GAP_MM):
     z = np.einsum("pa,fa->fp", values, nodes[..., 2])
     edges = np.einsum("fad,pai->fpdi", nodes[..., :2], slopes)
     projected = np.abs(np.linalg.det(edges)) * (2 / _SAMPLES) ** 2
-    glass = bed.coordinates[0][:, 2].min()
+    glass = bed.coordinates[..., 2].min()
     return float(projected[z < glass + gap_mm].sum())

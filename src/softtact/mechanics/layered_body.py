@@ -332,6 +332,19 @@ def build_unit_cell(spec, *, dielectric_law, cover_law=None, mesh=MeshSettings()
     return LayeredBody(slab, bed, slab.bottom[plan.roots])
 
 
+def build_patch(spec, counts, *, dielectric_law, mesh=MeshSettings()):
+    """A piece of the dielectric alone, `counts` frusta along x and y with free borders half a pitch from the outer ones' axes."""
+    frusta, thickness = spec.dielectric.frusta, spec.dielectric.sheet_thickness_mm
+    centres, neighbours = lattice(counts, frusta.pitch_mm)
+    lines = [frusta.pitch_mm * (np.arange(count + 1) - 0.5 * count) for count in counts]
+    plan = sheet_plan(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, [np.ptp(line) for line in lines],
+                      rings=mesh.frustum_rings)
+    slab = Slab(Layer(np.linspace(-thickness, 0.0, mesh.sheet_layers + 1), dielectric_law), Layer(np.zeros(1), None), plan, *lines,
+                sides="free", contact=mesh.contact, coarse_walls=mesh.coarse_walls)
+    bed = _bed(spec, centres, neighbours, dielectric_law, mesh, None, None, bottom=-thickness)
+    return LayeredBody(slab, bed, slab.bottom[plan.roots])
+
+
 def _bed(spec, centres, neighbours, law, mesh, scatter, contact, *, bottom=None):
     frusta = spec.dielectric.frusta
     if bottom is None:
