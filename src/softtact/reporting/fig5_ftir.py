@@ -23,6 +23,9 @@ def draw(area, summary, *, readings=None):
     axes.plot(area.force_n, area.area_measured_mm2, "s", ms=6, color=_MEASURED, mfc="none", mew=1.5, label=summary["source"])
     axes.plot(area.force_n, area.area_image_mm2, "k+", ms=8, label="discs found in the virtual dielectric's frames")
     axes.set(xlabel="force on the dielectric (N)", ylabel="contact area per frustum (mm²)", xlim=(0, None), ylim=(0, None))
+    if far:
+        middle = far[0][1].area_per_frustum_mm2.mean()
+        panels[0].set_ylim(0.9 * middle, 1.1 * max(curve.area_per_frustum_mm2.max() for _, curve in far))
     _total_on_the_right(panels, summary["frusta"])
     panels[0].set_title(f"RMSE of the model {summary['rmse_mm2_per_frustum']:.4f} mm² per frustum ({len(area)} forces, "
                         f"{summary['frusta']} frusta)\npaper, against its own sensor: 0.008 mm²", fontsize=9)
@@ -40,15 +43,12 @@ def _panels(far):
     figure, (high, low) = pyplot().subplots(2, 1, figsize=(6.6, 5.4), layout="constrained", sharex=True, height_ratios=(1, 4))
     high.spines["bottom"].set_linestyle(":")
     high.tick_params(bottom=False)
-    high.margins(y=1.0)
     return figure, [high, low]
 
 
 def _total_on_the_right(panels, count):
+    """A second scale of `count` frusta on every panel."""
     for panel in panels:
-        if len(panel.get_lines()) and panel is not panels[-1]:
-            middle = panel.get_lines()[0].get_ydata().mean()
-            panel.set_ylim(0.9 * middle, 1.1 * middle)
         second = panel.secondary_yaxis("right", functions=(lambda a: a * count, lambda a: a / count))
         second.spines["right"].set_visible(True)
     second.set_ylabel(f"total of {count} frusta (mm²)")
