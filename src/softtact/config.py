@@ -20,10 +20,11 @@ from pydantic import (
     PositiveInt,
     ValidationError,
     field_validator,
+    model_validator,
 )
 
 from softtact.errors import InputError
-from softtact.geometry.sensor_spec import SensorSpec
+from softtact.geometry.sensor_spec import READINGS, SensorSpec
 from softtact.learning.settings import Network, Search, Ssim, Training
 from softtact.materials.config import load_material
 from softtact.materials.laws.registry import LAWS
@@ -62,7 +63,9 @@ Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
 Fraction = Annotated[float, Field(gt=0.0, lt=1.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 Forces = Annotated[list[PositiveFloat], Field(min_length=1), AfterValidator(_rising)]
+ForcesFromZero = Annotated[list[NotNegative], Field(min_length=1), AfterValidator(_rising)]
 Law = _one_of(LAWS, kind="law")
+Reading = _one_of(READINGS, kind="reading")
 VirtualSensorKey = _one_of(VirtualSensorSettings.__dataclass_fields__, kind="key")
 Six = Annotated[list[float], Field(min_length=6, max_length=6)]
 
@@ -82,14 +85,38 @@ class Camera(Section):
     falloff: NotNegative
 
 
+class GlassMesh(Section):
+    """Resolution of the frustum on glass; what is not said is the default for its shape."""
+
+    frustum_levels: Annotated[list[float], AfterValidator(_rising)] | None = Field(
+        None, description="heights of its layers of elements, from 0 to 1")
+    frustum_rings: PositiveInt | None = Field(None, description="rings of elements around its core, thin at its rim")
+    refinement: Annotated[int, Field(ge=0)] | None = Field(None, description="how often all elements are split in plan")
+
+
 class Ftir(Section):
     """The dielectric pressed on glass, as a model and as a virtual specimen, and the camera that looks at it."""
 
-    forces_n: Forces
-    law: Law
-    virtual_law: Law
+    forces_n: ForcesFromZero = Field(description="on the whole dielectric")
+    readings: Annotated[list[Reading], Field(min_length=1)] = Field(
+        ["default", "as_printed"], description="of the printed frustum: its narrow or its wide end on the glass")
+    laws: Annotated[list[Law], Field(min_length=1)] = Field(["mooney_rivlin", "ogden2"], description="each solves each reading")
+    constants: Literal["printed", "fitted"] = Field("printed", description="of the laws: as published, or the card's fit")
+    reading: Reading = Field("default", description="of the model under test and of the virtual specimen; one of `readings`")
+    law: Law = Field(description="of the model under test; one of `laws`")
+    virtual_law: Law = Field(description="of the virtual specimen")
+    height_scatter: NotNegative = Field(0.01, description="standard deviation of its frusta's heights, share of the height")
+    tip_scatter: NotNegative = Field(0.02, description="the same of their tips' diameters")
+    mesh: GlassMesh = Field(GlassMesh(), description="of cells whose narrow end stands on the glass")
     camera: Camera
     measured: str | None = Field(None, description="CSV with force_n, area_mm2 (mean frustum) of one's own test")
+
+    @model_validator(mode="after")
+    def _tests_what_it_solves(self):
+        for key, chosen, among in (("reading", self.reading, self.readings), ("law", self.law, self.laws)):
+            if chosen not in among:
+                raise ValueError(f"{key} {chosen!r} of the model under test is not among the {key}s {', '.join(among)}; add it")
+        return self
 
     @field_validator("measured")
     @classmethod
@@ -158,6 +185,7 @@ class Mesh(Section):
     far_pitches: Literal[1, 2, 4] | None = Field(None, description="pitches that an element of the cover spans far from the object")
     frustum_levels: Annotated[list[float], AfterValidator(_rising)] | None = Field(
         None, description="heights of a frustum's layers of elements, from 0 to 1")
+    frustum_rings: PositiveInt | None = Field(None, description="rings of elements around a frustum's core, thin at its rim")
     local_over_shear: NotNegative | None = Field(None, description="volumetric stiffness of frusta at each point, over mu")
     tip_over_shear: NotNegative | None = Field(None, description="the same in the lowest layer of each frustum")
     refinement: Annotated[int, Field(ge=0)] | None = Field(

@@ -79,14 +79,14 @@ def test_calculix_finds_the_forces_that_are_kept_here(tmp_path):
     assert [-_SECTOR * float(total) for total in totals] == pytest.approx(FORCES, rel=1e-4)
 
 
-def frustum(**settings):
+def frustum(*, law=LAW, mesh=None, contact=HARD, **settings):
     """A bed of one frustum without neighbours over the glass at z = 0; settings are those of `MeshSettings`."""
-    mesh = MeshSettings(**settings)
+    mesh = mesh or MeshSettings(**settings)
     geometry = BedGeometry(centres=np.zeros((1, 2)), heights=np.array([HEIGHT]), tip_diameters=np.array([2 * TIP]),
                            root_diameter=2 * ROOT, neighbours=np.zeros((1, 4), dtype=bool))
-    return FrustumBed(geometry, LAW, levels=HEIGHT * np.asarray(mesh.frustum_levels), root_z_mm=HEIGHT, pcb_z_mm=0.0,
-                      tips_held=True, contact=HARD, local_over_shear=mesh.over_shear_of_layers,
-                      refinement=mesh.refinement)
+    return FrustumBed(geometry, law, levels=HEIGHT * np.asarray(mesh.frustum_levels), root_z_mm=HEIGHT, pcb_z_mm=0.0,
+                      tips_held=True, contact=contact, local_over_shear=mesh.over_shear_of_layers,
+                      refinement=mesh.refinement, rings=mesh.frustum_rings)
 
 
 def bonded_forces(bed, *, step_mm=0.01):

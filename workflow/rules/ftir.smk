@@ -11,9 +11,7 @@ rule press_on_glass:
         files=files,
         settings=as_settings(
             sensor=STUDY.sensor,
-            law=STUDY.values.ftir.law,
-            virtual_law=STUDY.values.ftir.virtual_law,
-            forces_n=STUDY.values.ftir.forces_n,
+            **{key: value for key, value in plain(STUDY.values.ftir).items() if key not in ("camera", "measured")},
             seed=STUDY.values.seed,
         ),
     log:
@@ -51,10 +49,11 @@ rule validate_ftir:
         **({"measured": STUDY.values.ftir.measured} if STUDY.values.ftir.measured else {}),
     output:
         area=f"{RESULTS}/ftir/contact_area.csv",
+        readings=f"{RESULTS}/ftir/readings.csv",
         summary=f"{RESULTS}/ftir/summary.json",
     params:
         files=files,
-        settings=as_settings(),
+        settings=as_settings(pixel_mm=STUDY.values.ftir.camera.pixel_mm),
     log:
         log_of("validate_ftir"),
     benchmark:

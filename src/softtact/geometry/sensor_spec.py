@@ -9,6 +9,9 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PositiveFloa
 
 from softtact.errors import InputError
 
+# How the frustum's two printed diameters are read: the narrow end, or (as the words of the text have it) the wide one as the tip.
+READINGS = ("default", "as_printed")
+
 
 def _plain_value(field):
     """Accept `{value, assumed, reason}` wherever a plain value stands."""
@@ -89,6 +92,13 @@ class SensorSpec(_Strict):
     tips_held: Annotated[bool, BeforeValidator(_plain_value)] = True
     friction: Friction = Friction()
     elastic_layer: ElasticLayer
+
+    def read_as(self, reading):
+        """The same sensor with the `default` reading of its frustum's diameters, the narrow end as tip, or `as_printed`."""
+        narrow, wide = sorted((self.dielectric.frusta.tip_diameter_mm, self.dielectric.frusta.root_diameter_mm))
+        tip, root = {"default": (narrow, wide), "as_printed": (wide, narrow)}[reading]
+        frusta = self.dielectric.frusta.model_copy(update={"tip_diameter_mm": tip, "root_diameter_mm": root})
+        return self.model_copy(update={"dielectric": self.dielectric.model_copy(update={"frusta": frusta})})
 
     @property
     def thickness_mm(self):

@@ -4,8 +4,9 @@ A frustum touches the rest of the sensor only through its root. So its inner unk
 each from the tip upwards layer by layer (static condensation, exact within Newton's method), and the global matrix
 knows the roots only. Contact, all unilateral:
 tip and folding side on the PCB; the side on the symmetric plane towards each neighbour, which moves with the root's outermost
-node: the two neighbours share it when their roots touch. The sheet's lower side on the frusta's sides is left out: in the unit cell
-they come no nearer than 0.01 mm up to 1 MPa.
+node: the two neighbours share it when their roots touch. The sheet's lower side on the frusta's sides is left out where roots
+are wider than tips: in the unit cell they come no nearer than 0.01 mm up to 1 MPa. Where tips are wider the sides fold onto the
+sheet; there it is a level plane that moves with the root's outermost node.
 """
 
 from dataclasses import dataclass, replace
@@ -20,6 +21,7 @@ from softtact.mechanics.elements import HEX27_BOTTOM, HEX27_SIDES, gauss, quad9
 from softtact.mechanics.hex_mesh import disc_plan, extrude
 from softtact.mechanics.parallel import SERIAL
 
+BOARD, SHEET = -1, -2                                     # what a contact point faces where it is no neighbour in DIRECTIONS
 DIRECTIONS = ((0, 1.0), (1, 1.0), (0, -1.0), (1, -1.0))   # axis and sign of the four neighbours: +x, +y, -x, -y
 
 
@@ -75,10 +77,10 @@ class FrustumBed:
     """
 
     def __init__(self, geometry, law, *, levels, root_z_mm, pcb_z_mm, tips_held, contact, local_over_shear, refinement=0,
-                 friction=None):
+                 rings=1, friction=None):
         """friction: `Coulomb` of the frusta on the board, or None."""
         self.geometry, self.contact, self.friction, self.grip = geometry, contact, friction, None
-        plan = disc_plan(refinement)
+        plan = disc_plan(refinement, rings)
         self.mesh = extrude(plan, levels)
         self.outer_faces = self._outer_faces(plan)
         self.count = len(geometry.heights)
@@ -115,13 +117,16 @@ class FrustumBed:
         points, weights = gauss(3, 2)
         values, slopes = quad9(points)
         on_pcb = np.vstack([self.mesh.layer(0)[:, HEX27_BOTTOM], self.outer_faces])
-        records = [(face, value, 2, 1.0, face[0], 0.0, -1) for face in on_pcb for value in values]
+        records = [(face, value, 2, 1.0, face[0], 0.0, BOARD) for face in on_pcb for value in values]
         root_xy = self.mesh.points[self.root, :2]
         for k, (axis, sign) in enumerate(DIRECTIONS):
             plane_node = self.root[np.argmax(sign * root_xy[:, axis])]
             facing = sign * self.mesh.points[self.outer_faces][..., axis].mean(axis=1) > 1e-6
             records += [(face, -sign * value, axis, sign, plane_node, sign, k)
                         for face in self.outer_faces[facing] for value in values]
+            if self.geometry.tip_diameters.min() > self.geometry.root_diameter:
+                records += [(face, -value, 2, 1.0, plane_node, 1.0, SHEET)
+                            for face in self.outer_faces[self._nearest_direction() == k] for value in values]
         self.point_nodes = np.array([[*r[0], r[4]] for r in records])
         self.point_weights = np.array([[*r[1], r[5]] for r in records])
         self.point_axis = np.array([r[2] for r in records])
@@ -129,11 +134,16 @@ class FrustumBed:
         self.board_points = len(on_pcb) * len(values)     # the first ones
         in_layer = [np.isin(self.point_nodes[:, 8], self.mesh.layer(k)) for k in range(self.mesh.layers)]   # by the face's centre
         self.point_layer = np.argmax(in_layer, axis=0)
-        offset = np.where(self.point_neighbour < 0, -pcb_z, self.geometry.wall_mm)
+        offset = np.choose(np.minimum(self.point_neighbour + 2, 2), [0.0, -pcb_z, self.geometry.wall_mm])
         self.gap0 = self._along(self.coordinates) + offset
         self.point_area = self._areas(np.array([r[0] for r in records]).reshape(-1, len(weights), 9)[:, 0], slopes, weights)
         absent = (self.point_neighbour[None] >= 0) & ~self.geometry.neighbours[:, self.point_neighbour]
         self.point_area[absent] = 0.0
+
+    def _nearest_direction(self):
+        """Which of DIRECTIONS (f,) each outer face looks into most."""
+        middle = self.mesh.points[self.outer_faces].mean(axis=1)
+        return np.argmax([sign * middle[:, axis] for axis, sign in DIRECTIONS], axis=0)
 
     def _along(self, field):
         """Weighted component (n, p) of a nodal field along each contact point's axis."""
@@ -162,8 +172,8 @@ class FrustumBed:
         below = np.concatenate([self.mesh.middle(k), self.mesh.planes[k]])
         inner = np.intersect1d(self.inner, _dofs(below))
         above = _dofs(self.mesh.planes[k + 1])
-        sideways = self.point_neighbour >= 0
-        planes = 3 * self.point_nodes[sideways, -1] + self.point_axis[sideways]
+        moving = self.point_neighbour != BOARD
+        planes = 3 * self.point_nodes[moving, -1] + self.point_axis[moving]
         outer = np.concatenate([above, np.setdiff1d(planes, above)])
         place = np.full(3 * self.nodes, -1, dtype=np.int64)
         place[inner], place[outer] = np.arange(len(inner)), len(inner) + np.arange(len(outer))

@@ -1,5 +1,6 @@
 """Meshes made by lifting a plan of quadratic quadrilaterals and triangles through levels of height."""
 
+import itertools
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -187,27 +188,32 @@ def _ring_quads(inner, inner_mid, outer, outer_mid):
     return np.array(quads)
 
 
-def disc_quads():
-    """Unit disc as an O-grid of five quads (5, 9, 2); corners of its outer sides lie at 0, 90, 180 and 270 degrees."""
+def disc_quads(rings=1):
+    """Unit disc as an O-grid of a core and `rings` rings of four quads (1 + 4 rings, 9, 2), the thinner the farther out.
+
+    Corners of the outer sides lie at 0, 90, 180 and 270 degrees.
+    """
     inner = _ring(_CORE_RADIUS, _AXES)
     inner_mid = _ring(0.5 * (_CORE_RADIUS * np.cos(np.pi / 4) + 0.5 * _CORE_RADIUS), _DIAGONALS)
-    core = np.array([[*inner, *inner_mid]])
-    ring = _ring_quads(inner, inner_mid, _ring(1.0, _AXES), _ring(DISC_MIDDLE_RADIUS, _DIAGONALS))
-    return with_centres(np.vstack([core, ring]))
+    outer, outer_mid = _ring(1.0, _AXES), _ring(DISC_MIDDLE_RADIUS, _DIAGONALS)
+    shares = 1.0 - (1.0 - np.arange(rings + 1) / rings) ** 2
+    curves = [(inner + share * (outer - inner), inner_mid + share * (outer_mid - inner_mid)) for share in shares]
+    between = [_ring_quads(*low, *high) for low, high in itertools.pairwise(curves)]
+    return with_centres(np.vstack([[[*inner, *inner_mid]], *between]))
 
 
-def disc_plan(refinement=0):
-    """Unit disc as an O-grid of 5 quads, each split into four `refinement` times."""
-    return refine(merge(disc_quads()), refinement)
+def disc_plan(refinement=0, rings=1):
+    """Unit disc as an O-grid of `disc_quads`, each split into four `refinement` times."""
+    return refine(merge(disc_quads(rings)), refinement)
 
 
-def cell_plan(pitch, diameter):
-    """One cell of a lattice of discs: quads (q, 9, 2) and triangles (4, 6, 2) in mm, the first five quads being the disc.
+def cell_plan(pitch, diameter, rings=1):
+    """One cell of a lattice of discs: quads (q, 9, 2) and triangles (4, 6, 2) in mm, the first quads being `disc_quads`.
 
     Along each side of the cell lie two elements. Where the discs of neighbours do not touch a ring of quads surrounds the disc.
     """
     half, radius = 0.5 * pitch, 0.5 * diameter
-    quads = [radius * disc_quads()]
+    quads = [radius * disc_quads(rings)]
     if radius < half * (1 - 1e-9):
         quads.append(with_centres(_ring_quads(*(r * _ring(1.0, a) if a is _AXES else r * _ring(DISC_MIDDLE_RADIUS, a)
                                                 for r in (radius, half) for a in (_AXES, _DIAGONALS)))))
@@ -235,13 +241,13 @@ class SheetPlan:
     quarters: tuple
 
 
-def sheet_plan(centres, counts, pitch, diameter, footprint, *, refinement=0):
+def sheet_plan(centres, counts, pitch, diameter, footprint, *, refinement=0, rings=1):
     """Cells at `centres` (f, 2) of a lattice `counts`, and strips of quads to the edges of the footprint (mm)."""
-    quads, triangles = cell_plan(pitch, diameter)
+    quads, triangles = cell_plan(pitch, diameter, rings)
     strips = _strips(counts, pitch, footprint)
     plan = refine(merge(np.vstack([(quads[None] + centres[:, None, None]).reshape(-1, 9, 2), strips]),
                         (triangles[None] + centres[:, None, None]).reshape(-1, 6, 2)), refinement)
-    disc = 0.5 * diameter * disc_plan(refinement).points
+    disc = 0.5 * diameter * disc_plan(refinement, rings).points
     roots = _find(plan.points, (centres[:, None] + disc).reshape(-1, 2)).reshape(len(centres), -1)
     return SheetPlan(plan, roots, len(quads) * 4**refinement, _quarters(plan, centres, pitch, refinement))
 

@@ -33,8 +33,9 @@ class MeshSettings:
     frustum_levels: heights of the frustum's element layers as shares of its height; local_over_shear: the share of the
     frusta's volumetric stiffness that acts at every point, over mu (see `blocks`), tip_over_shear: the same in the lowest
     layer, whose edges fold (with 1 a sphere does not pass 40 N); the smaller the softer, by 2 % in all. refinement: how often
-    all elements are split in plan. coarse_walls: along all walls between cells, not only far from the object, the
-    sheet moves as one quadratic curve: half a factor's operations, and 2 to 2.5 % of the map; without effect where refined.
+    all elements are split in plan. frustum_rings: rings of elements around a frustum's core, the thinner the farther out.
+    coarse_walls: along all walls between cells, not only far from the object, the sheet moves as one quadratic curve: half a
+    factor's operations, and 2 to 2.5 % of the map; without effect where refined.
     """
 
     sheet_layers: int = 1
@@ -42,6 +43,7 @@ class MeshSettings:
     local_over_shear: float = 0.5
     tip_over_shear: float = 4.0
     refinement: int = 0
+    frustum_rings: int = 1
     coarse_walls: bool = False
     cover_levels: tuple = (0.0, 0.45, 0.8, 1.0)
     cover_splits: tuple = (1, 1, 2)
@@ -268,7 +270,8 @@ def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), s
     cover = Layer(spec.cover.thickness_mm * (np.asarray(mesh.cover_levels) - 1), cover_law)
     splits, zone = _cover_splits(mesh, surface, x_lines, y_lines, frusta.pitch_mm)
     centres, neighbours = lattice(counts, frusta.pitch_mm)
-    plan = sheet_plan(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, spec.footprint_mm, refinement=mesh.refinement)
+    plan = sheet_plan(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, spec.footprint_mm, refinement=mesh.refinement,
+                      rings=mesh.frustum_rings)
     slab = Slab(sheet, cover, plan, x_lines, y_lines, sides="held", contact=contact or mesh.object_contact,
                 coarse_walls=mesh.coarse_walls or _far(zone, x_lines, y_lines), splits=splits,
                 friction=coulomb(spec.friction.object))
@@ -320,11 +323,25 @@ def build_unit_cell(spec, *, dielectric_law, cover_law=None, mesh=MeshSettings()
     sheet = Layer(np.linspace(bottom, -cover_mm, mesh.sheet_layers + 1), dielectric_law)
     cover = Layer(cover_mm * (np.asarray(mesh.cover_levels) - 1) if cover_mm else np.zeros(1), cover_law)
     centre = np.zeros((1, 2))
-    plan = sheet_plan(centre, (1, 1), frusta.pitch_mm, frusta.root_diameter_mm, (frusta.pitch_mm,) * 2, refinement=mesh.refinement)
+    plan = sheet_plan(centre, (1, 1), frusta.pitch_mm, frusta.root_diameter_mm, (frusta.pitch_mm,) * 2, refinement=mesh.refinement,
+                      rings=mesh.frustum_rings)
     slab = Slab(sheet, cover, plan, lines, lines, sides="symmetric", contact=mesh.contact, coarse_walls=mesh.coarse_walls,
                 splits=splits, friction=coulomb(spec.friction.object))
     bed = _bed(spec, centre, np.ones((1, 4), dtype=bool), dielectric_law, mesh,
                (np.array([height_factor]), np.array([tip_factor])), None, bottom=bottom)
+    return LayeredBody(slab, bed, slab.bottom[plan.roots])
+
+
+def build_patch(spec, counts, *, dielectric_law, mesh=MeshSettings()):
+    """A piece of the dielectric alone, `counts` frusta along x and y with free borders half a pitch from the outer ones' axes."""
+    frusta, thickness = spec.dielectric.frusta, spec.dielectric.sheet_thickness_mm
+    centres, neighbours = lattice(counts, frusta.pitch_mm)
+    lines = [frusta.pitch_mm * (np.arange(count + 1) - 0.5 * count) for count in counts]
+    plan = sheet_plan(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, [np.ptp(line) for line in lines],
+                      rings=mesh.frustum_rings)
+    slab = Slab(Layer(np.linspace(-thickness, 0.0, mesh.sheet_layers + 1), dielectric_law), Layer(np.zeros(1), None), plan, *lines,
+                sides="free", contact=mesh.contact, coarse_walls=mesh.coarse_walls)
+    bed = _bed(spec, centres, neighbours, dielectric_law, mesh, None, None, bottom=-thickness)
     return LayeredBody(slab, bed, slab.bottom[plan.roots])
 
 
@@ -340,7 +357,7 @@ def _bed(spec, centres, neighbours, law, mesh, scatter, contact, *, bottom=None)
                            wall_mm=0.5 * (frusta.pitch_mm - frusta.root_diameter_mm))
     return FrustumBed(geometry, law, levels=np.asarray(mesh.frustum_levels) * frusta.height_mm, root_z_mm=bottom,
                       pcb_z_mm=bottom - heights.max(), tips_held=spec.tips_held, contact=contact or mesh.contact,
-                      local_over_shear=mesh.over_shear_of_layers, refinement=mesh.refinement,
+                      local_over_shear=mesh.over_shear_of_layers, refinement=mesh.refinement, rings=mesh.frustum_rings,
                       friction=coulomb(spec.friction.board))
 
 

@@ -173,7 +173,7 @@ class Slab:
         return self.groups + [part for group in self.cell_groups for part in group.parts]
 
     def _number_unknowns(self, sides):
-        """Free unknowns: all but the sides, which are `held` (sensor shell) or `symmetric` (unit cell)."""
+        """Free unknowns: all but the sides, which are `held` (sensor shell), `symmetric` (unit cell) or also `free`."""
         x, y, _ = self.points.T
         on_x = (np.abs(x - self.x_lines[0]) < 1e-9) | (np.abs(x - self.x_lines[-1]) < 1e-9)
         on_y = (np.abs(y - self.y_lines[0]) < 1e-9) | (np.abs(y - self.y_lines[-1]) < 1e-9)
@@ -182,8 +182,8 @@ class Slab:
             held[on_x | on_y] = True
         elif sides == "symmetric":
             held[on_x, 0] = held[on_y, 1] = True
-        else:
-            raise ValueError(f"sides must be 'held' or 'symmetric', not {sides!r}")
+        elif sides != "free":
+            raise ValueError(f"sides must be 'held', 'symmetric' or 'free', not {sides!r}")
         self.free = np.flatnonzero(~held.ravel())
         self.number = np.full(held.size, -1, dtype=np.int64)
         self.number[self.free] = np.arange(len(self.free))

@@ -1,6 +1,6 @@
 """Figure 5.
 
-inputs: area, summary;  outputs: png, svg
+inputs: area, readings, summary;  outputs: png, svg
 """
 
 import pandas as pd
@@ -12,4 +12,5 @@ from softtact.reporting.style import save
 
 def run(*, inputs, outputs, settings, threads=1):
     """Draw."""
-    save(draw(pd.read_csv(inputs["area"]), read_json(inputs["summary"])), outputs["png"], outputs["svg"])
+    figure = draw(pd.read_csv(inputs["area"]), read_json(inputs["summary"]), readings=pd.read_csv(inputs["readings"]))
+    save(figure, outputs["png"], outputs["svg"])

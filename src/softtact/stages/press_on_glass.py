@@ -1,46 +1,78 @@
-"""The dielectric pressed on glass: the model's contact area, and a virtual specimen's with scatter.
+"""The dielectric pressed on glass: the models' contact area in each reading and law, and a virtual specimen's with scatter.
 
-inputs: card;  outputs: state, virtual;  settings: sensor, law, virtual_law, forces_n, seed
+inputs: card;  outputs: state, virtual
+settings: sensor, forces_n, readings, laws, constants (printed, fitted), reading, law, virtual_law, height_scatter, tip_scatter,
+    mesh, seed
 """
 
 import numpy as np
 import xarray
 
+from softtact.errors import InputError
 from softtact.files import write_dataset
 from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.cards import law_from_card, load_card
-from softtact.mechanics.glass_press import press_cell_on_glass
-from softtact.mechanics.layered_body import lattice
-
-HEIGHT_SCATTER, TIP_SCATTER, READING_SCATTER = 0.01, 0.02, 0.01   # of a moulded specimen; assumed
+from softtact.materials.laws.registry import make_law
+from softtact.mechanics.glass_dielectric import cell_family, press_specimen, scattered_specimen
+from softtact.mechanics.glass_press import glass_mesh, press_cell_on_glass
+from softtact.progress import progress
 
 
 def run(*, inputs, outputs, settings, threads=1):
-    """Solve one cell per law; the specimen's frusta differ in height and tip diameter."""
+    """Solve one cell per reading and law, then a specimen whose frusta differ in height and tip diameter."""
     spec, card = SensorSpec.from_dict(settings["sensor"]), load_card(inputs["card"])
+    changes = {key: value for key, value in settings["mesh"].items() if value is not None}
     forces = np.asarray(settings["forces_n"], dtype=float)
-    centres, _ = lattice(spec.frusta_counts, spec.dielectric.frusta.pitch_mm)
-    per_frustum = forces / len(centres)
-    model = press_cell_on_glass(spec, law_from_card(card, settings["law"]), per_frustum)
-    _write(outputs["state"], settings, forces, model, {})
-    law = law_from_card(card, settings["virtual_law"])
-    specimen = press_cell_on_glass(spec, law, per_frustum)
-    areas = _scattered(specimen.area_mm2, len(centres), settings["seed"])
-    _write(outputs["virtual"], settings, forces, specimen, {
-        "disc_area_mm2": (("force", "frustum"), areas),
-        "x_mm": ("frustum", centres[:, 0]), "y_mm": ("frustum", centres[:, 1])}, area=areas.mean(axis=1))
+    _write(outputs["state"], _models(spec, card, forces, settings, changes), settings)
+    _write(outputs["virtual"], _virtual(spec.read_as(settings["reading"]), card, forces, settings, changes), settings)
 
 
-def _scattered(area, count, seed):
-    """Disc areas (force, frustum): tip diameter and load share differ from frustum to frustum."""
-    rng = np.random.default_rng([seed, 2])
-    factor = (1 + TIP_SCATTER * rng.standard_normal(count)) ** 2 * (1 + HEIGHT_SCATTER * rng.standard_normal(count))
-    return area[:, None] * factor * (1 + READING_SCATTER * rng.standard_normal((len(area), count)))
+def _models(spec, card, forces, settings, changes):
+    """Data set (reading, law, force) of a cell that carries its share of the force."""
+    shape = len(settings["readings"]), len(settings["laws"]), len(forces)
+    area, compression, each = np.zeros(shape), np.zeros(shape), forces / np.prod(spec.frusta_counts)
+    for i, j in progress(list(np.ndindex(shape[:2])), label="frusta on glass"):
+        read, law = spec.read_as(settings["readings"][i]), _law(card, settings["laws"][j], settings["constants"])
+        curve = press_cell_on_glass(read, law, each, mesh=glass_mesh(read, **changes))
+        area[i, j], compression[i, j] = curve.area_mm2, curve.compression_mm
+    gap = spec.dielectric.frusta.pitch_mm - 2 * np.sqrt(area / np.pi)
+    axes = ("reading", "law", "force")
+    data = {"area_per_frustum_mm2": area, "compression_mm": compression, "disc_gap_mm": gap}
+    return xarray.Dataset({"force_n": ("force", forces, {"units": "N"}),
+                           **{name: (axes, values, {"units": name.rsplit("_", 1)[1]}) for name, values in data.items()}},
+                          coords={"reading": settings["readings"], "law": settings["laws"]},
+                          attrs={"reading_under_test": settings["reading"], "law_under_test": settings["law"],
+                                 "frusta": int(np.prod(spec.frusta_counts)), "pitch_mm": spec.dielectric.frusta.pitch_mm})
 
 
-def _write(path, settings, forces, curve, extra, *, area=None):
-    data = xarray.Dataset({
+def _law(card, name, constants):
+    """The law of a card with its fitted constants, or with the published ones at the same K / mu0."""
+    fitted = law_from_card(card, name)
+    if constants == "fitted":
+        return fitted
+    if name not in card.get("printed", {}):
+        raise InputError(f"The card of material {card['material']} has no printed constants of law {name!r}; "
+                         "set 'ftir.constants' to fitted.")
+    return make_law(name, card["printed"][name]["parameters"], bulk_over_shear=fitted.bulk_modulus / fitted.mu0)
+
+
+def _virtual(spec, card, forces, settings, changes):
+    """Data set (force, frustum) of the specimen."""
+    specimen = scattered_specimen(spec, height_scatter=settings["height_scatter"], tip_scatter=settings["tip_scatter"],
+                                  seed=settings["seed"])
+    law = _law(card, settings["virtual_law"], settings["constants"])
+    family = cell_family(spec, law, specimen, largest_n=forces[-1], mesh=glass_mesh(spec, **changes))
+    pressed = press_specimen(family, specimen, forces)
+    both = ("force", "frustum")
+    return xarray.Dataset({
         "force_n": ("force", forces, {"units": "N"}),
-        "area_per_frustum_mm2": ("force", curve.area_mm2 if area is None else area, {"units": "mm2"}),
-        "compression_mm": ("force", curve.compression_mm, {"units": "mm"}), **extra})
+        "area_per_frustum_mm2": ("force", pressed.area_mm2.mean(axis=1), {"units": "mm2", "long_name": "mean of the frusta"}),
+        "compression_mm": ("force", pressed.descent_mm, {"units": "mm", "long_name": "the plate's way from its first touch"}),
+        "disc_area_mm2": (both, pressed.area_mm2, {"units": "mm2"}), "frustum_force_n": (both, pressed.force_n, {"units": "N"}),
+        "x_mm": ("frustum", specimen.centres[:, 0]), "y_mm": ("frustum", specimen.centres[:, 1]),
+        "height_factor": ("frustum", specimen.height_factor), "tip_factor": ("frustum", specimen.tip_factor)},
+        attrs={"reading": settings["reading"], "law": settings["virtual_law"]})
+
+
+def _write(path, data, settings):
     write_dataset(path, data, seed=settings["seed"], settings=settings)

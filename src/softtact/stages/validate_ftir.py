@@ -1,35 +1,58 @@
-"""Contact area per frustum against force: the model's, the image's, and the measured one.
+"""Contact area per frustum against force: the model's, the image's, and the measured one; and which readings the paper allows.
 
 inputs: state, virtual, discs (list), measured (CSV force_n, area_mm2 of the mean frustum; without it the virtual dielectric
     stands in)
-outputs: area (CSV), summary (JSON)
+outputs: area (CSV), readings (CSV, long: each reading and law), summary (JSON);  settings: pixel_mm of the camera
 """
 
 import numpy as np
 import pandas as pd
 
 from softtact.errors import InputError
+from softtact.evaluation.curve_shape import PAPER_RMSE_MM2, judge, summary_sentence
 from softtact.files import read_dataset, write_csv, write_json
-
-PAPER_RMSE_MM2 = 0.008   # section 4.1
 
 
 def run(*, inputs, outputs, settings, threads=1):
-    """Join the three curves and report their differences."""
+    """Join the three curves, report their differences, and judge the readings by the paper's words."""
     state, virtual = read_dataset(inputs["state"]), read_dataset(inputs["virtual"])
-    forces, model = state.force_n.values, state.area_per_frustum_mm2.values
-    discs = pd.concat([pd.read_csv(path) for path in inputs["discs"]])
     count = virtual.sizes["frustum"]
+    readings = long_table(state, count)
+    write_csv(outputs["readings"], readings)
+    table, found, source = _curves(inputs, state, virtual, count)
+    write_csv(outputs["area"], table)
+    judged = judge(readings, pitch_mm=state.attrs["pitch_mm"], pixel_mm=settings["pixel_mm"])
+    write_json(outputs["summary"], _errors(table, virtual, count) | {
+        "discs_found": found, "source": source, "frusta": count, "verdict": summary_sentence(judged), "readings": judged,
+        "under_test": {"reading": state.attrs["reading_under_test"], "law": state.attrs["law_under_test"]}})
+
+
+def long_table(state, count):
+    """Every reading's and law's curve, one row a force."""
+    names = ["area_per_frustum_mm2", "compression_mm", "disc_gap_mm"]
+    table = state[[*names, "force_n"]].to_dataframe().reset_index()
+    table["area_total_mm2"] = count * table.area_per_frustum_mm2
+    return table[["reading", "law", "force_n", "area_per_frustum_mm2", "area_total_mm2", "compression_mm", "disc_gap_mm"]]
+
+
+def _curves(inputs, state, virtual, count):
+    """Table of the model under test, the image and the measurement; discs found by force; where the measurement is from."""
+    forces = state.force_n.values
+    model = state.area_per_frustum_mm2.sel(reading=state.attrs["reading_under_test"], law=state.attrs["law_under_test"]).values
+    discs = pd.concat([pd.read_csv(path) for path in inputs["discs"]])
     image = discs.groupby("force_n").area_mm2.sum().reindex(forces, fill_value=0.0).to_numpy() / count
     measured, source = _measured(inputs.get("measured"), forces, virtual)
-    table = pd.DataFrame({"force_n": forces, "area_per_frustum_mm2": model, "area_image_mm2": image,
-                          "area_measured_mm2": measured})
-    write_csv(outputs["area"], table)
-    rmse = _rmse(model, measured)
-    write_json(outputs["summary"], {
-        "rmse_mm2_per_frustum": rmse, "rmse_mm2_total": rmse * count, "paper_rmse_mm2": PAPER_RMSE_MM2,
-        "rmse_image_mm2_per_frustum": _rmse(image, virtual.area_per_frustum_mm2.values), "frusta": count,
-        "discs_found": {f"{force:g}": int(n) for force, n in discs.groupby("force_n").size().items()}, "source": source})
+    table = pd.DataFrame({"force_n": forces, "area_per_frustum_mm2": model, "area_image_mm2": image, "area_measured_mm2": measured,
+                          "area_total_mm2": count * model, "area_image_total_mm2": count * image,
+                          "area_measured_total_mm2": count * measured})
+    return table, {f"{force:g}": int(n) for force, n in discs.groupby("force_n").size().items()}, source
+
+
+def _errors(table, virtual, count):
+    """Root mean square differences over the forces, per frustum and of the whole dielectric."""
+    rmse = _rmse(table.area_per_frustum_mm2, table.area_measured_mm2)
+    return {"rmse_mm2_per_frustum": rmse, "rmse_mm2_total": rmse * count, "paper_rmse_mm2": PAPER_RMSE_MM2,
+            "rmse_image_mm2_per_frustum": _rmse(table.area_image_mm2, virtual.area_per_frustum_mm2.values)}
 
 
 def _measured(path, forces, virtual):

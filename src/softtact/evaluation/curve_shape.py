@@ -1,0 +1,86 @@
+"""Which simulated curves of contact area against force the paper's test allows, by its words alone.
+
+Printed are: the area grew with the force, "but not necessarily linearly"; one circle was detected around each contact; real and
+simulated area differed by 0.008 mm2. So, stated as a rule, a curve is compatible when
+    it rises at every force;
+    it grows by at least five times the paper's RMSE over the test, else the error would hide the growth;
+    neighbouring discs stay two pixels of the camera apart, else they merge and no circle goes around one of them;
+    no step's rate (area per force) exceeds four times the mean rate: growth in a jump would have been worth a word.
+The departure from a straight line is reported and excludes nothing.
+"""
+
+import numpy as np
+
+PAPER_RMSE_MM2 = 0.008          # section 4.1
+LEAST_GROWTH_MM2 = 5 * PAPER_RMSE_MM2
+LEAST_GAP_PIXELS = 2
+LARGEST_RATE = 4.0
+
+
+def measures(force_n, area_mm2, *, pitch_mm):
+    """What the rule asks of a curve of area (f,) per frustum at forces (f,), those of 0 N left out.
+
+    growth_mm2, growth_share: from the first force to the last;  disc_gap_mm: between equal circles of the last area;
+    largest_step_share: of the growth, in one step;  largest_rate: the steepest step's area per force over the mean one;
+    departure_from_line: largest distance from the straight line between the ends, as a share of the growth.
+    """
+    force, area = (np.asarray(values, dtype=float)[np.asarray(force_n) > 0] for values in (force_n, area_mm2))
+    growth = area[-1] - area[0]
+    scale = growth if abs(growth) > 1e-9 else np.inf
+    line = np.interp(force, force[[0, -1]], area[[0, -1]])
+    rate = np.diff(area) / np.diff(force) * (force[-1] - force[0])
+    return {"from_n": float(force[0]), "to_n": float(force[-1]), "growth_mm2": float(growth),
+            "growth_share": float(growth / area[0]), "rising": bool((np.diff(area) > 0).all()),
+            "disc_gap_mm": float(pitch_mm - 2 * np.sqrt(area[-1] / np.pi)),
+            "largest_step_share": float((np.diff(area) / scale).max(initial=0.0)),
+            "largest_rate": float((rate / scale).max(initial=0.0)),
+            "departure_from_line": float(np.abs((area - line) / scale).max())}
+
+
+def objections(found, *, pixel_mm):
+    """What speaks against a curve of these `measures`, in words; nothing where the paper allows it."""
+    least_gap = LEAST_GAP_PIXELS * pixel_mm
+    said = []
+    if not found["growth_mm2"] >= LEAST_GROWTH_MM2:
+        said.append(f"its area changes by {found['growth_mm2']:.3f} mm2, less than {LEAST_GROWTH_MM2:g} mm2 "
+                    "(five times the paper's RMSE)")
+    elif not found["rising"]:
+        said.append("its area falls between two forces")
+    if not found["disc_gap_mm"] >= least_gap:
+        said.append(f"its discs leave {max(found['disc_gap_mm'], 0):.3f} mm between them, less than {least_gap:g} mm "
+                    "(two pixels), so that no circles could be told apart")
+    if found["largest_rate"] > LARGEST_RATE:
+        said.append(f"it grows in a jump ({found['largest_step_share']:.0%} of the growth in one step, at "
+                    f"{found['largest_rate']:.1f} times the mean rate)")
+    return said
+
+
+def verdict(name, found, *, pixel_mm):
+    """One sentence on a curve called `name`."""
+    against = objections(found, pixel_mm=pixel_mm)
+    span = f"{found['from_n']:g} to {found['to_n']:g} N"
+    if against:
+        return f"{name}: hardly compatible with the paper's curve: from {span} " + ", and ".join(against) + "."
+    return (f"{name}: compatible with the paper's curve: from {span} its area grows by {found['growth_mm2']:.3f} mm2 per frustum "
+            f"({found['growth_share']:.0%}), at most {found['largest_rate']:.1f} times as fast as on average, "
+            f"{found['departure_from_line']:.0%} of the growth off a straight line, and {found['disc_gap_mm']:.2f} mm stay between "
+            "discs.")
+
+
+def judge(readings, *, pitch_mm, pixel_mm):
+    """Records {reading, law, allowed, sentence, and the measures} of a long table (reading, law, force_n, area_per_frustum_mm2)."""
+    records = []
+    for (reading, law), curve in readings.groupby(["reading", "law"], sort=False):
+        found = measures(curve.force_n, curve.area_per_frustum_mm2, pitch_mm=pitch_mm)
+        records.append({"reading": reading, "law": law, "allowed": not objections(found, pixel_mm=pixel_mm),
+                        "sentence": verdict(f"{reading}, {law}", found, pixel_mm=pixel_mm), **found})
+    return records
+
+
+def summary_sentence(records):
+    """What the paper's words allow, of all readings and laws judged."""
+    allowed = [f"{r['reading']} with {r['law']}" for r in records if r["allowed"]]
+    readings = list(dict.fromkeys(r["reading"] for r in records))
+    out = [name for name in readings if not any(r["allowed"] for r in records if r["reading"] == name)]
+    text = f"The paper's words allow {', '.join(allowed)}." if allowed else "The paper's words allow none of the curves."
+    return text + (f" They hardly allow the reading {' or '.join(out)} with any law." if out else "")
