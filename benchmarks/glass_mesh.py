@@ -1,6 +1,6 @@
 """How the contact area of a frustum on glass depends on its mesh, and on how contact is asked for (the tables of docs/ftir.md).
 
-    python benchmarks/glass_mesh.py
+    python benchmarks/glass_mesh.py        (some minutes; benchmarks/results/glass_mesh.json)
 """
 
 import time
@@ -8,12 +8,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import record
 
 from softtact.contact.height_field import HeightField
 from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.laws.registry import make_law
-from softtact.mechanics import glass_press
-from softtact.mechanics.glass_press import GLASS_MESH, contact_area
+from softtact.mechanics.glass_press import DARK_GAP_MM, GLASS_MESH, SETTINGS, contact_area, plate_over
 from softtact.mechanics.hyperelastic import press_levels
 from softtact.mechanics.layered_body import build_unit_cell
 
@@ -22,6 +22,7 @@ LAWS = {"mooney_rivlin": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040
         "ogden2": make_law("ogden2", {"mu1": 0.1351, "alpha1": 1.4538, "mu2": 0.2223, "alpha2": -4.9910}, bulk_over_shear=20.0)}
 FORCES = np.arange(10.0, 141.0, 10.0) / 540     # N on one frustum
 GAPS_MM = (2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1.5e-3)
+CHOSEN_GAP = GAPS_MM.index(DARK_GAP_MM)
 FORMER = replace(GLASS_MESH, frustum_levels=(0.0, 0.1, 0.3, 0.6, 1.0), frustum_rings=1)
 
 
@@ -50,37 +51,48 @@ MESHES = {
 def solve(law, mesh):
     """Areas (gaps, f) in mm2, compressions (f,) in mm, and seconds."""
     start, body = time.perf_counter(), build_unit_cell(SPEC, dielectric_law=law, mesh=mesh)
-    levels = list(press_levels(body, HeightField(glass_press._plate(SPEC)), FORCES, settings=glass_press._SETTINGS))
+    levels = list(press_levels(body, HeightField(plate_over(SPEC)), FORCES, settings=SETTINGS))
     seconds = time.perf_counter() - start
     areas = [[contact_area(body.bed, level.state.bed.displacement, gap_mm=gap) for level in levels] for gap in GAPS_MM]
     body.close()
     return np.array(areas), np.array([level.state.indentation for level in levels]), seconds
 
 
-def row(name, solved, finest):
-    """A row of the table: errors against the finest mesh over all forces."""
-    area, depth, seconds = solved
-    error, compression = area[2] / finest[0][2] - 1, depth / finest[1] - 1
-    return (f"| {name} | {seconds:.1f} | {area[2, -1]:.4f} | {np.sqrt((error**2).mean()):.2%} | {np.abs(error).max():.2%} "
-            f"| {np.abs(compression).max():.2%} |")
+def measured(law):
+    """Records of all meshes, errors against the first over all forces; and the areas (gaps, f) of the chosen one."""
+    records, finest, areas = [], None, None
+    for name, mesh in MESHES.items():
+        area, depth, seconds = solve(law, mesh)
+        finest = finest or (area[CHOSEN_GAP], depth)
+        error, compression = area[CHOSEN_GAP] / finest[0] - 1, depth / finest[1] - 1
+        records.append({"mesh": name, "seconds": seconds, "area_mm2": area[CHOSEN_GAP].tolist(), "compression_mm": depth.tolist(),
+                        "area_rms": float(np.sqrt((error**2).mean())), "area_worst": float(np.abs(error).max()),
+                        "compression_worst": float(np.abs(compression).max())})
+        print(row(records[-1]), flush=True)
+        areas = area if mesh is GLASS_MESH else areas
+    return records, areas
+
+
+def row(found):
+    """A row of the table."""
+    return (f"| {found['mesh']} | {found['seconds']:.1f} | {found['area_mm2'][-1]:.4f} | {found['area_rms']:.2%} "
+            f"| {found['area_worst']:.2%} | {found['compression_worst']:.2%} |")
 
 
 def main():
-    """Print the tables."""
+    """Print the tables and record them."""
     solve(LAWS["mooney_rivlin"], FORMER)     # compiles
+    laws = {}
     for name, law in LAWS.items():
         print(f"\n{name}\n\n| mesh | time, s | area at 140 N, mm2 | area: rms | worst | compression: worst |")
         print("|---|---|---|---|---|---|")
-        finest = None
-        for mesh_name, mesh in MESHES.items():
-            solved = solve(law, mesh)
-            finest = finest or solved
-            print(row(mesh_name, solved, finest), flush=True)
-            if mesh is GLASS_MESH:
-                areas = solved[0]
+        records, areas = measured(law)
+        by_gap = {f"{gap:g}": area.tolist() for gap, area in zip(GAPS_MM, areas, strict=True)}
+        laws[name] = {"meshes": records, "area_mm2_by_gap": by_gap}
         print("\n| gap below, um | 20 N | 60 N | 100 N | 140 N |\n|---|---|---|---|---|")
         for gap, area in zip(GAPS_MM, areas, strict=True):
             print(f"| {1e3 * gap:g} | " + " | ".join(f"{area[k]:.4f}" for k in (1, 5, 9, 13)) + " |", flush=True)
+    print(record.write("glass_mesh", force_n=FORCES.tolist(), laws=laws))
 
 
 if __name__ == "__main__":

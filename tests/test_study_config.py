@@ -101,6 +101,7 @@ def test_assumed_values_and_their_reasons_reach_the_stages_as_plain_numbers():
         ("ftir.law", "ogden", "there is no law 'ogden'; did you mean 'ogden"),
         ("ftir.reading", "printed", "there is no reading 'printed'; did you mean 'as_printed'?"),
         ("ftir.readings", ["as_printed"], "reading 'default' of the model under test is not among the readings as_printed; add it"),
+        ("ftir.forces_n", [0], "forces_n holds 0 N only; add a force above"),
         ("ftir.laws", ["yeoh"], "law 'mooney_rivlin' of the model under test is not among the laws yeoh; add it"),
         ("ftir.mesh", {"frustum_ring": 2}, "there is no key 'frustum_ring'; did you mean 'frustum_rings'?"),
         ("complexity.rule", "either", "at 'complexity.rule' (it is 'either')"),

@@ -116,6 +116,8 @@ class Ftir(Section):
         for key, chosen, among in (("reading", self.reading, self.readings), ("law", self.law, self.laws)):
             if chosen not in among:
                 raise ValueError(f"{key} {chosen!r} of the model under test is not among the {key}s {', '.join(among)}; add it")
+        if not self.forces_n[-1] > 0:
+            raise ValueError("forces_n holds 0 N only; add a force above")
         return self
 
     @field_validator("measured")

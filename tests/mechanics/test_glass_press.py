@@ -6,13 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from softtact.contact.height_field import HeightField
 from softtact.errors import ConvergenceError
 from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.laws.registry import make_law
 from softtact.mechanics.frustum_bed import SHEET
 from softtact.mechanics.glass_dielectric import Specimen, cell_family, press_specimen, scattered_specimen
-from softtact.mechanics.glass_press import GLASS_MESH, press_cell_on_glass
-from softtact.mechanics.layered_body import build_unit_cell
+from softtact.mechanics.glass_press import GLASS_MESH, SETTINGS, contact_area, plate_over, press_cell_on_glass
+from softtact.mechanics.hyperelastic import press_levels
+from softtact.mechanics.layered_body import build_patch, build_unit_cell
 
 CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
 LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492)
@@ -107,3 +109,17 @@ def test_a_specimen_has_the_scatter_that_is_asked_for_and_comes_back_with_its_se
     assert specimen.tip_factor.std() == pytest.approx(0.02, rel=0.1)
     assert (specimen.tip_factor == again.tip_factor).all()
     assert len(specimen.centres) == 540
+
+
+def test_four_frusta_with_free_borders_share_a_plate_alike_and_spread():
+    """A patch of 2 x 2 has two mirrors: four equal shares of the force. Its free sheet is softer than the endless lattice's."""
+    forces = 4 * np.array([20.0, 60.0]) / 540
+    body = build_patch(CORO, (2, 2), dielectric_law=LAW, mesh=COARSE)
+    levels = list(press_levels(body, HeightField(plate_over(CORO)), forces, settings=SETTINGS))
+    areas = np.array([[contact_area(body.bed, level.state.bed.displacement, frustum=k) for k in range(4)] for level in levels])
+    carried = levels[-1].state.bed.force[:, body.bed.root, 2].sum(axis=1)
+    body.close()
+    assert np.ptp(areas, axis=1).max() < 1e-4 * areas.mean()
+    assert np.abs(carried) == pytest.approx(forces[-1] / 4, rel=1e-4)
+    endless = press_cell_on_glass(CORO, LAW, forces / 4, mesh=COARSE)
+    assert (np.array([level.state.indentation for level in levels]) > 1.2 * endless.compression_mm).all()

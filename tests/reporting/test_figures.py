@@ -77,11 +77,13 @@ def test_the_page_holds_its_figures_and_links_its_data(tmp_path):
     write_csv(inputs["ceiling"], CEILING)
     write_csv(inputs["claims"], pd.DataFrame({"claim": ["a < b"], "verdict": ["reproduced"]}))
     inputs["ftir"] = folder / "summary.json"
-    write_json(inputs["ftir"], {"source": "virtual dielectric"})
-    inputs["figures"] = [folder / "figures" / "fig6_ssim.png"]
-    save(fig6_ssim.draw(SSIM, CEILING), inputs["figures"][0])
+    write_json(inputs["ftir"], {"source": "virtual dielectric", "verdict": "The words allow this."})
+    inputs["figures"] = [folder / "figures" / f"{name}.png" for name in ("fig6_ssim", "fig5_ftir", "material_foam")]
+    for path in inputs["figures"]:
+        save(fig6_ssim.draw(SSIM, CEILING), path)
     facts = {"study": "mine", "indenters": 3, "unseen": 1, "grasps": 2, "forces_n": [10.0], "trials": 2, "seed": 1}
     page = render_page(inputs, facts, folder=folder)
-    assert page.count("data:image/png;base64,") == 1
+    assert page.count("data:image/png;base64,") == 3
+    assert page.count("The words allow this.") == 1 and "Material foam: test curves" in page
     assert 'href="figures/fig6_ssim.svg"' in page and 'href="tables/table2.csv"' in page
     assert "a &lt; b" in page and "What is synthetic here" in page

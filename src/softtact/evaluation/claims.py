@@ -12,8 +12,8 @@ COLUMNS = ["claim", "where", "paper", "ours", "verdict", "rule", "evidence"]
 
 def claims(*, cards, complexity, ftir, ssim, timing, choose, printed_counts):
     """Data frame with COLUMNS; the arguments are what the study's files hold."""
-    rows = [*_materials(cards), _ftir(ftir), *_complexity(complexity, choose, printed_counts), *_agreement(ssim),
-            *_scores(ssim), *_times(timing)]
+    rows = [*_materials(cards), _ftir(ftir), *_curve_shapes(ftir), *_complexity(complexity, choose, printed_counts),
+            *_agreement(ssim), *_scores(ssim), *_times(timing)]
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
@@ -55,6 +55,17 @@ def _ftir(ftir):
     return _row("Simulated and measured contact area of the dielectric agree", "sec. 4.1, fig. 5", "RMSE 0.008 mm2",
                 f"{rmse:.4f} mm2 per frustum against the {ftir['source']}", verdict,
                 "RMSE per frustum <= 0.008 mm2 against a measured curve", "ftir/summary.json")
+
+
+def _curve_shapes(ftir):
+    """A row per reading of the printed frustum: does the area grow as the paper's words have it, with any law?"""
+    for reading in dict.fromkeys(record["reading"] for record in ftir["readings"]):
+        records = [record for record in ftir["readings"] if record["reading"] == reading]
+        yield _row(f"Frusta read as {reading}: the contact area grows with the force, in discs", "sec. 4.1, fig. 5",
+                   "increases, not necessarily linearly", " ".join(record["sentence"] for record in records),
+                   _verdict(any(record["allowed"] for record in records)),
+                   "with one law at least: rises at every force, by 0.04 mm2 or more, discs two pixels apart, no step steeper than "
+                   "four times the mean", "ftir/readings.csv")
 
 
 def _complexity(complexity, choose, printed):

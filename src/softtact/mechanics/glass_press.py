@@ -20,7 +20,7 @@ GLASS_MESH = MeshSettings(frustum_levels=(*np.linspace(0, 0.2, 11), 0.24, 0.28, 
 # Where tips are wide the sides fold onto the sheet, and thin layers there turn inside out before the paper's 140 N.
 WIDE_TIP_MESH = MeshSettings(frustum_levels=(0.0, 0.1, 0.3, 0.6, 0.9, 1.0), local_over_shear=0.1, tip_over_shear=0.1)
 # Overlaps that are pressed apart ripple by as much as they are allowed to, and the dark area with them.
-_SETTINGS = NewtonSettings(contact_passes=0, first_touch_mm=1e-3, smallest_scale_n=0.1, smallest_increment_n=1e-3)
+SETTINGS = NewtonSettings(contact_passes=0, first_touch_mm=1e-3, smallest_scale_n=0.1, smallest_increment_n=1e-3)
 _GIVE_UP_N = 5e-3    # force step at which a curve that may end early ends: smaller ones cost minutes and win little
 _SAMPLES = 24        # points a side of a face at which contact is asked for
 
@@ -44,9 +44,9 @@ def press_cell_on_glass(spec, law, forces_n, *, mesh=None, height_factor=1.0, ti
                            tip_factor=tip_factor)
     forces = np.asarray(forces_n, dtype=float)
     reached = [(0.0, 0.0, 0.0)] if forces[0] == 0 else []
-    settings = replace(_SETTINGS, smallest_increment_n=_GIVE_UP_N) if as_far_as_it_goes else _SETTINGS
+    settings = replace(SETTINGS, smallest_increment_n=_GIVE_UP_N) if as_far_as_it_goes else SETTINGS
     try:
-        for level in press_levels(body, HeightField(_plate(spec)), forces[forces > 0], settings=settings):
+        for level in press_levels(body, HeightField(plate_over(spec)), forces[forces > 0], settings=settings):
             area = contact_area(body.bed, level.state.bed.displacement)
             reached.append((level.force_n, area, level.state.indentation))
     except ConvergenceError:
@@ -63,7 +63,7 @@ def glass_mesh(spec, **changes):
     return replace(GLASS_MESH, **changes) if frusta.tip_diameter_mm < frusta.root_diameter_mm else WIDE_TIP_MESH
 
 
-def _plate(spec):
+def plate_over(spec):
     """A rigid plate over the cell, its underside at z = 0."""
     plate = trimesh.creation.box((4 * spec.dielectric.frusta.pitch_mm,) * 2 + (1.0,))
     plate.apply_translation([0, 0, 0.5])

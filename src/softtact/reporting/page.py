@@ -35,7 +35,8 @@ padding:.6em 1em}.reproduced{background:#d9f0d9}.not{background:#f7d7d7}.contrad
 <p class="box"><b>What is synthetic here.</b> {{ synthetic }}</p>
 <h2>Result in one table</h2>{{ summary }}
 <h2>Figures</h2>{% for f in figures %}<figure><img alt="{{ f.caption }}" src="data:image/png;base64,{{ f.data }}">
-<figcaption>{{ f.caption }} <a href="{{ f.link }}">PNG</a>, <a href="{{ f.svg }}">SVG</a></figcaption></figure>{% endfor %}
+<figcaption>{{ f.caption }}
+{{ f.said }} <a href="{{ f.link }}">PNG</a>, <a href="{{ f.svg }}">SVG</a></figcaption></figure>{% endfor %}
 <h2>Tables</h2>{% for t in tables %}<h3>{{ t.title }}</h3>{{ t.html }}<p><a href="{{ t.link }}">CSV</a></p>{% endfor %}
 <h2>The paper's claims</h2><p>Each verdict is computed by the rule beside it.</p>
 <table><tr>{% for c in claim_columns %}<th>{{ c }}</th>
@@ -58,13 +59,14 @@ def render_page(inputs, settings, *, folder):
     tables = [{"title": title, "html": _html(pd.read_csv(inputs[name])), "link": _link(inputs[name], folder)}
               for name, title in titles.items()]
     ftir = read_json(inputs["ftir"])
+    figures = [_figure(path, folder) | {"said": ftir["verdict"] if path.stem == "fig5_ftir" else ""} for path in inputs["figures"]]
     environment = Environment(autoescape=True)
     for table in tables:
         table["html"] = Markup(table["html"])
     return environment.from_string(TEMPLATE).render(
         study=settings["study"], facts=_facts(settings), synthetic=_synthetic(ftir), tables=tables,
         summary=Markup(_html(_summary(pd.read_csv(inputs["ssim"]), pd.read_csv(inputs["ceiling"])))),
-        figures=[_figure(path, folder) for path in inputs["figures"]], claims=claims.to_dict("records"),
+        figures=figures, claims=claims.to_dict("records"),
         claim_columns=list(claims.columns), version=softtact.__version__, machine=machine())
 
 
