@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import record
 
-from softtact.materials.cards import make_card
+from softtact.materials.card_making import make_card
 from softtact.materials.config import load_material
 from softtact.materials.fitting import collect, errors_of, fit_law, rms
 from softtact.materials.laws.registry import make_law

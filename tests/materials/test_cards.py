@@ -9,7 +9,8 @@ from softtact.errors import InputError, OutsideCardWarning
 from softtact.files import write_json
 from softtact.materials.agreement import difference, partings, paths_inside, paths_outside
 from softtact.materials.bulk import bulk_modulus
-from softtact.materials.cards import law_from_card, linear_from_card, load_card, make_card
+from softtact.materials.card_making import make_card
+from softtact.materials.cards import law_from_card, linear_from_card, load_card
 from softtact.materials.consistency import disagreements
 from softtact.materials.curves import VolumetricCurve, synthetic_curve
 from softtact.materials.laws.registry import make_law

@@ -4,8 +4,8 @@ import pytest
 import yaml
 
 from softtact.errors import InputError
-from softtact.materials.cards import printed_warnings
 from softtact.materials.config import law_from_printed, load_material
+from softtact.materials.consistency import printed_warnings
 
 TABLE_1 = {
     ("neoprene", "ogden2"): {"mu1": 0.0027, "alpha1": 8.74091, "mu2": 0.0551, "alpha2": 0.3889},

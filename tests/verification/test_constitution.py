@@ -11,6 +11,7 @@ PARAMETERS = {
     "yeoh": {"c10": 0.18, "c20": -0.01, "c30": 0.004},
     "reduced_polynomial2": {"c10": 0.18, "c20": 0.02},
     "arruda_boyce": {"mu": 0.3, "lambda_m": 2.5},
+    "gent": {"mu": 0.3, "jm": 15.0},
     "ogden1": {"mu1": 0.35, "alpha1": 3.3},
     "ogden2": {"mu1": 0.1351, "alpha1": 1.4538, "mu2": 0.2223, "alpha2": -4.9910},
     "ogden3": {"mu1": 0.4, "alpha1": 1.3, "mu2": 0.003, "alpha2": 5.0, "mu3": 0.02, "alpha3": -2.0},
@@ -27,6 +28,8 @@ def textbook_energy(name, l, p):
     if name.startswith("ogden"):
         terms = [(p[f"mu{k}"], p[f"alpha{k}"]) for k in range(1, int(name[-1]) + 1)]
         return sum(2 * mu / a**2 * ((l**a).sum(axis=1) - 3) for mu, a in terms)
+    if name == "gent":
+        return -p["mu"] * p["jm"] / 2 * np.log1p(-x / p["jm"])
     if name == "arruda_boyce":
         series = [1 / 2, 1 / 20, 11 / 1050, 19 / 7000, 519 / 673750]
         return p["mu"] * sum(c * ((x + 3) ** n - 3**n) / p["lambda_m"] ** (2 * n - 2) for n, c in enumerate(series, start=1))

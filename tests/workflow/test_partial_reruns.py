@@ -57,6 +57,13 @@ def test_an_edit_of_a_materials_law_reruns_the_fits_and_after(finished):
     assert "score_complexity" not in plan
 
 
+def test_an_edit_of_how_laws_are_fitted_plans_the_fits_again(finished):
+    """Snakemake plans what depends on them, too; where the cards come out the same their bytes stop it."""
+    edit_source(finished, "src/softtact/materials/prediction.py")
+    plan = finished.plan()
+    assert "fit_material" in plan and "mesh_sensor" not in plan
+
+
 @pytest.mark.parametrize("stage", ["train_cnn", "search_hyperparameters"])
 def test_an_edit_of_the_networks_code_reruns_learning_and_no_simulation(finished, stage):
     for path in own_files(finished, stage, but_not=["build_dataset", "simulate_press"]):
@@ -69,7 +76,7 @@ def test_an_edit_of_the_networks_code_reruns_learning_and_no_simulation(finished
 @pytest.mark.parametrize("stage", FIGURES)
 def test_an_edit_of_a_figures_code_redraws_that_figure_only(finished, stage):
     others = [figure for figure in FIGURES if figure != stage]
-    own = own_files(finished, stage, but_not=[*others, "report", "make_tables"])
+    own = own_files(finished, stage, but_not=[*others, "report", "make_tables", "fit_material"])
     for path in own:
         edit_source(finished, path)
     assert set(finished.plan()) == {stage, "report"}

@@ -39,7 +39,7 @@ def add(commands):
 
 def _fit(options):
     from softtact.files import write_json
-    from softtact.materials.cards import make_card
+    from softtact.materials.card_making import make_card
     from softtact.materials.readers import read_curves
 
     check_folders(options.out, options.plot)

@@ -7,8 +7,8 @@ import itertools
 
 import numpy as np
 
-from softtact.materials.curves import path_window
 from softtact.materials.laws.base import TEST_PATHS
+from softtact.materials.windows import path_window
 
 THRESHOLD = 0.2     # laws that part by more are named
 MARGIN = 0.1        # "just outside": so much farther, as a share of the window's extent in log stretch

@@ -65,7 +65,7 @@ class MeasuredCurves(_Section):
 
 
 class FitSettings(_Section):
-    """How the laws are fitted; see `softtact.materials.cards.CardOptions`."""
+    """How the laws are fitted; see `softtact.materials.card_making.CardOptions`."""
 
     laws: Literal["all"] | list[str] = "all"
     choose: str = Field("best", description="law for the solvers, or best")

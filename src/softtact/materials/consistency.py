@@ -6,6 +6,8 @@ as large, or five times the stress in compression. Each disagreement becomes a s
 
 import numpy as np
 
+from softtact.materials.laws.registry import make_law
+from softtact.materials.linear import LinearConstants
 from softtact.materials.stability import is_stable
 
 PRINTED = "Printed constants: "    # begins a card's sentences on what a publication prints
@@ -13,6 +15,17 @@ PRINTED = "Printed constants: "    # begins a card's sentences on what a publica
 PROBES = (("uniaxial", 0.5), ("uniaxial", 1.5), ("equibiaxial", 1.3), ("planar", 1.5))
 # Laws fitted to the same curves differ by tens of percent outside them; beyond this factor they are two materials.
 FACTOR = 1.5
+
+
+def printed_warnings(printed, *, bulk_over_shear=20.0):
+    """Sentences on where published constants {law: {"parameters": {...}}} contradict each other."""
+    laws = {
+        name: make_law(name, entry["parameters"], bulk_over_shear=bulk_over_shear)
+        for name, entry in printed.items()
+        if name != "linear"
+    }
+    linear = LinearConstants(**printed["linear"]["parameters"]) if "linear" in printed else None
+    return [f"{PRINTED}{sentence}" for sentence in disagreements(laws, linear=linear)]
 
 
 def disagreements(laws, *, linear=None, factor=FACTOR):

@@ -1,7 +1,7 @@
 """Fit the family of laws to a material's curves and write its card."""
 
 from softtact.files import write_json
-from softtact.materials.cards import make_card
+from softtact.materials.card_making import make_card
 from softtact.materials.config import FitStage, validated
 from softtact.materials.readers import read_curves
 

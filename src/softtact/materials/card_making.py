@@ -1,0 +1,233 @@
+"""A material card made: the family of laws fitted, judged and compared (docs/materials.md)."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from softtact.errors import InputError
+from softtact.materials.agreement import THRESHOLD, differences, partings, paths_inside, paths_outside
+from softtact.materials.bulk import bulk_modulus, poisson_ratio, small_strain_constants
+from softtact.materials.cards import law_of_entry, linear_from_card
+from softtact.materials.checks import refuse_mixed_units
+from softtact.materials.consistency import against_linear, printed_warnings
+from softtact.materials.curves import VOLUMETRIC, common_kind, join_by_mode
+from softtact.materials.fitting import STARTS, FitOptions, fit_law, law_names
+from softtact.materials.linear import LinearConstants, young_modulus
+from softtact.materials.prediction import predict_left_out
+from softtact.materials.stability import SCAN, covers, stable_ranges
+from softtact.materials.windows import principal_window
+from softtact.progress import progress
+
+_SYSTEMATIC = 0.7   # neighbouring residuals so alike are the law's misfit; noise gives 0 +- 1/sqrt(points)
+_NOTABLE = 0.01     # relative error from which that is worth saying
+
+@dataclass(frozen=True)
+class CardOptions:
+    """What a card is made with.
+
+    laws: list of names, or "all"
+    choose: the law that the solvers take, or "best": the first of the ranking
+    bulk_over_shear: K / mu0, for want of a volumetric test
+    poisson: Poisson's ratio of the linear constants; without it, it follows from a volumetric test, or the card has none
+    small_strain: strain up to which E is the slope of the uniaxial curve
+    window: {mode: [min, max]} stretch (volume ratio) to use, all by default
+    residual, weights, nonnegative, starts, seed: see `softtact.materials.fitting.FitOptions`
+    predict_left_out: fit each law also to all modes but one, and tell how it meets that one
+    disagreement: difference of two laws' stresses, as a share, beyond which they are named
+    """
+
+    laws: str | list = "all"
+    choose: str = "best"
+    bulk_over_shear: float = 20.0
+    poisson: float | None = None
+    small_strain: float = 0.1
+    window: dict = field(default_factory=dict)
+    residual: str = "absolute"
+    weights: dict = field(default_factory=dict)
+    nonnegative: bool = False
+    starts: int = STARTS
+    seed: int = 0
+    predict_left_out: bool = True
+    disagreement: float = THRESHOLD
+
+    @property
+    def fit(self):
+        """The part that `FitOptions` takes."""
+        return {name: getattr(self, name) for name in FitOptions.__dataclass_fields__}
+
+
+def make_card(curves, *, material="material", printed=None, **options):
+    """Fit the laws to the curves and return the card as a dict, ready for `write_json`.
+
+    curves: list of `Curve` and `VolumetricCurve`;  options: those of `CardOptions`
+    printed: constants published for the material, {law: {"parameters": {...}}}, checked against each other
+    """
+    options = CardOptions(**options)
+    refuse_mixed_units(curves)
+    curves = _windowed(join_by_mode(curves), options.window)
+    shape = [curve for curve in curves if curve.mode != VOLUMETRIC]
+    volumetric = next((curve for curve in curves if curve.mode == VOLUMETRIC), None)
+    bulk = bulk_modulus(volumetric, bulk_over_shear=options.bulk_over_shear)
+    if not shape:
+        raise InputError("There is only a volumetric curve; give a uniaxial, equibiaxial or planar one for the shape.")
+    fits, entries = {}, {}
+    for name in progress(law_names(options.laws), label="laws"):
+        fits[name] = fit_law(name, shape, **options.fit)
+        entries[name] = _law_entry(fits[name], shape, bulk, options)
+    ranking = sorted(entries, key=lambda name: (not entries[name]["stable_over_data"], entries[name]["aicc"]))
+    chosen = _choose(options.choose, ranking, entries)
+    linear, linear_warnings = _linear_entry(shape, bulk, options)
+    card = {
+        "material": material,
+        "kind": common_kind(curves),
+        "curves": [_curve_entry(curve) for curve in curves],
+        "strain_window": {curve.mode: list(curve.window) for curve in curves},
+        "bulk_source": bulk.source,
+        "chosen": chosen,
+        "ranking": ranking,
+        "laws": entries | linear,
+        "agreement": _agreement(entries, shape),
+        "warnings": [remark for curve in curves for remark in curve.remarks] + [*bulk.warnings],
+    }
+    card["warnings"] += [sentence for name, fit in fits.items() for sentence in _fit_warnings(fit, entries[name])]
+    card["warnings"] += [*_systematic(fits.values())]
+    card["warnings"] += linear_warnings + _consistency_warnings(card, options.disagreement)
+    if printed:
+        card["printed"] = printed
+        card["warnings"] += printed_warnings(printed, bulk_over_shear=options.bulk_over_shear)
+    return card
+
+
+def _windowed(curves, window):
+    """The curves cut to the windows of their modes."""
+    kept = [curve.within(window[curve.mode]) if curve.mode in window else curve for curve in curves]
+    for curve in kept:
+        if len(next(iter(curve.columns.values()))) < 2:
+            raise InputError(f"The window {window[curve.mode]} leaves no {curve.mode} curve; widen it.")
+    return kept
+
+
+def _choose(choose, ranking, entries):
+    """The name of the law to take: never one that is unstable where its data are."""
+    if choose not in (*ranking, "best"):
+        raise InputError(f"Law {choose!r} is to be chosen but is not fitted; choose one of {', '.join(ranking)}.")
+    name = ranking[0] if choose == "best" else choose
+    if not entries[name]["stable_over_data"]:
+        what = "No law" if choose == "best" else f"Law {name} is to be chosen, but it"
+        raise InputError(f"{what} is stable over the strains of these curves ({_ranges(entries[name])}); narrow the window, keep"
+                         f" the constants from being negative (nonnegative), or choose {_stable_names(ranking, entries)}.")
+    return name
+
+
+def _stable_names(ranking, entries):
+    return " or ".join(name for name in ranking if entries[name]["stable_over_data"]) or "other laws"
+
+
+def _curve_entry(curve):
+    points = len(next(iter(curve.columns.values())))
+    return {"mode": curve.mode, "kind": curve.kind, "source": curve.source, "points": points}
+
+
+def _law_entry(fit, curves, bulk, options):
+    """What the card says of one law."""
+    law = fit.make()
+    modulus = bulk.of(law.mu0)
+    low, high = SCAN
+    windows = [curve.window for curve in curves]
+    stable = stable_ranges(law, scan=(min(low, *(w[0] for w in windows)), max(high, *(w[1] for w in windows))))
+    return {
+        "parameters": fit.parameters,
+        "parameter_names": list(fit.parameters),
+        "covariance": _listed(fit.covariance),
+        "correlation": _listed(fit.correlation),
+        "standard_error": None if fit.covariance is None else _named_errors(fit),
+        "not_identifiable": fit.not_identifiable,
+        "rmse_mpa": fit.rmse_mpa,
+        "rmse_by_mode_mpa": fit.rmse_by_mode_mpa,
+        "relative_error": fit.relative_error,
+        "relative_error_by_mode": fit.relative_error_by_mode,
+        "aicc": fit.aicc,
+        "autocorrelation": fit.autocorrelation,
+        "left_out": predict_left_out(fit.law, curves, **options.fit) if options.predict_left_out else {},
+        "mu0_mpa": law.mu0,
+        "bulk_modulus_mpa": modulus,
+        "d_per_mpa": [2 / modulus] if modulus else [],
+        "d_source": bulk.source,
+        "small_strain": small_strain_constants(law.mu0, modulus),
+        "stable_range": stable,
+        "stable_over_data": law.mu0 > 0 and all(covers(stable[curve.mode], curve.window) for curve in curves),
+        "fit": fit.record,
+    }
+
+
+def _listed(matrix):
+    return None if matrix is None else matrix.tolist()
+
+
+def _named_errors(fit):
+    return dict(zip(fit.parameters, np.sqrt(np.diag(fit.covariance)).tolist(), strict=True))
+
+
+def _agreement(entries, curves):
+    """Differences of the laws' stresses within the data and just outside."""
+    windows = {curve.mode: curve.window for curve in curves}
+    laws = {name: law_of_entry(name, entry) for name, entry in entries.items() if entry["mu0_mpa"] > 0}
+    return {"inside": differences(laws, paths_inside(windows)),
+            "outside": differences(laws, paths_outside(principal_window(windows)))}
+
+
+def _linear_entry(curves, bulk, options):
+    """({"linear": entry}, warnings), or ({}, why there is none)."""
+    if options.poisson is None and bulk.modulus_mpa is None:
+        return {}, ["No linear constants: curves do not hold Poisson's ratio, and none was stated (`poisson`), nor a volumetric"
+                    " curve given."]
+    try:
+        young, error, rmse = young_modulus(curves, small_strain=options.small_strain)
+    except InputError as refusal:
+        return {}, [f"No linear constants: {refusal}"]
+    stated = options.poisson is not None
+    linear = LinearConstants(young, options.poisson if stated else poisson_ratio(young, bulk.modulus_mpa))
+    entry = {
+        "parameters": {"young_mpa": young, "poisson": linear.poisson},
+        "young_standard_error_mpa": error,
+        "rmse_mpa": rmse,
+        "mu0_mpa": linear.mu_mpa,
+        "bulk_modulus_mpa": linear.bulk_modulus_mpa,
+        "small_strain": options.small_strain,
+        "poisson_source": "stated in the settings, not fitted: curves of stress against stretch do not hold it" if stated
+        else f"from E and K of the {bulk.source}",
+    }
+    return {"linear": entry}, []
+
+
+def _fit_warnings(fit, entry):
+    """Sentences on constants that the curves do not determine and on instability within the data."""
+    if not entry["mu0_mpa"] > 0:
+        yield f"{fit.law}: the initial shear modulus is {entry['mu0_mpa']:.3g} MPa; do not use this law."
+    if not entry["stable_over_data"]:
+        yield f"{fit.law}: not stable over the whole range of the curves, only at stretches {_ranges(entry)}."
+    if fit.not_identifiable:
+        yield f"{fit.law}: these curves do not determine {', '.join(fit.not_identifiable)} (standard error above 100 %)."
+    if fit.at_bound:
+        yield f"{fit.law}: {', '.join(fit.at_bound)} ended on a bound of the search."
+
+
+def _systematic(fits):
+    """One sentence on the laws whose errors are no noise."""
+    named = [f"{fit.law} ({fit.autocorrelation:.2f})" for fit in fits
+             if fit.autocorrelation > _SYSTEMATIC and fit.relative_error > _NOTABLE]
+    if named:
+        yield (f"The errors of {', '.join(named)} are systematic: neighbours correlate as the numbers say. Their standard errors"
+               " cover noise, not that the law does not follow the material.")
+
+
+def _ranges(entry):
+    return ", ".join(f"{mode} {low:.2f} to {high:.2f}" for mode, (low, high) in entry["stable_range"].items())
+
+
+def _consistency_warnings(card, threshold):
+    """Laws that part from the chosen one, and linear constants that no stable law has."""
+    usable = {name: law_of_entry(name, card["laws"][name]) for name in card["ranking"] if card["laws"][name]["stable_over_data"]}
+    linear = linear_from_card(card) if "linear" in card["laws"] else None
+    parted = partings(card["chosen"], card["agreement"], among=list(usable), threshold=threshold)
+    return [*parted, *against_linear(usable, linear)]
