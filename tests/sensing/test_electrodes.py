@@ -58,6 +58,7 @@ def test_neighbours_guard_all_but_the_edges_on_the_border():
     factor = fringe_factor(SPEC, np.ones((7, 4)), outer=1, inner=0)
     assert (factor[1:-1, 1:-1] == 1).all()
     assert factor[0, 0] == pytest.approx((1 + 0.5 * edge_excess(5.5, 1.0)) * (1 + 0.5 * edge_excess(37 / 7, 1.0)))
+    assert factor == pytest.approx(factor[::-1, ::-1])
     assert factor[0, 1] == pytest.approx(1 + 0.5 * edge_excess(37 / 7, 1.0))
 
 

@@ -44,11 +44,8 @@ def equivalent_air_gap(spec, displacement_mm):
     """Thickness (mm) of air with the same capacitance per area, where the electrode plane moved by `displacement_mm`."""
     d, h = spec.dielectric, spec.dielectric.frusta.height_mm
     moved = np.minimum(displacement_mm, (1 - _LEAST_GAP) * spec.dielectric_thickness_mm)
-    solid = solid_share(d.frusta).mean() * h                       # height of the frusta without air
-    frusta = np.maximum(h - moved, solid)
-    sheet = d.sheet_thickness_mm + np.minimum(h - moved - solid, 0.0)
-    share = np.interp(frusta / h, *_pocket(d.frusta, d.relative_permittivity))
-    return frusta * share + sheet / d.relative_permittivity
+    share = np.interp(1 - moved / h, *_pocket(d.frusta, d.relative_permittivity))     # 1 / eps once no air is left
+    return (h - moved) * share + d.sheet_thickness_mm / d.relative_permittivity
 
 
 def capacitance_per_area(spec, displacement_mm):
