@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from naive_plates import edge_factor
 
 from softtact.geometry.sensor_spec import SensorSpec
 from softtact.sensing.electrodes import coupled, edge_excess, electrode_sides, fringe_factor, taxel_means
@@ -40,7 +41,7 @@ def test_a_spacing_shortens_both_sides_of_an_electrode():
     assert electrode_sides(SPEC, spacing_mm=0.5) == pytest.approx((5.5 - 0.5, 37 / 7 - 0.5))
 
 
-def test_the_field_at_edges_is_palmers():
+def test_the_field_at_the_edges_of_a_strip_is_palmers():
     assert edge_excess(5.0, 1.0) == pytest.approx((1 + np.log(10 * np.pi)) / (5 * np.pi))
     assert edge_excess(5.0, 1e-9) == pytest.approx(0, abs=1e-8)          # close plates have no edges
 
@@ -49,15 +50,22 @@ def test_without_edges_the_fringe_factor_is_one():
     assert (fringe_factor(SPEC, np.ones((7, 4)), outer=0, inner=0) == 1).all()
 
 
-def test_a_taxel_with_free_edges_all_around_is_palmers_rectangle():
+@pytest.mark.parametrize("gap", [0.1, 0.15, 0.2])
+def test_the_edges_of_two_pairs_of_sides_add_up_to_the_field_of_square_plates(gap):
+    field, strip = edge_factor(gap), edge_excess(1.0, gap)
+    assert 1 + 2 * strip == pytest.approx(field, rel=0.02)       # 1.4 % measured; the moments still rise by 0.5 % with their number
+    assert (1 + strip) ** 2 > 1.03 * field                       # Palmer's product: why it was not taken
+
+
+def test_a_taxel_with_free_edges_all_around_has_two_pairs_of_them():
     factor = fringe_factor(SPEC, np.full((7, 4), 0.8), outer=1, inner=1)
-    assert factor == pytest.approx(np.full((7, 4), (1 + edge_excess(5.5, 0.8)) * (1 + edge_excess(37 / 7, 0.8))))
+    assert factor == pytest.approx(np.full((7, 4), 1 + edge_excess(5.5, 0.8) + edge_excess(37 / 7, 0.8)))
 
 
 def test_neighbours_guard_all_but_the_edges_on_the_border():
     factor = fringe_factor(SPEC, np.ones((7, 4)), outer=1, inner=0)
     assert (factor[1:-1, 1:-1] == 1).all()
-    assert factor[0, 0] == pytest.approx((1 + 0.5 * edge_excess(5.5, 1.0)) * (1 + 0.5 * edge_excess(37 / 7, 1.0)))
+    assert factor[0, 0] == pytest.approx(1 + 0.5 * edge_excess(5.5, 1.0) + 0.5 * edge_excess(37 / 7, 1.0))
     assert factor == pytest.approx(factor[::-1, ::-1])
     assert factor[0, 1] == pytest.approx(1 + 0.5 * edge_excess(37 / 7, 1.0))
 

@@ -90,10 +90,10 @@ def test_a_thicker_sheet_is_one_more_capacitor_in_series():
     assert taxel_capacitance(SPEC, np.full(BUMP.shape, 0.1), sheet_excess_mm=excess, settings=FAULTLESS) == pytest.approx(expected)
 
 
-def test_electrodes_apart_with_free_edges_are_palmers_plates():
+def test_electrodes_apart_with_free_edges_are_plates_with_edges():
     alone = VirtualSensorSettings.faultless(electrode_spacing_mm=0.5, outer_fringe=1.0, inner_fringe=1.0)
     sides, gap = (5.0, 37 / 7 - 0.5), SPEC.dielectric_thickness_mm - 0.1
-    edges = np.prod([1 + edge_excess(side, gap) for side in sides])
+    edges = 1 + sum(edge_excess(side, gap) for side in sides)
     expected = EPSILON_0_PF_PER_MM * np.prod(sides) * edges / equivalent_air_gap(SPEC, 0.1)
     assert taxel_capacitance(SPEC, np.full(BUMP.shape, 0.1), settings=alone) == pytest.approx(np.full((7, 4), expected))
 

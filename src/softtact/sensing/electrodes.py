@@ -45,7 +45,7 @@ def electrode_sides(spec, *, spacing_mm=0.0):
 def edge_excess(side_mm, gap_mm):
     """What the field at two opposite edges adds to a plate's capacitance, as a share of it; side and gap in mm, any shape.
 
-    gap / (pi side) (1 + ln(2 pi side / gap)): H. B. Palmer, Trans. AIEE 56 (1937) 363-366, for side > gap
+    gap / (pi side) (1 + ln(2 pi side / gap)): a strip of two equal plates, side > gap; H. B. Palmer, Trans. AIEE 56 (1937) 363-366
     """
     return gap_mm / (np.pi * side_mm) * (1 + np.log(2 * np.pi * side_mm / gap_mm))
 
@@ -53,12 +53,13 @@ def edge_excess(side_mm, gap_mm):
 def fringe_factor(spec, gap_mm, *, spacing_mm=0.0, outer=1.0, inner=0.0):
     """Factors (..., rows, columns) of the taxels' capacitance for gaps (..., rows, columns) in mm.
 
+    The two pairs of edges add up. Palmer multiplies them, which is 3 to 6 % above the field of square plates, the sum 1.5 %.
     outer, inner: share of `edge_excess` that an edge on the sensor's border has, and one with a neighbour (1: as if alone)
     """
     sides = electrode_sides(spec, spacing_mm=spacing_mm)
     along_x = _edge_share(spec.taxels.columns, outer, inner)[None, :]
     along_y = _edge_share(spec.taxels.rows, outer, inner)[:, None]
-    return (1 + along_x * edge_excess(sides[0], gap_mm)) * (1 + along_y * edge_excess(sides[1], gap_mm))
+    return 1 + along_x * edge_excess(sides[0], gap_mm) + along_y * edge_excess(sides[1], gap_mm)
 
 
 def _edge_share(count, outer, inner):
