@@ -87,6 +87,8 @@ def test_assumed_values_and_their_reasons_reach_the_stages_as_plain_numbers():
         ("models.hyperelastic.mesh.refinement", -1, "at 'models.hyperelastic.mesh.refinement' (it is -1)"),
         ("models.hyperelastic.mesh.coarse_walls", "some", "at 'models.hyperelastic.mesh.coarse_walls' (it is 'some')"),
         ("models.hyperelastic.mesh.coarse_wall", True, "there is no key 'coarse_wall'; did you mean 'coarse_walls'?"),
+        ("virtual_sensor", {"noise_counts": -1}, "virtual_sensor: noise_counts is -1.0; give one number of 0 or more."),
+        ("virtual_sensor", {"dead_taxels": [3, 28]}, "virtual_sensor: dead_taxels has 28; the taxels are numbered 0 to 27."),
         ("virtual_sensor", {"noise_count": 1}, "there is no key 'noise_count'; did you mean 'noise_counts'?"),
         ("sensor", "cora", "there is no sensor 'cora'; did you mean 'coro'?"),
         ("materials", ["polyurethane", "neoprene", "rubber"], "there is no material 'rubber'; known: "),

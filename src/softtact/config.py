@@ -28,7 +28,7 @@ from softtact.geometry.sensor_spec import READINGS, SensorSpec
 from softtact.learning.settings import Network, Search, Ssim, Training
 from softtact.materials.config import load_material
 from softtact.materials.laws.registry import LAWS
-from softtact.sensing.virtual_sensor import VirtualSensorSettings
+from softtact.sensing.virtual_sensor import VirtualSensorSettings, make_specimen
 
 PROJECT = Path(__file__).resolve().parents[2]
 SETS = ("indenters", "unseen", "grasps")
@@ -238,7 +238,7 @@ class Values(Section):
     models: dict[Name, Model]
     tested: list[Name] = Field(min_length=1, description="models that a network is trained for")
     reference: Name
-    virtual_sensor: dict[VirtualSensorKey, float]
+    virtual_sensor: dict[VirtualSensorKey, float | list[float]]
     trials: PositiveInt
     dataset: Dataset
     search: Search
@@ -310,6 +310,7 @@ def load_study(values, *, folder="config"):
     _check_forces(checked, spec)
     materials = _materials(checked, spec, Path(folder, "materials"))
     _check_models(checked)
+    make_specimen(spec, seed=checked.seed, settings=VirtualSensorSettings.from_dict(checked.virtual_sensor))
     catalogue = _read_catalogue(Path(checked.objects.catalogue))
     items_of = {name: _items(name, getattr(checked.objects, name), catalogue) for name in SETS}
     return Study(checked, spec, materials, items_of)

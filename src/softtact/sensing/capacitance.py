@@ -1,54 +1,56 @@
-"""From the electrode's displacement to counts of the taxels: plate capacitors in columns over the electrodes.
+"""Capacitance per area between the PCB and the electrode plane where that plane moved towards the PCB.
 
-Per unit area, the air and the solid of the dielectric are capacitors in series: C = eps0 / (gap_air + solid / eps_r).
-The frusta's volume is spread evenly over their height: the compression takes air first, and solid only when no air is left.
+Symbols: h, t height of the frusta and thickness of the sheet above them (mm);  u displacement (mm);  stretch = (h - u) / h
+phi(z) area share of the solid at height z;  eps relative permittivity of the solid (air: 1).
+
+Within the height z solid and air lie side by side, so their permittivities add by area: eps(z) = 1 + (eps - 1) phi(z). Slices over
+one another are capacitors in series: C = eps0 / (integral dz / eps(z) + t / eps).
+That every height is an equipotential makes this an upper bound; straight field lines (columns of air and solid in series, side by
+side) make a lower one (J. W. Strutt, Phil. Trans. 161, 1871; J. C. Maxwell, Treatise, 1873, art. 306 to 308). Why the upper one was
+taken, and how far the field of the cell lies from it: docs/virtual_sensor.md.
+
+The solid keeps its volume. The sheet is confined, so the frusta give all the way: each slice spreads as its height shrinks,
+phi = min(1, k phi at rest), until the pocket between the frusta is full; what then still moves compresses solid.
 """
+
+import functools
 
 import numpy as np
 
+from softtact.sensing.electrodes import taxel_means
+
 EPSILON_0_PF_PER_MM = 8.8541878128e-3
+_LEAST_GAP = 0.02         # of the dielectric's thickness: the plates cannot meet
+_SLICES, _STATES = 400, 2001
 
 
-def layer_heights(spec):
-    """Heights (mm) of air and solid in the dielectric at rest, the frusta's volume spread evenly over their cell."""
-    f = spec.dielectric.frusta
-    r, R = 0.5 * f.tip_diameter_mm, 0.5 * f.root_diameter_mm
-    solid = np.pi * f.height_mm / 3 * (r * r + r * R + R * R) / f.pitch_mm**2
-    return f.height_mm - solid, solid + spec.dielectric.sheet_thickness_mm
+def solid_share(frusta):
+    """Area share phi (slices,) of the solid at the middles of equally thick slices of the frusta at rest, tip first."""
+    height = (np.arange(_SLICES) + 0.5) / _SLICES
+    diameter = frusta.tip_diameter_mm + height * (frusta.root_diameter_mm - frusta.tip_diameter_mm)
+    return np.minimum(0.25 * np.pi * diameter**2 / frusta.pitch_mm**2, 1.0)
+
+
+@functools.lru_cache(maxsize=32)
+def _pocket(frusta, permittivity):
+    """(stretch (states,) rising, mean of 1 / eps(z) (states,)) of the frusta from pulled to twice their height to a full pocket."""
+    phi = solid_share(frusta)
+    k = np.geomspace(0.5, 1 / phi.min(), _STATES)[::-1]
+    spread = np.minimum(1.0, k[:, None] * phi)
+    return phi.mean() / spread.mean(axis=1), (1 / (1 + (permittivity - 1) * spread)).mean(axis=1)
+
+
+def equivalent_air_gap(spec, displacement_mm):
+    """Thickness (mm) of air with the same capacitance per area, where the electrode plane moved by `displacement_mm`."""
+    d, h = spec.dielectric, spec.dielectric.frusta.height_mm
+    moved = np.minimum(displacement_mm, (1 - _LEAST_GAP) * spec.dielectric_thickness_mm)
+    share = np.interp(1 - moved / h, *_pocket(d.frusta, d.relative_permittivity))     # 1 / eps once no air is left
+    return (h - moved) * share + d.sheet_thickness_mm / d.relative_permittivity
 
 
 def capacitance_per_area(spec, displacement_mm):
-    """Capacitance in pF/mm2 where the electrode moved towards the PCB by `displacement_mm` (any shape)."""
-    air, solid = layer_heights(spec)
-    moved = np.clip(displacement_mm, None, 0.98 * (air + solid))   # the plates cannot meet
-    left_air = np.maximum(air - moved, 0.0)
-    left_solid = solid - np.maximum(moved - air, 0.0)
-    return EPSILON_0_PF_PER_MM / (left_air + left_solid / spec.dielectric.relative_permittivity)
-
-
-def taxel_means(spec, field):
-    """Means (..., rows, columns) over the taxels of a field (..., y, x) on the deformation map's grid (trapezoidal rule)."""
-    rows = _averaging(spec.map_y_mm, spec.taxels.rows)
-    columns = _averaging(spec.map_x_mm, spec.taxels.columns)
-    return np.einsum("ry,...yx,cx->...rc", rows, field, columns, optimize=True)
-
-
-def _averaging(grid, count):
-    """Weights (count, grid): the mean of the piecewise linear interpolant over equal parts of the side."""
-    edges = np.linspace(grid[0], grid[-1], count + 1)
-    weights = np.zeros((count, len(grid)))
-    for part, (low, high) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
-        inner = grid[(grid > low) & (grid < high)]
-        nodes = np.concatenate([[low], inner, [high]])
-        share = np.zeros(len(nodes))
-        share[:-1] += 0.5 * np.diff(nodes)
-        share[1:] += 0.5 * np.diff(nodes)
-        for node, weight in zip(nodes, share / (high - low), strict=True):
-            k = min(int(np.searchsorted(grid, node, side="right")) - 1, len(grid) - 2)
-            t = (node - grid[k]) / (grid[k + 1] - grid[k])
-            weights[part, k] += weight * (1 - t)
-            weights[part, k + 1] += weight * t
-    return weights
+    """Capacitance in pF/mm2 where the electrode plane moved towards the PCB by `displacement_mm` (any shape)."""
+    return EPSILON_0_PF_PER_MM / equivalent_air_gap(spec, displacement_mm)
 
 
 def ideal_counts(spec, deformation_map_mm, *, counts_per_relative_change=1000.0, largest=2400.0):

@@ -1,0 +1,88 @@
+"""The electrodes on the PCB: means over them, the field at their edges, what neighbours take from each other."""
+
+import numpy as np
+
+
+def taxel_means(spec, field, *, spacing_mm=0.0, shift_mm=(0.0, 0.0)):
+    """Means (..., rows, columns) over the electrodes of a field (..., y, x) on the deformation map's grid.
+
+    Exact for the field's piecewise linear interpolant, which goes on unchanged beyond the map's edge.
+    spacing_mm: between neighbouring electrodes, each in the middle of its taxel;  shift_mm: (x, y) of the object over the sensor
+    """
+    rows, columns = electrode_weights(spec, spacing_mm=spacing_mm, shift_mm=shift_mm)
+    return np.einsum("ry,...yx,cx->...rc", rows, field, columns, optimize=True)
+
+
+def electrode_weights(spec, *, spacing_mm=0.0, shift_mm=(0.0, 0.0)):
+    """Weights (rows, y) and (columns, x) whose products give the means over electrodes; arguments as for `taxel_means`."""
+    return (_averaging(spec.map_y_mm, spec.taxels.rows, spacing=spacing_mm, shift=shift_mm[1]),
+            _averaging(spec.map_x_mm, spec.taxels.columns, spacing=spacing_mm, shift=shift_mm[0]))
+
+
+def _averaging(grid, count, *, spacing=0.0, shift=0.0):
+    """Weights (count, grid): means over equal parts of the side, each shorter by `spacing`, of what moved by `shift`."""
+    edges = np.linspace(grid[0], grid[-1], count + 1)
+    weights = np.zeros((count, len(grid)))
+    for part, (low, high) in enumerate(zip(edges[:-1] + 0.5 * spacing - shift, edges[1:] - 0.5 * spacing - shift, strict=True)):
+        inner = grid[(grid > low) & (grid < high)]
+        nodes = np.concatenate([[low], inner, [high]])
+        share = np.zeros(len(nodes))
+        share[:-1] += 0.5 * np.diff(nodes)
+        share[1:] += 0.5 * np.diff(nodes)
+        for node, weight in zip(nodes, share / (high - low), strict=True):
+            k = int(np.clip(np.searchsorted(grid, node, side="right") - 1, 0, len(grid) - 2))
+            t = np.clip((node - grid[k]) / (grid[k + 1] - grid[k]), 0.0, 1.0)
+            weights[part, k] += weight * (1 - t)
+            weights[part, k + 1] += weight * t
+    return weights
+
+
+def electrode_sides(spec, *, spacing_mm=0.0):
+    """Sides (x, y) of an electrode in mm."""
+    return (spec.footprint_mm[0] / spec.taxels.columns - spacing_mm, spec.footprint_mm[1] / spec.taxels.rows - spacing_mm)
+
+
+def edge_excess(side_mm, gap_mm):
+    """What the field at two opposite edges adds to a plate's capacitance, as a share of it; side and gap in mm, any shape.
+
+    gap / (pi side) (1 + ln(2 pi side / gap)): a strip of two equal plates, side > gap; H. B. Palmer, Trans. AIEE 56 (1937) 363-366
+    """
+    return gap_mm / (np.pi * side_mm) * (1 + np.log(2 * np.pi * side_mm / gap_mm))
+
+
+def fringe_factor(spec, gap_mm, *, spacing_mm=0.0, outer=1.0, inner=0.0):
+    """Factors (..., rows, columns) of the taxels' capacitance for gaps (..., rows, columns) in mm.
+
+    The two pairs of edges add up. Palmer multiplies them, which is 3 to 6 % above the field of square plates, the sum 1.5 %.
+    outer, inner: share of `edge_excess` that an edge on the sensor's border has, and one with a neighbour (1: as if alone)
+    """
+    sides = electrode_sides(spec, spacing_mm=spacing_mm)
+    along_x = _edge_share(spec.taxels.columns, outer, inner)[None, :]
+    along_y = _edge_share(spec.taxels.rows, outer, inner)[:, None]
+    return 1 + along_x * edge_excess(sides[0], gap_mm) + along_y * edge_excess(sides[1], gap_mm)
+
+
+def _edge_share(count, outer, inner):
+    """Mean share (count,) of the two edges of each electrode in a line."""
+    low, high = np.full(count, float(inner)), np.full(count, float(inner))
+    low[0] = high[-1] = outer
+    return 0.5 * (low + high)
+
+
+def coupled(values, share):
+    """Values (..., rows, columns) after each pair of neighbours in a row or column exchanged `share` of their difference.
+
+    Nothing is lost: the sum stays, a uniform map stays, and what i takes from j is what j takes from i.
+    """
+    out = np.array(values, dtype=float)
+    for axis in (-1, -2):
+        flow = share * np.diff(values, axis=axis)
+        first, last = (_at(axis, slice(None, -1)), _at(axis, slice(1, None)))
+        out[first] += flow
+        out[last] -= flow
+    return out
+
+
+def _at(axis, part):
+    """Index of `part` along one of the last two axes."""
+    return (..., part, slice(None)) if axis == -2 else (..., part)

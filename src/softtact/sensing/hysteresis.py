@@ -1,0 +1,78 @@
+"""Viscoelastic lag of the deformation behind the force, over the history of loading.
+
+Quasi-linear viscoelasticity (Y. C. Fung, Biomechanics, 1993, ch. 7.6) in its creep form, since the press prescribes the force: the
+press' own map u_e(F) is the deformation after a long time under F, and what is felt at time t is
+
+    u(t) = integral of J(t - s) du_e/ds ds,   J(t) = 1 - sum_i g_i exp(-t / tau_i),
+
+J from 1 - sum g_i at once to 1 in the end. A step of force is followed by creep: u rises. (Held at a deformation, the force would
+relax; that is the same material seen from the other side, with other shares and shorter times.)
+Each term keeps the part q_i that has not yet arrived. Where u_e is linear in time its update is exact (Simo and Hughes,
+Computational Inelasticity, 1998, sec. 10.3; Taylor, Pister and Goudreau, 1970):
+
+    q_i(t + dt) = exp(-dt / tau_i) q_i(t) + g_i (u_e(t + dt) - u_e(t)) (1 - exp(-dt / tau_i)) tau_i / dt.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class LoadHistory:
+    """Corners of a history of force that is piecewise linear in time.
+
+    times_s (n,): never falling; two alike are a jump;  level (n,): index of the force level, 0 no force, 1 the first level
+    loading, unloading (levels,): which corner is read, in the order of the levels
+    """
+
+    times_s: np.ndarray
+    level: np.ndarray
+    loading: np.ndarray
+    unloading: np.ndarray
+
+
+def staircase(force_n, *, rate_n_per_s, hold_s, cycles_before=0, rest_s=0.0):
+    """The `LoadHistory` of a press: up the levels (N, rising) and down again, each held and read at the end of its hold.
+
+    cycles_before: to the highest level and back without holds, `rest_s` without force after each;  rate_n_per_s: inf for jumps
+    """
+    count = len(force_n)
+    cycle = [*range(1, count + 1), *range(count - 1, -1, -1), 0]
+    stairs = np.repeat([*range(1, count + 1), *range(count, 0, -1)], 2)
+    level = np.concatenate([[0], np.tile(cycle, cycles_before), stairs]).astype(int)
+    force = np.concatenate([[0.0], force_n])[level]
+    duration = np.abs(np.diff(force)) / rate_n_per_s
+    first = 1 + cycles_before * len(cycle)
+    duration[len(cycle) - 1:first - 1:len(cycle)] = rest_s
+    duration[first::2] = hold_s
+    read = first + 1 + 2 * np.arange(2 * count)
+    return LoadHistory(np.concatenate([[0.0], np.cumsum(duration)]), level, read[:count], read[count:][::-1])
+
+
+def lagged(values, times_s, *, shares, time_constants_s):
+    """What is felt (n, ...) at `times_s` (n,) of elastic values (n, ...), linear between; at the first all has arrived.
+
+    shares, time_constants_s (terms,): g_i and tau_i in s; without terms the values themselves
+    """
+    values = np.asarray(values, dtype=float)
+    out = values.copy()
+    for share, tau in zip(shares, time_constants_s, strict=True):
+        out -= _not_yet_arrived(values, np.diff(times_s) / tau, share)
+    return out
+
+
+def _not_yet_arrived(values, steps, share):
+    """q (n, ...) of one term; steps (n - 1,): durations over its time constant."""
+    late = np.zeros_like(values)
+    for k, step in enumerate(steps):
+        arriving = -np.expm1(-step) / step if step > 0 else 1.0     # mean of exp(-s) over the step
+        late[k + 1] = np.exp(-step) * late[k] + share * arriving * (values[k + 1] - values[k])
+    return late
+
+
+def felt_branches(maps, history, *, shares, time_constants_s):
+    """Maps (levels, ...) felt on the way up and on the way down, for elastic maps (levels, ...) of the same levels."""
+    elastic = np.concatenate([np.zeros((1, *maps.shape[1:])), maps])[history.level]
+    felt = lagged(elastic, history.times_s, shares=shares, time_constants_s=time_constants_s)
+    return felt[history.loading], felt[history.unloading]
