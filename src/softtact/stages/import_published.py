@@ -1,7 +1,7 @@
 """The published archive as press files and readings, with what was found in it.
 
 inputs: files (CSV, for the workflow's sake; `settings.folder` is what is read)
-outputs: presses, tactile (folders), items (JSON), inventory (JSON), counts, odd (CSV)
+outputs: presses, tactile (folders), item_list (JSON), inventory (JSON), counts, odd (CSV)
 settings: folder, variant, models, unseen, taxel_order, odd, largest_odd_share, sensor, seed
 """
 
@@ -41,7 +41,7 @@ def run(*, inputs, outputs, settings, threads=1):
     write_items(outputs, tables, items, sensor=sensor, settings=settings, signs=facts["sign"])
     write_csv(outputs["odd"], tables.odd.table())
     write_csv(outputs["counts"], counts_table(found_counts(tables, items)))
-    write_json(outputs["items"], [{"set": name, "item": item} for name, item in items])
+    write_json(outputs["item_list"], [{"set": name, "item": item} for name, item in items])
     write_json(outputs["inventory"], facts)
 
 
