@@ -52,7 +52,30 @@ def read_archive(archive):
                  for model, of_set in archive.simulated.items()}
     tests = {name: pair(real[name], {model: of_set[name] for model, of_set in simulated.items()}, odd=odd) for name in SETS}
     tests["curved"] = _only_grasped(tests, real["curved"][0], odd)
-    return Tables(real, simulated, tests, odd)
+    tables = Tables(real, simulated, tests, odd)
+    tell_disorder(tables)
+    return tables
+
+
+def tell_disorder(tables):
+    """Tell of tests whose readings fall where their maps deepen: perhaps the two do not match by order. They are kept."""
+    for model in tables.simulated:
+        sign = sign_towards_pcb(tables, model)
+        for name in SETS:
+            for test in tables.tests[name]:
+                follows = order_correlation(sign * tables.maps_mm(model, name, test), tables.readings(name, test))
+                if follows < 0:
+                    table = tables.real[name][0]
+                    tables.odd.keep(table.file, table.line[test.readings[0]], test.path, "the readings do not rise with the maps "
+                                    f"of {SOLVERS[model]} (correlation {follows:.2f}); other order?")
+
+
+def order_correlation(maps, counts):
+    """Correlation over a test's frames of the mean of the map (n, y, x) and of the counts (n, taxel); 1 for fewer than 3 frames."""
+    depth, count = maps.mean(axis=(1, 2), dtype=float), counts.mean(axis=1, dtype=float)
+    if len(maps) < 3 or depth.std() == 0 or count.std() == 0:
+        return 1.0
+    return float(np.corrcoef(depth, count)[0, 1])
 
 
 def _only_grasped(tests, table, odd):
@@ -81,12 +104,12 @@ def items_of(tables, *, unseen):
 
 def sign_towards_pcb(tables, model):
     """+1, or -1 where the archive's maps are mostly negative: ours are positive towards the PCB. Maps in metres are refused."""
-    values = [table.values for table in tables.simulated[model].values()]
-    deepest = max(float(np.nanmax(np.abs(array), initial=0)) for array in values)
-    if deepest < LEAST_DEPTH_MM:
+    of_tests = [tables.maps_mm(model, name, test) for name in SETS for test in tables.tests[name]]
+    deepest = max((float(np.abs(maps).max()) for maps in of_tests), default=0.0)
+    if of_tests and deepest < LEAST_DEPTH_MM:
         raise InputError(f"the maps of {SOLVERS[model]}: none is deeper than {deepest:g} mm, so they may be in metres; "
                          "write them in mm.")
-    return 1 if sum(float(np.nansum(array, dtype=float)) for array in values) >= 0 else -1
+    return 1 if sum(float(maps.sum(dtype=float)) for maps in of_tests) >= 0 else -1
 
 
 def judge_arrangement(tables, *, shape, seed):
