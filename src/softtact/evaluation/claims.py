@@ -6,7 +6,7 @@ import pandas as pd
 from softtact.materials.consistency import PRINTED
 
 REPRODUCED, NOT, CONTRADICTION, ARCHIVE = "reproduced", "not reproduced", "contradicts itself", "needs the archive"
-UNDECIDED = "undecided"
+UNDECIDED, MEASUREMENTS = "undecided", "needs the paper's measurements"
 VIRTUAL = "virtual sensor"      # the source of readings on which the paper's numbers cannot be judged
 CLOSE = 0.05                    # of mean SSIM: what trainings of one network from different seeds and searches may part by, assumed
 COLUMNS = ["claim", "where", "paper", "ours", "verdict", "rule", "evidence"]
@@ -19,7 +19,9 @@ def claims(*, cards, complexity, ftir, ssim, timing, choose, printed_counts, sou
     """
     rows = [*_materials(cards), _ftir(ftir), *_curve_shapes(ftir), *_complexity(complexity, choose, printed_counts),
             *_agreement(ssim, source), *_scores(ssim, source), *_times(timing)]
-    return pd.DataFrame(rows, columns=COLUMNS)
+    frame = pd.DataFrame(rows, columns=COLUMNS)
+    # The archive has maps and readings; stress-strain curves and camera frames of the paper are not in it.
+    return frame if source == VIRTUAL else frame.replace({"verdict": {ARCHIVE: MEASUREMENTS}})
 
 
 def _row(claim, where, paper, ours, verdict, rule, evidence):
