@@ -17,7 +17,7 @@ test: .venv/tested
 	$(BIN)/python -m pytest
 
 bench: .venv/installed
-	for benchmark in fast_models press scaling mesh_error against_calculix discretisation unknowns; do $(BIN)/python benchmarks/$$benchmark.py || exit 1; done
+	for benchmark in fast_models press scaling mesh_error against_calculix discretisation unknowns published_archive; do $(BIN)/python benchmarks/$$benchmark.py || exit 1; done
 
 lint: .venv/tested
 	$(BIN)/ruff check .

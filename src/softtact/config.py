@@ -227,6 +227,7 @@ class Data(Section):
     folder: str = Field("dataset", description="of the archive's CSV files (docs/published_archive.md)")
     variant: str | None = Field(None, description="ending of the files to read, V1 say, where there are several of a kind")
     unseen: list[Name] = Field([], description="the archive's indenters that training never sees, donut_m for its DonutM")
+    without: list[str] = Field([], description="tests, by their Path, and objects, by their item's name, that are not used")
     taxel_order: Arrangement = Field("rows", description="of tax1 to tax28 under the map; the import says which one fits best")
     odd: Literal["leave_out", "refuse"] = Field("leave_out", description="tests that are odd")
     largest_odd_share: Annotated[float, Field(ge=0.0, le=1.0)] = Field(0.1, description="of tests that may be left out")

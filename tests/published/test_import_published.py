@@ -20,7 +20,8 @@ SPLITS = ("train", "validation", "unseen", "grasps")
 def settings_for(folder, **changes):
     sensor = SensorSpec.from_yaml(SENSOR).model_dump(mode="json")
     return {"folder": str(folder), "variant": None, "models": ["elastic", "hyperelastic"], "unseen": ["donut_m"],
-            "taxel_order": "rows", "odd": "leave_out", "largest_odd_share": 0.1, "sensor": sensor, "seed": 5} | changes
+            "without": [], "taxel_order": "rows", "odd": "leave_out", "largest_odd_share": 0.1, "sensor": sensor,
+            "seed": 5} | changes
 
 
 def run_import(folder, results, **changes):
@@ -82,6 +83,16 @@ def test_odd_tests_are_left_out_of_the_files_and_stand_in_the_report(tmp_path):
     (odd,) = pd.read_csv(outputs["odd"]).to_dict("records")
     assert (odd["file"], odd["row"], odd["path"], odd["done"]) == ("Flat_Simulation_Isaac.csv", 2, "CircleG/test_0", "left out")
     assert set(read_dataset(outputs["tactile"] / "indenters/circle_g.nc").path.values) == {"CircleG/test_1"}
+
+
+def test_a_test_and_an_object_may_be_left_aside(tmp_path):
+    folder = Archive().write(tmp_path / "csv")
+    outputs = run_import(folder, tmp_path / "results", without=["Echo/test_0", "big_ball"])
+    assert not (outputs["tactile"] / "grasps/big_ball.nc").exists()
+    assert set(read_dataset(outputs["tactile"] / "indenters/echo.nc").path.values) == {"Echo/test_1"}
+    assert json.loads(outputs["inventory"].read_text())["tests_used"] == 13
+    with pytest.raises(InputError, match="no usable test and no object 'Echoo'"):
+        run_import(folder, tmp_path / "results", without=["Echoo"])
 
 
 def test_a_second_import_leaves_nothing_of_the_first(imported, tmp_path):

@@ -64,6 +64,14 @@ def test_of_several_variants_one_must_be_named(archive, tmp_path):
         find_archive, tmp_path, models=BOTH)
     found = find_archive(tmp_path, models=BOTH, variant="V1")
     assert {file.path.stem.split("_", 3)[3] for file in found.files()} == {"V1"}
+    assert "(it is 'V2')" in refusal(find_archive, tmp_path, models=BOTH, variant="V2")
+
+
+def test_the_shares_folders_may_stay_and_an_ending_that_is_asked_for_must_be_there(archive, tmp_path):
+    archive.write(tmp_path / "Simulations/all", ending="_V1")
+    assert len(find_archive(tmp_path, models=BOTH).files()) == 6
+    said = refusal(find_archive, tmp_path, models=BOTH, variant="V2")
+    assert "Simulations/all/Curved_Real_Abaqus_V1.csv is the only file of its kind" in said
 
 
 def test_a_missing_folder_and_a_missing_kind_are_refused_with_where_to_get_them(archive, tmp_path):

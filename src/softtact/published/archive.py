@@ -60,12 +60,12 @@ def describe(path):
 
 
 def find_archive(folder, *, models, variant=None):
-    """The `Archive` in a folder, with those of the `models` whose simulation files are there.
+    """The `Archive` in a folder and those below it, with those of the `models` whose simulation files are there.
 
     variant: the ending of the files to read ("V1"); None: the only one that is there
     """
     files = _files_in(folder)
-    chosen = {key: _choose(key, [file for file in files if file.stands_for == key], variant)
+    chosen = {key: _choose(folder, [file for file in files if file.stands_for == key], variant)
               for key in sorted({file.stands_for for file in files})}
     real = {name: [chosen[name, "real", solver] for solver in MODELS if (name, "real", solver) in chosen] for name in SETS}
     simulated = {model: {name: chosen[name, "simulation", solver] for name in SETS if (name, "simulation", solver) in chosen}
@@ -79,18 +79,21 @@ def _files_in(folder):
     if not Path(folder).is_dir():
         raise InputError(f"{folder}: there is no such folder; put the archive's CSV files there or correct 'data.folder'. "
                          f"They come from {WHERE}.")
-    return [file for file in map(describe, sorted(Path(folder).iterdir())) if file]
+    return [file for file in map(describe, sorted(Path(folder).rglob("*.*"))) if file]
 
 
-def _choose(key, files, variant):
-    """The one file of its kind to be read: the only one, or that of the `variant`."""
-    if len(files) == 1:
-        return files[0]
-    of_variant = [file for file in files if file.variant.lower() == (variant or "").lower()]
-    if variant is None or len(of_variant) != 1:
-        raise InputError(f"{files[0].path.parent}: {' and '.join(file.path.name for file in files)} are files of one kind; name "
-                         f"the one to read by its ending in 'data.variant' (it is {variant!r}), or take the others away.")
-    return of_variant[0]
+def _choose(folder, files, variant):
+    """The one file of its kind to be read: that of the `variant`, or else the only one, if it has no other ending."""
+    wanted = (variant or "").lower()
+    matching = [file for file in files if file.variant.lower() == wanted] if variant is not None else files
+    if not matching and len(files) == 1 and not files[0].variant:
+        matching = files
+    if len(matching) != 1:
+        names = " and ".join(str(file.path.relative_to(folder)) for file in files)
+        found = "are files of one kind" if len(files) > 1 else "is the only file of its kind"
+        raise InputError(f"{folder}: {names} {found}; name the one to read by its ending in 'data.variant' "
+                         f"(it is {variant!r}), or take the others away.")
+    return matching[0]
 
 
 def _check_complete(folder, real, simulated, models):

@@ -87,8 +87,12 @@ def _only_grasped(tests, table, odd):
     return [test for test in tests["curved"] if test.object not in indenters]
 
 
-def items_of(tables, *, unseen):
-    """{(set, item): tests}: an item is an object with all its tests.  unseen: indenters that training must not see."""
+def items_of(tables, *, unseen, without=()):
+    """{(set, item): tests}: an item is an object with all its tests.
+
+    unseen: indenters that training must not see;  without: paths of tests, or objects, that are not used
+    """
+    _check_known(tables, without)
     known = sorted({test.object for test in tables.tests["flat"]})
     for name in unseen:
         if name not in known:
@@ -97,9 +101,19 @@ def items_of(tables, *, unseen):
     items = {}
     for set_name in SETS:
         for test in tables.tests[set_name]:
+            if {test.path, test.object} & set(without):
+                continue
             name = "grasps" if set_name == "curved" else "unseen" if test.object in unseen else "indenters"
             items.setdefault((name, test.object), []).append((set_name, test))
     return items
+
+
+def _check_known(tables, without):
+    every = [test for tests in tables.tests.values() for test in tests]
+    for name in without:
+        if name not in {test.path for test in every} | {test.object for test in every}:
+            raise InputError(f"the configuration, at 'data.without': the archive has no usable test and no object "
+                             f"{name!r}; correct it.")
 
 
 def sign_towards_pcb(tables, model):

@@ -2,7 +2,7 @@
 
 inputs: files (CSV, for the workflow's sake; `settings.folder` is what is read)
 outputs: presses, tactile (folders), item_list (JSON), inventory (JSON), counts, odd (CSV)
-settings: folder, variant, models, unseen, taxel_order, odd, largest_odd_share, sensor, seed
+settings: folder, variant, models, unseen, without, taxel_order, odd, largest_odd_share, sensor, seed
 """
 
 import shutil
@@ -36,7 +36,7 @@ def run(*, inputs, outputs, settings, threads=1):
     tell(tables.odd)
     tests = sum(map(len, tables.paths().values()))
     tables.odd.refuse(tests, odd=settings["odd"], largest_share=settings["largest_odd_share"])
-    items = items_of(tables, unseen=settings["unseen"])
+    items = items_of(tables, unseen=settings["unseen"], without=settings["without"])
     facts = inventory(tables, items, tests=tests, sensor=sensor, settings=settings)
     write_items(outputs, tables, items, sensor=sensor, settings=settings, signs=facts["sign"])
     write_csv(outputs["odd"], tables.odd.table())
@@ -72,7 +72,7 @@ def inventory(tables, items, *, tests, sensor, settings):
         announce(f"the taxels' order is set to {chosen!r}, and readings follow the maps better as {best!r} (correlation "
                  f"{matches[best]:.2f} over {matches[chosen]:.2f}); consider 'data.taxel_order: {best}'")
     return {"files": files_table(tables), "found": found, "sentence": sentence, "tests": tests,
-            "tests_used": sum(map(len, tables.tests.values())), "tests_left_out": len(tables.odd.left_out()),
+            "tests_used": sum(map(len, items.values())), "tests_left_out": len(tables.odd.left_out()),
             "items": {name: sorted(item for of_set, item in items if of_set == name) for name in ("indenters", "unseen", "grasps")},
             "sign": {model: sign_towards_pcb(tables, model) for model in tables.simulated},
             "taxel_order": {"read_as": chosen, "best": best, "correlation": matches}}
