@@ -198,10 +198,11 @@ def test_readings_above_the_papers_scale_are_kept_and_told(archive, tmp_path):
     assert len(tables.tests["flat"]) == 12
 
 
-def test_readings_beside_isaacs_maps_must_be_the_same(archive, tmp_path):
+@pytest.mark.parametrize("column", ["force", "tax11"])
+def test_readings_beside_isaacs_maps_must_be_the_same(archive, tmp_path, column):
     folder = archive.write(tmp_path)
     other = archive.real["Flat"].copy()
-    other.loc[7, "force"] = 33.0
+    other.loc[7, column] += 3.0
     other.to_csv(folder / "Flat_Real_Issac.csv", index=False)
     (finding,) = read(folder).odd.findings
     assert (finding.path, finding.done) == ("CircleG/test_1", "left out") and "other readings" in finding.what
