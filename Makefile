@@ -17,7 +17,8 @@ test: .venv/tested
 	$(BIN)/python -m pytest
 
 bench: .venv/installed
-	for benchmark in fast_models press scaling mesh_error against_calculix discretisation unknowns virtual_sensor; do $(BIN)/python benchmarks/$$benchmark.py || exit 1; done
+	for benchmark in fast_models press scaling mesh_error against_calculix discretisation unknowns materials discs glass_mesh glass_edge \
+		virtual_sensor published_archive; do $(BIN)/python benchmarks/$$benchmark.py || exit 1; done
 
 lint: .venv/tested
 	$(BIN)/ruff check .

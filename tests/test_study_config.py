@@ -82,6 +82,11 @@ def test_assumed_values_and_their_reasons_reach_the_stages_as_plain_numbers():
     [
         ("forces_nn", [5], "there is no key 'forces_nn'; did you mean 'forces_n'?"),
         ("ftir.camera.pixel_m", 1, "there is no key 'pixel_m'; did you mean 'pixel_mm'?"),
+        ("data.sorce", "published", "at 'data': there is no key 'sorce'; did you mean 'source'?"),
+        ("data", {"source": "publishd"}, "at 'data.source' (it is 'publishd')"),
+        ("data", {"source": "published"}, "'unseen' is empty; name indenters of the archive that training must not see"),
+        ("data", {"source": "published", "unseen": ["a"], "folder": "no/such"}, "no/such: there is no such folder; put the"),
+        ("data.taxel_order", "row", "there is no arrangement 'row'; did you mean 'rows'?"),
         ("training.epoch", 3, "at 'training': there is no key 'epoch'; did you mean 'epochs'?"),
         ("models.hyperelastic.mesh", {"sheet_layer": 1}, "there is no key 'sheet_layer'; did you mean 'sheet_layers'?"),
         ("models.hyperelastic.mesh.refinement", -1, "at 'models.hyperelastic.mesh.refinement' (it is -1)"),

@@ -28,6 +28,9 @@ from softtact.geometry.sensor_spec import READINGS, SensorSpec
 from softtact.learning.settings import Network, Search, Ssim, Training
 from softtact.materials.config import load_material
 from softtact.materials.laws.registry import LAWS
+from softtact.published.archive import SOURCE as PUBLISHED
+from softtact.published.archive import Archive, find_archive
+from softtact.published.arrangement import ARRANGEMENTS
 from softtact.sensing.virtual_sensor import VirtualSensorSettings, make_specimen
 
 PROJECT = Path(__file__).resolve().parents[2]
@@ -66,6 +69,7 @@ Forces = Annotated[list[PositiveFloat], Field(min_length=1), AfterValidator(_ris
 ForcesFromZero = Annotated[list[NotNegative], Field(min_length=1), AfterValidator(_rising)]
 Law = _one_of(LAWS, kind="law")
 Reading = _one_of(READINGS, kind="reading")
+Arrangement = _one_of(ARRANGEMENTS, kind="arrangement")
 VirtualSensorKey = _one_of(VirtualSensorSettings.__dataclass_fields__, kind="key")
 Six = Annotated[list[float], Field(min_length=6, max_length=6)]
 
@@ -216,6 +220,25 @@ class Model(Section):
         return ["frustum_law", "card_dielectric", "card_cover"] if self.kind == "foundation" else []
 
 
+class Data(Section):
+    """Where maps and readings come from: presses and the virtual sensor, or the archive that the paper's authors published."""
+
+    source: Literal["generated", "published"] = "generated"
+    folder: str = Field("dataset", description="of the archive's CSV files (docs/published_archive.md)")
+    variant: str | None = Field(None, description="ending of the files to read, V1 say, where there are several of a kind")
+    unseen: list[Name] = Field([], description="the archive's indenters that training never sees, donut_m for its DonutM")
+    without: list[str] = Field([], description="tests, by their Path, and objects, by their item's name, that are not used")
+    taxel_order: Arrangement = Field("rows", description="of tax1 to tax28 under the map; the import says which one fits best")
+    odd: Literal["leave_out", "refuse"] = Field("leave_out", description="tests that are odd")
+    largest_odd_share: Annotated[float, Field(ge=0.0, le=1.0)] = Field(0.1, description="of tests that may be left out")
+
+    @model_validator(mode="after")
+    def _has_unseen_indenters(self):
+        if self.source == "published" and not self.unseen:
+            raise ValueError("'unseen' is empty; name indenters of the archive that training must not see")
+        return self
+
+
 class Dataset(Section):
     """How samples are made and split."""
 
@@ -240,6 +263,7 @@ class Values(Section):
     reference: Name
     virtual_sensor: dict[VirtualSensorKey, float | list[float]]
     trials: PositiveInt
+    data: Data = Data()
     dataset: Dataset
     search: Search
     training: Training
@@ -266,12 +290,24 @@ class Study:
 
     values: the configuration;  spec: the sensor
     materials: {name: MaterialConfig};  items_of: {set: {id: Item}} in the order of the configuration
+    archive: the published files that maps and readings come from, or None where they are generated
     """
 
     values: Values
     spec: SensorSpec
     materials: dict
     items_of: dict
+    archive: Archive | None = None
+
+    @property
+    def tested(self):
+        """The models that a network is trained for: of an archive, those whose simulations are there."""
+        return list(self.archive.simulated) if self.archive else self.values.tested
+
+    @property
+    def source(self):
+        """What the readings are from, in words."""
+        return PUBLISHED if self.archive else "virtual sensor"
 
     @property
     def name(self):
@@ -313,7 +349,14 @@ def load_study(values, *, folder="config"):
     make_specimen(spec, seed=checked.seed, settings=VirtualSensorSettings.from_dict(checked.virtual_sensor))
     catalogue = _read_catalogue(Path(checked.objects.catalogue))
     items_of = {name: _items(name, getattr(checked.objects, name), catalogue) for name in SETS}
-    return Study(checked, spec, materials, items_of)
+    return Study(checked, spec, materials, items_of, _archive(checked))
+
+
+def _archive(values):
+    """The published files that the study reads, or None."""
+    if values.data.source == "generated":
+        return None
+    return find_archive(values.data.folder, models=values.tested, variant=values.data.variant)
 
 
 def _validated(model, values, *, where):

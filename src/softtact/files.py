@@ -29,6 +29,11 @@ def atomic_path(path):
         temporary.unlink(missing_ok=True)
 
 
+def files_below(paths, *, suffix):
+    """The files of a list, or of a folder and all below it, sorted."""
+    return paths if isinstance(paths, list) else sorted(Path(paths).rglob(f"*{suffix}"))
+
+
 def digest(obj):
     """Short, stable digest (16 hex digits) of a JSON-like object."""
     text = json.dumps(obj, sort_keys=True, separators=(",", ":"), default=str)

@@ -120,3 +120,10 @@ def test_the_times_summary_adds_solver_and_network():
     timing = pd.DataFrame({"model": "elastic", "solver_s": [1.0, 3.0], "network_s": [0.5, 0.5]})
     row = summarise_times(timing).iloc[0]
     assert (row.maps, row["mean"], row["min"], row["max"]) == (2, 2.5, 1.5, 3.5) and row.sd == pytest.approx(2**0.5)
+
+
+def test_one_trial_at_the_same_force_twice_is_no_repetition():
+    samples = make_samples(trials=2, noise=30)
+    same = Samples(samples.maps_mm, samples.counts, samples.labels.assign(trial=0), samples.model, samples.split, samples.source)
+    assert len(score_sensor(samples, ssim=SSIM)) == 4
+    assert len(score_sensor(same, ssim=SSIM)) == 0

@@ -174,6 +174,13 @@ def test_what_cannot_be_used_is_refused_in_one_sentence(study, fault, sentence):
         build(study)
 
 
+def test_maps_of_zeros_before_the_touch_are_no_leak(study):
+    for press in study.presses.values():
+        press.deformation_map_mm.values[0] = 0
+    datasets, _ = build(study)
+    assert len(datasets["elastic", "grasps"].sample) == 9
+
+
 @pytest.mark.parametrize("changes", [{"train_fraction": 1.0}, {"training_trials": "some"}])
 def test_a_wrong_setting_is_refused_with_its_name(study, changes):
     with pytest.raises(InputError, match=f"{next(iter(changes))} is "):

@@ -88,6 +88,28 @@ def test_the_better_model_is_named_where_the_difference_is_clear(gain, expected)
     assert verdict(table(ssim=scores(gain)), "On grasped objects the hyperelastic") == expected
 
 
+def test_the_papers_numbers_are_judged_on_its_own_readings_only():
+    ssim = scores(0.12)                                    # 0.72 and 0.60 on every set
+    name = "SSIM of the hyperelastic model on grasps"
+    assert verdict(table(ssim=ssim), name) == "needs the archive"
+    frame = table(ssim=ssim, source="published archive", cards=[card(kind="synthetic")])
+    assert verdict(frame, name) == verdict(frame, "SSIM of the elastic model on grasps") == "reproduced"
+    assert verdict(frame, "SSIM of the hyperelastic model on validation") == "not reproduced"
+    assert verdict(frame, "Best object of the hyperelastic model") == "not reproduced"
+    assert verdict(frame, "rubber: the fit's RMSE") == "needs the paper's measurements"
+    assert not frame.ours.str.contains("virtual sensor").any()
+    assert frame.loc[name].ours == "0.72 over 5 maps, published archive"
+
+
+def test_an_archive_with_one_models_maps_leaves_comparisons_undecided():
+    ssim = scores(0.1)
+    nothing = pd.DataFrame(columns=["model", "item", "set", "force_n", "solver_s", "network_s"])
+    frame = table(ssim=ssim[ssim.model == "hyperelastic"], timing=nothing, source="published archive")
+    for start in ("SSIM of the elastic model on grasps", "Best object of the elastic", "On grasped objects the hyperelastic",
+                  "On smooth objects", "The hyperelastic model costs", "A hyperelastic map takes"):
+        assert verdict(frame, start) == "undecided"
+
+
 def test_two_objects_decide_nothing():
     few = scores(0.1, items=("object_1", "object_5"))
     frame = table(ssim=few)
@@ -108,6 +130,11 @@ def test_table_2_gives_the_six_printed_choices_beside_ours():
     printed = frame[frame.source == "paper"]
     assert len(printed) == 6 and (printed.model == printed.model_in_paper).all()
     assert list(frame[frame.source == "ours"].object) == ["mine"]
+
+
+def test_table_3_holds_the_papers_times_where_nothing_was_pressed():
+    frame = table3_timing(pd.DataFrame(columns=["model", "item", "set", "force_n", "solver_s", "network_s"]))
+    assert list(frame.source) == ["paper", "paper"] and list(frame.mean_s) == [37.4, 162.1]
 
 
 def test_table_3_sums_solver_and_network():

@@ -122,6 +122,14 @@ def presses(models):
     return [f"{RESULTS}/presses/{item.set}/{item.id}/{model}.nc" for model in models for item in STUDY.items()]
 
 
+def samples_of():
+    """What data sets are built from, as inputs: a file for each press and reading, or what the archive was turned into."""
+    if STUDY.archive:
+        return {name: f"{RESULTS}/{name}" for name in ("presses", "tactile")} | {"item_list": f"{RESULTS}/published/items.json"}
+    tactile = [f"{RESULTS}/tactile/{item.set}/{item.id}.nc" for item in STUDY.items()]
+    return {"presses": presses(STUDY.tested), "tactile": tactile}
+
+
 HELD = []  # open as long as this process lives
 
 

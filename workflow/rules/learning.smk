@@ -5,23 +5,22 @@ SPLITS = ("train", "validation", "unseen", "grasps")
 
 def dataset(split):
     """A split's files, one per tested model."""
-    return [f"{RESULTS}/dataset/{model}/{split}.nc" for model in STUDY.values.tested]
+    return [f"{RESULTS}/dataset/{model}/{split}.nc" for model in STUDY.tested]
 
 
 
 rule build_dataset:
     input:
         code=code("build_dataset"),
-        presses=presses(STUDY.values.tested),
-        tactile=[f"{RESULTS}/tactile/{item.set}/{item.id}.nc" for item in STUDY.items()],
+        **samples_of(),
     output:
         **{split: dataset(split) for split in SPLITS},
         manifest=f"{RESULTS}/dataset/manifest.csv",
     params:
         files=files,
         settings=as_settings(
-            models=STUDY.values.tested,
-            items=[{"set": item.set, "item": item.id} for item in STUDY.items()],
+            models=STUDY.tested,
+            **({} if STUDY.archive else {"items": [{"set": item.set, "item": item.id} for item in STUDY.items()]}),
             **plain(STUDY.values.dataset),
             seed=STUDY.values.seed,
         ),
@@ -89,11 +88,11 @@ rule train_cnn:
 rule evaluate:
     input:
         code=code("evaluate"),
-        networks=[f"{RESULTS}/learning/{model}/model.pt" for model in STUDY.values.tested],
+        networks=[f"{RESULTS}/learning/{model}/model.pt" for model in STUDY.tested],
         validation=dataset("validation"),
         unseen=dataset("unseen"),
         grasps=dataset("grasps"),
-        presses=presses(STUDY.values.tested),
+        **({} if STUDY.archive else {"presses": presses(STUDY.tested)}),
     output:
         ssim=f"{RESULTS}/evaluation/ssim.csv",
         ceiling=f"{RESULTS}/evaluation/ceiling.csv",

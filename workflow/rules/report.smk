@@ -2,7 +2,8 @@
 
 GRASPS = list(STUDY.items_of["grasps"].values())
 GRASP_UNITS = {item.id: item.unit for item in GRASPS}
-FIGURES = ("fig4_complexity", "fig5_ftir", "fig6_ssim", "fig7_maps", "fig8_policies")
+FROM_PRESSES = () if STUDY.archive else ("fig7_maps", "fig8_policies")     # an archive has no press of our objects
+FIGURES = ("fig4_complexity", "fig5_ftir", "fig6_ssim", *FROM_PRESSES)
 
 
 def figure_files(name):
@@ -26,7 +27,7 @@ rule make_tables:
         claims=f"{RESULTS}/tables/claims.csv",
     params:
         files=files,
-        settings=as_settings(**plain(STUDY.values.complexity)),
+        settings=as_settings(**plain(STUDY.values.complexity), source=STUDY.source),
     log:
         log_of("make_tables"),
     benchmark:
@@ -116,7 +117,7 @@ rule draw_fig7_maps:
         predictions=rules.evaluate.output.predictions,
         complexity=rules.score_complexity.output.table,
         objects=[item.file for item in GRASPS],
-        presses=[f"{RESULTS}/presses/grasps/{item.id}/{model}.nc" for item in GRASPS for model in STUDY.values.tested],
+        presses=[f"{RESULTS}/presses/grasps/{item.id}/{model}.nc" for item in GRASPS for model in STUDY.tested],
     output:
         **figure_files("fig7_maps"),
     params:
@@ -159,7 +160,11 @@ rule report:
         ssim=rules.evaluate.output.ssim,
         ceiling=rules.evaluate.output.ceiling,
         ftir=rules.validate_ftir.output.summary,
-        policies=rules.compare_policies.output.policies,
+        **(
+            {"inventory": rules.import_published.output.inventory, "counts": rules.import_published.output.counts}
+            if STUDY.archive
+            else {"policies": rules.compare_policies.output.policies}
+        ),
         figures=[
             *(f"{RESULTS}/figures/material_{name}.png" for name in STUDY.values.materials),
             *(figure_files(name)["png"] for name in FIGURES),

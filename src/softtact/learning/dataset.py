@@ -128,15 +128,19 @@ def check_splits(levels):
 
 
 def check_no_map_leaks(levels, presses, models):
-    """Refuse a test whose deformation map is one of the training set: the same shape under two names."""
+    """Refuse a test whose deformation map is one of the training set: the same shape under two names.
+
+    A map of zeros, before an object touches, is every object's and tells nothing.
+    """
     usable = levels[levels.usable]
     for model in models:
         owners = {}
         for row in usable[usable["set"] == TRAINING_SET].itertuples():
             owners[_map_of(presses, model, row).tobytes()] = row.item
         for row in usable[usable["set"] != TRAINING_SET].itertuples():
-            owner = owners.get(_map_of(presses, model, row).tobytes())
-            if owner is not None:
+            own = _map_of(presses, model, row)
+            owner = owners.get(own.tobytes())
+            if owner is not None and own.any():
                 raise InputError(f"{row.set}/{row.item}: its deformation map at {row.force_n:g} N is that of the "
                                  f"training indenter {owner}; leave one of the two out.")
 

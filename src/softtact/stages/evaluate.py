@@ -1,6 +1,7 @@
 """Scores and times of all networks.
 
-inputs: networks (one per model), validation, unseen, grasps (one per model each), presses (of the models, for times)
+inputs: networks (one per model), validation, unseen, grasps (one per model each),
+    presses (of the models, for times; an archive has none)
 outputs: ssim, ceiling, timing (CSV), predictions (NetCDF);  settings: ssim, seed
 """
 
@@ -30,5 +31,5 @@ def run(*, inputs, outputs, settings, threads=1):
     write_csv(outputs["ceiling"], pd.concat(ceilings))
     write_dataset(outputs["predictions"], predict_grasps(networks, splits["grasps"]), seed=settings.get("seed"),
                   settings=settings)
-    presses = (read_dataset(path) for path in inputs["presses"])
+    presses = (read_dataset(path) for path in inputs.get("presses", ()))
     write_csv(outputs["timing"], time_presses(presses, networks, predict=predict))

@@ -1,7 +1,7 @@
 """Tables 1 to 3 and the claims.
 
 inputs: cards (list), complexity, ftir, ssim, timing;  outputs: table1, contradictions, table2, table3, claims
-settings: rule, thresholds {total, overlap}
+settings: rule, thresholds {total, overlap}, source (of the readings)
 """
 
 import pandas as pd
@@ -25,4 +25,5 @@ def run(*, inputs, outputs, settings, threads=1):
     write_csv(outputs["table2"], table2_complexity(complexity, choose))
     write_csv(outputs["table3"], table3_timing(timing))
     write_csv(outputs["claims"], claims(cards=cards, complexity=complexity, ftir=read_json(inputs["ftir"]), ssim=ssim,
-                                        timing=timing, choose=choose, printed_counts=PRINTED_COUNTS))
+                                        timing=timing, choose=choose, printed_counts=PRINTED_COUNTS,
+                                        source=settings["source"]))

@@ -1,0 +1,190 @@
+"""The archive as the files that data sets are built from: per object, maps of each model and the readings that belong to them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray
+
+from softtact.errors import InputError
+from softtact.published.archive import MODELS, SETS, SOURCE
+from softtact.published.arrangement import ARRANGEMENTS, arrange, correlations
+from softtact.published.odd import Odd
+from softtact.published.pairing import MAP_COLUMNS, MAP_ROWS, TAXELS, object_name, pair
+from softtact.published.table import read_table
+
+SOLVERS = {model: solver.capitalize() for solver, model in MODELS.items()}
+COUNTED_AS = {"indenters": "real maps of indenters to train on", "unseen": "real maps of unseen indenters",
+              "grasps": "real maps of objects"}
+SAMPLED = 500               # maps that the taxels' arrangement is judged on
+LEAST_DEPTH_MM = 0.005      # an archive without any deeper map is taken for one in metres
+
+
+@dataclass(frozen=True)
+class Tables:
+    """What was read. real {set: [table, ...]};  simulated {model: {set: table}};  tests {set: [PairedTest, ...]};  odd"""
+
+    real: dict
+    simulated: dict
+    tests: dict
+    odd: Odd
+
+    def maps_mm(self, model, set_name, test):
+        """Maps (n, y, x) of a test, as the file has them."""
+        return self.simulated[model][set_name].values[test.maps[model]].reshape(-1, MAP_ROWS, MAP_COLUMNS)
+
+    def readings(self, set_name, test):
+        """Counts (n, taxel) of a test."""
+        return self.real[set_name][0].values[test.readings]
+
+    def paths(self):
+        """All tests of a set, usable or not: {set: [path, ...]}."""
+        return {name: list(dict.fromkeys(path for table in self._of_set(name) for path in table.paths)) for name in SETS}
+
+    def _of_set(self, name):
+        return [*self.real[name], *(of_set[name] for of_set in self.simulated.values())]
+
+
+def read_archive(archive):
+    """The `Tables` of an `Archive`, paired and checked."""
+    odd = Odd()
+    real = {name: [read_table(file.path, columns=TAXELS, force=True, odd=odd) for file in archive.real[name]] for name in SETS}
+    simulated = {model: {name: read_table(file.path, columns=MAP_COLUMNS, force=False, odd=odd) for name, file in of_set.items()}
+                 for model, of_set in archive.simulated.items()}
+    tests = {name: pair(real[name], {model: of_set[name] for model, of_set in simulated.items()}, odd=odd) for name in SETS}
+    tests["curved"] = _only_grasped(tests, real["curved"][0], odd)
+    tables = Tables(real, simulated, tests, odd)
+    tell_disorder(tables)
+    return tables
+
+
+def tell_disorder(tables):
+    """Tell of tests whose readings fall where their maps deepen: perhaps the two do not match by order. They are kept."""
+    for model in tables.simulated:
+        sign = sign_towards_pcb(tables, model)
+        for name in SETS:
+            for test in tables.tests[name]:
+                follows = order_correlation(sign * tables.maps_mm(model, name, test), tables.readings(name, test))
+                if follows < 0:
+                    table = tables.real[name][0]
+                    tables.odd.keep(table.file, table.line[test.readings[0]], test.path, "the readings do not rise with the maps "
+                                    f"of {SOLVERS[model]} (correlation {follows:.2f}); other order?")
+
+
+def order_correlation(maps, counts):
+    """Correlation over a test's frames of the mean of the map (n, y, x) and of the counts (n, taxel); 1 for fewer than 3 frames."""
+    depth, count = maps.mean(axis=(1, 2), dtype=float), counts.mean(axis=1, dtype=float)
+    if len(maps) < 3 or depth.std() == 0 or count.std() == 0:
+        return 1.0
+    return float(np.corrcoef(depth, count)[0, 1])
+
+
+def _only_grasped(tests, table, odd):
+    """The grasps of objects that are not among the indenters too, which training sees."""
+    indenters = {test.object for test in tests["flat"]}
+    for test in tests["curved"]:
+        if test.object in indenters:
+            odd.leave_out(table.file, table.line[test.readings[0]], test.path, "its object stands among the indenters too")
+    return [test for test in tests["curved"] if test.object not in indenters]
+
+
+def items_of(tables, *, unseen, without=()):
+    """{(set, item): tests}: an item is an object with all its tests.
+
+    unseen: indenters that training must not see;  without: paths of tests, or objects, that are not used
+    """
+    _check_known(tables, without)
+    known = sorted({test.object for test in tables.tests["flat"]})
+    for name in unseen:
+        if name not in known:
+            raise InputError(f"the configuration, at 'data.unseen': no usable test of the archive is of an indenter {name!r}; "
+                             f"name some of {', '.join(known) or 'none'}.")
+    items = {}
+    for set_name in SETS:
+        for test in tables.tests[set_name]:
+            if {test.path, test.object} & set(without):
+                continue
+            name = "grasps" if set_name == "curved" else "unseen" if test.object in unseen else "indenters"
+            items.setdefault((name, test.object), []).append((set_name, test))
+    return items
+
+
+def _check_known(tables, without):
+    every = [test for tests in tables.tests.values() for test in tests]
+    for name in without:
+        if name not in {test.path for test in every} | {test.object for test in every}:
+            raise InputError(f"the configuration, at 'data.without': the archive has no usable test and no object "
+                             f"{name!r}; correct it.")
+
+
+def sign_towards_pcb(tables, model):
+    """+1, or -1 where the archive's maps are mostly negative: ours are positive towards the PCB. Maps in metres are refused."""
+    of_tests = [tables.maps_mm(model, name, test) for name in SETS for test in tables.tests[name]]
+    deepest = max((float(np.abs(maps).max()) for maps in of_tests), default=0.0)
+    if of_tests and deepest < LEAST_DEPTH_MM:
+        raise InputError(f"the maps of {SOLVERS[model]}: none is deeper than {deepest:g} mm, so they may be in metres; "
+                         "write them in mm.")
+    return 1 if sum(float(maps.sum(dtype=float)) for maps in of_tests) >= 0 else -1
+
+
+def judge_arrangement(tables, *, shape, seed):
+    """{arrangement: correlation} over a sample of all usable maps of the first model."""
+    model = next(iter(tables.simulated))
+    pairs = [(name, test) for name in SETS for test in tables.tests[name]]
+    chosen = np.random.default_rng([seed, 28]).permutation(len(pairs))
+    maps, counts, size = [], [], 0
+    for k in chosen:
+        maps.append(tables.maps_mm(model, *pairs[k]))
+        counts.append(tables.readings(*pairs[k]))
+        size += len(counts[-1])
+        if size >= SAMPLED:
+            break
+    if not maps:
+        return dict.fromkeys(ARRANGEMENTS, 0.0)
+    return correlations(sign_towards_pcb(tables, model) * np.concatenate(maps), np.concatenate(counts), shape=shape)
+
+
+def press_dataset(tables, key, tests, *, model, sensor, sign):
+    """Maps of one item and model as `simulate_press` would write them; `path` tells each map's test."""
+    maps = sign * np.concatenate([tables.maps_mm(model, *test) for test in tests])
+    ones = np.ones(len(maps), dtype=np.int8)
+    return xarray.Dataset(
+        {"deformation_map_mm": (("force", "y", "x"), maps.astype(np.float32), {"units": "mm"}),
+         "force_n": ("force", _forces(tables, tests), {"units": "N"}), "path": ("force", _paths(tests)),
+         "converged": ("force", ones), "within_validity": ("force", ones)},
+        coords={"y": sensor.map_y_mm, "x": sensor.map_x_mm},
+        attrs={"model": model, "set": key[0], "item": key[1], "source": SOURCE, "solver": SOLVERS[model]})
+
+
+def tactile_dataset(tables, key, tests, *, shape, arrangement):
+    """Readings of one item, one trial each: nothing in the archive tells which readings repeat which."""
+    counts = np.concatenate([tables.readings(*test) for test in tests])
+    return xarray.Dataset(
+        {"tactile_map": (("trial", "force", "row", "column"), arrange(counts, arrangement, shape=shape)[None], {"units": "counts"}),
+         "force_n": ("force", _forces(tables, tests), {"units": "N"}), "path": ("force", _paths(tests))},
+        attrs={"source": SOURCE, "set": key[0], "item": key[1]})
+
+
+def _forces(tables, tests):
+    return np.concatenate([tables.real[name][0].force_n[test.readings] for name, test in tests])
+
+
+def _paths(tests):
+    return np.concatenate([np.full(len(test.readings), test.path, dtype=object) for _, test in tests])
+
+
+def found_counts(tables, items):
+    """{what: number} as `counts.PRINTED` names them: rows and maps in the files, and usable ones per set."""
+    found = {"real maps": sum(len(tables.real[name][0].test) for name in SETS)}
+    found |= {f"maps of {model}": sum(len(table.test) for table in of_set.values()) // MAP_ROWS
+              for model, of_set in tables.simulated.items()}
+    for (set_name, _), tests in items.items():
+        found[COUNTED_AS[set_name]] = found.get(COUNTED_AS[set_name], 0) + sum(len(test.readings) for _, test in tests)
+    return found
+
+
+def files_table(tables):
+    """[{file, rows, tests, objects}] of all files."""
+    every = [table for name in SETS for table in tables.real[name]] + [
+        table for of_set in tables.simulated.values() for table in of_set.values()]
+    return [{"file": table.file, "rows": len(table.test), "tests": len(table.paths),
+             "objects": len({object_name(path) for path in table.paths})} for table in every]

@@ -1,0 +1,59 @@
+"""What is odd in the archive: each by file and row, counted, and with what was done about it."""
+
+from dataclasses import asdict, dataclass, fields
+
+import pandas as pd
+
+from softtact.errors import InputError
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One oddity. row: the line of its first occurrence, 1 being the header;  path: the test, '' for a file;  count: occurrences
+    done: "left out" (the test) or "kept"."""
+
+    file: str
+    row: int
+    path: str
+    what: str
+    count: int
+    done: str
+
+    def __str__(self):
+        return f"{self.file}, row {self.row}{f', {self.path}' if self.path else ''}: {self.what}"
+
+
+class Odd:
+    """The findings, as they come up."""
+
+    def __init__(self):
+        self.findings = []
+
+    def leave_out(self, file, row, path, what, *, count=1):
+        """A finding for which its test is not used."""
+        self.findings.append(Finding(str(file), int(row), path, what, int(count), "left out"))
+
+    def keep(self, file, row, path, what, *, count=1):
+        """A finding that is only told."""
+        self.findings.append(Finding(str(file), int(row), path, what, int(count), "kept"))
+
+    def left_out(self):
+        """The tests that are not used, in the order of their first finding."""
+        return list(dict.fromkeys(f.path for f in self.findings if f.done == "left out"))
+
+    def table(self):
+        """A row per finding."""
+        return pd.DataFrame([asdict(f) for f in self.findings], columns=[field.name for field in fields(Finding)])
+
+    def refuse(self, tests, *, odd, largest_share):
+        """Refuse an archive that is odder than the user allows.
+
+        tests: how many there are;  odd: leave_out or refuse;  largest_share: of tests that may be left out
+        """
+        left = len(self.left_out())
+        if left and (odd == "refuse" or left > largest_share * tests):
+            first = [str(f) for f in self.findings if f.done == "left out"][:3]
+            allowed = "none may be" if odd == "refuse" else f"at most {largest_share:.0%} may be"
+            remedy = "set 'data.odd' to leave_out" if odd == "refuse" else "raise 'data.largest_odd_share'"
+            raise InputError(f"{left} of {tests} tests of the archive are odd, and {allowed} ({'; '.join(first)}); "
+                             f"correct the files or {remedy}.")

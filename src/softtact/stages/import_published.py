@@ -1,0 +1,97 @@
+"""The published archive as press files and readings, with what was found in it.
+
+inputs: files (CSV, for the workflow's sake; `settings.folder` is what is read)
+outputs: presses, tactile (folders), item_list (JSON), inventory (JSON), counts, odd (CSV)
+settings: folder, variant, models, unseen, without, taxel_order, odd, largest_odd_share, sensor, seed
+"""
+
+import shutil
+
+from softtact.errors import InputError
+from softtact.files import write_csv, write_dataset, write_json
+from softtact.geometry.sensor_spec import SensorSpec
+from softtact.progress import announce
+from softtact.published.archive import find_archive
+from softtact.published.counts import counts_sentence, counts_table
+from softtact.published.importing import (
+    files_table,
+    found_counts,
+    items_of,
+    judge_arrangement,
+    press_dataset,
+    read_archive,
+    sign_towards_pcb,
+    tactile_dataset,
+)
+from softtact.published.pairing import MAP_COLUMNS, MAP_ROWS, TAXELS
+
+TOLD = 20   # findings in the log; all stand in the table
+
+
+def run(*, inputs, outputs, settings, threads=1):
+    """Read, pair and check the archive, say what is odd, and write what is usable."""
+    sensor = SensorSpec.from_dict(settings["sensor"])
+    check_sensor(sensor)
+    tables = read_archive(find_archive(settings["folder"], models=settings["models"], variant=settings["variant"]))
+    tell(tables.odd)
+    tests = sum(map(len, tables.paths().values()))
+    tables.odd.refuse(tests, odd=settings["odd"], largest_share=settings["largest_odd_share"])
+    items = items_of(tables, unseen=settings["unseen"], without=settings["without"])
+    facts = inventory(tables, items, tests=tests, sensor=sensor, settings=settings)
+    write_items(outputs, tables, items, sensor=sensor, settings=settings, signs=facts["sign"])
+    write_csv(outputs["odd"], tables.odd.table())
+    write_csv(outputs["counts"], counts_table(found_counts(tables, items)))
+    write_json(outputs["item_list"], [{"set": name, "item": item} for name, item in items])
+    write_json(outputs["inventory"], facts)
+
+
+def check_sensor(sensor):
+    """Refuse a sensor of another grid: the archive's maps and readings are of the paper's."""
+    shape = sensor.taxels.rows * sensor.taxels.columns, *sensor.map_shape
+    if shape != (TAXELS, MAP_ROWS, MAP_COLUMNS):
+        raise InputError(f"sensor {sensor.name}: it has {shape[0]} taxels and maps of {shape[1]} x {shape[2]}; the archive is of "
+                         f"{TAXELS} taxels and maps of {MAP_ROWS} x {MAP_COLUMNS}: use the sensor 'coro'.")
+
+
+def tell(odd):
+    """What is odd, on the screen and in the log."""
+    for finding in odd.findings[:TOLD]:
+        announce(f"{finding} ({finding.done})")
+    if len(odd.findings) > TOLD:
+        announce(f"and {len(odd.findings) - TOLD} more oddities")
+
+
+def inventory(tables, items, *, tests, sensor, settings):
+    """What the archive holds, how it is read, and how that compares with print."""
+    found = found_counts(tables, items)
+    matches = judge_arrangement(tables, shape=_grid(sensor), seed=settings["seed"])
+    best, chosen = max(matches, key=matches.get), settings["taxel_order"]
+    sentence = counts_sentence(counts_table(found))
+    announce(sentence)
+    if best != chosen:
+        announce(f"the taxels' order is set to {chosen!r}, and readings follow the maps better as {best!r} (correlation "
+                 f"{matches[best]:.2f} over {matches[chosen]:.2f}); consider 'data.taxel_order: {best}'")
+    return {"files": files_table(tables), "found": found, "sentence": sentence, "tests": tests,
+            "tests_used": sum(map(len, items.values())), "tests_left_out": len(tables.odd.left_out()),
+            "items": {name: sorted(item for of_set, item in items if of_set == name) for name in ("indenters", "unseen", "grasps")},
+            "sign": {model: sign_towards_pcb(tables, model) for model in tables.simulated},
+            "taxel_order": {"read_as": chosen, "best": best, "correlation": matches}}
+
+
+def write_items(outputs, tables, items, *, sensor, settings, signs):
+    """A file of maps per item and model, and one of readings per item; what an earlier import left is removed."""
+    for name in ("presses", "tactile"):
+        shutil.rmtree(outputs[name], ignore_errors=True)
+        outputs[name].mkdir(parents=True)
+    for (set_name, item), tests in items.items():
+        key = set_name, item
+        for model, sign in signs.items():
+            write_dataset(outputs["presses"] / set_name / item / f"{model}.nc",
+                          press_dataset(tables, key, tests, model=model, sensor=sensor, sign=sign), seed=None, settings=settings)
+        write_dataset(outputs["tactile"] / set_name / f"{item}.nc",
+                      tactile_dataset(tables, key, tests, shape=_grid(sensor), arrangement=settings["taxel_order"]),
+                      seed=None, settings=settings)
+
+
+def _grid(sensor):
+    return sensor.taxels.rows, sensor.taxels.columns

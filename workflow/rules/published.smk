@@ -1,0 +1,27 @@
+# The archive that the paper's authors published, in place of presses and readings of the virtual sensor.
+
+rule import_published:
+    input:
+        code=code("import_published"),
+        files=[str(file.path) for file in STUDY.archive.files()],
+    output:
+        presses=directory(f"{RESULTS}/presses"),
+        tactile=directory(f"{RESULTS}/tactile"),
+        item_list=f"{RESULTS}/published/items.json",
+        inventory=f"{RESULTS}/published/inventory.json",
+        counts=f"{RESULTS}/published/counts.csv",
+        odd=f"{RESULTS}/published/odd.csv",
+    params:
+        files=files,
+        settings=as_settings(
+            **STUDY.values.data.model_dump(mode="json", exclude={"source"}),
+            models=STUDY.tested,
+            sensor=STUDY.sensor,
+            seed=STUDY.values.seed,
+        ),
+    log:
+        log_of("import_published"),
+    benchmark:
+        benchmark_of("import_published")
+    shell:
+        run_stage("import_published")
