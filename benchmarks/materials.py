@@ -120,6 +120,8 @@ def main():
     options.add_argument("--write-docs", action="store_true", help="put the last record into docs/materials.md")
     if options.parse_args().write_docs:
         return write_page(json.loads((record.RESULTS / "materials.json").read_text(encoding="utf-8")))
+    if "SOFTTACT_TEST_DATA" not in os.environ:
+        return print("SOFTTACT_TEST_DATA names no folder with the published tests: nothing was measured.")
     print(measure(os.environ["SOFTTACT_TEST_DATA"]))
 
 
