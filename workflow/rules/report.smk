@@ -2,7 +2,7 @@
 
 GRASPS = list(STUDY.items_of["grasps"].values())
 GRASP_UNITS = {item.id: item.unit for item in GRASPS}
-FIGURES = ("fig4_complexity", "fig5_ftir", "fig6_ssim", "fig7_maps", "fig8_policies")
+FIGURES = ("fig4_complexity", "fig5_ftir", "fig6_ssim", "fig7_maps", "fig8_policies", "fig9_networks")
 
 
 def figure_files(name):
@@ -148,6 +148,24 @@ rule draw_fig8_policies:
         run_stage("draw_fig8_policies")
 
 
+rule draw_fig9_networks:
+    input:
+        code=code("draw_fig9_networks"),
+        networks=rules.compare_networks.output.networks,
+        histories=learned("history.csv"),
+    output:
+        **figure_files("fig9_networks"),
+    params:
+        files=files,
+        settings=as_settings(),
+    log:
+        log_of("draw_fig9_networks"),
+    benchmark:
+        benchmark_of("draw_fig9_networks")
+    shell:
+        run_stage("draw_fig9_networks")
+
+
 rule report:
     input:
         code=code("report"),
@@ -156,8 +174,8 @@ rule report:
         table2=rules.make_tables.output.table2,
         table3=rules.make_tables.output.table3,
         claims=rules.make_tables.output.claims,
-        ssim=rules.evaluate.output.ssim,
-        ceiling=rules.evaluate.output.ceiling,
+        summary=rules.evaluate.output.summary,
+        networks=rules.compare_networks.output.networks,
         ftir=rules.validate_ftir.output.summary,
         policies=rules.compare_policies.output.policies,
         figures=[

@@ -1,6 +1,7 @@
 """The report page.
 
-inputs: table1, table2, table3, claims, ssim, ceiling, ftir, figures (list of PNG);  outputs: page;  settings: study facts
+inputs: table1, table2, table3, contradictions, policies, networks, claims, summary, ftir, figures (list of PNG)
+outputs: page;  settings: study facts
 """
 
 from softtact.files import atomic_path
