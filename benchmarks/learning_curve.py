@@ -17,7 +17,7 @@ from softtact.learning.training import prepare_torch
 from softtact.reporting.style import pyplot, save
 
 SSIM = {"window": 3, "data_range": 2400.0}
-SIZES, STEPS = (16, 32, 64, 128, 256, 512), 700
+SIZES, STEPS = (32, 128, 512), 200
 TESTS = ("validation", "unseen", "grasps")
 
 

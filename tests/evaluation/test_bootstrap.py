@@ -16,13 +16,14 @@ def width(bounds):
     return bounds[1] - bounds[0]
 
 
-def test_the_interval_of_a_normal_sample_is_students():
-    values = np.random.default_rng(0).normal(0.7, 0.1, 60)
-    students = stats.t.interval(0.95, 59, values.mean(), stats.sem(values))
-    found = interval(values, np.arange(60), repeats=10_000)
-    # The percentile bootstrap is narrower by sqrt(59/60) and by the normal's quantile in place of Student's: 3 % together.
-    assert width(found) == pytest.approx(0.97 * width(students), rel=0.03)
-    assert np.mean(found) == pytest.approx(values.mean(), abs=0.03 * width(students))
+# Ten thousand draws leave some 2 % in an interval's ends; few normal values draw a mean that is not quite normal.
+@pytest.mark.parametrize(("count", "tolerance"), [(60, 0.03), (20, 0.04), (8, 0.1)])
+def test_the_interval_of_a_normal_sample_is_students(count, tolerance):
+    values = 0.7 + 0.1 * stats.norm.ppf((np.arange(count) + 0.5) / count)      # a sample as normal as can be
+    students = stats.t.interval(0.95, count - 1, values.mean(), stats.sem(values))
+    found = interval(values, np.arange(count), repeats=10_000)
+    assert width(found) == pytest.approx(width(students), rel=tolerance)
+    assert np.mean(found) == pytest.approx(values.mean(), abs=tolerance * width(students))
 
 
 def test_maps_of_one_object_are_not_independent():
@@ -37,8 +38,8 @@ def test_a_trial_brings_all_its_maps():
     effect = np.array([-1.0, 1.0, -1.0, 1.0])
     items, trials = np.repeat([0, 1], 40), np.tile(np.repeat(np.arange(4), 10), 2)
     found = interval(np.tile(np.repeat(effect, 10), 2), items, trials, repeats=10_000)
-    # The mean of eight fair signs: 95 % lie within +-0.75 (P(|mean| = 1) = 0.8 %, P(|mean| >= 0.75) = 7 %).
-    assert found == pytest.approx((-0.75, 0.75))
+    # The mean of eight fair signs; two objects are so few that the interval is its whole range.
+    assert found == (-1.0, 1.0)
 
 
 def test_one_item_gives_no_interval():
