@@ -14,7 +14,8 @@ def interval_of_mean(values, items, trials, *, seed, level=LEVEL, repeats=REPEAT
     """(low, high) of the mean of `values` (n,), by percentiles over `repeats` draws; items, trials (n,) say what belongs together.
 
     With a single item nothing tells how items differ: (nan, nan). With few, plain percentiles are too narrow (by a third for
-    five), so they are taken farther out, as far as Student's interval of a normal sample is (Hesterberg 2015: expanded percentiles).
+    five), so they are taken farther out, to where Student's interval of a normal sample ends (expanded percentiles, Hesterberg
+    2015).
     """
     sums, counts, n_trials = by_trial(values, items, trials)     # (item, trial) each, and (item,)
     if len(n_trials) < 2:
