@@ -29,8 +29,8 @@ def score_samples(network, samples, *, ssim):
 def score_sensor(samples, *, ssim):
     """A row per level with at least two trials: set, item, force_n, ssim.
 
-    ssim: mean over the trials of each one's SSIM against the mean of the others. No network's scores can lie above it
-    but by chance.
+    ssim: mean over the trials of each one's SSIM against the mean of the others. A network's scores can
+    lie above it by chance, and by the noise that is left in the mean of few trials.
     """
     rows = []
     for (item, force), chosen in samples.labels.groupby(["item", "force_n"]).indices.items():

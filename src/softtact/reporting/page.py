@@ -16,7 +16,8 @@ CAPTIONS = {
                        "objects with the two thresholds.",
     "fig5_ftir": "Figure 5. Contact area of the dielectric pressed on glass.",
     "fig6_ssim": "Figure 6. SSIM of the networks' readings per item: bars are means, boxes quartiles over forces and trials; "
-                 "black dashes: the sensor's own repeated trials against each other, which no model can pass.",
+                 "black dashes: the sensor's own repeated trials against each other, which no model passes by more than the noise "
+                 "left in a mean of few trials.",
     "fig7_maps": "Figure 7. Objects from below, deformation maps of both models, tactile maps predicted from them, and the virtual "
                  "sensor's (mean of its trials). Jet colours as printed; tactile maps 0 to 2400 counts.",
     "fig8_policies": "Figure 8. Left: what each policy costs and which error it accepts, against the study's hyperelastic model. "
