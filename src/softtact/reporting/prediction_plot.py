@@ -1,6 +1,6 @@
 """A picture of a prediction: deformation maps and the taxels that a network reads off them."""
 
-from softtact.reporting.style import TACTILE_RANGE, pyplot, save
+from softtact.reporting.style import pyplot, save
 
 MOST = 8     # maps in one picture; of more, evenly chosen ones
 
@@ -11,11 +11,11 @@ def plot_prediction(maps, counts, path):
     shown = [round(k * (len(counts) - 1) / max(1, min(MOST, len(counts)) - 1)) for k in range(min(MOST, len(counts)))]
     extent, unit = _extent(maps)
     figure, axes = plt.subplots(2, len(shown), figsize=(1.2 + 2.3 * len(shown), 7.2), squeeze=False, layout="constrained")
+    most = max(1.0, float(counts.max()))          # the whole range of 2400 counts would leave light presses dark
     low, high = min(0.0, float(maps.maps_mm.min())), float(maps.maps_mm.max())
     for column, k in enumerate(shown):
         image = axes[0, column].imshow(maps.maps_mm[k], origin="lower", extent=extent, vmin=low, vmax=high, cmap="viridis")
-        taxels = axes[1, column].imshow(counts[k], origin="lower", extent=extent, vmin=TACTILE_RANGE[0], vmax=TACTILE_RANGE[1],
-                                        cmap="viridis")
+        taxels = axes[1, column].imshow(counts[k], origin="lower", extent=extent, vmin=0.0, vmax=most, cmap="viridis")
         axes[0, column].set_title("" if maps.force_n is None else f"{maps.force_n[k]:g} N")
         axes[1, column].set_xlabel(f"x ({unit})")
     for axis, name in zip(axes[:, 0], ("deformation", "predicted taxels"), strict=True):
