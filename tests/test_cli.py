@@ -51,7 +51,8 @@ def answer(capsys):
     return run
 
 
-@pytest.mark.parametrize("command", [[], ["press"], ["complexity"], ["fit"], ["export-deck"], ["detect-discs"], ["stage"]])
+@pytest.mark.parametrize("command", [[], ["press"], ["predict"], ["complexity"], ["fit"], ["export-deck"],
+                                     ["detect-discs"], ["stage"]])
 def test_every_command_has_help(command, capsys):
     with pytest.raises(SystemExit) as stop:
         main([*command, "--help"])

@@ -8,10 +8,10 @@ import argparse
 import sys
 
 import softtact
-from softtact.commands import complexity, detect_discs, export_deck, fit, press, stage
+from softtact.commands import complexity, detect_discs, export_deck, fit, predict, press, stage
 from softtact.errors import SofttactError
 
-COMMANDS = (press, complexity, fit, export_deck, detect_discs, stage)
+COMMANDS = (press, predict, complexity, fit, export_deck, detect_discs, stage)
 
 
 def main(arguments=None):

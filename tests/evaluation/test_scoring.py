@@ -6,7 +6,7 @@ import pytest
 import torch
 import xarray
 
-from softtact.evaluation.scoring import predict_grasps, score_samples, score_sensor, summarise_ssim
+from softtact.evaluation.scoring import predict_grasps, score_samples, score_sensor, summarise_scores
 from softtact.evaluation.timing import summarise_times, time_presses
 from softtact.learning.samples import Samples
 
@@ -38,7 +38,7 @@ def make_samples(*, split="grasps", model="elastic", items=("object_1", "object_
 
 def test_a_perfect_network_scores_one_with_no_error():
     scores = score_samples(Echo(), make_samples(), ssim=SSIM)
-    assert scores.columns.tolist() == ["model", "set", "item", "trial", "force_n", "ssim", "mae_counts"]
+    assert scores.columns.tolist() == ["model", "set", "item", "trial", "force_n", "ssim", "mae_counts", "overlap"]
     assert scores.ssim.values == pytest.approx(np.ones(12)) and scores.mae_counts.values == pytest.approx(0, abs=1e-3)
 
 
@@ -94,11 +94,20 @@ def test_a_level_that_an_object_lacks_is_nan():
     assert lacking.tolist() == [[False, True], [False, False]]
 
 
-def test_a_summary_has_mean_min_max_and_deviation_per_model_and_set():
-    scores = pd.DataFrame({"model": "elastic", "set": "unseen", "ssim": [0.2, 0.4, 0.9]})
-    row = summarise_ssim(scores).iloc[0]
-    assert (row.maps, row["mean"], row["min"], row["max"]) == (3, 0.5, 0.2, 0.9)
-    assert row.sd == pytest.approx(np.std([0.2, 0.4, 0.9], ddof=1))
+def test_the_summary_has_means_an_interval_and_the_ceiling_per_model_and_set():
+    samples = make_samples(noise=20)
+    scores, ceiling = score_samples(Echo(0.9), samples, ssim=SSIM), score_sensor(samples, ssim=SSIM)
+    row = summarise_scores(scores, ceiling, seed=1).iloc[0]
+    assert (row.model, row["set"], row["items"], row.maps) == ("elastic", "grasps", 2, 12)
+    for name in ("ssim", "mae_counts", "overlap"):
+        assert row[name] == pytest.approx(scores[name].mean())
+    assert row.ssim_low < row.ssim < row.ssim_high and row.sensor_ssim == pytest.approx(ceiling.ssim.mean())
+
+
+def test_one_item_has_a_mean_and_no_interval_and_a_sensor_read_once_no_ceiling():
+    samples = make_samples(items=("object_1",), trials=1)
+    row = summarise_scores(score_samples(Echo(0.9), samples, ssim=SSIM), score_sensor(samples, ssim=SSIM), seed=1).iloc[0]
+    assert row.ssim > 0.9 and np.isnan([row.ssim_low, row.ssim_high, row.sensor_ssim]).all()
 
 
 @pytest.fixture

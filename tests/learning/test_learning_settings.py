@@ -17,7 +17,8 @@ def test_defaults_are_what_the_paper_prints():
     (Training, {"epochs": 0}, r"it.epochs: .*greater than 0 \(it is 0\)"),
     (Training, {"learning_rate": "best"}, "it.learning_rate"),
     (Search, {"space": {"dense": [64, 8]}}, r"it.space.dense: a range is \[smallest, largest\]"),
-    (Network, {"architecture": "drawn"}, "it.architecture: .*'printed' or 'searched'"),
+    (Network, {"architecture": "drawn"}, "it.architecture: .*'printed', 'searched' or 'compact'"),
+    (Network, {"compact": {"filters": [16, 32]}}, "it.compact.filters.2: Field required"),
     (Ssim, {"window": 4}, "it.window: a window has a taxel at its centre"),
 ])
 def test_a_wrong_setting_is_refused_with_its_key_and_value(section, values, sentence):

@@ -12,7 +12,7 @@ from softtact.files import read_dataset, read_json
 from softtact.learning.dataset import SPLITS
 from softtact.learning.network import load_network, predict
 from softtact.learning.samples import read_samples
-from softtact.stages import build_dataset, evaluate, search_hyperparameters, train_cnn
+from softtact.stages import build_dataset, compare_networks, draw_fig9_networks, evaluate, search_hyperparameters, train_cnn
 
 SPACE = {"filters": [[2, 4], [2, 4], [2, 4]], "dense": [8, 24], "learning_rate": [1e-3, 1e-2]}
 SETTINGS = {"search": {"trials": 2, "max_epochs": 2, "batch": 8, "space": SPACE},
@@ -47,7 +47,7 @@ def training_inputs(folder, model):
 
 def run_evaluation(folder, inputs):
     outputs = {name: folder / "evaluation" / file for name, file in
-               {"ssim": "ssim.csv", "ceiling": "ceiling.csv", "timing": "timing.csv",
+               {"ssim": "ssim.csv", "summary": "summary.csv", "ceiling": "ceiling.csv", "timing": "timing.csv",
                 "predictions": "predictions.nc"}.items()}
     evaluate.run(inputs=inputs, outputs=outputs, settings=settings_of("ssim", "seed"))
     return outputs
@@ -109,6 +109,39 @@ def test_the_printed_architecture_or_the_searched_one_is_trained(finished):
     assert (options["filters"], options["dense"]) == (best["filters"], best["dense"])
 
 
+def test_the_compact_network_is_trained_with_its_own_rate_and_epochs(finished):
+    compact = {"architecture": "compact", "compact": {"filters": [2, 3, 4], "learning_rate": 0.004, "epochs": 2}}
+    outputs = run_training(finished[0], "elastic", into="compact", network=compact)
+    network, facts = load_network(outputs["model"])
+    assert (network.architecture, network.options["filters"], facts["model"]) == ("compact", [2, 3, 4], "elastic")
+    assert pd.read_csv(outputs["history"]).learning_rate.tolist() == [0.004, 0.002]
+
+
+def test_the_model_file_tells_what_maps_it_was_trained_on(finished):
+    _, facts = load_network(finished[0] / "learning/elastic/model.pt")
+    train = read_samples(finished[0] / "dataset/elastic/train.nc")
+    assert facts["range"]["force_n"] == [10.0, 30.0]
+    assert facts["range"]["map_max_mm"] == pytest.approx([train.maps_mm.max(axis=(1, 2)).min(), train.maps_mm.max()])
+
+
+def test_both_architectures_stand_in_one_table_and_one_figure(finished):
+    folder, inputs, _ = finished
+    runs = [run_training(folder, model, into=f"beside/{kind}", network={**SETTINGS["network"], "architecture": kind})
+            for kind in ("printed", "compact") for model in MODELS]
+    files = {"networks": [run["model"] for run in runs], "timings": [run["timing"] for run in runs]}
+    table = folder / "tables/networks.csv"
+    compare_networks.run(inputs={**files, **{name: inputs[name] for name in ("validation", "unseen", "grasps")}},
+                         outputs={"networks": table}, settings=settings_of("ssim", "seed"))
+    rows = pd.read_csv(table)
+    assert len(rows) == 2 * 2 * 3 and rows.architecture.unique().tolist() == ["printed", "compact"]
+    summary = pd.read_csv(finished[2]["summary"])
+    own = rows[rows.architecture == "printed"]
+    assert own.ssim.tolist() == pytest.approx(summary.ssim.tolist(), rel=1e-5)
+    pictures = {kind: folder / f"figures/fig9.{kind}" for kind in ("png", "svg")}
+    draw_fig9_networks.run(inputs={"networks": table, "histories": [run["history"] for run in runs]}, outputs=pictures, settings={})
+    assert all(path.stat().st_size > 10_000 for path in pictures.values())
+
+
 def test_a_given_learning_rate_is_used_instead_of_the_searchs(finished):
     outputs = run_training(finished[0], "elastic", into="given",
                            training={**SETTINGS["training"], "learning_rate": 0.004})
@@ -118,7 +151,7 @@ def test_a_given_learning_rate_is_used_instead_of_the_searchs(finished):
 def test_every_map_of_the_three_tests_is_scored_for_each_model(finished):
     folder, inputs, outputs = finished
     scores = pd.read_csv(outputs["ssim"])
-    assert scores.columns.tolist() == ["model", "set", "item", "trial", "force_n", "ssim", "mae_counts"]
+    assert scores.columns.tolist() == ["model", "set", "item", "trial", "force_n", "ssim", "mae_counts", "overlap"]
     for k, model in enumerate(MODELS):
         for split in ("validation", "unseen", "grasps"):
             rows = scores[(scores.model == model) & (scores["set"] == split)]
@@ -143,7 +176,7 @@ def test_times_and_predictions_cover_the_presses_and_the_grasps(finished):
 def test_scores_and_predictions_are_the_same_bytes_again(finished):
     folder, inputs, outputs = finished
     again = run_evaluation(folder / "again", inputs)
-    for name in ("ssim", "ceiling", "predictions"):
+    for name in ("ssim", "summary", "ceiling", "predictions"):
         assert again[name].read_bytes() == outputs[name].read_bytes()
 
 

@@ -1,4 +1,4 @@
-"""The printed network, and what its file may hold."""
+"""The printed network, the compact one, and what their files may hold."""
 
 import pickle
 
@@ -8,7 +8,16 @@ import torch
 from formula_study import TINY
 
 from softtact.errors import InputError
-from softtact.learning.network import TactileNetwork, load_network, predict, save_network, summed_l1
+from softtact.learning.network import (
+    CompactNetwork,
+    TactileNetwork,
+    load_network,
+    predict,
+    save,
+    save_network,
+    summed_l1,
+    taxel_weights,
+)
 
 SENSOR = {"map_shape": (57, 33), "taxels": (7, 4)}
 
@@ -67,6 +76,74 @@ def test_scales_are_units_inside_and_do_not_show_outside(tiny):
 def test_a_linear_activation_is_a_choice():
     network = TactileNetwork(**SENSOR, **{**TINY, "activation": "linear"})
     assert not any(isinstance(layer, torch.nn.ReLU) for layer in network.features)
+
+
+@pytest.fixture
+def compact():
+    torch.manual_seed(0)
+    return CompactNetwork(**SENSOR, map_scale_mm=0.4, count_scale=1200)
+
+
+def test_the_compact_layers_have_the_documented_shapes(compact):
+    shapes, x = [], torch.zeros(2, 1, 57, 33)
+    for layer in compact.features[::2]:
+        x = layer(x)
+        shapes.append(tuple(x.shape[1:]))
+    assert shapes == [(16, 57, 33), (32, 29, 17), (64, 29, 17)]
+    assert (compact.rows @ x @ compact.columns.T).shape == (2, 64, 7, 4)
+    assert compact(torch.zeros(2, 57, 33)).shape == (2, 7, 4)
+
+
+def test_the_compact_network_has_60_thousand_weights(compact):
+    by_hand = (9 + 1) * 16 + (9 * 16 + 1) * 32 + (9 * 32 + 1) * 64 + (9 * 64 + 1) * 64 + (64 + 1) + 2 * 28
+    assert sum(weight.numel() for weight in compact.parameters()) == by_hand == 60_345
+
+
+@pytest.mark.parametrize(("points", "parts"), [(29, 7), (17, 4), (12, 5)])
+def test_taxel_means_are_exact_for_what_is_linear_over_the_sensor(points, parts):
+    weights, x = taxel_weights(points, parts), np.linspace(0, 1, points)
+    assert weights.sum(axis=1) == pytest.approx(np.ones(parts))
+    assert weights @ x == pytest.approx((np.arange(parts) + 0.5) / parts)
+    assert (weights >= 0).all() and weights.sum(axis=0) * (points - 1) / parts == pytest.approx([0.5, *np.ones(points - 2), 0.5])
+
+
+def test_away_from_the_borders_only_the_compact_networks_affine_map_knows_where_a_taxel_lies(compact):
+    level = predict(compact, np.full((1, 57, 33), 0.2))[0]
+    assert level[2:5, 1] == pytest.approx(np.full(3, level[3, 1]), rel=1e-4)    # equally far from the zero padding
+    with torch.no_grad():
+        compact.gain[3, 1], compact.offset[3, 1] = 2.0, 0.01
+    changed = predict(compact, np.full((1, 57, 33), 0.2))[0]
+    assert changed[3, 1] == pytest.approx(2 * level[3, 1] + 12, rel=1e-4)
+    assert np.array_equal(np.delete(changed, 13), np.delete(level, 13))
+
+
+def test_a_map_that_cannot_be_halved_with_its_borders_is_refused():
+    with pytest.raises(InputError, match="a map of 56 x 33 points cannot be halved .* give odd sides"):
+        CompactNetwork(map_shape=(56, 33), taxels=(7, 4))
+
+
+def test_either_architecture_is_loaded_from_its_own_file(compact, tiny, tmp_path):
+    for network in (compact, tiny):
+        path = tmp_path / f"{network.architecture}.pt"
+        save_network(path, network, facts={"model": "elastic"})
+        loaded, _ = load_network(path)
+        maps = np.random.default_rng(0).random((3, 57, 33))
+        assert type(loaded) is type(network) and np.array_equal(predict(loaded, maps), predict(network, maps))
+
+
+def test_a_file_from_before_there_were_two_architectures_holds_the_printed_one(tiny, tmp_path):
+    save(tmp_path / "model.pt", {"options": tiny.options, "weights": tiny.state_dict(), "facts": {}})
+    assert isinstance(load_network(tmp_path / "model.pt")[0], TactileNetwork)
+
+
+@pytest.mark.parametrize("stored", [{"owner": "a checkpoint"}, [1, 2],
+                                    {"architecture": "drawn", "options": {}, "weights": {}, "facts": {}},
+                                    {"options": {"layers": 3}, "weights": {}, "facts": {}},
+                                    {"options": {"map_shape": [57, 33], "taxels": [7, 4], **TINY}, "weights": {}, "facts": {}}])
+def test_a_file_of_something_else_is_refused(stored, tmp_path):
+    save(tmp_path / "model.pt", stored)
+    with pytest.raises(InputError, match="it holds no network of printed, compact .* give a model.pt"):
+        load_network(tmp_path / "model.pt")
 
 
 def test_a_saved_network_predicts_the_same_and_keeps_its_facts(tiny, tmp_path):

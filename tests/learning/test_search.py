@@ -1,5 +1,10 @@
 """The hyperparameter search: it draws from its space, prunes, resumes and repeats itself."""
 
+import multiprocessing
+import threading
+import time
+from pathlib import Path
+
 import pandas as pd
 import pytest
 from formula_study import make_samples
@@ -60,6 +65,37 @@ def test_a_search_that_was_cut_off_in_a_trial_ends_as_an_undisturbed_one(undistu
     table = search_table(search(journal))
     assert numbers == [3, 4, 5, 6, 7], "finished trials must not run again"
     pd.testing.assert_frame_equal(table, undisturbed, check_exact=True)
+
+
+def search_in_a_process(journal, trials, started=None):
+    """In a process of its own: search; with `started`, the first trial tells that it runs, and lasts for a minute."""
+    if started is not None:
+        searching.run_trial = lambda *arguments, **options: started.set() or time.sleep(60)
+    search(Path(journal), trials=trials)
+
+
+def test_processes_share_a_search_and_end_with_the_same_table(tmp_path):
+    spawn = multiprocessing.get_context("spawn")
+    other = spawn.Process(target=search_in_a_process, args=(tmp_path / "search.journal", 8))
+    other.start()
+    own = search_table(search(tmp_path / "search.journal"))
+    other.join(60)
+    assert other.exitcode == 0
+    assert own.trial.tolist() == list(range(8)) and set(own.state) <= {"complete", "pruned"}
+    pd.testing.assert_frame_equal(search_table(search(tmp_path / "search.journal")), own, check_exact=True)
+
+
+def test_the_trial_of_a_process_that_died_is_done_by_the_others(tmp_path):
+    spawn = multiprocessing.get_context("spawn")
+    started = spawn.Event()
+    dying = spawn.Process(target=search_in_a_process, args=(tmp_path / "search.journal", 3, started))
+    dying.start()
+    assert started.wait(60)
+    threading.Timer(1.0, dying.kill).start()       # while this process is at work or waits
+    table = search_table(search(tmp_path / "search.journal", trials=3))
+    dying.join(10)
+    assert dying.exitcode != 0
+    assert table.trial.tolist() == [0, 1, 2] and set(table.state) <= {"complete", "pruned"}
 
 
 def test_a_finished_search_runs_nothing_again(tmp_path, monkeypatch):

@@ -54,6 +54,27 @@ def test_it_learns_eight_maps_by_heart():
     assert run.best["validation_loss"] < 0.05 * run.history[0]["train_loss"]
 
 
+COMPACT = {"architecture": "compact"}
+
+
+def test_the_compact_network_learns_more_than_ten_times_as_many_weights_in_equal_steps():
+    few, unseen = make_samples(48), make_samples(16, first=1000, split="validation")
+    networks = {"printed": {"filters": (8, 8, 8), "dense": 64, "activation": "relu"}, "compact": COMPACT}
+    runs = {name: train_to_end(new_run(few, rate=2e-3, network=network), few, unseen, epochs=8, batch=8)
+            for name, network in networks.items()}
+    weights = {name: sum(tensor.numel() for tensor in run.network.parameters()) for name, run in runs.items()}
+    assert weights["printed"] > 10 * weights["compact"]
+    assert runs["compact"].best["validation_loss"] < 0.6 * runs["printed"].best["validation_loss"]
+    assert runs["compact"].history[-1]["validation_ssim"] > runs["printed"].history[-1]["validation_ssim"]
+
+
+def test_the_compact_network_resumes_to_the_same_weights(train, validation, tmp_path):
+    undisturbed = train_to_end(new_run(train, network=COMPACT), train, validation)
+    train_to_end(new_run(train, network=COMPACT), train, validation, checkpoint=tmp_path / "c.pt", stop_after=2)
+    resumed = train_to_end(new_run(train, network=COMPACT), train, validation, checkpoint=tmp_path / "c.pt")
+    assert same_weights(resumed, undisturbed)
+
+
 def test_the_loss_is_reported_in_counts(train, validation):
     run = train_to_end(new_run(train), train, validation, epochs=1)
     predicted = torch.from_numpy(predict(run.network, validation.maps_mm))

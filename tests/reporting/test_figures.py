@@ -6,7 +6,7 @@ import pytest
 import trimesh
 
 from softtact.files import write_csv, write_json
-from softtact.reporting import fig4_complexity, fig5_ftir, fig6_ssim, fig7_maps
+from softtact.reporting import fig4_complexity, fig5_ftir, fig6_ssim, fig7_maps, fig9_networks
 from softtact.reporting.page import render_page
 from softtact.reporting.style import draw_map, pyplot, save
 
@@ -17,6 +17,29 @@ SSIM = pd.DataFrame([{"model": model, "set": name, "item": item, "trial": trial,
 CEILING = SSIM[SSIM.model == "elastic"][["set", "item", "force_n", "ssim"]]
 COMPLEXITY = pd.DataFrame({"object": ["object_1", "object_2"], "NPt": [100, 900], "CHt": [50, 50], "NPo": [20, 400],
                            "CHo": [20, 20], "model": ["elastic", "hyperelastic"]})
+
+
+SUMMARY = pd.DataFrame([{"model": "elastic", "set": name, "items": items, "maps": 8, "ssim": 0.6, "ssim_low": low,
+                         "ssim_high": high, "mae_counts": 30.0, "overlap": 0.8, "sensor_ssim": 0.99}
+                        for name, items, low, high in (("unseen", 4, 0.5, 0.7), ("grasps", 1, np.nan, np.nan))])
+NETWORKS = pd.concat([SUMMARY.assign(architecture=name, weights=weights, ssim=SUMMARY.ssim + gain,
+                                     ssim_high=SUMMARY.ssim_high + gain, epochs=3, epoch_s=time, map_s=0.01)
+                      for name, weights, gain, time in (("printed", 94_279_973, 0.0, 90.0), ("compact", 60_345, 0.1, 2.0))])
+HISTORY = pd.DataFrame({"epoch": [1, 2, 3], "train_loss": [900, 500, 300], "validation_loss": [1000, 700, 600],
+                        "validation_ssim": [0.5, 0.6, 0.7], "learning_rate": 1e-3})
+
+
+def test_figure_9_shows_each_architectures_scores_and_training():
+    histories = {("elastic", name): HISTORY for name in ("printed", "compact")}
+    figure = fig9_networks.draw(NETWORKS, histories)
+    scores, loss, ssim = figure.axes
+    assert [bar.get_height() for bar in scores.patches] == pytest.approx([0.6, 0.6, 0.7, 0.7])
+    assert len(loss.lines) == 4
+    assert [text.get_text() for text in ssim.get_legend().get_texts()] == ["elastic, printed", "elastic, compact"]
+    labels = [text.get_text() for text in scores.get_xticklabels()]
+    assert labels == ["unseen\n8 maps, items: 4", "grasps\n8 maps, items: 1\nno interval: one item only"]
+    named = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert "elastic, printed: 94.3 million weights, 90 s an epoch" in named
 
 
 def test_a_map_is_printed_with_y_running_to_the_left():
@@ -69,12 +92,11 @@ def test_a_figure_is_written_the_same_twice(tmp_path):
 
 def test_the_page_holds_its_figures_and_links_its_data(tmp_path):
     folder = tmp_path / "results"
-    names = ("table1", "contradictions", "table2", "table3", "policies", "claims", "ssim", "ceiling")
+    names = ("table1", "contradictions", "table2", "table3", "policies", "networks", "claims", "summary")
     inputs = {name: folder / "tables" / f"{name}.csv" for name in names}
-    for name in ("table1", "contradictions", "table2", "table3", "policies"):
+    for name in ("table1", "contradictions", "table2", "table3", "policies", "networks"):
         write_csv(inputs[name], COMPLEXITY)
-    write_csv(inputs["ssim"], SSIM)
-    write_csv(inputs["ceiling"], CEILING)
+    write_csv(inputs["summary"], SUMMARY)
     write_csv(inputs["claims"], pd.DataFrame({"claim": ["a < b"], "verdict": ["reproduced"]}))
     inputs["ftir"] = folder / "summary.json"
     write_json(inputs["ftir"], {"source": "virtual dielectric", "verdict": "The words allow this."})
@@ -86,6 +108,7 @@ def test_the_page_holds_its_figures_and_links_its_data(tmp_path):
     assert page.count("data:image/png;base64,") == 3
     assert page.count("The words allow this.") == 1 and "Material foam: test curves" in page
     assert 'href="figures/fig6_ssim.svg"' in page and 'href="tables/table2.csv"' in page
+    assert "0.500 to 0.700" in page and "one item: none" in page
     assert "a &lt; b" in page and "What is synthetic here" in page
 
 

@@ -8,6 +8,15 @@ def dataset(split):
     return [f"{RESULTS}/dataset/{model}/{split}.nc" for model in STUDY.tested]
 
 
+# The network that a study's own is compared with, on the same split.
+BESIDE = "printed" if STUDY.values.network.architecture == "compact" else "compact"
+
+
+def learned(name):
+    """A file of each trained network: the study's own of each model, then those beside it."""
+    return [f"{RESULTS}/learning/{model}/{part}{name}" for part in ("", f"{BESIDE}/") for model in STUDY.values.tested]
+
+
 
 rule build_dataset:
     input:
@@ -85,6 +94,33 @@ rule train_cnn:
         run_stage("train_cnn")
 
 
+rule train_beside:
+    input:
+        code=code("train_cnn"),
+        train=f"{RESULTS}/dataset/{{model}}/train.nc",
+        validation=f"{RESULTS}/dataset/{{model}}/validation.nc",
+        best=f"{RESULTS}/learning/{{model}}/best.json",
+    output:
+        model=f"{RESULTS}/learning/{{model}}/{BESIDE}/model.pt",
+        history=f"{RESULTS}/learning/{{model}}/{BESIDE}/history.csv",
+        timing=f"{RESULTS}/learning/{{model}}/{BESIDE}/timing.csv",
+    params:
+        files=files,
+        settings=as_settings(
+            training=STUDY.values.training.model_dump(mode="json", exclude={"threads"}),
+            network=plain(STUDY.values.network) | {"architecture": BESIDE},
+            ssim=plain(STUDY.values.ssim),
+            seed=STUDY.values.seed,
+        ),
+    threads: STUDY.values.training.threads
+    log:
+        log_of("train_beside", "{model}"),
+    benchmark:
+        benchmark_of("train_beside", "{model}")
+    shell:
+        run_stage("train_cnn")
+
+
 rule evaluate:
     input:
         code=code("evaluate"),
@@ -95,6 +131,7 @@ rule evaluate:
         **({} if STUDY.archive else {"presses": presses(STUDY.tested)}),
     output:
         ssim=f"{RESULTS}/evaluation/ssim.csv",
+        summary=f"{RESULTS}/evaluation/summary.csv",
         ceiling=f"{RESULTS}/evaluation/ceiling.csv",
         timing=f"{RESULTS}/evaluation/timing.csv",
         predictions=f"{RESULTS}/evaluation/predictions.nc",
@@ -107,3 +144,24 @@ rule evaluate:
         benchmark_of("evaluate")
     shell:
         run_stage("evaluate")
+
+
+rule compare_networks:
+    input:
+        code=code("compare_networks"),
+        networks=learned("model.pt"),
+        timings=learned("timing.csv"),
+        validation=dataset("validation"),
+        unseen=dataset("unseen"),
+        grasps=dataset("grasps"),
+    output:
+        networks=f"{RESULTS}/tables/networks.csv",
+    params:
+        files=files,
+        settings=as_settings(ssim=plain(STUDY.values.ssim), seed=STUDY.values.seed),
+    log:
+        log_of("compare_networks"),
+    benchmark:
+        benchmark_of("compare_networks")
+    shell:
+        run_stage("compare_networks")

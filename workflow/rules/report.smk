@@ -3,7 +3,7 @@
 GRASPS = list(STUDY.items_of["grasps"].values())
 GRASP_UNITS = {item.id: item.unit for item in GRASPS}
 FROM_PRESSES = () if STUDY.archive else ("fig7_maps", "fig8_policies")     # an archive has no press of our objects
-FIGURES = ("fig4_complexity", "fig5_ftir", "fig6_ssim", *FROM_PRESSES)
+FIGURES = ("fig4_complexity", "fig5_ftir", "fig6_ssim", *FROM_PRESSES, "fig9_networks")
 
 
 def figure_files(name):
@@ -149,6 +149,24 @@ rule draw_fig8_policies:
         run_stage("draw_fig8_policies")
 
 
+rule draw_fig9_networks:
+    input:
+        code=code("draw_fig9_networks"),
+        networks=rules.compare_networks.output.networks,
+        histories=learned("history.csv"),
+    output:
+        **figure_files("fig9_networks"),
+    params:
+        files=files,
+        settings=as_settings(),
+    log:
+        log_of("draw_fig9_networks"),
+    benchmark:
+        benchmark_of("draw_fig9_networks")
+    shell:
+        run_stage("draw_fig9_networks")
+
+
 rule report:
     input:
         code=code("report"),
@@ -157,8 +175,8 @@ rule report:
         table2=rules.make_tables.output.table2,
         table3=rules.make_tables.output.table3,
         claims=rules.make_tables.output.claims,
-        ssim=rules.evaluate.output.ssim,
-        ceiling=rules.evaluate.output.ceiling,
+        summary=rules.evaluate.output.summary,
+        networks=rules.compare_networks.output.networks,
         ftir=rules.validate_ftir.output.summary,
         **(
             {"inventory": rules.import_published.output.inventory, "counts": rules.import_published.output.counts}

@@ -4,30 +4,33 @@ import numpy as np
 import pandas as pd
 import xarray
 
+from softtact.evaluation.bootstrap import interval_of_mean
+from softtact.evaluation.overlap import contact_patch_overlap
 from softtact.evaluation.ssim import leave_one_out_ssim, map_ssim, mean_absolute_counts
 from softtact.learning.network import predict
 
-SSIM_COLUMNS = ["model", "set", "item", "trial", "force_n", "ssim", "mae_counts"]
+SSIM_COLUMNS = ["model", "set", "item", "trial", "force_n", "ssim", "mae_counts", "overlap"]
 CEILING_COLUMNS = ["set", "item", "force_n", "ssim"]
 
 
 def score_samples(network, samples, *, ssim):
-    """A row per sample of `samples`: model, set, item, trial, force_n, ssim, mae_counts.
+    """A row per sample of `samples`: model, set, item, trial, force_n, ssim, mae_counts, overlap.
 
     The rows of the split `validation` carry set = "validation": its items are indenters that training saw at other
     forces.
     """
     predicted = predict(network, samples.maps_mm)
     frame = samples.labels.assign(model=samples.model, ssim=map_ssim(predicted, samples.counts, **ssim),
-                                  mae_counts=mean_absolute_counts(predicted, samples.counts), set=samples.split)
+                                  mae_counts=mean_absolute_counts(predicted, samples.counts),
+                                  overlap=contact_patch_overlap(predicted, samples.counts), set=samples.split)
     return frame[SSIM_COLUMNS].sort_values(SSIM_COLUMNS[1:5], ignore_index=True)
 
 
 def score_sensor(samples, *, ssim):
     """A row per level with at least two trials: set, item, force_n, ssim.
 
-    ssim: mean over the trials of each one's SSIM against the mean of the others. No network's scores can lie above it
-    but by chance.
+    ssim: mean over the trials of each one's SSIM against the mean of the others. A network's scores can
+    lie above it by chance, and by the noise that is left in the mean of few trials.
     """
     rows = []
     for (item, force), chosen in samples.labels.groupby(["item", "force_n"]).indices.items():
@@ -65,12 +68,17 @@ def level_means(samples, maps, items, forces):
     return means
 
 
-def summarise_ssim(scores):
-    """Mean, min, max and standard deviation of SSIM per model and set: model, set, maps, mean, min, max, sd."""
-    return summarise(scores, by=["model", "set"], value="ssim")
+def summarise_scores(scores, ceiling, *, seed):
+    """Frame model, set, items, maps, ssim, ssim_low, ssim_high, mae_counts, overlap, sensor_ssim of a study's scores.
 
-
-def summarise(frame, *, by, value):
-    """Count and mean, min, max, sd of the column `value` per group."""
-    return frame.groupby(by, sort=False)[value].agg(
-        maps="size", mean="mean", min="min", max="max", sd="std").reset_index()
+    ssim_low, ssim_high: 95 % interval of the mean, by bootstrap over items, then trials; nan where there is one item only
+    sensor_ssim: mean of the ceiling, the sensor's trials against each other; nan where it was read once
+    """
+    own = ceiling.groupby("set").ssim.mean()
+    rows = []
+    for (model, set_name), group in scores.groupby(["model", "set"], sort=False):
+        low, high = interval_of_mean(group.ssim.to_numpy(), group["item"], group.trial, seed=seed)
+        rows.append({"model": model, "set": set_name, "items": group["item"].nunique(), "maps": len(group),
+                     "ssim": group.ssim.mean(), "ssim_low": low, "ssim_high": high, "mae_counts": group.mae_counts.mean(),
+                     "overlap": group.overlap.mean(), "sensor_ssim": own.get(set_name, np.nan)})
+    return pd.DataFrame(rows)

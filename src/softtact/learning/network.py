@@ -1,13 +1,20 @@
-"""The network: a deformation map in, 28 tactile counts out. The paper's section 3.3.2, layer by layer.
+"""The networks: a deformation map in, 28 tactile counts out.
 
-Three 2 x 2 convolutions (80, 95, 120 filters, no padding), each followed by 2 x 2 max-pooling with stride 1; a hidden
-layer of 570 neurons with ReLU; 28 linear outputs. 94.3 million weights, nearly all between the last pool and the
-hidden layer. The paper is silent on the convolutions' activation: ReLU by default.
+`printed`, the paper's section 3.3.2 layer by layer: three 2 x 2 convolutions (80, 95, 120 filters, no padding), each
+followed by 2 x 2 max-pooling with stride 1; a hidden layer of 570 neurons with ReLU; 28 linear outputs. 94.3 million
+weights, nearly all between the last pool and the hidden layer. The paper is silent on the convolutions' activation:
+ReLU by default.
+
+`compact`, built like the sensor: a count is the mean, over one electrode, of a rising function of the deformation (plates
+come closer), with a gain and an offset of its own. So: local features, their mean over each taxel, one look at the
+neighbouring taxels, and an affine map per taxel. 60 thousand weights; away from the borders, where zeros are padded, only
+this affine map knows where a taxel lies.
 
 Inside, maps and counts are divided by two constants of the training set, so that both are of order one. The constants
-are stored with the weights: the network's face is in mm and counts.
+are stored with the weights: a network's face is in mm and counts.
 """
 
+import numpy as np
 import torch
 from torch import nn
 
@@ -17,7 +24,9 @@ from softtact.files import atomic_path
 
 
 class TactileNetwork(nn.Module):
-    """Deformation maps (n, y, x) in mm to tactile maps (n, row, column) in counts."""
+    """The printed network: deformation maps (n, y, x) in mm to tactile maps (n, row, column) in counts."""
+
+    architecture = "printed"
 
     def __init__(self, *, map_shape, taxels, filters=(80, 95, 120), dense=570, activation="relu",
                  map_scale_mm=1.0, count_scale=1.0):
@@ -47,6 +56,52 @@ def block(n_in, n_out, activation):
     return nn.Conv2d(n_in, n_out, kernel_size=2), middle(), nn.MaxPool2d(kernel_size=2, stride=1)
 
 
+class CompactNetwork(nn.Module):
+    """The compact network: deformation maps (n, y, x) in mm to tactile maps (n, row, column) in counts.
+
+    filters: of the convolution on the map's grid, of the one that halves it, and of the one on the half grid
+    """
+
+    architecture = "compact"
+
+    def __init__(self, *, map_shape, taxels, filters=(16, 32, 64), map_scale_mm=1.0, count_scale=1.0):
+        super().__init__()
+        if not all(side % 2 for side in map_shape):
+            raise InputError(f"the compact network: a map of {map_shape[0]} x {map_shape[1]} points cannot be halved with both "
+                             "its borders kept; give odd sides.")
+        self.options = {"map_shape": list(map_shape), "taxels": list(taxels), "filters": list(filters)}
+        fine, half, deep = filters
+        self.features = nn.Sequential(                                       # zero padding 1: no row or column is lost
+            nn.Conv2d(1, fine, kernel_size=3, padding=1), nn.ReLU(),
+            nn.Conv2d(fine, half, kernel_size=3, padding=1, stride=2), nn.ReLU(),  # every second point, borders included
+            nn.Conv2d(half, deep, kernel_size=3, padding=1), nn.ReLU())
+        self.neighbours = nn.Conv2d(deep, deep, kernel_size=3, padding=1)
+        self.reading = nn.Conv2d(deep, 1, kernel_size=1)
+        self.gain, self.offset = nn.Parameter(torch.ones(*taxels)), nn.Parameter(torch.zeros(*taxels))
+        for name, side, parts in zip(("rows", "columns"), map_shape, taxels, strict=True):
+            weights = torch.tensor(taxel_weights(side // 2 + 1, parts), dtype=torch.float32)
+            self.register_buffer(name, weights, persistent=False)
+        self.register_buffer("map_scale_mm", torch.tensor(float(map_scale_mm)))
+        self.register_buffer("count_scale", torch.tensor(float(count_scale)))
+
+    def forward(self, maps_mm):                                      # (n, 57, 33) mm
+        x = self.features(maps_mm[:, None] / self.map_scale_mm)      # (n, 64, 29, 17)
+        x = self.rows @ x @ self.columns.T                           # (n, 64, 7, 4) means over each taxel
+        x = self.reading(torch.relu(self.neighbours(x)))[:, 0]       # (n, 7, 4)
+        return (self.gain * x + self.offset) * self.count_scale      # (n, 7, 4) counts
+
+
+def taxel_weights(points, parts):
+    """Weights (parts, points) of the mean over `parts` equal parts of a side, linear between its `points`."""
+    t = np.linspace(0, points - 1, parts + 1)[:, None] - np.arange(points)   # from each point to each part's ends
+    left, right = np.clip(t + 1, 0, 1), np.clip(t, 0, 1)
+    integral = 0.5 * left**2 + right - 0.5 * right**2                        # of each point's hat function
+    return np.diff(integral, axis=0) * parts / (points - 1)
+
+
+ARCHITECTURES = {network.architecture: network for network in (TactileNetwork, CompactNetwork)}
+
+
 def summed_l1(predicted, measured):
     """The paper's equation 1: |difference| summed over a map's taxels, in counts; here its mean over the maps (n, 7, 4)."""
     return (predicted - measured).abs().sum(dim=(1, 2)).mean()
@@ -64,16 +119,20 @@ def predict(network, maps_mm, *, batch=64):
 def save_network(path, network, *, facts):
     """Write weights, options and `facts` (plain values: model, seed, epoch, ...); the same network gives the same bytes."""
     weights = {name: tensor.detach().cpu() for name, tensor in network.state_dict().items()}
-    save(path, {"options": network.options, "weights": weights,
+    save(path, {"architecture": network.architecture, "options": network.options, "weights": weights,
                 "facts": {**facts, "softtact_version": softtact.__version__}})
 
 
 def load_network(path):
     """(network, facts) of a file that `save_network` wrote, on the CPU; only tensors and plain values are accepted."""
     stored = load(path)
-    network = TactileNetwork(**stored["options"])
-    network.load_state_dict(stored["weights"])
-    return network.eval(), stored["facts"]
+    try:
+        network = ARCHITECTURES[stored.get("architecture", TactileNetwork.architecture)](**stored["options"])
+        network.load_state_dict(stored["weights"])
+        return network.eval(), stored["facts"]
+    except (AttributeError, KeyError, TypeError, RuntimeError) as error:
+        raise InputError(f"{path}: it holds no network of {', '.join(ARCHITECTURES)} ({_reason(error)}); "
+                         "give a model.pt that a training wrote.") from None
 
 
 def save(path, stored):
@@ -89,5 +148,9 @@ def load(path):
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file; train the network first.") from None
     except Exception as error:  # torch raises whatever its unpickler met
-        reason = next(iter(str(error).splitlines()), type(error).__name__)
-        raise InputError(f"{path}: not a network's file ({reason}); delete it and train again.") from None
+        raise InputError(f"{path}: not a network's file ({_reason(error)}); delete it and train again.") from None
+
+
+def _reason(error):
+    """The first line of what an exception says."""
+    return next(iter(str(error).splitlines()), type(error).__name__)

@@ -36,6 +36,11 @@ class Samples:
         content.update(np.ascontiguousarray(self.counts))
         return content.hexdigest()[:16]
 
+    def range(self):
+        """Plain values of what the samples span: [least, greatest] of the maps' maxima in mm and of the forces in N."""
+        deepest, forces = self.maps_mm.max(axis=(1, 2)), self.labels.force_n
+        return {"map_max_mm": [float(deepest.min()), float(deepest.max())], "force_n": [float(forces.min()), float(forces.max())]}
+
     def subset(self, count, *, seed):
         """At most `count` samples (None: all), drawn with the seed, in their order."""
         if count is None or count >= len(self):

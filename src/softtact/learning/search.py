@@ -2,8 +2,14 @@
 
 The trials stand in a journal file. A search that was cut off takes it up, forgets the trial that was under way, and
 ends as it would have: each trial's draw depends on the seed and the trials finished before it.
+
+Several processes may share a journal, each doing what trials are left; all end with the same table. What is drawn then
+depends on who finishes when. A process that dies leaves its trial to the others.
 """
 
+import contextlib
+import fcntl
+import time
 from pathlib import Path
 
 import numpy as np
@@ -14,22 +20,55 @@ from softtact.errors import ConvergenceError, InputError
 from softtact.files import digest
 from softtact.learning.settings import Training
 from softtact.learning.training import start_run, train_network
-from softtact.progress import progress
+from softtact.progress import announce
+
+WAIT_S = 1.0     # between two looks at what other processes have left to do
 
 optuna.logging.set_verbosity(optuna.logging.WARNING)
 
 
 def search_hyperparameters(train, validation, *, options, activation, ssim, seed, device, journal):
     """Run the trials of `options` (a `Search`) that `journal` does not hold yet; returns the finished Optuna study."""
-    train = train.subset(options.maps, seed=seed)
-    study = open_study(journal, options=options, owner=search_digest(train, validation, options, activation, seed))
-    left = options.trials - len(study.trials)
-    for _ in progress(range(left), label=f"search for {train.model}", total=left):
+    train, journal = train.subset(options.maps, seed=seed), Path(journal)
+    owner = search_digest(train, validation, options, activation, seed)
+    journal.parent.mkdir(parents=True, exist_ok=True)
+    with open(journal.with_suffix(".users"), "w") as users:
+        study = join_study(users, journal, options=options, owner=owner)
+        while unfinished(study, options):
+            trial = claim_trial(study, journal, options=options, seed=seed)
+            if trial is None:      # others are at the last ones; if they died, theirs are to be done again
+                time.sleep(WAIT_S)
+                study = join_study(users, journal, options=options, owner=owner)
+                continue
+            announce(f"search for {train.model}: trial {trial.number + 1} of {options.trials}")
+            tell_result(study, trial, lambda trial: run_trial(
+                trial, train, validation, options=options, activation=activation, ssim=ssim, seed=seed, device=device))
+        return study
+
+
+def unfinished(study, options):
+    """Whether a trial is still to be drawn or at work."""
+    return len(study.trials) < options.trials or not all(trial.state.is_finished() for trial in study.trials)
+
+
+def claim_trial(study, journal, *, options, seed):
+    """The next trial, drawn; None if all are drawn. One process at a time."""
+    with open(journal.with_suffix(".claim"), "w") as claim:
+        fcntl.flock(claim, fcntl.LOCK_EX)
+        drawn = len(study.trials)
+        if drawn >= options.trials:
+            return None
         # A sampler's own state is not in the journal: a fresh one per trial makes resuming harmless.
-        study.sampler = make_sampler([seed, len(study.trials)])
-        study.optimize(lambda trial: run_trial(trial, train, validation, options=options, activation=activation,
-                                               ssim=ssim, seed=seed, device=device), n_trials=1)
-    return study
+        study.sampler = make_sampler([seed, drawn])
+        return study.ask()
+
+
+def tell_result(study, trial, run):
+    """Run a trial and note its value, or that it was pruned."""
+    try:
+        study.tell(trial, run(trial))
+    except optuna.TrialPruned:
+        study.tell(trial, state=optuna.trial.TrialState.PRUNED)
 
 
 def run_trial(trial, train, validation, *, options, activation, ssim, seed, device):
@@ -58,10 +97,18 @@ def draw(trial, space):
             "learning_rate": trial.suggest_float("learning_rate", *space.learning_rate, log=True)}
 
 
-def open_study(journal, *, options, owner):
-    """The Optuna study `owner` in the journal file, made if it is not there, without an unfinished trial."""
-    journal = Path(journal)
-    journal.parent.mkdir(parents=True, exist_ok=True)
+def join_study(users, journal, *, options, owner):
+    """The study, `users` then locked as by one who shares it; whoever finds nobody else there forgets unfinished trials."""
+    fcntl.flock(users, fcntl.LOCK_UN)
+    with contextlib.suppress(BlockingIOError):
+        fcntl.flock(users, fcntl.LOCK_EX | fcntl.LOCK_NB)     # the system drops the lock of a process that dies
+        open_study(journal, options=options, owner=owner, alone=True)
+    fcntl.flock(users, fcntl.LOCK_SH)
+    return open_study(journal, options=options, owner=owner, alone=False)
+
+
+def open_study(journal, *, options, owner, alone):
+    """The Optuna study `owner` in the journal file, made if it is not there; `alone`: without an unfinished trial."""
     backend = optuna.storages.journal.JournalFileBackend(
         str(journal), lock_obj=optuna.storages.journal.JournalFileOpenLock(str(journal)))
     storage = optuna.storages.JournalStorage(backend)
@@ -70,7 +117,7 @@ def open_study(journal, *, options, owner):
     known = {"storage": storage, "study_name": owner}
     study = optuna.create_study(**known, pruner=pruner, load_if_exists=True)
     finished = [trial for trial in study.trials if trial.state.is_finished() and trial.state.name != "FAIL"]
-    if len(finished) < len(study.trials):
+    if alone and len(finished) < len(study.trials):
         # Hyperband's brackets go by a trial's number: the numbers must go on without a gap.
         optuna.delete_study(**known)
         study = optuna.create_study(**known, pruner=pruner)

@@ -40,13 +40,25 @@ class Section(pydantic.BaseModel):
             raise InputError(f"{key}: {reason} (it is {fault['input']!r:.60}).") from None
 
 
-class Network(Section):
-    """The network that is trained: the printed one, or the best of the search."""
+class Compact(Section):
+    """The small network that mirrors the sensor; it has no hidden layer and takes no part in the search."""
 
-    architecture: Literal["printed", "searched"] = "printed"
+    filters: tuple[PositiveInt, PositiveInt, PositiveInt] = Field((16, 32, 64), description="full grid, halving, half grid")
+    learning_rate: PositiveFloat = Field(3e-3, description="of the first epoch, whatever `training.learning_rate` says")
+    epochs: PositiveInt | None = Field(None, description="at most; by default as many as in `training`")
+
+
+class Network(Section):
+    """The network that a study's results rest on: the printed one, the search's best of its form, or the compact one.
+
+    Beside it the other kind is trained on the same split, for comparison: compact, or printed where compact is chosen.
+    """
+
+    architecture: Literal["printed", "searched", "compact"] = "printed"
     filters: tuple[PositiveInt, ...] = Field((80, 95, 120), min_length=1, description="of each 2 x 2 convolution")
     dense: PositiveInt = Field(570, description="neurons of the hidden layer")
     activation: Literal["relu", "linear"] = Field("relu", description="after a convolution; the paper is silent")
+    compact: Compact = Compact()
 
 
 class SearchSpace(Section):

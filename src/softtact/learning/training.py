@@ -17,7 +17,7 @@ import torch
 from softtact.errors import ConvergenceError
 from softtact.evaluation.ssim import map_ssim
 from softtact.files import digest
-from softtact.learning.network import TactileNetwork, load, predict, save, summed_l1
+from softtact.learning.network import ARCHITECTURES, load, predict, save, summed_l1
 from softtact.progress import progress
 
 
@@ -63,11 +63,13 @@ def prepare_torch(*, threads, device="cpu"):
 def start_run(train, *, network, learning_rate, seed, device):
     """A `Run` with fresh weights; the training set's greatest map and count become the network's scales.
 
-    network: dict of filters, dense, activation
+    network: dict of the architecture (printed, if not said) and its options: filters, and dense, activation of the printed one
     """
     torch.manual_seed(seed)
-    model = TactileNetwork(map_shape=train.maps_mm.shape[1:], taxels=train.counts.shape[1:], **network,
-                           map_scale_mm=_largest(train.maps_mm), count_scale=_largest(train.counts)).to(device)
+    options = dict(network)
+    make = ARCHITECTURES[options.pop("architecture", "printed")]
+    model = make(map_shape=train.maps_mm.shape[1:], taxels=train.counts.shape[1:], **options,
+                 map_scale_mm=_largest(train.maps_mm), count_scale=_largest(train.counts)).to(device)
     # The fused update is one pass over the 94 million weights; the plain one costs as much as the gradients.
     return Run(model, torch.optim.Adam(model.parameters(), lr=learning_rate, fused=True))
 
@@ -149,7 +151,8 @@ def training_digest(run, train, validation, options, seed):
     """Tells trainings apart: a checkpoint of other data or settings must not be taken up."""
     choices = options.model_dump(exclude={"checkpoint_every_s", "threads"})
     rate = run.optimiser.param_groups[0]["lr"]
-    return digest([choices, rate, seed, run.network.options, train.digest(), validation.digest(), torch.__version__])
+    network = [run.network.architecture, run.network.options]
+    return digest([choices, rate, seed, network, train.digest(), validation.digest(), torch.__version__])
 
 
 def resume(run, checkpoint, owner):

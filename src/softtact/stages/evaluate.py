@@ -2,12 +2,12 @@
 
 inputs: networks (one per model), validation, unseen, grasps (one per model each),
     presses (of the models, for times; an archive has none)
-outputs: ssim, ceiling, timing (CSV), predictions (NetCDF);  settings: ssim, seed
+outputs: ssim, summary, ceiling, timing (CSV), predictions (NetCDF);  settings: ssim, seed
 """
 
 import pandas as pd
 
-from softtact.evaluation.scoring import predict_grasps, score_samples, score_sensor
+from softtact.evaluation.scoring import predict_grasps, score_samples, score_sensor, summarise_scores
 from softtact.evaluation.timing import time_presses
 from softtact.files import read_dataset, write_csv, write_dataset
 from softtact.learning.network import load_network, predict
@@ -24,11 +24,12 @@ def run(*, inputs, outputs, settings, threads=1):
     ssim = Ssim.from_dict(settings.get("ssim", {}), where="ssim").model_dump()
     networks = {facts["model"]: network for network, facts in map(load_network, inputs["networks"])}
     splits = {name: {samples.model: samples for samples in map(read_samples, inputs[name])} for name in TESTS}
-    scores = [score_samples(network, splits[name][model], ssim=ssim)
-              for model, network in networks.items() for name in TESTS]
-    ceilings = [score_sensor(next(iter(splits[name].values())), ssim=ssim) for name in TESTS]
-    write_csv(outputs["ssim"], pd.concat(scores))
-    write_csv(outputs["ceiling"], pd.concat(ceilings))
+    scores = pd.concat([score_samples(network, splits[name][model], ssim=ssim)
+                        for model, network in networks.items() for name in TESTS])
+    ceiling = pd.concat([score_sensor(next(iter(splits[name].values())), ssim=ssim) for name in TESTS])
+    write_csv(outputs["ssim"], scores)
+    write_csv(outputs["ceiling"], ceiling)
+    write_csv(outputs["summary"], summarise_scores(scores, ceiling, seed=settings.get("seed", 0)))
     write_dataset(outputs["predictions"], predict_grasps(networks, splits["grasps"]), seed=settings.get("seed"),
                   settings=settings)
     presses = (read_dataset(path) for path in inputs.get("presses", ()))

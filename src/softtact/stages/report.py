@@ -1,6 +1,6 @@
 """The report page.
 
-inputs: table1, contradictions, table2, table3, claims, ssim, ceiling, ftir, figures (list of PNG), and policies, or
+inputs: table1, contradictions, table2, table3, networks, claims, summary, ftir, figures (list of PNG), and policies, or
     inventory and counts of the published archive;  outputs: page;  settings: study facts
 """
 

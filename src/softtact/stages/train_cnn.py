@@ -1,8 +1,8 @@
-"""The network of one model, trained.
+"""A network of one model, trained.
 
 inputs: train, validation, best (of the search)
 outputs: model (the best epoch's weights), history, and timing where asked for; a checkpoint lies beside them meanwhile
-settings: training, network, ssim, seed
+settings: training, network (its `architecture` says which is trained), ssim, seed
 """
 
 import pandas as pd
@@ -18,28 +18,37 @@ HISTORY = ["epoch", "train_loss", "validation_loss", "validation_ssim", "learnin
 
 def run(*, inputs, outputs, settings, threads=1):
     """Train, or go on with a training that was cut off, and write the best weights and the history."""
-    options = Training.from_dict(settings["training"], where="training")
+    network = Network.from_dict(settings["network"], where="network")
+    best, seed = read_json(inputs["best"]), settings["seed"]
+    options = chosen_training(Training.from_dict(settings["training"], where="training"), network, best)
     ssim = Ssim.from_dict(settings.get("ssim", {}), where="ssim").model_dump()
     train, validation = read_samples(inputs["train"]), read_samples(inputs["validation"])
-    best, seed = read_json(inputs["best"]), settings["seed"]
-    training = start_run(
-        train, network=chosen_network(settings["network"], best), seed=seed,
-        learning_rate=best["learning_rate"] if options.learning_rate == "searched" else options.learning_rate,
-        device=prepare_torch(threads=threads, device=options.device))
+    training = start_run(train, network=chosen_network(network, best), seed=seed, learning_rate=options.learning_rate,
+                         device=prepare_torch(threads=threads, device=options.device))
     checkpoint = outputs["model"].with_name("checkpoint.pt")
     for _ in train_network(training, train, validation, options=options, ssim=ssim, seed=seed, checkpoint=checkpoint,
-                           label=f"network of {train.model}"):
+                           label=f"{network.architecture} network of {train.model}"):
         pass
-    write_results(outputs, training, facts={"model": train.model, "source": train.source, "seed": seed,
-                                            "config_digest": digest(settings)})
+    write_results(outputs, training, facts={
+        "model": train.model, "architecture": network.architecture, "source": train.source, "seed": seed, "range": train.range(),
+        "config_digest": digest(settings)})
     checkpoint.unlink(missing_ok=True)
 
 
-def chosen_network(values, best):
-    """filters, dense and activation: as printed, or as the search found them."""
-    network = Network.from_dict(values, where="network")
+def chosen_network(network, best):
+    """Architecture and its options: as printed, as the search found them, or the compact one's."""
+    if network.architecture == "compact":
+        return {"architecture": "compact", "filters": network.compact.filters}
     searched = {name: best[name] for name in ("filters", "dense")} if network.architecture == "searched" else {}
-    return {**network.model_dump(exclude={"architecture"}), **searched}
+    return {**network.model_dump(include={"filters", "dense", "activation"}), **searched}
+
+
+def chosen_training(options, network, best):
+    """`options` with the learning rate as a number: the search's, the stated one, or the compact network's own."""
+    if network.architecture == "compact":
+        own = {"learning_rate": network.compact.learning_rate, "epochs": network.compact.epochs or options.epochs}
+        return options.model_copy(update=own)
+    return options.model_copy(update={"learning_rate": best["learning_rate"]} if options.learning_rate == "searched" else {})
 
 
 def write_results(outputs, training, *, facts):

@@ -1,0 +1,59 @@
+"""`softtact predict`: the taxels that a trained network reads off deformation maps."""
+
+import sys
+from pathlib import Path
+
+from softtact.commands.common import add_command, check_folders, show
+from softtact.errors import InputError
+
+WRITTEN = (".nc", ".csv")
+
+
+def add(commands):
+    """Add the command to the parser."""
+    command = add_command(commands, "predict", _predict, "Predict the taxels' counts from deformation maps with a trained network.")
+    command.add_argument("maps", metavar="MAP_OR_PRESS", type=Path,
+                         help="NetCDF of a press (all its forces), or .npy or .csv of one map in mm, rows along y")
+    command.add_argument("--network", type=Path, required=True, metavar="MODEL.pt",
+                         help="a trained network; loading it runs no code of the file")
+    command.add_argument("--out", type=Path, metavar="FILE.nc|csv", help="write the counts")
+    command.add_argument("--plot", type=Path, metavar="FILE.png", help="draw maps and taxels")
+
+
+def _predict(options):
+    from softtact.learning.network import load_network, predict
+    from softtact.learning.prediction import outside_training, read_maps
+
+    check_folders(options.out, options.plot)
+    if options.out and options.out.suffix not in WRITTEN:
+        raise InputError(f"{options.out}: taxels are written as {' or '.join(WRITTEN)}; give such a name.")
+    network, facts = load_network(options.network)
+    maps = read_maps(options.maps, shape=tuple(network.options["map_shape"]))
+    counts = predict(network, maps.maps_mm)
+    warnings = outside_training(maps, facts)
+    for sentence in warnings:
+        print(f"softtact predict: {sentence}", file=sys.stderr)
+    _write(maps, counts, facts, options)
+    result = {"force_n": None if maps.force_n is None else maps.force_n.tolist(), "tactile_map": counts.tolist(),
+              "network": {"architecture": network.architecture} | facts, "warnings": warnings}
+    show(result, as_json=options.json, lines=_lines(maps, counts, network, facts))
+
+
+def _write(maps, counts, facts, options):
+    if options.out:
+        from softtact.learning.prediction import write_counts
+
+        write_counts(options.out, maps, counts, facts=facts)
+    if options.plot:
+        from softtact.reporting.prediction_plot import plot_prediction
+
+        plot_prediction(maps, counts, options.plot)
+
+
+def _lines(maps, counts, network, facts):
+    yield (f"network: {network.architecture}, trained on maps of the model {facts.get('model', 'unknown')} "
+           f"and readings of: {facts.get('source', 'unknown')}")
+    for k, taxels in enumerate(counts):
+        force = "" if maps.force_n is None else f" at {maps.force_n[k]:g} N"
+        yield f"counts{force} (deepest {maps.maps_mm[k].max():.4f} mm), row y and column x rising:"
+        yield from ("".join(f"{count:8.0f}" for count in row) for row in taxels)

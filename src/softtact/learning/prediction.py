@@ -1,0 +1,115 @@
+"""Maps from a user's file for a trained network, and its counts back to a file; what does not fit is refused or warned of."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import xarray
+
+from softtact.errors import InputError
+from softtact.files import read_dataset, write_csv, write_dataset
+
+MARGIN = 1e-3     # share by which a value may pass the training's range unsaid: files round
+
+
+@dataclass(frozen=True)
+class Maps:
+    """Deformation maps of one file.
+
+    maps_mm (n, y, x);  force_n (n,), valid (n,) and model, where the file is a press', else None
+    x_mm (x,), y_mm (y,): the grid, where the file tells
+    """
+
+    maps_mm: np.ndarray
+    force_n: np.ndarray | None = None
+    valid: np.ndarray | None = None
+    model: str | None = None
+    x_mm: np.ndarray | None = None
+    y_mm: np.ndarray | None = None
+
+
+def read_maps(path, *, shape):
+    """The `Maps` of a press (NetCDF) or of one map (.npy, .csv); `shape` (y, x) is what the network takes."""
+    readers = {".nc": _read_press, ".npy": _read_npy, ".csv": _read_csv}
+    if Path(path).suffix not in readers:
+        raise InputError(f"{path}: maps are read from {', '.join(readers)}; give one of these.")
+    if not Path(path).is_file():
+        raise InputError(f"{path}: there is no such file.")
+    maps = readers[Path(path).suffix](path)
+    got = maps.maps_mm.shape[1:]
+    if got != tuple(shape):
+        turned = "; it is transposed: rows run along y" if got == tuple(shape)[::-1] else ""
+        raise InputError(f"{path}: its map has {' x '.join(map(str, got))} values and the network takes "
+                         f"{' x '.join(map(str, shape))} (y, x){turned}.")
+    if not np.isfinite(maps.maps_mm).all():
+        raise InputError(f"{path}: it holds values that are not finite; make it again.")
+    return maps
+
+
+def _read_press(path):
+    data = read_dataset(path)
+    if "deformation_map_mm" not in data or data.deformation_map_mm.dims != ("force", "y", "x") or "force_n" not in data:
+        raise InputError(f"{path}: not a press with deformation_map_mm (force, y, x) and force_n; "
+                         "give what `softtact press` wrote.")
+    unit = data.deformation_map_mm.attrs.get("units", "mm")
+    if unit != "mm":
+        raise InputError(f"{path}: its maps are in {unit!r}; give them in mm.")
+    if "converged" in data and not data.converged.values.all():
+        raise InputError(f"{path}: a level of the press did not converge; press it again with smaller force steps.")
+    valid = data.within_validity.values == 1 if "within_validity" in data else None
+    grid = {f"{side}_mm": data[side].values if side in data.coords else None for side in "xy"}
+    return Maps(data.deformation_map_mm.values, data.force_n.values, valid, data.attrs.get("model"), **grid)
+
+
+def _read_npy(path):
+    try:
+        values = np.load(path, allow_pickle=False)
+    except (OSError, ValueError, EOFError) as error:
+        raise InputError(f"{path}: not an array of numbers ({error}); write it with numpy.save.") from None
+    return _one_map(path, values)
+
+
+def _read_csv(path):
+    try:
+        values = np.loadtxt(path, delimiter=",", ndmin=2)
+    except (ValueError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: not a table of numbers with commas and no header ({error}).") from None
+    return _one_map(path, values)
+
+
+def _one_map(path, values):
+    if values.ndim != 2 or values.dtype.kind not in "fiu":
+        raise InputError(f"{path}: it holds {values.ndim}-dimensional {values.dtype} values; give one map of numbers (y, x) in mm.")
+    return Maps(values[None].astype(float))
+
+
+def outside_training(maps, facts):
+    """Sentences on what the network has not seen in training; a network's file from before ranges were kept tells little."""
+    said = []
+    if maps.model and maps.model != facts.get("model", maps.model):
+        said.append(f"the maps are of the model {maps.model} and the network was trained on {facts['model']}.")
+    if maps.valid is not None and not maps.valid.all():
+        said.append(f"{(~maps.valid).sum()} of {len(maps.valid)} levels are beyond what the press' model is valid for.")
+    known = facts.get("range", {})
+    for name, values, unit in (("map_max_mm", maps.maps_mm.max(axis=(1, 2)), "mm deep at most"), ("force_n", maps.force_n, "N")):
+        if values is not None and name in known:
+            low, high = known[name]
+            outside = (values < low * (1 - MARGIN)) | (values > high * (1 + MARGIN))
+            if outside.any():
+                said.append(f"{outside.sum()} of {len(values)} maps lie outside the training maps' range, {low:.4g} to {high:.4g} "
+                            f"{unit} (the first with {values[outside][0]:.4g}); their counts are extrapolated.")
+    return said
+
+
+def write_counts(path, maps, counts, *, facts):
+    """Write counts (n, row, column) as NetCDF, or as CSV with a line for each taxel."""
+    if path.suffix == ".csv":
+        n, rows, columns = np.indices(counts.shape).reshape(3, -1)
+        forces = {} if maps.force_n is None else {"force_n": maps.force_n[n]}
+        write_csv(path, pd.DataFrame({"map": n, **forces, "row": rows, "column": columns, "counts": counts.ravel()}))
+        return
+    attributes = {"network_model": facts.get("model", ""), "source": f"network trained on: {facts.get('source', '')}"}
+    data = xarray.Dataset({"tactile_map": (("force", "row", "column"), counts, {"units": "counts"})}, attrs=attributes)
+    data = data if maps.force_n is None else data.assign(force_n=("force", maps.force_n, {"units": "N"}))
+    write_dataset(path, data, seed=facts.get("seed"), settings={})

@@ -1,0 +1,17 @@
+"""Figure 9.
+
+inputs: networks (CSV), histories (of each of its networks, in its order);  outputs: png, svg
+"""
+
+import pandas as pd
+
+from softtact.reporting.fig9_networks import draw
+from softtact.reporting.style import save
+
+
+def run(*, inputs, outputs, settings, threads=1):
+    """Draw."""
+    networks = pd.read_csv(inputs["networks"])
+    kinds = list(networks.groupby(["model", "architecture"], sort=False).groups)
+    histories = dict(zip(kinds, map(pd.read_csv, inputs["histories"]), strict=True))
+    save(draw(networks, histories), outputs["png"], outputs["svg"])
