@@ -113,19 +113,18 @@ def test_the_page_holds_its_figures_and_links_its_data(tmp_path):
 
 
 def test_the_page_of_an_archives_study_tells_of_the_archive_and_of_no_virtual_sensor(tmp_path):
-    names = ("table1", "contradictions", "table2", "table3", "counts", "claims", "ssim", "ceiling")
+    names = ("table1", "contradictions", "table2", "table3", "counts", "networks", "claims", "summary")
     inputs = {name: tmp_path / f"{name}.csv" for name in names}
-    for name in ("table1", "contradictions", "table2", "table3", "counts"):
+    for name in ("table1", "contradictions", "table2", "table3", "counts", "networks"):
         write_csv(inputs[name], COMPLEXITY)
-    write_csv(inputs["ssim"], SSIM)
-    write_csv(inputs["ceiling"], CEILING.iloc[:0])
+    write_csv(inputs["summary"], SUMMARY)
     write_csv(inputs["claims"], pd.DataFrame({"claim": ["a"], "verdict": ["reproduced"]}))
     inputs |= {"ftir": tmp_path / "ftir.json", "inventory": tmp_path / "inventory.json", "figures": [tmp_path / "fig6_ssim.png"]}
     write_json(inputs["ftir"], {"source": "virtual dielectric", "verdict": ""})
     items = {"indenters": ["a", "b"], "unseen": ["c"], "grasps": ["d"]}
     write_json(inputs["inventory"], {"tests": 9, "tests_used": 8, "tests_left_out": 1, "items": items,
                                      "sentence": "No count is met."})
-    save(fig6_ssim.draw(SSIM, pd.read_csv(inputs["ceiling"])), inputs["figures"][0])
+    save(fig6_ssim.draw(SSIM, CEILING.iloc[:0]), inputs["figures"][0])
     page = render_page(inputs, {"study": "published", "seed": 1}, folder=tmp_path)
     assert "8 of 9 tests of 2 indenters, 1 held-out ones" in page and "No count is met." in page
     assert "counts against those in print" in page and "Policies that choose" not in page
