@@ -6,7 +6,7 @@ import pytest
 import torch
 import xarray
 
-from softtact.evaluation.scoring import predict_grasps, score_samples, score_sensor, summarise_scores
+from softtact.evaluation.scoring import predict_grasps, score_items, score_samples, score_sensor, summarise_scores
 from softtact.evaluation.timing import summarise_times, time_presses
 from softtact.learning.samples import Samples
 
@@ -108,6 +108,16 @@ def test_one_item_has_a_mean_and_no_interval_and_a_sensor_read_once_no_ceiling()
     samples = make_samples(items=("object_1",), trials=1)
     row = summarise_scores(score_samples(Echo(0.9), samples, ssim=SSIM), score_sensor(samples, ssim=SSIM), seed=1).iloc[0]
     assert row.ssim > 0.9 and np.isnan([row.ssim_low, row.ssim_high, row.sensor_ssim]).all()
+
+
+def test_each_item_has_its_own_mean_and_an_interval_over_its_trials():
+    scores = score_samples(Echo(0.9), make_samples(noise=20), ssim=SSIM)
+    rows = score_items(scores, seed=1)
+    assert rows["item"].tolist() == ["object_1", "object_2"] and (rows.maps == 6).all()
+    assert rows.ssim.to_numpy() == pytest.approx(scores.groupby("item").ssim.mean().to_numpy())
+    assert (rows.ssim_low < rows.ssim).all() and (rows.ssim < rows.ssim_high).all()
+    alone = score_items(scores[scores.trial == 0], seed=1)
+    assert np.isnan(alone[["ssim_low", "ssim_high"]]).all(axis=None)
 
 
 @pytest.fixture

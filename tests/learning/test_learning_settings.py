@@ -24,3 +24,10 @@ def test_defaults_are_what_the_paper_prints():
 def test_a_wrong_setting_is_refused_with_its_key_and_value(section, values, sentence):
     with pytest.raises(InputError, match=sentence):
         section.from_dict(values, where="it")
+
+
+def test_a_search_has_filters_for_each_layer_that_it_may_draw():
+    assert Search().space.depth == (2, 4)
+    assert Search.from_dict({"space": {"filters": [[4, 8]]}}, where="search").space.depth == (1, 1)
+    with pytest.raises(InputError, match="layers goes to 5, and filters has ranges for 4; give as many"):
+        Search.from_dict({"space": {"layers": [2, 5]}}, where="search")

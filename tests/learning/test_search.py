@@ -15,7 +15,7 @@ from softtact.learning.settings import Search
 from softtact.learning.training import prepare_torch
 
 OPTIONS = Search(trials=8, max_epochs=4, batch=4, reduction_factor=2, maps=12,
-                 space={"filters": [[2, 4], [2, 4], [2, 4]], "dense": [4, 24], "learning_rate": [1e-5, 1e-2]})
+                 space={"layers": [2, 3], "filters": [[2, 4], [2, 4], [2, 4]], "dense": [4, 24], "learning_rate": [1e-5, 1e-2]})
 
 
 def search(journal, **changes):
@@ -32,8 +32,9 @@ def undisturbed(tmp_path_factory):
 
 def test_the_table_has_a_row_per_trial_drawn_from_the_space(undisturbed):
     assert undisturbed.columns.tolist() == [
-        "trial", "filters_1", "filters_2", "filters_3", "dense", "learning_rate", "value", "state", "epochs"]
+        "trial", "layers", "filters_1", "filters_2", "filters_3", "dense", "learning_rate", "value", "state", "epochs"]
     assert undisturbed.trial.tolist() == list(range(8))
+    assert set(undisturbed.layers) == {2, 3} and (undisturbed.filters_3.isna() == (undisturbed.layers == 2)).all()
     assert undisturbed.filters_2.between(2, 4).all() and undisturbed.dense.between(4, 24).all()
     assert undisturbed.learning_rate.between(1e-5, 1e-2).all() and undisturbed.learning_rate.nunique() == 8
 

@@ -131,6 +131,7 @@ rule evaluate:
         **({} if STUDY.archive else {"presses": presses(STUDY.tested)}),
     output:
         ssim=f"{RESULTS}/evaluation/ssim.csv",
+        items=f"{RESULTS}/evaluation/items.csv",
         summary=f"{RESULTS}/evaluation/summary.csv",
         ceiling=f"{RESULTS}/evaluation/ceiling.csv",
         timing=f"{RESULTS}/evaluation/timing.csv",

@@ -82,3 +82,16 @@ def summarise_scores(scores, ceiling, *, seed):
                      "ssim": group.ssim.mean(), "ssim_low": low, "ssim_high": high, "mae_counts": group.mae_counts.mean(),
                      "overlap": group.overlap.mean(), "sensor_ssim": own.get(set_name, np.nan)})
     return pd.DataFrame(rows)
+
+
+def score_items(scores, *, seed):
+    """Frame model, set, item, maps, ssim, ssim_low, ssim_high, mae_counts, overlap: a row per item and model.
+
+    ssim_low, ssim_high: 95 % interval of the item's mean, by bootstrap over its trials; nan with one
+    """
+    rows = []
+    for (model, set_name, item), group in scores.groupby(["model", "set", "item"], sort=False):
+        low, high = interval_of_mean(group.ssim.to_numpy(), group.trial, np.zeros(len(group), dtype=int), seed=seed)
+        rows.append({"model": model, "set": set_name, "item": item, "maps": len(group), "ssim": group.ssim.mean(), "ssim_low": low,
+                     "ssim_high": high, "mae_counts": group.mae_counts.mean(), "overlap": group.overlap.mean()})
+    return pd.DataFrame(rows)

@@ -1,4 +1,4 @@
-"""Hyperparameter search: Optuna with its Hyperband pruner over filters, hidden neurons and learning rate.
+"""Hyperparameter search: Optuna with its Hyperband pruner over layers, filters, hidden neurons and learning rate.
 
 The trials stand in a journal file. A search that was cut off takes it up, forgets the trial that was under way, and
 ends as it would have: each trial's draw depends on the seed and the trials finished before it.
@@ -92,7 +92,8 @@ def run_trial(trial, train, validation, *, options, activation, ssim, seed, devi
 
 def draw(trial, space):
     """Hyperparameters of a trial: filters (list), dense, learning_rate."""
-    filters = [trial.suggest_int(f"filters_{layer}", *bounds) for layer, bounds in enumerate(space.filters, start=1)]
+    layers = trial.suggest_int("layers", *space.depth)
+    filters = [trial.suggest_int(f"filters_{layer}", *bounds) for layer, bounds in enumerate(space.filters[:layers], start=1)]
     return {"filters": filters, "dense": trial.suggest_int("dense", *space.dense, log=True),
             "learning_rate": trial.suggest_float("learning_rate", *space.learning_rate, log=True)}
 
@@ -136,10 +137,12 @@ def search_digest(train, validation, options, activation, seed):
 
 
 def search_table(study):
-    """A row per trial: trial, the drawn values, value (validation loss, counts), state, epochs."""
+    """A row per trial: trial, the drawn values (none for a layer that it lacks), value (validation loss, counts), state, epochs."""
     rows = [{"trial": trial.number, **trial.params, "value": smallest_loss(trial), "state": trial.state.name.lower(),
              "epochs": len(trial.intermediate_values)} for trial in study.trials]
-    return pd.DataFrame(rows)
+    table = pd.DataFrame(rows)
+    filters = sorted(name for name in table if name.startswith("filters_"))
+    return table[["trial", "layers", *filters, "dense", "learning_rate", "value", "state", "epochs"]]
 
 
 def best_trial(study):

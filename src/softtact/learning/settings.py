@@ -64,9 +64,21 @@ class Network(Section):
 class SearchSpace(Section):
     """Ranges that the search draws from, [smallest, largest]; equal ends hold a value fixed."""
 
-    filters: tuple[Widths, ...] = Field(((16, 128), (16, 128), (16, 160)), min_length=1, description="per convolution")
+    layers: Widths | None = Field(None, description="convolutions, the first of `filters`; by default 2 up to as many as it has")
+    filters: tuple[Widths, ...] = Field(((16, 128), (16, 128), (16, 160), (16, 160)), min_length=1, description="per convolution")
     dense: Widths = Field((64, 768), description="drawn on a logarithmic scale")
     learning_rate: Rates = Field((1e-4, 2e-3), description="drawn on a logarithmic scale")
+
+    @pydantic.model_validator(mode="after")
+    def _has_filters_for_each_layer(self):
+        if self.depth[1] > len(self.filters):
+            raise ValueError(f"layers goes to {self.depth[1]}, and filters has ranges for {len(self.filters)}; give as many")
+        return self
+
+    @property
+    def depth(self):
+        """Fewest and most convolutions."""
+        return self.layers or (min(2, len(self.filters)), len(self.filters))
 
 
 class Search(Section):
