@@ -47,7 +47,7 @@ def training_inputs(folder, model):
 
 def run_evaluation(folder, inputs):
     outputs = {name: folder / "evaluation" / file for name, file in
-               {"ssim": "ssim.csv", "items": "items.csv", "summary": "summary.csv", "ceiling": "ceiling.csv",
+               {"ssim": "ssim.csv", "per_item": "items.csv", "summary": "summary.csv", "ceiling": "ceiling.csv",
                 "timing": "timing.csv", "predictions": "predictions.nc"}.items()}
     evaluate.run(inputs=inputs, outputs=outputs, settings=settings_of("ssim", "seed"))
     return outputs
@@ -176,7 +176,7 @@ def test_times_and_predictions_cover_the_presses_and_the_grasps(finished):
 def test_scores_and_predictions_are_the_same_bytes_again(finished):
     folder, inputs, outputs = finished
     again = run_evaluation(folder / "again", inputs)
-    for name in ("ssim", "items", "summary", "ceiling", "predictions"):
+    for name in ("ssim", "per_item", "summary", "ceiling", "predictions"):
         assert again[name].read_bytes() == outputs[name].read_bytes()
 
 

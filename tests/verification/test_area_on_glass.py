@@ -98,7 +98,7 @@ def lying_area(r, z):
     return np.pi * np.interp(DARK_GAP_MM, z[k - 1:k + 1], r[k - 1:k + 1]) ** 2
 
 
-@pytest.mark.slow
+@pytest.mark.gold
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
 @pytest.mark.parametrize("name", AREAS)
 def test_calculix_finds_the_areas_that_are_kept_here(name, tmp_path):

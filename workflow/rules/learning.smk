@@ -14,7 +14,7 @@ BESIDE = "printed" if STUDY.values.network.architecture == "compact" else "compa
 
 def learned(name):
     """A file of each trained network: the study's own of each model, then those beside it."""
-    return [f"{RESULTS}/learning/{model}/{part}{name}" for part in ("", f"{BESIDE}/") for model in STUDY.values.tested]
+    return [f"{RESULTS}/learning/{model}/{part}{name}" for part in ("", f"{BESIDE}/") for model in STUDY.tested]
 
 
 
@@ -131,7 +131,7 @@ rule evaluate:
         **({} if STUDY.archive else {"presses": presses(STUDY.tested)}),
     output:
         ssim=f"{RESULTS}/evaluation/ssim.csv",
-        items=f"{RESULTS}/evaluation/items.csv",
+        per_item=f"{RESULTS}/evaluation/items.csv",
         summary=f"{RESULTS}/evaluation/summary.csv",
         ceiling=f"{RESULTS}/evaluation/ceiling.csv",
         timing=f"{RESULTS}/evaluation/timing.csv",

@@ -2,7 +2,7 @@
 
 inputs: networks (one per model), validation, unseen, grasps (one per model each),
     presses (of the models, for times; an archive has none)
-outputs: ssim, items, summary, ceiling, timing (CSV), predictions (NetCDF);  settings: ssim, seed
+outputs: ssim, per_item, summary, ceiling, timing (CSV), predictions (NetCDF);  settings: ssim, seed
 """
 
 import pandas as pd
@@ -29,7 +29,7 @@ def run(*, inputs, outputs, settings, threads=1):
     ceiling = pd.concat([score_sensor(next(iter(splits[name].values())), ssim=ssim) for name in TESTS])
     write_csv(outputs["ssim"], scores)
     write_csv(outputs["ceiling"], ceiling)
-    write_csv(outputs["items"], score_items(scores, seed=settings.get("seed", 0)))
+    write_csv(outputs["per_item"], score_items(scores, seed=settings.get("seed", 0)))
     write_csv(outputs["summary"], summarise_scores(scores, ceiling, seed=settings.get("seed", 0)))
     write_dataset(outputs["predictions"], predict_grasps(networks, splits["grasps"]), seed=settings.get("seed"),
                   settings=settings)
