@@ -5,6 +5,7 @@ Heavy imports stand inside the commands' functions, so that `softtact --help` an
 """
 
 import argparse
+import os
 import sys
 
 import softtact
@@ -22,6 +23,8 @@ def main(arguments=None):
     except SofttactError as error:
         print(f"softtact {options.command}: {error}", file=sys.stderr)
         return 1
+    except BrokenPipeError:     # `| head` has seen enough; what is still in the buffer must not raise at the end
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except KeyboardInterrupt:
         print(f"softtact {options.command}: interrupted; nothing was written.", file=sys.stderr)
         return 130
