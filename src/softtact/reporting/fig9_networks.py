@@ -7,7 +7,7 @@ from softtact.reporting.style import colour, pyplot
 # An architecture is told by hatch and line, a model by its colour: apart in grey too.
 HATCHES = {"printed": "", "searched": "..", "compact": "////"}
 LINES = {"printed": "-", "searched": "-.", "compact": "--"}
-NO_INTERVAL = "no interval: one item only"
+NO_INTERVAL = "one item:\nno interval"
 
 
 def draw(networks, histories):
@@ -23,7 +23,7 @@ def draw(networks, histories):
     loss.set(xlabel="epoch", ylabel="loss, counts summed over the taxels", yscale="log",
              title="loss: validation thick, training thin")
     ssim.set(xlabel="epoch", ylabel="SSIM", title="SSIM of the validation maps")
-    ssim.legend(frameon=False, fontsize=8, loc="lower right")
+    ssim.legend(frameon=False, fontsize=8, loc="best")
     figure.legend(*scores.get_legend_handles_labels(), frameon=False, fontsize=8, ncols=3, loc="outside lower center")
     for axes in (loss, ssim):
         axes.xaxis.get_major_locator().set_params(integer=True)
