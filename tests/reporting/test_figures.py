@@ -37,7 +37,7 @@ def test_figure_9_shows_each_architectures_scores_and_training():
     assert len(loss.lines) == 4
     assert [text.get_text() for text in ssim.get_legend().get_texts()] == ["elastic, printed", "elastic, compact"]
     labels = [text.get_text() for text in scores.get_xticklabels()]
-    assert labels == ["unseen\n8 maps, items: 4", "grasps\n8 maps, items: 1\nno interval: one item only"]
+    assert labels == ["unseen\n8 maps, items: 4", "grasps\n8 maps, items: 1\none item:\nno interval"]
     named = [text.get_text() for text in figure.legends[0].get_texts()]
     assert "elastic, printed: 94.3 million weights, 90 s an epoch" in named
 
