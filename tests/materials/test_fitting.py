@@ -4,6 +4,7 @@ import time
 
 import numpy as np
 import pytest
+from table1 import TABLE_1
 
 from softtact.errors import InputError
 from softtact.materials.curves import synthetic_curve
@@ -186,14 +187,6 @@ def test_a_weight_of_two_counts_a_curves_points_twice(curves_of):
 def test_options_without_meaning_are_refused(curves_of, options, sentence):
     with pytest.raises(InputError, match=sentence):
         fit_law("neo_hooke", curves_of("neo_hooke", {"c10": 0.2}), **options)
-
-
-TABLE_1 = {
-    ("neoprene", "ogden2"): {"mu1": 0.0027, "alpha1": 8.74091, "mu2": 0.0551, "alpha2": 0.3889},
-    ("neoprene", "mooney_rivlin"): {"c10": 0.1786, "c01": 0.0022},
-    ("polyurethane", "ogden2"): {"mu1": 0.1351, "alpha1": 1.4538, "mu2": 0.2223, "alpha2": -4.9910},
-    ("polyurethane", "mooney_rivlin"): {"c10": 0.1706, "c01": 0.0040},
-}
 
 
 @pytest.mark.parametrize(("material", "law"), TABLE_1)

@@ -113,8 +113,8 @@ def _choose(choose, ranking, entries):
         raise InputError(f"Law {choose!r} is to be chosen but is not fitted; choose one of {', '.join(ranking)}.")
     name = ranking[0] if choose == "best" else choose
     if not entries[name]["stable_over_data"]:
-        what = "No law" if choose == "best" else f"Law {name} is to be chosen, but it"
-        raise InputError(f"{what} is stable over the strains of these curves ({_ranges(entries[name])}); narrow the window, keep"
+        what = "No law is" if choose == "best" else f"Law {name} is to be chosen but is not"
+        raise InputError(f"{what} stable over the strains of these curves ({_ranges(entries[name])}); narrow the window, keep"
                          f" the constants from being negative (nonnegative), or choose {_stable_names(ranking, entries)}.")
     return name
 
