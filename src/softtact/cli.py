@@ -1,6 +1,6 @@
 """The command `softtact`: its commands are the modules of `softtact.commands`.
 
-What the user can mend ends with one sentence on stderr: exit status 2 for a wrong command line, 1 for a refusal.
+What the user can mend ends with one sentence on stderr and an exit status of its own (`softtact.commands.common.EXIT_STATUS`).
 Heavy imports stand inside the commands' functions, so that `softtact --help` answers at once.
 """
 
@@ -9,26 +9,58 @@ import os
 import sys
 
 import softtact
-from softtact.commands import complexity, detect_discs, export_deck, fit, predict, press, stage
-from softtact.errors import SofttactError
+from softtact.commands import (
+    completion,
+    complexity,
+    config_schema,
+    detect_discs,
+    export_deck,
+    fit,
+    predict,
+    press,
+    stage,
+    view,
+)
+from softtact.commands.common import EXIT_TEXT
+from softtact.errors import ConvergenceError, SofttactError
 
-COMMANDS = (press, predict, complexity, fit, export_deck, detect_discs, stage)
+COMMANDS = (press, view, predict, complexity, fit, export_deck, detect_discs, stage, config_schema, completion)
+EXAMPLES = """examples:
+  softtact press part.stl --unit mm --force 5 --force 20 --out press.nc --vtu press.vtu --plot press.png
+  softtact view press.vtu                     turn the pressed sensor in a browser
+  softtact complexity part.stl --unit mm      which model the paper's rule takes for it
+  softtact fit uniaxial=tension.csv --out card.json
+  softtact press --help                       each command's help has examples of its own
+"""
 
 
 def main(arguments=None):
     """Run one command; return its exit status."""
-    options = _parser().parse_args(arguments)
+    parser = _parser()
+    if "_ARGCOMPLETE" in os.environ:     # a shell asks what could come next
+        import argcomplete
+
+        argcomplete.autocomplete(parser)
+    options = parser.parse_args(arguments)
     try:
         options.run(options)
+    except ConvergenceError as error:
+        return _said(options, error, status=3)
     except SofttactError as error:
-        print(f"softtact {options.command}: {error}", file=sys.stderr)
-        return 1
+        return _said(options, error, status=1)
     except BrokenPipeError:     # `| head` has seen enough; what is still in the buffer must not raise at the end
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except OSError as error:
+        place = error.filename or "a file"
+        return _said(options, f"{place}: {error.strerror or error}; make room or choose another place.", status=4)
     except KeyboardInterrupt:
-        print(f"softtact {options.command}: interrupted; nothing was written.", file=sys.stderr)
-        return 130
+        return _said(options, "interrupted; no half-written file is left.", status=130)
     return 0
+
+
+def _said(options, sentence, *, status):
+    print(f"softtact {options.command}: {sentence}", file=sys.stderr)
+    return status
 
 
 class _Parser(argparse.ArgumentParser):
@@ -39,7 +71,8 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _parser():
-    parser = _Parser(prog="softtact", description=softtact.__doc__)
+    parser = _Parser(prog="softtact", description=softtact.__doc__, epilog=f"{EXAMPLES}\n{EXIT_TEXT}",
+                     formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--version", action="version", version=f"softtact {softtact.__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for command in COMMANDS:

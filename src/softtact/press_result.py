@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from softtact.files import write_dataset
+from softtact.pressed_mesh import PressedMesh, of_map
 
 
 @dataclass(frozen=True)
@@ -19,6 +20,7 @@ class PressResult:
     The last four are nan where the model, the law or the policy does not tell.
     why: what made the choice of the model, where it was not the user's
     x_mm (x,), y_mm (y,): the map's grid;  model;  solver: the linear solver's name
+    mesh: the solver's mesh with its displacements, where it was asked for (`Sensor.keep_mesh`) and the model has one
     """
 
     deformation_map_mm: np.ndarray
@@ -42,6 +44,7 @@ class PressResult:
     expected_error_mm: np.ndarray | None = None
     why: str = ""
     attributes: dict = field(default_factory=dict)
+    mesh: PressedMesh | None = None
 
     def __post_init__(self):
         if self.expected_error_mm is None:
@@ -64,3 +67,9 @@ class PressResult:
     def write(self, path, *, settings=None, seed=None):
         """Write as NetCDF."""
         write_dataset(path, self.to_dataset(), seed=seed, settings=settings or {})
+
+    def write_vtu(self, path):
+        """Write the pressed sensor as VTU: the solver's mesh where it was kept, else the map's surface (see `pressed_mesh`)."""
+        mesh = self.mesh or of_map(self.deformation_map_mm, self.x_mm, self.y_mm, self.force_n,
+                                   thickness_mm=self.attributes["thickness_mm"])
+        mesh.write(path)

@@ -2,6 +2,7 @@
 
 import time
 import warnings
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from softtact.mechanics import hyperelastic
 from softtact.mechanics.elastic import press_layer
 from softtact.mechanics.foundation_press import FoundationMaps, press_foundation
 from softtact.press_result import PressResult
+from softtact.pressed_mesh import keep_level, of_body
 from softtact.progress import announce, progress
 from softtact.sensing.capacitance import ideal_counts
 
@@ -96,28 +98,34 @@ def press_hyperelastic(sensor, placed, forces, *, label, threads):
     grid = np.stack(np.meshgrid(sensor.spec.map_x_mm, sensor.spec.map_y_mm), axis=-1).reshape(-1, 2)
     sampling = body.slab.sampling(grid)
     announce(f"{label}: {body.bed.count} frusta, {len(forces)} force levels of the hyperelastic model, some seconds each")
-    record, times = [], []
-    levels = (record.append(_read_level(body, sampling, level))
-              for level in hyperelastic.press_levels(body, surface, forces, settings=sensor.solver))
+    record, times, kept = [], [], []
+
+    def read(level):
+        record.append(_read_level(body, sampling, level))
+        if sensor.keep_mesh:
+            kept.append(keep_level(body, level.state))
+
+    levels = (read(level) for level in hyperelastic.press_levels(body, surface, forces, settings=sensor.solver))
     try:
         _timed(levels, forces, label, times)
     except ConvergenceError as error:
-        error.result = _of_record(sensor, body, record, forces, times) if record else None
+        error.result = _of_record(sensor, body, record, forces, times, kept) if record else None
         raise
     finally:
         body.close()
-    return _of_record(sensor, body, record, forces, times)
+    return _of_record(sensor, body, record, forces, times, kept)
 
 
-def _of_record(sensor, body, record, forces, times):
+def _of_record(sensor, body, record, forces, times, kept):
     maps, *numbers = zip(*record, strict=True)
     names = ("indentation_mm", "contact_area_mm2", "penetration_mm", "frustum_compression_mm", "residual_n", "outside_card",
              "iterations")
     numbers = dict(zip(names, map(np.array, numbers), strict=True))
     _warn_outside_card(numbers["outside_card"], forces)
     valid = numbers["frustum_compression_mm"] < _FULL_POCKET * sensor.spec.dielectric.frusta.height_mm
-    return make_result(sensor, "hyperelastic", body.solver.name, np.stack(maps), forces[:len(maps)], np.array(times),
-                       within_validity=valid, **numbers)
+    result = make_result(sensor, "hyperelastic", body.solver.name, np.stack(maps), forces[:len(maps)], np.array(times),
+                         within_validity=valid, **numbers)
+    return replace(result, mesh=of_body(body, result.force_n, kept)) if kept else result
 
 
 def _warn_outside_card(shares, forces):
@@ -146,7 +154,7 @@ def make_result(sensor, model, solver, maps, forces, times, **numbers):
              "within_validity": np.asarray(numbers.pop("within_validity"), dtype=np.int8)}
     return PressResult(deformation_map_mm=maps, tactile_map=ideal_counts(spec, maps), force_n=forces, wall_time_s=times,
                        x_mm=spec.map_x_mm, y_mm=spec.map_y_mm, model=model, sensor=spec.name, solver=solver,
-                       attributes={**_friction(spec, model), **sensor.attributes}, **flags,
+                       attributes={"thickness_mm": spec.thickness_mm, **_friction(spec, model), **sensor.attributes}, **flags,
                        **{name: np.asarray(values) for name, values in numbers.items()})
 
 

@@ -55,6 +55,7 @@ class Sensor:
     """A sensor with one law per layer; `mesh` sets the layered body's resolution, `solver` what counts as solved.
 
     files: {"elastic": Compliance, "foundation": FoundationFlexibility}, what the fast models start from; else the user's cache
+    keep_mesh: whether a hyperelastic result keeps its mesh with the displacements of each level, some MB
     """
 
     spec: SensorSpec
@@ -64,6 +65,7 @@ class Sensor:
     files: dict = field(default_factory=dict)
     scatter: tuple | None = None
     attributes: dict = field(default_factory=dict)
+    keep_mesh: bool = False
 
     def press(self, mesh, *, pose=None, force_n, model="auto", policy="paper", tolerance_mm=TOLERANCE_MM, label="press",
               threads=None):

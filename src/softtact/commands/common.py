@@ -1,19 +1,29 @@
 """What several commands share: their common arguments, refusals before long work, and how a result is printed."""
 
+import argparse
 import json
+import sys
 from pathlib import Path
 
 from softtact.errors import InputError
 
 UNITS = ("mm", "cm", "m", "inch")
+EXIT_STATUS = {0: "done",
+               1: "refused: a file, a value or a combination of options is not usable; one sentence says why and what to do",
+               2: "wrong command line: an option or an argument is missing, unknown or not of its kind",
+               3: "a press stopped before its last force; the forces before it were printed and written",
+               4: "a file could not be read or written: no space, no permission",
+               130: "interrupted; no half-written file is left"}
+EXIT_TEXT = "exit status:\n" + "\n".join(f"  {status:<4}{meaning}" for status, meaning in EXIT_STATUS.items())
 
 
-def add_command(commands, name, run, summary):
-    """A new command `name` that calls run(options); every one but `stage` can answer in JSON."""
-    command = commands.add_parser(name, help=summary, description=summary)
+def add_command(commands, name, run, summary, examples, *, json=True):
+    """A new command `name` that calls run(options), with examples in its help; one with `json` can answer so."""
+    command = commands.add_parser(name, help=summary, description=summary, epilog=f"examples:{examples.rstrip()}\n\n{EXIT_TEXT}",
+                                  formatter_class=argparse.RawDescriptionHelpFormatter)
     command.set_defaults(run=run)
-    if name != "stage":
-        command.add_argument("--json", action="store_true", help="print the result as JSON")
+    if json:
+        command.add_argument("--json", action="store_true", help="print the result as JSON; messages go to stderr")
     return command
 
 
@@ -25,6 +35,26 @@ def add_mesh(command):
                          help="the mesh's origin in the sensor's frame, mm and degrees (default: centred, touching); "
                               "write --pose=-1,... where it begins with a minus")
     command.add_argument("--sensor", default="coro", help="name or YAML file of a sensor (default: coro)")
+
+
+def add_repair(command):
+    """The options of how a mesh that is no clean body is taken."""
+    command.add_argument("--repair", action=argparse.BooleanOptionalAction, default=True,
+                         help="mend what leaves no doubt (flat or small holes, doubled, turned or broken facets, bodies "
+                              "that overlap), and say so on stderr; with --no-repair such a mesh is refused")
+
+
+def read_object(options):
+    """The command line's mesh (trimesh, mm) and the list of its repairs, which are also said on stderr."""
+    from softtact.geometry.meshes import read_mesh
+    from softtact.geometry.repair import read_mended
+
+    if not options.repair:
+        return read_mesh(options.mesh, unit=options.unit), []
+    mended = read_mended(options.mesh, unit=options.unit)
+    for repair in mended.repairs:
+        print(f"softtact {options.command}: {options.mesh} was mended: {repair}", file=sys.stderr)
+    return mended.mesh, mended.repairs
 
 
 def show(result, *, as_json, lines):
@@ -53,6 +83,13 @@ def check_folders(*paths):
     for path in paths:
         if path and not path.parent.is_dir():
             raise InputError(f"{path}: there is no folder {path.parent}; make it first.")
+
+
+def check_names(endings):
+    """Refuse a file to write whose name does not end as one of those that it is written as: {path or None: endings}."""
+    for path, known in endings.items():
+        if path and path.suffix.lower() not in known:
+            raise InputError(f"{path}: it is written as {' or '.join(known)}; give a name that ends so.")
 
 
 def pairs(option, texts):

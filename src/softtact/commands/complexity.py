@@ -2,10 +2,15 @@
 
 from softtact.commands.common import add_command, add_mesh, pose_of, sensor_spec, short, show
 
+EXAMPLES = """
+  softtact complexity part.stl --unit mm
+  softtact complexity part.stl --unit mm --pose=0,0,0,0,0,90 --rule all --json
+"""
+
 
 def add(commands):
     """Add the command to the parser."""
-    command = add_command(commands, "complexity", _complexity, "Count a mesh's complexity and choose its model.")
+    command = add_command(commands, "complexity", _complexity, "Count a mesh's complexity and choose its model.", EXAMPLES)
     add_mesh(command)
     command.add_argument("--rule", choices=("any", "all"), default="any",
                          help="which of the two criteria the hyperelastic model takes (default: any)")

@@ -5,11 +5,16 @@ from pathlib import Path
 from softtact.commands.common import add_command, check_folders, show
 from softtact.errors import InputError
 
+EXAMPLES = """
+  softtact detect-discs press.mp4 --pixel-mm 0.03 --out discs.csv
+  softtact detect-discs frames/ --calibration-mm 10 --calibration-px 333 --every 5 --out discs.csv
+"""
+
 
 def add(commands):
     """Add the command to the parser."""
     command = add_command(commands, "detect-discs", _detect_discs,
-                           "Measure the bright contact discs in camera frames: table and annotated pictures.")
+                           "Measure the bright contact discs in camera frames: table and annotated pictures.", EXAMPLES)
     command.add_argument("frames", metavar="FRAMES", type=Path, help="an image, a multi-page TIFF, a video, or a folder of images")
     command.add_argument("--out", type=Path, required=True, metavar="DISCS.csv", help="the table to write, one row per disc")
     command.add_argument("--pixel-mm", type=float, metavar="MM", help="side of a pixel on the glass")

@@ -3,16 +3,31 @@
 from pathlib import Path
 
 import softtact
-from softtact.commands.common import add_command, add_mesh, check_folders, check_forces, pose_of, sensor_spec, show
+from softtact.commands.common import (
+    add_command,
+    add_mesh,
+    add_repair,
+    check_folders,
+    check_forces,
+    pose_of,
+    read_object,
+    sensor_spec,
+    show,
+)
 
+EXAMPLES = """
+  softtact export-deck part.stl --unit mm --force 5 --format calculix --out press.inp
+  softtact export-deck part.stl --unit mm --force 5 --force 20 --format abaqus --out press.inp
+"""
 DECK_FORMATS = ("calculix", "abaqus")
 
 
 def add(commands):
     """Add the command to the parser."""
     command = add_command(commands, "export-deck", _export_deck,
-                           "Write the hyperelastic press of a mesh as an input deck for another solver.")
+                           "Write the hyperelastic press of a mesh as an input deck for another solver.", EXAMPLES)
     add_mesh(command)
+    add_repair(command)
     command.add_argument("--force", type=float, action="append", required=True, metavar="N",
                          help="force in N; repeat it for several steps")
     command.add_argument("--format", choices=DECK_FORMATS, required=True, help="the solver that is to read the deck")
@@ -23,12 +38,12 @@ def add(commands):
 
 
 def _export_deck(options):
-    from softtact.geometry.meshes import check_over_sensor, place, read_mesh
+    from softtact.geometry.meshes import check_over_sensor, place
 
     spec, forces, pose = sensor_spec(options.sensor), sorted(set(options.force)), pose_of(options)
     check_forces(forces, spec)
     check_folders(options.out)
-    mesh = read_mesh(options.mesh, unit=options.unit)
+    mesh, repairs = read_object(options)
     check_over_sensor(place(mesh, pose=pose), spec.footprint_mm, name=str(options.mesh))
     from softtact.decks.export import export_press
 
@@ -36,6 +51,7 @@ def _export_deck(options):
                          dialect=options.format, path=options.out, name=options.mesh.name)
     result = {"deck": str(options.out), "format": options.format, "nodes": len(model.points),
               "elements": {part.name: len(part.elements) for part in model.parts}, "tied_nodes": len(model.ties),
-              "facets": {body.name: len(body.facets) for body in model.rigid}, "steps": [step.name for step in model.steps]}
-    lines = [f"{name}: {value}" for name, value in result.items() if name != "deck"]
+              "facets": {body.name: len(body.facets) for body in model.rigid}, "steps": [step.name for step in model.steps],
+              "repairs": repairs}
+    lines = [f"{name}: {value}" for name, value in result.items() if name != "deck" and value != []]
     show(result, as_json=options.json, lines=[*lines, f"written: {options.out}"])

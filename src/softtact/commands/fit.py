@@ -5,12 +5,17 @@ from pathlib import Path
 from softtact.commands.common import add_command, check_folders, numbers, pairs, show
 from softtact.errors import InputError
 
+EXAMPLES = """
+  softtact fit uniaxial=tension.csv planar=shear.csv --law all --out card.json --plot card.png
+  softtact fit uniaxial=tension.csv --law neo_hooke,yeoh --window uniaxial=0.8:1.4 --out card.json
+  softtact fit config/materials/polyurethane.yaml --out card.json
+"""
 LAYOUTS = ("plain", "soro_db", "stress_stretch", "literature")
 
 
 def add(commands):
     """Add the command to the parser."""
-    command = add_command(commands, "fit", _fit, "Fit hyperelastic laws to test curves and write a material card.")
+    command = add_command(commands, "fit", _fit, "Fit hyperelastic laws to test curves and write a material card.", EXAMPLES)
     command.add_argument("curves", nargs="+", metavar="CURVES",
                          help="CSV files, one test each, MODE=FILE to state a file's mode; or one YAML file of a material")
     command.add_argument("--law", help="a law's name, several with commas, or all (default)")

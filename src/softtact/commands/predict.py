@@ -6,12 +6,18 @@ from pathlib import Path
 from softtact.commands.common import add_command, check_folders, show
 from softtact.errors import InputError
 
+EXAMPLES = """
+  softtact press part.stl --unit mm --force 5 --force 20 --model elastic --out press.nc
+  softtact predict press.nc --network results/default/learning/elastic/model.pt --plot taxels.png
+  softtact predict map.csv --network model.pt --out counts.csv --json
+"""
 WRITTEN = (".nc", ".csv")
 
 
 def add(commands):
     """Add the command to the parser."""
-    command = add_command(commands, "predict", _predict, "Predict the taxels' counts from deformation maps with a trained network.")
+    command = add_command(commands, "predict", _predict, "Predict the taxels' counts from deformation maps with a trained network.",
+                          EXAMPLES)
     command.add_argument("maps", metavar="MAP_OR_PRESS", type=Path,
                          help="NetCDF of a press (all its forces), or .npy or .csv of one map in mm, rows along y")
     command.add_argument("--network", type=Path, required=True, metavar="MODEL.pt",

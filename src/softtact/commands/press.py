@@ -3,16 +3,36 @@
 from pathlib import Path
 
 import softtact
-from softtact.commands.common import add_command, add_mesh, check_folders, check_forces, pairs, pose_of, sensor_spec, show
+from softtact.commands.common import (
+    add_command,
+    add_mesh,
+    add_repair,
+    check_folders,
+    check_forces,
+    check_names,
+    pairs,
+    pose_of,
+    read_object,
+    sensor_spec,
+    show,
+)
 from softtact.errors import ConvergenceError, InputError
 
+EXAMPLES = """
+  softtact press part.stl --unit mm --force 20
+  softtact press part.obj --unit inch --force 5 --force 20 --model elastic --out press.nc --plot press.png
+  softtact press part.ply --unit m --pose=-2,1.5,0,0,0,30 --force 10 --model foundation --vtu press.vtu
+  softtact press part.stl --unit mm --force 20 --sensor my_sensor.yaml --policy error --tolerance 0.02
+  softtact press part.stl --unit mm --force 5 --model elastic --json > press.json
+"""
 MODELS = ("auto", "elastic", "foundation", "hyperelastic")
 
 
 def add(commands):
     """Add the command to the parser."""
-    command = add_command(commands, "press", _press, "Press a mesh on the sensor: deformation map and taxels.")
+    command = add_command(commands, "press", _press, "Press a mesh on the sensor: deformation map and taxels.", EXAMPLES)
     add_mesh(command)
+    add_repair(command)
     command.add_argument("--force", type=float, action="append", required=True, metavar="N",
                          help="force in N; repeat it for several levels")
     command.add_argument("--model", choices=MODELS, default="auto",
@@ -24,21 +44,28 @@ def add(commands):
     command.add_argument("--card", action="append", metavar="LAYER=CARD.json",
                          help="a card of `softtact fit` for the dielectric or the cover, in place of the printed constants")
     command.add_argument("--out", type=Path, metavar="FILE.nc", help="write the maps as NetCDF")
-    command.add_argument("--plot", type=Path, metavar="FILE.png", help="draw deformation map and taxels")
+    command.add_argument("--vtu", type=Path, metavar="FILE.vtu",
+                         help="write the pressed sensor for ParaView and softtact view: the hyperelastic model's whole mesh, the "
+                              "others' surface")
+    command.add_argument("--plot", type=Path, metavar="FILE.png", help="draw deformation map and taxels (PNG or SVG)")
 
 
 def _press(options):
-    from softtact.geometry.meshes import check_over_sensor, place, read_mesh
+    from dataclasses import replace
+
+    from softtact.geometry.meshes import check_over_sensor, place
 
     spec, forces, pose = sensor_spec(options.sensor), sorted(set(options.force)), pose_of(options)
     check_forces(forces, spec)
-    check_folders(options.out, options.plot)
-    mesh = read_mesh(options.mesh, unit=options.unit)
+    check_folders(options.out, options.vtu, options.plot)
+    check_names({options.out: (".nc",), options.vtu: (".vtu",), options.plot: (".png", ".svg")})
+    mesh, repairs = read_object(options)
     check_over_sensor(place(mesh, pose=pose), spec.footprint_mm, name=str(options.mesh))
     try:
-        sensor = softtact.load_sensor(options.sensor, materials=_cards(options))
+        sensor = replace(softtact.load_sensor(options.sensor, materials=_cards(options)), keep_mesh=options.vtu is not None,
+                         attributes={"mesh_repairs": "; ".join(repairs)})
         result = sensor.press(mesh, pose=pose, force_n=forces, model=options.model,
-                                                              policy=options.policy, tolerance_mm=options.tolerance)
+                              policy=options.policy, tolerance_mm=options.tolerance)
     except ConvergenceError as error:
         if error.result is not None:
             _show_press(error.result, options)
@@ -50,11 +77,14 @@ def _show_press(result, options):
     """Write and print what a press gave, be it the levels before one that was not reached."""
     if options.out:
         result.write(options.out)
+    if options.vtu:
+        result.write_vtu(options.vtu)
     if options.plot:
         from softtact.reporting.press_plot import plot_press
 
         plot_press(result, options.plot)
     summary = _press_summary(result)
+    summary["written"] = [str(path) for path in (options.out, options.vtu, options.plot) if path]
     show(summary, as_json=options.json, lines=_press_lines(summary))
 
 
@@ -80,6 +110,7 @@ def _press_summary(result):
              "iterations", "wall_time_s")
     levels |= {name: getattr(result, name) for name in names}
     facts = {name: getattr(result, name) for name in ("model", "solver", "why")}
+    facts["repairs"] = [repair for repair in result.attributes["mesh_repairs"].split("; ") if repair]
     return facts | {name: _or_none(values) for name, values in levels.items()}
 
 
@@ -114,3 +145,4 @@ def _quality_lines(summary):
         yield f"beyond what the model is valid for: {forces} N"
     if None not in summary["outside_card"]:
         yield f"strained beyond the data behind its law: {max(summary['outside_card']):.1%} of a layer"
+    yield from (f"written: {path}" for path in summary["written"])

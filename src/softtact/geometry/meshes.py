@@ -10,6 +10,7 @@ import numpy as np
 import trimesh
 
 from softtact.errors import InputError
+from softtact.geometry.bodies import OVERLAP, is_cavity, union_of
 from softtact.geometry.pose import Pose
 
 UNIT_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "inch": 25.4}
@@ -18,14 +19,25 @@ MIN_SIZE_MM = 1.0  # smaller than a taxel's resolution by far
 MAX_SIZE_MM = 500.0  # larger than any gripper holds
 _MERGE_DECIMALS = 5  # of a coordinate in mm: corners closer than 10 nm are one
 _FLAT = 1e-6  # thickness over size below which a mesh is no body
-_OVERLAP = 1e-6  # part of the volume by which closed pieces may intersect
 
 
 def read_triangles(path, *, unit, min_size_mm=MIN_SIZE_MM, max_size_mm=MAX_SIZE_MM):
     """Facets (n, 3, 3) in mm as the file stores them, corners not merged; finite and of plausible size."""
     path = Path(path)
-    triangles = _load_facets(path) * _unit_factor(path, unit)
+    triangles = load_sized(path, unit=unit)
     _refuse_non_finite(path, triangles)
+    return plausible_facets(path, triangles, unit=unit, min_size_mm=min_size_mm, max_size_mm=max_size_mm)
+
+
+def load_sized(path, *, unit):
+    """Facets (n, 3, 3) in mm as the file stores them, unchecked."""
+    return _load_facets(path) * _unit_factor(path, unit)
+
+
+def plausible_facets(path, triangles, *, unit, min_size_mm=MIN_SIZE_MM, max_size_mm=MAX_SIZE_MM):
+    """The facets (n, 3, 3) in mm, if their size is plausible; else refused with the unit that would make it so."""
+    if len(triangles) == 0:
+        raise InputError(f"{path}: no facet has finite coordinates; export the mesh again.")
     _refuse_implausible_size(path, triangles, unit, min_size_mm, max_size_mm)
     return triangles
 
@@ -40,11 +52,16 @@ def read_mesh(path, *, unit, min_size_mm=MIN_SIZE_MM, max_size_mm=MAX_SIZE_MM):
     path = Path(path)
     triangles = read_triangles(path, unit=unit, min_size_mm=min_size_mm, max_size_mm=max_size_mm)
     mesh = merge_facets(triangles)
+    check_body(path, mesh)
+    return mesh
+
+
+def check_body(path, mesh):
+    """Refuse a mesh that bounds no body: flat, open, inside out, or of pieces that overlap."""
     _refuse_flat(path, mesh)
     _refuse_open(path, mesh)
     _refuse_inverted(path, mesh)
     _refuse_overlapping(path, mesh)
-    return mesh
 
 
 def merge_facets(triangles):
@@ -175,9 +192,13 @@ def _refuse_overlapping(path, mesh):
     pieces = mesh.split(only_watertight=False)
     if len(pieces) < 2:
         return
-    bodies = [piece for piece in pieces if piece.volume > 0]  # the others are cavities
-    united = trimesh.boolean.union(bodies, engine="manifold") if len(bodies) > 1 else bodies[0]
+    bodies = [piece for piece in pieces if piece.volume > 0]
+    united = union_of(bodies)
     total = sum(body.volume for body in bodies)
-    if united.body_count != len(bodies) or total - united.volume > _OVERLAP * total:
+    if united is None or len(united.decompose()) != len(bodies) or total - united.volume() > OVERLAP * total:
         raise InputError(f"{path}: its {len(bodies)} closed pieces overlap or touch; unite them into one body, for "
                          "example with trimesh.boolean.union or Blender's Boolean modifier.")
+    outside = sum(piece.volume <= 0 and not is_cavity(piece, united) for piece in pieces)
+    if outside:
+        raise InputError(f"{path}: {outside} of its {len(pieces)} closed pieces face inwards and are no cavities of the others; "
+                         "flip them, for example with 'Recalculate outside' of Blender.")

@@ -163,6 +163,12 @@ class TopContact:
         """
         return float((self.area * state.planes.covered)[self.contact.response(state.gaps)[1] > 0].sum())
 
+    def pressure_of_faces(self, state):
+        """Mean pressure (t,) in MPa on each face, under the contact as it is now."""
+        area = self.area.reshape(len(self.faces), -1)
+        force = self.contact.response(state.gaps)[1] * self.area * state.planes.covered
+        return force.reshape(area.shape).sum(axis=1) / area.sum(axis=1)
+
     def normal_shapes(self, planes):
         """Change (t, points, 3 w) of the points' gaps by the faces' unknowns."""
         normal = planes.normals.reshape(*self.values.shape[:2], 3)

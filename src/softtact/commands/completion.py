@@ -1,0 +1,22 @@
+"""`softtact completion`: what makes a shell complete softtact's commands, options and files."""
+
+from softtact.commands.common import add_command
+
+SHELLS = ("bash", "zsh", "fish")
+EXAMPLES = """
+  softtact completion bash >> ~/.bashrc
+  softtact completion zsh  >> ~/.zshrc          below the line that calls compinit
+  softtact completion fish > ~/.config/fish/completions/softtact.fish
+"""
+
+
+def add(commands):
+    """Add the command to the parser."""
+    command = add_command(commands, "completion", _completion, "Print a shell's completion of this command.", EXAMPLES, json=False)
+    command.add_argument("shell", choices=SHELLS, help="the shell that is to complete")
+
+
+def _completion(options):
+    import argcomplete
+
+    print(argcomplete.shellcode(["softtact"], shell=options.shell))

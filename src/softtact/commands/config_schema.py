@@ -1,0 +1,42 @@
+"""`softtact config-schema`: what the files that a user writes may hold, as JSON schema for an editor."""
+
+import json
+from pathlib import Path
+
+from softtact.commands.common import add_command, check_folders
+
+KINDS = ("study", "sensor", "material")
+EXAMPLES = """
+  softtact config-schema study > study.schema.json
+  softtact config-schema sensor --out sensor.schema.json
+An editor with YAML support checks a file whose first line is:
+  # yaml-language-server: $schema=study.schema.json
+"""
+
+
+def add(commands):
+    """Add the command to the parser."""
+    command = add_command(commands, "config-schema", _schema,
+                          "Print the JSON schema of a study's, a sensor's or a material's YAML.", EXAMPLES, json=False)
+    command.add_argument("kind", choices=KINDS, help="which file")
+    command.add_argument("--out", type=Path, metavar="FILE.json", help="write it instead")
+
+
+def _schema(options):
+    from softtact.files import write_json
+
+    check_folders(options.out)
+    if options.out:
+        write_json(options.out, schema_of(options.kind))
+    else:
+        print(json.dumps(schema_of(options.kind), indent=2, sort_keys=True))
+
+
+def schema_of(kind):
+    """The JSON schema of a kind of file, generated from the types that read it."""
+    from softtact.config import Values
+    from softtact.geometry.sensor_spec import SensorSpec
+    from softtact.materials.config import MaterialConfig
+
+    model = {"study": Values, "sensor": SensorSpec, "material": MaterialConfig}[kind]
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | model.model_json_schema()

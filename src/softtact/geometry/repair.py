@@ -1,0 +1,235 @@
+"""Mending of meshes whose body is beyond doubt; each step says what it did, and what would have to be guessed is refused.
+
+Mended: facets without finite corners or without area, facets that are there twice, corners that lie apart by round-off, holes that
+are flat or small, facets that face the wrong way, bodies inside out, bodies that overlap. Not mended: large curved holes, edges
+where more than two walls meet, flat or empty meshes, sizes that no body on a sensor has.
+`meshes.read_mesh` then checks the result as it checks any mesh.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from manifold3d import triangulate
+
+from softtact.errors import InputError
+from softtact.geometry.bodies import OVERLAP, is_cavity, solid_of, union_of
+from softtact.geometry.meshes import MAX_SIZE_MM, MIN_SIZE_MM, check_body, load_sized, merge_facets, plausible_facets
+
+_APART = 1e-5        # of the size: corners nearer to each other are one point that was rounded twice
+_FLAT_HOLE = 1e-3    # of the size: how far a hole's rim may leave its plane
+_SMALL_HOLES = 0.05  # of the surface: curved holes that are closed by a plane piece all the same
+
+
+@dataclass(frozen=True)
+class Mended:
+    """A closed mesh (trimesh, mm) and the sentences that say what was done to it."""
+
+    mesh: trimesh.Trimesh
+    repairs: list
+
+
+def read_mended(path, *, unit, min_size_mm=MIN_SIZE_MM, max_size_mm=MAX_SIZE_MM):
+    """Read a mesh as `read_mesh` does, and mend it where that leaves no doubt; else InputError with the reason."""
+    path = Path(path)
+    said, stored = [], load_sized(path, unit=unit)
+    triangles = _finite(stored, said)
+    plausible_facets(path, triangles, unit=unit, min_size_mm=min_size_mm, max_size_mm=max_size_mm)
+    mesh = merge_facets(triangles)
+    if len(mesh.faces) == 0 or np.ptp(mesh.vertices, axis=0).min() == 0:
+        check_body(path, mesh)     # says that it is degenerate
+    for step in (_join_corners, _without_doubles, _close_holes, _turn_facets, _turn_bodies, _unite):
+        mesh = step(mesh, said)
+    try:
+        check_body(path, mesh)
+    except InputError as error:
+        done = f" (after: {'; '.join(said)})" if said else ""
+        raise InputError(f"{error}{done}") from None
+    return Mended(mesh, said)
+
+
+def _finite(triangles, said):
+    """Facets (n, 3, 3) with finite corners."""
+    good = np.isfinite(triangles).all(axis=(1, 2))
+    if not good.all():
+        said.append(f"left out {_count(~good, 'facet')} whose coordinates are not finite numbers")
+    return triangles[good]
+
+
+def _join_corners(mesh, said):
+    """Corners of open edges that lie apart by round-off become one."""
+    rim = np.unique(_open_edges(mesh))
+    if not len(rim):
+        return mesh
+    from scipy.spatial import cKDTree
+
+    pairs = cKDTree(mesh.vertices[rim]).query_pairs(_APART * _size(mesh), output_type="ndarray")
+    if not len(pairs):
+        return mesh
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    matrix = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(rim),) * 2)
+    _, group = connected_components(matrix, directed=False)
+    first = np.full(group.max() + 1, len(mesh.vertices))
+    np.minimum.at(first, group, rim)
+    number = np.arange(len(mesh.vertices))
+    number[rim] = first[group]
+    moved = _count(number != np.arange(len(number)), "corner")
+    said.append(f"joined {moved} that lay within {_APART * _size(mesh):.2g} mm of others")
+    return _of_faces(mesh.vertices, number[mesh.faces])
+
+
+def _without_doubles(mesh, said):
+    """Of facets with the same corners one is kept; two that face each other hold nothing between them, and both go."""
+    mesh = _of_faces(mesh.vertices, mesh.faces)
+    corners, which, uses = np.unique(np.sort(mesh.faces, axis=1), axis=0, return_inverse=True, return_counts=True)
+    if len(corners) == len(mesh.faces):
+        return mesh
+    which = which.ravel()
+    ahead = np.zeros(len(corners), dtype=int)
+    np.add.at(ahead, which, np.where(_is_even(mesh.faces), 1, -1))
+    _, first = np.unique(which, return_index=True)
+    # Facets that are all turned alike: one of them stays; as many of either side: a wall without thickness.
+    keep = first[(uses == 1) | (ahead != 0)]
+    said.append(f"left out {_number(len(mesh.faces) - len(keep), 'facet')} of those that were there twice")
+    return _of_faces(mesh.vertices, mesh.faces[np.sort(keep)])
+
+
+def _is_even(faces):
+    """Whether a face's corners are a turn of their rising order (n,)."""
+    a, b, c = faces.T
+    return (a < b).astype(int) + (b < c) + (c < a) == 2
+
+
+def _close_holes(mesh, said):
+    """Flat holes, and small curved ones, are closed by a plane piece; of others the mesh stays open."""
+    loops = _rims(mesh)
+    patches = [patch for loop in loops if (patch := _patch(mesh, loop)) is not None]
+    if len(patches) < len(loops) or not patches:
+        return mesh
+    curved = sum(area for _, area, flat in patches if not flat)
+    if curved > _SMALL_HOLES * mesh.area:
+        return mesh
+    area = sum(area for _, area, _ in patches)
+    said.append(f"closed {_number(len(patches), 'hole')}, {area:.3g} mm2 or {area / (mesh.area + area):.2g} of the surface")
+    return _of_faces(mesh.vertices, np.vstack([mesh.faces, *(faces for faces, _, _ in patches)]))
+
+
+def _rims(mesh):
+    """Closed loops of open edges, each an array of corners, against the way of the facets beside; empty where loops meet."""
+    edges = _open_edges(mesh)
+    following = dict(zip(edges[:, 1], edges[:, 0], strict=True))
+    if not len(edges) or len(following) < len(edges) or set(following) != set(following.values()):
+        return []
+    loops = []
+    while following:
+        start, at = next(iter(following.items()))
+        loop = [start]
+        del following[start]
+        while at != start:
+            loop.append(at)
+            at = following.pop(at)
+        loops.append(np.array(loop))
+    return loops
+
+
+def _patch(mesh, loop):
+    """Faces (k, 3) over a loop of corners, their area, and whether the loop is flat; None where they would overlap."""
+    points = mesh.vertices[loop]
+    middle = points.mean(axis=0)
+    _, _, axes = np.linalg.svd(points - middle)
+    normal = np.cross(points - middle, np.roll(points, -1, axis=0) - middle).sum(axis=0)
+    x = axes[0]
+    y = np.cross(normal / (np.linalg.norm(normal) or 1.0), x)
+    plane = (points - middle) @ np.column_stack([x, y])
+    faces = np.asarray(triangulate([plane])) if len(loop) > 3 else np.array([[0, 1, 2]])
+    corners = plane[faces]
+    areas = 0.5 * np.cross(np.pad(corners[:, 1] - corners[:, 0], ((0, 0), (0, 1))),
+                           np.pad(corners[:, 2] - corners[:, 0], ((0, 0), (0, 1))))[:, 2]
+    if len(faces) != len(loop) - 2 or (areas < -1e-9 * np.abs(areas).sum()).any():
+        return None
+    height = np.abs((points - middle) @ np.cross(x, y)).max()
+    return loop[faces], float(trimesh.triangles.area(mesh.vertices[loop[faces]]).sum()), height <= _FLAT_HOLE * _size(mesh)
+
+
+def _turn_facets(mesh, said):
+    """Neighbouring facets face the same side."""
+    if mesh.is_winding_consistent:
+        return mesh
+    turned = mesh.copy()
+    trimesh.repair.fix_winding(turned)
+    changed = (turned.faces != mesh.faces).any(axis=1)
+    bodies, of = trimesh.graph.connected_component_labels(mesh.face_adjacency, node_count=len(mesh.faces)), None
+    for body in range(bodies.max() + 1):     # the side of most facets is the body's
+        of = bodies == body
+        if changed[of].sum() > 0.5 * of.sum():
+            turned.faces[of] = turned.faces[of][:, ::-1]
+            changed[of] = ~changed[of]
+    said.append(f"turned {_count(changed, 'facet')} that faced against the neighbours")
+    return _of_faces(turned.vertices, turned.faces)
+
+
+def _turn_bodies(mesh, said):
+    """Bodies inside out are turned; a cavity stays: it lies in a body."""
+    if not mesh.is_watertight or not mesh.is_winding_consistent:
+        return mesh
+    pieces = list(mesh.split(only_watertight=False))
+    inward = [piece for piece in pieces if piece.volume < 0]
+    solid = union_of([piece for piece in pieces if piece.volume > 0])
+    wrong = [piece for piece in inward if not is_cavity(piece, solid)]
+    if not wrong:
+        return mesh
+    for piece in wrong:
+        piece.invert()
+    said.append(f"turned {_number(len(wrong), 'body')} inside out" if len(pieces) > 1 else "turned all facets: they faced inwards")
+    return trimesh.util.concatenate(pieces) if len(pieces) > 1 else pieces[0]
+
+
+def _unite(mesh, said):
+    """Bodies that overlap or touch become one."""
+    if not mesh.is_watertight or not mesh.is_winding_consistent or mesh.body_count < 2:
+        return mesh
+    pieces = list(mesh.split(only_watertight=False))
+    bodies = [piece for piece in pieces if piece.volume > 0]
+    united = union_of(bodies)
+    if united is None:
+        return mesh
+    total = sum(body.volume for body in bodies)
+    count = len(united.decompose())
+    if count == len(bodies) and total - united.volume() <= OVERLAP * total:
+        return mesh
+    for piece in pieces:
+        if piece.volume < 0:
+            united = united - solid_of(piece, inverted=True)
+    said.append(f"united {_number(len(bodies), 'body')} that overlap or touch into {count}")
+    raw = united.to_mesh64()
+    return merge_facets(raw.vert_properties[:, :3][raw.tri_verts])
+
+
+def _open_edges(mesh):
+    """Edges (n, 2), as their facets go along them, that only one facet has."""
+    _, first, uses = np.unique(mesh.edges_sorted, axis=0, return_index=True, return_counts=True)
+    return mesh.edges[first[uses == 1]]
+
+
+def _of_faces(vertices, faces):
+    """Mesh of faces, without those that have an equal corner."""
+    a, b, c = faces.T
+    mesh = trimesh.Trimesh(vertices, faces[(a != b) & (b != c) & (c != a)], process=False)
+    mesh.remove_unreferenced_vertices()
+    return mesh
+
+
+def _size(mesh):
+    return float(np.ptp(mesh.vertices, axis=0).max())
+
+
+def _count(mask, noun):
+    return _number(int(mask.sum()), noun)
+
+
+def _number(count, noun):
+    plural = noun if count == 1 else "bodies" if noun == "body" else f"{noun}s"
+    return f"{count} {plural}"

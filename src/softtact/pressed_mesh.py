@@ -1,0 +1,152 @@
+"""The pressed sensor as a mesh with displacements, for ParaView and `softtact view`.
+
+hyperelastic: the solver's own mesh, all of it (`Sensor.keep_mesh`), and the object's pressure on the cover's faces.
+elastic, foundation: the deformation map as a surface in the sensor's walls and bottom at rest; only the map's vertical
+displacement is known there, and no pressure on the map's grid.
+"""
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from softtact.errors import InputError
+from softtact.files import atomic_path
+
+# VTK's order of the nodes, by ours (bottom, top, middle of a plan of corners, mid-sides and centre).
+VTK_HEX27 = np.array([0, 1, 2, 3, 9, 10, 11, 12, 4, 5, 6, 7, 13, 14, 15, 16, 18, 19, 20, 21, 25, 23, 22, 24, 8, 17, 26])
+VTK_WEDGE18 = np.array([0, 1, 2, 6, 7, 8, 3, 4, 5, 9, 10, 11, 12, 13, 14, 15, 16, 17])
+LAYERS = {"frusta": 0, "sheet": 1, "cover": 2, "pressed face": 3, "wall at rest": 4}
+_DISPLACEMENT, _PRESSURE = "displacement_mm_{:g}N", "contact_pressure_mpa_{:g}N"
+_LEVEL = re.compile(r"displacement_mm_(.+)N")
+# Faces of a cell of VTK's by its corners; the cells that are drawn by `surface`.
+_FACES = {"hexahedron": ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
+          "wedge": ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)), "quad": ((0, 1, 2, 3),)}
+
+
+@dataclass(frozen=True)
+class PressedMesh:
+    """points (n, 3) in mm at rest, z = 0 at the sensing surface;  cells: [(VTK's kind, nodes (e, w), layer's number)]
+
+    force_n (l,);  displacement_mm (l, n, 3)
+    pressure_mpa (l, e): on the cells of the layer `pressed face`, positive in compression, or None where it is not known
+    """
+
+    points: np.ndarray
+    cells: list
+    force_n: np.ndarray
+    displacement_mm: np.ndarray
+    pressure_mpa: np.ndarray | None = None
+
+    def write(self, path):
+        """Write as VTU: for each force an array of displacements and, where known, of pressures (nan off the pressed face)."""
+        import meshio
+
+        kinds = [(kind, nodes) for kind, nodes, _ in self.cells]
+        layers = {"layer": [np.full(len(nodes), layer, dtype=np.int32) for _, nodes, layer in self.cells]}
+        moved = {_DISPLACEMENT.format(force): values.astype(np.float32)
+                 for force, values in zip(self.force_n, self.displacement_mm, strict=True)}
+        pressed = {} if self.pressure_mpa is None else {
+            _PRESSURE.format(force): [values.astype(np.float32) if layer == LAYERS["pressed face"]
+                                      else np.full(len(nodes), np.nan, np.float32) for _, nodes, layer in self.cells]
+            for force, values in zip(self.force_n, self.pressure_mpa, strict=True)}
+        mesh = meshio.Mesh(self.points, kinds, point_data=moved, cell_data=layers | pressed)
+        with atomic_path(path) as temporary:
+            mesh.write(temporary, file_format="vtu")
+
+    def surface(self):
+        """Points (n', 3) on the outside, triangles (m, 3) of them, and their numbers (n',) in `points`."""
+        faces = [corners for kind, nodes, _ in self.cells for corners in _outer_faces(kind, nodes)]
+        triangles = np.concatenate([quads[:, [0, k, k + 1]] for quads in faces for k in range(1, quads.shape[1] - 1)])
+        used, triangles = np.unique(triangles, return_inverse=True)
+        return self.points[used], triangles.reshape(-1, 3), used
+
+
+def read_vtu(path):
+    """The `PressedMesh` of a file that `PressedMesh.write` wrote; its pressures are left out."""
+    import meshio
+
+    try:
+        mesh = meshio.read(path, file_format="vtu")
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file.") from None
+    except (Exception, SystemExit) as error:     # meshio ends the program on some faults
+        raise InputError(f"{path}: not readable as VTU ({' '.join(str(error).split())[:120]}); write it again.") from None
+    levels = sorted((float(match[1]), name) for name in mesh.point_data if (match := _LEVEL.fullmatch(name)))
+    if not levels:
+        raise InputError(f"{path}: it holds no pressed sensor (no displacements); give a file of softtact press --vtu.")
+    layers = mesh.cell_data.get("layer", [[0]] * len(mesh.cells))
+    cells = [(block.type, block.data, int(layer[0])) for block, layer in zip(mesh.cells, layers, strict=True)]
+    return PressedMesh(points=mesh.points, cells=cells, force_n=np.array([force for force, _ in levels]),
+                       displacement_mm=np.stack([mesh.point_data[name] for _, name in levels]))
+
+
+def of_map(maps_mm, x_mm, y_mm, force_n, *, thickness_mm):
+    """The `PressedMesh` of deformation maps (l, ny, nx): a pressed face in walls and a bottom that are as at rest."""
+    count = np.array([len(y_mm), len(x_mm)])
+    number = np.arange(count.prod()).reshape(count)
+    top = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1).reshape(-1, 4)
+    x, y = np.meshgrid(x_mm, y_mm)
+    face = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+    rim = np.concatenate([number[0, :-1], number[:-1, -1], number[-1, :0:-1], number[:0:-1, 0]])
+    lower = count.prod() + np.arange(len(rim))
+    walls = np.column_stack([rim, lower, np.roll(lower, -1), np.roll(rim, -1)])
+    corners = lower[np.cumsum([0, count[1] - 1, count[0] - 1, count[1] - 1])]
+    points = np.vstack([face, face[rim] - [0.0, 0.0, thickness_mm]])
+    moved = np.zeros((len(maps_mm), len(points), 3))
+    moved[:, :len(face), 2] = -np.asarray(maps_mm).reshape(len(maps_mm), -1)
+    cells = [("quad", top, LAYERS["pressed face"]), ("quad", np.vstack([walls, corners[::-1]]), LAYERS["wall at rest"])]
+    return PressedMesh(points=points, cells=cells, force_n=np.asarray(force_n), displacement_mm=moved)
+
+
+def body_cells(body):
+    """Points (n, 3) in mm and cells, as of `PressedMesh`, of a `LayeredBody`: sheet, cover, and the frusta one by one."""
+    sheet, cover, bed = body.slab.sheet_mesh, body.slab.cover_mesh, body.bed
+    first = np.cumsum([0, len(sheet.points), len(cover.points)])
+    frusta = (bed.mesh.hexes[None] + first[2] + (np.arange(bed.count) * bed.nodes)[:, None, None]).reshape(-1, 27)
+    cells = [("hexahedron27", frusta[:, VTK_HEX27], LAYERS["frusta"]), ("hexahedron27", sheet.hexes[:, VTK_HEX27], LAYERS["sheet"]),
+             ("wedge18", sheet.wedges[:, VTK_WEDGE18], LAYERS["sheet"]), ("hexahedron20", cover.hexes + first[1], LAYERS["cover"])]
+    return np.vstack([sheet.points, cover.points, bed.coordinates.reshape(-1, 3)]), cells
+
+
+@dataclass(frozen=True)
+class KeptLevel:
+    """One level of a hyperelastic press: displacement_mm (n, 3) of the points of `body_cells`, pressure_mpa (t,) of top faces."""
+
+    displacement_mm: np.ndarray
+    pressure_mpa: np.ndarray
+
+
+def keep_level(body, state):
+    """The `KeptLevel` of a `BodyState`, in single precision; to be taken before the next level changes the contact."""
+    slab = state.slab.displacement
+    masters, weights = body.slab.sheet_nodes
+    sheet = np.einsum("pw,pwd->pd", weights, slab[masters])
+    cover = body.slab.cover_mesh.follow @ slab[:body.slab.cover_mesh.free]
+    moved = np.vstack([sheet, cover, state.bed.displacement.reshape(-1, 3)])
+    return KeptLevel(moved.astype(np.float32), body.slab.top.pressure_of_faces(state.slab).astype(np.float32))
+
+
+def of_body(body, force_n, kept):
+    """The `PressedMesh` of a hyperelastic press' `KeptLevel`s."""
+    points, cells = body_cells(body)
+    first = len(body.slab.sheet_mesh.points)
+    cells = [*cells, ("quad8", body.slab.cover_mesh.top + first, LAYERS["pressed face"])]
+    return PressedMesh(points=points, cells=cells, force_n=np.asarray(force_n),
+                       displacement_mm=np.stack([level.displacement_mm for level in kept]),
+                       pressure_mpa=np.stack([level.pressure_mpa for level in kept]))
+
+
+def _outer_faces(kind, nodes):
+    """Faces [(f, corners)] of cells of one kind that no other of them shares."""
+    shape = kind.rstrip("0123456789")
+    if shape not in _FACES:
+        raise InputError(f"Cells of the kind {kind!r} are not drawn; give a file of softtact press --vtu.")
+    if shape == "quad":
+        return [nodes[:, :4]]
+    out = []
+    for size in {len(face) for face in _FACES[shape]}:
+        faces = np.concatenate([nodes[:, face] for face in _FACES[shape] if len(face) == size])
+        _, first, uses = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+        out.append(faces[np.sort(first[uses == 1])])
+    return out

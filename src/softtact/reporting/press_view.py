@@ -1,0 +1,110 @@
+"""A press to look at from all sides: its surface at each force, as a page that turns or as a picture."""
+
+import html
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from softtact.errors import InputError
+from softtact.files import atomic_path, read_dataset
+from softtact.pressed_mesh import of_map, read_vtu
+from softtact.reporting.view3d import html_view
+
+UNIT = "displacement towards the PCB (mm)"
+_EYE = (-0.9, -1.35, 1.0)     # from where a picture looks
+_SHEET_MM = 1.0               # height of the walls where a file does not tell the sensor's thickness
+
+
+@dataclass(frozen=True)
+class PressView:
+    """points_mm (l, n, 3) as pressed, triangles (m, 3), values (l, n): displacement towards the PCB in mm;  labels: forces."""
+
+    points_mm: np.ndarray
+    triangles: np.ndarray
+    values: np.ndarray
+    labels: list
+    title: str
+
+
+def read_view(path):
+    """The `PressView` of a press' NetCDF or VTU file."""
+    readers = {".nc": _read_map, ".vtu": read_vtu}
+    path = Path(path)
+    if path.suffix.lower() not in readers:
+        raise InputError(f"{path}: not a press that can be shown; give the .nc or .vtu file of softtact press.")
+    mesh = readers[path.suffix.lower()](path)
+    _, triangles, used = mesh.surface()
+    moved = mesh.displacement_mm[:, used]
+    if not np.isfinite(moved).all():
+        raise InputError(f"{path}: some displacements are not finite numbers; press again.")
+    return PressView(points_mm=mesh.points[used] + moved, triangles=triangles, values=-moved[..., 2],
+                     labels=[f"{force:g} N" for force in mesh.force_n], title=path.name)
+
+
+def _read_map(path):
+    data = read_dataset(path)
+    missing = [name for name in ("deformation_map_mm", "force_n", "x", "y") if name not in data.variables]
+    if missing:
+        raise InputError(f"{path}: it holds no {missing[0]!r}, so it is no press; give the file of softtact press --out.")
+    if data["deformation_map_mm"].dims != ("force", "y", "x"):
+        raise InputError(f"{path}: the map has the dimensions {data['deformation_map_mm'].dims} and not force, y, x; press again.")
+    return of_map(data["deformation_map_mm"].values, data["x"].values, data["y"].values, data["force_n"].values,
+                  thickness_mm=float(data.attrs.get("thickness_mm", _SHEET_MM)))
+
+
+def write_page(view, path):
+    """Write a page that shows the press and needs nothing else."""
+    body = html_view(view.points_mm, view.triangles, view.values, title=view.title, unit=UNIT, labels=view.labels)
+    with atomic_path(path) as temporary:
+        temporary.write_text(f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{html.escape(view.title)}</title>'
+                             f'<body style="font:16px system-ui,sans-serif;max-width:1000px;margin:1em auto">{body}</html>\n',
+                             encoding="utf-8")
+
+
+def save_picture(view, path):
+    """Draw the press at its largest force to PNG; returns what drew it: pyvista where it is installed, else matplotlib."""
+    try:
+        import pyvista
+    except ImportError:
+        _draw_with_matplotlib(view, path)
+        return "matplotlib"
+    _draw_with_pyvista(pyvista, view, path)
+    return "pyvista"
+
+
+def _draw_with_pyvista(pyvista, view, path):
+    faces = np.column_stack([np.full(len(view.triangles), 3), view.triangles]).ravel()
+    surface = pyvista.PolyData(view.points_mm[-1], faces)
+    plotter = pyvista.Plotter(off_screen=True, window_size=(1200, 900))
+    bar = {"title": f"{UNIT}\n", "color": "black", "vertical": False, "position_x": 0.25, "position_y": 0.04, "width": 0.5,
+           "fmt": "%.3g", "title_font_size": 22, "label_font_size": 20, "n_labels": 3}
+    plotter.add_mesh(surface, scalars=view.values[-1], cmap="viridis", scalar_bar_args=bar)
+    size = " x ".join(f"{side:.3g}" for side in np.ptp(view.points_mm[-1], axis=0))
+    plotter.add_text(f"{view.title}, {view.labels[-1]}; {size} mm", color="black", font_size=12)
+    plotter.add_axes(color="black")
+    plotter.set_background("white")
+    plotter.enable_parallel_projection()
+    plotter.view_vector(_EYE)
+    plotter.camera.zoom(1.3)
+    with atomic_path(path) as temporary:
+        plotter.screenshot(temporary)
+    plotter.close()
+
+
+def _draw_with_matplotlib(view, path):
+    from matplotlib.colors import Normalize
+
+    from softtact.reporting.style import pyplot, save
+
+    plt = pyplot()
+    figure, axes = plt.subplots(figsize=(9, 7), subplot_kw={"projection": "3d"}, layout="constrained")
+    points, values = view.points_mm[-1], view.values[-1][view.triangles].mean(axis=1)
+    drawn = axes.plot_trisurf(*points.T, triangles=view.triangles, linewidth=0, antialiased=False)
+    limits = Normalize(values.min(), values.max())
+    drawn.set_facecolor(plt.get_cmap("viridis")(limits(values)))
+    axes.set(xlabel="x (mm)", ylabel="y (mm)", zlabel="z (mm)", title=f"{view.title}, {view.labels[-1]}")
+    axes.set_box_aspect(np.ptp(points, axis=0))
+    axes.view_init(elev=32, azim=-123)
+    figure.colorbar(plt.cm.ScalarMappable(limits, "viridis"), ax=axes, label=UNIT, shrink=0.6)
+    save(figure, path)
