@@ -64,14 +64,15 @@ class PressedMesh:
 
 def read_vtu(path):
     """The `PressedMesh` of a file that `PressedMesh.write` wrote; its pressures are left out."""
-    import meshio
+    from meshio import vtu
 
     try:
-        mesh = meshio.read(path, file_format="vtu")
+        mesh = vtu.read(path)
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file.") from None
-    except (Exception, SystemExit) as error:     # meshio ends the program on some faults
-        raise InputError(f"{path}: not readable as VTU ({' '.join(str(error).split())[:120]}); write it again.") from None
+    except Exception as error:     # the reader fails in many ways
+        raise InputError(f"{path}: not readable as VTU ({' '.join(str(error).split())[:120] or type(error).__name__}); "
+                         "write it again.") from None
     levels = sorted((float(match[1]), name) for name in mesh.point_data if (match := _LEVEL.fullmatch(name)))
     if not levels:
         raise InputError(f"{path}: it holds no pressed sensor (no displacements); give a file of softtact press --vtu.")

@@ -125,6 +125,7 @@ def _load_facets(path):
         raise InputError(f"{path}: the format '{path.suffix}' is not read; save the mesh as STL, OBJ or PLY.")
     if path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty; export the mesh again.")
+    _refuse_cut_off(path)
     try:
         mesh = trimesh.load(path, force="mesh", process=False)
         triangles = np.array(mesh.triangles, dtype=float)
@@ -133,7 +134,20 @@ def _load_facets(path):
                          f"({' '.join(str(error).split())[:120]}); export the mesh again.") from error
     if triangles.size == 0:
         raise InputError(f"{path}: the file holds no triangles; export a surface mesh, not points or curves.")
+    if triangles.shape[1:] != (3, 3):
+        raise InputError(f"{path}: some corners do not have three coordinates; export the mesh again.")
     return triangles
+
+
+def _refuse_cut_off(path):
+    """Refuse a text STL without its last line: what is missing might be closed as if it were a hole."""
+    with path.open("rb") as file:
+        start = file.read(84)
+        file.seek(max(0, path.stat().st_size - 2000))
+        end = file.read()
+    binary = path.stat().st_size == 84 + 50 * int.from_bytes(start[80:84], "little")
+    if path.suffix.lower() == ".stl" and start.startswith(b"solid") and not binary and b"endsolid" not in end:
+        raise InputError(f"{path}: its last line is not 'endsolid', so it was cut off; export the mesh again.")
 
 
 def _unit_factor(path, unit):
@@ -170,7 +184,8 @@ def _refuse_flat(path, mesh):
 
 
 def _refuse_open(path, mesh):
-    _, uses = np.unique(mesh.edges_sorted, axis=0, return_counts=True)
+    low, high = mesh.edges_sorted.T.astype(np.int64)
+    _, uses = np.unique(low * len(mesh.vertices) + high, return_counts=True)
     boundary, odd = int(np.sum(uses == 1)), int(np.sum((uses != 2) & (uses != 1)))
     if boundary or odd:
         raise InputError(f"{path}: the surface is not closed ({boundary} boundary edges, {odd} edges with more than "

@@ -38,7 +38,16 @@ def read_mended(path, *, unit, min_size_mm=MIN_SIZE_MM, max_size_mm=MAX_SIZE_MM)
     plausible_facets(path, triangles, unit=unit, min_size_mm=min_size_mm, max_size_mm=max_size_mm)
     mesh = merge_facets(triangles)
     if len(mesh.faces) == 0 or np.ptp(mesh.vertices, axis=0).min() == 0:
-        check_body(path, mesh)     # says that it is degenerate
+        check_body(path, mesh)     # it is degenerate, which no step mends
+    try:
+        check_body(path, mesh)
+        return Mended(mesh, said)
+    except InputError:
+        return Mended(_mended(path, mesh, said), said)
+
+
+def _mended(path, mesh, said):
+    """The mesh after all steps, of which what was done is appended to `said`."""
     for step in (_join_corners, _without_doubles, _close_holes, _turn_facets, _turn_bodies, _unite):
         mesh = step(mesh, said)
     try:
@@ -46,7 +55,7 @@ def read_mended(path, *, unit, min_size_mm=MIN_SIZE_MM, max_size_mm=MAX_SIZE_MM)
     except InputError as error:
         done = f" (after: {'; '.join(said)})" if said else ""
         raise InputError(f"{error}{done}") from None
-    return Mended(mesh, said)
+    return mesh
 
 
 def _finite(triangles, said):

@@ -65,8 +65,8 @@ def _read_press(path):
 def _read_npy(path):
     try:
         values = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise InputError(f"{path}: not an array of numbers ({error}); write it with numpy.save.") from None
+    except Exception as error:     # the reader of the header raises what Python's own parser does
+        raise InputError(f"{path}: not an array of numbers ({' '.join(str(error).split())[:120]}); write it with numpy.save.") from None
     return _one_map(path, values)
 
 

@@ -1,18 +1,43 @@
 """Material cards, and the laws made from them: what every stage after the fit reads (docs/materials.md)."""
 
+from typing import Annotated
+
+import pydantic
+
 from softtact.errors import InputError
 from softtact.files import read_json
+from softtact.materials.config import validated
 from softtact.materials.laws.registry import make_law
 from softtact.materials.linear import LinearConstants
 from softtact.materials.windows import principal_window
 
 
+class _CardLaw(pydantic.BaseModel):
+    """What presses take of a card's law; the card tells more."""
+
+    model_config = pydantic.ConfigDict(strict=True)
+    parameters: dict[str, pydantic.FiniteFloat]
+    bulk_modulus_mpa: pydantic.FiniteFloat | None = None
+
+
+class _Card(pydantic.BaseModel):
+    """What presses take of a card."""
+
+    model_config = pydantic.ConfigDict(strict=True)
+    material: str
+    kind: str
+    chosen: str
+    laws: dict[str, _CardLaw]
+    strain_window: dict[str, Annotated[list[pydantic.PositiveFloat], pydantic.Field(min_length=2, max_length=2)]] = {}
+
+
 def load_card(path):
-    """Read a card; a file that is none is refused."""
+    """Read a card, a mapping as `softtact fit` wrote it; a file that is none is refused."""
     card = read_json(path)
-    missing = [key for key in ("material", "kind", "chosen", "laws") if key not in card]
+    missing = [key for key in ("material", "kind", "chosen", "laws") if not isinstance(card, dict) or key not in card]
     if missing:
         raise InputError(f"{path}: not a material card, it lacks {', '.join(missing)}; write it with `softtact fit`.")
+    validated(_Card, card, where=str(path))
     return card
 
 
@@ -31,6 +56,8 @@ def law_from_card(card, law=None):
 
 def law_of_entry(name, entry):
     """The `Law` of one entry of a card, without a window of its own."""
+    if entry.get("bulk_modulus_mpa") is None:
+        raise InputError(f"The card's law {name} has no bulk_modulus_mpa; write the card again with `softtact fit`.")
     return make_law(name, entry["parameters"], bulk_modulus=entry["bulk_modulus_mpa"])
 
 
@@ -41,4 +68,4 @@ def linear_from_card(card):
             f"The card of material {card['material']} has no linear constants;"
             " fit it with a uniaxial curve and a stated poisson."
         )
-    return LinearConstants(**card["laws"]["linear"]["parameters"])
+    return LinearConstants.of(card["laws"]["linear"]["parameters"])

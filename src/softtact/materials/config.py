@@ -197,4 +197,4 @@ def _check_laws(config):
     if config.fit.choose != "best":
         law_class(config.fit.choose)
     for name, entry in config.printed.items():
-        LinearConstants(**entry.parameters) if name == "linear" else make_law(name, entry.parameters)
+        LinearConstants.of(entry.parameters) if name == "linear" else make_law(name, entry.parameters)

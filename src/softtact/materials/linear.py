@@ -24,6 +24,13 @@ class LinearConstants:
         if not -1 < self.poisson < 0.5:
             raise InputError(f"Poisson's ratio is {self.poisson:g}; give one between -1 and 0.5.")
 
+    @classmethod
+    def of(cls, parameters):
+        """The constants of a mapping, which must hold these two and no others."""
+        if set(parameters) != {"young_mpa", "poisson"}:
+            raise InputError(f"Linear constants are young_mpa and poisson, not {', '.join(map(str, parameters)) or 'none'}.")
+        return cls(**parameters)
+
     @property
     def mu_mpa(self):
         """Shear modulus, MPa."""

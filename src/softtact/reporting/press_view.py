@@ -74,6 +74,9 @@ def save_picture(view, path):
 
 
 def _draw_with_pyvista(pyvista, view, path):
+    from vtkmodules.vtkCommonCore import vtkLogger
+
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)     # it warns where there is no screen, and draws all the same
     faces = np.column_stack([np.full(len(view.triangles), 3), view.triangles]).ravel()
     surface = pyvista.PolyData(view.points_mm[-1], faces)
     plotter = pyvista.Plotter(off_screen=True, window_size=(1200, 900))
@@ -99,11 +102,14 @@ def _draw_with_matplotlib(view, path):
 
     plt = pyplot()
     figure, axes = plt.subplots(figsize=(9, 7), subplot_kw={"projection": "3d"}, layout="constrained")
-    points, values = view.points_mm[-1], view.values[-1][view.triangles].mean(axis=1)
-    drawn = axes.plot_trisurf(*points.T, triangles=view.triangles, linewidth=0, antialiased=False)
+    points = view.points_mm[-1]
+    a, b, c = points[view.triangles].transpose(1, 0, 2)
+    triangles = view.triangles[np.cross(b - a, c - a) @ _EYE > 0]     # matplotlib would draw far sides over near ones
+    values = view.values[-1][triangles].mean(axis=1)
+    drawn = axes.plot_trisurf(*points.T, triangles=triangles, linewidth=0, antialiased=False)
     limits = Normalize(values.min(), values.max())
     drawn.set_facecolor(plt.get_cmap("viridis")(limits(values)))
-    axes.set(xlabel="x (mm)", ylabel="y (mm)", zlabel="z (mm)", title=f"{view.title}, {view.labels[-1]}")
+    axes.set(xlabel="x (mm)", ylabel="y (mm)", zlabel="z (mm)", zticks=[-2, 0], title=f"{view.title}, {view.labels[-1]}")
     axes.set_box_aspect(np.ptp(points, axis=0))
     axes.view_init(elev=32, azim=-123)
     figure.colorbar(plt.cm.ScalarMappable(limits, "viridis"), ax=axes, label=UNIT, shrink=0.6)

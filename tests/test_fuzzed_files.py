@@ -1,0 +1,164 @@
+"""Files with random faults: every reader takes them or refuses them with the project's own errors, and with one sentence."""
+
+import json
+import struct
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from softtact.config import load_study
+from softtact.errors import SofttactError
+from softtact.geometry.repair import read_mended
+from softtact.geometry.sensor_spec import SensorSpec
+from softtact.learning.network import load_network
+from softtact.learning.prediction import read_maps
+from softtact.materials.cards import law_from_card, load_card
+from softtact.materials.config import load_material
+from softtact.materials.readers import read_curves
+from softtact.reporting.press_view import read_view
+
+ROOT = Path(__file__).resolve().parents[1]
+BOX = trimesh.creation.box(extents=(4, 5, 6))
+CURVE = b"# mode: uniaxial\nstretch,nominal_stress_mpa\n0.8,-0.3\n0.9,-0.13\n1.1,0.11\n1.3,0.28\n"
+CARD = json.dumps({"material": "m", "kind": "measured", "chosen": "neo_hooke", "strain_window": {"uniaxial": [0.8, 1.3]},
+                   "laws": {"neo_hooke": {"parameters": {"c10": 0.2}, "bulk_modulus_mpa": 8.0}}}).encode()
+SOME = [None, True, -1, 0, 1e999, "x", "1e", [], [1], {}, {"value": 1}, float("nan"), 10**400, ["a", {}], {"a": {"b": []}}, "é\x00"]
+quick = settings(max_examples=40, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+def taken_or_refused(read):
+    """Run a reader on what may be faulty."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            return read()
+        except SofttactError as error:
+            assert "\n" not in str(error), error
+            return None
+
+
+@st.composite
+def damaged(draw, content):
+    """The content with some bytes replaced, left out or added, or something else altogether."""
+    if draw(st.booleans()) and draw(st.booleans()):
+        return draw(st.binary(max_size=200))
+    data = bytearray(content)
+    for _ in range(draw(st.integers(0, 4))):
+        at = draw(st.integers(0, max(len(data) - 1, 0)))
+        data[at:at + draw(st.integers(0, 30))] = draw(st.one_of(st.binary(max_size=6), st.sampled_from(
+            [b"nan", b"inf", b"-", b"1e999", b"\n", b",", b"\x00", b"\xff\xfe", b"9" * 30, b"{", b"]", b": ", b"- "])))
+    return bytes(data[:draw(st.integers(0, len(data)))]) if draw(st.booleans()) else bytes(data)
+
+
+@st.composite
+def changed(draw, values):
+    """Nested mappings and lists of which one value is replaced, left out, or under another key."""
+    if draw(st.integers(0, 3)) == 0 or not values or not isinstance(values, (dict, list)):
+        return draw(st.sampled_from(SOME))
+    copy = dict(values) if isinstance(values, dict) else list(values)
+    key = draw(st.sampled_from(sorted(copy, key=str) if isinstance(copy, dict) else range(len(copy))))
+    kind = draw(st.integers(0, 7))
+    if isinstance(copy, dict) and kind < 2:
+        value = copy.pop(key)
+        return copy if kind == 0 else copy | {draw(st.sampled_from([3, "", f"{key}s", None])): value}
+    copy[key] = draw(changed(copy[key]))
+    return copy
+
+
+
+@pytest.mark.parametrize("kind", ["stl", "stl_ascii", "obj", "ply", "ply_ascii"])
+def test_damaged_meshes_are_refused_or_closed_bodies(kind, tmp_path):
+    ascii_ply = {"encoding": "ascii"} if kind == "ply_ascii" else {}
+    content = BOX.export(file_type=kind if kind == "stl_ascii" else kind[:3], **ascii_ply)
+    path = tmp_path / f"mesh.{kind[:3]}"
+
+    @quick
+    @given(damaged(content if isinstance(content, bytes) else content.encode()))
+    def read(data):
+        path.write_bytes(data)
+        mended = taken_or_refused(lambda: read_mended(path, unit="mm"))
+        if mended is not None:
+            assert mended.mesh.is_watertight and mended.mesh.volume > 0
+
+    read()
+
+
+@pytest.mark.parametrize("kind", ["stl", "stl_ascii", "ply"])
+def test_a_mesh_cut_off_anywhere_is_refused_or_whole(kind, tmp_path):
+    content = BOX.export(file_type=kind)
+    content = content if isinstance(content, bytes) else content.encode()
+    path = tmp_path / f"mesh.{kind[:3]}"
+    for end in range(0, len(content), 7):
+        path.write_bytes(content[:end])
+        mended = taken_or_refused(lambda: read_mended(path, unit="mm"))
+        assert mended is None or mended.mesh.volume == pytest.approx(120)
+
+
+@pytest.mark.parametrize(("name", "content", "read"), [
+    ("curve.csv", CURVE, lambda path: read_curves([f"uniaxial={path}"])),
+    ("card.json", CARD, lambda path: law_from_card(load_card(path))),
+    ("sensor.yaml", (ROOT / "config/sensors/coro.yaml").read_bytes(), SensorSpec.from_yaml),
+    ("neoprene.yaml", (ROOT / "config/materials/neoprene.yaml").read_bytes(), load_material),
+    ("map.csv", b"1,2,3\n4,5,6\n7,8,9\n", lambda path: read_maps(path, shape=(3, 3))),
+    ("model.pt", b"PK\x03\x04" + bytes(60), load_network),
+    ("press.vtu", b'<?xml version="1.0"?><VTKFile type="UnstructuredGrid"><UnstructuredGrid/></VTKFile>', read_view),
+    ("press.nc", b"\x89HDF\r\n\x1a\n" + bytes(80), read_view),
+], ids=lambda value: value if isinstance(value, str) else "")
+def test_damaged_files_are_refused_by_name(name, content, read, tmp_path):
+    path = tmp_path / name
+
+    @quick
+    @given(damaged(content))
+    def damage(data):
+        path.write_bytes(data)
+        taken_or_refused(lambda: read(path))
+
+    damage()
+
+
+@pytest.mark.parametrize("array", [np.zeros((3, 3)), np.array([{}, {}]), np.zeros(3, "S4")], ids=["numbers", "objects", "texts"])
+def test_a_damaged_array_is_refused(array, tmp_path):
+    path = tmp_path / "map.npy"
+    np.save(path, array, allow_pickle=True)
+
+    @quick
+    @given(damaged(path.read_bytes()))
+    def damage(data):
+        path.write_bytes(data)
+        taken_or_refused(lambda: read_maps(path, shape=(3, 3)))
+
+    damage()
+
+
+@pytest.mark.parametrize("kind", ["study", "sensor", "material", "card"])
+def test_wrong_values_anywhere_are_refused(kind, tmp_path, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    files = {"study": "config/config.yaml", "sensor": "config/sensors/coro.yaml", "material": "config/materials/neoprene.yaml"}
+    values = yaml.safe_load((ROOT / files[kind]).read_text()) if kind in files else json.loads(CARD)
+
+    def read(wrong):
+        if kind == "study":
+            return load_study(wrong)
+        path = tmp_path / ("card.json" if kind == "card" else f"{kind}.yaml")
+        path.write_text(json.dumps(wrong) if kind == "card" else yaml.safe_dump(wrong), encoding="utf-8")
+        if kind == "card":
+            return law_from_card(load_card(path))
+        return SensorSpec.from_yaml(path) if kind == "sensor" else load_material(path)
+
+    @settings(quick, max_examples=150 if kind != "study" else 60)
+    @given(changed(values))
+    def change(wrong):
+        taken_or_refused(lambda: read(wrong))
+
+    change()
+
+
+def test_a_binary_stl_that_promises_more_than_it_holds_asks_for_no_memory(tmp_path):
+    (tmp_path / "mesh.stl").write_bytes(b"x".ljust(80) + struct.pack("<I", 2**32 - 1) + bytes(500))
+    assert taken_or_refused(lambda: read_mended(tmp_path / "mesh.stl", unit="mm")) is None
