@@ -4,11 +4,10 @@
 that rules hand their stages plain values, and a comment in a YAML file reruns nothing.
 """
 
-import difflib
 import itertools
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Literal
 
 import yaml
 from pydantic import (
@@ -28,21 +27,16 @@ from softtact.geometry.sensor_spec import READINGS, SensorSpec
 from softtact.learning.settings import Network, Search, Ssim, Training
 from softtact.materials.config import load_material
 from softtact.materials.laws.registry import LAWS
+from softtact.progress import announce
 from softtact.published.archive import SOURCE as PUBLISHED
 from softtact.published.archive import Archive, find_archive
 from softtact.published.arrangement import ARRANGEMENTS
 from softtact.sensing.virtual_sensor import VirtualSensorSettings, make_specimen
+from softtact.unknown_names import first_fault, known_keys, unknown
 
 PROJECT = Path(__file__).resolve().parents[2]
 SETS = ("indenters", "unseen", "grasps")
 CENTRED = "centred"  # the pose that gives an item its object's plain name
-
-
-def _unknown(name, known, *, kind):
-    """What is to be said of a name that is not among the `known`."""
-    near = difflib.get_close_matches(str(name), [str(right) for right in known], n=1)
-    remedy = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(map(str, known)) or 'none'}"
-    return f"there is no {kind} {name!r}; {remedy}"
 
 
 def _one_of(known, *, kind):
@@ -50,7 +44,7 @@ def _one_of(known, *, kind):
 
     def check(name):
         if name not in known:
-            raise ValueError(_unknown(name, known, kind=kind))
+            raise ValueError(unknown(name, known, kind=kind))
         return name
 
     return Annotated[str, AfterValidator(check)]
@@ -349,7 +343,21 @@ def load_study(values, *, folder="config"):
     make_specimen(spec, seed=checked.seed, settings=VirtualSensorSettings.from_dict(checked.virtual_sensor))
     catalogue = _read_catalogue(Path(checked.objects.catalogue))
     items_of = {name: _items(name, getattr(checked.objects, name), catalogue) for name in SETS}
-    return Study(checked, spec, materials, items_of, _archive(checked))
+    study = Study(checked, spec, materials, items_of, _archive(checked))
+    _say_outside_paths(study, folder)
+    return study
+
+
+def _say_outside_paths(study, folder):
+    """Say on stderr which files of the configuration lie outside the folder that the study runs in."""
+    values = study.values
+    named = [("objects.catalogue", values.objects.catalogue), *((f"object {item.object}", item.file) for item in study.items()),
+             *((f"material {name}", path) for name, config in study.materials.items() for path in config.measured_files),
+             ("ftir.measured", values.ftir.measured), ("sensor", sensor_file(values.sensor, folder=folder)),
+             ("data.folder", values.data.folder if values.data.source == "published" else None)]
+    for what, path in dict.fromkeys(named):
+        if path is not None and not Path(path).resolve().is_relative_to(Path.cwd().resolve()):
+            announce(f"the configuration, at {what!r}: {path} lies outside this project, {Path.cwd()}; it is read from there.")
 
 
 def _archive(values):
@@ -364,7 +372,7 @@ def _validated(model, values, *, where):
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        raise InputError(_fault_sentence(model, error.errors()[0], where=where)) from None
+        raise InputError(_fault_sentence(model, first_fault(error), where=where)) from None
 
 
 def _fault_sentence(model, fault, *, where):
@@ -374,18 +382,10 @@ def _fault_sentence(model, fault, *, where):
     if fault["type"] == "missing":
         return f"{section}: the key {last!r} is missing; add it."
     if fault["type"] == "extra_forbidden":
-        return _sentence(f"{section}: {_unknown(last, _section_at(model, parents).model_fields, kind='key')}")
+        return _sentence(f"{section}: {unknown(last, known_keys(model, parents), kind='key')}")
     at = ".".join(str(part) for part in fault["loc"] if part != "[key]")
     given = "" if isinstance(fault["input"], dict) else f" (it is {fault['input']!r:.60})"
     return _sentence(f"{where}, at {at!r}{given}: {fault['msg'].removeprefix('Value error, ')}")
-
-
-def _section_at(kind, path):
-    """The section class that the keys `path` lead to from the type `kind`."""
-    for key in path:
-        values_of_dict = get_args(kind)[-1:]
-        kind = values_of_dict[0] if values_of_dict else kind.model_fields[key].annotation
-    return kind
 
 
 def _existing(folder, name, *, kind):
@@ -396,7 +396,7 @@ def _existing(folder, name, *, kind):
 
 def _refuse_unknown(name, known, *, kind, where):
     if name not in known:
-        raise InputError(_sentence(f"{where}: {_unknown(name, known, kind=kind)}"))
+        raise InputError(_sentence(f"{where}: {unknown(name, known, kind=kind)}"))
 
 
 def _sentence(text):

@@ -204,9 +204,9 @@ def _refuse_inverted(path, mesh):
 
 def _refuse_overlapping(path, mesh):
     """Closed pieces that overlap or share walls have facets inside the body, which no contact search expects."""
-    pieces = mesh.split(only_watertight=False)
-    if len(pieces) < 2:
+    if mesh.body_count < 2:
         return
+    pieces = mesh.split(only_watertight=False)
     bodies = [piece for piece in pieces if piece.volume > 0]
     united = union_of(bodies)
     total = sum(body.volume for body in bodies)

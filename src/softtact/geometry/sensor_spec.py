@@ -8,9 +8,14 @@ import yaml
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PositiveFloat, PositiveInt, ValidationError
 
 from softtact.errors import InputError
+from softtact.unknown_names import first_fault, known_keys, unknown
 
 # How the frustum's two printed diameters are read: the narrow end, or (as the words of the text have it) the wide one as the tip.
 READINGS = ("default", "as_printed")
+
+
+def _at(path):
+    return f", at {'.'.join(map(str, path))!r}" if path else ""
 
 
 def _plain_value(field):
@@ -132,8 +137,14 @@ class SensorSpec(_Strict):
         try:
             spec = cls.model_validate(values)
         except ValidationError as error:
-            fault = error.errors()[0]
+            fault = first_fault(error)
             field = ".".join(str(part) for part in fault["loc"])
+            if fault["type"] == "extra_forbidden":
+                *parents, last = fault["loc"]
+                said = unknown(last, known_keys(cls, parents), kind="key")
+                raise InputError(f"{where}{_at(parents)}: {said}{'' if said.endswith('?') else '.'}") from None
+            if fault["type"] == "missing":
+                raise InputError(f"{where}: the key '{field}' is missing; add it.") from None
             raise InputError(f"{where}: field '{field}' is not usable: {fault['msg']}; correct it.") from None
         if min(spec.frusta_counts) < 1:
             raise InputError(f"{where}: no frustum of pitch {spec.dielectric.frusta.pitch_mm} mm fits on the footprint "

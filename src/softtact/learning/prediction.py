@@ -66,7 +66,8 @@ def _read_npy(path):
     try:
         values = np.load(path, allow_pickle=False)
     except Exception as error:     # the reader of the header raises what Python's own parser does
-        raise InputError(f"{path}: not an array of numbers ({' '.join(str(error).split())[:120]}); write it with numpy.save.") from None
+        said = " ".join(str(error).split())[:120]
+        raise InputError(f"{path}: not an array of numbers ({said}); write it with numpy.save.") from None
     return _one_map(path, values)
 
 

@@ -16,6 +16,7 @@ from pydantic import Field
 from softtact.errors import InputError
 from softtact.materials.laws.registry import law_class, make_law
 from softtact.materials.linear import LinearConstants
+from softtact.unknown_names import first_fault, known_keys, unknown
 
 Mode = Literal["uniaxial", "equibiaxial", "planar", "volumetric"]
 
@@ -148,15 +149,17 @@ def validated(model, raw, *, where):
     try:
         return model.model_validate(raw)
     except pydantic.ValidationError as error:
-        fault = error.errors()[0]
+        fault = first_fault(error)
         field = ".".join(str(part) for part in fault["loc"] if part not in ("synthetic", "measured")) or "the file"
-        raise InputError(f"{where}: {_fault(field, fault)}") from None
+        raise InputError(f"{where}: {_fault(model, field, fault)}") from None
 
 
-def _fault(field, fault):
+def _fault(model, field, fault):
     """What is wrong with a field, and what to do."""
     if fault["type"] == "extra_forbidden":
-        return f"the key {field} is unknown; remove it or correct its name."
+        *parents, last = fault["loc"]
+        said = unknown(last, known_keys(model, parents), kind="key")
+        return f"the key {field} is unknown: {said}{'' if said.endswith('?') else '.'}"
     if fault["type"] == "missing":
         return f"the key {field} is missing; add it."
     reason = fault["msg"].removeprefix("Value error, ")

@@ -1,0 +1,34 @@
+"""What is to be said of a key or a name that is not known: the nearest right one."""
+
+import difflib
+from typing import get_args
+
+from pydantic import BaseModel
+
+
+def unknown(name, known, *, kind):
+    """What is to be said of a `kind` of thing called `name` that is not among the `known`."""
+    near = difflib.get_close_matches(str(name), [str(right) for right in known], n=1)
+    remedy = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(map(str, known)) or 'none'}"
+    return f"there is no {kind} {name!r}; {remedy}"
+
+
+def known_keys(model, path):
+    """Keys of the section that the keys `path` lead to from a pydantic model; of all, where it may be one of several."""
+    models = [model]
+    for key in path:     # the index of a list, the name of an entry, the kind of a section lead no further
+        below = [found for model in models if key in model.model_fields for found in _models(model.model_fields[key].annotation)]
+        models = below or models
+    return [name for model in models for name in model.model_fields]
+
+
+def first_fault(error):
+    """Of a pydantic ValidationError's faults the one to tell: a misspelt key before the right one that is missing for it."""
+    return min(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
+
+
+def _models(annotation):
+    """The pydantic models in a type."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [model for part in get_args(annotation) for model in _models(part)]

@@ -1,0 +1,110 @@
+"""`softtact view` and the VTU of a press: the pressed sensor in a page, in a picture and as ParaView reads it."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+import xarray
+
+import softtact
+from softtact.cli import main
+from softtact.commands import view as view_command
+from softtact.geometry.sensor_spec import SensorSpec
+from softtact.mechanics.layered_body import MeshSettings
+from softtact.pressed_mesh import LAYERS, of_map, read_vtu
+from softtact.reporting.press_view import _draw_with_matplotlib, read_view
+
+ROOT = Path(__file__).resolve().parents[1]
+X, Y = np.linspace(-2, 2, 5), np.linspace(-3, 3, 7)
+MAPS = np.stack([k * np.outer(np.hanning(7), np.hanning(5)) for k in (0.2, 0.5)])
+
+
+@pytest.fixture
+def press_nc(tmp_path):
+    data = xarray.Dataset({"deformation_map_mm": (("force", "y", "x"), MAPS), "force_n": ("force", [5.0, 20.0])},
+                          coords={"x": X, "y": Y}, attrs={"thickness_mm": 2.5})
+    data.to_netcdf(tmp_path / "press.nc", engine="h5netcdf")
+    return tmp_path / "press.nc"
+
+
+@pytest.fixture(scope="module")
+def hyperelastic(tmp_path_factory):
+    """A press on four frusta whose mesh was kept, as result and as VTU."""
+    sensor = softtact.load_sensor(ROOT / "config/sensors/coro.yaml")
+    spec = SensorSpec.from_yaml(ROOT / "config/sensors/coro.yaml").model_copy(update={"footprint_mm": (2.4, 2.4)})
+    sensor = replace(sensor, spec=spec, keep_mesh=True, mesh=MeshSettings.draft())
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=3.0)
+    result = sensor.press(ball, force_n=[0.2, 0.5], model="hyperelastic", label="", threads=1)
+    path = tmp_path_factory.mktemp("press") / "press.vtu"
+    result.write_vtu(path)
+    return result, path
+
+
+def test_paraview_reads_the_whole_mesh_with_displacements_and_the_pressure_of_the_force(hyperelastic):
+    pyvista = pytest.importorskip("pyvista")
+    result, path = hyperelastic
+    mesh = pyvista.read(path)
+    assert set(mesh.cell_data["layer"]) == {LAYERS[name] for name in ("frusta", "sheet", "cover", "pressed face")}
+    sizes = mesh.compute_cell_sizes(length=False, area=True, volume=True).cell_data
+    face = mesh.cell_data["layer"] == LAYERS["pressed face"]
+    assert sizes["Volume"][~face].sum() > 2.4**2 * 2.0 and (sizes["Volume"][~face] > 0).all()
+    pressed = (sizes["Area"] * mesh.cell_data["contact_pressure_mpa_0.5N"])[face].sum()
+    assert pressed == pytest.approx(0.5, rel=0.05)     # under a ball the pressure is not quite vertical
+    assert np.isnan(mesh.cell_data["contact_pressure_mpa_0.5N"][~face]).all()
+    top = np.abs(mesh.points[:, 2]) < 1e-9
+    deepest = -mesh.point_data["displacement_mm_0.5N"][top, 2].min()
+    assert deepest == pytest.approx(result.indentation_mm[1], rel=0.02)
+    assert (result.deformation_map_mm[1].max() <= deepest + 1e-6) and result.mesh.force_n.tolist() == [0.2, 0.5]
+
+
+def test_the_surface_of_the_whole_mesh_is_drawn_and_its_inside_is_not(hyperelastic):
+    mesh = read_vtu(hyperelastic[1])
+    points, triangles, used = mesh.surface()
+    assert len(used) < 0.5 * len(mesh.points) and mesh.displacement_mm.shape == (2, len(mesh.points), 3)
+    area = trimesh.triangles.area(points[triangles])[np.abs(points[triangles][..., 2]).max(axis=1) < 1e-9].sum()
+    assert area == pytest.approx(2 * 2.4**2)     # the cover's top, and the pressed faces on it
+
+
+def test_a_map_becomes_a_closed_block_whose_top_is_pressed():
+    mesh = of_map(MAPS, X, Y, [5, 20], thickness_mm=2.5)
+    points, triangles, used = mesh.surface()
+    block = trimesh.Trimesh(points + mesh.displacement_mm[1][used], triangles)
+    below = MAPS[1][1:-1, 1:-1].sum() * (X[1] - X[0]) * (Y[1] - Y[0])
+    assert block.is_watertight and block.volume == pytest.approx(4 * 6 * 2.5 - below, rel=0.01)
+
+
+def test_view_writes_a_page_and_a_picture_and_says_so_in_json(press_nc, tmp_path, capsys):
+    page, picture = tmp_path / "p.html", tmp_path / "p.png"
+    assert main(["view", str(press_nc), "--page", str(page), "--save", str(picture), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["page"] == str(page) and told["picture"] == str(picture) and not told["opened"]
+    assert "20 N" in page.read_text() and picture.stat().st_size > 10_000
+
+
+def test_view_opens_a_browser_where_there_is_one_and_draws_where_there_is_none(press_nc, tmp_path, monkeypatch, capsys):
+    opened = []
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(view_command, "_browser", lambda: type("B", (), {"open": lambda self, url: opened.append(url) or True})())
+    assert main(["view", str(press_nc)]) == 0 and "opened:" in capsys.readouterr().out
+    assert opened[0].startswith("file://") and opened[0].endswith("press.html")
+    monkeypatch.setattr(view_command, "_browser", lambda: None)
+    assert main(["view", str(press_nc)]) == 0
+    assert "no browser" in capsys.readouterr().err and Path("press.nc.png").stat().st_size > 10_000
+
+
+def test_without_pyvista_matplotlib_draws(press_nc, tmp_path):
+    _draw_with_matplotlib(read_view(press_nc), tmp_path / "plain.png")
+    assert (tmp_path / "plain.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(("name", "content", "said"), [
+    ("press.csv", b"1,2", "give the .nc or .vtu file"), ("press.nc", b"x", "not a readable NetCDF"), ("press.vtu", b"<", "not readable as VTU"),
+])
+def test_what_is_no_press_is_refused(name, content, said, tmp_path, capsys):
+    (tmp_path / name).write_bytes(content)
+    assert main(["view", str(tmp_path / name), "--save", str(tmp_path / "p.png")]) == 1
+    message = capsys.readouterr().err
+    assert said in message and name in message and not (tmp_path / "p.png").exists()
