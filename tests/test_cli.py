@@ -2,18 +2,29 @@
 
 import argparse
 import json
+import os
+import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import jsonschema
+import numpy as np
 import pytest
+import trimesh
+import yaml
 
+from softtact import cli
 from softtact.choice import TOLERANCE_MM
-from softtact.cli import main
+from softtact.cli import COMMANDS, main
+from softtact.commands import complexity
 from softtact.commands import press as press_command
+from softtact.commands.common import EXIT_STATUS
 from softtact.commands.fit import LAYOUTS as LAYOUTS_OFFERED
+from softtact.errors import ConvergenceError, InputError
 from softtact.materials.readers import LAYOUTS
-from softtact.sensor import MODELS
+from softtact.sensor import MODELS, Sensor
 
 ROOT = Path(__file__).resolve().parents[1]
 OBJECT = ROOT / "config/objects/grasped/object_5.stl"
@@ -51,13 +62,143 @@ def answer(capsys):
     return run
 
 
-@pytest.mark.parametrize("command", [[], ["press"], ["predict"], ["complexity"], ["fit"], ["export-deck"],
-                                     ["detect-discs"], ["stage"]])
-def test_every_command_has_help(command, capsys):
+NAMES = ("press", "view", "predict", "complexity", "fit", "export-deck", "detect-discs", "stage", "config-schema", "completion")
+
+
+@pytest.mark.parametrize("command", [[], *([name] for name in NAMES)])
+def test_every_commands_help_has_examples_and_the_exit_statuses(command, capsys):
     with pytest.raises(SystemExit) as stop:
         main([*command, "--help"])
     assert stop.value.code == 0
-    assert "usage: softtact" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "usage: softtact" in said and "examples:" in said
+    assert all(f"  {status:<4}{meaning}" in said for status, meaning in EXIT_STATUS.items())
+
+
+def test_the_docs_hold_the_exit_statuses_as_they_are():
+    page = (ROOT / "docs/command_line.md").read_text()
+    assert all(f"| {status} | {meaning} |" in page for status, meaning in EXIT_STATUS.items())
+
+
+def examples():
+    """Each command of the examples in the helps, as its arguments."""
+    for command in COMMANDS:
+        text = sys.modules[command.__name__].EXAMPLES.replace("\\\n", " ").replace(",\n      ", ", ")
+        for line in text.splitlines():
+            arguments = shlex.split(line, comments=True) if line.strip().startswith("softtact ") else []
+            yield from [arguments[1:]] if arguments else []
+
+
+@pytest.fixture
+def example_files(tmp_path, monkeypatch):
+    """What the examples name: meshes, curves, frames, a sensor, a network, in a folder of their own."""
+    mesh = trimesh.load(OBJECT)
+    mesh.export(tmp_path / "part.stl")
+    for name, scale in (("part.obj", 1 / 25.4), ("part.ply", 1e-3)):
+        mesh.copy().apply_scale(scale).export(tmp_path / name)
+    neo_hooke_file(tmp_path / "tension.csv", (0.8, 0.9, 1.1, 1.3, 1.4))
+    neo_hooke_file(tmp_path / "shear.csv", (1.1, 1.3, 1.5), exponents=(1, -3))
+    (tmp_path / "my_sensor.yaml").write_text((ROOT / "config/sensors/coro.yaml").read_text())
+    (tmp_path / "config").symlink_to(ROOT / "config")
+    monkeypatch.chdir(tmp_path)
+
+
+def test_the_examples_in_the_helps_are_right_command_lines():
+    parser = cli._parser()
+    seen = {parser.parse_args(without_redirection(arguments)).command for arguments in examples()}
+    assert seen == set(NAMES)
+
+
+def without_redirection(arguments):
+    return arguments[:next((k for k, word in enumerate(arguments) if word in (">", ">>")), len(arguments))]
+
+
+QUICK = ("complexity", "fit", "stage", "config-schema", "completion", "press part.stl --unit mm --force 5 --model elastic")
+
+
+def test_the_quick_examples_run(example_files, capsys):
+    """Those that need no minutes, no network and no camera's frames."""
+    lines = [(" ".join(arguments), arguments) for arguments in map(without_redirection, examples())]
+    quick = [arguments for line, arguments in lines if line.startswith(QUICK) and "all --out" not in line and ".yaml" not in line]
+    for arguments in quick:
+        assert main(arguments) == 0, arguments
+    assert {arguments[0] for arguments in quick} == {line.split()[0] for line in QUICK}
+
+
+def test_json_stands_alone_on_stdout_and_messages_on_stderr(capsys, tmp_path):
+    """A mended mesh makes a message; so does the first use of a sensor."""
+    doubled = trimesh.load(OBJECT)
+    trimesh.Trimesh(doubled.vertices, [*doubled.faces, doubled.faces[0]], process=False).export(tmp_path / "part.stl")
+    press = ["press", str(tmp_path / "part.stl"), "--unit", "mm", "--force", "5", "--model", "elastic", "--json"]
+    assert main([*press, "--vtu", str(tmp_path / "p.vtu"), "--out", str(tmp_path / "p.nc")]) == 0
+    captured = capsys.readouterr()
+    told = json.loads(captured.out)
+    assert told["repairs"] == ["left out 1 facet of those that were there twice"] and told["repairs"][0] in captured.err
+    assert told["written"] == [str(tmp_path / "p.nc"), str(tmp_path / "p.vtu")] and np.shape(told["tactile_map"]) == (1, 7, 4)
+
+
+@pytest.mark.parametrize(("fault", "status"), [
+    (ConvergenceError("The level of 20 N was not reached."), 3), (InputError("no."), 1), (KeyboardInterrupt(), 130),
+    (OSError(28, "No space left on device", "press.nc"), 4),
+])
+def test_what_stops_a_command_has_its_exit_status(fault, status, refused, monkeypatch):
+    def stop(options):
+        raise fault
+
+    monkeypatch.setattr(complexity, "_complexity", stop)
+    got, sentence = refused("complexity", OBJECT, "--unit", "mm")
+    assert got == status and sentence.startswith("softtact complexity: ")
+
+
+def test_a_press_that_stops_early_writes_and_prints_the_forces_before(capsys, tmp_path, monkeypatch):
+    whole = Sensor.press
+
+    def stops(self, mesh, **options):
+        result = whole(self, mesh, **options | {"force_n": [5.0]})
+        raise ConvergenceError("The level of 20 N was not reached.", result=result)
+
+    monkeypatch.setattr(Sensor, "press", stops)
+    status = main(["press", str(OBJECT), "--unit", "mm", "--force", "5", "--force", "20", "--model", "elastic", "--json",
+                   "--out", str(tmp_path / "p.nc")])
+    captured = capsys.readouterr()
+    assert status == 3 and json.loads(captured.out)["force_n"] == [5.0] and (tmp_path / "p.nc").exists()
+    assert captured.err.endswith("softtact press: The level of 20 N was not reached.\n")
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_is_a_script_of_the_shell(shell, answer, tmp_path):
+    script = tmp_path / "completion"
+    script.write_text(answer("completion", shell))
+    assert "softtact" in script.read_text()
+    if shutil.which(shell):
+        subprocess.run([shell, "-n", script], check=True)
+
+
+def test_bash_completes_commands_and_options(tmp_path):
+    """As bash asks: the line so far in the environment, the answers on file descriptor 8."""
+    call = "import sys; from softtact.cli import main; sys.argv[0] = 'softtact'; main()"
+
+    def completed(line):
+        environment = os.environ | {"_ARGCOMPLETE": "1", "COMP_LINE": line, "COMP_POINT": str(len(line)), "_ARGCOMPLETE_IFS": "\n",
+                                    "_ARGCOMPLETE_STDOUT_FILENAME": str(tmp_path / "answers"), "COMP_TYPE": "9"}
+        subprocess.run([sys.executable, "-c", call], env=environment, check=True)
+        return (tmp_path / "answers").read_text().split()
+
+    assert completed("softtact pre") == ["press", "predict"]
+    assert completed("softtact press part.stl --mod") == ["--model"]
+    assert set(completed("softtact press part.stl --model ")) >= {"auto", "elastic"}
+
+
+@pytest.mark.parametrize("kind", ["study", "sensor", "material"])
+def test_the_schema_in_docs_is_that_of_the_types_and_takes_the_projects_files(kind, answer):
+    schema = json.loads((ROOT / f"docs/schemas/{kind}.schema.json").read_text())
+    again = f"softtact config-schema {kind} --out docs/schemas/{kind}.schema.json"
+    assert schema == json.loads(answer("config-schema", kind)), again
+    files = {"study": "config/config.yaml", "sensor": "config/sensors/coro.yaml", "material": "config/materials/neoprene.yaml"}
+    values = yaml.safe_load((ROOT / files[kind]).read_text())
+    jsonschema.validate(values, schema)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(values | {"nam": 1}, schema)
 
 
 def test_the_command_line_offers_what_the_package_has():
@@ -69,8 +210,13 @@ def test_the_command_line_offers_what_the_package_has():
     assert options.choices["press"].get_default("tolerance") == TOLERANCE_MM
 
 
-def test_help_comes_without_loading_a_solver():
-    listed = "import sys, softtact.cli; print([m for m in ('torch', 'scipy', 'numba', 'pandas') if m in sys.modules])"
+HEAVY = ("numpy", "torch", "scipy", "numba", "pandas", "xarray", "matplotlib", "trimesh", "pyvista", "pydantic", "meshio",
+         "skimage")
+
+
+@pytest.mark.parametrize("imported", ["import softtact", "import softtact.cli; softtact.cli._parser().format_help()"])
+def test_the_package_and_its_help_load_no_heavy_library(imported):
+    listed = f"import sys; {imported}; print([name for name in {HEAVY} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", listed], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
 

@@ -27,10 +27,10 @@ from softtact.errors import ConvergenceError, SofttactError
 COMMANDS = (press, view, predict, complexity, fit, export_deck, detect_discs, stage, config_schema, completion)
 EXAMPLES = """examples:
   softtact press part.stl --unit mm --force 5 --force 20 --out press.nc --vtu press.vtu --plot press.png
-  softtact view press.vtu                     turn the pressed sensor in a browser
-  softtact complexity part.stl --unit mm      which model the paper's rule takes for it
+  softtact view press.vtu                     # turn the pressed sensor in a browser
+  softtact complexity part.stl --unit mm      # which model the paper's rule takes for it
   softtact fit uniaxial=tension.csv --out card.json
-  softtact press --help                       each command's help has examples of its own
+  softtact press --help                       # each command's help has examples of its own
 """
 
 

@@ -84,19 +84,17 @@ def read_vtu(path):
 
 def of_map(maps_mm, x_mm, y_mm, force_n, *, thickness_mm):
     """The `PressedMesh` of deformation maps (l, ny, nx): a pressed face in walls and a bottom that are as at rest."""
-    count = np.array([len(y_mm), len(x_mm)])
-    number = np.arange(count.prod()).reshape(count)
+    number = np.arange(len(y_mm) * len(x_mm)).reshape(len(y_mm), len(x_mm))
     top = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1).reshape(-1, 4)
     x, y = np.meshgrid(x_mm, y_mm)
     face = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
     rim = np.concatenate([number[0, :-1], number[:-1, -1], number[-1, :0:-1], number[:0:-1, 0]])
-    lower = count.prod() + np.arange(len(rim))
-    walls = np.column_stack([rim, lower, np.roll(lower, -1), np.roll(rim, -1)])
-    corners = lower[np.cumsum([0, count[1] - 1, count[0] - 1, count[1] - 1])]
-    points = np.vstack([face, face[rim] - [0.0, 0.0, thickness_mm]])
+    following = np.roll(rim, -1)
+    walls = np.column_stack([rim, rim + x.size, following + x.size, following])
+    points = np.vstack([face, face - [0.0, 0.0, thickness_mm]])
     moved = np.zeros((len(maps_mm), len(points), 3))
     moved[:, :len(face), 2] = -np.asarray(maps_mm).reshape(len(maps_mm), -1)
-    cells = [("quad", top, LAYERS["pressed face"]), ("quad", np.vstack([walls, corners[::-1]]), LAYERS["wall at rest"])]
+    cells = [("quad", top, LAYERS["pressed face"]), ("quad", np.vstack([walls, top[:, ::-1] + x.size]), LAYERS["wall at rest"])]
     return PressedMesh(points=points, cells=cells, force_n=np.asarray(force_n), displacement_mm=moved)
 
 

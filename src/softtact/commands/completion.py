@@ -5,7 +5,7 @@ from softtact.commands.common import add_command
 SHELLS = ("bash", "zsh", "fish")
 EXAMPLES = """
   softtact completion bash >> ~/.bashrc
-  softtact completion zsh  >> ~/.zshrc          below the line that calls compinit
+  softtact completion zsh  >> ~/.zshrc          # below the line that calls compinit
   softtact completion fish > ~/.config/fish/completions/softtact.fish
 """
 

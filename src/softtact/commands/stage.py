@@ -5,7 +5,7 @@ from softtact.commands.common import add_command
 EXAMPLES = r"""
   softtact stage make_curves --out 'curves[]=uniaxial.csv' --settings '{"material": "mine", "kind": "synthetic",
       "law": "neo_hooke", "parameters": {"c10": 0.2}, "noise": 0.01, "points": 9, "seed": 1, "modes": {"uniaxial": [0.8, 1.4]}}'
-  snakemake --cores all --printshellcmds      runs all stages of the study, and prints their commands
+  snakemake --cores all --printshellcmds      # runs all stages of the study, and prints their commands
 """
 
 

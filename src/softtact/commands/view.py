@@ -9,9 +9,9 @@ from softtact.commands.common import add_command, check_folders, check_names, sh
 
 EXAMPLES = """
   softtact press part.stl --unit mm --force 5 --force 20 --model elastic --out press.nc --vtu press.vtu
-  softtact view press.nc                      opens a page that turns; a picture where there is no browser
-  softtact view press.vtu --save press.png    a picture of the whole sensor at the largest force
-  softtact view press.nc --page press.html    the page, to keep or to send
+  softtact view press.nc                           # opens a page that turns; a picture where there is no browser
+  softtact view press.vtu --save press.png    # a picture of the whole sensor at the largest force
+  softtact view press.nc --page press.html    # the page, to keep or to send
 """
 
 

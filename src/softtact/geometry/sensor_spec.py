@@ -1,7 +1,7 @@
 """The sensor as its YAML file describes it: sizes in mm, layers, frusta, taxels. No mechanics."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Generic, TypeVar
 
 import numpy as np
 import yaml
@@ -12,6 +12,7 @@ from softtact.unknown_names import first_fault, known_keys, unknown
 
 # How the frustum's two printed diameters are read: the narrow end, or (as the words of the text have it) the wide one as the tip.
 READINGS = ("default", "as_printed")
+T = TypeVar("T")
 
 
 def _at(path):
@@ -30,12 +31,25 @@ def _plain_value(field):
     return field
 
 
-Length = Annotated[PositiveFloat, BeforeValidator(_plain_value)]
-Coefficient = Annotated[float, Field(ge=0.0, allow_inf_nan=False), BeforeValidator(_plain_value)]
-
-
 class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Stated(_Strict, Generic[T]):
+    """A value with whether it is assumed, and why."""
+
+    value: T
+    assumed: bool = False
+    reason: str = ""
+
+
+def _or_stated(kind):
+    """A `kind` of value, which may stand as a `Stated` one in the file."""
+    return Annotated[kind, BeforeValidator(_plain_value, json_schema_input_type=kind | Stated[kind])]
+
+
+Length = _or_stated(PositiveFloat)
+Coefficient = _or_stated(Annotated[float, Field(ge=0.0, allow_inf_nan=False)])
 
 
 class Frusta(_Strict):
@@ -94,7 +108,7 @@ class SensorSpec(_Strict):
     taxels: Taxels
     dielectric: Dielectric
     cover: Cover
-    tips_held: Annotated[bool, BeforeValidator(_plain_value)] = True
+    tips_held: _or_stated(bool) = True
     friction: Friction = Friction()
     elastic_layer: ElasticLayer
 
