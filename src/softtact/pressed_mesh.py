@@ -12,11 +12,9 @@ import numpy as np
 
 from softtact.errors import InputError
 from softtact.files import atomic_path
+from softtact.mechanics.vtk_cells import COVER, FRUSTA, SHEET, body_cells
 
-# VTK's order of the nodes, by ours (bottom, top, middle of a plan of corners, mid-sides and centre).
-VTK_HEX27 = np.array([0, 1, 2, 3, 9, 10, 11, 12, 4, 5, 6, 7, 13, 14, 15, 16, 18, 19, 20, 21, 25, 23, 22, 24, 8, 17, 26])
-VTK_WEDGE18 = np.array([0, 1, 2, 6, 7, 8, 3, 4, 5, 9, 10, 11, 12, 13, 14, 15, 16, 17])
-LAYERS = {"frusta": 0, "sheet": 1, "cover": 2, "pressed face": 3, "wall at rest": 4}
+LAYERS = {"frusta": FRUSTA, "sheet": SHEET, "cover": COVER, "pressed face": 3, "wall at rest": 4}
 _DISPLACEMENT, _PRESSURE = "displacement_mm_{:g}N", "contact_pressure_mpa_{:g}N"
 _LEVEL = re.compile(r"displacement_mm_(.+)N")
 # Faces of a cell of VTK's by its corners; the cells that are drawn by `surface`.
@@ -96,16 +94,6 @@ def of_map(maps_mm, x_mm, y_mm, force_n, *, thickness_mm):
     moved[:, :len(face), 2] = -np.asarray(maps_mm).reshape(len(maps_mm), -1)
     cells = [("quad", top, LAYERS["pressed face"]), ("quad", np.vstack([walls, top[:, ::-1] + x.size]), LAYERS["wall at rest"])]
     return PressedMesh(points=points, cells=cells, force_n=np.asarray(force_n), displacement_mm=moved)
-
-
-def body_cells(body):
-    """Points (n, 3) in mm and cells, as of `PressedMesh`, of a `LayeredBody`: sheet, cover, and the frusta one by one."""
-    sheet, cover, bed = body.slab.sheet_mesh, body.slab.cover_mesh, body.bed
-    first = np.cumsum([0, len(sheet.points), len(cover.points)])
-    frusta = (bed.mesh.hexes[None] + first[2] + (np.arange(bed.count) * bed.nodes)[:, None, None]).reshape(-1, 27)
-    cells = [("hexahedron27", frusta[:, VTK_HEX27], LAYERS["frusta"]), ("hexahedron27", sheet.hexes[:, VTK_HEX27], LAYERS["sheet"]),
-             ("wedge18", sheet.wedges[:, VTK_WEDGE18], LAYERS["sheet"]), ("hexahedron20", cover.hexes + first[1], LAYERS["cover"])]
-    return np.vstack([sheet.points, cover.points, bed.coordinates.reshape(-1, 3)]), cells
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from softtact.mechanics.elastic import elastic_slab, map_cells
 from softtact.mechanics.foundation import foundation_slab
 from softtact.mechanics.hyperelastic import NewtonSettings
 from softtact.mechanics.layered_body import MeshSettings, build_sensor_body
-from softtact.pressed_mesh import VTK_HEX27, body_cells
+from softtact.mechanics.vtk_cells import VTK_HEX27, body_cells
 
 _SCATTER_KEYS = ("height_scatter", "tip_scatter", "specimen")
 _SOLVER_KEYS = ("largest_penetration_mm",)
