@@ -8,6 +8,8 @@ import yaml
 
 from softtact.config import Mesh, load_study
 from softtact.errors import InputError
+from softtact.geometry.sensor_spec import SensorSpec
+from softtact.materials.config import load_material
 from softtact.mechanics.layered_body import MeshSettings
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -128,3 +130,29 @@ def test_the_mesh_section_knows_the_keys_of_the_solver():
 def test_a_missing_key_is_named():
     values = {key: value for key, value in DEFAULT.items() if key != "forces_n"}
     assert refusal(values) == "the configuration: the key 'forces_n' is missing; add it."
+
+
+@pytest.mark.parametrize(("file", "right", "wrong", "said"), [
+    ("sensors/coro.yaml", "tip_diameter_mm", "tip_diametre_mm",
+     "at 'dielectric.frusta': there is no key 'tip_diametre_mm'; did you mean 'tip_diameter_mm'?"),
+    ("sensors/coro.yaml", "name:", "nam:", "there is no key 'nam'; did you mean 'name'?"),
+    ("materials/neoprene.yaml", "  points:", "  point:", "there is no key 'point'; did you mean 'points'?"),
+    ("materials/neoprene.yaml", "bulk_over_shear:", "bulk_over_sheer:", "did you mean 'bulk_over_shear'?"),
+])
+def test_a_misspelt_key_of_a_sensor_or_a_material_is_named_with_the_right_one(file, right, wrong, said, tmp_path):
+    text = (ROOT / "config" / file).read_text()
+    assert right in text
+    path = tmp_path / Path(file).name
+    path.write_text(text.replace(right, wrong, 1))
+    with pytest.raises(InputError) as caught:
+        (SensorSpec.from_yaml if "sensor" in file else load_material)(path)
+    assert said in str(caught.value) and str(caught.value).startswith(str(path))
+
+
+def test_files_outside_the_project_are_said_and_those_inside_are_not(tmp_path, capsys):
+    load_study(DEFAULT)
+    assert capsys.readouterr().err == ""
+    (tmp_path / "area.csv").write_text("force_n,area_mm2\n1,0.1\n")
+    load_study(changed("ftir.measured", str(tmp_path / "area.csv")))
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and f"at 'ftir.measured': {tmp_path / 'area.csv'} lies outside this project" in said

@@ -60,6 +60,16 @@ def test_paraview_reads_the_whole_mesh_with_displacements_and_the_pressure_of_th
     assert result.mesh.force_n.tolist() == [0.2, 0.5]
 
 
+def test_cover_sheet_and_frusta_move_alike_where_they_meet(hyperelastic):
+    mesh = hyperelastic[0].mesh
+    _, place = np.unique(np.round(mesh.points, 6), axis=0, return_inverse=True)
+    most, least = (np.full((place.max() + 1, 3), start) for start in (-np.inf, np.inf))
+    np.maximum.at(most, place.ravel(), mesh.displacement_mm[1])
+    np.minimum.at(least, place.ravel(), mesh.displacement_mm[1])
+    assert (np.bincount(place.ravel()) > 1).sum() > 4 * 25 + 4
+    assert (most - least).max() < 1e-6 < 0.1 < np.abs(mesh.displacement_mm[1]).max()
+
+
 def test_the_surface_of_the_whole_mesh_is_drawn_and_its_inside_is_not(hyperelastic):
     mesh = read_vtu(hyperelastic[1])
     points, triangles, used = mesh.surface()

@@ -122,7 +122,8 @@ def test_a_mended_mesh_says_what_was_done_and_gives_the_clean_meshs_map(spoil, s
     path = tmp_path / f"bad.{suffix}"
     spoil(punch()).export(path)
     mended = read_mended(path, unit="mm")
-    assert (mended.repairs == []) if said is None else said in "; ".join(mended.repairs)
+    assert (mended.repairs == []) if said is None else mended.repairs[0].startswith(said)
+    assert mended.repairs[1:] == ([] if spoil is not with_nan else [mended.repairs[1]]), "no step undoes another"
     assert mended.mesh.volume == pytest.approx(punch().volume, rel=1e-4)
     got = sensor.press(mended.mesh, force_n=[5, 20], model="elastic", label="").deformation_map_mm
     assert np.abs(got - clean).max() < 1e-3 * clean.max()     # corners are rounded by up to 20 nm, in single precision
@@ -195,7 +196,7 @@ def test_a_mesh_of_a_million_facets_is_read_in_its_own_size(tmp_path):
     (tmp_path / "bowl.stl").write_bytes(b"solid bowl".ljust(80) + content[80:])
     mended = read_mended(tmp_path / "bowl.stl", unit="mm")
     assert mended.repairs == [] and len(mended.mesh.faces) > 1_000_000
-    assert mended.mesh.extents == pytest.approx([10, 10, 3])
+    assert mended.mesh.extents == pytest.approx([10, 10, 3], abs=1e-5)     # corners are rounded to that
 
 
 @pytest.mark.skipif(not DATA, reason="SOFTTACT_TEST_DATA is not set")

@@ -9,7 +9,7 @@ FRUSTA, SHEET, COVER = 0, 1, 2     # layers
 
 
 def body_cells(body):
-    """Points (n, 3) in mm of a `LayeredBody`: sheet, cover, the frusta one by one; and cells [(VTK's kind, nodes (e, w), layer)]."""
+    """Points (n, 3) in mm of a `LayeredBody`: sheet, cover, the frusta one by one; cells [(VTK's kind, nodes (e, w), layer)]."""
     sheet, cover, bed = body.slab.sheet_mesh, body.slab.cover_mesh, body.bed
     first = np.cumsum([0, len(sheet.points), len(cover.points)])
     frusta = (bed.mesh.hexes[None] + first[2] + (np.arange(bed.count) * bed.nodes)[:, None, None]).reshape(-1, 27)
