@@ -123,7 +123,7 @@ def test_a_mended_mesh_says_what_was_done_and_gives_the_clean_meshs_map(spoil, s
     spoil(punch()).export(path)
     mended = read_mended(path, unit="mm")
     assert (mended.repairs == []) if said is None else mended.repairs[0].startswith(said)
-    assert mended.repairs[1:] == ([] if spoil is not with_nan else [mended.repairs[1]]), "no step undoes another"
+    assert len(mended.repairs) == (2 if spoil is with_nan else int(said is not None))     # no step mends what another broke
     assert mended.mesh.volume == pytest.approx(punch().volume, rel=1e-4)
     got = sensor.press(mended.mesh, force_n=[5, 20], model="elastic", label="").deformation_map_mm
     assert np.abs(got - clean).max() < 1e-3 * clean.max()     # corners are rounded by up to 20 nm, in single precision
@@ -180,6 +180,7 @@ def test_an_object_a_thousand_times_too_small_or_too_large_is_named_with_the_lik
         read_mended(tmp_path / "part.stl", unit={"m": "m", "inch": "inch"}[unit_of_file])
 
 
+@pytest.mark.slow
 def test_a_mesh_of_a_million_facets_is_read_in_its_own_size(tmp_path):
     """As a binary STL whose header begins with `solid`, like that of a text one."""
     count = 501     # of squares along a side: two sheets of 2 * 501^2 facets, and the border between them

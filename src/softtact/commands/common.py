@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import os
 import sys
 from pathlib import Path
 
@@ -83,6 +84,8 @@ def check_folders(*paths):
     for path in paths:
         if path and not path.parent.is_dir():
             raise InputError(f"{path}: there is no folder {path.parent}; make it first.")
+        if path and not os.access(path.parent, os.W_OK):
+            raise InputError(f"{path}: the folder {path.parent} may not be written to; choose another.")
 
 
 def check_names(endings):
