@@ -89,7 +89,7 @@ def _draw_with_pyvista(pyvista, view, path):
     plotter.set_background("white")
     plotter.enable_parallel_projection()
     plotter.view_vector(_EYE)
-    plotter.camera.zoom(1.3)
+    plotter.camera.zoom(1.15)
     with atomic_path(path) as temporary:
         plotter.screenshot(temporary)
     plotter.close()
