@@ -18,6 +18,7 @@ class PressResult:
     expected_error_mm (force,): root mean square over the map, against the hyperelastic model, where the model was chosen by it
     The last four are nan where the model, the law or the policy does not tell.
     why: what made the choice of the model, where it was not the user's
+    largest_counts: where the sensor's readout ends
     x_mm (x,), y_mm (y,): the map's grid;  model;  solver: the linear solver's name
     """
 
@@ -41,6 +42,7 @@ class PressResult:
     solver: str
     expected_error_mm: np.ndarray | None = None
     why: str = ""
+    largest_counts: float = 2400.0
     attributes: dict = field(default_factory=dict)
 
     def __post_init__(self):
