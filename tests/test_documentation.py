@@ -6,6 +6,8 @@ that what they name is there.
 
 import re
 import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 import imageio.v3 as iio
@@ -111,3 +113,15 @@ def test_what_a_page_links_or_tells_to_run_is_there(page):
     makefile = (ROOT / "Makefile").read_text()
     for target in re.findall(r"^    make (\w+)", text, flags=re.MULTILINE):
         assert re.search(rf"^{target}:", makefile, flags=re.MULTILINE), target
+
+
+def test_the_site_builds_without_a_warning_and_loads_nothing_from_elsewhere(tmp_path):
+    pytest.importorskip("myst_parser", reason="pip install -e '.[docs]'")
+    folders = ["-d", str(tmp_path / "trees"), str(ROOT / "docs"), str(tmp_path / "site")]
+    done = subprocess.run([sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html", *folders],
+                          capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    pages = {path.stem: path.read_text(encoding="utf-8") for path in (tmp_path / "site").glob("*.html")}
+    assert pages["theory"].count("<math") > 50 and "softtact.sensor.load_sensor" in pages["api"]
+    for name, page in pages.items():
+        assert not re.search(r"""(?:src=|<link[^>]*href=)["']?(?:https?:)?//""", page), name
