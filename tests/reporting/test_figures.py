@@ -110,7 +110,7 @@ def test_the_page_holds_its_figures_and_links_its_data(tmp_path):
     assert page.count("data:image/png;base64,") == 3
     assert page.count("The words allow this.") == 1 and "Material foam: test curves" in page
     assert 'href="figures/fig6_ssim.svg"' in page and 'href="tables/table2.csv"' in page
-    assert "pad: 30 x 20 mm" in page and "0.500 to 0.700" in page and "one item: none" in page
+    assert "pad: 30 x 20 mm. It is not the paper" in page and "0.500 to 0.700" in page and "one item: none" in page
     assert "a &lt; b" in page and "What is synthetic here" in page
 
 

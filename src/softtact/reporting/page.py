@@ -26,6 +26,8 @@ CAPTIONS = {
                      "interval (bootstrap over items, then trials). Right: loss and SSIM of the validation maps after each epoch.",
 }
 
+PAPERS_SENSOR = "coro: "     # how the line on it begins
+
 TEMPLATE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>softtact: {{ study }}</title>
 <style>body{font:16px/1.5 system-ui,sans-serif;max-width:1080px;margin:2em auto;padding:0 1em;color:#222}
 h1,h2{line-height:1.2}table{border-collapse:collapse;font-size:13px;margin:1em 0;display:block;overflow-x:auto}
@@ -79,7 +81,8 @@ def render_page(inputs, settings, *, folder):
 
 
 def _facts(settings):
-    return (f"Sensor {settings['sensor']}. "
+    another = "It is not the paper's sensor: the paper's numbers and claims below are another sensor's. "
+    return (f"Sensor {settings['sensor']}. {'' if settings['sensor'].startswith(PAPERS_SENSOR) else another}"
             f"{settings['indenters']} indenters, {settings['unseen']} unseen ones and {settings['grasps']} objects were pressed at "
             f"{', '.join(f'{force:g}' for force in settings['forces_n'])} N with each model; the virtual sensor read each press "
             f"{settings['trials']} times. Seed {settings['seed']}.")
