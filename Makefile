@@ -1,9 +1,9 @@
-# `make`: the default study.  `make tiny`: the smallest study.  `make test`: the tests.
+# `make`: the default study.  `make tiny`: the smallest study.  `make test`: the tests.  `make docs`: the documentation.
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 BIN := .venv/bin
 SNAKEMAKE = $(BIN)/snakemake --cores all
 
-.PHONY: study tiny test lint bench clean
+.PHONY: study tiny test lint bench docs clean
 
 study: .venv/installed
 	$(SNAKEMAKE)
@@ -31,7 +31,16 @@ lint: .venv/tested
 	touch $@
 
 .venv/tested: .venv/installed
-	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[test]'
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[test,docs]'
+	touch $@
+
+# The documentation as a site, from docs/ into site/; a warning is an error.
+docs: .venv/documented
+	$(BIN)/python -m sphinx -W --keep-going -q -b html -d site/.doctrees docs site
+	@echo "Open site/index.html"
+
+.venv/documented: .venv/installed
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[docs]'
 	touch $@
 
 clean:

@@ -17,6 +17,7 @@ from softtact.pressing import PRESSES
 
 POLICIES = ("paper", "error")
 TOLERANCE_MM = 0.01
+CALIBRATED_ON = "coro"     # the sensor whose presses gave the expected error below
 _KNOWN = 0.5     # of a frustum's height: the error was calibrated up to a compression of 0.36, and is not told much beyond
 
 
@@ -103,6 +104,8 @@ def _by_error(sensor, placed, forces, label, threads, tolerance_mm):
     model = cheapest(errors, tolerance_mm)
     told = "; ".join(f"{name} {1e3 * values.max():.3g} um" for name, values in errors.items())
     why = f"expected errors: {told}; asked for {1e3 * tolerance_mm:.3g} um"
+    if sensor.spec.name != CALIBRATED_ON:
+        why += f" (calibrated on presses of the sensor {CALIBRATED_ON}, not of {sensor.spec.name})"
     if model == "hyperelastic":
         result = PRESSES[model](sensor, placed, forces, label=label, threads=threads)
         spent = result.wall_time_s + elastic.wall_time_s + foundation.wall_time_s

@@ -23,6 +23,7 @@ from pydantic import (
 )
 
 from softtact.errors import InputError
+from softtact.evaluation.ssim import check_window
 from softtact.geometry.sensor_spec import READINGS, SensorSpec
 from softtact.learning.settings import Network, Search, Ssim, Training
 from softtact.materials.config import load_material
@@ -340,6 +341,8 @@ def load_study(values, *, folder="config"):
     _check_forces(checked, spec)
     materials = _materials(checked, spec, Path(folder, "materials"))
     _check_models(checked)
+    _check_sensor(checked, spec)
+    checked = _with_range(checked, spec)
     make_specimen(spec, seed=checked.seed, settings=VirtualSensorSettings.from_dict(checked.virtual_sensor))
     catalogue = _read_catalogue(Path(checked.objects.catalogue))
     items_of = {name: _items(name, getattr(checked.objects, name), catalogue) for name in SETS}
@@ -423,6 +426,24 @@ def _materials(values, spec, folder):
 def _check_models(values):
     for name in [*values.tested, values.reference, *values.choice.models.values()]:
         _refuse_unknown(name, list(values.models), kind="model", where="the configuration, at 'models'")
+
+
+def _check_sensor(values, spec):
+    """Refuse now a sensor that a model or a network of the study would refuse after hours."""
+    for model in values.models.values():
+        spec.check_for(model.kind)
+    lost, shortest = 2 * max(len(values.network.filters), values.search.space.depth[1]), min(spec.map_shape)
+    if shortest <= lost:
+        raise InputError(f"{spec.name}, at 'map_shape': the printed and the searched network's layers take up to {lost} rows and "
+                         f"columns, and the map has {shortest}; give it more points.")
+    check_window(values.ssim.window, (spec.taxels.rows, spec.taxels.columns))
+
+
+def _with_range(values, spec):
+    """The configuration with the sensor's range of counts as that of the SSIM, unless it says another."""
+    if "data_range" in values.ssim.model_fields_set:
+        return values
+    return values.model_copy(update={"ssim": values.ssim.model_copy(update={"data_range": spec.largest_counts})})
 
 
 def _read_catalogue(path):

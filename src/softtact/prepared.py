@@ -11,9 +11,14 @@ from softtact.progress import announce
 _FORMAT = 2     # of the files; another one makes them again
 
 
+def _values(spec):
+    """What of a sensor the fast models start from; its readout is none of their business."""
+    return spec.model_dump(mode="json", exclude={"largest_counts"})
+
+
 def cached_compliance(spec, *, threads=1):
     """The elastic layer's `Compliance`, by the sensor's values."""
-    return _cached("compliance", [spec.model_dump(mode="json")], Compliance,
+    return _cached("compliance", [_values(spec)], Compliance,
                    f"{spec.name}: computing the elastic layer's flexibility, once for this sensor (some ten seconds)",
                    lambda: elastic_compliance(spec, threads=threads))
 
@@ -21,7 +26,7 @@ def cached_compliance(spec, *, threads=1):
 def cached_foundation(spec, laws, *, threads=1):
     """The `FoundationFlexibility` of a sensor with its laws {"dielectric", "cover"}, by the values of all three."""
     dielectric, cover = laws["dielectric"], laws["cover"]
-    return _cached("foundation", [spec.model_dump(mode="json"), repr(dielectric), repr(cover)], FoundationFlexibility,
+    return _cached("foundation", [_values(spec), repr(dielectric), repr(cover)], FoundationFlexibility,
                    f"{spec.name}: computing a frustum's law and the slab's flexibility, once for this sensor and these laws (about "
                    "a minute)", lambda: foundation_flexibility(spec, dielectric_law=dielectric, cover_law=cover, threads=threads))
 

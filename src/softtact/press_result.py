@@ -19,6 +19,7 @@ class PressResult:
     expected_error_mm (force,): root mean square over the map, against the hyperelastic model, where the model was chosen by it
     The last four are nan where the model, the law or the policy does not tell.
     why: what made the choice of the model, where it was not the user's
+    largest_counts: where the sensor's readout ends
     x_mm (x,), y_mm (y,): the map's grid;  model;  solver: the linear solver's name
     mesh: the solver's mesh with its displacements, where it was asked for (`Sensor.keep_mesh`) and the model has one
     """
@@ -43,6 +44,7 @@ class PressResult:
     solver: str
     expected_error_mm: np.ndarray | None = None
     why: str = ""
+    largest_counts: float = 2400.0
     attributes: dict = field(default_factory=dict)
     mesh: PressedMesh | None = None
 

@@ -154,6 +154,7 @@ def make_result(sensor, model, solver, maps, forces, times, **numbers):
              "within_validity": np.asarray(numbers.pop("within_validity"), dtype=np.int8)}
     return PressResult(deformation_map_mm=maps, tactile_map=ideal_counts(spec, maps), force_n=forces, wall_time_s=times,
                        x_mm=spec.map_x_mm, y_mm=spec.map_y_mm, model=model, sensor=spec.name, solver=solver,
+                       largest_counts=spec.largest_counts,
                        attributes={"thickness_mm": spec.thickness_mm, **_friction(spec, model), **sensor.attributes}, **flags,
                        **{name: np.asarray(values) for name, values in numbers.items()})
 

@@ -53,8 +53,9 @@ def test_a_map_is_printed_with_y_running_to_the_left():
 
 
 def test_figure_6_shows_the_mean_of_every_item_and_model():
-    figure = fig6_ssim.draw(SSIM, CEILING)
+    figure = fig6_ssim.draw(SSIM, CEILING, choices={"window": 3, "data_range": 3000.0})
     assert len(figure.axes) == 3
+    assert figure.axes[0].get_ylabel() == "SSIM (window 3, range 3000 counts)"
     heights = [bar.get_height() for bar in figure.axes[0].patches]
     assert heights == pytest.approx([0.55] * 4)
     assert "n = 4" in figure.axes[2].get_title()
@@ -74,7 +75,7 @@ def test_figure_7_outlines_only_the_chosen_model():
     counts = {model: np.ones((7, 4)) for model in maps}
     item = {"name": "object_5", "mesh": trimesh.creation.box((4, 4, 4)), "chosen": "elastic", "force": 50.0, "deformation": maps,
             "tactile": counts, "sensor": np.ones((7, 4)), "extent": (-11, 11, -18.5, 18.5)}
-    figure = fig7_maps.draw([item])
+    figure = fig7_maps.draw([item], largest_counts=2400)
     red = [axes.get_ylabel().split("\n")[0] for axes in figure.axes
            if "left" in axes.spines and axes.spines["left"].get_edgecolor()[:3] == (1.0, 0.0, 0.0)]
     assert red == ["elastic"]
@@ -103,12 +104,13 @@ def test_the_page_holds_its_figures_and_links_its_data(tmp_path):
     inputs["figures"] = [folder / "figures" / f"{name}.png" for name in ("fig6_ssim", "fig5_ftir", "material_foam")]
     for path in inputs["figures"]:
         save(fig6_ssim.draw(SSIM, CEILING), path)
-    facts = {"study": "mine", "indenters": 3, "unseen": 1, "grasps": 2, "forces_n": [10.0], "trials": 2, "seed": 1}
+    facts = {"study": "mine", "sensor": "pad: 30 x 20 mm",
+             "indenters": 3, "unseen": 1, "grasps": 2, "forces_n": [10.0], "trials": 2, "seed": 1}
     page = render_page(inputs, facts, folder=folder)
     assert page.count("data:image/png;base64,") == 3
     assert page.count("The words allow this.") == 1 and "Material foam: test curves" in page
     assert 'href="figures/fig6_ssim.svg"' in page and 'href="tables/table2.csv"' in page
-    assert "0.500 to 0.700" in page and "one item: none" in page
+    assert "pad: 30 x 20 mm. It is not the paper" in page and "0.500 to 0.700" in page and "one item: none" in page
     assert "a &lt; b" in page and "What is synthetic here" in page
 
 

@@ -242,5 +242,6 @@ def test_the_guide_names_every_setting_with_its_default():
     guide = (Path(__file__).parents[2] / "docs/virtual_sensor.md").read_text(encoding="utf-8")
     for name in VirtualSensorSettings.__dataclass_fields__:
         value = getattr(VirtualSensorSettings(), name)
-        shown = f"[{', '.join(f'{v:g}' for v in value)}]" if isinstance(value, tuple) else f"{value:g}"
+        shown = f"[{', '.join(f'{v:g}' for v in value)}]" if isinstance(value, tuple) else str(value)
+        shown = f"{value:g}" if isinstance(value, float) else shown
         assert f"`{name}: {shown}`" in guide, name

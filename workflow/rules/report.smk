@@ -102,7 +102,7 @@ rule draw_fig6_ssim:
         **figure_files("fig6_ssim"),
     params:
         files=files,
-        settings=as_settings(),
+        settings=as_settings(ssim=plain(STUDY.values.ssim)),
     log:
         log_of("draw_fig6_ssim"),
     benchmark:
@@ -122,7 +122,7 @@ rule draw_fig7_maps:
         **figure_files("fig7_maps"),
     params:
         files=files,
-        settings=as_settings(units=list(GRASP_UNITS.items())),
+        settings=as_settings(units=list(GRASP_UNITS.items()), largest_counts=STUDY.spec.largest_counts),
     log:
         log_of("draw_fig7_maps"),
     benchmark:
@@ -158,7 +158,7 @@ rule draw_fig9_networks:
         **figure_files("fig9_networks"),
     params:
         files=files,
-        settings=as_settings(),
+        settings=as_settings(ssim=plain(STUDY.values.ssim)),
     log:
         log_of("draw_fig9_networks"),
     benchmark:
@@ -193,6 +193,7 @@ rule report:
         files=files,
         settings=as_settings(
             study=STUDY.name,
+            sensor=STUDY.spec.in_words,
             seed=STUDY.values.seed,
             trials=STUDY.values.trials,
             forces_n=STUDY.values.forces_n,

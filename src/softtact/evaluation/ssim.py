@@ -2,7 +2,7 @@
 
 scikit-image's `structural_similarity` with a uniform window (gaussian_weights=False), sample covariance, and the mean
 over the windows that lie wholly inside. The usual sides of 7 or 11 do not fit on 7 x 4 taxels: 3 by default, with a
-data range of 2400 counts.
+data range of the readout's 2400 counts.
 """
 
 import numpy as np
@@ -39,6 +39,11 @@ def check_maps(predicted, measured, window):
     """Refuse maps of different shapes, and a window that does not fit on them."""
     if predicted.shape != measured.shape:
         raise InputError(f"SSIM: {predicted.shape} predicted and {measured.shape} measured values; give maps alike.")
-    smallest = min(predicted.shape[1:])
+    check_window(window, predicted.shape[1:])
+
+
+def check_window(window, taxels):
+    """Refuse a window that does not fit on (rows, columns) of taxels."""
+    smallest = min(taxels)
     if window > smallest:
         raise InputError(f"ssim.window is {window}; it must fit on the {smallest} taxels of the map's shorter side.")

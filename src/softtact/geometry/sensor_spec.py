@@ -105,6 +105,7 @@ class SensorSpec(_Strict):
     footprint_mm: tuple[PositiveFloat, PositiveFloat]
     map_shape: tuple[PositiveInt, PositiveInt]
     force_range_n: tuple[float, PositiveFloat]
+    largest_counts: PositiveFloat = Field(2400.0, description="of the readout's converter; pictures end there")
     taxels: Taxels
     dielectric: Dielectric
     cover: Cover
@@ -138,6 +139,22 @@ class SensorSpec(_Strict):
     def map_y_mm(self):
         """Rows of the deformation map, (57,) for the paper's sensor."""
         return np.linspace(-0.5, 0.5, self.map_shape[0]) * self.footprint_mm[1]
+
+    @property
+    def in_words(self):
+        """Name, size and counts in one line."""
+        sides, frusta = " x ".join(f"{side:g}" for side in self.footprint_mm), " x ".join(map(str, self.frusta_counts))
+        return (f"{self.name}: {sides} mm, {frusta} frusta, {self.taxels.rows} x {self.taxels.columns} taxels, "
+                f"maps of {self.map_shape[0]} x {self.map_shape[1]} points")
+
+    def check_for(self, kind):
+        """Refuse a map or a lattice that a model of this kind (elastic, foundation, hyperelastic) cannot take by its quarters."""
+        if kind in ("elastic", "foundation") and not all(count % 2 for count in self.map_shape):
+            raise InputError(f"{self.name}, at 'map_shape': {list(self.map_shape)} has no middle row and column, which the fast "
+                             "models ask for; write odd numbers.")
+        if kind == "foundation" and any(count % 2 for count in self.frusta_counts):
+            raise InputError(f"{self.name}: its lattice of {self.frusta_counts[0]} x {self.frusta_counts[1]} frusta has a row in "
+                             "the middle; the foundation model wants even numbers; change the pitch or the footprint a little.")
 
     @property
     def frusta_counts(self):

@@ -11,7 +11,6 @@ import numpy as np
 from softtact.contact.object_points import NodeGrid
 from softtact.contact.stencil import Stencil
 from softtact.contact.unilateral import ContactLevels, press_elastic
-from softtact.errors import InputError
 from softtact.mechanics.quarter_slab import PARITIES, ElasticLayer, ParityBlocks, QuarterSlab
 
 _SHARES = (0.34, 0.3, 0.22, 0.14)     # of the layer's thickness, from below, that its element layers have
@@ -63,11 +62,8 @@ def _coarse_nodes(grid):
 
 def map_cells(spec):
     """Elements (nx, ny) along a quarter's sides: as many as the map has steps there; nodes lie at half the map's spacing."""
-    steps = [count - 1 for count in spec.map_shape[::-1]]
-    if any(count % 2 for count in steps):
-        raise InputError(f"{spec.name}, at 'map_shape': {list(spec.map_shape)} has no middle row and column, which the fast models "
-                         "ask for; write odd numbers.")
-    return tuple(count // 2 for count in steps)
+    spec.check_for("elastic")
+    return tuple((count - 1) // 2 for count in spec.map_shape[::-1])
 
 
 def surface_grid(slab):

@@ -11,7 +11,6 @@ import numpy as np
 import scipy.sparse as sp
 
 from softtact.contact.object_points import NodeGrid
-from softtact.errors import InputError
 from softtact.mechanics.elastic import map_cells, surface_grid
 from softtact.mechanics.frustum_law import FrustumLaw, frustum_law
 from softtact.mechanics.linear_solvers import make_solver
@@ -58,10 +57,8 @@ class FoundationFlexibility:
 
 def foundation_flexibility(spec, *, dielectric_law, cover_law, frustum=None, threads=1):
     """The `FoundationFlexibility` of a sensor with its two laws; `frustum`: its `FrustumLaw`, or None to compute it."""
+    spec.check_for("foundation")
     frustum = frustum or frustum_law(spec, dielectric_law)
-    if any(count % 2 for count in spec.frusta_counts):
-        raise InputError(f"{spec.name}: its lattice of {spec.frusta_counts[0]} x {spec.frusta_counts[1]} frusta has a row in the "
-                         "middle; the foundation model wants even numbers; change the pitch or the footprint a little.")
     slab = foundation_slab(spec, dielectric_law, cover_law)
     centres = _quarter_lattice(spec)
     roots = _roots(slab, centres, frustum)

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from softtact.reporting.style import colour, pyplot
+from softtact.reporting.style import colour, pyplot, ssim_label
 
 
-def draw(ssim, ceiling):
-    """Figure from ssim.csv and ceiling.csv; one panel a set of test data."""
+def draw(ssim, ceiling, *, choices=None):
+    """Figure from ssim.csv and ceiling.csv; one panel a set of test data.  choices: {window, data_range} of the SSIM"""
     plt = pyplot()
     sets = [name for name in ("validation", "unseen", "grasps") if (ssim.set == name).any()]
     counts = [max(3, ssim[ssim.set == name].item.nunique()) for name in sets]
@@ -14,7 +14,7 @@ def draw(ssim, ceiling):
                                 gridspec_kw={"width_ratios": counts}, layout="constrained")
     for axis, name in zip(axes[0], sets, strict=True):
         _draw_set(axis, ssim[ssim.set == name], ceiling[ceiling.set == name], name)
-    axes[0, 0].set_ylabel("SSIM (window 3, range 2400 counts)")
+    axes[0, 0].set_ylabel(ssim_label(choices))
     figure.legend(*axes[0, 0].get_legend_handles_labels(), frameon=False, ncols=3, loc="outside lower center")
     return figure
 

@@ -2,13 +2,16 @@
 
 import numpy as np
 
-from softtact.reporting.style import TACTILE_RANGE, draw_map, pyplot
+from softtact.reporting.style import draw_map, pyplot
 
 ROWS = ("object", "deformation", "tactile map")
 
 
-def draw(objects):
-    """Figure from [{name, mesh, chosen, deformation {model: (y, x)}, tactile {model: (row, column)}, sensor, extent, force}]."""
+def draw(objects, *, largest_counts):
+    """Figure from [{name, mesh, chosen, deformation {model: (y, x)}, tactile {model: (row, column)}, sensor, extent, force}].
+
+    largest_counts: where the colours of tactile maps end
+    """
     plt = pyplot()
     models = list(objects[0]["deformation"])
     rows = 1 + 2 * len(models) + 1
@@ -23,12 +26,12 @@ def draw(objects):
             _label(axis, k, f"{model}\ndeformation\nx (mm)")
             figure.colorbar(image, ax=axis, label="mm", shrink=0.8)
             axis = figure.add_subplot(grid[1 + len(models) + m, k])
-            counts = draw_map(axis, item["tactile"][model], extent=item["extent"], limits=TACTILE_RANGE)
+            counts = draw_map(axis, item["tactile"][model], extent=item["extent"], limits=(0, largest_counts))
             _label(axis, k, f"{model}\nCNN\nx (mm)")
             if model == item["chosen"]:
                 _outline(axis)
         axis = figure.add_subplot(grid[-1, k])
-        counts = draw_map(axis, item["sensor"], extent=item["extent"], limits=TACTILE_RANGE)
+        counts = draw_map(axis, item["sensor"], extent=item["extent"], limits=(0, largest_counts))
         _label(axis, k, "virtual\nsensor\nx (mm)")
         axis.set_xlabel("y (mm)")
     figure.colorbar(counts, ax=figure.axes[-1], label="counts", shrink=0.8)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from softtact.reporting.style import colour, pyplot
+from softtact.reporting.style import colour, pyplot, ssim_label
 
 # An architecture is told by hatch and line, a model by its colour: apart in grey too.
 HATCHES = {"printed": "", "searched": "..", "compact": "////"}
@@ -10,11 +10,14 @@ LINES = {"printed": "-", "searched": "-.", "compact": "--"}
 NO_INTERVAL = "one item:\nno interval"
 
 
-def draw(networks, histories):
-    """Figure of networks.csv and {(model, architecture): history.csv}; one model's printed and compact stand side by side."""
+def draw(networks, histories, *, choices=None):
+    """Figure of networks.csv and {(model, architecture): history.csv}; one model's printed and compact stand side by side.
+
+    choices: {window, data_range} of the SSIM
+    """
     plt = pyplot()
     figure, (scores, loss, ssim) = plt.subplots(1, 3, figsize=(13, 4.6), layout="constrained", width_ratios=(1.3, 1, 1))
-    _draw_scores(scores, networks)
+    _draw_scores(scores, networks, choices)
     for (model, architecture), history in histories.items():
         style = {"color": colour(model), "ls": LINES[architecture], "marker": "." if len(history) < 40 else None}
         loss.plot(history.epoch, history.validation_loss, lw=1.6, **style)
@@ -30,7 +33,7 @@ def draw(networks, histories):
     return figure
 
 
-def _draw_scores(axes, networks):
+def _draw_scores(axes, networks, choices):
     sets = list(networks["set"].unique())
     kinds = list(networks.groupby(["model", "architecture"], sort=False).groups)
     width = 0.84 / len(kinds)
@@ -45,7 +48,7 @@ def _draw_scores(axes, networks):
     axes.hlines(ceiling, np.arange(len(sets)) - 0.45, np.arange(len(sets)) + 0.45, color="k", lw=1, ls=":",
                 label="sensor against itself")
     axes.set_xticks(range(len(sets)), [_set_label(networks, name) for name in sets])
-    axes.set(ylabel="SSIM (window 3, range 2400 counts)", ylim=(min(0.0, networks.ssim.min()), 1.05),
+    axes.set(ylabel=ssim_label(choices), ylim=(min(0.0, networks.ssim.min()), 1.05),
              title="mean and 95 % interval")
 
 

@@ -19,12 +19,14 @@ CAPTIONS = {
                  "black dashes, where trials are repeated: the sensor's own trials against each other, which no model passes by "
                  "more than the noise left in a mean of few trials.",
     "fig7_maps": "Figure 7. Objects from below, deformation maps of both models, tactile maps predicted from them, and the virtual "
-                 "sensor's (mean of its trials). Jet colours as printed; tactile maps 0 to 2400 counts.",
+                 "sensor's (mean of its trials). Jet colours as printed; tactile maps from 0 to the readout's largest count.",
     "fig8_policies": "Figure 8. Left: what each policy costs and which error it accepts, against the study's hyperelastic model. "
                      "Right: the error that was expected before the costly model ran, against the true one.",
     "fig9_networks": "Figure 9. The paper's network and another architecture on the same split. Left: mean SSIM with its 95 % "
                      "interval (bootstrap over items, then trials). Right: loss and SSIM of the validation maps after each epoch.",
 }
+
+PAPERS_SENSOR = "coro: "     # how the line on it begins
 
 TEMPLATE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>softtact: {{ study }}</title>
 <style>body{font:16px/1.5 system-ui,sans-serif;max-width:1080px;margin:2em auto;padding:0 1em;color:#222}
@@ -79,7 +81,9 @@ def render_page(inputs, settings, *, folder):
 
 
 def _facts(settings):
-    return (f"{settings['indenters']} indenters, {settings['unseen']} unseen ones and {settings['grasps']} objects were pressed at "
+    another = "It is not the paper's sensor: the paper's numbers and claims below are another sensor's. "
+    return (f"Sensor {settings['sensor']}. {'' if settings['sensor'].startswith(PAPERS_SENSOR) else another}"
+            f"{settings['indenters']} indenters, {settings['unseen']} unseen ones and {settings['grasps']} objects were pressed at "
             f"{', '.join(f'{force:g}' for force in settings['forces_n'])} N with each model; the virtual sensor read each press "
             f"{settings['trials']} times. Seed {settings['seed']}.")
 

@@ -1,10 +1,10 @@
 """A picture of one press: deformation map and taxels at every force."""
 
-from softtact.reporting.style import TACTILE_RANGE, pyplot, save
+from softtact.reporting.style import pyplot, save
 
 
 def plot_press(result, path):
-    """Draw a `PressResult` to PNG or SVG: a column per force, the map in mm above, the 28 ideal counts below."""
+    """Draw a `PressResult` to PNG or SVG: a column per force, the map in mm above, the ideal counts of the taxels below."""
     plt = pyplot()
     forces = result.force_n
     half = [0.5 * (side[-1] - side[0]) for side in (result.x_mm, result.y_mm)]
@@ -13,8 +13,8 @@ def plot_press(result, path):
     top = float(result.deformation_map_mm.max())
     for k, force in enumerate(forces):
         image = axes[0, k].imshow(result.deformation_map_mm[k], origin="lower", extent=extent, vmin=0, vmax=top, cmap="viridis")
-        counts = axes[1, k].imshow(result.tactile_map[k], origin="lower", extent=extent, vmin=TACTILE_RANGE[0],
-                                   vmax=TACTILE_RANGE[1], cmap="viridis")
+        counts = axes[1, k].imshow(result.tactile_map[k], origin="lower", extent=extent, vmin=0,
+                                   vmax=result.largest_counts, cmap="viridis")
         axes[0, k].set_title(f"{force:g} N, depth {result.indentation_mm[k]:.2f} mm")
         for axis in axes[:, k]:
             axis.set_xlabel("x (mm)")

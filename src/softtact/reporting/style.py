@@ -7,7 +7,6 @@ from softtact.files import atomic_path
 # Dark blue, light orange and a green between: apart in grey as well.
 MODEL_COLOURS = {"hyperelastic": "#1f4e79", "elastic": "#e08214", "foundation": "#3f9c6d"}
 MODEL_NAMES = {name: name for name in MODEL_COLOURS}
-TACTILE_RANGE = (0, 2400)   # counts; the colour scale of the paper's figure 7
 
 
 def pyplot():
@@ -25,6 +24,11 @@ def pyplot():
 def colour(model):
     """A model's colour; grey for one that has none of its own."""
     return MODEL_COLOURS.get(model, "0.4")
+
+
+def ssim_label(ssim):
+    """Axis label of structural similarity with its choices {window, data_range}, if they are known."""
+    return "SSIM" if ssim is None else f"SSIM (window {ssim['window']}, range {ssim['data_range']:g} counts)"
 
 
 def save(figure, *paths):

@@ -35,7 +35,7 @@ class VirtualSensorSettings:
     counts_per_relative_change: counts at dC/C0 = 1;  gain_scatter, offset_counts: standard deviations over taxels
     drift, drift_counts: standard deviations of each taxel's change of gain and zero from trial to trial
     dead_taxels: their numbers, row by row from 0;  dead_share: chance that a taxel is dead
-    noise_counts, step_counts, largest_counts (.inf: no limit): of the converter
+    noise_counts, step_counts, largest_counts (None: the sensor's; .inf: no limit): of the converter
     """
 
     electrode_spacing_mm: float = 0.3
@@ -60,7 +60,7 @@ class VirtualSensorSettings:
     dead_share: float = 0.0
     noise_counts: float = 6.0
     step_counts: float = 1.0
-    largest_counts: float = 2400.0
+    largest_counts: float | None = None
 
     @classmethod
     def from_dict(cls, values):
@@ -92,9 +92,11 @@ class VirtualSensorSettings:
     def _check_sizes(self):
         for name in set(self.__dataclass_fields__) - set(_LISTS):
             value = getattr(self, name)
+            if name == "largest_counts" and value is None:
+                continue
             if not (np.isscalar(value) and value >= 0 and (np.isfinite(value) or name in _MAY_BE_INFINITE)):
                 raise InputError(f"virtual_sensor: {name} is {value}; give one number of 0 or more.")
-        if not (self.rate_n_per_s > 0 and self.largest_counts > 0):
+        if not (self.rate_n_per_s > 0 and (self.largest_counts is None or self.largest_counts > 0)):
             raise InputError("virtual_sensor: rate_n_per_s and largest_counts must be above 0; .inf takes their effect away.")
         if self.coupling > 0.25:
             raise InputError(f"virtual_sensor: coupling is {self.coupling:g}; four neighbours can take 0.25 each at most.")
@@ -142,7 +144,8 @@ def read_branches(spec, deformation_map_mm, *, force_n, trials, seed, item, sett
                         cycles_before=settings.cycles_before, rest_s=settings.rest_s)
     draws = [np.random.default_rng([seed, 1, trial, *item.encode()]) for trial in range(trials)]
     true = np.stack([_true_counts(spec, specimen, deformation_map_mm, force_n, history, rng, settings) for rng in draws])
-    counts = _read_out(true, specimen, draws, settings)
+    largest = spec.largest_counts if settings.largest_counts is None else settings.largest_counts
+    counts = _read_out(true, specimen, draws, settings, largest=largest)
     return Branches(*np.split(counts, 2, axis=1))
 
 
@@ -202,11 +205,11 @@ def _at_force(maps, force_n, factor):
     return (1 - share) * maps[low] + share * maps[low + 1]
 
 
-def _read_out(true, specimen, draws, s):
+def _read_out(true, specimen, draws, s, *, largest):
     """Counts as the converter gives them, of true ones (trial, level, row, column)."""
     taxels = true.shape[2:]
     steps = np.stack([rng.standard_normal((2, *taxels)) for rng in draws])[:, :, None]                # (trial, 2, 1, row, column)
     noise = s.noise_counts * np.stack([rng.standard_normal((true.shape[1], *taxels)) for rng in draws])
     counts = amplified(true, gain=specimen.gain, offset=specimen.offset_counts, gain_drift=random_walk(steps[:, 0], s.drift),
                        offset_drift=random_walk(steps[:, 1], s.drift_counts))
-    return converted(counts, noise=noise, step=s.step_counts, largest=s.largest_counts, dead=specimen.dead)
+    return converted(counts, noise=noise, step=s.step_counts, largest=largest, dead=specimen.dead)

@@ -1,6 +1,6 @@
 """Figure 6.
 
-inputs: ssim, ceiling;  outputs: png, svg
+inputs: ssim, ceiling;  outputs: png, svg;  settings: ssim {window, data_range}
 """
 
 import pandas as pd
@@ -11,4 +11,5 @@ from softtact.reporting.style import save
 
 def run(*, inputs, outputs, settings, threads=1):
     """Draw."""
-    save(draw(pd.read_csv(inputs["ssim"]), pd.read_csv(inputs["ceiling"])), outputs["png"], outputs["svg"])
+    figure = draw(pd.read_csv(inputs["ssim"]), pd.read_csv(inputs["ceiling"]), choices=settings["ssim"])
+    save(figure, outputs["png"], outputs["svg"])

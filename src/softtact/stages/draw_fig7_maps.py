@@ -1,7 +1,7 @@
 """Figure 7.
 
 inputs: predictions, complexity, objects (list of meshes), presses (list: every model of every object)
-outputs: png, svg;  settings: units [[object, unit], ...]
+outputs: png, svg;  settings: units [[object, unit], ...], largest_counts
 """
 
 import pandas as pd
@@ -19,7 +19,7 @@ def run(*, inputs, outputs, settings, threads=1):
     presses = {(press.attrs["item"], press.attrs["model"]): press for press in map(read_dataset, inputs["presses"])}
     objects = [_object(name, read_mesh(path, unit=unit), chosen[name], presses, predictions)
                for path, (name, unit) in zip(inputs["objects"], settings["units"], strict=True)]
-    save(draw(objects), outputs["png"], outputs["svg"])
+    save(draw(objects, largest_counts=settings["largest_counts"]), outputs["png"], outputs["svg"])
 
 
 def _object(name, mesh, chosen, presses, predictions):

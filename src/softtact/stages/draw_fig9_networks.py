@@ -1,6 +1,6 @@
 """Figure 9.
 
-inputs: networks (CSV), histories (of each of its networks, in its order);  outputs: png, svg
+inputs: networks (CSV), histories (of each of its networks, in its order);  outputs: png, svg;  settings: ssim {window, data_range}
 """
 
 import pandas as pd
@@ -14,4 +14,4 @@ def run(*, inputs, outputs, settings, threads=1):
     networks = pd.read_csv(inputs["networks"])
     kinds = list(networks.groupby(["model", "architecture"], sort=False).groups)
     histories = dict(zip(kinds, map(pd.read_csv, inputs["histories"]), strict=True))
-    save(draw(networks, histories), outputs["png"], outputs["svg"])
+    save(draw(networks, histories, choices=settings["ssim"]), outputs["png"], outputs["svg"])

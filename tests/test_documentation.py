@@ -1,0 +1,127 @@
+"""What the README and the pages of docs/ say to type is typed: every `softtact` line and block of Python runs, on small data.
+
+A block that cannot run here has `<!-- not run: reason -->` before it. Of other commands (make, snakemake, benchmarks) it is checked
+that what they name is there.
+"""
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+import torch
+import trimesh
+
+import softtact
+from softtact.cli import main
+from softtact.learning.network import TactileNetwork, save_network
+from softtact.optics.frames import render_frame
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+BLOCK = re.compile(r"(?P<mark><!-- not run: [^>]+ -->\n\n?)?"
+                   r"(?:^```(?P<kind>\w+)\n(?P<fenced>.*?)^```|(?P<indented>(?:^    [^\n]*\n)+))", re.MULTILINE | re.DOTALL)
+
+
+def blocks(page):
+    """(marked as not run, "python" or "shell", text) of each block of code."""
+    for block in BLOCK.finditer(page.read_text(encoding="utf-8") + "\n"):
+        marked = block["mark"] is not None
+        if block["kind"] == "python":
+            yield marked, "python", block["fenced"]
+        elif block["kind"] in (None, "sh", "shell"):
+            yield marked, "shell", block["fenced"] or block["indented"]
+
+
+def python_blocks(*, run):
+    """The blocks of each page as one program, for a later one goes on from an earlier one."""
+    programs = {page.name: "\n".join(text for marked, kind, text in blocks(page) if kind == "python" and marked != run)
+                for page in PAGES}
+    return [pytest.param(text, id=name) for name, text in programs.items() if text]
+
+
+def shell_lines(*, run):
+    """Each line once, by the first page that has it."""
+    found = {line.strip(): page.name for page in reversed(PAGES) for marked, kind, text in blocks(page)
+             if kind == "shell" and marked != run for line in text.splitlines() if line.strip().startswith("softtact ")}
+    return [pytest.param(line, id=f"{page}-{line[9:40]}") for line, page in found.items()]
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory):
+    """A folder with the files that the pages speak of, all made up and small."""
+    folder = tmp_path_factory.mktemp("desk")
+    (folder / "config").symlink_to(ROOT / "config")
+    part = trimesh.creation.box((8, 8, 4))
+    part.export(folder / "part.stl")
+    softtact.load_sensor("coro").press(part, force_n=[5], model="elastic", threads=1).write(folder / "press.nc")
+    stretch = np.linspace(1.02, 1.6, 12)
+    curves = {"uniaxial": stretch - stretch**-2, "equibiaxial": stretch - stretch**-5, "planar": stretch - stretch**-3}
+    curves |= {"tension": curves["uniaxial"], "shear": curves["planar"]}
+    for name, shape in curves.items():
+        table = np.column_stack([stretch, 0.35 * shape])
+        np.savetxt(folder / f"{name}.csv", table, delimiter=",", header="stretch,nominal_stress_mpa", comments="")
+    for name, shape in (("a", "tension"), ("b", "shear")):
+        table = np.column_stack([100 * (stretch - 1), 350 * curves[shape]])
+        np.savetxt(folder / f"{name}.csv", table, delimiter=",", header="Strain [%],Stress", comments="")
+    frames = [render_frame([-0.8, 0.8], [0.2, -0.2], [area] * 2, footprint_mm=(4.2, 3.0), pixel_mm=0.03, blur_mm=0.05, noise=0.02,
+                           falloff=0.2, seed=0) for area in (0.2, 0.4)]
+    iio.imwrite(folder / "press.mp4", np.repeat(np.stack(frames)[..., None], 3, axis=3), plugin="pyav", codec="libx264", fps=2)
+    (folder / "frames").mkdir()
+    iio.imwrite(folder / "frames/0.png", frames[0])
+    torch.manual_seed(0)
+    network = TactileNetwork(map_shape=(57, 33), taxels=(7, 4), filters=(2, 2, 2), dense=4)
+    for path in (folder / "model.pt", folder / "results/default/learning/elastic/model.pt"):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        save_network(path, network, facts={"model": "elastic", "seed": 0, "source": "nothing: a test's"})
+    np.save(folder / "map.npy", np.full((57, 33), 0.1))
+    return folder
+
+
+@pytest.mark.parametrize("text", python_blocks(run=True))
+def test_python_on_a_page_runs(text, desk, monkeypatch):
+    monkeypatch.chdir(desk)
+    exec(compile(text, "page", "exec"), {"__name__": "page"})
+
+
+@pytest.mark.parametrize("line", shell_lines(run=True))
+def test_a_softtact_line_on_a_page_succeeds(line, desk, monkeypatch, capsys):
+    monkeypatch.chdir(desk)
+    assert main(shlex.split(line, comments=True)[1:]) == 0
+    assert capsys.readouterr().out
+    for option, name in re.findall(r"--(out|plot) (\S+)", line):
+        assert (desk / name).stat().st_size > 0, option
+
+
+def test_most_is_run_and_every_exception_has_a_reason():
+    lines, code = shell_lines(run=True), python_blocks(run=True)
+    left_out = shell_lines(run=False) + python_blocks(run=False)
+    assert len(lines) >= 15 and len(code) >= 3 and len(left_out) < 0.5 * len(lines + code)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_what_a_page_links_or_tells_to_run_is_there(page):
+    text = page.read_text(encoding="utf-8")
+    for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", text):
+        assert target.startswith("http") or (page.parent / target).exists(), target
+    for name in re.findall(r"(?:config|benchmarks|workflow|examples|scripts)/[a-z0-9_/]+\.(?:yaml|py|sh|smk)", text):
+        assert (ROOT / name).exists(), name
+    makefile = (ROOT / "Makefile").read_text()
+    for target in re.findall(r"^    make (\w+)", text, flags=re.MULTILINE):
+        assert re.search(rf"^{target}:", makefile, flags=re.MULTILINE), target
+
+
+def test_the_site_builds_without_a_warning_and_loads_nothing_from_elsewhere(tmp_path):
+    pytest.importorskip("myst_parser", reason="pip install -e '.[docs]'")
+    folders = ["-d", str(tmp_path / "trees"), str(ROOT / "docs"), str(tmp_path / "site")]
+    done = subprocess.run([sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html", *folders],
+                          capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    pages = {path.stem: path.read_text(encoding="utf-8") for path in (tmp_path / "site").glob("*.html")}
+    assert pages["theory"].count("<math") > 50 and "softtact.sensor.load_sensor" in pages["api"]
+    for name, page in pages.items():
+        assert not re.search(r"""(?:src=|<link[^>]*href=)["']?(?:https?:)?//""", page), name

@@ -1,0 +1,62 @@
+"""The programs in examples/ run as their docstrings say, on less."""
+
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from softtact.files import read_dataset
+
+ROOT = Path(__file__).resolve().parents[1]
+OBJECT = ROOT / "config/objects/indenters/circle_s.stl"
+
+
+@pytest.fixture(autouse=True)
+def in_project(monkeypatch):
+    monkeypatch.chdir(ROOT)
+
+
+def run(name, *arguments):
+    return runpy.run_path(str(ROOT / f"examples/{name}.py"))["main"]([str(argument) for argument in arguments])
+
+
+def test_press_a_mesh_prints_a_line_a_force_and_draws(tmp_path, capsys):
+    result = run("press_a_mesh", OBJECT, "--unit", "mm", "--force", 5, 20, "--out", tmp_path / "p.png")
+    assert result.tactile_map.shape == (2, 7, 4) and (tmp_path / "p.png").stat().st_size > 0
+    assert capsys.readouterr().out.count(" N: ") == 2
+
+
+def test_higher_frusta_gain_more_per_pressure_and_every_curve_flattens(tmp_path):
+    table = run("sweep_frustum_height", "--heights", 0.4, 0.6, "--out", tmp_path / "h.svg")
+    low, high = (table[table.height_mm == height] for height in (0.4, 0.6))
+    assert (high.gain > low.gain).all()
+    for rows in (low, high):
+        assert (np.diff(rows.gain) > 0).all() and rows.gain.iloc[-1] / rows.gain.iloc[0] < 100 / 2
+    assert "relative gain of capacitance" in (tmp_path / "h.svg").read_text()
+
+
+def test_a_training_set_pairs_each_map_with_a_reading_of_the_virtual_sensor(tmp_path):
+    run("make_training_set", "--presses", 2, "--workers", 1, "--out", tmp_path / "set.nc")
+    data = read_dataset(tmp_path / "set.nc")
+    assert data.deformation_map_mm.shape == (8, 57, 33) and data.tactile_map.shape == (8, 7, 4)
+    assert data.attrs["source"] == "virtual sensor"
+    deepest, most = data.deformation_map_mm.values.max(axis=(1, 2)), data.tactile_map.values.max(axis=(1, 2))
+    assert (np.diff(deepest.reshape(2, 4)) > 0).all() and (np.diff(most.reshape(2, 4)) > 0).all()
+
+
+def test_the_robot_loop_feels_where_the_object_is_and_says_that_it_is_no_robot(capsys):
+    last = run("robot_loop", "--steps", 1, "--batch", 2)
+    assert last.shape == (2, 7, 4) and "no robot" in capsys.readouterr().out
+    example = runpy.run_path(str(ROOT / "examples/robot_loop.py"))
+    feel = example["TactileSensor"](*loaded())
+    ends = feel([[0, -8, 0, 0, 0, 0], [0, 8, 0, 0, 0, 0]], force_n=15.0)
+    rows = example["centre_of_touch"](ends)[:, 0]
+    assert rows[0] < 0.35 and rows[1] > 0.65
+
+
+def loaded():
+    import softtact
+    from softtact.geometry.meshes import read_mesh
+
+    return softtact.load_sensor("coro"), read_mesh(OBJECT, unit="mm")
