@@ -347,7 +347,7 @@ def load_study(values, *, folder="config"):
     materials = _materials(checked, spec, Path(folder, "materials"))
     _check_models(checked)
     make_specimen(spec, seed=checked.seed, settings=VirtualSensorSettings.from_dict(checked.virtual_sensor))
-    catalogue = _read_catalogue(Path(checked.objects.catalogue))
+    catalogue = read_catalogue(Path(checked.objects.catalogue))
     items_of = {name: _items(name, getattr(checked.objects, name), catalogue) for name in SETS}
     return Study(checked, spec, materials, items_of, _archive(checked))
 
@@ -425,7 +425,7 @@ def _check_models(values):
         _refuse_unknown(name, list(values.models), kind="model", where="the configuration, at 'models'")
 
 
-def _read_catalogue(path):
+def read_catalogue(path):
     """{name: CatalogueEntry} with the mesh files' paths as seen from here; a missing mesh is refused now."""
     try:
         lines = yaml.safe_load(path.read_text(encoding="utf-8"))
