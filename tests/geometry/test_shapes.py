@@ -55,7 +55,8 @@ def silhouette(entry, *, step=0.5, half=20.0):
 
 def turned_and_mirrored(image):
     """An image in all attitudes, in steps of 15 degrees: (attitude, pixel)."""
-    turned = [ndimage.rotate(each, angle, reshape=False, order=1) for each in (image, image[:, ::-1]) for angle in range(0, 360, 15)]
+    turned = [ndimage.rotate(each, angle, reshape=False, order=1)
+              for each in (image, image[:, ::-1]) for angle in range(0, 360, 15)]
     return np.stack(turned).reshape(len(turned), -1)
 
 

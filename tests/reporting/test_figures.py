@@ -103,12 +103,14 @@ def test_the_page_holds_its_figures_and_links_its_data(tmp_path):
     inputs["figures"] = [folder / "figures" / f"{name}.png" for name in ("fig6_ssim", "fig5_ftir", "material_foam")]
     for path in inputs["figures"]:
         save(fig6_ssim.draw(SSIM, CEILING), path)
-    facts = {"study": "mine", "indenters": 3, "unseen": 1, "grasps": 2, "forces_n": [10.0], "trials": 2, "seed": 1}
+    facts = {"study": "mine", "indenters": 3, "unseen": 1, "grasps": 2, "forces_n": [10.0], "seed": 1,
+             "presses": {"indenters": 4, "unseen": 1, "grasps": 2}, "trials": {"indenters": 2, "unseen": 2, "grasps": 50}}
     page = render_page(inputs, facts, folder=folder)
     assert page.count("data:image/png;base64,") == 3
     assert page.count("The words allow this.") == 1 and "Material foam: test curves" in page
     assert 'href="figures/fig6_ssim.svg"' in page and 'href="tables/table2.csv"' in page
     assert "0.500 to 0.700" in page and "one item: none" in page
+    assert "3 indenters in 4 places, each read 2 times" in page and "2 objects in 2 places, each read 50 times" in page
     assert "a &lt; b" in page and "What is synthetic here" in page
 
 

@@ -35,10 +35,10 @@ rule read_virtual_sensor:
         tactile=f"{RESULTS}/tactile/{{set}}/{{item}}.nc",
     params:
         files=files,
-        settings=as_settings(
+        settings=lambda w: as_settings(
             sensor=STUDY.sensor,
             virtual_sensor=STUDY.values.virtual_sensor,
-            trials=STUDY.values.trials,
+            trials=STUDY.trials_of(w.set),
             seed=STUDY.values.seed,
         ),
     log:

@@ -1,7 +1,7 @@
 # Tables, one rule per figure, and the page that gathers them.
 
-GRASPS = list(STUDY.items_of["grasps"].values())
-GRASP_UNITS = {item.id: item.unit for item in GRASPS}
+GRASPS = [item for item in STUDY.items_of["grasps"].values() if item.first]   # each object once
+SHOWN = GRASPS[:6]      # in figure 7, as in print
 FROM_PRESSES = () if STUDY.archive else ("fig7_maps", "fig8_policies")     # an archive has no press of our objects
 FIGURES = ("fig4_complexity", "fig5_ftir", "fig6_ssim", *FROM_PRESSES, "fig9_networks")
 
@@ -45,7 +45,9 @@ rule draw_fig4_complexity:
         **figure_files("fig4_complexity"),
     params:
         files=files,
-        settings=as_settings(thresholds=plain(STUDY.values.complexity)["thresholds"], units=list(GRASP_UNITS.items())),
+        settings=as_settings(
+            thresholds=plain(STUDY.values.complexity)["thresholds"], units=[(item.id, item.unit) for item in GRASPS]
+        ),
     log:
         log_of("draw_fig4_complexity"),
     benchmark:
@@ -116,13 +118,13 @@ rule draw_fig7_maps:
         code=code("draw_fig7_maps"),
         predictions=rules.evaluate.output.predictions,
         complexity=rules.score_complexity.output.table,
-        objects=[item.file for item in GRASPS],
-        presses=[f"{RESULTS}/presses/grasps/{item.id}/{model}.nc" for item in GRASPS for model in STUDY.tested],
+        objects=[item.file for item in SHOWN],
+        presses=[f"{RESULTS}/presses/grasps/{item.id}/{model}.nc" for item in SHOWN for model in STUDY.tested],
     output:
         **figure_files("fig7_maps"),
     params:
         files=files,
-        settings=as_settings(units=list(GRASP_UNITS.items())),
+        settings=as_settings(units=[(item.id, item.unit) for item in SHOWN]),
     log:
         log_of("draw_fig7_maps"),
     benchmark:
@@ -194,9 +196,10 @@ rule report:
         settings=as_settings(
             study=STUDY.name,
             seed=STUDY.values.seed,
-            trials=STUDY.values.trials,
+            trials={name: STUDY.trials_of(name) for name in STUDY.items_of},
+            presses={name: len(items) for name, items in STUDY.items_of.items()},
             forces_n=STUDY.values.forces_n,
-            **{name: len(items) for name, items in STUDY.items_of.items()},
+            **{name: len({item.object for item in items.values()}) for name, items in STUDY.items_of.items()},
         ),
     log:
         log_of("report"),

@@ -2,7 +2,8 @@
 
 The pipeline reads meshes and never calls this module: whatever is pressed lies on disk as an STL file, with one line
 in `catalogue.yaml`. Names of indenters that the published data set uses are kept; their drawings are not published,
-so the sizes are ours, and so are the indenters beyond those. Every pressing face is at least 90 mm2, wide enough to carry the sensor's full 50 N.
+so the sizes are ours, and so are the indenters beyond those. Every pressing face is at least 90 mm2, wide enough to carry
+the sensor's full 50 N.
 """
 
 import argparse

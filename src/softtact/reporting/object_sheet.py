@@ -1,4 +1,4 @@
-"""All objects of a catalogue on one sheet, as the sensor sees them: `python -m softtact.reporting.object_sheet --out docs/objects.png`."""
+"""All objects of a catalogue on one sheet, as the sensor sees them: `python -m softtact.reporting.object_sheet`."""
 
 import argparse
 from pathlib import Path

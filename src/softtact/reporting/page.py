@@ -79,9 +79,10 @@ def render_page(inputs, settings, *, folder):
 
 
 def _facts(settings):
-    return (f"{settings['indenters']} indenters, {settings['unseen']} unseen ones and {settings['grasps']} objects were pressed at "
-            f"{', '.join(f'{force:g}' for force in settings['forces_n'])} N with each model; the virtual sensor read each press "
-            f"{settings['trials']} times. Seed {settings['seed']}.")
+    said = {name: f"{settings[name]} {words} in {settings['presses'][name]} places, each read {settings['trials'][name]} times"
+            for name, words in (("indenters", "indenters"), ("unseen", "unseen ones"), ("grasps", "objects"))}
+    forces = ", ".join(f"{force:g}" for force in settings["forces_n"])
+    return (f"Pressed at {forces} N with each model and read by the virtual sensor: {'; '.join(said.values())}. Seed {settings['seed']}.")
 
 
 def _archive_facts(settings, archive):
