@@ -26,7 +26,7 @@ from pydantic import (
 
 from softtact.errors import InputError
 from softtact.geometry.sensor_spec import READINGS, SensorSpec
-from softtact.learning.settings import Network, Search, Ssim, Training
+from softtact.learning.settings import LearningCurve, Network, Search, Ssim, Training
 from softtact.materials.config import load_material
 from softtact.materials.laws.registry import LAWS
 from softtact.published.archive import SOURCE as PUBLISHED
@@ -272,6 +272,7 @@ class Values(Section):
     search: Search
     training: Training
     network: Network
+    learning_curve: LearningCurve = LearningCurve()
     ssim: Ssim
 
 
@@ -308,6 +309,11 @@ class Study:
     def tested(self):
         """The models that a network is trained for: of an archive, those whose simulations are there."""
         return list(self.archive.simulated) if self.archive else self.values.tested
+
+    @property
+    def learnt_from(self):
+        """The models whose maps data sets are made of: those under test, and the reference, as if a model were perfect."""
+        return self.tested if self.archive else list(dict.fromkeys([*self.tested, self.values.reference]))
 
     @property
     def source(self):

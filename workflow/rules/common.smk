@@ -127,7 +127,7 @@ def samples_of():
     if STUDY.archive:
         return {name: f"{RESULTS}/{name}" for name in ("presses", "tactile")} | {"item_list": f"{RESULTS}/published/items.json"}
     tactile = [f"{RESULTS}/tactile/{item.set}/{item.id}.nc" for item in STUDY.items()]
-    return {"presses": presses(STUDY.tested), "tactile": tactile}
+    return {"presses": presses(STUDY.learnt_from), "tactile": tactile}
 
 
 HELD = []  # open as long as this process lives

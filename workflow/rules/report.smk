@@ -3,7 +3,8 @@
 GRASPS = [item for item in STUDY.items_of["grasps"].values() if item.first]   # each object once
 SHOWN = GRASPS[:6]      # in figure 7, as in print
 FROM_PRESSES = () if STUDY.archive else ("fig7_maps", "fig8_policies")     # an archive has no press of our objects
-FIGURES = ("fig4_complexity", "fig5_ftir", "fig6_ssim", *FROM_PRESSES, "fig9_networks")
+FROM_CURVES = ("fig10_learning_curve",) if CURVES else ()
+FIGURES = ("fig4_complexity", "fig5_ftir", "fig6_ssim", *FROM_PRESSES, "fig9_networks", *FROM_CURVES)
 
 
 def figure_files(name):
@@ -169,6 +170,24 @@ rule draw_fig9_networks:
         run_stage("draw_fig9_networks")
 
 
+rule draw_fig10_learning_curve:
+    input:
+        code=code("draw_fig10_learning_curve"),
+        curves=CURVES,
+        ceiling=rules.evaluate.output.ceiling,
+    output:
+        **figure_files("fig10_learning_curve"),
+    params:
+        files=files,
+        settings=as_settings(),
+    log:
+        log_of("draw_fig10_learning_curve"),
+    benchmark:
+        benchmark_of("draw_fig10_learning_curve")
+    shell:
+        run_stage("draw_fig10_learning_curve")
+
+
 rule report:
     input:
         code=code("report"),
@@ -179,6 +198,7 @@ rule report:
         claims=rules.make_tables.output.claims,
         summary=rules.evaluate.output.summary,
         networks=rules.compare_networks.output.networks,
+        **({"limits": rules.find_limits.output.limits} if CURVES else {}),
         ftir=rules.validate_ftir.output.summary,
         **(
             {"inventory": rules.import_published.output.inventory, "counts": rules.import_published.output.counts}
