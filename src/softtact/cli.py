@@ -9,10 +9,10 @@ import os
 import sys
 
 import softtact
-from softtact.commands import complexity, detect_discs, export_deck, fit, predict, press, stage
+from softtact.commands import complexity, cost, detect_discs, export_deck, fit, predict, press, stage
 from softtact.errors import SofttactError
 
-COMMANDS = (press, predict, complexity, fit, export_deck, detect_discs, stage)
+COMMANDS = (press, predict, complexity, fit, export_deck, detect_discs, cost, stage)
 
 
 def main(arguments=None):

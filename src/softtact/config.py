@@ -316,6 +316,11 @@ class Study:
         return self.tested if self.archive else list(dict.fromkeys([*self.tested, self.values.reference]))
 
     @property
+    def pressed_with(self):
+        """The models that every item is pressed with: those learnt from, and those that policies choose between."""
+        return [] if self.archive else list(dict.fromkeys([*self.learnt_from, *self.values.choice.models.values()]))
+
+    @property
     def source(self):
         """What the readings are from, in words."""
         return PUBLISHED if self.archive else "virtual sensor"
@@ -337,6 +342,30 @@ class Study:
     def items(self):
         """The items of all sets, in order."""
         return [item for items in self.items_of.values() for item in items.values()]
+
+
+def read_values(configfile=None, *, default="config/config.yaml"):
+    """The configuration mapping of a file over the default one, merged as Snakemake does it."""
+    values = _read_yaml(Path(default))
+    return values if configfile is None else _merged(values, _read_yaml(Path(configfile)))
+
+
+def _merged(base, over):
+    return base | {key: _merged(base[key], value) if isinstance(base.get(key), dict) and isinstance(value, dict) else value
+                   for key, value in over.items()}
+
+
+def _read_yaml(path):
+    """A mapping of a YAML file; what is none is refused."""
+    try:
+        values = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such configuration; give the path of one, from the project's folder.") from None
+    except (UnicodeDecodeError, yaml.YAMLError) as error:
+        raise InputError(f"{path}: not valid YAML ({' '.join(str(error).split())}); correct it.") from None
+    if not isinstance(values, dict):
+        raise InputError(f"{path}: it holds no keys; write a configuration such as config/tiny.yaml.")
+    return values
 
 
 def sensor_file(name, *, folder=None):

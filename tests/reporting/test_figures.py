@@ -6,7 +6,7 @@ import pytest
 import trimesh
 
 from softtact.files import write_csv, write_json
-from softtact.reporting import fig4_complexity, fig5_ftir, fig6_ssim, fig7_maps, fig9_networks
+from softtact.reporting import fig4_complexity, fig5_ftir, fig6_ssim, fig7_maps, fig9_networks, fig10_learning_curve
 from softtact.reporting.page import render_page
 from softtact.reporting.style import draw_map, pyplot, save
 
@@ -78,6 +78,18 @@ def test_figure_7_outlines_only_the_chosen_model():
     red = [axes.get_ylabel().split("\n")[0] for axes in figure.axes
            if "left" in axes.spines and axes.spines["left"].get_edgecolor()[:3] == (1.0, 0.0, 0.0)]
     assert red == ["elastic"]
+
+
+def test_figure_10_has_a_line_per_model_and_set_with_intervals_and_the_ceiling():
+    curves = pd.DataFrame([{"model": model, "architecture": "compact", "set": name, "maps": maps, "ssim": 0.5 + 0.001 * maps,
+                            "ssim_low": 0.4, "ssim_high": 0.8} for model in ("elastic", "reference")
+                           for name in ("validation", "grasps") for maps in (10, 100)])
+    figure = fig10_learning_curve.draw(curves, CEILING)
+    assert [axes.get_title() for axes in figure.axes] == ["validation", "grasps"]
+    for axes in figure.axes:
+        assert len(axes.containers) == 2 and len(axes.collections) == 2 and axes.get_xscale() == "log"
+        assert axes.containers[0].lines[0].get_ydata() == pytest.approx([0.51, 0.6])
+        assert any(line.get_linestyle() == ":" for line in axes.lines)
 
 
 def test_a_figure_is_written_the_same_twice(tmp_path):

@@ -1,7 +1,6 @@
 """Figure 10: SSIM against the number of training maps, a panel a set."""
 
-from softtact.reporting.fig9_networks import LINES
-from softtact.reporting.style import colour, pyplot
+from softtact.reporting.style import ARCHITECTURE_LINES, colour, pyplot
 
 MARKS = {"elastic": "s", "foundation": "D", "hyperelastic": "o"}      # apart in grey too
 
@@ -30,5 +29,5 @@ def _draw_set(axes, curves):
     for k, ((model, architecture), rows) in enumerate(kinds):
         beside = 1.03 ** (k - 0.5 * (len(kinds) - 1))     # intervals of one number of maps stand beside each other
         spread = [rows.ssim - rows.ssim_low, rows.ssim_high - rows.ssim]
-        axes.errorbar(rows.maps * beside, rows.ssim, yerr=spread, color=colour(model), ls=LINES[architecture], lw=1.4, ms=5,
-                      marker=MARKS.get(model, "^"), capsize=3, elinewidth=0.8, label=f"{model}, {architecture}")
+        axes.errorbar(rows.maps * beside, rows.ssim, yerr=spread, color=colour(model), ls=ARCHITECTURE_LINES[architecture],
+                      lw=1.4, ms=5, marker=MARKS.get(model, "^"), capsize=3, elinewidth=0.8, label=f"{model}, {architecture}")
