@@ -1,9 +1,9 @@
-"""What limits a score: the mechanical model, the number of maps, or the network.
+"""What limits a score: the mechanical model, the number of maps, or the network with its training.
 
 Three differences of mean SSIM, each with all else equal:
 model    the same network on the reference's own maps, which the sensor felt, less that on the model's (at all maps, equal steps)
 data     all maps less the next smaller share of them (the same network, equal steps)
-network  the better of the two architectures less the study's own, both trained as the study trains them
+network  the best network on the same maps (the two that the study trains, and the curve's) less the study's own
 The largest above `CLEAR` is named. Nothing here is chosen by these numbers.
 """
 
@@ -15,7 +15,7 @@ from softtact.evaluation.claims import PRINTED_SSIM
 CLEAR = 0.01      # of mean SSIM: below, a difference is no more than another seed may make (assumed)
 COLUMNS = ["model", "set", "ssim", "paper", "sensor_ssim", "perfect_model_gain", "more_maps_gain", "other_network_gain", "limit",
            "sentence"]
-WORDS = {"model": "the mechanical model", "data": "the number of maps", "network": "the network"}
+WORDS = {"model": "the mechanical model", "data": "the number of maps", "network": "the network or its training"}
 
 
 def limits(curves, networks, *, own, tested, reference, source):
@@ -39,7 +39,7 @@ def _row(model, set_name, scored, curve, perfect, *, own, source):
     curve, score = curve.sort_values("maps"), scored.ssim[own]
     gains = {"model": perfect.sort_values("maps").ssim.iloc[-1] - curve.ssim.iloc[-1] if len(perfect) else np.nan,
              "data": curve.ssim.iloc[-1] - curve.ssim.iloc[-2] if len(curve) > 1 else np.nan,
-             "network": scored.ssim.max() - score}
+             "network": max(scored.ssim.max(), curve.ssim.iloc[-1]) - score}
     paper = PRINTED_SSIM.get(set_name, {}).get(model, np.nan)
     limit = _largest(gains)
     return {"model": model, "set": set_name, "ssim": score, "paper": paper, "sensor_ssim": scored.sensor_ssim.iloc[0],
@@ -58,6 +58,6 @@ def _sentence(score, paper, curve, gains, limit, source):
                                           "readings)" if source != "published archive" else f" (paper: {paper:g})")
     told = [f"a perfect model would bring {gains['model']:+.3f}" if not np.isnan(gains["model"]) else "",
             f"going from {curve.maps.iloc[-2]} to {curve.maps.iloc[-1]} maps brought {gains['data']:+.3f}"
-            if not np.isnan(gains["data"]) else "", f"the better network {gains['network']:+.3f}"]
+            if not np.isnan(gains["data"]) else "", f"the best network trained here {gains['network']:+.3f}"]
     end = f"what limits first is {WORDS[limit]}" if limit in WORDS else f"none of the three stands out by more than {CLEAR:g}"
     return f"SSIM {score:.3f}{against}: {', '.join(filter(None, told))}; {end}."
