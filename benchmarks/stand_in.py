@@ -21,6 +21,7 @@ from softtact.sensing.virtual_sensor import read_virtual_sensor
 SOURCE = "virtual sensor on foundation presses"
 FORCES = np.linspace(5, 50, 10)
 POSES = {"indenters": ["0,0", "-4,0", "4,0", "0,-8", "0,8"], "unseen": ["0,0", "-4,0", "0,8"], "grasps": ["0,0"]}   # x,y in mm
+OBJECTS = {"indenters": 24, "unseen": 6, "grasps": 6}     # the first so many of the catalogue
 SEED, TRIALS = 20250, 3
 
 
@@ -56,7 +57,7 @@ def list_presses(items):
     with open("config/objects/catalogue.yaml", encoding="utf-8") as lines:
         catalogue = yaml.safe_load(lines)
     for set_name, poses in POSES.items():
-        entries = [entry for entry in catalogue if entry["set"] == set_name]
+        entries = [entry for entry in catalogue if entry["set"] == set_name][:OBJECTS[set_name]]
         for entry, (k, place) in itertools.islice(itertools.product(entries, enumerate(poses)), items):
             mesh = read_mesh(f"config/objects/{entry['file']}", unit=entry["unit"])
             pose = Pose.parse(f"{place},0,0,0,0") if k else None         # None: centred over the sensor

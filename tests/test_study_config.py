@@ -55,17 +55,43 @@ def test_the_studies_are_valid(name):
     assert load_study(merged(name)).name == name
 
 
-def test_the_default_study_has_twenty_indenters_and_the_six_objects_of_fig_7():
+def test_the_default_study_has_sixteen_indenters_and_the_six_objects_of_fig_7():
+    fig_7 = {f"config/objects/grasped/object_{number}.stl" for number in range(1, 7)}
     study = load_study(DEFAULT)
-    assert len(study.items_of["indenters"]) >= 20
-    assert len(study.items_of["grasps"]) == 6
+    assert len({item.object for item in study.items_of["indenters"].values()}) >= 16
+    assert len({item.file for item in study.items_of["grasps"].values()} & fig_7) == 6
     assert study.values.forces_n[-1] == study.sensor["force_range_n"][1] == 50
 
 
-def test_the_paper_study_has_twenty_levels_and_twelve_thousand_readings_of_indenters():
+def test_the_paper_study_has_the_papers_numbers():
     study = load_study(merged("paper"))
-    assert len(study.values.forces_n) == 20
-    assert len(study.items_of["indenters"]) * len(study.values.forces_n) * study.values.trials == 12_000
+    presses = {name: len(items) for name, items in study.items_of.items()}
+    objects = {name: len({item.object for item in items.values()}) for name, items in study.items_of.items()}
+    assert objects == {"indenters": 49, "unseen": 10, "grasps": 12}
+    levels = len(study.values.forces_n)
+    assert (presses["indenters"] * levels, presses["unseen"] * levels) == (13_000, 400)
+    assert presses["grasps"] * study.trials_of("grasps") == 2_000 and study.trials_of("grasps") == 50
+
+
+def test_presses_beyond_the_listed_poses_are_drawn_for_each_object_in_turn():
+    study = load_study(changed("objects.unseen", {"names": ["hexagon", "ellipse"], "presses": 5}))
+    items = study.items_of["unseen"]
+    assert list(items) == ["hexagon", "hexagon-1", "hexagon-2", "ellipse", "ellipse-1"]
+    assert [item.first for item in items.values()] == [True, False, False, True, False]
+    again = load_study(changed("objects.unseen", {"names": ["ellipse", "z_form", "hexagon"], "presses": 9})).items_of["unseen"]
+    assert all(again[name].pose == item.pose for name, item in items.items())
+    other = load_study(changed("objects.unseen", {"names": ["hexagon"], "presses": 2}) | {"seed": 7}).items_of["unseen"]
+    assert other["hexagon-1"].pose != items["hexagon-1"].pose
+
+
+def test_one_mesh_under_two_names_in_two_sets_is_refused(tmp_path):
+    lines = (ROOT / "config/objects/catalogue.yaml").read_text().replace("file: ", f"file: {ROOT}/config/objects/")
+    catalogue = tmp_path / "catalogue.yaml"
+    file = ROOT / "config/objects/indenters/square.stl"
+    catalogue.write_text(lines + f"- {{name: new, file: {file}, unit: mm, set: unseen, label: New}}\n")
+    values = changed("objects.catalogue", str(catalogue))
+    values["objects"]["unseen"] = {"names": ["new"]}
+    assert "square.stl: 'new' of the set unseen has the same mesh as 'square' of the set indenters" in refusal(values)
 
 
 def test_an_item_is_named_by_its_object_and_its_pose():
@@ -104,6 +130,8 @@ def test_assumed_values_and_their_reasons_reach_the_stages_as_plain_numbers():
         ("objects.unseen.names", ["square"], "there is no object of set unseen 'square'"),
         ("objects.catalogue", "config/none.yaml", "config/none.yaml: there is no such catalogue"),
         ("objects.indenters.poses", {"left": [1, 2]}, "at 'objects.indenters.poses.left"),
+        ("objects.unseen.presses", 1, "presses is 1, and 4 objects in 1 listed poses are 4; give that many or more"),
+        ("dataset.split_by", "form", "at 'dataset.split_by' (it is 'form')"),
         ("forces_n", [5, 60], "60 N is out of the range of coro, above 0 and up to 50 N"),
         ("forces_n", [0, 5], "at 'forces_n.0' (it is 0): Input should be greater than 0"),
         ("forces_n", [10, 5], "at 'forces_n' (it is [10, 5]): the values must rise"),

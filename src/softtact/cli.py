@@ -13,6 +13,7 @@ from softtact.commands import (
     completion,
     complexity,
     config_schema,
+    cost,
     detect_discs,
     export_deck,
     fit,
@@ -24,12 +25,13 @@ from softtact.commands import (
 from softtact.commands.common import EXIT_TEXT
 from softtact.errors import ConvergenceError, SofttactError
 
-COMMANDS = (press, view, predict, complexity, fit, export_deck, detect_discs, stage, config_schema, completion)
+COMMANDS = (press, view, predict, complexity, fit, export_deck, detect_discs, cost, stage, config_schema, completion)
 EXAMPLES = """examples:
   softtact press part.stl --unit mm --force 5 --force 20 --out press.nc --vtu press.vtu --plot press.png
   softtact view press.vtu                     # turn the pressed sensor in a browser
   softtact complexity part.stl --unit mm      # which model the paper's rule takes for it
   softtact fit uniaxial=tension.csv --out card.json
+  softtact cost --configfile config/paper.yaml   # jobs, hours and disk of a study, before it runs
   softtact press --help                       # each command's help has examples of its own
 """
 

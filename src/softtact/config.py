@@ -5,6 +5,7 @@ that rules hand their stages plain values, and a comment in a YAML file reruns n
 """
 
 import itertools
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -25,7 +26,7 @@ from pydantic import (
 from softtact.errors import InputError
 from softtact.evaluation.ssim import check_window
 from softtact.geometry.sensor_spec import READINGS, SensorSpec
-from softtact.learning.settings import Network, Search, Ssim, Training
+from softtact.learning.settings import LearningCurve, Network, Search, Ssim, Training
 from softtact.materials.config import load_material
 from softtact.materials.laws.registry import LAWS
 from softtact.progress import announce
@@ -150,10 +151,12 @@ class Choice(Section):
 
 
 class ItemSet(Section):
-    """Objects of the catalogue, by name or `all` of a set, and the poses in which each is pressed."""
+    """Objects of the catalogue, by name or `all` of a set, and the poses in which each is pressed: listed ones, then drawn ones."""
 
     names: list[Name] | Literal["all"]
-    poses: dict[Name, Six | None] = Field({CENTRED: None}, min_length=1, description="x, y, z in mm, then degrees")
+    poses: dict[Name, Six | None] = Field({CENTRED: None}, min_length=1, description="of each: x, y, z in mm, then degrees")
+    presses: PositiveInt | None = Field(None, description="in all; those beyond the listed poses are drawn for each object in turn")
+    trials: PositiveInt | None = Field(None, description="readings of each press of this set; by default the study's `trials`")
 
 
 class Objects(Section):
@@ -238,6 +241,7 @@ class Dataset(Section):
     """How samples are made and split."""
 
     train_fraction: Fraction
+    split_by: Literal["map", "press", "object"] = Field("map", description="what goes to training or validation as a whole")
     training_trials: Literal["each", "mean"] = Field("each", description="a sample per trial, or one of their mean")
 
 
@@ -263,12 +267,13 @@ class Values(Section):
     search: Search
     training: Training
     network: Network
+    learning_curve: LearningCurve = LearningCurve()
     ssim: Ssim
 
 
 @dataclass(frozen=True)
 class Item:
-    """One object in one pose: what a press presses. `id` names it in paths."""
+    """One object in one pose: what a press presses. `id` names it in paths; `first` is its object's first pose."""
 
     id: str
     set: str
@@ -277,6 +282,7 @@ class Item:
     unit: str
     label: str
     pose: list[float] | None
+    first: bool
 
 
 @dataclass(frozen=True)
@@ -300,6 +306,16 @@ class Study:
         return list(self.archive.simulated) if self.archive else self.values.tested
 
     @property
+    def learnt_from(self):
+        """The models whose maps data sets are made of: those under test, and the reference, as if a model were perfect."""
+        return self.tested if self.archive else list(dict.fromkeys([*self.tested, self.values.reference]))
+
+    @property
+    def pressed_with(self):
+        """The models that every item is pressed with: those learnt from, and those that policies choose between."""
+        return [] if self.archive else list(dict.fromkeys([*self.learnt_from, *self.values.choice.models.values()]))
+
+    @property
     def source(self):
         """What the readings are from, in words."""
         return PUBLISHED if self.archive else "virtual sensor"
@@ -314,9 +330,37 @@ class Study:
         """The sensor's description as plain JSON values; what is assumed, and why, is left out."""
         return self.spec.model_dump(mode="json")
 
+    def trials_of(self, set_name):
+        """How often the virtual sensor reads each press of a set."""
+        return getattr(self.values.objects, set_name).trials or self.values.trials
+
     def items(self):
         """The items of all sets, in order."""
         return [item for items in self.items_of.values() for item in items.values()]
+
+
+def read_values(configfile=None, *, default="config/config.yaml"):
+    """The configuration mapping of a file over the default one, merged as Snakemake does it."""
+    values = _read_yaml(Path(default))
+    return values if configfile is None else _merged(values, _read_yaml(Path(configfile)))
+
+
+def _merged(base, over):
+    return base | {key: _merged(base[key], value) if isinstance(base.get(key), dict) and isinstance(value, dict) else value
+                   for key, value in over.items()}
+
+
+def _read_yaml(path):
+    """A mapping of a YAML file; what is none is refused."""
+    try:
+        values = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such configuration; give the path of one, from the project's folder.") from None
+    except (UnicodeDecodeError, yaml.YAMLError) as error:
+        raise InputError(f"{path}: not valid YAML ({' '.join(str(error).split())}); correct it.") from None
+    if not isinstance(values, dict):
+        raise InputError(f"{path}: it holds no keys; write a configuration such as config/tiny.yaml.")
+    return values
 
 
 def sensor_file(name, *, folder=None):
@@ -344,8 +388,9 @@ def load_study(values, *, folder="config"):
     _check_sensor(checked, spec)
     checked = _with_range(checked, spec)
     make_specimen(spec, seed=checked.seed, settings=VirtualSensorSettings.from_dict(checked.virtual_sensor))
-    catalogue = _read_catalogue(Path(checked.objects.catalogue))
-    items_of = {name: _items(name, getattr(checked.objects, name), catalogue) for name in SETS}
+    catalogue = read_catalogue(Path(checked.objects.catalogue))
+    items_of = {name: _items(name, getattr(checked.objects, name), catalogue, spec=spec, seed=checked.seed) for name in SETS}
+    _check_shapes(items_of)
     study = Study(checked, spec, materials, items_of, _archive(checked))
     _say_outside_paths(study, folder)
     return study
@@ -446,7 +491,7 @@ def _with_range(values, spec):
     return values.model_copy(update={"ssim": values.ssim.model_copy(update={"data_range": spec.largest_counts})})
 
 
-def _read_catalogue(path):
+def read_catalogue(path):
     """{name: CatalogueEntry} with the mesh files' paths as seen from here; a missing mesh is refused now."""
     try:
         lines = yaml.safe_load(path.read_text(encoding="utf-8"))
@@ -459,21 +504,63 @@ def _read_catalogue(path):
     return {entry.name: entry for entry in entries}
 
 
-def _items(set_name, chosen, catalogue):
-    """{id: Item} of one set: each object in each pose."""
+def _items(set_name, chosen, catalogue, *, spec, seed):
+    """{id: Item} of one set: each object in its poses, the listed ones and those that are drawn."""
     known = [name for name, entry in catalogue.items() if entry.set == set_name]
     names = known if chosen.names == "all" else chosen.names
     where = f"the configuration, at 'objects.{set_name}'"
     for name in names:
         _refuse_unknown(name, known, kind=f"object of set {set_name}", where=where)
-    pairs = itertools.product(names, chosen.poses.items())
-    items = [_item(catalogue[name], pose_name, pose) for name, (pose_name, pose) in pairs]
-    return {item.id: item for item in items}
+    drawn = _dealt(chosen, len(names), where=where)
+    items = {}
+    for entry, count in zip((catalogue[name] for name in names), drawn, strict=True):
+        poses = chosen.poses | _drawn(entry, count, spec=spec, seed=seed)
+        made = [_item(entry, pose_name, pose, first=k == 0) for k, (pose_name, pose) in enumerate(poses.items())]
+        items |= {item.id: item for item in made}
+    return items
 
 
-def _item(entry, pose_name, pose):
+def _check_shapes(items_of):
+    """Refuse a mesh that stands in two sets, be it under two names: a test must not hold a shape that training saw."""
+    seen = {}
+    for item in (item for items in items_of.values() for item in items.values() if item.first):
+        other = seen.setdefault(Path(item.file).read_bytes(), item)
+        if other.set != item.set:
+            raise InputError(f"{item.file}: {item.object!r} of the set {item.set} has the same mesh as {other.object!r} of the set "
+                             f"{other.set}; leave one of the two out.")
+
+
+def _dealt(chosen, objects, *, where):
+    """How many poses are drawn for each object of a set, so that there are as many presses as it says."""
+    listed = objects * len(chosen.poses)
+    more = (chosen.presses or listed) - listed
+    if more < 0:
+        raise InputError(f"{where}: presses is {chosen.presses}, and {objects} objects in {len(chosen.poses)} listed poses are "
+                         f"{listed}; give that many or more, or leave 'presses' out.")
+    return [more // objects + (k < more % objects) for k in range(objects)]
+
+
+def _drawn(entry, count, *, spec, seed):
+    """{"1": pose, ...} of an object, `count` of them; they depend on the seed, its name and its mesh."""
+    if not count:
+        return {}
+    from softtact.geometry.meshes import read_triangles
+    from softtact.geometry.places import draw_poses
+
+    _check_mesh(entry)
+    poses = draw_poses(read_triangles(entry.file, unit=entry.unit), count=count, footprint_mm=spec.footprint_mm,
+                       seed=[seed, zlib.crc32(entry.name.encode())])
+    return {str(k): pose for k, pose in enumerate(poses, start=1)}
+
+
+def _check_mesh(entry):
     if not Path(entry.file).is_file():
         raise InputError(f"{entry.file}: there is no such mesh, which the catalogue names for {entry.name!r}; "
                          "put it there or correct the line.")
+
+
+def _item(entry, pose_name, pose, *, first):
+    _check_mesh(entry)
     suffix = "" if pose_name == CENTRED else f"-{pose_name}"
-    return Item(entry.name + suffix, entry.set, entry.name, entry.file, entry.unit, entry.label + suffix, pose)
+    return Item(entry.name + suffix, entry.set, entry.name, entry.file, entry.unit, entry.label + suffix, pose,
+                first)

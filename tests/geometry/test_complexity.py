@@ -91,7 +91,7 @@ def test_a_pose_moves_what_overlaps():
 
 
 def grasped():
-    entries = [entry for entry in yaml.safe_load((OBJECTS / "catalogue.yaml").read_text()) if entry["set"] == "grasps"]
+    entries = [entry for entry in yaml.safe_load((OBJECTS / "catalogue.yaml").read_text()) if entry["name"].startswith("object_")]
     return [OBJECTS / entry["file"] for entry in entries], entries
 
 

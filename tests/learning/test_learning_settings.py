@@ -3,7 +3,7 @@
 import pytest
 
 from softtact.errors import InputError
-from softtact.learning.settings import Network, Search, Ssim, Training
+from softtact.learning.settings import LearningCurve, Network, Search, Ssim, Training
 
 
 def test_defaults_are_what_the_paper_prints():
@@ -19,6 +19,8 @@ def test_defaults_are_what_the_paper_prints():
     (Search, {"space": {"dense": [64, 8]}}, r"it.space.dense: a range is \[smallest, largest\]"),
     (Network, {"architecture": "drawn"}, "it.architecture: .*'printed', 'searched' or 'compact'"),
     (Network, {"compact": {"filters": [16, 32]}}, "it.compact.filters.2: Field required"),
+    (LearningCurve, {"shares": [0.5, 0.2]}, "it.shares: shares rise from one to the next"),
+    (LearningCurve, {"shares": [0.5, 1.2]}, "it.shares.1: .*less than or equal to 1"),
     (Ssim, {"window": 4}, "it.window: a window has a taxel at its centre"),
 ])
 def test_a_wrong_setting_is_refused_with_its_key_and_value(section, values, sentence):

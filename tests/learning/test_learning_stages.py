@@ -12,7 +12,15 @@ from softtact.files import read_dataset, read_json
 from softtact.learning.dataset import SPLITS
 from softtact.learning.network import load_network, predict
 from softtact.learning.samples import read_samples
-from softtact.stages import build_dataset, compare_networks, draw_fig9_networks, evaluate, search_hyperparameters, train_cnn
+from softtact.stages import (
+    build_dataset,
+    compare_networks,
+    draw_fig9_networks,
+    evaluate,
+    learning_curve,
+    search_hyperparameters,
+    train_cnn,
+)
 
 SPACE = {"filters": [[2, 4], [2, 4], [2, 4]], "dense": [8, 24], "learning_rate": [1e-3, 1e-2]}
 SETTINGS = {"search": {"trials": 2, "max_epochs": 2, "batch": 8, "space": SPACE},
@@ -140,6 +148,22 @@ def test_both_architectures_stand_in_one_table_and_one_figure(finished):
     pictures = {kind: folder / f"figures/fig9.{kind}" for kind in ("png", "svg")}
     draw_fig9_networks.run(inputs={"networks": table, "histories": [run["history"] for run in runs]}, outputs=pictures, settings={})
     assert all(path.stat().st_size > 10_000 for path in pictures.values())
+
+
+def test_the_learning_curve_has_a_row_per_network_share_and_set_with_intervals_where_there_are_objects(finished):
+    folder, inputs, _ = finished
+    curve = {"shares": [0.5, 1.0], "steps": 4, "networks": ["printed", "compact"]}
+    files = {split: folder / f"dataset/elastic/{split}.nc" for split in SPLITS} | {"best": folder / "learning/elastic/best.json"}
+    outputs = {"curve": folder / "learning/elastic/learning_curve.csv"}
+    learning_curve.run(inputs=files, outputs=outputs,
+                       settings=settings_of("training", "network", "ssim", "seed", learning_curve=curve))
+    rows = pd.read_csv(outputs["curve"])
+    train = len(read_samples(files["train"]))
+    assert len(rows) == 2 * 2 * 3 and rows.maps.unique().tolist() == [train // 2, train]
+    assert rows.architecture.unique().tolist() == ["printed", "compact"] and (rows.model == "elastic").all()
+    validation = rows[rows["set"] == "validation"]
+    assert (validation.ssim_low < validation.ssim).all() and (validation.ssim < validation.ssim_high).all()
+    assert rows[rows["set"] == "unseen"].ssim_low.isna().all()      # one object: no interval
 
 
 def test_a_given_learning_rate_is_used_instead_of_the_searchs(finished):

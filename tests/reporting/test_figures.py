@@ -6,7 +6,7 @@ import pytest
 import trimesh
 
 from softtact.files import write_csv, write_json
-from softtact.reporting import fig4_complexity, fig5_ftir, fig6_ssim, fig7_maps, fig9_networks
+from softtact.reporting import fig4_complexity, fig5_ftir, fig6_ssim, fig7_maps, fig9_networks, fig10_learning_curve
 from softtact.reporting.page import render_page
 from softtact.reporting.style import draw_map, pyplot, save
 
@@ -81,6 +81,18 @@ def test_figure_7_outlines_only_the_chosen_model():
     assert red == ["elastic"]
 
 
+def test_figure_10_has_a_line_per_model_and_set_with_intervals_and_the_ceiling():
+    curves = pd.DataFrame([{"model": model, "architecture": "compact", "set": name, "maps": maps, "ssim": 0.5 + 0.001 * maps,
+                            "ssim_low": 0.4, "ssim_high": 0.8} for model in ("elastic", "reference")
+                           for name in ("validation", "grasps") for maps in (10, 100)])
+    figure = fig10_learning_curve.draw(curves, CEILING)
+    assert [axes.get_title() for axes in figure.axes] == ["validation", "grasps"]
+    for axes in figure.axes:
+        assert len(axes.containers) == 2 and len(axes.collections) == 2 and axes.get_xscale() == "log"
+        assert axes.containers[0].lines[0].get_ydata() == pytest.approx([0.51, 0.6])
+        assert any(line.get_linestyle() == ":" for line in axes.lines)
+
+
 def test_a_figure_is_written_the_same_twice(tmp_path):
     area = pd.DataFrame({"force_n": [0.0, 10.0], "area_per_frustum_mm2": [0.1, 0.2], "area_measured_mm2": [0.1, 0.2],
                          "area_image_mm2": [0.1, 0.2]})
@@ -104,13 +116,15 @@ def test_the_page_holds_its_figures_and_links_its_data(tmp_path):
     inputs["figures"] = [folder / "figures" / f"{name}.png" for name in ("fig6_ssim", "fig5_ftir", "material_foam")]
     for path in inputs["figures"]:
         save(fig6_ssim.draw(SSIM, CEILING), path)
-    facts = {"study": "mine", "sensor": "pad: 30 x 20 mm",
-             "indenters": 3, "unseen": 1, "grasps": 2, "forces_n": [10.0], "trials": 2, "seed": 1}
+    facts = {"study": "mine", "sensor": "pad: 30 x 20 mm", "indenters": 3, "unseen": 1, "grasps": 2, "forces_n": [10.0], "seed": 1,
+             "presses": {"indenters": 4, "unseen": 1, "grasps": 2}, "trials": {"indenters": 2, "unseen": 2, "grasps": 50}}
     page = render_page(inputs, facts, folder=folder)
     assert page.count("data:image/png;base64,") == 3
     assert page.count("The words allow this.") == 1 and "Material foam: test curves" in page
     assert 'href="figures/fig6_ssim.svg"' in page and 'href="tables/table2.csv"' in page
-    assert "pad: 30 x 20 mm. It is not the paper" in page and "0.500 to 0.700" in page and "one item: none" in page
+    assert "pad: 30 x 20 mm. It is not the paper" in page
+    assert "0.500 to 0.700" in page and "one item: none" in page
+    assert "3 indenters in 4 places, each read 2 times" in page and "2 objects in 2 places, each read 50 times" in page
     assert "a &lt; b" in page and "What is synthetic here" in page
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from softtact.code_closure import code_closure
 from softtact.config import load_study
+from softtact.cost import cost_lines, read_costs, study_costs
 from softtact.errors import InputError
 
 try:
@@ -127,7 +128,7 @@ def samples_of():
     if STUDY.archive:
         return {name: f"{RESULTS}/{name}" for name in ("presses", "tactile")} | {"item_list": f"{RESULTS}/published/items.json"}
     tactile = [f"{RESULTS}/tactile/{item.set}/{item.id}.nc" for item in STUDY.items()]
-    return {"presses": presses(STUDY.tested), "tactile": tactile}
+    return {"presses": presses(STUDY.learnt_from), "tactile": tactile}
 
 
 HELD = []  # open as long as this process lives
@@ -146,5 +147,13 @@ def hold_study():
         raise WorkflowError(f"{RESULTS}: another run of this study is at work; wait for its end.") from None
 
 
+def tell_cost():
+    """Say what the whole study takes, before it starts; an archive's size is not known then."""
+    if not STUDY.archive:
+        measured = read_costs()
+        print(*cost_lines(STUDY, study_costs(STUDY, measured), measured, cores=workflow.cores), sep="\n", file=sys.stderr)
+
+
 onstart:
     hold_study()
+    tell_cost()

@@ -3,9 +3,9 @@
 SPLITS = ("train", "validation", "unseen", "grasps")
 
 
-def dataset(split):
-    """A split's files, one per tested model."""
-    return [f"{RESULTS}/dataset/{model}/{split}.nc" for model in STUDY.tested]
+def dataset(split, models=STUDY.tested):
+    """A split's files, one per model, by default of those under test."""
+    return [f"{RESULTS}/dataset/{model}/{split}.nc" for model in models]
 
 
 # The network that a study's own is compared with, on the same split.
@@ -17,18 +17,32 @@ def learned(name):
     return [f"{RESULTS}/learning/{model}/{part}{name}" for part in ("", f"{BESIDE}/") for model in STUDY.tested]
 
 
+CURVE = STUDY.values.learning_curve
+CURVES = [f"{RESULTS}/learning/{model}/learning_curve.csv" for model in STUDY.learnt_from] if CURVE.shares else []
+
+
+def curve_networks(model):
+    """The networks of a model's learning curve; the reference has no search, so its maps meet the compact one only."""
+    return CURVE.networks if model in STUDY.tested else ("compact",)
+
+
+def curve_files(wildcards):
+    """The search's result, where a network of the learning curve takes its learning rate from it."""
+    needed = set(curve_networks(wildcards.model)) != {"compact"}
+    return {"best": f"{RESULTS}/learning/{wildcards.model}/best.json"} if needed else {}
+
 
 rule build_dataset:
     input:
         code=code("build_dataset"),
         **samples_of(),
     output:
-        **{split: dataset(split) for split in SPLITS},
+        **{split: dataset(split, STUDY.learnt_from) for split in SPLITS},
         manifest=f"{RESULTS}/dataset/manifest.csv",
     params:
         files=files,
         settings=as_settings(
-            models=STUDY.tested,
+            models=STUDY.learnt_from,
             **({} if STUDY.archive else {"items": [{"set": item.set, "item": item.id} for item in STUDY.items()]}),
             **plain(STUDY.values.dataset),
             seed=STUDY.values.seed,
@@ -166,3 +180,48 @@ rule compare_networks:
         benchmark_of("compare_networks")
     shell:
         run_stage("compare_networks")
+
+
+rule learning_curve:
+    input:
+        unpack(curve_files),
+        code=code("learning_curve"),
+        **{split: f"{RESULTS}/dataset/{{model}}/{split}.nc" for split in SPLITS},
+    output:
+        curve=f"{RESULTS}/learning/{{model}}/learning_curve.csv",
+    params:
+        files=files,
+        settings=lambda w: as_settings(
+            learning_curve=plain(CURVE) | {"networks": curve_networks(w.model)},
+            training=STUDY.values.training.model_dump(mode="json", exclude={"threads"}),
+            network=plain(STUDY.values.network),
+            ssim=plain(STUDY.values.ssim),
+            seed=STUDY.values.seed,
+        ),
+    threads: STUDY.values.training.threads
+    log:
+        log_of("learning_curve", "{model}"),
+    benchmark:
+        benchmark_of("learning_curve", "{model}")
+    shell:
+        run_stage("learning_curve")
+
+
+rule find_limits:
+    input:
+        code=code("find_limits"),
+        curves=CURVES,
+        networks=rules.compare_networks.output.networks,
+    output:
+        limits=f"{RESULTS}/tables/limits.csv",
+    params:
+        files=files,
+        settings=as_settings(
+            own=STUDY.values.network.architecture, tested=STUDY.tested, reference=STUDY.values.reference, source=STUDY.source
+        ),
+    log:
+        log_of("find_limits"),
+    benchmark:
+        benchmark_of("find_limits")
+    shell:
+        run_stage("find_limits")

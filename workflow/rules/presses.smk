@@ -1,5 +1,10 @@
 # Every item pressed with every model, and read by the virtual sensor.
 
+# After each press: how many there are of all. The shell counts, for a total among the settings would rerun all when it changes.
+PRESSES = len(STUDY.pressed_with) * len(STUDY.items())
+TOLD = f"echo \"presses: $(find {RESULTS}/presses -name '[!.]*.nc' | wc -l) of {PRESSES} are there\" >&2"
+
+
 rule simulate_press:
     input:
         unpack(model_files),
@@ -24,7 +29,7 @@ rule simulate_press:
         benchmark_of("simulate_press", "{set}/{item}/{model}")
     threads: 1
     shell:
-        run_stage("simulate_press")
+        f'{run_stage("simulate_press")} && {TOLD}'
 
 
 rule read_virtual_sensor:
@@ -35,10 +40,10 @@ rule read_virtual_sensor:
         tactile=f"{RESULTS}/tactile/{{set}}/{{item}}.nc",
     params:
         files=files,
-        settings=as_settings(
+        settings=lambda w: as_settings(
             sensor=STUDY.sensor,
             virtual_sensor=STUDY.values.virtual_sensor,
-            trials=STUDY.values.trials,
+            trials=STUDY.trials_of(w.set),
             seed=STUDY.values.seed,
         ),
     log:

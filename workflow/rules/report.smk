@@ -1,9 +1,10 @@
 # Tables, one rule per figure, and the page that gathers them.
 
-GRASPS = list(STUDY.items_of["grasps"].values())
-GRASP_UNITS = {item.id: item.unit for item in GRASPS}
+GRASPS = [item for item in STUDY.items_of["grasps"].values() if item.first]   # each object once
+SHOWN = GRASPS[:6]      # in figure 7, as in print
 FROM_PRESSES = () if STUDY.archive else ("fig7_maps", "fig8_policies")     # an archive has no press of our objects
-FIGURES = ("fig4_complexity", "fig5_ftir", "fig6_ssim", *FROM_PRESSES, "fig9_networks")
+FROM_CURVES = ("fig10_learning_curve",) if CURVES else ()
+FIGURES = ("fig4_complexity", "fig5_ftir", "fig6_ssim", *FROM_PRESSES, "fig9_networks", *FROM_CURVES)
 
 
 def figure_files(name):
@@ -45,7 +46,9 @@ rule draw_fig4_complexity:
         **figure_files("fig4_complexity"),
     params:
         files=files,
-        settings=as_settings(thresholds=plain(STUDY.values.complexity)["thresholds"], units=list(GRASP_UNITS.items())),
+        settings=as_settings(
+            thresholds=plain(STUDY.values.complexity)["thresholds"], units=[(item.id, item.unit) for item in GRASPS]
+        ),
     log:
         log_of("draw_fig4_complexity"),
     benchmark:
@@ -116,13 +119,15 @@ rule draw_fig7_maps:
         code=code("draw_fig7_maps"),
         predictions=rules.evaluate.output.predictions,
         complexity=rules.score_complexity.output.table,
-        objects=[item.file for item in GRASPS],
-        presses=[f"{RESULTS}/presses/grasps/{item.id}/{model}.nc" for item in GRASPS for model in STUDY.tested],
+        objects=[item.file for item in SHOWN],
+        presses=[f"{RESULTS}/presses/grasps/{item.id}/{model}.nc" for item in SHOWN for model in STUDY.tested],
     output:
         **figure_files("fig7_maps"),
     params:
         files=files,
-        settings=as_settings(units=list(GRASP_UNITS.items()), largest_counts=STUDY.spec.largest_counts),
+        settings=as_settings(
+            units=[(item.id, item.unit) for item in SHOWN], largest_counts=STUDY.spec.largest_counts
+        ),
     log:
         log_of("draw_fig7_maps"),
     benchmark:
@@ -167,6 +172,24 @@ rule draw_fig9_networks:
         run_stage("draw_fig9_networks")
 
 
+rule draw_fig10_learning_curve:
+    input:
+        code=code("draw_fig10_learning_curve"),
+        curves=CURVES,
+        ceiling=rules.evaluate.output.ceiling,
+    output:
+        **figure_files("fig10_learning_curve"),
+    params:
+        files=files,
+        settings=as_settings(),
+    log:
+        log_of("draw_fig10_learning_curve"),
+    benchmark:
+        benchmark_of("draw_fig10_learning_curve")
+    shell:
+        run_stage("draw_fig10_learning_curve")
+
+
 rule report:
     input:
         code=code("report"),
@@ -177,6 +200,7 @@ rule report:
         claims=rules.make_tables.output.claims,
         summary=rules.evaluate.output.summary,
         networks=rules.compare_networks.output.networks,
+        **({"limits": rules.find_limits.output.limits} if CURVES else {}),
         ftir=rules.validate_ftir.output.summary,
         **(
             {"inventory": rules.import_published.output.inventory, "counts": rules.import_published.output.counts}
@@ -195,9 +219,10 @@ rule report:
             study=STUDY.name,
             sensor=STUDY.spec.in_words,
             seed=STUDY.values.seed,
-            trials=STUDY.values.trials,
+            trials={name: STUDY.trials_of(name) for name in STUDY.items_of},
+            presses={name: len(items) for name, items in STUDY.items_of.items()},
             forces_n=STUDY.values.forces_n,
-            **{name: len(items) for name, items in STUDY.items_of.items()},
+            **{name: len({item.object for item in items.values()}) for name, items in STUDY.items_of.items()},
         ),
     log:
         log_of("report"),

@@ -8,6 +8,7 @@ from softtact.evaluation.bootstrap import interval_of_mean
 from softtact.evaluation.overlap import contact_patch_overlap
 from softtact.evaluation.ssim import leave_one_out_ssim, map_ssim, mean_absolute_counts
 from softtact.learning.network import predict
+from softtact.learning.samples import object_of
 
 SSIM_COLUMNS = ["model", "set", "item", "trial", "force_n", "ssim", "mae_counts", "overlap"]
 CEILING_COLUMNS = ["set", "item", "force_n", "ssim"]
@@ -71,17 +72,24 @@ def level_means(samples, maps, items, forces):
 def summarise_scores(scores, ceiling, *, seed):
     """Frame model, set, items, maps, ssim, ssim_low, ssim_high, mae_counts, overlap, sensor_ssim of a study's scores.
 
-    ssim_low, ssim_high: 95 % interval of the mean, by bootstrap over items, then trials; nan where there is one item only
+    ssim_low, ssim_high: 95 % interval of the mean, by bootstrap over objects, then presses and trials; nan where there is one
+    object only
     sensor_ssim: mean of the ceiling, the sensor's trials against each other; nan where it was read once
     """
     own = ceiling.groupby("set").ssim.mean()
     rows = []
     for (model, set_name), group in scores.groupby(["model", "set"], sort=False):
-        low, high = interval_of_mean(group.ssim.to_numpy(), group["item"], group.trial, seed=seed)
+        low, high = interval_over_objects(group, seed=seed)
         rows.append({"model": model, "set": set_name, "items": group["item"].nunique(), "maps": len(group),
                      "ssim": group.ssim.mean(), "ssim_low": low, "ssim_high": high, "mae_counts": group.mae_counts.mean(),
                      "overlap": group.overlap.mean(), "sensor_ssim": own.get(set_name, np.nan)})
     return pd.DataFrame(rows)
+
+
+def interval_over_objects(scores, *, seed):
+    """(low, high) of the mean SSIM of a set's scores: objects are drawn, then trials of each; a trial is one press read once."""
+    trial = pd.factorize(scores["item"] + " " + scores.trial.astype(str))[0]
+    return interval_of_mean(scores.ssim.to_numpy(), scores["item"].map(object_of), trial, seed=seed)
 
 
 def score_items(scores, *, seed):

@@ -2,13 +2,15 @@
 
 The pipeline reads meshes and never calls this module: whatever is pressed lies on disk as an STL file, with one line
 in `catalogue.yaml`. Names of indenters that the published data set uses are kept; their drawings are not published,
-so the sizes are ours. Every pressing face is at least 90 mm2, wide enough to carry the sensor's full 50 N.
+so the sizes are ours, and so are the indenters beyond those. Every pressing face is at least 90 mm2, wide enough to carry
+the sensor's full 50 N.
 """
 
 import argparse
 from pathlib import Path
 
 import numpy as np
+import trimesh
 
 from softtact.files import atomic_path
 from softtact.geometry.solids import (
@@ -16,6 +18,7 @@ from softtact.geometry.solids import (
     ball,
     block,
     dome,
+    hull,
     pad,
     path,
     polygon,
@@ -72,6 +75,22 @@ def corner_brackets(x=8.0, y=15.0, leg=5.0):
                  for sx in (-1, 1) for sy in (-1, 1))
 
 
+def blob(*discs):
+    """Pad of overlapping discs (x, y, diameter)."""
+    return union(disc(diameter, (x, y)) for x, y, diameter in discs)
+
+
+def half_disc(radius):
+    """Half of a disc, its straight side along x."""
+    angle = np.radians(np.linspace(0.0, 180.0, 25))
+    return face(*np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
+
+
+def cap(radius, base_diameter):
+    """Spherical cap of an indenter."""
+    return dome(radius=radius, base_diameter=base_diameter, height=FACE_HEIGHT + OVERLAP)
+
+
 def ellipse(length=24.0, width=13.0):
     """Elliptic pad with its long side along y."""
     angle = 2 * np.pi * np.arange(48) / 48
@@ -99,11 +118,37 @@ INDENTERS = {
     "Glasses": lambda: union([hoop(14, 7, (0, 9)), hoop(14, 7, (0, -9)), bar((0, -3.4), (0, 3.4))]),
     "Triangle": lambda: face(*corner_points(3, 11)),
     "Square": lambda: face(*corner_points(4, 9, start_deg=45)),
-    "Sphere": lambda: dome(radius=20, base_diameter=19, height=FACE_HEIGHT + OVERLAP),
+    "Sphere": lambda: cap(20, 19),
     "Star": star,
     "Rectangle": lambda: face((-5, -12), (5, -12), (5, 12), (-5, 12)),
     "T Form": lambda: union([bar((-8, 10), (8, 10)), bar((0, 10), (0, -12))]),
     "U Form": lambda: bar((-7, 11), (-7, -11), (7, -11), (7, 11)),
+    # From here on names are ours: the publication tells the kinds, and that there are 49 in all.
+    "Triangle S": lambda: face(*corner_points(3, 9.2)),
+    "Triangle Right": lambda: face((-7, -12), (7, -12), (-7, 12)),
+    "Triangle Long": lambda: face((-5, -15), (5, -15), (0, 15)),
+    "Square S": lambda: face(*corner_points(4, 7.6, start_deg=45)),
+    "Square M": lambda: face(*corner_points(4, 10.8, start_deg=45)),
+    "Square G": lambda: face(*corner_points(4, 13, start_deg=45)),
+    "Sphere S": lambda: cap(16, 17),
+    "Sphere M": lambda: cap(25, 19),
+    "Sphere G": lambda: cap(32, 19.5),
+    "Circle XG": lambda: disc(19.5),
+    "Rectangle S": lambda: face((-4, -8), (4, -8), (4, 8), (-4, 8)),
+    "Rectangle G": lambda: face((-8, -14), (8, -14), (8, 14), (-8, 14)),
+    "Donut S": lambda: hoop(13, 5),
+    "Donut XG": lambda: hoop(19.6, 14.5),
+    "Bar": lambda: bar((0, -14), (0, 14), width=5),
+    "Cruz X": lambda: union([bar((-6, -10), (6, 10)), bar((-6, 10), (6, -10))]),
+    "H Form": lambda: union([bar((-6, -11), (-6, 11)), bar((6, -11), (6, 11)), bar((-6, 0), (6, 0))]),
+    "Y Form": lambda: union([bar((0, -12), (0, 0)), bar((0, 0), (-7, 11)), bar((0, 0), (7, 11))]),
+    "V Form": lambda: bar((-7, 11), (0, -11), (7, 11)),
+    "Pentagon": lambda: face(*corner_points(5, 9.5)),
+    "Half Moon": lambda: half_disc(9.8),
+    "Three Dots": lambda: union([disc(7, (-5, -8)), disc(7, (5, -3)), disc(7, (-1, 9))]),
+    "Irregular A": lambda: face((-7, -9), (3, -13), (8, -2), (4, 8), (-5, 11)),
+    "Irregular B": lambda: blob((-3, -9, 9), (2, -3, 11), (-2, 5, 8), (3, 10, 7)),
+    "Irregular C": lambda: union([bar((-6, -12), (1, -6), (-3, 3), (6, 12)), bar((1, -6), (7, -9)), disc(6, (6, 4))]),
 }
 
 UNSEEN = {
@@ -113,6 +158,10 @@ UNSEEN = {
     "Two Dots": lambda: union([disc(8.5, (-3, 8)), disc(8.5, (3, -8))]),
     "Ring Segment": lambda: arc(radius=7.8, width=4, start_deg=-30, end_deg=210, height=FACE_HEIGHT + OVERLAP),
     "Z Form": lambda: bar((-6, 11), (6, 11), (-6, -11), (6, -11)),
+    "Arrow": lambda: union([bar((0, -13), (0, 12)), bar((-7, 4), (0, 12), (7, 4))]),
+    "Parallelogram": lambda: face((-9, -9), (2, -9), (9, 9), (-2, 9)),
+    "S Form": lambda: bar((7, 11), (-6, 9), (-6, 1), (6, -1), (6, -9), (-7, -11)),
+    "Irregular D": lambda: union([face((-8, 1), (1, -4), (8, 3), (2, 12), (-5, 11)), bar((3, -2), (-4, -13))]),
 }
 
 
@@ -175,8 +224,62 @@ def object_6():
     return union([body, *bosses, *low])
 
 
+def key():
+    """Key lying flat: a bow with its hole, a blade, and four bits of different lengths."""
+    thickness = 2.3
+    bits = [path([(0, y), (reach, y)], width=1.8, height=thickness)
+            for y, reach in ((-5.0, 4.4), (-8.0, 3.4), (-11.0, 4.8), (-14.0, 3.8))]
+    return union([ring(outer=18, inner=7, height=thickness, centre=(0.0, 8.0)),
+                  path([(0, 0), (0, -15)], width=5.0, height=thickness), *bits])
+
+
+def bolt_head():
+    """Head of a socket bolt: a hexagon with chamfered corners and a hexagonal hole, its shank behind."""
+    head = polygon(corner_points(6, 9.6), height=7.0, edge=0.6)
+    shank = raised(pad((0, 0), radius=5.0, height=20.5), 6.5)
+    socket = raised(polygon(corner_points(6, 4.6, start_deg=0.0), height=5.0), -1.0)
+    return union([head, shank]) - socket
+
+
+def coin():
+    """Coin: a raised rim, and a star in relief that stays 0.05 mm behind it."""
+    body = raised(pad((0, 0), radius=9.8, height=1.6, edge=0.2, round_top=True), 0.3)
+    relief = [raised(polygon([(0, 0), *tips], height=0.6, edge=0.15), 0.05) for tips in _rays(points=8, outer=7.0, half_deg=12.0)]
+    return union([body, ring(outer=19.6, inner=15.6, height=1.0), *relief])
+
+
+def _rays(*, points, outer, half_deg):
+    """Pairs of corners, counter-clockwise, that make narrow triangles with the centre."""
+    for start in 360.0 * np.arange(points) / points:
+        yield [outer * np.array([np.cos(angle), np.sin(angle)]) for angle in np.radians([start - half_deg, start + half_deg])]
+
+
+def spanner():
+    """Open-ended spanner lying flat: jaws, and a handle that ends in a round."""
+    thickness = 4.0
+    jaws = raised(arc(radius=6.2, width=4.5, start_deg=130, end_deg=410, height=thickness), 0.0).translate((0.0, 8.0, 0.0))
+    return union([jaws, path([(0, 1), (0, -15)], width=6.0, height=thickness)])
+
+
+def bottle_cap():
+    """Screw cap, open side down: a wall with 24 grips around it, closed behind."""
+    height = 11.0
+    wall = ring(outer=19.0, inner=14.5, height=height)
+    grips = [pad(centre, radius=0.6, height=height - 0.5).translate((0.0, 0.0, 0.5)) for centre in corner_points(24, 9.3)]
+    return union([wall, raised(pad((0, 0), radius=9.0, height=1.5), height - 1.5), *grips])
+
+
+def egg():
+    """Egg on its side: a ball, stretched along y and narrower towards one end."""
+    points = trimesh.creation.icosphere(subdivisions=4).vertices
+    narrow = 1.0 - 0.16 * points[:, 1]
+    shaped = np.column_stack([20.0 * narrow * points[:, 0], 27.0 * points[:, 1], 20.0 * narrow * points[:, 2]])
+    return hull(shaped - [0.0, 0.0, shaped[:, 2].min()])
+
+
+EVERYDAY = {"Key": key, "Bolt Head": bolt_head, "Coin": coin, "Spanner": spanner, "Bottle Cap": bottle_cap, "Egg": egg}
 GRASPED = {f"Object {number}": shape for number, shape in
-           enumerate([object_1, object_2, object_3, object_4, object_5, object_6], start=1)}
+           enumerate([object_1, object_2, object_3, object_4, object_5, object_6], start=1)} | EVERYDAY
 
 # set -> (folder, shapes, what every shape of the set gets)
 SETS = {

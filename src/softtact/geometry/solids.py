@@ -92,6 +92,11 @@ def ball(*, radius, subdivisions=4):
     return Manifold.hull_points(sphere.vertices + [0, 0, radius])
 
 
+def hull(points):
+    """Convex solid around points (n, 3)."""
+    return Manifold.hull_points(points)
+
+
 def union(solids):
     """One solid of several."""
     return Manifold.batch_boolean(list(solids), OpType.Add)

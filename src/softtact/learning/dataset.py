@@ -1,7 +1,8 @@
 """Data sets: deformation maps of each model paired with the sensor's readings, split so that nothing leaks.
 
 A *level* is one press at one force. Levels of the set `indenters` are shuffled with the seed and split into train and
-validation; `unseen` and `grasps` are tests. All trials of a level are on one side, for they share its deformation map.
+validation: each for itself (the paper's way), or all of a press, or of an object, together (`split_by`). `unseen` and `grasps` are
+tests, whose objects training never sees. All trials of a level are on one side, for they share its deformation map.
 All models share the split, and a level is used only where it is within every model's validity: the networks see the
 same samples.
 """
@@ -12,6 +13,7 @@ import xarray
 
 from softtact.errors import ConvergenceError, InputError
 from softtact.files import read_dataset
+from softtact.learning.samples import object_of
 
 SPLITS = ("train", "validation", "unseen", "grasps")
 TRAINING_SET = "indenters"
@@ -20,10 +22,11 @@ MEAN = -1  # in place of a trial's number: the mean over the trials
 MANIFEST = ["set", "item", "model", "force_n", "trial", "split", "converged", "within_validity"]
 
 
-def build_datasets(presses, tactile, *, models, items, train_fraction, seed, training_trials="each"):
+def build_datasets(presses, tactile, *, models, items, train_fraction, seed, training_trials="each", split_by="map"):
     """Join and split presses and readings.
 
     presses {(model, set, item): dataset};  tactile {(set, item): dataset};  items: [{"set", "item"}, ...]
+    split_by: what goes to training or validation as a whole, map, press or object
     training_trials: "each" makes every trial a training sample, "mean" the mean over a level's trials
     Returns {(model, split): dataset} and the manifest, a row per model, level and trial.
     """
@@ -32,7 +35,7 @@ def build_datasets(presses, tactile, *, models, items, train_fraction, seed, tra
     check_items(items)
     for key in items:
         check_item(key, presses, tactile, models)
-    levels = assign_splits(list_levels(items, presses, models), train_fraction=train_fraction, seed=seed)
+    levels = assign_splits(list_levels(items, presses, models), train_fraction=train_fraction, seed=seed, split_by=split_by)
     check_splits(levels)
     check_no_map_leaks(levels, presses, models)
     samples = {split: order_samples(levels, tactile, split, seed=seed, training_trials=training_trials)
@@ -71,12 +74,13 @@ def check_converged(press, path):
 
 
 def check_items(items):
-    """Refuse an item that stands in two sets, or twice in one: a test must not hold what training saw."""
-    seen = {}
+    """Refuse an item that stands twice, and an object in two sets: a test must not hold what training saw."""
+    sets, seen = {}, set()
     for set_name, item in items:
-        if item in seen:
-            raise InputError(f"{item}: it is in the sets {seen[item]} and {set_name}; leave it in one of them.")
-        seen[item] = set_name
+        own = sets.setdefault(object_of(item), set_name)
+        if item in seen or own != set_name:
+            raise InputError(f"{item}: it is in the sets {own} and {set_name}; leave it in one of them.")
+        seen.add(item)
 
 
 def check_item(key, presses, tactile, models):
@@ -107,14 +111,15 @@ def list_levels(items, presses, models):
     return pd.DataFrame(rows, columns=["set", "item", "level", "force_n", "usable"])
 
 
-def assign_splits(levels, *, train_fraction, seed):
+def assign_splits(levels, *, train_fraction, seed, split_by="map"):
     """`levels` with the column split: train or validation by lot for indenters, else the level's set."""
     levels = levels.assign(split=levels["set"].where(levels.usable, OUT_OF_RANGE))
-    candidates = np.flatnonzero(levels.usable & (levels["set"] == TRAINING_SET))
-    shuffled = np.random.default_rng([seed, 0]).permutation(candidates)
-    n_train = round(train_fraction * len(shuffled))
-    levels.loc[shuffled[:n_train], "split"] = "train"
-    levels.loc[shuffled[n_train:], "split"] = "validation"
+    candidates = levels[levels.usable & (levels["set"] == TRAINING_SET)]
+    item = candidates["item"]
+    units = {"map": candidates.index.to_series(), "press": item, "object": item.map(object_of)}[split_by]
+    shuffled = np.random.default_rng([seed, 0]).permutation(units.unique())
+    trained = units.isin(shuffled[:round(train_fraction * len(shuffled))])
+    levels.loc[candidates.index, "split"] = np.where(trained, "train", "validation")
     return levels
 
 

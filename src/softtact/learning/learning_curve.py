@@ -4,16 +4,17 @@ import math
 
 import pandas as pd
 
-from softtact.evaluation.scoring import score_samples
+from softtact.evaluation.scoring import interval_over_objects, score_samples
 from softtact.learning.training import start_run, train_network
 
-COLUMNS = ["maps", "epochs", "set", "ssim", "mae_counts", "overlap"]
+COLUMNS = ["maps", "epochs", "set", "ssim", "ssim_low", "ssim_high", "mae_counts", "overlap"]
 
 
 def learning_curve(train, validation, tests, *, sizes, steps, network, options, ssim, seed, device):
     """Mean scores of networks trained on the first `sizes` maps of one shuffled order: a frame with COLUMNS, a row a size and set.
 
     tests {set: samples};  network, ssim as for `start_run` and `train_network`;  options: a `Training` with its learning rate
+    ssim_low, ssim_high: 95 % interval of the mean over objects and trials, not over seeds of the training
     steps: of the optimiser, as near as whole epochs allow, so that a large set is not also trained for longer
     """
     rows = []
@@ -27,6 +28,8 @@ def learning_curve(train, validation, tests, *, sizes, steps, network, options, 
             pass
         run.network.load_state_dict(run.best["weights"])
         for name, samples in tests.items():
-            means = score_samples(run.network, samples, ssim=ssim)[COLUMNS[3:]].mean()
-            rows.append({"maps": len(part), "epochs": epochs, "set": name, **means})
+            scores = score_samples(run.network, samples, ssim=ssim)
+            low, high = interval_over_objects(scores, seed=seed)
+            rows.append({"maps": len(part), "epochs": epochs, "set": name, "ssim_low": low, "ssim_high": high,
+                         **scores[["ssim", "mae_counts", "overlap"]].mean()})
     return pd.DataFrame(rows, columns=COLUMNS)

@@ -50,6 +50,11 @@ class Samples:
                        self.model, self.split, self.source)
 
 
+def object_of(item):
+    """The object of an item's name: `square-1` is the square in its first drawn pose."""
+    return item.partition("-")[0]
+
+
 LABELS = ("set", "item", "trial", "force_n")
 
 

@@ -18,6 +18,7 @@ def _rising(bounds):
 
 
 Widths = Annotated[tuple[PositiveInt, PositiveInt], pydantic.AfterValidator(_rising)]
+Share = Annotated[float, Field(gt=0.0, le=1.0)]
 Rates = Annotated[tuple[PositiveFloat, PositiveFloat], pydantic.AfterValidator(_rising)]
 
 
@@ -105,6 +106,21 @@ class Training(Section):
     threads: PositiveInt = Field(2, description="cores that the workflow gives to a training")
 
 
+class LearningCurve(Section):
+    """SSIM against the number of training maps: the same training on growing shares of them."""
+
+    shares: tuple[Share, ...] = Field((), description="of the training maps, rising; empty: no learning curve")
+    steps: PositiveInt = Field(300, description="of the optimiser at each share, so that more maps are not also trained for longer")
+    networks: tuple[Literal["printed", "searched", "compact"], ...] = Field(("compact",), min_length=1)
+
+    @pydantic.field_validator("shares")
+    @classmethod
+    def _rise(cls, shares):
+        if list(shares) != sorted(set(shares)):
+            raise ValueError("shares rise from one to the next; sort them and leave out doubles")
+        return shares
+
+
 class Ssim(Section):
     """Structural similarity of tactile maps."""
 
@@ -117,3 +133,19 @@ class Ssim(Section):
         if window % 2 == 0:
             raise ValueError("a window has a taxel at its centre; give an odd side")
         return window
+
+
+def chosen_network(network, best):
+    """Architecture and its options: as printed, as the search found them (`best`), or the compact one's."""
+    if network.architecture == "compact":
+        return {"architecture": "compact", "filters": network.compact.filters}
+    searched = {name: best[name] for name in ("filters", "dense")} if network.architecture == "searched" else {}
+    return {**network.model_dump(include={"filters", "dense", "activation"}), **searched}
+
+
+def chosen_training(options, network, best):
+    """`options` with the learning rate as a number: the search's, the stated one, or the compact network's own."""
+    if network.architecture == "compact":
+        own = {"learning_rate": network.compact.learning_rate, "epochs": network.compact.epochs or options.epochs}
+        return options.model_copy(update=own)
+    return options.model_copy(update={"learning_rate": best["learning_rate"]} if options.learning_rate == "searched" else {})

@@ -53,10 +53,10 @@ def _draw_ratios(axes, complexity, thresholds):
 
 
 def _label_objects(axes, names, x, y):
-    """Number the objects of figure 7; those at the same place share one label."""
+    """Number the objects of figure 7 in their first pose; those at the same place share one label."""
     places = {}
     for name, a, b in zip(names, x, y, strict=True):
-        if name.startswith("object_"):
+        if name.startswith("object_") and "-" not in name:
             places.setdefault((round(np.log10(a), 1), round(np.log10(b), 1)), []).append((name.removeprefix("object_"), a, b))
     for here in places.values():
         _, a, b = here[0]

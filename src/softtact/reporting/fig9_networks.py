@@ -2,11 +2,10 @@
 
 import numpy as np
 
-from softtact.reporting.style import colour, pyplot, ssim_label
+from softtact.reporting.style import ARCHITECTURE_LINES, colour, pyplot, ssim_label
 
 # An architecture is told by hatch and line, a model by its colour: apart in grey too.
 HATCHES = {"printed": "", "searched": "..", "compact": "////"}
-LINES = {"printed": "-", "searched": "-.", "compact": "--"}
 NO_INTERVAL = "one item:\nno interval"
 
 
@@ -19,7 +18,7 @@ def draw(networks, histories, *, choices=None):
     figure, (scores, loss, ssim) = plt.subplots(1, 3, figsize=(13, 4.6), layout="constrained", width_ratios=(1.3, 1, 1))
     _draw_scores(scores, networks, choices)
     for (model, architecture), history in histories.items():
-        style = {"color": colour(model), "ls": LINES[architecture], "marker": "." if len(history) < 40 else None}
+        style = {"color": colour(model), "ls": ARCHITECTURE_LINES[architecture], "marker": "." if len(history) < 40 else None}
         loss.plot(history.epoch, history.validation_loss, lw=1.6, **style)
         loss.plot(history.epoch, history.train_loss, lw=0.7, alpha=0.6, **style)
         ssim.plot(history.epoch, history.validation_ssim, lw=1.6, label=f"{model}, {architecture}", **style)

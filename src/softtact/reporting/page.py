@@ -23,7 +23,10 @@ CAPTIONS = {
     "fig8_policies": "Figure 8. Left: what each policy costs and which error it accepts, against the study's hyperelastic model. "
                      "Right: the error that was expected before the costly model ran, against the true one.",
     "fig9_networks": "Figure 9. The paper's network and another architecture on the same split. Left: mean SSIM with its 95 % "
-                     "interval (bootstrap over items, then trials). Right: loss and SSIM of the validation maps after each epoch.",
+                     "interval (bootstrap over objects, then trials). Right: loss and SSIM of the validation maps after an epoch.",
+    "fig10_learning_curve": "Figure 10. Mean SSIM against the number of training maps, with its 95 % interval (bootstrap over "
+                            "objects, then trials): equal steps of the optimiser for each. The reference's maps are those that the "
+                            "virtual sensor itself felt, so that line is what the same network reads from a perfect model.",
 }
 
 PAPERS_SENSOR = "coro: "     # how the line on it begins
@@ -63,7 +66,8 @@ def render_page(inputs, settings, *, folder):
               "counts": "The archive's counts against those in print",
               "policies": "Policies that choose a model, on the presses that the expected error was not calibrated on",
               "networks": "Architectures on the same split: scores with their 95 % interval, and times in s (epoch_s an epoch, "
-                          "map_s one map alone)"}
+                          "map_s one map alone)",
+              "limits": "What limits the scores: model, data or network"}
     tables = [{"title": title, "html": _html(pd.read_csv(inputs[name])), "link": _link(inputs[name], folder)}
               for name, title in titles.items() if name in inputs]
     ftir = read_json(inputs["ftir"])
@@ -81,11 +85,13 @@ def render_page(inputs, settings, *, folder):
 
 
 def _facts(settings):
+    said = {name: f"{settings[name]} {words} in {settings['presses'][name]} places, each read {settings['trials'][name]} times"
+            for name, words in (("indenters", "indenters"), ("unseen", "unseen ones"), ("grasps", "objects"))}
+    forces = ", ".join(f"{force:g}" for force in settings["forces_n"])
     another = "It is not the paper's sensor: the paper's numbers and claims below are another sensor's. "
     return (f"Sensor {settings['sensor']}. {'' if settings['sensor'].startswith(PAPERS_SENSOR) else another}"
-            f"{settings['indenters']} indenters, {settings['unseen']} unseen ones and {settings['grasps']} objects were pressed at "
-            f"{', '.join(f'{force:g}' for force in settings['forces_n'])} N with each model; the virtual sensor read each press "
-            f"{settings['trials']} times. Seed {settings['seed']}.")
+            f"Pressed at {forces} N with each model and read by the virtual sensor: {'; '.join(said.values())}. "
+            f"Seed {settings['seed']}.")
 
 
 def _archive_facts(settings, archive):

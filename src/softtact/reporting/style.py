@@ -7,6 +7,7 @@ from softtact.files import atomic_path
 # Dark blue, light orange and a green between: apart in grey as well.
 MODEL_COLOURS = {"hyperelastic": "#1f4e79", "elastic": "#e08214", "foundation": "#3f9c6d"}
 MODEL_NAMES = {name: name for name in MODEL_COLOURS}
+ARCHITECTURE_LINES = {"printed": "-", "searched": "-.", "compact": "--"}
 
 
 def pyplot():

@@ -5,11 +5,13 @@ inputs: ssim, ceiling;  outputs: png, svg;  settings: ssim {window, data_range}
 
 import pandas as pd
 
+from softtact.learning.samples import object_of
 from softtact.reporting.fig6_ssim import draw
 from softtact.reporting.style import save
 
 
 def run(*, inputs, outputs, settings, threads=1):
-    """Draw."""
-    figure = draw(pd.read_csv(inputs["ssim"]), pd.read_csv(inputs["ceiling"]), choices=settings["ssim"])
-    save(figure, outputs["png"], outputs["svg"])
+    """Draw; an object's presses in several places stand together."""
+    scores, ceiling = (pd.read_csv(inputs[name]) for name in ("ssim", "ceiling"))
+    together = (table.assign(item=table["item"].map(object_of)) for table in (scores, ceiling))
+    save(draw(*together, choices=settings["ssim"]), outputs["png"], outputs["svg"])

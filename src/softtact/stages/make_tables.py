@@ -9,6 +9,7 @@ import pandas as pd
 from softtact.evaluation.claims import claims
 from softtact.files import read_json, write_csv
 from softtact.geometry.complexity import choose_model
+from softtact.learning.samples import object_of
 from softtact.reporting.tables import PRINTED_COUNTS, contradictions, table1_materials, table2_complexity, table3_timing
 
 
@@ -20,6 +21,8 @@ def run(*, inputs, outputs, settings, threads=1):
     def choose(*counts, rule=settings["rule"]):
         return choose_model(*counts, rule=rule, **settings["thresholds"])
 
+    complexity = complexity[~complexity.object.map(object_of).duplicated()]     # each object in its first pose
+    ssim = ssim.assign(item=ssim["item"].map(object_of))
     write_csv(outputs["table1"], table1_materials(cards))
     write_csv(outputs["contradictions"], contradictions(cards))
     write_csv(outputs["table2"], table2_complexity(complexity, choose))

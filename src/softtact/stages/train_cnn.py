@@ -10,7 +10,7 @@ import pandas as pd
 from softtact.files import digest, read_json, write_csv
 from softtact.learning.network import save_network
 from softtact.learning.samples import read_samples
-from softtact.learning.settings import Network, Ssim, Training
+from softtact.learning.settings import Network, Ssim, Training, chosen_network, chosen_training
 from softtact.learning.training import prepare_torch, start_run, train_network
 
 HISTORY = ["epoch", "train_loss", "validation_loss", "validation_ssim", "learning_rate"]
@@ -33,22 +33,6 @@ def run(*, inputs, outputs, settings, threads=1):
         "model": train.model, "architecture": network.architecture, "source": train.source, "seed": seed, "range": train.range(),
         "config_digest": digest(settings)})
     checkpoint.unlink(missing_ok=True)
-
-
-def chosen_network(network, best):
-    """Architecture and its options: as printed, as the search found them, or the compact one's."""
-    if network.architecture == "compact":
-        return {"architecture": "compact", "filters": network.compact.filters}
-    searched = {name: best[name] for name in ("filters", "dense")} if network.architecture == "searched" else {}
-    return {**network.model_dump(include={"filters", "dense", "activation"}), **searched}
-
-
-def chosen_training(options, network, best):
-    """`options` with the learning rate as a number: the search's, the stated one, or the compact network's own."""
-    if network.architecture == "compact":
-        own = {"learning_rate": network.compact.learning_rate, "epochs": network.compact.epochs or options.epochs}
-        return options.model_copy(update=own)
-    return options.model_copy(update={"learning_rate": best["learning_rate"]} if options.learning_rate == "searched" else {})
 
 
 def write_results(outputs, training, *, facts):

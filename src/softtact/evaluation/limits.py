@@ -1,0 +1,63 @@
+"""What limits a score: the mechanical model, the number of maps, or the network with its training.
+
+Three differences of mean SSIM, each with all else equal:
+model    the same network on the reference's own maps, which the sensor felt, less that on the model's (at all maps, equal steps)
+data     all maps less the next smaller share of them (the same network, equal steps)
+network  the best network on the same maps (the two that the study trains, and the curve's) less the study's own
+The largest above `CLEAR` is named. Nothing here is chosen by these numbers.
+"""
+
+import numpy as np
+import pandas as pd
+
+from softtact.evaluation.claims import PRINTED_SSIM
+
+CLEAR = 0.01      # of mean SSIM: below, a difference is no more than another seed may make (assumed)
+COLUMNS = ["model", "set", "ssim", "paper", "sensor_ssim", "perfect_model_gain", "more_maps_gain", "other_network_gain", "limit",
+           "sentence"]
+WORDS = {"model": "the mechanical model", "data": "the number of maps", "network": "the network or its training"}
+
+
+def limits(curves, networks, *, own, tested, reference, source):
+    """Frame with COLUMNS, a row per tested model and set.
+
+    curves: learning_curve.csv of all models, the reference's (where there is one) among them;  networks: networks.csv
+    own: the study's architecture;  source: of the readings
+    """
+    compact = curves[curves.architecture == "compact"] if "compact" in set(curves.architecture) else curves
+    rows = []
+    for model in tested:
+        for set_name in curves["set"].unique():
+            scored = networks[(networks.model == model) & (networks["set"] == set_name)].set_index("architecture")
+            of_set = compact[compact["set"] == set_name]
+            rows.append(_row(model, set_name, scored, of_set[of_set.model == model], of_set[of_set.model == reference],
+                             own=own, source=source))
+    return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def _row(model, set_name, scored, curve, perfect, *, own, source):
+    curve, score = curve.sort_values("maps"), scored.ssim[own]
+    gains = {"model": perfect.sort_values("maps").ssim.iloc[-1] - curve.ssim.iloc[-1] if len(perfect) else np.nan,
+             "data": curve.ssim.iloc[-1] - curve.ssim.iloc[-2] if len(curve) > 1 else np.nan,
+             "network": max(scored.ssim.max(), curve.ssim.iloc[-1]) - score}
+    paper = PRINTED_SSIM.get(set_name, {}).get(model, np.nan)
+    limit = _largest(gains)
+    return {"model": model, "set": set_name, "ssim": score, "paper": paper, "sensor_ssim": scored.sensor_ssim.iloc[0],
+            "perfect_model_gain": gains["model"], "more_maps_gain": gains["data"], "other_network_gain": gains["network"],
+            "limit": limit, "sentence": _sentence(score, paper, curve, gains, limit, source)}
+
+
+def _largest(gains):
+    """The name of the largest clear gain, or `none`."""
+    clear = {name: gain for name, gain in gains.items() if gain > CLEAR}
+    return max(clear, key=clear.get, default="none")
+
+
+def _sentence(score, paper, curve, gains, limit, source):
+    against = "" if np.isnan(paper) else (f" ({'at least' if score >= paper else 'below'} the paper's {paper:g}, which is of other "
+                                          "readings)" if source != "published archive" else f" (paper: {paper:g})")
+    told = [f"a perfect model would bring {gains['model']:+.3f}" if not np.isnan(gains["model"]) else "",
+            f"going from {curve.maps.iloc[-2]} to {curve.maps.iloc[-1]} maps brought {gains['data']:+.3f}"
+            if not np.isnan(gains["data"]) else "", f"the best network trained here {gains['network']:+.3f}"]
+    end = f"what limits first is {WORDS[limit]}" if limit in WORDS else f"none of the three stands out by more than {CLEAR:g}"
+    return f"SSIM {score:.3f}{against}: {', '.join(filter(None, told))}; {end}."

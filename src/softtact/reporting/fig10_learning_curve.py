@@ -1,0 +1,33 @@
+"""Figure 10: SSIM against the number of training maps, a panel a set."""
+
+from softtact.reporting.style import ARCHITECTURE_LINES, colour, pyplot
+
+MARKS = {"elastic": "s", "foundation": "D", "hyperelastic": "o"}      # apart in grey too
+
+
+def draw(curves, ceiling):
+    """Figure of the learning_curve.csv of all models in one frame, and of ceiling.csv."""
+    plt = pyplot()
+    sets = list(curves["set"].unique())
+    figure, panels = plt.subplots(1, len(sets), figsize=(3.6 * len(sets), 4.2), sharey=True, squeeze=False, layout="constrained")
+    for axes, name in zip(panels[0], sets, strict=True):
+        _draw_set(axes, curves[curves["set"] == name])
+        own = ceiling[ceiling["set"] == name].ssim.mean()
+        if own == own:     # a sensor that was read once has none
+            axes.axhline(own, color="k", lw=1, ls=":", label="sensor against itself")
+        axes.set(title=name, xlabel="training maps with their readings", xscale="log")
+        sizes = sorted(curves.maps.unique())
+        axes.set_xticks(sizes, sizes, rotation=45)
+        axes.minorticks_off()
+    panels[0, 0].set_ylabel("SSIM (window 3, range 2400 counts)")
+    figure.legend(*panels[0, 0].get_legend_handles_labels(), frameon=False, fontsize=8, ncols=3, loc="outside lower center")
+    return figure
+
+
+def _draw_set(axes, curves):
+    kinds = list(curves.groupby(["model", "architecture"], sort=False))
+    for k, ((model, architecture), rows) in enumerate(kinds):
+        beside = 1.03 ** (k - 0.5 * (len(kinds) - 1))     # intervals of one number of maps stand beside each other
+        spread = [rows.ssim - rows.ssim_low, rows.ssim_high - rows.ssim]
+        axes.errorbar(rows.maps * beside, rows.ssim, yerr=spread, color=colour(model), ls=ARCHITECTURE_LINES[architecture],
+                      lw=1.4, ms=5, marker=MARKS.get(model, "^"), capsize=3, elinewidth=0.8, label=f"{model}, {architecture}")

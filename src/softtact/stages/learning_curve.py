@@ -1,0 +1,33 @@
+"""SSIM against the number of training maps of one model.
+
+inputs: train, validation, unseen, grasps, and best (of the search) where a network takes its rate from it
+outputs: curve (CSV);  settings: learning_curve, training, network, ssim, seed
+"""
+
+import pandas as pd
+
+from softtact.files import read_json, write_csv
+from softtact.learning.learning_curve import COLUMNS, learning_curve
+from softtact.learning.samples import read_samples
+from softtact.learning.settings import LearningCurve, Network, Ssim, Training, chosen_network, chosen_training
+from softtact.learning.training import prepare_torch
+
+TESTS = ("validation", "unseen", "grasps")
+
+
+def run(*, inputs, outputs, settings, threads=1):
+    """Train every network at every share; write a row per network, share and set."""
+    curve = LearningCurve.from_dict(settings["learning_curve"], where="learning_curve")
+    options = Training.from_dict(settings["training"], where="training")
+    best = read_json(inputs["best"]) if "best" in inputs else None
+    train, tests = read_samples(inputs["train"]), {name: read_samples(inputs[name]) for name in TESTS}
+    sizes = sorted({max(1, round(share * len(train))) for share in curve.shares})
+    shared = {"sizes": sizes, "steps": curve.steps, "ssim": Ssim.from_dict(settings["ssim"], where="ssim").model_dump(),
+              "seed": settings["seed"], "device": prepare_torch(threads=threads, device=options.device)}
+    tables = []
+    for kind in curve.networks:
+        network = Network.from_dict(settings["network"] | {"architecture": kind}, where="network")
+        table = learning_curve(train, tests["validation"], tests, network=chosen_network(network, best),
+                               options=chosen_training(options, network, best), **shared)
+        tables.append(table.assign(model=train.model, architecture=kind))
+    write_csv(outputs["curve"], pd.concat(tables)[["model", "architecture", *COLUMNS]])

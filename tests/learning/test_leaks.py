@@ -1,0 +1,78 @@
+"""Nothing that a test calls unseen was trained on: over the items of the studies' own configurations."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import yaml
+
+from softtact.config import load_study
+from softtact.errors import InputError
+from softtact.learning.dataset import assign_splits, check_items, list_levels
+from softtact.learning.samples import object_of
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module", params=["config", "paper"])
+def study(request):
+    """The default and the paper's study, whole."""
+    values, over = (yaml.safe_load((ROOT / f"config/{name}.yaml").read_text()) for name in ("config", request.param))
+    for key, value in over.items():
+        values[key] = values[key] | value if isinstance(value, dict) and key != "objects" else value
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(ROOT)
+        values["objects"].setdefault("catalogue", "config/objects/catalogue.yaml")
+        yield load_study(values)
+
+
+@pytest.fixture(params=["map", "press", "object"])
+def levels(study, request):
+    """All levels of a study, split in each of the ways, as if every press were valid; and the way."""
+    items = [(item.set, item.id) for item in study.items()]
+    check_items(items)
+    forces = np.array(study.values.forces_n)
+    press = SimpleNamespace(force_n=SimpleNamespace(values=forces), within_validity=SimpleNamespace(values=np.ones(len(forces))))
+    presses = {("elastic", *key): press for key in items}
+    split = assign_splits(list_levels(items, presses, ["elastic"]), train_fraction=0.8, seed=study.values.seed,
+                          split_by=request.param)
+    return split.assign(object=split["item"].map(object_of)), request.param
+
+
+def of(levels, *splits):
+    return levels[levels.split.isin(splits)]
+
+
+def shared(levels, column):
+    """What of a column stands both in training and in validation."""
+    return set(of(levels, "train")[column]) & set(of(levels, "validation")[column])
+
+
+def test_no_object_press_or_mesh_of_a_test_was_trained_on_or_chosen_by(study, levels):
+    levels, _ = levels
+    learnt, tests = of(levels, "train", "validation"), of(levels, "unseen", "grasps")
+    assert len(learnt) + len(tests) == len(levels) and len(tests) > 0
+    for column in ("object", "item"):
+        assert not set(learnt[column]) & set(tests[column])
+    meshes = {name: {Path(item.file).read_bytes() for item in items.values()} for name, items in study.items_of.items()}
+    assert not meshes["indenters"] & (meshes["unseen"] | meshes["grasps"]) and not meshes["unseen"] & meshes["grasps"]
+
+
+def test_training_and_validation_share_no_map_and_no_more_than_the_way_of_splitting_says(levels):
+    levels, way = levels
+    pairs = levels.assign(pair=levels["item"] + " " + levels.force_n.astype(str))
+    assert not shared(pairs, "pair") and pairs.pair.is_unique
+    assert bool(shared(levels, "item")) == (way == "map")
+    assert bool(shared(levels, "object")) == (way != "object")
+    assert abs(len(of(levels, "train")) / len(of(levels, "train", "validation")) - 0.8) < 0.05
+
+
+def test_no_object_is_pressed_twice_in_one_place(study):
+    places = [(item.object, None if item.pose is None else tuple(item.pose)) for item in study.items()]
+    assert len(set(places)) == len(places)
+
+
+def test_an_object_in_two_sets_is_refused_in_whatever_poses():
+    with pytest.raises(InputError, match="square-2: it is in the sets indenters and grasps"):
+        check_items([("indenters", "square"), ("indenters", "square-1"), ("grasps", "square-2")])
