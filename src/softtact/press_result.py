@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from softtact.errors import InputError
 from softtact.files import write_dataset
 
 
@@ -19,6 +20,7 @@ class PressResult:
     The last four are nan where the model, the law or the policy does not tell.
     why: what made the choice of the model, where it was not the user's
     x_mm (x,), y_mm (y,): the map's grid;  model;  solver: the linear solver's name
+    bodies: a `PressedBody` for each force where `Sensor.press` was asked to keep them, else none; not written with the maps
     """
 
     deformation_map_mm: np.ndarray
@@ -42,6 +44,7 @@ class PressResult:
     expected_error_mm: np.ndarray | None = None
     why: str = ""
     attributes: dict = field(default_factory=dict)
+    bodies: tuple = ()
 
     def __post_init__(self):
         if self.expected_error_mm is None:
@@ -49,6 +52,13 @@ class PressResult:
 
     _PER_FORCE = ("indentation_mm", "contact_area_mm2", "penetration_mm", "frustum_compression_mm", "residual_n",
                   "outside_card", "expected_error_mm", "iterations", "converged", "within_validity", "wall_time_s")
+
+    def pressed_body(self, level=-1):
+        """The `PressedBody` at the force of number `level`, by default the last one: nodes, cells and displacements."""
+        if not self.bodies:
+            raise InputError(f"This result of the {self.model} model keeps no body; press with model='hyperelastic' and "
+                             "keep_body=True.")
+        return self.bodies[level]
 
     def to_dataset(self):
         """The result as an xarray dataset with dimensions force, y, x, row, column."""

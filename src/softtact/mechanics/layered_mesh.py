@@ -9,10 +9,8 @@ from softtact.mechanics.elastic import elastic_slab, map_cells
 from softtact.mechanics.foundation import foundation_slab
 from softtact.mechanics.hyperelastic import NewtonSettings
 from softtact.mechanics.layered_body import MeshSettings, build_sensor_body
+from softtact.mechanics.pressed_body import VTK_HEX27, pressed_body
 
-# VTK's order of the nodes, by ours (bottom, top, middle of a plan of corners, mid-sides and centre).
-_VTK_HEX27 = np.array([0, 1, 2, 3, 9, 10, 11, 12, 4, 5, 6, 7, 13, 14, 15, 16, 18, 19, 20, 21, 25, 23, 22, 24, 8, 17, 26])
-_VTK_WEDGE18 = np.array([0, 1, 2, 6, 7, 8, 3, 4, 5, 9, 10, 11, 12, 13, 14, 15, 16, 17])
 _SCATTER_KEYS = ("height_scatter", "tip_scatter", "specimen")
 _SOLVER_KEYS = ("largest_penetration_mm",)
 
@@ -49,14 +47,7 @@ def layered_mesh(spec, values):
     settings = mesh_settings(values)
     body = build_sensor_body(spec, dielectric_law=None, cover_law=None, mesh=settings,   # a mesh has no material
                              scatter=frustum_scatter(spec, values))
-    sheet, cover, bed = body.slab.sheet_mesh, body.slab.cover_mesh, body.bed
-    first = np.cumsum([0, len(sheet.points), len(cover.points)])
-    frusta = (bed.mesh.hexes[None] + first[2] + (np.arange(bed.count) * bed.nodes)[:, None, None]).reshape(-1, 27)
-    cells = [("hexahedron27", frusta[:, _VTK_HEX27], 0), ("hexahedron27", sheet.hexes[:, _VTK_HEX27], 1),
-             ("wedge18", sheet.wedges[:, _VTK_WEDGE18], 1), ("hexahedron20", cover.hexes + first[1], 2)]
-    return meshio.Mesh(np.vstack([sheet.points, cover.points, bed.coordinates.reshape(-1, 3)]),
-                       [(kind, nodes) for kind, nodes, _ in cells],
-                       cell_data={"layer": [np.full(len(nodes), number) for _, nodes, number in cells]})
+    return pressed_body(body).to_meshio(displaced=False)
 
 
 def slab_mesh(spec, kind):
@@ -66,7 +57,7 @@ def slab_mesh(spec, kind):
     slab = elastic_slab(double, cells=cells) if kind == "elastic" else foundation_slab(double, _NO_LAW, _NO_LAW, cells=cells)
     points = slab.points - [*(0.5 * side for side in spec.footprint_mm), 0.0]
     layer = np.repeat(np.arange(len(slab.hexes)), slab.hexes.shape[1])
-    return meshio.Mesh(points, [("hexahedron27", slab.hexes.reshape(-1, 27)[:, _VTK_HEX27])], cell_data={"layer": [layer]})
+    return meshio.Mesh(points, [("hexahedron27", slab.hexes.reshape(-1, 27)[:, VTK_HEX27])], cell_data={"layer": [layer]})
 
 
 _NO_LAW = NeoHooke({"c10": 1.0}, bulk_modulus=1.0)     # a mesh has no material
