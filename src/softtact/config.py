@@ -154,6 +154,13 @@ class Choice(Section):
         description="errors that a user would accept, root mean square over the map")
 
 
+class SectionPress(Section):
+    """The press that figure 2 and the report's turning view show: a large force, with the deformed body kept."""
+
+    object: Name = Field(description="of the catalogue")
+    force_n: PositiveFloat
+
+
 class ItemSet(Section):
     """Objects of the catalogue, by name or `all` of a set, and the poses in which each is pressed."""
 
@@ -257,6 +264,7 @@ class Values(Section):
     ftir: Ftir
     complexity: Complexity
     choice: Choice
+    section: SectionPress
     forces_n: Forces
     models: dict[Name, Model]
     tested: list[Name] = Field(min_length=1, description="models that a network is trained for")
@@ -290,6 +298,7 @@ class Study:
 
     values: the configuration;  spec: the sensor
     materials: {name: MaterialConfig};  items_of: {set: {id: Item}} in the order of the configuration
+    section_item: what figure 2 presses
     archive: the published files that maps and readings come from, or None where they are generated
     """
 
@@ -297,6 +306,7 @@ class Study:
     spec: SensorSpec
     materials: dict
     items_of: dict
+    section_item: Item
     archive: Archive | None = None
 
     @property
@@ -349,7 +359,14 @@ def load_study(values, *, folder="config"):
     make_specimen(spec, seed=checked.seed, settings=VirtualSensorSettings.from_dict(checked.virtual_sensor))
     catalogue = _read_catalogue(Path(checked.objects.catalogue))
     items_of = {name: _items(name, getattr(checked.objects, name), catalogue) for name in SETS}
-    return Study(checked, spec, materials, items_of, _archive(checked))
+    return Study(checked, spec, materials, items_of, _section_item(checked, catalogue), _archive(checked))
+
+
+def _section_item(values, catalogue):
+    """The item that the section's press presses, centred."""
+    name = values.section.object
+    _refuse_unknown(name, list(catalogue), kind="object", where="the configuration, at 'section.object'")
+    return _item(catalogue[name], CENTRED, None)
 
 
 def _archive(values):
@@ -405,9 +422,9 @@ def _sentence(text):
 
 def _check_forces(values, spec):
     low, high = spec.force_range_n
-    for force in values.forces_n:
+    for key, force in [*(("forces_n", force) for force in values.forces_n), ("section.force_n", values.section.force_n)]:
         if not low < force <= high:
-            raise InputError(f"the configuration, at 'forces_n': {force:g} N is out of the range of {spec.name}, above "
+            raise InputError(f"the configuration, at '{key}': {force:g} N is out of the range of {spec.name}, above "
                              f"{low:g} and up to {high:g} N; leave it out or change the sensor's force_range_n.")
 
 

@@ -82,20 +82,25 @@ def card_of(layer):
 
 def model_files(wildcards):
     """The prepared files that a model's presses start from, as the configuration lists them under `needs`."""
-    return _prepared(wildcards, STUDY.values.models[wildcards.model].needs)
+    return needs_of(wildcards.model)
+
+
+def needs_of(model):
+    """The same of a model by its name."""
+    return _prepared(model, STUDY.values.models[model].needs)
 
 
 def compliance_files(wildcards):
     """The prepared files that a model's compliance is computed from."""
-    return _prepared(wildcards, STUDY.values.models[wildcards.model].prepared_from)
+    return _prepared(wildcards.model, STUDY.values.models[wildcards.model].prepared_from)
 
 
-def _prepared(wildcards, names):
+def _prepared(model, names):
     """Prepared files of a model by their names."""
     prepared = {
-        "mesh": f"{RESULTS}/sensor/{wildcards.model}/mesh.vtu",
-        "frustum_law": f"{RESULTS}/sensor/{wildcards.model}/frustum_law.npz",
-        "compliance": f"{RESULTS}/sensor/{wildcards.model}/compliance.npz",
+        "mesh": f"{RESULTS}/sensor/{model}/mesh.vtu",
+        "frustum_law": f"{RESULTS}/sensor/{model}/frustum_law.npz",
+        "compliance": f"{RESULTS}/sensor/{model}/compliance.npz",
         "card_dielectric": card_of("dielectric"),
         "card_cover": card_of("cover"),
     }
@@ -115,6 +120,20 @@ def mesh_of(model):
 def plain(section):
     """A section of the configuration as JSON values."""
     return section.model_dump(mode="json")
+
+
+def pressed_with(model, item, forces_n):
+    """The settings of a press of an item with a model of the configuration."""
+    chosen = STUDY.values.models[model]
+    return as_settings(
+        item=press_settings(item),
+        sensor=STUDY.sensor,
+        model=model,
+        kind=chosen.kind,
+        laws=chosen.laws,
+        mesh=mesh_of(model),
+        forces_n=forces_n,
+    )
 
 
 def presses(models):

@@ -2,8 +2,8 @@
 
 GRASPS = list(STUDY.items_of["grasps"].values())
 GRASP_UNITS = {item.id: item.unit for item in GRASPS}
-FROM_PRESSES = () if STUDY.archive else ("fig7_maps", "fig8_policies")     # an archive has no press of our objects
-FIGURES = ("fig4_complexity", "fig5_ftir", "fig6_ssim", *FROM_PRESSES, "fig9_networks")
+FROM_PRESSES = () if STUDY.archive else ("fig2_section", "fig7_maps", "fig8_policies")     # an archive has no press of our objects
+FIGURES = sorted(["fig4_complexity", "fig5_ftir", "fig6_ssim", *FROM_PRESSES, "fig9_networks"])
 
 
 def figure_files(name):
@@ -34,6 +34,27 @@ rule make_tables:
         benchmark_of("make_tables")
     shell:
         run_stage("make_tables")
+
+
+if not STUDY.archive:
+
+    rule draw_fig2_section:
+        input:
+            code=code("draw_fig2_section"),
+            body=rules.press_section.output.body,
+            summary=rules.press_section.output.summary,
+            object=STUDY.section_item.file,
+        output:
+            **figure_files("fig2_section"),
+        params:
+            files=files,
+            settings=as_settings(sensor=STUDY.sensor, unit=STUDY.section_item.unit, pose=STUDY.section_item.pose),
+        log:
+            log_of("draw_fig2_section"),
+        benchmark:
+            benchmark_of("draw_fig2_section")
+        shell:
+            run_stage("draw_fig2_section")
 
 
 rule draw_fig4_complexity:

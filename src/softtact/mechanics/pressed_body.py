@@ -12,7 +12,7 @@ REGIONS = ("frusta", "sheet", "cover")     # from below; their numbers are the c
 
 # VTK's order of the nodes, by ours (bottom, top, middle of a plan of corners, mid-sides and centre).
 VTK_HEX27 = np.array([0, 1, 2, 3, 9, 10, 11, 12, 4, 5, 6, 7, 13, 14, 15, 16, 18, 19, 20, 21, 25, 23, 22, 24, 8, 17, 26])
-_VTK_WEDGE18 = np.array([0, 1, 2, 6, 7, 8, 3, 4, 5, 9, 10, 11, 12, 13, 14, 15, 16, 17])
+VTK_WEDGE18 = np.array([0, 1, 2, 6, 7, 8, 3, 4, 5, 9, 10, 11, 12, 13, 14, 15, 16, 17])
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def pressed_body(body, state=None):
     first = np.cumsum([0, len(sheet.points), len(cover.points)])
     hexes = (frusta.hexes[None] + first[2] + (np.arange(body.bed.count) * body.bed.nodes)[:, None, None]).reshape(-1, 27)
     cells = (Cells("hexahedron27", hexes[:, VTK_HEX27], "frusta"), Cells("hexahedron27", sheet.hexes[:, VTK_HEX27], "sheet"),
-             Cells("wedge18", sheet.wedges[:, _VTK_WEDGE18], "sheet"), Cells("hexahedron20", cover.hexes + first[1], "cover"))
+             Cells("wedge18", sheet.wedges[:, VTK_WEDGE18], "sheet"), Cells("hexahedron20", cover.hexes + first[1], "cover"))
     return PressedBody(points_mm=np.vstack([sheet.points, cover.points, body.bed.coordinates.reshape(-1, 3)]),
                        displacement_mm=np.vstack([np.einsum("pm,pmd->pd", weights, slab[masters]),
                                                   cover.follow @ slab[:cover.free], bed.reshape(-1, 3)]),
