@@ -66,7 +66,12 @@ rule draw_fig4_complexity:
         **figure_files("fig4_complexity"),
     params:
         files=files,
-        settings=as_settings(thresholds=plain(STUDY.values.complexity)["thresholds"], units=list(GRASP_UNITS.items())),
+        settings=as_settings(
+            thresholds=plain(STUDY.values.complexity)["thresholds"],
+            objects=[{"name": item.id, "unit": item.unit, "pose": item.pose} for item in GRASPS],
+            footprint_mm=STUDY.spec.footprint_mm,
+            reach_mm=STUDY.spec.thickness_mm,
+        ),
     log:
         log_of("draw_fig4_complexity"),
     benchmark:
@@ -143,7 +148,7 @@ rule draw_fig7_maps:
         **figure_files("fig7_maps"),
     params:
         files=files,
-        settings=as_settings(units=list(GRASP_UNITS.items())),
+        settings=as_settings(units=list(GRASP_UNITS.items()), trials=STUDY.values.trials),
     log:
         log_of("draw_fig7_maps"),
     benchmark:

@@ -33,7 +33,7 @@ def draw(section, outline, *, spec, summary, y_mm):
         axes.set(xlim=(-half - 0.4, half + 0.4), ylim=(bottom - 0.25, height + 0.6), aspect="equal", ylabel="z (mm)")
         axes.set_title(title, fontsize=9, loc="left")
     reach = _CLOSE_PITCHES * spec.dielectric.frusta.pitch_mm
-    for axes, title in zip(close, ("close, at rest", "close, pressed: thin lines are the mesh's, each element cut in three"), strict=True):
+    for axes, title in zip(close, ("close, at rest", "close, pressed: thin lines: elements, each cut in three"), strict=True):
         axes.set(xlim=(middle - reach, middle + reach), ylim=(bottom - 0.12, bottom + 1.15), aspect="equal", xlabel="x (mm)",
                  ylabel="z (mm)")
         axes.set_title(title, fontsize=9, loc="left")

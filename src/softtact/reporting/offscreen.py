@@ -28,7 +28,7 @@ def _image(pyvista, number, view, size, arrays):
         faces = np.hstack([np.full((len(triangles), 1), 3), triangles]).astype(np.int64)
         surface = pyvista.PolyData(arrays[f"points_{number}_{p}"], faces.ravel())
         if look["as_lines"]:
-            plotter.add_mesh(surface.extract_all_edges(), color=look["colour"], line_width=1.2, opacity=look["opacity"])
+            plotter.add_mesh(surface.extract_all_edges(), color=look["colour"], line_width=1.8, opacity=look["opacity"])
         else:
             plotter.add_mesh(surface, color=look["colour"], opacity=look["opacity"], smooth_shading=look["edges"] is None,
                              split_sharp_edges=look["edges"] is None, show_edges=look["edges"] is not None,
