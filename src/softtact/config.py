@@ -6,7 +6,7 @@ that rules hand their stages plain values, and a comment in a YAML file reruns n
 
 import difflib
 import itertools
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Literal, get_args
 
@@ -328,6 +328,13 @@ class Study:
     def sensor(self):
         """The sensor's description as plain JSON values; what is assumed, and why, is left out."""
         return self.spec.model_dump(mode="json")
+
+    def named(self):
+        """What the configuration names, as plain JSON values: the sensor, the materials' settings, the items of each set."""
+        materials = {name: {"curves": material.curve_settings, "fit": material.fit_settings}
+                     for name, material in self.materials.items()}
+        items = {name: [asdict(item) for item in items.values()] for name, items in self.items_of.items()}
+        return {"sensor": self.sensor, "materials": materials, "items": items, "section": asdict(self.section_item)}
 
     def items(self):
         """The items of all sets, in order."""

@@ -3,6 +3,7 @@
 GRASPS = list(STUDY.items_of["grasps"].values())
 GRASP_UNITS = {item.id: item.unit for item in GRASPS}
 FROM_PRESSES = () if STUDY.archive else ("fig2_section", "fig7_maps", "fig8_policies")     # an archive has no press of our objects
+VIEWS = () if STUDY.archive else ("pressed_sensor",)      # HTML: they turn
 FIGURES = sorted(["fig4_complexity", "fig5_ftir", "fig6_ssim", *FROM_PRESSES, "fig9_networks"])
 
 
@@ -55,6 +56,25 @@ if not STUDY.archive:
             benchmark_of("draw_fig2_section")
         shell:
             run_stage("draw_fig2_section")
+
+
+    rule draw_pressed_sensor:
+        input:
+            code=code("draw_pressed_sensor"),
+            body=rules.press_section.output.body,
+            summary=rules.press_section.output.summary,
+            object=STUDY.section_item.file,
+        output:
+            html=f"{RESULTS}/figures/pressed_sensor.html",
+        params:
+            files=files,
+            settings=as_settings(unit=STUDY.section_item.unit, pose=STUDY.section_item.pose),
+        log:
+            log_of("draw_pressed_sensor"),
+        benchmark:
+            benchmark_of("draw_pressed_sensor")
+        shell:
+            run_stage("draw_pressed_sensor")
 
 
 rule draw_fig4_complexity:
@@ -193,9 +213,38 @@ rule draw_fig9_networks:
         run_stage("draw_fig9_networks")
 
 
+def drawn_by(stage):
+    """The source files that a figure's page links to: its stage, and what that draws with."""
+    files = [path for path in code(stage) if "/reporting/" in path and not path.endswith(("/style.py", "/render.py"))]
+    return [f"src/softtact/stages/{stage}.py", *files]
+
+
+def data_of(rule):
+    """What a rule without wildcards reads, its code left out."""
+    named = [paths for key, paths in rule.input.items() if key != "code"]
+    return [path for paths in named for path in ([paths] if isinstance(paths, str) else paths)]
+
+
+def data_of_material(name):
+    """What a material's picture is drawn from."""
+    modes = STUDY.materials[name].modes
+    return [f"{RESULTS}/materials/{name}.json", *(f"{RESULTS}/curves/{name}/{mode}.csv" for mode in modes)]
+
+
+SOURCES = {
+    **{f"material_{name}": {"data": data_of_material(name), "code": drawn_by("draw_material")} for name in STUDY.values.materials},
+    **{
+        name: {"data": data_of(getattr(rules, f"draw_{name}")), "code": drawn_by(f"draw_{name}")}
+        for name in (*FIGURES, *VIEWS)
+    },
+}
+STAGES = sorted(path.stem for path in Path("src/softtact/stages").glob("[!_]*.py"))
+
+
 rule report:
     input:
         code=code("report"),
+        sources=sorted({path for stage in STAGES for path in code(stage)}),
         table1=rules.make_tables.output.table1,
         contradictions=rules.make_tables.output.contradictions,
         table2=rules.make_tables.output.table2,
@@ -212,9 +261,14 @@ rule report:
         figures=[
             *(f"{RESULTS}/figures/material_{name}.png" for name in STUDY.values.materials),
             *(figure_files(name)["png"] for name in FIGURES),
+            *(f"{RESULTS}/figures/{name}.html" for name in VIEWS),
         ],
     output:
         page=f"{RESULTS}/report.html",
+        sources=f"{RESULTS}/sources.html",
+        config=f"{RESULTS}/config.yaml",
+        named=f"{RESULTS}/config_named.yaml",
+        run=f"{RESULTS}/tables/run.csv",
     params:
         files=files,
         settings=as_settings(
@@ -223,6 +277,10 @@ rule report:
             trials=STUDY.values.trials,
             forces_n=STUDY.values.forces_n,
             **{name: len(items) for name, items in STUDY.items_of.items()},
+            sources=SOURCES,
+            benchmarks=f"{RESULTS}/benchmarks",
+            config=plain(STUDY.values),
+            named=STUDY.named(),
         ),
     log:
         log_of("report"),

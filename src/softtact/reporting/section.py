@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from softtact.mechanics.elements import hex20, hex27, wedge18
+from softtact.mechanics.elements import HEX20_TOP, hex20, hex27, wedge18
 from softtact.mechanics.pressed_body import REGIONS, VTK_HEX27, VTK_WEDGE18
 
+_FACE_TRIANGLES = np.array([[0, 4, 7], [4, 1, 5], [5, 2, 6], [6, 3, 7], [4, 5, 6], [4, 6, 7]])     # of corners, then mid-sides
 _BESIDE_MM = 0.01     # a plane exactly through the frusta's axes would run along faces of elements
 
 
@@ -45,6 +46,16 @@ def read_body(path):
     cells = [(block.type, block.data[layer == number], int(number))       # a file has one block for each kind of cell
              for block, layer in zip(mesh.cells, mesh.cell_data["layer"], strict=True) for number in np.unique(layer)]
     return Body(mesh.points, mesh.point_data["displacement_mm"], cells)
+
+
+def top_surface(body):
+    """Points (n, 3) at rest, displacements (n, 3) in mm and triangles (m, 3) of the cover's upper side."""
+    hexes = np.vstack([nodes for kind, nodes, region in body.cells if region == REGIONS.index("cover")])
+    faces = hexes[:, HEX20_TOP]
+    faces = faces[(body.points_mm[faces, 2] > -1e-9).all(axis=1)]
+    used, numbers = np.unique(faces, return_inverse=True)
+    triangles = numbers.reshape(-1, 8)[:, _FACE_TRIANGLES].reshape(-1, 3)
+    return body.points_mm[used], body.displacement_mm[used], triangles
 
 
 def row_under_load(body, spec):
