@@ -1,11 +1,13 @@
 """Stands in for `python -m softtact.stages`: writes small outputs that follow from the command line alone.
 
 Usage: stub_runner.py NAME --in name=path ... --out name=path ... --settings JSON --threads N
-A press waits SOFTTACT_STUB_WAIT_S seconds, to be caught in the middle.
+A press waits SOFTTACT_STUB_WAIT_S seconds, to be caught in the middle. With SOFTTACT_STUB_KILLED=FOLDER each stage's first job
+kills itself after its first output, and leaves its name in the folder.
 """
 
 import hashlib
 import os
+import signal
 import sys
 import time
 from pathlib import Path
@@ -23,6 +25,16 @@ def main(arguments):
         time.sleep(float(os.environ.get("SOFTTACT_STUB_WAIT_S", "0")))
     for path in (Path(value.partition("=")[2]) for option, value in pairs if option == "--out"):
         write(path, f"{stage} {path.name} {digest.hexdigest()}\n")
+        kill_first(stage, path)
+
+
+def kill_first(stage, path):
+    """SIGKILL this process if it is the first of its stage, with a part of another file left beside the output."""
+    killed = os.environ.get("SOFTTACT_STUB_KILLED")
+    if killed and not Path(killed, stage).exists():
+        Path(killed, stage).touch()
+        path.with_name(f".{path.stem}-x7f{path.suffix}").write_text("half of a f")
+        os.kill(os.getpid(), signal.SIGKILL)
 
 
 def content(path):

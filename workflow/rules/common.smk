@@ -157,8 +157,11 @@ def hold_study():
 
     The system drops this lock when its holder dies, however it dies; Snakemake's own would stay behind.
     """
-    Path(RESULTS).mkdir(parents=True, exist_ok=True)
-    HELD.append(open(f"{RESULTS}/.running", "w"))
+    try:
+        Path(RESULTS).mkdir(parents=True, exist_ok=True)
+        HELD.append(open(f"{RESULTS}/.running", "w"))
+    except OSError as error:
+        raise WorkflowError(f"{RESULTS}: cannot be written to ({error.strerror}); make room or correct its permissions.") from None
     try:
         fcntl.flock(HELD[-1], fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:

@@ -6,6 +6,7 @@ td,th{border-bottom:1px solid #ddd;padding:4px 8px;text-align:left;vertical-alig
 figure{margin:2em 0}img{max-width:100%}figcaption,.links{font-size:14px;color:#444}nav a{margin-right:1em}
 .box{background:#fff6e0;border-left:4px solid #e0a000;padding:.6em 1em}.reproduced{background:#d9f0d9}.not{background:#f7d7d7}
 .contradicts{background:#ffe9c7}.needs{background:#e6e6f5}.undecided{background:#eee}summary{cursor:pointer}
+figure .links{margin-top:.4em}
 pre{font-size:12px;line-height:1.35;background:#f8f8f8;padding:1em;overflow-x:auto}"""
 
 PAGE = """<!doctype html><html lang="en"><head><meta charset="utf-8"><title>softtact: {{ study }}</title>
@@ -22,12 +23,12 @@ PAGE = """<!doctype html><html lang="en"><head><meta charset="utf-8"><title>soft
 <h2 id="figures">Figures</h2>{% for f in figures %}<figure id="{{ f.name }}">
 {% if f.html %}{{ f.html }}{% else %}<img alt="{{ f.caption }}" src="data:image/png;base64,{{ f.image }}">{% endif %}
 <figcaption>{{ f.caption }} {{ f.said }}</figcaption>
-<p class="links">{% for text, link in f.files %}<a href="{{ link }}">{{ text }}</a>{{ ", " if not loop.last }}{% endfor %}.
+<div class="links">{% for text, link in f.files %}<a href="{{ link }}">{{ text }}</a>{{ ", " if not loop.last }}{% endfor %}.
 Data: {% for text, link in f.data[:4] %}<a href="{{ link }}">{{ text }}</a>{{ ", " if not loop.last }}{% endfor %}
 {%- if f.data|length > 4 %}<details><summary>and {{ f.data|length - 4 }} more files</summary>
-{% for text, link in f.data[4:] %}<a href="{{ link }}">{{ text }}</a> {% endfor %}</details>{% endif %}
+{% for text, link in f.data[4:] %}<a href="{{ link }}">{{ text }}</a> {% endfor %}</details>{% else %}.{% endif %}
 Code: {% for text, link in f.code %}<a href="{{ link }}">{{ text }}</a>{{ ", " if not loop.last }}{% endfor %}.
-<a href="{{ config }}">Configuration</a>.</p></figure>{% endfor %}
+<a href="{{ config }}">Configuration</a>.</div></figure>{% endfor %}
 <h2 id="tables">Tables</h2>{% for t in tables %}<h3>{{ t.title }}</h3>{{ t.html }}
 <p class="links"><a href="{{ t.link }}">CSV</a>. Code: <a href="{{ t.code[1] }}">{{ t.code[0] }}</a>.
 <a href="{{ config }}">Configuration</a>.</p>{% endfor %}

@@ -14,10 +14,10 @@ COLUMNS = ["stage", "jobs", "total_s", "mean_s", "longest_s", "largest_memory_mb
 def run_record(folder):
     """A row for each stage with a benchmark below `folder`, and one of all: seconds of wall time, memory in MB.
 
-    Each job counts once, by its last run; a stage whose jobs are all from an earlier run is here, too.
+    Each job counts once, by its last run; a stage whose jobs are all from an earlier run is here, too. The report's own job is not.
     """
     rows = []
-    for stage in sorted(path for path in Path(folder).glob("*") if path.is_dir()):
+    for stage in sorted(path for path in Path(folder).glob("*") if path.is_dir() and path.name != "report"):
         jobs = pd.concat([_read(path) for path in sorted(stage.rglob("*.tsv"))] or [pd.DataFrame({"s": [], "max_rss": []})])
         if len(jobs):
             rows.append(_row(stage.name, jobs.s.to_numpy(), jobs.max_rss.to_numpy()))

@@ -5,9 +5,11 @@ then cuts these. No picture is rendered here.
 """
 
 from dataclasses import dataclass
+from xml.etree import ElementTree
 
 import numpy as np
 
+from softtact.errors import InputError
 from softtact.mechanics.elements import HEX20_TOP, hex20, hex27, wedge18
 from softtact.mechanics.pressed_body import REGIONS, VTK_HEX27, VTK_WEDGE18
 
@@ -39,13 +41,20 @@ class Body:
 
 
 def read_body(path):
-    """`Body` of a VTU file."""
+    """`Body` of a VTU file; a damaged one raises `InputError`."""
     import meshio
 
-    mesh = meshio.read(path)
+    try:
+        mesh = meshio.vtu.read(path)     # meshio.read would end the process
+        fields = mesh.cell_data["layer"], mesh.point_data["displacement_mm"]
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file.") from None
+    except (meshio.ReadError, ElementTree.ParseError, KeyError, ValueError, OSError) as error:
+        raise InputError(f"{path}: not a readable pressed sensor ({error}); delete it and make it again.") from None
+    layers, displacement = fields
     cells = [(block.type, block.data[layer == number], int(number))       # a file has one block for each kind of cell
-             for block, layer in zip(mesh.cells, mesh.cell_data["layer"], strict=True) for number in np.unique(layer)]
-    return Body(mesh.points, mesh.point_data["displacement_mm"], cells)
+             for block, layer in zip(mesh.cells, layers, strict=True) for number in np.unique(layer)]
+    return Body(mesh.points, displacement, cells)
 
 
 def top_surface(body):
