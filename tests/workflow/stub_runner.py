@@ -12,6 +12,8 @@ import sys
 import time
 from pathlib import Path
 
+DAMAGED = b"half of a f"     # refused, as a stage refuses what it cannot read
+
 
 def main(arguments):
     stage, options = arguments[0], arguments[1:]
@@ -20,7 +22,10 @@ def main(arguments):
     settings = dict(pairs)["--settings"]
     digest = hashlib.sha256((stage + settings).encode())
     for path in inputs:
-        digest.update(b"".join(content(Path(path))))
+        found = content(Path(path))
+        if DAMAGED in found:
+            sys.exit(f"{stage}: {path}: damaged; delete it and make it again.")
+        digest.update(b"".join(found))
     if stage == "simulate_press":
         time.sleep(float(os.environ.get("SOFTTACT_STUB_WAIT_S", "0")))
     for path in (Path(value.partition("=")[2]) for option, value in pairs if option == "--out"):
@@ -33,7 +38,7 @@ def kill_first(stage, path):
     killed = os.environ.get("SOFTTACT_STUB_KILLED")
     if killed and not Path(killed, stage).exists():
         Path(killed, stage).touch()
-        path.with_name(f".{path.stem}-x7f{path.suffix}").write_text("half of a f")
+        path.with_name(f".{path.stem}-x7f{path.suffix}").write_bytes(DAMAGED)
         os.kill(os.getpid(), signal.SIGKILL)
 
 

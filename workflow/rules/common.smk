@@ -17,6 +17,10 @@ except InputError as error:
 
 RESULTS = f"results/{STUDY.name}"
 
+_there = next(path for path in (Path(RESULTS), *Path(RESULTS).parents) if path.exists())
+if not _there.is_dir() or not os.access(_there, os.W_OK):
+    sys.exit(f"softtact: {RESULTS}: cannot be written to; {_there} is no folder, or not yours to write in: correct that.")
+
 # The running interpreter, activated or not. It reaches the shell by the environment, for where it lies is no reason to
 # run anything again.
 os.environ["SOFTTACT_PYTHON"] = sys.executable
@@ -157,11 +161,8 @@ def hold_study():
 
     The system drops this lock when its holder dies, however it dies; Snakemake's own would stay behind.
     """
-    try:
-        Path(RESULTS).mkdir(parents=True, exist_ok=True)
-        HELD.append(open(f"{RESULTS}/.running", "w"))
-    except OSError as error:
-        raise WorkflowError(f"{RESULTS}: cannot be written to ({error.strerror}); make room or correct its permissions.") from None
+    Path(RESULTS).mkdir(parents=True, exist_ok=True)
+    HELD.append(open(f"{RESULTS}/.running", "w"))
     try:
         fcntl.flock(HELD[-1], fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
