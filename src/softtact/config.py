@@ -315,6 +315,11 @@ class Study:
         return list(self.archive.simulated) if self.archive else self.values.tested
 
     @property
+    def models(self):
+        """The models that objects are pressed with, each once: those tested, those that policies choose among, the reference."""
+        return list(dict.fromkeys([*self.tested, *self.values.choice.models.values(), self.values.reference]))
+
+    @property
     def source(self):
         """What the readings are from, in words."""
         return PUBLISHED if self.archive else "virtual sensor"

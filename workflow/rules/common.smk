@@ -145,6 +145,18 @@ def presses(models):
     return [f"{RESULTS}/presses/{item.set}/{item.id}/{model}.nc" for model in models for item in STUDY.items()]
 
 
+def everything(workflow):
+    """All files of the study: one that went missing is made again, though what was made from it is still there."""
+    fixed = [path for rule in workflow.rules if not rule.has_wildcards() and rule.name != "all" for path in rule.output]
+    models = () if STUDY.archive else STUDY.models
+    sensor = [path for model in models for path in needs_of(model).values()]
+    materials = [path for name in STUDY.values.materials for path in (*data_of_material(name), *figure_files(f"material_{name}").values())]
+    learning = [path for name in ("model.pt", "history.csv", "timing.csv") for path in learned(name)]
+    learning += [f"{RESULTS}/learning/{model}/{name}" for model in STUDY.tested for name in ("search.csv", "best.json")]
+    readings = [] if STUDY.archive else [f"{RESULTS}/tactile/{item.set}/{item.id}.nc" for item in STUDY.items()]
+    return sorted({*fixed, *sensor, *materials, *learning, *presses(models), *readings})
+
+
 def samples_of():
     """What data sets are built from, as inputs: a file for each press and reading, or what the archive was turned into."""
     if STUDY.archive:
