@@ -16,10 +16,11 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 PARTS = ("workflow", "profiles", "config", "src")
-# What holds times, or is drawn from them: tables of times, the claims on them, the policies' costs, networks by seconds, the search's diary, the page.
+# What holds times, or is drawn from them: tables of times, the claims on them, the policies' costs, networks by seconds, the
+# searches' diaries, the page.
 TIMED = ("report.html", "tables/run.csv", "tables/table3_timing.csv", "tables/claims.csv", "tables/policies.csv",
-         "tables/networks.csv", "evaluation/timing.csv", "choice/presses.csv", "figures/fig8_policies", "figures/fig9_networks", "learning/elastic/search.journal",
-         "learning/hyperelastic/search.journal")
+         "tables/networks.csv", "evaluation/timing.csv", "choice/presses.csv", "figures/fig8_policies", "figures/fig9_networks",
+         "learning/elastic/search.journal", "learning/hyperelastic/search.journal")
 SKIPPED = ("logs/", "benchmarks/", ".running")
 TIMED_VARIABLES = ("wall_time_s",)
 
