@@ -9,6 +9,7 @@ include: "workflow/rules/common.smk"
 rule all:
     input:
         f"{RESULTS}/report.html",
+        lambda wildcards: everything(workflow),
 
 
 include: "workflow/rules/materials.smk"

@@ -73,32 +73,35 @@ def cheapest(errors, tolerance_mm):
     return next((name for name in ("elastic", "foundation") if errors[name].max() <= tolerance_mm), "hyperelastic")
 
 
-def press_auto(sensor, placed, forces, *, label, threads, policy, tolerance_mm):
-    """A press with the model that a policy takes; the result tells which, why, and with what error to expect."""
+def press_auto(sensor, placed, forces, *, label, threads, policy, tolerance_mm, keep_body=False):
+    """A press with the model that a policy takes; the result tells which, why, and with what error to expect.
+
+    label, threads, keep_body: passed on to the models' presses
+    """
     if policy not in POLICIES:
         raise InputError(f"The policy {policy!r} is unknown; use one of {', '.join(POLICIES)}.")
     if policy == "paper":
-        return _by_counts(sensor, placed, forces, label, threads)
+        return _by_counts(sensor, placed, forces, label=label, threads=threads, keep_body=keep_body)
     if not tolerance_mm > 0:
         raise InputError(f"The tolerance {tolerance_mm:g} mm is not positive; give the largest error of a map in mm.")
-    return _by_error(sensor, placed, forces, label, threads, tolerance_mm)
+    return _by_error(sensor, placed, forces, tolerance_mm, label=label, threads=threads, keep_body=keep_body)
 
 
-def _by_counts(sensor, placed, forces, label, threads):
+def _by_counts(sensor, placed, forces, **how):
     counts = score(placed.triangles, footprint_mm=sensor.spec.footprint_mm, reach_mm=sensor.spec.thickness_mm)
     model = choose_model(counts.NPt, counts.CHt, counts.NPo, counts.CHo)
-    result = PRESSES[model](sensor, placed, forces, label=label, threads=threads)
+    result = PRESSES[model](sensor, placed, forces, **how)
     why = (f"the paper's rule: NPt / CHt = {counts.ratio_total:.3g} ({TOTAL_THRESHOLD:g} asks for the hyperelastic model), "
            f"NPo / CHo = {counts.ratio_overlap:.3g} ({OVERLAP_THRESHOLD:g})")
     return replace(result, why=why)
 
 
-def _by_error(sensor, placed, forces, label, threads, tolerance_mm):
-    elastic = PRESSES["elastic"](sensor, placed, forces, label=label, threads=threads)
+def _by_error(sensor, placed, forces, tolerance_mm, **how):
+    elastic = PRESSES["elastic"](sensor, placed, forces, **how)
     try:
-        foundation = PRESSES["foundation"](sensor, placed, forces, label=label, threads=threads)
+        foundation = PRESSES["foundation"](sensor, placed, forces, **how)
     except ConvergenceError as error:
-        result = PRESSES["hyperelastic"](sensor, placed, forces, label=label, threads=threads)
+        result = PRESSES["hyperelastic"](sensor, placed, forces, **how)
         return replace(result, why=f"the foundation model tells no error: {error}", expected_error_mm=np.zeros(len(forces)))
     errors = expected_errors(elastic, foundation, height_mm=sensor.spec.dielectric.frusta.height_mm)
     model = cheapest(errors, tolerance_mm)
@@ -107,7 +110,7 @@ def _by_error(sensor, placed, forces, label, threads, tolerance_mm):
     if sensor.spec.name != CALIBRATED_ON:
         why += f" (calibrated on presses of the sensor {CALIBRATED_ON}, not of {sensor.spec.name})"
     if model == "hyperelastic":
-        result = PRESSES[model](sensor, placed, forces, label=label, threads=threads)
+        result = PRESSES[model](sensor, placed, forces, **how)
         spent = result.wall_time_s + elastic.wall_time_s + foundation.wall_time_s
         return replace(result, why=why, expected_error_mm=np.zeros(len(forces)), wall_time_s=spent)
     result = {"elastic": elastic, "foundation": foundation}[model]

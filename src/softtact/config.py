@@ -6,7 +6,7 @@ that rules hand their stages plain values, and a comment in a YAML file reruns n
 
 import itertools
 import zlib
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -150,6 +150,13 @@ class Choice(Section):
         description="errors that a user would accept, root mean square over the map")
 
 
+class SectionPress(Section):
+    """The press that figure 2 and the report's turning view show: a large force, with the deformed body kept."""
+
+    object: Name = Field(description="of the catalogue")
+    force_n: PositiveFloat
+
+
 class ItemSet(Section):
     """Objects of the catalogue, by name or `all` of a set, and the poses in which each is pressed: listed ones, then drawn ones."""
 
@@ -256,6 +263,7 @@ class Values(Section):
     ftir: Ftir
     complexity: Complexity
     choice: Choice
+    section: SectionPress
     forces_n: Forces
     models: dict[Name, Model]
     tested: list[Name] = Field(min_length=1, description="models that a network is trained for")
@@ -291,6 +299,7 @@ class Study:
 
     values: the configuration;  spec: the sensor
     materials: {name: MaterialConfig};  items_of: {set: {id: Item}} in the order of the configuration
+    section_item: what figure 2 presses
     archive: the published files that maps and readings come from, or None where they are generated
     """
 
@@ -298,6 +307,7 @@ class Study:
     spec: SensorSpec
     materials: dict
     items_of: dict
+    section_item: Item
     archive: Archive | None = None
 
     @property
@@ -333,6 +343,13 @@ class Study:
     def trials_of(self, set_name):
         """How often the virtual sensor reads each press of a set."""
         return getattr(self.values.objects, set_name).trials or self.values.trials
+
+    def named(self):
+        """What the configuration names, as plain JSON values: the sensor, the materials' settings, the items of each set."""
+        materials = {name: {"curves": material.curve_settings, "fit": material.fit_settings}
+                     for name, material in self.materials.items()}
+        items = {name: [asdict(item) for item in items.values()] for name, items in self.items_of.items()}
+        return {"sensor": self.sensor, "materials": materials, "items": items, "section": asdict(self.section_item)}
 
     def items(self):
         """The items of all sets, in order."""
@@ -391,7 +408,7 @@ def load_study(values, *, folder="config"):
     catalogue = read_catalogue(Path(checked.objects.catalogue))
     items_of = {name: _items(name, getattr(checked.objects, name), catalogue, spec=spec, seed=checked.seed) for name in SETS}
     _check_shapes(items_of)
-    study = Study(checked, spec, materials, items_of, _archive(checked))
+    study = Study(checked, spec, materials, items_of, _section_item(checked, catalogue), _archive(checked))
     _say_outside_paths(study, folder)
     return study
 
@@ -406,6 +423,13 @@ def _say_outside_paths(study, folder):
     for what, path in dict.fromkeys(named):
         if path is not None and not Path(path).resolve().is_relative_to(Path.cwd().resolve()):
             announce(f"the configuration, at {what!r}: {path} lies outside this project, {Path.cwd()}; it is read from there.")
+
+
+def _section_item(values, catalogue):
+    """The item that the section's press presses, centred."""
+    name = values.section.object
+    _refuse_unknown(name, list(catalogue), kind="object", where="the configuration, at 'section.object'")
+    return _item(catalogue[name], CENTRED, None, first=True)
 
 
 def _archive(values):
@@ -453,9 +477,9 @@ def _sentence(text):
 
 def _check_forces(values, spec):
     low, high = spec.force_range_n
-    for force in values.forces_n:
+    for key, force in [*(("forces_n", force) for force in values.forces_n), ("section.force_n", values.section.force_n)]:
         if not low < force <= high:
-            raise InputError(f"the configuration, at 'forces_n': {force:g} N is out of the range of {spec.name}, above "
+            raise InputError(f"the configuration, at '{key}': {force:g} N is out of the range of {spec.name}, above "
                              f"{low:g} and up to {high:g} N; leave it out or change the sensor's force_range_n.")
 
 

@@ -9,6 +9,10 @@ class InputError(SofttactError):
     """A file, a field or an argument is not usable as given."""
 
 
+class OutputError(SofttactError):
+    """A file cannot be written: the disk is full, or its folder is not writable."""
+
+
 class ConvergenceError(SofttactError):
     """A solver did not reach its tolerance; nothing of the unfinished step may be used.
 

@@ -1,32 +1,56 @@
 """Reading and writing: whole files or none, labelled, with their provenance inside."""
 
 import contextlib
+import errno
 import hashlib
+import io
 import json
 import os
 import tempfile
+import zipfile
 from pathlib import Path
 
+import numpy as np
+
 import softtact
-from softtact.errors import InputError
+from softtact.errors import InputError, OutputError
 
 
 @contextlib.contextmanager
 def atomic_path(path):
-    """Yield a temporary path beside `path`; rename it to `path` if the block succeeds, delete it otherwise."""
+    """Yield a temporary path beside `path`; rename it to `path` if the block succeeds, delete it otherwise.
+
+    A full disk, or a folder that cannot be written to, becomes an `OutputError`.
+    """
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
+    except OSError as error:
+        raise _not_written(path, error) from None
     os.close(handle)
     temporary = Path(name)
     try:
-        yield temporary
+        try:
+            yield temporary
+        except OSError as error:
+            if error.errno in _NO_ROOM:
+                raise _not_written(path, error) from None
+            raise
         umask = os.umask(0)
         os.umask(umask)
         temporary.chmod(0o666 & ~umask)  # mkstemp makes private files; results are to be shared
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+_NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EROFS)
+
+
+def _not_written(path, error):
+    return OutputError(f"{path}: cannot be written ({error.strerror or error}); make room on the disk, or its folder writable, "
+                       "and run again.")
 
 
 def files_below(paths, *, suffix):
@@ -72,8 +96,10 @@ def write_dataset(path, dataset, *, seed, settings):
         "config_digest": digest(settings),
         "seed": -1 if seed is None else int(seed),
     }
+    content = io.BytesIO()    # HDF5 itself leaves the process in ruins where the disk is full
+    dataset.assign_attrs(provenance).to_netcdf(content, engine="h5netcdf")
     with atomic_path(path) as temporary:
-        dataset.assign_attrs(provenance).to_netcdf(temporary, engine="h5netcdf")
+        temporary.write_bytes(content.getbuffer())
 
 
 def read_dataset(path):
@@ -86,3 +112,15 @@ def read_dataset(path):
         raise InputError(f"{path}: there is no such file.") from None
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: not a readable NetCDF file ({error}); delete it and make it again.") from None
+
+
+@contextlib.contextmanager
+def read_arrays(path):
+    """The arrays of an .npz file, open while a block reads them; a damaged file raises `InputError`."""
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            yield data
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file.") from None
+    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile) as error:
+        raise InputError(f"{path}: not a readable file of arrays ({error}); delete it and make it again.") from None

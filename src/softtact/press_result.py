@@ -4,8 +4,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from softtact.errors import InputError
 from softtact.files import write_dataset
-from softtact.pressed_mesh import PressedMesh, of_map
+from softtact.pressed_mesh import of_bodies, of_map
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class PressResult:
     why: what made the choice of the model, where it was not the user's
     largest_counts: where the sensor's readout ends
     x_mm (x,), y_mm (y,): the map's grid;  model;  solver: the linear solver's name
-    mesh: the solver's mesh with its displacements, where it was asked for (`Sensor.keep_mesh`) and the model has one
+    bodies: a `PressedBody` for each force where `Sensor.press` was asked to keep them, else none; not written with the maps
     """
 
     deformation_map_mm: np.ndarray
@@ -46,7 +47,7 @@ class PressResult:
     why: str = ""
     largest_counts: float = 2400.0
     attributes: dict = field(default_factory=dict)
-    mesh: PressedMesh | None = None
+    bodies: tuple = ()
 
     def __post_init__(self):
         if self.expected_error_mm is None:
@@ -54,6 +55,13 @@ class PressResult:
 
     _PER_FORCE = ("indentation_mm", "contact_area_mm2", "penetration_mm", "frustum_compression_mm", "residual_n",
                   "outside_card", "expected_error_mm", "iterations", "converged", "within_validity", "wall_time_s")
+
+    def pressed_body(self, level=-1):
+        """The `PressedBody` at the force of number `level`, by default the last one: nodes, cells and displacements."""
+        if not self.bodies:
+            raise InputError(f"This result of the {self.model} model keeps no body; press with model='hyperelastic' and "
+                             "keep_body=True.")
+        return self.bodies[level]
 
     def to_dataset(self):
         """The result as an xarray dataset with dimensions force, y, x, row, column."""
@@ -72,6 +80,8 @@ class PressResult:
 
     def write_vtu(self, path):
         """Write the pressed sensor as VTU: the solver's mesh where it was kept, else the map's surface (see `pressed_mesh`)."""
-        mesh = self.mesh or of_map(self.deformation_map_mm, self.x_mm, self.y_mm, self.force_n,
-                                   thickness_mm=self.attributes["thickness_mm"])
+        if self.bodies:
+            mesh = of_bodies(self.bodies, self.force_n)
+        else:
+            mesh = of_map(self.deformation_map_mm, self.x_mm, self.y_mm, self.force_n, thickness_mm=self.attributes["thickness_mm"])
         mesh.write(path)

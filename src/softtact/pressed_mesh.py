@@ -1,6 +1,6 @@
 """The pressed sensor as a mesh with displacements, for ParaView and `softtact view`.
 
-hyperelastic: the solver's own mesh, all of it (`Sensor.keep_mesh`), and the object's pressure on the cover's faces.
+hyperelastic: the solver's own mesh, all of it (`Sensor.press(keep_body=True)`), and the object's pressure on the cover's faces.
 elastic, foundation: the deformation map as a surface in the sensor's walls and bottom at rest; only the map's vertical
 displacement is known there, and no pressure on the map's grid.
 """
@@ -12,9 +12,8 @@ import numpy as np
 
 from softtact.errors import InputError
 from softtact.files import atomic_path
-from softtact.mechanics.vtk_cells import COVER, FRUSTA, SHEET, body_cells
 
-LAYERS = {"frusta": FRUSTA, "sheet": SHEET, "cover": COVER, "pressed face": 3, "wall at rest": 4}
+LAYERS = {"frusta": 0, "sheet": 1, "cover": 2, "pressed face": 3, "wall at rest": 4}
 _DISPLACEMENT, _PRESSURE = "displacement_mm_{:g}N", "contact_pressure_mpa_{:g}N"
 _LEVEL = re.compile(r"displacement_mm_(.+)N")
 # Faces of a cell of VTK's by its corners; the cells that are drawn by `surface`.
@@ -96,32 +95,13 @@ def of_map(maps_mm, x_mm, y_mm, force_n, *, thickness_mm):
     return PressedMesh(points=points, cells=cells, force_n=np.asarray(force_n), displacement_mm=moved)
 
 
-@dataclass(frozen=True)
-class KeptLevel:
-    """One level of a hyperelastic press: displacement_mm (n, 3) of the points of `body_cells`, pressure_mpa (t,) of top faces."""
-
-    displacement_mm: np.ndarray
-    pressure_mpa: np.ndarray
-
-
-def keep_level(body, state):
-    """The `KeptLevel` of a `BodyState`, in single precision; to be taken before the next level changes the contact."""
-    slab = state.slab.displacement
-    masters, weights = body.slab.sheet_nodes
-    sheet = np.einsum("pw,pwd->pd", weights, slab[masters])
-    cover = body.slab.cover_mesh.follow @ slab[:body.slab.cover_mesh.free]
-    moved = np.vstack([sheet, cover, state.bed.displacement.reshape(-1, 3)])
-    return KeptLevel(moved.astype(np.float32), body.slab.top.pressure_of_faces(state.slab).astype(np.float32))
-
-
-def of_body(body, force_n, kept):
-    """The `PressedMesh` of a hyperelastic press' `KeptLevel`s."""
-    points, cells = body_cells(body)
-    first = len(body.slab.sheet_mesh.points)
-    cells = [*cells, ("quad8", body.slab.cover_mesh.top + first, LAYERS["pressed face"])]
-    return PressedMesh(points=points, cells=cells, force_n=np.asarray(force_n),
-                       displacement_mm=np.stack([level.displacement_mm for level in kept]),
-                       pressure_mpa=np.stack([level.pressure_mpa for level in kept]))
+def of_bodies(bodies, force_n):
+    """The `PressedMesh` of a hyperelastic press' `PressedBody`s, one for each force."""
+    first = bodies[0]
+    cells = [(cells.kind, cells.nodes, LAYERS[cells.region]) for cells in first.cells]
+    return PressedMesh(points=first.points_mm, cells=[*cells, ("quad8", first.top, LAYERS["pressed face"])],
+                       force_n=np.asarray(force_n), displacement_mm=np.stack([body.displacement_mm for body in bodies]),
+                       pressure_mpa=np.stack([body.pressure_mpa for body in bodies]))
 
 
 def _outer_faces(kind, nodes):

@@ -12,8 +12,8 @@ from softtact.errors import ConvergenceError, OutsideCardWarning
 from softtact.mechanics import hyperelastic
 from softtact.mechanics.elastic import press_layer
 from softtact.mechanics.foundation_press import FoundationMaps, press_foundation
+from softtact.mechanics.pressed_body import pressed_body
 from softtact.press_result import PressResult
-from softtact.pressed_mesh import keep_level, of_body
 from softtact.progress import announce, progress
 from softtact.sensing.capacitance import ideal_counts
 
@@ -25,8 +25,8 @@ _MARGIN, _LEAST_MARGIN_MM = 1.3, 0.1     # of the depth on springs, within which
 _RISE = 1.15              # of the object's depth: points within may touch
 
 
-def press_elastic(sensor, placed, forces, *, label, threads):
-    """All levels at once with the elastic model."""
+def press_elastic(sensor, placed, forces, *, label, threads, keep_body=False):
+    """All levels at once with the elastic model, which has no body to keep: the surface's flexibility is all that it knows."""
     start, compliance = time.perf_counter(), sensor.prepared("elastic", threads)
     underside = Underside(HeightField(placed), compliance.grid)
     points, press = _within_reach(underside, underside.nodes, compliance.bedding, forces, sensor.spec.thickness_mm,
@@ -41,8 +41,8 @@ def press_elastic(sensor, placed, forces, *, label, threads):
                        frustum_compression_mm=unknown, residual_n=unknown, outside_card=unknown, iterations=contact.iterations)
 
 
-def press_on_foundation(sensor, placed, forces, *, label, threads):
-    """Level by level with the foundation model."""
+def press_on_foundation(sensor, placed, forces, *, label, threads, keep_body=False):
+    """Level by level with the foundation model, which has no body to keep."""
     start, flexibility = time.perf_counter(), sensor.prepared("foundation", threads)
     underside = Underside(HeightField(placed), flexibility.grid)
     levels, times = [], []
@@ -91,32 +91,36 @@ def _within_reach(underside, points_within, bedding, forces, deepest, solve, dep
         reach *= _MARGIN
 
 
-def press_hyperelastic(sensor, placed, forces, *, label, threads):
-    """Level by level with the hyperelastic model; a ConvergenceError holds the levels before."""
+def press_hyperelastic(sensor, placed, forces, *, label, threads, keep_body=False):
+    """Level by level with the hyperelastic model; a ConvergenceError holds the levels before.
+
+    keep_body: let the result hold the whole body's displacements at each level
+    """
     surface = HeightField(placed)
     body = sensor.body(threads=threads, surface=surface)
     grid = np.stack(np.meshgrid(sensor.spec.map_x_mm, sensor.spec.map_y_mm), axis=-1).reshape(-1, 2)
     sampling = body.slab.sampling(grid)
     announce(f"{label}: {body.bed.count} frusta, {len(forces)} force levels of the hyperelastic model, some seconds each")
-    record, times, kept = [], [], []
+    record, times, bodies = [], [], []
 
     def read(level):
         record.append(_read_level(body, sampling, level))
-        if sensor.keep_mesh:
-            kept.append(keep_level(body, level.state))
+        if keep_body:
+            bodies.append(pressed_body(body, level.state))
 
-    levels = (read(level) for level in hyperelastic.press_levels(body, surface, forces, settings=sensor.solver))
+    levels = (read(level)
+              for level in hyperelastic.press_levels(body, surface, forces, settings=sensor.solver))
     try:
         _timed(levels, forces, label, times)
     except ConvergenceError as error:
-        error.result = _of_record(sensor, body, record, forces, times, kept) if record else None
+        error.result = _of_record(sensor, body, record, forces, times, bodies) if record else None
         raise
     finally:
         body.close()
-    return _of_record(sensor, body, record, forces, times, kept)
+    return _of_record(sensor, body, record, forces, times, bodies)
 
 
-def _of_record(sensor, body, record, forces, times, kept):
+def _of_record(sensor, body, record, forces, times, bodies):
     maps, *numbers = zip(*record, strict=True)
     names = ("indentation_mm", "contact_area_mm2", "penetration_mm", "frustum_compression_mm", "residual_n", "outside_card",
              "iterations")
@@ -125,7 +129,7 @@ def _of_record(sensor, body, record, forces, times, kept):
     valid = numbers["frustum_compression_mm"] < _FULL_POCKET * sensor.spec.dielectric.frusta.height_mm
     result = make_result(sensor, "hyperelastic", body.solver.name, np.stack(maps), forces[:len(maps)], np.array(times),
                          within_validity=valid, **numbers)
-    return replace(result, mesh=of_body(body, result.force_n, kept)) if kept else result
+    return replace(result, bodies=tuple(bodies))
 
 
 def _warn_outside_card(shares, forces):

@@ -55,7 +55,6 @@ class Sensor:
     """A sensor with one law per layer; `mesh` sets the layered body's resolution, `solver` what counts as solved.
 
     files: {"elastic": Compliance, "foundation": FoundationFlexibility}, what the fast models start from; else the user's cache
-    keep_mesh: whether a hyperelastic result keeps its mesh with the displacements of each level, some MB
     """
 
     spec: SensorSpec
@@ -65,16 +64,17 @@ class Sensor:
     files: dict = field(default_factory=dict)
     scatter: tuple | None = None
     attributes: dict = field(default_factory=dict)
-    keep_mesh: bool = False
 
     def press(self, mesh, *, pose=None, force_n, model="auto", policy="paper", tolerance_mm=TOLERANCE_MM, label="press",
-              threads=None):
+              threads=None, keep_body=False):
         """Press a mesh (trimesh, mm) through forces (N, one or an increasing list) and return a `PressResult`.
 
         pose: `Pose` of the mesh in the sensor frame; by default its bounding box is centred over the sensor, its lowest
         side down. model: elastic, foundation, hyperelastic, or auto: chosen by a policy, `paper` (complexity of the contact)
         or `error` (the cheapest model that is expected to be within `tolerance_mm` of the hyperelastic one; see `choice`).
         threads: by default one for each core.
+        keep_body: let the result hold the deformed body at each force (`PressResult.pressed_body`), some 20 MB each; of the
+        hyperelastic model, for the others have displacements of the map's plane alone.
         Raises ConvergenceError at a force that is not reached; its `result` holds the forces before.
         """
         if model not in MODELS:
@@ -86,8 +86,9 @@ class Sensor:
         # Dense products of some hundred rows would wait for each other on more threads, up to five times as long.
         with threadpool_limits(limits=threads if model == "elastic" else 1):
             if model == "auto":
-                return press_auto(self, placed, forces, label=label, threads=threads, policy=policy, tolerance_mm=tolerance_mm)
-            return PRESSES[model](self, placed, forces, label=label, threads=threads)
+                return press_auto(self, placed, forces, label=label, threads=threads, policy=policy, tolerance_mm=tolerance_mm,
+                                  keep_body=keep_body)
+            return PRESSES[model](self, placed, forces, label=label, threads=threads, keep_body=keep_body)
 
     def press_many(self, meshes, poses=None, *, force_n, model="auto", workers=None, failures="raise", label="presses", **options):
         """Press each of `meshes` in its pose, all through the same forces; a list of `PressResult`s in their order.

@@ -1,11 +1,14 @@
 """Claims and tables: a verdict follows from the numbers, and changes with them."""
 
+import numpy as np
 import pandas as pd
 import pytest
+import xarray
 
 from softtact.evaluation.claims import claims
+from softtact.evaluation.features import feature_table
 from softtact.geometry.complexity import choose_model
-from softtact.reporting.tables import PRINTED_COUNTS, table2_complexity, table3_timing
+from softtact.reporting.tables import PRINTED_COUNTS, PRINTED_TIMES, table2_complexity, table3_timing
 
 
 def choose(*counts, rule="any"):
@@ -37,7 +40,8 @@ def table(**changes):
     timing = pd.DataFrame({"model": ["elastic", "hyperelastic"], "solver_s": [0.1, 100.0], "network_s": [0.01, 0.01]})
     complexity = pd.DataFrame({"object": ["object_1", "object_5"], "model": ["elastic", "hyperelastic"]})
     arguments = {"cards": [card()], "complexity": complexity, "ftir": ftir(0.005, "measured curve"), "ssim": scores(0.1),
-                 "timing": timing, "choose": choose, "printed_counts": PRINTED_COUNTS} | changes
+                 "timing": timing, "choose": choose, "printed_counts": PRINTED_COUNTS,
+                 "printed_times": PRINTED_TIMES} | changes
     return claims(**arguments).set_index("claim")
 
 
@@ -142,3 +146,91 @@ def test_table_3_sums_solver_and_network():
     frame = table3_timing(timing)
     assert frame[frame.source == "ours"].mean_s.iloc[0] == pytest.approx(0.3)
     assert frame[frame.source == "paper"].mean_s.iloc[0] == 37.4
+
+
+def test_what_the_papers_own_numbers_contradict_is_told():
+    frame = table()
+    assert verdict(frame, "Hyperelastic maps take 3.5 times") == "contradicts itself"          # table 3 gives 4.3
+    assert verdict(frame, "The data set holds 53,400 maps") == "contradicts itself"            # its parts make 46,200
+    assert verdict(frame, "The elastic model's longest time is 64") == "reproduced"
+    slower = PRINTED_TIMES | {"hyperelastic": (3.5 * 37.4, 48.0, 1863.0, 110.9)}
+    assert verdict(table(printed_times=slower), "Hyperelastic maps take 3.5 times") == "reproduced"
+
+
+def features(**shares):
+    """A row per object and model: the lower feature's share, and how many features the map has."""
+    rows = [{"item": item, "model": model, "force_n": 50.0, "features": count, "raised_mm": 0.4, "lower_mm": 0.4 * share,
+             "lower_sd_mm": 0.01, "lower_points": 20, "lower_share": share, "frustum_share": strain}
+            for item in ("object_1", "object_3", "object_4", "object_5", "object_6")
+            for model, share, count, strain in (("elastic", shares.get("elastic", 0.0), shares.get("few", 3), np.nan),
+                                                ("hyperelastic", shares.get("hyperelastic", 0.5),
+                                                 shares.get("many", 4) if item in ("object_5", "object_6")
+                                                 else shares.get("few", 3), shares.get("strain", 0.4)))]
+    return pd.DataFrame(rows)
+
+
+DETAILED = pd.DataFrame({"object": ["object_1", "object_3", "object_5", "object_6"], "NPt": [20, 20, 200, 200], "CHt": 10,
+                         "NPo": 10, "CHo": 10, "model": ["elastic", "elastic", "hyperelastic", "hyperelastic"]})
+
+
+@pytest.mark.parametrize(("shares", "start", "expected"), [
+    ({}, "object 5: the elastic model loses", "reproduced"),
+    ({"elastic": 0.2}, "object 5: the elastic model loses", "not reproduced"),
+    ({"hyperelastic": 0.05}, "object 6: the elastic model loses", "not reproduced"),
+    ({}, "object 4: both models show", "reproduced"),
+    ({"few": 1}, "object 4: both models show", "not reproduced"),
+    ({}, "On detailed objects the elastic", "reproduced"),
+    ({"many": 3}, "On detailed objects the elastic", "not reproduced"),
+    ({}, "Objects with NPt of ten times", "reproduced"),
+    ({"many": 3}, "Objects with NPt of ten times", "not reproduced"),
+    ({}, "The dielectric is strained so much", "reproduced"),
+    ({"strain": 0.05}, "The dielectric is strained so much", "not reproduced")])
+def test_maps_decide_what_is_seen_and_what_is_lost(shares, start, expected):
+    frame = table(features=features(**shares), complexity=DETAILED)
+    assert verdict(frame, start) == expected
+    assert verdict(table(complexity=DETAILED), start) == "undecided"            # nothing was pressed
+
+
+def test_a_lower_feature_is_found_by_its_height_and_features_are_counted():
+    heights = np.full((57, 33), np.nan)
+    heights[5:15, 5:25], heights[30:40, 5:25], heights[45:50, 5:25] = 0.0, 0.5, 2.0
+    values = np.zeros((57, 33))
+    values[5:15, 5:25], values[30:40, 5:25] = 0.4, 0.1
+    press = xarray.Dataset({"deformation_map_mm": (("force", "y", "x"), values[None]), "force_n": ("force", [50.0]),
+                            "frustum_compression_mm": ("force", [0.2])}, attrs={"item": "object_5", "model": "hyperelastic"})
+    row = feature_table([press], {"object_5": heights}, frustum_height_mm=0.5).iloc[0]
+    assert (row.features, row.lower_points, row.lower_share, row.frustum_share) == (1, 200, pytest.approx(0.25), 0.4)
+
+
+def test_a_wider_spread_is_named_where_it_is_clear():
+    wide = scores(0.0)
+    wide.loc[wide.model == "elastic", "ssim"] += 0.3 * wide.item.str[-1].astype(int)
+    wide.loc[wide.model == "hyperelastic", "ssim"] += 0.001 * wide.item.str[-1].astype(int)
+    name = "The elastic model's SSIM varies more"
+    assert verdict(table(ssim=wide), name) == "reproduced"
+    other = wide.assign(model=wide.model.map({"elastic": "hyperelastic", "hyperelastic": "elastic"}))
+    assert verdict(table(ssim=other), name) == "not reproduced"
+    assert verdict(table(ssim=scores(0.1, items=("object_1", "object_2"))), name) == "undecided"
+
+
+def test_repeated_readings_decide_on_hysteresis_only_if_they_are_the_papers():
+    ceiling = pd.DataFrame({"set": "grasps", "item": "object_1", "force_n": [10.0, 50.0], "ssim": [0.97, 0.99]})
+    name = "Readings of the same press scatter"
+    assert verdict(table(ceiling=ceiling), name) == "needs the archive"
+    assert verdict(table(ceiling=ceiling, source="published archive"), name) == "reproduced"
+    assert verdict(table(ceiling=ceiling.assign(ssim=0.9999), source="published archive"), name) == "not reproduced"
+    assert verdict(table(), name) == "undecided"
+
+
+def test_every_claim_has_its_place_rule_evidence_and_uncertainty_and_none_comes_twice():
+    frame = table(features=features(), complexity=DETAILED).reset_index()
+    assert len(frame) >= 15 and frame.claim.is_unique
+    assert not (frame == "").any(axis=None)
+
+
+def test_each_score_comes_with_its_interval():
+    summary = pd.DataFrame([{"model": "elastic", "set": "grasps", "ssim_low": 0.5, "ssim_high": 0.7},
+                            {"model": "elastic", "set": "unseen", "ssim_low": np.nan, "ssim_high": np.nan}])
+    frame = table(summary=summary)
+    assert frame.loc["SSIM of the elastic model on grasps"].uncertainty == "95 % interval 0.500 to 0.700"
+    assert "no interval" in frame.loc["SSIM of the elastic model on unseen"].uncertainty

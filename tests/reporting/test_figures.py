@@ -1,13 +1,16 @@
 """Figures draw what they are given and are written whole, twice the same; the page holds them and links its data."""
 
+import sys
+
 import numpy as np
 import pandas as pd
 import pytest
 import trimesh
 
 from softtact.files import write_csv, write_json
-from softtact.reporting import fig4_complexity, fig5_ftir, fig6_ssim, fig7_maps, fig9_networks, fig10_learning_curve
+from softtact.reporting import fig4_complexity, fig5_ftir, fig6_ssim, fig7_maps, fig9_networks, fig10_learning_curve, render
 from softtact.reporting.page import render_page
+from softtact.reporting.run_record import run_record
 from softtact.reporting.style import draw_map, pyplot, save
 
 SSIM = pd.DataFrame([{"model": model, "set": name, "item": item, "trial": trial, "force_n": 10.0, "mae_counts": 9.0,
@@ -15,6 +18,7 @@ SSIM = pd.DataFrame([{"model": model, "set": name, "item": item, "trial": trial,
                      for model in ("elastic", "hyperelastic") for name in ("validation", "unseen", "grasps")
                      for item in ("object_1", "object_2") for trial in (0, 1)])
 CEILING = SSIM[SSIM.model == "elastic"][["set", "item", "force_n", "ssim"]]
+NO_RUN = run_record("nowhere")
 COMPLEXITY = pd.DataFrame({"object": ["object_1", "object_2"], "NPt": [100, 900], "CHt": [50, 50], "NPo": [20, 400],
                            "CHo": [20, 20], "model": ["elastic", "hyperelastic"]})
 
@@ -61,19 +65,59 @@ def test_figure_6_shows_the_mean_of_every_item_and_model():
     assert "n = 4" in figure.axes[2].get_title()
 
 
-def test_figure_4_draws_one_object_for_each_chosen_model_and_all_ratios():
-    meshes = {name: trimesh.creation.box((4, 4, 4)) for name in COMPLEXITY.object}
+@pytest.fixture
+def without_renderer(monkeypatch):
+    """A renderer that dies as a broken driver does; figures then draw their views themselves, which is quicker, too."""
+    monkeypatch.setattr(render, "_COMMAND", (sys.executable, "-S", "-c", "import os; os.abort()"))
+
+
+def placed(name):
+    mesh = trimesh.creation.box((4, 4, 4))
+    mesh.apply_translation((0, 0, 2))
+    return fig4_complexity.Placed(mesh, (22.0, 37.0), 2.5)
+
+
+def test_figure_4_draws_the_printed_objects_else_one_for_each_chosen_model_and_all_ratios(without_renderer):
+    meshes = {name: placed(name) for name in COMPLEXITY.object}
     indenter = COMPLEXITY.iloc[:1].assign(object="square", NPt=150)     # comes first and has no mesh to draw
     figure = fig4_complexity.draw(pd.concat([indenter, COMPLEXITY]), meshes, thresholds={"total": 10, "overlap": 8})
-    assert [axes.get_title().split(":")[0] for axes in figure.axes[:-1]] == ["object_1", "object_2"]
+    assert [axes.get_title() for axes in figure.axes[:-1]] == [
+        "object 1: elastic\nmesh NPt 100, hull CHt 50", "over the sensor: NPo 20, CHo 20",
+        "object 2: hyperelastic\nmesh NPt 900, hull CHt 50", "over the sensor: NPo 400, CHo 20"]
     points = np.vstack([collection.get_offsets() for collection in figure.axes[-1].collections])
     assert sorted(points[:, 0]) == pytest.approx([2, 3, 18])
+    both = COMPLEXITY.assign(object=["object_3", "object_6"])
+    assert fig4_complexity.chosen_objects(pd.concat([COMPLEXITY, both]), dict.fromkeys([*both.object, "object_1"])) == [
+        "object_3", "object_6"]
 
 
-def test_figure_7_outlines_only_the_chosen_model():
+def test_a_figure_says_that_matplotlib_drew_its_views(without_renderer, capsys):
+    figure = fig4_complexity.draw(COMPLEXITY, {name: placed(name) for name in COMPLEXITY.object},
+                                  thresholds={"total": 10, "overlap": 8})
+    assert [text.get_text() for text in figure.texts] == [render.FALLBACK]
+    assert f"{render.FALLBACK} (status" in capsys.readouterr().err
+
+
+def test_a_view_is_rendered_without_a_display(monkeypatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    box = trimesh.creation.box((4, 4, 4))
+    image, = render.rendered([render.View([render.part_of(box, colour="#ff0000")])], size=(120, 90))
+    assert image.shape == (90, 120, 3)
+    red = (image[..., 0] > 60) & (image[..., 1] < 60)
+    assert 0.1 < red.mean() < 0.9 and (image[0, 0] == 255).all()
+
+
+def test_a_renderer_that_does_not_answer_is_given_up(monkeypatch, capsys):
+    monkeypatch.setattr(render, "_COMMAND", (sys.executable, "-S", "-c", "import time; time.sleep(30)"))
+    assert render.rendered([render.View()], timeout_s=0.3) is None
+    assert "no answer within 0.3 s" in capsys.readouterr().err
+
+
+def test_figure_7_outlines_only_the_chosen_model(without_renderer):
     maps = {"elastic": np.ones((57, 33)), "hyperelastic": np.ones((57, 33))}
     counts = {model: np.ones((7, 4)) for model in maps}
-    item = {"name": "object_5", "mesh": trimesh.creation.box((4, 4, 4)), "chosen": "elastic", "force": 50.0, "deformation": maps,
+    item = {"name": "object_5", "mesh": trimesh.creation.box((4, 4, 4)), "chosen": "elastic", "force": 50.0, "trials": 5,
+            "deformation": maps,
             "tactile": counts, "sensor": np.ones((7, 4)), "extent": (-11, 11, -18.5, 18.5)}
     figure = fig7_maps.draw([item], largest_counts=2400)
     red = [axes.get_ylabel().split("\n")[0] for axes in figure.axes
@@ -116,12 +160,16 @@ def test_the_page_holds_its_figures_and_links_its_data(tmp_path):
     inputs["figures"] = [folder / "figures" / f"{name}.png" for name in ("fig6_ssim", "fig5_ftir", "material_foam")]
     for path in inputs["figures"]:
         save(fig6_ssim.draw(SSIM, CEILING), path)
+    source = {"data": [folder / "evaluation/ssim.csv"], "code": ["src/softtact/stages/draw_fig6_ssim.py"]}
     facts = {"study": "mine", "sensor": "pad: 30 x 20 mm", "indenters": 3, "unseen": 1, "grasps": 2, "forces_n": [10.0], "seed": 1,
-             "presses": {"indenters": 4, "unseen": 1, "grasps": 2}, "trials": {"indenters": 2, "unseen": 2, "grasps": 50}}
-    page = render_page(inputs, facts, folder=folder)
+             "presses": {"indenters": 4, "unseen": 1, "grasps": 2}, "trials": {"indenters": 2, "unseen": 2, "grasps": 50},
+             "sources": {"fig6_ssim": source}}
+    page = render_page(inputs, facts, folder=folder, run=NO_RUN)
     assert page.count("data:image/png;base64,") == 3
     assert page.count("The words allow this.") == 1 and "Material foam: test curves" in page
     assert 'href="figures/fig6_ssim.svg"' in page and 'href="tables/table2.csv"' in page
+    assert 'href="evaluation/ssim.csv"' in page and 'href="sources.html#softtact/stages/draw_fig6_ssim.py"' in page
+    assert 'href="sources.html#config"' in page
     assert "pad: 30 x 20 mm. It is not the paper" in page
     assert "0.500 to 0.700" in page and "one item: none" in page
     assert "3 indenters in 4 places, each read 2 times" in page and "2 objects in 2 places, each read 50 times" in page
@@ -141,7 +189,7 @@ def test_the_page_of_an_archives_study_tells_of_the_archive_and_of_no_virtual_se
     write_json(inputs["inventory"], {"tests": 9, "tests_used": 8, "tests_left_out": 1, "items": items,
                                      "sentence": "No count is met."})
     save(fig6_ssim.draw(SSIM, CEILING.iloc[:0]), inputs["figures"][0])
-    page = render_page(inputs, {"study": "published", "seed": 1}, folder=tmp_path)
+    page = render_page(inputs, {"study": "published", "seed": 1, "sources": {}}, folder=tmp_path, run=NO_RUN)
     assert "8 of 9 tests of 2 indenters, 1 held-out ones" in page and "No count is met." in page
     assert "counts against those in print" in page and "Policies that choose" not in page
     assert "virtual sensor" not in page

@@ -15,7 +15,7 @@ def results(project):
     folder = project.folder / "results/tiny"
     skipped = ("logs", "benchmarks", ".running")
     paths = [path for path in sorted(folder.rglob("*")) if path.is_file()]
-    named = {str(path.relative_to(folder)): path.read_bytes() for path in paths}
+    named = {str(path.relative_to(folder)): path.read_bytes() for path in paths if not path.name.startswith(".")}
     return {name: content for name, content in named.items() if not name.startswith(skipped)}
 
 
@@ -42,6 +42,35 @@ def test_a_killed_run_resumes_and_gives_the_files_of_an_undisturbed_one(killed, 
     resumed = killed.snakemake()
     assert "Missing output files" in resumed.stdout
     assert results(killed) == results(finished_once)
+
+
+def test_sigkill_in_every_stage_is_survived_and_ends_with_the_same_files(finished_once, tmp_path):
+    """The first job of each stage dies after its first output; a job that is tried again is what the next run would run."""
+    project, killed = Project.of_sources(tmp_path / "project"), tmp_path / "killed"
+    killed.mkdir()
+    project.snakemake("--retries", "1", environment={"SOFTTACT_STUB_KILLED": str(killed)})
+    stages = {path.stem for path in (project.folder / "src/softtact/stages").glob("[!_]*.py")} - {"import_published"}
+    assert {path.name for path in killed.iterdir()} == stages
+    assert results(project) == results(finished_once)
+
+
+def test_a_damaged_file_is_told_and_when_deleted_made_again_with_all_that_comes_of_it(finished, finished_once):
+    damaged = finished.folder / "results/tiny/presses/grasps/object_5/elastic.nc"
+    damaged.write_text("half of a f")
+    refused = finished.snakemake(check=False)
+    assert refused.returncode != 0
+    assert "presses/grasps/object_5/elastic.nc: damaged" in refused.stdout
+    damaged.unlink()
+    finished.snakemake()
+    assert results(finished) == results(finished_once)
+
+
+def test_results_that_cannot_be_written_are_told_in_one_sentence(tmp_path):
+    project = Project.of_sources(tmp_path)
+    (project.folder / "results").write_text("a file, where a folder is wanted")
+    done = project.snakemake(check=False)
+    assert done.returncode != 0 and "Traceback" not in done.stdout
+    assert "results/tiny: cannot be written to" in done.stdout
 
 
 def test_a_second_run_beside_a_running_one_is_refused(tmp_path):

@@ -76,7 +76,7 @@ def test_an_edit_of_the_networks_code_reruns_learning_and_no_simulation(finished
 @pytest.mark.parametrize("stage", FIGURES)
 def test_an_edit_of_a_figures_code_redraws_that_figure_only(finished, stage):
     others = [figure for figure in FIGURES if figure != stage]
-    own = own_files(finished, stage, but_not=[*others, "report", "make_tables", "fit_material"])
+    own = own_files(finished, stage, but_not=[*others, "report", "make_tables", "fit_material", "simulate_press"])
     for path in own:
         edit_source(finished, path)
     assert set(finished.plan()) == {stage, "report"}

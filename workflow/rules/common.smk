@@ -18,6 +18,10 @@ except InputError as error:
 
 RESULTS = f"results/{STUDY.name}"
 
+_there = next(path for path in (Path(RESULTS), *Path(RESULTS).parents) if path.exists())
+if not _there.is_dir() or not os.access(_there, os.W_OK):
+    sys.exit(f"softtact: {RESULTS}: cannot be written to; {_there} is no folder, or not yours to write in: correct that.")
+
 # The running interpreter, activated or not. It reaches the shell by the environment, for where it lies is no reason to
 # run anything again.
 os.environ["SOFTTACT_PYTHON"] = sys.executable
@@ -83,20 +87,25 @@ def card_of(layer):
 
 def model_files(wildcards):
     """The prepared files that a model's presses start from, as the configuration lists them under `needs`."""
-    return _prepared(wildcards, STUDY.values.models[wildcards.model].needs)
+    return needs_of(wildcards.model)
+
+
+def needs_of(model):
+    """The same of a model by its name."""
+    return _prepared(model, STUDY.values.models[model].needs)
 
 
 def compliance_files(wildcards):
     """The prepared files that a model's compliance is computed from."""
-    return _prepared(wildcards, STUDY.values.models[wildcards.model].prepared_from)
+    return _prepared(wildcards.model, STUDY.values.models[wildcards.model].prepared_from)
 
 
-def _prepared(wildcards, names):
+def _prepared(model, names):
     """Prepared files of a model by their names."""
     prepared = {
-        "mesh": f"{RESULTS}/sensor/{wildcards.model}/mesh.vtu",
-        "frustum_law": f"{RESULTS}/sensor/{wildcards.model}/frustum_law.npz",
-        "compliance": f"{RESULTS}/sensor/{wildcards.model}/compliance.npz",
+        "mesh": f"{RESULTS}/sensor/{model}/mesh.vtu",
+        "frustum_law": f"{RESULTS}/sensor/{model}/frustum_law.npz",
+        "compliance": f"{RESULTS}/sensor/{model}/compliance.npz",
         "card_dielectric": card_of("dielectric"),
         "card_cover": card_of("cover"),
     }
@@ -118,9 +127,37 @@ def plain(section):
     return section.model_dump(mode="json")
 
 
+def pressed_with(model, item, forces_n):
+    """The settings of a press of an item with a model of the configuration."""
+    chosen = STUDY.values.models[model]
+    return as_settings(
+        item=press_settings(item),
+        sensor=STUDY.sensor,
+        model=model,
+        kind=chosen.kind,
+        laws=chosen.laws,
+        mesh=mesh_of(model),
+        forces_n=forces_n,
+    )
+
+
 def presses(models):
     """The press files of some models, in the study's order."""
     return [f"{RESULTS}/presses/{item.set}/{item.id}/{model}.nc" for model in models for item in STUDY.items()]
+
+
+def everything(workflow):
+    """All files of the study: one that went missing is made again, though what was made from it is still there."""
+    without = ("compare_policies", "draw_fig7_maps", "draw_fig8_policies") if STUDY.archive else ()
+    rules_asked = [rule for rule in workflow.rules if not rule.has_wildcards() and rule.name not in ("all", *without)]
+    fixed = [path for rule in rules_asked for path in rule.output]
+    models = () if STUDY.archive else STUDY.pressed_with
+    sensor = [path for model in models for path in needs_of(model).values()]
+    materials = [path for name in STUDY.values.materials for path in (*data_of_material(name), *figure_files(f"material_{name}").values())]
+    learning = [path for name in ("model.pt", "history.csv", "timing.csv") for path in learned(name)]
+    learning += [f"{RESULTS}/learning/{model}/{name}" for model in STUDY.tested for name in ("search.csv", "best.json")]
+    readings = [] if STUDY.archive else [f"{RESULTS}/tactile/{item.set}/{item.id}.nc" for item in STUDY.items()]
+    return sorted({*fixed, *sensor, *materials, *learning, *presses(models), *readings})
 
 
 def samples_of():

@@ -71,6 +71,7 @@ rule search_hyperparameters:
             ssim=plain(STUDY.values.ssim),
             device=STUDY.values.training.device,
             seed=STUDY.values.seed,
+            threads=STUDY.values.training.threads,     # of sums, on however few cores: the results depend on it
         ),
     threads: STUDY.values.training.threads
     log:
@@ -98,6 +99,7 @@ rule train_cnn:
             network=plain(STUDY.values.network),
             ssim=plain(STUDY.values.ssim),
             seed=STUDY.values.seed,
+            threads=STUDY.values.training.threads,
         ),
     threads: STUDY.values.training.threads
     log:
@@ -125,6 +127,7 @@ rule train_beside:
             network=plain(STUDY.values.network) | {"architecture": BESIDE},
             ssim=plain(STUDY.values.ssim),
             seed=STUDY.values.seed,
+            threads=STUDY.values.training.threads,
         ),
     threads: STUDY.values.training.threads
     log:

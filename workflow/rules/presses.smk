@@ -14,15 +14,7 @@ rule simulate_press:
         press=f"{RESULTS}/presses/{{set}}/{{item}}/{{model}}.nc",
     params:
         files=files,
-        settings=lambda w: as_settings(
-            item=press_settings(STUDY.items_of[w.set][w.item]),
-            sensor=STUDY.sensor,
-            model=w.model,
-            kind=STUDY.values.models[w.model].kind,
-            laws=STUDY.values.models[w.model].laws,
-            mesh=mesh_of(w.model),
-            forces_n=STUDY.values.forces_n,
-        ),
+        settings=lambda w: pressed_with(w.model, STUDY.items_of[w.set][w.item], STUDY.values.forces_n),
     log:
         log_of("simulate_press", "{set}/{item}/{model}"),
     benchmark:
@@ -52,3 +44,24 @@ rule read_virtual_sensor:
         benchmark_of("read_virtual_sensor", "{set}/{item}")
     shell:
         run_stage("read_virtual_sensor")
+
+
+rule press_section:
+    input:
+        **needs_of(STUDY.values.choice.models["hyperelastic"]),
+        code=code("press_section"),
+        object=STUDY.section_item.file,
+    output:
+        body=f"{RESULTS}/section/pressed_sensor.vtu",
+        summary=f"{RESULTS}/section/press.json",
+    params:
+        files=files,
+        settings=pressed_with(
+            STUDY.values.choice.models["hyperelastic"], STUDY.section_item, [STUDY.values.section.force_n]
+        ),
+    log:
+        log_of("press_section"),
+    benchmark:
+        benchmark_of("press_section")
+    shell:
+        run_stage("press_section")

@@ -2,14 +2,41 @@
 
 GRASPS = [item for item in STUDY.items_of["grasps"].values() if item.first]   # each object once
 SHOWN = GRASPS[:6]      # in figure 7, as in print
-FROM_PRESSES = () if STUDY.archive else ("fig7_maps", "fig8_policies")     # an archive has no press of our objects
+FROM_PRESSES = () if STUDY.archive else ("fig2_section", "fig7_maps", "fig8_policies")     # an archive has no press of our objects
+VIEWS = () if STUDY.archive else ("pressed_sensor",)      # HTML: they turn
 FROM_CURVES = ("fig10_learning_curve",) if CURVES else ()
-FIGURES = ("fig4_complexity", "fig5_ftir", "fig6_ssim", *FROM_PRESSES, "fig9_networks", *FROM_CURVES)
+FIGURES = sorted(
+    ["fig4_complexity", "fig5_ftir", "fig6_ssim", *FROM_PRESSES, "fig9_networks", *FROM_CURVES],
+    key=lambda name: int(name[3:].split("_")[0]),
+)
 
 
 def figure_files(name):
     """A figure's two files."""
     return {kind: f"{RESULTS}/figures/{name}.{kind}" for kind in ("png", "svg")}
+
+
+if not STUDY.archive:
+
+    rule measure_features:
+        input:
+            code=code("measure_features"),
+            objects=[item.file for item in GRASPS],
+            presses=[f"{RESULTS}/presses/grasps/{item.id}/{model}.nc" for item in GRASPS for model in STUDY.tested],
+        output:
+            features=f"{RESULTS}/evaluation/features.csv",
+        params:
+            files=files,
+            settings=as_settings(
+                objects=[{"name": item.id, "unit": item.unit, "pose": item.pose} for item in GRASPS],
+                frustum_height_mm=STUDY.spec.dielectric.frusta.height_mm,
+            ),
+        log:
+            log_of("measure_features"),
+        benchmark:
+            benchmark_of("measure_features")
+        shell:
+            run_stage("measure_features")
 
 
 rule make_tables:
@@ -19,7 +46,11 @@ rule make_tables:
         complexity=rules.score_complexity.output.table,
         ftir=rules.validate_ftir.output.summary,
         ssim=rules.evaluate.output.ssim,
+        summary=rules.evaluate.output.summary,
+        per_item=rules.evaluate.output.per_item,
+        ceiling=rules.evaluate.output.ceiling,
         timing=rules.evaluate.output.timing,
+        **({} if STUDY.archive else {"features": rules.measure_features.output.features}),
     output:
         table1=f"{RESULTS}/tables/table1_materials.csv",
         contradictions=f"{RESULTS}/tables/table1_contradictions.csv",
@@ -37,6 +68,46 @@ rule make_tables:
         run_stage("make_tables")
 
 
+if not STUDY.archive:
+
+    rule draw_fig2_section:
+        input:
+            code=code("draw_fig2_section"),
+            body=rules.press_section.output.body,
+            summary=rules.press_section.output.summary,
+            object=STUDY.section_item.file,
+        output:
+            **figure_files("fig2_section"),
+        params:
+            files=files,
+            settings=as_settings(sensor=STUDY.sensor, unit=STUDY.section_item.unit, pose=STUDY.section_item.pose),
+        log:
+            log_of("draw_fig2_section"),
+        benchmark:
+            benchmark_of("draw_fig2_section")
+        shell:
+            run_stage("draw_fig2_section")
+
+
+    rule draw_pressed_sensor:
+        input:
+            code=code("draw_pressed_sensor"),
+            body=rules.press_section.output.body,
+            summary=rules.press_section.output.summary,
+            object=STUDY.section_item.file,
+        output:
+            html=f"{RESULTS}/figures/pressed_sensor.html",
+        params:
+            files=files,
+            settings=as_settings(unit=STUDY.section_item.unit, pose=STUDY.section_item.pose),
+        log:
+            log_of("draw_pressed_sensor"),
+        benchmark:
+            benchmark_of("draw_pressed_sensor")
+        shell:
+            run_stage("draw_pressed_sensor")
+
+
 rule draw_fig4_complexity:
     input:
         code=code("draw_fig4_complexity"),
@@ -47,7 +118,10 @@ rule draw_fig4_complexity:
     params:
         files=files,
         settings=as_settings(
-            thresholds=plain(STUDY.values.complexity)["thresholds"], units=[(item.id, item.unit) for item in GRASPS]
+            thresholds=plain(STUDY.values.complexity)["thresholds"],
+            objects=[{"name": item.id, "unit": item.unit, "pose": item.pose} for item in GRASPS],
+            footprint_mm=STUDY.spec.footprint_mm,
+            reach_mm=STUDY.spec.thickness_mm,
         ),
     log:
         log_of("draw_fig4_complexity"),
@@ -126,7 +200,9 @@ rule draw_fig7_maps:
     params:
         files=files,
         settings=as_settings(
-            units=[(item.id, item.unit) for item in SHOWN], largest_counts=STUDY.spec.largest_counts
+            units=[(item.id, item.unit) for item in SHOWN],
+            trials=STUDY.trials_of("grasps"),
+            largest_counts=STUDY.spec.largest_counts,
         ),
     log:
         log_of("draw_fig7_maps"),
@@ -190,9 +266,38 @@ rule draw_fig10_learning_curve:
         run_stage("draw_fig10_learning_curve")
 
 
+def drawn_by(stage):
+    """The source files that a figure's page links to: its stage, and what that draws with."""
+    files = [path for path in code(stage) if "/reporting/" in path and not path.endswith(("/style.py", "/render.py"))]
+    return [f"src/softtact/stages/{stage}.py", *files]
+
+
+def data_of(rule):
+    """What a rule without wildcards reads, its code left out."""
+    named = [paths for key, paths in rule.input.items() if key != "code"]
+    return [path for paths in named for path in ([paths] if isinstance(paths, str) else paths)]
+
+
+def data_of_material(name):
+    """What a material's picture is drawn from."""
+    modes = STUDY.materials[name].modes
+    return [f"{RESULTS}/materials/{name}.json", *(f"{RESULTS}/curves/{name}/{mode}.csv" for mode in modes)]
+
+
+SOURCES = {
+    **{f"material_{name}": {"data": data_of_material(name), "code": drawn_by("draw_material")} for name in STUDY.values.materials},
+    **{
+        name: {"data": data_of(getattr(rules, f"draw_{name}")), "code": drawn_by(f"draw_{name}")}
+        for name in (*FIGURES, *VIEWS)
+    },
+}
+STAGES = sorted(path.stem for path in Path("src/softtact/stages").glob("[!_]*.py"))
+
+
 rule report:
     input:
         code=code("report"),
+        sources=sorted({path for stage in STAGES for path in code(stage)}),
         table1=rules.make_tables.output.table1,
         contradictions=rules.make_tables.output.contradictions,
         table2=rules.make_tables.output.table2,
@@ -209,10 +314,16 @@ rule report:
         ),
         figures=[
             *(f"{RESULTS}/figures/material_{name}.png" for name in STUDY.values.materials),
-            *(figure_files(name)["png"] for name in FIGURES),
+            *(figure_files(name)["png"] for name in FIGURES[:1]),
+            *(f"{RESULTS}/figures/{name}.html" for name in VIEWS),
+            *(figure_files(name)["png"] for name in FIGURES[1:]),
         ],
     output:
         page=f"{RESULTS}/report.html",
+        sources=f"{RESULTS}/sources.html",
+        config=f"{RESULTS}/config.yaml",
+        named=f"{RESULTS}/config_named.yaml",
+        run=f"{RESULTS}/tables/run.csv",
     params:
         files=files,
         settings=as_settings(
@@ -223,6 +334,10 @@ rule report:
             presses={name: len(items) for name, items in STUDY.items_of.items()},
             forces_n=STUDY.values.forces_n,
             **{name: len({item.object for item in items.values()}) for name, items in STUDY.items_of.items()},
+            sources=SOURCES,
+            benchmarks=f"{RESULTS}/benchmarks",
+            config=plain(STUDY.values),
+            named=STUDY.named(),
         ),
     log:
         log_of("report"),

@@ -5,10 +5,15 @@ from pathlib import Path
 
 from softtact.commands.common import add_command, show
 
+EXAMPLES = """
+  softtact cost
+  softtact cost --configfile config/paper.yaml --cores 32 --json
+"""
+
 
 def add(commands):
     """Add the command to the parser."""
-    command = add_command(commands, "cost", _cost, "Tell a study's jobs, hours and disk before it is started.")
+    command = add_command(commands, "cost", _cost, "Tell a study's jobs, hours and disk before it is started.", EXAMPLES)
     command.add_argument("--configfile", type=Path, metavar="FILE.yaml",
                          help="the study's configuration over config/config.yaml (default: that alone)")
     command.add_argument("--cores", type=int, default=os.cpu_count(), metavar="N", help="to work on (default: all)")

@@ -62,10 +62,10 @@ def _press(options):
     mesh, repairs = read_object(options)
     check_over_sensor(place(mesh, pose=pose), spec.footprint_mm, name=str(options.mesh))
     try:
-        sensor = replace(softtact.load_sensor(options.sensor, materials=_cards(options)), keep_mesh=options.vtu is not None,
+        sensor = replace(softtact.load_sensor(options.sensor, materials=_cards(options)),
                          attributes={"mesh_repairs": "; ".join(repairs)})
         result = sensor.press(mesh, pose=pose, force_n=forces, model=options.model,
-                              policy=options.policy, tolerance_mm=options.tolerance)
+                              policy=options.policy, tolerance_mm=options.tolerance, keep_body=options.vtu is not None)
     except ConvergenceError as error:
         if error.result is not None:
             _show_press(error.result, options)

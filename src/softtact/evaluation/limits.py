@@ -10,7 +10,7 @@ The largest above `CLEAR` is named. Nothing here is chosen by these numbers.
 import numpy as np
 import pandas as pd
 
-from softtact.evaluation.claims import PRINTED_SSIM
+from softtact.evaluation.claims_of_scores import PRINTED_SSIM
 
 CLEAR = 0.01      # of mean SSIM: below, a difference is no more than another seed may make (assumed)
 COLUMNS = ["model", "set", "ssim", "paper", "sensor_ssim", "perfect_model_gain", "more_maps_gain", "other_network_gain", "limit",

@@ -103,7 +103,7 @@ class Training(Section):
     schedule: Literal["cosine", "constant"] = Field("cosine", description="of the learning rate over the epochs")
     checkpoint_every_s: NonNegativeFloat = Field(120.0, description="least time between two checkpoints")
     device: Literal["auto", "cpu", "cuda"] = Field("auto", description="auto: a GPU where there is one")
-    threads: PositiveInt = Field(2, description="cores that the workflow gives to a training")
+    threads: PositiveInt = Field(2, description="of a training; on fewer cores as many threads, for the weights depend on it")
 
 
 class LearningCurve(Section):

@@ -11,6 +11,7 @@ import numpy as np
 from softtact.contact.object_points import NodeGrid
 from softtact.contact.stencil import Stencil
 from softtact.contact.unilateral import ContactLevels, press_elastic
+from softtact.files import read_arrays
 from softtact.mechanics.quarter_slab import PARITIES, ElasticLayer, ParityBlocks, QuarterSlab
 
 _SHARES = (0.34, 0.3, 0.22, 0.14)     # of the layer's thickness, from below, that its element layers have
@@ -36,7 +37,7 @@ class Compliance:
     @classmethod
     def load(cls, path):
         """Read what `save` wrote."""
-        with np.load(path, allow_pickle=False) as data:
+        with read_arrays(path) as data:
             return cls(grid=NodeGrid(data["x"], data["y"]), blocks=ParityBlocks(data["blocks"]), bedding=float(data["bedding"]),
                        stencil=Stencil(data["stencil"]))
 

@@ -11,6 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from softtact.contact.object_points import NodeGrid
+from softtact.files import read_arrays
 from softtact.mechanics.elastic import map_cells, surface_grid
 from softtact.mechanics.frustum_law import FrustumLaw, frustum_law
 from softtact.mechanics.linear_solvers import make_solver
@@ -48,7 +49,7 @@ class FoundationFlexibility:
     @classmethod
     def load(cls, path):
         """Read what `save` wrote."""
-        with np.load(path, allow_pickle=False) as data:
+        with read_arrays(path) as data:
             law = FrustumLaw(**{name.removeprefix("law_"): data[name] for name in data.files if name.startswith("law_")})
             blocks = {name: ParityBlocks(data[name]) for name in ("surface", "sideways", "membrane")}
             return cls(grid=NodeGrid(data["x"], data["y"]), counts=tuple(data["counts"]),

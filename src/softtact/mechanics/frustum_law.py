@@ -15,6 +15,7 @@ from scipy.interpolate import PchipInterpolator
 
 from softtact.contact.height_field import HeightField
 from softtact.errors import ConvergenceError
+from softtact.files import read_arrays
 from softtact.mechanics.hyperelastic import NewtonSettings, press_levels
 from softtact.mechanics.layered_body import MeshSettings, build_unit_cell
 
@@ -68,7 +69,7 @@ class FrustumLaw:
     @classmethod
     def load(cls, path):
         """Read what `save` wrote."""
-        with np.load(path, allow_pickle=False) as data:
+        with read_arrays(path) as data:
             return cls(**dict(data))
 
     def arrays(self):

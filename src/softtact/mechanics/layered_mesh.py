@@ -9,7 +9,7 @@ from softtact.mechanics.elastic import elastic_slab, map_cells
 from softtact.mechanics.foundation import foundation_slab
 from softtact.mechanics.hyperelastic import NewtonSettings
 from softtact.mechanics.layered_body import MeshSettings, build_sensor_body
-from softtact.mechanics.vtk_cells import VTK_HEX27, body_cells
+from softtact.mechanics.pressed_body import VTK_HEX27, pressed_body
 
 _SCATTER_KEYS = ("height_scatter", "tip_scatter", "specimen")
 _SOLVER_KEYS = ("largest_penetration_mm",)
@@ -47,9 +47,7 @@ def layered_mesh(spec, values):
     settings = mesh_settings(values)
     body = build_sensor_body(spec, dielectric_law=None, cover_law=None, mesh=settings,   # a mesh has no material
                              scatter=frustum_scatter(spec, values))
-    points, cells = body_cells(body)
-    return meshio.Mesh(points, [(kind, nodes) for kind, nodes, _ in cells],
-                       cell_data={"layer": [np.full(len(nodes), number) for _, nodes, number in cells]})
+    return pressed_body(body).to_meshio(displaced=False)
 
 
 def slab_mesh(spec, kind):

@@ -1,35 +1,92 @@
-"""Figure 4: two objects' meshes with their hulls, and the ratios that choose the model."""
+"""Figure 4: meshes and hulls of two objects, whole and where the sensor can touch, and the ratios that choose the model."""
+
+from dataclasses import dataclass
 
 import numpy as np
 
+from softtact.geometry.complexity import overlap_points
+from softtact.reporting.render import Part, View, add_view, part_of, rendered, tell_fallback
 from softtact.reporting.style import colour, pyplot
 
+PRINTED = ("object_3", "object_6")     # what the paper's figure shows: a flat cylinder and a detailed one
+_OUTSIDE = 1.015                       # times the hull's size
+_BELOW = {"seen_from": (0.55, -0.9, -0.9), "up": (0.0, 0.0, -1.0)}     # the side that touches
 
-def draw(complexity, meshes, *, thresholds):
-    """Figure from the complexity table and {object: trimesh} (drawn: the first of each chosen model that has a mesh)."""
+
+@dataclass(frozen=True)
+class Placed:
+    """A mesh (trimesh) in the sensor's frame, and what of it counts as the overlap."""
+
+    mesh: object
+    footprint_mm: tuple
+    reach_mm: float
+
+
+def draw(complexity, placed, *, thresholds):
+    """Figure from the complexity table and {object: Placed}."""
     plt = pyplot()
-    shown = list(complexity[complexity.object.isin(list(meshes))].drop_duplicates("model").object)
-    figure = plt.figure(figsize=(3.3 * len(shown) + 5.2, 3.8), layout="constrained")
-    grid = figure.add_gridspec(1, len(shown) + 1, width_ratios=[1] * len(shown) + [1.5])
-    for k, name in enumerate(shown):
-        row = complexity.set_index("object").loc[name]
-        _draw_mesh(figure.add_subplot(grid[k], projection="3d"), meshes[name], row, name)
-    _draw_ratios(figure.add_subplot(grid[-1]), complexity, thresholds)
+    shown = chosen_objects(complexity, placed)
+    figure = plt.figure(figsize=(2.9 * len(shown) + 5.0, 5.6), layout="constrained")
+    grid = figure.add_gridspec(2, len(shown) + 1, width_ratios=[1] * len(shown) + [1.6])
+    rows = complexity.set_index("object").loc[shown]
+    views = [view for name in shown for view in (_whole(placed[name], rows.model[name]), _overlap(placed[name], rows.model[name]))]
+    images = rendered(views)
+    for k, (name, row) in enumerate(rows.iterrows()):
+        titles = (f"{name.replace('_', ' ')}: {row.model}\nmesh NPt {row.NPt:.0f}, hull CHt {row.CHt:.0f}",
+                  f"over the sensor: NPo {row.NPo:.0f}, CHo {row.CHo:.0f}")
+        for r, title in enumerate(titles):
+            axes = add_view(figure, grid[r, k], views[2 * k + r], images and images[2 * k + r])
+            axes.set_title(title, fontsize=9)
+    _draw_ratios(figure.add_subplot(grid[:, -1]), complexity, thresholds)
+    tell_fallback(figure, images)
     return figure
 
 
-def _draw_mesh(axes, mesh, row, name):
-    from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
+def chosen_objects(complexity, placed):
+    """The paper's two where both are here, else the first of each chosen model."""
+    if all(name in placed and (complexity.object == name).any() for name in PRINTED):
+        return list(PRINTED)
+    return list(complexity[complexity.object.isin(list(placed))].drop_duplicates("model").object)
 
-    light = 0.35 + 0.6 * np.abs(mesh.face_normals @ np.array([0.4, 0.3, 0.86]))
-    axes.add_collection3d(Poly3DCollection(mesh.triangles, facecolors=np.column_stack([light] * 3), edgecolors="none"))
-    hull = mesh.convex_hull
-    axes.add_collection3d(Line3DCollection(hull.vertices[hull.edges_unique], colors=colour(row.model), linewidths=0.3))
-    low, high = mesh.bounds
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]), box_aspect=high - low)
-    axes.view_init(elev=-35, azim=-60)   # from below: the side that touches
-    axes.set_axis_off()
-    axes.set_title(f"{name}: {row.model}\nNPt {row.NPt:.0f}, CHt {row.CHt:.0f}, NPo {row.NPo:.0f}, CHo {row.CHo:.0f}")
+
+def _whole(placed, model):
+    """The mesh with its facets, and the edges of its convex hull."""
+    return View([part_of(placed.mesh, colour="#d5d8dc", edges="#8a8f96"), _hull(placed.mesh.vertices, model)], **_BELOW)
+
+
+def _overlap(placed, model):
+    """The part that the sensor can touch in the pale rest, and the edges of the hull of the mesh's points there."""
+    points = overlap_points(placed.mesh.triangles, footprint_mm=placed.footprint_mm, reach_mm=placed.reach_mm)
+    parts = [part_of(placed.mesh, colour="#d5d8dc", opacity=0.25)]
+    if len(points):
+        parts += [_within(placed, points[:, 2].min()), _hull(points, model)]
+    return View([part for part in parts if part is not None], **_BELOW)
+
+
+def _within(placed, lowest):
+    """`Part` of the mesh, cut to the footprint and to what is at most the reach above its lowest point there."""
+    import pyvista
+
+    x, y = (0.5 * side for side in placed.footprint_mm)
+    surface = pyvista.wrap(placed.mesh)
+    for axis, side in ((0, x), (0, -x), (1, y), (1, -y), (2, lowest + placed.reach_mm)):
+        inwards = -np.sign(side) if axis < 2 else -1.0
+        surface = surface.clip(normal=inwards * np.eye(3)[axis], origin=side * np.eye(3)[axis], invert=False)
+    surface = surface.triangulate()
+    return Part(np.asarray(surface.points), surface.faces.reshape(-1, 4)[:, 1:], colour="#9aa3ad", edges="#565b61")
+
+
+def _hull(points, model):
+    """The edges of points' convex hull, a little outside so that they are seen; None where the points lie in a plane."""
+    import trimesh
+    from scipy.spatial import QhullError
+
+    try:
+        hull = trimesh.convex.convex_hull(points)
+    except (QhullError, ValueError, IndexError):
+        return None
+    middle = hull.bounds.mean(axis=0)
+    return Part(middle + _OUTSIDE * (hull.vertices - middle), hull.faces, colour=colour(model), as_lines=True)
 
 
 def _draw_ratios(axes, complexity, thresholds):

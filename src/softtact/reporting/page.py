@@ -1,7 +1,8 @@
-"""report.html: one file, figures inside, links to the data beside it."""
+"""report.html: one file, figures inside, links from each to its data, its code and the configuration."""
 
 import base64
 import os
+from pathlib import Path
 
 import pandas as pd
 from jinja2 import Environment
@@ -9,17 +10,26 @@ from markupsafe import Markup
 
 import softtact
 from softtact.files import read_json
+from softtact.reporting.page_template import PAGE, SOURCES, STYLE
+from softtact.reporting.run_record import run_sentence
 from softtact.reporting.tables import machine
 
 CAPTIONS = {
-    "fig4_complexity": "Figure 4. Mesh (grey) and convex hull (lines) of an object for each chosen model, and the ratios of all "
-                       "objects with the two thresholds.",
+    "fig2_section": "Figure 2. Section through the sensor at rest and pressed: how the frusta fold. Curved elements are cut by "
+                    "their shape functions; displacements are to scale.",
+    "pressed_sensor": "The sensor's surface in the same press: turn it by mouse, touch or arrow keys, and slide from rest to "
+                      "pressed. Grey: the object, lifted from the surface.",
+    "fig4_complexity": "Figure 4. Above: mesh (grey) and convex hull (lines in the colour of the chosen model) of two objects, "
+                       "seen from the side that touches. Below: the part over the sensor and within its reach. Right: the ratios "
+                       "of all objects with the two thresholds.",
     "fig5_ftir": "Figure 5. Contact area of the dielectric pressed on glass.",
     "fig6_ssim": "Figure 6. SSIM of the networks' readings per item: bars are means, boxes quartiles over forces and trials; "
                  "black dashes, where trials are repeated: the sensor's own trials against each other, which no model passes by "
                  "more than the noise left in a mean of few trials.",
-    "fig7_maps": "Figure 7. Objects from below, deformation maps of both models, tactile maps predicted from them, and the virtual "
-                 "sensor's (mean of its trials). Jet colours as printed; tactile maps from 0 to the readout's largest count.",
+    "fig7_maps": "Figure 7. Objects seen from the side that touches, deformation maps of both models in mm (one scale for both), "
+                 "tactile maps predicted from them, and the virtual sensor's (mean of its trials). Jet colours and turned 90 "
+                 "degrees as printed; tactile maps from 0 to the readout's largest count; red: the model chosen by the complexity "
+                 "rule.",
     "fig8_policies": "Figure 8. Left: what each policy costs and which error it accepts, against the study's hyperelastic model. "
                      "Right: the error that was expected before the costly model ran, against the true one.",
     "fig9_networks": "Figure 9. The paper's network and another architecture on the same split. Left: mean SSIM with its 95 % "
@@ -28,60 +38,71 @@ CAPTIONS = {
                             "objects, then trials): equal steps of the optimiser for each. The reference's maps are those that the "
                             "virtual sensor itself felt, so that line is what the same network reads from a perfect model.",
 }
-
+TITLES = {"table1": "Table 1. Material laws (stress in MPa)",
+          "contradictions": "Where the paper's table 1 contradicts itself",
+          "table2": "Table 2. Complexity and choice of model",
+          "table3": "Table 3. Time per tactile map (s)",
+          "counts": "The archive's counts against those in print",
+          "policies": "Policies that choose a model, on the presses that the expected error was not calibrated on",
+          "networks": "Architectures on the same split: scores with their 95 % interval, and times in s (epoch_s an epoch, "
+                      "map_s one map alone)",
+          "limits": "What limits the scores: model, data or network"}
+_STAGE_OF = {"policies": "compare_policies", "networks": "compare_networks", "counts": "import_published"}   # others: make_tables
+_DRAWN_BY_MATPLOTLIB = "Views are rendered off screen by VTK; a figure says so where matplotlib drew them instead."
+_WITH_VIEWS = ("fig4_complexity", "fig7_maps")
+_FOLDERS = ("presses", "tactile", "dataset", "learning", "evaluation", "section", "tables", "figures", "logs")
 PAPERS_SENSOR = "coro: "     # how the line on it begins
 
-TEMPLATE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>softtact: {{ study }}</title>
-<style>body{font:16px/1.5 system-ui,sans-serif;max-width:1080px;margin:2em auto;padding:0 1em;color:#222}
-h1,h2{line-height:1.2}table{border-collapse:collapse;font-size:13px;margin:1em 0;display:block;overflow-x:auto}
-td,th{border-bottom:1px solid #ddd;padding:4px 8px;text-align:left;vertical-align:top}th{background:#f4f4f4}
-figure{margin:2em 0}img{max-width:100%}figcaption{font-size:14px;color:#444}.box{background:#fff6e0;border-left:4px solid #e0a000;
-padding:.6em 1em}.reproduced{background:#d9f0d9}.not{background:#f7d7d7}.contradicts{background:#ffe9c7}.needs{background:#e6e6f5}
-.undecided{background:#eee}
-</style><h1>Simulating a soft tactile sensor: the study <i>{{ study }}</i></h1>
-<p>{{ facts }}</p>
-<p class="box"><b>What is synthetic here.</b> {{ synthetic }}</p>
-<h2>Result in one table</h2>{{ summary }}
-<h2>Figures</h2>{% for f in figures %}<figure><img alt="{{ f.caption }}" src="data:image/png;base64,{{ f.data }}">
-<figcaption>{{ f.caption }}
-{{ f.said }} <a href="{{ f.link }}">PNG</a>, <a href="{{ f.svg }}">SVG</a></figcaption></figure>{% endfor %}
-<h2>Tables</h2>{% for t in tables %}<h3>{{ t.title }}</h3>{{ t.html }}<p><a href="{{ t.link }}">CSV</a></p>{% endfor %}
-<h2>The paper's claims</h2><p>Each verdict is computed by the rule beside it.</p>
-<table><tr>{% for c in claim_columns %}<th>{{ c }}</th>
-{% endfor %}</tr>{% for row in claims %}<tr class="{{ row.verdict.split()[0] }}">{% for c in claim_columns %}<td>{{ row[c] }}</td>
-{% endfor %}</tr>{% endfor %}</table>
-<p>softtact {{ version }}; {{ machine }}. Files: <a href="presses">presses</a>, <a href="tactile">readings</a>,
-<a href="dataset">data sets</a>, <a href="learning">networks</a>, <a href="evaluation">evaluation</a>,
-<a href="logs">logs</a>.</p></html>
-"""
 
-
-def render_page(inputs, settings, *, folder):
-    """The page as text; `inputs` as in the stage, links relative to `folder`."""
+def render_page(inputs, settings, *, folder, run):
+    """The page as text; `inputs` and `settings` as in the stage, links relative to `folder`, run as of `run_record`."""
     claims = pd.read_csv(inputs["claims"], keep_default_na=False)
-    titles = {"table1": "Table 1. Material laws (stress in MPa)",
-              "contradictions": "Where the paper's table 1 contradicts itself",
-              "table2": "Table 2. Complexity and choice of model",
-              "table3": "Table 3. Time per tactile map (s)",
-              "counts": "The archive's counts against those in print",
-              "policies": "Policies that choose a model, on the presses that the expected error was not calibrated on",
-              "networks": "Architectures on the same split: scores with their 95 % interval, and times in s (epoch_s an epoch, "
-                          "map_s one map alone)",
-              "limits": "What limits the scores: model, data or network"}
-    tables = [{"title": title, "html": _html(pd.read_csv(inputs[name])), "link": _link(inputs[name], folder)}
-              for name, title in titles.items() if name in inputs]
     ftir = read_json(inputs["ftir"])
     archive = read_json(inputs["inventory"]) if "inventory" in inputs else None
-    figures = [_figure(path, folder) | {"said": ftir["verdict"] if path.stem == "fig5_ftir" else ""} for path in inputs["figures"]]
-    environment = Environment(autoescape=True)
-    for table in tables:
-        table["html"] = Markup(table["html"])
-    return environment.from_string(TEMPLATE).render(
-        study=settings["study"], facts=_archive_facts(settings, archive) if archive else _facts(settings),
-        synthetic=_synthetic_but_for_the_archive(ftir) if archive else _synthetic(ftir), tables=tables,
-        summary=Markup(_html(_summary(pd.read_csv(inputs["summary"])))),
-        figures=figures, claims=claims.to_dict("records"),
-        claim_columns=list(claims.columns), version=softtact.__version__, machine=machine())
+    said = {"fig5_ftir": ftir["verdict"], **dict.fromkeys(_WITH_VIEWS, _DRAWN_BY_MATPLOTLIB)}
+    figures = [_figure(path, folder, settings["sources"].get(path.stem, {})) | {"said": said.get(path.stem, "")}
+               for path in inputs["figures"]]
+    rows = [row | {"link": row.get("evidence", "") if (folder / row.get("evidence", "")).is_file() else ""}
+            for row in claims.to_dict("records")]
+    counts = ", ".join(f"{number} {verdict}" for verdict, number in claims.verdict.value_counts().items())
+    return Environment(autoescape=True).from_string(PAGE).render(
+        study=settings["study"], style=Markup(STYLE), facts=_archive_facts(settings, archive) if archive else _facts(settings),
+        synthetic=_synthetic_but_for_the_archive(ftir) if archive else _synthetic(ftir), tables=_tables(inputs, folder),
+        summary=Markup(_html(_summary(pd.read_csv(inputs["summary"])))), run=Markup(_html(run)), run_said=run_sentence(run),
+        run_link="tables/run.csv", figures=figures, claims=rows, verdicts=f"{len(claims)} claims, {counts}",
+        claim_columns=list(claims.columns), claims_link=_link(inputs["claims"], folder),
+        claims_code=("evaluation/claims.py", code_link("softtact/evaluation/claims.py")), config=f"{SOURCES_PAGE}#config",
+        sources=SOURCES_PAGE, version=softtact.__version__, machine=machine(),
+        folders=[name for name in _FOLDERS if (folder / name).is_dir()])
+
+
+SOURCES_PAGE = "sources.html"
+
+
+def render_sources(paths, *, study, config, named, page):
+    """The page of the configuration (YAML texts) and of source files below src/, each under its own anchor."""
+    files = [(_below_src(path), Path(path).read_text(encoding="utf-8")) for path in paths]
+    return Environment(autoescape=True).from_string(SOURCES).render(
+        study=study, style=Markup(STYLE), files=files, config=config, named=named, page=page, version=softtact.__version__)
+
+
+def code_link(name):
+    """Where the page of sources holds a file, given by its path below src/."""
+    return f"{SOURCES_PAGE}#{name}"
+
+
+def _below_src(path):
+    return Path(path).as_posix().removeprefix("src/")
+
+
+def _tables(inputs, folder):
+    tables = []
+    for name, title in TITLES.items():
+        if name in inputs:
+            stage = f"softtact/stages/{_STAGE_OF.get(name, 'make_tables')}.py"
+            tables.append({"title": title, "html": Markup(_html(pd.read_csv(inputs[name]))), "link": _link(inputs[name], folder),
+                           "code": (stage.removeprefix("softtact/"), code_link(stage))})
+    return tables
 
 
 def _facts(settings):
@@ -100,7 +121,8 @@ def _archive_facts(settings, archive):
     return (f"Maps and readings are those of the published archive: {archive['tests_used']} of {archive['tests']} tests of "
             f"{len(items['indenters'])} indenters, {len(items['unseen'])} held-out ones (our choice: the paper does not name its "
             f"own) and {len(items['grasps'])} objects; {archive['tests_left_out']} odd tests are left out (published/odd.csv). "
-            f"{archive['sentence']} No object was pressed, so figures 7 and 8 and our times are not here. Seed {settings['seed']}.")
+            f"{archive['sentence']} No object was pressed, so figures 2, 7 and 8 and our times are not here. "
+            f"Seed {settings['seed']}.")
 
 
 def _synthetic_but_for_the_archive(ftir):
@@ -134,9 +156,19 @@ def _link(path, folder):
     return os.path.relpath(path, folder)
 
 
-def _figure(path, folder):
+def _figure(path, folder, source):
+    """What the template shows of a figure; source: {data: [paths], code: [paths below src/]} of what drew it."""
     material = path.stem.removeprefix("material_")
     caption = CAPTIONS.get(path.stem) or (f"Material {material}: test curves and the laws fitted to them, what they leave, and the "
                                           "stretches over which each law is stable.")
-    return {"caption": caption, "data": base64.b64encode(path.read_bytes()).decode(),
-            "link": _link(path, folder), "svg": _link(path.with_suffix(".svg"), folder)}
+    shown = {"name": path.stem, "caption": caption, "data": [(_short(p, folder), _link(p, folder)) for p in source.get("data", ())],
+             "code": [(name.removeprefix("softtact/"), code_link(name)) for name in map(_below_src, source.get("code", ()))]}
+    if path.suffix == ".html":
+        return shown | {"html": Markup(path.read_text(encoding="utf-8")), "files": [("HTML", _link(path, folder))]}
+    return shown | {"image": base64.b64encode(path.read_bytes()).decode(),
+                    "files": [("PNG", _link(path, folder)), ("SVG", _link(path.with_suffix(".svg"), folder))]}
+
+
+def _short(path, folder):
+    """A file's path as seen from the results, without the way up to what lies outside."""
+    return _link(path, folder).replace("../", "")

@@ -1,17 +1,24 @@
 """Figure 4.
 
-inputs: complexity, objects (list of meshes);  outputs: png, svg;  settings: thresholds, units [[object, unit], ...]
+inputs: complexity, objects (list of meshes);  outputs: png, svg
+settings: thresholds, objects [{name, unit, pose}, ...], footprint_mm, reach_mm
 """
 
 import pandas as pd
 
-from softtact.geometry.meshes import read_mesh
-from softtact.reporting.fig4_complexity import draw
+from softtact.geometry.meshes import place, read_mesh
+from softtact.geometry.pose import Pose
+from softtact.reporting.fig4_complexity import Placed, draw
 from softtact.reporting.style import save
 
 
 def run(*, inputs, outputs, settings, threads=1):
     """Draw."""
-    meshes = {name: read_mesh(path, unit=unit)
-              for path, (name, unit) in zip(inputs["objects"], settings["units"], strict=True)}
-    save(draw(pd.read_csv(inputs["complexity"]), meshes, thresholds=settings["thresholds"]), outputs["png"], outputs["svg"])
+    placed = {entry["name"]: Placed(_placed(path, entry), tuple(settings["footprint_mm"]), settings["reach_mm"])
+              for path, entry in zip(inputs["objects"], settings["objects"], strict=True)}
+    save(draw(pd.read_csv(inputs["complexity"]), placed, thresholds=settings["thresholds"]), outputs["png"], outputs["svg"])
+
+
+def _placed(path, entry):
+    pose = None if entry["pose"] is None else Pose.from_values(entry["pose"])
+    return place(read_mesh(path, unit=entry["unit"]), pose=pose)

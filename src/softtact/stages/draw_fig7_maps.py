@@ -1,7 +1,7 @@
 """Figure 7.
 
 inputs: predictions, complexity, objects (list of meshes), presses (list: every model of every object)
-outputs: png, svg;  settings: units [[object, unit], ...], largest_counts
+outputs: png, svg;  settings: units [[object, unit], ...], trials, largest_counts
 """
 
 import pandas as pd
@@ -17,7 +17,7 @@ def run(*, inputs, outputs, settings, threads=1):
     predictions = read_dataset(inputs["predictions"])
     chosen = pd.read_csv(inputs["complexity"]).set_index("object").model
     presses = {(press.attrs["item"], press.attrs["model"]): press for press in map(read_dataset, inputs["presses"])}
-    objects = [_object(name, read_mesh(path, unit=unit), chosen[name], presses, predictions)
+    objects = [_object(name, read_mesh(path, unit=unit), chosen[name], presses, predictions) | {"trials": settings["trials"]}
                for path, (name, unit) in zip(inputs["objects"], settings["units"], strict=True)]
     save(draw(objects, largest_counts=settings["largest_counts"]), outputs["png"], outputs["svg"])
 

@@ -1,6 +1,7 @@
 """Tables 1 to 3 and the claims.
 
-inputs: cards (list), complexity, ftir, ssim, timing;  outputs: table1, contradictions, table2, table3, claims
+inputs: cards (list), complexity, ftir, ssim, summary, per_item, ceiling, timing, and features where objects were pressed
+outputs: table1, contradictions, table2, table3, claims
 settings: rule, thresholds {total, overlap}, source (of the readings)
 """
 
@@ -10,7 +11,14 @@ from softtact.evaluation.claims import claims
 from softtact.files import read_json, write_csv
 from softtact.geometry.complexity import choose_model
 from softtact.learning.samples import object_of
-from softtact.reporting.tables import PRINTED_COUNTS, contradictions, table1_materials, table2_complexity, table3_timing
+from softtact.reporting.tables import (
+    PRINTED_COUNTS,
+    PRINTED_TIMES,
+    contradictions,
+    table1_materials,
+    table2_complexity,
+    table3_timing,
+)
 
 
 def run(*, inputs, outputs, settings, threads=1):
@@ -27,6 +35,7 @@ def run(*, inputs, outputs, settings, threads=1):
     write_csv(outputs["contradictions"], contradictions(cards))
     write_csv(outputs["table2"], table2_complexity(complexity, choose))
     write_csv(outputs["table3"], table3_timing(timing))
+    scores = {name: pd.read_csv(inputs[name]) for name in ("summary", "per_item", "ceiling", "features") if name in inputs}
     write_csv(outputs["claims"], claims(cards=cards, complexity=complexity, ftir=read_json(inputs["ftir"]), ssim=ssim,
-                                        timing=timing, choose=choose, printed_counts=PRINTED_COUNTS,
-                                        source=settings["source"]))
+                                        timing=timing, choose=choose, printed_counts=PRINTED_COUNTS, printed_times=PRINTED_TIMES,
+                                        source=settings["source"], **scores))

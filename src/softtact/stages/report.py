@@ -1,14 +1,30 @@
-"""The report page.
+"""The report page, and beside it the configuration and the code that it was made with.
 
-inputs: table1, contradictions, table2, table3, networks, claims, summary, ftir, figures (list of PNG), and policies, or
-    inventory and counts of the published archive;  outputs: page;  settings: study facts
+inputs: table1, contradictions, table2, table3, networks, claims, summary, ftir, figures (list of PNG and HTML), sources (list of
+    source files), and policies, or inventory and counts of the published archive
+outputs: page, sources, config, named, run
+settings: study facts, config (all values), named (what these name), benchmarks (folder), sources {figure: {data, code}}
 """
 
-from softtact.files import atomic_path
-from softtact.reporting.page import render_page
+import yaml
+
+from softtact.files import atomic_path, write_csv
+from softtact.reporting.page import render_page, render_sources
+from softtact.reporting.run_record import run_record
 
 
 def run(*, inputs, outputs, settings, threads=1):
-    """Write the page, whole."""
-    with atomic_path(outputs["page"]) as temporary:
-        temporary.write_text(render_page(inputs, settings, folder=outputs["page"].parent), encoding="utf-8")
+    """Write the configuration, the sources, the record of the run, and the page, each whole."""
+    config, named = (yaml.safe_dump(settings[name], sort_keys=False, allow_unicode=True, width=120) for name in ("config", "named"))
+    record = run_record(settings["benchmarks"])
+    write_csv(outputs["run"], record)
+    _write(outputs["config"], config)
+    _write(outputs["named"], named)
+    _write(outputs["sources"], render_sources(inputs["sources"], study=settings["study"], config=config, named=named,
+                                              page=outputs["page"].name))
+    _write(outputs["page"], render_page(inputs, settings, folder=outputs["page"].parent, run=record))
+
+
+def _write(path, text):
+    with atomic_path(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")

@@ -19,7 +19,7 @@ def run(*, inputs, outputs, settings, threads=1):
     study = search_hyperparameters(
         read_samples(inputs["train"]), read_samples(inputs["validation"]), options=options,
         activation=network.activation, ssim=ssim.model_dump(), seed=settings["seed"],
-        device=prepare_torch(threads=threads, device=settings.get("device", "auto")),
+        device=prepare_torch(threads=settings.get("threads", threads), device=settings.get("device", "auto")),
         journal=outputs["search"].with_name("search.journal"))
     write_csv(outputs["search"], search_table(study))
     write_json(outputs["best"], best_trial(study))

@@ -19,6 +19,11 @@ COMPLIANCES = {"elastic": Compliance, "foundation": FoundationFlexibility}
 
 def run(*, inputs, outputs, settings, threads=1):
     """Press, and write the maps; a press that does not converge fails with its name."""
+    press_item(inputs, settings, threads=threads).write(outputs["press"], settings=settings)
+
+
+def press_item(inputs, settings, *, threads, keep_body=False):
+    """The `PressResult` of the item of the settings."""
     item, mesh = settings["item"], settings["mesh"]
     spec = SensorSpec.from_dict(settings["sensor"])
     names = {"model": settings["model"], "set": item["set"], "item": item["name"]}
@@ -31,11 +36,10 @@ def run(*, inputs, outputs, settings, threads=1):
     pose = None if item["pose"] is None else Pose.from_values(item["pose"])
     label = f"{item['set']}/{item['name']}/{settings['model']}"
     try:
-        result = sensor.press(read_mesh(inputs["object"], unit=item["unit"]), pose=pose, force_n=settings["forces_n"],
-                              model=kind, label=label, threads=threads)
+        return sensor.press(read_mesh(inputs["object"], unit=item["unit"]), pose=pose, force_n=settings["forces_n"],
+                            model=kind, label=label, threads=threads, keep_body=keep_body)
     except ConvergenceError as error:
         raise ConvergenceError(f"{label}: {error}", result=error.result) from None
-    result.write(outputs["press"], settings=settings)
 
 
 def _laws(inputs, laws):

@@ -2,7 +2,7 @@
 
 inputs: train, validation, best (of the search)
 outputs: model (the best epoch's weights), history, and timing where asked for; a checkpoint lies beside them meanwhile
-settings: training, network (its `architecture` says which is trained), ssim, seed
+settings: training, network (its `architecture` says which is trained), ssim, seed, threads (by default those of the job)
 """
 
 import pandas as pd
@@ -24,7 +24,7 @@ def run(*, inputs, outputs, settings, threads=1):
     ssim = Ssim.from_dict(settings.get("ssim", {}), where="ssim").model_dump()
     train, validation = read_samples(inputs["train"]), read_samples(inputs["validation"])
     training = start_run(train, network=chosen_network(network, best), seed=seed, learning_rate=options.learning_rate,
-                         device=prepare_torch(threads=threads, device=options.device))
+                         device=prepare_torch(threads=settings.get("threads", threads), device=options.device))
     checkpoint = outputs["model"].with_name("checkpoint.pt")
     for _ in train_network(training, train, validation, options=options, ssim=ssim, seed=seed, checkpoint=checkpoint,
                            label=f"{network.architecture} network of {train.model}"):

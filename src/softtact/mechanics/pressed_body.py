@@ -1,0 +1,63 @@
+"""The layered body under load as nodes, cells and displacements: what a section or a file for ParaView is made of.
+
+The cells are eliminated during a press, but every state of it holds the displacements of all nodes, frusta's inner ones too.
+"""
+
+from dataclasses import dataclass
+
+import meshio
+import numpy as np
+
+REGIONS = ("frusta", "sheet", "cover")     # from below; their numbers are the cell data `layer`
+
+# VTK's order of the nodes, by ours (bottom, top, middle of a plan of corners, mid-sides and centre).
+VTK_HEX27 = np.array([0, 1, 2, 3, 9, 10, 11, 12, 4, 5, 6, 7, 13, 14, 15, 16, 18, 19, 20, 21, 25, 23, 22, 24, 8, 17, 26])
+VTK_WEDGE18 = np.array([0, 1, 2, 6, 7, 8, 3, 4, 5, 9, 10, 11, 12, 13, 14, 15, 16, 17])
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Like elements: nodes (e, w) in VTK's order, their kind by meshio's name, and the region of REGIONS that they are of."""
+
+    kind: str
+    nodes: np.ndarray
+    region: str
+
+
+@dataclass(frozen=True)
+class PressedBody:
+    """Sheet, cover and frusta: points_mm (n, 3) at rest, displacement_mm (n, 3) in single precision, cells a list of `Cells`.
+
+    top (t, 8): the cover's upper faces;  pressure_mpa (t,): the object's mean pressure on each, positive in compression
+
+    The sensor's frame: z = 0 is the top at rest, a displacement towards the PCB has a negative z. The regions share no nodes: a
+    frustum's root repeats nodes of the sheet, the sheet's top repeats places of the cover, and both move alike.
+    """
+
+    points_mm: np.ndarray
+    displacement_mm: np.ndarray
+    cells: tuple
+    top: np.ndarray
+    pressure_mpa: np.ndarray
+
+    def to_meshio(self, *, displaced=True):
+        """As a meshio mesh at rest; cell data `layer`: 0 frusta, 1 sheet, 2 cover; point data `displacement_mm` if `displaced`."""
+        layers = [np.full(len(cells.nodes), REGIONS.index(cells.region)) for cells in self.cells]
+        return meshio.Mesh(self.points_mm, [(cells.kind, cells.nodes) for cells in self.cells], cell_data={"layer": layers},
+                           point_data={"displacement_mm": self.displacement_mm} if displaced else {})
+
+
+def pressed_body(body, state=None):
+    """The `PressedBody` of a `LayeredBody` in a `BodyState`, to be taken before the next level changes the contact; or at rest."""
+    slab, bed = (state.slab.displacement, state.bed.displacement) if state else body.rest()
+    sheet, cover, frusta = body.slab.sheet_mesh, body.slab.cover_mesh, body.bed.mesh
+    masters, weights = body.slab.sheet_nodes
+    first = np.cumsum([0, len(sheet.points), len(cover.points)])
+    hexes = (frusta.hexes[None] + first[2] + (np.arange(body.bed.count) * body.bed.nodes)[:, None, None]).reshape(-1, 27)
+    cells = (Cells("hexahedron27", hexes[:, VTK_HEX27], "frusta"), Cells("hexahedron27", sheet.hexes[:, VTK_HEX27], "sheet"),
+             Cells("wedge18", sheet.wedges[:, VTK_WEDGE18], "sheet"), Cells("hexahedron20", cover.hexes + first[1], "cover"))
+    moved = np.vstack([np.einsum("pm,pmd->pd", weights, slab[masters]), cover.follow @ slab[:cover.free], bed.reshape(-1, 3)])
+    pressure = body.slab.top.pressure_of_faces(state.slab) if state else np.zeros(len(cover.top))
+    return PressedBody(points_mm=np.vstack([sheet.points, cover.points, body.bed.coordinates.reshape(-1, 3)]),
+                       displacement_mm=moved.astype(np.float32), cells=cells, top=cover.top + first[1],
+                       pressure_mpa=pressure.astype(np.float32))

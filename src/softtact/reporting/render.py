@@ -1,0 +1,131 @@
+"""Views of solids for figures: rendered off screen by VTK, or drawn by matplotlib where that does not work.
+
+VTK needs some OpenGL (its wheels bring a software one). A driver that fails may end the process or never answer, so it runs in a
+process of its own and within a time. What then stands in a figure is told in the log and in the figure.
+"""
+
+import json
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from softtact.progress import announce
+
+FALLBACK = "3-D views drawn by matplotlib: no off-screen renderer here"
+TIMEOUT_S = 120.0
+_COMMAND = (sys.executable, "-m", "softtact.reporting.offscreen")
+
+
+@dataclass(frozen=True)
+class Part:
+    """Triangles (m, 3) of points_mm (n, 3) in one colour; as lines: their edges alone;  edges: their colour, None without."""
+
+    points_mm: np.ndarray
+    triangles: np.ndarray
+    colour: str = "#b8bcc4"
+    opacity: float = 1.0
+    as_lines: bool = False
+    edges: str | None = None
+
+
+@dataclass(frozen=True)
+class View:
+    """Parts seen from a direction: `seen_from` (3,) points from the middle to the eye, `up` (3,) is upwards in the picture."""
+
+    parts: list = field(default_factory=list)
+    seen_from: tuple = (0.6, -1.0, 0.8)
+    up: tuple = (0.0, 0.0, 1.0)
+
+
+def part_of(mesh, **look):
+    """A `Part` of a trimesh."""
+    return Part(points_mm=np.asarray(mesh.vertices), triangles=np.asarray(mesh.faces), **look)
+
+
+def rendered(views, *, size=(900, 675), timeout_s=TIMEOUT_S):
+    """Images (h, w, 3) of the views in 0 to 255, or None where rendering failed, after a sentence in the log."""
+    with tempfile.TemporaryDirectory(prefix="softtact-render-") as folder:
+        _write(views, size, Path(folder))
+        try:
+            done = subprocess.run([*_COMMAND, folder], capture_output=True, text=True, timeout=timeout_s)
+        except subprocess.TimeoutExpired:
+            announce(f"{FALLBACK} (no answer within {timeout_s:g} s).")
+            return None
+        images = Path(folder, "images.npz")
+        if done.returncode or not images.exists():
+            said = done.stderr.strip().splitlines() or ["it said nothing"]
+            announce(f"{FALLBACK} (status {done.returncode}: {said[-1]:.200}).")
+            return None
+        with np.load(images) as kept:
+            return [kept[f"view{k}"] for k in range(len(views))]
+
+
+def _write(views, size, folder):
+    """views.json and arrays.npz, as `offscreen` reads them."""
+    arrays, listed = {}, []
+    for v, view in enumerate(views):
+        for p, part in enumerate(view.parts):
+            arrays[f"points_{v}_{p}"], arrays[f"triangles_{v}_{p}"] = part.points_mm, part.triangles
+        looks = [{"colour": part.colour, "opacity": part.opacity, "as_lines": part.as_lines, "edges": part.edges}
+                 for part in view.parts]
+        listed.append({"parts": looks, "seen_from": list(map(float, view.seen_from)), "up": list(map(float, view.up))})
+    np.savez(folder / "arrays.npz", **arrays)
+    (folder / "views.json").write_text(json.dumps({"size": size, "views": listed}), encoding="utf-8")
+
+
+def add_view(figure, place, view, image):
+    """Axes at a place of a grid with the image, or with the view drawn by matplotlib where there is no image."""
+    if image is None:
+        axes = figure.add_subplot(place, projection="3d")
+        _draw(axes, view)
+    else:
+        axes = figure.add_subplot(place)
+        axes.imshow(_cropped(image))
+    axes.set_axis_off()
+    return axes
+
+
+def tell_fallback(figure, images):
+    """A line under the figure where its views were drawn by matplotlib."""
+    if images is None:
+        figure.text(0.005, 0.002, FALLBACK, fontsize=6, color="0.4", ha="left", va="bottom")
+
+
+def _cropped(image, margin=8):
+    """The image without its white border but for a margin."""
+    rows, columns = (np.flatnonzero((image < 250).any(axis=(1 - axis, 2))) for axis in (0, 1))
+    if not len(rows):
+        return image
+    return image[max(0, rows[0] - margin):rows[-1] + margin, max(0, columns[0] - margin):columns[-1] + margin]
+
+
+def _draw(axes, view):
+    """The view in matplotlib's 3-D axes: flat facets, farther ones first."""
+    from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
+
+    points = np.vstack([part.points_mm for part in view.parts])
+    for part in view.parts:
+        corners = part.points_mm[part.triangles]
+        if part.as_lines:
+            axes.add_collection3d(Line3DCollection(corners[:, [0, 1, 2, 0]], colors=part.colour, linewidths=0.3))
+            continue
+        axes.add_collection3d(Poly3DCollection(corners, facecolors=_shaded(corners, part), edgecolors=part.edges or "none",
+                                               linewidths=0.1))
+    low, high = points.min(axis=0), points.max(axis=0)
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]), box_aspect=np.maximum(high - low, 1e-3))
+    x, y, z = view.seen_from
+    axes.view_init(elev=np.degrees(np.arctan2(z, np.hypot(x, y))), azim=np.degrees(np.arctan2(y, x)))
+
+
+def _shaded(corners, part):
+    """Colours (m, 4) of facets (m, 3, 3), lighter towards a light from above."""
+    from matplotlib.colors import to_rgb
+
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    light = 0.45 + 0.55 * np.abs(normal @ np.array([0.4, 0.3, 0.86]))
+    return np.column_stack([light[:, None] * np.array(to_rgb(part.colour)), np.full(len(corners), part.opacity)])

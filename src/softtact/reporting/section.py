@@ -1,0 +1,134 @@
+"""A section through the pressed sensor: the material that lies in a plane y = const at rest, and where the press takes it.
+
+The curved elements are cut into small straight ones by their own shape functions, with their displacements; a plane of VTK's
+then cuts these. No picture is rendered here.
+"""
+
+from dataclasses import dataclass
+from xml.etree import ElementTree
+
+import numpy as np
+
+from softtact.errors import InputError
+from softtact.mechanics.elements import HEX20_TOP, hex20, hex27, wedge18
+from softtact.mechanics.pressed_body import REGIONS, VTK_HEX27, VTK_WEDGE18
+
+_FACE_TRIANGLES = np.array([[0, 4, 7], [4, 1, 5], [5, 2, 6], [6, 3, 7], [4, 5, 6], [4, 6, 7]])     # of corners, then mid-sides
+_BESIDE_MM = 0.01     # a plane exactly through the frusta's axes would run along faces of elements
+
+
+@dataclass(frozen=True)
+class Section:
+    """Polygons in a plane: rest_mm, pressed_mm lists of (k, 2), x and z; region (n,): of REGIONS, by number."""
+
+    rest_mm: list
+    pressed_mm: list
+    region: np.ndarray
+
+
+@dataclass(frozen=True)
+class Body:
+    """What `stages.press_section` writes, read again: points_mm, displacement_mm (n, 3), cells [(kind, nodes, region number)]."""
+
+    points_mm: np.ndarray
+    displacement_mm: np.ndarray
+    cells: list
+
+    def points_of(self, region):
+        """Numbers of the points that a region's cells use."""
+        number = REGIONS.index(region)
+        return np.unique(np.concatenate([nodes.ravel() for _, nodes, own in self.cells if own == number]))
+
+
+def read_body(path):
+    """`Body` of a VTU file; a damaged one raises `InputError`."""
+    import meshio
+
+    try:
+        mesh = meshio.vtu.read(path)     # meshio.read would end the process
+        fields = mesh.cell_data["layer"], mesh.point_data["displacement_mm"]
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file.") from None
+    except (meshio.ReadError, ElementTree.ParseError, KeyError, ValueError, OSError) as error:
+        raise InputError(f"{path}: not a readable pressed sensor ({error}); delete it and make it again.") from None
+    layers, displacement = fields
+    cells = [(block.type, block.data[layer == number], int(number))       # a file has one block for each kind of cell
+             for block, layer in zip(mesh.cells, layers, strict=True) for number in np.unique(layer)]
+    return Body(mesh.points, displacement, cells)
+
+
+def top_surface(body):
+    """Points (n, 3) at rest, displacements (n, 3) in mm and triangles (m, 3) of the cover's upper side."""
+    hexes = np.vstack([nodes for kind, nodes, region in body.cells if region == REGIONS.index("cover")])
+    faces = hexes[:, HEX20_TOP]
+    faces = faces[(body.points_mm[faces, 2] > -1e-9).all(axis=1)]
+    used, numbers = np.unique(faces, return_inverse=True)
+    triangles = numbers.reshape(-1, 8)[:, _FACE_TRIANGLES].reshape(-1, 3)
+    return body.points_mm[used], body.displacement_mm[used], triangles
+
+
+def row_under_load(body, spec):
+    """y (mm) of the row of frusta under the place that went down most."""
+    nodes = body.points_of("sheet")
+    deepest = body.points_mm[nodes[np.argmin(body.displacement_mm[nodes, 2])], 1]
+    pitch, count = spec.dielectric.frusta.pitch_mm, spec.frusta_counts[1]
+    rows = pitch * (np.arange(count) - 0.5 * (count - 1))
+    return float(rows[np.argmin(np.abs(rows - deepest))])
+
+
+def section(body, y_mm, *, parts=3):
+    """The `Section` at y_mm of a `Body`; each element is cut into `parts` along each of its directions."""
+    import pyvista
+
+    plane = y_mm + _BESIDE_MM
+    rest, pressed, regions = [], [], []
+    for kind, nodes, region in body.cells:
+        y = body.points_mm[nodes, 1]
+        nodes = nodes[(y.min(axis=1) < plane) & (y.max(axis=1) > plane)]
+        if not len(nodes):
+            continue
+        points, moved, linear, cell_type = _refined(kind, body.points_mm[nodes], body.displacement_mm[nodes], parts)
+        grid = pyvista.UnstructuredGrid({cell_type: linear}, points)
+        grid["displacement"] = moved
+        cut = grid.slice(normal="y", origin=(0.0, plane, 0.0))
+        for face in cut.regular_faces if cut.is_all_triangles else cut.irregular_faces:
+            at, to = cut.points[face], cut["displacement"][face]
+            rest.append(at[:, [0, 2]])
+            pressed.append((at + to)[:, [0, 2]])
+            regions.append(region)
+    return Section(rest, pressed, np.array(regions))
+
+
+def _refined(kind, points, displacement, parts):
+    """Points (n, 3), displacements (n, 3) and linear cells of elements (e, w, 3), with VTK's type of these cells."""
+    at, cells, values, cell_type = _LATTICES[kind](parts)
+    numbers = cells[None] + (np.arange(len(points)) * len(at))[:, None, None]
+    return (*(np.einsum("pw,ewd->epd", values, field).reshape(-1, 3) for field in (points, displacement)),
+            numbers.reshape(-1, cells.shape[1]), cell_type)
+
+
+def _hexes(shape, order):
+    def lattice(parts):
+        line = np.linspace(-1, 1, parts + 1)
+        z, y, x = np.meshgrid(line, line, line, indexing="ij")
+        at = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+        n = parts + 1
+        k, j, i = (grid.ravel() for grid in np.meshgrid(*[np.arange(parts)] * 3, indexing="ij"))
+        corners = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
+        cells = np.column_stack([(i + a) + n * (j + b) + n * n * (k + c) for a, b, c in corners])
+        return at, cells, shape(at)[0][:, order], 12
+    return lattice
+
+
+def _wedges(parts):
+    steps = [(i, j) for j in range(parts + 1) for i in range(parts + 1 - j)]
+    number = {step: k for k, step in enumerate(steps)}
+    up = [(number[i, j], number[i + 1, j], number[i, j + 1]) for i, j in steps if i + j < parts]
+    down = [(number[i + 1, j], number[i + 1, j + 1], number[i, j + 1]) for i, j in steps if i + j < parts - 1]
+    plan, triangles = np.array(steps) / parts, np.array(up + down)
+    at = np.vstack([np.column_stack([plan, np.full(len(plan), z)]) for z in np.linspace(-1, 1, parts + 1)])
+    cells = np.vstack([np.hstack([triangles + k * len(plan), triangles + (k + 1) * len(plan)]) for k in range(parts)])
+    return at, cells, wedge18(at)[0][:, VTK_WEDGE18], 13
+
+
+_LATTICES = {"hexahedron27": _hexes(hex27, VTK_HEX27), "hexahedron20": _hexes(hex20, np.arange(20)), "wedge18": _wedges}

@@ -1,0 +1,30 @@
+"""Figure 2.
+
+inputs: body (VTU), summary (JSON), object (mesh);  outputs: png, svg;  settings: sensor, unit, pose
+"""
+
+import numpy as np
+
+from softtact.files import read_json
+from softtact.geometry.meshes import place, read_mesh
+from softtact.geometry.pose import Pose
+from softtact.geometry.sensor_spec import SensorSpec
+from softtact.reporting.fig2_section import draw
+from softtact.reporting.section import read_body, row_under_load, section
+from softtact.reporting.style import save
+
+
+def run(*, inputs, outputs, settings, threads=1):
+    """Cut the pressed body through the row of frusta under the load, and draw."""
+    spec, summary, body = SensorSpec.from_dict(settings["sensor"]), read_json(inputs["summary"]), read_body(inputs["body"])
+    y = row_under_load(body, spec)
+    pose = None if settings["pose"] is None else Pose.from_values(settings["pose"])
+    placed = place(read_mesh(inputs["object"], unit=settings["unit"]), pose=pose)
+    figure = draw(section(body, y), _outline(placed, y, summary["indentation_mm"]), spec=spec, summary=summary, y_mm=y)
+    save(figure, outputs["png"], outputs["svg"])
+
+
+def _outline(mesh, y, depth):
+    """Polygons (k, 2), x and z, of the object in the plane y, lowered by `depth` mm."""
+    cut = mesh.section(plane_origin=(0.0, y, 0.0), plane_normal=(0.0, 1.0, 0.0))
+    return [] if cut is None else [loop[:, [0, 2]] - np.array([0.0, depth]) for loop in cut.discrete]

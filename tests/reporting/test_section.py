@@ -1,0 +1,62 @@
+"""A section through the body: its layers' areas at rest, and the same material where the press takes it."""
+
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+
+from softtact.geometry.sensor_spec import SensorSpec
+from softtact.mechanics.layered_mesh import layered_mesh
+from softtact.mechanics.pressed_body import REGIONS
+from softtact.reporting.section import read_body, row_under_load, section, top_surface
+
+CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
+SMALL = CORO.model_copy(update={"footprint_mm": (6.0, 8.4)})   # 5 x 7 frusta
+SQUEEZE = 0.1
+
+
+@pytest.fixture(scope="module")
+def body(tmp_path_factory):
+    """A small sensor shortened by a tenth, and most in the row at y = 2.4 mm."""
+    mesh = layered_mesh(SMALL, {"cover_levels": [0.0, 1.0], "cover_splits": [0], "frustum_levels": [0.0, 0.35, 1.0]})
+    bump = 0.01 * np.exp(-((mesh.points[:, 1] - 2.4) ** 2)) * (mesh.points[:, 2] + 2.5)
+    down = np.column_stack([np.zeros((len(bump), 2)), -SQUEEZE * (mesh.points[:, 2] + 2.5) - bump])
+    path = tmp_path_factory.mktemp("body") / "body.vtu"
+    meshio.Mesh(mesh.points, mesh.cells, cell_data=mesh.cell_data, point_data={"displacement_mm": down}).write(path)
+    return read_body(path)
+
+
+def area(polygons):
+    total = 0.0
+    for polygon in polygons:
+        x, z = polygon.T
+        total += 0.5 * abs(np.dot(x, np.roll(z, -1)) - np.dot(z, np.roll(x, -1)))
+    return total
+
+
+def test_the_layers_of_a_section_at_rest_have_their_areas(body):
+    cut = section(body, 0.0)
+    areas = {name: area([p for p, r in zip(cut.rest_mm, cut.region, strict=True) if r == k]) for k, name in enumerate(REGIONS)}
+    assert areas["cover"] == pytest.approx(6.0 * 1.5, rel=1e-6)
+    assert areas["sheet"] == pytest.approx(6.0 * 0.5, rel=1e-6)
+    assert areas["frusta"] == pytest.approx(5 * 0.5 * 0.5 * (0.6 + 1.2), rel=0.01)     # 0.01 mm beside the axes
+
+
+def test_pressed_material_lies_where_its_displacement_takes_it(body):
+    cut = section(body, -2.4)       # the bump does not reach here
+    for rest, pressed in zip(cut.rest_mm, cut.pressed_mm, strict=True):
+        np.testing.assert_allclose(pressed[:, 1] + 2.5, (1 - SQUEEZE) * (rest[:, 1] + 2.5), atol=2e-5)
+        np.testing.assert_allclose(pressed[:, 0], rest[:, 0], atol=1e-9)
+
+
+def test_the_row_under_the_load_is_found(body):
+    assert row_under_load(body, SMALL) == pytest.approx(2.4)
+
+
+def test_the_top_surface_covers_the_footprint_and_goes_down_with_it(body):
+    points, moved, triangles = top_surface(body)
+    corners = points[triangles]
+    areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    assert areas.sum() == pytest.approx(6.0 * 8.4)
+    assert (points[:, 2] == 0).all() and moved[:, 2].max() < -SQUEEZE * 2.4
