@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 
 from softtact.contact.friction import Drag, Grip
+from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.mechanics.blocks import HexBlock
 from softtact.mechanics.condensation import Condensation, Springs
 from softtact.mechanics.elements import HEX27_BOTTOM, HEX27_SIDES, gauss, quad9
@@ -139,6 +140,7 @@ class FrustumBed:
         self.point_area = self._areas(np.array([r[0] for r in records]).reshape(-1, len(weights), 9)[:, 0], slopes, weights)
         absent = (self.point_neighbour[None] >= 0) & ~self.geometry.neighbours[:, self.point_neighbour]
         self.point_area[absent] = 0.0
+        self.gap0[absent] = NO_CONTACT_MM    # a frustum at the lattice's edge may bulge; that is no overlap
 
     def _nearest_direction(self):
         """Which of DIRECTIONS (f,) each outer face looks into most."""
