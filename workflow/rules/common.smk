@@ -112,6 +112,12 @@ def mesh_of(model):
     return STUDY.values.models[model].mesh.model_dump(mode="json", exclude_none=True)
 
 
+def friction_of(model):
+    """A model's own coefficients of friction; None where it takes the sensor's."""
+    friction = STUDY.values.models[model].friction
+    return friction and friction.model_dump(mode="json")
+
+
 def plain(section):
     """A section of the configuration as JSON values."""
     return section.model_dump(mode="json")

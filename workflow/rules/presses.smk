@@ -16,6 +16,7 @@ rule simulate_press:
             kind=STUDY.values.models[w.model].kind,
             laws=STUDY.values.models[w.model].laws,
             mesh=mesh_of(w.model),
+            friction=friction_of(w.model),
             forces_n=STUDY.values.forces_n,
         ),
     log:

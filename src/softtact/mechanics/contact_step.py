@@ -82,7 +82,7 @@ class ContactStepper:
             if direction is None:
                 return None
             step = problem.best_share(x, direction) * direction
-            beyond = problem.free and abs(x[-1] + step[-1]) > largest
+            beyond = problem.free and not problem.held and abs(x[-1] + step[-1]) > largest
             if beyond:       # the object stops on the way
                 step = (np.copysign(largest, step[-1]) - x[-1]) / step[-1] * step
             x = x + step

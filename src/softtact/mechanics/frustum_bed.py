@@ -238,8 +238,11 @@ class FrustumBed:
         """Stiffness (n, p) of the contact points in N/mm3."""
         return self.contact.response(gaps)[2]
 
-    def condense(self, state, frusta):
-        """Recompute the condensed tangents of the given frusta (k,); returns those of their roots (k, 1, 75, 75)."""
+    def condense(self, state, frusta, damping=None):
+        """Recompute the condensed tangents of the given frusta (k,); returns those of their roots (k, 1, 75, 75).
+
+        damping: stiffness (k,) in N/mm on their inner unknowns, see `Condensation.set`
+        """
         slope = self.contact.at(frusta).response(state.gaps[frusta])[2] * self.point_area[frusta]
         displacement = state.displacement[frusta]
         friction = None if state.drag is None else state.drag.stiffness(frusta)
@@ -248,7 +251,8 @@ class FrustumBed:
             springs = self._springs(layer, slope)
             if friction is not None:
                 springs = springs.with_others(self._friction_springs(layer, friction, frusta))
-            layer.condensed.set(frusta, [self._layer_tangents(k, displacement, frusta), *left], springs)
+            layer.condensed.set(frusta, [self._layer_tangents(k, displacement, frusta), *left], springs,
+                                damping=damping)
             left = [layer.condensed.outer[frusta][:, None]]
         return left[0]
 

@@ -108,6 +108,7 @@ class Step:
         return max(np.abs(self.slab).max(), np.abs(self.bed).max(), abs(self.indentation))
 
 
+_DAMPINGS = 4         # steps that are tried with ever more damping of the cells that they throw too far
 _FIRST_SHIFT = 0.01   # N/mm on every free unknown of the slab, doubled until the tangent is positive definite
 
 
@@ -165,6 +166,14 @@ class LayeredBody:
         Where nothing touches, a force finds no stiffness: the step is then not finite.
         """
         state = self.friction.for_tangent(state)
+        for _ in range(_DAMPINGS):
+            step = self._newton_step(state, force_n, surface, largest_mm)
+            if not (np.isfinite(step.largest()) and self.cells.damp(step.slab, step.bed)):
+                break
+        return step
+
+    def _newton_step(self, state, force_n, surface, largest_mm):
+        """The step with the cells as they are damped now."""
         self.cells.refresh(state, workers=self.workers)
         residual, kept = self.cells.condensed_residual(state)
         contact = StepContact(self.slab, state.slab, state.indentation, surface)
