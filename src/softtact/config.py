@@ -208,7 +208,16 @@ class Mesh(Section):
     largest_penetration_mm: PositiveFloat | None = Field(None, description="deeper overlaps in contacts are pressed apart")
     height_scatter: NotNegative | None = Field(None, description="standard deviation, share of the height")
     tip_scatter: NotNegative | None = Field(None, description="standard deviation, share of the tip's diameter")
+    thickness_scatter: Annotated[float, Field(ge=0, le=0.1)] | None = Field(
+        None, description="the same of sheet and cover, one thickness each for a specimen")
     specimen: Annotated[int, Field(ge=0)] | None = Field(None, description="seed of the scatter")
+
+
+class OwnFriction(Section):
+    """A model's own coefficients of Coulomb friction, in place of the sensor's."""
+
+    object: NotNegative = Field(0.0, description="of the object on the cover")
+    board: NotNegative = Field(0.0, description="of the frusta on the board; needs tips that are not held")
 
 
 class Model(Section):
@@ -217,6 +226,7 @@ class Model(Section):
     kind: Literal["elastic", "foundation", "hyperelastic"] = "hyperelastic"
     mesh: Mesh = Mesh()
     laws: dict[Literal["dielectric", "cover"], Law] = {}
+    friction: OwnFriction | None = Field(None, description="only of a hyperelastic model; by default the sensor's")
     needs: list[Literal["mesh", "compliance", "card_dielectric", "card_cover"]] = []
 
     @property
@@ -401,7 +411,7 @@ def load_study(values, *, folder="config"):
     spec = SensorSpec.from_yaml(sensor_file(checked.sensor, folder=folder))
     _check_forces(checked, spec)
     materials = _materials(checked, spec, Path(folder, "materials"))
-    _check_models(checked)
+    _check_models(checked, spec)
     _check_sensor(checked, spec)
     checked = _with_range(checked, spec)
     make_specimen(spec, seed=checked.seed, settings=VirtualSensorSettings.from_dict(checked.virtual_sensor))
@@ -492,9 +502,15 @@ def _materials(values, spec, folder):
     return {name: load_material(_existing(folder, name, kind="material")) for name in values.materials}
 
 
-def _check_models(values):
+def _check_models(values, spec):
     for name in [*values.tested, values.reference, *values.choice.models.values()]:
         _refuse_unknown(name, list(values.models), kind="model", where="the configuration, at 'models'")
+    for name, model in values.models.items():
+        where = f"the configuration, at 'models.{name}'"
+        if model.friction and model.kind != "hyperelastic":
+            raise InputError(f"{where}: a model of kind {model.kind!r} knows no friction; leave 'friction' out.")
+        if model.friction:
+            SensorSpec.from_dict({**spec.model_dump(mode="json"), "friction": model.friction.model_dump()}, where=where)
 
 
 def _check_sensor(values, spec):

@@ -86,6 +86,22 @@ def test_a_step_is_the_least_energy_that_a_general_minimiser_finds(exact, seed):
     assert np.abs(scipy.optimize.approx_fprime(found, scene.energy, 1e-9)).max() < 1e-4    # the differences' own rounding
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_an_object_that_would_go_too_far_stops_and_the_body_is_in_balance_at_that_depth(exact, seed):
+    scene = Scene(seed)
+    _, free = scene.step(ContactStepper(DenseSolver()))
+    step, lowering = scene.step(ContactStepper(DenseSolver()), largest=0.3 * abs(free))
+    assert lowering == pytest.approx(0.3 * free, rel=1e-12)
+    at_depth = scipy.optimize.approx_fprime(np.append(step, lowering), scene.energy, 1e-9)
+    assert np.abs(at_depth[:-1]).max() < 1e-4    # the differences' own rounding
+    assert at_depth[-1] < -1e-2                  # N: deeper down the energy is still less
+
+
+def test_a_limit_that_the_object_does_not_reach_changes_nothing():
+    (step, lowering), (limited, lowered) = (Scene(1).step(ContactStepper(DenseSolver()), largest=far) for far in (np.inf, 1.0))
+    assert lowered == lowering and (limited == step).all()
+
+
 def test_an_object_that_is_held_is_not_lowered():
     step, lowering = Scene(1).step(ContactStepper(DenseSolver()), excess=None)
     assert lowering == 0.0 and np.abs(step).max() > 0

@@ -7,7 +7,7 @@ import pytest
 
 from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.laws.registry import make_law
-from softtact.mechanics.layered_body import MeshSettings, build_unit_cell
+from softtact.mechanics.layered_body import MeshSettings, build_patch, build_unit_cell
 
 CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
 LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040})
@@ -29,3 +29,13 @@ def test_neighbours_meet_halfway_between_the_axes(tip_mm, root_mm):
     from_axis = -(weights * bed.coordinates[0, nodes, axis[:, None]]).sum(axis=1)
     np.testing.assert_allclose(bed.gap0[0, towards], half - from_axis, atol=1e-12)
     assert bed.gap0.min() > -1e-12
+
+
+def test_a_frustum_at_the_edge_that_bulges_overlaps_nothing():
+    body = build_patch(CORO, (2, 1), dielectric_law=LAW, mesh=MeshSettings.draft())
+    _, bulge = body.rest()
+    bulge[..., :2] = 0.02 * body.bed.coordinates[..., :2]     # wider by 2 %, from the middle of the pair
+    state = body.bed.evaluate(bulge)
+    faces_neighbour = body.bed.point_neighbour >= 0
+    absent = faces_neighbour[None] & ~body.bed.geometry.neighbours[:, body.bed.point_neighbour]
+    assert absent.any(axis=1).all() and state.gaps[absent].min() > 1.0

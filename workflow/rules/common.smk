@@ -122,6 +122,12 @@ def mesh_of(model):
     return STUDY.values.models[model].mesh.model_dump(mode="json", exclude_none=True)
 
 
+def friction_of(model):
+    """A model's own coefficients of friction; None where it takes the sensor's."""
+    friction = STUDY.values.models[model].friction
+    return friction and friction.model_dump(mode="json")
+
+
 def plain(section):
     """A section of the configuration as JSON values."""
     return section.model_dump(mode="json")
@@ -137,6 +143,7 @@ def pressed_with(model, item, forces_n):
         kind=chosen.kind,
         laws=chosen.laws,
         mesh=mesh_of(model),
+        friction=friction_of(model),
         forces_n=forces_n,
     )
 

@@ -42,18 +42,21 @@ class Condensation:
         self.outer = np.zeros((bodies, outer, outer))
         self._modified = np.zeros(bodies, dtype=bool)
 
-    def set(self, bodies, tangents, springs=None):
+    def set(self, bodies, tangents, springs=None, *, damping=None):
         """Assemble, factor and condense the matrices of the given bodies (b,).
 
-        tangents: for each group of elements (b, k, w, w) in N/mm;  springs: `Springs` of these bodies.
+        tangents: for each group of elements (b, k, w, w) in N/mm;  springs: `Springs` of these bodies;  damping: stiffness (b,)
+        in N/mm to add on each inner unknown, which shortens steps along soft modes (Levenberg and Marquardt)
 
         Where folding made a matrix indefinite its eigenvalues are made positive: with |matrix| every Newton step lowers the
         energy, and goes as far along a mode of negative stiffness as along one of positive; at equilibrium only the rate
         of convergence depends on it. Nocedal and Wright, Numerical Optimization, sec. 3.4.
         """
         springs = springs or Springs(np.zeros((len(bodies), 0)), np.zeros((0, 1), dtype=np.int64), np.zeros((0, 1)))
-        _set(bodies, tuple(tangents), self._dofs, springs.stiffness, springs.places, springs.weights, self._rows, self.outer,
-             self._modified, _SMALLEST_STIFFNESS, lapack.LETTERS, lapack.FACTORS, lapack.POTRF, lapack.TRSM, lapack.SYRK)
+        damping = np.zeros(len(bodies)) if damping is None else damping
+        _set(bodies, damping, tuple(tangents), self._dofs, springs.stiffness, springs.places, springs.weights, self._rows,
+             self.outer, self._modified, _SMALLEST_STIFFNESS, lapack.LETTERS, lapack.FACTORS, lapack.POTRF, lapack.TRSM,
+             lapack.SYRK)
 
     def residual(self, inner):
         """What the inner residuals (bodies, n) leave on the outer unknowns (bodies, m), and the part to keep for `recover`."""
@@ -80,7 +83,8 @@ class Condensation:
 
 
 @njit(cache=True, nogil=True)
-def _set(bodies, tangents, dofs, stiffness, places, weights, rows, outer, modified, smallest, letters, factors, potrf, trsm, syrk):
+def _set(bodies, damping, tangents, dofs, stiffness, places, weights, rows, outer, modified, smallest, letters, factors, potrf,
+         trsm, syrk):
     n, m = rows.shape[1], outer.shape[1]
     matrix = np.empty((n + m, n + m))
     for b in range(len(bodies)):
@@ -90,6 +94,8 @@ def _set(bodies, tangents, dofs, stiffness, places, weights, rows, outer, modifi
             for element in range(len(dofs[group])):
                 _add_element(matrix, tangents[group][b, element], dofs[group][element])
         _add_springs(matrix, stiffness[b], places, weights)
+        for i in range(n):
+            matrix[i, i] += damping[b]
         body = bodies[b]
         modified[body] = _condense(matrix, rows[body], outer[body], smallest, letters, factors, potrf, trsm, syrk)
 

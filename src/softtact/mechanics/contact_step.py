@@ -51,7 +51,7 @@ class ContactStepper:
         self.factors, self.iterations = 0, 0     # so far, of the matrix and of conjugate gradients
         self._along = None                       # the factored matrix's solution for the object's lowering
 
-    def step(self, rubber, residual, contact, *, drag=(0.0, 0.0), excess=None):
+    def step(self, rubber, residual, contact, *, drag=(0.0, 0.0), excess=None, largest=np.inf):
         """Step (n,) in mm of the unknowns, and how far the object is lowered with it; None if A is not positive definite.
 
         rubber: A, upper triangle (csr), with friction;  residual (n,) in N
@@ -60,30 +60,34 @@ class ContactStepper:
         drag: friction's border (n,) and corner in N/mm, between the unknowns and the object's lowering
         excess: the object's force less the wanted one in N; None holds the object where it is. A free object that touches
         nothing finds no stiffness: it is lowered by nan.
+        largest: mm, by which a free object is moved at most; farther steps end there with the contact of that depth
         """
         problem = _Problem(rubber, contact, residual, drag, excess)
         x = problem.rest()
         if problem.free and not contact.points.slope(0.0).any():
             return problem.parts(np.append(x[:-1], np.nan))
-        enough = _INNER_TOLERANCE * np.abs(problem.gradient(x)).max()
+        problem.judge(x)
         for number in range(_FACINGS):
-            x = self._least(problem, x, enough, first=number == 0)
-            if x is None or number == _FACINGS - 1 or not contact.follow(*problem.parts(x)):
-                break
-            if np.abs(problem.gradient(x)).max() <= enough:
+            x = self._least(problem, x, largest, first=number == 0)
+            if x is None or number == _FACINGS - 1 or not contact.follow(*problem.parts(x)) or problem.solved(x):
                 break
         return None if x is None else problem.parts(x)
 
-    def _least(self, problem, x, enough, *, first):
+    def _least(self, problem, x, largest, *, first):
         """The step of least energy, from x on, until its gradient is small enough; None if A is not positive definite."""
         for number in range(_INNER_STEPS):
-            gradient = problem.gradient(x)
-            if np.abs(gradient).max() <= enough:
+            if problem.solved(x):
                 break
-            direction = self._direction(problem, x, gradient, first=first and number == 0)
+            direction = self._direction(problem, x, problem.gradient(x), first=first and number == 0)
             if direction is None:
                 return None
-            x = x + problem.best_share(x, direction) * direction
+            step = problem.best_share(x, direction) * direction
+            beyond = problem.free and not problem.held and abs(x[-1] + step[-1]) > largest
+            if beyond:       # the object stops on the way
+                step = (np.copysign(largest, step[-1]) - x[-1]) / step[-1] * step
+            x = x + step
+            if beyond:
+                problem.hold(x)
         return x
 
     def _direction(self, problem, x, gradient, *, first):
@@ -115,18 +119,20 @@ class ContactStepper:
         self._corner = max(slope @ lowering**2 + corner - self._border @ self._along, _LEAST_CORNER)
         return True
 
-    def _precondition(self, right):
+    def _precondition(self, right, *, held):
         """The factored matrix's inverse; with the object free, of the matrix bordered by its lowering."""
         inner = self.solver.solve(right[:len(self._border)])
         if len(right) == len(inner):
             return inner
+        if held:
+            return np.append(inner, 0.0)
         lowered = (right[-1] - self._border @ inner) / self._corner
         return np.append(inner - lowered * self._along, lowered)
 
     def _conjugate_gradients(self, problem, slope, right):
         """Approximate solution of the Newton system, and whether it is as good as wanted; given up where it would take too long."""
         x, r = np.zeros(len(right)), right
-        z = self._precondition(r)
+        z = self._precondition(r, held=problem.held)
         p, size = z, r @ z
         first = size
         for iteration in range(_MOST_ITERATIONS):
@@ -137,7 +143,7 @@ class ContactStepper:
                 return x, False
             x = x + (size / curvature) * p
             r = r - (size / curvature) * q
-            z = self._precondition(r)
+            z = self._precondition(r, held=problem.held)
             size, before = r @ z, size
             if size <= _FORCING**2 * first:
                 return x, True
@@ -153,7 +159,7 @@ class _Problem:
     def __init__(self, rubber, contact, residual, drag, excess):
         self.rubber, self.lower, self.diagonal = rubber, rubber.T, rubber.diagonal()
         self.contact, self.drag = contact, drag
-        self.size, self.free = len(residual), excess is not None
+        self.size, self.free, self.held = len(residual), excess is not None, False
         # What the points face may change under way: the residual less the contact's share in it stays.
         residual = np.append(residual, excess) if self.free else residual
         self.residual = residual + self._spread(self.points.pressure(0.0))
@@ -164,6 +170,18 @@ class _Problem:
 
     def rest(self):
         return np.zeros(self.size + self.free)
+
+    def judge(self, x):
+        """Let the gradient at x decide which gradient is small enough."""
+        self._enough = _INNER_TOLERANCE * np.abs(self.gradient(x)).max()
+
+    def solved(self, x):
+        return np.abs(self.gradient(x)).max() <= self._enough
+
+    def hold(self, x):
+        """Keep a free object where it is at x: no longer is its force to be balanced, only those of the body."""
+        self.held = True
+        self.judge(x)
 
     def parts(self, x):
         return x[:self.size], float(x[-1]) if self.free else 0.0
@@ -187,10 +205,16 @@ class _Problem:
         return np.append(product + border * x[-1], np.sum(border * u) + corner * x[-1])
 
     def gradient(self, x):
-        return self.residual + self._elastic(x) - self._spread(self.points.pressure(self.change(x)))
+        return self._of_unknowns(self.residual + self._elastic(x) - self._spread(self.points.pressure(self.change(x))))
 
     def product(self, slope, x):
-        return self._elastic(x) + self._spread(slope * self.change(x))
+        return self._of_unknowns(self._elastic(x) + self._spread(slope * self.change(x)))
+
+    def _of_unknowns(self, forces):
+        """Forces as they are, without the object's where it is held."""
+        if self.held:
+            forces[-1] = 0.0
+        return forces
 
     def best_share(self, x, direction):
         """The share of the direction, at most all of it, with the least energy along it."""

@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 
 from softtact.contact.friction import Drag, Grip
+from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.mechanics.blocks import HexBlock
 from softtact.mechanics.condensation import Condensation, Springs
 from softtact.mechanics.elements import HEX27_BOTTOM, HEX27_SIDES, gauss, quad9
@@ -139,6 +140,7 @@ class FrustumBed:
         self.point_area = self._areas(np.array([r[0] for r in records]).reshape(-1, len(weights), 9)[:, 0], slopes, weights)
         absent = (self.point_neighbour[None] >= 0) & ~self.geometry.neighbours[:, self.point_neighbour]
         self.point_area[absent] = 0.0
+        self.gap0[absent] = NO_CONTACT_MM    # a frustum at the lattice's edge may bulge; that is no overlap
 
     def _nearest_direction(self):
         """Which of DIRECTIONS (f,) each outer face looks into most."""
@@ -236,8 +238,11 @@ class FrustumBed:
         """Stiffness (n, p) of the contact points in N/mm3."""
         return self.contact.response(gaps)[2]
 
-    def condense(self, state, frusta):
-        """Recompute the condensed tangents of the given frusta (k,); returns those of their roots (k, 1, 75, 75)."""
+    def condense(self, state, frusta, damping=None):
+        """Recompute the condensed tangents of the given frusta (k,); returns those of their roots (k, 1, 75, 75).
+
+        damping: stiffness (k,) in N/mm on their inner unknowns, see `Condensation.set`
+        """
         slope = self.contact.at(frusta).response(state.gaps[frusta])[2] * self.point_area[frusta]
         displacement = state.displacement[frusta]
         friction = None if state.drag is None else state.drag.stiffness(frusta)
@@ -246,7 +251,8 @@ class FrustumBed:
             springs = self._springs(layer, slope)
             if friction is not None:
                 springs = springs.with_others(self._friction_springs(layer, friction, frusta))
-            layer.condensed.set(frusta, [self._layer_tangents(k, displacement, frusta), *left], springs)
+            layer.condensed.set(frusta, [self._layer_tangents(k, displacement, frusta), *left], springs,
+                                damping=damping)
             left = [layer.condensed.outer[frusta][:, None]]
         return left[0]
 

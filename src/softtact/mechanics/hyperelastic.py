@@ -185,7 +185,7 @@ def _newton(body, surface, state, force, tolerance, settings):
         residual = body.residual_norm(state, force)
         if residual <= tolerance:
             return state, iteration, residual
-        step = body.newton_step(state, force, looks)
+        step = body.newton_step(state, force, looks, largest_mm=settings.largest_step_mm)
         state = body.reface(state, step.planes)
         trial = _line_search(body, state, step, force, residual, settings) if np.isfinite(step.largest()) else None
         if trial is None and fresh and looks is None:

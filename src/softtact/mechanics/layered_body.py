@@ -108,6 +108,7 @@ class Step:
         return max(np.abs(self.slab).max(), np.abs(self.bed).max(), abs(self.indentation))
 
 
+_DAMPINGS = 4         # steps that are tried with ever more damping of the cells that they throw too far
 _FIRST_SHIFT = 0.01   # N/mm on every free unknown of the slab, doubled until the tangent is positive definite
 
 
@@ -156,27 +157,39 @@ class LayeredBody:
         depth = self.slab.top.balanced(state.slab, state.indentation, force_n)
         return replace(state, slab=self.slab.reface(state.slab, state.slab.planes, depth), indentation=depth)
 
-    def newton_step(self, state, force_n, surface=None):
+    def newton_step(self, state, force_n, surface=None, *, largest_mm=np.inf):
         """The Newton step under a given force (N), or with the indentation kept where `force_n` is None.
+
+        largest_mm: by which the object goes down at most
 
         With a surface the step's contact is with the facets that the points face where it leads, else with those of the state.
         Where nothing touches, a force finds no stiffness: the step is then not finite.
         """
         state = self.friction.for_tangent(state)
+        for _ in range(_DAMPINGS):
+            step = self._newton_step(state, force_n, surface, largest_mm)
+            if not (np.isfinite(step.largest()) and self.cells.damp(step.slab, step.bed)):
+                break
+        return step
+
+    def _newton_step(self, state, force_n, surface, largest_mm):
+        """The step with the cells as they are damped now."""
         self.cells.refresh(state, workers=self.workers)
         residual, kept = self.cells.condensed_residual(state)
         contact = StepContact(self.slab, state.slab, state.indentation, surface)
-        step, lowering = self._step_of_unknowns(state, residual.ravel()[self.slab.unknowns], contact, force_n)
+        step, lowering = self._step_of_unknowns(state, residual.ravel()[self.slab.unknowns], contact, force_n,
+                                                 largest_mm)
         full = np.zeros(3 * self.slab.nodes)
         full[self.slab.unknowns] = step
         slab, bed = self.cells.recover(kept, full.reshape(-1, 3))
         return Step(slab=slab, bed=bed, indentation=lowering, planes=contact.planes)
 
-    def _step_of_unknowns(self, state, residual, contact, force_n):
+    def _step_of_unknowns(self, state, residual, contact, force_n, largest_mm):
         """Step of the global unknowns, and how far the object goes down; the tangent is made positive definite where it is not."""
         excess, drag = None if force_n is None else state.force - force_n, self.slab.friction_border(state.slab)
         for shift in _shifts():
-            step = self.stepper.step(self._rubber_tangent(state, shift), residual, contact, drag=drag, excess=excess)
+            step = self.stepper.step(self._rubber_tangent(state, shift), residual, contact, drag=drag, excess=excess,
+                                     largest=largest_mm)
             if step is not None:
                 return step
 

@@ -11,7 +11,8 @@ from softtact.mechanics.hyperelastic import NewtonSettings
 from softtact.mechanics.layered_body import MeshSettings, build_sensor_body
 from softtact.mechanics.pressed_body import VTK_HEX27, pressed_body
 
-_SCATTER_KEYS = ("height_scatter", "tip_scatter", "specimen")
+_SCATTER_KEYS = ("height_scatter", "tip_scatter", "thickness_scatter", "specimen")
+_LARGEST_DEVIATION = 2.5     # standard deviations: a specimen beyond would not have passed inspection
 _SOLVER_KEYS = ("largest_penetration_mm",)
 
 
@@ -38,13 +39,26 @@ def frustum_scatter(spec, values):
         return None
     count = int(np.prod(spec.frusta_counts))
     rng = np.random.default_rng(int(values.get("specimen", 0)))
-    heights, tips = rng.standard_normal((2, count)).clip(-2.5, 2.5)
+    heights, tips = rng.standard_normal((2, count)).clip(-_LARGEST_DEVIATION, _LARGEST_DEVIATION)
     return 1 + values.get("height_scatter", 0.0) * heights, 1 + values.get("tip_scatter", 0.0) * tips
+
+
+def specimen_of(spec, values):
+    """The sensor with the thickness of sheet and cover of one specimen; the frusta's scatter is `frustum_scatter`'s."""
+    scatter = values.get("thickness_scatter", 0.0)
+    if not scatter:
+        return spec
+    sheet, cover = 1 + scatter * np.random.default_rng([int(values.get("specimen", 0)), 1]).standard_normal(2).clip(
+        -_LARGEST_DEVIATION, _LARGEST_DEVIATION)
+    dielectric = spec.dielectric.model_copy(update={"sheet_thickness_mm": spec.dielectric.sheet_thickness_mm * sheet})
+    return spec.model_copy(update={
+        "dielectric": dielectric, "cover": spec.cover.model_copy(update={"thickness_mm": spec.cover.thickness_mm * cover})})
 
 
 def layered_mesh(spec, values):
     """Sheet, cover and frusta as one meshio mesh; cell data `layer`: 0 frusta, 1 sheet, 2 cover."""
     settings = mesh_settings(values)
+    spec = specimen_of(spec, values)
     body = build_sensor_body(spec, dielectric_law=None, cover_law=None, mesh=settings,   # a mesh has no material
                              scatter=frustum_scatter(spec, values))
     return pressed_body(body).to_meshio(displaced=False)

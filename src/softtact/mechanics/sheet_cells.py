@@ -11,6 +11,9 @@ from softtact.mechanics.parallel import SERIAL, chunks
 
 _CHUNK = 8                          # cells that one thread condenses at once
 _REFRESH_MM = 4e-3                  # a cell that moved less than this keeps its tangent (residuals stay exact)
+# A cell is thrown too far where its inner nodes go so far beyond this multiple of its walls' step, or its walls farther than that.
+_FARTHEST_MM, _FARTHEST_RATIO, _FARTHEST_OUTER_MM = 0.05, 2.0, 0.4
+_LEAST_DAMPING, _DAMPING_GROWTH = 0.05, 4.0     # N/mm on each unknown; a frustum's softest mode has 0.03 at rest
 _REFRESH_SLOPE = 0.2                # ... unless a contact point's stiffness changed by this share of the penalty
 _REFRESH_WITH_FRICTION = 20.0       # ... or, with friction, by this many N/mm3: with 100 light presses creep and fail
 
@@ -22,6 +25,7 @@ class SheetCells:
         self.slab, self.bed, self.roots, self.count = slab, bed, roots, bed.count
         self.kinds = [CellKind(slab, group, roots[group.cells]) for group in slab.cell_groups]
         self._tangent_at = None
+        self._damping, self._damped_with = np.zeros(self.count), np.zeros(self.count)
 
     @property
     def eliminated(self):
@@ -49,8 +53,22 @@ class SheetCells:
         """
         stale = self._stale(state)
         tasks = [(kind, part) for kind in self.kinds for part in chunks(np.flatnonzero(stale[kind.cells]), _CHUNK)]
-        workers.map(lambda task: task[0].condense(state, self.bed, task[1]), tasks)
+        workers.map(lambda task: task[0].condense(state, self.bed, task[1], self._damping), tasks)
+        self._damped_with = self._damping.copy()
         return int(stale.sum())
+
+    def damp(self, slab_step, bed_step):
+        """Damp the cells that a step throws too far, for which it is to be found again: whether there are any; free the others.
+
+        A frustum about to snap into a new fold has a soft mode: its step would be of no use, and shorten that of all others.
+        """
+        inner, outer = self._movement(slab_step, bed_step)
+        thrown = (inner > _FARTHEST_MM + _FARTHEST_RATIO * outer) | (outer > _FARTHEST_OUTER_MM)
+        if thrown.any():
+            self._damping = np.where(thrown, np.maximum(_DAMPING_GROWTH * self._damping, _LEAST_DAMPING), self._damping)
+        else:
+            self._damping = np.where(self._damping > _LEAST_DAMPING, self._damping / _DAMPING_GROWTH, 0.0)
+        return bool(thrown.any())
 
     def forget(self):
         """Let the next `refresh` recompute all cells."""
@@ -65,7 +83,7 @@ class SheetCells:
             self._tangent_at, self._above, self._slope_at = place, above, slope
             return np.ones(self.count, dtype=bool)
         stale = np.abs(place - self._tangent_at).max(axis=1) > _REFRESH_MM
-        stale |= np.abs(slope - self._slope_at).max(axis=1) > limit
+        stale |= (np.abs(slope - self._slope_at).max(axis=1) > limit) | (self._damping != self._damped_with)
         for kind, now, before in zip(self.kinds, above, self._above, strict=True):
             stale[kind.cells] |= np.abs(now - before).max(axis=1) > _REFRESH_MM
             before[stale[kind.cells]] = now[stale[kind.cells]]
@@ -93,7 +111,33 @@ class SheetCells:
         return residual, (in_frusta, in_cells)
 
     def recover(self, kept, slab_step):
-        """Newton steps of the slab (n, 3), its inner nodes filled in, and of the frusta (f, nodes, 3)."""
+        """Newton steps of the slab (n, 3), its inner nodes filled in, and of the frusta (f, nodes, 3).
+
+        A cell's step is its answer to its walls' movement and its own way to balance. The latter is cut where it goes farther
+        than `_FARTHEST_MM`: a frustum that snaps into a new fold would else shorten the step of the whole sensor. Since each
+        cell's inner matrix is positive definite, what is left still lowers the energy.
+        """
+        slab, frusta = self._recovered(kept, slab_step)
+        if max(np.abs(slab).max(), np.abs(frusta).max()) <= _FARTHEST_MM:
+            return slab, frusta
+        inner, _ = self._movement(*self._recovered(kept, np.zeros_like(slab_step)))
+        if not (inner > _FARTHEST_MM).any():
+            return slab, frusta
+        share, (in_frusta, in_cells) = _FARTHEST_MM / np.maximum(inner, _FARTHEST_MM), kept
+        cut = ([share[:, None] * half for half in in_frusta],
+               [share[kind.cells, None] * half for kind, half in zip(self.kinds, in_cells, strict=True)])
+        return self._recovered(cut, slab_step)
+
+    def _movement(self, slab, frusta):
+        """How far (f,) in mm a step moves each cell's inner nodes at most, and its walls."""
+        inner, outer, flat = np.abs(frusta.reshape(self.count, -1)).max(axis=1), np.zeros(self.count), slab.reshape(-1)
+        for kind in self.kinds:
+            inner[kind.cells] = np.maximum(inner[kind.cells], np.abs(flat[kind.inner_dofs]).max(axis=1, initial=0.0))
+            outer[kind.cells] = np.abs(flat[kind.outer_dofs]).max(axis=1, initial=0.0)
+        return inner, outer
+
+    def _recovered(self, kept, slab_step):
+        """The steps of slab and frusta for what cells and frusta keep of their residuals, and for the walls' step."""
         in_frusta, in_cells = kept
         flat = slab_step.copy().reshape(-1)
         for kind, half in zip(self.kinds, in_cells, strict=True):
@@ -127,15 +171,16 @@ class CellKind:
         self.inner_dofs, self.outer_dofs = dofs[:, inner], dofs[:, ~inner]
         return place
 
-    def condense(self, state, bed, chosen):
-        """Recompute the condensed tangents of some of these cells (k,), counted among them."""
-        tangents = [bed.condense(state.bed, self.cells[chosen])]
+    def condense(self, state, bed, chosen, damping):
+        """Recompute the condensed tangents of some of these cells (k,), counted among them; damping (all cells,) in N/mm."""
+        damping = damping[self.cells[chosen]]
+        tangents = [bed.condense(state.bed, self.cells[chosen], damping)]
         for nodes, block in self._parts:
             per_cell = len(nodes) // len(self.cells)
             elements = (chosen[:, None] * per_cell + np.arange(per_cell)).ravel()
             each = block.tangent(state.slab.displacement[nodes[elements]], elements)
             tangents.append(each.reshape(len(chosen), per_cell, *each.shape[1:]))
-        self.condensed.set(chosen, tangents)
+        self.condensed.set(chosen, tangents, damping=damping)
 
 
 def _dofs(nodes):

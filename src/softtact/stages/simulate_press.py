@@ -1,7 +1,7 @@
 """One item pressed with one model through all forces.
 
 inputs: object (STL), and of mesh, compliance, card_dielectric, card_cover what the model needs
-outputs: press;  settings: item {name, set, unit, pose}, sensor, model, kind, laws {layer: law}, mesh, forces_n
+outputs: press;  settings: item {name, set, unit, pose}, sensor, model, kind, laws {layer: law}, mesh, friction, forces_n
 """
 
 from softtact.errors import ConvergenceError
@@ -11,7 +11,7 @@ from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.cards import law_from_card, load_card
 from softtact.mechanics.elastic import Compliance
 from softtact.mechanics.foundation import FoundationFlexibility
-from softtact.mechanics.layered_mesh import frustum_scatter, mesh_settings, newton_settings
+from softtact.mechanics.layered_mesh import frustum_scatter, mesh_settings, newton_settings, specimen_of
 from softtact.sensor import Sensor
 
 COMPLIANCES = {"elastic": Compliance, "foundation": FoundationFlexibility}
@@ -31,6 +31,9 @@ def press_item(inputs, settings, *, threads, keep_body=False):
     if kind in COMPLIANCES:     # a press needs no laws then: the compliance knows them
         sensor = Sensor(spec, laws={}, files={kind: COMPLIANCES[kind].load(inputs["compliance"])}, attributes=names)
     else:
+        if settings["friction"] is not None:
+            spec = SensorSpec.from_dict({**settings["sensor"], "friction": settings["friction"]})
+        spec = specimen_of(spec, mesh)
         sensor = Sensor(spec, laws=_laws(inputs, settings["laws"]), mesh=mesh_settings(mesh), solver=newton_settings(mesh),
                         scatter=frustum_scatter(spec, mesh), attributes=names)
     pose = None if item["pose"] is None else Pose.from_values(item["pose"])

@@ -1,0 +1,68 @@
+"""Steps of single cells: cut where they go too far on their own, damped where a soft mode throws them; always downhill."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from softtact.geometry.sensor_spec import SensorSpec
+from softtact.materials.laws.registry import make_law
+from softtact.mechanics.layered_body import MeshSettings, build_sensor_body
+
+CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
+SMALL = CORO.model_copy(update={"footprint_mm": (3.6, 2.4), "map_shape": (5, 7)})   # 3 x 2 frusta
+LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492)
+COARSE = MeshSettings(cover_levels=(0.0, 1.0), cover_splits=(0,), far_pitches=1, frustum_levels=(0.0, 0.35, 1.0))
+DEPTH_MM = 0.05
+
+
+def plate(x, y):
+    """A level plate over everything."""
+    return np.zeros(len(x)), np.tile([0.0, 0.0, -1.0], (len(x), 1))
+
+
+@pytest.fixture
+def body():
+    return build_sensor_body(SMALL, dielectric_law=LAW, cover_law=LAW, mesh=COARSE)
+
+
+def bent(body, *, by):
+    """The body under a plate held at DEPTH_MM, the first frustum bent sideways by so many mm in its middle."""
+    slab, bed = body.rest()
+    z = body.bed.coordinates[0, :, 2]
+    middle = np.sin(np.pi * (z - z.min()) / np.ptp(z))
+    bed[0, :, 0] += by * middle
+    return body.evaluate(slab, bed, DEPTH_MM, body.slab.facing(slab, plate))
+
+
+def change_of_energy(body, state, step, share=1e-4):
+    """Of the energy (mJ) by a small share of the step."""
+    trial = body.evaluate(state.slab.displacement + share * step.slab, state.bed.displacement + share * step.bed,
+                          state.indentation + share * step.indentation, step.planes)
+    return trial.energy - state.energy
+
+
+def farthest(step):
+    """How far (f,) in mm each frustum's nodes go."""
+    return np.abs(step.bed.reshape(len(step.bed), -1)).max(axis=1)
+
+
+def test_a_cell_far_from_balance_goes_a_bounded_way_and_the_energy_falls(body):
+    slightly, far = (body.newton_step(bent(body, by=by), None) for by in (0.002, 0.12))
+    assert farthest(far)[0] < 0.07        # 0.05 towards its own balance, and its answer to the sheet's movement
+    np.testing.assert_allclose(farthest(far)[1:], farthest(slightly)[1:], rtol=0.2, atol=1e-3)     # the others go as they would
+    assert change_of_energy(body, bent(body, by=0.12), far) < 0
+
+
+def test_a_cell_that_was_thrown_too_far_is_damped_until_it_is_not(body):
+    state = bent(body, by=0.02)
+    free = body.newton_step(state, None)
+    thrown = np.zeros_like(free.bed)
+    thrown[0] = 1.0
+    for _ in range(3):
+        assert body.cells.damp(np.zeros_like(free.slab), thrown)
+    damped = body.newton_step(state, None)
+    assert farthest(damped)[0] < 0.8 * farthest(free)[0] and change_of_energy(body, state, damped) < 0
+    for _ in range(4):     # steps that throw nothing take the damping off again
+        last = body.newton_step(state, None)
+    np.testing.assert_allclose(last.bed, free.bed, atol=1e-3 * farthest(free)[0])     # conjugate gradients are not exact
