@@ -7,6 +7,7 @@ import numpy as np
 from softtact.errors import ConvergenceError
 from softtact.mechanics.layered_body import BodyState
 
+_DEEP = 0.45           # of a frustum's height: from here on elements of the default mesh may be unstable
 _WORTH_A_PASS = 0.8    # of the overlap, to which pressing apart must have brought it to be done again
 
 
@@ -119,9 +120,12 @@ def _reach(body, force, target, settings):
 
 def _failure(body, reached, force, target, residual):
     x, y, share = body.most_compressed(reached.state)
+    remedy = "Ask for smaller forces or for levels nearer to each other"
+    if share > _DEEP:
+        remedy += ", or press with MeshSettings.stable() (--mesh-quality stable)"
     return (f"The level of {target:g} N was not reached: from {reached.force:.4g} N on no step towards {force:.4g} N lowers the "
             f"energy (unbalanced force {residual:.2g} N); the frustum at x {x:.1f}, y {y:.1f} mm is compressed by {share:.0%} "
-            "of its height. Ask for smaller forces or for levels nearer to each other.")
+            f"of its height. {remedy}.")
 
 
 def _press_apart(body, surface, state, residual, force, settings):
