@@ -110,7 +110,8 @@ def test_what_a_page_links_or_tells_to_run_is_there(page):
     text = page.read_text(encoding="utf-8")
     for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", text):
         assert target.startswith("http") or (page.parent / target).exists(), target
-    for name in re.findall(r"(?<![\w/])(?:tests|config|benchmarks|workflow|examples|scripts)/[a-z0-9_/]+\.(?:yaml|py|sh|smk)", text):
+    named = r"(?<![\w/])(?:tests|config|benchmarks|workflow|examples|scripts)/[a-z0-9_/]+\.(?:yaml|py|sh|smk)"
+    for name in re.findall(named, text):
         assert (ROOT / name).exists(), name
     makefile = (ROOT / "Makefile").read_text()
     for target in re.findall(r"^    make (\w+)", text, flags=re.MULTILINE):
