@@ -77,6 +77,8 @@ def pytest_terminal_summary(terminalreporter, exitstatus, config):
         return
     if exitstatus != 0:
         terminalreporter.write_line("docs/verification.md is not written: not every test passed.", red=True)
+    elif config.getoption("numprocesses", default=None):
+        terminalreporter.write_line("docs/verification.md is not written: its rows are of one process; leave -n out.", red=True)
     elif missing := _files_left_out(config):
         terminalreporter.write_line(f"docs/verification.md is not written: {', '.join(missing)} did not run in full.", red=True)
     else:
