@@ -13,8 +13,12 @@ tiny: .venv/installed
 	$(SNAKEMAKE) --configfile config/tiny.yaml
 	@echo "Open results/tiny/report.html"
 
+# Two processes with one thread each: two threads in one process take nearly as long as one.
+test: export OMP_NUM_THREADS = 1
+test: export MKL_NUM_THREADS = 1
+test: export OPENBLAS_NUM_THREADS = 1
 test: .venv/tested
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 bench: .venv/installed
 	for benchmark in fast_models press scaling mesh_error against_calculix discretisation unknowns materials discs glass_mesh glass_edge \

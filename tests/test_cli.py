@@ -62,7 +62,8 @@ def answer(capsys):
     return run
 
 
-NAMES = ("press", "view", "predict", "complexity", "fit", "export-deck", "detect-discs", "stage", "config-schema", "completion")
+NAMES = ("press", "view", "predict", "complexity", "fit", "export-deck", "detect-discs", "cost", "stage", "config-schema",
+         "completion")
 
 
 @pytest.mark.parametrize("command", [[], *([name] for name in NAMES)])

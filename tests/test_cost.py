@@ -1,6 +1,7 @@
 """What a study costs, told before it starts."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -79,7 +80,7 @@ def test_a_configuration_that_is_not_there_and_an_archives_study_are_refused(cap
     assert "config/papr.yaml: there is no such configuration" in capsys.readouterr().err
     study, _ = costs_of("tiny")
     with pytest.raises(InputError, match="it reads the published archive"):
-        study_costs(type(study)(study.values, study.spec, {}, study.items_of, archive=tmp_path), read_costs())
+        study_costs(replace(study, archive=tmp_path), read_costs())
 
 
 def test_every_measured_time_is_positive_and_says_where_it_comes_from():

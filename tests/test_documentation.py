@@ -91,7 +91,9 @@ def test_python_on_a_page_runs(text, desk, monkeypatch):
 @pytest.mark.parametrize("line", shell_lines(run=True))
 def test_a_softtact_line_on_a_page_succeeds(line, desk, monkeypatch, capsys):
     monkeypatch.chdir(desk)
-    assert main(shlex.split(line, comments=True)[1:]) == 0
+    words = [word for word in shlex.split(line, comments=True)[1:] if word not in (">", ">>")]
+    arguments = words[:-1] if " > " in line or " >> " in line else words
+    assert main(arguments) == 0
     assert capsys.readouterr().out
     for option, name in re.findall(r"--(out|plot) (\S+)", line):
         assert (desk / name).stat().st_size > 0, option
@@ -108,7 +110,8 @@ def test_what_a_page_links_or_tells_to_run_is_there(page):
     text = page.read_text(encoding="utf-8")
     for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", text):
         assert target.startswith("http") or (page.parent / target).exists(), target
-    for name in re.findall(r"(?:config|benchmarks|workflow|examples|scripts)/[a-z0-9_/]+\.(?:yaml|py|sh|smk)", text):
+    named = r"(?<![\w/])(?:tests|config|benchmarks|workflow|examples|scripts)/[a-z0-9_/]+\.(?:yaml|py|sh|smk)"
+    for name in re.findall(named, text):
         assert (ROOT / name).exists(), name
     makefile = (ROOT / "Makefile").read_text()
     for target in re.findall(r"^    make (\w+)", text, flags=re.MULTILINE):

@@ -53,10 +53,11 @@ def changed(tmp_path, **values):
     return str(path)
 
 
-def test_its_study_says_but_its_sensor_and_the_forces_on_its_whole_dielectric_and_takes_the_readouts_range_from_it():
+def test_its_study_says_but_its_sensor_and_the_forces_on_its_whole_width_and_takes_the_readouts_range_from_it():
     study = load_study(merged("second_sensor"))
     own, tiny = (yaml.safe_load((ROOT / f"config/{name}.yaml").read_text()) for name in ("second_sensor", "tiny"))
     own["ftir"].pop("forces_n"), tiny["ftir"].pop("forces_n")
+    assert own.pop("section") == {"force_n": 40}
     assert own == tiny | {"study": "second_sensor", "sensor": "pad"}
     assert study.spec.frusta_counts == (18, 12) and study.values.ssim.data_range == study.spec.largest_counts == 3000
 

@@ -14,7 +14,7 @@ from softtact.cli import main
 from softtact.commands import view as view_command
 from softtact.geometry.sensor_spec import SensorSpec
 from softtact.mechanics.layered_body import MeshSettings
-from softtact.pressed_mesh import LAYERS, of_map, read_vtu
+from softtact.pressed_mesh import LAYERS, of_bodies, of_map, read_vtu
 from softtact.reporting.press_view import _draw_with_matplotlib, read_view
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -61,7 +61,7 @@ def test_paraview_reads_the_whole_mesh_with_displacements_and_the_pressure_of_th
 
 
 def test_cover_sheet_and_frusta_move_alike_where_they_meet(hyperelastic):
-    mesh = hyperelastic[0].mesh
+    mesh = of_bodies(hyperelastic[0].bodies, hyperelastic[0].force_n)
     _, place = np.unique(np.round(mesh.points, 6), axis=0, return_inverse=True)
     most, least = (np.full((place.max() + 1, 3), start) for start in (-np.inf, np.inf))
     np.maximum.at(most, place.ravel(), mesh.displacement_mm[1])

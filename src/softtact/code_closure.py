@@ -5,6 +5,7 @@ and an edit reruns just the stages that import the edited file.
 """
 
 import ast
+from functools import cache
 from pathlib import Path
 
 
@@ -23,15 +24,23 @@ def code_closure(module, *, source="src"):
 
 def _imported_files(path, source):
     """Files below `source` that the imports of `path` reach."""
-    tree = ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
-    # A package's own functions import late and for its users only; its module level is what everyone runs.
-    nodes = tree.body if path.name == "__init__.py" else ast.walk(tree)
-    for node in nodes:
+    for node in _imports(path.read_text(encoding="utf-8"), module_level=path.name == "__init__.py"):
         if isinstance(node, ast.Import):
             yield from (_file(alias.name, source) for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
+        else:
             base = _absolute(node, path, source)
             yield from (_file_of_name(base, alias.name, source) for alias in node.names)
+
+
+@cache
+def _imports(text, *, module_level):
+    """The import statements of a source text. Parsed once, since the closures of a workflow's rules have most files in common.
+
+    A package's own functions import late and for its users only; its module level is what everyone runs.
+    """
+    tree = ast.parse(text)
+    nodes = tree.body if module_level else ast.walk(tree)
+    return [node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom)]
 
 
 def _file_of_name(package, name, source):

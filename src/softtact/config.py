@@ -10,7 +10,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-import yaml
 from pydantic import (
     AfterValidator,
     BaseModel,
@@ -25,6 +24,7 @@ from pydantic import (
 
 from softtact.errors import InputError
 from softtact.evaluation.ssim import check_window
+from softtact.files import read_yaml
 from softtact.geometry.sensor_spec import READINGS, SensorSpec
 from softtact.learning.settings import LearningCurve, Network, Search, Ssim, Training
 from softtact.materials.config import load_material
@@ -379,12 +379,7 @@ def _merged(base, over):
 
 def _read_yaml(path):
     """A mapping of a YAML file; what is none is refused."""
-    try:
-        values = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such configuration; give the path of one, from the project's folder.") from None
-    except (UnicodeDecodeError, yaml.YAMLError) as error:
-        raise InputError(f"{path}: not valid YAML ({' '.join(str(error).split())}); correct it.") from None
+    values = read_yaml(path, missing="there is no such configuration; give the path of one, from the project's folder.")
     if not isinstance(values, dict):
         raise InputError(f"{path}: it holds no keys; write a configuration such as config/tiny.yaml.")
     return values
@@ -533,12 +528,7 @@ def _with_range(values, spec):
 
 def read_catalogue(path):
     """{name: CatalogueEntry} with the mesh files' paths as seen from here; a missing mesh is refused now."""
-    try:
-        lines = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such catalogue of objects; correct 'objects.catalogue'.") from None
-    except (UnicodeDecodeError, yaml.YAMLError) as error:
-        raise InputError(f"{path}: not valid YAML ({' '.join(str(error).split())}); correct it.") from None
+    lines = read_yaml(path, missing="there is no such catalogue of objects; correct 'objects.catalogue'.")
     entries = [_validated(CatalogueEntry, line, where=str(path)) for line in lines or []]
     entries = [entry.model_copy(update={"file": str(path.parent / entry.file)}) for entry in entries]
     return {entry.name: entry for entry in entries}

@@ -12,10 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean
 
-import yaml
-
 from softtact.config import PROJECT, SETS
 from softtact.errors import InputError
+from softtact.files import read_yaml
 
 BYTES = 4          # of a number in a data set; twice that in a press
 READING_NUMBERS = 2          # branches of a reading: the way up and the way down
@@ -41,10 +40,7 @@ def read_costs(path=None):
     """The measured times of `config/costs.yaml`, of the folder that the command runs in or the project's own."""
     here = Path("config/costs.yaml")
     path = Path(path or (here if here.is_file() else PROJECT / here))
-    try:
-        return yaml.safe_load(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no file of measured times; restore it from the repository.") from None
+    return read_yaml(path, missing="there is no file of measured times; restore it from the repository.")
 
 
 def study_costs(study, measured, *, results="results"):

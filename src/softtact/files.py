@@ -11,6 +11,7 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
+import yaml
 
 import softtact
 from softtact.errors import InputError, OutputError
@@ -51,6 +52,16 @@ _NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EROFS)
 def _not_written(path, error):
     return OutputError(f"{path}: cannot be written ({error.strerror or error}); make room on the disk, or its folder writable, "
                        "and run again.")
+
+
+def read_yaml(path, *, missing):
+    """What a YAML file holds; `missing` says of a file that is not there what to do about it."""
+    try:
+        return yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{path}: {missing}") from None
+    except (UnicodeDecodeError, yaml.YAMLError) as error:
+        raise InputError(f"{path}: not valid YAML ({' '.join(str(error).split())}); correct it.") from None
 
 
 def files_below(paths, *, suffix):

@@ -146,7 +146,8 @@ def test_both_architectures_stand_in_one_table_and_one_figure(finished):
     own = rows[rows.architecture == "printed"]
     assert own.ssim.tolist() == pytest.approx(summary.ssim.tolist(), rel=1e-5)
     pictures = {kind: folder / f"figures/fig9.{kind}" for kind in ("png", "svg")}
-    draw_fig9_networks.run(inputs={"networks": table, "histories": [run["history"] for run in runs]}, outputs=pictures, settings={})
+    draw_fig9_networks.run(inputs={"networks": table, "histories": [run["history"] for run in runs]}, outputs=pictures,
+                           settings=settings_of("ssim"))
     assert all(path.stat().st_size > 10_000 for path in pictures.values())
 
 

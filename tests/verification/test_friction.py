@@ -21,7 +21,7 @@ from softtact.errors import InputError
 from softtact.geometry.meshes import place
 from softtact.geometry.sensor_spec import Friction, SensorSpec
 from softtact.materials.laws.registry import make_law
-from softtact.mechanics import contact_step
+from softtact.mechanics import contact_step, sheet_cells
 from softtact.mechanics.hex_mesh import extrude, grid_plan
 from softtact.mechanics.hyperelastic import NewtonSettings, press_levels
 from softtact.mechanics.layered_body import build_sensor_body
@@ -74,6 +74,8 @@ def test_forces_and_newton_steps_are_the_slopes_of_the_potential_of_a_press_with
     monkeypatch.setattr(contact_step, "_INNER_STEPS", 1)
     monkeypatch.setattr(contact_step, "_FORCING", 1e-9)
     monkeypatch.setattr(contact_step._Problem, "best_share", lambda *_: 1.0)
+    monkeypatch.setattr(sheet_cells, "_FARTHEST_MM", np.inf)        # nor damps or cuts the steps of single cells
+    monkeypatch.setattr(sheet_cells, "_FARTHEST_OUTER_MM", np.inf)
     body, h = body_with(board=0.3, on_object=0.3), 1e-6
     level = last_level(body, [0.5, 1.0], surface=surface)
     covered = level.state.slab.planes.covered[level.state.slab.gaps < 0]
@@ -452,4 +454,4 @@ def test_a_result_states_its_friction():
     ball, pose = sphere(2.5)
     spec = small_spec(2, 2, margin=0.4).model_copy(update={"friction": Friction(object=0.3)})
     result = Sensor(spec, LAWS, mesh=COARSE).press(ball, pose=pose, force_n=1.0, model="hyperelastic")
-    assert result.attributes == {"friction_object": 0.3, "friction_board": 0.0, "tips_held": 1}
+    assert result.attributes == {"friction_object": 0.3, "friction_board": 0.0, "tips_held": 1, "thickness_mm": 2.5}

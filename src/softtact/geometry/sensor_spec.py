@@ -4,10 +4,10 @@ from pathlib import Path
 from typing import Annotated, Generic, TypeVar
 
 import numpy as np
-import yaml
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PositiveFloat, PositiveInt, ValidationError
 
 from softtact.errors import InputError
+from softtact.files import read_yaml
 from softtact.unknown_names import first_fault, known_keys, unknown
 
 # How the frustum's two printed diameters are read: the narrow end, or (as the words of the text have it) the wide one as the tip.
@@ -189,12 +189,7 @@ class SensorSpec(_Strict):
     def from_yaml(cls, path):
         """Read a sensor file."""
         path = Path(path)
-        try:
-            values = yaml.safe_load(path.read_text(encoding="utf-8"))
-        except FileNotFoundError:
-            raise InputError(f"{path}: there is no such sensor file.") from None
-        except (yaml.YAMLError, UnicodeDecodeError) as error:
-            raise InputError(f"{path}: not valid YAML ({' '.join(str(error).split())}).") from None
+        values = read_yaml(path, missing="there is no such sensor file.")
         if not isinstance(values, dict):
             raise InputError(f"{path}: a sensor file must hold keys and values; see config/sensors/coro.yaml.")
         return cls.from_dict(values, where=str(path))

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import pydantic
-import yaml
 from pydantic import Field
 
 from softtact.errors import InputError
+from softtact.files import read_yaml
 from softtact.materials.laws.registry import law_class, make_law
 from softtact.materials.linear import LinearConstants
 from softtact.unknown_names import first_fault, known_keys, unknown
@@ -134,13 +134,8 @@ class MaterialConfig(_Section):
 def load_material(path):
     """Read a material's YAML into a `MaterialConfig`; what is wrong is told in one sentence."""
     path = Path(path)
-    try:
-        raw = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        known = ", ".join(sorted(file.stem for file in path.parent.glob("*.yaml"))) or "none"
-        raise InputError(f"{path}: there is no such material; known beside it: {known}.") from None
-    except (UnicodeDecodeError, yaml.YAMLError) as error:
-        raise InputError(f"{path}: not valid YAML ({' '.join(str(error).split())}); correct it.") from None
+    known = ", ".join(sorted(file.stem for file in path.parent.glob("*.yaml"))) or "none"
+    raw = read_yaml(path, missing=f"there is no such material; known beside it: {known}.")
     return _resolved(validated(MaterialConfig, raw, where=str(path)), path)
 
 

@@ -14,7 +14,7 @@ def main(folder):
     pyvista.OFF_SCREEN = True
     folder = Path(folder)
     spec = json.loads((folder / "views.json").read_text(encoding="utf-8"))
-    with np.load(folder / "arrays.npz") as arrays:
+    with np.load(folder / "arrays.npz", allow_pickle=False) as arrays:
         images = {f"view{v}": _image(pyvista, v, view, spec["size"], arrays) for v, view in enumerate(spec["views"])}
     np.savez_compressed(folder / "images.npz", **images)
 

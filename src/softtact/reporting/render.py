@@ -60,7 +60,7 @@ def rendered(views, *, size=(900, 675), timeout_s=TIMEOUT_S):
             said = done.stderr.strip().splitlines() or ["it said nothing"]
             announce(f"{FALLBACK} (status {done.returncode}: {said[-1]:.200}).")
             return None
-        with np.load(images) as kept:
+        with np.load(images, allow_pickle=False) as kept:
             return [kept[f"view{k}"] for k in range(len(views))]
 
 
