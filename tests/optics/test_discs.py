@@ -3,7 +3,7 @@
 import imageio.v3 as iio
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.ndimage import gaussian_filter
 
@@ -90,6 +90,7 @@ def test_centres_are_found_to_a_tenth_of_a_pixel():
 
 @settings(max_examples=10, deadline=None)
 @given(x=st.floats(-1, 1), y=st.floats(-1, 1))
+@example(x=0.58984375, y=0.0)     # whole steps of Gauss and Newton lead away from it
 def test_a_disc_moves_with_its_contact_and_keeps_its_area(x, y):
     pixel = CAMERA["pixel_mm"]
     picture = render_frame([x * pixel], [y * pixel], [0.283], footprint_mm=(2, 2), seed=0, **CAMERA | {"noise": 0.0})

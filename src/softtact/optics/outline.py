@@ -24,6 +24,7 @@ A, B, S, ROW, COLUMN, R = range(6)
 SHAPE = slice(6, 6 + 2 * len(HARMONICS))
 STEPS = 12
 _STILL = 0.004  # pixels; a tenth of what noise leaves open at best
+_HALVINGS, _WORSE = 8, 4.0      # of a step that makes the misfit so many times larger; up to that it mends itself mostly
 _FAR = 5.0     # blurs from the outline: beyond, the light is that of glass or of the disc's middle
 _FLAT = 8.0    # blurs: a larger radius is locally straight, to 1e-3 of the contrast
 
@@ -71,17 +72,28 @@ class Outline:
 
 def fit_outline(rows, columns, light, *, start, prior, noise, other=0.0, limits=(-1e6, 1e6)):
     """The `Outline` of the disc in pixels (n,) of brightness `light` (n,); `other`: light of its neighbours (n,)."""
-    values, weight = start.copy(), 1.0 / prior.sd**2
-    for _ in range(STEPS):
+    weight = 1.0 / prior.sd**2
+
+    def look(values):
+        """Values, brightness and slopes there, and what is to become least: squared misfit and squared distance from the prior."""
         model, slopes = _light(values, rows, columns, other)
         model, passed = clipped(model, noise=noise, limits=limits)
-        slopes *= passed
+        return values, model, slopes * passed, ((light - model) ** 2).sum() / noise**2 + weight @ (prior.mean - values) ** 2
+
+    values, model, slopes, misfit = look(start.copy())
+    for _ in range(STEPS):
         normal = slopes @ slopes.T / noise**2 + np.diag(weight)
         step = np.linalg.lstsq(normal, slopes @ (light - model) / noise**2 + weight * (prior.mean - values), rcond=1e-12)[0]
-        values = _bounded(values, step)
+        # A whole step of Gauss and Newton can lead away from a disc that begins a little beside its place.
+        trials = (look(_bounded(values, 0.5**halving * step)) for halving in range(_HALVINGS))
+        found = next((trial for trial in trials if trial[-1] < _WORSE * misfit), None)
+        if found is None:
+            break
+        values, model, slopes, misfit = found
         if np.abs(step[S:]).max() < _STILL:
             break
     residual = float(np.sqrt(np.mean((light - model) ** 2)))
+    normal = slopes @ slopes.T / noise**2 + np.diag(weight)
     return Outline(values, np.linalg.pinv(normal), residual / noise, residual / max(abs(values[A]), 1e-9))
 
 
