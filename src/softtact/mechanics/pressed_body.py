@@ -26,7 +26,7 @@ class Cells:
 
 @dataclass(frozen=True)
 class PressedBody:
-    """Sheet, cover and frusta: points_mm (n, 3) at rest, displacement_mm (n, 3) in single precision, cells a list of `Cells`.
+    """Sheet, cover and frusta: points_mm (n, 3) at rest, displacement_mm (n, 3) in single precision, cells a tuple of `Cells`.
 
     top (t, 8): the cover's upper faces;  pressure_mpa (t,): the object's mean pressure on each, positive in compression
 

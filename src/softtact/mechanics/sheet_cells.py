@@ -11,11 +11,11 @@ from softtact.mechanics.parallel import SERIAL, chunks
 
 _CHUNK = 8                          # cells that one thread condenses at once
 _REFRESH_MM = 4e-3                  # a cell that moved less than this keeps its tangent (residuals stay exact)
+_REFRESH_SLOPE = 0.2                # ... unless a contact point's stiffness changed by this share of the penalty
+_REFRESH_WITH_FRICTION = 20.0       # ... or, with friction, by this many N/mm3: with 100 light presses creep and fail
 # A cell is thrown too far where its inner nodes go so far beyond this multiple of its walls' step, or its walls farther than that.
 _FARTHEST_MM, _FARTHEST_RATIO, _FARTHEST_OUTER_MM = 0.05, 2.0, 0.4
 _LEAST_DAMPING, _DAMPING_GROWTH = 0.05, 4.0     # N/mm on each unknown; a frustum's softest mode has 0.03 at rest
-_REFRESH_SLOPE = 0.2                # ... unless a contact point's stiffness changed by this share of the penalty
-_REFRESH_WITH_FRICTION = 20.0       # ... or, with friction, by this many N/mm3: with 100 light presses creep and fail
 
 
 class SheetCells:
