@@ -42,8 +42,8 @@ MESHES = {
     "12 thin layers, 3 rings": replace(GLASS_MESH, frustum_levels=layers(12, 3), frustum_rings=3),
     "16 thin layers, 4 rings": replace(GLASS_MESH, frustum_levels=layers(16, 4), frustum_rings=4),
     "**chosen**: 17 graded layers, 4 rings": GLASS_MESH,
-    "chosen, local_over_shear 0": replace(GLASS_MESH, local_over_shear=0.0, tip_over_shear=0.0),
-    "chosen, local_over_shear 0.5": replace(GLASS_MESH, local_over_shear=0.5, tip_over_shear=0.5),
+    "chosen, local_over_shear 0": replace(GLASS_MESH, local_over_shear=0.0),
+    "chosen, local_over_shear 0.5": replace(GLASS_MESH, local_over_shear=0.5),
     "chosen, penalty 10000 N/mm3": replace(GLASS_MESH, contact_stiffness=10000.0),
 }
 

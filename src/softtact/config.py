@@ -198,7 +198,9 @@ class Mesh(Section):
         None, description="heights of a frustum's layers of elements, from 0 to 1")
     frustum_rings: PositiveInt | None = Field(None, description="rings of elements around a frustum's core, thin at its rim")
     local_over_shear: NotNegative | None = Field(None, description="volumetric stiffness of frusta at each point, over mu")
-    tip_over_shear: NotNegative | None = Field(None, description="the same in the lowest layer of each frustum")
+    growing_over_shear: NotNegative | None = Field(
+        None, description="stiffness of frusta against large volume changes that their elements' pressure misses, over mu")
+    trilinear_pressure: bool | None = Field(None, description="pressure in the frusta's elements: trilinear (default), or linear")
     refinement: Annotated[int, Field(ge=0)] | None = Field(
         None, description="how often all elements are split into four in plan")
     contact_stiffness: PositiveFloat | None = Field(None, description="N/mm3 of the contacts' penalty")

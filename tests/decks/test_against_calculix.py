@@ -87,10 +87,9 @@ def test_what_the_elements_differ_by_halves_with_every_element_split(solve):
     elements lose an order where they are distorted, as the wedges between roots are.
     """
     forces = np.array([0.05])
-    soft = {"local_over_shear": 0.1, "tip_over_shear": 0.1}
-    coarse = cell_error(MeshSettings(coarse_walls=True, **soft), forces, solve)
-    fine = cell_error(MeshSettings(**soft, refinement=1, sheet_layers=2,
-                                   frustum_levels=(0.0, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)), forces, solve)
+    coarse = cell_error(MeshSettings.converging(coarse_walls=True), forces, solve)
+    fine = cell_error(MeshSettings.converging(refinement=1, sheet_layers=2,
+                                              frustum_levels=(0.0, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)), forces, solve)
     assert (coarse > 0).all() and (np.abs(fine) < 0.6 * coarse).all()
 
 

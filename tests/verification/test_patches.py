@@ -14,6 +14,7 @@ from softtact.mechanics.elements import HEX20_NODES
 from softtact.mechanics.hex_mesh import disc_plan, extrude, grid_plan
 
 MOONEY = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040})
+FRUSTA = {"local_over_shear": 0.5, "growing_over_shear": 100.0, "trilinear": True}     # as in `MeshSettings`
 GRADIENT = np.array([[0.05, 0.10, 0.0], [-0.02, -0.10, 0.03], [0.04, 0.0, 0.08]])
 POINTS = pytest.mark.parametrize("points", [2, 3])
 
@@ -83,11 +84,12 @@ def test_the_energy_of_an_affine_map_is_volume_times_density(points, record):
 
 @POINTS
 @pytest.mark.parametrize("name", ["mooney_rivlin", "ogden2"])
-def test_force_is_the_slope_of_energy_and_tangent_the_slope_of_force(points, name, record):
+@pytest.mark.parametrize("held", [{"local_over_shear": 0.5}, FRUSTA], ids=["linear", "frusta"])
+def test_force_is_the_slope_of_energy_and_tangent_the_slope_of_force(points, name, held, record):
     law = {"mooney_rivlin": MOONEY,
            "ogden2": make_law("ogden2", {"mu1": 0.1351, "alpha1": 1.4538, "mu2": 0.2223, "alpha2": -4.9910})}[name]
     rng = np.random.default_rng(1)
-    block = HexBlock(bent_element(), law, points_per_side=points, local_over_shear=0.5)
+    block = HexBlock(bent_element(), law, points_per_side=points, **held)
     displacement = 0.05 * rng.standard_normal((1, 20, 3))
     direction, step = rng.standard_normal((1, 20, 3)), 1e-5
     plus, minus = (block.evaluate(displacement + sign * step * direction) for sign in (1, -1))
@@ -98,14 +100,15 @@ def test_force_is_the_slope_of_energy_and_tangent_the_slope_of_force(points, nam
     difference = ((plus.force - minus.force) / (2 * step)).ravel()
     product = block.tangent(displacement)[0] @ direction.ravel()
     got = np.linalg.norm(product - difference) / np.linalg.norm(difference)
-    record(f"element tangent against differences of its forces, {name}, {points}^3 points: relative deviation",
+    record(f"element tangent against differences of its forces, {name}, {points}^3 points"
+           + (", as in frusta" if held is FRUSTA else "") + ": relative deviation",
            expected=0.0, source="central differences, step 1e-5 mm", got=got)
     assert got < 1e-7
 
 
 def test_a_rigid_rotation_on_top_changes_no_energy_and_turns_the_forces(record):
     """x -> Q x + c after any deformation: energy stays, nodal forces and tangent turn by Q (frame indifference)."""
-    block = HexBlock(bent_element(), MOONEY, local_over_shear=0.5)
+    block = HexBlock(bent_element(), MOONEY, **FRUSTA)
     coordinates = bent_element()
     displacement = 0.05 * np.random.default_rng(2).standard_normal((1, 20, 3))
     Q = Rotation.from_euler("xyz", [0.7, -1.1, 2.0]).as_matrix()

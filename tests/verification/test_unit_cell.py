@@ -30,8 +30,8 @@ SOURCE = "naive solver, limit of a sheet of 4 x 4 x 2 and 8 x 8 x 4 elements, ti
 def refined(refinement):
     """Settings of the sensor's mesh with every element split so often in all directions."""
     finer = 2**refinement
-    return MeshSettings(sheet_layers=finer * SHEET_LAYERS, local_over_shear=0.0, tip_over_shear=0.0,
-                        frustum_levels=tuple(np.linspace(0, 1, finer * LAYERS + 1)), refinement=refinement)
+    return MeshSettings.converging(sheet_layers=finer * SHEET_LAYERS, local_over_shear=0.0, refinement=refinement,
+                                   frustum_levels=tuple(np.linspace(0, 1, finer * LAYERS + 1)))
 
 
 def cell_stiffness(mesh):

@@ -235,7 +235,7 @@ def _steps(body, surface, forces_n, indentations_mm, touch_mm):
 
 def _remarks(body):
     block = body.bed.block
-    share = f"{block.local_modulus.min() / block.law.bulk_modulus:.2g} to {block.local_modulus.max() / block.law.bulk_modulus:.2g}"
+    share = f"{block.local_modulus / block.law.bulk_modulus:.2g}"
     return ("units: mm, N, MPa",
             "*EQUATION: the sheet's upper nodes follow the cover's lower side; where walls between cells are coarse, nodes at "
             "their quarters follow the curve through the corner, the middle and the next corner; small elements of the "
@@ -244,6 +244,6 @@ def _remarks(body):
             "softtact: the sheet's underside on the frusta's sides, friction of frusta on each other, the object's steep walls and "
             "upper sides.",
             f"Facets of the object narrower than {SLIVER_MM} mm are left out.",
-            f"softtact lets the share {share} of the frusta's bulk modulus act at every point and projects the rest on linear "
-            "functions; these elements have one volumetric energy. Its bricks and wedges under the cover have nodes in faces and "
-            "bodies, too.")
+            f"softtact lets the share {share} of the frusta's bulk modulus act at every point and projects the rest on "
+            f"{'tri' * (block.basis.shape[1] > 4)}linear functions; these elements have one volumetric energy. Its bricks and "
+            "wedges under the cover have nodes in faces and bodies, too.")

@@ -1,13 +1,18 @@
 """A block of elements of one material: energy, internal force and tangent at finite strain.
 
-The volumetric energy (K - k)/2 (J-1)^2 sees J only through its projection on linear functions in each element
-(four modes: discontinuous linear pressure). The element does not lock for nearly incompressible rubber, the pressure needs
-no unknown of its own, and the tangent stays symmetric (Sussman and Bathe, Computers & Structures 26 (1987) 357).
+The volumetric energy (K - k)/2 (J-1)^2 sees J only through its projection on some functions in each element: linear ones
+(four modes: discontinuous linear pressure), or trilinear ones (eight). The pressure needs no unknown of its own, and the tangent
+stays symmetric (Sussman and Bathe, Computers & Structures 26 (1987) 357). With linear functions the element does not lock
+for any bulk modulus (Q2/P-1 is stable); trilinear ones do not pass that test, and cost 1 % at K = 20 mu.
 
-A rest, k/4 (J^2 - 1 - 2 ln J), may see J at every point. Between the modes J is free otherwise, and the edges of frusta
-that fold onto the PCB snap to J = 0.1, where no further step converges: with k = mu a sphere stalls at 40 N, with k = 4 mu it
-takes 13 iterations to 50 N. Alone it would be a material of Poisson's ratio 0.38, far from locking; it makes the unit cell
-1 % stiffer with two layers a frustum, 4 % with four narrow ones.
+Volume changes that the functions do not see have no stiffness but the shear's. Where the pressure is several mu that is too
+little: elements collapse to J = 0.1, where no further step converges. Frusta under sharp or deep objects are pressed so far.
+Two terms hold them:
+* k/4 (J^2 - 1 - 2 ln J) sees J at every point; alone it would be a material of Poisson's ratio 0.38 with k = 4 mu, far from
+  locking.
+* q/4 (J - its projection)^4 is nothing for small deviations, which are an element's error, and stops large ones: an element
+  that gives way settles beside where it was, where without it it would collapse.
+What both cost and save: docs/performance.md, "Frusta pressed beyond half of their height".
 
 Frusta want full quadrature (27 points): with 8 points they soften by spurious modes once they fold (13 % more compression
 at 0.4 MPa) and Newton's method stalls.
@@ -34,30 +39,47 @@ class BlockState:
     displacement: np.ndarray
 
 
+@dataclass(frozen=True)
+class Volumetric:
+    """Energy (mJ) of volume changes, pressure (e, g) by which it changes with J, in MPa, and the second derivative (e, g) of its
+    growing part by what the projection does not see, in MPa; (0, 0) where there is none.
+    """
+
+    energy: float
+    pressure: np.ndarray
+    growing: np.ndarray
+
+
 class SolidBlock:
     """Elements of one kind and one law, by their shape functions' gradients.
 
     gradients (u, g, m, 3) in 1/mm and volumes (u, g) in mm3 of the shapes that occur; shapes (e,): which is an element's, by
-    default each its own; points (g, 3) of the quadrature in parent coordinates; local_over_shear: k / mu, one or of each
-    shape (u,). Displacements come per element (e, m, 3) in mm.
+    default each its own; points (g, 3) of the quadrature in parent coordinates; local_over_shear: k / mu; growing_over_shear:
+    q / mu; trilinear: project on trilinear instead of linear functions. Displacements come per element (e, m, 3) in mm.
     """
 
-    def __init__(self, gradients, volumes, points, law, *, shapes=None, local_over_shear=0.0):
-        self.law, self._local_over_shear = law, local_over_shear
+    def __init__(self, gradients, volumes, points, law, *, shapes=None, local_over_shear=0.0, growing_over_shear=0.0,
+                 trilinear=False):
+        self.law, self._local_over_shear, self._growing_over_shear = law, local_over_shear, growing_over_shear
         self.gradients, self.volumes = np.ascontiguousarray(gradients), np.ascontiguousarray(volumes)
         self.shapes = np.arange(len(gradients)) if shapes is None else shapes
-        self.basis = np.column_stack([np.ones(len(points)), points])   # (g, 4): 1, xi, eta, zeta
+        self.basis = _pressure_modes(points, trilinear)
         gram = np.einsum("eg,gp,gq->epq", self.volumes, self.basis, self.basis, optimize=True)
         self.gram_inverse = np.linalg.inv(gram)
 
     @property
     def local_modulus(self):
-        """k of each shape (u,) in MPa."""
-        return np.minimum(self._local_over_shear * self.law.mu0, self.law.bulk_modulus) * np.ones(len(self.volumes))
+        """k in MPa."""
+        return min(self._local_over_shear * self.law.mu0, self.law.bulk_modulus)
+
+    @property
+    def growing_modulus(self):
+        """q in MPa."""
+        return self._growing_over_shear * self.law.mu0
 
     @property
     def projected_modulus(self):
-        """K - k of each shape (u,) in MPa."""
+        """K - k in MPa."""
         return self.law.bulk_modulus - self.local_modulus
 
     def evaluate(self, displacement, *, workers=SERIAL):
@@ -73,19 +95,20 @@ class SolidBlock:
         if not J.min() > 0:
             return None
         response = self.law.isochoric(C, tangent=False)
-        modes, pressure = self._pressure(J, shapes)
-        local = 0.25 * self.local_modulus[shapes, None] * (J * J - 1 - 2 * np.log(J))
-        energy = float(self.volumes[shapes].ravel() @ (response.energy + local.ravel()) + 0.5 * (modes[0] * modes[1]).sum())
-        return energy, kernels.internal_force(F, C, J, self.gradients, self.volumes, shapes, response.stress, pressure)
+        volumetric = self._volumetric(J, shapes)
+        energy = float(self.volumes[shapes].ravel() @ response.energy + volumetric.energy)
+        return energy, kernels.internal_force(F, C, J, self.gradients, self.volumes, shapes, response.stress,
+                                              volumetric.pressure)
 
     def tangent(self, displacement, elements=slice(None)):
         """Tangent (e, 3 m, 3 m) in N/mm of the chosen elements, whose displacement (e, m, 3) is given."""
         shapes = self.shapes[elements]
         F, C, J = kernels.deformation(displacement, self.gradients, shapes)
         response = self.law.isochoric(C, tangent=True)
-        _, pressure = self._pressure(J, shapes)
-        return kernels.tangent(F, C, J, self.gradients, self.volumes, shapes, response.stress, response.tangent, pressure,
-                               self.basis, self.gram_inverse, self.projected_modulus, self.local_modulus)
+        volumetric = self._volumetric(J, shapes)
+        return kernels.tangent(F, C, J, self.gradients, self.volumes, shapes, response.stress, response.tangent,
+                               volumetric.pressure, self.basis, self.gram_inverse, self.projected_modulus,
+                               self.local_modulus, volumetric.growing)
 
     @property
     def volume(self):
@@ -98,11 +121,35 @@ class SolidBlock:
         low, high = stretch_range(C)
         return float(self.volumes[self.shapes].ravel() @ ((low < window[0]) | (high > window[1])))
 
-    def _pressure(self, J, shapes):
-        """Modes of the volume change with their conjugate pressures, and the whole pressure (e, g) at the points."""
-        change = ((J - 1) * self.volumes[shapes]) @ self.basis
-        conjugate = self.projected_modulus[shapes, None] * np.einsum("epq,eq->ep", self.gram_inverse[shapes], change)
-        return (change, conjugate), conjugate @ self.basis.T + 0.5 * self.local_modulus[shapes, None] * (J - 1 / J)
+    def _volumetric(self, J, shapes):
+        """The volumetric part of the energy of elements with volume changes J (e, g), a `Volumetric`."""
+        volumes, k, q = self.volumes[shapes], self.local_modulus, self.growing_modulus
+        change = J - 1
+        seen = self._projected(change, shapes)
+        pressure = self.projected_modulus * seen + 0.5 * k * (J - 1 / J)
+        density = 0.5 * self.projected_modulus * seen**2 + 0.25 * k * (J * J - 1 - 2 * np.log(J))
+        growing = np.empty((0, 0))
+        if q > 0:
+            unseen = change - seen
+            held = q * unseen**3
+            pressure += held - self._projected(held, shapes)
+            density += 0.25 * q * unseen**4
+            growing = 3 * q * unseen**2
+        return Volumetric(energy=float((volumes * density).sum()), pressure=pressure, growing=growing)
+
+    def _projected(self, field, shapes):
+        """A field (e, g) projected, element by element, on the functions of the pressure."""
+        moments = (field * self.volumes[shapes]) @ self.basis
+        return np.einsum("epq,eq->ep", self.gram_inverse[shapes], moments) @ self.basis.T
+
+
+def _pressure_modes(points, trilinear):
+    """Functions of the pressure at parent points (g, 3): (g, 4), or (g, 8) if trilinear."""
+    linear = np.column_stack([np.ones(len(points)), points])
+    if not trilinear:
+        return linear
+    x, y, z = points.T
+    return np.column_stack([linear, x * y, y * z, z * x, x * y * z])
 
 
 def _unlike(coordinates):
@@ -111,23 +158,21 @@ def _unlike(coordinates):
 
 
 class HexBlock(SolidBlock):
-    """Hexahedra of 20 or 27 nodes given by coordinates (e, 20 or 27, 3) in mm; local_over_shear: one, or of each (e,)."""
+    """Hexahedra of 20 or 27 nodes given by coordinates (e, 20 or 27, 3) in mm; options as `SolidBlock` has them."""
 
-    def __init__(self, coordinates, law, *, points_per_side=3, local_over_shear=0.0):
+    def __init__(self, coordinates, law, *, points_per_side=3, **options):
         points, weights = gauss(points_per_side, 3)
         shape = {20: hex20, 27: hex27}[coordinates.shape[1]]
         first, shapes = _unlike(coordinates)
         gradients, volumes = reference_gradients(coordinates[first], shape(points)[1], weights)
-        if np.ndim(local_over_shear):
-            local_over_shear = np.asarray(local_over_shear)[first]
-        super().__init__(gradients, volumes, points, law, shapes=shapes, local_over_shear=local_over_shear)
+        super().__init__(gradients, volumes, points, law, shapes=shapes, **options)
 
 
 class WedgeBlock(SolidBlock):
-    """18-node wedges given by coordinates (e, 18, 3) in mm."""
+    """18-node wedges given by coordinates (e, 18, 3) in mm; options as `SolidBlock` has them."""
 
-    def __init__(self, coordinates, law, *, local_over_shear=0.0):
+    def __init__(self, coordinates, law, **options):
         points, weights = wedge_rule()
         first, shapes = _unlike(coordinates)
         gradients, volumes = reference_gradients(coordinates[first], wedge18(points)[1], weights)
-        super().__init__(gradients, volumes, points, law, shapes=shapes, local_over_shear=local_over_shear)
+        super().__init__(gradients, volumes, points, law, shapes=shapes, **options)

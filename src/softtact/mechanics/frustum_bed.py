@@ -77,9 +77,12 @@ class FrustumBed:
     grip: how friction holds the points on the board during a step, None without.
     """
 
-    def __init__(self, geometry, law, *, levels, root_z_mm, pcb_z_mm, tips_held, contact, local_over_shear, refinement=0,
-                 rings=1, friction=None):
-        """friction: `Coulomb` of the frusta on the board, or None."""
+    def __init__(self, geometry, law, *, levels, root_z_mm, pcb_z_mm, tips_held, contact, local_over_shear,
+                 growing_over_shear, trilinear, refinement=0, rings=1, friction=None):
+        """local_over_shear, growing_over_shear, trilinear: see `blocks`
+
+        friction: `Coulomb` of the frusta on the board, or None
+        """
         self.geometry, self.contact, self.friction, self.grip = geometry, contact, friction, None
         plan = disc_plan(refinement, rings)
         self.mesh = extrude(plan, levels)
@@ -88,9 +91,8 @@ class FrustumBed:
         self.nodes = len(self.mesh.points)
         self.root, self.tip = self.mesh.planes[-1], self.mesh.planes[0]
         self.coordinates = self._place(levels, root_z_mm)
-        per_layer = np.broadcast_to(local_over_shear, self.mesh.layers)
-        self.block = HexBlock(self.per_element(self.coordinates), law,
-                              local_over_shear=np.tile(per_layer.repeat(len(self.mesh.layer(0))), self.count))
+        self.block = HexBlock(self.per_element(self.coordinates), law, trilinear=trilinear, local_over_shear=local_over_shear,
+                              growing_over_shear=growing_over_shear)
         self._contact_points(pcb_z_mm)
         self._number_unknowns(tips_held)
         self.layers = [self._layer(k) for k in range(self.mesh.layers)]

@@ -15,10 +15,10 @@ from softtact.mechanics.layered_body import MeshSettings, build_unit_cell
 # for green light (0.53 um) in acrylic (n = 1.49) 0.13 um at 45 degrees and 0.05 um at 60 degrees.
 DARK_GAP_MM = 1e-4
 # Where tips are narrow their sides fold onto the glass: thin layers in the lowest third and thin rings at the rim (docs/ftir.md).
-GLASS_MESH = MeshSettings(frustum_levels=(*np.linspace(0, 0.2, 11), 0.24, 0.28, 0.33, 0.4, 0.5, 0.7, 1.0), frustum_rings=4,
-                          local_over_shear=0.1, tip_over_shear=0.1)
+GLASS_MESH = MeshSettings.converging(frustum_levels=(*np.linspace(0, 0.2, 11), 0.24, 0.28, 0.33, 0.4, 0.5, 0.7, 1.0),
+                                     frustum_rings=4)
 # Where tips are wide the sides fold onto the sheet, and thin layers there turn inside out before the paper's 140 N.
-WIDE_TIP_MESH = MeshSettings(frustum_levels=(0.0, 0.1, 0.3, 0.6, 0.9, 1.0), local_over_shear=0.1, tip_over_shear=0.1)
+WIDE_TIP_MESH = MeshSettings.converging(frustum_levels=(0.0, 0.1, 0.3, 0.6, 0.9, 1.0))
 # Overlaps that are pressed apart ripple by as much as they are allowed to, and the dark area with them.
 SETTINGS = NewtonSettings(contact_passes=0, first_touch_mm=1e-3, smallest_scale_n=0.1, smallest_increment_n=1e-3)
 _GIVE_UP_N = 5e-3    # force step at which a curve that may end early ends: smaller ones cost minutes and win little

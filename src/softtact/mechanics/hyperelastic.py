@@ -7,7 +7,7 @@ import numpy as np
 from softtact.errors import ConvergenceError
 from softtact.mechanics.layered_body import BodyState
 
-_DEEP = 0.45           # of a frustum's height: from here on elements of the default mesh may be unstable
+_DEEP = 0.55           # of a frustum's height: from here on elements of the default mesh may be unstable
 _WORTH_A_PASS = 0.8    # of the overlap, to which pressing apart must have brought it to be done again
 
 

@@ -112,33 +112,37 @@ def _elasticity(A, f, S, D):
 
 
 @njit(cache=True, nogil=True)
-def tangent(F, C, J, gradients, volumes, shapes, stress, moduli, pressure, basis, gram_inverse, bulk_modulus, local_modulus):
-    """Tangent (e, 3 m, 3 m) of `internal_force` with the pressure of `SolidBlock`: a projected and a local part.
+def tangent(F, C, J, gradients, volumes, shapes, stress, moduli, pressure, basis, gram_inverse, bulk_modulus, local_modulus,
+            growing):
+    """Tangent (e, 3 m, 3 m) of `internal_force` with the pressure of `SolidBlock`: a projected, a local and a growing part.
 
-    projected = bulk_modulus * basis . gram_inverse . integral(basis (J - 1)), basis (g, p): symmetric, rank p per element
-    local = local_modulus (J - 1/J) / 2;  both moduli (u,) in MPa
+    projected = bulk_modulus P(J - 1), P = basis . gram_inverse . integral(basis ...), basis (g, p): symmetric, rank p per element
+    local = local_modulus (J - 1/J) / 2;  both moduli in MPa
+    growing: derivative (1 - P) growing (1 - P), a modulus (e, g) in MPa, or (0, 0) where there is none
 
     The products run over blocks of components (i, j >= i): K_ij = G^T A_ij G with the gradients G (3 g, m), three large
     products an element instead of one with the strain-displacement matrix, which has a third of zeros.
     """
     elements, points = J.shape
-    nodes, modes = gradients.shape[2], basis.shape[1]
+    nodes = gradients.shape[2]
     out = np.empty((elements, 3 * nodes, 3 * nodes))
     G = np.empty((3 * points, nodes))
     # A_ij G for each i, columns j >= i side by side
     rights = (np.empty((3 * points, 3 * nodes)), np.empty((3 * points, 2 * nodes)), np.empty((3 * points, nodes)))
-    volume_change = np.empty((modes, 3 * nodes))
+    change = np.empty((points, 3 * nodes))    # of the volume at each point, J F^-T : G
+    grows = growing.size > 0
     A = np.empty((3, 3, 3, 3))
     D = np.empty((6, 6))
     S = np.empty((3, 3))
     cofactor = np.empty((3, 3))
     for e in range(elements):
-        volume_change[:] = 0.0
         for g in range(points):
             n = e * points + g
             inverse = inverse_symmetric(C[n])
             w, pj = volumes[shapes[e], g], pressure[e, g] * J[e, g]
-            local = 0.5 * local_modulus[shapes[e]] * (J[e, g] * J[e, g] + 1.0)
+            local = 0.5 * local_modulus * (J[e, g] * J[e, g] + 1.0)
+            if grows:
+                local += growing[e, g] * J[e, g] * J[e, g]
             for k in range(6):
                 value = w * (stress[n, k] + pj * inverse[k])
                 S[_ROW[k], _COL[k]] = value
@@ -158,9 +162,7 @@ def tangent(F, C, J, gradients, volumes, shapes, stress, moduli, pressure, basis
             for a in range(nodes):
                 x[a], y[a], z[a] = gradient[a, 0], gradient[a, 1], gradient[a, 2]
                 for i in range(3):
-                    change = cofactor[i, 0] * x[a] + cofactor[i, 1] * y[a] + cofactor[i, 2] * z[a]
-                    for m in range(modes):
-                        volume_change[m, 3 * a + i] += basis[g, m] * change
+                    change[g, 3 * a + i] = cofactor[i, 0] * x[a] + cofactor[i, 1] * y[a] + cofactor[i, 2] * z[a]
             for i in range(3):
                 for k in range(3):
                     row = rights[i][3 * g + k]
@@ -169,7 +171,15 @@ def tangent(F, C, J, gradients, volumes, shapes, stress, moduli, pressure, basis
                         for a in range(nodes):
                             row[first + a] = ax * x[a] + ay * y[a] + az * z[a]
         K = out[e]
-        K[:] = bulk_modulus[shapes[e]] * (volume_change.T @ (gram_inverse[shapes[e]] @ volume_change))
+        seen = basis.T @ change
+        projected = gram_inverse[shapes[e]] @ seen
+        if grows:
+            weighted = basis * growing[e].reshape(points, 1)
+            inner = (weighted * volumes[shapes[e]].reshape(points, 1)).T @ basis
+            cross = projected.T @ (weighted.T @ change)
+            K[:] = projected.T @ (bulk_modulus * seen + inner @ projected) - cross - cross.T
+        else:
+            K[:] = bulk_modulus * (projected.T @ seen)
         for i in range(3):
             block = G.T @ rights[i]
             for a in range(nodes):

@@ -30,18 +30,19 @@ class MeshSettings:
     each layer, a pitch wide, are split in plan: the lowest under the object, the others at its edges (see `refinement`);
     far_pitches: pitches (1, 2, 4) that an element far from the object spans; contact_stiffness: N/mm3 of the contacts' penalty,
     a third of it takes a quarter fewer iterations and leaves three times the overlap; sheet_layers: elements through the sheet;
-    frustum_levels: heights of the frustum's element layers as shares of its height; local_over_shear: the share of the
-    frusta's volumetric stiffness that acts at every point, over mu (see `blocks`), tip_over_shear: the same in the lowest
-    layer, whose edges fold (with 1 a sphere does not pass 40 N); the smaller the softer, by 2 % in all. refinement: how often
-    all elements are split in plan. frustum_rings: rings of elements around a frustum's core, the thinner the farther out.
-    coarse_walls: along all walls between cells, not only far from the object, the sheet moves as one quadratic curve: half a
-    factor's operations, and 2 to 2.5 % of the map; without effect where refined.
+    frustum_levels: heights of the frustum's element layers as shares of its height; local_over_shear, growing_over_shear:
+    what holds volume changes in the frusta that their elements' pressure does not see, over mu (see `blocks`);
+    trilinear_pressure: or linear, which is softer by 2 % for small movements, and fails under deep objects.
+    refinement: how often all elements are split in plan. frustum_rings: rings of elements around a frustum's core, the
+    thinner the farther out. coarse_walls: along all walls between cells, not only far from the object, the sheet moves as one
+    quadratic curve: half a factor's operations, and 2 to 2.5 % of the map; without effect where refined.
     """
 
     sheet_layers: int = 1
     frustum_levels: tuple = (0.0, 0.2, 0.6, 1.0)
     local_over_shear: float = 0.5
-    tip_over_shear: float = 4.0
+    growing_over_shear: float = 100.0
+    trilinear_pressure: bool = True
     refinement: int = 0
     frustum_rings: int = 1
     coarse_walls: bool = False
@@ -54,11 +55,6 @@ class MeshSettings:
         if len(self.cover_splits) != len(self.cover_levels) - 1:
             raise ValueError(f"cover_splits has {len(self.cover_splits)} entries for the {len(self.cover_levels) - 1} layers "
                              "of cover_levels")
-
-    @property
-    def over_shear_of_layers(self):
-        """The pointwise share over mu of each layer of a frustum, from the tip upwards."""
-        return [self.tip_over_shear] + [self.local_over_shear] * (len(self.frustum_levels) - 2)
 
     @property
     def contact(self):
@@ -77,14 +73,17 @@ class MeshSettings:
                    cover_splits=(0, 2), contact_stiffness=1000.0)
 
     @classmethod
-    def stable(cls):
-        """For frusta pressed to more than half of their height: no mode of an element is left to the shear stiffness alone.
+    def converging(cls, *, local_over_shear=0.1, **changes):
+        """To be refined: linear pressure, which does not lock, and little else; single frusta and cells, but no whole sensor."""
+        return cls(local_over_shear=local_over_shear, growing_over_shear=0.0, trilinear_pressure=False, **changes)
 
-        Where the pressure in the rubber is several mu, volume changes that linear functions do not see let elements collapse
-        if no more than about that many mu resist them (`blocks`). Sphere to 50 N, 3.7 mu: the default does not converge, this
-        does; unit cell 2 % stiffer up to 0.4 MPa, alike at 0.7 MPa (docs/performance.md).
+    @classmethod
+    def stable(cls):
+        """For frusta pressed to more than 60 % of their height, where on the default mesh elements give way and many steps fail.
+
+        A sphere to 50 N; unit cell 1 to 2 % stiffer up to 0.4 MPa, alike from 0.7 MPa on (docs/performance.md).
         """
-        return cls(local_over_shear=10.0, tip_over_shear=10.0)
+        return cls(local_over_shear=4.0)
 
 
 @dataclass(frozen=True)
@@ -380,7 +379,8 @@ def _bed(spec, centres, neighbours, law, mesh, scatter, contact, *, bottom=None)
                            wall_mm=0.5 * (frusta.pitch_mm - frusta.root_diameter_mm))
     return FrustumBed(geometry, law, levels=np.asarray(mesh.frustum_levels) * frusta.height_mm, root_z_mm=bottom,
                       pcb_z_mm=bottom - heights.max(), tips_held=spec.tips_held, contact=contact or mesh.contact,
-                      local_over_shear=mesh.over_shear_of_layers, refinement=mesh.refinement, rings=mesh.frustum_rings,
+                      local_over_shear=mesh.local_over_shear, growing_over_shear=mesh.growing_over_shear,
+                      trilinear=mesh.trilinear_pressure, refinement=mesh.refinement, rings=mesh.frustum_rings,
                       friction=coulomb(spec.friction.board))
 
 

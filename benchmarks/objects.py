@@ -1,0 +1,93 @@
+"""Which objects reach 50 N? `python benchmarks/objects.py [--mesh default|draft|stable] [OBJECT ...]`, hours for all.
+
+OBJECT: names in config/objects; by default the default study's indenters and the six objects of figure 7. Each is pressed in a
+process of its own, on one thread. What is in the record already is not pressed again: an ended run goes on with the next call
+(`--again` begins anew).
+"""
+
+import argparse
+import json
+import resource
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import record
+import yaml
+
+import softtact
+from softtact.errors import ConvergenceError
+from softtact.geometry.meshes import read_mesh
+from softtact.mechanics.layered_body import MeshSettings
+
+CONFIG = Path(__file__).resolve().parents[1] / "config"
+FORCES_N = [5, 10, 20, 35, 50]
+MESHES = {"default": MeshSettings, "draft": MeshSettings.draft, "stable": MeshSettings.stable}
+
+
+def default_objects():
+    """Names of the default study's indenters, trained on or not, and of the paper's six objects."""
+    objects = yaml.safe_load((CONFIG / "config.yaml").read_text(encoding="utf-8"))["objects"]
+    return [*objects["indenters"]["names"], *objects["unseen"]["names"], *(f"object_{k}" for k in range(1, 7))]
+
+
+def measure(name, mesh):
+    """One press in this process: what each level that was reached says, and what stopped it, if anything did."""
+    file = next((CONFIG / "objects").glob(f"*/{name}.stl"))
+    sensor = softtact.load_sensor("coro")
+    sensor.mesh = MESHES[mesh]()
+    stopped, start = None, time.process_time()
+    try:
+        result = sensor.press(read_mesh(file, unit="mm"), force_n=FORCES_N, model="hyperelastic", threads=1)
+    except ConvergenceError as error:
+        result, stopped = error.result, str(error)
+    row = {"object": name, "mesh": mesh, "stopped": stopped, "processor_s": round(time.process_time() - start, 1),
+           "memory_gb": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6, 2),
+           "solver": getattr(result, "solver", None)}
+    return {**row, **(_levels(result, sensor) if result else {"force_n": []})}
+
+
+def _levels(result, sensor):
+    height = sensor.spec.dielectric.frusta.height_mm
+    lists = {"force_n": (result.force_n, 3), "indentation_mm": (result.indentation_mm, 4), "iterations": (result.iterations, 0),
+             "overlap_um": (1e3 * result.penetration_mm, 2), "residual_n": (result.residual_n, 5),
+             "frustum_compression": (result.frustum_compression_mm / height, 3), "outside_card": (result.outside_card, 4)}
+    return {name: [round(float(value), digits) for value in values] for name, (values, digits) in lists.items()}
+
+
+def main():
+    """Press what is missing, write benchmarks/results/objects.json after each, and print a row of each."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("objects", nargs="*", metavar="OBJECT")
+    parser.add_argument("--mesh", choices=MESHES, default="default")
+    parser.add_argument("--again", action="store_true")
+    parser.add_argument("--one", nargs=2, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.one:
+        print(json.dumps(measure(*options.one)))
+        return
+    mesh, path = options.mesh, record.RESULTS / "objects.json"
+    rows = [] if options.again or not path.exists() else json.loads(path.read_text(encoding="utf-8"))["rows"]
+    for name in options.objects or default_objects():
+        if not any((row["object"], row["mesh"]) == (name, mesh) for row in rows):
+            run = subprocess.run([sys.executable, __file__, "--one", name, mesh], capture_output=True, text=True,
+                                 env=record.threads_of(1), check=False)
+            if run.returncode:
+                sys.exit(f"{name}: {run.stderr.strip()}")
+            rows.append(json.loads(run.stdout.splitlines()[-1]))
+            record.write("objects", rows=rows)
+    for row in rows:
+        print(_line(row))
+
+
+def _line(row):
+    if not row["force_n"]:
+        return f"| {row['object']} | {row['mesh']} | none | | | | | {row['processor_s']} |"
+    return (f"| {row['object']} | {row['mesh']} | {row['force_n'][-1]:g} | {row['indentation_mm'][-1]:.3f} | "
+            f"{sum(row['iterations']):.0f} | {max(row['overlap_um']):.2f} | {row['frustum_compression'][-1]:.0%} | "
+            f"{row['processor_s']:.0f} |")
+
+
+if __name__ == "__main__":
+    main()
