@@ -179,3 +179,11 @@ def test_a_file_that_is_no_network_is_refused_and_runs_nothing(content, tmp_path
 def test_a_missing_file_is_refused_with_the_remedy(tmp_path):
     with pytest.raises(InputError, match=r"model.pt: there is no such file; train"):
         load_network(tmp_path / "model.pt")
+
+
+def test_equal_maps_are_read_once_and_told_each_time(tiny, monkeypatch):
+    maps = np.random.default_rng(3).uniform(0, 0.3, (3, 57, 33))
+    expected, seen, forward = predict(tiny, maps), [], type(tiny).forward
+    monkeypatch.setattr(type(tiny), "forward", lambda self, part: seen.append(len(part)) or forward(self, part))
+    assert (predict(tiny, maps[[0, 2, 2, 1, 0]]) == expected[[0, 2, 2, 1, 0]]).all()
+    assert sum(seen) == 3

@@ -108,12 +108,16 @@ def summed_l1(predicted, measured):
 
 
 def predict(network, maps_mm, *, batch=64):
-    """Tactile maps (n, row, column) in counts, as numpy, of deformation maps (n, y, x) in mm."""
+    """Tactile maps (n, row, column) in counts, as numpy, of deformation maps (n, y, x) in mm.
+
+    Equal maps, of which repeated trials have many, are given to the network once.
+    """
     device = next(network.parameters()).device
-    maps_mm = torch.as_tensor(maps_mm, dtype=torch.float32)
+    maps, own = np.unique(np.asarray(maps_mm, dtype=np.float32), axis=0, return_inverse=True)
     network.eval()
     with torch.inference_mode():
-        return torch.cat([network(part.to(device)).cpu() for part in maps_mm.split(batch)]).numpy()
+        tactile = torch.cat([network(part.to(device)).cpu() for part in torch.from_numpy(maps).split(batch)]).numpy()
+    return tactile[own.ravel()]
 
 
 def save_network(path, network, *, facts):
