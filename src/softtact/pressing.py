@@ -19,6 +19,7 @@ from softtact.sensing.capacitance import ideal_counts
 
 _DEEPEST_LINEAR = 0.5     # of the layer's thickness: a linear layer does not know that it ends
 _HARDLY_COMPRESSED = 0.27    # of a frustum's height: below, the foundation model is within 2 % (docs/fast_models.md)
+_OVERLAP_LEFT = 2.0       # times the allowed overlap: above, pressing apart has failed and the contact is not solved
 _FULL_POCKET = 0.8        # of a frustum's height: above, its pocket is full and contacts begin that the models leave out
 _CORNER = 0.01            # share of a layer: strains at an edge of the object go beyond any data
 _MARGIN, _LEAST_MARGIN_MM = 1.3, 0.1     # of the depth on springs, within which points are looked for at first
@@ -126,7 +127,8 @@ def _of_record(sensor, body, record, forces, times, bodies):
              "iterations")
     numbers = dict(zip(names, map(np.array, numbers), strict=True))
     _warn_outside_card(numbers["outside_card"], forces)
-    valid = numbers["frustum_compression_mm"] < _FULL_POCKET * sensor.spec.dielectric.frusta.height_mm
+    valid = ((numbers["frustum_compression_mm"] < _FULL_POCKET * sensor.spec.dielectric.frusta.height_mm)
+             & (numbers["penetration_mm"] < _OVERLAP_LEFT * sensor.solver.largest_penetration_mm))
     result = make_result(sensor, "hyperelastic", body.solver.name, np.stack(maps), forces[:len(maps)], np.array(times),
                          within_validity=valid, **numbers)
     return replace(result, bodies=tuple(bodies))

@@ -200,6 +200,7 @@ rule learning_curve:
             network=plain(STUDY.values.network),
             ssim=plain(STUDY.values.ssim),
             seed=STUDY.values.seed,
+            threads=STUDY.values.training.threads,
         ),
     threads: STUDY.values.training.threads
     log:

@@ -1,7 +1,7 @@
 """SSIM against the number of training maps of one model.
 
 inputs: train, validation, unseen, grasps, and best (of the search) where a network takes its rate from it
-outputs: curve (CSV);  settings: learning_curve, training, network, ssim, seed
+outputs: curve (CSV);  settings: learning_curve, training, network, ssim, seed, threads
 """
 
 import pandas as pd
@@ -23,7 +23,7 @@ def run(*, inputs, outputs, settings, threads=1):
     train, tests = read_samples(inputs["train"]), {name: read_samples(inputs[name]) for name in TESTS}
     sizes = sorted({max(1, round(share * len(train))) for share in curve.shares})
     shared = {"sizes": sizes, "steps": curve.steps, "ssim": Ssim.from_dict(settings["ssim"], where="ssim").model_dump(),
-              "seed": settings["seed"], "device": prepare_torch(threads=threads, device=options.device)}
+              "seed": settings["seed"], "device": prepare_torch(threads=settings.get("threads", threads), device=options.device)}
     tables = []
     for kind in curve.networks:
         network = Network.from_dict(settings["network"] | {"architecture": kind}, where="network")

@@ -1,0 +1,165 @@
+"""A thousand random presses of each model: does one crash, hang, or return nonsense that it does not flag?
+
+    python benchmarks/random_presses.py [--models elastic foundation hyperelastic] [--presses 1000] [--limit-s 3600]
+
+Objects of config/objects, from a third of the sensor's side to all of it, in any turn, tilted by up to 25 degrees, anywhere over
+it; forces up to the sensor's pressure at full range; laws and constants anew every 25 presses. The sensor is a piece of the
+default one, 8 x 8 frusta, the hyperelastic mesh the draft. The seed is the press' number: `--one MODEL NUMBER` presses it again,
+and an ended run goes on. Counts: benchmarks/results/random_presses.json, from there docs/verification.md.
+"""
+
+import argparse
+import json
+import signal
+import sys
+import time
+import warnings
+from pathlib import Path
+
+import numpy as np
+import record
+from scipy.spatial.transform import Rotation
+
+from softtact.errors import ConvergenceError, InputError
+from softtact.geometry.meshes import read_mesh
+from softtact.geometry.pose import Pose
+from softtact.geometry.sensor_spec import SensorSpec
+from softtact.materials.laws.registry import make_law
+from softtact.mechanics.elastic import elastic_compliance
+from softtact.mechanics.foundation import foundation_flexibility
+from softtact.mechanics.hyperelastic import NewtonSettings
+from softtact.mechanics.layered_body import MeshSettings
+from softtact.sensor import Sensor
+
+CONFIG = Path(__file__).resolve().parents[1] / "config"
+OBJECTS = sorted(CONFIG.glob("objects/*/*.stl"))
+MODELS = ("elastic", "foundation", "hyperelastic")
+SIDE_MM, MAP = 9.6, (17, 17)
+LARGEST_N = 6.0            # 50 N on 22 x 37 mm, over this area
+A_SENSOR = 25              # presses
+ALLOWED_MM = 0.02          # of overlap, as the studies have it; less depth than this is none
+HANGS_S = 300              # for a press of a few seconds
+OUTCOMES = ("reached", "flagged", "stopped", "refused", "nonsense", "hung", "crashed")
+
+
+def random_sensor(number, model):
+    """The sensor of a block of presses: a law of its own in each layer, and an elastic layer of its own."""
+    rng = np.random.default_rng([1, number])
+    spec = SensorSpec.from_yaml(CONFIG / "sensors/coro.yaml").model_copy(
+        update={"footprint_mm": (SIDE_MM, SIDE_MM), "map_shape": MAP, "force_range_n": (0.0, LARGEST_N)})
+    layer = spec.elastic_layer.model_copy(update={"young_mpa": rng.uniform(0.5, 3.0), "poisson": rng.uniform(0.1, 0.45)})
+    spec = spec.model_copy(update={"elastic_layer": layer})
+    sensor = Sensor(spec, {name: random_law(rng) for name in ("dielectric", "cover")}, mesh=MeshSettings.draft(),
+                    solver=NewtonSettings(largest_penetration_mm=ALLOWED_MM))
+    if model == "elastic":
+        sensor.files["elastic"] = elastic_compliance(spec)
+    if model == "foundation":
+        sensor.files["foundation"] = foundation_flexibility(spec, dielectric_law=sensor.laws["dielectric"],
+                                                            cover_law=sensor.laws["cover"])
+    return sensor
+
+
+def random_law(rng):
+    """Neo-Hooke, Mooney-Rivlin or Yeoh of shear modulus 0.15 to 0.6 MPa and K / mu 5 to 25."""
+    mu, ratio, share = np.exp(rng.uniform(np.log(0.15), np.log(0.6))), rng.uniform(5, 25), rng.uniform(0, 0.3)
+    name, constants = [("neo_hooke", {"c10": 0.5 * mu}),
+                       ("mooney_rivlin", {"c10": 0.5 * mu * (1 - share), "c01": 0.5 * mu * share}),
+                       ("yeoh", {"c10": 0.5 * mu, "c20": 0.02 * mu * share, "c30": 0.01 * mu * share})][rng.integers(3)]
+    return make_law(name, constants, bulk_over_shear=ratio)
+
+
+def random_press(number):
+    """Mesh, pose and forces (N) of a press."""
+    rng = np.random.default_rng([2, number])
+    mesh = read_mesh(OBJECTS[rng.integers(len(OBJECTS))], unit="mm")
+    mesh.apply_scale(SIDE_MM * rng.uniform(0.33, 1.0) / max(mesh.extents[:2]))
+    turn = Rotation.from_euler("xyz", [*rng.uniform(-25, 25, 2), rng.uniform(0, 360)], degrees=True)
+    low = turn.apply(mesh.vertices)
+    middle = 0.5 * (low.min(axis=0) + low.max(axis=0))
+    place = rng.uniform(-0.5, 0.5, 2) * SIDE_MM
+    pose = Pose(np.array([*(place - middle[:2]), -low[:, 2].min()]), turn)
+    return mesh, pose, np.sort(rng.uniform(0.02, LARGEST_N, rng.integers(1, 4)))
+
+
+def outcome(sensor, model, number):
+    """What became of a press, one of OUTCOMES, and the reason if it is not `reached`."""
+    mesh, pose, forces = random_press(number)
+    try:
+        result = sensor.press(mesh, pose=pose, force_n=forces, model=model, threads=1)
+    except InputError as error:
+        return "refused", str(error)
+    except ConvergenceError as error:
+        return "stopped", str(error)
+    except TimeoutError:
+        return "hung", f"{HANGS_S} s"
+    except Exception as error:      # whatever it is, it is what is looked for
+        return "crashed", f"{type(error).__name__}: {error}"
+    faults = nonsense(result, sensor)
+    if faults:
+        return ("nonsense", faults) if result.within_validity.all() else ("flagged", faults)
+    return "reached", ""
+
+
+def nonsense(result, sensor):
+    """What cannot be of a result, in words; empty where all can."""
+    maps, depth = result.deformation_map_mm, result.indentation_mm
+    found = {"numbers that are not finite": not all(np.isfinite(values).all() for values in (maps, depth, result.tactile_map)),
+             "a map deeper than the object": (maps.max(axis=(1, 2)) > depth + 0.02).any(),
+             "a map beyond the layer": maps.max() > sensor.spec.thickness_mm,
+             "less depth at more force": (np.diff(depth) < -ALLOWED_MM).any(),
+             "overlap": result.penetration_mm.max() > 2 * ALLOWED_MM,
+             "no contact": (result.contact_area_mm2 <= 0).any(),
+             "a balance that is none": (result.residual_n > 1e-2 * np.maximum(result.force_n, 1)).any()}
+    return ", ".join(name for name, here in found.items() if here)
+
+
+def told():
+    """The counts of each model in the record."""
+    path = record.RESULTS / "random_presses.json"
+    return json.loads(path.read_text(encoding="utf-8"))["models"] if path.exists() else {}
+
+
+def measure(model, presses, deadline):
+    """Press from where the record ends, and keep the record."""
+    row = told().get(model, {"presses": 0, **dict.fromkeys(OUTCOMES, 0), "processor_s": 0.0, "notes": []})
+    sensor = None
+    while row["presses"] < presses and time.monotonic() < deadline:
+        number, start = row["presses"], time.process_time()
+        if sensor is None or number % A_SENSOR == 0:
+            sensor = random_sensor(number // A_SENSOR, model)
+        signal.alarm(HANGS_S)
+        what, why = outcome(sensor, model, number)
+        signal.alarm(0)
+        row["presses"] += 1
+        row[what] += 1
+        row["processor_s"] = round(row["processor_s"] + time.process_time() - start, 1)
+        if what not in ("reached", "flagged"):
+            row["notes"].append([number, what, why[:300]])
+        if row["presses"] % A_SENSOR == 0 or row["presses"] == presses:
+            record.write("random_presses", models=told() | {model: row})     # another process may count another model
+            print(model, {name: row[name] for name in ("presses", *OUTCOMES)}, flush=True)
+
+
+def _too_long(*_):
+    raise TimeoutError
+
+
+def main():
+    """Run the models one after the other, or one press again."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--models", nargs="+", choices=MODELS, default=MODELS)
+    parser.add_argument("--presses", type=int, default=1000)
+    parser.add_argument("--limit-s", type=float, default=np.inf)
+    parser.add_argument("--one", nargs=2, metavar=("MODEL", "NUMBER"))
+    options = parser.parse_args()
+    warnings.simplefilter("ignore")
+    signal.signal(signal.SIGALRM, _too_long)
+    if options.one:
+        model, number = options.one[0], int(options.one[1])
+        sys.exit(": ".join(outcome(random_sensor(number // A_SENSOR, model), model, number)))
+    for model in options.models:
+        measure(model, options.presses, time.monotonic() + options.limit_s)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,62 @@
+"""Random presses: does one crash, hang, or return nonsense that it does not flag?"""
+
+import importlib.util
+import json
+import sys
+import warnings
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+RECORD = ROOT / "benchmarks/results/random_presses.json"
+WRONG = ("nonsense", "hung", "crashed")
+
+
+@pytest.fixture(scope="module")
+def benchmark():
+    """benchmarks/random_presses.py as a module."""
+    sys.path.insert(0, str(ROOT / "benchmarks"))
+    spec = importlib.util.spec_from_file_location("random_presses", ROOT / "benchmarks/random_presses.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    yield module
+    sys.path.remove(str(ROOT / "benchmarks"))
+
+
+@pytest.mark.parametrize("model", ["elastic", "foundation", "hyperelastic"])
+def test_no_press_of_the_long_run_went_wrong_unsaid(model, record):
+    """The counts of the last long run (`python benchmarks/random_presses.py`), which is too long for a test."""
+    models = json.loads(RECORD.read_text(encoding="utf-8"))["models"]
+    if model not in models:
+        pytest.skip(f"benchmarks/results/random_presses.json has no {model} presses yet")
+    counts = models[model]
+    said = ", ".join(f"{counts[name]} {name}" for name in ("reached", "flagged", "stopped", "refused"))
+    wrong = sum(counts[name] for name in WRONG)
+    record(f"{model}: of {counts['presses']} random presses ({said}) those that crashed, hung or gave unflagged nonsense",
+           expected=0.0, source="benchmarks/random_presses.py", got=wrong)
+    assert wrong == 0, [note for note in counts["notes"] if note[1] in WRONG]
+
+
+@pytest.mark.parametrize(("model", "presses"), [("elastic", 20), ("foundation", 5)])
+def test_presses_that_nobody_tried_before_go_well(benchmark, model, presses):
+    first = 10**6      # beyond those of the long run
+    sensor = benchmark.random_sensor(first, model)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        outcomes = [benchmark.outcome(sensor, model, first + k) for k in range(presses)]
+    assert not [found for found in outcomes if found[0] in WRONG]
+
+
+def test_nonsense_is_called_so(benchmark):
+    """The judge itself: a good result passes, each fault that is put into it is named."""
+    from dataclasses import replace
+
+    sensor = benchmark.random_sensor(0, "elastic")
+    mesh, pose, forces = benchmark.random_press(0)
+    good = sensor.press(mesh, pose=pose, force_n=[*forces, 5.9], model="elastic", threads=1)
+    assert benchmark.nonsense(good, sensor) == ""
+    assert "not finite" in benchmark.nonsense(replace(good, tactile_map=good.tactile_map * float("nan")), sensor)
+    assert "deeper than the object" in benchmark.nonsense(replace(good, deformation_map_mm=good.deformation_map_mm + 1), sensor)
+    assert "less depth" in benchmark.nonsense(replace(good, indentation_mm=good.indentation_mm[::-1]), sensor)
+    assert "no contact" in benchmark.nonsense(replace(good, contact_area_mm2=0 * good.contact_area_mm2), sensor)
