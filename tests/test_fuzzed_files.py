@@ -12,7 +12,6 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from softtact.config import load_study
 from softtact.errors import SofttactError
 from softtact.geometry.repair import read_mended
 from softtact.geometry.sensor_spec import SensorSpec
@@ -22,6 +21,7 @@ from softtact.materials.cards import law_from_card, load_card
 from softtact.materials.config import load_material
 from softtact.materials.readers import read_curves
 from softtact.reporting.press_view import read_view
+from softtact.study.config import load_study
 
 ROOT = Path(__file__).resolve().parents[1]
 BOX = trimesh.creation.box(extents=(4, 5, 6))

@@ -10,7 +10,6 @@ import yaml
 from test_study_config import merged
 
 import softtact
-from softtact.config import load_study
 from softtact.errors import InputError
 from softtact.learning.network import ARCHITECTURES
 from softtact.mechanics.elastic import elastic_compliance
@@ -18,6 +17,7 @@ from softtact.mechanics.foundation import foundation_flexibility
 from softtact.reporting.press_plot import plot_press
 from softtact.sensing.capacitance import ideal_counts
 from softtact.sensing.virtual_sensor import read_virtual_sensor
+from softtact.study.config import load_study
 
 ROOT = Path(__file__).resolve().parents[1]
 MAP, TAXELS, FORCES = (13, 21), (3, 5), [2.0, 6.0]

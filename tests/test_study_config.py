@@ -6,11 +6,12 @@ from pathlib import Path
 import pytest
 import yaml
 
-from softtact.config import Mesh, load_study
 from softtact.errors import InputError
 from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.config import load_material
 from softtact.mechanics.layered_body import MeshSettings
+from softtact.study.config import load_study
+from softtact.study.keys import Mesh
 
 ROOT = Path(__file__).resolve().parents[1]
 DEFAULT = yaml.safe_load((ROOT / "config/config.yaml").read_text())

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean
 
-from softtact.config import PROJECT, SETS
 from softtact.errors import InputError
 from softtact.files import read_yaml
+from softtact.study.config import PROJECT, SETS
 
 BYTES = 4          # of a number in a data set; twice that in a press
 READING_NUMBERS = 2          # branches of a reading: the way up and the way down

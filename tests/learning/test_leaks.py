@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import yaml
 
-from softtact.config import load_study
 from softtact.errors import InputError
 from softtact.learning.dataset import assign_splits, check_items, list_levels
 from softtact.learning.samples import object_of
+from softtact.study.config import load_study
 
 ROOT = Path(__file__).resolve().parents[2]
 

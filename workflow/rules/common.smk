@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from softtact.code_closure import code_closure
-from softtact.config import load_study
+from softtact.study.config import load_study
 from softtact.cost import cost_lines, read_costs, study_costs
 from softtact.errors import InputError
 

@@ -34,9 +34,9 @@ def _schema(options):
 
 def schema_of(kind):
     """The JSON schema of a kind of file, generated from the types that read it."""
-    from softtact.config import Values
     from softtact.geometry.sensor_spec import SensorSpec
     from softtact.materials.config import MaterialConfig
+    from softtact.study.keys import Values
 
     model = {"study": Values, "sensor": SensorSpec, "material": MaterialConfig}[kind]
     return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | model.model_json_schema()

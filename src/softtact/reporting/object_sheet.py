@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from softtact.config import read_catalogue
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
 from softtact.geometry.meshes import place, read_mesh
 from softtact.reporting.style import pyplot, save
+from softtact.study.objects import read_catalogue
 
 FOOTPRINT_MM = (22.0, 37.0)      # of the sensor `coro`, drawn around every object
 SHOWN_MM = 2.5                   # above the lowest point: the thickness of the soft layers

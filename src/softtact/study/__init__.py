@@ -1,0 +1,1 @@
+"""A study: its configuration, checked, and what the configuration names."""

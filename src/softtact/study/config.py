@@ -1,0 +1,211 @@
+"""A study's configuration, checked before any work starts.
+
+`load_study` is the one way in. It also reads the files that the configuration names (sensor, materials, objects), so
+that rules hand their stages plain values, and a comment in a YAML file reruns nothing.
+"""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from softtact.errors import InputError
+from softtact.evaluation.ssim import check_window
+from softtact.files import read_yaml
+from softtact.geometry.sensor_spec import SensorSpec
+from softtact.materials.config import load_material
+from softtact.progress import announce
+from softtact.published.archive import SOURCE as PUBLISHED
+from softtact.published.archive import Archive, find_archive
+from softtact.sensing.virtual_sensor import VirtualSensorSettings, make_specimen
+from softtact.study.faults import existing, refuse_unknown, validated
+from softtact.study.keys import CENTRED, Values
+from softtact.study.objects import Item, check_shapes, items_of_set, make_item, read_catalogue
+
+PROJECT = Path(__file__).resolve().parents[3]
+SETS = ("indenters", "unseen", "grasps")
+
+
+@dataclass(frozen=True)
+class Study:
+    """A checked configuration with the files that it names.
+
+    values: the configuration;  spec: the sensor
+    materials: {name: MaterialConfig};  items_of: {set: {id: Item}} in the order of the configuration
+    section_item: what figure 2 presses
+    archive: the published files that maps and readings come from, or None where they are generated
+    """
+
+    values: Values
+    spec: SensorSpec
+    materials: dict
+    items_of: dict
+    section_item: Item
+    archive: Archive | None = None
+
+    @property
+    def tested(self):
+        """The models that a network is trained for: of an archive, those whose simulations are there."""
+        return list(self.archive.simulated) if self.archive else self.values.tested
+
+    @property
+    def learnt_from(self):
+        """The models whose maps data sets are made of: those under test, and the reference, as if a model were perfect."""
+        return self.tested if self.archive else list(dict.fromkeys([*self.tested, self.values.reference]))
+
+    @property
+    def pressed_with(self):
+        """The models that every item is pressed with: those learnt from, and those that policies choose between."""
+        return [] if self.archive else list(dict.fromkeys([*self.learnt_from, *self.values.choice.models.values()]))
+
+    @property
+    def source(self):
+        """What the readings are from, in words."""
+        return PUBLISHED if self.archive else "virtual sensor"
+
+    @property
+    def name(self):
+        """The study's name, and its folder below results/."""
+        return self.values.study
+
+    @property
+    def sensor(self):
+        """The sensor's description as plain JSON values; what is assumed, and why, is left out."""
+        return self.spec.model_dump(mode="json")
+
+    def trials_of(self, set_name):
+        """How often the virtual sensor reads each press of a set."""
+        return getattr(self.values.objects, set_name).trials or self.values.trials
+
+    def named(self):
+        """What the configuration names, as plain JSON values: the sensor, the materials' settings, the items of each set."""
+        materials = {name: {"curves": material.curve_settings, "fit": material.fit_settings}
+                     for name, material in self.materials.items()}
+        items = {name: [asdict(item) for item in items.values()] for name, items in self.items_of.items()}
+        return {"sensor": self.sensor, "materials": materials, "items": items, "section": asdict(self.section_item)}
+
+    def items(self):
+        """The items of all sets, in order."""
+        return [item for items in self.items_of.values() for item in items.values()]
+
+
+def read_values(configfile=None, *, default="config/config.yaml"):
+    """The configuration mapping of a file over the default one, merged as Snakemake does it."""
+    values = _read_yaml(Path(default))
+    return values if configfile is None else _merged(values, _read_yaml(Path(configfile)))
+
+
+def _merged(base, over):
+    return base | {key: _merged(base[key], value) if isinstance(base.get(key), dict) and isinstance(value, dict) else value
+                   for key, value in over.items()}
+
+
+def _read_yaml(path):
+    """A mapping of a YAML file; what is none is refused."""
+    values = read_yaml(path, missing="there is no such configuration; give the path of one, from the project's folder.")
+    if not isinstance(values, dict):
+        raise InputError(f"{path}: it holds no keys; write a configuration such as config/tiny.yaml.")
+    return values
+
+
+def sensor_file(name, *, folder=None):
+    """The YAML file of a sensor, given by its path or by its name in `folder`/sensors.
+
+    folder: by default config/ where the command runs, else the project's own
+    """
+    if Path(name).suffix in (".yaml", ".yml"):
+        return Path(name)
+    here = Path("config")
+    folder = folder or (here if (here / "sensors").is_dir() else PROJECT / "config")
+    return existing(Path(folder, "sensors"), name, kind="sensor")
+
+
+def load_study(values, *, folder="config"):
+    """The `Study` of a configuration mapping; the first fault becomes an `InputError` of one sentence.
+
+    folder: where sensors/ and materials/ lie
+    """
+    checked = validated(Values, values, where="the configuration")
+    spec = SensorSpec.from_yaml(sensor_file(checked.sensor, folder=folder))
+    _check_forces(checked, spec)
+    materials = _materials(checked, spec, Path(folder, "materials"))
+    _check_models(checked, spec)
+    _check_sensor(checked, spec)
+    checked = _with_range(checked, spec)
+    make_specimen(spec, seed=checked.seed, settings=VirtualSensorSettings.from_dict(checked.virtual_sensor))
+    catalogue = read_catalogue(Path(checked.objects.catalogue))
+    items_of = {name: items_of_set(name, getattr(checked.objects, name), catalogue, spec=spec, seed=checked.seed) for name in SETS}
+    check_shapes(items_of)
+    study = Study(checked, spec, materials, items_of, _section_item(checked, catalogue), _archive(checked))
+    _say_outside_paths(study, folder)
+    return study
+
+
+def _say_outside_paths(study, folder):
+    """Say on stderr which files of the configuration lie outside the folder that the study runs in."""
+    values = study.values
+    named = [("objects.catalogue", values.objects.catalogue), *((f"object {item.object}", item.file) for item in study.items()),
+             *((f"material {name}", path) for name, config in study.materials.items() for path in config.measured_files),
+             ("ftir.measured", values.ftir.measured), ("sensor", sensor_file(values.sensor, folder=folder)),
+             ("data.folder", values.data.folder if values.data.source == "published" else None)]
+    for what, path in dict.fromkeys(named):
+        if path is not None and not Path(path).resolve().is_relative_to(Path.cwd().resolve()):
+            announce(f"the configuration, at {what!r}: {path} lies outside this project, {Path.cwd()}; it is read from there.")
+
+
+def _section_item(values, catalogue):
+    """The item that the section's press presses, centred."""
+    name = values.section.object
+    refuse_unknown(name, list(catalogue), kind="object", where="the configuration, at 'section.object'")
+    return make_item(catalogue[name], CENTRED, None, first=True)
+
+
+def _archive(values):
+    """The published files that the study reads, or None."""
+    if values.data.source == "generated":
+        return None
+    return find_archive(values.data.folder, models=values.tested, variant=values.data.variant)
+
+
+def _check_forces(values, spec):
+    low, high = spec.force_range_n
+    for key, force in [*(("forces_n", force) for force in values.forces_n), ("section.force_n", values.section.force_n)]:
+        if not low < force <= high:
+            raise InputError(f"the configuration, at '{key}': {force:g} N is out of the range of {spec.name}, above "
+                             f"{low:g} and up to {high:g} N; leave it out or change the sensor's force_range_n.")
+
+
+def _materials(values, spec, folder):
+    """{name: MaterialConfig} of the listed materials, among which the sensor's own must be."""
+    for layer in (spec.dielectric, spec.cover):
+        if layer.material not in values.materials:
+            raise InputError(f"the configuration, at 'materials': sensor {spec.name} is made of {layer.material!r}, "
+                             "which is not in the list; add it.")
+    return {name: load_material(existing(folder, name, kind="material")) for name in values.materials}
+
+
+def _check_models(values, spec):
+    for name in [*values.tested, values.reference, *values.choice.models.values()]:
+        refuse_unknown(name, list(values.models), kind="model", where="the configuration, at 'models'")
+    for name, model in values.models.items():
+        where = f"the configuration, at 'models.{name}'"
+        if model.friction and model.kind != "hyperelastic":
+            raise InputError(f"{where}: a model of kind {model.kind!r} knows no friction; leave 'friction' out.")
+        if model.friction:
+            SensorSpec.from_dict({**spec.model_dump(mode="json"), "friction": model.friction.model_dump()}, where=where)
+
+
+def _check_sensor(values, spec):
+    """Refuse now a sensor that a model or a network of the study would refuse after hours."""
+    for model in values.models.values():
+        spec.check_for(model.kind)
+    lost, shortest = 2 * max(len(values.network.filters), values.search.space.depth[1]), min(spec.map_shape)
+    if shortest <= lost:
+        raise InputError(f"{spec.name}, at 'map_shape': the printed and the searched network's layers take up to {lost} rows and "
+                         f"columns, and the map has {shortest}; give it more points.")
+    check_window(values.ssim.window, (spec.taxels.rows, spec.taxels.columns))
+
+
+def _with_range(values, spec):
+    """The configuration with the sensor's range of counts as that of the SSIM, unless it says another."""
+    if "data_range" in values.ssim.model_fields_set:
+        return values
+    return values.model_copy(update={"ssim": values.ssim.model_copy(update={"data_range": spec.largest_counts})})

@@ -1,0 +1,44 @@
+"""What is wrong with a configuration, in one sentence that names the field, the value and the remedy."""
+
+from pydantic import ValidationError
+
+from softtact.errors import InputError
+from softtact.unknown_names import first_fault, known_keys, unknown
+
+
+def validated(model, values, *, where):
+    """`model` from plain values; the first fault becomes an `InputError` naming the field and the remedy."""
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        raise InputError(_fault__sentence(model, first_fault(error), where=where)) from None
+
+
+def _fault__sentence(model, fault, *, where):
+    """One sentence for a fault of pydantic's."""
+    *parents, last = fault["loc"] or ("",)
+    section = f"{where}, at {'.'.join(map(str, parents))!r}" if parents else where
+    if fault["type"] == "missing":
+        return f"{section}: the key {last!r} is missing; add it."
+    if fault["type"] == "extra_forbidden":
+        return _sentence(f"{section}: {unknown(last, known_keys(model, parents), kind='key')}")
+    at = ".".join(str(part) for part in fault["loc"] if part != "[key]")
+    given = "" if isinstance(fault["input"], dict) else f" (it is {fault['input']!r:.60})"
+    return _sentence(f"{where}, at {at!r}{given}: {fault['msg'].removeprefix('Value error, ')}")
+
+
+def existing(folder, name, *, kind):
+    """The YAML file of `name` in a folder; an unknown name is refused with the nearest right one."""
+    refuse_unknown(name, sorted(path.stem for path in folder.glob("*.yaml")), kind=kind, where=str(folder))
+    return folder / f"{name}.yaml"
+
+
+def refuse_unknown(name, known, *, kind, where):
+    """Raise an `InputError` that tells the nearest right name if `name` is not among the `known` ones."""
+    if name not in known:
+        raise InputError(_sentence(f"{where}: {unknown(name, known, kind=kind)}"))
+
+
+def _sentence(text):
+    """The text with an end."""
+    return text if text.endswith(("?", ".")) else f"{text}."

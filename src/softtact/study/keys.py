@@ -1,0 +1,275 @@
+"""The keys of a study's configuration, each typed and described in place; `Values` is all of it."""
+
+import itertools
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    PositiveFloat,
+    PositiveInt,
+    field_validator,
+    model_validator,
+)
+
+from softtact.geometry.sensor_spec import READINGS
+from softtact.learning.settings import LearningCurve, Network, Search, Ssim, Training
+from softtact.materials.laws.registry import LAWS
+from softtact.published.arrangement import ARRANGEMENTS
+from softtact.sensing.virtual_sensor import VirtualSensorSettings
+from softtact.unknown_names import unknown
+
+CENTRED = "centred"  # the pose that gives an item its object's plain name
+
+
+def _one_of(known, *, kind):
+    """A string among the `known` ones."""
+
+    def check(name):
+        if name not in known:
+            raise ValueError(unknown(name, known, kind=kind))
+        return name
+
+    return Annotated[str, AfterValidator(check)]
+
+
+def _rising(values):
+    if any(low >= high for low, high in itertools.pairwise(values)):
+        raise ValueError("the values must rise from one to the next")
+    return values
+
+
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
+Fraction = Annotated[float, Field(gt=0.0, lt=1.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+Forces = Annotated[list[PositiveFloat], Field(min_length=1), AfterValidator(_rising)]
+ForcesFromZero = Annotated[list[NotNegative], Field(min_length=1), AfterValidator(_rising)]
+Law = _one_of(LAWS, kind="law")
+Reading = _one_of(READINGS, kind="reading")
+Arrangement = _one_of(ARRANGEMENTS, kind="arrangement")
+VirtualSensorKey = _one_of(VirtualSensorSettings.__dataclass_fields__, kind="key")
+Six = Annotated[list[float], Field(min_length=6, max_length=6)]
+
+
+class Section(BaseModel):
+    """A mapping of the configuration whose keys are all known."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Camera(Section):
+    """The camera behind the acrylic plate of the contact-area test."""
+
+    pixel_mm: PositiveFloat
+    blur_mm: NotNegative
+    noise: NotNegative
+    falloff: NotNegative
+
+
+class GlassMesh(Section):
+    """Resolution of the frustum on glass; what is not said is the default for its shape."""
+
+    frustum_levels: Annotated[list[float], AfterValidator(_rising)] | None = Field(
+        None, description="heights of its layers of elements, from 0 to 1")
+    frustum_rings: PositiveInt | None = Field(None, description="rings of elements around its core, thin at its rim")
+    refinement: Annotated[int, Field(ge=0)] | None = Field(None, description="how often all elements are split in plan")
+
+
+class Ftir(Section):
+    """The dielectric pressed on glass, as a model and as a virtual specimen, and the camera that looks at it."""
+
+    forces_n: ForcesFromZero = Field(description="on the whole dielectric")
+    readings: Annotated[list[Reading], Field(min_length=1)] = Field(
+        ["default", "as_printed"], description="of the printed frustum: its narrow or its wide end on the glass")
+    laws: Annotated[list[Law], Field(min_length=1)] = Field(["mooney_rivlin", "ogden2"], description="each solves each reading")
+    constants: Literal["printed", "fitted"] = Field("printed", description="of the laws: as published, or the card's fit")
+    reading: Reading = Field("default", description="of the model under test and of the virtual specimen; one of `readings`")
+    law: Law = Field(description="of the model under test; one of `laws`")
+    virtual_law: Law = Field(description="of the virtual specimen")
+    height_scatter: NotNegative = Field(0.01, description="standard deviation of its frusta's heights, share of the height")
+    tip_scatter: NotNegative = Field(0.02, description="the same of their tips' diameters")
+    mesh: GlassMesh = Field(GlassMesh(), description="of cells whose narrow end stands on the glass")
+    camera: Camera
+    measured: str | None = Field(None, description="CSV with force_n, area_mm2 (mean frustum) of one's own test")
+
+    @model_validator(mode="after")
+    def _tests_what_it_solves(self):
+        for key, chosen, among in (("reading", self.reading, self.readings), ("law", self.law, self.laws)):
+            if chosen not in among:
+                raise ValueError(f"{key} {chosen!r} of the model under test is not among the {key}s {', '.join(among)}; add it")
+        if not self.forces_n[-1] > 0:
+            raise ValueError("forces_n holds 0 N only; add a force above")
+        return self
+
+    @field_validator("measured")
+    @classmethod
+    def _exists(cls, path):
+        if path is not None and not Path(path).is_file():
+            raise ValueError(f"there is no file {path}; give the path of the CSV, or null for the virtual dielectric")
+        return path
+
+
+class Thresholds(Section):
+    """NPt >= total * CHt, NPo >= overlap * CHo."""
+
+    total: PositiveFloat
+    overlap: PositiveFloat
+
+
+class Complexity(Section):
+    """When an object asks for the hyperelastic model."""
+
+    rule: Literal["any", "all"]
+    thresholds: Thresholds
+
+
+class Choice(Section):
+    """How the policies that choose a model are compared."""
+
+    models: dict[Literal["elastic", "foundation", "hyperelastic"], Name] = Field(description="the study's model of each kind")
+    tolerances_mm: Annotated[list[PositiveFloat], Field(min_length=1), AfterValidator(_rising)] = Field(
+        description="errors that a user would accept, root mean square over the map")
+
+
+class SectionPress(Section):
+    """The press that figure 2 and the report's turning view show: a large force, with the deformed body kept."""
+
+    object: Name = Field(description="of the catalogue")
+    force_n: PositiveFloat
+
+
+class ItemSet(Section):
+    """Objects of the catalogue, by name or `all` of a set, and the poses in which each is pressed: listed ones, then drawn ones."""
+
+    names: list[Name] | Literal["all"]
+    poses: dict[Name, Six | None] = Field({CENTRED: None}, min_length=1, description="of each: x, y, z in mm, then degrees")
+    presses: PositiveInt | None = Field(None, description="in all; those beyond the listed poses are drawn for each object in turn")
+    trials: PositiveInt | None = Field(None, description="readings of each press of this set; by default the study's `trials`")
+
+
+class Objects(Section):
+    """What is pressed: training indenters, indenters that training never sees, grasped objects."""
+
+    catalogue: str
+    indenters: ItemSet
+    unseen: ItemSet
+    grasps: ItemSet
+
+
+class CatalogueEntry(Section):
+    """One line of the catalogue: a mesh file beside it, the mesh's unit, and its set."""
+
+    name: Name
+    file: str
+    unit: str
+    set: Literal["indenters", "unseen", "grasps"]
+    label: str
+
+
+class Mesh(Section):
+    """Resolution of a model's mesh, and the scatter of its frusta; what is not said is the model's own default."""
+
+    sheet_layers: PositiveInt | None = None
+    cover_levels: Annotated[list[float], AfterValidator(_rising)] | None = Field(
+        None, description="heights of the cover's layers of elements, from 0 to 1")
+    cover_splits: list[Annotated[int, Field(ge=0, le=4)]] | None = Field(
+        None, description="how often each of these layers' elements, a pitch wide, are split under the object and at its edges")
+    far_pitches: Literal[1, 2, 4] | None = Field(None, description="pitches that an element of the cover spans far from the object")
+    frustum_levels: Annotated[list[float], AfterValidator(_rising)] | None = Field(
+        None, description="heights of a frustum's layers of elements, from 0 to 1")
+    frustum_rings: PositiveInt | None = Field(None, description="rings of elements around a frustum's core, thin at its rim")
+    local_over_shear: NotNegative | None = Field(None, description="volumetric stiffness of frusta at each point, over mu")
+    growing_over_shear: NotNegative | None = Field(
+        None, description="stiffness of frusta against large volume changes that their elements' pressure misses, over mu")
+    trilinear_pressure: bool | None = Field(None, description="pressure in the frusta's elements: trilinear (default), or linear")
+    refinement: Annotated[int, Field(ge=0)] | None = Field(
+        None, description="how often all elements are split into four in plan")
+    contact_stiffness: PositiveFloat | None = Field(None, description="N/mm3 of the contacts' penalty")
+    coarse_walls: bool | None = Field(
+        None, description="along all walls between cells, not only far from the object, the sheet moves as one quadratic curve: "
+                          "half the work, and 2 to 2.5 % of the map; without effect in a refined plan")
+    largest_penetration_mm: PositiveFloat | None = Field(None, description="deeper overlaps in contacts are pressed apart")
+    height_scatter: NotNegative | None = Field(None, description="standard deviation, share of the height")
+    tip_scatter: NotNegative | None = Field(None, description="standard deviation, share of the tip's diameter")
+    thickness_scatter: Annotated[float, Field(ge=0, le=0.1)] | None = Field(
+        None, description="the same of sheet and cover, one thickness each for a specimen")
+    specimen: Annotated[int, Field(ge=0)] | None = Field(None, description="seed of the scatter")
+
+
+class OwnFriction(Section):
+    """A model's own coefficients of Coulomb friction, in place of the sensor's."""
+
+    object: NotNegative = Field(0.0, description="of the object on the cover")
+    board: NotNegative = Field(0.0, description="of the frusta on the board; needs tips that are not held")
+
+
+class Model(Section):
+    """One mechanical model of the sensor: its kind, its mesh, the law of each layer, and the files its presses start from."""
+
+    kind: Literal["elastic", "foundation", "hyperelastic"] = "hyperelastic"
+    mesh: Mesh = Mesh()
+    laws: dict[Literal["dielectric", "cover"], Law] = {}
+    friction: OwnFriction | None = Field(None, description="only of a hyperelastic model; by default the sensor's")
+    needs: list[Literal["mesh", "compliance", "card_dielectric", "card_cover"]] = []
+
+    @property
+    def prepared_from(self):
+        """What its compliance is computed from."""
+        return ["frustum_law", "card_dielectric", "card_cover"] if self.kind == "foundation" else []
+
+
+class Data(Section):
+    """Where maps and readings come from: presses and the virtual sensor, or the archive that the paper's authors published."""
+
+    source: Literal["generated", "published"] = "generated"
+    folder: str = Field("dataset", description="of the archive's CSV files (docs/published_archive.md)")
+    variant: str | None = Field(None, description="ending of the files to read, V1 say, where there are several of a kind")
+    unseen: list[Name] = Field([], description="the archive's indenters that training never sees, donut_m for its DonutM")
+    without: list[str] = Field([], description="tests, by their Path, and objects, by their item's name, that are not used")
+    taxel_order: Arrangement = Field("rows", description="of tax1 to tax28 under the map; the import says which one fits best")
+    odd: Literal["leave_out", "refuse"] = Field("leave_out", description="tests that are odd")
+    largest_odd_share: Annotated[float, Field(ge=0.0, le=1.0)] = Field(0.1, description="of tests that may be left out")
+
+    @model_validator(mode="after")
+    def _has_unseen_indenters(self):
+        if self.source == "published" and not self.unseen:
+            raise ValueError("'unseen' is empty; name indenters of the archive that training must not see")
+        return self
+
+
+class Dataset(Section):
+    """How samples are made and split."""
+
+    train_fraction: Fraction
+    split_by: Literal["map", "press", "object"] = Field("map", description="what goes to training or validation as a whole")
+    training_trials: Literal["each", "mean"] = Field("each", description="a sample per trial, or one of their mean")
+
+
+class Values(Section):
+    """The whole configuration; `config/config.yaml` holds it with comments."""
+
+    study: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$")]
+    seed: Annotated[int, Field(ge=0)]
+    sensor: str
+    materials: list[Name]
+    objects: Objects
+    ftir: Ftir
+    complexity: Complexity
+    choice: Choice
+    section: SectionPress
+    forces_n: Forces
+    models: dict[Name, Model]
+    tested: list[Name] = Field(min_length=1, description="models that a network is trained for")
+    reference: Name
+    virtual_sensor: dict[VirtualSensorKey, float | list[float]]
+    trials: PositiveInt
+    data: Data = Data()
+    dataset: Dataset
+    search: Search
+    training: Training
+    network: Network
+    learning_curve: LearningCurve = LearningCurve()
+    ssim: Ssim
