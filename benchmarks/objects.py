@@ -52,7 +52,7 @@ def _levels(result, sensor):
     height = sensor.spec.dielectric.frusta.height_mm
     lists = {"force_n": (result.force_n, 3), "indentation_mm": (result.indentation_mm, 4), "iterations": (result.iterations, 0),
              "overlap_um": (1e3 * result.penetration_mm, 2), "residual_n": (result.residual_n, 5),
-             "frustum_compression": (result.frustum_compression_mm / height, 3), "outside_card": (result.outside_card, 4)}
+             "frustum_compression": (result.frustum_compression_mm / height, 3)}
     return {name: [round(float(value), digits) for value in values] for name, (values, digits) in lists.items()}
 
 

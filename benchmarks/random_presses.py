@@ -1,18 +1,20 @@
 """A thousand random presses of each model: does one crash, hang, or return nonsense that it does not flag?
 
-    python benchmarks/random_presses.py [--models elastic foundation hyperelastic] [--presses 1000] [--limit-s 3600]
+    python benchmarks/random_presses.py [--models elastic foundation hyperelastic] [--presses 1000] [--jobs 1]
 
 Objects of config/objects, from a third of the sensor's side to all of it, in any turn, tilted by up to 25 degrees, anywhere over
 it; forces up to the sensor's pressure at full range; laws and constants anew every 25 presses. The sensor is a piece of the
-default one, 8 x 8 frusta, the hyperelastic mesh the draft. The seed is the press' number: `--one MODEL NUMBER` presses it again,
-and an ended run goes on. Counts: benchmarks/results/random_presses.json, from there docs/verification.md.
+default one, 8 x 8 frusta, 6 x 6 for the hyperelastic model on the draft mesh. The seed is the press' number: `--one MODEL NUMBER`
+presses it again, and an ended run goes on. Counts: benchmarks/results/random_presses.json, from there docs/verification.md.
 """
 
 import argparse
 import json
+import multiprocessing
 import signal
 import time
 import warnings
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -33,8 +35,9 @@ from softtact.sensor import Sensor
 CONFIG = Path(__file__).resolve().parents[1] / "config"
 OBJECTS = sorted(CONFIG.glob("objects/*/*.stl"))
 MODELS = ("elastic", "foundation", "hyperelastic")
-SIDE_MM, MAP = 9.6, (17, 17)
-LARGEST_N = 6.0            # 50 N on 22 x 37 mm, over this area
+FRUSTA = {"elastic": 8, "foundation": 8, "hyperelastic": 6}     # on a side of the sensor
+PITCH_MM = 1.2
+LARGEST_MPA = 6 / 9.6**2   # 50 N on the default sensor, 22 x 37 mm, and somewhat more
 A_SENSOR = 25              # presses
 ALLOWED_MM = 0.02          # of overlap, as the studies have it; less depth than this is none
 HANGS_S = 300              # for a press of a few seconds
@@ -43,9 +46,10 @@ OUTCOMES = ("reached", "flagged", "stopped", "refused", "nonsense", "hung", "cra
 
 def random_sensor(number, model):
     """The sensor of a block of presses: a law of its own in each layer, and an elastic layer of its own."""
-    rng = np.random.default_rng([1, number])
+    rng, side = np.random.default_rng([1, number]), PITCH_MM * FRUSTA[model]
     spec = SensorSpec.from_yaml(CONFIG / "sensors/coro.yaml").model_copy(
-        update={"footprint_mm": (SIDE_MM, SIDE_MM), "map_shape": MAP, "force_range_n": (0.0, LARGEST_N)})
+        update={"footprint_mm": (side, side), "map_shape": (2 * FRUSTA[model] + 1,) * 2,
+                "force_range_n": (0.0, LARGEST_MPA * side**2)})
     layer = spec.elastic_layer.model_copy(update={"young_mpa": rng.uniform(0.5, 3.0), "poisson": rng.uniform(0.1, 0.45)})
     spec = spec.model_copy(update={"elastic_layer": layer})
     sensor = Sensor(spec, {name: random_law(rng) for name in ("dielectric", "cover")}, mesh=MeshSettings.draft(),
@@ -67,22 +71,22 @@ def random_law(rng):
     return make_law(name, constants, bulk_over_shear=ratio)
 
 
-def random_press(number):
-    """Mesh, pose and forces (N) of a press."""
-    rng = np.random.default_rng([2, number])
+def random_press(number, model):
+    """Mesh, pose and forces (N) of a press on the model's sensor."""
+    rng, side = np.random.default_rng([2, number]), PITCH_MM * FRUSTA[model]
     mesh = read_mesh(OBJECTS[rng.integers(len(OBJECTS))], unit="mm")
-    mesh.apply_scale(SIDE_MM * rng.uniform(0.33, 1.0) / max(mesh.extents[:2]))
+    mesh.apply_scale(side * rng.uniform(0.33, 1.0) / max(mesh.extents[:2]))
     turn = Rotation.from_euler("xyz", [*rng.uniform(-25, 25, 2), rng.uniform(0, 360)], degrees=True)
     low = turn.apply(mesh.vertices)
     middle = 0.5 * (low.min(axis=0) + low.max(axis=0))
-    place = rng.uniform(-0.5, 0.5, 2) * SIDE_MM
+    place = rng.uniform(-0.5, 0.5, 2) * side
     pose = Pose(np.array([*(place - middle[:2]), -low[:, 2].min()]), turn)
-    return mesh, pose, np.sort(rng.uniform(0.02, LARGEST_N, rng.integers(1, 4)))
+    return mesh, pose, np.sort(rng.uniform(0.02, LARGEST_MPA * side**2, rng.integers(1, 4)))
 
 
 def outcome(sensor, model, number):
     """What became of a press, one of OUTCOMES, and the reason if it is not `reached`."""
-    mesh, pose, forces = random_press(number)
+    mesh, pose, forces = random_press(number, model)
     try:
         result = sensor.press(mesh, pose=pose, force_n=forces, model=model, threads=1)
     except InputError as error:
@@ -118,23 +122,31 @@ def told():
     return json.loads(path.read_text(encoding="utf-8"))["models"] if path.exists() else {}
 
 
-def measure(model, presses, deadline):
-    """Press from where the record ends, and keep the record."""
-    row = told().get(model, {"presses": 0, **dict.fromkeys(OUTCOMES, 0), "processor_s": 0.0, "notes": []})
-    sensor = None
-    while row["presses"] < presses and time.monotonic() < deadline:
-        number, start = row["presses"], time.process_time()
-        if sensor is None or number % A_SENSOR == 0:
-            sensor = random_sensor(number // A_SENSOR, model)
+def press_block(model, block):
+    """Rows [number, outcome, reason] of the presses of a sensor, and processor time in s."""
+    warnings.simplefilter("ignore")
+    signal.signal(signal.SIGALRM, _too_long)
+    start, rows = time.process_time(), []
+    sensor = random_sensor(block, model)
+    for number in range(block * A_SENSOR, (block + 1) * A_SENSOR):
         signal.alarm(HANGS_S)
-        what, why = outcome(sensor, model, number)
+        rows.append([number, *outcome(sensor, model, number)])
         signal.alarm(0)
-        row["presses"] += 1
-        row[what] += 1
-        row["processor_s"] = round(row["processor_s"] + time.process_time() - start, 1)
-        if what not in ("reached", "flagged"):
-            row["notes"].append([number, what, why[:300]])
-        if row["presses"] % A_SENSOR == 0 or row["presses"] == presses:
+    return rows, time.process_time() - start
+
+
+def measure(model, presses, jobs):
+    """Press from where the record ends, and keep the record after each sensor's presses."""
+    row = told().get(model, {"presses": 0, **dict.fromkeys(OUTCOMES, 0), "processor_s": 0.0, "notes": []})
+    blocks = range(row["presses"] // A_SENSOR, presses // A_SENSOR)
+    with multiprocessing.get_context("spawn").Pool(jobs) as pool:
+        for rows, seconds in pool.imap(partial(press_block, model), blocks):
+            row["presses"] += len(rows)
+            row["processor_s"] = round(row["processor_s"] + seconds, 1)
+            for number, what, why in rows:
+                row[what] += 1
+                if what not in ("reached", "flagged"):
+                    row["notes"].append([number, what, why[:300]])
             record.write("random_presses", models=told() | {model: row})     # another process may count another model
             print(model, {name: row[name] for name in ("presses", *OUTCOMES)}, flush=True)
 
@@ -148,17 +160,16 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--models", nargs="+", choices=MODELS, default=MODELS)
     parser.add_argument("--presses", type=int, default=1000)
-    parser.add_argument("--limit-s", type=float, default=np.inf)
+    parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--one", nargs=2, metavar=("MODEL", "NUMBER"))
     options = parser.parse_args()
-    warnings.simplefilter("ignore")
-    signal.signal(signal.SIGALRM, _too_long)
     if options.one:
+        warnings.simplefilter("ignore")
         model, number = options.one[0], int(options.one[1])
         print(": ".join(outcome(random_sensor(number // A_SENSOR, model), model, number)))
         return
     for model in options.models:
-        measure(model, options.presses, time.monotonic() + options.limit_s)
+        measure(model, options.presses, options.jobs)
 
 
 if __name__ == "__main__":

@@ -45,5 +45,5 @@ def write(name, **numbers):
     RESULTS.mkdir(exist_ok=True)
     path = RESULTS / f"{name}.json"
     whole = {"date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M"), "machine": machine(), "versions": versions(), **numbers}
-    path.write_text(json.dumps(whole, indent=1) + "\n", encoding="utf-8")
+    path.write_text(json.dumps(whole, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     return path

@@ -16,12 +16,12 @@ from softtact.files import atomic_path, read_dataset, read_json, write_csv, writ
 from softtact.mechanics.elastic import Compliance
 from softtact.mechanics.foundation import FoundationFlexibility
 from softtact.mechanics.frustum_law import FrustumLaw
-from softtact.reporting.section import read_body
+from softtact.pressed_mesh import read_vtu
 
 ROOT = Path(__file__).parents[1]
 MAPS = xarray.Dataset({"deformation_map_mm": (("force", "y", "x"), np.arange(5 * 57 * 33, dtype=float).reshape(5, 57, 33))})
 TETRAHEDRON = meshio.Mesh(np.eye(4, 3), [("tetra", [[0, 1, 2, 3]])], cell_data={"layer": [np.zeros(1)]},
-                          point_data={"displacement_mm": np.zeros((4, 3))})
+                          point_data={"displacement_mm_5N": np.zeros((4, 3))})
 
 
 def write_arrays(path):
@@ -34,7 +34,7 @@ def write_arrays(path):
     ("compliance.npz", write_arrays, Compliance.load),
     ("flexibility.npz", write_arrays, FoundationFlexibility.load),
     ("law.npz", write_arrays, FrustumLaw.load),
-    ("body.vtu", TETRAHEDRON.write, read_body)])
+    ("body.vtu", TETRAHEDRON.write, read_vtu)])
 def test_a_truncated_file_is_refused_by_its_name_and_with_a_remedy(tmp_path, name, write, read):
     path = tmp_path / name
     write(path)

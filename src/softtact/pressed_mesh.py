@@ -35,6 +35,10 @@ class PressedMesh:
     displacement_mm: np.ndarray
     pressure_mpa: np.ndarray | None = None
 
+    def points_of(self, layer):
+        """Numbers of the points that the cells of a layer use, by its name in `LAYERS`."""
+        return np.unique(np.concatenate([nodes.ravel() for _, nodes, own in self.cells if own == LAYERS[layer]]))
+
     def write(self, path):
         """Write as VTU: for each force an array of displacements and, where known, of pressures (nan off the pressed face)."""
         import meshio
@@ -73,8 +77,9 @@ def read_vtu(path):
     levels = sorted((float(match[1]), name) for name in mesh.point_data if (match := _LEVEL.fullmatch(name)))
     if not levels:
         raise InputError(f"{path}: it holds no pressed sensor (no displacements); give a file of softtact press --vtu.")
-    layers = mesh.cell_data.get("layer", [[0]] * len(mesh.cells))
-    cells = [(block.type, block.data, int(layer[0])) for block, layer in zip(mesh.cells, layers, strict=True)]
+    layers = mesh.cell_data.get("layer", [np.zeros(len(block.data)) for block in mesh.cells])
+    cells = [(block.type, block.data[layer == own], int(own))     # a file has one block for all neighbouring cells of a kind
+             for block, layer in zip(mesh.cells, layers, strict=True) for own in np.unique(layer)]
     return PressedMesh(points=mesh.points, cells=cells, force_n=np.array([force for force, _ in levels]),
                        displacement_mm=np.stack([mesh.point_data[name] for _, name in levels]))
 

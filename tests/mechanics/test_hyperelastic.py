@@ -67,6 +67,14 @@ def test_a_press_that_stalls_says_between_which_forces_and_gives_no_level():
         next(levels)
 
 
+def test_a_press_that_crawls_ends_after_the_iterations_of_a_level():
+    body = small_body()
+    surface = HeightField(place(trimesh.creation.icosphere(radius=3.0), pose=None))
+    levels = press_levels(body, surface, [20.0], settings=NewtonSettings(max_iterations=4, level_iterations=7))
+    with pytest.raises(ConvergenceError, match=", 8 iterations in all"):     # to 20 N and to 10 N, four each
+        next(levels)
+
+
 def test_the_mesh_file_holds_the_volume_of_sheet_and_cover_and_of_the_frusta():
     """As VTK sees it, which cuts curved elements into tetrahedra: cones of eight sides, with a tenth less volume."""
     import pyvista

@@ -1,15 +1,16 @@
 """A section through the body: its layers' areas at rest, and the same material where the press takes it."""
 
+from dataclasses import replace
 from pathlib import Path
 
-import meshio
 import numpy as np
 import pytest
 
 from softtact.geometry.sensor_spec import SensorSpec
-from softtact.mechanics.layered_mesh import layered_mesh
-from softtact.mechanics.pressed_body import REGIONS
-from softtact.reporting.section import read_body, row_under_load, section, top_surface
+from softtact.mechanics.layered_body import MeshSettings, build_sensor_body
+from softtact.mechanics.pressed_body import REGIONS, pressed_body
+from softtact.pressed_mesh import of_bodies, read_vtu
+from softtact.reporting.section import row_under_load, section, top_surface
 
 CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
 SMALL = CORO.model_copy(update={"footprint_mm": (6.0, 8.4)})   # 5 x 7 frusta
@@ -19,12 +20,14 @@ SQUEEZE = 0.1
 @pytest.fixture(scope="module")
 def body(tmp_path_factory):
     """A small sensor shortened by a tenth, and most in the row at y = 2.4 mm."""
-    mesh = layered_mesh(SMALL, {"cover_levels": [0.0, 1.0], "cover_splits": [0], "frustum_levels": [0.0, 0.35, 1.0]})
-    bump = 0.01 * np.exp(-((mesh.points[:, 1] - 2.4) ** 2)) * (mesh.points[:, 2] + 2.5)
-    down = np.column_stack([np.zeros((len(bump), 2)), -SQUEEZE * (mesh.points[:, 2] + 2.5) - bump])
+    mesh = MeshSettings(cover_levels=(0.0, 1.0), cover_splits=(0,), frustum_levels=(0.0, 0.35, 1.0))
+    rest = pressed_body(build_sensor_body(SMALL, dielectric_law=None, cover_law=None, mesh=mesh))
+    above = rest.points_mm[:, 2] + 2.5
+    bump = 0.01 * np.exp(-((rest.points_mm[:, 1] - 2.4) ** 2)) * above
+    down = np.column_stack([np.zeros((len(bump), 2)), -SQUEEZE * above - bump])
     path = tmp_path_factory.mktemp("body") / "body.vtu"
-    meshio.Mesh(mesh.points, mesh.cells, cell_data=mesh.cell_data, point_data={"displacement_mm": down}).write(path)
-    return read_body(path)
+    of_bodies([rest, replace(rest, displacement_mm=down)], [1.0, 5.0]).write(path)
+    return read_vtu(path)
 
 
 def area(polygons):

@@ -53,7 +53,7 @@ def test_nonsense_is_called_so(benchmark):
     from dataclasses import replace
 
     sensor = benchmark.random_sensor(0, "elastic")
-    mesh, pose, forces = benchmark.random_press(0)
+    mesh, pose, forces = benchmark.random_press(0, "elastic")
     good = sensor.press(mesh, pose=pose, force_n=[*forces, 5.9], model="elastic", threads=1)
     assert benchmark.nonsense(good, sensor) == ""
     assert "not finite" in benchmark.nonsense(replace(good, tactile_map=good.tactile_map * float("nan")), sensor)

@@ -18,6 +18,7 @@ class NewtonSettings:
     relative_tolerance: largest unbalanced nodal force as a share of the force, at least of smallest_scale_n
     largest_penetration_mm, contact_passes: with deeper overlaps they are pressed apart and the level is solved again, so often
     largest_step_mm: largest movement of a node in one iteration;  smallest_increment_n: force steps are halved down to this
+    level_iterations: a level ends where it took so many in all its steps: one that crawls would go on for hours
     first_touch_mm, first_touch_tolerance_n: overlap at which the press begins, and the residual that is good enough there
     refacing_iterations: iterations that look anew which facet each point faces
     With friction
@@ -29,6 +30,7 @@ class NewtonSettings:
     largest_penetration_mm: float = 1e-3
     contact_passes: int = 10
     max_iterations: int = 40
+    level_iterations: int = 300
     largest_step_mm: float = 0.12
     smallest_increment_n: float = 0.02
     smallest_scale_n: float = 10.0
@@ -99,15 +101,14 @@ def _advance(body, surface, reached, target, settings):
         if state is not None and force >= target:
             state, spent, residual = _press_apart(body, surface, state, residual, force, settings)
             iterations += spent
-        if state is None:
-            increment = 0.5 * (force - reached.force)
-            if increment < settings.smallest_increment_n:
-                raise ConvergenceError(_failure(body, reached, force, target, residual))
-            continue
-        reached, increment = Reached(force, state), 2 * increment
-        if force >= target:
+        if state is not None and force >= target:
             return Level(force_n=target, state=state, iterations=iterations, residual_n=residual,
                          penetration_mm=body.penetration(state))
+        increment = 2 * increment if state is not None else 0.5 * (force - reached.force)
+        if state is None and (increment < settings.smallest_increment_n or iterations >= settings.level_iterations):
+            raise ConvergenceError(_failure(body, reached, force, target, residual, iterations))
+        if state is not None:
+            reached = Reached(force, state)
 
 
 def _reach(body, force, target, settings):
@@ -118,14 +119,14 @@ def _reach(body, force, target, settings):
     return max(growth * force, target / growth**2)
 
 
-def _failure(body, reached, force, target, residual):
+def _failure(body, reached, force, target, residual, iterations):
     x, y, share = body.most_compressed(reached.state)
     remedy = "Ask for smaller forces or for levels nearer to each other"
     if share > _DEEP:
         remedy += ", or press with MeshSettings.stable() (--mesh-quality stable)"
-    return (f"The level of {target:g} N was not reached: from {reached.force:.4g} N on no step towards {force:.4g} N lowers the "
-            f"energy (unbalanced force {residual:.2g} N); the frustum at x {x:.1f}, y {y:.1f} mm is compressed by {share:.0%} "
-            f"of its height. {remedy}.")
+    return (f"The level of {target:g} N was not reached: from {reached.force:.4g} N on no step towards {force:.4g} N found a "
+            f"balance (unbalanced force {residual:.2g} N, {iterations} iterations in all); the frustum at x {x:.1f}, y {y:.1f} mm "
+            f"is compressed by {share:.0%} of its height. {remedy}.")
 
 
 def _press_apart(body, surface, state, residual, force, settings):

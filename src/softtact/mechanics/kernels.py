@@ -112,6 +112,81 @@ def _elasticity(A, f, S, D):
 
 
 @njit(cache=True, nogil=True)
+def _moduli(D, S, stress, moduli, inverse, w, pj, local):
+    """Stress S (3, 3) and material tangent D (6, 6) at a point, both times its volume w.
+
+    pj: pressure times J;  local: dp/dJ J^2 of what acts at the point alone
+    """
+    for k in range(6):
+        value = w * (stress[k] + pj * inverse[k])
+        S[_ROW[k], _COL[k]] = value
+        S[_COL[k], _ROW[k]] = value
+        for m in range(k, 6):
+            i, j, p, q = _ROW[k], _COL[k], _ROW[m], _COL[m]
+            ip, jq, iq, jp = _sym(inverse, i, p), _sym(inverse, j, q), _sym(inverse, i, q), _sym(inverse, j, p)
+            D[k, m] = w * (moduli[k, m] + (pj + local) * inverse[k] * inverse[m] - pj * (ip * jq + iq * jp))
+            D[m, k] = D[k, m]
+
+
+@njit(cache=True, nogil=True)
+def _volume_change(change, f, inverse, gradient, scale):
+    """How the volume at a point changes with the nodes' displacements: scale F C^-1 : G, (3 m,) into `change`."""
+    for i in range(3):
+        x = scale * (f[i, 0] * inverse[0] + f[i, 1] * inverse[3] + f[i, 2] * inverse[5])
+        y = scale * (f[i, 0] * inverse[3] + f[i, 1] * inverse[1] + f[i, 2] * inverse[4])
+        z = scale * (f[i, 0] * inverse[5] + f[i, 1] * inverse[4] + f[i, 2] * inverse[2])
+        for a in range(len(gradient)):
+            change[3 * a + i] = x * gradient[a, 0] + y * gradient[a, 1] + z * gradient[a, 2]
+
+
+@njit(cache=True, nogil=True)
+def _times_gradients(rights, A, G, g):
+    """Rows of point g in A_ij G for each i, columns j >= i side by side, from A (3, 3, 3, 3) and the gradients G (3 g, m)."""
+    x, y, z = G[3 * g], G[3 * g + 1], G[3 * g + 2]
+    nodes = len(x)
+    for i in range(3):
+        for k in range(3):
+            row = rights[i][3 * g + k]
+            for j in range(i, 3):
+                first, ax, ay, az = (j - i) * nodes, A[i, k, j, 0], A[i, k, j, 1], A[i, k, j, 2]
+                for a in range(nodes):
+                    row[first + a] = ax * x[a] + ay * y[a] + az * z[a]
+
+
+@njit(cache=True, nogil=True)
+def _add_blocks(K, G, rights):
+    """K (3 m, 3 m) plus its blocks of components (i, j): G^T (A_ij G)."""
+    nodes = G.shape[1]
+    for i in range(3):
+        block = G.T @ rights[i]
+        for a in range(nodes):
+            for b in range(nodes):
+                K[3 * a + i, 3 * b + i] += block[a, b]
+        for j in range(i + 1, 3):
+            for a in range(nodes):
+                for b in range(nodes):
+                    value = block[a, (j - i) * nodes + b]
+                    K[3 * a + i, 3 * b + j] += value
+                    K[3 * b + j, 3 * a + i] += value
+
+
+@njit(cache=True, nogil=True)
+def _volumetric(K, change, basis, gram_inverse, bulk_modulus, volumes, growing):
+    """K (3 m, 3 m) of the pressure's projected part, and of its growing part but for what stands at the points."""
+    seen = basis.T @ change
+    projected = gram_inverse @ seen
+    if len(growing) == 0:
+        K[:] = bulk_modulus * (projected.T @ seen)
+        return
+    weighted = np.empty_like(basis)
+    for g in range(len(growing)):
+        weighted[g] = growing[g] * basis[g]
+    inner = (basis.T * volumes) @ weighted
+    cross = projected.T @ (weighted.T @ change)
+    K[:] = projected.T @ (bulk_modulus * seen + inner @ projected) - cross - cross.T
+
+
+@njit(cache=True, nogil=True)
 def tangent(F, C, J, gradients, volumes, shapes, stress, moduli, pressure, basis, gram_inverse, bulk_modulus, local_modulus,
             growing):
     """Tangent (e, 3 m, 3 m) of `internal_force` with the pressure of `SolidBlock`: a projected, a local and a growing part.
@@ -127,70 +202,24 @@ def tangent(F, C, J, gradients, volumes, shapes, stress, moduli, pressure, basis
     nodes = gradients.shape[2]
     out = np.empty((elements, 3 * nodes, 3 * nodes))
     G = np.empty((3 * points, nodes))
-    # A_ij G for each i, columns j >= i side by side
     rights = (np.empty((3 * points, 3 * nodes)), np.empty((3 * points, 2 * nodes)), np.empty((3 * points, nodes)))
-    change = np.empty((points, 3 * nodes))    # of the volume at each point, J F^-T : G
+    change = np.empty((points, 3 * nodes))
+    A, D, S = np.empty((3, 3, 3, 3)), np.empty((6, 6)), np.empty((3, 3))
     grows = growing.size > 0
-    A = np.empty((3, 3, 3, 3))
-    D = np.empty((6, 6))
-    S = np.empty((3, 3))
-    cofactor = np.empty((3, 3))
     for e in range(elements):
         for g in range(points):
-            n = e * points + g
+            n, j, w, gradient = e * points + g, J[e, g], volumes[shapes[e], g], gradients[shapes[e], g]
             inverse = inverse_symmetric(C[n])
-            w, pj = volumes[shapes[e], g], pressure[e, g] * J[e, g]
-            local = 0.5 * local_modulus * (J[e, g] * J[e, g] + 1.0)
+            local = 0.5 * local_modulus * (j * j + 1.0)
             if grows:
-                local += growing[e, g] * J[e, g] * J[e, g]
-            for k in range(6):
-                value = w * (stress[n, k] + pj * inverse[k])
-                S[_ROW[k], _COL[k]] = value
-                S[_COL[k], _ROW[k]] = value
-                for m in range(k, 6):
-                    i, j, p, q = _ROW[k], _COL[k], _ROW[m], _COL[m]
-                    ip, jq, iq, jp = _sym(inverse, i, p), _sym(inverse, j, q), _sym(inverse, i, q), _sym(inverse, j, p)
-                    D[k, m] = w * (moduli[n, k, m] + (pj + local) * inverse[k] * inverse[m] - pj * (ip * jq + iq * jp))
-                    D[m, k] = D[k, m]
-            f, gradient = F[e, g], gradients[shapes[e], g]
-            _elasticity(A, f, S, D)
-            for i in range(3):      # J F^-T = J F C^-1
-                for k in range(3):
-                    cofactor[i, k] = w * J[e, g] * (f[i, 0] * _sym(inverse, 0, k) + f[i, 1] * _sym(inverse, 1, k)
-                                                    + f[i, 2] * _sym(inverse, 2, k))
-            x, y, z = G[3 * g], G[3 * g + 1], G[3 * g + 2]
-            for a in range(nodes):
-                x[a], y[a], z[a] = gradient[a, 0], gradient[a, 1], gradient[a, 2]
-                for i in range(3):
-                    change[g, 3 * a + i] = cofactor[i, 0] * x[a] + cofactor[i, 1] * y[a] + cofactor[i, 2] * z[a]
-            for i in range(3):
-                for k in range(3):
-                    row = rights[i][3 * g + k]
-                    for j in range(i, 3):
-                        first, ax, ay, az = (j - i) * nodes, A[i, k, j, 0], A[i, k, j, 1], A[i, k, j, 2]
-                        for a in range(nodes):
-                            row[first + a] = ax * x[a] + ay * y[a] + az * z[a]
-        K = out[e]
-        seen = basis.T @ change
-        projected = gram_inverse[shapes[e]] @ seen
-        if grows:
-            weighted = basis * growing[e].reshape(points, 1)
-            inner = (weighted * volumes[shapes[e]].reshape(points, 1)).T @ basis
-            cross = projected.T @ (weighted.T @ change)
-            K[:] = projected.T @ (bulk_modulus * seen + inner @ projected) - cross - cross.T
-        else:
-            K[:] = bulk_modulus * (projected.T @ seen)
-        for i in range(3):
-            block = G.T @ rights[i]
-            for a in range(nodes):
-                for b in range(nodes):
-                    K[3 * a + i, 3 * b + i] += block[a, b]
-            for j in range(i + 1, 3):
-                for a in range(nodes):
-                    for b in range(nodes):
-                        value = block[a, (j - i) * nodes + b]
-                        K[3 * a + i, 3 * b + j] += value
-                        K[3 * b + j, 3 * a + i] += value
+                local += growing[e, g] * j * j
+            _moduli(D, S, stress[n], moduli[n], inverse, w, pressure[e, g] * j, local)
+            _elasticity(A, F[e, g], S, D)
+            _volume_change(change[g], F[e, g], inverse, gradient, w * j)
+            G[3 * g:3 * g + 3] = gradient.T
+            _times_gradients(rights, A, G, g)
+        _volumetric(out[e], change, basis, gram_inverse[shapes[e]], bulk_modulus, volumes[shapes[e]], growing[e:e + 1].ravel())
+        _add_blocks(out[e], G, rights)
     return out
 
 

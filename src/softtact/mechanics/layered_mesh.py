@@ -61,7 +61,7 @@ def layered_mesh(spec, values):
     spec = specimen_of(spec, values)
     body = build_sensor_body(spec, dielectric_law=None, cover_law=None, mesh=settings,   # a mesh has no material
                              scatter=frustum_scatter(spec, values))
-    return pressed_body(body).to_meshio(displaced=False)
+    return pressed_body(body).to_meshio()
 
 
 def slab_mesh(spec, kind):

@@ -40,11 +40,10 @@ class PressedBody:
     top: np.ndarray
     pressure_mpa: np.ndarray
 
-    def to_meshio(self, *, displaced=True):
-        """As a meshio mesh at rest; cell data `layer`: 0 frusta, 1 sheet, 2 cover; point data `displacement_mm` if `displaced`."""
+    def to_meshio(self):
+        """As a meshio mesh at rest; cell data `layer`: 0 frusta, 1 sheet, 2 cover."""
         layers = [np.full(len(cells.nodes), REGIONS.index(cells.region)) for cells in self.cells]
-        return meshio.Mesh(self.points_mm, [(cells.kind, cells.nodes) for cells in self.cells], cell_data={"layer": layers},
-                           point_data={"displacement_mm": self.displacement_mm} if displaced else {})
+        return meshio.Mesh(self.points_mm, [(cells.kind, cells.nodes) for cells in self.cells], cell_data={"layer": layers})
 
 
 def pressed_body(body, state=None):

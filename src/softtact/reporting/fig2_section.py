@@ -3,6 +3,7 @@
 import numpy as np
 
 from softtact.mechanics.pressed_body import REGIONS
+from softtact.pressed_mesh import LAYERS
 from softtact.reporting.style import pyplot
 
 # Light to dark from the cover down: apart in grey, too.
@@ -46,8 +47,8 @@ def draw(section, outline, *, spec, summary, y_mm):
 def _draw_layers(axes, polygons, region):
     from matplotlib.collections import PolyCollection
 
-    for number, name in enumerate(REGIONS):
-        own = [polygon for polygon, where in zip(polygons, region, strict=True) if where == number]
+    for name in REGIONS:
+        own = [polygon for polygon, where in zip(polygons, region, strict=True) if where == LAYERS[name]]
         axes.add_collection(PolyCollection(own, facecolor=_COLOURS[name], edgecolor="0.75" if name == "frusta" else "0.5",
                                            linewidths=0.1, zorder=2))
 
@@ -55,7 +56,7 @@ def _draw_layers(axes, polygons, region):
 def _deepest(section):
     """x (mm) of the place of the frusta that went down most."""
     frusta = [(rest, pressed) for rest, pressed, where in zip(section.rest_mm, section.pressed_mm, section.region, strict=True)
-              if where == REGIONS.index("frusta")]
+              if where == LAYERS["frusta"]]
     down = [float((rest[:, 1] - pressed[:, 1]).max()) for rest, pressed in frusta]
     return float(frusta[int(np.argmax(down))][0][:, 0].mean())
 

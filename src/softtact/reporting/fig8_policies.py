@@ -5,7 +5,11 @@ import numpy as np
 from softtact.reporting.style import MODEL_COLOURS, pyplot
 
 CALIBRATION_SET = "indenters"
-_MARKS = {"always": "s", "paper": "D", "error": "o"}
+_BELOW = {"xytext": (0, -8), "ha": "center", "va": "top"}
+_ABOVE = {"xytext": (5, 5), "ha": "left", "va": "bottom"}
+# Mark, colour, meaning and where its texts stand, of each kind of policy; below and above, so that near ones stay apart.
+_KINDS = {"always": ("s", "0.45", "always the same model", _BELOW), "paper": ("D", "#b22222", "the paper's rule", _ABOVE),
+          "error": ("o", "#1f7a4d", "by expected error, tolerance of", _ABOVE)}
 
 
 def draw(policies, presses):
@@ -18,25 +22,34 @@ def draw(policies, presses):
 
 
 def _draw_policies(axes, policies):
-    for kind, mark in _MARKS.items():
+    highest = 1e3 * policies.mean_error_mm.max()
+    for kind, (mark, colour, meaning, beside) in _KINDS.items():
         rows = policies[policies.policy.str.startswith(kind)]
-        axes.plot(rows.time_per_press_s, 1e3 * rows.mean_error_mm.clip(lower=1e-5), mark, ms=6,
-                  color={"always": "0.55", "paper": "#b22222", "error": "#1f7a4d"}[kind], ls="-" if kind == "error" else "none")
-    axes.set(xscale="log", xlabel="time per press, s", ylabel="mean error of the maps, um", ylim=(0, None),
+        axes.plot(rows.time_per_press_s, 1e3 * rows.mean_error_mm, mark, ms=6, color=colour, ls="-" if kind == "error" else "none",
+                  label=meaning)
+        for place, names in _places(rows, width=0.05 * highest).items():
+            axes.annotate(names, place, **beside, textcoords="offset points", fontsize=8, color=colour)
+    axes.set(xscale="log", xlabel="time per press, s", ylabel="mean error of the maps, um", ylim=(-0.1 * highest, 1.12 * highest),
              title=f"{policies.presses.iloc[0]} presses that were not calibrated on")
-    axes.margins(x=0.35, y=0.1)
-    for (time, error), names in _places(policies, width=0.05 * 1e3 * policies.mean_error_mm.max()).items():
-        axes.annotate("\n".join(names), (time, error), xytext=(8, 2), textcoords="offset points", fontsize=8)
+    axes.margins(x=0.2)
+    axes.legend(frameon=False, fontsize=8, loc="upper right")
 
 
 def _places(policies, *, width):
-    """{(time, error in um): names} of the policies, those that would print over each other at one place."""
+    """{(time, error in um): text} of policies of one kind, those that would print over each other in one text."""
     places = {}
     for _, row in policies.sort_values("mean_error_mm").iterrows():
         time, error = row.time_per_press_s, 1e3 * row.mean_error_mm
         here = next((place for place in places if abs(np.log(place[0] / time)) < 0.7 and abs(place[1] - error) < width), None)
         places.setdefault(here or (time, error), []).append(row.policy)
-    return places
+    return {place: _in_short(names) for place, names in places.items()}
+
+
+def _in_short(names):
+    """What tells policies of one kind apart: a model, or tolerances in rising order."""
+    if not names[0].startswith("error"):
+        return ", ".join(name.removeprefix("always ") for name in names if name != "paper")
+    return ", ".join(f"{tolerance:g}" for tolerance in sorted(float(name.split()[1]) for name in names)) + " um"
 
 
 def _draw_expected(axes, presses):

@@ -5,13 +5,12 @@ then cuts these. No picture is rendered here.
 """
 
 from dataclasses import dataclass
-from xml.etree import ElementTree
 
 import numpy as np
 
-from softtact.errors import InputError
-from softtact.mechanics.elements import HEX20_TOP, hex20, hex27, wedge18
-from softtact.mechanics.pressed_body import REGIONS, VTK_HEX27, VTK_WEDGE18
+from softtact.mechanics.elements import hex20, hex27, wedge18
+from softtact.mechanics.pressed_body import VTK_HEX27, VTK_WEDGE18
+from softtact.pressed_mesh import LAYERS
 
 _FACE_TRIANGLES = np.array([[0, 4, 7], [4, 1, 5], [5, 2, 6], [6, 3, 7], [4, 5, 6], [4, 6, 7]])     # of corners, then mid-sides
 _BESIDE_MM = 0.01     # a plane exactly through the frusta's axes would run along faces of elements
@@ -19,75 +18,42 @@ _BESIDE_MM = 0.01     # a plane exactly through the frusta's axes would run alon
 
 @dataclass(frozen=True)
 class Section:
-    """Polygons in a plane: rest_mm, pressed_mm lists of (k, 2), x and z; region (n,): of REGIONS, by number."""
+    """Polygons in a plane: rest_mm, pressed_mm lists of (k, 2), x and z; region (n,): their layers' numbers, by `LAYERS`."""
 
     rest_mm: list
     pressed_mm: list
     region: np.ndarray
 
 
-@dataclass(frozen=True)
-class Body:
-    """What `stages.press_section` writes, read again: points_mm, displacement_mm (n, 3), cells [(kind, nodes, region number)]."""
-
-    points_mm: np.ndarray
-    displacement_mm: np.ndarray
-    cells: list
-
-    def points_of(self, region):
-        """Numbers of the points that a region's cells use."""
-        number = REGIONS.index(region)
-        return np.unique(np.concatenate([nodes.ravel() for _, nodes, own in self.cells if own == number]))
-
-
-def read_body(path):
-    """`Body` of a VTU file; a damaged one raises `InputError`."""
-    import meshio
-
-    try:
-        mesh = meshio.vtu.read(path)     # meshio.read would end the process
-        fields = mesh.cell_data["layer"], mesh.point_data["displacement_mm"]
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file.") from None
-    except (meshio.ReadError, ElementTree.ParseError, KeyError, ValueError, OSError) as error:
-        raise InputError(f"{path}: not a readable pressed sensor ({error}); delete it and make it again.") from None
-    layers, displacement = fields
-    cells = [(block.type, block.data[layer == number], int(number))       # a file has one block for each kind of cell
-             for block, layer in zip(mesh.cells, layers, strict=True) for number in np.unique(layer)]
-    return Body(mesh.points, displacement, cells)
-
-
-def top_surface(body):
-    """Points (n, 3) at rest, displacements (n, 3) in mm and triangles (m, 3) of the cover's upper side."""
-    hexes = np.vstack([nodes for kind, nodes, region in body.cells if region == REGIONS.index("cover")])
-    faces = hexes[:, HEX20_TOP]
-    faces = faces[(body.points_mm[faces, 2] > -1e-9).all(axis=1)]
+def top_surface(mesh):
+    """Points (n, 3) at rest, displacements (n, 3) in mm at the largest force and triangles (m, 3) of the cover's upper side."""
+    faces = np.vstack([nodes for _, nodes, layer in mesh.cells if layer == LAYERS["pressed face"]])
     used, numbers = np.unique(faces, return_inverse=True)
     triangles = numbers.reshape(-1, 8)[:, _FACE_TRIANGLES].reshape(-1, 3)
-    return body.points_mm[used], body.displacement_mm[used], triangles
+    return mesh.points[used], mesh.displacement_mm[-1, used], triangles
 
 
-def row_under_load(body, spec):
-    """y (mm) of the row of frusta under the place that went down most."""
-    nodes = body.points_of("sheet")
-    deepest = body.points_mm[nodes[np.argmin(body.displacement_mm[nodes, 2])], 1]
+def row_under_load(mesh, spec):
+    """y (mm) of the row of frusta under the place that went down most at the largest force."""
+    nodes = mesh.points_of("sheet")
+    deepest = mesh.points[nodes[np.argmin(mesh.displacement_mm[-1, nodes, 2])], 1]
     pitch, count = spec.dielectric.frusta.pitch_mm, spec.frusta_counts[1]
     rows = pitch * (np.arange(count) - 0.5 * (count - 1))
     return float(rows[np.argmin(np.abs(rows - deepest))])
 
 
-def section(body, y_mm, *, parts=3):
-    """The `Section` at y_mm of a `Body`; each element is cut into `parts` along each of its directions."""
+def section(mesh, y_mm, *, parts=3):
+    """The `Section` at y_mm of a `PressedMesh` at its largest force; each element cut into `parts` along each of its directions."""
     import pyvista
 
     plane = y_mm + _BESIDE_MM
     rest, pressed, regions = [], [], []
-    for kind, nodes, region in body.cells:
-        y = body.points_mm[nodes, 1]
+    for kind, nodes, region in mesh.cells:
+        y = mesh.points[nodes, 1]
         nodes = nodes[(y.min(axis=1) < plane) & (y.max(axis=1) > plane)]
-        if not len(nodes):
+        if kind not in _LATTICES or not len(nodes):
             continue
-        points, moved, linear, cell_type = _refined(kind, body.points_mm[nodes], body.displacement_mm[nodes], parts)
+        points, moved, linear, cell_type = _refined(kind, mesh.points[nodes], mesh.displacement_mm[-1, nodes], parts)
         grid = pyvista.UnstructuredGrid({cell_type: linear}, points)
         grid["displacement"] = moved
         cut = grid.slice(normal="y", origin=(0.0, plane, 0.0))

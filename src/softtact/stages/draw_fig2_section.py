@@ -9,14 +9,15 @@ from softtact.files import read_json
 from softtact.geometry.meshes import place, read_mesh
 from softtact.geometry.pose import Pose
 from softtact.geometry.sensor_spec import SensorSpec
+from softtact.pressed_mesh import read_vtu
 from softtact.reporting.fig2_section import draw
-from softtact.reporting.section import read_body, row_under_load, section
+from softtact.reporting.section import row_under_load, section
 from softtact.reporting.style import save
 
 
 def run(*, inputs, outputs, settings, threads=1):
     """Cut the pressed body through the row of frusta under the load, and draw."""
-    spec, summary, body = SensorSpec.from_dict(settings["sensor"]), read_json(inputs["summary"]), read_body(inputs["body"])
+    spec, summary, body = SensorSpec.from_dict(settings["sensor"]), read_json(inputs["summary"]), read_vtu(inputs["body"])
     y = row_under_load(body, spec)
     pose = None if settings["pose"] is None else Pose.from_values(settings["pose"])
     placed = place(read_mesh(inputs["object"], unit=settings["unit"]), pose=pose)

@@ -8,7 +8,8 @@ import numpy as np
 from softtact.files import atomic_path, read_json
 from softtact.geometry.meshes import place, read_mesh
 from softtact.geometry.pose import Pose
-from softtact.reporting.section import read_body, top_surface
+from softtact.pressed_mesh import read_vtu
+from softtact.reporting.section import top_surface
 from softtact.reporting.view3d import html_view
 
 _LIFTED_MM = 6.0     # of the object above the surface, so that its imprint is seen
@@ -16,7 +17,7 @@ _LIFTED_MM = 6.0     # of the object above the surface, so that its imprint is s
 
 def run(*, inputs, outputs, settings, threads=1):
     """Two states, at rest and pressed, of the surface with the object above it."""
-    body, summary = read_body(inputs["body"]), read_json(inputs["summary"])
+    body, summary = read_vtu(inputs["body"]), read_json(inputs["summary"])
     pose = None if settings["pose"] is None else Pose.from_values(settings["pose"])
     lifted = place(read_mesh(inputs["object"], unit=settings["unit"]), pose=pose)
     at = np.asarray(lifted.vertices) + [0.0, 0.0, _LIFTED_MM]

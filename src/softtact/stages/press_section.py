@@ -1,18 +1,17 @@
 """One object pressed with a large force, with the deformed body kept: for the section through the sensor and the view that turns.
 
 inputs, settings: as for `simulate_press`, with forces_n [one force]
-outputs: body (VTU: nodes at rest, displacements, `layer` of each cell), summary (JSON: what the press says of itself)
+outputs: body (VTU as of `softtact press --vtu`), summary (JSON: what the press says of itself)
 """
 
-from softtact.files import atomic_path, write_json
+from softtact.files import write_json
 from softtact.stages.simulate_press import press_item
 
 
 def run(*, inputs, outputs, settings, threads=1):
     """Press, and write the body at the force."""
     result = press_item(inputs, settings, threads=threads, keep_body=True)
-    with atomic_path(outputs["body"]) as temporary:
-        result.pressed_body().to_meshio().write(temporary, file_format="vtu")
+    result.write_vtu(outputs["body"])
     names = ("force_n", "indentation_mm", "contact_area_mm2", "frustum_compression_mm", "penetration_mm", "residual_n")
     summary = {name: float(getattr(result, name)[-1]) for name in names}
     write_json(outputs["summary"], summary | {"item": settings["item"]["name"], "model": settings["model"]})
