@@ -9,6 +9,7 @@ import trimesh
 from softtact.contact.height_field import HeightField
 from softtact.errors import ConvergenceError
 from softtact.geometry.meshes import place
+from softtact.geometry.pose import Pose
 from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.laws.registry import make_law
 from softtact.mechanics.hyperelastic import NewtonSettings, press_levels
@@ -27,8 +28,8 @@ def small_body():
     return build_sensor_body(SMALL, dielectric_law=LAWS["dielectric"], cover_law=LAWS["cover"], mesh=COARSE)
 
 
-def press_small(mesh, forces):
-    return Sensor(SMALL, LAWS, mesh=COARSE).press(mesh, force_n=forces, model="hyperelastic")
+def press_small(mesh, forces, **where):
+    return Sensor(SMALL, LAWS, mesh=COARSE).press(mesh, force_n=forces, model="hyperelastic", **where)
 
 
 @pytest.fixture(scope="module")
@@ -57,6 +58,13 @@ def test_a_tip_between_the_contact_points_finds_its_first_touch():
     """The cap of a small sphere on a corner of the grid is nearer to the surface than any point that feels contact."""
     result = press_small(trimesh.creation.icosphere(subdivisions=4, radius=2.0), [0.2, 1.0])
     assert (np.diff(result.indentation_mm) > 0).all()
+
+
+def test_a_spike_that_goes_in_between_the_contact_points_is_lowered_until_they_feel_it():
+    spike = trimesh.creation.cone(radius=0.8, height=2.5, sections=64)
+    spike.apply_transform(np.diag([1.0, -1.0, -1.0, 1.0]))
+    result = press_small(spike, [0.05, 0.1], pose=Pose.from_values([0.17, 0.11, 0, 0, 0, 0]))
+    assert (np.diff(result.indentation_mm) > 0).all() and result.residual_n.max() < 1e-3
 
 
 def test_a_press_that_stalls_says_between_which_forces_and_gives_no_level():

@@ -8,6 +8,7 @@ from softtact.errors import ConvergenceError
 from softtact.mechanics.layered_body import BodyState
 
 _DEEP = 0.55           # of a frustum's height: from here on elements of the default mesh may be unstable
+_MOST_LOWERINGS = 100  # of the first touch's depth, until a point of the cover feels the object
 _WORTH_A_PASS = 0.8    # of the overlap, to which pressing apart must have brought it to be done again
 
 
@@ -75,15 +76,26 @@ def _first_touch(body, surface, settings):
     """Equilibrium at a small given indentation: under force control alone the free object has no stiffness."""
     slab, bed = body.rest()
     planes = body.slab.facing(slab, surface)
-    depth = settings.first_touch_mm + planes.anchors[:, 2].min()   # a tip may lie between the points that feel contact
     if body.friction.active:
         body.friction.release()
-        body.friction.begin_step(body.evaluate(slab, bed, depth - settings.first_touch_mm, planes))
-    start = body.evaluate(slab, bed, depth, planes)
+    start = _lowered_until_felt(body, body.evaluate(slab, bed, planes.anchors[:, 2].min(), planes), settings.first_touch_mm)
+    if body.friction.active:
+        body.friction.begin_step(body.evaluate(slab, bed, start.indentation - settings.first_touch_mm, planes))
+        start = _again(body, start)
     state, _, _ = _settle(body, surface, start, None, settings.first_touch_tolerance_n, settings)
     if state is None:
         raise ConvergenceError("The first touch of the object did not converge.")
     return state
+
+
+def _lowered_until_felt(body, state, step_mm):
+    """The state at rest with the object a step lower, or more steps: a tip may lie between the points that feel contact."""
+    for _ in range(_MOST_LOWERINGS):
+        state = body.lowered(state, step_mm)
+        if state.force > 0:
+            return state
+    raise ConvergenceError(f"None of the cover's contact points feels the object, though it was lowered by "
+                           f"{_MOST_LOWERINGS * step_mm:g} mm; press with a finer cover (cover_splits) or with a larger object.")
 
 
 def _advance(body, surface, reached, target, settings):

@@ -163,7 +163,11 @@ class LayeredBody:
 
     def let_down(self, state, force_n):
         """The state with the object at the depth where its force is `force_n`: the least energy over the indentation."""
-        depth = self.slab.top.balanced(state.slab, state.indentation, force_n)
+        return self.lowered(state, self.slab.top.balanced(state.slab, state.indentation, force_n) - state.indentation)
+
+    def lowered(self, state, by_mm):
+        """The state with the object lower by so much."""
+        depth = state.indentation + by_mm
         return replace(state, slab=self.slab.reface(state.slab, state.slab.planes, depth), indentation=depth)
 
     def newton_step(self, state, force_n, surface=None, *, largest_mm=np.inf):
