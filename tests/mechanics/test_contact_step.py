@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from softtact.contact.penalty import Contact, penalty
 from softtact.mechanics import contact_step
 from softtact.mechanics.contact_step import ContactStepper, LinearGaps
+from softtact.mechanics.sparsity import symmetric_product
 
 UNKNOWNS, POINTS = 12, 8
 CONTACT = Contact(stiffness=3000.0, smoothing=1 / 3000)
@@ -147,6 +148,13 @@ def test_a_body_that_is_not_stable_has_no_step():
     scene = Scene(5)
     scene.matrix = scene.matrix - 3 * np.linalg.eigvalsh(scene.matrix)[-1] * np.eye(UNKNOWNS)
     assert scene.step(ContactStepper(DenseSolver())) is None
+
+
+def test_a_symmetric_matrix_times_a_vector_is_found_from_its_upper_triangle():
+    rng = np.random.default_rng(7)
+    half = sp.random(60, 60, density=0.1, rng=rng) + sp.eye(60)
+    whole, x = (half + half.T).tocsr(), rng.normal(size=60)
+    np.testing.assert_allclose(symmetric_product(sp.triu(whole).tocsr(), x), whole @ x, rtol=1e-13, atol=1e-13)
 
 
 class SlidingScene(Scene):

@@ -6,10 +6,12 @@ and the contact's energy Phi: a convex problem whose Newton systems A + B'.W.B a
 preconditioned by the factor of an earlier such matrix, which also serves the next steps: a solve takes a fiftieth of its time.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
+
+from softtact.mechanics.sparsity import symmetric_product
 
 _INNER_STEPS = 12
 _FACINGS = 4                 # lookups of what the points face; an edge that slides over them moves forces from point to point
@@ -43,6 +45,23 @@ class LinearGaps:
         return self.area * self.contact.response(self.gaps + change)[2]
 
 
+@dataclass(frozen=True)
+class _Move:
+    """A step or a direction x (n,) or (n + 1,), and what depends on it linearly.
+
+    change (p,): of the gaps in mm;  elastic (n,) or (n + 1,): the rubber's forces in N
+    Steps are sums of directions, so both are found once for each direction, the costliest thing in it but for the factor's use.
+    """
+
+    x: np.ndarray
+    change: np.ndarray
+    elastic: np.ndarray
+
+    def plus(self, share, other):
+        """This and a share of another."""
+        return _Move(self.x + share * other.x, self.change + share * other.change, self.elastic + share * other.elastic)
+
+
 class ContactStepper:
     """Steps of one body; keeps the last factor for the next step. solver: of `linear_solvers`."""
 
@@ -63,36 +82,40 @@ class ContactStepper:
         largest: mm, by which a free object is moved at most; farther steps end there with the contact of that depth
         """
         problem = _Problem(rubber, contact, residual, drag, excess)
-        x = problem.rest()
+        at = problem.move(problem.rest())
         if problem.free and not contact.points.slope(0.0).any():
-            return problem.parts(np.append(x[:-1], np.nan))
-        problem.judge(x)
+            return problem.parts(np.append(at.x[:-1], np.nan))
+        problem.judge(at)
         for number in range(_FACINGS):
-            x = self._least(problem, x, largest, first=number == 0)
-            if x is None or number == _FACINGS - 1 or not contact.follow(*problem.parts(x)) or problem.solved(x):
+            at = self._least(problem, at, largest, first=number == 0)
+            if at is None or number == _FACINGS - 1 or not contact.follow(*problem.parts(at.x)):
                 break
-        return None if x is None else problem.parts(x)
+            at = problem.faced_anew(at)
+            if problem.solved(at):
+                break
+        return None if at is None else problem.parts(at.x)
 
-    def _least(self, problem, x, largest, *, first):
-        """The step of least energy, from x on, until its gradient is small enough; None if A is not positive definite."""
+    def _least(self, problem, at, largest, *, first):
+        """The step of least energy, from one on, until its gradient is small enough; None if A is not positive definite."""
         for number in range(_INNER_STEPS):
-            if problem.solved(x):
+            if problem.solved(at):
                 break
-            direction = self._direction(problem, x, problem.gradient(x), first=first and number == 0)
+            direction = self._direction(problem, at, first=first and number == 0)
             if direction is None:
                 return None
-            step = problem.best_share(x, direction) * direction
-            beyond = problem.free and not problem.held and abs(x[-1] + step[-1]) > largest
+            share = problem.best_share(at, direction)
+            lowered = share * direction.x[-1]
+            beyond = problem.free and not problem.held and abs(at.x[-1] + lowered) > largest
             if beyond:       # the object stops on the way
-                step = (np.copysign(largest, step[-1]) - x[-1]) / step[-1] * step
-            x = x + step
+                share = (np.copysign(largest, lowered) - at.x[-1]) / direction.x[-1]
+            at = at.plus(share, direction)
             if beyond:
-                problem.hold(x)
-        return x
+                problem.hold(at)
+        return at
 
-    def _direction(self, problem, x, gradient, *, first):
+    def _direction(self, problem, at, *, first):
         """Newton's step of the convex problem, with the present factor if it still serves."""
-        slope = problem.points.slope(problem.change(x))
+        slope, gradient = problem.points.slope(at.change), problem.gradient(at)
         if self._along is not None and not (first and self._outdated(slope)):
             direction, good = self._conjugate_gradients(problem, slope, -gradient)
             if good:
@@ -100,7 +123,7 @@ class ContactStepper:
         if not self._factor(problem, slope):
             return None
         direction, good = self._conjugate_gradients(problem, slope, -gradient)
-        return direction if good or direction.any() else None
+        return direction if good or direction.x.any() else None
 
     def _outdated(self, slope):
         """Whether so many points have come into contact, or lost it, that conjugate gradients would not pay."""
@@ -131,34 +154,34 @@ class ContactStepper:
 
     def _conjugate_gradients(self, problem, slope, right):
         """Approximate solution of the Newton system, and whether it is as good as wanted; given up where it would take too long."""
-        x, r = np.zeros(len(right)), right
+        found, r = problem.nowhere(), right
         z = self._precondition(r, held=problem.held)
         p, size = z, r @ z
         first = size
         for iteration in range(_MOST_ITERATIONS):
             self.iterations += 1
-            q = problem.product(slope, p)
+            along = problem.move(p)
+            q = problem.product(slope, along)
             curvature = p @ q
             if not curvature > 0:
-                return x, False
-            x = x + (size / curvature) * p
+                return found, False
+            found = found.plus(size / curvature, along)
             r = r - (size / curvature) * q
             z = self._precondition(r, held=problem.held)
             size, before = r @ z, size
             if size <= _FORCING**2 * first:
-                return x, True
+                return found, True
             if iteration >= _JUDGED_AFTER and size > first * _FORCING ** (2 * iteration / _MOST_ITERATIONS):
-                return x, False
+                return found, False
             p = z + (size / before) * p
-        return x, False
+        return found, False
 
 
 class _Problem:
     """The convex problem of one step, in the unknowns and, where the object is free, its lowering behind them."""
 
     def __init__(self, rubber, contact, residual, drag, excess):
-        self.rubber, self.lower, self.diagonal = rubber, rubber.T, rubber.diagonal()
-        self.contact, self.drag = contact, drag
+        self.rubber, self.contact, self.drag = rubber, contact, drag
         self.size, self.free, self.held = len(residual), excess is not None, False
         # What the points face may change under way: the residual less the contact's share in it stays.
         residual = np.append(residual, excess) if self.free else residual
@@ -171,23 +194,34 @@ class _Problem:
     def rest(self):
         return np.zeros(self.size + self.free)
 
-    def judge(self, x):
-        """Let the gradient at x decide which gradient is small enough."""
-        self._enough = _INNER_TOLERANCE * np.abs(self.gradient(x)).max()
+    def nowhere(self):
+        """The `_Move` of no step."""
+        return _Move(self.rest(), np.zeros(len(self.points.gaps)), self.rest())
 
-    def solved(self, x):
-        return np.abs(self.gradient(x)).max() <= self._enough
+    def move(self, x):
+        """The `_Move` of a step."""
+        return _Move(x, self._change(x), self._elastic(x))
 
-    def hold(self, x):
-        """Keep a free object where it is at x: no longer is its force to be balanced, only those of the body."""
+    def faced_anew(self, move):
+        """The same step after the points came to face something else."""
+        return replace(move, change=self._change(move.x))
+
+    def judge(self, at):
+        """Let the gradient at a step decide which gradient is small enough."""
+        self._enough = _INNER_TOLERANCE * np.abs(self.gradient(at)).max()
+
+    def solved(self, at):
+        return np.abs(self.gradient(at)).max() <= self._enough
+
+    def hold(self, at):
+        """Keep a free object where it is: no longer is its force to be balanced, only those of the body."""
         self.held = True
-        self.judge(x)
+        self.judge(at)
 
     def parts(self, x):
         return x[:self.size], float(x[-1]) if self.free else 0.0
 
-    def change(self, x):
-        """Change (p,) of the gaps."""
+    def _change(self, x):
         change = self.points.rows @ x[:self.size]
         return change + self.points.lowering * x[-1] if self.free else change
 
@@ -198,17 +232,17 @@ class _Problem:
 
     def _elastic(self, x):
         u = x[:self.size]
-        product = self.rubber @ u + self.lower @ u - self.diagonal * u
+        product = symmetric_product(self.rubber, u)
         if not self.free:
             return product
         border, corner = self.drag
         return np.append(product + border * x[-1], np.sum(border * u) + corner * x[-1])
 
-    def gradient(self, x):
-        return self._of_unknowns(self.residual + self._elastic(x) - self._spread(self.points.pressure(self.change(x))))
+    def gradient(self, at):
+        return self._of_unknowns(self.residual + at.elastic - self._spread(self.points.pressure(at.change)))
 
-    def product(self, slope, x):
-        return self._of_unknowns(self._elastic(x) + self._spread(slope * self.change(x)))
+    def product(self, slope, along):
+        return self._of_unknowns(along.elastic + self._spread(slope * along.change))
 
     def _of_unknowns(self, forces):
         """Forces as they are, without the object's where it is held."""
@@ -216,13 +250,12 @@ class _Problem:
             forces[-1] = 0.0
         return forces
 
-    def best_share(self, x, direction):
+    def best_share(self, at, direction):
         """The share of the direction, at most all of it, with the least energy along it."""
-        now, along = self.change(x), self.change(direction)
-        linear, curvature = self.residual @ direction + self._elastic(x) @ direction, direction @ self._elastic(direction)
+        linear, curvature = (self.residual + at.elastic) @ direction.x, direction.x @ direction.elastic
 
         def slope(share):
-            return linear + share * curvature - along @ self.points.pressure(now + share * along)
+            return linear + share * curvature - direction.change @ self.points.pressure(at.change + share * direction.change)
 
         start, end = slope(0.0), slope(1.0)
         low, high, share = 0.0, 1.0, 1.0

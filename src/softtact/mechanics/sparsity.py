@@ -34,6 +34,25 @@ class SymmetricPattern:
                           self.indptr)
 
 
+def symmetric_product(upper, x):
+    """A x, of a symmetric matrix by its upper triangle (csr): its values are read once, not once for each triangle."""
+    out = np.zeros(len(x))
+    _symmetric_product(upper.indptr, upper.indices, upper.data, x, out)
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _symmetric_product(indptr, indices, data, x, out):
+    for row in range(len(indptr) - 1):
+        own, total = x[row], 0.0
+        for k in range(indptr[row], indptr[row + 1]):
+            column, value = indices[k], data[k]
+            total += value * x[column]
+            if column != row:
+                out[column] += value * own
+        out[row] += total
+
+
 def _ragged(elements):
     """Node numbers of elements of all kinds in one array, and where each element begins."""
     sizes = np.concatenate([np.full(len(nodes), nodes.shape[1]) for nodes in elements])
