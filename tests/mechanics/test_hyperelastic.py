@@ -54,6 +54,13 @@ def test_the_contact_area_does_not_depend_on_how_far_overlaps_were_pressed_apart
     np.testing.assert_allclose(areas[1], areas[0], rtol=0.02)
 
 
+def test_overlaps_that_were_not_pressed_apart_are_outside_validity(cylinder_press):
+    solver = NewtonSettings(largest_penetration_mm=0.25 * cylinder_press.penetration_mm.min(), contact_passes=0)
+    cylinder = trimesh.creation.cylinder(radius=1.8, height=3, sections=64)
+    left = Sensor(SMALL, LAWS, mesh=COARSE, solver=solver).press(cylinder, force_n=[0.5], model="hyperelastic")
+    assert cylinder_press.within_validity.all() and not left.within_validity.any()
+
+
 def test_a_tip_between_the_contact_points_finds_its_first_touch():
     """The cap of a small sphere on a corner of the grid is nearer to the surface than any point that feels contact."""
     result = press_small(trimesh.creation.icosphere(subdivisions=4, radius=2.0), [0.2, 1.0])
