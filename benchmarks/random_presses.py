@@ -4,7 +4,7 @@
 
 Objects of config/objects, from a third of the sensor's side to all of it, in any turn, tilted by up to 25 degrees, anywhere over
 it; forces up to the sensor's pressure at full range; laws and constants anew every 25 presses. The sensor is a piece of the
-default one, 8 x 8 frusta, 6 x 6 for the hyperelastic model on the draft mesh. The seed is the press' number: `--one MODEL NUMBER`
+default one, 8 x 8 frusta, 4 x 4 for the hyperelastic model on the draft mesh. The seed is the press' number: `--one MODEL NUMBER`
 presses it again, and an ended run goes on. Counts: benchmarks/results/random_presses.json, from there docs/verification.md.
 """
 
@@ -35,7 +35,7 @@ from softtact.sensor import Sensor
 CONFIG = Path(__file__).resolve().parents[1] / "config"
 OBJECTS = sorted(CONFIG.glob("objects/*/*.stl"))
 MODELS = ("elastic", "foundation", "hyperelastic")
-FRUSTA = {"elastic": 8, "foundation": 8, "hyperelastic": 6}     # on a side of the sensor
+FRUSTA = {"elastic": 8, "foundation": 8, "hyperelastic": 4}     # on a side of the sensor
 PITCH_MM = 1.2
 LARGEST_MPA = 6 / 9.6**2   # 50 N on the default sensor, 22 x 37 mm, and somewhat more
 A_SENSOR = 25              # presses

@@ -19,7 +19,8 @@ from softtact.sensing.capacitance import ideal_counts
 
 _DEEPEST_LINEAR = 0.5     # of the layer's thickness: a linear layer does not know that it ends
 _HARDLY_COMPRESSED = 0.27    # of a frustum's height: below, the foundation model is within 2 % (docs/fast_models.md)
-_OVERLAP_LEFT = 2.0       # times the allowed overlap: above, pressing apart has failed and the contact is not solved
+_OVERLAP_LEFT = 2.0       # times the allowed overlap, or gap under pressure: above, pressing apart has failed
+_FEWEST_POINTS = 9       # of the cover that carry the object: fewer do not resolve where a spike touches, and how deep
 _FULL_POCKET = 0.8        # of a frustum's height: above, its pocket is full and contacts begin that the models leave out
 _CORNER = 0.01            # share of a layer: strains at an edge of the object go beyond any data
 _MARGIN, _LEAST_MARGIN_MM = 1.3, 0.1     # of the depth on springs, within which points are looked for at first
@@ -122,13 +123,12 @@ def press_hyperelastic(sensor, placed, forces, *, label, threads, keep_body=Fals
 
 
 def _of_record(sensor, body, record, forces, times, bodies):
-    maps, *numbers = zip(*record, strict=True)
-    names = ("indentation_mm", "contact_area_mm2", "penetration_mm", "frustum_compression_mm", "residual_n", "outside_card",
-             "iterations")
-    numbers = dict(zip(names, map(np.array, numbers), strict=True))
+    maps, levels = zip(*record, strict=True)
+    numbers = {name: np.array([level[name] for level in levels]) for name in levels[0]}
     _warn_outside_card(numbers["outside_card"], forces)
     valid = ((numbers["frustum_compression_mm"] < _FULL_POCKET * sensor.spec.dielectric.frusta.height_mm)
-             & (numbers["penetration_mm"] < _OVERLAP_LEFT * sensor.solver.largest_penetration_mm))
+             & (numbers.pop("contact_error_mm") < _OVERLAP_LEFT * sensor.solver.largest_penetration_mm)
+             & (numbers.pop("points") >= _FEWEST_POINTS))
     result = make_result(sensor, "hyperelastic", body.solver.name, np.stack(maps), forces[:len(maps)], np.array(times),
                          within_validity=valid, **numbers)
     return replace(result, bodies=tuple(bodies))
@@ -144,10 +144,13 @@ def _warn_outside_card(shares, forces):
 
 
 def _read_level(body, sampling, level):
-    slab, bed = level.state.slab, level.state.bed
-    return (-(sampling @ slab.displacement[:, 2]), level.state.indentation, body.slab.top.area_under_pressure(slab),
-            level.penetration_mm, float(body.bed.compression(bed.displacement).max()), level.residual_n,
-            body.share_outside_window(level.state), level.iterations)
+    """The map (y * x,) in mm of a level, and its numbers by their names."""
+    slab, bed, top = level.state.slab, level.state.bed, body.slab.top
+    return -(sampling @ slab.displacement[:, 2]), {
+        "indentation_mm": level.state.indentation, "contact_area_mm2": top.area_under_pressure(slab),
+        "penetration_mm": level.penetration_mm, "contact_error_mm": body.contact_error(level.state),
+        "points": np.count_nonzero(top.under_pressure(slab)), "frustum_compression_mm": body.bed.compression(bed.displacement).max(),
+        "residual_n": level.residual_n, "outside_card": body.share_outside_window(level.state), "iterations": level.iterations}
 
 
 PRESSES = {"elastic": press_elastic, "foundation": press_on_foundation, "hyperelastic": press_hyperelastic}

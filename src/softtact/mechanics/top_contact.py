@@ -161,7 +161,11 @@ class TopContact:
 
         By the pressure, not by the gap: where overlaps were pressed apart, touching points have gaps near zero of either sign.
         """
-        return float((self.area * state.planes.covered)[self.contact.response(state.gaps)[1] > 0].sum())
+        return float((self.area * state.planes.covered)[self.under_pressure(state)].sum())
+
+    def under_pressure(self, state):
+        """Which points (p,) carry pressure."""
+        return self.contact.response(state.gaps)[1] * state.planes.covered > 0
 
     def pressure_of_faces(self, state):
         """Mean pressure (t,) in MPa on each face, under the contact as it is now."""
