@@ -128,10 +128,17 @@ def _of_record(sensor, body, record, forces, times, bodies):
     _warn_outside_card(numbers["outside_card"], forces)
     valid = ((numbers["frustum_compression_mm"] < _FULL_POCKET * sensor.spec.dielectric.frusta.height_mm)
              & (numbers.pop("contact_error_mm") < _OVERLAP_LEFT * sensor.solver.largest_penetration_mm)
-             & (numbers.pop("points") >= _FEWEST_POINTS))
+             & (numbers.pop("points") >= _FEWEST_POINTS)
+             & _grows(numbers["indentation_mm"], slack=sensor.solver.largest_penetration_mm))
     result = make_result(sensor, "hyperelastic", body.solver.name, np.stack(maps), forces[:len(maps)], np.array(times),
                          within_validity=valid, **numbers)
     return replace(result, bodies=tuple(bodies))
+
+
+def _grows(depth, *, slack):
+    """Which of the depths (l,) are not above a later one, nor below an earlier one: of two such one is another equilibrium."""
+    deepest_before, least_after = np.maximum.accumulate(depth), np.minimum.accumulate(depth[::-1])[::-1]
+    return (depth >= deepest_before - slack) & (depth <= least_after + slack)
 
 
 def _warn_outside_card(shares, forces):
@@ -149,11 +156,17 @@ def _read_level(body, sampling, level):
     return -(sampling @ slab.displacement[:, 2]), {
         "indentation_mm": level.state.indentation, "contact_area_mm2": top.area_under_pressure(slab),
         "penetration_mm": level.penetration_mm, "contact_error_mm": body.contact_error(level.state),
-        "points": np.count_nonzero(top.under_pressure(slab)), "frustum_compression_mm": body.bed.compression(bed.displacement).max(),
+        "points": np.count_nonzero(top.under_pressure(slab)),
+        "frustum_compression_mm": body.bed.compression(bed.displacement).max(),
         "residual_n": level.residual_n, "outside_card": body.share_outside_window(level.state), "iterations": level.iterations}
 
 
 PRESSES = {"elastic": press_elastic, "foundation": press_on_foundation, "hyperelastic": press_hyperelastic}
+
+
+def flag_buried(result, placed):
+    """The result with the levels flagged at which the object's top has sunk below the surface at rest: no model feels that side."""
+    return replace(result, within_validity=result.within_validity & (result.indentation_mm < placed.bounds[1, 2]).astype(np.int8))
 
 
 def make_result(sensor, model, solver, maps, forces, times, **numbers):

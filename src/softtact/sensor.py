@@ -20,7 +20,7 @@ from softtact.materials.config import law_from_printed
 from softtact.mechanics import hyperelastic
 from softtact.mechanics.layered_body import MeshSettings, build_sensor_body
 from softtact.prepared import cached_compliance, cached_foundation
-from softtact.pressing import PRESSES
+from softtact.pressing import PRESSES, flag_buried
 
 MODELS = ("auto", *PRESSES)
 PROJECT = Path(__file__).parents[2]
@@ -85,10 +85,12 @@ class Sensor:
         threads = threads or _cores()
         # Dense products of some hundred rows would wait for each other on more threads, up to five times as long.
         with threadpool_limits(limits=threads if model == "elastic" else 1):
+            how = {"label": label, "threads": threads, "keep_body": keep_body}
             if model == "auto":
-                return press_auto(self, placed, forces, label=label, threads=threads, policy=policy, tolerance_mm=tolerance_mm,
-                                  keep_body=keep_body)
-            return PRESSES[model](self, placed, forces, label=label, threads=threads, keep_body=keep_body)
+                result = press_auto(self, placed, forces, policy=policy, tolerance_mm=tolerance_mm, **how)
+            else:
+                result = PRESSES[model](self, placed, forces, **how)
+        return flag_buried(result, placed)
 
     def press_many(self, meshes, poses=None, *, force_n, model="auto", workers=None, failures="raise", label="presses", **options):
         """Press each of `meshes` in its pose, all through the same forces; a list of `PressResult`s in their order.

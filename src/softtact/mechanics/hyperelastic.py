@@ -89,7 +89,7 @@ def _first_touch(body, surface, settings):
 
 
 def _lowered_until_felt(body, state, step_mm):
-    """The state at rest with the object a step lower, or more steps: a tip may lie between the points that feel contact."""
+    """The state with the object a step lower, or more steps: a tip may lie between the points that feel contact."""
     for _ in range(_MOST_LOWERINGS):
         state = body.lowered(state, step_mm)
         if state.force > 0:
@@ -203,6 +203,9 @@ def _newton(body, surface, state, force, tolerance, settings):
         if residual <= tolerance:
             return state, iteration, residual
         step = body.newton_step(state, force, looks, largest_mm=settings.largest_step_mm)
+        if not np.isfinite(step.indentation):     # a free object that lost its touch on the way
+            state = _lowered_until_felt(body, state, settings.first_touch_mm)
+            continue
         state = body.reface(state, step.planes)
         trial = _line_search(body, state, step, force, residual, settings) if np.isfinite(step.largest()) else None
         if trial is None and fresh and looks is None:
