@@ -18,7 +18,7 @@ from softtact.mechanics.hyperelastic import NewtonSettings
 from softtact.mechanics.layered_body import MeshSettings
 from softtact.sensor import Sensor
 
-FORCES_N = {"flat punch": [2.0, 4.0, 8.0], "sphere": [2.0, 4.0, 6.0], "ridges": [2.0, 4.0, 6.0]}
+FORCES_N = {"flat punch": [2.0, 4.0, 8.0], "sphere": [2.0, 4.0, 6.0], "ridges": [1.0, 2.0, 4.0]}
 OVERLAP_MM = 0.01       # what is pressed apart; of 1 um it takes more iterations and changes the maps by less than 1 %
 FRUSTA = (6, 6)
 FINE = {"frustum_levels": (0.0, 0.1, 0.3, 0.6, 1.0), "sheet_layers": 2, "cover_levels": (0.0, 0.25, 0.5, 0.75, 1.0)}
