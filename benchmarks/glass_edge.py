@@ -13,7 +13,7 @@ from glass_mesh import LAWS, SPEC
 from softtact.contact.height_field import HeightField
 from softtact.mechanics.glass_press import GLASS_MESH, contact_area, press_cell_on_glass
 from softtact.mechanics.hyperelastic import NewtonSettings, press_levels
-from softtact.mechanics.layered_body import build_patch
+from softtact.mechanics.sensor_bodies import build_patch
 
 SIZES = (4, 6)
 FORCES = np.array([10.0, 40.0, 80.0, 140.0]) / 540      # N on the mean frustum

@@ -15,7 +15,7 @@ import trimesh
 
 import softtact
 from softtact.mechanics.hyperelastic import NewtonSettings
-from softtact.mechanics.layered_body import MeshSettings
+from softtact.mechanics.mesh_settings import MeshSettings
 from softtact.sensor import Sensor
 
 FORCES_N = {"flat punch": [2.0, 4.0, 8.0], "sphere": [2.0, 4.0, 6.0], "ridges": [1.0, 2.0, 4.0]}

@@ -19,7 +19,7 @@ import yaml
 import softtact
 from softtact.errors import ConvergenceError
 from softtact.geometry.meshes import read_mesh
-from softtact.mechanics.layered_body import MeshSettings
+from softtact.mechanics.mesh_settings import MeshSettings
 
 CONFIG = Path(__file__).resolve().parents[1] / "config"
 FORCES_N = [5, 10, 20, 35, 50]

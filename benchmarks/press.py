@@ -18,7 +18,7 @@ import record
 
 import softtact
 from softtact.geometry.meshes import read_mesh
-from softtact.mechanics.layered_body import MeshSettings
+from softtact.mechanics.mesh_settings import MeshSettings
 
 OBJECTS = ["config/objects/indenters/circle_m.stl", "config/objects/indenters/sphere.stl"]
 MESHES = {"production": MeshSettings(), "draft": MeshSettings.draft()}

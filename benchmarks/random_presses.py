@@ -29,7 +29,7 @@ from softtact.materials.laws.registry import make_law
 from softtact.mechanics.elastic import elastic_compliance
 from softtact.mechanics.foundation import foundation_flexibility
 from softtact.mechanics.hyperelastic import NewtonSettings
-from softtact.mechanics.layered_body import MeshSettings
+from softtact.mechanics.mesh_settings import MeshSettings
 from softtact.sensor import Sensor
 
 CONFIG = Path(__file__).resolve().parents[1] / "config"

@@ -24,7 +24,7 @@ from softtact.geometry.meshes import read_mesh
 from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.laws.registry import make_law
 from softtact.mechanics.hyperelastic import NewtonSettings
-from softtact.mechanics.layered_body import MeshSettings
+from softtact.mechanics.mesh_settings import MeshSettings
 from softtact.sensor import Sensor
 
 OBJECTS = ["config/objects/indenters/circle_m.stl"]

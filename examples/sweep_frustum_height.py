@@ -17,7 +17,7 @@ import pandas as pd
 
 import softtact
 from softtact.mechanics.frustum_law import frustum_law
-from softtact.mechanics.layered_body import MeshSettings
+from softtact.mechanics.mesh_settings import MeshSettings
 from softtact.reporting.style import pyplot, save
 from softtact.sensing.capacitance import capacitance_per_area
 

@@ -9,7 +9,7 @@ import yaml
 from softtact.errors import InputError
 from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.config import load_material
-from softtact.mechanics.layered_body import MeshSettings
+from softtact.mechanics.mesh_settings import MeshSettings
 from softtact.study.config import load_study
 from softtact.study.keys import Mesh
 

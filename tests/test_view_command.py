@@ -13,7 +13,7 @@ import softtact
 from softtact.cli import main
 from softtact.commands import view as view_command
 from softtact.geometry.sensor_spec import SensorSpec
-from softtact.mechanics.layered_body import MeshSettings
+from softtact.mechanics.mesh_settings import MeshSettings
 from softtact.pressed_mesh import LAYERS, of_bodies, of_map, read_vtu
 from softtact.reporting.press_view import _draw_with_matplotlib, read_view
 

@@ -18,7 +18,8 @@ from softtact.geometry.sensor_spec import SensorSpec
 from softtact.many import press_many, raise_first
 from softtact.materials.config import law_from_printed
 from softtact.mechanics import hyperelastic
-from softtact.mechanics.layered_body import MeshSettings, build_sensor_body
+from softtact.mechanics.mesh_settings import MeshSettings
+from softtact.mechanics.sensor_bodies import build_sensor_body
 from softtact.prepared import cached_compliance, cached_foundation
 from softtact.pressing import PRESSES, flag_buried
 

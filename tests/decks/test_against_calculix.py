@@ -20,7 +20,8 @@ from softtact.geometry.sensor_spec import Friction
 from softtact.mechanics.blocks import HexBlock
 from softtact.mechanics.elements import HEX20_NODES
 from softtact.mechanics.hyperelastic import NewtonSettings, press_levels
-from softtact.mechanics.layered_body import MeshSettings, build_sensor_body, build_unit_cell
+from softtact.mechanics.mesh_settings import MeshSettings
+from softtact.mechanics.sensor_bodies import build_sensor_body, build_unit_cell
 
 pytestmark = needs_ccx
 PATCH = CORO.model_copy(update={"footprint_mm": (4.8, 4.8)})     # 4 x 4 frusta

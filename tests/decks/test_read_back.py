@@ -16,7 +16,8 @@ from softtact.errors import InputError
 from softtact.geometry.meshes import place
 from softtact.geometry.sensor_spec import Friction
 from softtact.mechanics.elements import HEX20_BOTTOM, HEX20_SIDES, HEX20_TOP
-from softtact.mechanics.layered_body import MeshSettings, build_unit_cell
+from softtact.mechanics.mesh_settings import MeshSettings
+from softtact.mechanics.sensor_bodies import build_unit_cell
 from softtact.sensor import Sensor
 
 SMALL = CORO.model_copy(update={"footprint_mm": (2.4, 3.6), "map_shape": (7, 5)})   # 2 x 3 frusta

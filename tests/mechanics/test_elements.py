@@ -23,7 +23,7 @@ from softtact.mechanics.elements import (
     wedge_rule,
 )
 from softtact.mechanics.hex_mesh import disc_plan, extrude, sheet_plan
-from softtact.mechanics.layered_body import lattice
+from softtact.mechanics.sensor_bodies import lattice
 
 LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040})
 

@@ -6,7 +6,8 @@ from test_hyperelastic import LAWS, SMALL
 
 from softtact.contact.height_field import HeightField
 from softtact.geometry.meshes import place
-from softtact.mechanics.layered_body import MeshSettings, build_sensor_body
+from softtact.mechanics.mesh_settings import MeshSettings
+from softtact.mechanics.sensor_bodies import build_sensor_body
 
 LONG = SMALL.model_copy(update={"footprint_mm": (6.0, 24.0)})
 PUNCH = trimesh.creation.cylinder(radius=1.0, height=2, sections=32)

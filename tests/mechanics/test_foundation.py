@@ -24,7 +24,7 @@ from softtact.mechanics.foundation_press import (
     rotating_loads,
 )
 from softtact.mechanics.frustum_law import FrustumLaw, _root_stiffness, frustum_law
-from softtact.mechanics.layered_body import build_unit_cell
+from softtact.mechanics.sensor_bodies import build_unit_cell
 from softtact.sensor import Sensor
 
 CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")

@@ -7,7 +7,8 @@ import pytest
 
 from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.laws.registry import make_law
-from softtact.mechanics.layered_body import MeshSettings, build_patch, build_unit_cell
+from softtact.mechanics.mesh_settings import MeshSettings
+from softtact.mechanics.sensor_bodies import build_patch, build_unit_cell
 
 CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
 LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040})

@@ -14,7 +14,7 @@ from softtact.mechanics.frustum_bed import SHEET
 from softtact.mechanics.glass_dielectric import Specimen, cell_family, press_specimen, scattered_specimen
 from softtact.mechanics.glass_press import GLASS_MESH, SETTINGS, contact_area, plate_over, press_cell_on_glass
 from softtact.mechanics.hyperelastic import press_levels
-from softtact.mechanics.layered_body import build_patch, build_unit_cell
+from softtact.mechanics.sensor_bodies import build_patch, build_unit_cell
 
 CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
 LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492)

@@ -13,8 +13,9 @@ from softtact.geometry.pose import Pose
 from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.laws.registry import make_law
 from softtact.mechanics.hyperelastic import NewtonSettings, press_levels
-from softtact.mechanics.layered_body import MeshSettings, build_sensor_body
 from softtact.mechanics.layered_mesh import layered_mesh
+from softtact.mechanics.mesh_settings import MeshSettings
+from softtact.mechanics.sensor_bodies import build_sensor_body
 from softtact.sensor import Sensor
 
 CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")

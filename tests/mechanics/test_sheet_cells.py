@@ -7,7 +7,8 @@ import pytest
 
 from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.laws.registry import make_law
-from softtact.mechanics.layered_body import MeshSettings, build_sensor_body
+from softtact.mechanics.mesh_settings import MeshSettings
+from softtact.mechanics.sensor_bodies import build_sensor_body
 
 CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
 SMALL = CORO.model_copy(update={"footprint_mm": (3.6, 2.4), "map_shape": (5, 7)})   # 3 x 2 frusta

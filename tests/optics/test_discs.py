@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy.ndimage import gaussian_filter
 
 from softtact.errors import InputError
-from softtact.mechanics.layered_body import lattice
+from softtact.mechanics.sensor_bodies import lattice
 from softtact.optics.discs import COLUMNS, DTYPES, detect_discs
 from softtact.optics.frames import BACKGROUND, BRIGHTNESS, expose, render_frame
 

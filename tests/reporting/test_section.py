@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from softtact.geometry.sensor_spec import SensorSpec
-from softtact.mechanics.layered_body import MeshSettings, build_sensor_body
+from softtact.mechanics.mesh_settings import MeshSettings
 from softtact.mechanics.pressed_body import REGIONS, pressed_body
+from softtact.mechanics.sensor_bodies import build_sensor_body
 from softtact.pressed_mesh import of_bodies, read_vtu
 from softtact.reporting.section import row_under_load, section, top_surface
 

@@ -24,8 +24,8 @@ from softtact.materials.laws.registry import make_law
 from softtact.mechanics import contact_step, sheet_cells
 from softtact.mechanics.hex_mesh import extrude, grid_plan
 from softtact.mechanics.hyperelastic import NewtonSettings, press_levels
-from softtact.mechanics.layered_body import build_sensor_body
 from softtact.mechanics.linear_solvers import make_solver
+from softtact.mechanics.sensor_bodies import build_sensor_body
 from softtact.sensor import Sensor
 
 COULOMB = "Coulomb's law"

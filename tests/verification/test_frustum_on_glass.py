@@ -18,7 +18,7 @@ from softtact.decks.laws import law_card
 from softtact.materials.laws.registry import make_law
 from softtact.mechanics.frustum_bed import BedGeometry, FrustumBed
 from softtact.mechanics.hex_mesh import grid_plan
-from softtact.mechanics.layered_body import MeshSettings
+from softtact.mechanics.mesh_settings import MeshSettings
 
 TIP, ROOT, HEIGHT = 0.3, 0.6, 0.5        # radii and height in mm
 LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492)

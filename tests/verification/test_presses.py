@@ -17,7 +17,9 @@ from softtact.geometry.pose import Pose
 from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.laws.registry import make_law
 from softtact.mechanics.hyperelastic import NewtonSettings, press_levels
-from softtact.mechanics.layered_body import LayeredBody, MeshSettings, build_sensor_body, build_unit_cell
+from softtact.mechanics.layered_body import LayeredBody
+from softtact.mechanics.mesh_settings import MeshSettings
+from softtact.mechanics.sensor_bodies import build_sensor_body, build_unit_cell
 from softtact.mechanics.slab import Slab
 from softtact.sensor import Sensor
 

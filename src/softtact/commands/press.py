@@ -78,7 +78,7 @@ def _press(options):
 
 def _mesh(options):
     """The hyperelastic body's `MeshSettings`."""
-    from softtact.mechanics.layered_body import MeshSettings
+    from softtact.mechanics.mesh_settings import MeshSettings
 
     return {"default": MeshSettings, "draft": MeshSettings.draft, "stable": MeshSettings.stable}[options.mesh_quality]()
 

@@ -17,7 +17,8 @@ from softtact.contact.height_field import HeightField
 from softtact.errors import ConvergenceError
 from softtact.files import read_arrays
 from softtact.mechanics.hyperelastic import NewtonSettings, press_levels
-from softtact.mechanics.layered_body import MeshSettings, build_unit_cell
+from softtact.mechanics.mesh_settings import MeshSettings
+from softtact.mechanics.sensor_bodies import build_unit_cell
 
 _FIRST_N, _LEVELS_A_DECADE = 2e-3, 9
 _PRESSURE_MPA = 2.0      # on the cell, up to which the law is asked for: about five times that of 50 N on a flat punch of 11 mm

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 from softtact.errors import ConvergenceError
 from softtact.mechanics.glass_press import GlassCurve, press_cell_on_glass
-from softtact.mechanics.layered_body import lattice
+from softtact.mechanics.sensor_bodies import lattice
 
 _SPARE = 1.25            # cells are pressed so much farther than the mean frustum: the tallest carries more
 _LEVELS = 14            # of force, at which a cell is solved

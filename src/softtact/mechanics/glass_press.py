@@ -9,7 +9,8 @@ from softtact.contact.height_field import HeightField
 from softtact.errors import ConvergenceError
 from softtact.mechanics.elements import HEX27_BOTTOM, quad9
 from softtact.mechanics.hyperelastic import NewtonSettings, press_levels
-from softtact.mechanics.layered_body import MeshSettings, build_unit_cell
+from softtact.mechanics.mesh_settings import MeshSettings
+from softtact.mechanics.sensor_bodies import build_unit_cell
 
 # A gap this wide ends total reflection: the evanescent wave's intensity falls to 1/e in lambda / (4 pi sqrt(n^2 sin^2 theta - 1)),
 # for green light (0.53 um) in acrylic (n = 1.49) 0.13 um at 45 degrees and 0.05 um at 60 degrees.

@@ -5,85 +5,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from softtact.contact.friction import coulomb
-from softtact.contact.height_field import HeightField
-from softtact.contact.penalty import Contact
 from softtact.mechanics.body_friction import BodyFriction
 from softtact.mechanics.contact_step import ContactStepper
-from softtact.mechanics.frustum_bed import BedGeometry, BedState, FrustumBed
-from softtact.mechanics.hex_mesh import sheet_plan
+from softtact.mechanics.frustum_bed import BedState
 from softtact.mechanics.linear_solvers import make_solver
 from softtact.mechanics.parallel import Workers
-from softtact.mechanics.refinement import FAR, NEAR, levels_of, zones
 from softtact.mechanics.sheet_cells import SheetCells
-from softtact.mechanics.slab import Layer, Slab, SlabState, StepContact
+from softtact.mechanics.slab import SlabState, StepContact
 from softtact.mechanics.top_contact import FacingPlanes
-
-_OBJECT_SMOOTHING_MM = 1e-3
-
-
-@dataclass(frozen=True)
-class MeshSettings:
-    """Resolution of the layered body.
-
-    cover_levels: heights of the cover's element layers as shares of its thickness; cover_splits: how often the elements of
-    each layer, a pitch wide, are split in plan: the lowest under the object, the others at its edges (see `refinement`);
-    far_pitches: pitches (1, 2, 4) that an element far from the object spans; contact_stiffness: N/mm3 of the contacts' penalty,
-    a third of it takes a quarter fewer iterations and leaves three times the overlap; sheet_layers: elements through the sheet;
-    frustum_levels: heights of the frustum's element layers as shares of its height; local_over_shear, growing_over_shear:
-    what holds volume changes in the frusta that their elements' pressure does not see, over mu (see `blocks`);
-    trilinear_pressure: or linear, which is softer by 2 % for small movements, and fails under deep objects.
-    refinement: how often all elements are split in plan. frustum_rings: rings of elements around a frustum's core, the
-    thinner the farther out. coarse_walls: along all walls between cells, not only far from the object, the sheet moves as one
-    quadratic curve: half a factor's operations, and 2 to 2.5 % of the map; without effect where refined.
-    """
-
-    sheet_layers: int = 1
-    frustum_levels: tuple = (0.0, 0.2, 0.6, 1.0)
-    local_over_shear: float = 0.5
-    growing_over_shear: float = 100.0
-    trilinear_pressure: bool = True
-    refinement: int = 0
-    frustum_rings: int = 1
-    coarse_walls: bool = False
-    cover_levels: tuple = (0.0, 0.45, 0.8, 1.0)
-    cover_splits: tuple = (1, 1, 2)
-    far_pitches: int = 2
-    contact_stiffness: float = 3000.0
-
-    def __post_init__(self):
-        if len(self.cover_splits) != len(self.cover_levels) - 1:
-            raise ValueError(f"cover_splits has {len(self.cover_splits)} entries for the {len(self.cover_levels) - 1} layers "
-                             "of cover_levels")
-
-    @property
-    def contact(self):
-        """The frusta's penalty, linear above half of a pressure of 1 MPa."""
-        return Contact(stiffness=self.contact_stiffness, smoothing=1.0 / self.contact_stiffness)
-
-    @property
-    def object_contact(self):
-        """The object's penalty: softer where it is lightly pressed, a third fewer factors under a wide punch and 0.3 um deeper."""
-        return Contact(stiffness=self.contact_stiffness, smoothing=_OBJECT_SMOOTHING_MM)
-
-    @classmethod
-    def draft(cls):
-        """For quick studies: a layer less in the cover and in each frustum, and walls as one curve."""
-        return cls(frustum_levels=(0.0, 0.35, 1.0), local_over_shear=4.0, coarse_walls=True, cover_levels=(0.0, 0.55, 1.0),
-                   cover_splits=(0, 2), contact_stiffness=1000.0)
-
-    @classmethod
-    def converging(cls, *, local_over_shear=0.1, **changes):
-        """To be refined: linear pressure, which does not lock, and little else; single frusta and cells, but no whole sensor."""
-        return cls(local_over_shear=local_over_shear, growing_over_shear=0.0, trilinear_pressure=False, **changes)
-
-    @classmethod
-    def stable(cls):
-        """For frusta pressed to more than 60 % of their height, where on the default mesh elements give way and many steps fail.
-
-        A sphere to 50 N; unit cell 1 to 2 % stiffer up to 0.4 MPa, alike from 0.7 MPa on (docs/performance.md).
-        """
-        return cls(local_over_shear=4.0)
 
 
 @dataclass(frozen=True)
@@ -115,7 +44,6 @@ class Step:
 
     def largest(self):
         return max(np.abs(self.slab).max(), np.abs(self.bed).max(), abs(self.indentation))
-
 
 _DAMPINGS = 4         # steps that are tried with ever more damping of the cells that they throw too far
 _FIRST_SHIFT = 0.01   # N/mm on every free unknown of the slab, doubled until the tangent is positive definite
@@ -265,129 +193,3 @@ def _add_volumes(volumes, block, displacement):
     if block.law.stretch_window is not None:
         outside, whole = volumes.get(id(block.law), (0.0, 0.0))
         volumes[id(block.law)] = outside + block.volume_outside(displacement, block.law.stretch_window), whole + block.volume
-
-
-def _lines(side, count, pitch, pitches):
-    """Grid lines: the frusta's lattice, one for `pitches` of them, and a strip to each edge where one is left."""
-    half = 0.5 * count * pitch
-    inner = pitch * np.append(np.arange(0, count, pitches), count) - half
-    margin = 0.5 * side - half
-    return np.concatenate([[-0.5 * side], inner, [0.5 * side]]) if margin > 1e-6 else inner
-
-
-def lattice(counts, pitch):
-    """Centres (n, 2) of a frustum lattice around the origin and who has a neighbour in +x, +y, -x, -y (n, 4)."""
-    nx, ny = counts
-    i, j = (grid.ravel() for grid in np.meshgrid(np.arange(nx), np.arange(ny)))
-    centres = pitch * np.column_stack([i - 0.5 * (nx - 1), j - 0.5 * (ny - 1)])
-    return centres, np.column_stack([i < nx - 1, j < ny - 1, i > 0, j > 0])
-
-
-def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), scatter=None, contact=None, threads=1, surface=None):
-    """The whole sensor. `scatter`: None or (heights factor (n,), tip diameter factor (n,)) of its frusta.
-
-    surface: the underside of the object that is to be pressed, where the cover's mesh is to be fine; without it a pitch everywhere
-    """
-    frusta, counts = spec.dielectric.frusta, spec.frusta_counts
-    bottom = -(spec.cover.thickness_mm + spec.dielectric.sheet_thickness_mm)
-    x_lines, y_lines = (_lines(side, count, frusta.pitch_mm, mesh.far_pitches)
-                        for side, count in zip(spec.footprint_mm, counts, strict=True))
-    sheet = Layer(np.linspace(bottom, -spec.cover.thickness_mm, mesh.sheet_layers + 1), dielectric_law)
-    cover = Layer(spec.cover.thickness_mm * (np.asarray(mesh.cover_levels) - 1), cover_law)
-    splits, zone = _cover_splits(mesh, surface, x_lines, y_lines, frusta.pitch_mm)
-    centres, neighbours = lattice(counts, frusta.pitch_mm)
-    plan = sheet_plan(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, spec.footprint_mm, refinement=mesh.refinement,
-                      rings=mesh.frustum_rings)
-    slab = Slab(sheet, cover, plan, x_lines, y_lines, sides="held", contact=contact or mesh.object_contact,
-                coarse_walls=mesh.coarse_walls or _far(zone, x_lines, y_lines), splits=splits,
-                friction=coulomb(spec.friction.object))
-    return LayeredBody(slab, _bed(spec, centres, neighbours, dielectric_law, mesh, scatter, contact), slab.bottom[plan.roots],
-                       threads=threads)
-
-
-def _cover_splits(mesh, surface, x_lines, y_lines, pitch):
-    """How often the cover's elements are split, layer by layer from below (layers, ny 2^m, nx 2^m), and its zones.
-
-    The sheet follows the cover's lower side, which must not be finer than the sheet: it would hang freely between its nodes.
-    """
-    far = int(np.log2(mesh.far_pitches)) + mesh.refinement
-    most = far + max(mesh.cover_splits)
-    shape = (len(x_lines) - 1, len(y_lines) - 1)
-    zone = np.full((shape[1] << most, shape[0] << most), NEAR) if surface is None else zones(surface, x_lines, y_lines, most)
-    narrow = [np.round(np.log2(mesh.far_pitches * pitch / np.diff(lines))).astype(int).clip(0) for lines in (x_lines, y_lines)]
-    narrow = np.maximum(*np.meshgrid(*narrow)).repeat(1 << most, axis=0).repeat(1 << most, axis=1)
-    levels = []
-    for k, splits in enumerate(mesh.cover_splits):
-        of_zone = far + np.array([mesh.refinement - far, 0, splits if k == 0 else 0, min(splits, 1), splits])
-        levels.append(levels_of(np.maximum(of_zone[zone] - narrow, 0), shape, most))
-    return np.stack(levels), zone
-
-
-def _far(zone, x_lines, y_lines):
-    """A function of places (n, 2) that tells (n,) which lie among FAR places of the grid only."""
-    x, y = (np.interp(np.arange(size + 1), np.linspace(0, size, len(lines)), lines)
-            for size, lines in zip(zone.shape[::-1], (x_lines, y_lines), strict=True))
-
-    def far(places):
-        around = np.zeros(len(places), dtype=int)
-        for dx, dy in itertools.product((-1e-6, 1e-6), repeat=2):
-            i, j = (np.clip(np.searchsorted(lines, value) - 1, 0, len(lines) - 2)
-                    for lines, value in ((x, places[:, 0] + dx), (y, places[:, 1] + dy)))
-            around = np.maximum(around, zone[j, i])
-        return around == FAR
-
-    return far
-
-
-def build_unit_cell(spec, *, dielectric_law, cover_law=None, mesh=MeshSettings(), height_factor=1.0, tip_factor=1.0):
-    """One frustum of an endless lattice with its share of the sheet, and of the cover where a law for it is given."""
-    frusta = spec.dielectric.frusta
-    lines = 0.5 * frusta.pitch_mm * np.linspace(-1, 1, 2**mesh.refinement + 1)
-    splits = np.minimum(mesh.cover_splits, 1)[:, None, None] * np.ones((2 * len(lines) - 2,) * 2, dtype=int) if cover_law else None
-    cover_mm = 0.0 if cover_law is None else spec.cover.thickness_mm
-    bottom = -(cover_mm + spec.dielectric.sheet_thickness_mm)
-    sheet = Layer(np.linspace(bottom, -cover_mm, mesh.sheet_layers + 1), dielectric_law)
-    cover = Layer(cover_mm * (np.asarray(mesh.cover_levels) - 1) if cover_mm else np.zeros(1), cover_law)
-    centre = np.zeros((1, 2))
-    plan = sheet_plan(centre, (1, 1), frusta.pitch_mm, frusta.root_diameter_mm, (frusta.pitch_mm,) * 2, refinement=mesh.refinement,
-                      rings=mesh.frustum_rings)
-    slab = Slab(sheet, cover, plan, lines, lines, sides="symmetric", contact=mesh.contact, coarse_walls=mesh.coarse_walls,
-                splits=splits, friction=coulomb(spec.friction.object))
-    bed = _bed(spec, centre, np.ones((1, 4), dtype=bool), dielectric_law, mesh,
-               (np.array([height_factor]), np.array([tip_factor])), None, bottom=bottom)
-    return LayeredBody(slab, bed, slab.bottom[plan.roots])
-
-
-def build_patch(spec, counts, *, dielectric_law, mesh=MeshSettings()):
-    """A piece of the dielectric alone, `counts` frusta along x and y with free borders half a pitch from the outer ones' axes."""
-    frusta, thickness = spec.dielectric.frusta, spec.dielectric.sheet_thickness_mm
-    centres, neighbours = lattice(counts, frusta.pitch_mm)
-    lines = [frusta.pitch_mm * (np.arange(count + 1) - 0.5 * count) for count in counts]
-    plan = sheet_plan(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, [np.ptp(line) for line in lines],
-                      rings=mesh.frustum_rings)
-    slab = Slab(Layer(np.linspace(-thickness, 0.0, mesh.sheet_layers + 1), dielectric_law), Layer(np.zeros(1), None), plan, *lines,
-                sides="free", contact=mesh.contact, coarse_walls=mesh.coarse_walls)
-    bed = _bed(spec, centres, neighbours, dielectric_law, mesh, None, None, bottom=-thickness)
-    return LayeredBody(slab, bed, slab.bottom[plan.roots])
-
-
-def _bed(spec, centres, neighbours, law, mesh, scatter, contact, *, bottom=None):
-    frusta = spec.dielectric.frusta
-    if bottom is None:
-        bottom = -(spec.cover.thickness_mm + spec.dielectric.sheet_thickness_mm)
-    height_factor, tip_factor = scatter or (np.ones(len(centres)), np.ones(len(centres)))
-    heights = frusta.height_mm * height_factor
-    # Every cone is built with the same root; where its printed readings are swapped the tip is the wide end.
-    geometry = BedGeometry(centres=centres, heights=heights, tip_diameters=frusta.tip_diameter_mm * tip_factor,
-                           root_diameter=frusta.root_diameter_mm, neighbours=neighbours,
-                           wall_mm=0.5 * (frusta.pitch_mm - frusta.root_diameter_mm))
-    return FrustumBed(geometry, law, levels=np.asarray(mesh.frustum_levels) * frusta.height_mm, root_z_mm=bottom,
-                      pcb_z_mm=bottom - heights.max(), tips_held=spec.tips_held, contact=contact or mesh.contact,
-                      local_over_shear=mesh.local_over_shear, growing_over_shear=mesh.growing_over_shear,
-                      trilinear=mesh.trilinear_pressure, refinement=mesh.refinement, rings=mesh.frustum_rings,
-                      friction=coulomb(spec.friction.board))
-
-
-def surface_of(mesh):
-    """The object's underside as the body asks for it."""
-    return HeightField(mesh)

@@ -8,8 +8,9 @@ from softtact.materials.laws.neo_hooke import NeoHooke
 from softtact.mechanics.elastic import elastic_slab, map_cells
 from softtact.mechanics.foundation import foundation_slab
 from softtact.mechanics.hyperelastic import NewtonSettings
-from softtact.mechanics.layered_body import MeshSettings, build_sensor_body
+from softtact.mechanics.mesh_settings import MeshSettings
 from softtact.mechanics.pressed_body import VTK_HEX27, pressed_body
+from softtact.mechanics.sensor_bodies import build_sensor_body
 
 _SCATTER_KEYS = ("height_scatter", "tip_scatter", "thickness_scatter", "specimen")
 _LARGEST_DEVIATION = 2.5     # standard deviations: a specimen beyond would not have passed inspection
