@@ -53,6 +53,8 @@ def _in_short(names):
 
 
 def _draw_expected(axes, presses):
+    from matplotlib.ticker import LogLocator, NullFormatter
+
     for model in ("elastic", "foundation"):
         for calibrated, rows in presses.groupby(presses.set == CALIBRATION_SET):
             axes.scatter(1e3 * rows[f"{model}_error_mm"], 1e3 * rows[f"{model}_expected_mm"], s=22, edgecolors=MODEL_COLOURS[model],
@@ -63,4 +65,8 @@ def _draw_expected(axes, presses):
     axes.plot([low, high], [low, high], color="0.6", lw=0.8)
     axes.set(xscale="log", yscale="log", xlim=(low, high), ylim=(low, high), aspect="equal",
              xlabel="true error of a press, um", ylabel="expected error, um")
+    for axis in (axes.xaxis, axes.yaxis):     # by default each of 2 to 9 has its text, one over the other
+        axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter(NullFormatter())
     axes.legend(frameon=False, fontsize=8, loc="upper left")
