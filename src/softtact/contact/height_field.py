@@ -63,15 +63,24 @@ def _fill_bins(triangles, origin, size, bins):
         return np.zeros(bins * bins + 1, dtype=np.int64), np.zeros(0, dtype=np.int64)
     low = np.clip(((triangles[..., :2].min(axis=1) - 1e-9 - origin) / size).astype(int), 0, bins - 1)
     high = np.clip(((triangles[..., :2].max(axis=1) + 1e-9 - origin) / size).astype(int), 0, bins - 1)
-    owner, cell = [], []
-    for t, ((i0, j0), (i1, j1)) in enumerate(zip(low, high, strict=True)):
-        cells = (np.arange(j0, j1 + 1)[:, None] * bins + np.arange(i0, i1 + 1)).ravel()
-        cell.append(cells)
-        owner.append(np.full(len(cells), t))
-    cell, owner = np.concatenate(cell), np.concatenate(owner)
-    order = np.argsort(cell, kind="stable")
-    starts = np.searchsorted(cell[order], np.arange(bins * bins + 1))
-    return starts.astype(np.int64), owner[order].astype(np.int64)
+    return _listed(low, high, bins)
+
+
+@njit(cache=True, nogil=True)
+def _listed(low, high, bins):
+    """Which boxes of bins, from low to high (t, 2), cover each bin: starts (bins^2 + 1,), members in rising order."""
+    starts = np.zeros(bins * bins + 1, dtype=np.int64)
+    for t in range(len(low)):
+        for j in range(low[t, 1], high[t, 1] + 1):
+            starts[j * bins + low[t, 0] + 1:j * bins + high[t, 0] + 2] += 1
+    starts = np.cumsum(starts)
+    members, fill = np.empty(starts[-1], dtype=np.int64), starts[:-1].copy()
+    for t in range(len(low)):
+        for j in range(low[t, 1], high[t, 1] + 1):
+            for i in range(low[t, 0], high[t, 0] + 1):
+                members[fill[j * bins + i]] = t
+                fill[j * bins + i] += 1
+    return starts, members
 
 
 @njit(cache=True, nogil=True)

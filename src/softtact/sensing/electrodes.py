@@ -1,5 +1,7 @@
 """The electrodes on the PCB: means over them, the field at their edges, what neighbours take from each other."""
 
+from functools import lru_cache
+
 import numpy as np
 
 
@@ -15,12 +17,14 @@ def taxel_means(spec, field, *, spacing_mm=0.0, shift_mm=(0.0, 0.0)):
 
 def electrode_weights(spec, *, spacing_mm=0.0, shift_mm=(0.0, 0.0)):
     """Weights (rows, y) and (columns, x) whose products give the means over electrodes; arguments as for `taxel_means`."""
-    return (_averaging(spec.map_y_mm, spec.taxels.rows, spacing=spacing_mm, shift=shift_mm[1]),
-            _averaging(spec.map_x_mm, spec.taxels.columns, spacing=spacing_mm, shift=shift_mm[0]))
+    return (_averaging(tuple(spec.map_y_mm), spec.taxels.rows, spacing=spacing_mm, shift=shift_mm[1]),
+            _averaging(tuple(spec.map_x_mm), spec.taxels.columns, spacing=spacing_mm, shift=shift_mm[0]))
 
 
+@lru_cache(maxsize=32)     # the same for all presses of a sensor, and a tenth of a press with the elastic model
 def _averaging(grid, count, *, spacing=0.0, shift=0.0):
     """Weights (count, grid): means over equal parts of the side, each shorter by `spacing`, of what moved by `shift`."""
+    grid = np.array(grid)
     edges = np.linspace(grid[0], grid[-1], count + 1)
     weights = np.zeros((count, len(grid)))
     for part, (low, high) in enumerate(zip(edges[:-1] + 0.5 * spacing - shift, edges[1:] - 0.5 * spacing - shift, strict=True)):
@@ -34,6 +38,7 @@ def _averaging(grid, count, *, spacing=0.0, shift=0.0):
             t = np.clip((node - grid[k]) / (grid[k + 1] - grid[k]), 0.0, 1.0)
             weights[part, k] += weight * (1 - t)
             weights[part, k + 1] += weight * t
+    weights.flags.writeable = False
     return weights
 
 
