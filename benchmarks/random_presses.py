@@ -41,7 +41,8 @@ LARGEST_MPA = 6 / 9.6**2   # 50 N on the default sensor, 22 x 37 mm, and somewha
 A_SENSOR = 25              # presses
 ALLOWED_MM = 0.02          # of overlap, as the studies have it; less depth than this is none
 HANGS_S = 300              # for a press of a few seconds
-OUTCOMES = ("reached", "flagged", "stopped", "refused", "nonsense", "hung", "crashed")
+# outside: without a fault, but with levels that are told to be outside validity;  flagged: with faults, at such levels only
+OUTCOMES = ("reached", "outside", "flagged", "stopped", "refused", "nonsense", "hung", "crashed")
 
 
 def random_sensor(number, model):
@@ -97,23 +98,31 @@ def outcome(sensor, model, number):
         return "hung", f"{HANGS_S} s"
     except Exception as error:      # whatever it is, it is what is looked for
         return "crashed", f"{type(error).__name__}: {error}"
-    faults = nonsense(result, sensor)
+    return judged(result, sensor)
+
+
+def judged(result, sensor):
+    """The outcome of a press that has a result: all its levels with a fault must be flagged."""
+    faults, told = nonsense(result, sensor), result.within_validity == 0
     if faults:
-        return ("nonsense", faults) if result.within_validity.all() else ("flagged", faults)
-    return "reached", ""
+        which = ", ".join(faults)
+        return ("flagged", which) if told[np.any(list(faults.values()), axis=0)].all() else ("nonsense", which)
+    return ("outside", f"{np.count_nonzero(told)} of {len(told)} levels") if told.any() else ("reached", "")
 
 
 def nonsense(result, sensor):
-    """What cannot be of a result, in words; empty where all can."""
+    """What cannot be of a result: {what: at which levels (l,)}; empty where all can."""
     maps, depth = result.deformation_map_mm, result.indentation_mm
-    found = {"numbers that are not finite": not all(np.isfinite(values).all() for values in (maps, depth, result.tactile_map)),
-             "a map deeper than the object": (maps.max(axis=(1, 2)) > depth + 0.02).any(),
-             "a map beyond the layer": maps.max() > sensor.spec.thickness_mm,
-             "less depth at more force": (np.diff(depth) < -ALLOWED_MM).any(),
-             "overlap": result.penetration_mm.max() > 2 * ALLOWED_MM,
-             "no contact": (result.contact_area_mm2 <= 0).any(),
-             "a balance that is none": (result.residual_n > 1e-2 * np.maximum(result.force_n, 1)).any()}
-    return ", ".join(name for name, here in found.items() if here)
+    falls = np.diff(depth) < -ALLOWED_MM
+    finite = np.isfinite(maps).all(axis=(1, 2)) & np.isfinite(depth) & np.isfinite(result.tactile_map).all(axis=(1, 2))
+    found = {"numbers that are not finite": ~finite,
+             "a map deeper than the object": maps.max(axis=(1, 2)) > depth + ALLOWED_MM,
+             "a map beyond the layer": maps.max(axis=(1, 2)) > sensor.spec.thickness_mm,
+             "less depth at more force": np.append(falls, False) | np.append(False, falls),
+             "overlap": result.penetration_mm > 2 * ALLOWED_MM,
+             "no contact": result.contact_area_mm2 <= 0,
+             "a balance that is none": result.residual_n > 1e-2 * np.maximum(result.force_n, 1)}
+    return {name: where for name, where in found.items() if where.any()}
 
 
 def told():
@@ -138,14 +147,14 @@ def press_block(model, block):
 def measure(model, presses, jobs):
     """Press from where the record ends, and keep the record after each sensor's presses."""
     row = told().get(model, {"presses": 0, **dict.fromkeys(OUTCOMES, 0), "processor_s": 0.0, "notes": []})
-    blocks = range(row["presses"] // A_SENSOR, presses // A_SENSOR)
+    blocks = range(row["presses"] // A_SENSOR, -(-presses // A_SENSOR))     # whole blocks
     with multiprocessing.get_context("spawn").Pool(jobs) as pool:
         for rows, seconds in pool.imap(partial(press_block, model), blocks):
             row["presses"] += len(rows)
             row["processor_s"] = round(row["processor_s"] + seconds, 1)
             for number, what, why in rows:
                 row[what] += 1
-                if what not in ("reached", "flagged"):
+                if what not in ("reached", "outside"):
                     row["notes"].append([number, what, why[:300]])
             record.write("random_presses", models=told() | {model: row})     # another process may count another model
             print(model, {name: row[name] for name in ("presses", *OUTCOMES)}, flush=True)

@@ -36,8 +36,11 @@ class PressedMesh:
     pressure_mpa: np.ndarray | None = None
 
     def points_of(self, layer):
-        """Numbers of the points that the cells of a layer use, by its name in `LAYERS`."""
-        return np.unique(np.concatenate([nodes.ravel() for _, nodes, own in self.cells if own == LAYERS[layer]]))
+        """Numbers of the points that the cells of a layer use, by its name in `LAYERS`. Raises InputError where it has none."""
+        used = [nodes.ravel() for _, nodes, own in self.cells if own == LAYERS[layer]]
+        if not used:
+            raise InputError(f"The pressed sensor has no cells of the layer {layer!r}; keep the body of a hyperelastic press.")
+        return np.unique(np.concatenate(used))
 
     def write(self, path):
         """Write as VTU: for each force an array of displacements and, where known, of pressures (nan off the pressed face)."""

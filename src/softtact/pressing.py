@@ -16,12 +16,8 @@ from softtact.mechanics.pressed_body import pressed_body
 from softtact.press_result import PressResult
 from softtact.progress import announce, progress
 from softtact.sensing.capacitance import ideal_counts
+from softtact.validity import valid_elastic, valid_foundation, valid_hyperelastic
 
-_DEEPEST_LINEAR = 0.5     # of the layer's thickness: a linear layer does not know that it ends
-_HARDLY_COMPRESSED = 0.27    # of a frustum's height: below, the foundation model is within 2 % (docs/fast_models.md)
-_OVERLAP_LEFT = 2.0       # times the allowed overlap, or gap under pressure: above, pressing apart has failed
-_FEWEST_POINTS = 9       # of the cover that carry the object: fewer do not resolve where a spike touches, and how deep
-_FULL_POCKET = 0.8        # of a frustum's height: above, its pocket is full and contacts begin that the models leave out
 _CORNER = 0.01            # share of a layer: strains at an edge of the object go beyond any data
 _MARGIN, _LEAST_MARGIN_MM = 1.3, 0.1     # of the depth on springs, within which points are looked for at first
 _RISE = 1.15              # of the object's depth: points within may touch
@@ -39,7 +35,7 @@ def press_elastic(sensor, placed, forces, *, label, threads, keep_body=False):
     seconds = np.full(len(forces), (time.perf_counter() - start) / len(forces))
     return make_result(sensor, "elastic", "conjugate gradients", press.maps, forces, seconds, indentation_mm=contact.depth,
                        contact_area_mm2=area @ (contact.force > 0), penetration_mm=contact.penetration,
-                       within_validity=contact.depth - underside.lowest_mm < _DEEPEST_LINEAR * sensor.spec.thickness_mm,
+                       within_validity=valid_elastic(contact.depth - underside.lowest_mm, thickness_mm=sensor.spec.thickness_mm),
                        frustum_compression_mm=unknown, residual_n=unknown, outside_card=unknown, iterations=contact.iterations)
 
 
@@ -68,13 +64,13 @@ def _of_levels(sensor, flexibility, points, levels, forces, times):
     """The result of a foundation press' levels, be it those before one that was not reached."""
     area, count = points.covered * np.prod(flexibility.grid.step), len(levels)
     compression = np.array([level.compression.max() for level in levels])
-    deepest = min(flexibility.law.limit_mm, _HARDLY_COMPRESSED * sensor.spec.dielectric.frusta.height_mm)
+    valid = valid_foundation(compression, frustum_mm=sensor.spec.dielectric.frusta.height_mm, law_limit_mm=flexibility.law.limit_mm)
     unknown = np.full(count, np.nan)
     numbers = {"indentation_mm": [level.depth for level in levels], "penetration_mm": [level.penetration for level in levels],
                "contact_area_mm2": [area[level.touching].sum() for level in levels],
                "iterations": [level.iterations for level in levels], "frustum_compression_mm": compression}
     return make_result(sensor, "foundation", "dense", FoundationMaps(flexibility, points)(levels), forces[:count],
-                       np.array(times[:count]), within_validity=compression < deepest, residual_n=unknown, outside_card=unknown,
+                       np.array(times[:count]), within_validity=valid, residual_n=unknown, outside_card=unknown,
                        **numbers)
 
 
@@ -126,19 +122,13 @@ def _of_record(sensor, body, record, forces, times, bodies):
     maps, levels = zip(*record, strict=True)
     numbers = {name: np.array([level[name] for level in levels]) for name in levels[0]}
     _warn_outside_card(numbers["outside_card"], forces)
-    valid = ((numbers["frustum_compression_mm"] < _FULL_POCKET * sensor.spec.dielectric.frusta.height_mm)
-             & (numbers.pop("contact_error_mm") < _OVERLAP_LEFT * sensor.solver.largest_penetration_mm)
-             & (numbers.pop("points") >= _FEWEST_POINTS)
-             & _grows(numbers["indentation_mm"], slack=sensor.solver.largest_penetration_mm))
+    valid = valid_hyperelastic(compression_mm=numbers["frustum_compression_mm"], depth_mm=numbers["indentation_mm"],
+                               contact_error_mm=numbers.pop("contact_error_mm"), points=numbers.pop("points"),
+                               frustum_mm=sensor.spec.dielectric.frusta.height_mm,
+                               allowed_mm=sensor.solver.largest_penetration_mm)
     result = make_result(sensor, "hyperelastic", body.solver.name, np.stack(maps), forces[:len(maps)], np.array(times),
                          within_validity=valid, **numbers)
     return replace(result, bodies=tuple(bodies))
-
-
-def _grows(depth, *, slack):
-    """Which of the depths (l,) are not above a later one, nor below an earlier one: of two such one is another equilibrium."""
-    deepest_before, least_after = np.maximum.accumulate(depth), np.minimum.accumulate(depth[::-1])[::-1]
-    return (depth >= deepest_before - slack) & (depth <= least_after + slack)
 
 
 def _warn_outside_card(shares, forces):
@@ -162,11 +152,6 @@ def _read_level(body, sampling, level):
 
 
 PRESSES = {"elastic": press_elastic, "foundation": press_on_foundation, "hyperelastic": press_hyperelastic}
-
-
-def flag_buried(result, placed):
-    """The result with the levels flagged at which the object's top has sunk below the surface at rest: no model feels that side."""
-    return replace(result, within_validity=result.within_validity & (result.indentation_mm < placed.bounds[1, 2]).astype(np.int8))
 
 
 def make_result(sensor, model, solver, maps, forces, times, **numbers):

@@ -6,13 +6,14 @@
 
 import os
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from softtact.choice import TOLERANCE_MM, press_auto
-from softtact.errors import InputError
+from softtact.errors import ConvergenceError, InputError
 from softtact.geometry.meshes import check_over_sensor, place
 from softtact.geometry.sensor_spec import SensorSpec
 from softtact.many import press_many, raise_first
@@ -21,7 +22,8 @@ from softtact.mechanics import hyperelastic
 from softtact.mechanics.mesh_settings import MeshSettings
 from softtact.mechanics.sensor_bodies import build_sensor_body
 from softtact.prepared import cached_compliance, cached_foundation
-from softtact.pressing import PRESSES, flag_buried
+from softtact.pressing import PRESSES
+from softtact.validity import flag_buried
 
 MODELS = ("auto", *PRESSES)
 PROJECT = Path(__file__).parents[2]
@@ -85,13 +87,13 @@ class Sensor:
         check_over_sensor(placed, self.spec.footprint_mm)
         threads = threads or _cores()
         # Dense products of some hundred rows would wait for each other on more threads, up to five times as long.
-        with threadpool_limits(limits=threads if model == "elastic" else 1):
-            how = {"label": label, "threads": threads, "keep_body": keep_body}
-            if model == "auto":
-                result = press_auto(self, placed, forces, policy=policy, tolerance_mm=tolerance_mm, **how)
-            else:
-                result = PRESSES[model](self, placed, forces, **how)
-        return flag_buried(result, placed)
+        press = PRESSES[model] if model != "auto" else partial(press_auto, policy=policy, tolerance_mm=tolerance_mm)
+        try:
+            with threadpool_limits(limits=threads if model == "elastic" else 1):
+                return flag_buried(press(self, placed, forces, label=label, threads=threads, keep_body=keep_body), placed)
+        except ConvergenceError as error:
+            error.result = error.result and flag_buried(error.result, placed)
+            raise
 
     def press_many(self, meshes, poses=None, *, force_n, model="auto", workers=None, failures="raise", label="presses", **options):
         """Press each of `meshes` in its pose, all through the same forces; a list of `PressResult`s in their order.

@@ -6,11 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from softtact.errors import InputError
 from softtact.geometry.sensor_spec import SensorSpec
 from softtact.mechanics.mesh_settings import MeshSettings
 from softtact.mechanics.pressed_body import REGIONS, pressed_body
 from softtact.mechanics.sensor_bodies import build_sensor_body
-from softtact.pressed_mesh import of_bodies, read_vtu
+from softtact.pressed_mesh import of_bodies, of_map, read_vtu
 from softtact.reporting.section import row_under_load, section, top_surface
 
 CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
@@ -45,6 +46,19 @@ def test_the_layers_of_a_section_at_rest_have_their_areas(body):
     assert areas["cover"] == pytest.approx(6.0 * 1.5, rel=1e-6)
     assert areas["sheet"] == pytest.approx(6.0 * 0.5, rel=1e-6)
     assert areas["frusta"] == pytest.approx(5 * 0.5 * 0.5 * (0.6 + 1.2), rel=0.01)     # 0.01 mm beside the axes
+
+
+def test_cells_that_cannot_be_cut_are_told_not_left_out(body):
+    kind, nodes, layer = body.cells[0]
+    with pytest.raises(InputError, match="Cells of the kind 'tetra10' are not cut"):
+        section(replace(body, cells=[*body.cells[1:], ("tetra10", nodes[:, :10], layer)]), 0.0)
+
+
+def test_points_of_a_layer_that_is_not_there_are_told():
+    flat = of_map(np.zeros((1, 3, 3)), np.arange(3.0), np.arange(3.0), [1.0], thickness_mm=2.5)
+    assert len(flat.points_of("pressed face")) == 9
+    with pytest.raises(InputError, match="no cells of the layer 'sheet'"):
+        flat.points_of("sheet")
 
 
 def test_pressed_material_lies_where_its_displacement_takes_it(body):

@@ -6,6 +6,7 @@ import sys
 import warnings
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[2]
@@ -31,7 +32,7 @@ def test_no_press_of_the_long_run_went_wrong_unsaid(model, record):
     if model not in models:
         pytest.skip(f"benchmarks/results/random_presses.json has no {model} presses yet")
     counts = models[model]
-    said = ", ".join(f"{counts[name]} {name}" for name in ("reached", "flagged", "stopped", "refused"))
+    said = ", ".join(f"{counts[name]} {name}" for name in ("reached", "outside", "flagged", "stopped", "refused"))
     wrong = sum(counts[name] for name in WRONG)
     record(f"{model}: of {counts['presses']} random presses ({said}) those that crashed, hung or gave unflagged nonsense",
            expected=0.0, source="benchmarks/random_presses.py", got=wrong)
@@ -58,7 +59,7 @@ def test_presses_that_went_wrong_in_a_long_run_are_mended_or_flagged(benchmark, 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         found, why = benchmark.outcome(sensor, "hyperelastic", number)
-    assert found in ("reached", "flagged"), why
+    assert found in ("reached", "outside", "flagged"), why
 
 
 def test_nonsense_is_called_so(benchmark):
@@ -68,8 +69,22 @@ def test_nonsense_is_called_so(benchmark):
     sensor = benchmark.random_sensor(0, "elastic")
     mesh, pose, forces = benchmark.random_press(0, "elastic")
     good = sensor.press(mesh, pose=pose, force_n=[*forces, 5.9], model="elastic", threads=1)
-    assert benchmark.nonsense(good, sensor) == ""
-    assert "not finite" in benchmark.nonsense(replace(good, tactile_map=good.tactile_map * float("nan")), sensor)
-    assert "deeper than the object" in benchmark.nonsense(replace(good, deformation_map_mm=good.deformation_map_mm + 1), sensor)
-    assert "less depth" in benchmark.nonsense(replace(good, indentation_mm=good.indentation_mm[::-1]), sensor)
+    assert benchmark.nonsense(good, sensor) == {} and benchmark.judged(good, sensor)[0] == "reached"
+    nan = good.tactile_map * float("nan")
+    assert "numbers that are not finite" in benchmark.nonsense(replace(good, tactile_map=nan), sensor)
+    deeper = replace(good, deformation_map_mm=good.deformation_map_mm + 1)
+    assert "a map deeper than the object" in benchmark.nonsense(deeper, sensor)
+    assert "less depth at more force" in benchmark.nonsense(replace(good, indentation_mm=good.indentation_mm[::-1]), sensor)
     assert "no contact" in benchmark.nonsense(replace(good, contact_area_mm2=0 * good.contact_area_mm2), sensor)
+
+
+def test_a_fault_is_flagged_only_where_its_own_levels_are(benchmark):
+    from dataclasses import replace
+
+    sensor = benchmark.random_sensor(0, "elastic")
+    mesh, pose, forces = benchmark.random_press(0, "elastic")
+    good = sensor.press(mesh, pose=pose, force_n=[0.5, 1.0, 1.5], model="elastic", threads=1)
+    bad = replace(good, contact_area_mm2=good.contact_area_mm2 * [1, 1, 0])
+    for flags, said in (([1, 1, 1], "nonsense"), ([0, 1, 1], "nonsense"), ([1, 1, 0], "flagged"), ([0, 1, 0], "flagged")):
+        assert benchmark.judged(replace(bad, within_validity=np.array(flags)), sensor) == (said, "no contact")
+    assert benchmark.judged(replace(good, within_validity=np.array([1, 0, 1])), sensor) == ("outside", "1 of 3 levels")

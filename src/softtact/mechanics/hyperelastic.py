@@ -203,7 +203,7 @@ def _newton(body, surface, state, force, tolerance, settings):
         if residual <= tolerance:
             return state, iteration, residual
         step = body.newton_step(state, force, looks, largest_mm=settings.largest_step_mm)
-        if not np.isfinite(step.indentation):     # a free object that lost its touch on the way
+        if np.isnan(step.indentation) and not state.force > 0:     # a free object that lost its touch on the way
             state = _lowered_until_felt(body, state, settings.first_touch_mm)
             continue
         state = body.reface(state, step.planes)

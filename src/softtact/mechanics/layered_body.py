@@ -14,6 +14,9 @@ from softtact.mechanics.sheet_cells import SheetCells
 from softtact.mechanics.slab import SlabState, StepContact
 from softtact.mechanics.top_contact import FacingPlanes
 
+_DAMPINGS = 4         # steps that are tried with ever more damping of the cells that they throw too far
+_FIRST_SHIFT = 0.01   # N/mm on every free unknown of the slab, doubled until the tangent is positive definite
+
 
 @dataclass(frozen=True)
 class BodyState:
@@ -44,9 +47,6 @@ class Step:
 
     def largest(self):
         return max(np.abs(self.slab).max(), np.abs(self.bed).max(), abs(self.indentation))
-
-_DAMPINGS = 4         # steps that are tried with ever more damping of the cells that they throw too far
-_FIRST_SHIFT = 0.01   # N/mm on every free unknown of the slab, doubled until the tangent is positive definite
 
 
 def _shifts():

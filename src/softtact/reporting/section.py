@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from softtact.errors import InputError
 from softtact.mechanics.elements import hex20, hex27, wedge18
 from softtact.mechanics.pressed_body import VTK_HEX27, VTK_WEDGE18
 from softtact.pressed_mesh import LAYERS
@@ -51,8 +52,10 @@ def section(mesh, y_mm, *, parts=3):
     for kind, nodes, region in mesh.cells:
         y = mesh.points[nodes, 1]
         nodes = nodes[(y.min(axis=1) < plane) & (y.max(axis=1) > plane)]
-        if kind not in _LATTICES or not len(nodes):
+        if region == LAYERS["pressed face"] or not len(nodes):     # the face is the cover's, which is cut as a solid
             continue
+        if kind not in _LATTICES:
+            raise InputError(f"Cells of the kind {kind!r} are not cut; give a body that `Sensor.press(keep_body=True)` kept.")
         points, moved, linear, cell_type = _refined(kind, mesh.points[nodes], mesh.displacement_mm[-1, nodes], parts)
         grid = pyvista.UnstructuredGrid({cell_type: linear}, points)
         grid["displacement"] = moved

@@ -11,10 +11,10 @@ def validated(model, values, *, where):
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        raise InputError(_fault__sentence(model, first_fault(error), where=where)) from None
+        raise InputError(_fault_sentence(model, first_fault(error), where=where)) from None
 
 
-def _fault__sentence(model, fault, *, where):
+def _fault_sentence(model, fault, *, where):
     """One sentence for a fault of pydantic's."""
     *parents, last = fault["loc"] or ("",)
     section = f"{where}, at {'.'.join(map(str, parents))!r}" if parents else where

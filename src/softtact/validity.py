@@ -1,0 +1,43 @@
+"""Which levels of a press are to be relied on (`PressResult.within_validity`), and why not: docs/command_line.md lists it."""
+
+from dataclasses import replace
+
+import numpy as np
+
+_DEEPEST_LINEAR = 0.5       # of the layer's thickness: a linear layer does not know that it ends
+_HARDLY_COMPRESSED = 0.27   # of a frustum's height: below, the foundation model is within 2 % (docs/fast_models.md)
+_FULL_POCKET = 0.8          # of a frustum's height: above, its pocket is full and contacts begin that the models leave out
+_OVERLAP_LEFT = 2.0         # times the allowed overlap, or gap under pressure: above, pressing apart has failed
+_FEWEST_POINTS = 9          # of the cover that carry the object: fewer do not resolve where a spike touches, and how deep
+
+
+def valid_elastic(depth_mm, *, thickness_mm):
+    """Which levels (l,) of an elastic press hold: depth_mm (l,) is how far the object's lowest point has come down."""
+    return depth_mm < _DEEPEST_LINEAR * thickness_mm
+
+
+def valid_foundation(compression_mm, *, frustum_mm, law_limit_mm):
+    """Which levels (l,) of a foundation press hold: compression_mm (l,) of the most compressed frustum, frustum_mm high."""
+    return compression_mm < min(law_limit_mm, _HARDLY_COMPRESSED * frustum_mm)
+
+
+def valid_hyperelastic(*, compression_mm, contact_error_mm, points, depth_mm, frustum_mm, allowed_mm):
+    """Which levels (l,) of a hyperelastic press hold, by its most compressed frustum, contacts and course.
+
+    contact_error_mm (l,): deepest overlap, or widest gap under pressure, of which `allowed_mm` were asked for
+    points (l,): of the cover that carry the object
+    """
+    return ((compression_mm < _FULL_POCKET * frustum_mm) & (contact_error_mm < _OVERLAP_LEFT * allowed_mm)
+            & (points >= _FEWEST_POINTS) & _grows(depth_mm, slack_mm=allowed_mm))
+
+
+def _grows(depth, *, slack_mm):
+    """Which of the depths (l,) are not above a later one, nor below an earlier one: of two such one is another equilibrium."""
+    deepest_before, least_after = np.maximum.accumulate(depth), np.minimum.accumulate(depth[::-1])[::-1]
+    return (depth >= deepest_before - slack_mm) & (depth <= least_after + slack_mm)
+
+
+def flag_buried(result, placed):
+    """The result with the levels flagged at which the object's top has sunk below the surface at rest: no model feels that side."""
+    above = result.indentation_mm < placed.bounds[1, 2]
+    return replace(result, within_validity=result.within_validity & above.astype(np.int8))
