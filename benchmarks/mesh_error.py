@@ -1,9 +1,10 @@
 """Error of the hyperelastic press's meshes: `python benchmarks/mesh_error.py [MESH ...]`, some minutes.
 
 A sensor of 6 x 6 frusta is pressed with a flat punch, a sphere and a ridged block on each mesh and on finer ones; the error is
-the largest difference of the deformation map over the map's maximum, against the last mesh asked for. "finer cover" splits the
-production mesh's cover once more in height and towards edges, "two rings" its frusta, "fine" all elements in plan; "reference"
-splits all in plan and has more layers everywhere.
+the largest difference of the deformation map over the map's maximum, against the last mesh asked for. "edges" and "two rings" are
+the production mesh with edges split twice more and with finer frusta, "bound" has the edges and a lowest layer of the cover that
+keeps to the sheet's plan; "fine" has all three. "reference" keeps to the plan in two layers, splits all in plan and has more layers
+everywhere.
 """
 
 import sys
@@ -21,14 +22,15 @@ from softtact.sensor import Sensor
 FORCES_N = {"flat punch": [2.0, 4.0, 8.0], "sphere": [2.0, 4.0, 6.0], "ridges": [1.0, 2.0, 4.0]}
 OVERLAP_MM = 0.01       # what is pressed apart; of 1 um it takes more iterations and changes the maps by less than 1 %
 FRUSTA = (6, 6)
-FINE = {"frustum_levels": (0.0, 0.1, 0.3, 0.6, 1.0), "sheet_layers": 2, "cover_levels": (0.0, 0.25, 0.5, 0.75, 1.0)}
+MORE_LAYERS = {"frustum_levels": (0.0, 0.1, 0.3, 0.6, 1.0), "sheet_layers": 2, "cover_levels": (0.0, 0.25, 0.5, 0.75, 1.0)}
 MESHES = {
     "draft": MeshSettings.draft(),
     "production": MeshSettings(),
-    "finer cover": MeshSettings(cover_levels=FINE["cover_levels"], cover_splits=(1, 1, 2, 2)),
+    "edges": MeshSettings(cover_splits=(1, 1, 4)),
     "two rings": MeshSettings(frustum_rings=2),
+    "bound": MeshSettings(cover_splits=(1, 4)),
     "fine": MeshSettings.fine(),
-    "reference": MeshSettings(cover_splits=(1, 1, 2, 2), refinement=1, **FINE),
+    "reference": MeshSettings(cover_splits=(1, 4), refinement=1, **MORE_LAYERS),
 }
 
 

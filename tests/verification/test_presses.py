@@ -27,6 +27,7 @@ CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yam
 LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492),
         "cover": make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)}
 COARSE = MeshSettings(cover_levels=(0.0, 1.0), cover_splits=(0,), far_pitches=1, frustum_levels=(0.0, 0.35, 1.0))
+BOUND = MeshSettings(cover_levels=(0.0, 0.5, 1.0), cover_splits=(0,), far_pitches=1, frustum_levels=(0.0, 0.35, 1.0))
 TIGHT = NewtonSettings(relative_tolerance=1e-8)
 
 
@@ -36,8 +37,8 @@ def small_spec(columns, rows, *, margin=0.6):
     return CORO.model_copy(update={"footprint_mm": side, "map_shape": (4 * rows + 5, 4 * columns + 5)})
 
 
-def small_body(columns, rows):
-    return build_sensor_body(small_spec(columns, rows), dielectric_law=LAWS["dielectric"], cover_law=LAWS["cover"], mesh=COARSE)
+def small_body(columns, rows, *, mesh=COARSE):
+    return build_sensor_body(small_spec(columns, rows), dielectric_law=LAWS["dielectric"], cover_law=LAWS["cover"], mesh=mesh)
 
 
 def tilted_plate(x, y):
@@ -65,6 +66,7 @@ def folding_body():
 
 
 CASES = {"sides held": (lambda: small_body(2, 2), [0.5, 1.0, 2.0, 4.0, 8.0]),
+         "cover bound to the sheet's plan": (lambda: small_body(2, 2, mesh=BOUND), [0.5, 1.0, 2.0, 4.0]),
          "sides gliding, frusta folded": (folding_body, [0.2, 0.4, 0.8, 1.4, 2.0, 2.6, 3.2, 4.0])}
 
 

@@ -104,7 +104,8 @@ def deck_model(body, placed, *, forces_n=None, indentations_mm=None, title="pres
 def _node_sets(body, mesh, held):
     """Sets by name: nodes of each part, the plane under the cover, tips, nodes that follow others, held ones."""
     sets = {part.name: part.nodes for part in mesh.parts}
-    sets["INTERFACE"] = np.sort(mesh.slab[body.slab.cover_mesh.bottom_nodes])
+    interface = mesh.slab[body.slab.interface_nodes]
+    sets["INTERFACE"] = np.sort(interface[interface >= 0])     # a deck leaves out nodes in the middle of faces
     tips = mesh.frusta[:, body.bed.tip]
     return sets | {"TIPS": tips[tips >= 0], "TIED": np.array([tie.slave for tie in mesh.ties], dtype=int),
                    "HELD": np.unique(held[:, 0])}

@@ -9,7 +9,9 @@ from softtact.mechanics.layered_body import BodyState
 
 _DEEP = 0.55           # of a frustum's height: from here on elements of the default mesh may be unstable
 _MOST_LOWERINGS = 100  # of the first touch's depth, until a point of the cover feels the object
-_WORTH_A_PASS = 0.8    # of the overlap, to which pressing apart must have brought it to be done again
+# Pressing apart is in vain where so many passes that moved anything have not brought the overlap below this share of the least
+# before. Passes that move nothing add up: the force of a single point at an edge is below the tolerance.
+_WORTH_A_PASS, _PASSES_IN_VAIN = 0.8, 3
 
 
 @dataclass(frozen=True)
@@ -29,7 +31,7 @@ class NewtonSettings:
 
     relative_tolerance: float = 1e-4   # of a nodal force; 1e-6 changes the indentation by 2e-6 of itself
     largest_penetration_mm: float = 1e-3
-    contact_passes: int = 10
+    contact_passes: int = 20
     max_iterations: int = 40
     level_iterations: int = 300
     largest_step_mm: float = 0.12
@@ -143,15 +145,17 @@ def _failure(body, reached, force, target, residual, iterations):
 
 def _press_apart(body, surface, state, residual, force, settings):
     """The level once more with its overlaps pressed apart, as long as they are deeper than allowed and become less."""
-    iterations, before = 0, np.inf
+    iterations, spent, least, in_vain = 0, 0, np.inf, 0
     for _ in range(settings.contact_passes):
         overlap = body.contact_error(state) if state is not None else 0.0
-        if overlap <= settings.largest_penetration_mm or overlap > _WORTH_A_PASS * before:
+        in_vain = in_vain + (spent > 0) if overlap > _WORTH_A_PASS * least else 0
+        least = min(least, overlap)
+        if overlap <= settings.largest_penetration_mm or in_vain == _PASSES_IN_VAIN:
             break
         body.press_apart(state, allowed_mm=settings.largest_penetration_mm)
         start = body.let_down(_again(body, state), force)
         state, spent, residual = _settle(body, surface, start, force, _tolerance(force, settings), settings)
-        iterations, before = iterations + spent, overlap
+        iterations += spent
     return state, iterations, residual
 
 

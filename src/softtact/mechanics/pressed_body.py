@@ -30,8 +30,8 @@ class PressedBody:
 
     top (t, 8): the cover's upper faces;  pressure_mpa (t,): the object's mean pressure on each, positive in compression
 
-    The sensor's frame: z = 0 is the top at rest, a displacement towards the PCB has a negative z. The regions share no nodes: a
-    frustum's root repeats nodes of the sheet, the sheet's top repeats places of the cover, and both move alike.
+    The sensor's frame: z = 0 is the top at rest, a displacement towards the PCB has a negative z. A frustum's root repeats nodes
+    of the sheet, and the lower side of the cover's part on a grid repeats places of what is below; both move alike.
     """
 
     points_mm: np.ndarray
@@ -53,10 +53,19 @@ def pressed_body(body, state=None):
     masters, weights = body.slab.sheet_nodes
     first = np.cumsum([0, len(sheet.points), len(cover.points)])
     hexes = (frusta.hexes[None] + first[2] + (np.arange(body.bed.count) * body.bed.nodes)[:, None, None]).reshape(-1, 27)
-    cells = (Cells("hexahedron27", hexes[:, VTK_HEX27], "frusta"), Cells("hexahedron27", sheet.hexes[:, VTK_HEX27], "sheet"),
-             Cells("wedge18", sheet.wedges[:, VTK_WEDGE18], "sheet"), Cells("hexahedron20", cover.hexes + first[1], "cover"))
+    cells = (Cells("hexahedron27", hexes[:, VTK_HEX27], "frusta"), *_on_plan(body.slab),
+             Cells("hexahedron20", cover.hexes + first[1], "cover"))
     moved = np.vstack([np.einsum("pm,pmd->pd", weights, slab[masters]), cover.follow @ slab[:cover.free], bed.reshape(-1, 3)])
     pressure = body.slab.top.pressure_of_faces(state.slab) if state else np.zeros(len(cover.top))
     return PressedBody(points_mm=np.vstack([sheet.points, cover.points, body.bed.coordinates.reshape(-1, 3)]),
                        displacement_mm=moved.astype(np.float32), cells=cells, top=cover.top + first[1],
                        pressure_mpa=pressure.astype(np.float32))
+
+
+def _on_plan(slab):
+    """`Cells` of the sheet, and of the cover's layers that keep to its plan."""
+    mesh = slab.sheet_mesh
+    for region, layers in (("sheet", range(slab.sheet_layers)), ("cover", range(slab.sheet_layers, mesh.layers))):
+        for kind, order, of_layer in (("hexahedron27", VTK_HEX27, mesh.layer), ("wedge18", VTK_WEDGE18, mesh.wedge_layer)):
+            if layers:
+                yield Cells(kind, np.vstack([of_layer(k) for k in layers])[:, order], region)

@@ -14,7 +14,7 @@ REACH_MM = 1.0        # what stands higher above the object's lowest point is ta
 AROUND_MM = 0.3       # the zone under the object ends so far from it
 NEAR_MM = 2.4         # and elements have at most the pitch's size so far around
 _STEEP = 1.2          # rise over run within an element above which there is an edge in it
-_FLAT_MM = 0.02       # the underside rises less than this over a smallest element where it is flat
+_SLANTED = 0.067      # rise over run within an element above which the underside is curved, not flat
 _SAMPLES = 4          # heights along each side of the smallest element
 FAR, NEAR, FLAT, CURVED, EDGE = range(5)
 
@@ -29,7 +29,7 @@ def zones(surface, x_lines, y_lines, most):
     reached = _in_places(low, np.min) < REACH_MM
     touched = _in_places(height, np.min) < REACH_MM
     under, near = (maximum_filter(touched, 2 * int(np.ceil(far / side - 1e-9)) + 1) for far in (AROUND_MM, NEAR_MM))
-    curved, edge = reached & (rise > _FLAT_MM), reached & (rise > _STEEP * side)
+    curved, edge = reached & (rise > _SLANTED * side), reached & (rise > _STEEP * side)
     return np.max([NEAR * near, FLAT * under, CURVED * curved, EDGE * edge], axis=0)
 
 

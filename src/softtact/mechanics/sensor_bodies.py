@@ -52,9 +52,10 @@ def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), s
 
 
 def _cover_splits(mesh, surface, x_lines, y_lines, pitch):
-    """How often the cover's elements are split, layer by layer from below (layers, ny 2^m, nx 2^m), and its zones.
+    """How often the cover's uppermost layers are split, from below (layers, ny 2^m, nx 2^m), and its zones.
 
-    The sheet follows the cover's lower side, which must not be finer than the sheet: it would hang freely between its nodes.
+    What is below follows their lower side, which must not be finer: it would hang freely between the nodes. Where it lies on the
+    sheet itself it is split wherever the object presses, to follow the sheet between the frusta.
     """
     far = int(np.log2(mesh.far_pitches)) + mesh.refinement
     most = far + max(mesh.cover_splits)
@@ -62,9 +63,9 @@ def _cover_splits(mesh, surface, x_lines, y_lines, pitch):
     zone = np.full((shape[1] << most, shape[0] << most), NEAR) if surface is None else zones(surface, x_lines, y_lines, most)
     narrow = [np.round(np.log2(mesh.far_pitches * pitch / np.diff(lines))).astype(int).clip(0) for lines in (x_lines, y_lines)]
     narrow = np.maximum(*np.meshgrid(*narrow)).repeat(1 << most, axis=0).repeat(1 << most, axis=1)
-    levels = []
+    levels, on_sheet = [], mesh.bound_layers == 0
     for k, splits in enumerate(mesh.cover_splits):
-        of_zone = far + np.array([mesh.refinement - far, 0, splits if k == 0 else 0, min(splits, 1), splits])
+        of_zone = far + np.array([mesh.refinement - far, 0, splits if k == 0 and on_sheet else 0, min(splits, 1), splits])
         levels.append(levels_of(np.maximum(of_zone[zone] - narrow, 0), shape, most))
     return np.stack(levels), zone
 

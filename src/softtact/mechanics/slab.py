@@ -1,7 +1,8 @@
 """Sheet and cover as one slab over the frusta, with the contact of a rigid object on its top (`TopContact`).
 
 The sheet's elements meet the frusta's roots node by node. The cover knows nothing of the frusta, so its hexahedra may be
-coarser in plan: the sheet's upper nodes follow the cover's lower side.
+coarser in plan: the nodes of what is below follow its lower side. Where sheet and cover meet, the field still changes from
+frustum to frustum, and such a tie costs several per cent of the map; so the cover's lowest layers may keep to the sheet's plan.
 """
 
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ from softtact.mechanics.cover_mesh import cover_mesh
 from softtact.mechanics.elements import quad8
 from softtact.mechanics.hex_mesh import extrude
 from softtact.mechanics.parallel import SERIAL, unique_rows
+from softtact.mechanics.plan_location import plan_interpolation
 from softtact.mechanics.sparsity import add_upper
 from softtact.mechanics.top_contact import FacingPlanes, TopContact
 
@@ -59,12 +61,14 @@ class CellGroup:
 class Slab:
     """Sheet (its plan a `SheetPlan`) under a cover on a grid; a cover of one level is the sheet's top without a cover.
 
-    Nodes: the cover's first, then the sheet's without its top. `bottom` are the nodes under the sheet, in the plan's order.
+    sheet_mesh: the sheet (`sheet_layers`) and the cover's layers that keep to its plan;  cover_mesh: the cover's other layers
+    Nodes: cover_mesh's first, then sheet_mesh's without its top. `bottom`: those under the sheet, in the plan's order.
     """
 
     def __init__(self, sheet, cover, sheet_plan, x_lines, y_lines, *, sides, contact, coarse_walls=True, splits=None,
                  friction=None):
-        """splits (cover's layers, ny 2^m, nx 2^m): how often the cover is split where (see `cover_mesh`); None: nowhere.
+        """splits (layers, ny 2^m, nx 2^m): how often the cover's uppermost layers are split where (see `cover_mesh`); the layers
+        below these keep to the sheet's plan. None: none does, and none is split.
 
         coarse_walls: everywhere (True), nowhere (False), or where a function of places (n, 2) says so (n,)
         friction: `Coulomb` of the object on the top, or None
@@ -73,18 +77,20 @@ class Slab:
             splits = np.zeros((len(cover.levels) - 1, len(y_lines) - 1, len(x_lines) - 1), dtype=np.int64)
         self.x_lines, self.y_lines = np.asarray(x_lines), np.asarray(y_lines)
         self.layers, self.sheet_plan = (sheet, cover), sheet_plan
-        self.cover_mesh = cover_mesh(x_lines, y_lines, cover.levels, splits)
-        self.sheet_mesh = extrude(sheet_plan.plan, sheet.levels)
+        bound = len(cover.levels) - 1 - len(splits)
+        self.cover_mesh = cover_mesh(x_lines, y_lines, cover.levels[bound:], splits)
+        self.sheet_mesh = extrude(sheet_plan.plan, np.append(sheet.levels, cover.levels[1:bound + 1]))
+        self.sheet_layers = len(sheet.levels) - 1
         self._coarse_walls = coarse_walls
         self._number_nodes(sheet_plan)
         self.groups, self.cell_groups = [], []   # (nodes, block) outside of cells; a `CellGroup` for each kind of cell
         self._add_cover(cover.law)
-        self._add_sheet(sheet_plan, sheet.law)
+        self._add_sheet(sheet_plan, [sheet.law] * self.sheet_layers + [cover.law] * bound)
         self._number_unknowns(sides)
         self.top = TopContact(self.cover_mesh, contact, friction)
 
     def _number_nodes(self, plan):
-        """Masters (p, 8) and weights (p, 8) of the sheet's nodes: its top follows the cover, the rest its own unknowns.
+        """Masters (p, 8) and weights (p, 8) of sheet_mesh's nodes: its top follows the cover, the rest its own unknowns.
 
         Along the walls between cells, two elements a side, the sheet moves as one quadratic curve: the nodes at the quarters
         follow the corner, the middle and the next corner. (Free quarters: half as many unknowns again, and 1 % softer.)
@@ -140,18 +146,18 @@ class Slab:
             hanging = mesh.hexes[~alone]
             self.groups.append(_of_masters(*mesh.masters(), hanging, HexBlock(mesh.points[hanging], law, points_per_side=2)))
 
-    def _add_sheet(self, plan, law):
-        """Like elements (nodes, block): those of the strips around, and those of each kind of cell, cell by cell."""
+    def _add_sheet(self, plan, laws):
+        """Like elements (nodes, block): those of the strips around, and those of each kind of cell, cell by cell; a law a layer."""
         mesh, cells = self.sheet_mesh, len(plan.roots)
         in_cells = cells * plan.cell_quads
-        layers = [(mesh.layer(k), mesh.wedge_layer(k)) for k in range(mesh.layers)]
-        self.groups += [self._following(hexes[in_cells:], HexBlock, law) for hexes, _ in layers if len(hexes) > in_cells]
+        layers = [(mesh.layer(k), mesh.wedge_layer(k), law) for k, law in enumerate(laws)]
+        self.groups += [self._following(hexes[in_cells:], HexBlock, law) for hexes, _, law in layers if len(hexes) > in_cells]
         if not cells:
             return
-        pieces = [(hexes[:in_cells].reshape(cells, -1, 27), HexBlock) for hexes, _ in layers]
-        pieces += [(wedges.reshape(cells, -1, 18), WedgeBlock) for _, wedges in layers if len(wedges)]
-        for same in self._like_cells(np.hstack([elements.reshape(cells, -1) for elements, _ in pieces])):
-            parts = [self._following(elements[same].reshape(-1, elements.shape[2]), make, law) for elements, make in pieces]
+        pieces = [(hexes[:in_cells].reshape(cells, -1, 27), HexBlock, law) for hexes, _, law in layers]
+        pieces += [(wedges.reshape(cells, -1, 18), WedgeBlock, law) for _, wedges, law in layers if len(wedges)]
+        for same in self._like_cells(np.hstack([elements.reshape(cells, -1) for elements, _, _ in pieces])):
+            parts = [self._following(elements[same].reshape(-1, elements.shape[2]), make, law) for elements, make, law in pieces]
             self.cell_groups.append(CellGroup(same, parts))
 
     def _following(self, elements, make, law):
@@ -297,9 +303,23 @@ class Slab:
 
     def sampling(self, points):
         """Sparse matrix (p, nodes) that interpolates a nodal field of the plane between sheet and cover at points (p, 2)."""
-        at = self._under_cover(points)
-        at.resize(len(points), self.nodes)
-        return at
+        if self.sheet_layers == self.sheet_mesh.layers:
+            at = self._under_cover(points)
+            at.resize(len(points), self.nodes)
+            return at
+        plane = self.sheet_mesh.planes[self.sheet_layers]
+        masters, weights = self._masters[plane], self._weights[plane]
+        rows = np.repeat(np.arange(len(plane)), masters.shape[1])
+        own = sp.csr_matrix((weights.ravel(), (rows, masters.ravel())), shape=(len(plane), self.nodes))
+        return _without_zeros(plan_interpolation(self.sheet_plan.plan, points) @ own)
+
+    @property
+    def interface_nodes(self):
+        """Free nodes (n,) of the plane between sheet and cover."""
+        if self.sheet_layers == self.sheet_mesh.layers:
+            return self.cover_mesh.bottom_nodes
+        plane = self.sheet_mesh.planes[self.sheet_layers]
+        return np.unique(self._masters[plane][np.abs(self._weights[plane]) > 1e-12])
 
 
 class StepContact:

@@ -175,8 +175,9 @@ class Mesh(Section):
     sheet_layers: PositiveInt | None = None
     cover_levels: Annotated[list[float], AfterValidator(_rising)] | None = Field(
         None, description="heights of the cover's layers of elements, from 0 to 1")
-    cover_splits: list[Annotated[int, Field(ge=0, le=4)]] | None = Field(
-        None, description="how often each of these layers' elements, a pitch wide, are split under the object and at its edges")
+    cover_splits: list[Annotated[int, Field(ge=0, le=5)]] | None = Field(
+        None, description="how often the elements, a pitch wide, of the uppermost of these layers are split under the object and "
+                          "at its edges; layers below, without a number here, keep to the sheet's plan")
     far_pitches: Literal[1, 2, 4] | None = Field(None, description="pitches that an element of the cover spans far from the object")
     frustum_levels: Annotated[list[float], AfterValidator(_rising)] | None = Field(
         None, description="heights of a frustum's layers of elements, from 0 to 1")
