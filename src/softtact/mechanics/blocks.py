@@ -177,3 +177,22 @@ class WedgeBlock(SolidBlock):
         first, shapes = _unlike(coordinates)
         gradients, volumes = reference_gradients(coordinates[first], wedge18(points)[1], weights)
         super().__init__(gradients, volumes, points, law, shapes=shapes, **options)
+
+
+def of_masters(masters, weights, elements, block):
+    """Nodes (e, w) that elements (e, m) hang on, and the block in terms of these."""
+    masters, weights = masters[elements], weights[elements]
+    used = np.abs(weights) > 1e-12
+    needed = [np.unique(m[u]) for m, u in zip(masters, used, strict=True)]
+    width = max(map(len, needed))
+    nodes = np.stack([np.pad(n, (0, width - len(n)), mode="edge") for n in needed])
+    follow = np.zeros((*elements.shape, width))
+    for e, unique in enumerate(needed):
+        rows, columns = np.nonzero(used[e])
+        np.add.at(follow[e], (rows, np.searchsorted(unique, masters[e][rows, columns])), weights[e][rows, columns])
+    table = np.hstack([block.shapes[:, None], follow.reshape(len(follow), -1)])
+    first, block.shapes = unique_rows(table)
+    own = table[first, 0].astype(int)
+    block.gradients = np.ascontiguousarray(np.einsum("egmd,emw->egwd", block.gradients[own], follow[first], optimize=True))
+    block.volumes, block.gram_inverse = block.volumes[own], block.gram_inverse[own]
+    return nodes, block

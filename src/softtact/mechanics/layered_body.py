@@ -11,7 +11,8 @@ from softtact.mechanics.frustum_bed import BedState
 from softtact.mechanics.linear_solvers import make_solver
 from softtact.mechanics.parallel import Workers
 from softtact.mechanics.sheet_cells import SheetCells
-from softtact.mechanics.slab import SlabState, StepContact
+from softtact.mechanics.slab import SlabState
+from softtact.mechanics.step_contact import StepContact
 from softtact.mechanics.top_contact import FacingPlanes
 
 _DAMPINGS = 4         # steps that are tried with ever more damping of the cells that they throw too far

@@ -10,17 +10,16 @@ from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 
 from softtact.contact.friction import Drag
-from softtact.mechanics.blocks import HexBlock, WedgeBlock
+from softtact.mechanics.blocks import HexBlock, WedgeBlock, of_masters
 from softtact.mechanics.contact_step import LinearGaps
 from softtact.mechanics.cover_mesh import cover_mesh
 from softtact.mechanics.elements import quad8
 from softtact.mechanics.hex_mesh import extrude
-from softtact.mechanics.parallel import SERIAL, unique_rows
+from softtact.mechanics.parallel import SERIAL
 from softtact.mechanics.plan_location import plan_interpolation
-from softtact.mechanics.sparsity import add_upper
+from softtact.mechanics.sparsity import add_upper, upper_pattern, upper_positions
 from softtact.mechanics.top_contact import FacingPlanes, TopContact
 
 
@@ -144,7 +143,7 @@ class Slab:
         self.groups.append((mesh.hexes[alone], block))
         if not alone.all():
             hanging = mesh.hexes[~alone]
-            self.groups.append(_of_masters(*mesh.masters(), hanging, HexBlock(mesh.points[hanging], law, points_per_side=2)))
+            self.groups.append(of_masters(*mesh.masters(), hanging, HexBlock(mesh.points[hanging], law, points_per_side=2)))
 
     def _add_sheet(self, plan, laws):
         """Like elements (nodes, block): those of the strips around, and those of each kind of cell, cell by cell; a law a layer."""
@@ -161,7 +160,7 @@ class Slab:
             self.cell_groups.append(CellGroup(same, parts))
 
     def _following(self, elements, make, law):
-        return _of_masters(self._masters, self._weights, elements, make(self.sheet_mesh.points[elements], law))
+        return of_masters(self._masters, self._weights, elements, make(self.sheet_mesh.points[elements], law))
 
     def _like_cells(self, nodes):
         """Numbers of like cells, kind by kind, of cells with nodes (c, k): those whose nodes follow others in the same way."""
@@ -230,9 +229,9 @@ class Slab:
         *groups, top = [(3 * nodes[..., None] + np.arange(3)).reshape(len(nodes), -1)
                         for nodes in [*(nodes for nodes, _ in self.groups), self.top.faces]]
         members, self._top_dofs = [number[dofs] for dofs in [*groups, *cells]], number[top]
-        indptr, indices = _upper_pattern([*members, self._top_dofs], len(keep))
-        self._positions = [_upper_positions(indptr, indices, dofs) for dofs in members]
-        self._top_positions = _upper_positions(indptr, indices, self._top_dofs)
+        indptr, indices = upper_pattern([*members, self._top_dofs], len(keep))
+        self._positions = [upper_positions(indptr, indices, dofs) for dofs in members]
+        self._top_positions = upper_positions(indptr, indices, self._top_dofs)
         self._matrix, self._pressed = (sp.csr_matrix((np.zeros(len(indices)), indices, indptr), shape=(len(keep),) * 2)
                                        for _ in range(2))
 
@@ -322,33 +321,6 @@ class Slab:
         return np.unique(self._masters[plane][np.abs(self._weights[plane]) > 1e-12])
 
 
-class StepContact:
-    """The object's contact in the course of a step from a `SlabState`; `planes` and `points` are what it is at present.
-
-    surface: looked up anew where the step leads; None: the points keep the planes that they face
-    """
-
-    def __init__(self, slab, state, indentation, surface=None):
-        self._slab, self._state, self._indentation, self._surface = slab, state, indentation, surface
-        self._face(state.planes)
-
-    def _face(self, planes):
-        self.planes, self.points = planes, self._slab.linear_gaps(self._state.displacement, planes, self._indentation)
-
-    def pressed(self, rubber, stiffness):
-        """The rubber's tangent with points of a stiffness (p,) in N/mm."""
-        return self._slab.pressed(rubber, stiffness, self.planes)
-
-    def follow(self, step, lowering):
-        """Look up what the points face after a step (unknowns,) in mm of the slab; True if there is a surface to ask."""
-        if self._surface is None:
-            return False
-        displacement = self._state.displacement.copy()
-        displacement.ravel()[self._slab.unknowns] += step
-        self._face(self._slab.facing(displacement, self._surface))
-        return True
-
-
 def _place(value, lines, fine):
     """Which interval of lines, each cut into `fine` equal parts, values (p,) lie in."""
     grid = np.interp(np.arange(fine * (len(lines) - 1) + 1), fine * np.arange(len(lines)), lines)
@@ -359,60 +331,3 @@ def _without_zeros(matrix):
     matrix.data[np.abs(matrix.data) < 1e-12] = 0.0
     matrix.eliminate_zeros()
     return matrix.tocsr()
-
-
-def _of_masters(masters, weights, elements, block):
-    """Nodes (e, w) that elements (e, m) hang on, and the block in terms of these."""
-    masters, weights = masters[elements], weights[elements]
-    used = np.abs(weights) > 1e-12
-    needed = [np.unique(m[u]) for m, u in zip(masters, used, strict=True)]
-    width = max(map(len, needed))
-    nodes = np.stack([np.pad(n, (0, width - len(n)), mode="edge") for n in needed])
-    follow = np.zeros((*elements.shape, width))
-    for e, unique in enumerate(needed):
-        rows, columns = np.nonzero(used[e])
-        np.add.at(follow[e], (rows, np.searchsorted(unique, masters[e][rows, columns])), weights[e][rows, columns])
-    table = np.hstack([block.shapes[:, None], follow.reshape(len(follow), -1)])
-    first, block.shapes = unique_rows(table)
-    own = table[first, 0].astype(int)
-    block.gradients = np.ascontiguousarray(np.einsum("egmd,emw->egwd", block.gradients[own], follow[first], optimize=True))
-    block.volumes, block.gram_inverse = block.volumes[own], block.gram_inverse[own]
-    return nodes, block
-
-
-def _upper_pattern(members, size):
-    """indptr, indices of the upper triangle of all unknowns that meet in an element; members (e, k), -1 where held."""
-    pattern = sp.csr_matrix((size, size), dtype=bool)
-    for dofs in members:
-        here = dofs >= 0
-        rows = np.repeat(np.arange(len(dofs)), dofs.shape[1]).reshape(dofs.shape)[here]
-        incidence = sp.csr_matrix((np.ones(len(rows), dtype=bool), (rows, dofs[here])), shape=(len(dofs), size))
-        pattern = pattern + sp.triu(incidence.T @ incidence, format="csr")
-    pattern.sort_indices()
-    return pattern.indptr, pattern.indices
-
-
-@njit(cache=True, nogil=True)
-def _upper_positions(indptr, indices, dofs):
-    """Places (e, k (k + 1) / 2) in the values of the upper triangle for entries (i, j >= i) of matrices of unknowns (e, k).
-
-    -1 where one is held.
-    """
-    elements, size = dofs.shape
-    out = np.full((elements, size * (size + 1) // 2), -1, np.int32)
-    for e in range(elements):
-        n = -1
-        for i in range(size):
-            for j in range(i, size):
-                n += 1
-                row, column = min(dofs[e, i], dofs[e, j]), max(dofs[e, i], dofs[e, j])
-                if row >= 0:
-                    low, high = indptr[row], indptr[row + 1]
-                    while high - low > 1:
-                        middle = (low + high) // 2
-                        if indices[middle] <= column:
-                            low = middle
-                        else:
-                            high = middle
-                    out[e, n] = low
-    return out

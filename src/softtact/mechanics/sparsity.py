@@ -177,3 +177,41 @@ def add_upper(values, matrices, positions):
                 if place >= 0:
                     values[place] += matrices[e, i, j]
                 n += 1
+
+
+def upper_pattern(members, size):
+    """indptr, indices of the upper triangle of all unknowns that meet in an element; members (e, k), -1 where held."""
+    pattern = sp.csr_matrix((size, size), dtype=bool)
+    for dofs in members:
+        here = dofs >= 0
+        rows = np.repeat(np.arange(len(dofs)), dofs.shape[1]).reshape(dofs.shape)[here]
+        incidence = sp.csr_matrix((np.ones(len(rows), dtype=bool), (rows, dofs[here])), shape=(len(dofs), size))
+        pattern = pattern + sp.triu(incidence.T @ incidence, format="csr")
+    pattern.sort_indices()
+    return pattern.indptr, pattern.indices
+
+
+@njit(cache=True, nogil=True)
+def upper_positions(indptr, indices, dofs):
+    """Places (e, k (k + 1) / 2) in the values of the upper triangle for entries (i, j >= i) of matrices of unknowns (e, k).
+
+    -1 where one is held.
+    """
+    elements, size = dofs.shape
+    out = np.full((elements, size * (size + 1) // 2), -1, np.int32)
+    for e in range(elements):
+        n = -1
+        for i in range(size):
+            for j in range(i, size):
+                n += 1
+                row, column = min(dofs[e, i], dofs[e, j]), max(dofs[e, i], dofs[e, j])
+                if row >= 0:
+                    low, high = indptr[row], indptr[row + 1]
+                    while high - low > 1:
+                        middle = (low + high) // 2
+                        if indices[middle] <= column:
+                            low = middle
+                        else:
+                            high = middle
+                    out[e, n] = low
+    return out

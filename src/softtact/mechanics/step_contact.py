@@ -1,0 +1,28 @@
+"""The object's contact with a slab as a step of Newton's method sees it."""
+
+
+class StepContact:
+    """The object's contact in the course of a step from a `SlabState`; `planes` and `points` are what it is at present.
+
+    surface: looked up anew where the step leads; None: the points keep the planes that they face
+    """
+
+    def __init__(self, slab, state, indentation, surface=None):
+        self._slab, self._state, self._indentation, self._surface = slab, state, indentation, surface
+        self._face(state.planes)
+
+    def _face(self, planes):
+        self.planes, self.points = planes, self._slab.linear_gaps(self._state.displacement, planes, self._indentation)
+
+    def pressed(self, rubber, stiffness):
+        """The rubber's tangent with points of a stiffness (p,) in N/mm."""
+        return self._slab.pressed(rubber, stiffness, self.planes)
+
+    def follow(self, step, lowering):
+        """Look up what the points face after a step (unknowns,) in mm of the slab; True if there is a surface to ask."""
+        if self._surface is None:
+            return False
+        displacement = self._state.displacement.copy()
+        displacement.ravel()[self._slab.unknowns] += step
+        self._face(self._slab.facing(displacement, self._surface))
+        return True

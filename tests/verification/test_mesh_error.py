@@ -1,0 +1,54 @@
+"""How far the map on each mesh is from that on a much finer one: a small press here, the long comparison from its record."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from softtact.geometry.sensor_spec import SensorSpec
+from softtact.materials.laws.registry import make_law
+from softtact.mechanics.hyperelastic import NewtonSettings
+from softtact.mechanics.mesh_settings import MeshSettings
+from softtact.sensor import Sensor
+
+ROOT = Path(__file__).parents[2]
+CORO = SensorSpec.from_yaml(ROOT / "config/sensors/coro.yaml")
+SMALL = CORO.model_copy(update={"footprint_mm": (3.6, 3.6), "map_shape": (13, 13)})      # 3 x 3 frusta, a map as dense as theirs
+LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492),
+        "cover": make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)}
+# No share with the fine mesh: elements split in plan, twice as many layers, two of the cover's bound, edges split five times.
+FINER = MeshSettings(refinement=1, frustum_levels=(0.0, 0.1, 0.3, 0.6, 1.0), cover_levels=(0.0, 0.25, 0.5, 0.75, 1.0),
+                     cover_splits=(1, 4))
+LARGEST_PERCENT = {"fine": 2.5, "production": 10.0, "draft": 12.0}     # what the README promises
+
+
+def map_under_a_punch(mesh):
+    """At 1 N, under a flat punch of 1.2 mm radius."""
+    punch = trimesh.creation.cylinder(radius=1.2, height=2, sections=96)
+    sensor = Sensor(SMALL, LAWS, mesh=mesh, solver=NewtonSettings(largest_penetration_mm=0.01))
+    return sensor.press(punch, force_n=1.0, model="hyperelastic").deformation_map_mm[0]
+
+
+@pytest.mark.slow
+def test_the_fine_mesh_is_near_to_a_finer_one_and_the_default_less(record):
+    finer = map_under_a_punch(FINER)
+    error = {name: 100 * np.abs(map_under_a_punch(mesh) - finer).max() / finer.max()
+             for name, mesh in (("fine", MeshSettings.fine()), ("default", MeshSettings()))}
+    for name, got in error.items():
+        record(f"3 x 3 frusta, flat punch, 1 N: largest error of the map on the {name} mesh, % of its maximum", expected=0.0,
+               source="a mesh split everywhere", got=got)
+    assert error["fine"] < LARGEST_PERCENT["fine"] < error["default"]
+
+
+@pytest.mark.parametrize("mesh", LARGEST_PERCENT)
+def test_the_errors_of_the_long_comparison_are_what_is_promised(mesh, record):
+    """The last run of `python benchmarks/mesh_error.py`, which is too long for a test."""
+    kept = json.loads((ROOT / "benchmarks/results/mesh_error.json").read_text(encoding="utf-8"))
+    rows = [row for row in kept["rows"] if row["mesh"] == mesh]
+    assert {row["object"] for row in rows} == {"flat punch", "sphere", "ridges"} and kept["against"] == "reference"
+    worst = max(max(row["largest_error_percent"]) for row in rows)
+    record(f"36 frusta, three objects, three levels: largest error of the map on the {mesh} mesh, % of its maximum", expected=0.0,
+           source="benchmarks/mesh_error.py", got=worst)
+    assert 0.5 < worst < LARGEST_PERCENT[mesh]
