@@ -50,6 +50,13 @@ def test_homogeneous_strain_is_in_balance_where_sheet_and_cover_share_nodes_and_
     assert tied == tied_anywhere > 1e-3 * largest
 
 
+def test_the_bound_layer_is_of_the_covers_rubber():
+    cover_law = make_law("neo_hooke", {"c10": 0.2}, bulk_modulus=8.0)
+    slab = build_sensor_body(SMALL, dielectric_law=LAW, cover_law=cover_law, mesh=BOUND).slab
+    volumes = {law: sum(block.volume for _, block in slab.solids if block.law is law) for law in (LAW, cover_law)}
+    assert list(volumes.values()) == pytest.approx([36 * 0.5, 36 * 1.5], rel=1e-9)
+
+
 @pytest.fixture(scope="module")
 def press():
     return Sensor(SMALL, {"dielectric": LAW, "cover": LAW}, mesh=BOUND).press(PUNCH, force_n=[1.0, 3.0], model="hyperelastic",
