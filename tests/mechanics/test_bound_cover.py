@@ -9,10 +9,12 @@ from scipy.spatial import cKDTree
 
 from softtact.contact.height_field import HeightField
 from softtact.decks.mesh import body_mesh
+from softtact.errors import InputError
 from softtact.geometry.meshes import place
 from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.laws.registry import make_law
 from softtact.mechanics.hyperelastic import NewtonSettings, _press_apart
+from softtact.mechanics.layered_mesh import mesh_settings
 from softtact.mechanics.mesh_settings import MeshSettings
 from softtact.mechanics.pressed_body import pressed_body
 from softtact.mechanics.sensor_bodies import build_sensor_body
@@ -113,7 +115,7 @@ def test_parts_of_body_and_deck_are_those_of_the_layers():
     assert np.count_nonzero(interface < 0) == 5 * 25      # middles of the five bricks' faces in each cell
 
 
-@pytest.mark.parametrize(("splits", "bound"), [((1, 1, 2), 0), ((1, 4), 1), ((3,), 2)])
+@pytest.mark.parametrize(("splits", "bound"), [((1, 1, 2), 0), ((1, 4), 1), ((1,), 2)])
 def test_layers_without_a_number_of_splits_are_bound(splits, bound):
     assert MeshSettings(cover_splits=splits).bound_layers == bound
 
@@ -122,6 +124,12 @@ def test_layers_without_a_number_of_splits_are_bound(splits, bound):
 def test_splits_for_no_layer_or_too_many_are_refused(splits):
     with pytest.raises(ValueError, match="cover_splits has . entries for the 3 layers"):
         MeshSettings(cover_splits=splits)
+
+
+@pytest.mark.parametrize("splits", [(2, 1, 2), (3,)])
+def test_a_lowest_layer_that_would_hang_freely_is_refused(splits):
+    with pytest.raises(InputError, match=f"mesh: cover_splits begins with {splits[0]}; give 0 or 1"):
+        mesh_settings({"cover_splits": list(splits)})
 
 
 class Overlapping:

@@ -125,9 +125,9 @@ def _numbers_in_use(members, count):
 
 def _parts(body, sheet, cover, frusta):
     slab, bed = body.slab, body.bed
-    none, share = np.zeros((0, 15), dtype=np.int64), slab.sheet_layers / slab.sheet_mesh.layers
-    (hexes, more_hexes), (wedges, more_wedges) = (np.split(sheet[kind], [round(share * len(kind))])     # the cover's are above
-                                                  for kind in (_hexes(slab.sheet_mesh), _wedges(slab.sheet_mesh)))
+    none, mesh = np.zeros((0, 15), dtype=np.int64), slab.sheet_mesh
+    (hexes, more_hexes), (wedges, more_wedges) = (np.split(sheet[kind], [len(kind) // mesh.layers * slab.sheet_layers])
+                                                  for kind in (_hexes(mesh), _wedges(mesh)))     # the cover's are above
     pieces = [("SHEET", hexes, wedges, slab.layers[0].law),
               ("COVER", np.vstack([more_hexes, cover]), more_wedges, slab.layers[1].law),
               ("FRUSTA", frusta[:, _hexes(bed.mesh)].reshape(-1, 20), none, bed.block.law)]

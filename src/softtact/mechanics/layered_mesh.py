@@ -26,7 +26,7 @@ def mesh_settings(values):
     try:
         return MeshSettings(**{key: tuple(value) if isinstance(value, list) else value for key, value in own.items()})
     except ValueError as problem:
-        raise InputError(f"mesh: {problem}; give one number for each layer.") from None
+        raise InputError(f"mesh: {problem}.") from None
 
 
 def newton_settings(values):

@@ -40,7 +40,10 @@ class MeshSettings:
     def __post_init__(self):
         if not 1 <= len(self.cover_splits) <= len(self.cover_levels) - 1:
             raise ValueError(f"cover_splits has {len(self.cover_splits)} entries for the {len(self.cover_levels) - 1} layers of "
-                             "cover_levels, of which it tells the uppermost ones")
+                             "cover_levels; give a number for each, or for the uppermost ones")
+        if self.cover_splits[0] > 1:
+            raise ValueError(f"cover_splits begins with {self.cover_splits[0]}; give 0 or 1, for a layer finer than what is below "
+                             "hangs freely there, and the map is wrong by up to a third")
 
     @property
     def bound_layers(self):

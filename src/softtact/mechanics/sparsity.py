@@ -136,6 +136,18 @@ def _expand(number, counts, starts, neighbours):
 
 
 @njit(cache=True, nogil=True)
+def _place_of(value, low, high, wanted):
+    """Where in the rising values from low to high the wanted one stands."""
+    while high - low > 1:
+        middle = (low + high) // 2
+        if value[middle] <= wanted:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@njit(cache=True, nogil=True)
 def _positions(nodes, number, rank, starts, neighbours, before, indptr):
     elements, m = nodes.shape
     k = 3 * m
@@ -144,13 +156,7 @@ def _positions(nodes, number, rank, starts, neighbours, before, indptr):
         for p in range(m):
             for q in range(p, m):
                 a, b = min(nodes[e, p], nodes[e, q]), max(nodes[e, p], nodes[e, q])
-                low, high = starts[a], starts[a + 1]
-                while high - low > 1:
-                    middle = (low + high) // 2
-                    if neighbours[middle] <= b:
-                        low = middle
-                    else:
-                        high = middle
+                low = _place_of(neighbours, starts[a], starts[a + 1], b)
                 for i in range(3):
                     row = 3 * p + i
                     for j in range(i if p == q else 0, 3):
@@ -206,12 +212,5 @@ def upper_positions(indptr, indices, dofs):
                 n += 1
                 row, column = min(dofs[e, i], dofs[e, j]), max(dofs[e, i], dofs[e, j])
                 if row >= 0:
-                    low, high = indptr[row], indptr[row + 1]
-                    while high - low > 1:
-                        middle = (low + high) // 2
-                        if indices[middle] <= column:
-                            low = middle
-                        else:
-                            high = middle
-                    out[e, n] = low
+                    out[e, n] = _place_of(indices, indptr[row], indptr[row + 1], column)
     return out
