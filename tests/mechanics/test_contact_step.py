@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from softtact.contact.penalty import Contact, penalty
 from softtact.mechanics import contact_step
 from softtact.mechanics.contact_step import ContactStepper, LinearGaps
-from softtact.mechanics.sparsity import symmetric_product
+from softtact.mechanics.sparsity import SymmetricProduct
 
 UNKNOWNS, POINTS = 12, 8
 CONTACT = Contact(stiffness=3000.0, smoothing=1 / 3000)
@@ -54,6 +54,9 @@ class Scene:
 
     def pressed(self, rubber, slope):
         return rubber + sp.csr_matrix(np.triu(self.rows.T @ (slope[:, None] * self.rows)))
+
+    def rubber_forces(self, rubber, step):
+        return SymmetricProduct(rubber.indptr, rubber.indices)(rubber.data, step)
 
     def follow(self, step, lowering):
         """The object is plain: the points always face the same."""
@@ -150,11 +153,17 @@ def test_a_body_that_is_not_stable_has_no_step():
     assert scene.step(ContactStepper(DenseSolver())) is None
 
 
-def test_a_symmetric_matrix_times_a_vector_is_found_from_its_upper_triangle():
+@pytest.mark.parametrize("components", [1, 2, 3, 4])
+def test_a_symmetric_matrix_times_a_vector_is_found_from_its_upper_triangle(components):
+    """Nodes of three components have three rows of the same columns; the last node here is held along its last component."""
     rng = np.random.default_rng(7)
-    half = sp.random(60, 60, density=0.1, rng=rng) + sp.eye(60)
-    whole, x = (half + half.T).tocsr(), rng.normal(size=60)
-    np.testing.assert_allclose(symmetric_product(sp.triu(whole).tocsr(), x), whole @ x, rtol=1e-13, atol=1e-13)
+    graph = sp.random(20, 20, density=0.1, rng=rng) + sp.eye(20)
+    half = sp.kron(graph, np.ones((components, components))).tocsr()[:-1, :-1]
+    half.data = rng.normal(size=half.nnz)
+    whole, x = (half + half.T).tocsr(), rng.normal(size=half.shape[0])
+    upper = sp.triu(whole, format="csr")
+    upper.sort_indices()
+    np.testing.assert_allclose(SymmetricProduct(upper.indptr, upper.indices)(upper.data, x), whole @ x, rtol=1e-13, atol=1e-13)
 
 
 class SlidingScene(Scene):

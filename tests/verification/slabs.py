@@ -61,7 +61,7 @@ class HeldSlab:
         self.slab = Slab(*layers, _without_frusta(x, y), x, y, sides=sides,
                          contact=Contact(stiffness=stiffness, smoothing=smoothing))
         self._hold_the_base()
-        self.slab.build_pattern(np.zeros(0, dtype=int), [])
+        self.slab.build_pattern(np.zeros(0, dtype=int), [], precision=np.float64)     # whole Newton steps to the last digit
 
     def _hold_the_base(self):
         slab = self.slab

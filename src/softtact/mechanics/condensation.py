@@ -34,12 +34,14 @@ class Condensation:
     """Bodies of n inner and m outer unknowns; `outer` (bodies, m, m) are their condensed matrices.
 
     element_dofs: for each group of like elements the places (k, w) of their unknowns in a body's matrix, -1 where held.
+    All in single precision: it serves steps that are corrected by a residual in double precision.
     """
 
     def __init__(self, bodies, inner, outer, element_dofs):
         self._dofs = tuple(np.ascontiguousarray(dofs) for dofs in element_dofs)
-        self._rows = np.zeros((bodies, inner, inner + outer))   # factor L' and the coupling L^-1 K_inner,outer side by side
-        self.outer = np.zeros((bodies, outer, outer))
+        # The factor L' and the coupling L^-1 K_inner,outer side by side.
+        self._rows = np.zeros((bodies, inner, inner + outer), dtype=np.float32)
+        self.outer = np.zeros((bodies, outer, outer), dtype=np.float32)
         self._modified = np.zeros(bodies, dtype=bool)
 
     def set(self, bodies, tangents, springs=None, *, damping=None):
@@ -60,15 +62,16 @@ class Condensation:
 
     def residual(self, inner):
         """What the inner residuals (bodies, n) leave on the outer unknowns (bodies, m), and the part to keep for `recover`."""
-        half = np.array(inner, order="C")
-        passed_on = np.empty(self.outer.shape[:2])
+        half = np.array(inner, dtype=np.float32, order="C")
+        passed_on = np.empty(self.outer.shape[:2], dtype=np.float32)
         _reduce(self._rows, half, passed_on, lapack.LETTERS, lapack.FACTORS, lapack.TRSV, lapack.GEMV)
         return passed_on, half
 
     def recover(self, half, outer_step):
         """Newton step (bodies, n) of the inner unknowns for that of the outer ones (bodies, m)."""
-        step = half.copy()
-        _recover(self._rows, step, np.ascontiguousarray(outer_step), lapack.LETTERS, lapack.FACTORS, lapack.TRSV, lapack.GEMV)
+        step = half.astype(np.float32)     # a copy; a half that was cut is in double precision
+        _recover(self._rows, step, np.ascontiguousarray(outer_step, dtype=np.float32), lapack.LETTERS, lapack.FACTORS, lapack.TRSV,
+                 lapack.GEMV)
         return -step
 
     def positive_outer(self):
@@ -86,7 +89,7 @@ class Condensation:
 def _set(bodies, damping, tangents, dofs, stiffness, places, weights, rows, outer, modified, smallest, letters, factors, potrf,
          trsm, syrk):
     n, m = rows.shape[1], outer.shape[1]
-    matrix = np.empty((n + m, n + m))
+    matrix = np.empty((n + m, n + m), np.float32)
     for b in range(len(bodies)):
         for i in range(n + m):
             matrix[i, i:] = 0.0
@@ -129,14 +132,14 @@ def _condense(matrix, rows, outer, smallest, letters, factors, potrf, trsm, syrk
     """Fill a body's rows and outer matrix; True where its inner matrix was not positive definite."""
     n, m = len(rows), len(outer)
     size = np.array([n, m, n + m, 0], dtype=np.int32)
-    (L, N, R, T), (one, minus_one, _, _) = _addresses(letters, 1), _addresses(factors, 8)
+    (L, N, R, T), (one, minus_one, _, _) = _addresses(letters, 1), _addresses(factors, 4)
     _n, _m, _lead, info = _addresses(size, 4)
     rows[:] = matrix[:n]
     outer[:] = matrix[n:, n:]
     potrf(L, _n, rows.ctypes.data, _lead, info)
     modified = size[3] != 0
     if modified:
-        rows[:, :n] = _made_positive(matrix[:n, :n].copy(), smallest)
+        rows[:, :n] = _made_positive(matrix[:n, :n].astype(np.float64), smallest)
         potrf(L, _n, rows.ctypes.data, _lead, info)
     coupling = rows[:, n:].ctypes.data
     trsm(R, L, T, N, _m, _n, one, rows.ctypes.data, _lead, coupling, _lead)
@@ -153,14 +156,14 @@ def _made_positive(matrix, smallest):
         for j in range(i):
             matrix[i, j] = matrix[j, i]
     values, vectors = np.linalg.eigh(matrix)
-    return (vectors * np.maximum(np.abs(values), smallest)) @ vectors.T
+    return ((vectors * np.maximum(np.abs(values), smallest)) @ vectors.T).astype(np.float32)
 
 
 @njit(cache=True, nogil=True)
 def _reduce(rows, half, passed_on, letters, factors, trsv, gemv):
     n, m = rows.shape[1], passed_on.shape[1]
     size = np.array([n, m, n + m, 1], dtype=np.int32)
-    (L, N, _, _), (_, minus_one, zero, _) = _addresses(letters, 1), _addresses(factors, 8)
+    (L, N, _, _), (_, minus_one, zero, _) = _addresses(letters, 1), _addresses(factors, 4)
     _n, _m, _lead, _one = _addresses(size, 4)
     for body in range(len(rows)):
         A, h = rows[body], half[body].ctypes.data
@@ -173,7 +176,7 @@ def _reduce(rows, half, passed_on, letters, factors, trsv, gemv):
 def _recover(rows, step, outer_step, letters, factors, trsv, gemv):
     n, m = rows.shape[1], outer_step.shape[1]
     size = np.array([n, m, n + m, 1], dtype=np.int32)
-    (L, N, _, T), (one, _, _, _) = _addresses(letters, 1), _addresses(factors, 8)
+    (L, N, _, T), (one, _, _, _) = _addresses(letters, 1), _addresses(factors, 4)
     _n, _m, _lead, _one = _addresses(size, 4)
     for body in range(len(rows)):
         A, s = rows[body], step[body].ctypes.data

@@ -11,8 +11,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from softtact.mechanics.sparsity import symmetric_product
-
 _INNER_STEPS = 12
 _FACINGS = 4                 # lookups of what the points face; an edge that slides over them moves forces from point to point
 _INNER_TOLERANCE = 0.3       # of the residual that the step is to cut
@@ -75,7 +73,8 @@ class ContactStepper:
 
         rubber: A, upper triangle (csr), with friction;  residual (n,) in N
         contact: its `points` are `LinearGaps`, its `pressed(rubber, slope)` the upper triangle of A + B'.W.B for slope (p,) in
-        N/mm, its `follow(step, lowering)` looks up what the points face where a step leads, and says whether that was done
+        N/mm, its `rubber_forces(rubber, step)` A times a step (n,), its `follow(step, lowering)` looks up what the points face
+        where a step leads, and says whether that was done
         drag: friction's border (n,) and corner in N/mm, between the unknowns and the object's lowering
         excess: the object's force less the wanted one in N; None holds the object where it is. A free object that touches
         nothing finds no stiffness: it is lowered by nan.
@@ -232,7 +231,7 @@ class _Problem:
 
     def _elastic(self, x):
         u = x[:self.size]
-        product = symmetric_product(self.rubber, u)
+        product = self.contact.rubber_forces(self.rubber, u)
         if not self.free:
             return product
         border, corner = self.drag

@@ -17,8 +17,9 @@ from numba import njit
 from softtact.contact.friction import Drag, Grip
 from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.mechanics.blocks import HexBlock
-from softtact.mechanics.condensation import Condensation, Springs
+from softtact.mechanics.condensation import Springs
 from softtact.mechanics.elements import HEX27_BOTTOM, HEX27_SIDES, gauss, quad9
+from softtact.mechanics.elimination import LayerwiseElimination
 from softtact.mechanics.hex_mesh import disc_plan, extrude
 from softtact.mechanics.parallel import SERIAL
 
@@ -55,22 +56,6 @@ class BedState:
     drag: Drag | None = None
 
 
-@dataclass(frozen=True)
-class Layer:
-    """A layer of a frustum's elements and the unknowns that are eliminated with it; the same in all frusta.
-
-    hexes (h, 27): its elements' nodes;  inner, outer: unknowns of a frustum that are eliminated, and that are left
-    points (p,): the contact points on it;  place (3 nodes,): where unknowns stand in the layer's matrix, -1: held or elsewhere
-    """
-
-    hexes: np.ndarray
-    inner: np.ndarray
-    outer: np.ndarray
-    points: np.ndarray
-    place: np.ndarray
-    condensed: Condensation
-
-
 class FrustumBed:
     """All frusta of a sensor with one law. Local node numbers are those of `self.mesh`; roots are `self.root`.
 
@@ -95,7 +80,7 @@ class FrustumBed:
                               growing_over_shear=growing_over_shear)
         self._contact_points(pcb_z_mm)
         self._number_unknowns(tips_held)
-        self.layers = [self._layer(k) for k in range(self.mesh.layers)]
+        self.elimination = self._elimination()
 
     def _place(self, levels, root_z):
         """Nodal coordinates (n, nodes, 3): the unit disc scaled by the cone's radius, the height by each frustum's own."""
@@ -168,24 +153,19 @@ class FrustumBed:
         self.inner = np.flatnonzero(number.ravel() == 0)
         self.root_dofs = (3 * self.root[:, None] + np.arange(3)).ravel()
 
-    def _layer(self, k):
-        """What is eliminated with the k-th layer of elements: its lower nodes and those in its middle.
-
-        It leaves the nodes above, and those of the root that carry the planes towards the neighbours.
-        """
-        below = np.concatenate([self.mesh.middle(k), self.mesh.planes[k]])
-        inner = np.intersect1d(self.inner, _dofs(below))
-        above = _dofs(self.mesh.planes[k + 1])
-        moving = self.point_neighbour != BOARD
-        planes = 3 * self.point_nodes[moving, -1] + self.point_axis[moving]
-        outer = np.concatenate([above, np.setdiff1d(planes, above)])
-        place = np.full(3 * self.nodes, -1, dtype=np.int64)
-        place[inner], place[outer] = np.arange(len(inner)), len(inner) + np.arange(len(outer))
-        points = np.flatnonzero(self.point_layer == k)
-        carried = [place[self._left_below[None]]] if k else []
-        self._left_below = outer
-        return Layer(hexes=self.mesh.layer(k), inner=inner, outer=outer, points=points, place=place,
-                     condensed=Condensation(self.count, len(inner), len(outer), [place[_dofs(self.mesh.layer(k))], *carried]))
+    def _elimination(self):
+        """Layer by layer from the tip up: each leaves the nodes above, and the root's that carry the planes at its points."""
+        eliminated = np.zeros(3 * self.nodes, dtype=bool)
+        eliminated[self.inner] = True
+        moves = eliminated.copy()
+        moves[self.root_dofs] = True
+        layers, planes = [], []
+        for k in range(self.mesh.layers):
+            unknowns = _dofs(self.mesh.layer(k))
+            layers.append([np.where(moves[unknowns], unknowns, -1)])
+            moving = (self.point_layer == k) & (self.point_neighbour != BOARD)
+            planes.append(3 * self.point_nodes[moving, -1] + self.point_axis[moving])
+        return LayerwiseElimination(self.count, eliminated, layers, coupled=planes)
 
     def evaluate(self, displacement, *, workers=SERIAL):
         """Energy, nodal forces and gaps for displacement (n, nodes, 3); None if an element is inside out."""
@@ -241,37 +221,38 @@ class FrustumBed:
         return self.contact.response(gaps)[2]
 
     def condense(self, state, frusta, damping=None):
-        """Recompute the condensed tangents of the given frusta (k,); returns those of their roots (k, 1, 75, 75).
+        """Recompute the condensed tangents of the given frusta (k,).
 
         damping: stiffness (k,) in N/mm on their inner unknowns, see `Condensation.set`
         """
         slope = self.contact.at(frusta).response(state.gaps[frusta])[2] * self.point_area[frusta]
         displacement = state.displacement[frusta]
         friction = None if state.drag is None else state.drag.stiffness(frusta)
-        left = []
-        for k, layer in enumerate(self.layers):
-            springs = self._springs(layer, slope)
-            if friction is not None:
-                springs = springs.with_others(self._friction_springs(layer, friction, frusta))
-            layer.condensed.set(frusta, [self._layer_tangents(k, displacement, frusta), *left], springs,
-                                damping=damping)
-            left = [layer.condensed.outer[frusta][:, None]]
-        return left[0]
+        layers = (([self._layer_tangents(k, displacement, frusta)], self._springs(k, frusta, slope, friction))
+                  for k in range(self.mesh.layers))
+        self.elimination.set(frusta, layers, damping=damping)
 
-    def _springs(self, layer, slope):
-        """The layer's contact points with stiffnesses from `slope` (b, p) in N/mm."""
-        at = layer.points
-        return Springs(slope[:, at], layer.place[3 * self.point_nodes[at] + self.point_axis[at, None]], self.point_weights[at])
+    @property
+    def root_stiffness(self):
+        """What the condensed frusta leave on their roots (n, 3 r, 3 r) in N/mm, r nodes each."""
+        return self.elimination.matrices
 
-    def _friction_springs(self, layer, stiffness, frusta):
-        """Friction at the layer's points on the board, of stiffness (b, all points on the board, 2, 2) in N/mm3.
+    def _springs(self, k, frusta, slope, friction):
+        """The k-th layer's contact points in frusta (b,), stiffnesses from `slope` (b, p) in N/mm and from `friction`, if any."""
+        at, place = np.flatnonzero(self.point_layer == k), self.elimination.stages[k].place
+        springs = Springs(slope[:, at], place[3 * self.point_nodes[at] + self.point_axis[at, None]], self.point_weights[at])
+        if friction is None:
+            return springs
+        return springs.with_others(self._friction_springs(at[at < self.board_points], place, friction, frusta))
+
+    def _friction_springs(self, at, place, stiffness, frusta):
+        """Friction at points on the board, of stiffness (b, all points on the board, 2, 2) in N/mm3.
 
         Three springs a point make its symmetric 2 x 2 matrix: along x, along y, and on the sum of both components.
         """
-        at = layer.points[layer.points < self.board_points]
         K = stiffness[:, at] * self.point_area[frusta][:, at, None, None]
         both = K[..., 0, 1]
-        x, y = (layer.place[3 * self.point_nodes[at] + axis] for axis in (0, 1))
+        x, y = (place[3 * self.point_nodes[at] + axis] for axis in (0, 1))
         weights, held = self.point_weights[at], np.full(x.shape, -1)
         return Springs(np.hstack([K[..., 0, 0] - both, K[..., 1, 1] - both, both]),
                        np.vstack([np.hstack([x, held]), np.hstack([held, y]), np.hstack([x, y])]),
@@ -279,27 +260,22 @@ class FrustumBed:
 
     def _layer_tangents(self, k, displacement, frusta):
         """Tangents (b, h, 81, 81) of the k-th layer's h elements in frusta (b,)."""
-        hexes = self.layers[k].hexes
+        hexes = self.mesh.layer(k)
         elements = frusta[:, None] * len(self.mesh.hexes) + k * len(hexes) + np.arange(len(hexes))
-        tangents = self.block.tangent(displacement[:, hexes].reshape(-1, 27, 3), elements.ravel())
+        tangents = self.block.tangent(displacement[:, hexes].reshape(-1, 27, 3), elements.ravel(), precision=np.float32)
         return tangents.reshape(*elements.shape, 81, 81)
 
     def condensed_residual(self, state):
         """Root forces (n, 75) after the inner residual has been eliminated, and what `inner_step` needs again."""
         force = state.force.reshape(self.count, -1).copy()
-        halves = []
-        for layer in self.layers:
-            passed_on, half = layer.condensed.residual(force[:, layer.inner])
-            force[:, layer.outer] += passed_on
-            halves.append(half)
+        halves = self.elimination.residual(force)
         return force[:, self.root_dofs], halves
 
     def inner_step(self, halves, root_step):
         """Newton step (n, nodes, 3) of the frusta for the roots' step (n, 75)."""
         step = np.zeros((self.count, 3 * self.nodes))
         step[:, self.root_dofs] = root_step
-        for layer, half in zip(self.layers[::-1], halves[::-1], strict=True):
-            step[:, layer.inner] = layer.condensed.recover(half, step[:, layer.outer])
+        self.elimination.recover(halves, step)
         return step.reshape(self.count, self.nodes, 3)
 
     def inner_residual(self, state):

@@ -175,36 +175,48 @@ def _volumetric(K, change, basis, gram_inverse, bulk_modulus, volumes, growing):
     """K (3 m, 3 m) of the pressure's projected part, and of its growing part but for what stands at the points."""
     seen = basis.T @ change
     projected = gram_inverse @ seen
+    bulk_modulus = change.dtype.type(bulk_modulus)
     if len(growing) == 0:
         K[:] = bulk_modulus * (projected.T @ seen)
         return
-    weighted = np.empty_like(basis)
+    weighted, measured = np.empty_like(basis), np.empty_like(basis)
     for g in range(len(growing)):
-        weighted[g] = growing[g] * basis[g]
-    inner = (basis.T * volumes) @ weighted
-    cross = projected.T @ (weighted.T @ change)
-    K[:] = projected.T @ (bulk_modulus * seen + inner @ projected) - cross - cross.T
+        weighted[g], measured[g] = growing[g] * basis[g], volumes[g] * basis[g]
+    # P^T (k seen + inner P) - P^T cross - cross^T P as one symmetric product of twice as many rows.
+    half = (bulk_modulus * seen + (measured.T @ weighted) @ projected) * change.dtype.type(0.5) - weighted.T @ change
+    K[:] = np.vstack((projected, half)).T @ np.vstack((half, projected))
+
+
+@njit(cache=True, nogil=True)
+def _in_precision(values, like):
+    """A copy of the values (n, k) in the precision of another array."""
+    out = np.empty(values.shape, like.dtype)
+    out[:] = values
+    return out
 
 
 @njit(cache=True, nogil=True)
 def tangent(F, C, J, gradients, volumes, shapes, stress, moduli, pressure, basis, gram_inverse, bulk_modulus, local_modulus,
-            growing):
+            growing, like):
     """Tangent (e, 3 m, 3 m) of `internal_force` with the pressure of `SolidBlock`: a projected, a local and a growing part.
 
     projected = bulk_modulus P(J - 1), P = basis . gram_inverse . integral(basis ...), basis (g, p): symmetric, rank p per element
     local = local_modulus (J - 1/J) / 2;  both moduli in MPa
     growing: derivative (1 - P) growing (1 - P), a modulus (e, g) in MPa, or (0, 0) where there is none
+    like: an array in whose precision the products are taken; what stands at a point is found in double precision
 
     The products run over blocks of components (i, j >= i): K_ij = G^T A_ij G with the gradients G (3 g, m), three large
     products an element instead of one with the strain-displacement matrix, which has a third of zeros.
     """
     elements, points = J.shape
     nodes = gradients.shape[2]
-    out = np.empty((elements, 3 * nodes, 3 * nodes))
-    G = np.empty((3 * points, nodes))
-    rights = (np.empty((3 * points, 3 * nodes)), np.empty((3 * points, 2 * nodes)), np.empty((3 * points, nodes)))
-    change = np.empty((points, 3 * nodes))
-    A, D, S = np.empty((3, 3, 3, 3)), np.empty((6, 6)), np.empty((3, 3))
+    out = np.empty((elements, 3 * nodes, 3 * nodes), like.dtype)
+    G = np.empty((3 * points, nodes), like.dtype)
+    rights = (np.empty((3 * points, 3 * nodes), like.dtype), np.empty((3 * points, 2 * nodes), like.dtype),
+              np.empty((3 * points, nodes), like.dtype))
+    change = np.empty((points, 3 * nodes), like.dtype)
+    modes = _in_precision(basis, like)
+    A, D, S = np.empty((3, 3, 3, 3), like.dtype), np.empty((6, 6)), np.empty((3, 3))
     grows = growing.size > 0
     for e in range(elements):
         for g in range(points):
@@ -218,7 +230,8 @@ def tangent(F, C, J, gradients, volumes, shapes, stress, moduli, pressure, basis
             _volume_change(change[g], F[e, g], inverse, gradient, w * j)
             G[3 * g:3 * g + 3] = gradient.T
             _times_gradients(rights, A, G, g)
-        _volumetric(out[e], change, basis, gram_inverse[shapes[e]], bulk_modulus, volumes[shapes[e]], growing[e:e + 1].ravel())
+        _volumetric(out[e], change, modes, _in_precision(gram_inverse[shapes[e]], like), bulk_modulus, volumes[shapes[e]],
+                    growing[e:e + 1].ravel())
         _add_blocks(out[e], G, rights)
     return out
 

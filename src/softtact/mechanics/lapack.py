@@ -1,4 +1,5 @@
-"""LAPACK and BLAS routines of scipy that compiled loops can call: thousands of small matrices without Python in between.
+"""LAPACK and BLAS routines of scipy in single precision that compiled loops can call: thousands of small matrices without
+Python in between.
 
 A compiled function takes the routines it needs as arguments: numba caches it then, which it would not with an address in it.
 """
@@ -23,12 +24,12 @@ class Routine(types.WrapperAddressProtocol):
         return types.void(*[types.uintp] * self._arguments)
 
 
-POTRF = Routine("cython_lapack", "dpotrf", 5)
-TRSM = Routine("cython_blas", "dtrsm", 11)
-SYRK = Routine("cython_blas", "dsyrk", 10)
-TRSV = Routine("cython_blas", "dtrsv", 8)
-GEMV = Routine("cython_blas", "dgemv", 11)
+POTRF = Routine("cython_lapack", "spotrf", 5)
+TRSM = Routine("cython_blas", "strsm", 11)
+SYRK = Routine("cython_blas", "ssyrk", 10)
+TRSV = Routine("cython_blas", "strsv", 8)
+GEMV = Routine("cython_blas", "sgemv", 11)
 
 # What the routines are told, as memory that they can point at.
 LETTERS = np.array([ord(letter) for letter in "LNRT"], dtype=np.uint8)
-FACTORS = np.array([1.0, -1.0, 0.0])
+FACTORS = np.array([1.0, -1.0, 0.0], dtype=np.float32)

@@ -80,6 +80,7 @@ class PardisoSolver:
     """MKL PARDISO's Cholesky; the analysis is reused while the pattern stays."""
 
     name = "pardiso"
+    precision = np.float64
     _POSITIVE, _FACTOR, _SOLVE, _ANALYSE_AND_FACTOR = 2, 22, 33, 12
     # Entries of iparm, counted from 0: own values, METIS on one thread (the same order whatever the number of threads), and no
     # iterative refinement, which makes a solve four times as long for digits that Newton's method does not need.
@@ -88,7 +89,7 @@ class PardisoSolver:
     def __init__(self, *, threads=1):
         from pypardiso import PyPardisoSolver
 
-        self._solver, self._pattern, self._upper = PyPardisoSolver(mtype=self._POSITIVE), None, None
+        self._solver, self._pattern, self._upper, self._converted = PyPardisoSolver(mtype=self._POSITIVE), None, None, None
         self._threads = threads
         for entry, value in self._PARAMETERS.items():
             self._solver.set_iparm(entry + 1, value)
@@ -97,8 +98,8 @@ class PardisoSolver:
         """Factor the matrix whose upper triangle (csr, sorted, with its diagonal) is given; False if not positive definite."""
         from pypardiso.pardiso_wrapper import PyPardisoError
 
-        self._upper = upper
         pattern = (upper.indptr, upper.indices)
+        upper = self._upper = self._in_precision(upper)
         same = self._pattern is not None and all(a is b for a, b in zip(pattern, self._pattern, strict=True))
         self._solver.set_phase(self._FACTOR if same else self._ANALYSE_AND_FACTOR)
         try:
@@ -107,6 +108,15 @@ class PardisoSolver:
             return False
         self._pattern = pattern
         return True
+
+    def _in_precision(self, upper):
+        """The matrix with values as the solver takes them, the same object for each matrix that has to be converted."""
+        if upper.dtype == self.precision:
+            return upper
+        if self._converted is None or self._converted.nnz != upper.nnz:
+            self._converted = sp.csr_matrix((upper.data.astype(self.precision), upper.indices, upper.indptr), shape=upper.shape)
+        self._converted.data[:] = upper.data
+        return self._converted
 
     def solve(self, right):
         """Solve for one (n,) or several (n, k) right-hand sides."""
@@ -135,7 +145,7 @@ class SuperLUSolver:
 
     def factor(self, upper):
         """Factor the matrix whose upper triangle (csr) is given; False if not positive definite."""
-        full = upper + sp.triu(upper, 1).T
+        full = (upper + sp.triu(upper, 1).T).astype(float)
         self._lu = spla.splu(full.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
                              options={"SymmetricMode": True})
         # Pivots from the diagonal, whose signs are those of the eigenvalues (Sylvester's law of inertia).

@@ -23,9 +23,10 @@ def zones(surface, x_lines, y_lines, most):
     """FAR, NEAR, FLAT, CURVED or EDGE for each place of a grid (ny 2^most, nx 2^most) whose cells are split `most` times."""
     height = _heights(surface, x_lines, y_lines, _SAMPLES << most)
     side = min(np.diff(lines).max() for lines in (x_lines, y_lines)) / (1 << most)
-    # An edge on the line between two elements concerns both, so heights around each sample are compared.
-    low = minimum_filter(height, _SAMPLES)
-    rise = _in_places(maximum_filter(height, _SAMPLES) - low, np.max)
+    # An edge on the line between two elements concerns both, so each sample is compared with those beside it. (Farther ones: 9000
+    # unknowns more under a wide punch at edges split four times, and the same map to 0.2 %.)
+    low = minimum_filter(height, 3)
+    rise = _in_places(maximum_filter(height, 3) - low, np.max)
     reached = _in_places(low, np.min) < REACH_MM
     touched = _in_places(height, np.min) < REACH_MM
     under, near = (maximum_filter(touched, 2 * int(np.ceil(far / side - 1e-9)) + 1) for far in (AROUND_MM, NEAR_MM))

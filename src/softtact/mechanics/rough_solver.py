@@ -7,7 +7,6 @@ import importlib.metadata
 import os
 
 import numpy as np
-import scipy.sparse as sp
 
 from softtact.mechanics.linear_solvers import PardisoSolver
 
@@ -19,6 +18,7 @@ class RoughSolver(PardisoSolver):
     """The interface of `linear_solvers`, with factors and solutions of about seven digits."""
 
     name = "pardiso, single precision"
+    precision = np.float32
 
     def __init__(self, *, threads=1, quick_analysis=False):
         """quick_analysis: order by minimum degree: on a layer of small elements as little fill as dissection, in two thirds of
@@ -28,14 +28,6 @@ class RoughSolver(PardisoSolver):
         self._solver.set_iparm(_SINGLE, 1)
         if quick_analysis:
             self._solver.set_iparm(_ORDERING, _MINIMUM_DEGREE)
-        self._single = None
-
-    def factor(self, upper):
-        """Factor the matrix whose upper triangle (csr, sorted, with its diagonal) is given; False if not positive definite."""
-        if self._single is None:
-            self._single = sp.csr_matrix((upper.data.astype(np.float32), upper.indices, upper.indptr), shape=upper.shape)
-        self._single.data[:] = upper.data
-        return super().factor(self._single)
 
     def solve(self, right):
         """Solve for one (n,) or several (n, k) right-hand sides, scaled to the range of single precision."""

@@ -6,7 +6,7 @@ matrix are the cells' walls and the cover. Cells under parts of the cover that a
 
 import numpy as np
 
-from softtact.mechanics.condensation import Condensation
+from softtact.mechanics.elimination import LayerwiseElimination
 from softtact.mechanics.parallel import SERIAL, chunks
 
 _CHUNK = 8                          # cells that one thread condenses at once
@@ -40,11 +40,11 @@ class SheetCells:
     @property
     def outer(self):
         """Condensed matrices, kind by kind (c, k, k)."""
-        return [kind.condensed.outer for kind in self.kinds]
+        return [kind.elimination.matrices for kind in self.kinds]
 
     def positive_outer(self):
         """The condensed matrices without their modes of negative stiffness."""
-        return [kind.condensed.positive_outer() for kind in self.kinds]
+        return [kind.elimination.positive_matrices() for kind in self.kinds]
 
     def refresh(self, state, *, workers=SERIAL):
         """Recompute the condensed tangents of the cells that moved or changed contact since their last one; their number.
@@ -52,6 +52,8 @@ class SheetCells:
         Keeping the others is a quasi-Newton step: forces are always exact.
         """
         stale = self._stale(state)
+        frusta = chunks(np.flatnonzero(stale), _CHUNK)
+        workers.map(lambda part: self.bed.condense(state.bed, part, self._damping[part]), frusta)
         tasks = [(kind, part) for kind in self.kinds for part in chunks(np.flatnonzero(stale[kind.cells]), _CHUNK)]
         workers.map(lambda task: task[0].condense(state, self.bed, task[1], self._damping), tasks)
         self._damped_with = self._damping.copy()
@@ -105,9 +107,9 @@ class SheetCells:
         np.add.at(residual, self.roots.ravel(), root_force.reshape(-1, 3))
         flat, in_cells = residual.reshape(-1), []
         for kind in self.kinds:
-            passed_on, half = kind.condensed.residual(flat[kind.inner_dofs])
+            passed_on, halves = kind.residual(flat)
             np.add.at(flat, kind.outer_dofs.ravel(), passed_on.ravel())
-            in_cells.append(half)
+            in_cells.append(halves)
         return residual, (in_frusta, in_cells)
 
     def recover(self, kept, slab_step):
@@ -125,7 +127,7 @@ class SheetCells:
             return slab, frusta
         share, (in_frusta, in_cells) = _FARTHEST_MM / np.maximum(inner, _FARTHEST_MM), kept
         cut = ([share[:, None] * half for half in in_frusta],
-               [share[kind.cells, None] * half for kind, half in zip(self.kinds, in_cells, strict=True)])
+               [[share[kind.cells, None] * half for half in halves] for kind, halves in zip(self.kinds, in_cells, strict=True)])
         return self._recovered(cut, slab_step)
 
     def _movement(self, slab, frusta):
@@ -140,8 +142,8 @@ class SheetCells:
         """The steps of slab and frusta for what cells and frusta keep of their residuals, and for the walls' step."""
         in_frusta, in_cells = kept
         flat = slab_step.copy().reshape(-1)
-        for kind, half in zip(self.kinds, in_cells, strict=True):
-            flat[kind.inner_dofs] = kind.condensed.recover(half, flat[kind.outer_dofs])
+        for kind, halves in zip(self.kinds, in_cells, strict=True):
+            flat[kind.inner_dofs] = kind.inner_step(halves, flat)
         full = flat.reshape(-1, 3)
         return full, self.bed.inner_step(in_frusta, full[self.roots].reshape(self.count, -1))
 
@@ -150,37 +152,55 @@ class CellKind:
     """Cells (c,) that are translations of each other, with the sheet's elements in them; nodes (c, n) of each."""
 
     def __init__(self, slab, group, roots):
-        self.cells, self._parts = group.cells, group.parts
-        members = [nodes.reshape(len(self.cells), -1) for nodes, _ in self._parts]
+        self.cells, self._layers = group.cells, group.layers
+        members = [nodes.reshape(len(self.cells), -1) for nodes, _ in group.parts]
         self.nodes, local = _same_in_all(np.hstack([*members, roots]))
         *groups, root = np.split(local, np.cumsum([m.shape[1] for m in members]))
-        place = self._number_dofs(slab)
-        elements = [root[None], *(group.reshape(-1, nodes.shape[1]) for group, (nodes, _) in zip(groups, self._parts, strict=True))]
-        self.condensed = Condensation(len(self.cells), self.inner_dofs.shape[1], self.outer_dofs.shape[1],
-                                      [place[_dofs(nodes)] for nodes in elements])
+        elements = iter(_dofs(group.reshape(-1, nodes.shape[1])) for group, (nodes, _) in zip(groups, group.parts, strict=True))
+        layers = [[next(elements) for _ in layer] for layer in self._layers]
+        layers[0].insert(0, _dofs(root[None]))
+        inner = self._inner(slab)
+        self.elimination = LayerwiseElimination(len(self.cells), inner, layers)
+        self.inner_dofs, self.outer_dofs = _dofs(self.nodes)[:, inner], _dofs(self.nodes)[:, self.elimination.outer]
+        self._inner_places = np.flatnonzero(inner)
 
-    def _number_dofs(self, slab):
-        """Inner unknowns: of nodes in one cell only and in every cell; the others stay global (-1 where held)."""
+    def _inner(self, slab):
+        """Which unknowns (n,) are of nodes in one cell only, in every cell; the others stay global."""
         free = np.zeros(3 * slab.nodes, dtype=bool)
         free[slab.free] = True
-        dofs = _dofs(self.nodes)
-        inner = (np.repeat(slab.uses[self.nodes] == 1, 3, axis=1) & free[dofs]).all(axis=0)
-        place = np.empty(len(inner), dtype=np.int64)
-        place[inner] = np.arange(inner.sum())
-        place[~inner] = inner.sum() + np.arange((~inner).sum())
-        self.inner_dofs, self.outer_dofs = dofs[:, inner], dofs[:, ~inner]
-        return place
+        return (np.repeat(slab.uses[self.nodes] == 1, 3, axis=1) & free[_dofs(self.nodes)]).all(axis=0)
+
+    def residual(self, flat):
+        """What the slab's forces (all unknowns,) on inner unknowns leave on the outer ones (c, k), and what `inner_step` needs."""
+        force = np.zeros((len(self.cells), 3 * self.nodes.shape[1]))
+        force[:, self._inner_places] = flat[self.inner_dofs]
+        halves = self.elimination.residual(force)
+        return force[:, self.elimination.outer], halves
+
+    def inner_step(self, halves, flat):
+        """The Newton step (c, inner) of the inner unknowns for a step (all unknowns,) of the slab's outer ones."""
+        step = np.zeros((len(self.cells), 3 * self.nodes.shape[1]))
+        step[:, self.elimination.outer] = flat[self.outer_dofs]
+        self.elimination.recover(halves, step)
+        return step[:, self._inner_places]
 
     def condense(self, state, bed, chosen, damping):
-        """Recompute the condensed tangents of some of these cells (k,), counted among them; damping (all cells,) in N/mm."""
-        damping = damping[self.cells[chosen]]
-        tangents = [bed.condense(state.bed, self.cells[chosen], damping)]
-        for nodes, block in self._parts:
-            per_cell = len(nodes) // len(self.cells)
-            elements = (chosen[:, None] * per_cell + np.arange(per_cell)).ravel()
-            each = block.tangent(state.slab.displacement[nodes[elements]], elements)
-            tangents.append(each.reshape(len(chosen), per_cell, *each.shape[1:]))
-        self.condensed.set(chosen, tangents, damping=damping)
+        """Recompute the condensed tangents of some of these cells (k,), counted among them, from those of their frusta.
+
+        damping: of all cells, in N/mm
+        """
+        frusta = [bed.root_stiffness[self.cells[chosen], None]]
+        layers = ((frusta * (k == 0) + [self._tangents(state, part, chosen) for part in layer], None)
+                  for k, layer in enumerate(self._layers))
+        self.elimination.set(chosen, layers, damping=damping[self.cells[chosen]])
+
+    def _tangents(self, state, part, chosen):
+        """Tangents (b, k, w, w) of like elements in some of the cells (b,)."""
+        nodes, block = part
+        per_cell = len(nodes) // len(self.cells)
+        elements = (chosen[:, None] * per_cell + np.arange(per_cell)).ravel()
+        each = block.tangent(state.slab.displacement[nodes[elements]], elements, precision=np.float32)
+        return each.reshape(len(chosen), per_cell, *each.shape[1:])
 
 
 def _dofs(nodes):

@@ -19,7 +19,7 @@ from softtact.mechanics.elements import quad8
 from softtact.mechanics.hex_mesh import extrude
 from softtact.mechanics.parallel import SERIAL
 from softtact.mechanics.plan_location import plan_interpolation
-from softtact.mechanics.sparsity import add_upper, upper_pattern, upper_positions
+from softtact.mechanics.sparsity import SymmetricProduct, add_upper, upper_pattern, upper_positions
 from softtact.mechanics.top_contact import FacingPlanes, TopContact
 
 
@@ -51,10 +51,18 @@ class Layer:
 
 @dataclass(frozen=True)
 class CellGroup:
-    """Cells (c,) of the sheet under equal pieces of the cover; parts: nodes (c * elements, w), cell by cell, and their block."""
+    """Cells (c,) of the sheet under equal pieces of the cover.
+
+    layers: layer by layer from below like elements: nodes (c * elements, w), cell by cell, and their block
+    """
 
     cells: np.ndarray
-    parts: list
+    layers: list
+
+    @property
+    def parts(self):
+        """Those of all layers."""
+        return [part for layer in self.layers for part in layer]
 
 
 class Slab:
@@ -153,11 +161,12 @@ class Slab:
         self.groups += [self._following(hexes[in_cells:], HexBlock, law) for hexes, _, law in layers if len(hexes) > in_cells]
         if not cells:
             return
-        pieces = [(hexes[:in_cells].reshape(cells, -1, 27), HexBlock, law) for hexes, _, law in layers]
-        pieces += [(wedges.reshape(cells, -1, 18), WedgeBlock, law) for _, wedges, law in layers if len(wedges)]
-        for same in self._like_cells(np.hstack([elements.reshape(cells, -1) for elements, _, _ in pieces])):
-            parts = [self._following(elements[same].reshape(-1, elements.shape[2]), make, law) for elements, make, law in pieces]
-            self.cell_groups.append(CellGroup(same, parts))
+        pieces = [[(hexes[:in_cells].reshape(cells, -1, 27), HexBlock, law), (wedges.reshape(cells, -1, 18), WedgeBlock, law)]
+                  for hexes, wedges, law in layers]
+        for same in self._like_cells(np.hstack([elements.reshape(cells, -1) for layer in pieces for elements, _, _ in layer])):
+            self.cell_groups.append(CellGroup(same, [
+                [self._following(elements[same].reshape(-1, elements.shape[2]), make, law)
+                 for elements, make, law in layer if elements.size] for layer in pieces]))
 
     def _following(self, elements, make, law):
         return of_masters(self._masters, self._weights, elements, make(self.sheet_mesh.points[elements], law))
@@ -220,8 +229,11 @@ class Slab:
         return SlabState(elastic=elastic, energy=energy + touch.energy, force=force, gaps=touch.gaps, planes=planes,
                          displacement=displacement, indentation_force=touch.indentation_force, drag=touch.drag)
 
-    def build_pattern(self, eliminated, cells):
-        """Fix the global matrix: its unknowns are the free but the `eliminated` ones; `cells` [(c, k)]: what cells leave."""
+    def build_pattern(self, eliminated, cells, *, precision=np.float32):
+        """Fix the global matrix: its unknowns are the free but the `eliminated` ones; `cells` [(c, k)]: what cells leave.
+
+        precision: of its values; single is enough for steps that a residual in double precision corrects
+        """
         keep = np.setdiff1d(self.free, eliminated)
         self.unknowns = keep
         number = np.full(3 * self.nodes, -1, dtype=np.int64)
@@ -232,8 +244,9 @@ class Slab:
         indptr, indices = upper_pattern([*members, self._top_dofs], len(keep))
         self._positions = [upper_positions(indptr, indices, dofs) for dofs in members]
         self._top_positions = upper_positions(indptr, indices, self._top_dofs)
-        self._matrix, self._pressed = (sp.csr_matrix((np.zeros(len(indices)), indices, indptr), shape=(len(keep),) * 2)
-                                       for _ in range(2))
+        self._matrix, self._pressed = (
+            sp.csr_matrix((np.zeros(len(indices), dtype=precision), indices, indptr), shape=(len(keep),) * 2) for _ in range(2))
+        self.product = SymmetricProduct(indptr, indices)
 
     def tangent(self, state, condensed, *, workers=SERIAL):
         """Upper triangle (csr) of the tangent with the cells' condensed blocks [(f, k, k)] and the object's contact."""
@@ -244,7 +257,7 @@ class Slab:
         """Upper triangle (csr) of the tangent with friction, but without the object's pressure; valid until the next call."""
         matrix = self._matrix
         matrix.data[:] = 0.0
-        blocks = workers.map(lambda group: group[1].tangent(state.displacement[group[0]]), self.groups)
+        blocks = workers.map(lambda group: group[1].tangent(state.displacement[group[0]], precision=matrix.dtype.type), self.groups)
         for part, positions in zip([*blocks, *condensed], self._positions, strict=True):
             add_upper(matrix.data, part, positions)
         if state.drag is not None:

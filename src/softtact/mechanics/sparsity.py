@@ -34,23 +34,73 @@ class SymmetricPattern:
                           self.indptr)
 
 
-def symmetric_product(upper, x):
-    """A x, of a symmetric matrix by its upper triangle (csr): its values are read once, not once for each triangle."""
-    out = np.zeros(len(x))
-    _symmetric_product(upper.indptr, upper.indices, upper.data, x, out)
-    return out
+class SymmetricProduct:
+    """A x for symmetric matrices of one pattern, given by their upper triangles (csr, sorted, with their diagonals).
+
+    Values are read once, not once for each triangle, and the columns of rows that have the same ones (a node's three) once for all.
+    """
+
+    def __init__(self, indptr, indices):
+        self._indptr, self._indices = indptr, indices
+        self._alike = _rows_alike(indptr, indices)
+
+    def __call__(self, data, x):
+        """A x (n,) in double precision, whatever that of the values."""
+        out = np.zeros(len(x))
+        _symmetric_product(self._indptr, self._indices, data, self._alike, x, out)
+        return out
 
 
 @njit(cache=True, nogil=True)
-def _symmetric_product(indptr, indices, data, x, out):
-    for row in range(len(indptr) - 1):
-        own, total = x[row], 0.0
-        for k in range(indptr[row], indptr[row + 1]):
-            column, value = indices[k], data[k]
-            total += value * x[column]
-            if column != row:
-                out[column] += value * own
-        out[row] += total
+def _rows_alike(indptr, indices):
+    """How many rows, one after the other, have the same columns from their diagonals on: threes, and ones for all others."""
+    alike, count, row = np.empty(len(indptr) - 1, np.int8), 0, 0
+    while row < len(indptr) - 1:
+        together = row + 2 < len(indptr) - 1
+        for later in range(1, 3):
+            if together:
+                first, second, end = indptr[row] + later, indptr[row + later], indptr[row + later + 1]
+                together = indptr[row + 1] - first == end - second and (indices[first:indptr[row + 1]] == indices[second:end]).all()
+        alike[count] = 3 if together else 1
+        row += alike[count]
+        count += 1
+    return alike[:count].copy()
+
+
+@njit(cache=True, nogil=True)
+def _symmetric_product(indptr, indices, data, alike, x, out):
+    row = 0
+    for rows in alike:
+        if rows == 3:
+            _add_three_rows(row, indptr, indices, data, x, out)
+        else:
+            own, total = x[row], 0.0
+            for k in range(indptr[row], indptr[row + 1]):
+                column, value = indices[k], data[k]
+                total += value * x[column]
+                if column != row:
+                    out[column] += value * own
+            out[row] += total
+        row += rows
+
+
+@njit(cache=True, nogil=True)
+def _add_three_rows(row, indptr, indices, data, x, out):
+    first, second, third = indptr[row], indptr[row + 1], indptr[row + 2]
+    x0, x1, x2 = x[row], x[row + 1], x[row + 2]
+    total0 = data[first] * x0 + data[first + 1] * x1 + data[first + 2] * x2
+    total1 = data[first + 1] * x0 + data[second] * x1 + data[second + 1] * x2
+    total2 = data[first + 2] * x0 + data[second + 1] * x1 + data[third] * x2
+    first, second, third = first + 3, second + 2, third + 1
+    for k in range(indptr[row + 1] - first):
+        column, a, b, c = indices[first + k], data[first + k], data[second + k], data[third + k]
+        total0 += a * x[column]
+        total1 += b * x[column]
+        total2 += c * x[column]
+        out[column] += a * x0 + b * x1 + c * x2
+    out[row] += total0
+    out[row + 1] += total1
+    out[row + 2] += total2
 
 
 def _ragged(elements):

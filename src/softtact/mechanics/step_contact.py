@@ -18,6 +18,10 @@ class StepContact:
         """The rubber's tangent with points of a stiffness (p,) in N/mm."""
         return self._slab.pressed(rubber, stiffness, self.planes)
 
+    def rubber_forces(self, rubber, step):
+        """Forces (unknowns,) of the rubber's tangent against a step (unknowns,) in mm."""
+        return self._slab.product(rubber.data, step)
+
     def follow(self, step, lowering):
         """Look up what the points face after a step (unknowns,) in mm of the slab; True if there is a surface to ask."""
         if self._surface is None:
