@@ -1,8 +1,8 @@
-"""Which objects reach 50 N? `python benchmarks/objects.py [--mesh default|draft|stable] [OBJECT ...]`, hours for all.
+"""Which objects reach 50 N? `python benchmarks/objects.py [--mesh default|draft|stable|fine] [OBJECT ...]`, hours for all.
 
 OBJECT: names in config/objects; by default the default study's indenters and the six objects of figure 7. Each is pressed in a
 process of its own, on one thread. What is in the record already is not pressed again: an ended run goes on with the next call
-(`--again` begins anew).
+(`--again` begins anew). The maps are kept as benchmarks/results/maps/MESH/OBJECT.npz, for `model_errors.py`.
 """
 
 import argparse
@@ -10,9 +10,11 @@ import json
 import resource
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
+import numpy as np
 import record
 import yaml
 
@@ -23,7 +25,8 @@ from softtact.mechanics.mesh_settings import MeshSettings
 
 CONFIG = Path(__file__).resolve().parents[1] / "config"
 FORCES_N = [5, 10, 20, 35, 50]
-MESHES = {"default": MeshSettings, "draft": MeshSettings.draft, "stable": MeshSettings.stable}
+MESHES = {"default": MeshSettings, "draft": MeshSettings.draft, "stable": MeshSettings.stable, "fine": MeshSettings.fine}
+MAPS = record.RESULTS / "maps"
 
 
 def default_objects():
@@ -45,7 +48,17 @@ def measure(name, mesh):
     row = {"object": name, "mesh": mesh, "stopped": stopped, "processor_s": round(time.process_time() - start, 1),
            "memory_gb": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6, 2),
            "solver": getattr(result, "solver", None)}
+    if result:
+        save_maps(MAPS / mesh / f"{name}.npz", result)
     return {**row, **(_levels(result, sensor) if result else {"force_n": []})}
+
+
+def save_maps(path, result):
+    """The maps in mm (single precision: a tenth of a nanometre) with their forces in N, at once or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".part", delete=False) as file:
+        np.savez_compressed(file, force_n=result.force_n, map_mm=result.deformation_map_mm.astype(np.float32))
+    Path(file.name).replace(path)
 
 
 def _levels(result, sensor):

@@ -237,12 +237,13 @@ def add_upper(values, matrices, positions):
 
 def upper_pattern(members, size):
     """indptr, indices of the upper triangle of all unknowns that meet in an element; members (e, k), -1 where held."""
-    pattern = sp.csr_matrix((size, size), dtype=bool)
-    for dofs in members:
-        here = dofs >= 0
-        rows = np.repeat(np.arange(len(dofs)), dofs.shape[1]).reshape(dofs.shape)[here]
-        incidence = sp.csr_matrix((np.ones(len(rows), dtype=bool), (rows, dofs[here])), shape=(len(dofs), size))
-        pattern = pattern + sp.triu(incidence.T @ incidence, format="csr")
+    starts = np.cumsum([0, *map(len, members)])
+    rows = np.concatenate([np.repeat(np.arange(first, first + len(dofs)), dofs.shape[1])
+                           for first, dofs in zip(starts, members, strict=False)])
+    columns = np.concatenate([dofs.ravel() for dofs in members])
+    here = columns >= 0
+    incidence = sp.csr_matrix((np.ones(here.sum(), dtype=bool), (rows[here], columns[here])), shape=(starts[-1], size))
+    pattern = sp.triu(incidence.T @ incidence, format="csr")
     pattern.sort_indices()
     return pattern.indptr, pattern.indices
 
