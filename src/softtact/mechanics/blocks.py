@@ -18,6 +18,7 @@ Frusta want full quadrature (27 points): with 8 points they soften by spurious m
 at 0.4 MPa) and Newton's method stalls.
 """
 
+import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -145,6 +146,28 @@ class SolidBlock:
         """A field (e, g) projected, element by element, on the functions of the pressure."""
         moments = (field * self.volumes[shapes]) @ self.basis
         return np.einsum("epq,eq->ep", self.gram_inverse[shapes], moments) @ self.basis.T
+
+
+def joined(parts):
+    """The same elements in as few blocks as there are kinds of them; parts and result: [(nodes (e, m), block)].
+
+    The kind is the law, the numbers of nodes and of points; the parts' blocks come to use their share of the new ones' arrays.
+    """
+    kinds = {}
+    for nodes, block in parts:
+        kinds.setdefault((id(block.law), type(block), *block.gradients.shape[1:3]), []).append((nodes, block))
+    return [(np.vstack([nodes for nodes, _ in alike]), _joined_block([block for _, block in alike])) for alike in kinds.values()]
+
+
+def _joined_block(blocks):
+    whole, first = copy.copy(blocks[0]), np.cumsum([0, *(len(block.gradients) for block in blocks)])
+    whole.shapes = np.concatenate([block.shapes + start for block, start in zip(blocks, first, strict=False)])
+    for name in ("gradients", "volumes", "gram_inverse"):
+        values = np.concatenate([getattr(block, name) for block in blocks])
+        setattr(whole, name, values)
+        for k, block in enumerate(blocks):
+            setattr(block, name, values[first[k]:first[k + 1]])
+    return whole
 
 
 def _pressure_modes(points, trilinear):

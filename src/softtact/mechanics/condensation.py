@@ -10,7 +10,9 @@ import numpy as np
 from numba import njit
 
 from softtact.mechanics import lapack
+from softtact.mechanics.parallel import SERIAL, slices
 
+_AT_ONCE = 60                # bodies that one thread reduces or recovers at once
 _SMALLEST_STIFFNESS = 0.02   # N/mm of a mode of a folding body; the softest mode of a frustum at rest has 0.03
 
 
@@ -60,18 +62,20 @@ class Condensation:
              self.outer, self._modified, _SMALLEST_STIFFNESS, lapack.LETTERS, lapack.FACTORS, lapack.POTRF, lapack.TRSM,
              lapack.SYRK)
 
-    def residual(self, inner):
+    def residual(self, inner, *, workers=SERIAL):
         """What the inner residuals (bodies, n) leave on the outer unknowns (bodies, m), and the part to keep for `recover`."""
         half = np.array(inner, dtype=np.float32, order="C")
         passed_on = np.empty(self.outer.shape[:2], dtype=np.float32)
-        _reduce(self._rows, half, passed_on, lapack.LETTERS, lapack.FACTORS, lapack.TRSV, lapack.GEMV)
+        workers.map(lambda part: _reduce(self._rows[part], half[part], passed_on[part], lapack.LETTERS, lapack.FACTORS, lapack.TRSV,
+                                         lapack.GEMV), slices(len(half), _AT_ONCE))
         return passed_on, half
 
-    def recover(self, half, outer_step):
+    def recover(self, half, outer_step, *, workers=SERIAL):
         """Newton step (bodies, n) of the inner unknowns for that of the outer ones (bodies, m)."""
         step = half.astype(np.float32)     # a copy; a half that was cut is in double precision
-        _recover(self._rows, step, np.ascontiguousarray(outer_step, dtype=np.float32), lapack.LETTERS, lapack.FACTORS, lapack.TRSV,
-                 lapack.GEMV)
+        outer = np.ascontiguousarray(outer_step, dtype=np.float32)
+        workers.map(lambda part: _recover(self._rows[part], step[part], outer[part], lapack.LETTERS, lapack.FACTORS, lapack.TRSV,
+                                          lapack.GEMV), slices(len(step), _AT_ONCE))
         return -step
 
     def positive_outer(self):

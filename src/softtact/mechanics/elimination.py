@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from softtact.mechanics.condensation import Condensation
+from softtact.mechanics.parallel import SERIAL
 
 
 @dataclass(frozen=True)
@@ -66,19 +67,19 @@ class LayerwiseElimination:
             stage.condensed.set(bodies, [*tangents, *carried], springs, damping=damping)
             carried = [stage.condensed.outer[bodies][:, None]]
 
-    def residual(self, force):
+    def residual(self, force, *, workers=SERIAL):
         """Pass the inner forces (bodies, n) on to the outer unknowns, in place; returns what `recover` needs."""
         halves = []
         for stage in self.stages:
-            passed_on, half = stage.condensed.residual(force[:, stage.inner])
+            passed_on, half = stage.condensed.residual(force[:, stage.inner], workers=workers)
             force[:, stage.outer] += passed_on
             halves.append(half)
         return halves
 
-    def recover(self, halves, step):
+    def recover(self, halves, step, *, workers=SERIAL):
         """Fill in the inner unknowns of a Newton step (bodies, n) whose outer ones are given, in place."""
         for stage, half in zip(self.stages[::-1], halves[::-1], strict=True):
-            step[:, stage.inner] = stage.condensed.recover(half, step[:, stage.outer])
+            step[:, stage.inner] = stage.condensed.recover(half, step[:, stage.outer], workers=workers)
 
 
 def _members(groups):

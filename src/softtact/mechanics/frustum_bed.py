@@ -21,6 +21,7 @@ from softtact.mechanics.condensation import Springs
 from softtact.mechanics.elements import HEX27_BOTTOM, HEX27_SIDES, gauss, quad9
 from softtact.mechanics.elimination import LayerwiseElimination
 from softtact.mechanics.hex_mesh import disc_plan, extrude
+from softtact.mechanics.kernels import add_forces
 from softtact.mechanics.parallel import SERIAL
 
 BOARD, SHEET = -1, -2                                     # what a contact point faces where it is no neighbour in DIRECTIONS
@@ -46,9 +47,10 @@ class BedGeometry:
 class BedState:
     """energy (mJ), force (n, nodes, 3) on the frusta's nodes, gaps (n, p) at the contact points, displacement.
 
-    drag: friction at the points on the board (n, b), None without.
+    elastic: energy and force of the rubber alone;  drag: friction at the points on the board (n, b), None without.
     """
 
+    elastic: tuple
     energy: float
     force: np.ndarray
     gaps: np.ndarray
@@ -76,6 +78,7 @@ class FrustumBed:
         self.nodes = len(self.mesh.points)
         self.root, self.tip = self.mesh.planes[-1], self.mesh.planes[0]
         self.coordinates = self._place(levels, root_z_mm)
+        self._element_nodes = (self.nodes * np.arange(self.count)[:, None, None] + self.mesh.hexes).reshape(-1, 27)
         self.block = HexBlock(self.per_element(self.coordinates), law, trilinear=trilinear, local_over_shear=local_over_shear,
                               growing_over_shear=growing_over_shear)
         self._contact_points(pcb_z_mm)
@@ -172,14 +175,19 @@ class FrustumBed:
         body = self.block.evaluate(self.per_element(displacement), workers=workers)
         if body is None:
             return None
-        gaps = self.gap0 + self._along(displacement)
-        energy, pressure, _ = self.contact.response(gaps)
         force = np.zeros((self.count, self.nodes, 3))
-        per_element = body.force.reshape(self.count, -1, 27, 3)
-        for k, nodes in enumerate(self.mesh.hexes):
-            force[:, nodes] += per_element[:, k]
+        add_forces(force.reshape(-1, 3), self._element_nodes, body.force.reshape(-1, 27, 3))
+        return self._with_contact(displacement, (body.energy, force))
+
+    def again(self, state):
+        """The same displacements after the contact's or friction's own state has changed."""
+        return self._with_contact(state.displacement, state.elastic)
+
+    def _with_contact(self, displacement, elastic):
+        gaps, force = self.gap0 + self._along(displacement), elastic[1].copy()
+        energy, pressure, _ = self.contact.response(gaps)
         _scatter_contact(force, -pressure * self.point_area, self.point_nodes, self.point_weights, self.point_axis)
-        state = BedState(energy=body.energy + float((energy * self.point_area).sum()), force=force, gaps=gaps,
+        state = BedState(elastic=elastic, energy=elastic[0] + float((energy * self.point_area).sum()), force=force, gaps=gaps,
                          displacement=displacement)
         return state if self.grip is None else self._with_friction(state)
 
@@ -265,17 +273,17 @@ class FrustumBed:
         tangents = self.block.tangent(displacement[:, hexes].reshape(-1, 27, 3), elements.ravel(), precision=np.float32)
         return tangents.reshape(*elements.shape, 81, 81)
 
-    def condensed_residual(self, state):
+    def condensed_residual(self, state, *, workers=SERIAL):
         """Root forces (n, 75) after the inner residual has been eliminated, and what `inner_step` needs again."""
         force = state.force.reshape(self.count, -1).copy()
-        halves = self.elimination.residual(force)
+        halves = self.elimination.residual(force, workers=workers)
         return force[:, self.root_dofs], halves
 
-    def inner_step(self, halves, root_step):
+    def inner_step(self, halves, root_step, *, workers=SERIAL):
         """Newton step (n, nodes, 3) of the frusta for the roots' step (n, 75)."""
         step = np.zeros((self.count, 3 * self.nodes))
         step[:, self.root_dofs] = root_step
-        self.elimination.recover(halves, step)
+        self.elimination.recover(halves, step, workers=workers)
         return step.reshape(self.count, self.nodes, 3)
 
     def inner_residual(self, state):

@@ -83,7 +83,7 @@ def _first_touch(body, surface, settings):
     start = _lowered_until_felt(body, body.evaluate(slab, bed, planes.anchors[:, 2].min(), planes), settings.first_touch_mm)
     if body.friction.active:
         body.friction.begin_step(body.evaluate(slab, bed, start.indentation - settings.first_touch_mm, planes))
-        start = _again(body, start)
+        start = body.again(start)
     state, _, _ = _settle(body, surface, start, None, settings.first_touch_tolerance_n, settings)
     if state is None:
         raise ConvergenceError("The first touch of the object did not converge.")
@@ -110,7 +110,7 @@ def _advance(body, surface, reached, target, settings):
     while True:
         force = min(target, reached.force + increment, _reach(body, reached.force, target, settings))
         body.friction.begin_step(reached.state)
-        state, spent, residual = _settle(body, surface, _again(body, reached.state), force, _tolerance(force, settings), settings)
+        state, spent, residual = _settle(body, surface, body.again(reached.state), force, _tolerance(force, settings), settings)
         iterations += spent
         if state is not None and force >= target:
             state, spent, residual = _press_apart(body, surface, state, residual, force, settings)
@@ -153,7 +153,7 @@ def _press_apart(body, surface, state, residual, force, settings):
         if overlap <= settings.largest_penetration_mm or in_vain == _PASSES_IN_VAIN:
             break
         body.press_apart(state, allowed_mm=settings.largest_penetration_mm)
-        start = body.let_down(_again(body, state), force)
+        start = body.let_down(body.again(state), force)
         state, spent, residual = _settle(body, surface, start, force, _tolerance(force, settings), settings)
         iterations += spent
     return state, iterations, residual
@@ -176,20 +176,15 @@ def _settle(body, surface, state, force, tolerance, settings):
         if state is None:
             break
         body.friction.renew(state)
-        own = _again(body, state)
+        own = body.again(state)
         residual = body.residual_norm(own, force)
         if residual <= tolerance:
             return own, iterations, residual
         if k >= settings.whole_passes:     # what is left now swings: more friction, less pressure, less friction
             body.friction.renew(state, halfway=True)
-            own = _again(body, state)
+            own = body.again(state)
         state = own
     return None, iterations, residual
-
-
-def _again(body, state):
-    """The state evaluated anew, after the body's contact or friction changed."""
-    return body.evaluate(state.slab.displacement, state.bed.displacement, state.indentation, state.slab.planes)
 
 
 def _newton(body, surface, state, force, tolerance, settings):

@@ -48,6 +48,15 @@ def deformation(displacement, gradients, shapes):
 
 
 @njit(cache=True, nogil=True)
+def add_forces(total, nodes, forces):
+    """Add elements' forces (e, m, 3) to those of all nodes (n, 3); nodes (e, m)."""
+    for e in range(len(nodes)):
+        for a in range(nodes.shape[1]):
+            for i in range(3):
+                total[nodes[e, a], i] += forces[e, a, i]
+
+
+@njit(cache=True, nogil=True)
 def inverse_symmetric(c):
     """Inverse (6,) of a symmetric 3 x 3 tensor (6,)."""
     xx, yy, zz, xy, yz, zx = c[0], c[1], c[2], c[3], c[4], c[5]

@@ -86,6 +86,11 @@ class LayeredBody:
         bed = self.bed.evaluate(bed_displacement, workers=self.workers) if slab is not None else None
         return None if bed is None else BodyState(slab=slab, bed=bed, indentation=indentation)
 
+    def again(self, state):
+        """The same displacements after the contact's or friction's own state has changed: the rubber is not evaluated anew."""
+        return BodyState(slab=self.slab.reface(state.slab, state.slab.planes, state.indentation), bed=self.bed.again(state.bed),
+                         indentation=state.indentation)
+
     def reface(self, state, planes):
         """The same state with the object's contact on other planes."""
         return replace(state, slab=self.slab.reface(state.slab, planes, state.indentation))
@@ -117,13 +122,13 @@ class LayeredBody:
     def _newton_step(self, state, force_n, surface, largest_mm):
         """The step with the cells as they are damped now."""
         self.cells.refresh(state, workers=self.workers)
-        residual, kept = self.cells.condensed_residual(state)
-        contact = StepContact(self.slab, state.slab, state.indentation, surface)
+        residual, kept = self.cells.condensed_residual(state, workers=self.workers)
+        contact = StepContact(self.slab, state.slab, state.indentation, surface, workers=self.workers)
         step, lowering = self._step_of_unknowns(state, residual.ravel()[self.slab.unknowns], contact, force_n,
                                                  largest_mm)
         full = np.zeros(3 * self.slab.nodes)
         full[self.slab.unknowns] = step
-        slab, bed = self.cells.recover(kept, full.reshape(-1, 3))
+        slab, bed = self.cells.recover(kept, full.reshape(-1, 3), workers=self.workers)
         return Step(slab=slab, bed=bed, indentation=lowering, planes=contact.planes)
 
     def _step_of_unknowns(self, state, residual, contact, force_n, largest_mm):

@@ -100,35 +100,34 @@ class SheetCells:
         without = state.slab.drag is None and drag is None
         return slope, _REFRESH_SLOPE * self.bed.contact.stiffness if without else _REFRESH_WITH_FRICTION
 
-    def condensed_residual(self, state):
+    def condensed_residual(self, state, *, workers=SERIAL):
         """Residual (n, 3) of the slab with all inner unknowns eliminated, and what `recover` needs again."""
-        root_force, in_frusta = self.bed.condensed_residual(state.bed)
+        root_force, in_frusta = self.bed.condensed_residual(state.bed, workers=workers)
         residual = state.slab.force.copy()
         np.add.at(residual, self.roots.ravel(), root_force.reshape(-1, 3))
-        flat, in_cells = residual.reshape(-1), []
-        for kind in self.kinds:
-            passed_on, halves = kind.residual(flat)
+        flat = residual.reshape(-1)
+        reduced = workers.map(lambda kind: kind.residual(flat), self.kinds)
+        for kind, (passed_on, _) in zip(self.kinds, reduced, strict=True):
             np.add.at(flat, kind.outer_dofs.ravel(), passed_on.ravel())
-            in_cells.append(halves)
-        return residual, (in_frusta, in_cells)
+        return residual, (in_frusta, [halves for _, halves in reduced])
 
-    def recover(self, kept, slab_step):
+    def recover(self, kept, slab_step, *, workers=SERIAL):
         """Newton steps of the slab (n, 3), its inner nodes filled in, and of the frusta (f, nodes, 3).
 
         A cell's step is its answer to its walls' movement and its own way to balance. The latter is cut where it goes farther
         than `_FARTHEST_MM`: a frustum that snaps into a new fold would else shorten the step of the whole sensor. Since each
         cell's inner matrix is positive definite, what is left still lowers the energy.
         """
-        slab, frusta = self._recovered(kept, slab_step)
+        slab, frusta = self._recovered(kept, slab_step, workers)
         if max(np.abs(slab).max(), np.abs(frusta).max()) <= _FARTHEST_MM:
             return slab, frusta
-        inner, _ = self._movement(*self._recovered(kept, np.zeros_like(slab_step)))
+        inner, _ = self._movement(*self._recovered(kept, np.zeros_like(slab_step), workers))
         if not (inner > _FARTHEST_MM).any():
             return slab, frusta
         share, (in_frusta, in_cells) = _FARTHEST_MM / np.maximum(inner, _FARTHEST_MM), kept
         cut = ([share[:, None] * half for half in in_frusta],
                [[share[kind.cells, None] * half for half in halves] for kind, halves in zip(self.kinds, in_cells, strict=True)])
-        return self._recovered(cut, slab_step)
+        return self._recovered(cut, slab_step, workers)
 
     def _movement(self, slab, frusta):
         """How far (f,) in mm a step moves each cell's inner nodes at most, and its walls."""
@@ -138,14 +137,15 @@ class SheetCells:
             outer[kind.cells] = np.abs(flat[kind.outer_dofs]).max(axis=1, initial=0.0)
         return inner, outer
 
-    def _recovered(self, kept, slab_step):
+    def _recovered(self, kept, slab_step, workers):
         """The steps of slab and frusta for what cells and frusta keep of their residuals, and for the walls' step."""
         in_frusta, in_cells = kept
         flat = slab_step.copy().reshape(-1)
-        for kind, halves in zip(self.kinds, in_cells, strict=True):
-            flat[kind.inner_dofs] = kind.inner_step(halves, flat)
+        steps = workers.map(lambda both: both[0].inner_step(both[1], flat), list(zip(self.kinds, in_cells, strict=True)))
+        for kind, step in zip(self.kinds, steps, strict=True):
+            flat[kind.inner_dofs] = step
         full = flat.reshape(-1, 3)
-        return full, self.bed.inner_step(in_frusta, full[self.roots].reshape(self.count, -1))
+        return full, self.bed.inner_step(in_frusta, full[self.roots].reshape(self.count, -1), workers=workers)
 
 
 class CellKind:

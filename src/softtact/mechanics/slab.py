@@ -12,11 +12,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from softtact.contact.friction import Drag
-from softtact.mechanics.blocks import HexBlock, WedgeBlock, of_masters
+from softtact.mechanics.blocks import HexBlock, WedgeBlock, joined, of_masters
 from softtact.mechanics.contact_step import LinearGaps
 from softtact.mechanics.cover_mesh import cover_mesh
 from softtact.mechanics.elements import quad8
 from softtact.mechanics.hex_mesh import extrude
+from softtact.mechanics.kernels import add_forces
 from softtact.mechanics.parallel import SERIAL
 from softtact.mechanics.plan_location import plan_interpolation
 from softtact.mechanics.sparsity import SymmetricProduct, add_upper, upper_pattern, upper_positions
@@ -93,6 +94,7 @@ class Slab:
         self.groups, self.cell_groups = [], []   # (nodes, block) outside of cells; a `CellGroup` for each kind of cell
         self._add_cover(cover.law)
         self._add_sheet(sheet_plan, [sheet.law] * self.sheet_layers + [cover.law] * bound)
+        self._joined = joined(self.solids)     # to evaluate a hundred small blocks takes twice as long
         self._number_unknowns(sides)
         self.top = TopContact(self.cover_mesh, contact, friction)
 
@@ -210,12 +212,12 @@ class Slab:
         """Energy, forces and contact with the object lowered by `indentation` mm; None if an element is inside out."""
         force = np.zeros((self.nodes, 3))
         energy = 0.0
-        for nodes, block in self.solids:
+        for nodes, block in self._joined:
             state = block.evaluate(displacement[nodes], workers=workers)
             if state is None:
                 return None
             energy += state.energy
-            np.add.at(force, nodes.ravel(), state.force.reshape(-1, 3))
+            add_forces(force, nodes, state.force.reshape(*nodes.shape, 3))
         return self._with_contact(displacement, (energy, force), planes, indentation)
 
     def reface(self, state, planes, indentation):
@@ -225,7 +227,7 @@ class Slab:
     def _with_contact(self, displacement, elastic, planes, indentation):
         energy, force = elastic[0], elastic[1].copy()
         touch = self.top.touch(displacement, planes, indentation)
-        np.add.at(force, self.top.faces.ravel(), touch.force.reshape(-1, 3))
+        add_forces(force, self.top.faces, touch.force.reshape(*self.top.faces.shape, 3))
         return SlabState(elastic=elastic, energy=energy + touch.energy, force=force, gaps=touch.gaps, planes=planes,
                          displacement=displacement, indentation_force=touch.indentation_force, drag=touch.drag)
 

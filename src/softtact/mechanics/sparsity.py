@@ -7,6 +7,8 @@ import numpy as np
 import scipy.sparse as sp
 from numba import njit
 
+from softtact.mechanics.parallel import SERIAL
+
 
 class SymmetricPattern:
     """Pattern of the unknowns that meet in an element.
@@ -42,13 +44,15 @@ class SymmetricProduct:
 
     def __init__(self, indptr, indices):
         self._indptr, self._indices = indptr, indices
-        self._alike = _rows_alike(indptr, indices)
+        alike = _rows_alike(indptr, indices)
+        first = np.cumsum([0, *alike])
+        half = np.searchsorted(indptr[first], indptr[-1] // 2)
+        self._parts = [(0, alike[:half]), (first[half], alike[half:])]     # as many values in each; sums do not depend on threads
 
-    def __call__(self, data, x):
+    def __call__(self, data, x, *, workers=SERIAL):
         """A x (n,) in double precision, whatever that of the values."""
-        out = np.zeros(len(x))
-        _symmetric_product(self._indptr, self._indices, data, self._alike, x, out)
-        return out
+        one, other = workers.map(lambda part: _symmetric_product(self._indptr, self._indices, data, *part, x), self._parts)
+        return one + other
 
 
 @njit(cache=True, nogil=True)
@@ -68,8 +72,9 @@ def _rows_alike(indptr, indices):
 
 
 @njit(cache=True, nogil=True)
-def _symmetric_product(indptr, indices, data, alike, x, out):
-    row = 0
+def _symmetric_product(indptr, indices, data, row, alike, x):
+    """What the rows from `row` on give, by their upper halves."""
+    out = np.zeros(len(x))
     for rows in alike:
         if rows == 3:
             _add_three_rows(row, indptr, indices, data, x, out)
@@ -82,6 +87,7 @@ def _symmetric_product(indptr, indices, data, alike, x, out):
                     out[column] += value * own
             out[row] += total
         row += rows
+    return out
 
 
 @njit(cache=True, nogil=True)

@@ -1,5 +1,7 @@
 """The object's contact with a slab as a step of Newton's method sees it."""
 
+from softtact.mechanics.parallel import SERIAL
+
 
 class StepContact:
     """The object's contact in the course of a step from a `SlabState`; `planes` and `points` are what it is at present.
@@ -7,8 +9,8 @@ class StepContact:
     surface: looked up anew where the step leads; None: the points keep the planes that they face
     """
 
-    def __init__(self, slab, state, indentation, surface=None):
-        self._slab, self._state, self._indentation, self._surface = slab, state, indentation, surface
+    def __init__(self, slab, state, indentation, surface=None, *, workers=SERIAL):
+        self._slab, self._state, self._indentation, self._surface, self._workers = slab, state, indentation, surface, workers
         self._face(state.planes)
 
     def _face(self, planes):
@@ -20,7 +22,7 @@ class StepContact:
 
     def rubber_forces(self, rubber, step):
         """Forces (unknowns,) of the rubber's tangent against a step (unknowns,) in mm."""
-        return self._slab.product(rubber.data, step)
+        return self._slab.product(rubber.data, step, workers=self._workers)
 
     def follow(self, step, lowering):
         """Look up what the points face after a step (unknowns,) in mm of the slab; True if there is a surface to ask."""
