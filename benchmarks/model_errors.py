@@ -1,7 +1,7 @@
 """Errors of the fast models and of the coarser meshes: `python benchmarks/model_errors.py [--mesh fine|default] [OBJECT ...]`.
 
-What they are held against are the hyperelastic maps that `objects.py --mesh fine` left in benchmarks/results/maps. Every object that
-has one is pressed with the fast models at the same forces, which takes seconds; other meshes' maps are read. Error: root mean
+What they are held against are the hyperelastic maps that `objects.py --mesh fine` left in benchmarks/results/maps. Every object
+that has one is pressed with the fast models at the same forces, which takes seconds; other meshes' maps are read. Error: root mean
 square over the map in % of its maximum; SSIM: scikit-image's, window of 7, the map's maximum as range. Writes
 benchmarks/results/model_errors_MESH.json.
 """

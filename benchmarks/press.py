@@ -20,9 +20,9 @@ import softtact
 from softtact.geometry.meshes import read_mesh
 from softtact.mechanics.mesh_settings import MeshSettings
 
-OBJECTS = ["config/objects/indenters/circle_m.stl", "config/objects/indenters/sphere.stl"]
-MESHES = {"production": MeshSettings(), "draft": MeshSettings.draft()}
-LEVELS, THREADS = (5, 20), (1, 2)
+OBJECTS = ["config/objects/indenters/circle_m.stl"]
+MESHES = {"production": MeshSettings(), "draft": MeshSettings.draft(), "fine": MeshSettings.fine()}
+CASES = [("draft", 20, 2), ("production", 5, 2), ("production", 20, 2), ("fine", 5, 2), ("fine", 20, 2), ("production", 20, 1)]
 LARGEST_N = 50.0
 
 
@@ -41,20 +41,21 @@ def measure(file, mesh, levels, threads):
 
 
 def main(files):
-    """Print a row per object, mesh, number of levels and threads, and write benchmarks/results/press.json."""
-    rows = []
+    """Print a row per object and case (mesh, levels, threads), and write benchmarks/results/press.json after each."""
+    rows, path = [], "No press was made."
     print(f"{'object':12}{'mesh':12}{'levels':>7}{'threads':>8}{'seconds':>9}{'iterations':>11}{'memory, GB':>11}")
-    for case in itertools.product(files, MESHES, map(str, LEVELS), map(str, THREADS)):
-        run = subprocess.run([sys.executable, __file__, "--one", *case], capture_output=True, text=True, env=record.threads_of(1),
-                             check=False)
+    for file, case in itertools.product(files, CASES):
+        run = subprocess.run([sys.executable, __file__, "--one", file, *map(str, case)], capture_output=True, text=True,
+                             env=record.threads_of(1), check=False)
         if run.returncode:
-            print(*case, run.stderr.strip().splitlines()[-1], flush=True)
+            print(file, *case, run.stderr.strip().splitlines()[-1], flush=True)
             continue
         row = json.loads(run.stdout)
         rows.append(row)
         print(f"{row['object']:12}{row['mesh']:12}{row['levels']:7}{row['threads']:8}{row['seconds']:9.1f}{row['iterations']:11}"
               f"{row['memory_gb']:11.2f}", flush=True)
-    print(record.write("press", rows=rows))
+        path = record.write("press", rows=rows)
+    print(path)
 
 
 if __name__ == "__main__":

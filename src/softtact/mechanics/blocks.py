@@ -54,15 +54,16 @@ class Volumetric:
 class SolidBlock:
     """Elements of one kind and one law, by their shape functions' gradients.
 
-    gradients (u, g, m, 3) in 1/mm and volumes (u, g) in mm3 of the shapes that occur; shapes (e,): which is an element's, by
-    default each its own; points (g, 3) of the quadrature in parent coordinates; local_over_shear: k / mu; growing_over_shear:
-    q / mu; trilinear: project on trilinear instead of linear functions. Displacements come per element (e, m, 3) in mm.
+    gradients (u, g, m, 3) in 1/mm, kept as (u, g, 3, m), and volumes (u, g) in mm3 of the shapes that occur; shapes (e,): which is
+    an element's, by default each its own; points (g, 3) of the quadrature in parent coordinates; local_over_shear: k / mu;
+    growing_over_shear: q / mu; trilinear: project on trilinear instead of linear functions. Displacements come per element
+    (e, m, 3) in mm.
     """
 
     def __init__(self, gradients, volumes, points, law, *, shapes=None, local_over_shear=0.0, growing_over_shear=0.0,
                  trilinear=False):
         self.law, self._local_over_shear, self._growing_over_shear = law, local_over_shear, growing_over_shear
-        self.gradients, self.volumes = np.ascontiguousarray(gradients), np.ascontiguousarray(volumes)
+        self.gradients, self.volumes = np.ascontiguousarray(gradients.transpose(0, 1, 3, 2)), np.ascontiguousarray(volumes)
         self.shapes = np.arange(len(gradients)) if shapes is None else shapes
         self.basis = _pressure_modes(points, trilinear)
         gram = np.einsum("eg,gp,gq->epq", self.volumes, self.basis, self.basis, optimize=True)
@@ -155,7 +156,7 @@ def joined(parts):
     """
     kinds = {}
     for nodes, block in parts:
-        kinds.setdefault((id(block.law), type(block), *block.gradients.shape[1:3]), []).append((nodes, block))
+        kinds.setdefault((id(block.law), type(block), *block.gradients.shape[1:]), []).append((nodes, block))
     return [(np.vstack([nodes for nodes, _ in alike]), _joined_block([block for _, block in alike])) for alike in kinds.values()]
 
 
@@ -219,6 +220,6 @@ def of_masters(masters, weights, elements, block):
     table = np.hstack([block.shapes[:, None], follow.reshape(len(follow), -1)])
     first, block.shapes = unique_rows(table)
     own = table[first, 0].astype(int)
-    block.gradients = np.ascontiguousarray(np.einsum("egmd,emw->egwd", block.gradients[own], follow[first], optimize=True))
+    block.gradients = np.ascontiguousarray(np.einsum("egdm,emw->egdw", block.gradients[own], follow[first], optimize=True))
     block.volumes, block.gram_inverse = block.volumes[own], block.gram_inverse[own]
     return nodes, block

@@ -1,6 +1,6 @@
 """Compiled loops over elements: kinematics, internal forces and tangents. Plain arrays in, plain arrays out.
 
-Symmetric tensors are stored as xx, yy, zz, xy, yz, zx. Many elements are translations of each other: gradients (u, g, m, 3)
+Symmetric tensors are stored as xx, yy, zz, xy, yz, zx. Many elements are translations of each other: gradients (u, g, 3, m)
 and volumes (u, g) are kept once for each shape, `shapes` (e,) tells which is an element's. All kernels run on one core and
 release the GIL.
 """
@@ -13,29 +13,36 @@ _COL = np.array([0, 1, 2, 1, 2, 0])
 _VOIGT = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
 
 
+@njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})     # sums over nodes, several at once
+def _gradient(along, slopes):
+    """Derivatives by x, y, z of one component of the displacement (m,) from the shape functions' gradients (3, m) at a point."""
+    by_x, by_y, by_z = 0.0, 0.0, 0.0
+    for a in range(len(along)):
+        by_x += along[a] * slopes[0, a]
+        by_y += along[a] * slopes[1, a]
+        by_z += along[a] * slopes[2, a]
+    return by_x, by_y, by_z
+
+
 @njit(cache=True, nogil=True)
 def deformation(displacement, gradients, shapes):
     """Deformation gradient F (e, g, 3, 3), C (e*g, 6) and J (e, g) from nodal displacement (e, m, 3)."""
     elements, nodes, _ = displacement.shape
+    along = np.empty((3, nodes))
     points = gradients.shape[1]
     F = np.empty((elements, points, 3, 3))
     C = np.empty((elements * points, 6))
     J = np.empty((elements, points))
     for e in range(elements):
+        for a in range(nodes):
+            for i in range(3):
+                along[i, a] = displacement[e, a, i]
         for g in range(points):
-            xx, xy, xz, yx, yy, yz, zx, zy, zz = 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0
-            for a in range(nodes):
-                x, y, z = gradients[shapes[e], g, a, 0], gradients[shapes[e], g, a, 1], gradients[shapes[e], g, a, 2]
-                u, v, w = displacement[e, a, 0], displacement[e, a, 1], displacement[e, a, 2]
-                xx += u * x
-                xy += u * y
-                xz += u * z
-                yx += v * x
-                yy += v * y
-                yz += v * z
-                zx += w * x
-                zy += w * y
-                zz += w * z
+            slopes = gradients[shapes[e], g]
+            xx, xy, xz = _gradient(along[0], slopes)
+            yx, yy, yz = _gradient(along[1], slopes)
+            zx, zy, zz = _gradient(along[2], slopes)
+            xx, yy, zz = xx + 1.0, yy + 1.0, zz + 1.0
             f = F[e, g]
             f[0, 0], f[0, 1], f[0, 2] = xx, xy, xz
             f[1, 0], f[1, 1], f[1, 2] = yx, yy, yz
@@ -75,11 +82,13 @@ def inverse_symmetric(c):
 def internal_force(F, C, J, gradients, volumes, shapes, stress, pressure):
     """Nodal forces (e, 3 m): isochoric second Piola-Kirchhoff stress (e*g, 6) plus pressure (e, g) J C^-1."""
     elements, points = J.shape
-    nodes = gradients.shape[2]
-    force = np.zeros((elements, 3 * nodes))
+    nodes = gradients.shape[3]
+    force = np.empty((elements, 3 * nodes))
+    own = np.empty((3, nodes))
     S = np.empty((3, 3))
     P = np.empty((3, 3))
     for e in range(elements):
+        own[:] = 0.0
         for g in range(points):
             n = e * points + g
             w, pj = volumes[shapes[e], g], pressure[e, g] * J[e, g]
@@ -91,11 +100,14 @@ def internal_force(F, C, J, gradients, volumes, shapes, stress, pressure):
             for i in range(3):
                 for j in range(3):
                     P[i, j] = F[e, g, i, 0] * S[0, j] + F[e, g, i, 1] * S[1, j] + F[e, g, i, 2] * S[2, j]
-            for a in range(nodes):
-                x, y, z = gradients[shapes[e], g, a, 0], gradients[shapes[e], g, a, 1], gradients[shapes[e], g, a, 2]
-                force[e, 3 * a] += P[0, 0] * x + P[0, 1] * y + P[0, 2] * z
-                force[e, 3 * a + 1] += P[1, 0] * x + P[1, 1] * y + P[1, 2] * z
-                force[e, 3 * a + 2] += P[2, 0] * x + P[2, 1] * y + P[2, 2] * z
+            slopes = gradients[shapes[e], g]
+            for i in range(3):
+                x, y, z = P[i, 0], P[i, 1], P[i, 2]
+                for a in range(nodes):
+                    own[i, a] += x * slopes[0, a] + y * slopes[1, a] + z * slopes[2, a]
+        for a in range(nodes):
+            for i in range(3):
+                force[e, 3 * a + i] = own[i, a]
     return force
 
 
@@ -144,8 +156,8 @@ def _volume_change(change, f, inverse, gradient, scale):
         x = scale * (f[i, 0] * inverse[0] + f[i, 1] * inverse[3] + f[i, 2] * inverse[5])
         y = scale * (f[i, 0] * inverse[3] + f[i, 1] * inverse[1] + f[i, 2] * inverse[4])
         z = scale * (f[i, 0] * inverse[5] + f[i, 1] * inverse[4] + f[i, 2] * inverse[2])
-        for a in range(len(gradient)):
-            change[3 * a + i] = x * gradient[a, 0] + y * gradient[a, 1] + z * gradient[a, 2]
+        for a in range(gradient.shape[1]):
+            change[3 * a + i] = x * gradient[0, a] + y * gradient[1, a] + z * gradient[2, a]
 
 
 @njit(cache=True, nogil=True)
@@ -218,7 +230,7 @@ def tangent(F, C, J, gradients, volumes, shapes, stress, moduli, pressure, basis
     products an element instead of one with the strain-displacement matrix, which has a third of zeros.
     """
     elements, points = J.shape
-    nodes = gradients.shape[2]
+    nodes = gradients.shape[3]
     out = np.empty((elements, 3 * nodes, 3 * nodes), like.dtype)
     G = np.empty((3 * points, nodes), like.dtype)
     rights = (np.empty((3 * points, 3 * nodes), like.dtype), np.empty((3 * points, 2 * nodes), like.dtype),
@@ -237,7 +249,7 @@ def tangent(F, C, J, gradients, volumes, shapes, stress, moduli, pressure, basis
             _moduli(D, S, stress[n], moduli[n], inverse, w, pressure[e, g] * j, local)
             _elasticity(A, F[e, g], S, D)
             _volume_change(change[g], F[e, g], inverse, gradient, w * j)
-            G[3 * g:3 * g + 3] = gradient.T
+            G[3 * g:3 * g + 3] = gradient
             _times_gradients(rights, A, G, g)
         _volumetric(out[e], change, modes, _in_precision(gram_inverse[shapes[e]], like), bulk_modulus, volumes[shapes[e]],
                     growing[e:e + 1].ravel())
