@@ -1,0 +1,59 @@
+"""Blocks of elements: joined ones and single precision give what each alone gives in double precision."""
+
+import numpy as np
+import pytest
+
+from softtact.materials.laws.registry import make_law
+from softtact.mechanics.blocks import HexBlock, WedgeBlock, joined, of_masters
+from softtact.mechanics.elements import HEX27_NODES
+from softtact.mechanics.hex_mesh import extrude, sheet_plan
+
+LAWS = [make_law("mooney_rivlin", {"c10": 0.17, "c01": 0.004}, bulk_modulus=7.0),
+        make_law("neo_hooke", {"c10": 0.3}, bulk_modulus=9.0)]
+
+
+def parts():
+    """Elements of a frustum's cell: two laws, hexahedra and wedges, some that hang on nodes of larger ones."""
+    mesh = extrude(sheet_plan(np.zeros((1, 2)), (1, 1), 1.2, 0.9, (1.2, 1.2)).plan, np.array([0.0, 0.2, 0.5]))
+    lower, upper = (mesh.layer(k) for k in (0, 1))
+    found = [(lower, HexBlock(mesh.points[lower], LAWS[0])), (upper, HexBlock(mesh.points[upper], LAWS[0])),
+             (upper[:2], HexBlock(mesh.points[upper[:2]], LAWS[1]))]
+    wedges = mesh.wedge_layer(0)
+    if len(wedges):
+        found.append((wedges, WedgeBlock(mesh.points[wedges], LAWS[0])))
+    masters, weights = np.arange(len(mesh.points))[:, None].repeat(2, axis=1), np.tile([1.0, 0.0], (len(mesh.points), 1))
+    masters[0], weights[0] = (1, 2), (0.5, 0.5)
+    hanging = lower[:1]
+    found.append(of_masters(masters, weights, hanging, HexBlock(mesh.points[hanging], LAWS[0])))
+    return mesh.points, found
+
+
+def total(field, solids):
+    """Energy and nodal forces (n, 3) of all."""
+    states = [(nodes, block.evaluate(field[nodes])) for nodes, block in solids]
+    force = np.zeros_like(field)
+    for nodes, state in states:
+        np.add.at(force, nodes.ravel(), state.force.reshape(-1, 3))
+    return sum(state.energy for _, state in states), force
+
+
+def test_joined_blocks_have_the_energy_and_the_forces_of_their_parts():
+    points, solids = parts()
+    field = 0.002 * np.random.default_rng(0).normal(size=points.shape)
+    energy, force = total(field, solids)
+    whole = joined(solids)
+    assert len(whole) < len(solids)
+    together, forces = total(field, whole)
+    assert together == pytest.approx(energy, rel=1e-12)
+    np.testing.assert_allclose(forces, force, atol=1e-12 * np.abs(force).max())
+    again, _ = total(field, solids)          # the parts live on, in the new arrays
+    assert again == pytest.approx(energy, rel=1e-12)
+
+
+@pytest.mark.parametrize("options", [{}, {"local_over_shear": 0.5}, {"growing_over_shear": 100.0, "trilinear": True}])
+def test_tangents_in_single_precision_are_those_in_double_precision_to_seven_digits(options):
+    block = HexBlock(0.5 * HEX27_NODES[None], LAWS[0], **options)
+    field = 0.02 * np.random.default_rng(1).normal(size=(1, 27, 3))
+    exact, rough = block.tangent(field), block.tangent(field, precision=np.float32)
+    assert rough.dtype == np.float32
+    assert np.abs(rough - exact).max() < 2e-6 * np.abs(exact).max()      # sums of 81 products of seven digits
