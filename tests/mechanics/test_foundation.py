@@ -24,6 +24,7 @@ from softtact.mechanics.foundation_press import (
     rotating_loads,
 )
 from softtact.mechanics.frustum_law import FrustumLaw, _root_stiffness, frustum_law
+from softtact.mechanics.mesh_settings import MeshSettings
 from softtact.mechanics.sensor_bodies import build_unit_cell
 from softtact.sensor import Sensor
 
@@ -79,7 +80,7 @@ def test_a_frustum_takes_more_force_the_more_it_is_compressed(law):
 
 
 def test_the_first_slope_is_the_linear_stiffness_of_a_frustum_at_rest(law):
-    body = build_unit_cell(SMALL, dielectric_law=LAWS["dielectric"])
+    body = build_unit_cell(SMALL, dielectric_law=LAWS["dielectric"], mesh=MeshSettings(frustum_rings=2))
     stiffness = _root_stiffness(body.bed)
     body.close()
     straight = np.tile([0.0, 0.0, 1.0], len(law.root_xy))
@@ -278,12 +279,12 @@ def test_without_patches_a_centred_object_of_two_symmetries_gives_a_map_that_has
 def test_at_a_small_force_the_foundation_gives_the_hyperelastic_models_map(flexibility):
     """Both start from the same cell and laws; at 1 N strains are a few per cent.
 
-    What is left is the punch's edge, where the pressure is singular and both models' contact has steps of 0.3 and 0.1 mm: each acts
-    as a punch smaller by a share of that, a tenth of the radius or less, and depth and map go with it.
+    What is left is the punch's edge, where the pressure is singular and the foundation's contact has steps of 0.3 mm: it acts as a
+    punch smaller by a share of that, and the fine mesh's own 1 to 2 %.
     """
-    sensor = Sensor(SMALL, LAWS, files={"foundation": flexibility})
+    sensor = Sensor(SMALL, LAWS, files={"foundation": flexibility}, mesh=MeshSettings.fine())
     punch = trimesh.creation.cylinder(radius=1.7, height=3.0, sections=96)
     fast, full = (sensor.press(punch, force_n=1.0, model=model, threads=1) for model in ("foundation", "hyperelastic"))
     difference, largest = np.abs(fast.deformation_map_mm - full.deformation_map_mm), full.deformation_map_mm.max()
-    assert difference.max() < 0.06 * largest and difference.mean() < 0.01 * largest
-    assert fast.indentation_mm[0] == pytest.approx(full.indentation_mm[0], rel=0.1)
+    assert difference.max() < 0.03 * largest and difference.mean() < 0.01 * largest
+    assert fast.indentation_mm[0] == pytest.approx(full.indentation_mm[0], rel=0.02)

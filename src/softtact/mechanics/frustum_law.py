@@ -79,8 +79,11 @@ class FrustumLaw:
 
 
 def frustum_law(spec, law, *, mesh=None, pressure_mpa=_PRESSURE_MPA):
-    """The `FrustumLaw` of a sensor's frusta of a hyperelastic law, from its unit cell up to a pressure, or as far as it goes."""
-    body = build_unit_cell(spec, dielectric_law=law, mesh=mesh or MeshSettings())
+    """The `FrustumLaw` of a sensor's frusta of a hyperelastic law, from its unit cell up to a pressure, or as far as it goes.
+
+    mesh: `MeshSettings` of the cell; by default frusta of two rings, which one cell can afford (of one: 2 % too stiff)
+    """
+    body = build_unit_cell(spec, dielectric_law=law, mesh=mesh or MeshSettings(frustum_rings=2))
     bed = body.bed
     root_xy = bed.coordinates[0][bed.root, :2] - bed.geometry.centres[0]
     stiffness = _root_stiffness(bed)
