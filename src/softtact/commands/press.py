@@ -44,7 +44,7 @@ def add(commands):
     command.add_argument("--mesh-quality", choices=("default", "draft", "stable", "fine"), default="default",
                          help="of the hyperelastic model: default is 1 to 4 %% off in the map's root mean square, draft 2 to 6 %% "
                               "and several times quicker; stable presses frusta deeper than half of their height; fine is 1 %% "
-                              "off, at most 2.4 %%, for 3.5 times the default's time and 4 GB for the default sensor")
+                              "off, at most 2.4 %%, for 2.7 times the default's time and 3 to 4 GB")
     command.add_argument("--card", action="append", metavar="LAYER=CARD.json",
                          help="a card of `softtact fit` for the dielectric or the cover, in place of the printed constants")
     command.add_argument("--out", type=Path, metavar="FILE.nc", help="write the maps as NetCDF")

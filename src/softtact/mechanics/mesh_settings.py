@@ -68,7 +68,7 @@ class MeshSettings:
 
     @classmethod
     def fine(cls):
-        """Within 1.3 to 2.4 % of the map's maximum, for 3.5 times the default's time and 4 GB (docs/discretisation.md).
+        """Within 1.3 to 2.4 % of the map's maximum, for 2.7 times the default's time and 3 to 4 GB (docs/discretisation.md).
 
         The cover's lowest layer keeps to the sheet's plan; edges are resolved to a sixteenth of a pitch, frusta by two rings.
         """
