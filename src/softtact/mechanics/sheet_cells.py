@@ -190,7 +190,7 @@ class CellKind:
         damping: of all cells, in N/mm
         """
         frusta = [bed.root_stiffness[self.cells[chosen], None]]
-        layers = ((frusta * (k == 0) + [self._tangents(state, part, chosen) for part in layer], None)
+        layers = (((frusta if k == 0 else []) + [self._tangents(state, part, chosen) for part in layer], None)
                   for k, layer in enumerate(self._layers))
         self.elimination.set(chosen, layers, damping=damping[self.cells[chosen]])
 
