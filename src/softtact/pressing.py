@@ -29,13 +29,17 @@ def press_elastic(sensor, placed, forces, *, label, threads, keep_body=False):
     underside = Underside(HeightField(placed), compliance.grid)
     points, press = _within_reach(underside, underside.nodes, compliance.bedding, forces, sensor.spec.thickness_mm,
                                   lambda points: press_layer(compliance, points, forces), lambda press: press.contact.depth[-1])
-    contact = press.contact
-    area = points.covered * np.prod(compliance.grid.step)
-    unknown = np.full(len(forces), np.nan)
     seconds = np.full(len(forces), (time.perf_counter() - start) / len(forces))
+    return elastic_result(sensor, compliance, press, forces, seconds, lowest_mm=underside.lowest_mm)
+
+
+def elastic_result(sensor, compliance, press, forces, seconds, *, lowest_mm):
+    """The result of a `LayerPress`; lowest_mm: of the object over the free surface."""
+    contact, unknown, thickness = press.contact, np.full(len(forces), np.nan), sensor.spec.thickness_mm
     return make_result(sensor, "elastic", "conjugate gradients", press.maps, forces, seconds, indentation_mm=contact.depth,
-                       contact_area_mm2=area @ (contact.force > 0), penetration_mm=contact.penetration,
-                       within_validity=valid_elastic(contact.depth - underside.lowest_mm, thickness_mm=sensor.spec.thickness_mm),
+                       contact_area_mm2=np.prod(compliance.grid.step) * np.count_nonzero(contact.force > 0, axis=0),
+                       penetration_mm=contact.penetration,
+                       within_validity=valid_elastic(contact.depth - lowest_mm, thickness_mm=thickness),
                        frustum_compression_mm=unknown, residual_n=unknown, outside_card=unknown, iterations=contact.iterations)
 
 

@@ -90,17 +90,21 @@ class Sensor:
         press = PRESSES[model] if model != "auto" else partial(press_auto, policy=policy, tolerance_mm=tolerance_mm)
         try:
             with threadpool_limits(limits=threads if model == "elastic" else 1):
-                return flag_buried(press(self, placed, forces, label=label, threads=threads, keep_body=keep_body), placed)
+                result = press(self, placed, forces, label=label, threads=threads, keep_body=keep_body)
+                return flag_buried(result, placed.bounds[1, 2])
         except ConvergenceError as error:
-            error.result = error.result and flag_buried(error.result, placed)
+            error.result = error.result and flag_buried(error.result, placed.bounds[1, 2])
             raise
 
-    def press_many(self, meshes, poses=None, *, force_n, model="auto", workers=None, failures="raise", label="presses", **options):
+    def press_many(self, meshes, poses=None, *, force_n, model="auto", workers=None, device="auto", failures="raise",
+                   label="presses", **options):
         """Press each of `meshes` in its pose, all through the same forces; a list of `PressResult`s in their order.
 
         meshes: one for each press, or a single one for all poses;  poses: a `Pose` or None (centred) for each press
-        workers: processes, by default one for each core;  failures: `raise` the first, after all are done, or `keep` each
-        error in its press' place;  options: policy, tolerance_mm, as for `press`
+        workers: processes, by default one for each core;  device: `cuda` or another of torch's GPUs takes all presses of the
+        elastic model as one batch, `auto` where there is one; the other models', and those on the `cpu`, go over processes
+        failures: `raise` the first, after all are done, or `keep` each error in its press' place
+        options: policy, tolerance_mm, as for `press`
         """
         meshes = list(meshes) if isinstance(meshes, (list, tuple)) else [meshes] * len(poses)
         poses = list(poses) if poses is not None else [None] * len(meshes)
@@ -109,7 +113,7 @@ class Sensor:
         if failures not in ("raise", "keep"):
             raise InputError(f"failures={failures!r} is unknown; write 'raise' or 'keep'.")
         results = press_many(self, meshes, poses, self.checked_forces(force_n), model=model, workers=workers or _cores(),
-                             label=label, options=options)
+                             device=device, label=label, options=options)
         return raise_first(results) if failures == "raise" else results
 
     def prepared(self, model, threads=1):

@@ -37,7 +37,7 @@ def _grows(depth, *, slack_mm):
     return (depth >= deepest_before - slack_mm) & (depth <= least_after + slack_mm)
 
 
-def flag_buried(result, placed):
+def flag_buried(result, top_mm):
     """The result with the levels flagged at which the object's top has sunk below the surface at rest: no model feels that side."""
-    above = result.indentation_mm < placed.bounds[1, 2]
+    above = result.indentation_mm < top_mm
     return replace(result, within_validity=result.within_validity & above.astype(np.int8))

@@ -132,5 +132,5 @@ def test_one_point_carries_everything():
 
 
 def test_a_level_that_does_not_settle_is_named():
-    with pytest.raises(ConvergenceError, match="at 6 N in 1 iterations"):
+    with pytest.raises(ConvergenceError, match="at 0.3 N in 1 iterations"):
         press_elastic(*layer_contact(SHAPES["sphere"]), FORCES, settings=ContactSettings(max_iterations=1))

@@ -4,8 +4,8 @@ Unknown are the forces f >= 0 at the contact points:  gap = gap0 - depth + A f >
 with the flexibility A among the points. Primal-dual active sets, that is a semismooth Newton method: points that penetrate join,
 points that pull leave. The equations of a set are solved by conjugate gradients on the plane sum f = const, in single precision
 with the residual in double (iterative refinement). A product with A for twenty levels takes seven times as long as for one,
-which is what makes the levels cheap. Many points that settle together suit this; few and changing ones `active_set`, which is the
-plain method and its specification.
+which is what makes the levels cheap; many presses on a GPU are more columns still (`mechanics/elastic_batch`). Many points that
+settle together suit this; few and changing ones `active_set`, which is the plain method and its specification.
 References: Hintermueller, Ito and Kunisch, SIAM J. Optim. 13 (2003) 865; Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23
 (2001) 1376 (projected conjugate gradients); Johnson, Contact Mechanics, sec. 5.9.
 """
@@ -13,6 +13,7 @@ References: Hintermueller, Ito and Kunisch, SIAM J. Optim. 13 (2003) 865; Gould,
 from dataclasses import dataclass
 
 import numpy as np
+from array_api_compat import array_namespace, device
 
 from softtact.errors import ConvergenceError
 
@@ -31,17 +32,37 @@ class ContactSettings:
 
 @dataclass(frozen=True)
 class ContactLevels:
-    """Levels l: forces (c, l) in N, depth (l,) in mm, gaps (c, l) in mm, iterations (l,)."""
+    """Levels l: forces (c, l) in N, depth (l,) in mm, gaps (c, l) in mm, iterations (l,), settled (l,): which were reached."""
 
     force: np.ndarray
     depth: np.ndarray
     gap: np.ndarray
     iterations: np.ndarray
+    settled: np.ndarray
 
     @property
     def penetration(self):
         """Deepest overlap (l,) in mm."""
         return np.maximum(0.0, -self.gap.min(axis=0))
+
+
+class DenseFlexibility:
+    """What a matrix (c, c) in mm/N does to forces (c, l), in double and in single precision."""
+
+    def __init__(self, matrix):
+        self._double, self._single = matrix.astype(np.float64), matrix.astype(np.float32)
+
+    def double(self, force):
+        """Displacements (c, l) of forces (c, l) in double precision."""
+        return self._double @ force
+
+    def single(self, force):
+        """The same in single precision."""
+        return self._single @ force
+
+    def precondition(self, x):
+        """About the inverse of `single`: nothing is known of a matrix."""
+        return x
 
 
 def press_elastic(flexibility, gap0, forces_n, *, area=None, bedding=1.0, precondition=None, settings=ContactSettings()):
@@ -50,82 +71,116 @@ def press_elastic(flexibility, gap0, forces_n, *, area=None, bedding=1.0, precon
     flexibility (c, c): mm/N;  area (c,): in any unit, and bedding: force per area and depth, for a first guess
     precondition: approximate inverse of the flexibility, of (c, l), or None. Raises ConvergenceError naming a level not reached.
     """
+    forces_n, acting = np.asarray(forces_n, dtype=float), DenseFlexibility(flexibility)
+    if precondition is not None:
+        acting.precondition = precondition
     area = np.ones(len(gap0)) if area is None else area
-    return _Press(flexibility, gap0, np.asarray(forces_n, dtype=float), precondition, settings).run(area, bedding)
+    depth = depth_on_springs(gap0 - gap0.min(), area, forces_n / bedding) + gap0.min()
+    levels = press_columns(acting, gap0[:, None], forces_n[None], depth[None], area=area, settings=settings)
+    if not levels.settled.all():
+        raise ConvergenceError(not_settled(forces_n[~levels.settled][0], settings))
+    return levels
+
+
+def not_settled(force_n, settings=ContactSettings()):
+    """What is said of a level that is not reached."""
+    return f"The elastic press did not settle its contact at {force_n:g} N in {settings.max_iterations} iterations."
+
+
+def press_columns(flexibility, gap0, forces_n, depth, *, area, settings=ContactSettings()):
+    """`ContactLevels` of many presses on one surface, with a column for each press and level, a press' levels side by side.
+
+    flexibility: has `double`, `single`, `precondition`, of (c, columns);  gap0 (c, p): in mm, far above any depth where an object
+    has no point;  forces_n (p, l): in N, rising;  depth (p, l): first guesses in mm;  area (c,): of the points, in any unit
+    All are arrays of one kind, NumPy's or torch's on any device; so are the levels' fields.
+    """
+    return _Press(flexibility, gap0, forces_n, settings).run(depth, area)
 
 
 @dataclass
 class _State:
-    """Forces f (c, l) of all levels, which of them act, depths, gaps, iterations."""
+    """Forces f (c, m) of all columns, which of them act, depths, gaps, iterations, and which columns have settled."""
 
     f: np.ndarray
     active: np.ndarray
     depth: np.ndarray
     gap: np.ndarray
     iterations: np.ndarray
+    settled: np.ndarray
 
 
 class _Press:
-    def __init__(self, flexibility, gap0, forces, precondition, settings):
-        self.gap0, self.forces, self.settings = gap0[:, None], forces, settings
-        self.double, self.single = flexibility.astype(np.float64), flexibility.astype(np.float32)
-        self.precondition = precondition or (lambda x: x)
+    """The method on columns m, whose presses and last levels are `press` and `last` (m,)."""
 
-    def run(self, area, bedding):
-        state, last = self._first(area, bedding), len(self.forces) - 1
-        self._settle(state, np.array([last]))
-        if last:
-            self._scale_down(state, last)
-            self._settle(state, np.arange(last))
-        return ContactLevels(force=state.f, depth=state.depth, gap=state.gap, iterations=state.iterations)
+    def __init__(self, flexibility, gap0, forces, settings):
+        self.xp = array_namespace(gap0)
+        self.flexibility, self.gap0, self.settings = flexibility, gap0, settings
+        self.forces, levels = self.xp.reshape(forces, (-1,)), forces.shape[1]
+        self.columns = self.xp.arange(len(self.forces), device=device(gap0))
+        self.press, self.level = self.columns // levels, self.columns % levels
+        self.last = self.press * levels + levels - 1
 
-    def _first(self, area, bedding):
+    def run(self, depth, area):
+        state = self._first(self.xp.reshape(depth, (-1,)), area)
+        self._settle(state, self.columns[self.columns == self.last])
+        below = self.columns[self.columns != self.last]
+        if len(below):
+            self._scale_down(state, below)
+            self._settle(state, below)
+        return ContactLevels(force=state.f, depth=state.depth, gap=state.gap, iterations=state.iterations, settled=state.settled)
+
+    def _first(self, depth, area):
         """Forces of springs side by side under the object, as deep as each force asks for."""
-        gap = self.gap0[:, 0] - self.gap0.min()
-        depth = depth_on_springs(gap, area, self.forces / bedding)
-        pressed = np.maximum(0.0, depth - gap[:, None]) * area[:, None]
-        return _State(f=pressed * (self.forces / pressed.sum(axis=0)), active=pressed > 0, depth=depth,
-                      gap=np.zeros_like(pressed), iterations=np.zeros(len(self.forces), dtype=int))
+        xp = self.xp
+        pressed = xp.clip(depth - self.gap0[:, self.press], min=0.0) * area[:, None]
+        pressed *= self.forces / xp.sum(pressed, axis=0)
+        return _State(f=pressed, active=pressed > 0, depth=depth, gap=xp.zeros_like(pressed),
+                      iterations=xp.zeros_like(self.columns), settled=self.columns < 0)
 
-    def _scale_down(self, state, last):
+    def _scale_down(self, state, below):
         """Start the levels below the last one with its forces, scaled, where the contact is about as wide at first guess."""
-        like = np.flatnonzero(state.active[:, :last].sum(axis=0) > _AS_WIDE * state.active[:, last].sum())
-        state.f[:, like] = state.f[:, [last]] * self.forces[like] / self.forces[last]
-        state.active[:, like] = state.active[:, [last]]
+        xp, last = self.xp, self.last[below]
+        points = xp.sum(xp.astype(state.active, xp.int64), axis=0)
+        like = points[below] > _AS_WIDE * points[last]
+        below, last = below[like], last[like]
+        state.f[:, below] = state.f[:, last] * (self.forces[below] / self.forces[last])
+        state.active[:, below] = state.active[:, last]
 
-    def _settle(self, state, levels):
+    def _settle(self, state, columns):
+        """Iterate on some columns until each has settled, or has had its iterations."""
         for _ in range(self.settings.max_iterations):
-            settled = self._evaluate(state, levels)
-            levels = levels[~settled]
-            if not len(levels):
+            state.settled[columns] = self._evaluate(state, columns)
+            columns = columns[~state.settled[columns]]
+            if not len(columns):
                 return
-            self._newton(state, levels)
-        raise ConvergenceError(f"The elastic press did not settle its contact at {self.forces[levels[0]]:g} N in "
-                               f"{self.settings.max_iterations} iterations.")
+            self._newton(state, columns)
 
-    def _evaluate(self, state, levels):
-        """Gaps of some levels, with points joined that penetrate and left that pull; which of the levels have settled."""
-        tolerance, f, active = self.settings.tolerance_mm, state.f[:, levels], state.active[:, levels]
-        free_gap = self.gap0 + self.double @ f
-        state.depth[levels] = np.where(active, free_gap, 0.0).sum(axis=0) / active.sum(axis=0)
-        gap = free_gap - state.depth[levels]
+    def _evaluate(self, state, columns):
+        """Gaps of some columns, with points joined that penetrate and left that pull; which of the columns have settled."""
+        xp, tolerance = self.xp, self.settings.tolerance_mm
+        f, active, forces = state.f[:, columns], state.active[:, columns], self.forces[columns]
+        gap = self.gap0[:, self.press[columns]] + self.flexibility.double(f)
+        depth = xp.sum(xp.where(active, gap, 0.0), axis=0) / xp.sum(xp.astype(active, gap.dtype), axis=0)
+        gap -= depth
         joining, pulling = ~active & (gap < -tolerance), active & (f < 0)
-        state.gap[:, levels], state.active[:, levels] = gap, (active | joining) & ~pulling
-        settled = ~((np.abs(gap) > tolerance) & active | joining | pulling).any(axis=0)
-        return settled & (np.abs(f.sum(axis=0) - self.forces[levels]) <= 1e-9 * self.forces[levels])
+        state.depth[columns], state.gap[:, columns], state.active[:, columns] = depth, gap, (active | joining) & ~pulling
+        unsettled = xp.any((xp.abs(gap) > tolerance) & active | joining | pulling, axis=0)
+        return ~unsettled & (xp.abs(xp.sum(f, axis=0) - forces) <= 1e-9 * forces)
 
-    def _newton(self, state, levels):
-        """One step of the forces of some levels; what acts no more loses its force."""
-        active = state.active[:, levels]
-        f = np.where(active, state.f[:, levels], 0.0)
-        lost = (f - state.f[:, levels]).astype(np.float32)
-        right = -state.gap[:, levels] - (self.single @ lost if lost.any() else 0.0)
-        mask = active.astype(np.float32)
-        f += projected_conjugate_gradients(lambda x: (self.single @ x) * mask, lambda x: self.precondition(x * mask) * mask, mask,
-                                           right * mask, self.forces[levels] - f.sum(axis=0), self.settings)
-        f += active * ((self.forces[levels] - f.sum(axis=0)) / active.sum(axis=0))     # what single precision lost
-        state.f[:, levels] = f
-        state.iterations[levels] += 1
+    def _newton(self, state, columns):
+        """One step of the forces of some columns; what acts no more loses its force."""
+        xp, single, precondition = self.xp, self.flexibility.single, self.flexibility.precondition
+        active, before = state.active[:, columns], state.f[:, columns]
+        f = xp.where(active, before, 0.0)
+        lost = xp.astype(f - before, xp.float32)
+        right = -state.gap[:, columns] - (single(lost) if xp.any(lost != 0) else 0.0)
+        mask = xp.astype(active, xp.float32)
+        f += projected_conjugate_gradients(lambda x: single(x) * mask, lambda x: precondition(x * mask) * mask, mask,
+                                           xp.where(active, right, 0.0), self.forces[columns] - xp.sum(f, axis=0), self.settings)
+        lacking = (self.forces[columns] - xp.sum(f, axis=0)) / xp.sum(xp.astype(active, f.dtype), axis=0)
+        f += xp.where(active, lacking, 0.0)     # what single precision lost
+        state.f[:, columns] = f
+        state.iterations[columns] += 1
 
 
 def depth_on_springs(gap, area, force_over_bedding):
@@ -140,8 +195,9 @@ def depth_on_springs(gap, area, force_over_bedding):
 
 
 def projected_conjugate_gradients(apply, precondition, mask, right, total, settings):
-    """x (c, l), zero where mask (c, l) is, with sum x = total (l,) and apply(x) - right constant where it is not."""
-    right = right.astype(np.float32)
+    """x (c, m), zero where mask (c, m) is, with sum x = total (m,) and apply(x) - right constant where it is not."""
+    xp = array_namespace(mask)
+    right = xp.astype(right, xp.float32)
     along = precondition(mask)
     weight = _dot(along, mask)
 
@@ -149,27 +205,27 @@ def projected_conjugate_gradients(apply, precondition, mask, right, total, setti
         z = precondition(x)
         return z - along * (_dot(z, mask) / weight)
 
-    x = along * (total.astype(np.float32) / weight)
+    x = along * (xp.astype(total, xp.float32) / weight)
     r = right - apply(x)
     z = project(r)
-    p, rho = z.copy(), _dot(r, z)
-    first = np.maximum(np.maximum(rho, _dot(right, project(right))), 1e-30)
+    p, rho = xp.asarray(z, copy=True), _dot(r, z)
+    first = xp.clip(xp.maximum(rho, _dot(right, project(right))), min=1e-30)
     for _ in range(settings.inner_iterations):
-        if (rho <= settings.inner_tolerance**2 * first).all():
+        if xp.all(rho <= settings.inner_tolerance**2 * first):
             break
         q = apply(p)
-        step = np.where(rho > 0, rho / np.maximum(_dot(p, q), 1e-30), 0.0)
+        step = xp.where(rho > 0, rho / xp.clip(_dot(p, q), min=1e-30), 0.0)
         x += step * p
         before, r = r, r - step * q
         z = project(r)
-        turned = np.maximum(_dot(r - before, z), 0.0)      # Polak and Ribiere's: in single precision r is not quite conjugate to z
-        p = z + np.where(rho > 0, turned / np.maximum(rho, 1e-30), 0.0) * p
+        turned = xp.clip(_dot(r - before, z), min=0.0)     # Polak and Ribiere's: in single precision r is not quite conjugate to z
+        p = z + xp.where(rho > 0, turned / xp.clip(rho, min=1e-30), 0.0) * p
         rho = _dot(r, z)
-    return x.astype(np.float64)
+    return xp.astype(x, xp.float64)
 
 
 def _dot(a, b):
-    return np.einsum("cl,cl->l", a, b)
+    return array_namespace(a).sum(a * b, axis=0)
 
 
 @dataclass(frozen=True)
