@@ -1,5 +1,6 @@
 """Seconds of twenty levels to 50 N with the fast models, and presses per second: `python benchmarks/fast_models.py` from the
-project's folder; `--many N` presses as many random poses of ten indenters (default 200, of one level each).
+project's folder; `--many N` presses as many random poses of ten indenters (default 1000, of one level each), over one and two
+processes, and with the elastic model as one batch on a GPU where there is one.
 
 Preparation that is made once per sensor, and compiled kernels, are made before the clock starts. Times depend on the machine and on
 what else it does: compare the ratios of one run.
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import record
+import torch
 
 import softtact
 from softtact.geometry.meshes import default_pose, read_mesh
@@ -41,22 +43,26 @@ def _seconds(sensor, mesh, model):
 
 
 def many(sensor, count, *, seed=1):
-    """Presses per second of random poses, by model and processes."""
+    """Presses per second of random poses, by model, and by processes or on a GPU."""
     rng = np.random.default_rng(seed)
     meshes = [read_mesh(f"config/objects/indenters/{MANY[k % len(MANY)]}.stl", unit="mm") for k in range(count)]
     poses = [_random_pose(mesh, rng) for mesh in meshes]
+    ways = [(model, "cpu", workers) for model in MODELS for workers in (1, 2)]
+    if torch.cuda.is_available():
+        ways.append(("elastic", "cuda", softtact.sensor.cores()))
+        sensor.press_many(meshes[:2], poses[:2], force_n=[20.0], model="elastic", device="cuda", label="")     # starts CUDA
     rows = []
-    for model in MODELS:
-        for workers in (1, 2):
-            for batch in sorted({min(batch, count) for batch in (10, 50, count)}):
-                start = time.perf_counter()
-                results = sensor.press_many(meshes[:batch], poses[:batch], force_n=[20.0], model=model, workers=workers,
-                                            failures="keep", label="")
-                seconds = time.perf_counter() - start
-                failed = sum(isinstance(result, Exception) for result in results)
-                rows.append({"model": model, "workers": workers, "batch": batch, "per_second": round(batch / seconds, 2),
-                             "failed": failed, "memory_gb": _memory_gb()})
-                print(rows[-1], flush=True)
+    for model, device, workers in ways:
+        for batch in sorted({min(batch, count) for batch in (10, 100, count)}):
+            start = time.perf_counter()
+            results = sensor.press_many(meshes[:batch], poses[:batch], force_n=[20.0], model=model, workers=workers, device=device,
+                                        failures="keep", label="")
+            seconds = time.perf_counter() - start
+            failed = sum(isinstance(result, Exception) for result in results)
+            rows.append({"model": model, "device": device, "workers": workers, "batch": batch,
+                         "per_second": round(batch / seconds, 2), "failed": failed, "memory_gb": _memory_gb(),
+                         "gpu_memory_gb": round(torch.cuda.max_memory_allocated() / 1e9, 2) if device == "cuda" else None})
+            print(rows[-1], flush=True)
     return rows
 
 
@@ -77,7 +83,7 @@ def _memory_gb():
 def main():
     """Measure, print, and write benchmarks/results/fast_models.json."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--many", type=int, default=200, metavar="N", help="random poses (default: 200)")
+    parser.add_argument("--many", type=int, default=1000, metavar="N", help="random poses (default: 1000)")
     options = parser.parse_args()
     sensor, prepared = softtact.load_sensor("coro"), {}
     for model in MODELS:

@@ -2,7 +2,7 @@
 
 OBJECT: names in config/objects; by default the default study's indenters and the six objects of figure 7. Each is pressed in a
 process of its own, on one thread. What is in the record already is not pressed again: an ended run goes on with the next call
-(`--again` begins anew). The maps are kept as benchmarks/results/maps/MESH/OBJECT.npz, for `model_errors.py`.
+(`--again` presses it again). The maps are kept as benchmarks/results/maps/MESH/OBJECT.npz, for `model_errors.py`.
 """
 
 import argparse
@@ -81,14 +81,15 @@ def main():
         print(json.dumps(measure(*options.one)))
         return
     mesh, path = options.mesh, record.RESULTS / "objects.json"
-    rows = [] if options.again or not path.exists() else json.loads(path.read_text(encoding="utf-8"))["rows"]
+    rows = json.loads(path.read_text(encoding="utf-8"))["rows"] if path.exists() else []
     for name in options.objects or default_objects():
-        if not any((row["object"], row["mesh"]) == (name, mesh) for row in rows):
+        there = [row for row in rows if (row["object"], row["mesh"]) == (name, mesh)]
+        if options.again or not there:
             run = subprocess.run([sys.executable, __file__, "--one", name, mesh], capture_output=True, text=True,
                                  env=record.threads_of(1), check=False)
             if run.returncode:
                 sys.exit(f"{name}: {run.stderr.strip()}")
-            rows.append(json.loads(run.stdout.splitlines()[-1]))
+            rows = [*(row for row in rows if row not in there), json.loads(run.stdout.splitlines()[-1])]
             record.write("objects", rows=rows)
     for row in rows:
         print(_line(row))

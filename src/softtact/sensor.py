@@ -85,7 +85,7 @@ class Sensor:
         forces = self.checked_forces(force_n)
         placed = place(mesh, pose=pose)
         check_over_sensor(placed, self.spec.footprint_mm)
-        threads = threads or _cores()
+        threads = threads or cores()
         # Dense products of some hundred rows would wait for each other on more threads, up to five times as long.
         press = PRESSES[model] if model != "auto" else partial(press_auto, policy=policy, tolerance_mm=tolerance_mm)
         try:
@@ -112,7 +112,7 @@ class Sensor:
             raise InputError(f"There are {len(meshes)} meshes and {len(poses)} poses; give one pose for each mesh, or one mesh.")
         if failures not in ("raise", "keep"):
             raise InputError(f"failures={failures!r} is unknown; write 'raise' or 'keep'.")
-        results = press_many(self, meshes, poses, self.checked_forces(force_n), model=model, workers=workers or _cores(),
+        results = press_many(self, meshes, poses, self.checked_forces(force_n), model=model, workers=workers or cores(),
                              device=device, label=label, options=options)
         return raise_first(results) if failures == "raise" else results
 
@@ -141,6 +141,6 @@ class Sensor:
         return forces
 
 
-def _cores():
+def cores():
     """Cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()

@@ -14,7 +14,7 @@ from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.contact.unilateral import ContactLevels, ContactSettings, depth_on_springs, press_columns
 from softtact.mechanics.elastic import LayerPress
 
-COLUMNS_AT_ONCE = 4000      # 0.9 MB each on the coro's grid, most of it in single precision
+COLUMNS_AT_ONCE = 4000      # 1 MB each on the coro's grid, most of it in single precision
 
 
 class DeviceSurface:
