@@ -92,7 +92,7 @@ def _quarter_lattice(spec):
 def _roots(slab, centres, frustum):
     """Displacements of all roots' nodes (3 b m, unknowns); those on a plane of symmetry count as in the quarter."""
     at = slab.interpolation(np.abs((centres[:, None] + frustum.root_xy).reshape(-1, 2)))
-    roots = sp.kron(at, sp.eye(3), format="csr")
+    roots = sp.kron(sp.kron(sp.eye(len(centres)), frustum.spread, format="csr") @ at, sp.eye(3), format="csr")
     roots.resize(roots.shape[0], slab.unknowns)
     return roots
 

@@ -4,6 +4,9 @@ The cell is the hyperelastic one: any law and geometry; board, folding sides and
 root's nodes (tip held, at rest) the part that a straight descent meets is taken out and replaced by the cell's force:
     K 1 = k b,  1.b = 1:    forces on the root = (K - k b b') u + b p(w),   w = b.u
 so that small displacements of any kind meet the frustum's own linear stiffness, and a compression w meets the cell's force p(w).
+The root's nodes lie on another mesh than the slab's. They follow it in the mean, weighted so that the root's forces act on the slab
+as the traction of which they are the nodal forces (mortar coupling; Wohlmuth, SIAM J. Numer. Anal. 38 (2000) 989). Tied to the
+slab at single points instead, they were point loads, under which a slab gives way the more the finer its elements are.
 """
 
 from dataclasses import dataclass
@@ -16,11 +19,13 @@ from scipy.interpolate import PchipInterpolator
 from softtact.contact.height_field import HeightField
 from softtact.errors import ConvergenceError
 from softtact.files import read_arrays
+from softtact.mechanics.elements import HEX27_TOP, gauss, quad9
 from softtact.mechanics.hyperelastic import NewtonSettings, press_levels
 from softtact.mechanics.mesh_settings import MeshSettings
 from softtact.mechanics.sensor_bodies import build_unit_cell
 
 _FIRST_N, _LEVELS_A_DECADE = 2e-3, 9
+_MORTAR_POINTS = 10      # along a side of a root's face: so dense that elements of a tenth of a pitch do not feel them singly
 _PRESSURE_MPA = 2.0      # on the cell, up to which the law is asked for: about five times that of 50 N on a flat punch of 11 mm
 
 
@@ -28,12 +33,14 @@ _PRESSURE_MPA = 2.0      # on the cell, up to which the law is asked for: about 
 class FrustumLaw:
     """force_n (f,) of one frustum at compressions compression_mm (f,), both from 0 on; beyond, the last slope goes on.
 
-    root_xy (m, 2) in mm: the root's nodes about the axis;  rest (3 m, 3 m) in N/mm: stiffness against all else;  descent (3 m,): b
+    root_xy (s, 2) in mm: points of the root about the axis;  spread (m, s): displacements of the root's nodes from those there
+    rest (3 m, 3 m) in N/mm: stiffness against all else;  descent (3 m,): b
     """
 
     force_n: np.ndarray
     compression_mm: np.ndarray
     root_xy: np.ndarray
+    spread: np.ndarray
     rest: np.ndarray
     descent: np.ndarray
 
@@ -75,7 +82,7 @@ class FrustumLaw:
 
     def arrays(self):
         """All fields by name, to be saved."""
-        return {name: getattr(self, name) for name in ("force_n", "compression_mm", "root_xy", "rest", "descent")}
+        return {name: getattr(self, name) for name in ("force_n", "compression_mm", "root_xy", "spread", "rest", "descent")}
 
 
 def frustum_law(spec, law, *, mesh=None, pressure_mpa=_PRESSURE_MPA):
@@ -85,9 +92,9 @@ def frustum_law(spec, law, *, mesh=None, pressure_mpa=_PRESSURE_MPA):
     """
     body = build_unit_cell(spec, dielectric_law=law, mesh=mesh or MeshSettings(frustum_rings=2))
     bed = body.bed
-    root_xy = bed.coordinates[0][bed.root, :2] - bed.geometry.centres[0]
+    root_xy, spread = _root_mortar(bed)
     stiffness = _root_stiffness(bed)
-    straight = np.zeros((len(root_xy), 3))
+    straight = np.zeros((len(spread), 3))
     straight[:, 2] = 1.0
     straight = straight.ravel()
     along = stiffness @ straight
@@ -95,8 +102,27 @@ def frustum_law(spec, law, *, mesh=None, pressure_mpa=_PRESSURE_MPA):
     descent = along / k
     force, compression = _cell_curve(spec, body, descent, pressure_mpa * spec.dielectric.frusta.pitch_mm**2)
     body.close()
-    return FrustumLaw(force_n=force, compression_mm=compression, root_xy=root_xy, descent=descent,
+    return FrustumLaw(force_n=force, compression_mm=compression, root_xy=root_xy, spread=spread, descent=descent,
                       rest=stiffness - k * np.outer(descent, descent))
+
+
+def _root_mortar(bed):
+    """Points (s, 2) of a frustum's root about its axis, and weights (m, s): from a field there to its root nodes' values.
+
+    The values are those whose quadratic interpolation over the root has the same products with its shape functions as the field.
+    """
+    place = np.full(bed.nodes, -1)
+    place[bed.root] = np.arange(len(bed.root))
+    faces = place[bed.mesh.layer(bed.mesh.layers - 1)[:, HEX27_TOP]]
+    xy = (bed.coordinates[0][bed.root, :2] - bed.geometry.centres[0])[faces]
+    points, weights = gauss(_MORTAR_POINTS, 2)
+    values, slopes = quad9(points)
+    areas = weights * np.linalg.det(np.einsum("gad,fai->fgid", slopes, xy))
+    mass, products = np.zeros((len(bed.root),) * 2), np.zeros((len(bed.root), *areas.shape))
+    for f, (face, area) in enumerate(zip(faces, areas, strict=True)):
+        mass[np.ix_(face, face)] += values.T @ (area[:, None] * values)
+        products[face, f] = values.T * area
+    return np.einsum("ga,fai->fgi", values, xy).reshape(-1, 2), np.linalg.solve(mass, products.reshape(len(mass), -1))
 
 
 def _root_stiffness(bed):
