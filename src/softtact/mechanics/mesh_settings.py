@@ -18,6 +18,7 @@ class MeshSettings:
     a third of it takes a quarter fewer iterations and leaves three times the overlap; sheet_layers: elements through the sheet;
     frustum_levels: heights of the frustum's element layers as shares of its height; local_over_shear, growing_over_shear:
     what holds volume changes in the frusta that their elements' pressure does not see, over mu (see `blocks`);
+    slab_growing_over_shear: the latter in sheet and cover, where frusta are pressed to two thirds of their height;
     trilinear_pressure: or linear, which is softer by 2 % for small movements, and fails under deep objects.
     refinement: how often all elements are split in plan. frustum_rings: rings of elements around a frustum's core, the
     thinner the farther out. coarse_walls: along all walls between cells, not only far from the object, the sheet moves as one
@@ -28,6 +29,7 @@ class MeshSettings:
     frustum_levels: tuple = (0.0, 0.2, 0.6, 1.0)
     local_over_shear: float = 0.5
     growing_over_shear: float = 100.0
+    slab_growing_over_shear: float = 0.0
     trilinear_pressure: bool = True
     refinement: int = 0
     frustum_rings: int = 1

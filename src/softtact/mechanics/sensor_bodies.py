@@ -46,7 +46,7 @@ def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), s
                       rings=mesh.frustum_rings)
     slab = Slab(sheet, cover, plan, x_lines, y_lines, sides="held", contact=contact or mesh.object_contact,
                 coarse_walls=mesh.coarse_walls or _far(zone, x_lines, y_lines), splits=splits,
-                friction=coulomb(spec.friction.object))
+                growing_over_shear=mesh.slab_growing_over_shear, friction=coulomb(spec.friction.object))
     return LayeredBody(slab, _bed(spec, centres, neighbours, dielectric_law, mesh, scatter, contact), slab.bottom[plan.roots],
                        threads=threads)
 
@@ -99,7 +99,7 @@ def build_unit_cell(spec, *, dielectric_law, cover_law=None, mesh=MeshSettings()
     plan = sheet_plan(centre, (1, 1), frusta.pitch_mm, frusta.root_diameter_mm, (frusta.pitch_mm,) * 2, refinement=mesh.refinement,
                       rings=mesh.frustum_rings)
     slab = Slab(sheet, cover, plan, lines, lines, sides="symmetric", contact=mesh.contact, coarse_walls=mesh.coarse_walls,
-                splits=splits, friction=coulomb(spec.friction.object))
+                splits=splits, growing_over_shear=mesh.slab_growing_over_shear, friction=coulomb(spec.friction.object))
     bed = _bed(spec, centre, np.ones((1, 4), dtype=bool), dielectric_law, mesh,
                (np.array([height_factor]), np.array([tip_factor])), None, bottom=bottom)
     return LayeredBody(slab, bed, slab.bottom[plan.roots])
@@ -113,7 +113,8 @@ def build_patch(spec, counts, *, dielectric_law, mesh=MeshSettings()):
     plan = sheet_plan(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, [np.ptp(line) for line in lines],
                       rings=mesh.frustum_rings)
     slab = Slab(Layer(np.linspace(-thickness, 0.0, mesh.sheet_layers + 1), dielectric_law), Layer(np.zeros(1), None), plan, *lines,
-                sides="free", contact=mesh.contact, coarse_walls=mesh.coarse_walls)
+                sides="free", contact=mesh.contact, coarse_walls=mesh.coarse_walls,
+                growing_over_shear=mesh.slab_growing_over_shear)
     bed = _bed(spec, centres, neighbours, dielectric_law, mesh, None, None, bottom=-thickness)
     return LayeredBody(slab, bed, slab.bottom[plan.roots])
 

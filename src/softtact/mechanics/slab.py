@@ -74,12 +74,12 @@ class Slab:
     """
 
     def __init__(self, sheet, cover, sheet_plan, x_lines, y_lines, *, sides, contact, coarse_walls=True, splits=None,
-                 friction=None):
+                 growing_over_shear=0.0, friction=None):
         """splits (layers, ny 2^m, nx 2^m): how often the cover's uppermost layers are split where (see `cover_mesh`); the layers
         below these keep to the sheet's plan. None: none does, and none is split.
 
         coarse_walls: everywhere (True), nowhere (False), or where a function of places (n, 2) says so (n,)
-        friction: `Coulomb` of the object on the top, or None
+        growing_over_shear: see `blocks`;  friction: `Coulomb` of the object on the top, or None
         """
         if splits is None:
             splits = np.zeros((len(cover.levels) - 1, len(y_lines) - 1, len(x_lines) - 1), dtype=np.int64)
@@ -89,7 +89,7 @@ class Slab:
         self.cover_mesh = cover_mesh(x_lines, y_lines, cover.levels[bound:], splits)
         self.sheet_mesh = extrude(sheet_plan.plan, np.append(sheet.levels, cover.levels[1:bound + 1]))
         self.sheet_layers = len(sheet.levels) - 1
-        self._coarse_walls = coarse_walls
+        self._coarse_walls, self._held = coarse_walls, {"growing_over_shear": growing_over_shear}
         self._number_nodes(sheet_plan)
         self.groups, self.cell_groups = [], []   # (nodes, block) outside of cells; a `CellGroup` for each kind of cell
         self._add_cover(cover.law)
@@ -149,11 +149,12 @@ class Slab:
         if not len(mesh.hexes):
             return
         alone = (mesh.hexes < mesh.free).all(axis=1)
-        block = HexBlock(mesh.points[mesh.hexes[alone]], law, points_per_side=2)
+        block = HexBlock(mesh.points[mesh.hexes[alone]], law, points_per_side=2, **self._held)
         self.groups.append((mesh.hexes[alone], block))
         if not alone.all():
             hanging = mesh.hexes[~alone]
-            self.groups.append(of_masters(*mesh.masters(), hanging, HexBlock(mesh.points[hanging], law, points_per_side=2)))
+            block = HexBlock(mesh.points[hanging], law, points_per_side=2, **self._held)
+            self.groups.append(of_masters(*mesh.masters(), hanging, block))
 
     def _add_sheet(self, plan, laws):
         """Like elements (nodes, block): those of the strips around, and those of each kind of cell, cell by cell; a law a layer."""
@@ -171,7 +172,7 @@ class Slab:
                  for elements, make, law in layer if elements.size] for layer in pieces]))
 
     def _following(self, elements, make, law):
-        return of_masters(self._masters, self._weights, elements, make(self.sheet_mesh.points[elements], law))
+        return of_masters(self._masters, self._weights, elements, make(self.sheet_mesh.points[elements], law, **self._held))
 
     def _like_cells(self, nodes):
         """Numbers of like cells, kind by kind, of cells with nodes (c, k): those whose nodes follow others in the same way."""

@@ -185,6 +185,7 @@ class Mesh(Section):
     local_over_shear: NotNegative | None = Field(None, description="volumetric stiffness of frusta at each point, over mu")
     growing_over_shear: NotNegative | None = Field(
         None, description="stiffness of frusta against large volume changes that their elements' pressure misses, over mu")
+    slab_growing_over_shear: NotNegative | None = Field(None, description="the same of sheet and cover")
     trilinear_pressure: bool | None = Field(None, description="pressure in the frusta's elements: trilinear (default), or linear")
     refinement: Annotated[int, Field(ge=0)] | None = Field(
         None, description="how often all elements are split into four in plan")
