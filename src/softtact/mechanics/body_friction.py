@@ -22,10 +22,13 @@ class BodyFriction:
         """No point holds to anything: before a press."""
         self._top.grip = self._bed.grip = None
 
-    def begin_step(self, state):
-        """Hold the points where a step starts from a `BodyState`."""
+    def begin_step(self, state, *, growth=1.0):
+        """Hold the points where a step starts from a `BodyState`, by pressures as they are to grow: a first guess of its end's."""
         self._top.begin_step(state.slab, state.indentation)
         self._bed.begin_step(state.bed)
+        for part in (self._top, self._bed):
+            if part.friction is not None:
+                part.grip = replace(part.grip, pressure=growth * part.grip.pressure)
 
     def renew(self, state, *, halfway=False):
         """Bring friction up to date with the pressures of a `BodyState`, or half the way there."""
