@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from softtact.mechanics.condensation import Springs
+from softtact.mechanics.condensation import Condensation, Springs
 from softtact.mechanics.elimination import LayerwiseElimination
 from softtact.mechanics.parallel import Workers
 
@@ -125,3 +125,23 @@ def test_damping_is_a_stiffness_on_inner_unknowns():
     for body, damping in enumerate((0.0, 1.0, 5.0)):
         expected = schur(damped.whole(body) + damping * np.diag(ELIMINATED.astype(float)))
         np.testing.assert_allclose(damped.elimination.matrices[body], expected, atol=EPSILON * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("stiffest", [1e3, 1e8])
+def test_soft_modes_that_go_down_stay_so_beside_one_of_any_stiffness(stiffest):
+    """A layer near instability may leave 1e8 N/mm to the next one; what single precision rounds off is more than soft modes."""
+    inner, outer, rng = 60, 9, np.random.default_rng(8)
+    values = np.append(np.geomspace(0.1, 4e3, inner - 1) * rng.choice([-1, 1], inner - 1), stiffest)
+    basis = np.linalg.qr(rng.normal(size=(inner, inner)))[0]
+    matrix = np.zeros((inner + outer, inner + outer))
+    matrix[:inner, :inner] = (basis * values) @ basis.T
+    matrix[:inner, inner:] = rng.normal(size=(inner, outer))
+    matrix[inner:, :inner] = matrix[:inner, inner:].T
+    body = Condensation(1, inner, outer, [np.arange(inner + outer)[None]])
+    body.set(np.array([0]), [matrix.astype(np.float32)[None, None]])
+    assert body.modified == 1
+    force = rng.normal(size=(1, inner))
+    _, half = body.residual(force)
+    step = body.recover(half, np.zeros((1, outer)))
+    assert np.isfinite(body.outer).all()
+    assert (step * force).sum() < 0 and np.linalg.norm(step) < np.linalg.norm(force) / 0.1     # of the softest mode alone

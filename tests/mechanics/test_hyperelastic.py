@@ -92,6 +92,17 @@ def test_a_press_that_crawls_ends_after_the_iterations_of_a_level():
         next(levels)
 
 
+def test_a_tangent_that_nothing_makes_positive_definite_fails_the_level_and_is_not_tried_for_ever(monkeypatch):
+    body, shifts = small_body(), []
+    surface = HeightField(place(trimesh.creation.icosphere(radius=3.0), pose=None))
+    levels = press_levels(body, surface, [1.0, 2.0], settings=NewtonSettings(smallest_increment_n=0.6))
+    next(levels)
+    monkeypatch.setattr(body.stepper, "step", lambda rubber, *_, **__: shifts.append(rubber.diagonal().max()))     # None: no step
+    with pytest.raises(ConvergenceError, match="level of 2 N was not reached: from 1 N on"):
+        next(levels)
+    assert max(shifts) > 1e6 * shifts[0]      # N/mm: all was tried
+
+
 def test_the_mesh_file_holds_the_volume_of_sheet_and_cover_and_of_the_frusta():
     """As VTK sees it, which cuts curved elements into tetrahedra: cones of eight sides, with a tenth less volume."""
     import pyvista

@@ -14,6 +14,7 @@ from softtact.mechanics.parallel import SERIAL, slices
 
 _AT_ONCE = 60                # bodies that one thread reduces or recovers at once
 _SMALLEST_STIFFNESS = 0.02   # N/mm of a mode of a folding body; the softest mode of a frustum at rest has 0.03
+_ROUNDING = float(np.finfo(np.float32).eps)
 
 
 @dataclass(frozen=True)
@@ -160,7 +161,9 @@ def _made_positive(matrix, smallest):
         for j in range(i):
             matrix[i, j] = matrix[j, i]
     values, vectors = np.linalg.eigh(matrix)
-    return ((vectors * np.maximum(np.abs(values), smallest)) @ vectors.T).astype(np.float32)
+    # What a layer close to instability left to this one may be so stiff that, rounded, softer modes would be negative again.
+    least = max(smallest, len(matrix) * _ROUNDING * np.abs(values).max())
+    return ((vectors * np.maximum(np.abs(values), least)) @ vectors.T).astype(np.float32)
 
 
 @njit(cache=True, nogil=True)

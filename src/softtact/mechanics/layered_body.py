@@ -1,6 +1,5 @@
 """The layered sensor as one body: slab (sheet and cover) tied to the bed of frusta, and one Newton step of it."""
 
-import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +15,8 @@ from softtact.mechanics.step_contact import StepContact
 from softtact.mechanics.top_contact import FacingPlanes
 
 _DAMPINGS = 4         # steps that are tried with ever more damping of the cells that they throw too far
-_FIRST_SHIFT = 0.01   # N/mm on every free unknown of the slab, doubled until the tangent is positive definite
+_FIRST_SHIFT = 0.01   # N/mm on every free unknown of the slab, doubled until the tangent is positive definite ...
+_MOST_DOUBLINGS = 40  # ... but a tangent that is not even finite will never be
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def _shifts():
     """What is tried, one after the other, until a tangent is positive definite, so that every step lowers the energy."""
     yield None
     yield 0.0
-    for doubling in itertools.count():
+    for doubling in range(_MOST_DOUBLINGS):
         yield _FIRST_SHIFT * 2**doubling
 
 
@@ -132,13 +132,17 @@ class LayeredBody:
         return Step(slab=slab, bed=bed, indentation=lowering, planes=contact.planes)
 
     def _step_of_unknowns(self, state, residual, contact, force_n, largest_mm):
-        """Step of the global unknowns, and how far the object goes down; the tangent is made positive definite where it is not."""
+        """Step of the global unknowns, and how far the object goes down; the tangent is made positive definite where it is not.
+
+        Not a number where that cannot be done, which fails Newton's method there.
+        """
         excess, drag = None if force_n is None else state.force - force_n, self.slab.friction_border(state.slab)
         for shift in _shifts():
             step = self.stepper.step(self._rubber_tangent(state, shift), residual, contact, drag=drag, excess=excess,
                                      largest=largest_mm)
             if step is not None:
                 return step
+        return np.full(len(residual), np.nan), np.nan
 
     def _rubber_tangent(self, state, shift):
         """The rubber's tangent as it is (None), or without the cells' modes of negative stiffness and stiffened by a shift."""
