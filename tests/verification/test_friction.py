@@ -242,7 +242,7 @@ def test_the_more_friction_the_smaller_the_indentation_between_free_and_held_tip
 
 
 def test_a_step_that_begins_with_the_pressures_of_its_end_takes_fewer_iterations_and_errs_less(record, monkeypatch):
-    """The guess changes the way to a step's end, not its balance; what is left is the error of the step's length."""
+    """Paths of sliding are not unique: what is found is always in balance, and with the guess nearer to where small steps lead."""
     coarse, small = [1.0, 2.0, 4.0], np.linspace(0.25, 4.0, 16)
 
     def pressed(forces):

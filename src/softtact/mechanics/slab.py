@@ -89,7 +89,7 @@ class Slab:
         self.cover_mesh = cover_mesh(x_lines, y_lines, cover.levels[bound:], splits)
         self.sheet_mesh = extrude(sheet_plan.plan, np.append(sheet.levels, cover.levels[1:bound + 1]))
         self.sheet_layers = len(sheet.levels) - 1
-        self._coarse_walls, self._held = coarse_walls, {"growing_over_shear": growing_over_shear}
+        self._coarse_walls, self._growing_over_shear = coarse_walls, growing_over_shear
         self._number_nodes(sheet_plan)
         self.groups, self.cell_groups = [], []   # (nodes, block) outside of cells; a `CellGroup` for each kind of cell
         self._add_cover(cover.law)
@@ -149,12 +149,14 @@ class Slab:
         if not len(mesh.hexes):
             return
         alone = (mesh.hexes < mesh.free).all(axis=1)
-        block = HexBlock(mesh.points[mesh.hexes[alone]], law, points_per_side=2, **self._held)
+        block = self._cover_block(mesh.hexes[alone], law)
         self.groups.append((mesh.hexes[alone], block))
         if not alone.all():
             hanging = mesh.hexes[~alone]
-            block = HexBlock(mesh.points[hanging], law, points_per_side=2, **self._held)
-            self.groups.append(of_masters(*mesh.masters(), hanging, block))
+            self.groups.append(of_masters(*mesh.masters(), hanging, self._cover_block(hanging, law)))
+
+    def _cover_block(self, hexes, law):
+        return HexBlock(self.cover_mesh.points[hexes], law, points_per_side=2, growing_over_shear=self._growing_over_shear)
 
     def _add_sheet(self, plan, laws):
         """Like elements (nodes, block): those of the strips around, and those of each kind of cell, cell by cell; a law a layer."""
@@ -172,7 +174,8 @@ class Slab:
                  for elements, make, law in layer if elements.size] for layer in pieces]))
 
     def _following(self, elements, make, law):
-        return of_masters(self._masters, self._weights, elements, make(self.sheet_mesh.points[elements], law, **self._held))
+        block = make(self.sheet_mesh.points[elements], law, growing_over_shear=self._growing_over_shear)
+        return of_masters(self._masters, self._weights, elements, block)
 
     def _like_cells(self, nodes):
         """Numbers of like cells, kind by kind, of cells with nodes (c, k): those whose nodes follow others in the same way."""
