@@ -16,6 +16,7 @@ import record
 import torch
 
 import softtact
+from softtact.errors import ConvergenceError
 from softtact.geometry.meshes import default_pose, read_mesh
 from softtact.geometry.pose import Pose
 
@@ -30,9 +31,13 @@ def twenty_levels(sensor, files):
     for file in files:
         mesh, row = read_mesh(file, unit="mm"), {"object": file.stem}
         for model in MODELS:
-            row[model] = round(min(_seconds(sensor, mesh, model) for _ in range(2)), 3)
+            try:
+                row[model] = round(min(_seconds(sensor, mesh, model) for _ in range(2)), 3)
+            except ConvergenceError as error:
+                row |= {model: None, "stopped": str(error)}
         rows.append(row)
-        print(f"{row['object']:16}" + "".join(f"{row[model]:12.3f}" for model in MODELS), flush=True)
+        seconds = "".join(f"{row[model] or np.nan:12.3f}" for model in MODELS)
+        print(f"{row['object']:16}{seconds} {row.get('stopped', '')}", flush=True)
     return rows
 
 
@@ -93,7 +98,7 @@ def main():
     files = sorted(Path("config/objects/indenters").glob("*.stl"))
     _seconds(sensor, read_mesh(files[0], unit="mm"), "foundation"), _seconds(sensor, read_mesh(files[0], unit="mm"), "elastic")
     rows = twenty_levels(sensor, files)
-    median = {model: float(np.median([row[model] for row in rows])) for model in MODELS}
+    median = {model: float(np.median([row[model] for row in rows if row[model]])) for model in MODELS}
     print("median", median)
     record.write("fast_models", prepared_or_loaded_s=prepared, levels=len(FORCES), seconds=rows, median_s=median,
                  many=many(sensor, options.many))

@@ -208,6 +208,7 @@ class FreeBody:
             more = max(shift, 1e-3 * float(np.abs(matrix.data[diagonal]).mean()))
             matrix.data[diagonal] += more
             shift += more
+
     def join_contact(self):
         """Take a contact kept apart back into the factor, where the rubber alone hardly stands; False if there is none."""
         apart, self._apart = self._apart, None

@@ -1,6 +1,7 @@
 """Linear tetrahedra without any projection of the pressure, fast: they lock, and serve where another program has no better.
 
-The deformation is constant in an element, so forces and tangent need only three vectors per node.
+The deformation is constant in an element, so forces and tangent need only three vectors for each of nodes 1 to 3; what node 0
+feels is minus what the others do.
 Symbols: F deformation gradient, H = J F^-T its cofactor, B = F F^T, I1 = tr B, I2 = (I1^2 - B:B)/2, s1 = J^(-2/3), s2 = J^(-4/3),
          G_a gradient of node a's shape function; f_a = F G_a, h_a = H G_a, g_a = 2 (I1 f_a - B f_a).
 Forces:  V (psi1 s1 (2 f_a + r1 h_a) + psi2 s2 (g_a + r2 h_a) + U' h_a),  r1 = -2/3 I1/J, r2 = -4/3 I2/J, U' = K (J - 1)
@@ -15,12 +16,14 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numba import njit
 
+_PLACE = ((0, 3, 5), (3, 1, 4), (5, 4, 2))     # of a symmetric matrix's entries in xx, yy, zz, xy, yz, zx
+
 
 class LinearTetrahedra:
     """Linear tetrahedra (e, 4) at points (n, 3) in mm, of a law psi(i1, i2) of the invariants; `threads` share the elements."""
 
     def __init__(self, points, tetrahedra, law, *, threads=1):
-        self.law, self.nodes = law, np.ascontiguousarray(tetrahedra)
+        self.law, self.nodes = law, np.ascontiguousarray(tetrahedra, dtype=np.int32)
         self.gradients, self.volumes = _gradients(points, self.nodes)
         if self.volumes.min() <= 0:
             raise ValueError(f"tetrahedron {int(np.argmin(self.volumes))} is inverted")
@@ -85,77 +88,99 @@ def _constant_derivatives(law):
 
 @njit(cache=True, nogil=True)
 def _gradients(points, nodes):
-    """Gradients (e, 4, 3) of the shape functions in 1/mm and volumes (e,) in mm3."""
-    gradients, volumes = np.empty((len(nodes), 4, 3)), np.empty(len(nodes))
-    edges, cofactor = np.empty((3, 3)), np.empty((3, 3))
+    """Gradients (e, 3, 3) in 1/mm of the shape functions of nodes 1 to 3 (node 0 has minus their sum), and volumes (e,) in mm3."""
+    gradients, volumes = np.empty((len(nodes), 3, 3)), np.empty(len(nodes))
     for e in range(len(nodes)):
-        for i in range(3):
-            for j in range(3):
-                edges[i, j] = points[nodes[e, i + 1], j] - points[nodes[e, 0], j]
-        determinant = _cofactor(edges, cofactor)
+        origin = points[nodes[e, 0]]
+        x, y, z = points[nodes[e, 1]] - origin, points[nodes[e, 2]] - origin, points[nodes[e, 3]] - origin
+        determinant, cofactor = _cofactor((x[0], x[1], x[2], y[0], y[1], y[2], z[0], z[1], z[2]))
         volumes[e] = determinant / 6
-        for j in range(3):
-            total = 0.0
-            for i in range(3):
-                gradients[e, i + 1, j] = cofactor[i, j] / determinant
-                total += gradients[e, i + 1, j]
-            gradients[e, 0, j] = -total
+        for i in range(9):
+            gradients[e, i // 3, i % 3] = cofactor[i] / determinant
     return gradients, volumes
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _cofactor(f, h):
-    """Cofactor of f (3, 3) into h; returns the determinant."""
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        h[i, 0] = f[j, 1] * f[k, 2] - f[j, 2] * f[k, 1]
-        h[i, 1] = f[j, 2] * f[k, 0] - f[j, 0] * f[k, 2]
-        h[i, 2] = f[j, 0] * f[k, 1] - f[j, 1] * f[k, 0]
-    return f[0, 0] * h[0, 0] + f[0, 1] * h[0, 1] + f[0, 2] * h[0, 2]
+def _cofactor(f):
+    """Determinant and cofactor of a matrix; both matrices are tuples of nine, row by row, which stay in registers."""
+    h = (f[4] * f[8] - f[5] * f[7], f[5] * f[6] - f[3] * f[8], f[3] * f[7] - f[4] * f[6],
+         f[7] * f[2] - f[8] * f[1], f[8] * f[0] - f[6] * f[2], f[6] * f[1] - f[7] * f[0],
+         f[1] * f[5] - f[2] * f[4], f[2] * f[3] - f[0] * f[5], f[0] * f[4] - f[1] * f[3])
+    return f[0] * h[0] + f[1] * h[1] + f[2] * h[2], h
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _deformation(displacement, nodes, gradients, f):
-    for i in range(3):
-        for j in range(3):
-            total = 1.0 if i == j else 0.0
-            for a in range(4):
-                total += displacement[nodes[a], i] * gradients[a, j]
-            f[i, j] = total
+def _deformation(u, n, g):
+    """F by the nodes' displacements from that of node 0, whose gradient is minus the sum of the others'."""
+    x0, y0, z0 = u[n[0], 0], u[n[0], 1], u[n[0], 2]
+    x1, y1, z1 = u[n[1], 0] - x0, u[n[1], 1] - y0, u[n[1], 2] - z0
+    x2, y2, z2 = u[n[2], 0] - x0, u[n[2], 1] - y0, u[n[2], 2] - z0
+    x3, y3, z3 = u[n[3], 0] - x0, u[n[3], 1] - y0, u[n[3], 2] - z0
+    return (1 + x1 * g[0, 0] + x2 * g[1, 0] + x3 * g[2, 0], x1 * g[0, 1] + x2 * g[1, 1] + x3 * g[2, 1],
+            x1 * g[0, 2] + x2 * g[1, 2] + x3 * g[2, 2], y1 * g[0, 0] + y2 * g[1, 0] + y3 * g[2, 0],
+            1 + y1 * g[0, 1] + y2 * g[1, 1] + y3 * g[2, 1], y1 * g[0, 2] + y2 * g[1, 2] + y3 * g[2, 2],
+            z1 * g[0, 0] + z2 * g[1, 0] + z3 * g[2, 0], z1 * g[0, 1] + z2 * g[1, 1] + z3 * g[2, 1],
+            1 + z1 * g[0, 2] + z2 * g[1, 2] + z3 * g[2, 2])
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _left_cauchy_green(f, b):
-    """B = F F^T into b; returns its invariants I1, I2."""
-    squares = 0.0
-    for i in range(3):
-        for j in range(3):
-            b[i, j] = f[i, 0] * f[j, 0] + f[i, 1] * f[j, 1] + f[i, 2] * f[j, 2]
-            squares += b[i, j] * b[i, j]
-    I1 = b[0, 0] + b[1, 1] + b[2, 2]
-    return I1, 0.5 * (I1 * I1 - squares)
+def _left_cauchy_green(f):
+    """I1 and I2 of B = F F^T, and its entries xx, yy, zz, xy, yz, zx."""
+    x, y, z = f[:3], f[3:6], f[6:]
+    xx, yy, zz, xy, yz, zx = _dot(x, x), _dot(y, y), _dot(z, z), _dot(x, y), _dot(y, z), _dot(z, x)
+    return xx + yy + zz, xx * yy + yy * zz + zz * xx - xy * xy - yz * yz - zx * zx, (xx, yy, zz, xy, yz, zx)
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _node_vectors(f, h, b, I1, gradients, fa, ga, ha):
-    for a in range(4):
-        for i in range(3):
-            fa[a, i] = f[i, 0] * gradients[a, 0] + f[i, 1] * gradients[a, 1] + f[i, 2] * gradients[a, 2]
-            ha[a, i] = h[i, 0] * gradients[a, 0] + h[i, 1] * gradients[a, 1] + h[i, 2] * gradients[a, 2]
-        for i in range(3):
-            ga[a, i] = 2 * (I1 * fa[a, i] - b[i, 0] * fa[a, 0] - b[i, 1] * fa[a, 1] - b[i, 2] * fa[a, 2])
+def _isochoric(J):
+    """J^(-2/3), NaN where the element is inside out."""
+    root = np.cbrt(J) if J > 0 else np.nan
+    return 1 / (root * root)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _symmetric_times(b, v):
+    """A symmetric matrix of entries xx, yy, zz, xy, yz, zx times a vector of three."""
+    return (b[0] * v[0] + b[3] * v[1] + b[5] * v[2], b[3] * v[0] + b[1] * v[1] + b[4] * v[2],
+            b[5] * v[0] + b[4] * v[1] + b[2] * v[2])
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _times(m, g):
+    """A matrix (a tuple of nine) times a vector of three."""
+    return (m[0] * g[0] + m[1] * g[1] + m[2] * g[2], m[3] * g[0] + m[4] * g[1] + m[5] * g[2],
+            m[6] * g[0] + m[7] * g[1] + m[8] * g[2])
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _row(matrix, row):
+    return matrix[row, 0], matrix[row, 1], matrix[row, 2]
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _sum(x, a, y, b, z, c):
+    """x a + y b + z c of numbers and vectors of three."""
+    return (x * a[0] + y * b[0] + z * c[0], x * a[1] + y * b[1] + z * c[1], x * a[2] + y * b[2] + z * c[2])
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _cross(a, b):
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _invariants(displacement, nodes, gradients):
     """Isochoric invariants i1, i2 (e,); NaN where J <= 0."""
     i1, i2 = np.empty(len(nodes)), np.empty(len(nodes))
-    f, h, b = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     for e in range(len(nodes)):
-        _deformation(displacement, nodes[e], gradients[e], f)
-        J = _cofactor(f, h)
-        I1, I2 = _left_cauchy_green(f, b)
-        s1 = J ** (-2 / 3) if J > 0 else np.nan
+        f = _deformation(displacement, nodes[e], gradients[e])
+        I1, I2, _ = _left_cauchy_green(f)
+        s1 = _isochoric(_cofactor(f)[0])
         i1[e], i2[e] = s1 * I1, s1 * s1 * I2
     return i1, i2
 
@@ -163,76 +188,109 @@ def _invariants(displacement, nodes, gradients):
 @njit(cache=True, nogil=True, error_model="numpy")
 def _forces(displacement, nodes, gradients, volumes, table, bulk_modulus, force):
     energy, size = 0.0, 0.0
-    f, h, b = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    fa, ga, ha = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
     for e in range(len(nodes)):
-        _deformation(displacement, nodes[e], gradients[e], f)
-        J = _cofactor(f, h)
-        I1, I2 = _left_cauchy_green(f, b)
-        s1 = J ** (-2 / 3) if J > 0 else np.nan
+        f = _deformation(displacement, nodes[e], gradients[e])
+        J, h = _cofactor(f)
+        I1, I2, b = _left_cauchy_green(f)
+        s1 = _isochoric(J)
         t = table[e] if len(table) > 1 else table[0]
         psi = t[0] if len(table) > 1 else t[1] * (s1 * I1 - 3) + t[2] * (s1 * s1 * I2 - 3)
+        energy += volumes[e] * (psi + 0.5 * bulk_modulus * (J - 1) ** 2)
         p1, p2 = volumes[e] * s1 * t[1], volumes[e] * s1 * s1 * t[2]
         ch = -2 / 3 * I1 / J * p1 - 4 / 3 * I2 / J * p2 + volumes[e] * bulk_modulus * (J - 1)
-        energy += volumes[e] * (psi + 0.5 * bulk_modulus * (J - 1) ** 2)
-        _node_vectors(f, h, b, I1, gradients[e], fa, ga, ha)
-        for a in range(4):
-            for i in range(3):
-                value = 2 * p1 * fa[a, i] + p2 * ga[a, i] + ch * ha[a, i]
-                force[nodes[e, a], i] += value
-                size += abs(value)
+        cf = 2 * p1 + 2 * p2 * I1
+        x0, y0, z0 = 0.0, 0.0, 0.0
+        for a in range(1, 4):
+            G = _row(gradients[e], a - 1)
+            fa = _times(f, G)
+            x, y, z = _sum(cf, fa, -2 * p2, _symmetric_times(b, fa), ch, _times(h, G))
+            force[nodes[e, a], 0] += x
+            force[nodes[e, a], 1] += y
+            force[nodes[e, a], 2] += z
+            size += abs(x) + abs(y) + abs(z)
+            x0, y0, z0 = x0 - x, y0 - y, z0 - z
+        force[nodes[e, 0], 0] += x0
+        force[nodes[e, 0], 1] += y0
+        force[nodes[e, 0], 2] += z0
+        size += abs(x0) + abs(y0) + abs(z0)
     return energy, size
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _tangents(displacement, nodes, gradients, volumes, table, bulk_modulus, positions, values):
-    f, h, b = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    fa, ga, ha = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
-    fc, gc, hc = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
-    cross, turned, block = np.empty(3), np.empty(3), np.empty((3, 3))
+    whole = np.empty((12, 12))
     for e in range(len(nodes)):
-        G, V = gradients[e], volumes[e]
-        _deformation(displacement, nodes[e], G, f)
-        J = _cofactor(f, h)
-        I1, I2 = _left_cauchy_green(f, b)
-        _node_vectors(f, h, b, I1, G, fa, ga, ha)
-        s1 = J ** (-2 / 3)
-        s2 = s1 * s1
-        r1, r2 = -2 / 3 * I1 / J, -4 / 3 * I2 / J
         t = table[e] if len(table) > 1 else table[0]
-        p1, p2 = V * t[1] * s1, V * t[2] * s2
-        p11, p12, p22 = V * t[3] * s1 * s1, V * t[4] * s1 * s2, V * t[5] * s2 * s2
-        c_ff, c_fg, c_gg = 4 * p11 + 4 * p2, 2 * p12, p22
-        c_fh = 2 * p11 * r1 + 2 * p12 * r2 - 4 / 3 * p1 / J
-        c_gh = p12 * r1 + p22 * r2 - 4 / 3 * p2 / J
-        c_hh = (p11 * r1 * r1 + 2 * p12 * r1 * r2 + p22 * r2 * r2 + (10 / 9 * p1 * I1 + 28 / 9 * p2 * I2) / (J * J)
-                + V * bulk_modulus)
-        c_1, c_2, c_3 = 2 * p1 + 2 * p2 * I1, -2 * p2, p1 * r1 + p2 * r2 + V * bulk_modulus * (J - 1)
-        for a in range(4):
-            for i in range(3):
-                fc[a, i] = c_ff * fa[a, i] + c_fg * ga[a, i] + c_fh * ha[a, i]
-                gc[a, i] = c_fg * fa[a, i] + c_gg * ga[a, i] + c_gh * ha[a, i]
-                hc[a, i] = c_fh * fa[a, i] + c_gh * ga[a, i] + c_hh * ha[a, i]
-        for p in range(4):
-            for q in range(p, 4):
-                GG = G[p, 0] * G[q, 0] + G[p, 1] * G[q, 1] + G[p, 2] * G[q, 2]
-                ff = fa[p, 0] * fa[q, 0] + fa[p, 1] * fa[q, 1] + fa[p, 2] * fa[q, 2]
-                cross[0] = G[p, 1] * G[q, 2] - G[p, 2] * G[q, 1]
-                cross[1] = G[p, 2] * G[q, 0] - G[p, 0] * G[q, 2]
-                cross[2] = G[p, 0] * G[q, 1] - G[p, 1] * G[q, 0]
-                for i in range(3):
-                    turned[i] = c_3 * (f[i, 0] * cross[0] + f[i, 1] * cross[1] + f[i, 2] * cross[2])
-                    for k in range(3):
-                        block[i, k] = (fa[p, i] * fc[q, k] + ga[p, i] * gc[q, k] + ha[p, i] * hc[q, k]
-                                       + c_2 * (b[i, k] * GG + fa[q, i] * fa[p, k]))
-                    block[i, i] += c_1 * GG + c_2 * ff
-                for i in range(3):
-                    j, k = (i + 1) % 3, (i + 2) % 3
-                    block[i, j] += turned[k]
-                    block[j, i] -= turned[k]
-                for i in range(3):
-                    row = 3 * p + i
-                    for k in range(i if p == q else 0, 3):
-                        place = positions[e, row * 12 - row * (row - 1) // 2 + 3 * q + k - row]
-                        if place >= 0:
-                            values[place] += block[i, k]
+        _blocks(_deformation(displacement, nodes[e], gradients[e]), gradients[e], volumes[e], t, bulk_modulus, whole)
+        _complete(whole)
+        count = 0
+        for row in range(12):
+            for column in range(row, 12):
+                place = positions[e, count]
+                count += 1
+                if place >= 0:
+                    values[place] += whole[row, column]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _blocks(f, gradients, V, t, bulk_modulus, whole):
+    """The tangent (12, 12) of nodes 1 to 3, above its diagonal of blocks and on it."""
+    J, h = _cofactor(f)
+    I1, I2, b = _left_cauchy_green(f)
+    s1 = _isochoric(J)
+    s2 = s1 * s1
+    r1, r2 = -2 / 3 * I1 / J, -4 / 3 * I2 / J
+    p1, p2 = V * t[1] * s1, V * t[2] * s2
+    p11, p12, p22 = V * t[3] * s1 * s1, V * t[4] * s1 * s2, V * t[5] * s2 * s2
+    c_ff, c_fg, c_gg = 4 * p11 + 4 * p2, 2 * p12, p22
+    c_fh = 2 * p11 * r1 + 2 * p12 * r2 - 4 / 3 * p1 / J
+    c_gh = p12 * r1 + p22 * r2 - 4 / 3 * p2 / J
+    c_hh = (p11 * r1 * r1 + 2 * p12 * r1 * r2 + p22 * r2 * r2 + (10 / 9 * p1 * I1 + 28 / 9 * p2 * I2) / (J * J)
+            + V * bulk_modulus)
+    c_1, c_2, c_3 = 2 * p1 + 2 * p2 * I1, -2 * p2, p1 * r1 + p2 * r2 + V * bulk_modulus * (J - 1)
+    one = _vectors(f, h, b, I1, _row(gradients, 0))
+    two = _vectors(f, h, b, I1, _row(gradients, 1))
+    three = _vectors(f, h, b, I1, _row(gradients, 2))
+    squares, mixed = (c_ff, c_gg, c_hh, c_1), (c_fg, c_gh, c_fh)
+    _block(whole, 3, 3, one, one, f, b, squares, mixed, c_2, c_3)
+    _block(whole, 3, 6, one, two, f, b, squares, mixed, c_2, c_3)
+    _block(whole, 3, 9, one, three, f, b, squares, mixed, c_2, c_3)
+    _block(whole, 6, 6, two, two, f, b, squares, mixed, c_2, c_3)
+    _block(whole, 6, 9, two, three, f, b, squares, mixed, c_2, c_3)
+    _block(whole, 9, 9, three, three, f, b, squares, mixed, c_2, c_3)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _vectors(f, h, b, I1, G):
+    """G_a, f_a, g_a = 2 (I1 f_a - B f_a) and h_a of a node."""
+    fa = _times(f, G)
+    bf = _symmetric_times(b, fa)
+    return G, fa, (2 * (I1 * fa[0] - bf[0]), 2 * (I1 * fa[1] - bf[1]), 2 * (I1 * fa[2] - bf[2])), _times(h, G)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _block(whole, row, column, first, second, f, b, squares, mixed, c_2, c_3):
+    """The block of two nodes, each given by its `_vectors`, at a row and column of `whole`; coefficients as above."""
+    (G, fa, ga, ha), (Gb, fb, gb, hb), (c_ff, c_gg, c_hh, c_1), (c_fg, c_gh, c_fh) = first, second, squares, mixed
+    fc, gc, hc = _sum(c_ff, fb, c_fg, gb, c_fh, hb), _sum(c_fg, fb, c_gg, gb, c_gh, hb), _sum(c_fh, fb, c_gh, gb, c_hh, hb)
+    GG, (x, y, z) = _dot(G, Gb), _times(f, _cross(G, Gb))
+    unity, turned = c_1 * GG + c_2 * _dot(fa, fb), ((0.0, z, -y), (-z, 0.0, x), (y, -x, 0.0))
+    for i in range(3):
+        for k in range(3):
+            whole[row + i, column + k] = (
+                fa[i] * fc[k] + ga[i] * gc[k] + ha[i] * hc[k] + (unity if i == k else 0.0)
+                + c_2 * (b[_PLACE[i][k]] * GG + fb[i] * fa[k]) + c_3 * turned[i][k])
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _complete(whole):
+    """The rows of node 0, minus the sums of the others': a body that moves as a whole feels nothing."""
+    for i in range(3):
+        for column in range(3, 12):
+            total = 0.0
+            for row in (3 + i, 6 + i, 9 + i):
+                total -= whole[row, column] if row // 3 <= column // 3 else whole[column, row]
+            whole[i, column] = total
+    for i in range(3):
+        for k in range(i, 3):
+            whole[i, k] = -(whole[i, 3 + k] + whole[i, 6 + k] + whole[i, 9 + k])
