@@ -6,7 +6,7 @@ import pytest
 from softtact.materials.laws.registry import make_law
 from softtact.mechanics.blocks import SolidBlock
 from softtact.mechanics.free_body import FreeBody, RigidContact, SolidElements, flat_surface, ground
-from softtact.mechanics.free_press import FreeSettings, press_to_forces, press_to_indentations
+from softtact.mechanics.free_press import FreeSettings, _least_squares, press_to_forces, press_to_indentations
 from softtact.mechanics.rough_solver import RoughSolver
 from softtact.mechanics.tetrahedra import LinearTetrahedra
 
@@ -170,3 +170,18 @@ def test_a_block_on_a_board_is_pressed_as_hard_as_it_presses_the_board():
     state = list(press_to_indentations(body, [0.1, 0.2], settings=EXACT))[-1].state
     near = state.displacement[body.contacts[1].near_nodes]
     assert body.contacts[1].near_force(near, 0.0)[:, 2].sum() == pytest.approx(-state.object_force, rel=1e-7)
+
+
+def test_earlier_steps_are_weighed_as_by_singular_values():
+    rng = np.random.default_rng(3)
+    rows, target = rng.normal(size=(4, 50)) * np.array([[1.0], [1e-6], [10.0], [1e-3]]), rng.normal(size=50)
+    expected = np.linalg.lstsq(rows.T, target, rcond=None)[0]
+    assert _least_squares(rows, target) == pytest.approx(expected, rel=1e-9)      # normal equations, condition 10: 1e-15 times 100
+
+
+@pytest.mark.parametrize("third", [0.0, 1.0])
+def test_a_step_without_change_or_made_twice_leaves_the_weighed_sum_as_it_is(third):
+    rng = np.random.default_rng(4)
+    rows, target = rng.normal(size=(2, 30)), rng.normal(size=30)
+    more = np.vstack([rows, third * rows[0]])
+    assert _least_squares(more, target) @ more == pytest.approx(_least_squares(rows, target) @ rows, abs=1e-12)
