@@ -50,7 +50,7 @@ def paper_choice(sensor, name):
 def main():
     """Press, calibrate, compare, and write."""
     sensor = softtact.load_sensor("coro")
-    rows = json.loads((record.RESULTS / "objects.json").read_text(encoding="utf-8"))["rows"]
+    rows = record.read("objects")["rows"]
     seconds = {row["object"]: row["processor_s"] for row in rows if row["mesh"] == MESH}
     names = sorted(path.stem for path in (MAPS / MESH).glob("*.npz"))
     presses_of(sensor, names[0], 0.0)     # compiled, loaded

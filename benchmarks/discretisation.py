@@ -11,7 +11,6 @@ docs/discretisation.md, and docs/discretisation.png.
 """
 
 import argparse
-import json
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -226,7 +225,7 @@ def main():
     options.add_argument("--only", nargs="+", choices=KINDS, help="measure these kinds anew, the rest is of the last record")
     options.add_argument("--redraw", action="store_true", help="page and figure of the last record, without a run")
     given = options.parse_args()
-    old = json.loads((record.RESULTS / "discretisation.json").read_text()) if given.redraw or given.only else {}
+    old = record.read("discretisation") if given.redraw or given.only else {}
     rows = old["rows"] if given.redraw else measured(old, given.only or KINDS)
     write_table(rows)
     draw(rows)

@@ -1,6 +1,6 @@
 """Seconds of twenty levels to 50 N with the fast models, and presses per second: `python benchmarks/fast_models.py` from the
 project's folder; `--many N` presses as many random poses of ten indenters (default 1000, of one level each), over one and two
-processes, and with the elastic model as one batch on a GPU where there is one.
+processes, and with the elastic model as one batch on a GPU where there is one; 0 keeps what the record holds of them.
 
 Preparation that is made once per sensor, and compiled kernels, are made before the clock starts. Times depend on the machine and on
 what else it does: compare the ratios of one run.
@@ -88,7 +88,7 @@ def _memory_gb():
 def main():
     """Measure, print, and write benchmarks/results/fast_models.json."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--many", type=int, default=1000, metavar="N", help="random poses (default: 1000)")
+    parser.add_argument("--many", type=int, default=1000, metavar="N", help="random poses (default: 1000; 0: as recorded)")
     options = parser.parse_args()
     sensor, prepared = softtact.load_sensor("coro"), {}
     for model in MODELS:
@@ -101,7 +101,7 @@ def main():
     median = {model: float(np.median([row[model] for row in rows if row[model]])) for model in MODELS}
     print("median", median)
     record.write("fast_models", prepared_or_loaded_s=prepared, levels=len(FORCES), seconds=rows, median_s=median,
-                 many=many(sensor, options.many))
+                 many=many(sensor, options.many) if options.many else record.read("fast_models")["many"])
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ The folder holds `materials/literature` (Treloar 1944, Kawabata 1981) and `mater
 """
 
 import argparse
-import json
 import os
 import time
 from pathlib import Path
@@ -119,7 +118,7 @@ def main():
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--write-docs", action="store_true", help="put the last record into docs/materials.md")
     if options.parse_args().write_docs:
-        return write_page(json.loads((record.RESULTS / "materials.json").read_text(encoding="utf-8")))
+        return write_page(record.read("materials"))
     if "SOFTTACT_TEST_DATA" not in os.environ:
         return print("SOFTTACT_TEST_DATA names no folder with the published tests: nothing was measured.")
     print(measure(os.environ["SOFTTACT_TEST_DATA"]))

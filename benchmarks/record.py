@@ -40,6 +40,11 @@ def threads_of(count):
     return {**os.environ, **{name: str(count) for name in THREAD_VARIABLES}}
 
 
+def read(name):
+    """The last record."""
+    return json.loads((RESULTS / f"{name}.json").read_text(encoding="utf-8"))
+
+
 def write(name, **numbers):
     """Write the record and return its path."""
     RESULTS.mkdir(exist_ok=True)
