@@ -46,7 +46,9 @@ def parts_of_iteration(counts, threads):
     start = time.perf_counter()
     body = sensor_of(counts).body(threads=threads, surface=HeightField(place(PUNCH, pose=None)))
     built = time.perf_counter() - start
+    start = time.perf_counter()
     level, = press_levels(body, HeightField(place(PUNCH, pose=None)), [FORCE_N])
+    pressed = time.perf_counter() - start
     state, cells, slab = level.state, body.cells, body.slab
     everyone = np.arange(cells.count)
 
@@ -59,7 +61,7 @@ def parts_of_iteration(counts, threads):
     row = {"frusta": len(everyone), "threads": threads, "solver": body.solver.name, "iterations": level.iterations,
            "unknowns_global": len(slab.unknowns),
            "unknowns_all": len(slab.free) + cells.count * (len(body.bed.inner)),
-           "build_s": built, "condense_s": least(condense),
+           "build_s": built, "press_s": pressed, "condense_s": least(condense),
            "assemble_s": least(lambda: slab.tangent(state.slab, cells.outer, workers=body.workers)),
            "factor_s": least(lambda: body.solver.factor(matrix)), "solve_s": least(lambda: body.solver.solve(right)),
            "residual_s": least(lambda: body.evaluate(state.slab.displacement, state.bed.displacement, state.indentation,
@@ -72,8 +74,8 @@ def parts_of_iteration(counts, threads):
 def main():
     """Print a row per sensor and number of threads, and write benchmarks/results/scaling.json."""
     rows = []
-    names = ("frusta", "threads", "unknowns_all", "unknowns_global", "build_s", "condense_s", "assemble_s", "factor_s", "solve_s",
-             "residual_s", "memory_gb")
+    names = ("frusta", "threads", "unknowns_all", "unknowns_global", "build_s", "press_s", "iterations", "condense_s", "assemble_s",
+             "factor_s", "solve_s", "residual_s", "memory_gb")
     print("".join(f"{name:>16}" for name in names))
     with threadpool_limits(limits=1):
         for counts, threads in itertools.product(SENSORS, (1, 2)):
