@@ -1,5 +1,6 @@
 """The foundation model on a small sensor: a frustum's law, the slab's blocks against the whole, and its presses."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ from softtact.mechanics.foundation_press import (
     press_foundation,
     rotating_loads,
 )
-from softtact.mechanics.frustum_law import FrustumLaw, _root_stiffness, frustum_law
+from softtact.mechanics.frustum_law import FrustumLaw, _root_stiffness, _stiffness_at_rest, frustum_law
 from softtact.mechanics.mesh_settings import MeshSettings
 from softtact.mechanics.sensor_bodies import build_unit_cell
 from softtact.sensor import Sensor
@@ -117,6 +118,28 @@ def test_the_rest_stiffness_takes_a_straight_descent_without_force_and_all_else_
     assert law.descent.reshape(-1, 3)[:, :2].sum(axis=0) == pytest.approx([0, 0], abs=1e-9)
 
 
+def test_a_frustum_rocks_only_under_a_force_too_small_to_hold_its_tip_down(law):
+    """A free tip leans by s u and its rim, e from the middle, lifts the root by e s u; the force that ends it is k s u / e."""
+    u = 0.02
+    free = law.tip_radius_mm * law.lean * u
+    enough = law.upright * law.lean * u / law.tip_radius_mm
+    rises = law.rise(u, enough * np.array([0.0, 0.25, 1.0, 2.0]))
+    np.testing.assert_allclose(rises, [free, 0.75 * free, 0.0, 0.0], atol=1e-12 * free)
+
+
+def test_the_lean_of_a_free_tip_balances_the_moment_that_would_hold_it_flat(law):
+    """Of the frustum held flat: the tip's moment under a root moved sideways is its stiffness times the lean."""
+    bed = build_unit_cell(SMALL, dielectric_law=LAWS["dielectric"], mesh=MeshSettings(frustum_rings=2)).bed
+    moved = np.zeros((1, bed.nodes, 3))
+    moved[0, bed.root, 0] = 1e-5
+    inner, stiffness = np.setdiff1d(bed.inner, 3 * bed.tip + 2), _stiffness_at_rest(bed)
+    flat = moved.ravel()
+    flat[inner] = -np.linalg.solve(stiffness[np.ix_(inner, inner)], stiffness[inner] @ flat)
+    x = bed.coordinates[0][bed.tip, 0] - bed.geometry.centres[0][0]
+    moment = (bed.evaluate(flat.reshape(moved.shape)).elastic[1][0, bed.tip, 2] * x).sum()
+    assert abs(moment) / 1e-5 == pytest.approx(law.upright * law.lean, rel=0.1)     # free, the tip bends besides
+
+
 def test_a_law_is_read_as_it_was_written(law, tmp_path):
     law.save(tmp_path / "law.npz")
     loaded = FrustumLaw.load(tmp_path / "law.npz")
@@ -200,6 +223,12 @@ def test_membrane_forces_are_those_of_the_whole_slab(loaded, whole):
     assert_close((places.membrane() @ load).reshape(3, -1), whole.membrane(moved), 1e-5)
 
 
+def test_movements_of_the_roots_are_those_of_the_whole_slab(loaded, whole):
+    places, load, moved = loaded
+    mean = (whole.roots @ moved).reshape(36, -1, 3).mean(axis=1)[:, :2].T
+    assert_close((places.roots() @ load).reshape(2, -1), mean, 1e-5)
+
+
 def test_rotating_loads_are_the_gradient_of_their_energy():
     """1/2 sum N_ab w_a w_b with slopes over two pitches, w = 0 beyond the lattice: by central differences."""
     rng = np.random.default_rng(1)
@@ -266,6 +295,20 @@ def test_the_frusta_and_the_held_sides_carry_the_objects_force(name, flexibility
     assert pushed.min() >= 0
     assert pushed.sum() + whole.sides_carry(moved, forces) == pytest.approx(3.0, rel=1e-4)
     assert 0.9 * 3.0 < pushed.sum() < 1.1 * 3.0      # the held sides push or hold down only a little
+
+
+def test_rocking_frusta_push_where_the_rims_of_their_tips_meet_the_board(flexibility):
+    """With tips thirty times as stiff against being held flat, so that some rock on so small a sensor; nothing else followed."""
+    law = replace(flexibility.law, upright=30 * flexibility.law.upright)
+    points = points_of(PUNCH, flexibility)
+    level, = press_foundation(replace(flexibility, law=law), points, [3.0], settings=FoundationSettings(follow=False))
+    sideways = np.hypot(*(_Places(flexibility, points).roots() @ level.load).reshape(2, -1))
+    q = -level.load[-36:]
+    rise = law.rise(sideways, q)
+    assert ((rise > 0) & (q > 0)).any() and (rise == 0).any()
+    short = level.compression + rise
+    np.testing.assert_allclose(law.extension(q)[q > 0], short[q > 0], atol=2e-4 * short.max())     # what an iteration may leave
+    assert (short[q == 0] < 1e-5).all()
 
 
 def test_small_forces_give_a_map_in_proportion(flexibility):

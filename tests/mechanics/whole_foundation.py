@@ -19,6 +19,7 @@ class WholeFoundation:
         roots = _roots(self.slab, self.centres() + self.half, frustum)
         count = len(self.centres())
         self.stiffness = (self.slab.stiffness + roots.T @ sp.kron(sp.eye(count), frustum.rest, format="csr") @ roots).tocsr()
+        self.roots = roots
         self.descents = sp.kron(sp.eye(count), frustum.descent[None], format="csr") @ roots
         free = np.ones((*self.slab.numbers.shape, 3), dtype=bool)
         free[:, [0, -1]] = free[:, :, [0, -1]] = False

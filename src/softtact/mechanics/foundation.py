@@ -18,6 +18,7 @@ from softtact.mechanics.linear_solvers import make_solver
 from softtact.mechanics.quarter_slab import PARITIES, ElasticLayer, ParityBlocks, QuarterSlab
 
 SHEET_SHARES, COVER_SHARES = (1.0,), (0.45, 0.35, 0.2)
+_BLOCKS = ("surface", "sideways", "membrane", "roots")
 _TIE = 20.0     # N/mm of the springs that tie the frusta's descents to the slab while it is condensed, and are taken off again
 
 
@@ -28,6 +29,7 @@ class FoundationFlexibility:
     surface: among the grid's nodes in the quarter (a,), the frusta (b,) and the electrode plane at the map's points (c,)
     sideways: of the grid's every second node, in x and in y (2 c,), from the nodes and frusta (a + b,)
     membrane: forces N_x, N_y, N_xy of the frusta's cells (3 b,) in N/mm, from the same
+    roots: of the frusta's roots, in x and in y (2 b,), from the same
     grid: the nodes;  counts: frusta along x and y;  bedding: pressure per depth in N/mm3 of the layer at rest
     """
 
@@ -38,12 +40,13 @@ class FoundationFlexibility:
     surface: ParityBlocks
     sideways: ParityBlocks
     membrane: ParityBlocks
+    roots: ParityBlocks
 
     def save(self, path):
         """Write as a NumPy archive."""
         arrays = {"x": self.grid.x, "y": self.grid.y, "counts": self.counts, "bedding": self.bedding}
         arrays |= {f"law_{name}": values for name, values in self.law.arrays().items()}
-        arrays |= {name: getattr(self, name).blocks for name in ("surface", "sideways", "membrane")}
+        arrays |= {name: getattr(self, name).blocks for name in _BLOCKS}
         np.savez(path, **arrays)
 
     @classmethod
@@ -51,7 +54,7 @@ class FoundationFlexibility:
         """Read what `save` wrote."""
         with read_arrays(path) as data:
             law = FrustumLaw(**{name.removeprefix("law_"): data[name] for name in data.files if name.startswith("law_")})
-            blocks = {name: ParityBlocks(data[name]) for name in ("surface", "sideways", "membrane")}
+            blocks = {name: ParityBlocks(data[name]) for name in _BLOCKS}
             return cls(grid=NodeGrid(data["x"], data["y"]), counts=tuple(data["counts"]),
                        bedding=float(data["bedding"]), law=law, **blocks)
 
@@ -65,14 +68,16 @@ def foundation_flexibility(spec, *, dielectric_law, cover_law, frustum=None, thr
     roots = _roots(slab, centres, frustum)
     stiffness = slab.stiffness + roots.T @ sp.block_diag([frustum.rest] * len(centres), format="csr") @ roots
     descents = _cleaned(sp.kron(sp.eye(len(centres)), frustum.descent[None], format="csr") @ roots)
-    membrane = _membrane(slab, spec, centres)
+    followed = sp.vstack([_membrane(slab, spec, centres), _mean_movement(roots, len(centres))]).tocsr()
     columns = np.concatenate([3 * slab.top.ravel() + 2, slab.unknowns + np.arange(len(centres))])
     rows = np.concatenate([columns, 3 * slab.plane(len(SHEET_SHARES))[::2, ::2].ravel() + 2,
                            *(3 * slab.top[::2, ::2].ravel() + axis for axis in (0, 1))])
-    parts = [_of_parity(slab, stiffness, descents, membrane, rows, len(columns), parity, threads) for parity in PARITIES]
-    surface, sideways, forces = (ParityBlocks(np.stack(blocks).astype(np.float32)) for blocks in zip(*parts, strict=True))
+    parts = [_of_parity(slab, stiffness, descents, followed, rows, len(columns), parity, threads) for parity in PARITIES]
+    surface, sideways, both = (np.stack(blocks).astype(np.float32) for blocks in zip(*parts, strict=True))
+    membrane, moved = both[:, :3 * len(centres)], both[:, 3 * len(centres):]
     return FoundationFlexibility(grid=surface_grid(slab), counts=spec.frusta_counts, bedding=_bedding(spec, frustum, cover_law),
-                                 law=frustum, surface=surface, sideways=sideways, membrane=forces)
+                                 law=frustum, surface=ParityBlocks(surface), sideways=ParityBlocks(sideways),
+                                 membrane=ParityBlocks(membrane), roots=ParityBlocks(moved))
 
 
 def foundation_slab(spec, dielectric_law, cover_law, *, cells=None):
@@ -114,8 +119,14 @@ def _membrane(slab, spec, centres):
     return sp.vstack(slab.mean_forces(cells_of, len(centres))).tocsr() / pitch**2
 
 
-def _of_parity(slab, stiffness, descents, membrane, rows, loaded, parity, threads):
-    """Blocks of one parity: surface (loaded + c, loaded), sideways (2 c, loaded), membrane (3 b, loaded), for downwards forces.
+def _mean_movement(roots, count):
+    """Mean movement in x and y (2 b, unknowns) of `count` roots, of the displacements of all their nodes (3 b m, unknowns)."""
+    nodes = roots.shape[0] // (3 * count)
+    return sp.vstack([sp.kron(sp.eye(count), np.tile(axis, nodes)[None] / nodes) @ roots for axis in np.eye(3)[:2]])
+
+
+def _of_parity(slab, stiffness, descents, followed, rows, loaded, parity, threads):
+    """Blocks of one parity: surface (loaded + c, loaded), sideways (2 c, loaded), `followed` (f, loaded), for downwards forces.
 
     The frusta's descents are unknowns of their own, tied by springs, so that they stay when the rest is condensed.
     """
@@ -131,8 +142,8 @@ def _of_parity(slab, stiffness, descents, membrane, rows, loaded, parity, thread
     upper.sort_indices()
     solver = make_solver(threads=threads)
     solver.factor(upper)
-    response = np.zeros((slab.unknowns, membrane.shape[0]))
-    response[free] = solver.solve(np.asfortranarray(membrane[:, free].toarray().T))
+    response = np.zeros((slab.unknowns, followed.shape[0]))
+    response[free] = solver.solve(np.asfortranarray(followed[:, free].toarray().T))
     solver.close()
     top = response[3 * slab.top.ravel() + 2]
     forces = np.vstack([top, descents @ response]).T

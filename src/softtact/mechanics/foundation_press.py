@@ -6,6 +6,8 @@ Unknown are the object's forces f >= 0 on patches of the cover and the frusta's 
     u, w = G [E' f; -(q + r)]
 Active sets and Newton's method, each step solved directly. Where the contact is large, four points that the object covers whole
 share a patch and its uniform pressure, which leaves some hundred unknowns, at 0.1 to 0.4 % of the map (docs/fast_models.md).
+Frusta rock: where the sheet moves sideways, one that is hardly pressed leans on the rim of its tip and lifts the sheet:
+    extension(q) = w + rise,    see `FrustumLaw.rise`
 Three effects of finite displacement that the linear slab lacks follow the deformation from step to step:
 - pieces of the slab that rotate carry their membrane forces and the pressure between object and board with them: loads r =
   -div(N grad w) on the frusta, N the integrals over the height of s_xx + s_zz, s_yy + s_zz, s_xy (initial stress; von Karman's
@@ -26,6 +28,7 @@ import scipy.sparse as sp
 from softtact.errors import ConvergenceError
 
 _PATIENCE = 8        # iterations, after which loads that swing are followed half of the way only
+_SLOWLY = 5.0        # times as exact must what is followed half of the way only have settled
 _ABSURD_MM = 1e6     # where an iteration has run away; on its first few points an object may be thought to sink by metres
 _FIRST_PATCHES = 30
 _LEVEL_MM = 0.02     # range of heights among the points of a patch
@@ -37,13 +40,15 @@ class FoundationSettings:
     """When a level counts as reached.
 
     tolerance: largest change of a frustum's force in the last step, of the whole force;  gap_mm: overlap that joins a contact
-    follow: whether the effects of finite displacement are taken in;  patches: whether four points share one
+    follow: whether the effects of finite displacement are taken in;  rocking: whether frusta rock
+    patches: whether four points share one
     """
 
     tolerance: float = 2e-5
     gap_mm: float = 1e-6
     max_iterations: int = 60
     follow: bool = True
+    rocking: bool = True
     patches: bool = True
 
 
@@ -72,7 +77,7 @@ def press_foundation(flexibility, points, forces_n, *, settings=FoundationSettin
         if len(path) > 1:
             state.continue_along(path[-2:], force)
         yield press.level(state, float(force))
-        path.append((force, (state.q, state.r, state.moved)))
+        path.append((force, (state.q, state.r, state.moved, state.rise)))
 
 
 class FoundationMaps:
@@ -88,20 +93,22 @@ class FoundationMaps:
 
 @dataclass
 class _State:
-    """Which patches and frusta act; the frusta's forces q and loads r in N; the points' sideways movement (2, c) in mm."""
+    """Which patches and frusta act; the frusta's forces q and loads r in N; in mm the points' movement sideways (2, c) and the
+    frusta's rise (b,)."""
 
     touching: np.ndarray
     standing: np.ndarray
     q: np.ndarray
     r: np.ndarray
     moved: np.ndarray
+    rise: np.ndarray
 
     def continue_along(self, path, force):
-        """Guess the next level on the line through the last two, each (force, (q, r, moved))."""
+        """Guess the next level on the line through the last two, each (force, (q, r, moved, rise))."""
         (first, before), (second, now) = path
         share = (force - second) / (second - first)
-        self.q, self.r, self.moved = (b + share * (b - a) for a, b in zip(before, now, strict=True))
-        self.q = np.maximum(self.q, 0.0)
+        self.q, self.r, self.moved, self.rise = (b + share * (b - a) for a, b in zip(before, now, strict=True))
+        self.q, self.rise = np.maximum(self.q, 0.0), np.maximum(self.rise, 0.0)
 
 
 class _Press:
@@ -114,6 +121,8 @@ class _Press:
         self.patch = _patches(points, flexibility.grid, settings.patches)
         self.half = np.ones(points.count)
         self.half[points.edge] = 0.5
+        if settings.rocking:
+            self.roots = places.roots()
         if settings.follow:
             self.membrane, self.sideways = places.membrane(), _Sideways(flexibility, points, places)
 
@@ -123,8 +132,8 @@ class _Press:
         return _State(gap <= np.sort(gap)[:_FIRST_PATCHES][-1], np.ones(self.frusta, dtype=bool), *self.nothing())
 
     def nothing(self):
-        """q, r and moved of the unloaded sensor."""
-        return np.zeros(self.frusta), np.zeros(self.frusta), np.zeros((2, self.points.count))
+        """q, r, moved and rise of the unloaded sensor."""
+        return np.zeros(self.frusta), np.zeros(self.frusta), np.zeros((2, self.points.count)), np.zeros(self.frusta)
 
     def level(self, state, force):
         """Newton's method from a state, which is brought up to the level."""
@@ -142,7 +151,8 @@ class _Press:
             forces = np.concatenate([f, q + state.r])
             displacement = (matrix @ forces.astype(np.float32)).astype(float)
             gap, down, load = gap0 - depth + displacement[:c], -displacement[c:], spread.T @ forces
-            change = max(self._take(state, q), self._follow(state, load, down, share=1.0 if iteration <= _PATIENCE else 0.5))
+            change = max(self._take(state, q), self._rock(state, load),
+                         self._follow(state, load, down, share=1.0 if iteration <= _PATIENCE else 0.5))
             if self._same_sets(state, f, q, gap, down) and change <= self.settings.tolerance * force:
                 touched = self.patch.T @ (state.touching * 1.0) > 0
                 return FoundationLevel(force_n=force, depth=depth, load=load, touching=touched, iterations=iteration,
@@ -168,7 +178,7 @@ class _Press:
         place = np.arange(len(a), len(rows))
         system[place, place] += slope.astype(np.float32)
         by_loads = matrix[rows, c:] @ state.r.astype(np.float32)
-        right = np.concatenate([-gap0[a], slope * state.q[b] - law.extension(state.q[b])]) - by_loads
+        right = np.concatenate([-gap0[a], slope * state.q[b] - law.extension(state.q[b]) + state.rise[b]]) - by_loads
         at_rest, per_depth = _solve_positive(system, np.column_stack([right, np.arange(len(rows)) < len(a)])).T
         depth = (force - at_rest[:len(a)].sum()) / per_depth[:len(a)].sum()
         forces = np.zeros(len(matrix))
@@ -187,10 +197,22 @@ class _Press:
         """Let patches and frusta join that overlap, and leave that pull; whether none did."""
         small = self.settings.gap_mm
         touching = np.where(state.touching, f >= 0, gap < -small)
-        standing = np.where(state.standing, q >= 0, down > small)
+        standing = np.where(state.standing, q >= 0, down + state.rise > small)
         same = bool((touching == state.touching).all() and (standing == state.standing).all())
         state.touching, state.standing = touching, standing
         return same
+
+    def _rock(self, state, load):
+        """Bring the rise of rocking frusta half of the way up to date, for all of it would swing: a force ends what lifts it.
+
+        Returns what is missing as the largest change of a frustum's force in N, weighed more than others that settle at once.
+        """
+        if not self.settings.rocking:
+            return 0.0
+        sideways = np.hypot(*(self.roots @ load.astype(np.float32)).reshape(2, -1))
+        missing = self.law.rise(sideways, state.q) - state.rise
+        state.rise = state.rise + 0.5 * missing
+        return _SLOWLY * float((np.abs(missing) / self.law.slope(state.q)).max())
 
     def _follow(self, state, load, down, *, share):
         """Bring loads and movement up to date, or go a share of the way; the largest change of a load in N."""
@@ -264,6 +286,13 @@ class _Places:
         quarter = block.blocks.shape[1] // 2
         return np.vstack([block.between(axis * quarter + numbers, signs, self.columns, self.signs)
                           * signs[:, axis:axis + 1].astype(np.float32) for axis in (0, 1)])
+
+    def roots(self):
+        """Movement in x and y (2 b, n + b) of all frusta's roots."""
+        block = self.flexibility.roots
+        quarter = block.blocks.shape[1] // 2
+        return np.vstack([block.between(axis * quarter + self.frusta, self.frustum_signs, self.columns, self.signs)
+                          * self.frustum_signs[:, axis:axis + 1].astype(np.float32) for axis in (0, 1)])
 
     def membrane(self):
         """Membrane forces (3 b, n + b) of all cells."""

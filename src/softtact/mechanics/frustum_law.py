@@ -4,6 +4,8 @@ The cell is the hyperelastic one: any law and geometry; board, folding sides and
 root's nodes (tip held, at rest) the part that a straight descent meets is taken out and replaced by the cell's force:
     K 1 = k b,  1.b = 1:    forces on the root = (K - k b b') u + b p(w),   w = b.u
 so that small displacements of any kind meet the frustum's own linear stiffness, and a compression w meets the cell's force p(w).
+Where the root moves sideways, the tip, held in the plane of the board, would lean, and is kept flat by a moment that the board
+can only give to a tip that is pressed: beyond, the frustum rocks on its tip's rim and lifts the root (`FrustumLaw.rise`).
 The root's nodes lie on another mesh than the slab's. They follow it in the mean, weighted so that the root's forces act on the slab
 as the traction of which they are the nodal forces (mortar coupling; Wohlmuth, SIAM J. Numer. Anal. 38 (2000) 989). Tied to the
 slab at single points instead, they were point loads, under which a slab gives way the more the finer its elements are.
@@ -35,6 +37,8 @@ class FrustumLaw:
 
     root_xy (s, 2) in mm: points of the root about the axis;  spread (m, s): displacements of the root's nodes from those there
     rest (3 m, 3 m) in N/mm: stiffness against all else;  descent (3 m,): b
+    lean in 1/mm: of a free tip, over the root's movement sideways;  upright in N mm: stiffness of the tip against leaning
+    tip_radius_mm: of the rim that a frustum rocks on
     """
 
     force_n: np.ndarray
@@ -43,6 +47,9 @@ class FrustumLaw:
     spread: np.ndarray
     rest: np.ndarray
     descent: np.ndarray
+    lean: float
+    upright: float
+    tip_radius_mm: float
 
     @cached_property
     def _curve(self):
@@ -66,6 +73,14 @@ class FrustumLaw:
         """Derivative of `extension` in mm/N."""
         return np.where(force < self.force_n[-1], self._curve_slope(np.minimum(force, self.force_n[-1])), self._last_slope)
 
+    def rise(self, sideways, force):
+        """How far roots that have moved `sideways` (mm) are lifted by frusta that rock under forces >= 0 (N), in mm.
+
+        A rigid tip of radius e on a board without tension: its moment is at most e times the force, and what it leans beyond
+        what this moment holds back, turns it about its rim.
+        """
+        return self.tip_radius_mm * np.maximum(self.lean * sideways - self.tip_radius_mm * force / self.upright, 0.0)
+
     @cached_property
     def _last_slope(self):
         return float(self._curve_slope(self.force_n[-1]))
@@ -82,7 +97,7 @@ class FrustumLaw:
 
     def arrays(self):
         """All fields by name, to be saved."""
-        return {name: getattr(self, name) for name in ("force_n", "compression_mm", "root_xy", "spread", "rest", "descent")}
+        return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
 
 def frustum_law(spec, law, *, mesh=None, pressure_mpa=_PRESSURE_MPA):
@@ -100,10 +115,11 @@ def frustum_law(spec, law, *, mesh=None, pressure_mpa=_PRESSURE_MPA):
     along = stiffness @ straight
     k = float(straight @ along)
     descent = along / k
+    lean, upright, radius = _tip(bed)
     force, compression = _cell_curve(spec, body, descent, pressure_mpa * spec.dielectric.frusta.pitch_mm**2)
     body.close()
     return FrustumLaw(force_n=force, compression_mm=compression, root_xy=root_xy, spread=spread, descent=descent,
-                      rest=stiffness - k * np.outer(descent, descent))
+                      rest=stiffness - k * np.outer(descent, descent), lean=lean, upright=upright, tip_radius_mm=radius)
 
 
 def _root_mortar(bed):
@@ -127,16 +143,39 @@ def _root_mortar(bed):
 
 def _root_stiffness(bed):
     """Stiffness (3 m, 3 m) of a frustum's root nodes at rest, the tip standing on the board."""
-    size = 3 * bed.nodes
+    return _condensed(_stiffness_at_rest(bed), np.setdiff1d(bed.inner, 3 * bed.tip + 2), bed.root_dofs)
+
+
+def _stiffness_at_rest(bed):
+    """Stiffness (3 n, 3 n) of all of a frustum's nodes."""
     tangents = bed.block.tangent(bed.per_element(np.zeros((1, bed.nodes, 3))))
-    stiffness = np.zeros((size, size))
+    stiffness = np.zeros((3 * bed.nodes,) * 2)
     for element, nodes in zip(tangents, bed.mesh.hexes, strict=True):
         dofs = (3 * nodes[:, None] + np.arange(3)).ravel()
         stiffness[np.ix_(dofs, dofs)] += element
-    inner = np.setdiff1d(bed.inner, 3 * bed.tip + 2)
-    outer = bed.root_dofs
+    return stiffness
+
+
+def _condensed(stiffness, inner, outer):
+    """Stiffness of the unknowns `outer` once those of `inner` follow them."""
     coupling = stiffness[np.ix_(inner, outer)]
     return stiffness[np.ix_(outer, outer)] - coupling.T @ np.linalg.solve(stiffness[np.ix_(inner, inner)], coupling)
+
+
+def _tip(bed):
+    """Lean of a free tip over the root's movement sideways (1/mm), its stiffness against leaning (N mm), and its radius (mm).
+
+    Both by the tip's vertical movements z = x: the work-conjugate moment of a tip that stays plane.
+    """
+    x = bed.coordinates[0][bed.tip, 0] - bed.geometry.centres[0][0]
+    vertical = 3 * bed.tip + 2
+    inner = np.setdiff1d(bed.inner, vertical)
+    kept = np.concatenate([vertical, bed.root_dofs])
+    stiffness = _condensed(_stiffness_at_rest(bed), inner, kept)
+    sideways = np.tile([1.0, 0.0, 0.0], len(bed.root))
+    tips = len(bed.tip)
+    free = -np.linalg.solve(stiffness[:tips, :tips], stiffness[:tips, tips:] @ sideways)
+    return float(abs(free @ x) / (x @ x)), float(x @ stiffness[:tips, :tips] @ x), float(np.abs(x).max())
 
 
 def _cell_curve(spec, body, descent, largest_n):
