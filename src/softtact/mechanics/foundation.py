@@ -18,7 +18,8 @@ from softtact.mechanics.linear_solvers import make_solver
 from softtact.mechanics.quarter_slab import PARITIES, ElasticLayer, ParityBlocks, QuarterSlab
 
 SHEET_SHARES, COVER_SHARES = (1.0,), (0.45, 0.35, 0.2)
-_BLOCKS = ("surface", "sideways", "membrane", "roots")
+_BLOCKS = ("surface", "sideways", "membrane", "lateral", "lateral_self")
+_NUMBERS = ("bedding", "pitch_mm", "slab_mm")
 _TIE = 20.0     # N/mm of the springs that tie the frusta's descents to the slab while it is condensed, and are taken off again
 
 
@@ -29,22 +30,27 @@ class FoundationFlexibility:
     surface: among the grid's nodes in the quarter (a,), the frusta (b,) and the electrode plane at the map's points (c,)
     sideways: of the grid's every second node, in x and in y (2 c,), from the nodes and frusta (a + b,)
     membrane: forces N_x, N_y, N_xy of the frusta's cells (3 b,) in N/mm, from the same
-    roots: of the frusta's roots, in x and in y (2 b,), from the same
+    lateral: movement and tilt of the frusta's roots along x, then along y (4 b,), from all of these (a + b + c)
+    lateral_self: the same, from unit forces and moments of the same kind (4 b)
+    pitch_mm, slab_mm: of the frusta, and thickness of the slab
     grid: the nodes;  counts: frusta along x and y;  bedding: pressure per depth in N/mm3 of the layer at rest
     """
 
     grid: NodeGrid
     counts: tuple
     bedding: float
+    pitch_mm: float
+    slab_mm: float
     law: FrustumLaw
     surface: ParityBlocks
     sideways: ParityBlocks
     membrane: ParityBlocks
-    roots: ParityBlocks
+    lateral: ParityBlocks
+    lateral_self: ParityBlocks
 
     def save(self, path):
         """Write as a NumPy archive."""
-        arrays = {"x": self.grid.x, "y": self.grid.y, "counts": self.counts, "bedding": self.bedding}
+        arrays = {"x": self.grid.x, "y": self.grid.y, "counts": self.counts} | {name: getattr(self, name) for name in _NUMBERS}
         arrays |= {f"law_{name}": values for name, values in self.law.arrays().items()}
         arrays |= {name: getattr(self, name).blocks for name in _BLOCKS}
         np.savez(path, **arrays)
@@ -55,8 +61,8 @@ class FoundationFlexibility:
         with read_arrays(path) as data:
             law = FrustumLaw(**{name.removeprefix("law_"): data[name] for name in data.files if name.startswith("law_")})
             blocks = {name: ParityBlocks(data[name]) for name in _BLOCKS}
-            return cls(grid=NodeGrid(data["x"], data["y"]), counts=tuple(data["counts"]),
-                       bedding=float(data["bedding"]), law=law, **blocks)
+            return cls(grid=NodeGrid(data["x"], data["y"]), counts=tuple(data["counts"]), law=law, **blocks,
+                       **{name: float(data[name]) for name in _NUMBERS})
 
 
 def foundation_flexibility(spec, *, dielectric_law, cover_law, frustum=None, threads=1):
@@ -68,16 +74,19 @@ def foundation_flexibility(spec, *, dielectric_law, cover_law, frustum=None, thr
     roots = _roots(slab, centres, frustum)
     stiffness = slab.stiffness + roots.T @ sp.block_diag([frustum.rest] * len(centres), format="csr") @ roots
     descents = _cleaned(sp.kron(sp.eye(len(centres)), frustum.descent[None], format="csr") @ roots)
-    followed = sp.vstack([_membrane(slab, spec, centres), _mean_movement(roots, len(centres))]).tocsr()
+    followed = sp.vstack([_membrane(slab, spec, centres), _lateral_movement(roots, frustum, centres)]).tocsr()
     columns = np.concatenate([3 * slab.top.ravel() + 2, slab.unknowns + np.arange(len(centres))])
     rows = np.concatenate([columns, 3 * slab.plane(len(SHEET_SHARES))[::2, ::2].ravel() + 2,
                            *(3 * slab.top[::2, ::2].ravel() + axis for axis in (0, 1))])
     parts = [_of_parity(slab, stiffness, descents, followed, rows, len(columns), parity, threads) for parity in PARITIES]
-    surface, sideways, both = (np.stack(blocks).astype(np.float32) for blocks in zip(*parts, strict=True))
-    membrane, moved = both[:, :3 * len(centres)], both[:, 3 * len(centres):]
-    return FoundationFlexibility(grid=surface_grid(slab), counts=spec.frusta_counts, bedding=_bedding(spec, frustum, cover_law),
-                                 law=frustum, surface=ParityBlocks(surface), sideways=ParityBlocks(sideways),
-                                 membrane=ParityBlocks(membrane), roots=ParityBlocks(moved))
+    surface, sideways, both, own = (np.stack(blocks).astype(np.float32) for blocks in zip(*parts, strict=True))
+    membrane, lateral = both[:, :3 * len(centres), :len(columns)], both[:, 3 * len(centres):]
+    own = own[:, 3 * len(centres):, 3 * len(centres):]
+    return FoundationFlexibility(
+        grid=surface_grid(slab), counts=spec.frusta_counts, bedding=_bedding(spec, frustum, cover_law),
+        pitch_mm=spec.dielectric.frusta.pitch_mm, slab_mm=spec.dielectric.sheet_thickness_mm + spec.cover.thickness_mm,
+        law=frustum, surface=ParityBlocks(surface), sideways=ParityBlocks(sideways), membrane=ParityBlocks(membrane),
+        lateral=ParityBlocks(lateral), lateral_self=ParityBlocks(own))
 
 
 def foundation_slab(spec, dielectric_law, cover_law, *, cells=None):
@@ -119,14 +128,14 @@ def _membrane(slab, spec, centres):
     return sp.vstack(slab.mean_forces(cells_of, len(centres))).tocsr() / pitch**2
 
 
-def _mean_movement(roots, count):
-    """Mean movement in x and y (2 b, unknowns) of `count` roots, of the displacements of all their nodes (3 b m, unknowns)."""
-    nodes = roots.shape[0] // (3 * count)
-    return sp.vstack([sp.kron(sp.eye(count), np.tile(axis, nodes)[None] / nodes) @ roots for axis in np.eye(3)[:2]])
+def _lateral_movement(roots, frustum, centres):
+    """Movement and tilt of the roots along x, then along y (4 b, unknowns), of the displacements of all their nodes."""
+    return sp.vstack([sp.kron(sp.eye(len(centres)), row[None]) @ roots for row in frustum.lateral])
 
 
 def _of_parity(slab, stiffness, descents, followed, rows, loaded, parity, threads):
-    """Blocks of one parity: surface (loaded + c, loaded), sideways (2 c, loaded), `followed` (f, loaded), for downwards forces.
+    """Blocks of one parity: surface (loaded + c, loaded), sideways (2 c, loaded), followed (f, loaded + c), for downwards forces;
+    and `followed` (f, f) for forces of their own.
 
     The frusta's descents are unknowns of their own, tied by springs, so that they stay when the rest is condensed.
     """
@@ -145,9 +154,9 @@ def _of_parity(slab, stiffness, descents, followed, rows, loaded, parity, thread
     response = np.zeros((slab.unknowns, followed.shape[0]))
     response[free] = solver.solve(np.asfortranarray(followed[:, free].toarray().T))
     solver.close()
-    top = response[3 * slab.top.ravel() + 2]
-    forces = np.vstack([top, descents @ response]).T
-    return whole[:loaded + place, :loaded], -whole[loaded + place:, :loaded], -forces
+    top, plane = response[rows[:loaded - count]], response[rows[loaded:loaded + place]]
+    forces = np.vstack([top, descents @ response, plane]).T
+    return whole[:loaded + place, :loaded], -whole[loaded + place:, :loaded], -forces, followed @ response
 
 
 def _bedding(spec, frustum, cover_law):

@@ -25,9 +25,11 @@ from softtact.mechanics.elements import HEX27_TOP, gauss, quad9
 from softtact.mechanics.hyperelastic import NewtonSettings, press_levels
 from softtact.mechanics.mesh_settings import MeshSettings
 from softtact.mechanics.sensor_bodies import build_unit_cell
+from softtact.mechanics.single_frustum import SingleFrustum
 
 _FIRST_N, _LEVELS_A_DECADE = 2e-3, 9
 _MORTAR_POINTS = 10      # along a side of a root's face: so dense that elements of a tenth of a pitch do not feel them singly
+_MOVEMENT, _TILT, _LATERAL_LEVELS = 0.25, 0.1, 16   # of the height; about what 50 N do beside a punch's edge
 _PRESSURE_MPA = 2.0      # on the cell, up to which the law is asked for: about five times that of 50 N on a flat punch of 11 mm
 
 
@@ -37,6 +39,8 @@ class FrustumLaw:
 
     root_xy (s, 2) in mm: points of the root about the axis;  spread (m, s): displacements of the root's nodes from those there
     rest (3 m, 3 m) in N/mm: stiffness against all else;  descent (3 m,): b
+    lateral (4, 3 m): movement (mm) and tilt of the root along x, then along y, of its nodes' displacements
+    stiffness (g, 3): at compressions lateral_at_mm (g,), against movement (N/mm), between it and tilt (N), against tilt (N mm)
     lean in 1/mm: of a free tip, over the root's movement sideways;  upright in N mm: stiffness of the tip against leaning
     tip_radius_mm: of the rim that a frustum rocks on
     """
@@ -47,6 +51,9 @@ class FrustumLaw:
     spread: np.ndarray
     rest: np.ndarray
     descent: np.ndarray
+    lateral: np.ndarray
+    lateral_at_mm: np.ndarray
+    stiffness: np.ndarray
     lean: float
     upright: float
     tip_radius_mm: float
@@ -81,6 +88,23 @@ class FrustumLaw:
         """
         return self.tip_radius_mm * np.maximum(self.lean * sideways - self.tip_radius_mm * force / self.upright, 0.0)
 
+    def stiffening(self, force):
+        """By how much frusta under forces (b,) in N are stiffer than at rest against (movement, tilt), (b, 2, 2), and that matrix'
+        derivative by their compression, per mm.
+        """
+        place = np.clip(self.extension(force), 0.0, self.lateral_at_mm[-1])
+        growth = np.where((place < self.lateral_at_mm[-1])[:, None], self._stiffness_slope(place), 0.0)
+        more = self._stiffness(place) - self.stiffness[0]
+        return tuple(values[:, [0, 1, 1, 2]].reshape(-1, 2, 2) for values in (more, growth))
+
+    @cached_property
+    def _stiffness(self):
+        return PchipInterpolator(self.lateral_at_mm, self.stiffness)
+
+    @cached_property
+    def _stiffness_slope(self):
+        return self._stiffness.derivative()
+
     @cached_property
     def _last_slope(self):
         return float(self._curve_slope(self.force_n[-1]))
@@ -107,7 +131,7 @@ def frustum_law(spec, law, *, mesh=None, pressure_mpa=_PRESSURE_MPA):
     """
     body = build_unit_cell(spec, dielectric_law=law, mesh=mesh or MeshSettings(frustum_rings=2))
     bed = body.bed
-    root_xy, spread = _root_mortar(bed)
+    root_xy, spread, mass = _root_mortar(bed)
     stiffness = _root_stiffness(bed)
     straight = np.zeros((len(spread), 3))
     straight[:, 2] = 1.0
@@ -116,10 +140,13 @@ def frustum_law(spec, law, *, mesh=None, pressure_mpa=_PRESSURE_MPA):
     k = float(straight @ along)
     descent = along / k
     lean, upright, radius = _tip(bed)
+    lateral = _lateral(bed, mass)
     force, compression = _cell_curve(spec, body, descent, pressure_mpa * spec.dielectric.frusta.pitch_mm**2)
+    at, stiffer = _lateral_stiffness(bed, compression[-1])
     body.close()
-    return FrustumLaw(force_n=force, compression_mm=compression, root_xy=root_xy, spread=spread, descent=descent,
-                      rest=stiffness - k * np.outer(descent, descent), lean=lean, upright=upright, tip_radius_mm=radius)
+    return FrustumLaw(force_n=force, compression_mm=compression, root_xy=root_xy, spread=spread, descent=descent, lateral=lateral,
+                      lateral_at_mm=at, stiffness=stiffer, rest=stiffness - k * np.outer(descent, descent), lean=lean,
+                      upright=upright, tip_radius_mm=radius)
 
 
 def _root_mortar(bed):
@@ -138,7 +165,7 @@ def _root_mortar(bed):
     for f, (face, area) in enumerate(zip(faces, areas, strict=True)):
         mass[np.ix_(face, face)] += values.T @ (area[:, None] * values)
         products[face, f] = values.T * area
-    return np.einsum("ga,fai->fgi", values, xy).reshape(-1, 2), np.linalg.solve(mass, products.reshape(len(mass), -1))
+    return np.einsum("ga,fai->fgi", values, xy).reshape(-1, 2), np.linalg.solve(mass, products.reshape(len(mass), -1)), mass
 
 
 def _root_stiffness(bed):
@@ -176,6 +203,30 @@ def _tip(bed):
     tips = len(bed.tip)
     free = -np.linalg.solve(stiffness[:tips, :tips], stiffness[:tips, tips:] @ sideways)
     return float(abs(free @ x) / (x @ x)), float(x @ stiffness[:tips, :tips] @ x), float(np.abs(x).max())
+
+
+def _lateral(bed, mass):
+    """Movement and tilt along x, then along y, of a root's nodal displacements (4, 3 m): the plane nearest to them in its area."""
+    xy = bed.coordinates[0][bed.root, :2] - bed.geometry.centres[0]
+    rows = []
+    for axis, sideways in enumerate(np.eye(3)[:2]):
+        for shape, direction in ((np.ones(len(xy)), sideways), (xy[:, axis], np.eye(3)[2])):
+            weight = mass @ shape
+            rows.append(np.outer(weight / (weight @ shape), direction).ravel())
+    return np.array(rows)
+
+
+def _lateral_stiffness(bed, largest_mm):
+    """Compressions (g,) in mm, and a root's stiffness (g, 3) there against movement, between it and tilt, and against tilt.
+
+    Not for the smallest of movements but for those of a frustum beside an edge: between them contacts begin. Where a frustum
+    cannot be pressed so far under a rigid root, the stiffness ends there.
+    """
+    movement, descents = _MOVEMENT * bed.geometry.heights[0], np.linspace(0.0, largest_mm, _LATERAL_LEVELS)
+    moved, tilted = ([frustum.move(*place, descent) for descent in descents] for frustum, place in
+                     ((SingleFrustum(bed), (movement, 0.0)), (SingleFrustum(bed), (0.0, _TILT))))
+    both = [(*(a / movement), b[1] / _TILT) for a, b in zip(moved, tilted, strict=True) if a is not None and b is not None]
+    return descents[:len(both)], np.array(both)
 
 
 def _cell_curve(spec, body, descent, largest_n):

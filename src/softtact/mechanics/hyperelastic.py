@@ -109,6 +109,8 @@ def _advance(body, surface, reached, target, settings):
     iterations, increment = 0, target - reached.force
     while True:
         force = min(target, reached.force + increment, _reach(body, reached.force, target, settings))
+        if settings.contact_passes:
+            body.press_apart(reached.state, allowed_mm=0.0)
         body.friction.begin_step(reached.state, growth=force / reached.force if reached.force > 0 else 1.0)
         state, spent, residual = _settle(body, surface, body.again(reached.state), force, _tolerance(force, settings), settings)
         iterations += spent

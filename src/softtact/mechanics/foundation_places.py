@@ -1,0 +1,128 @@
+"""Where a press of the foundation model acts: its nodes and frusta among the flexibility of a quarter, and patches of points."""
+
+import numpy as np
+import scipy.sparse as sp
+
+_LEVEL_MM = 0.02     # range of heights among the points of a patch
+_MANY_POINTS = 800   # from which on patches save time; a small contact wants all of its points
+
+
+def patches_of(points, grid, shared):
+    """Matrix (patches, c) of the points' shares in patches: four whole points of a square, level with each other, or one alone.
+
+    Squares are counted from the middle, where a row's and a column's points go in pairs, so that a symmetric contact stays so.
+    """
+    label = np.arange(points.count)
+    if shared and points.count > _MANY_POINTS:
+        from_middle = [place - size // 2 for place, size in zip(np.divmod(points.nodes, grid.shape[1]), grid.shape, strict=True)]
+        pair = [np.sign(place) * ((np.abs(place) + 1) // 2) for place in from_middle]
+        full = np.prod([np.where(place == 0, 1, 2) for place in from_middle], axis=0)
+        _, square = np.unique(np.stack(pair, axis=1), axis=0, return_inverse=True)
+        square = square.ravel()
+        whole = np.ones(points.count, dtype=bool)
+        whole[points.edge] = False
+        count = np.bincount(square, weights=whole)
+        low, high = np.full(len(count), np.inf), np.full(len(count), -np.inf)
+        np.minimum.at(low, square, points.gap)
+        np.maximum.at(high, square, points.gap)
+        together = (count[square] == full) & (high - low <= _LEVEL_MM)[square]
+        label = np.where(together, points.count + square, label)
+    _, label, size = np.unique(label, return_inverse=True, return_counts=True)
+    return sp.csr_matrix((1.0 / size[label], (label, np.arange(points.count))))
+
+
+class Places:
+    """A press' nodes and frusta in the quarter's numbers and signs, and the matrices between them and what a press asks for."""
+
+    def __init__(self, flexibility, points):
+        self.flexibility, grid = flexibility, flexibility.grid
+        nodes, signs = grid.quarter(points.all_nodes)
+        self.frusta, self.frustum_signs = lattice_places(flexibility.counts)
+        quarter = (len(grid.x) // 2 + 1) * (len(grid.y) // 2 + 1)
+        self.columns = np.concatenate([nodes, quarter + self.frusta])
+        self.signs = np.vstack([signs, self.frustum_signs])
+        self._map_start = quarter + len(self.frusta) // 4
+
+    def surface(self):
+        """Flexibility (n + b, n + b) of nodes and frusta."""
+        return self.flexibility.surface.between(self.columns, self.signs, self.columns, self.signs)
+
+    def maps(self, load, lateral):
+        """Deformation maps (l, ny, nx) in mm under loads (n + b, l) and lateral ones of frusta (4 b, l), with the held edges."""
+        coarse = self.flexibility.grid.every_second
+        numbers, signs = coarse.quarter(np.arange(coarse.count))
+        rows = self.flexibility.surface.between(self._map_start + numbers, signs, self.columns, self.signs)
+        by_frusta = self._lateral(self._map_start + numbers, signs).T @ lateral.astype(np.float32)
+        down = rows @ load.astype(np.float32) + by_frusta
+        return np.pad(down.T.reshape(-1, *coarse.shape).astype(float), ((0, 0), (1, 1), (1, 1)))
+
+    def sideways(self, nodes):
+        """Movement in x and y (2 k, n + b) of some nodes (k,) of the grid of every second node."""
+        numbers, signs = self.flexibility.grid.every_second.quarter(nodes)
+        block = self.flexibility.sideways
+        quarter = block.blocks.shape[1] // 2
+        return np.vstack([block.between(axis * quarter + numbers, signs, self.columns, self.signs)
+                          * signs[:, axis:axis + 1].astype(np.float32) for axis in (0, 1)])
+
+    def lateral(self):
+        """Movement and tilt along x, then along y (4 b, n + b), of all frusta's roots."""
+        return self._lateral(self.columns, self.signs)
+
+    def _lateral(self, columns, signs):
+        """The same from unit forces downwards at places by their numbers (k,) in the quarter and signs (k, 2)."""
+        return np.vstack([self.flexibility.lateral.between(rows, self.frustum_signs, columns, signs) * sign[:, None]
+                          for rows, sign in self._lateral_rows()])
+
+    def lateral_self(self):
+        """The same (4 b, 4 b) from unit forces and moments of the frusta along x, then along y."""
+        block, kinds = self.flexibility.lateral_self, list(self._lateral_rows())
+        return np.block([[block.between(rows, self.frustum_signs, columns, self.frustum_signs) * np.outer(sign, other)
+                          for columns, other in kinds] for rows, sign in kinds])
+
+    def _lateral_rows(self):
+        """Movement and tilt along x, then along y: their rows (b,) of all frusta among the quarter's, and signs (b,)."""
+        quarter = self.flexibility.lateral.blocks.shape[1] // 4
+        for kind in range(4):
+            yield kind * quarter + self.frusta, self.frustum_signs[:, kind // 2].astype(np.float32)
+
+    def membrane(self):
+        """Membrane forces (3 b, n + b) of all cells."""
+        block = self.flexibility.membrane
+        quarter = block.blocks.shape[1] // 3
+        rows = [block.between(k * quarter + self.frusta, self.frustum_signs, self.columns, self.signs) for k in range(3)]
+        rows[2] *= self.frustum_signs.prod(axis=1).astype(np.float32)[:, None]
+        return np.vstack(rows)
+
+
+def lattice_places(counts):
+    """Of all frusta, x fastest: their numbers in the quarter (b,), from the middle, and signs (b, 2)."""
+    i, j = (grid.ravel() for grid in np.meshgrid(*(np.arange(count) for count in counts)))
+    half = [count // 2 for count in counts]
+    away = [np.where(k >= h, k - h, h - 1 - k) for k, h in zip((i, j), half, strict=True)]
+    return away[1] * half[0] + away[0], np.column_stack([np.where(i < half[0], -1, 1), np.where(j < half[1], -1, 1)])
+
+
+class Sideways:
+    """Movement of the points in x and y, interpolated between the nodes around them of the grid of every second node."""
+
+    def __init__(self, flexibility, points, places):
+        grid, coarse = flexibility.grid, flexibility.grid.every_second
+        j, i = np.divmod(points.nodes, grid.shape[1])
+        at = np.column_stack([i, j]) / 2 - 0.5        # in steps of the coarse grid, whose first node is the grid's second one
+        low = np.floor(at).astype(int)
+        share = at - low
+        corner, weight = [], []
+        for dx, dy in ((0, 0), (1, 0), (0, 1), (1, 1)):
+            x, y = low[:, 0] + dx, low[:, 1] + dy
+            inside = (x >= 0) & (x < coarse.shape[1]) & (y >= 0) & (y < coarse.shape[0])
+            corner.append(np.where(inside, y * coarse.shape[1] + x, 0))
+            product = np.where(dx, share[:, 0], 1 - share[:, 0]) * np.where(dy, share[:, 1], 1 - share[:, 1])
+            weight.append(np.where(inside, product, 0.0))
+        used, place = np.unique(np.stack(corner, axis=1), return_inverse=True)
+        rows = np.repeat(np.arange(points.count), 4)
+        self._between = sp.csr_matrix((np.stack(weight, axis=1).ravel(), (rows, place.ravel())), shape=(points.count, len(used)))
+        self._nodes = places.sideways(used)
+
+    def __call__(self, load):
+        """Movement (2, c) in mm under a load (n + b,)."""
+        return np.stack([self._between @ part for part in (self._nodes @ load).reshape(2, -1)])
