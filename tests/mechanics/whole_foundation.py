@@ -21,6 +21,7 @@ class WholeFoundation:
         self.stiffness = (self.slab.stiffness + roots.T @ sp.kron(sp.eye(count), frustum.rest, format="csr") @ roots).tocsr()
         self.roots = roots
         self.descents = sp.kron(sp.eye(count), frustum.descent[None], format="csr") @ roots
+        self.lateral = sp.vstack([sp.kron(sp.eye(count), row[None], format="csr") @ roots for row in frustum.lateral]).tocsr()
         free = np.ones((*self.slab.numbers.shape, 3), dtype=bool)
         free[:, [0, -1]] = free[:, :, [0, -1]] = False
         self.free, self.held = np.flatnonzero(free), np.flatnonzero(~free)
@@ -33,11 +34,15 @@ class WholeFoundation:
         x, y = (pitch * (np.arange(count) - (count - 1) / 2) for count in self.spec.frusta_counts)
         return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
 
-    def forces(self, nodes, load):
-        """Forces (unknowns,) of a load (n + b,): downwards on nodes (n,) of the grid, and on the frusta's roots."""
+    def forces(self, nodes, load, lateral=None):
+        """Forces (unknowns,) of a load (n + b,): downwards on nodes (n,) of the grid, and on the frusta's roots.
+
+        lateral (4 b,): forces and moments on the roots along x, then along y
+        """
         force = np.zeros(self.slab.unknowns)
         force[3 * self.top[nodes] + 2] = -load[:len(nodes)]
-        return force - self.descents.T @ load[len(nodes):]
+        force -= self.descents.T @ load[len(nodes):]
+        return force if lateral is None else force + self.lateral.T @ lateral
 
     def displacement(self, forces):
         """Displacement (unknowns,) under forces (unknowns,)."""

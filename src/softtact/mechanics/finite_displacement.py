@@ -10,7 +10,7 @@ Pressure: the slab's second variation under the pressure p between object and bo
 the board's side they are forces p t and moments p u on roots that tilt and move: pressure pushes what slopes sideways.
 Rotation: pieces of the slab carry their membrane forces with them, N the integrals over the height of s_xx + s_zz, s_yy + s_zz and
 s_xy: loads r = -div(N grad w) on the frusta (initial stress; von Karman's plate has the first terms). They press the deepest parts
-deeper and lift the slab beside. Their horizontal part, which a sheet that slopes between its frusta feels, moves roots sideways.
+deeper and lift the slab beside.
 Edges: the top moves sideways, and the object's edges meet other points of it: points at edges move by half as much, because a point
 stands for the middle of what the object covers of its rectangle. What moves sideways under a slope meets another height.
 
@@ -58,7 +58,6 @@ class FiniteDisplacement:
         """settings: `FoundationSettings`, of which `follow` and `rocking` count"""
         self.law, self.settings, self.lattice = flexibility.law, settings, flexibility.counts[::-1]
         self.frusta, self.points = len(places.frusta), points
-        self._sheet = 0.5 * flexibility.pitch_mm / flexibility.slab_mm
         if settings.follow or settings.rocking:
             self.lateral = places.lateral()
         if settings.follow:
@@ -112,13 +111,10 @@ class FiniteDisplacement:
 
     def _found(self, effects, load, down, q, roots):
         forces = (self.membrane @ load).reshape(3, *self.lattice)
-        loads, sideways = rotating_loads(down, forces)
         more, pushed = self._stiffened(q, roots)
-        loads = loads.ravel() + pushed
+        loads = rotating_loads(down, forces).ravel() + pushed
         pressed = more - q[:, None, None] * [[0.0, 1.0], [1.0, 0.0]]
-        lateral = self._lateral(effects.lateral, pressed, roots)
-        lateral[::2] += self._sheet * sideways.reshape(2, -1)
-        return Effects(loads, lateral, self.sideways(load), effects.rise)
+        return Effects(loads, self._lateral(effects.lateral, pressed, roots), self.sideways(load), effects.rise)
 
     def _stiffened(self, q, roots):
         """Stiffness (b, 2, 2) of roots beyond the linear one, and how much more force than their law's (b,) frusta take in N."""
@@ -142,14 +138,13 @@ class FiniteDisplacement:
 
 
 def rotating_loads(down, forces):
-    """What membrane forces (3, ny, nx) in N/mm do in a slab that has come down by `down` (ny, nx) in mm, held beyond the lattice.
+    """Loads on the frusta (ny, nx), upwards in N, of membrane forces (3, ny, nx) in N/mm in a slab that has come down by `down`
+    (ny, nx) in mm: the gradient of 1/2 sum N_ab w_a w_b over the cells; beyond the lattice the slab is held.
 
-    Loads on the frusta (ny, nx), upwards in N: the gradient of 1/2 sum N_ab w_a w_b over the cells; and N_ab w_b (2, ny, nx) in N.
     Slopes w_a are taken over two pitches: the slab, thicker than a pitch, turns as a whole only over such lengths.
     """
     x, y = _centred(down, 1), _centred(down, 0)
-    along_x, along_y = forces[0] * x + forces[2] * y, forces[1] * y + forces[2] * x
-    return -_centred(along_x, 1) - _centred(along_y, 0), np.stack([along_x, along_y])
+    return -_centred(forces[0] * x + forces[2] * y, 1) - _centred(forces[1] * y + forces[2] * x, 0)
 
 
 def _centred(values, axis):

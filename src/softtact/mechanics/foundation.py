@@ -19,7 +19,6 @@ from softtact.mechanics.quarter_slab import PARITIES, ElasticLayer, ParityBlocks
 
 SHEET_SHARES, COVER_SHARES = (1.0,), (0.45, 0.35, 0.2)
 _BLOCKS = ("surface", "sideways", "membrane", "lateral", "lateral_self")
-_NUMBERS = ("bedding", "pitch_mm", "slab_mm")
 _TIE = 20.0     # N/mm of the springs that tie the frusta's descents to the slab while it is condensed, and are taken off again
 
 
@@ -32,15 +31,12 @@ class FoundationFlexibility:
     membrane: forces N_x, N_y, N_xy of the frusta's cells (3 b,) in N/mm, from the same
     lateral: movement and tilt of the frusta's roots along x, then along y (4 b,), from all of these (a + b + c)
     lateral_self: the same, from unit forces and moments of the same kind (4 b)
-    pitch_mm, slab_mm: of the frusta, and thickness of the slab
     grid: the nodes;  counts: frusta along x and y;  bedding: pressure per depth in N/mm3 of the layer at rest
     """
 
     grid: NodeGrid
     counts: tuple
     bedding: float
-    pitch_mm: float
-    slab_mm: float
     law: FrustumLaw
     surface: ParityBlocks
     sideways: ParityBlocks
@@ -50,7 +46,7 @@ class FoundationFlexibility:
 
     def save(self, path):
         """Write as a NumPy archive."""
-        arrays = {"x": self.grid.x, "y": self.grid.y, "counts": self.counts} | {name: getattr(self, name) for name in _NUMBERS}
+        arrays = {"x": self.grid.x, "y": self.grid.y, "counts": self.counts, "bedding": self.bedding}
         arrays |= {f"law_{name}": values for name, values in self.law.arrays().items()}
         arrays |= {name: getattr(self, name).blocks for name in _BLOCKS}
         np.savez(path, **arrays)
@@ -61,8 +57,8 @@ class FoundationFlexibility:
         with read_arrays(path) as data:
             law = FrustumLaw(**{name.removeprefix("law_"): data[name] for name in data.files if name.startswith("law_")})
             blocks = {name: ParityBlocks(data[name]) for name in _BLOCKS}
-            return cls(grid=NodeGrid(data["x"], data["y"]), counts=tuple(data["counts"]), law=law, **blocks,
-                       **{name: float(data[name]) for name in _NUMBERS})
+            return cls(grid=NodeGrid(data["x"], data["y"]), counts=tuple(data["counts"]),
+                       bedding=float(data["bedding"]), law=law, **blocks)
 
 
 def foundation_flexibility(spec, *, dielectric_law, cover_law, frustum=None, threads=1):
@@ -84,7 +80,6 @@ def foundation_flexibility(spec, *, dielectric_law, cover_law, frustum=None, thr
     own = own[:, 3 * len(centres):, 3 * len(centres):]
     return FoundationFlexibility(
         grid=surface_grid(slab), counts=spec.frusta_counts, bedding=_bedding(spec, frustum, cover_law),
-        pitch_mm=spec.dielectric.frusta.pitch_mm, slab_mm=spec.dielectric.sheet_thickness_mm + spec.cover.thickness_mm,
         law=frustum, surface=ParityBlocks(surface), sideways=ParityBlocks(sideways), membrane=ParityBlocks(membrane),
         lateral=ParityBlocks(lateral), lateral_self=ParityBlocks(own))
 

@@ -35,7 +35,7 @@ class FoundationSettings:
     """
 
     tolerance: float = 2e-5
-    gap_mm: float = 1e-6
+    gap_mm: float = 3e-5     # single precision leaves 1e-5
     max_iterations: int = 60
     follow: bool = True
     rocking: bool = True
