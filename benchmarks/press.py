@@ -18,6 +18,7 @@ import record
 
 import softtact
 from softtact.geometry.meshes import read_mesh
+from softtact.mechanics.hyperelastic import NewtonSettings
 from softtact.mechanics.mesh_settings import MeshSettings
 
 OBJECTS = ["config/objects/indenters/circle_m.stl"]
@@ -29,7 +30,7 @@ LARGEST_N = 50.0
 def measure(file, mesh, levels, threads):
     """One press in this process: seconds, iterations, memory, and where it went."""
     sensor, body = softtact.load_sensor("coro"), read_mesh(file, unit="mm")
-    sensor.mesh = MESHES[mesh]
+    sensor.mesh, sensor.solver = MESHES[mesh], NewtonSettings.draft() if mesh == "draft" else NewtonSettings()
     sensor.press(body, force_n=[0.5], model="hyperelastic", threads=threads)
     start = time.perf_counter()
     result = sensor.press(body, force_n=np.linspace(LARGEST_N / levels, LARGEST_N, levels), model="hyperelastic", threads=threads)

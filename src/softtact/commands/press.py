@@ -66,8 +66,8 @@ def _press(options):
     mesh, repairs = read_object(options)
     check_over_sensor(place(mesh, pose=pose), spec.footprint_mm, name=str(options.mesh))
     try:
-        sensor = replace(softtact.load_sensor(options.sensor, materials=_cards(options)), mesh=_mesh(options),
-                         attributes={"mesh_repairs": "; ".join(repairs)})
+        sensor = replace(softtact.load_sensor(options.sensor, materials=_cards(options)),
+                         **_quality(options), attributes={"mesh_repairs": "; ".join(repairs)})
         result = sensor.press(mesh, pose=pose, force_n=forces, model=options.model,
                               policy=options.policy, tolerance_mm=options.tolerance, keep_body=options.vtu is not None)
     except ConvergenceError as error:
@@ -77,12 +77,14 @@ def _press(options):
     _show_press(result, options)
 
 
-def _mesh(options):
-    """The hyperelastic body's `MeshSettings`."""
+def _quality(options):
+    """The hyperelastic body's mesh and what counts as solved on it, by the names of `Sensor`."""
+    from softtact.mechanics.hyperelastic import NewtonSettings
     from softtact.mechanics.mesh_settings import MeshSettings
 
-    return {"default": MeshSettings, "draft": MeshSettings.draft, "stable": MeshSettings.stable,
-            "fine": MeshSettings.fine}[options.mesh_quality]()
+    mesh = {"default": MeshSettings, "draft": MeshSettings.draft, "stable": MeshSettings.stable, "fine": MeshSettings.fine}
+    solver = NewtonSettings.draft if options.mesh_quality == "draft" else NewtonSettings
+    return {"mesh": mesh[options.mesh_quality](), "solver": solver()}
 
 
 def _show_press(result, options):

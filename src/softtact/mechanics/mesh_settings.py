@@ -64,7 +64,7 @@ class MeshSettings:
 
     @classmethod
     def draft(cls):
-        """For quick studies: a layer less in the cover and in each frustum, and walls as one curve."""
+        """For quick studies: a layer less in the cover and in each frustum, and walls as one curve; see `NewtonSettings.draft`."""
         return cls(frustum_levels=(0.0, 0.35, 1.0), local_over_shear=4.0, coarse_walls=True, cover_levels=(0.0, 0.55, 1.0),
                    cover_splits=(0, 2), contact_stiffness=1000.0)
 
