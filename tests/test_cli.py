@@ -348,3 +348,15 @@ def test_export_deck_writes_the_whole_sensor_with_a_step_per_force(answer, tmp_p
     assert told["tied_nodes"] > 540 * 16 + (18 * 31 + 19 * 30) * 2
     text = deck.read_text()
     assert "units: mm, N, MPa" in text and text.index(", 3, -5\n") < text.index(", 3, -20\n")
+
+
+def test_the_draft_mesh_comes_with_what_counts_as_solved_on_it():
+    from types import SimpleNamespace
+
+    from softtact.commands.press import _quality
+    from softtact.mechanics.hyperelastic import NewtonSettings
+    from softtact.mechanics.mesh_settings import MeshSettings
+
+    draft, fine = (_quality(SimpleNamespace(mesh_quality=name)) for name in ("draft", "fine"))
+    assert draft == {"mesh": MeshSettings.draft(), "solver": NewtonSettings.draft()}
+    assert fine == {"mesh": MeshSettings.fine(), "solver": NewtonSettings()}

@@ -55,6 +55,12 @@ def test_the_contact_area_does_not_depend_on_how_far_overlaps_were_pressed_apart
     np.testing.assert_allclose(areas[1], areas[0], rtol=0.02)
 
 
+def test_a_light_press_overlaps_by_less_in_proportion():
+    cylinder = trimesh.creation.cylinder(radius=1.8, height=3, sections=64)
+    light = press_small(cylinder, [0.1])
+    assert light.penetration_mm[0] <= 1e-3 * light.indentation_mm[0] / 0.2 < 1e-4      # the cover comes down by less
+
+
 def test_overlaps_that_were_not_pressed_apart_are_outside_validity(cylinder_press):
     solver = NewtonSettings(largest_penetration_mm=0.25 * cylinder_press.penetration_mm.min(), contact_passes=0)
     cylinder = trimesh.creation.cylinder(radius=1.8, height=3, sections=64)

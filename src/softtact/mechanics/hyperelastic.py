@@ -20,7 +20,7 @@ class NewtonSettings:
 
     relative_tolerance: largest unbalanced nodal force as a share of the force, at least of smallest_scale_n
     largest_penetration_mm, contact_passes: with deeper overlaps they are pressed apart and the level is solved again, so often
-    largest_penetration_share: of how far the cover has come down, where that is less: a micrometre is 4 % of a light press
+    full_depth_mm: where the cover has come down by less, so much less may overlap: a micrometre is 4 % of a light press
     largest_step_mm: largest movement of a node in one iteration;  smallest_increment_n: force steps are halved down to this
     level_iterations: a level ends where it took so many in all its steps: one that crawls would go on for hours
     first_touch_mm, first_touch_tolerance_n: overlap at which the press begins, and the residual that is good enough there
@@ -32,7 +32,7 @@ class NewtonSettings:
 
     relative_tolerance: float = 3e-4   # of a nodal force; 1e-4 changes the indentation by 3e-4 of itself, the map by 0.03 % (rms)
     largest_penetration_mm: float = 1e-3
-    largest_penetration_share: float = 0.005
+    full_depth_mm: float = 0.2
     contact_passes: int = 20
     max_iterations: int = 40
     level_iterations: int = 300
@@ -171,7 +171,8 @@ def _press_apart(body, surface, state, residual, force, settings):
 
 def _allowed_mm(state, settings):
     """Overlap that a state may have."""
-    return min(settings.largest_penetration_mm, -settings.largest_penetration_share * state.slab.displacement[:, 2].min())
+    depth = -state.slab.displacement[:, 2].min()
+    return settings.largest_penetration_mm * min(1.0, depth / settings.full_depth_mm)
 
 
 def _tolerance(force, settings):
