@@ -138,6 +138,9 @@ class Overlapping:
     def __init__(self, overlaps, spent):
         self.overlaps, self.spent, self.passes = overlaps, spent, 0
 
+    def descent(self, state):
+        return 1.0
+
     def contact_error(self, state):
         return self.overlaps[self.passes]
 

@@ -159,7 +159,8 @@ def _press_apart(body, surface, state, residual, force, settings):
         overlap = body.contact_error(state) if state is not None else 0.0
         in_vain = in_vain + (spent > 0) if overlap > _WORTH_A_PASS * least else 0
         least = min(least, overlap)
-        allowed = _allowed_mm(state, settings) if state is not None else 0.0
+        depth = body.descent(state) if state is not None else 0.0
+        allowed = settings.largest_penetration_mm * min(1.0, depth / settings.full_depth_mm)
         if overlap <= allowed or in_vain == _PASSES_IN_VAIN:
             break
         body.press_apart(state, allowed_mm=allowed)
@@ -167,12 +168,6 @@ def _press_apart(body, surface, state, residual, force, settings):
         state, spent, residual = _settle(body, surface, start, force, _tolerance(force, settings), settings)
         iterations += spent
     return state, iterations, residual
-
-
-def _allowed_mm(state, settings):
-    """Overlap that a state may have."""
-    depth = -state.slab.displacement[:, 2].min()
-    return settings.largest_penetration_mm * min(1.0, depth / settings.full_depth_mm)
 
 
 def _tolerance(force, settings):

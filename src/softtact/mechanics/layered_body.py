@@ -156,6 +156,10 @@ class LayeredBody:
         """Deepest penetration in mm, of the object into the cover or of frusta into the board or each other."""
         return float(max(0.0, -self.slab.top.own_gaps(state.slab).min(), -state.bed.gaps.min()))
 
+    def descent(self, state):
+        """How far the cover has come down where it did most, in mm."""
+        return float(-state.slab.displacement[:, 2].min())
+
     def contact_error(self, state):
         """Deepest overlap, or widest gap under pressure, in mm."""
         return max(self.slab.top.contact.error(self.slab.top.own_gaps(state.slab)), self.bed.contact.error(state.bed.gaps))
