@@ -26,7 +26,8 @@ class FoundationError:
     """Expected error of the foundation model over its map's root mean square: `at_rest` + `growth` * compression / height.
 
     compression: of the most compressed frustum. The values given here are those of ten indenters (bordes_v, circle_g, circle_m,
-    cruz, donut_m, echo_v, glasses, square, star, triangle) at five levels to 50 N on the sensor `coro`, against the hyperelastic model's fine mesh (benchmarks/choice.py).
+    cruz, donut_m, echo_v, glasses, square, star, triangle) at five levels to 50 N on the sensor `coro`, against the hyperelastic
+    model's fine mesh (benchmarks/choice.py).
     """
 
     at_rest: float = 0.0196
