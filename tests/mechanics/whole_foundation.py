@@ -19,7 +19,6 @@ class WholeFoundation:
         roots = _roots(self.slab, self.centres() + self.half, frustum)
         count = len(self.centres())
         self.stiffness = (self.slab.stiffness + roots.T @ sp.kron(sp.eye(count), frustum.rest, format="csr") @ roots).tocsr()
-        self.roots = roots
         self.descents = sp.kron(sp.eye(count), frustum.descent[None], format="csr") @ roots
         self.lateral = sp.vstack([sp.kron(sp.eye(count), row[None], format="csr") @ roots for row in frustum.lateral]).tocsr()
         free = np.ones((*self.slab.numbers.shape, 3), dtype=bool)
