@@ -10,7 +10,7 @@ from itertools import repeat
 import numpy as np
 
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
-from softtact.contact.object_points import Underside
+from softtact.contact.underside import Underside
 from softtact.contact.unilateral import not_settled
 from softtact.errors import ConvergenceError, InputError, SofttactError
 from softtact.geometry.meshes import check_over_sensor, place

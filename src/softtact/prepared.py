@@ -8,7 +8,7 @@ from softtact.mechanics.elastic import Compliance, elastic_compliance
 from softtact.mechanics.foundation import FoundationFlexibility, foundation_flexibility
 from softtact.progress import announce
 
-_FORMAT = 7     # of the files; another one makes them again
+_FORMAT = 8     # of the files; another one makes them again
 
 
 def _values(spec):

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from softtact.contact.height_field import HeightField
-from softtact.contact.object_points import Underside
+from softtact.contact.underside import Underside
 from softtact.errors import ConvergenceError, OutsideCardWarning
 from softtact.mechanics import hyperelastic
 from softtact.mechanics.elastic import press_layer

@@ -6,7 +6,7 @@ import numpy as np
 import trimesh
 
 from softtact.contact.height_field import HeightField
-from softtact.contact.object_points import Underside
+from softtact.contact.underside import Underside
 from softtact.geometry.pose import Pose
 from softtact.mechanics.elastic import surface_grid
 from softtact.mechanics.quarter_slab import PARITIES, ElasticLayer, ParityBlocks, QuarterSlab
@@ -34,9 +34,9 @@ def placed(mesh, values=(0, 0, 0, 0, 0, 0)):
     return mesh
 
 
-def object_points(mesh, grid, reach=THICKNESS):
-    """`ObjectPoints` of a placed mesh on a grid."""
-    return Underside(HeightField(mesh), grid).points(reach)
+def underside(mesh, grid):
+    """`Underside` of a placed mesh over a grid."""
+    return Underside(HeightField(mesh), grid)
 
 
 def ball(radius):

@@ -1,17 +1,16 @@
-"""Points where an object can touch: areas and edges sharper than the grid, and what lies between its nodes."""
+"""Nodes where an object can touch, and how far it covers their surroundings: edges sharper than the grid, kinks, tips, borders."""
 
 import numpy as np
 import pytest
 import trimesh
-from small_layer import ball, flat_box, object_points, placed, punch
+from small_layer import ball, flat_box, placed, punch, underside
 
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
-from softtact.contact.object_points import NodeGrid, Underside
+from softtact.contact.node_grid import NodeGrid
 from softtact.errors import InputError
 
 STEP = 0.34                                        # mm, about that of the sensor's grid
 GRID = NodeGrid(STEP * np.arange(-20, 21), STEP * np.arange(-24, 25))
-HALF_SAMPLE = 1 / 16                               # of a step: an edge is found among eight samples along a side
 OBLONG = flat_box(5.13, 3.47)                      # mm: 15.09 x 10.2 steps
 ANYWHERE = (0.11, 0.23, 0, 0, 0, 27)
 FLAT = {
@@ -22,14 +21,18 @@ FLAT = {
 }
 
 
-def places_of(points, grid=GRID):
-    """Places (c, 2) of `ObjectPoints` in mm."""
-    return points.interpolation(points.weights()) @ grid.points[points.all_nodes]
+def object_points(mesh, reach=2.5):
+    return underside(mesh, GRID).points(reach)
 
 
-def centroid(mesh):
-    points = object_points(mesh, GRID)
-    return points.covered @ places_of(points) / points.covered.sum()
+def of_node(points, i, j, values):
+    """What `values` (c, ...) says of the node i, j steps from the middle."""
+    number = (j + 24) * 41 + i + 20
+    return values[np.flatnonzero(points.nodes == number)[0]]
+
+
+def still(points):
+    return np.zeros((2, points.count))
 
 
 # --- grid ---
@@ -47,134 +50,167 @@ def test_the_map_s_nodes_are_every_second_one_with_the_middle_among_them():
     np.testing.assert_allclose(grid.every_second.y / STEP, [-4, -2, 0, 2, 4], atol=1e-12)
 
 
-# --- areas and places ---
+# --- coverage ---
 
 
-def test_every_rectangle_that_a_plate_covers_whole_has_one_point_at_its_node():
-    """A plate over all of the grid: no edge anywhere."""
-    points = object_points(placed(flat_box(30.0, 30.0)), GRID)
+def test_a_plate_over_all_of_the_grid_covers_every_node_whole():
+    points = object_points(placed(flat_box(30.0, 30.0)))
     np.testing.assert_array_equal(points.nodes, np.arange(GRID.count))
     np.testing.assert_array_equal(points.covered, 1.0)
-    assert len(points.edge) == 0 == len(points.others)
-
-
-def test_each_covered_rectangle_has_exactly_one_point():
-    surface = HeightField(FLAT["circle"][0])
-    points = object_points(FLAT["circle"][0], GRID)
-    middle = np.flatnonzero(surface(*GRID.points.T)[0] < NO_CONTACT_MM)      # nodes under the punch: more than half covered, mostly
-    assert len(np.unique(points.nodes)) == points.count
-    assert np.isin(middle, points.nodes).all()
-    assert not np.isin(points.others, points.nodes).any()
-    assert np.hypot(*GRID.points[points.nodes].T).max() < 3.0 + STEP / np.sqrt(2)
+    assert len(points.edge) == 0 and points.beneath is None
 
 
 @pytest.mark.parametrize("name", FLAT)
 def test_a_flat_punch_covers_its_area(name):
+    """Hat functions sum to one everywhere; 64 samples a step squared."""
     mesh, expected = FLAT[name]
-    covered = object_points(mesh, GRID).covered.sum() * STEP**2
-    assert covered == pytest.approx(expected, rel=0.01)      # 64 samples a rectangle; less than a tenth of one is left out
-
-
-@pytest.mark.parametrize("mesh", [punch(3.0), OBLONG], ids=["circle", "rectangle"])
-@pytest.mark.parametrize("share", [(0.3, 0.0), (0.0, 0.3), (0.3, 0.7)])
-def test_a_punch_that_moves_by_part_of_a_step_takes_its_points_along(mesh, share):
-    moved = centroid(placed(mesh, (share[0] * STEP, share[1] * STEP, 0, 0, 0, 0))) - centroid(placed(mesh))
-    np.testing.assert_allclose(moved / STEP, share, atol=0.03)      # half of HALF_SAMPLE, as opposite edges err differently
+    assert object_points(mesh).covered.sum() * STEP**2 == pytest.approx(expected, rel=0.01)
 
 
 @pytest.mark.parametrize("name", FLAT)
-def test_points_at_an_edge_lie_inside_the_object(name):
-    mesh, _ = FLAT[name]
-    points = object_points(mesh, GRID)
-    places = places_of(points)[points.edge]
-    inside = HeightField(mesh)
-    towards_middle = places + HALF_SAMPLE * STEP * -np.sign(places - mesh.centroid[:2])
-    assert (inside(*towards_middle.T)[0] < NO_CONTACT_MM).all()
-    assert len(points.edge) > 20
-
-
-@pytest.mark.parametrize("name", FLAT)
-def test_points_that_are_not_at_an_edge_are_their_nodes(name):
-    points = object_points(FLAT[name][0], GRID)
+def test_nodes_that_are_not_near_an_edge_are_covered_whole(name):
+    points = object_points(FLAT[name][0])
     plain = np.setdiff1d(np.arange(points.count), points.edge)
-    np.testing.assert_allclose(places_of(points)[plain], GRID.points[points.nodes[plain]], atol=1e-12)
+    assert len(plain) > 20 and len(points.edge) > 20
     np.testing.assert_array_equal(points.covered[plain], 1.0)
 
 
-# --- between the nodes ---
+@pytest.mark.parametrize("beyond", [0.0, 0.25, 0.5, 0.75])
+def test_a_straight_edge_covers_a_share_of_a_hat_that_tells_where_it_is(beyond):
+    """An edge r steps beyond the node before covers r^2 / 2 of the next one's hat, and 1 - (1 - r)^2 / 2 of its own.
+
+    Samples are an eighth of a step apart, with these edges between them: the midpoint rule is exact on a straight hat.
+    """
+    points = object_points(placed(flat_box(2 * (5 + beyond) * STEP, 8.0)))
+    assert of_node(points, 5, 0, points.covered) == pytest.approx(1 - (1 - beyond) ** 2 / 2, abs=1e-6)
+    if beyond:
+        assert of_node(points, 6, 0, points.covered) == pytest.approx(beyond**2 / 2, abs=1e-6)
+    assert of_node(points, 4, 0, points.covered) == pytest.approx(1.0, abs=1e-6)
 
 
-@pytest.mark.parametrize("shift", [None, (0.0, 0.0), (0.3, -0.2), (5.0, -5.0)])
-def test_support_weights_are_shares_of_one(shift):
-    points = object_points(FLAT["rectangle turned"][0], GRID)
-    weights = points.weights(None if shift is None else np.tile(shift, (len(points.edge), 1)))
-    assert (weights >= 0).all()
-    np.testing.assert_allclose(weights.sum(axis=1), 1.0, rtol=1e-12)
-    np.testing.assert_allclose(points.interpolation(weights).sum(axis=1), 1.0, rtol=1e-12)
+@pytest.mark.parametrize("moved", [-0.5, 0.25, 0.75])
+def test_nodes_that_move_meet_the_edge_elsewhere(moved):
+    """Moving the nodes by a part of a step is moving the object back by it."""
+    points = object_points(placed(flat_box(10 * STEP, 8.0)))
+    shifted = object_points(placed(flat_box(10 * STEP, 8.0), (-moved * STEP, 0, 0, 0, 0, 0)))
+    by_nodes = points.covered_at(np.array([np.full(points.count, moved * STEP), np.zeros(points.count)]), rounding_mm=0.01)
+    for i in (4, 5):
+        assert of_node(points, i, 0, by_nodes) == pytest.approx(of_node(shifted, i, 0, shifted.covered), abs=1e-6)
 
 
-def test_a_point_at_an_edge_moves_by_the_shift_it_is_given():
-    points = object_points(FLAT["circle off the nodes"][0], GRID)
-    free = (np.abs(points.offset) > 0.1).all(axis=1)                 # not on their nodes' lines, which they would leave
-    shift = np.tile([0.05, -0.08], (len(points.edge), 1))
-    moved = points.interpolation(points.weights(shift)) @ GRID.points[points.all_nodes] - places_of(points)
-    assert free.sum() > 10
-    np.testing.assert_allclose(moved[points.edge][free] / STEP, shift[free], atol=1e-9)
+def test_the_way_out_of_an_object_is_across_its_edge():
+    points = object_points(placed(flat_box(10 * STEP, 8.0)))
+    outwards = np.zeros((points.count, 2))
+    outwards[points.edge] = points.outwards()
+    np.testing.assert_allclose(of_node(points, 5, 0, outwards), [1.0, 0.0], atol=1e-9)
+    np.testing.assert_allclose(outwards[points.edge].sum(axis=1), 1.0)
 
 
 # --- heights ---
 
 
-def test_gap_and_slope_are_those_of_a_tilted_plate_where_the_points_lie():
+def test_gap_and_slope_are_those_of_a_tilted_plate_even_beyond_its_edge():
     mesh = placed(flat_box(5.13, 3.47), (0.1, 0.2, 0, 6.0, -4.0, 20.0))
-    points, surface = object_points(mesh, GRID), HeightField(mesh)
-    normal = surface(np.array([0.1]), np.array([0.2]))[1][0]
-    slope = -normal[:2] / normal[2]
-    wall = np.abs(points.slope - slope).max(axis=1) > 1e-9           # points under the plate's tilted sides
-    assert wall.mean() < 0.15
-    height = surface(np.array([0.1]), np.array([0.2]))[0] + (places_of(points) - [0.1, 0.2]) @ slope
-    np.testing.assert_allclose(points.gap[~wall], height[~wall], atol=1e-9)
+    points, surface = object_points(mesh), HeightField(mesh)
+    height, normal = surface(np.array([0.1]), np.array([0.2]))
+    slope = -normal[0, :2] / normal[0, 2]
+    wall = np.abs(points.slope - slope).max(axis=1) > 1e-9           # nodes at the plate's tilted sides
+    assert wall.mean() < 0.2
+    expected = height + (GRID.points[points.nodes] - [0.1, 0.2]) @ slope
+    np.testing.assert_allclose(points.gap[~wall], expected[~wall], atol=1e-9)
 
 
-def test_a_sphere_s_points_lie_on_its_underside():
-    """Facets of 2.2 mm/64: their sag, edge^2 / 8 R, is a micrometre or two."""
-    points = object_points(placed(ball(6.0)), GRID, reach=1.0)
-    radius = np.hypot(*places_of(points).T)
-    np.testing.assert_allclose(points.gap, 6.0 - np.sqrt(36.0 - radius**2), atol=0.02)
-    np.testing.assert_allclose(np.hypot(*points.slope.T), radius / np.sqrt(36.0 - radius**2), atol=0.06)     # a facet's half angle
+def test_a_sphere_s_points_lie_on_its_underside_and_are_covered_whole():
+    """Facets of 0.11 mm lie less than a micrometre inside. No slope changes by more than 0.08 a step."""
+    points = object_points(placed(trimesh.creation.icosphere(subdivisions=6, radius=6.0)), reach=0.5)
+    radius = np.hypot(*GRID.points[points.nodes].T)
+    np.testing.assert_allclose(points.gap, 6.0 - np.sqrt(36.0 - radius**2), atol=0.001)
+    np.testing.assert_allclose(np.hypot(*points.slope.T), radius / np.sqrt(36.0 - radius**2), atol=0.02)     # a facet's half angle
+    np.testing.assert_array_equal(points.covered, 1.0)
 
 
 def test_no_point_is_higher_than_asked_for():
-    underside = Underside(HeightField(placed(ball(6.0))), GRID)
-    few, many = underside.points(0.3), underside.points(0.6)
-    assert few.gap.max() <= underside.lowest_mm + 0.3 + 0.02         # a rectangle's lowest place counts, the point is its node
+    below = underside(placed(ball(6.0)), GRID)
+    few, many = below.points(0.3), below.points(0.6)
+    assert few.gap.max() <= below.lowest_mm + 0.3
     assert few.count < many.count and np.isin(few.nodes, many.nodes).all()
 
 
 def test_the_depth_on_springs_presses_them_with_the_whole_force():
-    underside = Underside(HeightField(placed(punch(2.0))), GRID)
-    area = object_points(placed(punch(2.0)), GRID).covered.sum() * STEP**2
-    assert underside.depth_on_springs(3.0, 0.5) == pytest.approx(3.0 / 0.5 / area, rel=0.01)     # slivers count here
+    below = underside(placed(punch(2.0)), GRID)
+    assert below.depth_on_springs(3.0, 0.5) == pytest.approx(3.0 / 0.5 / (4 * np.pi), rel=0.05)     # half a step's samples
 
 
 def test_a_sharp_tip_has_a_point_at_its_lowest_place():
     """A cone twice as high as its radius, its tip down."""
     cone = trimesh.creation.cone(radius=2.0, height=4.0, sections=64)
     cone.apply_transform(trimesh.transformations.rotation_matrix(np.pi, [1, 0, 0]))
-    points = object_points(placed(cone), GRID, reach=1.0)
+    points = object_points(placed(cone), reach=1.0)
     assert points.count > 0 and points.gap.min() < 0.25 * STEP
+
+
+# --- rounded edges and kinks ---
+
+
+def profile(corners, length=8.0):
+    """A convex bar along y with a section of corners (x, z)."""
+    return placed(trimesh.convex.convex_hull([(x, y, z) for x, z in corners for y in (-length / 2, length / 2)]))
+
+
+def test_more_of_a_rounded_edge_counts_the_deeper_it_is_pressed():
+    """Of a radius of 0.25 mm from x = 5.5 steps on: up to a height h it is sqrt(2 R h - h^2) wide."""
+    flat, radius, angles = 5.5 * STEP, 0.25, np.linspace(0, np.pi / 2, 41)
+    half = [(flat + radius * np.sin(a), radius * (1 - np.cos(a))) for a in angles] + [(flat + radius, 2.0)]
+    points = object_points(profile(half + [(-x, z) for x, z in half]))
+    node = np.flatnonzero(points.nodes == 24 * 41 + 26)[0]
+    assert points.gap[node] == 0.0 and points.slope[node, 0] == 0.0       # the flat's plane, though the node lies beyond it
+    shares = [points.covered_at(still(points), rounding_mm=height)[node] for height in (0.0, 0.02, 0.1)]
+    beyond = [0.5 + np.sqrt(2 * radius * height - height**2) / STEP for height in (0.0, 0.02, 0.1)]
+    expected = [r**2 / 2 if r < 1 else 1 - (2 - r) ** 2 / 2 for r in beyond]
+    np.testing.assert_allclose(shares, expected, atol=0.07)      # a sample is an eighth of a step
+
+
+def test_beyond_a_kink_a_node_is_touched_only_once_the_object_has_come_down_to_it():
+    """A flat bottom of half 4.6 steps, then sides of slope 0.3: the node at 5 lies 0.4 * 0.3 steps higher."""
+    kink = 4.6 * STEP
+    points = object_points(profile([(kink, 0), (-kink, 0), (kink + 1.5, 0.45), (-kink - 1.5, 0.45), (0, 2.0)]))
+    light, deep = points.as_deep(0.02), points.as_deep(0.2)
+    assert of_node(light, 5, 0, light.gap) == 0.0
+    assert of_node(light, 5, 0, light.covered_at(still(light), rounding_mm=1e-4)) == pytest.approx(0.6**2 / 2, abs=0.08)
+    assert of_node(deep, 5, 0, deep.gap) == pytest.approx(0.4 * STEP * 0.3, abs=1e-9)
+    assert of_node(deep, 5, 0, deep.slope)[0] == pytest.approx(0.3)
+    assert of_node(deep, 5, 0, deep.covered) > 0.8
+    for seen in (light, deep):
+        assert of_node(seen, 3, 0, seen.gap) == 0.0
+
+
+def test_the_lower_part_of_a_step_keeps_its_edge_beside_the_higher_one():
+    """A ridge of half 3.5 steps, 0.25 mm lower than the plate around it."""
+    ridge = trimesh.util.concatenate([trimesh.creation.box((7 * STEP, 8.0, 1.0)), trimesh.creation.box((9.0, 8.0, 0.5))])
+    points = object_points(placed(ridge))
+    light = points.as_deep(0.1)
+    assert of_node(light, 4, 0, light.gap) == 0.0
+    assert of_node(light, 4, 0, light.covered) == pytest.approx(0.5**2 / 2, abs=1e-6)
+    assert of_node(points, 4, 0, points.gap) == pytest.approx(0.25)      # once the object has come down to it
+    assert of_node(points, 6, 0, points.gap) == pytest.approx(0.25)      # boxes of 1 and of 0.5 mm about the same middle
 
 
 # --- borders and refusals ---
 
 
-def test_an_object_over_the_border_keeps_points_on_the_grid():
-    points = object_points(placed(punch(3.0), (6.0, 7.5, 0, 0, 0, 0)), GRID)
-    assert points.all_nodes.min() >= 0 and points.all_nodes.max() < GRID.count
-    places = places_of(points)
-    assert (places <= [GRID.x[-1] + 1e-9, GRID.y[-1] + 1e-9]).all()
+def test_an_object_over_the_border_covers_the_outermost_nodes_as_if_the_grid_went_on():
+    points = object_points(placed(flat_box(10 * STEP, 30.0)))
+    covered = np.array([of_node(points, 5, j, points.covered) for j in range(-24, 25)])
+    np.testing.assert_allclose(covered, 0.5, atol=1e-6)
 
 
 def test_an_object_that_misses_the_free_surface_is_refused():
     with pytest.raises(InputError, match="misses every free point"):
-        Underside(HeightField(placed(punch(1.0), (9.0, 0, 0, 0, 0, 0))), GRID)
+        underside(placed(punch(1.0), (9.0, 0, 0, 0, 0, 0)), GRID)
+
+
+def test_only_nodes_under_the_object_count_where_points_are_nodes():
+    mesh = FLAT["rectangle turned"][0]
+    points = underside(mesh, GRID).nodes(1.0)
+    np.testing.assert_array_equal(points.nodes, np.flatnonzero(HeightField(mesh)(*GRID.points.T)[0] < NO_CONTACT_MM))
+    np.testing.assert_array_equal(points.covered, 1.0)

@@ -8,7 +8,7 @@ import trimesh
 from whole_layer import WholeLayer
 
 from softtact.contact.height_field import HeightField
-from softtact.contact.object_points import Underside
+from softtact.contact.underside import Underside
 from softtact.errors import InputError
 from softtact.geometry.meshes import place
 from softtact.geometry.pose import Pose
@@ -48,7 +48,7 @@ def placed(name):
 
 
 def points_of(name, compliance):
-    return Underside(HeightField(placed(name)), compliance.grid).points(SMALL.thickness_mm)
+    return Underside(HeightField(placed(name)), compliance.grid).nodes(SMALL.thickness_mm)
 
 
 @pytest.mark.parametrize("name", OBJECTS)
@@ -81,7 +81,7 @@ def test_turning_the_object_by_half_a_turn_turns_the_map(compliance):
     for angle in (0.0, np.pi):
         turned = mesh.copy()
         turned.apply_transform(trimesh.transformations.rotation_matrix(angle, [0, 0, 1]))
-        points = Underside(HeightField(turned), compliance.grid).points(SMALL.thickness_mm)
+        points = Underside(HeightField(turned), compliance.grid).nodes(SMALL.thickness_mm)
         maps.append(press_layer(compliance, points, FORCES).maps[-1])
     # samples of edges lie alike on both sides; what is left is single precision
     np.testing.assert_allclose(maps[1], maps[0][::-1, ::-1], atol=1e-5 * maps[0].max())

@@ -9,13 +9,13 @@ import trimesh
 from whole_foundation import WholeFoundation
 
 from softtact.contact.height_field import HeightField
-from softtact.contact.object_points import Underside
-from softtact.errors import InputError
+from softtact.contact.underside import Underside
+from softtact.errors import ConvergenceError, InputError
 from softtact.geometry.meshes import place
 from softtact.geometry.pose import Pose
 from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.laws.registry import make_law
-from softtact.mechanics.finite_displacement import rotating_loads
+from softtact.mechanics.finite_displacement import membrane_loads
 from softtact.mechanics.foundation import FoundationFlexibility, foundation_flexibility
 from softtact.mechanics.foundation_places import Places, lattice_places
 from softtact.mechanics.foundation_press import FoundationMaps, FoundationSettings, press_foundation
@@ -265,11 +265,11 @@ def loaded(flexibility, whole):
     both and under the first alone.
     """
     points = points_of(BOX, flexibility, TILTED)
-    load = np.random.default_rng(3).uniform(0.0, 1.0, len(points.all_nodes) + 36)
+    load = np.random.default_rng(3).uniform(0.0, 1.0, len(points.nodes) + 36)
     load[-36:] *= -0.3
     lateral = np.random.default_rng(4).uniform(-0.1, 0.1, 4 * 36)
-    moved = whole.displacement(whole.forces(points.all_nodes, load, lateral))
-    return Places(flexibility, points), load, lateral, moved, whole.displacement(whole.forces(points.all_nodes, load))
+    moved = whole.displacement(whole.forces(points.nodes, load, lateral))
+    return Places(flexibility, points), load, lateral, moved, whole.displacement(whole.forces(points.nodes, load))
 
 
 def assert_close(got, expected, relative):
@@ -304,7 +304,7 @@ def test_movements_and_tilts_of_the_roots_are_those_of_the_whole_slab(loaded, wh
     assert_close(places.lateral() @ load + places.lateral_self() @ lateral, whole.lateral @ moved, 1e-5)
 
 
-def test_rotating_loads_are_the_gradient_of_their_energy():
+def test_membrane_loads_are_the_gradient_of_their_energy():
     """1/2 sum N_ab w_a w_b with slopes over two pitches, w = 0 beyond the lattice: by central differences."""
     rng = np.random.default_rng(1)
     down, forces = rng.standard_normal((5, 7)), rng.standard_normal((3, 5, 7))
@@ -314,7 +314,7 @@ def test_rotating_loads_are_the_gradient_of_their_energy():
         x, y = 0.5 * (padded[1:-1, 2:] - padded[1:-1, :-2]), 0.5 * (padded[2:, 1:-1] - padded[:-2, 1:-1])
         return 0.5 * (forces[0] * x**2 + forces[1] * y**2 + 2 * forces[2] * x * y).sum()
 
-    loads = rotating_loads(down, forces)
+    loads = membrane_loads(down, forces)
     for place_ in [(0, 0), (2, 3), (4, 6), (1, 5)]:
         step = np.zeros_like(down)
         step[place_] = 1e-4
@@ -362,7 +362,7 @@ def test_the_frusta_and_the_held_sides_carry_the_objects_force(name, flexibility
     mesh, values = POSES[name]
     points = points_of(mesh, flexibility, values)
     level, = press_foundation(flexibility, points, [3.0], settings=FoundationSettings(follow=False))
-    forces = whole.forces(points.all_nodes, level.load)
+    forces = whole.forces(points.nodes, level.load)
     moved = whole.displacement(forces)
     pushed = -level.load[-36:]
     assert_close(level.compression, -(whole.descents @ moved), 1e-4)
@@ -392,20 +392,37 @@ def test_with_all_that_finite_displacement_adds_frusta_and_whole_slab_are_in_bal
     mesh, values = POSES[name]
     points, law = points_of(mesh, flexibility, values), flexibility.law
     level, = press_foundation(flexibility, points, [3.0], settings=FoundationSettings(rocking=False, tolerance=1e-6))
-    moved = whole.displacement(whole.forces(points.all_nodes, level.load, level.lateral.ravel()))
+    moved = whole.displacement(whole.forces(points.nodes, level.load, level.lateral.ravel()))
     down, roots = -(whole.descents @ moved), (whole.lateral @ moved).reshape(2, 2, -1).transpose(2, 0, 1)
     assert_close(level.compression, down, 1e-4)
     # Membrane forces are followed without those of the lateral loads, which are of second order themselves.
-    linear = whole.displacement(whole.forces(points.all_nodes, level.load))
+    linear = whole.displacement(whole.forces(points.nodes, level.load))
     q = force_of(law, down)
     more, growth = law.stiffening(q)
-    rotating = rotating_loads(down.reshape(6, 6), whole.membrane(linear).reshape(3, 6, 6)).ravel()
-    pushed = q + rotating + 0.5 * np.einsum("bai,bij,baj->b", roots, growth, roots)
+    by_slope = membrane_loads(down.reshape(6, 6), whole.membrane(linear).reshape(3, 6, 6)).ravel()
+    pushed = q + by_slope + 0.5 * np.einsum("bai,bij,baj->b", roots, growth, roots)
     assert_close(-level.load[-36:], pushed, 2e-3)      # forces turn steep: a frusta's 1e-4 mm are 1e-3 of its force
     by_movement = -np.einsum("bij,baj->aib", more, roots).reshape(4, -1)
     by_pressure = np.stack([q * roots[:, 0, 1], q * roots[:, 0, 0], q * roots[:, 1, 1], q * roots[:, 1, 0]])
     assert_close(level.lateral, by_movement + by_pressure, 2e-3)
     assert np.abs(level.lateral).max() > 1e-3
+
+
+def test_a_force_that_is_not_reached_at_once_is_reached_by_way_of_smaller_ones(flexibility):
+    """With few iterations allowed a tilted box does not reach 4 N from rest; the map is the same as if it had."""
+    points = points_of(BOX, flexibility, TILTED)
+    at_once, in_steps = (next(press_foundation(flexibility, points, [4.0], settings=FoundationSettings(max_iterations=count)))
+                         for count in (60, 5))
+    assert at_once.iterations > 5 and in_steps.iterations > at_once.iterations
+    maps = FoundationMaps(flexibility, points)([at_once, in_steps])
+    assert_close(maps[1], maps[0], 2e-3)
+
+
+def test_a_force_that_is_not_reached_says_from_which_one_on(flexibility):
+    points = points_of(BOX, flexibility, TILTED)
+    levels = press_foundation(flexibility, points, [4.0], settings=FoundationSettings(max_iterations=1))
+    with pytest.raises(ConvergenceError, match="did not reach 4 N: from 0 N on .* ask for smaller forces, or for the hyperelastic"):
+        next(levels)
 
 
 def test_small_forces_give_a_map_in_proportion(flexibility):

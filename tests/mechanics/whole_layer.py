@@ -25,10 +25,9 @@ class WholeLayer:
 
         Newton's method on the energy  1/2 u.K u + k/2 sum min(gap, 0)^2 - F depth,  gap = gap0 - depth - B u.
         """
-        at = points.interpolation(points.weights())
-        nodes = self.top[points.all_nodes]
-        place = sp.csr_matrix((np.ones(len(nodes)), (np.arange(len(nodes)), nodes)), shape=(len(nodes), self.stiffness.shape[0]))
-        descend, gap0, solver = at @ place, points.gap, make_solver()
+        nodes = self.top[points.nodes]
+        descend = sp.csr_matrix((np.ones(len(nodes)), (np.arange(len(nodes)), nodes)), shape=(len(nodes), self.stiffness.shape[0]))
+        gap0, solver = points.gap, make_solver()
         active = gap0 < gap0.min() + 0.3
         for _ in range(iterations):
             b = descend[np.flatnonzero(active)]

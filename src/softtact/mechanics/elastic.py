@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from softtact.contact.object_points import NodeGrid
+from softtact.contact.node_grid import NodeGrid
 from softtact.contact.stencil import Stencil
 from softtact.contact.unilateral import ContactLevels, press_elastic
 from softtact.files import read_arrays
@@ -43,16 +43,14 @@ class Compliance:
 
     def among(self, points):
         """Flexibility (c, c) among `ObjectPoints`."""
-        places = self.grid.quarter(points.all_nodes)
-        at = points.interpolation(points.weights()).astype(np.float32)
-        return np.ascontiguousarray((at @ (at @ self.blocks.between(*places, *places)).T).T)
+        places = self.grid.quarter(points.nodes)
+        return self.blocks.between(*places, *places)
 
     def maps(self, points, force):
         """Deformation maps (l, ny, nx) in mm of forces (c, l) in N at `ObjectPoints`, with the held edges."""
         coarse = self.grid.every_second
-        rows = self.blocks.between(*self.grid.quarter(_coarse_nodes(self.grid)), *self.grid.quarter(points.all_nodes))
-        load = points.interpolation(points.weights()).T @ force
-        inner = (rows @ load.astype(np.float32)).T.reshape(-1, *coarse.shape)
+        rows = self.blocks.between(*self.grid.quarter(_coarse_nodes(self.grid)), *self.grid.quarter(points.nodes))
+        inner = (rows @ force.astype(np.float32)).T.reshape(-1, *coarse.shape)
         return np.pad(inner.astype(float), ((0, 0), (1, 1), (1, 1)))
 
 

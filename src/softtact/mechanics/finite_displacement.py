@@ -8,14 +8,13 @@ Pressed frusta (`FrustumLaw.stiffening`): against a root's movement u and tilt t
 Pressure: the slab's second variation under the pressure p between object and board is, for rubber of constant volume,
 1/2 p du_i/dx_j du_j/dx_i. A uniform pressure leaves its boundary terms only, and of these the free object's top has none. At
 the board's side they are forces p t and moments p u on roots that tilt and move: pressure pushes what slopes sideways.
-Rotation: pieces of the slab carry their membrane forces with them, N the integrals over the height of s_xx + s_zz, s_yy + s_zz and
-s_xy: loads r = -div(N grad w) on the frusta (initial stress; von Karman's plate has the first terms). They press the deepest parts
-deeper and lift the slab beside.
-Edges: the top moves sideways, and the object's edges meet other points of it: points at edges move by half as much, because a point
-stands for the middle of what the object covers of its rectangle. What moves sideways under a slope meets another height.
+Slopes: membrane forces, N the integrals over the height of s_xx, s_yy and s_xy, pull or push where the slab slopes: loads
+r = -div(N grad w) on the frusta (initial stress; von Karman's plate). They press the deepest parts deeper and lift the slab beside.
+Edges: the top moves sideways, and the object's edges meet other points of it (`soft_edges`). What moves sideways under a slope
+meets another height.
 
-Left out: what the slab's own strain adds at second order (but for the rotation of its forces), pressures that differ over the
-height, friction. What each of these effects is worth stands in docs/fast_models.md.
+Left out: what the slab's own strain adds at second order, that pieces of it turn otherwise than its mean slope, pressures that
+differ over the height, friction. What each of these effects is worth stands in docs/fast_models.md.
 """
 
 from dataclasses import astuple, dataclass
@@ -72,7 +71,7 @@ class FiniteDisplacement:
     def down(self, effects):
         """How far nodes and frusta (n + b,) come down under lateral loads of the frusta, in mm."""
         if not self.settings.follow:
-            return np.zeros(len(self.points.all_nodes) + self.frusta, dtype=np.float32)
+            return np.zeros(self.points.count + self.frusta, dtype=np.float32)
         return effects.lateral.ravel().astype(np.float32) @ self.lateral
 
     def renewed(self, effects, load, down, q, *, share):
@@ -112,7 +111,7 @@ class FiniteDisplacement:
     def _found(self, effects, load, down, q, roots):
         forces = (self.membrane @ load).reshape(3, *self.lattice)
         more, pushed = self._stiffened(q, roots)
-        loads = rotating_loads(down, forces).ravel() + pushed
+        loads = membrane_loads(down, forces).ravel() + pushed
         pressed = more - q[:, None, None] * [[0.0, 1.0], [1.0, 0.0]]
         return Effects(loads, self._lateral(effects.lateral, pressed, roots), self.sideways(load), effects.rise)
 
@@ -137,7 +136,7 @@ class FiniteDisplacement:
         return self.lateral_self[np.ix_(both, both)].astype(float)
 
 
-def rotating_loads(down, forces):
+def membrane_loads(down, forces):
     """Loads on the frusta (ny, nx), upwards in N, of membrane forces (3, ny, nx) in N/mm in a slab that has come down by `down`
     (ny, nx) in mm: the gradient of 1/2 sum N_ab w_a w_b over the cells; beyond the lattice the slab is held.
 

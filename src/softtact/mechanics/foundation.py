@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from softtact.contact.object_points import NodeGrid
+from softtact.contact.node_grid import NodeGrid
 from softtact.files import read_arrays
 from softtact.mechanics.elastic import map_cells, surface_grid
 from softtact.mechanics.frustum_law import FrustumLaw, frustum_law
@@ -28,7 +28,7 @@ class FoundationFlexibility:
 
     surface: among the grid's nodes in the quarter (a,), the frusta (b,) and the electrode plane at the map's points (c,)
     sideways: of the grid's every second node, in x and in y (2 c,), from the nodes and frusta (a + b,)
-    membrane: forces N_x, N_y, N_xy of the frusta's cells (3 b,) in N/mm, from the same
+    membrane: forces N_xx, N_yy, N_xy of the frusta's cells (3 b,) in N/mm, from the same
     lateral: movement and tilt of the frusta's roots along x, then along y (4 b,), from all of these (a + b + c)
     lateral_self: the same, from unit forces and moments of the same kind (4 b)
     grid: the nodes;  counts: frusta along x and y;  bedding: pressure per depth in N/mm3 of the layer at rest
@@ -61,11 +61,14 @@ class FoundationFlexibility:
                        bedding=float(data["bedding"]), law=law, **blocks)
 
 
-def foundation_flexibility(spec, *, dielectric_law, cover_law, frustum=None, threads=1):
-    """The `FoundationFlexibility` of a sensor with its two laws; `frustum`: its `FrustumLaw`, or None to compute it."""
+def foundation_flexibility(spec, *, dielectric_law, cover_law, frustum=None, cells=None, threads=1):
+    """The `FoundationFlexibility` of a sensor with its two laws.
+
+    frustum: its `FrustumLaw`, or None to compute it;  cells: elements along the quarter's sides, by default the map's steps there
+    """
     spec.check_for("foundation")
     frustum = frustum or frustum_law(spec, dielectric_law)
-    slab = foundation_slab(spec, dielectric_law, cover_law)
+    slab = foundation_slab(spec, dielectric_law, cover_law, cells=cells)
     centres = _quarter_lattice(spec)
     roots = _roots(slab, centres, frustum)
     stiffness = slab.stiffness + roots.T @ sp.block_diag([frustum.rest] * len(centres), format="csr") @ roots

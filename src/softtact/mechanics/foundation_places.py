@@ -4,6 +4,7 @@ import numpy as np
 import scipy.sparse as sp
 
 _LEVEL_MM = 0.02     # range of heights among the points of a patch
+_WHOLE = 0.999        # covered share from which on a point may share a patch
 _MANY_POINTS = 800   # from which on patches save time; a small contact wants all of its points
 
 
@@ -19,16 +20,22 @@ def patches_of(points, grid, shared):
         full = np.prod([np.where(place == 0, 1, 2) for place in from_middle], axis=0)
         _, square = np.unique(np.stack(pair, axis=1), axis=0, return_inverse=True)
         square = square.ravel()
-        whole = np.ones(points.count, dtype=bool)
-        whole[points.edge] = False
+        whole = np.minimum(points.covered, points.as_deep(0.0).covered) > _WHOLE
         count = np.bincount(square, weights=whole)
         low, high = np.full(len(count), np.inf), np.full(len(count), -np.inf)
         np.minimum.at(low, square, points.gap)
         np.maximum.at(high, square, points.gap)
         together = (count[square] == full) & (high - low <= _LEVEL_MM)[square]
         label = np.where(together, points.count + square, label)
-    _, label, size = np.unique(label, return_inverse=True, return_counts=True)
-    return sp.csr_matrix((1.0 / size[label], (label, np.arange(points.count))))
+    _, label = np.unique(label, return_inverse=True)
+    weight = _pressure_weights(points, grid)
+    return sp.csr_matrix((weight / np.bincount(label, weights=weight)[label], (label, np.arange(points.count))))
+
+
+def _pressure_weights(points, grid):
+    """Nodal forces (c,) of a uniform pressure on quadratic elements, whose corners are every second node from the middle."""
+    from_middle = [place - size // 2 for place, size in zip(np.divmod(points.nodes, grid.shape[1]), grid.shape, strict=True)]
+    return np.prod([np.where(place % 2, 2.0, 1.0) for place in from_middle], axis=0)
 
 
 class Places:
@@ -36,7 +43,7 @@ class Places:
 
     def __init__(self, flexibility, points):
         self.flexibility, grid = flexibility, flexibility.grid
-        nodes, signs = grid.quarter(points.all_nodes)
+        nodes, signs = grid.quarter(points.nodes)
         self.frusta, self.frustum_signs = lattice_places(flexibility.counts)
         quarter = (len(grid.x) // 2 + 1) * (len(grid.y) // 2 + 1)
         self.columns = np.concatenate([nodes, quarter + self.frusta])

@@ -11,7 +11,7 @@ step to step (`finite_displacement`), e the frusta's rise and l lateral forces o
     extension(q) = w + e,       u, w = G [E' f; -(q + r)] + L' l
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg as sla
@@ -19,10 +19,16 @@ import scipy.linalg as sla
 from softtact.errors import ConvergenceError
 from softtact.mechanics.finite_displacement import Effects, FiniteDisplacement
 from softtact.mechanics.foundation_places import Places, patches_of
+from softtact.mechanics.soft_edges import SoftEdges
 
+_FIRST_LOOKS, _LOOKS_AGAIN = 2, 6     # looks at what the object covers where points have moved: at first, and once forces settle
+_STRAYED = 0.03      # of a step, and of the depth, by which points and object must have moved since to be looked at again
 _PATIENCE = 8        # iterations, after which loads that swing are followed half of the way only
 _ABSURD_MM = 1e6     # where an iteration has run away; on its first few points an object may be thought to sink by metres
 _FIRST_PATCHES = 30
+_FREE, _SOFTEST = 1e6, 1e4     # mm/N: softness of a point that the object does not cover; from where on a patch cannot touch
+_SHORTER = 0.25      # share of a step to a force that is tried next where the step failed
+_SHORTEST = 0.004    # share of the force itself: steps that are still shorter are not tried
 
 
 @dataclass(frozen=True)
@@ -63,12 +69,31 @@ class FoundationLevel:
 def press_foundation(flexibility, points, forces_n, *, settings=FoundationSettings()):
     """Yield a `FoundationLevel` for each force (N, increasing). Raises ConvergenceError naming the level that was not reached."""
     press = _Press(flexibility, points, settings)
-    state, path = press.first(), [(0.0, press.unloaded())]
+    path = [(0.0, press.first())]
     for force in forces_n:
-        if len(path) > 1:
-            state.continue_along(path[-2:], force)
-        yield press.level(state, float(force))
-        path.append((force, (state.q, state.effects)))
+        yield _advance(press, path, float(force))
+
+
+def _advance(press, path, target):
+    """Reach a force (N) from the end of a path of forces and states, by way of smaller ones where no step leads there at once.
+
+    Appends what it reaches to the path. At once is what nearly always works but from rest under a tilted object.
+    """
+    force, spent = target, 0
+    while True:
+        state, before = _continued(path, force), path[-1][0]
+        level, iterations = press.level(state, force)
+        spent += iterations
+        if level is not None:
+            path.append((force, state))
+            if force == target:
+                return replace(level, iterations=spent)
+            force = target
+        elif _SHORTER * (force - before) < _SHORTEST * target:
+            raise ConvergenceError(f"The foundation model did not reach {target:g} N: from {before:.3g} N on its corrections for "
+                                   "finite displacement run away; ask for smaller forces, or for the hyperelastic model.")
+        else:
+            force = before + _SHORTER * (force - before)
 
 
 class FoundationMaps:
@@ -85,49 +110,50 @@ class FoundationMaps:
 
 @dataclass
 class _State:
-    """Which patches and frusta act, the forces q (b,) of the frusta's law in N, and the effects of finite displacement."""
+    """Which patches and frusta act, the forces q (b,) of the frusta's law in N, and the effects of finite displacement.
+
+    depth: of the object since its first touch, in mm
+    """
 
     touching: np.ndarray
     standing: np.ndarray
     q: np.ndarray
     effects: Effects
+    depth: float
 
-    def continue_along(self, path, force):
-        """Guess the next level on the line through the last two, each a force, q, and the effects."""
-        (first, (q, effects)), (second, now) = path
-        share = (force - second) / (second - first)
-        self.q = np.maximum(now[0] + share * (now[0] - q), 0.0)
-        self.effects = now[1].continued(effects, share)
+
+def _continued(path, force):
+    """The state at a force, guessed on the line through the last two of a path, or its only one."""
+    second, now = path[-1]
+    if len(path) == 1:
+        return replace(now)
+    first, before = path[-2]
+    share = (force - second) / (second - first)
+    return replace(now, q=np.maximum(now.q + share * (now.q - before.q), 0.0), depth=now.depth + share * (now.depth - before.depth),
+                   effects=now.effects.continued(before.effects, share))
 
 
 class _Press:
     def __init__(self, flexibility, points, settings):
         self.law, self.points, self.settings = flexibility.law, points, settings
-        self.step = flexibility.grid.step
         places = Places(flexibility, points)
         self.frusta = len(places.frusta)
-        self.slab = _Slab(places.surface(), len(points.all_nodes))
         self.patch = patches_of(points, flexibility.grid, settings.patches)
-        self.half = np.ones(points.count)
-        self.half[points.edge] = 0.5
+        self.slab, self.edges = _Slab(places.surface(), self.patch), SoftEdges(flexibility)
         self.finite = FiniteDisplacement(flexibility, points, places, settings)
 
     def first(self):
         """Where a press begins: the lowest patches touch."""
         gap = self.patch @ self.points.gap
-        return _State(gap <= np.sort(gap)[:_FIRST_PATCHES][-1], np.ones(self.frusta, dtype=bool), *self.unloaded())
-
-    def unloaded(self):
-        """q and effects of the unloaded sensor."""
-        return np.zeros(self.frusta), self.finite.none()
+        return _State(gap <= np.sort(gap)[:_FIRST_PATCHES][-1], np.ones(self.frusta, dtype=bool), np.zeros(self.frusta),
+                      self.finite.none(), 0.0)
 
     def level(self, state, force):
-        """Newton's method from a state, which is brought up to the level."""
-        c = self.patch.shape[0]
+        """Newton's method from a state, which is brought up to the level; None if it is not reached, and iterations."""
+        c, looks, again = self.patch.shape[0], _FIRST_LOOKS, _LOOKS_AGAIN
         for iteration in range(1, self.settings.max_iterations + 1):
-            if iteration <= 2:      # the movement is known well enough after one step; following it on would let points swing
-                at, gap0 = self._contact(state.effects.moved)
-                self.slab.under(at)
+            if looks:      # followed from step to step, points at edges would swing
+                gap0, contact, looks = self._contact(state), (state.effects.moved, state.depth), looks - 1
             effects, already = state.effects, self.slab.seen(self.finite.down(state.effects))
             try:
                 f, q, depth = self._solve(gap0, already, state, force)
@@ -138,24 +164,35 @@ class _Press:
             forces = np.concatenate([f, q + effects.loads])
             displacement = (self.slab.matrix @ forces.astype(np.float32)).astype(float) + already
             gap, down, load = gap0 - depth + displacement[:c], -displacement[c:], self.slab.load(forces)
-            change = self._take(state, q)
+            change, state.depth = self._take(state, q), depth - self.points.gap.min()
             share = 1.0 if iteration <= _PATIENCE else 0.5
             state.effects, missing = self.finite.renewed(effects, load, down, state.q, share=share)
             same = self._same_sets(state, f, q, gap, down)
-            if same and max(change, missing) <= self.settings.tolerance * force:
+            if same and max(change, missing) <= self.settings.tolerance * force and not looks:
+                if again and self._elsewhere(state, *contact):
+                    again, looks = again - 1, 1
+                    continue
                 touched = self.patch.T @ (state.touching * 1.0) > 0
+                overlap = float(max(0.0, -gap[self.possible].min()))
                 return FoundationLevel(force_n=force, depth=depth, load=load, lateral=effects.lateral, touching=touched,
-                                       iterations=iteration, compression=down, penetration=float(max(0.0, -gap.min())))
-        raise ConvergenceError(f"The foundation model did not reach {force:g} N in {iteration} iterations: its corrections for "
-                               "finite displacement run away; ask for smaller forces, or for the hyperelastic model.")
+                                       iterations=iteration, compression=down, penetration=overlap), iteration
+        return None, iteration
 
-    def _contact(self, moved):
-        """Matrix (c, n) from the slab's displacements to those of patches; gaps (c,)."""
-        points = self.points
-        shift = -0.5 * moved[:, points.edge].T / self.step
-        at = self.patch @ points.interpolation(points.weights(shift))
-        gap0 = self.patch @ (points.gap + (points.slope.T * moved).sum(axis=0) * self.half)
-        return at.tocsr().astype(np.float32), gap0
+    def _contact(self, state):
+        """Gaps (c,) of patches where their points have moved sideways. Patches beside which the object ends are softer, and those
+        that it has left cannot touch.
+        """
+        points, moved = self.points.as_deep(state.depth), state.effects.moved
+        softness = self.patch.power(2) @ np.minimum(self.edges(points, moved, state.depth), _FREE)
+        self.possible = softness < _SOFTEST
+        state.touching = state.touching & self.possible
+        self.slab.soften(softness)
+        return self.patch @ (points.gap + (points.slope.T * moved).sum(axis=0))
+
+    def _elsewhere(self, state, moved, depth):
+        """Whether points have moved on, or the object come down, since the contact was looked at, by what counts."""
+        steps = np.abs(state.effects.moved - moved).max() / self.points.step.min()
+        return steps > _STRAYED or abs(state.depth - depth) > _STRAYED * abs(state.depth)
 
     def _solve(self, gap0, already, state, force):
         """Forces of patches (c,) and frusta (b,), and the depth, of the present active sets with the law's tangent.
@@ -188,7 +225,7 @@ class _Press:
     def _same_sets(self, state, f, q, gap, down):
         """Let patches and frusta join that overlap, and leave that pull; whether none did."""
         small = self.settings.gap_mm
-        touching = np.where(state.touching, f >= 0, gap < -small)
+        touching = np.where(state.touching, f >= 0, self.possible & (gap < -small))
         standing = np.where(state.standing, q >= 0, down + state.effects.rise > small)
         same = bool((touching == state.touching).all() and (standing == state.standing).all())
         state.touching, state.standing = touching, standing
@@ -198,30 +235,31 @@ class _Press:
 class _Slab:
     """The flexibility among patches, downwards, and frusta, upwards: matrix (c + b, c + b) in mm/N."""
 
-    def __init__(self, flexibility, nodes):
-        """flexibility (n + b, n + b) of n nodes and of frusta, downwards"""
-        self._nodes, self._cross = (np.ascontiguousarray(part) for part in np.split(flexibility[:nodes], [nodes], axis=1))
-        self._frusta, self.matrix, self._at = flexibility[nodes:, nodes:], None, None
-
-    def under(self, at):
-        """Let patches move as `at` (c, n) says."""
-        c, self._at = at.shape[0], at
-        if self.matrix is None:
-            self.matrix = np.empty((c + len(self._frusta),) * 2, dtype=np.float32)
-            self.matrix[c:, c:] = self._frusta
-        self.matrix[:c, :c] = at @ np.ascontiguousarray((at @ self._nodes).T)
-        self.matrix[:c, c:] = -(at @ self._cross)
+    def __init__(self, flexibility, patch):
+        """flexibility (n + b, n + b) of n nodes and of frusta, downwards;  patch (c, n): shares of nodes in patches"""
+        c, n = patch.shape
+        self._patch = at = patch.astype(np.float32)
+        self.matrix = np.empty((c + len(flexibility) - n,) * 2, dtype=np.float32)
+        self.matrix[:c, :c] = at @ np.ascontiguousarray((at @ flexibility[:n, :n]).T)
+        self.matrix[:c, c:] = -(at @ np.ascontiguousarray(flexibility[:n, n:]))
         self.matrix[c:, :c] = self.matrix[:c, c:].T
+        self.matrix[c:, c:] = flexibility[n:, n:]
+        self._hard = np.diag(self.matrix)[:c].copy()
+
+    def soften(self, softness):
+        """Let a spring of softness (c,) in mm/N act in series with each patch."""
+        place = np.arange(len(softness))
+        self.matrix[place, place] = self._hard + softness
 
     def seen(self, down):
         """How far patches move down and frusta up (c + b,) where nodes and frusta come down (n + b,)."""
-        nodes = self._at.shape[1]
-        return np.concatenate([self._at @ down[:nodes], -down[nodes:]])
+        nodes = self._patch.shape[1]
+        return np.concatenate([self._patch @ down[:nodes], -down[nodes:]])
 
     def load(self, forces):
         """Forces (n + b,) downwards on nodes and frusta of those (c + b,) on patches downwards and on frusta upwards."""
-        patches = self._at.shape[0]
-        return np.concatenate([self._at.T @ forces[:patches], -forces[patches:]])
+        patches = self._patch.shape[0]
+        return np.concatenate([self._patch.T @ forces[:patches], -forces[patches:]])
 
 
 def _solve_positive(system, right):

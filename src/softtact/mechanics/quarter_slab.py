@@ -117,7 +117,7 @@ class QuarterSlab:
         """Membrane forces in N/mm, over cells of the plan, as functionals of the displacement: three matrices (count, unknowns).
 
         cells_of(x, y): number of the cell at points of the quarter, -1 where there is none. The forces are the integrals over the
-        height, averaged over the cell, of s_xx + s_zz, s_yy + s_zz and s_xy: what turns a piece of the slab that rotates.
+        height, averaged over the cell, of s_xx, s_yy and s_xy.
         """
         points, weights = gauss(3, 3)
         j, i = (grid.ravel() for grid in np.meshgrid(np.arange(self.cells[1]), np.arange(self.cells[0]), indexing="ij"))
@@ -128,7 +128,7 @@ class QuarterSlab:
             for point, weight, gradient in zip(points, weights * np.prod(size) / 8, gradients, strict=True):
                 owner = cells_of((i + 0.5 + 0.5 * point[0]) * size[0], (j + 0.5 + 0.5 * point[1]) * size[1])
                 inside = owner >= 0
-                for (rows, columns, values), row in zip(entries, _rotating_stress(layer, gradient), strict=True):
+                for (rows, columns, values), row in zip(entries, _membrane_stress(layer, gradient), strict=True):
                     rows.append(np.repeat(owner[inside], 81))
                     columns.append(dofs[inside].ravel())
                     values.append(np.tile(weight * row, inside.sum()))
@@ -149,14 +149,12 @@ class QuarterSlab:
         return out
 
 
-def _rotating_stress(layer, gradient):
-    """Rows (3, 81) that give s_xx + s_zz, s_yy + s_zz, s_xy from an element's displacement, of gradients (27, 3)."""
+def _membrane_stress(layer, gradient):
+    """Rows (3, 81) that give s_xx, s_yy, s_xy from an element's displacement, of gradients (27, 3)."""
     mu, lam = layer.shear_modulus, layer.bulk_modulus - 2 / 3 * layer.shear_modulus
-    volume = 2 * lam * gradient
-    first, second, shear = volume.copy(), volume.copy(), np.zeros_like(gradient)
+    first, second, shear = lam * gradient, lam * gradient, np.zeros_like(gradient)
     for row, axis in ((first, 0), (second, 1)):
         row[:, axis] += 2 * mu * gradient[:, axis]
-        row[:, 2] += 2 * mu * gradient[:, 2]
     shear[:, 0], shear[:, 1] = mu * gradient[:, 1], mu * gradient[:, 0]
     return first.ravel(), second.ravel(), shear.ravel()
 

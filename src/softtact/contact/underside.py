@@ -1,0 +1,148 @@
+"""An object's underside over a grid of nodes: where it can touch (`ObjectPoints`), edges and all.
+
+A node near an edge gets the plane of a facet, and its surroundings' heights over that: of the facet over the node, or of that which
+is lowest near it, whichever explains more. Beside a kink, where a node is touched only once the object has come down far enough, it
+gets both (`Beneath`).
+"""
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy.ndimage import binary_dilation
+
+from softtact.contact.height_field import NO_CONTACT_MM
+from softtact.contact.object_points import LOWEST, REACH, SAMPLES, Beneath, ObjectPoints, hat_shares, window_places
+from softtact.contact.unilateral import depth_on_springs
+from softtact.errors import InputError
+
+_SMOOTH = 0.6        # slope without an edge
+_KINK = 0.1          # change of slope from node to node that is an edge
+_FLAT = 0.05         # of a step, by which what lies in a plane may depart from it
+_MOSTLY = 2.0        # times as much must lie in the plane over a node as in that of what is lowest near it ...
+_ENOUGH = 0.9        # ... or so much of its surroundings
+_ALIKE = 0.99        # share in a plane from which on all of a node's surroundings lie in it
+_TRAPEZOID = np.array([0.25, 0.5, 0.25])
+
+
+class Underside:
+    """An object's underside over the nodes of a grid;  lowest_mm: over the free surface."""
+
+    def __init__(self, surface, grid):
+        self._surface, self._grid = surface, grid
+        self._coarse = _sampled(surface, grid.points, grid.step)
+        self.lowest_mm = float(self._coarse.min())
+        if self.lowest_mm >= NO_CONTACT_MM:
+            raise InputError("The object misses every free point of the sensor's surface; move it over the sensor.")
+
+    def depth_on_springs(self, force_n, bedding):
+        """How far (mm) the object sinks from its first touch into a bed of springs of `bedding` N/mm3: a first guess."""
+        there = self._coarse < NO_CONTACT_MM
+        area = np.broadcast_to(np.outer(_TRAPEZOID, _TRAPEZOID).ravel() * np.prod(self._grid.step), there.shape)[there]
+        return depth_on_springs(self._coarse[there] - self.lowest_mm, area, force_n / bedding)
+
+    def points(self, reach_mm):
+        """The `ObjectPoints` as far as the object is lower than `reach_mm` over its lowest point."""
+        near = self._near_edges()
+        plain = np.setdiff1d(np.flatnonzero(self._middle < self.lowest_mm + reach_mm), near)
+        nodes, gap, slope, window, beneath = self._beside_edges(near, reach_mm)
+        height, slopes = self._facets(self._grid.points[plain])
+        order = np.argsort(np.concatenate([plain, nodes]))
+        edge = np.argsort(order)[len(plain):]
+        return ObjectPoints(nodes=np.concatenate([plain, nodes])[order], gap=np.concatenate([height, gap])[order],
+                            slope=np.vstack([slopes, slope])[order], edge=edge, window=window, step=self._grid.step,
+                            beneath=beneath)
+
+    def nodes(self, reach_mm):
+        """The same with each node under the object held and all others free: blunter, but no node comes down below the object."""
+        height, slope = self._facets(self._grid.points)
+        kept = np.flatnonzero(height < self.lowest_mm + reach_mm)
+        if not len(kept):
+            raise InputError("The object touches between the nodes of the sensor's surface only; take the foundation model.")
+        side = len(window_places())
+        return ObjectPoints(nodes=kept, gap=height[kept], slope=slope[kept], edge=np.zeros(0, dtype=np.int64),
+                            window=np.zeros((0, side, side), dtype=np.float32), step=self._grid.step)
+
+    @property
+    def _middle(self):
+        return self._coarse[:, self._coarse.shape[1] // 2]
+
+    def _facets(self, places):
+        """Height (p,) of the object over places (p, 2), and slope (p, 2), none where it misses them."""
+        height, normal = self._surface(*places.T)
+        return height, np.where((height < NO_CONTACT_MM)[:, None], -normal[:, :2] / normal[:, 2:], 0.0)
+
+    def _near_edges(self):
+        """Nodes with an edge within a hat's reach and a step's movement."""
+        shape, step = self._grid.shape, self._grid.step.min()
+        low, high = (bound.reshape(shape) for bound in (self._coarse.min(axis=1), self._coarse.max(axis=1)))
+        edges = (low < NO_CONTACT_MM) & (high - low > _SMOOTH * step)
+        middle = self._middle.reshape(shape)
+        for axis in (0, 1):
+            bend = np.abs(np.diff(middle, n=2, axis=axis)) > _KINK * step
+            edges |= np.pad(bend, [(1, 1) if k == axis else (0, 0) for k in (0, 1)])
+            jump = np.abs(np.diff(middle, axis=axis)) > 2 * _SMOOTH * step
+            edges |= np.pad(jump, [(0, 1) if k == axis else (0, 0) for k in (0, 1)])
+            edges |= np.pad(jump, [(1, 0) if k == axis else (0, 0) for k in (0, 1)])
+        return np.flatnonzero(binary_dilation(edges, np.ones((3, 3)), iterations=REACH))
+
+    def _beside_edges(self, near, reach_mm):
+        """Nodes near edges that the object may hold: numbers (e,), gaps, slopes and windows; and their `Beneath`."""
+        heights = self._windows(near)
+        over_node = self._above(near, heights, np.zeros((len(near), 2)))
+        over_lowest = self._above(near, heights, _lowest_places(heights))
+        still = np.zeros((len(near), 2))
+        tolerance = _FLAT * self._grid.step.min()
+        own, lowest = (hat_shares(np.abs(found[2]), still, tolerance) for found in (over_node, over_lowest))
+        mostly = (own >= _MOSTLY * lowest) | (own >= _ENOUGH)
+        gap, slope, window = (np.where(mostly.reshape(-1, *(1,) * (a.ndim - 1)), a, b)
+                              for a, b in zip(over_node, over_lowest, strict=True))
+        kept = (window <= LOWEST * self._grid.step.min()).any(axis=(1, 2)) & (gap < self.lowest_mm + reach_mm)
+        both = np.flatnonzero(mostly[kept] & (lowest[kept] > 0) & (lowest[kept] < _ALIKE))
+        beneath = Beneath(both, *(values[kept][both] for values in over_lowest)) if len(both) else None
+        return near[kept], gap[kept], slope[kept], window[kept], beneath
+
+    def _above(self, nodes, heights, places):
+        """Gaps (e,), slopes (e, 2) and windows of nodes on the planes of the facets over places (e, 2) in steps from them.
+
+        Facets too steep to stand for a node's surroundings count as level at their place; none over a place: infinitely high.
+        """
+        step, samples = self._grid.step, window_places()
+        height, slope = self._facets(self._grid.points[nodes] + places * step)
+        slope[np.linalg.norm(slope, axis=1) > _SMOOTH] = 0.0
+        gap = height - (slope * places * step).sum(axis=1)
+        x, y = (slope[:, axis, None] * samples * step[axis] for axis in (0, 1))
+        window = heights - (gap[:, None, None] + y[:, :, None] + x[:, None, :])
+        window[(heights >= NO_CONTACT_MM) | (height >= NO_CONTACT_MM)[:, None, None]] = NO_CONTACT_MM
+        return gap, slope, window.astype(np.float32)
+
+    def _windows(self, nodes):
+        """Heights (e, s, s) of the object at the samples around nodes."""
+        j, i = np.divmod(nodes, self._grid.shape[1])
+        wanted = np.zeros([count + 2 * REACH for count in self._grid.shape], dtype=bool)
+        wanted[j + REACH, i + REACH] = True
+        rectangles = np.argwhere(binary_dilation(wanted, np.ones((3, 3)), iterations=REACH))
+        side = (np.arange(SAMPLES) + 0.5) / SAMPLES - 0.5
+        away = (rectangles - REACH)[:, None, None, ::-1] + np.stack(np.meshgrid(side, side), axis=-1)
+        where = self._grid.points[0] + away * self._grid.step
+        blocks = np.full((*wanted.shape, SAMPLES, SAMPLES), NO_CONTACT_MM)
+        blocks[tuple(rectangles.T)] = self._surface(*where.reshape(-1, 2).T)[0].reshape(-1, SAMPLES, SAMPLES)
+        raster = blocks.transpose(0, 2, 1, 3).reshape(wanted.shape[0] * SAMPLES, -1)
+        size = len(window_places())
+        return sliding_window_view(raster, (size, size))[SAMPLES * j + SAMPLES // 2, SAMPLES * i + SAMPLES // 2]
+
+
+def _sampled(surface, points, step):
+    """Heights (n, 9) at three by three samples of each node's own rectangle, up to its sides."""
+    side = np.linspace(-0.5, 0.5, 3)
+    where = points[:, None] + np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2) * step * (1 - 1e-9)
+    return surface(*where.reshape(-1, 2).T)[0].reshape(len(points), 9)
+
+
+def _lowest_places(heights):
+    """Where (e, 2), in steps from the node, windows are lowest within a hat's reach; of equals the nearest to the node."""
+    places = window_places()
+    x, y = np.meshgrid(places, places)
+    within = np.maximum(np.abs(x), np.abs(y)) < 1
+    away = np.stack([x[within], y[within]], axis=1)
+    hat = heights[:, within]
+    lowest = hat <= hat.min(axis=1, keepdims=True) + 1e-6
+    return away[np.where(lowest, np.linalg.norm(away, axis=1), np.inf).argmin(axis=1)]
