@@ -26,9 +26,9 @@ _KNOWN = 0.5     # of a frustum's height: the error was calibrated up to a compr
 class FoundationError:
     """Expected error of the foundation model over its map's root mean square: `at_rest` + `growth` * (compression / height)^3.
 
-    compression: of the most compressed frustum; of the powers 1 to 4 the third and fourth follow the indenters. The values given here are those of ten indenters (bordes_v, circle_g, circle_m,
-    cruz, donut_m, echo_v, glasses, square, star, triangle) at five levels to 50 N on the sensor `coro`, against the hyperelastic
-    model's fine mesh (benchmarks/choice.py).
+    compression: of the most compressed frustum; of the powers 1 to 4 the third and fourth follow the indenters best. The values
+    given here are those of ten indenters (bordes_v, circle_g, circle_m, cruz, donut_m, echo_v, glasses, square, star, triangle) at
+    five levels to 50 N on the sensor `coro`, against the hyperelastic model's fine mesh (benchmarks/choice.py).
     """
 
     at_rest: float = 0.0128

@@ -1,8 +1,8 @@
 """A press in the foundation model: the object on the slab, the slab on the frusta, level by level.
 
 Unknown are the object's forces f >= 0 on patches of the cover and the frusta's forces q >= 0:
-    gap  = gap0 - depth + E u >= 0,     f gap = 0,  sum f = F
-    w    = extension(q),                w <= 0 where q = 0       (w: how far the slab comes down on a frustum)
+    gap  = gap0 - depth + E u + k f >= 0,     f gap = 0,  sum f = F       (k: softness beside edges, `soft_edges`)
+    w    = extension(q),                      w <= 0 where q = 0          (w: how far the slab comes down on a frustum)
     u, w = G [E' f; -(q + r)]
 Active sets and Newton's method, each step solved directly. Where the contact is large, four points that the object covers whole
 share a patch and its uniform pressure, which leaves some hundred unknowns, at 0.1 to 0.4 % of the map (docs/fast_models.md).
@@ -21,10 +21,11 @@ from softtact.mechanics.finite_displacement import Effects, FiniteDisplacement
 from softtact.mechanics.foundation_places import Places, patches_of
 from softtact.mechanics.soft_edges import SoftEdges
 
-_FIRST_LOOKS, _LOOKS_AGAIN = 2, 6     # looks at what the object covers where points have moved: at first, and once forces settle
+_FIRST_LOOKS, _LOOKS_AGAIN = 1, 6     # looks at what the object covers where points have moved: at first, and once forces settle
 _STRAYED = 0.03      # of a step, and of the depth, by which points and object must have moved since to be looked at again
 _PATIENCE = 8        # iterations, after which loads that swing are followed half of the way only
 _ABSURD_MM = 1e6     # where an iteration has run away; on its first few points an object may be thought to sink by metres
+_ROUGHLY = 100       # times the tolerance is enough for a force that is only on the way
 _FIRST_PATCHES = 30
 _FREE, _SOFTEST = 1e6, 1e4     # mm/N: softness of a point that the object does not cover; from where on a patch cannot touch
 _SHORTER = 0.25      # share of a step to a force that is tried next where the step failed
@@ -53,7 +54,7 @@ class FoundationLevel:
     """One force level.
 
     load (n + b,): N at nodes and frusta;  lateral (4, b): see `Effects`;  touching (c,): points under pressure
-    compression (b,): of frusta in mm, negative where one is lifted;  penetration in mm: of patches as a whole
+    compression (b,): of frusta in mm, negative where one is lifted;  penetration in mm: of patches as a whole, softness included
     """
 
     force_n: float
@@ -82,7 +83,7 @@ def _advance(press, path, target):
     force, spent = target, 0
     while True:
         state, before = _continued(path, force), path[-1][0]
-        level, iterations = press.level(state, force)
+        level, iterations = press.level(state, force, rough=force < target)
         spent += iterations
         if level is not None:
             path.append((force, state))
@@ -140,6 +141,7 @@ class _Press:
         self.frusta = len(places.frusta)
         self.patch = patches_of(points, flexibility.grid, settings.patches)
         self.slab, self.edges = _Slab(places.surface(), self.patch), SoftEdges(flexibility)
+        self.possible = np.ones(self.patch.shape[0], dtype=bool)
         self.finite = FiniteDisplacement(flexibility, points, places, settings)
 
     def first(self):
@@ -148,9 +150,13 @@ class _Press:
         return _State(gap <= np.sort(gap)[:_FIRST_PATCHES][-1], np.ones(self.frusta, dtype=bool), np.zeros(self.frusta),
                       self.finite.none(), 0.0)
 
-    def level(self, state, force):
-        """Newton's method from a state, which is brought up to the level; None if it is not reached, and iterations."""
-        c, looks, again = self.patch.shape[0], _FIRST_LOOKS, _LOOKS_AGAIN
+    def level(self, state, force, *, rough=False):
+        """Newton's method from a state, which is brought up to the level; None if it is not reached, and iterations.
+
+        rough: on the way to another
+        """
+        c, looks, again = self.patch.shape[0], _FIRST_LOOKS, 0 if rough else _LOOKS_AGAIN
+        enough = (_ROUGHLY if rough else 1.0) * self.settings.tolerance * force
         for iteration in range(1, self.settings.max_iterations + 1):
             if looks:      # followed from step to step, points at edges would swing
                 gap0, contact, looks = self._contact(state), (state.effects.moved, state.depth), looks - 1
@@ -168,7 +174,7 @@ class _Press:
             share = 1.0 if iteration <= _PATIENCE else 0.5
             state.effects, missing = self.finite.renewed(effects, load, down, state.q, share=share)
             same = self._same_sets(state, f, q, gap, down)
-            if same and max(change, missing) <= self.settings.tolerance * force and not looks:
+            if same and max(change, missing) <= enough and not looks:
                 if again and self._elsewhere(state, *contact):
                     again, looks = again - 1, 1
                     continue

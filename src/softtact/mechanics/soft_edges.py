@@ -54,8 +54,9 @@ def beyond(covered):
 
 
 def own_flexibility(flexibility, axis):
-    """Of a row of nodes across an axis, all pushed alike beside rows that are held: flexibility in mm/N, of rows of elements'
-    corners, and of middles, in the middle of the sensor."""
+    """Flexibility (2,) in mm/N of a row of nodes across an axis (0: x), pushed alike beside rows that are held, in the sensor's
+    middle: of rows of elements' corners, and of their middles.
+    """
     grid = flexibility.grid
     along, across = (min(_AROUND, (count - 3) // 2) for count in (grid.shape[axis], grid.shape[1 - axis]))
     found = []
