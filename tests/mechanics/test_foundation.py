@@ -415,7 +415,7 @@ def test_a_force_that_is_not_reached_at_once_is_reached_by_way_of_smaller_ones(f
                          for count in (60, 5))
     assert at_once.iterations > 5 and in_steps.iterations > at_once.iterations
     maps = FoundationMaps(flexibility, points)([at_once, in_steps])
-    assert_close(maps[1], maps[0], 2e-3)
+    assert_close(maps[1], maps[0], 1e-2)      # edges are looked at again only where points moved by 3 % of a step
 
 
 def test_a_force_that_is_not_reached_says_from_which_one_on(flexibility):
