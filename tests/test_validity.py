@@ -54,8 +54,11 @@ def test_elastic_levels_hold_to_half_of_the_layer():
 
 def test_foundation_levels_hold_within_their_law_and_what_was_compared():
     compression = np.array([0.05, 0.164, 0.166])
-    assert valid_foundation(compression, frustum_mm=0.5, law_limit_mm=1.0).tolist() == [True, True, False]    # 0.33 of 0.5 mm
-    assert valid_foundation(compression, frustum_mm=0.5, law_limit_mm=0.07).tolist() == [True, False, False]
+    sensor, hardly = {"frustum_mm": 0.5, "thickness_mm": 2.0}, np.zeros(3)
+    assert valid_foundation(compression, hardly, **sensor, law_limit_mm=1.0).tolist() == [True, True, False]    # 0.33 of 0.5 mm
+    assert valid_foundation(compression, hardly, **sensor, law_limit_mm=0.07).tolist() == [True, False, False]
+    deep = np.array([0.99, 1.01, 0.5])      # half of the layer
+    assert valid_foundation(hardly, deep, **sensor, law_limit_mm=1.0).tolist() == [True, False, True]
 
 
 @pytest.mark.parametrize("height, expected", [(0.1, 0), (3.0, 1)])

@@ -68,9 +68,11 @@ def _of_levels(sensor, flexibility, points, levels, forces, times):
     """The result of a foundation press' levels, be it those before one that was not reached."""
     area, count = points.covered * np.prod(flexibility.grid.step), len(levels)
     compression = np.array([level.compression.max() for level in levels])
-    valid = valid_foundation(compression, frustum_mm=sensor.spec.dielectric.frusta.height_mm, law_limit_mm=flexibility.law.limit_mm)
+    depth = np.array([level.depth for level in levels])
+    valid = valid_foundation(compression, depth - points.gap.min(), frustum_mm=sensor.spec.dielectric.frusta.height_mm,
+                             thickness_mm=sensor.spec.thickness_mm, law_limit_mm=flexibility.law.limit_mm)
     unknown = np.full(count, np.nan)
-    numbers = {"indentation_mm": [level.depth for level in levels], "penetration_mm": [level.penetration for level in levels],
+    numbers = {"indentation_mm": depth, "penetration_mm": [level.penetration for level in levels],
                "contact_area_mm2": [area[level.touching].sum() for level in levels],
                "iterations": [level.iterations for level in levels], "frustum_compression_mm": compression}
     return make_result(sensor, "foundation", "dense", FoundationMaps(flexibility, points)(levels), forces[:count],

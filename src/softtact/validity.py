@@ -16,9 +16,11 @@ def valid_elastic(depth_mm, *, thickness_mm):
     return depth_mm < _DEEPEST_LINEAR * thickness_mm
 
 
-def valid_foundation(compression_mm, *, frustum_mm, law_limit_mm):
-    """Which levels (l,) of a foundation press hold: compression_mm (l,) of the most compressed frustum, frustum_mm high."""
-    return compression_mm < min(law_limit_mm, _HARDLY_COMPRESSED * frustum_mm)
+def valid_foundation(compression_mm, depth_mm, *, frustum_mm, thickness_mm, law_limit_mm):
+    """Which levels (l,) of a foundation press hold, by its most compressed frustum (l,), frustum_mm high, and by how far the
+    object's lowest point has come down (l,): the slab is linear, too, and a corner sinks into it without end.
+    """
+    return (compression_mm < min(law_limit_mm, _HARDLY_COMPRESSED * frustum_mm)) & (depth_mm < _DEEPEST_LINEAR * thickness_mm)
 
 
 def valid_hyperelastic(*, compression_mm, contact_error_mm, points, depth_mm, frustum_mm, allowed_mm):

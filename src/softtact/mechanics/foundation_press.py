@@ -21,7 +21,7 @@ from softtact.mechanics.finite_displacement import Effects, FiniteDisplacement
 from softtact.mechanics.foundation_places import Places, patches_of
 from softtact.mechanics.soft_edges import SoftEdges
 
-_FIRST_LOOKS, _LOOKS_AGAIN = 1, 6     # looks at what the object covers where points have moved: at first, and once forces settle
+_LOOKS_AGAIN = 6     # at what the object covers where points have moved, once forces have settled; the last of them halfway only
 _STRAYED = 0.03      # of a step, and of the depth, by which points and object must have moved since to be looked at again
 _PATIENCE = 8        # iterations, after which loads that swing are followed half of the way only
 _ABSURD_MM = 1e6     # where an iteration has run away; on its first few points an object may be thought to sink by metres
@@ -155,11 +155,14 @@ class _Press:
 
         rough: on the way to another
         """
-        c, looks, again = self.patch.shape[0], _FIRST_LOOKS, 0 if rough else _LOOKS_AGAIN
+        c, look, again = self.patch.shape[0], True, 0 if rough else _LOOKS_AGAIN
+        moved, down_by = state.effects.moved, state.depth     # where the contact was looked at
         enough = (_ROUGHLY if rough else 1.0) * self.settings.tolerance * force
         for iteration in range(1, self.settings.max_iterations + 1):
-            if looks:      # followed from step to step, points at edges would swing
-                gap0, contact, looks = self._contact(state), (state.effects.moved, state.depth), looks - 1
+            if look:      # followed from step to step, points at edges would swing
+                share = 0.5 if iteration > 1 and again < _LOOKS_AGAIN // 2 else 1.0
+                moved, down_by = moved + share * (state.effects.moved - moved), down_by + share * (state.depth - down_by)
+                gap0, look = self._contact(state, moved, down_by), False
             effects, already = state.effects, self.slab.seen(self.finite.down(state.effects))
             try:
                 f, q, depth = self._solve(gap0, already, state, force)
@@ -174,9 +177,9 @@ class _Press:
             share = 1.0 if iteration <= _PATIENCE else 0.5
             state.effects, missing = self.finite.renewed(effects, load, down, state.q, share=share)
             same = self._same_sets(state, f, q, gap, down)
-            if same and max(change, missing) <= enough and not looks:
-                if again and self._elsewhere(state, *contact):
-                    again, looks = again - 1, 1
+            if same and max(change, missing) <= enough:
+                if again and self._elsewhere(state, moved, down_by):
+                    again, look = again - 1, True
                     continue
                 touched = self.patch.T @ (state.touching * 1.0) > 0
                 overlap = float(max(0.0, -gap[self.possible].min()))
@@ -184,12 +187,13 @@ class _Press:
                                        iterations=iteration, compression=down, penetration=overlap), iteration
         return None, iteration
 
-    def _contact(self, state):
-        """Gaps (c,) of patches where their points have moved sideways. Patches beside which the object ends are softer, and those
-        that it has left cannot touch.
+    def _contact(self, state, moved, depth):
+        """Gaps (c,) of patches where their points have moved sideways by `moved` (2, c) and the object has come down by `depth`.
+
+        Patches beside which the object ends are softer, and those that it has left cannot touch.
         """
-        points, moved = self.points.as_deep(state.depth), state.effects.moved
-        softness = self.patch.power(2) @ np.minimum(self.edges(points, moved, state.depth), _FREE)
+        points = self.points.as_deep(depth)
+        softness = self.patch.power(2) @ np.minimum(self.edges(points, moved, depth), _FREE)
         self.possible = softness < _SOFTEST
         state.touching = state.touching & self.possible
         self.slab.soften(softness)
