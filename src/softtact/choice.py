@@ -32,7 +32,7 @@ class FoundationError:
     """
 
     at_rest: float = 0.0128
-    growth: float = 0.629
+    growth: float = 0.640
 
     def __call__(self, maps_mm, compression_mm, height_mm):
         """Errors (l,) in mm of maps (l, y, x) with largest compressions (l,) in mm."""
