@@ -36,9 +36,13 @@ class NodeGrid:
         """The grid of every second node, from the second one on: the map's, without its outer rows and columns."""
         return NodeGrid(self.x[1::2], self.y[1::2])
 
+    def from_middle(self, nodes):
+        """How many steps (n, 2) in x and y nodes (n,) lie from the middle."""
+        j, i = np.divmod(nodes, len(self.x))
+        return np.column_stack([i - len(self.x) // 2, j - len(self.y) // 2])
+
     def quarter(self, nodes):
         """Of nodes (n,): their numbers (n,) in the quarter x, y >= 0, from the middle, x fastest; and signs (n, 2) of x and y."""
-        j, i = np.divmod(nodes, len(self.x))
-        place = np.column_stack([i - len(self.x) // 2, j - len(self.y) // 2])
+        place = self.from_middle(nodes)
         away = np.abs(place)
         return away[:, 1] * (len(self.x) // 2 + 1) + away[:, 0], np.where(place < 0, -1, 1)

@@ -15,10 +15,9 @@ def patches_of(points, grid, shared):
     """
     label = np.arange(points.count)
     if shared and points.count > _MANY_POINTS:
-        from_middle = [place - size // 2 for place, size in zip(np.divmod(points.nodes, grid.shape[1]), grid.shape, strict=True)]
-        pair = [np.sign(place) * ((np.abs(place) + 1) // 2) for place in from_middle]
-        full = np.prod([np.where(place == 0, 1, 2) for place in from_middle], axis=0)
-        _, square = np.unique(np.stack(pair, axis=1), axis=0, return_inverse=True)
+        place = grid.from_middle(points.nodes)
+        full = np.where(place == 0, 1, 2).prod(axis=1)
+        _, square = np.unique(np.sign(place) * ((np.abs(place) + 1) // 2), axis=0, return_inverse=True)
         square = square.ravel()
         whole = np.minimum(points.covered, points.as_deep(0.0).covered) > _WHOLE
         count = np.bincount(square, weights=whole)
@@ -34,8 +33,7 @@ def patches_of(points, grid, shared):
 
 def _pressure_weights(points, grid):
     """Nodal forces (c,) of a uniform pressure on quadratic elements, whose corners are every second node from the middle."""
-    from_middle = [place - size // 2 for place, size in zip(np.divmod(points.nodes, grid.shape[1]), grid.shape, strict=True)]
-    return np.prod([np.where(place % 2, 2.0, 1.0) for place in from_middle], axis=0)
+    return np.where(grid.from_middle(points.nodes) % 2, 2.0, 1.0).prod(axis=1)
 
 
 class Places:

@@ -39,8 +39,7 @@ class SoftEdges:
     def _of_nodes(self, points):
         """Flexibility (e,) of the nodes near edges among held ones, and how many steps (e,) behind them an edge holds them."""
         if self._last is None or self._last[0] is not points:
-            j, i = np.divmod(points.nodes[points.edge], self._grid.shape[1])
-            middle = np.stack([i - self._grid.shape[1] // 2, j - self._grid.shape[0] // 2], axis=1) % 2
+            middle = self._grid.from_middle(points.nodes[points.edge]) % 2
             outwards = points.outwards()
             own = (outwards * self._by_axis[[0, 1], middle]).sum(axis=1)
             self._last = points, own, 1 + _MIDDLE_BEYOND * (outwards * middle).sum(axis=1)
