@@ -17,12 +17,13 @@ from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.laws.registry import make_law
 from softtact.mechanics.finite_displacement import membrane_loads
 from softtact.mechanics.foundation import FoundationFlexibility, foundation_flexibility
-from softtact.mechanics.foundation_places import Places, lattice_places
+from softtact.mechanics.foundation_places import Places, Sideways, lattice_places
 from softtact.mechanics.foundation_press import FoundationMaps, FoundationSettings, press_foundation
 from softtact.mechanics.frustum_law import FrustumLaw, _root_stiffness, _stiffness_at_rest, frustum_law
 from softtact.mechanics.mesh_settings import MeshSettings
 from softtact.mechanics.sensor_bodies import build_unit_cell
 from softtact.mechanics.single_frustum import SingleFrustum
+from softtact.mechanics.soft_edges import SoftEdges
 from softtact.sensor import Sensor
 
 CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
@@ -423,6 +424,22 @@ def test_a_force_that_is_not_reached_says_from_which_one_on(flexibility):
     levels = press_foundation(flexibility, points, [4.0], settings=FoundationSettings(max_iterations=1))
     with pytest.raises(ConvergenceError, match="did not reach 4 N: from 0 N on .* ask for smaller forces, or for the hyperelastic"):
         next(levels)
+
+
+def test_the_object_holds_nodes_beside_its_edge_as_softly_as_its_edge_reaches_where_they_have_moved_to(flexibility, whole):
+    """Depth less gap and softness times force is how far the whole slab comes down there; the softness by the movement found."""
+    points = points_of(PUNCH, flexibility)
+    level, = press_foundation(flexibility, points, [10.0], settings=FoundationSettings(rocking=False))
+    down = -whole.displacement(whole.forces(points.nodes, level.load, level.lateral.ravel()))[3 * whole.top[points.nodes] + 2]
+    moved = Sideways(flexibility, points, Places(flexibility, points))(level.load.astype(np.float32))
+    softness, force = SoftEdges(flexibility)(points, moved, level.depth), level.load[:-36]
+    held = (force > 0) & np.isfinite(softness)
+    assert (softness[held] > 0).sum() > 20 and np.abs(moved).max() > 0.02
+    # edges are looked at again only where points moved by 3 % of a step: a mean over the nodes held softly
+    soft = held & (softness > 0)
+    missing = np.abs(down + softness * force - level.depth)[soft].mean()
+    assert missing < 0.03 * level.depth
+    assert missing < 0.3 * np.abs(down + SoftEdges(flexibility)(points, 0 * moved, level.depth) * force - level.depth)[soft].mean()
 
 
 def test_small_forces_give_a_map_in_proportion(flexibility):
