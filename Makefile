@@ -21,7 +21,7 @@ test: .venv/tested
 	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 bench: .venv/installed
-	for benchmark in fast_models press scaling mesh_error against_calculix discretisation unknowns materials discs glass_mesh glass_edge \
+	for benchmark in fast_models press scaling mesh_error edges against_calculix discretisation unknowns materials discs glass_mesh glass_edge \
 		virtual_sensor published_archive; do $(BIN)/python benchmarks/$$benchmark.py || exit 1; done
 
 lint: .venv/tested

@@ -1,10 +1,10 @@
 """Error of the hyperelastic press's meshes: `python benchmarks/mesh_error.py [MESH ...]`, some minutes.
 
 A sensor of 6 x 6 frusta is pressed with a flat punch, a sphere and a ridged block on each mesh and on finer ones; the error is
-the largest difference of the deformation map over the map's maximum, against the last mesh asked for. "edges" and "two rings" are
-the production mesh with edges split twice more and with finer frusta, "bound" has the edges and a lowest layer of the cover that
-keeps to the sheet's plan; "fine" has all three. "reference" keeps to the plan in two layers, splits all in plan and has more layers
-everywhere.
+the difference of the deformation map over the map's maximum, largest and in the root mean square, against the last mesh asked for.
+"two rings" is the production mesh with finer frusta, "three layers" has two layers above the cover's lowest one and is finer at
+edges, "tied cover" has these three on the sheet, and "fine" three layers and two rings. "reference" keeps to the plan in two
+layers, splits all in plan and has more layers everywhere.
 """
 
 import sys
@@ -20,15 +20,16 @@ from softtact.mechanics.mesh_settings import MeshSettings
 from softtact.sensor import Sensor
 
 FORCES_N = {"flat punch": [2.0, 4.0, 8.0], "sphere": [2.0, 4.0, 6.0], "ridges": [1.0, 2.0, 4.0]}
-OVERLAP_MM = 0.01       # what is pressed apart; of 1 um it takes more iterations and changes the maps by less than 1 %
+OVERLAP_MM = 1e-3       # what is pressed apart
 FRUSTA = (6, 6)
 MORE_LAYERS = {"frustum_levels": (0.0, 0.1, 0.3, 0.6, 1.0), "sheet_layers": 2, "cover_levels": (0.0, 0.25, 0.5, 0.75, 1.0)}
+THREE_LAYERS = (0.0, 0.45, 0.8, 1.0)
 MESHES = {
     "draft": MeshSettings.draft(),
     "production": MeshSettings(),
-    "edges": MeshSettings(cover_splits=(1, 1, 4)),
     "two rings": MeshSettings(frustum_rings=2),
-    "bound": MeshSettings(cover_splits=(1, 4)),
+    "tied cover": MeshSettings(cover_levels=THREE_LAYERS, cover_splits=(1, 1, 2)),
+    "three layers": MeshSettings(cover_levels=THREE_LAYERS, cover_splits=(1, 2)),
     "fine": MeshSettings.fine(),
     "reference": MeshSettings(cover_splits=(1, 4), refinement=1, **MORE_LAYERS),
 }

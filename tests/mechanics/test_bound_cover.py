@@ -23,6 +23,7 @@ from softtact.sensor import Sensor
 CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
 SMALL = CORO.model_copy(update={"footprint_mm": (6.0, 6.0), "map_shape": (11, 11)})     # 5 x 5 frusta
 LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492)
+THREE = (0.0, 0.45, 0.8, 1.0)
 LAYERS = {"cover_levels": (0.0, 0.4, 1.0), "far_pitches": 1, "frustum_levels": (0.0, 0.35, 1.0)}
 BOUND, TIED = MeshSettings(cover_splits=(1,), **LAYERS), MeshSettings(cover_splits=(1, 1), **LAYERS)
 PUNCH = trimesh.creation.cylinder(radius=1.5, height=2, sections=64)
@@ -117,19 +118,19 @@ def test_parts_of_body_and_deck_are_those_of_the_layers():
 
 @pytest.mark.parametrize(("splits", "bound"), [((1, 1, 2), 0), ((1, 4), 1), ((1,), 2)])
 def test_layers_without_a_number_of_splits_are_bound(splits, bound):
-    assert MeshSettings(cover_splits=splits).bound_layers == bound
+    assert MeshSettings(cover_levels=THREE, cover_splits=splits).bound_layers == bound
 
 
 @pytest.mark.parametrize("splits", [(), (1, 1, 1, 2)])
 def test_splits_for_no_layer_or_too_many_are_refused(splits):
     with pytest.raises(ValueError, match="cover_splits has . entries for the 3 layers"):
-        MeshSettings(cover_splits=splits)
+        MeshSettings(cover_levels=THREE, cover_splits=splits)
 
 
 @pytest.mark.parametrize("splits", [(2, 1, 2), (3,)])
 def test_a_lowest_layer_that_would_hang_freely_is_refused(splits):
     with pytest.raises(InputError, match=f"mesh: cover_splits begins with {splits[0]}; give 0 or 1"):
-        mesh_settings({"cover_splits": list(splits)})
+        mesh_settings({"cover_levels": list(THREE), "cover_splits": list(splits)})
 
 
 class Overlapping:

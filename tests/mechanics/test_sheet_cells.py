@@ -51,7 +51,7 @@ def farthest(step):
 def test_a_cell_far_from_balance_goes_a_bounded_way_and_the_energy_falls(body, monkeypatch):
     monkeypatch.setattr(body.cells, "damp", lambda *step: False)     # damping alone would shorten the step, too
     slightly, far = (body.newton_step(bent(body, by=by), None) for by in (0.002, 0.12))
-    assert farthest(far)[0] < 0.07        # 0.05 towards its own balance, and its answer to the sheet's movement
+    assert farthest(far)[0] < farthest(slightly)[0] + 0.05     # the sheet's movement, and 0.05 towards its own balance
     np.testing.assert_allclose(farthest(far)[1:], farthest(slightly)[1:], rtol=0.2, atol=1e-3)     # the others go as they would
     assert change_of_energy(body, bent(body, by=0.12), far) < 0
 

@@ -9,6 +9,8 @@ from softtact.mechanics.hex_mesh import SheetPlan, grid_plan, merge, with_centre
 from softtact.mechanics.linear_solvers import make_solver
 from softtact.mechanics.slab import Layer, Slab
 
+_LOOKED_UP = 10     # steps
+
 
 def graded(fine, cells, far, count):
     """Lines from 0: `cells` equal cells up to `fine`, then `count` cells growing in a constant ratio up to `far` (mm)."""
@@ -71,11 +73,15 @@ class HeldSlab:
         slab.free = np.flatnonzero(free)
 
     def press(self, surface, depth, *, tolerance=1e-9, iterations=40):
-        """Equilibrium with the object lowered by `depth` mm, by whole Newton steps; tolerance relative to the force."""
+        """Equilibrium with the object lowered by `depth` mm, by Newton steps; tolerance relative to the force.
+
+        Where the points lie under the object is looked up in the first steps, as in a press: the tangent knows nothing of it.
+        """
         slab, displacement = self.slab, np.zeros((self.slab.nodes, 3))
         solver = make_solver()
-        for _ in range(iterations):
-            planes = slab.facing(displacement, surface)
+        for iteration in range(iterations):
+            if iteration < _LOOKED_UP:
+                planes = slab.facing(displacement, surface)
             state = slab.evaluate(displacement, planes, depth)
             residual = state.force.ravel()[slab.free]
             if np.abs(residual).max() < tolerance * abs(state.indentation_force):
@@ -84,14 +90,25 @@ class HeldSlab:
             matrix = slab.tangent(state, [])
             if not solver.factor(matrix):
                 raise ArithmeticError("the slab's tangent is not positive definite")
-            displacement = displacement.copy()
-            displacement.ravel()[slab.free] -= solver.solve(residual)
+            step = np.zeros_like(displacement)
+            step.ravel()[slab.free] = solver.solve(residual)
+            # From where points are looked up no more, points at an edge may take turns for ever unless some steps are cut.
+            share = 1.0 if iteration < _LOOKED_UP else self._share(displacement, step, planes, depth, np.abs(residual).max())
+            displacement = displacement - share * step
         raise ArithmeticError(f"no equilibrium after {iterations} iterations")
 
+    def _share(self, displacement, step, planes, depth, before):
+        """The first of 1, 1/2, ... of the step after which less is unbalanced."""
+        for share in 0.5 ** np.arange(8):
+            force = self.slab.evaluate(displacement - share * step, planes, depth).force
+            if np.abs(force.ravel()[self.slab.free]).max() < before:
+                break
+        return share
+
     def _pressure(self, state):
-        c = self.slab.top.contact
-        depth = np.maximum(-state.gaps, 0.0)
-        return c.stiffness * np.where(depth > c.smoothing, depth - c.smoothing / 2, depth**2 / (2 * c.smoothing))
+        c = self.slab.top.contact_on(state.planes)
+        depth, stiffness = np.maximum(-state.gaps, 0.0), 1 / (1 / c.stiffness + c.softness)
+        return stiffness * np.where(depth > c.smoothing, depth - c.smoothing / 2, depth**2 / (2 * c.smoothing))
 
 
 def _without_frusta(x, y):

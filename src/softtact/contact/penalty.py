@@ -29,24 +29,31 @@ class Contact:
     The offsets (mm, zero at first) hold the points out of each other: with a point's last overlap as its offset the same pressure
     leaves none. It is the augmented Lagrangian method in terms of lengths: exact contact without a stiffer penalty, which
     Newton's method would have to follow in smaller steps. Simo and Laursen, Computers & Structures 42 (1992) 97.
+
+    softness (mm/MPa): of a spring in series with each point, whose shortening is no overlap and is not pressed apart.
     """
 
     stiffness: float = 3000.0
     smoothing: float = 1.0 / 3000.0
     offset: float | np.ndarray = 0.0
+    softness: float | np.ndarray = 0.0
 
     def response(self, gaps):
         """`penalty` of the points, the offset added to their overlap."""
-        return penalty(gaps - self.offset, stiffness=self.stiffness, smoothing=self.smoothing)
+        return penalty(gaps - self.offset, stiffness=1.0 / (1.0 / self.stiffness + self.softness), smoothing=self.smoothing)
+
+    def own_gaps(self, gaps):
+        """Gaps in mm without what the points' springs give way."""
+        return gaps + self.softness * self.response(gaps)[1] if np.any(self.softness) else gaps
 
     def at(self, points):
         """The contact of some of the points."""
-        return self if np.ndim(self.offset) == 0 else replace(self, offset=self.offset[points])
+        return replace(self, **{name: value[points] for name in ("offset", "softness") if np.ndim(value := getattr(self, name))})
 
     def error(self, gaps):
         """Deepest overlap, or widest gap under pressure, in mm."""
-        return float(np.where(gaps < self.offset, np.abs(gaps), 0.0).max(initial=0.0))
+        return float(np.where(gaps < self.offset, np.abs(self.own_gaps(gaps)), 0.0).max(initial=0.0))
 
     def pressed_apart(self, gaps):
         """The contact with offsets that hold each point where its surfaces just touch."""
-        return replace(self, offset=np.maximum(0.0, self.offset - gaps))
+        return replace(self, offset=np.maximum(0.0, self.offset - self.own_gaps(gaps)))

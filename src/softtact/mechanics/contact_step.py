@@ -13,9 +13,9 @@ import scipy.sparse as sp
 
 _INNER_STEPS = 12
 _FACINGS = 4                 # lookups of what the points face; an edge that slides over them moves forces from point to point
-_INNER_TOLERANCE = 0.3       # of the residual that the step is to cut
+_INNER_TOLERANCE = 0.1       # of the residual that the step is to cut
 _FORCING = 0.3               # conjugate gradients end when the preconditioned residual has fallen to this share
-_MOST_ITERATIONS = 25        # ... or when they would take more than so many; then a new factor follows
+_MOST_ITERATIONS = 40        # ... or when they would take more than so many; then a new factor follows
 _JUDGED_AFTER = 3            # iterations after which it is judged how many it would take
 _LEAST_CORNER = 1e-9         # N/mm: rounding must not turn the object's own stiffness negative
 _MOST_CHANGED = 0.05         # share of the points in contact that may have changed since a factor that begins a step

@@ -168,7 +168,8 @@ def _split(nodes, shape, parent, children):
 
 _AXES = np.deg2rad([0, 90, 180, 270])
 _DIAGONALS = _AXES + np.pi / 4
-_CORE_RADIUS = 0.5   # of the inner square's corners: all five quads of similar size
+_CORE_RADIUS = 0.5   # of the inner square's corners: all five quads of similar size ...
+_WIDE_CORE = 0.6     # ... but a single ring around it is thinner, to follow the rim (docs/discretisation.md)
 # A quadratic arc over 90 degrees with its mid-side node on the circle encloses 1.2 % too little. The ends stay on the circle, where
 # frusta touch; the middle moves out to this radius, so that the disc's area is exactly pi: 8/3 sqrt(2) m - 2/3 = pi.
 DISC_MIDDLE_RADIUS = (np.pi + 2 / 3) * 3 / (8 * np.sqrt(2))
@@ -193,8 +194,9 @@ def disc_quads(rings=1):
 
     Corners of the outer sides lie at 0, 90, 180 and 270 degrees.
     """
-    inner = _ring(_CORE_RADIUS, _AXES)
-    inner_mid = _ring(0.5 * (_CORE_RADIUS * np.cos(np.pi / 4) + 0.5 * _CORE_RADIUS), _DIAGONALS)
+    core = _WIDE_CORE if rings == 1 else _CORE_RADIUS
+    inner = _ring(core, _AXES)
+    inner_mid = _ring(0.5 * core * (np.cos(np.pi / 4) + 0.5), _DIAGONALS)
     outer, outer_mid = _ring(1.0, _AXES), _ring(DISC_MIDDLE_RADIUS, _DIAGONALS)
     shares = 1.0 - (1.0 - np.arange(rings + 1) / rings) ** 2
     curves = [(inner + share * (outer - inner), inner_mid + share * (outer_mid - inner_mid)) for share in shares]

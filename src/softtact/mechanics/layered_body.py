@@ -104,24 +104,24 @@ class LayeredBody:
         depth = state.indentation + by_mm
         return replace(state, slab=self.slab.reface(state.slab, state.slab.planes, depth), indentation=depth)
 
-    def newton_step(self, state, force_n, surface=None, *, largest_mm=np.inf):
+    def newton_step(self, state, force_n, surface=None, *, largest_mm=np.inf, kept_mm=0.0):
         """The Newton step under a given force (N), or with the indentation kept where `force_n` is None.
 
-        largest_mm: by which the object goes down at most
+        largest_mm: by which the object goes down at most;  kept_mm: cells that moved less since their last tangent keep it
 
         With a surface the step's contact is with the facets that the points face where it leads, else with those of the state.
         Where nothing touches, a force finds no stiffness: the step is then not finite.
         """
         state = self.friction.for_tangent(state)
         for _ in range(_DAMPINGS):
-            step = self._newton_step(state, force_n, surface, largest_mm)
+            step = self._newton_step(state, force_n, surface, largest_mm, kept_mm)
             if not (np.isfinite(step.largest()) and self.cells.damp(step.slab, step.bed)):
                 break
         return step
 
-    def _newton_step(self, state, force_n, surface, largest_mm):
+    def _newton_step(self, state, force_n, surface, largest_mm, kept_mm):
         """The step with the cells as they are damped now."""
-        self.cells.refresh(state, workers=self.workers)
+        self.cells.refresh(state, kept_mm=kept_mm, workers=self.workers)
         residual, kept = self.cells.condensed_residual(state, workers=self.workers)
         contact = StepContact(self.slab, state.slab, state.indentation, surface, workers=self.workers)
         step, lowering = self._step_of_unknowns(state, residual.ravel()[self.slab.unknowns], contact, force_n,
@@ -162,12 +162,12 @@ class LayeredBody:
 
     def contact_error(self, state):
         """Deepest overlap, or widest gap under pressure, in mm."""
-        return max(self.slab.top.contact.error(self.slab.top.own_gaps(state.slab)), self.bed.contact.error(state.bed.gaps))
+        return max(self.slab.top.error(state.slab), self.bed.contact.error(state.bed.gaps))
 
     def press_apart(self, state, *, allowed_mm):
         """Hold the points that overlap where their surfaces just touch, on the object or in the bed, wherever it is too much."""
-        if self.slab.top.contact.error(self.slab.top.own_gaps(state.slab)) > allowed_mm:
-            self.slab.top.contact = self.slab.top.contact.pressed_apart(state.slab.gaps)
+        if self.slab.top.error(state.slab) > allowed_mm:
+            self.slab.top.press_apart(state.slab)
         if self.bed.contact.error(state.bed.gaps) > allowed_mm:
             self.bed.contact = self.bed.contact.pressed_apart(state.bed.gaps)
 

@@ -34,8 +34,8 @@ class MeshSettings:
     refinement: int = 0
     frustum_rings: int = 1
     coarse_walls: bool = False
-    cover_levels: tuple = (0.0, 0.45, 0.8, 1.0)
-    cover_splits: tuple = (1, 1, 2)
+    cover_levels: tuple = (0.0, 0.5, 1.0)
+    cover_splits: tuple = (1,)
     far_pitches: int = 2
     contact_stiffness: float = 3000.0
 
@@ -64,17 +64,16 @@ class MeshSettings:
 
     @classmethod
     def draft(cls):
-        """For quick studies: a layer less in the cover and in each frustum, and walls as one curve; see `NewtonSettings.draft`."""
-        return cls(frustum_levels=(0.0, 0.35, 1.0), local_over_shear=4.0, coarse_walls=True, cover_levels=(0.0, 0.55, 1.0),
-                   cover_splits=(0, 2), contact_stiffness=1000.0)
+        """For quick studies: a layer less in frusta, a cover tied to the sheet, walls as one curve; see `NewtonSettings.draft`."""
+        return cls(frustum_levels=(0.0, 0.35, 1.0), coarse_walls=True, cover_splits=(0, 1), contact_stiffness=1000.0)
 
     @classmethod
     def fine(cls):
-        """Within 1.3 to 2.4 % of the map's maximum, for 2.7 times the default's time and 3 to 4 GB (docs/discretisation.md).
+        """Within 2.2 % of the map's maximum everywhere, for twice the default's time and 2.5 GB (docs/discretisation.md).
 
-        The cover's lowest layer keeps to the sheet's plan; edges are resolved to a sixteenth of a pitch, frusta by two rings.
+        The cover has a layer more and is fine at edges, frusta have two rings.
         """
-        return cls(cover_splits=(1, 4), frustum_rings=2)
+        return cls(cover_levels=(0.0, 0.45, 0.8, 1.0), cover_splits=(1, 3), frustum_rings=2)
 
     @classmethod
     def converging(cls, *, local_over_shear=0.1, **changes):

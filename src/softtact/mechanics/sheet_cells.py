@@ -10,8 +10,7 @@ from softtact.mechanics.elimination import LayerwiseElimination
 from softtact.mechanics.parallel import SERIAL, chunks
 
 _CHUNK = 8                          # cells that one thread condenses at once
-_REFRESH_MM = 4e-3                  # a cell that moved less than this keeps its tangent (residuals stay exact)
-_REFRESH_SLOPE = 0.2                # ... unless a contact point's stiffness changed by this share of the penalty
+_REFRESH_SLOPE = 0.2                # a cell keeps no tangent where a contact point's stiffness changed by this share of the penalty
 _REFRESH_WITH_FRICTION = 20.0       # ... or, with friction, by this many N/mm3: with 100 light presses creep and fail
 # A cell is thrown too far where its inner nodes go so far beyond this multiple of its walls' step, or its walls farther than that.
 _FARTHEST_MM, _FARTHEST_RATIO, _FARTHEST_OUTER_MM = 0.05, 2.0, 0.4
@@ -46,12 +45,12 @@ class SheetCells:
         """The condensed matrices without their modes of negative stiffness."""
         return [kind.elimination.positive_matrices() for kind in self.kinds]
 
-    def refresh(self, state, *, workers=SERIAL):
-        """Recompute the condensed tangents of the cells that moved or changed contact since their last one; their number.
+    def refresh(self, state, *, kept_mm=0.0, workers=SERIAL):
+        """Recompute the condensed tangents of the cells that moved by more than `kept_mm` or changed contact since their last one.
 
-        Keeping the others is a quasi-Newton step: forces are always exact.
+        Keeping the others is a quasi-Newton step: forces are always exact. Returns how many were recomputed.
         """
-        stale = self._stale(state)
+        stale = self._stale(state, kept_mm)
         frusta = chunks(np.flatnonzero(stale), _CHUNK)
         workers.map(lambda part: self.bed.condense(state.bed, part, self._damping[part]), frusta)
         tasks = [(kind, part) for kind in self.kinds for part in chunks(np.flatnonzero(stale[kind.cells]), _CHUNK)]
@@ -76,7 +75,7 @@ class SheetCells:
         """Let the next `refresh` recompute all cells."""
         self._tangent_at = None
 
-    def _stale(self, state):
+    def _stale(self, state, kept_mm):
         slope, limit = self._slope(state)
         roots = state.slab.displacement[self.roots].reshape(self.count, -1)
         place = np.hstack([roots, state.bed.displacement.reshape(self.count, -1)])
@@ -84,10 +83,10 @@ class SheetCells:
         if self._tangent_at is None:
             self._tangent_at, self._above, self._slope_at = place, above, slope
             return np.ones(self.count, dtype=bool)
-        stale = np.abs(place - self._tangent_at).max(axis=1) > _REFRESH_MM
+        stale = np.abs(place - self._tangent_at).max(axis=1) > kept_mm
         stale |= (np.abs(slope - self._slope_at).max(axis=1) > limit) | (self._damping != self._damped_with)
         for kind, now, before in zip(self.kinds, above, self._above, strict=True):
-            stale[kind.cells] |= np.abs(now - before).max(axis=1) > _REFRESH_MM
+            stale[kind.cells] |= np.abs(now - before).max(axis=1) > kept_mm
             before[stale[kind.cells]] = now[stale[kind.cells]]
         self._tangent_at[stale], self._slope_at[stale] = place[stale], slope[stale]
         return stale

@@ -96,7 +96,9 @@ class Slab:
         self._add_sheet(sheet_plan, [sheet.law] * self.sheet_layers + [cover.law] * bound)
         self._joined = joined(self.solids)     # to evaluate a hundred small blocks takes twice as long
         self._number_unknowns(sides)
-        self.top = TopContact(self.cover_mesh, contact, friction)
+        pressed = cover.law or sheet.law     # None in bodies at rest, of which only the mesh is wanted
+        self.top = TopContact(self.cover_mesh, contact, plane_modulus=pressed.plane_modulus if pressed else np.inf,
+                              friction=friction)
 
     def _number_nodes(self, plan):
         """Masters (p, 8) and weights (p, 8) of sheet_mesh's nodes: its top follows the cover, the rest its own unknowns.
@@ -286,7 +288,7 @@ class Slab:
         columns = np.broadcast_to(self._top_dofs[:, None], shapes.shape)[free]
         rows = sp.csr_matrix((shapes[free], (points, columns)), shape=(len(gaps), len(self.unknowns)))
         return LinearGaps(gaps=gaps, rows=rows, lowering=planes.normals[:, 2], area=self.top.area * planes.covered,
-                          contact=self.top.contact)
+                          contact=self.top.contact_on(planes))
 
     def friction_border(self, state):
         """How friction ties the unknowns to the object's lowering: derivative (unknowns,) of their residual by it, and its own."""

@@ -5,13 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from softtact.contact.coverage import continues, covered
+from softtact.contact.face_edges import ROWS, own_areas, softness
 from softtact.contact.friction import Drag, Grip
 from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.mechanics.elements import gauss, quad8
 
-# Contact points along a side of a top face. More of them hold a face flat that lies half under a punch's edge: with 8 the punch
-# acts up to half a face wider (docs/discretisation.md).
-TOP_POINTS = 3
 _NEAR_MM, _LARGEST_SHIFT_MM = 0.2, 0.02   # points that may touch when the object is let down on the cover, and how far at once
 
 
@@ -20,6 +18,7 @@ class FacingPlanes:
     """The planes of the object's facets that points face: anchors (p, 3) in mm at no indentation, outward normals (p, 3).
 
     covered (p,): share of a point's own area that the object covers;  beside (p,): points that lie beside the object themselves
+    softness (p,): mm/MPa of a spring between point and plane, where an edge covers it in part (`contact/face_edges`)
     A point keeps its plane during a step of Newton's method, so that each step lowers one potential.
     """
 
@@ -27,6 +26,7 @@ class FacingPlanes:
     normals: np.ndarray
     covered: np.ndarray
     beside: np.ndarray
+    softness: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -50,22 +50,20 @@ class TopContact:
     grip: how friction holds the points during a step, None without.
     """
 
-    def __init__(self, mesh, contact, friction=None):
-        """contact: `Contact`, the law of the points;  friction: `Coulomb` of the object on them, or None."""
+    def __init__(self, mesh, contact, *, plane_modulus, friction=None):
+        """contact: `Contact`, the law of the points;  friction: `Coulomb` of the object on them, or None.
+
+        plane_modulus: E / (1 - nu^2) in MPa of what the object presses on
+        """
         self.contact, self.friction, self.grip = contact, friction, None
-        points, weights = gauss(TOP_POINTS, 2)
+        points, weights = gauss(ROWS, 2)
         values, slopes = quad8(points)
         edges = np.einsum("tad,gai->tgdi", mesh.points[mesh.top][..., :2], slopes)
         self.faces, self.values = _of_free_nodes(mesh.follow, mesh.top, np.broadcast_to(values, (len(mesh.top), *values.shape)))
         self.area = (np.linalg.det(edges) * weights).ravel()
         self.reference = self.at_points(mesh.points)
-
-        # Each point's own area: the rectangle whose sides are as long as the weights of Gauss's rule along a line.
         half = 0.5 * np.ptp(mesh.points[mesh.top[:, :4]][..., :2], axis=1)
-        ends = np.concatenate([[-1.0], np.cumsum(np.polynomial.legendre.leggauss(TOP_POINTS)[1]) - 1.0])
-        i, j = (g.ravel() for g in np.meshgrid(np.arange(TOP_POINTS), np.arange(TOP_POINTS), indexing="ij"))
-        places = np.stack([np.column_stack([ends[i + a], ends[j + b]]) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))], axis=1)
-        self._own_area = (half[:, None, None] * (places - points[:, None])).reshape(-1, 4, 2)
+        self._own_area, self._give = own_areas(half, points).reshape(-1, 4, 2), 2.0 * np.sqrt(half.prod(axis=1)) / plane_modulus
 
     def at_points(self, field):
         """A nodal field (n, 3) at the points (p, 3)."""
@@ -83,22 +81,33 @@ class TopContact:
         anchors[beside] = np.column_stack([foot, base])[beside]
         normals[beside] = foot_normals[beside]
         share[anchors[:, 2] >= NO_CONTACT_MM] = 0.0
-        return FacingPlanes(anchors=anchors, normals=normals, covered=share, beside=beside)
+        return FacingPlanes(anchors=anchors, normals=normals, covered=share, beside=beside, softness=softness(share, self._give))
+
+    def contact_on(self, planes):
+        """The points' `Contact` on the planes that they face."""
+        return replace(self.contact, softness=planes.softness)
 
     def gaps(self, displacement, planes, indentation):
         """Normal gaps (p,) in mm between the points and the planes they face."""
         offset = self.reference + self.at_points(displacement) - planes.anchors
         return np.einsum("pd,pd->p", planes.normals, offset) + indentation * planes.normals[:, 2]
 
-    @staticmethod
-    def own_gaps(state):
-        """Gaps (p,) of the points that lie under the object; of those beside it a gap that says so."""
-        return np.where(state.planes.beside, NO_CONTACT_MM, state.gaps)
+    def own_gaps(self, state):
+        """Gaps (p,) of the points that lie under the object, without what edges give way; of those beside it one that says so."""
+        return np.where(state.planes.beside, NO_CONTACT_MM, self.contact_on(state.planes).own_gaps(state.gaps))
+
+    def error(self, state):
+        """Deepest overlap, or widest gap under pressure, in mm of points that lie under the object."""
+        return self.contact_on(state.planes).error(np.where(state.planes.beside, NO_CONTACT_MM, state.gaps))
+
+    def press_apart(self, state):
+        """From now on hold each point where it just touches the object."""
+        self.contact = self.contact_on(state.planes).pressed_apart(state.gaps)
 
     def touch(self, displacement, planes, indentation):
         """The contact with the object lowered by `indentation` mm."""
         gaps, normals = self.gaps(displacement, planes, indentation), planes.normals
-        density, pressure, _ = self.contact.response(gaps)
+        density, pressure, _ = self.contact_on(planes).response(gaps)
         area = self.area * planes.covered
         push = (pressure * area)[:, None] * normals      # on the slab: along the object's outward normal
         touch = Touch(energy=float(density @ area), force=-self._on_nodes(push), gaps=gaps,
@@ -133,7 +142,11 @@ class TopContact:
 
     def renewed_grip(self, state):
         """The grip with the pressures of a `SlabState`."""
-        return state.drag.next_pass(state.gaps, self.contact.response(state.gaps)[1])
+        return state.drag.next_pass(state.gaps, self._pressure(state))
+
+    def _pressure(self, state):
+        """Pressure (p,) in MPa under the contact as it is now, on what is covered of the points' areas."""
+        return self.contact_on(state.planes).response(state.gaps)[1]
 
     def balanced(self, state, indentation, force_n):
         """The indentation (mm) at which the object's force, friction aside, is `force_n` on the cover as it is.
@@ -142,7 +155,7 @@ class TopContact:
         """
         near = np.flatnonzero(state.gaps < _NEAR_MM)
         down, area = -state.planes.normals[near, 2], (self.area * state.planes.covered)[near]
-        contact, gaps, shift = self.contact.at(near), state.gaps[near], 0.0
+        contact, gaps, shift = self.contact_on(state.planes).at(near), state.gaps[near], 0.0
         for _ in range(50):
             _, pressure, slope = contact.response(gaps - shift * down)
             excess = pressure @ (down * area) - force_n
@@ -154,7 +167,7 @@ class TopContact:
 
     def stiffness(self, state):
         """Stiffness (p,) in N/mm of the points along their normals."""
-        return self.contact.response(state.gaps)[2] * self.area * state.planes.covered
+        return self.contact_on(state.planes).response(state.gaps)[2] * self.area * state.planes.covered
 
     def area_under_pressure(self, state):
         """Area in mm2 of the points that carry pressure under the contact as it is now, as far as the object covers it.
@@ -165,12 +178,12 @@ class TopContact:
 
     def under_pressure(self, state):
         """Which points (p,) carry pressure."""
-        return self.contact.response(state.gaps)[1] * state.planes.covered > 0
+        return self._pressure(state) * state.planes.covered > 0
 
     def pressure_of_faces(self, state):
         """Mean pressure (t,) in MPa on each face, under the contact as it is now."""
         area = self.area.reshape(len(self.faces), -1)
-        force = self.contact.response(state.gaps)[1] * self.area * state.planes.covered
+        force = self._pressure(state) * self.area * state.planes.covered
         return force.reshape(area.shape).sum(axis=1) / area.sum(axis=1)
 
     def normal_shapes(self, planes):

@@ -82,6 +82,11 @@ class Law:
         """Initial shear modulus, MPa."""
         raise NotImplementedError
 
+    @property
+    def plane_modulus(self):
+        """E / (1 - nu^2) for small strains, MPa: what stands against an indenter on a half-space."""
+        return 4 * self.mu0 * (self.bulk_modulus + self.mu0 / 3) / (self.bulk_modulus + 4 * self.mu0 / 3)
+
     def isochoric(self, C6, *, tangent=True):
         """`IsochoricResponse` for C6 (n, 6): the components xx, yy, zz, xy, yz, zx of C, not doubled."""
         raise NotImplementedError
