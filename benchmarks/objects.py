@@ -80,19 +80,27 @@ def main():
     if options.one:
         print(json.dumps(measure(*options.one)))
         return
-    mesh, path = options.mesh, record.RESULTS / "objects.json"
-    rows = json.loads(path.read_text(encoding="utf-8"))["rows"] if path.exists() else []
+    mesh = options.mesh
     for name in options.objects or default_objects():
-        there = [row for row in rows if (row["object"], row["mesh"]) == (name, mesh)]
-        if options.again or not there:
+        if options.again or not any(_is(row, name, mesh) for row in recorded()):
             run = subprocess.run([sys.executable, __file__, "--one", name, mesh], capture_output=True, text=True,
                                  env=record.threads_of(1), check=False)
             if run.returncode:
                 sys.exit(f"{name}: {run.stderr.strip()}")
-            rows = [*(row for row in rows if row not in there), json.loads(run.stdout.splitlines()[-1])]
-            record.write("objects", rows=rows)
-    for row in rows:
+            others = [row for row in recorded() if not _is(row, name, mesh)]      # read anew: another process may press others
+            record.write("objects", rows=[*others, json.loads(run.stdout.splitlines()[-1])])
+    for row in recorded():
         print(_line(row))
+
+
+def recorded():
+    """The rows of the record."""
+    path = record.RESULTS / "objects.json"
+    return json.loads(path.read_text(encoding="utf-8"))["rows"] if path.exists() else []
+
+
+def _is(row, name, mesh):
+    return (row["object"], row["mesh"]) == (name, mesh)
 
 
 def _line(row):

@@ -88,7 +88,7 @@ def frustum(*, law=LAW, mesh=None, contact=HARD, **settings):
                       tips_held=True, contact=contact, local_over_shear=mesh.local_over_shear,
                       growing_over_shear=mesh.growing_over_shear,
                       trilinear=mesh.trilinear_pressure,
-                      refinement=mesh.refinement, rings=mesh.frustum_rings)
+                      refinement=mesh.refinement, rings=mesh.frustum_rings, core=mesh.core)
 
 
 def bonded_forces(bed, *, step_mm=0.01):

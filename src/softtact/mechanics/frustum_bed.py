@@ -20,7 +20,7 @@ from softtact.mechanics.blocks import HexBlock
 from softtact.mechanics.condensation import Springs
 from softtact.mechanics.elements import HEX27_BOTTOM, HEX27_SIDES, gauss, quad9
 from softtact.mechanics.elimination import LayerwiseElimination
-from softtact.mechanics.hex_mesh import disc_plan, extrude
+from softtact.mechanics.hex_mesh import CORE_RADIUS, disc_plan, extrude
 from softtact.mechanics.kernels import add_forces
 from softtact.mechanics.parallel import SERIAL
 
@@ -65,13 +65,13 @@ class FrustumBed:
     """
 
     def __init__(self, geometry, law, *, levels, root_z_mm, pcb_z_mm, tips_held, contact, local_over_shear,
-                 growing_over_shear, trilinear, refinement=0, rings=1, friction=None):
+                 growing_over_shear, trilinear, refinement=0, rings=1, core=CORE_RADIUS, friction=None):
         """local_over_shear, growing_over_shear, trilinear: see `blocks`
 
         friction: `Coulomb` of the frusta on the board, or None
         """
         self.geometry, self.contact, self.friction, self.grip = geometry, contact, friction, None
-        plan = disc_plan(refinement, rings)
+        plan = disc_plan(refinement, rings, core)
         self.mesh = extrude(plan, levels)
         self.outer_faces = self._outer_faces(plan)
         self.count = len(geometry.heights)

@@ -168,8 +168,7 @@ def _split(nodes, shape, parent, children):
 
 _AXES = np.deg2rad([0, 90, 180, 270])
 _DIAGONALS = _AXES + np.pi / 4
-_CORE_RADIUS = 0.5   # of the inner square's corners: all five quads of similar size ...
-_WIDE_CORE = 0.6     # ... but a single ring around it is thinner, to follow the rim (docs/discretisation.md)
+CORE_RADIUS = 0.5   # of the inner square's corners: all five quads of similar size
 # A quadratic arc over 90 degrees with its mid-side node on the circle encloses 1.2 % too little. The ends stay on the circle, where
 # frusta touch; the middle moves out to this radius, so that the disc's area is exactly pi: 8/3 sqrt(2) m - 2/3 = pi.
 DISC_MIDDLE_RADIUS = (np.pi + 2 / 3) * 3 / (8 * np.sqrt(2))
@@ -189,12 +188,11 @@ def _ring_quads(inner, inner_mid, outer, outer_mid):
     return np.array(quads)
 
 
-def disc_quads(rings=1):
-    """Unit disc as an O-grid of a core and `rings` rings of four quads (1 + 4 rings, 9, 2), the thinner the farther out.
+def disc_quads(rings=1, core=CORE_RADIUS):
+    """Unit disc as an O-grid of a square core and `rings` rings of four quads (1 + 4 rings, 9, 2), the thinner the farther out.
 
     Corners of the outer sides lie at 0, 90, 180 and 270 degrees.
     """
-    core = _WIDE_CORE if rings == 1 else _CORE_RADIUS
     inner = _ring(core, _AXES)
     inner_mid = _ring(0.5 * core * (np.cos(np.pi / 4) + 0.5), _DIAGONALS)
     outer, outer_mid = _ring(1.0, _AXES), _ring(DISC_MIDDLE_RADIUS, _DIAGONALS)
@@ -204,18 +202,18 @@ def disc_quads(rings=1):
     return with_centres(np.vstack([[[*inner, *inner_mid]], *between]))
 
 
-def disc_plan(refinement=0, rings=1):
+def disc_plan(refinement=0, rings=1, core=CORE_RADIUS):
     """Unit disc as an O-grid of `disc_quads`, each split into four `refinement` times."""
-    return refine(merge(disc_quads(rings)), refinement)
+    return refine(merge(disc_quads(rings, core)), refinement)
 
 
-def cell_plan(pitch, diameter, rings=1):
+def cell_plan(pitch, diameter, rings=1, core=CORE_RADIUS):
     """One cell of a lattice of discs: quads (q, 9, 2) and triangles (4, 6, 2) in mm, the first quads being `disc_quads`.
 
     Along each side of the cell lie two elements. Where the discs of neighbours do not touch a ring of quads surrounds the disc.
     """
     half, radius = 0.5 * pitch, 0.5 * diameter
-    quads = [radius * disc_quads(rings)]
+    quads = [radius * disc_quads(rings, core)]
     if radius < half * (1 - 1e-9):
         quads.append(with_centres(_ring_quads(*(r * _ring(1.0, a) if a is _AXES else r * _ring(DISC_MIDDLE_RADIUS, a)
                                                 for r in (radius, half) for a in (_AXES, _DIAGONALS)))))
@@ -243,13 +241,13 @@ class SheetPlan:
     quarters: tuple
 
 
-def sheet_plan(centres, counts, pitch, diameter, footprint, *, refinement=0, rings=1):
+def sheet_plan(centres, counts, pitch, diameter, footprint, *, refinement=0, rings=1, core=CORE_RADIUS):
     """Cells at `centres` (f, 2) of a lattice `counts`, and strips of quads to the edges of the footprint (mm)."""
-    quads, triangles = cell_plan(pitch, diameter, rings)
+    quads, triangles = cell_plan(pitch, diameter, rings, core)
     strips = _strips(counts, pitch, footprint)
     plan = refine(merge(np.vstack([(quads[None] + centres[:, None, None]).reshape(-1, 9, 2), strips]),
                         (triangles[None] + centres[:, None, None]).reshape(-1, 6, 2)), refinement)
-    disc = 0.5 * diameter * disc_plan(refinement, rings).points
+    disc = 0.5 * diameter * disc_plan(refinement, rings, core).points
     roots = _find(plan.points, (centres[:, None] + disc).reshape(-1, 2)).reshape(len(centres), -1)
     return SheetPlan(plan, roots, len(quads) * 4**refinement, _quarters(plan, centres, pitch, refinement))
 

@@ -3,8 +3,10 @@
 from dataclasses import dataclass
 
 from softtact.contact.penalty import Contact
+from softtact.mechanics.hex_mesh import CORE_RADIUS
 
 _OBJECT_SMOOTHING_MM = 1e-3
+_CORE_IN_ONE_RING = 0.6     # docs/discretisation.md
 
 
 @dataclass(frozen=True)
@@ -21,7 +23,9 @@ class MeshSettings:
     slab_growing_over_shear: the latter in sheet and cover, where frusta are pressed to two thirds of their height;
     trilinear_pressure: or linear, which is softer by 2 % for small movements, and fails under deep objects.
     refinement: how often all elements are split in plan. frustum_rings: rings of elements around a frustum's core, the
-    thinner the farther out. coarse_walls: along all walls between cells, not only far from the object, the sheet moves as one
+    thinner the farther out; frustum_core: corners of this square core over the radius, by default 0.6 in one ring, which so
+    follows the rim, else 0.5: wider ones give way earlier where frusta are pressed flat. coarse_walls: along all walls between
+    cells, not only far from the object, the sheet moves as one
     quadratic curve: half a factor's operations, and 2 to 2.5 % of the map; without effect where refined.
     """
 
@@ -33,6 +37,7 @@ class MeshSettings:
     trilinear_pressure: bool = True
     refinement: int = 0
     frustum_rings: int = 1
+    frustum_core: float | None = None
     coarse_walls: bool = False
     cover_levels: tuple = (0.0, 0.5, 1.0)
     cover_splits: tuple = (1,)
@@ -46,6 +51,13 @@ class MeshSettings:
         if self.cover_splits[0] > 1:
             raise ValueError(f"cover_splits begins with {self.cover_splits[0]}; give 0 or 1, for a layer finer than what is below "
                              "hangs freely there, and the map is wrong by up to a third")
+
+    @property
+    def core(self):
+        """The core's corners over the radius of a frustum's disc."""
+        if self.frustum_core is not None:
+            return self.frustum_core
+        return _CORE_IN_ONE_RING if self.frustum_rings == 1 else CORE_RADIUS
 
     @property
     def bound_layers(self):

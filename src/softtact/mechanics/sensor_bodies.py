@@ -43,7 +43,7 @@ def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), s
     splits, zone = _cover_splits(mesh, surface, x_lines, y_lines, frusta.pitch_mm)
     centres, neighbours = lattice(counts, frusta.pitch_mm)
     plan = sheet_plan(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, spec.footprint_mm, refinement=mesh.refinement,
-                      rings=mesh.frustum_rings)
+                      rings=mesh.frustum_rings, core=mesh.core)
     slab = Slab(sheet, cover, plan, x_lines, y_lines, sides="held", contact=contact or mesh.object_contact,
                 coarse_walls=mesh.coarse_walls or _far(zone, x_lines, y_lines), splits=splits,
                 growing_over_shear=mesh.slab_growing_over_shear, friction=coulomb(spec.friction.object))
@@ -97,7 +97,7 @@ def build_unit_cell(spec, *, dielectric_law, cover_law=None, mesh=MeshSettings()
     cover = Layer(cover_mm * (np.asarray(mesh.cover_levels) - 1) if cover_mm else np.zeros(1), cover_law)
     centre = np.zeros((1, 2))
     plan = sheet_plan(centre, (1, 1), frusta.pitch_mm, frusta.root_diameter_mm, (frusta.pitch_mm,) * 2, refinement=mesh.refinement,
-                      rings=mesh.frustum_rings)
+                      rings=mesh.frustum_rings, core=mesh.core)
     slab = Slab(sheet, cover, plan, lines, lines, sides="symmetric", contact=mesh.contact, coarse_walls=mesh.coarse_walls,
                 splits=splits, growing_over_shear=mesh.slab_growing_over_shear, friction=coulomb(spec.friction.object))
     bed = _bed(spec, centre, np.ones((1, 4), dtype=bool), dielectric_law, mesh,
@@ -111,7 +111,7 @@ def build_patch(spec, counts, *, dielectric_law, mesh=MeshSettings()):
     centres, neighbours = lattice(counts, frusta.pitch_mm)
     lines = [frusta.pitch_mm * (np.arange(count + 1) - 0.5 * count) for count in counts]
     plan = sheet_plan(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, [np.ptp(line) for line in lines],
-                      rings=mesh.frustum_rings)
+                      rings=mesh.frustum_rings, core=mesh.core)
     slab = Slab(Layer(np.linspace(-thickness, 0.0, mesh.sheet_layers + 1), dielectric_law), Layer(np.zeros(1), None), plan, *lines,
                 sides="free", contact=mesh.contact, coarse_walls=mesh.coarse_walls,
                 growing_over_shear=mesh.slab_growing_over_shear)
@@ -132,5 +132,5 @@ def _bed(spec, centres, neighbours, law, mesh, scatter, contact, *, bottom=None)
     return FrustumBed(geometry, law, levels=np.asarray(mesh.frustum_levels) * frusta.height_mm, root_z_mm=bottom,
                       pcb_z_mm=bottom - heights.max(), tips_held=spec.tips_held, contact=contact or mesh.contact,
                       local_over_shear=mesh.local_over_shear, growing_over_shear=mesh.growing_over_shear,
-                      trilinear=mesh.trilinear_pressure, refinement=mesh.refinement, rings=mesh.frustum_rings,
+                      trilinear=mesh.trilinear_pressure, refinement=mesh.refinement, rings=mesh.frustum_rings, core=mesh.core,
                       friction=coulomb(spec.friction.board))

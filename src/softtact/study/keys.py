@@ -182,6 +182,8 @@ class Mesh(Section):
     frustum_levels: Annotated[list[float], AfterValidator(_rising)] | None = Field(
         None, description="heights of a frustum's layers of elements, from 0 to 1")
     frustum_rings: PositiveInt | None = Field(None, description="rings of elements around a frustum's core, thin at its rim")
+    frustum_core: Annotated[float, Field(ge=0.3, le=0.8)] | None = Field(
+        None, description="corners of this core over the frustum's radius; with 0.5 frusta may be pressed flatter than with 0.6")
     local_over_shear: NotNegative | None = Field(None, description="volumetric stiffness of frusta at each point, over mu")
     growing_over_shear: NotNegative | None = Field(
         None, description="stiffness of frusta against large volume changes that their elements' pressure misses, over mu")
