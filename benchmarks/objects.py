@@ -21,6 +21,7 @@ import yaml
 import softtact
 from softtact.errors import ConvergenceError
 from softtact.geometry.meshes import read_mesh
+from softtact.mechanics.hyperelastic import NewtonSettings
 from softtact.mechanics.mesh_settings import MeshSettings
 
 CONFIG = Path(__file__).resolve().parents[1] / "config"
@@ -39,7 +40,7 @@ def measure(name, mesh):
     """One press in this process: what each level that was reached says, and what stopped it, if anything did."""
     file = next((CONFIG / "objects").glob(f"*/{name}.stl"))
     sensor = softtact.load_sensor("coro")
-    sensor.mesh = MESHES[mesh]()
+    sensor.mesh, sensor.solver = MESHES[mesh](), NewtonSettings.draft() if mesh == "draft" else NewtonSettings()
     stopped, start = None, time.process_time()
     try:
         result = sensor.press(read_mesh(file, unit="mm"), force_n=FORCES_N, model="hyperelastic", threads=1)

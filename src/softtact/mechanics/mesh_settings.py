@@ -81,7 +81,7 @@ class MeshSettings:
 
     @classmethod
     def fine(cls):
-        """Within 2.2 % of the map's maximum everywhere, for twice the default's time and 2.5 GB (docs/discretisation.md).
+        """Within 2.2 % of the map's maximum everywhere, for two to three times the default's time and 2.6 GB (docs/discretisation.md).
 
         The cover has a layer more and is fine at edges, frusta have two rings.
         """
