@@ -81,7 +81,7 @@ class MeshSettings:
 
     @classmethod
     def fine(cls):
-        """Within 2.2 % of the map's maximum everywhere, for two to three times the default's time and 2.6 GB (docs/discretisation.md).
+        """Within 2.2 % of the map's maximum everywhere, for 2.4 to 2.8 times the default's time (docs/discretisation.md).
 
         The cover has a layer more and is fine at edges, frusta have two rings.
         """
