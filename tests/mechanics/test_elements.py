@@ -23,6 +23,7 @@ from softtact.mechanics.elements import (
     wedge_rule,
 )
 from softtact.mechanics.hex_mesh import disc_plan, extrude, sheet_plan
+from softtact.mechanics.mesh_settings import MeshSettings
 from softtact.mechanics.sensor_bodies import lattice
 
 LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040})
@@ -66,9 +67,17 @@ def volume(mesh):
     return total
 
 
-@pytest.mark.parametrize("refinement", [0, 1])
-def test_the_disc_of_quadratic_quads_has_the_area_of_a_circle(refinement):
-    assert volume(extrude(disc_plan(refinement), [0.0, 1.0])) == pytest.approx(np.pi, rel=1e-12)
+@pytest.mark.parametrize(("refinement", "rings", "core"), [(0, 1, 0.5), (1, 1, 0.5), (0, 1, 0.8), (0, 2, 0.4)])
+def test_the_disc_of_quadratic_quads_has_the_area_of_a_circle(refinement, rings, core):
+    assert volume(extrude(disc_plan(refinement, rings, core), [0.0, 1.0])) == pytest.approx(np.pi, rel=1e-12)
+
+
+@pytest.mark.parametrize(("mesh", "core"), [(MeshSettings(), 0.6), (MeshSettings(frustum_rings=2), 0.5),
+                                            (MeshSettings(frustum_core=0.7), 0.7)])
+def test_a_frustums_core_is_as_wide_as_asked_for_or_as_its_rings_want_it(mesh, core):
+    innermost = disc_plan(0, mesh.frustum_rings, mesh.core).quads[0, :4]
+    corners = disc_plan(0, mesh.frustum_rings, mesh.core).points[innermost]
+    assert np.hypot(*corners.T) == pytest.approx(np.full(4, core))
 
 
 def test_a_frustum_has_the_volume_of_a_truncated_cone():

@@ -56,6 +56,14 @@ def test_a_cell_far_from_balance_goes_a_bounded_way_and_the_energy_falls(body, m
     assert change_of_energy(body, bent(body, by=0.12), far) < 0
 
 
+def test_a_cell_that_moved_less_than_allowed_keeps_its_tangent(body):
+    at_rest, bent_by_10_um = (bent(body, by=by) for by in (0.0, 0.01))
+    assert body.cells.refresh(at_rest, kept_mm=0.03) == body.cells.count     # the first tangents are those of all
+    assert body.cells.refresh(bent_by_10_um, kept_mm=0.03) == 0
+    assert body.cells.refresh(bent_by_10_um, kept_mm=0.004) == 1             # only the first frustum was bent
+    assert body.cells.refresh(bent_by_10_um, kept_mm=0.004) == 0
+
+
 def test_a_cell_that_was_thrown_too_far_is_damped_until_it_is_not(body):
     state = bent(body, by=0.02)
     free = body.newton_step(state, None)
