@@ -60,6 +60,22 @@ def test_what_is_done_is_not_counted_and_the_studys_own_times_come_first(tmp_pat
     assert cost.hours == pytest.approx(3 * 40 / 3600)
 
 
+def test_presses_that_share_a_job_share_its_time(tmp_path):
+    """The default study presses some objects in two places; a fast model does so in one job."""
+    study, told = costs_of("config")
+    jobs = study.press_jobs("elastic")
+    assert sorted({len(items) for items in jobs}) == [1, 2] and sum(map(len, jobs)) == len(study.items())
+    assert [len(items) for items in study.press_jobs("hyperelastic")] == [1] * len(study.items())
+    times = read_costs()["presses"]["elastic"]
+    start_s = times["fixed_s"] * len(jobs) / len(study.items())
+    assert told["simulate_press, elastic"].each_s == pytest.approx(start_s + 5 * times["level_s"])     # five levels
+    two = next(items[0] for items in jobs if len(items) == 2)
+    path = tmp_path / study.name / f"benchmarks/simulate_presses/{two.set}/{two.id}/elastic.tsv"
+    path.parent.mkdir(parents=True)
+    path.write_text("s\th:m:s\n5.0\t0:00:05\n")
+    assert costs_of("config", tmp_path)[1]["simulate_press, elastic"].each_s == 2.5
+
+
 def test_a_trial_of_hyperband_costs_a_part_of_its_epochs():
     # max 9, factor 3: brackets from 1, 3 and 9 epochs take 9, 5 and 3 of 17 trials; a third goes on at each rung
     mean = (9 * (1 + 2 / 3 + 6 / 9) + 5 * (3 + 6 / 3) + 3 * 9) / 17

@@ -10,11 +10,13 @@ import trimesh
 
 from softtact.contact.unilateral import ContactSettings
 from softtact.errors import ConvergenceError, InputError
+from softtact.files import read_dataset
 from softtact.geometry.pose import Pose
 from softtact.geometry.sensor_spec import SensorSpec
 from softtact.many import press_batch
 from softtact.mechanics.elastic import elastic_compliance
 from softtact.sensor import Sensor
+from softtact.stages import simulate_press, simulate_presses
 
 CORO = SensorSpec.from_yaml(Path(__file__).parents[1] / "config/sensors/coro.yaml")
 SMALL = CORO.model_copy(update={"footprint_mm": (7.2, 7.2), "map_shape": (13, 13)})
@@ -47,6 +49,45 @@ def test_a_press_that_fails_is_named_after_the_others_are_done_or_kept_in_its_pl
         sensor.press_many(MESHES[0], [POSES[0], BESIDE], force_n=1.0, model="elastic", workers=1)
     first, second = sensor.press_many(MESHES[0], [POSES[0], BESIDE], force_n=1.0, model="elastic", workers=1, failures="keep")
     assert first.converged.all() and isinstance(second, InputError)
+
+
+# --- as a stage of the workflow ---
+
+
+@pytest.fixture
+def stage(sensor, tmp_path):
+    """(inputs, settings) of the stage that presses a cylinder in two places, and of each press alone."""
+    sensor.files["elastic"].save(tmp_path / "compliance.npz")
+    MESHES[0].export(tmp_path / "punch.stl")
+    shared = {"sensor": SMALL.model_dump(mode="json"), "model": "layer", "kind": "elastic", "laws": {}, "mesh": {},
+              "friction": None, "forces_n": [1.0, 4.0]}
+    items = [{"name": name, "set": "indenters", "unit": "mm", "pose": pose}
+             for name, pose in (("punch", None), ("punch-1", [0.3, 0.2, 1.0, 0.0, 0.0, 30.0]))]
+    return {"object": tmp_path / "punch.stl", "compliance": tmp_path / "compliance.npz"}, shared, items
+
+
+def test_an_objects_places_pressed_together_are_written_as_each_press_alone(stage, tmp_path):
+    inputs, shared, items = stage
+    together = [tmp_path / f"{item['name']}.nc" for item in items]
+    simulate_presses.run(inputs=inputs, outputs={"press": together}, settings={**shared, "items": items})
+    for path, item in zip(together, items, strict=True):
+        simulate_press.run(inputs=inputs, outputs={"press": tmp_path / "alone.nc"}, settings={**shared, "item": item})
+        one, alone = read_dataset(path), read_dataset(tmp_path / "alone.nc")
+        assert one.attrs == alone.attrs and one.attrs["item"] == item["name"] and one.attrs["model"] == "layer"
+        np.testing.assert_allclose(one.deformation_map_mm, alone.deformation_map_mm, rtol=0, atol=1e-6)
+    first, second = map(read_dataset, together)
+    assert np.abs(first.deformation_map_mm - second.deformation_map_mm).max() > 0.01     # places apart
+
+
+def test_a_place_that_fails_is_named_and_no_press_of_its_job_is_written(stage, tmp_path):
+    inputs, shared, items = stage
+    items = [*items, {**items[1], "name": "punch-2", "pose": [50.0, 0, 1, 0, 0, 0]}]
+    outputs = [tmp_path / f"{item['name']}.nc" for item in items]
+    with pytest.raises(InputError, match="^indenters/punch-2/layer: The object misses the sensor"):
+        simulate_presses.run(inputs=inputs, outputs={"press": outputs}, settings={**shared, "items": items})
+    assert not any(path.exists() for path in outputs)
+    with pytest.raises(InputError, match="2 outputs 'press' for 3 items; give one for each"):
+        simulate_presses.run(inputs=inputs, outputs={"press": outputs[:2]}, settings={**shared, "items": items})
 
 
 # --- as one batch, on any device of torch ---

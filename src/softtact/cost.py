@@ -22,7 +22,10 @@ READING_NUMBERS = 2          # branches of a reading: the way up and the way dow
 
 @dataclass(frozen=True)
 class Cost:
-    """Jobs of one stage: how many, how many of them are left, seconds of each, and MB that all of them leave on disk."""
+    """Jobs of one stage: how many, how many of them are left, seconds of each, and MB that all of them leave on disk.
+
+    Presses count each for itself, also where a fast model presses an object's places in one job.
+    """
 
     stage: str
     jobs: int
@@ -75,8 +78,8 @@ def _presses(study, measured, folder):
     levels, grid = len(values.forces_n), math.prod(study.spec.map_shape)
     for model in study.pressed_with:
         files = [folder / "presses" / item.set / item.id / f"{model}.nc" for item in study.items()]
-        times = measured["presses"].get(model) or measured["presses"][values.models[model].kind]
-        seconds = _own(folder, f"simulate_press/*/*/{model}.tsv") or times["fixed_s"] + levels * times["level_s"]
+        times, jobs = measured["presses"].get(model) or measured["presses"][values.models[model].kind], study.press_jobs(model)
+        seconds = _own_press_s(folder, model, jobs) or times["fixed_s"] * len(jobs) / len(files) + levels * times["level_s"]
         yield Cost(f"simulate_press, {model}", len(files), _left(files), seconds, len(files) * levels * grid * 2 * BYTES / 1e6)
 
 
@@ -186,6 +189,21 @@ def _left(files):
 
 def _own(folder, pattern):
     """Mean wall time of the study's own finished jobs, or None."""
-    times = [float(path.read_text(encoding="utf-8").splitlines()[1].split("\t")[0])
-             for path in folder.glob(f"benchmarks/{pattern}")]
+    times = [_wall_s(path) for path in folder.glob(f"benchmarks/{pattern}")]
     return mean(times) if times else None
+
+
+def _own_press_s(folder, model, jobs):
+    """The same for one press of a model, several of which may share a job; jobs: [[Item]]."""
+    done = {}
+    for items in jobs:
+        stage = "simulate_press" if len(items) == 1 else "simulate_presses"
+        path = folder / "benchmarks" / stage / items[0].set / items[0].id / f"{model}.tsv"
+        if path.exists():
+            done[path] = len(items)
+    return sum(map(_wall_s, done)) / sum(done.values()) if done else None
+
+
+def _wall_s(path):
+    """Seconds of wall time in Snakemake's benchmark of a job."""
+    return float(path.read_text(encoding="utf-8").splitlines()[1].split("\t")[0])

@@ -30,6 +30,20 @@ def test_a_new_indenter_is_the_only_one_simulated(finished):
     assert LEARNING <= set(plan)
 
 
+def test_more_places_of_an_object_press_it_again_with_the_fast_models_and_no_other(finished):
+    """Three indenters in five presses: the first two get a second place. A fast model presses both places in one job."""
+    finished.edit("config/tiny.yaml", "donut_m], presses: null", "donut_m], presses: 5")
+    plan = finished.plan()
+    assert {job["item"] for job in plan["simulate_press"]} == {"circle_m-1", "square-1"}
+    assert {job["model"] for job in plan["simulate_press"]} == {"hyperelastic", "reference"}
+    together = {rule for rule in plan if rule.startswith("simulate_presses")}
+    assert together == {f"simulate_presses_{model}_indenters_{item}" for model in ("elastic", "foundation")
+                        for item in ("circle_m", "square")}
+    finished.snakemake("--until", "simulate_presses_elastic_indenters_square")
+    left = {rule for rule in finished.plan() if rule.startswith("simulate_presses")}
+    assert together - left == {"simulate_presses_elastic_indenters_square"}
+
+
 def test_a_comment_in_the_sensors_file_reruns_nothing(finished):
     finished.edit("config/sensors/coro.yaml", "name: coro", "name: coro   # the paper's")
     assert finished.plan() == {}

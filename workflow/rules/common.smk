@@ -3,6 +3,7 @@
 import fcntl
 import json
 import os
+import re
 import sys
 from pathlib import Path
 
@@ -48,6 +49,11 @@ def log_of(stage, part="all"):
 def benchmark_of(stage, part="all"):
     """Where Snakemake writes a job's time and memory."""
     return f"{RESULTS}/benchmarks/{stage}/{part}.tsv"
+
+
+def rule_name(*parts):
+    """The name of a rule that a loop makes."""
+    return re.sub(r"\W", "_", "_".join(parts))
 
 
 def run_stage(stage):
@@ -133,11 +139,12 @@ def plain(section):
     return section.model_dump(mode="json")
 
 
-def pressed_with(model, item, forces_n):
-    """The settings of a press of an item with a model of the configuration."""
+def pressed_with(model, items, forces_n):
+    """The settings of a press of an item, or of several in one job, with a model of the configuration."""
     chosen = STUDY.values.models[model]
+    pressed = [press_settings(item) for item in items]
     return as_settings(
-        item=press_settings(item),
+        **({"items": pressed} if len(pressed) > 1 else {"item": pressed[0]}),
         sensor=STUDY.sensor,
         model=model,
         kind=chosen.kind,

@@ -14,7 +14,7 @@ rule simulate_press:
         press=f"{RESULTS}/presses/{{set}}/{{item}}/{{model}}.nc",
     params:
         files=files,
-        settings=lambda w: pressed_with(w.model, STUDY.items_of[w.set][w.item], STUDY.values.forces_n),
+        settings=lambda w: pressed_with(w.model, [STUDY.items_of[w.set][w.item]], STUDY.values.forces_n),
     log:
         log_of("simulate_press", "{set}/{item}/{model}"),
     benchmark:
@@ -22,6 +22,33 @@ rule simulate_press:
     threads: 1
     shell:
         f'{run_stage("simulate_press")} && {TOLD}'
+
+
+# An object in several places, with a fast model: one job, for its start takes longer than a press. Which places these are is
+# the study's, so they are rules of their own without wildcards, which Snakemake prefers to the rule above.
+for _model in STUDY.pressed_with:
+    for _items in (_items for _items in STUDY.press_jobs(_model) if len(_items) > 1):
+        _first = f"{_items[0].set}/{_items[0].id}"
+
+        rule:
+            name:
+                rule_name("simulate_presses", _model, _first)
+            input:
+                **needs_of(_model),
+                code=code("simulate_presses"),
+                object=_items[0].file,
+            output:
+                press=[f"{RESULTS}/presses/{_item.set}/{_item.id}/{_model}.nc" for _item in _items],
+            params:
+                files=files,
+                settings=pressed_with(_model, _items, STUDY.values.forces_n),
+            log:
+                log_of("simulate_presses", f"{_first}/{_model}"),
+            benchmark:
+                benchmark_of("simulate_presses", f"{_first}/{_model}")
+            threads: 1
+            shell:
+                f'{run_stage("simulate_presses")} && {TOLD}'
 
 
 rule read_virtual_sensor:
@@ -57,7 +84,7 @@ rule press_section:
     params:
         files=files,
         settings=pressed_with(
-            STUDY.values.choice.models["hyperelastic"], STUDY.section_item, [STUDY.values.section.force_n]
+            STUDY.values.choice.models["hyperelastic"], [STUDY.section_item], [STUDY.values.section.force_n]
         ),
     log:
         log_of("press_section"),

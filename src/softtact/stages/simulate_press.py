@@ -24,25 +24,42 @@ def run(*, inputs, outputs, settings, threads=1):
 
 def press_item(inputs, settings, *, threads, keep_body=False):
     """The `PressResult` of the item of the settings."""
-    item, mesh = settings["item"], settings["mesh"]
-    spec = SensorSpec.from_dict(settings["sensor"])
-    names = {"model": settings["model"], "set": item["set"], "item": item["name"]}
-    kind = settings["kind"]
-    if kind in COMPLIANCES:     # a press needs no laws then: the compliance knows them
-        sensor = Sensor(spec, laws={}, files={kind: COMPLIANCES[kind].load(inputs["compliance"])}, attributes=names)
-    else:
-        if settings["friction"] is not None:
-            spec = SensorSpec.from_dict({**settings["sensor"], "friction": settings["friction"]})
-        spec = specimen_of(spec, mesh)
-        sensor = Sensor(spec, laws=_laws(inputs, settings["laws"]), mesh=mesh_settings(mesh), solver=newton_settings(mesh),
-                        scatter=frustum_scatter(spec, mesh), attributes=names)
-    pose = None if item["pose"] is None else Pose.from_values(item["pose"])
-    label = f"{item['set']}/{item['name']}/{settings['model']}"
+    item, label = settings["item"], press_label(settings)
+    sensor = make_sensor(inputs, settings)
     try:
-        return sensor.press(read_mesh(inputs["object"], unit=item["unit"]), pose=pose, force_n=settings["forces_n"],
-                            model=kind, label=label, threads=threads, keep_body=keep_body)
+        return sensor.press(read_mesh(inputs["object"], unit=item["unit"]), pose=pose_of(item), force_n=settings["forces_n"],
+                            model=settings["kind"], label=label, threads=threads, keep_body=keep_body)
     except ConvergenceError as error:
         raise ConvergenceError(f"{label}: {error}", result=error.result) from None
+
+
+def make_sensor(inputs, settings):
+    """The `Sensor` that is pressed, with what its model prepared."""
+    kind, mesh, names = settings["kind"], settings["mesh"], names_of(settings)
+    spec = SensorSpec.from_dict(settings["sensor"])
+    if kind in COMPLIANCES:     # a press needs no laws then: the compliance knows them
+        return Sensor(spec, laws={}, files={kind: COMPLIANCES[kind].load(inputs["compliance"])}, attributes=names)
+    if settings["friction"] is not None:
+        spec = SensorSpec.from_dict({**settings["sensor"], "friction": settings["friction"]})
+    spec = specimen_of(spec, mesh)
+    return Sensor(spec, laws=_laws(inputs, settings["laws"]), mesh=mesh_settings(mesh), solver=newton_settings(mesh),
+                  scatter=frustum_scatter(spec, mesh), attributes=names)
+
+
+def names_of(settings):
+    """What a press' file says of itself."""
+    item = settings["item"]
+    return {"model": settings["model"], "set": item["set"], "item": item["name"]}
+
+
+def press_label(settings):
+    """A press in words: where its file lies."""
+    return "{set}/{item}/{model}".format_map(names_of(settings))
+
+
+def pose_of(item):
+    """The `Pose` of an item, or None for the centred one."""
+    return None if item["pose"] is None else Pose.from_values(item["pose"])
 
 
 def _laws(inputs, laws):

@@ -5,6 +5,7 @@ that rules hand their stages plain values, and a comment in a YAML file reruns n
 """
 
 from dataclasses import asdict, dataclass
+from itertools import groupby
 from pathlib import Path
 
 from softtact.errors import InputError
@@ -22,6 +23,7 @@ from softtact.study.objects import Item, check_shapes, items_of_set, make_item, 
 
 PROJECT = Path(__file__).resolve().parents[3]
 SETS = ("indenters", "unseen", "grasps")
+TOGETHER = 50     # presses of a fast model in one job at most: a minute's work, and a command line within the system's limit
 
 
 @dataclass(frozen=True)
@@ -85,6 +87,17 @@ class Study:
     def items(self):
         """The items of all sets, in order."""
         return [item for items in self.items_of.values() for item in items.values()]
+
+    def press_jobs(self, model):
+        """[[Item]]: what a model presses in one job each, in the order of `items`.
+
+        A fast model presses an object's places together, for to start takes it longer than to press. Another object is another
+        job, so that a change of one presses that one again.
+        """
+        if self.values.models[model].kind == "hyperelastic":
+            return [[item] for item in self.items()]
+        places = [list(same) for _, same in groupby(self.items(), key=lambda item: (item.set, item.object))]
+        return [same[first:first + TOGETHER] for same in places for first in range(0, len(same), TOGETHER)]
 
 
 def read_values(configfile=None, *, default="config/config.yaml"):
