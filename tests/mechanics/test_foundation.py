@@ -18,7 +18,7 @@ from softtact.materials.laws.registry import make_law
 from softtact.mechanics.finite_displacement import membrane_loads
 from softtact.mechanics.foundation import FoundationFlexibility, foundation_flexibility
 from softtact.mechanics.foundation_places import Places, Sideways, lattice_places
-from softtact.mechanics.foundation_press import FoundationMaps, FoundationSettings, press_foundation
+from softtact.mechanics.foundation_press import FoundationMaps, FoundationSettings, _Press, press_foundation
 from softtact.mechanics.frustum_law import FrustumLaw, _root_stiffness, _stiffness_at_rest, frustum_law
 from softtact.mechanics.mesh_settings import MeshSettings
 from softtact.mechanics.sensor_bodies import build_unit_cell
@@ -424,6 +424,15 @@ def test_a_force_that_is_not_reached_says_from_which_one_on(flexibility):
     levels = press_foundation(flexibility, points, [4.0], settings=FoundationSettings(max_iterations=1))
     with pytest.raises(ConvergenceError, match="did not reach 4 N: from 0 N on .* ask for smaller forces, or for the hyperelastic"):
         next(levels)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_level_whose_patches_have_all_let_go_is_not_reached_and_nothing_is_divided_by_zero(flexibility):
+    press = _Press(flexibility, points_of(BOX, flexibility), FoundationSettings())
+    state = press.first()
+    assert state.touching.any()
+    state.touching[:] = False
+    assert press.level(state, 1.0) == (None, 1)
 
 
 def test_the_object_holds_nodes_beside_its_edge_as_softly_as_its_edge_reaches_where_they_have_moved_to(flexibility, whole):

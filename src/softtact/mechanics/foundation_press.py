@@ -163,6 +163,8 @@ class _Press:
                 share = 0.5 if iteration > 1 and again < _LOOKS_AGAIN // 2 else 1.0
                 moved, down_by = moved + share * (state.effects.moved - moved), down_by + share * (state.depth - down_by)
                 gap0, look = self._contact(state, moved, down_by), False
+            if not state.touching.any():     # nothing carries the force
+                break
             effects, already = state.effects, self.slab.seen(self.finite.down(state.effects))
             try:
                 f, q, depth = self._solve(gap0, already, state, force)
