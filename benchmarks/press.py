@@ -17,35 +17,39 @@ import numpy as np
 import record
 
 import softtact
+from softtact.devices import find_device
 from softtact.geometry.meshes import read_mesh
 from softtact.mechanics.hyperelastic import NewtonSettings
 from softtact.mechanics.mesh_settings import MeshSettings
 
 OBJECTS = ["config/objects/indenters/circle_m.stl"]
 MESHES = {"production": MeshSettings(), "draft": MeshSettings.draft(), "fine": MeshSettings.fine()}
-CASES = [("draft", 20, 2), ("production", 5, 2), ("production", 20, 2), ("fine", 5, 2), ("fine", 20, 2), ("production", 20, 1)]
+CASES = [("draft", 20, 2, "cpu"), ("production", 5, 2, "cpu"), ("production", 20, 2, "cpu"), ("fine", 5, 2, "cpu"),
+         ("fine", 20, 2, "cpu"), ("production", 20, 1, "cpu")]
+ON_GPU = [("draft", 20, 2, "cuda"), ("production", 20, 2, "cuda"), ("fine", 20, 2, "cuda")]     # where torch finds one
 LARGEST_N = 50.0
 
 
-def measure(file, mesh, levels, threads):
+def measure(file, mesh, levels, threads, device):
     """One press in this process: seconds, iterations, memory, and where it went."""
     sensor, body = softtact.load_sensor("coro"), read_mesh(file, unit="mm")
+    sensor.device = device
     sensor.mesh, sensor.solver = MESHES[mesh], NewtonSettings.draft() if mesh == "draft" else NewtonSettings()
     sensor.press(body, force_n=[0.5], model="hyperelastic", threads=threads)
     start = time.perf_counter()
     result = sensor.press(body, force_n=np.linspace(LARGEST_N / levels, LARGEST_N, levels), model="hyperelastic", threads=threads)
-    return {"object": Path(file).stem, "mesh": mesh, "levels": levels, "threads": threads, "solver": result.solver,
-            "seconds": round(time.perf_counter() - start, 2), "iterations": int(result.iterations.sum()),
+    return {"object": Path(file).stem, "mesh": mesh, "levels": levels, "threads": threads, "device": device,
+            "solver": result.solver, "seconds": round(time.perf_counter() - start, 2), "iterations": int(result.iterations.sum()),
             "indentation_mm": round(float(result.indentation_mm[-1]), 5), "residual_n": float(result.residual_n.max()),
             "overlap_um": round(1e3 * float(result.penetration_mm.max()), 3),
             "memory_gb": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6, 2)}
 
 
 def main(files):
-    """Print a row per object and case (mesh, levels, threads), and write benchmarks/results/press.json after each."""
+    """Print a row per object and case (mesh, levels, threads, device), and write benchmarks/results/press.json after each."""
     rows, path = [], "No press was made."
-    print(f"{'object':12}{'mesh':12}{'levels':>7}{'threads':>8}{'seconds':>9}{'iterations':>11}{'memory, GB':>11}")
-    for file, case in itertools.product(files, CASES):
+    print(f"{'object':12}{'mesh':12}{'levels':>7}{'threads':>8}{'device':>8}{'seconds':>9}", "iterations memory, GB")
+    for file, case in itertools.product(files, CASES + (ON_GPU if find_device("auto") != "cpu" else [])):
         run = subprocess.run([sys.executable, __file__, "--one", file, *map(str, case)], capture_output=True, text=True,
                              env=record.threads_of(1), check=False)
         if run.returncode:
@@ -53,7 +57,7 @@ def main(files):
             continue
         row = json.loads(run.stdout)
         rows.append(row)
-        print(f"{row['object']:12}{row['mesh']:12}{row['levels']:7}{row['threads']:8}{row['seconds']:9.1f}{row['iterations']:11}"
+        print(f"{row['object']:12}{row['mesh']:12}{row['levels']:7}{row['threads']:8}{row['device']:>8}{row['seconds']:9.1f}{row['iterations']:11}"
               f"{row['memory_gb']:11.2f}", flush=True)
         path = record.write("press", rows=rows)
     print(path)
@@ -61,7 +65,7 @@ def main(files):
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--one"]:
-        file, mesh, levels, threads = sys.argv[2:]
-        print(json.dumps(measure(file, mesh, int(levels), int(threads))))
+        file, mesh, levels, threads, device = sys.argv[2:]
+        print(json.dumps(measure(file, mesh, int(levels), int(threads), device)))
     else:
         main(sys.argv[1:] or OBJECTS)

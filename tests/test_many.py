@@ -60,7 +60,7 @@ def stage(sensor, tmp_path):
     sensor.files["elastic"].save(tmp_path / "compliance.npz")
     MESHES[0].export(tmp_path / "punch.stl")
     shared = {"sensor": SMALL.model_dump(mode="json"), "model": "layer", "kind": "elastic", "laws": {}, "mesh": {},
-              "friction": None, "forces_n": [1.0, 4.0]}
+              "friction": None, "device": "cpu", "forces_n": [1.0, 4.0]}
     items = [{"name": name, "set": "indenters", "unit": "mm", "pose": pose}
              for name, pose in (("punch", None), ("punch-1", [0.3, 0.2, 1.0, 0.0, 0.0, 30.0]))]
     return {"object": tmp_path / "punch.stl", "compliance": tmp_path / "compliance.npz"}, shared, items

@@ -12,6 +12,7 @@ import numpy as np
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
 from softtact.contact.underside import Underside
 from softtact.contact.unilateral import not_settled
+from softtact.devices import find_device
 from softtact.errors import ConvergenceError, InputError, SofttactError
 from softtact.geometry.meshes import check_over_sensor, place
 from softtact.pressing import elastic_result
@@ -38,11 +39,7 @@ def on_gpu(device, model):
         return False
     if model != "elastic":
         raise InputError(f"device={device!r}: only the elastic model presses on a GPU; leave it out for the model {model!r}.")
-    import torch  # seconds, which presses by processes need not wait for
-
-    if device != "auto" and not torch.cuda.is_available():
-        raise InputError(f"device={device!r}: torch finds no GPU here; write 'cpu', or leave it out.")
-    return torch.cuda.is_available()
+    return find_device(device) != "cpu"
 
 
 def press_batch(sensor, jobs, force_n, *, device, workers, label):

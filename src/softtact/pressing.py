@@ -132,7 +132,7 @@ def _of_record(sensor, body, record, forces, times, bodies):
                                contact_error_mm=numbers.pop("contact_error_mm"), points=numbers.pop("points"),
                                frustum_mm=sensor.spec.dielectric.frusta.height_mm,
                                allowed_mm=sensor.solver.largest_penetration_mm)
-    result = make_result(sensor, "hyperelastic", body.solver.name, np.stack(maps), forces[:len(maps)], np.array(times),
+    result = make_result(sensor, "hyperelastic", body.method, np.stack(maps), forces[:len(maps)], np.array(times),
                          within_validity=valid, **numbers)
     return replace(result, bodies=tuple(bodies))
 

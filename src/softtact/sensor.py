@@ -13,6 +13,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from softtact.choice import TOLERANCE_MM, press_auto
+from softtact.devices import find_device
 from softtact.errors import ConvergenceError, InputError
 from softtact.geometry.meshes import check_over_sensor, place
 from softtact.geometry.sensor_spec import SensorSpec
@@ -57,6 +58,7 @@ def _config_file(kind, name):
 class Sensor:
     """A sensor with one law per layer; `mesh` sets the layered body's resolution, `solver` what counts as solved.
 
+    device: where the hyperelastic model sums up its elements: `cpu`, `cuda`, or `auto`: a GPU where torch finds one
     files: {"elastic": Compliance, "foundation": FoundationFlexibility}, what the fast models start from; else the user's cache
     """
 
@@ -67,6 +69,7 @@ class Sensor:
     files: dict = field(default_factory=dict)
     scatter: tuple | None = None
     attributes: dict = field(default_factory=dict)
+    device: str = "cpu"
 
     def press(self, mesh, *, pose=None, force_n, model="auto", policy="paper", tolerance_mm=TOLERANCE_MM, label="press",
               threads=None, keep_body=False):
@@ -101,8 +104,8 @@ class Sensor:
         """Press each of `meshes` in its pose, all through the same forces; a list of `PressResult`s in their order.
 
         meshes: one for each press, or a single one for all poses;  poses: a `Pose` or None (centred) for each press
-        workers: processes, by default one for each core;  device: `cuda` or another of torch's GPUs takes all presses of the
-        elastic model as one batch, `auto` where there is one; the other models', and those on the `cpu`, go over processes
+        workers: processes, by default one for each core;  device: `cuda`, or `auto` where there is one, takes all presses of the
+        elastic model to a GPU as one batch; the other models', and those on the `cpu`, go over processes
         failures: `raise` the first, after all are done, or `keep` each error in its press' place
         options: policy, tolerance_mm, as for `press`
         """
@@ -125,8 +128,14 @@ class Sensor:
 
     def body(self, *, threads=1, surface=None):
         """The `LayeredBody` that the hyperelastic model presses on."""
-        return build_sensor_body(self.spec, dielectric_law=self.laws["dielectric"], cover_law=self.laws["cover"],
+        device = find_device(self.device)
+        body = build_sensor_body(self.spec, dielectric_law=self.laws["dielectric"], cover_law=self.laws["cover"],
                                  mesh=self.mesh, scatter=self.scatter, threads=threads, surface=surface)
+        if device != "cpu":
+            from softtact.mechanics.device_kernels import DeviceKernels  # torch, which takes seconds to import
+
+            body.sum_with(DeviceKernels(device))
+        return body
 
     def checked_forces(self, force_n):
         """Forces (N) as an increasing array within the sensor's range; others are refused."""

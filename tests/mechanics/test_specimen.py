@@ -1,12 +1,16 @@
 """One specimen of the sensor: frusta and layers that differ from the nominal ones, the same for the same seed."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from softtact.errors import InputError
 from softtact.geometry.sensor_spec import SensorSpec
-from softtact.mechanics.layered_mesh import frustum_scatter, layered_mesh, mesh_settings, specimen_of
+from softtact.mechanics.hyperelastic import NewtonSettings
+from softtact.mechanics.layered_mesh import frustum_scatter, layered_mesh, mesh_settings, newton_settings, specimen_of
+from softtact.mechanics.mesh_settings import MeshSettings
 
 CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
 SCATTER = {"height_scatter": 0.01, "tip_scatter": 0.02, "thickness_scatter": 0.02, "specimen": 7}
@@ -32,6 +36,16 @@ def test_thicknesses_scatter_as_asked_for_over_many_specimens():
 
 def test_without_scatter_of_thickness_the_sensor_stays_as_it_is():
     assert specimen_of(CORO, {"height_scatter": 0.01}) is CORO and mesh_settings(SCATTER) == mesh_settings({})
+
+
+def test_a_preset_is_a_mesh_by_name_that_other_keys_change():
+    assert mesh_settings({"preset": "draft"}) == MeshSettings.draft() and mesh_settings({"preset": "fine"}) == MeshSettings.fine()
+    assert mesh_settings({"preset": "draft", "cover_splits": [1, 1]}) == replace(MeshSettings.draft(), cover_splits=(1, 1))
+    assert newton_settings({"preset": "draft"}) == NewtonSettings.draft() and newton_settings({}) == NewtonSettings()
+    looser = newton_settings({"preset": "draft", "largest_penetration_mm": 0.02})
+    assert looser == replace(NewtonSettings.draft(), largest_penetration_mm=0.02)
+    with pytest.raises(InputError, match="mesh: there is no preset 'drft'; did you mean 'draft'"):
+        mesh_settings({"preset": "drft"})
 
 
 def test_the_scatter_of_layers_leaves_that_of_the_frusta_as_it_was():

@@ -151,6 +151,7 @@ def pressed_with(model, items, forces_n):
         laws=chosen.laws,
         mesh=mesh_of(model),
         friction=friction_of(model),
+        device=chosen.device,
         forces_n=forces_n,
     )
 

@@ -45,6 +45,8 @@ def add(commands):
                          help="of the hyperelastic model: default is 1 to 4 %% off in the map's root mean square, draft 2 to 6 %% "
                               "and several times quicker; stable presses frusta deeper than half of their height; fine is 1 %% "
                               "off, at most 2.4 %%, for 2.7 times the default's time and 3 to 4 GB")
+    command.add_argument("--device", default="cpu", metavar="DEVICE",
+                         help="of the hyperelastic model: cpu (default), cuda, or auto, a GPU where there is one, sums up elements")
     command.add_argument("--card", action="append", metavar="LAYER=CARD.json",
                          help="a card of `softtact fit` for the dielectric or the cover, in place of the printed constants")
     command.add_argument("--out", type=Path, metavar="FILE.nc", help="write the maps as NetCDF")
@@ -67,7 +69,7 @@ def _press(options):
     check_over_sensor(place(mesh, pose=pose), spec.footprint_mm, name=str(options.mesh))
     try:
         sensor = replace(softtact.load_sensor(options.sensor, materials=_cards(options)),
-                         **_quality(options), attributes={"mesh_repairs": "; ".join(repairs)})
+                         **_quality(options), device=options.device, attributes={"mesh_repairs": "; ".join(repairs)})
         result = sensor.press(mesh, pose=pose, force_n=forces, model=options.model,
                               policy=options.policy, tolerance_mm=options.tolerance, keep_body=options.vtu is not None)
     except ConvergenceError as error:
@@ -79,12 +81,10 @@ def _press(options):
 
 def _quality(options):
     """The hyperelastic body's mesh and what counts as solved on it, by the names of `Sensor`."""
-    from softtact.mechanics.hyperelastic import NewtonSettings
-    from softtact.mechanics.mesh_settings import MeshSettings
+    from softtact.mechanics.layered_mesh import PRESETS
 
-    mesh = {"default": MeshSettings, "draft": MeshSettings.draft, "stable": MeshSettings.stable, "fine": MeshSettings.fine}
-    solver = NewtonSettings.draft if options.mesh_quality == "draft" else NewtonSettings
-    return {"mesh": mesh[options.mesh_quality](), "solver": solver()}
+    mesh, solver = PRESETS[options.mesh_quality]
+    return {"mesh": mesh(), "solver": solver()}
 
 
 def _show_press(result, options):

@@ -57,8 +57,10 @@ class SolidBlock:
     gradients (u, g, m, 3) in 1/mm, kept as (u, g, 3, m), and volumes (u, g) in mm3 of the shapes that occur; shapes (e,): which is
     an element's, by default each its own; points (g, 3) of the quadrature in parent coordinates; local_over_shear: k / mu;
     growing_over_shear: q / mu; trilinear: project on trilinear instead of linear functions. Displacements come per element
-    (e, m, 3) in mm.
+    (e, m, 3) in mm. loops: what sums over points and nodes, `kernels` or `device_kernels`.
     """
+
+    loops = kernels
 
     def __init__(self, gradients, volumes, points, law, *, shapes=None, local_over_shear=0.0, growing_over_shear=0.0,
                  trilinear=False):
@@ -93,14 +95,14 @@ class SolidBlock:
         return BlockState(energy=sum(energies), force=np.concatenate(forces), displacement=displacement)
 
     def _evaluate(self, displacement, shapes):
-        F, C, J = kernels.deformation(displacement, self.gradients, shapes)
+        F, C, J = self.loops.deformation(displacement, self.gradients, shapes)
         if not J.min() > 0:
             return None
         response = self.law.isochoric(C, tangent=False)
         volumetric = self._volumetric(J, shapes)
         energy = float(self.volumes[shapes].ravel() @ response.energy + volumetric.energy)
-        return energy, kernels.internal_force(F, C, J, self.gradients, self.volumes, shapes, response.stress,
-                                              volumetric.pressure)
+        return energy, self.loops.internal_force(F, C, J, self.gradients, self.volumes, shapes, response.stress,
+                                                 volumetric.pressure)
 
     def tangent(self, displacement, elements=slice(None), *, precision=np.float64):
         """Tangent (e, 3 m, 3 m) in N/mm of the chosen elements, whose displacement (e, m, 3) is given.
@@ -108,12 +110,12 @@ class SolidBlock:
         precision: float32 takes two thirds of the time, for steps that are corrected by a residual in double precision
         """
         shapes = self.shapes[elements]
-        F, C, J = kernels.deformation(displacement, self.gradients, shapes)
+        F, C, J = self.loops.deformation(displacement, self.gradients, shapes)
         response = self.law.isochoric(C, tangent=True)
         volumetric = self._volumetric(J, shapes)
-        return kernels.tangent(F, C, J, self.gradients, self.volumes, shapes, response.stress, response.tangent,
-                               volumetric.pressure, self.basis, self.gram_inverse, self.projected_modulus,
-                               self.local_modulus, volumetric.growing, np.empty(0, precision))
+        return self.loops.tangent(F, C, J, self.gradients, self.volumes, shapes, response.stress, response.tangent,
+                                  volumetric.pressure, self.basis, self.gram_inverse, self.projected_modulus,
+                                  self.local_modulus, volumetric.growing, np.empty(0, precision))
 
     @property
     def volume(self):

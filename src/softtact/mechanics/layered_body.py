@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from softtact.mechanics import kernels
 from softtact.mechanics.body_friction import BodyFriction
 from softtact.mechanics.contact_step import ContactStepper
 from softtact.mechanics.frustum_bed import BedState
@@ -70,6 +71,17 @@ class LayeredBody:
         slab.build_pattern(self.cells.eliminated, self.cells.outer_dofs)
         self.solver = make_solver(threads=threads, rough=True)
         self.stepper = ContactStepper(self.solver)
+
+    def sum_with(self, loops):
+        """Let elements be summed by `loops`: `kernels`, as from the start, or `device_kernels`."""
+        for block in self.slab.blocks + [self.bed.block]:
+            block.loops = loops
+
+    @property
+    def method(self):
+        """Linear solver and device in words."""
+        loops = self.bed.block.loops
+        return self.solver.name if loops is kernels else f"{self.solver.name}; elements on {loops.device}"
 
     def close(self):
         """Free the factors, and end the threads."""

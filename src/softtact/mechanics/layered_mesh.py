@@ -1,5 +1,7 @@
 """The layered body's mesh as a file, and its settings from plain values."""
 
+from dataclasses import replace
+
 import meshio
 import numpy as np
 
@@ -11,27 +13,42 @@ from softtact.mechanics.hyperelastic import NewtonSettings
 from softtact.mechanics.mesh_settings import MeshSettings
 from softtact.mechanics.pressed_body import VTK_HEX27, pressed_body
 from softtact.mechanics.sensor_bodies import build_sensor_body
+from softtact.unknown_names import unknown
 
 _SCATTER_KEYS = ("height_scatter", "tip_scatter", "thickness_scatter", "specimen")
 _LARGEST_DEVIATION = 2.5     # standard deviations: a specimen beyond would not have passed inspection
 _SOLVER_KEYS = ("largest_penetration_mm",)
+# Meshes by name, and what counts as solved on them.
+PRESETS = {"default": (MeshSettings, NewtonSettings), "draft": (MeshSettings.draft, NewtonSettings.draft),
+           "stable": (MeshSettings.stable, NewtonSettings), "fine": (MeshSettings.fine, NewtonSettings)}
 
 
 def mesh_settings(values):
-    """`MeshSettings` from a mapping; the scatter's and the solver's keys are passed over, an unknown key is refused."""
-    own = {key: value for key, value in values.items() if key not in _SCATTER_KEYS + _SOLVER_KEYS}
+    """`MeshSettings` from a mapping: those of its `preset`, changed by what else it says.
+
+    The scatter's and the solver's keys are passed over, an unknown key is refused.
+    """
+    own = {key: value for key, value in values.items() if key not in ("preset", *_SCATTER_KEYS, *_SOLVER_KEYS)}
     unknown = sorted(set(own) - set(MeshSettings.__dataclass_fields__))
     if unknown:
         raise InputError(f"mesh: key {unknown[0]!r} is unknown; use one of {', '.join(MeshSettings.__dataclass_fields__)}.")
     try:
-        return MeshSettings(**{key: tuple(value) if isinstance(value, list) else value for key, value in own.items()})
+        changes = {key: tuple(value) if isinstance(value, list) else value for key, value in own.items()}
+        return replace(_preset(values)[0](), **changes)
     except ValueError as problem:
         raise InputError(f"mesh: {problem}.") from None
 
 
 def newton_settings(values):
     """`NewtonSettings` from the same mapping."""
-    return NewtonSettings(**{key: values[key] for key in _SOLVER_KEYS if key in values})
+    return replace(_preset(values)[1](), **{key: values[key] for key in _SOLVER_KEYS if key in values})
+
+
+def _preset(values):
+    name = values.get("preset", "default")
+    if name not in PRESETS:
+        raise InputError(f"mesh: {unknown(name, PRESETS, kind='preset')}")
+    return PRESETS[name]
 
 
 def frustum_scatter(spec, values):

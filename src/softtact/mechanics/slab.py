@@ -194,6 +194,11 @@ class Slab:
         """All elements with their nodes: [(nodes (e, w), block)]."""
         return self.groups + [part for group in self.cell_groups for part in group.parts]
 
+    @property
+    def blocks(self):
+        """All blocks of elements: those of `solids`, and the same joined."""
+        return [block for _, block in self.solids + self._joined]
+
     def _number_unknowns(self, sides):
         """Free unknowns: all but the sides, which are `held` (sensor shell), `symmetric` (unit cell) or also `free`."""
         x, y, _ = self.points.T

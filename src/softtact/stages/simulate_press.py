@@ -1,7 +1,7 @@
 """One item pressed with one model through all forces.
 
 inputs: object (STL), and of mesh, compliance, card_dielectric, card_cover what the model needs
-outputs: press;  settings: item {name, set, unit, pose}, sensor, model, kind, laws {layer: law}, mesh, friction, forces_n
+outputs: press;  settings: item {name, set, unit, pose}, sensor, model, kind, laws {layer: law}, mesh, friction, device, forces_n
 """
 
 from softtact.errors import ConvergenceError
@@ -43,7 +43,7 @@ def make_sensor(inputs, settings):
         spec = SensorSpec.from_dict({**settings["sensor"], "friction": settings["friction"]})
     spec = specimen_of(spec, mesh)
     return Sensor(spec, laws=_laws(inputs, settings["laws"]), mesh=mesh_settings(mesh), solver=newton_settings(mesh),
-                  scatter=frustum_scatter(spec, mesh), attributes=names)
+                  scatter=frustum_scatter(spec, mesh), attributes=names, device=settings["device"])
 
 
 def names_of(settings):

@@ -202,6 +202,8 @@ def _check_models(values, spec):
         where = f"the configuration, at 'models.{name}'"
         if model.friction and model.kind != "hyperelastic":
             raise InputError(f"{where}: a model of kind {model.kind!r} knows no friction; leave 'friction' out.")
+        if model.device != "cpu" and model.kind != "hyperelastic":
+            raise InputError(f"{where}: a model of kind {model.kind!r} has no 'device'; leave it out.")
         if model.friction:
             SensorSpec.from_dict({**spec.model_dump(mode="json"), "friction": model.friction.model_dump()}, where=where)
 

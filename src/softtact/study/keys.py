@@ -172,6 +172,8 @@ class CatalogueEntry(Section):
 class Mesh(Section):
     """Resolution of a model's mesh, and the scatter of its frusta; what is not said is the model's own default."""
 
+    preset: Literal["default", "draft", "stable", "fine"] | None = Field(
+        None, description="the mesh, and what counts as solved on it, that the other keys change (docs/discretisation.md)")
     sheet_layers: PositiveInt | None = None
     cover_levels: Annotated[list[float], AfterValidator(_rising)] | None = Field(
         None, description="heights of the cover's layers of elements, from 0 to 1")
@@ -217,6 +219,8 @@ class Model(Section):
     mesh: Mesh = Mesh()
     laws: dict[Literal["dielectric", "cover"], Law] = {}
     friction: OwnFriction | None = Field(None, description="only of a hyperelastic model; by default the sensor's")
+    device: Literal["cpu", "cuda", "auto"] = Field(
+        "cpu", description="only of a hyperelastic model; where its elements are summed up; auto: a GPU where there is one")
     needs: list[Literal["mesh", "compliance", "card_dielectric", "card_cover"]] = []
 
     @property

@@ -1,0 +1,123 @@
+"""The loops of `kernels` as batched products on a device of torch: what elements do goes to a GPU, what laws do stays.
+
+A law sees C of all points (6 numbers each) and gives stress and moduli (6 and 36), so that there is one text of every law. Sums
+run in double precision but for the products of a tangent in single precision, as in `kernels`; both agree to rounding.
+"""
+
+import torch
+
+_ROW, _COL = [0, 1, 2, 0, 1, 2], [0, 1, 2, 1, 2, 0]     # of xx, yy, zz, xy, yz, zx
+_VOIGT = [[0, 3, 5], [3, 1, 4], [5, 4, 2]]
+
+
+class DeviceKernels:
+    """`deformation`, `internal_force` and `tangent` with the arguments of `kernels`: arrays, but for F, which stays there."""
+
+    def __init__(self, device):
+        self.device = torch.device(device)
+        self._kept = {}
+
+    def deformation(self, displacement, gradients, shapes):
+        """See `kernels.deformation`."""
+        F, C, J = _kinematics(self._constant(gradients)[self._there(shapes)], self._there(displacement))
+        return F, _back(C), _back(J)
+
+    def internal_force(self, F, C, J, gradients, volumes, shapes, stress, pressure):
+        """See `kernels.internal_force`."""
+        which = self._there(shapes)
+        force = _forces(F, self._there(J), self._constant(gradients)[which], self._constant(volumes)[which],
+                        self._per_point(stress, J), self._there(pressure))
+        return _back(force)
+
+    def tangent(self, F, C, J, gradients, volumes, shapes, stress, moduli, pressure, basis, gram_inverse, bulk_modulus,
+                local_modulus, growing, like):
+        """See `kernels.tangent`."""
+        which, precision = self._there(shapes), torch.from_numpy(like).dtype
+        G, w, J_there = self._constant(gradients)[which], self._constant(volumes)[which], self._there(J)
+        pj, growing = self._there(pressure) * J_there, self._there(growing) if growing.size else None
+        local = 0.5 * local_modulus * (J_there**2 + 1)
+        if growing is not None:
+            local = local + growing * J_there**2
+        A, inverse = _moduli(F, w, self._per_point(stress, J), self._per_point(moduli, J), pj, local)
+        change = torch.einsum("egij,egjm->egmi", (w * J_there)[..., None, None] * (F @ inverse), G).flatten(2)
+        volumetric = _volumetric(change.to(precision), self._constant(basis).to(precision),
+                                 self._constant(gram_inverse)[which].to(precision), bulk_modulus, w.to(precision),
+                                 None if growing is None else growing.to(precision))
+        return _back(volumetric + _products(A.to(precision), G.to(precision)))
+
+    def _there(self, values):
+        return torch.as_tensor(values, device=self.device)
+
+    def _per_point(self, values, J):
+        """A law's answer (e * g, ...) as (e, g, ...)."""
+        return self._there(values).reshape(*J.shape, *values.shape[1:])
+
+    def _constant(self, array):
+        """An array that does not change, brought there once; it is kept, so that no other can have its identity."""
+        if id(array) not in self._kept:
+            self._kept[id(array)] = array, self._there(array)
+        return self._kept[id(array)][1]
+
+
+def _back(values):
+    return values.cpu().numpy()
+
+
+def _kinematics(G, u):
+    """F (e, g, 3, 3), C (e * g, 6) and J (e, g) from gradients (e, g, 3, m) and displacements (e, m, 3)."""
+    F = torch.einsum("egjm,emi->egij", G, u) + torch.eye(3, dtype=G.dtype, device=G.device)
+    C = F.mT @ F
+    x, y, z = F.unbind(-2)
+    J = (x * torch.linalg.cross(y, z, dim=-1)).sum(-1)
+    return F, C[..., _ROW, _COL].flatten(0, 1), J
+
+
+def _inverse_of_c(F):
+    """C^-1 (e, g, 3, 3) from the cofactors of F."""
+    x, y, z = F.unbind(-2)
+    cofactors = torch.stack([torch.linalg.cross(*pair, dim=-1) for pair in ((y, z), (z, x), (x, y))], dim=-2)
+    inverse = cofactors / (x * cofactors[..., 0, :]).sum(-1)[..., None, None]     # F^-T
+    return inverse.mT @ inverse
+
+
+def _stress(w, stress, pj, inverse):
+    """Second Piola-Kirchhoff stress (e, g, 3, 3) times the points' volumes."""
+    return w[..., None, None] * (stress[..., _VOIGT] + pj[..., None, None] * inverse)
+
+
+def _forces(F, J, G, w, stress, pressure):
+    """Nodal forces (e, 3 m)."""
+    P = F @ _stress(w, stress, pressure * J, _inverse_of_c(F))
+    return torch.einsum("egij,egjm->emi", P, G).flatten(1)
+
+
+def _moduli(F, w, stress, moduli, pj, local):
+    """A (e, g, i, k, j, l) = F_ip F_jq D_pkql + delta_ij S_kl, times the points' volumes, and C^-1 (e, g, 3, 3)."""
+    inverse = _inverse_of_c(F)
+    S, rows = _stress(w, stress, pj, inverse), torch.tensor(_VOIGT, device=F.device)
+    D = moduli[..., rows[:, :, None, None], rows[None, None, :, :]]
+    D = D + (pj + local)[..., None, None, None, None] * torch.einsum("egij,egpq->egijpq", inverse, inverse)
+    crossed = torch.einsum("egip,egjq->egijpq", inverse, inverse) + torch.einsum("egiq,egjp->egijpq", inverse, inverse)
+    D = w[..., None, None, None, None] * (D - pj[..., None, None, None, None] * crossed)
+    A = torch.einsum("egip,egpkql,egjq->egikjl", F, D, F)
+    return A + torch.einsum("ij,egkl->egikjl", torch.eye(3, dtype=F.dtype, device=F.device), S), inverse
+
+
+def _products(A, G):
+    """K (e, 3 m, 3 m): the sum over points of G_ka A_ikjl G_lb."""
+    elements, points, _, nodes = G.shape
+    right = torch.einsum("egikjl,eglb->egkijb", A, G).reshape(elements, 3 * points, 9 * nodes)
+    K = G.reshape(elements, 3 * points, nodes).mT @ right
+    return K.reshape(elements, nodes, 3, 3, nodes).permute(0, 1, 2, 4, 3).reshape(elements, 3 * nodes, 3 * nodes)
+
+
+def _volumetric(change, basis, gram_inverse, bulk_modulus, w, growing):
+    """The pressure's part of K, see `kernels._volumetric`, from how the points' volumes change with the nodes (e, g, 3 m)."""
+    seen = basis.T @ change
+    projected = gram_inverse @ seen
+    if growing is None:
+        return bulk_modulus * (projected.mT @ seen)
+    weighted, measured = growing[..., None] * basis, w[..., None] * basis
+    half = 0.5 * (bulk_modulus * seen + (measured.mT @ weighted) @ projected) - weighted.mT @ change
+    return torch.cat([projected, half], dim=1).mT @ torch.cat([half, projected], dim=1)
+
