@@ -44,14 +44,20 @@ def test_a_killed_run_resumes_and_gives_the_files_of_an_undisturbed_one(killed, 
     assert results(killed) == results(finished_once)
 
 
-def test_sigkill_in_every_stage_is_survived_and_ends_with_the_same_files(finished_once, tmp_path):
-    """The first job of each stage dies after its first output; a job that is tried again is what the next run would run."""
-    project, killed = Project.of_sources(tmp_path / "project"), tmp_path / "killed"
+def test_sigkill_in_every_stage_is_survived_and_ends_with_the_same_files(finished, tmp_path):
+    """The first job of each stage dies after its first output; a job that is tried again is what the next run would run.
+
+    One object gets a second place, for a job that presses several.
+    """
+    project, killed = Project.of_sources(tmp_path / "shot"), tmp_path / "killed"
     killed.mkdir()
+    for each in (project, finished):
+        each.edit("config/tiny.yaml", "donut_m], presses: null", "donut_m], presses: 4")
+    finished.snakemake()
     project.snakemake("--retries", "1", environment={"SOFTTACT_STUB_KILLED": str(killed)})
     stages = {path.stem for path in (project.folder / "src/softtact/stages").glob("[!_]*.py")} - {"import_published"}
     assert {path.name for path in killed.iterdir()} == stages
-    assert results(project) == results(finished_once)
+    assert results(project) == results(finished)
 
 
 def test_a_damaged_file_is_told_and_when_deleted_made_again_with_all_that_comes_of_it(finished, finished_once):
