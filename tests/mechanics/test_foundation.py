@@ -15,6 +15,7 @@ from softtact.geometry.meshes import place
 from softtact.geometry.pose import Pose
 from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.laws.registry import make_law
+from softtact.mechanics import foundation_press
 from softtact.mechanics.finite_displacement import membrane_loads
 from softtact.mechanics.foundation import FoundationFlexibility, foundation_flexibility
 from softtact.mechanics.foundation_places import Places, Sideways, lattice_places
@@ -424,6 +425,27 @@ def test_a_force_that_is_not_reached_says_from_which_one_on(flexibility):
     levels = press_foundation(flexibility, points, [4.0], settings=FoundationSettings(max_iterations=1))
     with pytest.raises(ConvergenceError, match="did not reach 4 N: from 0 N on .* ask for smaller forces, or for the hyperelastic"):
         next(levels)
+
+
+@pytest.mark.parametrize("values", [(0, 0, 0, 0, 0, 0), TILTED])
+def test_steps_that_keep_their_levels_factor_give_the_map_of_steps_with_their_own(flexibility, monkeypatch, values):
+    made, points = [], points_of(BOX, flexibility, values)
+
+    class Counted(foundation_press._Factored):
+        def __init__(self, *what):
+            made.append(self)
+            super().__init__(*what)
+
+    monkeypatch.setattr(foundation_press, "_Factored", Counted)
+    levels, counts = [], []
+    for share in (0.0, FoundationSettings().same_slope):
+        made.clear()
+        settings = FoundationSettings(same_slope=share)
+        levels.append(list(press_foundation(flexibility, points, [0.3, 0.6, 0.9], settings=settings)))
+        counts.append(len(made))
+    assert counts[1] < counts[0]
+    own, kept = (FoundationMaps(flexibility, points)(each) for each in levels)
+    assert_close(kept, own, 1e-3)      # the tolerance's 0.03 % in the root mean square
 
 
 @pytest.mark.filterwarnings("error")

@@ -39,6 +39,7 @@ class FoundationSettings:
     tolerance: largest change of a frustum's force in the last step, of the whole force;  gap_mm: overlap that joins a contact
     follow: whether the effects of finite displacement are taken in;  rocking: whether frusta rock
     patches: whether four points share one
+    same_slope: share by which frusta's compliances may change before a step's matrix is factored anew, if no contact changed
     """
 
     tolerance: float = 5e-5     # a hundredth changes the map by 0.03 % at most (root mean square)
@@ -47,6 +48,7 @@ class FoundationSettings:
     follow: bool = True
     rocking: bool = True
     patches: bool = True
+    same_slope: float = 0.05     # a step's error is cut to as much: a level's second step needs no factor of its own
 
 
 @dataclass(frozen=True)
@@ -141,7 +143,7 @@ class _Press:
         self.frusta = len(places.frusta)
         self.patch = patches_of(points, flexibility.grid, settings.patches)
         self.slab, self.edges = _Slab(places.surface(), self.patch), SoftEdges(flexibility)
-        self.possible = np.ones(self.patch.shape[0], dtype=bool)
+        self.possible, self._factored = np.ones(self.patch.shape[0], dtype=bool), None
         self.finite = FiniteDisplacement(flexibility, points, places, settings)
 
     def first(self):
@@ -199,6 +201,7 @@ class _Press:
         self.possible = softness < _SOFTEST
         state.touching = state.touching & self.possible
         self.slab.soften(softness)
+        self._factored = None
         return self.patch @ (points.gap + (points.slope.T * moved).sum(axis=0))
 
     def _elsewhere(self, state, moved, depth):
@@ -211,19 +214,16 @@ class _Press:
 
         already (c + b,): what else has moved patches down and frusta up
         """
-        c, law, matrix = len(gap0), self.law, self.slab.matrix
-        a, b = np.flatnonzero(state.touching), np.flatnonzero(state.standing)
-        rows = np.concatenate([a, c + b])
-        system = matrix.take(rows, axis=0).take(rows, axis=1)
-        slope = law.slope(state.q[b])
-        place = np.arange(len(a), len(rows))
-        system[place, place] += slope.astype(np.float32)
-        moved = (matrix[:, c:] @ state.effects.loads.astype(np.float32) + already)[rows]
-        right = np.concatenate([-gap0[a], slope * state.q[b] - law.extension(state.q[b]) + state.effects.rise[b]]) - moved
-        at_rest, per_depth = _solve_positive(system, np.column_stack([right, np.arange(len(rows)) < len(a)])).T
-        depth = (force - at_rest[:len(a)].sum()) / per_depth[:len(a)].sum()
+        c, law, matrix, slope = len(gap0), self.law, self.slab.matrix, self.law.slope(state.q)
+        if self._factored is None or not self._factored.serves(state, slope, self.settings.same_slope):
+            self._factored = _Factored(matrix, state, slope)
+        factored, a, b = self._factored, np.flatnonzero(state.touching), np.flatnonzero(state.standing)
+        moved = (matrix[:, c:] @ state.effects.loads.astype(np.float32) + already)[factored.rows]
+        reached = factored.slope[b] * state.q[b] - law.extension(state.q[b]) + state.effects.rise[b]
+        at_rest = factored.solve(np.concatenate([-gap0[a], reached]) - moved)
+        depth = (force - at_rest[:len(a)].sum()) / factored.per_depth[:len(a)].sum()
         forces = np.zeros(len(matrix))
-        forces[rows] = at_rest + depth * per_depth
+        forces[factored.rows] = at_rest + depth * factored.per_depth
         return forces[:c], forces[c:], depth
 
     @staticmethod
@@ -274,8 +274,28 @@ class _Slab:
         return np.concatenate([self._patch.T @ forces[:patches], -forces[patches:]])
 
 
-def _solve_positive(system, right):
-    """Solve a positive definite system in single precision, with the residual corrected once."""
-    factor = sla.cho_factor(system.T, lower=False, check_finite=False)      # the transpose is in LAPACK's order
-    first = sla.cho_solve(factor, right.astype(np.float32), check_finite=False)
-    return first + sla.cho_solve(factor, (right - system @ first).astype(np.float32), check_finite=False).astype(float)
+class _Factored:
+    """The matrix of some active sets and slopes (b,), factored in single precision.
+
+    rows: those of the touching patches, then of the standing frusta;  per_depth: their forces in N for each mm of depth
+    """
+
+    def __init__(self, matrix, state, slope):
+        self._touching, self._standing, self.slope = state.touching.copy(), state.standing.copy(), slope
+        a, b = np.flatnonzero(state.touching), np.flatnonzero(state.standing)
+        self.rows, frusta = np.concatenate([a, len(state.touching) + b]), np.arange(len(a), len(a) + len(b))
+        self._system = matrix.take(self.rows, axis=0).take(self.rows, axis=1)
+        self._system[frusta, frusta] += slope[b].astype(np.float32)
+        self._factor = sla.cho_factor(self._system.T, lower=False, check_finite=False)      # the transpose is in LAPACK's order
+        self.per_depth = self.solve(np.arange(len(self.rows)) < len(a))
+
+    def serves(self, state, slope, share):
+        """Whether the sets are still these, and the slopes within a share of these."""
+        same = np.array_equal(state.touching, self._touching) and np.array_equal(state.standing, self._standing)
+        return same and bool((np.abs(slope - self.slope) <= share * self.slope).all())
+
+    def solve(self, right):
+        """The solution (rows,), with the residual of single precision corrected once."""
+        first = sla.cho_solve(self._factor, right.astype(np.float32), check_finite=False)
+        missing = (right - self._system @ first).astype(np.float32)
+        return first + sla.cho_solve(self._factor, missing, check_finite=False).astype(float)
