@@ -11,6 +11,9 @@ from numba import njit
 _ROW = np.array([0, 1, 2, 0, 1, 2])
 _COL = np.array([0, 1, 2, 1, 2, 0])
 _VOIGT = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
+_PAIR = np.array([0, 2, 3])     # components (i, j >= i) are pair _PAIR[i] + j: 00 01 02 11 12 22
+_LANES = 16                     # numbers of single precision in the widest vector of a processor
+_AT_ONCE = 4                    # modes of the pressure that are added at once
 
 
 @njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})     # sums over nodes, several at once
@@ -111,25 +114,21 @@ def internal_force(F, C, J, gradients, volumes, shapes, stress, pressure):
     return force
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath={"contract"})
 def _elasticity(A, f, S, D):
-    """First elasticity tensor A (i, k, j, l) = F_ip F_jq D_pkql + delta_ij S_kl from the material one D (6, 6)."""
-    half = np.empty((3, 3, 6))
+    """First elasticity tensor A (k, ij, l) = F_ip F_jq D_pkql + delta_ij S_kl, pairs ij as in `_PAIR`, from D (6, 6) at rest."""
+    half = np.empty((3, 6))
     for i in range(3):
         for k in range(3):
             for m in range(6):
-                total = 0.0
-                for p in range(3):
-                    total += f[i, p] * D[_VOIGT[p, k], m]
-                half[i, k, m] = total
-    for i in range(3):
-        for k in range(3):
-            for j in range(3):
+                half[k, m] = f[i, 0] * D[_VOIGT[0, k], m] + f[i, 1] * D[_VOIGT[1, k], m] + f[i, 2] * D[_VOIGT[2, k], m]
+        for j in range(i, 3):
+            for k in range(3):
                 for l in range(3):
                     total = S[k, l] if i == j else 0.0
                     for q in range(3):
-                        total += half[i, k, _VOIGT[q, l]] * f[j, q]
-                    A[i, k, j, l] = total
+                        total += half[k, _VOIGT[q, l]] * f[j, q]
+                    A[k, _PAIR[i] + j, l] = total
 
 
 @njit(cache=True, nogil=True)
@@ -149,70 +148,98 @@ def _moduli(D, S, stress, moduli, inverse, w, pj, local):
             D[m, k] = D[k, m]
 
 
-@njit(cache=True, nogil=True)
-def _volume_change(change, f, inverse, gradient, scale):
-    """How the volume at a point changes with the nodes' displacements: scale F C^-1 : G, (3 m,) into `change`."""
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def _volume_change(change, f, inverse, slopes, scale):
+    """How the volume at a point changes with the nodes' displacements: scale F C^-1 : G into `change`, component by component."""
+    number, (by_x, by_y, by_z), width = slopes.dtype.type, (slopes[0], slopes[1], slopes[2]), slopes.shape[1]
     for i in range(3):
-        x = scale * (f[i, 0] * inverse[0] + f[i, 1] * inverse[3] + f[i, 2] * inverse[5])
-        y = scale * (f[i, 0] * inverse[3] + f[i, 1] * inverse[1] + f[i, 2] * inverse[4])
-        z = scale * (f[i, 0] * inverse[5] + f[i, 1] * inverse[4] + f[i, 2] * inverse[2])
-        for a in range(gradient.shape[1]):
-            change[3 * a + i] = x * gradient[0, a] + y * gradient[1, a] + z * gradient[2, a]
+        x = number(scale * (f[i, 0] * inverse[0] + f[i, 1] * inverse[3] + f[i, 2] * inverse[5]))
+        y = number(scale * (f[i, 0] * inverse[3] + f[i, 1] * inverse[1] + f[i, 2] * inverse[4]))
+        z = number(scale * (f[i, 0] * inverse[5] + f[i, 1] * inverse[4] + f[i, 2] * inverse[2]))
+        own = change[i * width:(i + 1) * width]
+        for a in range(width):
+            own[a] = x * by_x[a] + y * by_y[a] + z * by_z[a]
 
 
-@njit(cache=True, nogil=True)
-def _times_gradients(rights, A, G, g):
-    """Rows of point g in A_ij G for each i, columns j >= i side by side, from A (3, 3, 3, 3) and the gradients G (3 g, m)."""
-    x, y, z = G[3 * g], G[3 * g + 1], G[3 * g + 2]
-    nodes = len(x)
-    for i in range(3):
-        for k in range(3):
-            row = rights[i][3 * g + k]
-            for j in range(i, 3):
-                first, ax, ay, az = (j - i) * nodes, A[i, k, j, 0], A[i, k, j, 1], A[i, k, j, 2]
-                for a in range(nodes):
-                    row[first + a] = ax * x[a] + ay * y[a] + az * z[a]
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def _times_gradients(right, A, slopes):
+    """A_ij G of a point (3, 6 width), the pairs ij side by side, from A (3, 6, 3) and the gradients G (3, width)."""
+    by_x, by_y, by_z, width = slopes[0], slopes[1], slopes[2], slopes.shape[1]
+    for k in range(3):
+        for pair in range(6):
+            x, y, z, own = A[k, pair, 0], A[k, pair, 1], A[k, pair, 2], right[k, pair * width:(pair + 1) * width]
+            for a in range(width):
+                own[a] = x * by_x[a] + y * by_y[a] + z * by_z[a]
 
 
-@njit(cache=True, nogil=True)
-def _add_blocks(K, G, rights):
-    """K (3 m, 3 m) plus its blocks of components (i, j): G^T (A_ij G)."""
-    nodes = G.shape[1]
-    for i in range(3):
-        block = G.T @ rights[i]
-        for a in range(nodes):
-            for b in range(nodes):
-                K[3 * a + i, 3 * b + i] += block[a, b]
-        for j in range(i + 1, 3):
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def _add_products(blocks, G, right):
+    """Blocks (even, 6 width) plus G^T (A_ij G) of two points: gradients G (6, width), A_ij G (6, 6 width).
+
+    Two points and two nodes at once, so that what is loaded serves twice: twice as fast as BLAS on matrices so small.
+    """
+    g0, g1, g2, g3, g4, g5 = G[0], G[1], G[2], G[3], G[4], G[5]
+    r0, r1, r2, r3, r4, r5 = right[0], right[1], right[2], right[3], right[4], right[5]
+    for a in range(0, len(blocks), 2):
+        s0, s1, s2, s3, s4, s5 = g0[a], g1[a], g2[a], g3[a], g4[a], g5[a]
+        t0, t1, t2, t3, t4, t5 = g0[a + 1], g1[a + 1], g2[a + 1], g3[a + 1], g4[a + 1], g5[a + 1]
+        first, second = blocks[a], blocks[a + 1]
+        for b in range(blocks.shape[1]):
+            x0, x1, x2, x3, x4, x5 = r0[b], r1[b], r2[b], r3[b], r4[b], r5[b]
+            first[b] += s0 * x0 + s1 * x1 + s2 * x2 + s3 * x3 + s4 * x4 + s5 * x5
+            second[b] += t0 * x0 + t1 * x1 + t2 * x2 + t3 * x3 + t4 * x4 + t5 * x5
+
+
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def _add_modes(blocks, nodes, left, right):
+    """Blocks plus left^T right of modes (p, 3 width), p a multiple of `_AT_ONCE`."""
+    width = left.shape[1] // 3
+    for m in range(0, len(left), _AT_ONCE):
+        for i in range(3):
+            start, (r0, r1, r2, r3) = i * width, (right[m], right[m + 1], right[m + 2], right[m + 3])
+            r0, r1, r2, r3 = r0[start:], r1[start:], r2[start:], r3[start:]
             for a in range(nodes):
-                for b in range(nodes):
-                    value = block[a, (j - i) * nodes + b]
-                    K[3 * a + i, 3 * b + j] += value
-                    K[3 * b + j, 3 * a + i] += value
+                w, x, y, z = left[m, start + a], left[m + 1, start + a], left[m + 2, start + a], left[m + 3, start + a]
+                own = blocks[a, (_PAIR[i] + i) * width:(_PAIR[i] + 3) * width]
+                for b in range(len(own)):
+                    own[b] += w * r0[b] + x * r1[b] + y * r2[b] + z * r3[b]
 
 
 @njit(cache=True, nogil=True)
-def _volumetric(K, change, basis, gram_inverse, bulk_modulus, volumes, growing):
-    """K (3 m, 3 m) of the pressure's projected part, and of its growing part but for what stands at the points."""
+def _add_volumetric(blocks, nodes, change, basis, gram_inverse, bulk_modulus, volumes, growing):
+    """Blocks plus those of the pressure's projected part, and of its growing part but for what stands at the points."""
     seen = basis.T @ change
     projected = gram_inverse @ seen
     bulk_modulus = change.dtype.type(bulk_modulus)
     if len(growing) == 0:
-        K[:] = bulk_modulus * (projected.T @ seen)
+        _add_modes(blocks, nodes, projected, bulk_modulus * seen)
         return
     weighted, measured = np.empty_like(basis), np.empty_like(basis)
     for g in range(len(growing)):
         weighted[g], measured[g] = growing[g] * basis[g], volumes[g] * basis[g]
-    # P^T (k seen + inner P) - P^T cross - cross^T P as one symmetric product of twice as many rows.
+    # P^T (k seen + inner P) - P^T cross - cross^T P as one symmetric sum of two products.
     half = (bulk_modulus * seen + (measured.T @ weighted) @ projected) * change.dtype.type(0.5) - weighted.T @ change
-    K[:] = np.vstack((projected, half)).T @ np.vstack((half, projected))
+    _add_modes(blocks, nodes, projected, half)
+    _add_modes(blocks, nodes, half, projected)
 
 
 @njit(cache=True, nogil=True)
-def _in_precision(values, like):
-    """A copy of the values (n, k) in the precision of another array."""
-    out = np.empty(values.shape, like.dtype)
-    out[:] = values
+def _spread(K, blocks, width):
+    """Fill K (3 m, 3 m), unknowns node by node, from the blocks of pairs (ij) of components."""
+    nodes = len(K) // 3
+    for i in range(3):
+        for j in range(i, 3):
+            start = (_PAIR[i] + j) * width
+            for a in range(nodes):
+                for b in range(nodes):
+                    K[3 * a + i, 3 * b + j] = K[3 * b + j, 3 * a + i] = blocks[a, start + b]
+
+
+@njit(cache=True, nogil=True)
+def _padded(values, rows, columns, like):
+    """A copy of the values (n, k) in the precision of another array, with zeros up to (rows, columns)."""
+    out = np.zeros((rows, columns), like.dtype)
+    out[:len(values), :values.shape[1]] = values
     return out
 
 
@@ -226,34 +253,40 @@ def tangent(F, C, J, gradients, volumes, shapes, stress, moduli, pressure, basis
     growing: derivative (1 - P) growing (1 - P), a modulus (e, g) in MPa, or (0, 0) where there is none
     like: an array in whose precision the products are taken; what stands at a point is found in double precision
 
-    The products run over blocks of components (i, j >= i): K_ij = G^T A_ij G with the gradients G (3 g, m), three large
-    products an element instead of one with the strain-displacement matrix, which has a third of zeros.
+    The products run over blocks of components (i, j >= i): K_ij = G^T A_ij G with the gradients G (3 g, m), six blocks side by side
+    in rows of whole vectors instead of one product with the strain-displacement matrix, which has a third of zeros.
     """
     elements, points = J.shape
     nodes = gradients.shape[3]
+    width = -(-nodes // _LANES) * _LANES
     out = np.empty((elements, 3 * nodes, 3 * nodes), like.dtype)
-    G = np.empty((3 * points, nodes), like.dtype)
-    rights = (np.empty((3 * points, 3 * nodes), like.dtype), np.empty((3 * points, 2 * nodes), like.dtype),
-              np.empty((3 * points, nodes), like.dtype))
-    change = np.empty((points, 3 * nodes), like.dtype)
-    modes = _in_precision(basis, like)
-    A, D, S = np.empty((3, 3, 3, 3), like.dtype), np.empty((6, 6)), np.empty((3, 3))
+    blocks, right = np.empty((nodes + nodes % 2, 6 * width), like.dtype), np.empty((6, 6 * width), like.dtype)
+    G, change = np.zeros((3 * points + 3, width), like.dtype), np.empty((points, 3 * width), like.dtype)
+    several = -(-basis.shape[1] // _AT_ONCE) * _AT_ONCE
+    modes = _padded(basis, points, several, like)
+    A, D, S = np.empty((3, 6, 3), like.dtype), np.empty((6, 6)), np.empty((3, 3))
     grows = growing.size > 0
     for e in range(elements):
+        blocks[:], right[:] = 0.0, 0.0
         for g in range(points):
-            n, j, w, gradient = e * points + g, J[e, g], volumes[shapes[e], g], gradients[shapes[e], g]
+            n, j, w, own = e * points + g, J[e, g], volumes[shapes[e], g], G[3 * g:3 * g + 3]
             inverse = inverse_symmetric(C[n])
             local = 0.5 * local_modulus * (j * j + 1.0)
             if grows:
                 local += growing[e, g] * j * j
             _moduli(D, S, stress[n], moduli[n], inverse, w, pressure[e, g] * j, local)
             _elasticity(A, F[e, g], S, D)
-            _volume_change(change[g], F[e, g], inverse, gradient, w * j)
-            G[3 * g:3 * g + 3] = gradient
-            _times_gradients(rights, A, G, g)
-        _volumetric(out[e], change, modes, _in_precision(gram_inverse[shapes[e]], like), bulk_modulus, volumes[shapes[e]],
-                    growing[e:e + 1].ravel())
-        _add_blocks(out[e], G, rights)
+            own[:, :nodes] = gradients[shapes[e], g]
+            _volume_change(change[g], F[e, g], inverse, own, w * j)
+            _times_gradients(right[3 * (g % 2):], A, own)
+            if g % 2 == 1:
+                _add_products(blocks, G[3 * g - 3:], right)
+        if points % 2 == 1:
+            right[3:] = 0.0
+            _add_products(blocks, G[3 * points - 3:], right)
+        inverse_of_gram = _padded(gram_inverse[shapes[e]], several, several, like)
+        _add_volumetric(blocks, nodes, change, modes, inverse_of_gram, bulk_modulus, volumes[shapes[e]], growing[e:e + 1].ravel())
+        _spread(out[e], blocks, width)
     return out
 
 
