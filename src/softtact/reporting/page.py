@@ -67,7 +67,8 @@ def render_page(inputs, settings, *, folder, run):
     counts = ", ".join(f"{number} {verdict}" for verdict, number in claims.verdict.value_counts().items())
     return Environment(autoescape=True).from_string(PAGE).render(
         study=settings["study"], style=Markup(STYLE), facts=_archive_facts(settings, archive) if archive else _facts(settings),
-        synthetic=_synthetic_but_for_the_archive(ftir) if archive else _synthetic(ftir), tables=_tables(inputs, folder),
+        synthetic=_synthetic_but_for_the_archive(ftir) if archive else _synthetic(ftir, settings["config"]),
+        tables=_tables(inputs, folder),
         summary=Markup(_html(_summary(pd.read_csv(inputs["summary"])))), run=Markup(_html(run)), run_said=run_sentence(run),
         run_link="tables/run.csv", figures=figures, claims=rows, verdicts=f"{len(claims)} claims, {counts}",
         claim_columns=list(claims.columns), claims_link=_link(inputs["claims"], folder),
@@ -132,11 +133,12 @@ def _synthetic_but_for_the_archive(ftir):
             "order, how the taxels lie, and which indenters are held out is assumed.")
 
 
-def _synthetic(ftir):
+def _synthetic(ftir, config):
+    rubs = "friction, " if config.get("models", {}).get(config.get("reference"), {}).get("friction") else ""
     return ("The paper's curves, camera frames and taxel readings are not published here. Stress-strain curves are made from "
             f"its printed constants with noise; the measured contact area is from: {ftir['source']}; the readings come from a "
-            "virtual sensor (another law, another mesh, scatter, hysteresis, noise). SSIM values below are against that virtual "
-            "sensor and are not the paper's.")
+            f"virtual sensor (another law, another mesh, {rubs}scatter, hysteresis, noise). SSIM values below are "
+            "against that virtual sensor and are not the paper's.")
 
 
 def _summary(summary):
