@@ -163,7 +163,7 @@ def test_the_page_holds_its_figures_and_links_its_data(tmp_path):
     source = {"data": [folder / "evaluation/ssim.csv"], "code": ["src/softtact/stages/draw_fig6_ssim.py"]}
     facts = {"study": "mine", "sensor": "pad: 30 x 20 mm", "indenters": 3, "unseen": 1, "grasps": 2, "forces_n": [10.0], "seed": 1,
              "presses": {"indenters": 4, "unseen": 1, "grasps": 2}, "trials": {"indenters": 2, "unseen": 2, "grasps": 50},
-             "sources": {"fig6_ssim": source}}
+             "sources": {"fig6_ssim": source}, "config": {"reference": "felt", "models": {"felt": {"friction": {"object": 0.3}}}}}
     page = render_page(inputs, facts, folder=folder, run=NO_RUN)
     assert page.count("data:image/png;base64,") == 3
     assert page.count("The words allow this.") == 1 and "Material foam: test curves" in page
@@ -174,6 +174,9 @@ def test_the_page_holds_its_figures_and_links_its_data(tmp_path):
     assert "0.500 to 0.700" in page and "one item: none" in page
     assert "3 indenters in 4 places, each read 2 times" in page and "2 objects in 2 places, each read 50 times" in page
     assert "a &lt; b" in page and "What is synthetic here" in page
+    assert "another mesh, friction, scatter" in page
+    facts["config"]["models"]["felt"]["friction"] = None
+    assert "another mesh, scatter" in render_page(inputs, facts, folder=folder, run=NO_RUN)
 
 
 def test_the_page_of_an_archives_study_tells_of_the_archive_and_of_no_virtual_sensor(tmp_path):
