@@ -211,20 +211,27 @@ def _positions(nodes, number, rank, starts, neighbours, before, indptr):
     for e in range(elements):
         for p in range(m):
             for q in range(p, m):
-                a, b = min(nodes[e, p], nodes[e, q]), max(nodes[e, p], nodes[e, q])
-                low = _place_of(neighbours, starts[a], starts[a + 1], b)
+                a, b = nodes[e, p], nodes[e, q]
+                low, high = min(a, b), max(a, b)
+                columns = before[_place_of(neighbours, starts[low], starts[low + 1], high)]
                 for i in range(3):
-                    row = 3 * p + i
+                    n = _entries_before(3 * p + i, k) + 3 * q
+                    one, its_rank = number[a, i], rank[a, i]
                     for j in range(i if p == q else 0, 3):
-                        first, second = number[nodes[e, p], i], number[nodes[e, q], j]
-                        place = -1
-                        if first >= 0 and second >= 0:
-                            if first <= second:
-                                place = indptr[first] + before[low] - rank[nodes[e, p], i] + rank[nodes[e, q], j]
-                            else:
-                                place = indptr[second] + before[low] - rank[nodes[e, q], j] + rank[nodes[e, p], i]
-                        out[e, row * k - row * (row - 1) // 2 + 3 * q + j - row] = place
+                        other = number[b, j]
+                        if one < 0 or other < 0:
+                            out[e, n + j] = -1
+                        elif one <= other:
+                            out[e, n + j] = indptr[one] + columns - its_rank + rank[b, j]
+                        else:
+                            out[e, n + j] = indptr[other] + columns - rank[b, j] + its_rank
     return out
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _entries_before(row, size):
+    """Where column 0 of a row would stand among the entries (i, j >= i) of a matrix, row by row."""
+    return row * size - row * (row - 1) // 2 - row
 
 
 @njit(cache=True, nogil=True)

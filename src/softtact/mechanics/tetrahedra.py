@@ -16,6 +16,9 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numba import njit
 
+from softtact.mechanics.small_tensors import cofactor, combined, cross, dot, left_cauchy_green, symmetric_times, times
+from softtact.mechanics.tetrahedra_forces import add_forces
+
 _PLACE = ((0, 3, 5), (3, 1, 4), (5, 4, 2))     # of a symmetric matrix's entries in xx, yy, zz, xy, yz, zx
 
 
@@ -39,8 +42,8 @@ class LinearTetrahedra:
         """
         def share(part):
             own = force if part.start == 0 else np.zeros_like(force)
-            return own, *_forces(displacement, self.nodes[part], self.gradients[part], self.volumes[part],
-                                 self._table(displacement, part), self.law.bulk_modulus, own)
+            return own, *add_forces(displacement, self.nodes[part], self.gradients[part], self.volumes[part],
+                                    self._table(displacement, part), self.law.bulk_modulus, own)
 
         results = self._map(share)
         energy = sum(energy for _, energy, _ in results)
@@ -93,20 +96,11 @@ def _gradients(points, nodes):
     for e in range(len(nodes)):
         origin = points[nodes[e, 0]]
         x, y, z = points[nodes[e, 1]] - origin, points[nodes[e, 2]] - origin, points[nodes[e, 3]] - origin
-        determinant, cofactor = _cofactor((x[0], x[1], x[2], y[0], y[1], y[2], z[0], z[1], z[2]))
+        determinant, dual = cofactor((x[0], x[1], x[2], y[0], y[1], y[2], z[0], z[1], z[2]))
         volumes[e] = determinant / 6
         for i in range(9):
-            gradients[e, i // 3, i % 3] = cofactor[i] / determinant
+            gradients[e, i // 3, i % 3] = dual[i] / determinant
     return gradients, volumes
-
-
-@njit(cache=True, nogil=True, inline="always")
-def _cofactor(f):
-    """Determinant and cofactor of a matrix; both matrices are tuples of nine, row by row, which stay in registers."""
-    h = (f[4] * f[8] - f[5] * f[7], f[5] * f[6] - f[3] * f[8], f[3] * f[7] - f[4] * f[6],
-         f[7] * f[2] - f[8] * f[1], f[8] * f[0] - f[6] * f[2], f[6] * f[1] - f[7] * f[0],
-         f[1] * f[5] - f[2] * f[4], f[2] * f[3] - f[0] * f[5], f[0] * f[4] - f[1] * f[3])
-    return f[0] * h[0] + f[1] * h[1] + f[2] * h[2], h
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -124,14 +118,6 @@ def _deformation(u, n, g):
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _left_cauchy_green(f):
-    """I1 and I2 of B = F F^T, and its entries xx, yy, zz, xy, yz, zx."""
-    x, y, z = f[:3], f[3:6], f[6:]
-    xx, yy, zz, xy, yz, zx = _dot(x, x), _dot(y, y), _dot(z, z), _dot(x, y), _dot(y, z), _dot(z, x)
-    return xx + yy + zz, xx * yy + yy * zz + zz * xx - xy * xy - yz * yz - zx * zx, (xx, yy, zz, xy, yz, zx)
-
-
-@njit(cache=True, nogil=True, inline="always")
 def _isochoric(J):
     """J^(-2/3), NaN where the element is inside out."""
     root = np.cbrt(J) if J > 0 else np.nan
@@ -139,38 +125,8 @@ def _isochoric(J):
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _symmetric_times(b, v):
-    """A symmetric matrix of entries xx, yy, zz, xy, yz, zx times a vector of three."""
-    return (b[0] * v[0] + b[3] * v[1] + b[5] * v[2], b[3] * v[0] + b[1] * v[1] + b[4] * v[2],
-            b[5] * v[0] + b[4] * v[1] + b[2] * v[2])
-
-
-@njit(cache=True, nogil=True, inline="always")
-def _times(m, g):
-    """A matrix (a tuple of nine) times a vector of three."""
-    return (m[0] * g[0] + m[1] * g[1] + m[2] * g[2], m[3] * g[0] + m[4] * g[1] + m[5] * g[2],
-            m[6] * g[0] + m[7] * g[1] + m[8] * g[2])
-
-
-@njit(cache=True, nogil=True, inline="always")
 def _row(matrix, row):
     return matrix[row, 0], matrix[row, 1], matrix[row, 2]
-
-
-@njit(cache=True, nogil=True, inline="always")
-def _sum(x, a, y, b, z, c):
-    """x a + y b + z c of numbers and vectors of three."""
-    return (x * a[0] + y * b[0] + z * c[0], x * a[1] + y * b[1] + z * c[1], x * a[2] + y * b[2] + z * c[2])
-
-
-@njit(cache=True, nogil=True, inline="always")
-def _cross(a, b):
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@njit(cache=True, nogil=True, inline="always")
-def _dot(a, b):
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -179,41 +135,10 @@ def _invariants(displacement, nodes, gradients):
     i1, i2 = np.empty(len(nodes)), np.empty(len(nodes))
     for e in range(len(nodes)):
         f = _deformation(displacement, nodes[e], gradients[e])
-        I1, I2, _ = _left_cauchy_green(f)
-        s1 = _isochoric(_cofactor(f)[0])
+        I1, I2, _ = left_cauchy_green(f)
+        s1 = _isochoric(cofactor(f)[0])
         i1[e], i2[e] = s1 * I1, s1 * s1 * I2
     return i1, i2
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _forces(displacement, nodes, gradients, volumes, table, bulk_modulus, force):
-    energy, size = 0.0, 0.0
-    for e in range(len(nodes)):
-        f = _deformation(displacement, nodes[e], gradients[e])
-        J, h = _cofactor(f)
-        I1, I2, b = _left_cauchy_green(f)
-        s1 = _isochoric(J)
-        t = table[e] if len(table) > 1 else table[0]
-        psi = t[0] if len(table) > 1 else t[1] * (s1 * I1 - 3) + t[2] * (s1 * s1 * I2 - 3)
-        energy += volumes[e] * (psi + 0.5 * bulk_modulus * (J - 1) ** 2)
-        p1, p2 = volumes[e] * s1 * t[1], volumes[e] * s1 * s1 * t[2]
-        ch = -2 / 3 * I1 / J * p1 - 4 / 3 * I2 / J * p2 + volumes[e] * bulk_modulus * (J - 1)
-        cf = 2 * p1 + 2 * p2 * I1
-        x0, y0, z0 = 0.0, 0.0, 0.0
-        for a in range(1, 4):
-            G = _row(gradients[e], a - 1)
-            fa = _times(f, G)
-            x, y, z = _sum(cf, fa, -2 * p2, _symmetric_times(b, fa), ch, _times(h, G))
-            force[nodes[e, a], 0] += x
-            force[nodes[e, a], 1] += y
-            force[nodes[e, a], 2] += z
-            size += abs(x) + abs(y) + abs(z)
-            x0, y0, z0 = x0 - x, y0 - y, z0 - z
-        force[nodes[e, 0], 0] += x0
-        force[nodes[e, 0], 1] += y0
-        force[nodes[e, 0], 2] += z0
-        size += abs(x0) + abs(y0) + abs(z0)
-    return energy, size
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -235,8 +160,8 @@ def _tangents(displacement, nodes, gradients, volumes, table, bulk_modulus, posi
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _blocks(f, gradients, V, t, bulk_modulus, whole):
     """The tangent (12, 12) of nodes 1 to 3, above its diagonal of blocks and on it."""
-    J, h = _cofactor(f)
-    I1, I2, b = _left_cauchy_green(f)
+    J, h = cofactor(f)
+    I1, I2, b = left_cauchy_green(f)
     s1 = _isochoric(J)
     s2 = s1 * s1
     r1, r2 = -2 / 3 * I1 / J, -4 / 3 * I2 / J
@@ -263,18 +188,19 @@ def _blocks(f, gradients, V, t, bulk_modulus, whole):
 @njit(cache=True, nogil=True, inline="always")
 def _vectors(f, h, b, I1, G):
     """G_a, f_a, g_a = 2 (I1 f_a - B f_a) and h_a of a node."""
-    fa = _times(f, G)
-    bf = _symmetric_times(b, fa)
-    return G, fa, (2 * (I1 * fa[0] - bf[0]), 2 * (I1 * fa[1] - bf[1]), 2 * (I1 * fa[2] - bf[2])), _times(h, G)
+    fa = times(f, G)
+    bf = symmetric_times(b, fa)
+    return G, fa, (2 * (I1 * fa[0] - bf[0]), 2 * (I1 * fa[1] - bf[1]), 2 * (I1 * fa[2] - bf[2])), times(h, G)
 
 
 @njit(cache=True, nogil=True, inline="always")
 def _block(whole, row, column, first, second, f, b, squares, mixed, c_2, c_3):
     """The block of two nodes, each given by its `_vectors`, at a row and column of `whole`; coefficients as above."""
     (G, fa, ga, ha), (Gb, fb, gb, hb), (c_ff, c_gg, c_hh, c_1), (c_fg, c_gh, c_fh) = first, second, squares, mixed
-    fc, gc, hc = _sum(c_ff, fb, c_fg, gb, c_fh, hb), _sum(c_fg, fb, c_gg, gb, c_gh, hb), _sum(c_fh, fb, c_gh, gb, c_hh, hb)
-    GG, (x, y, z) = _dot(G, Gb), _times(f, _cross(G, Gb))
-    unity, turned = c_1 * GG + c_2 * _dot(fa, fb), ((0.0, z, -y), (-z, 0.0, x), (y, -x, 0.0))
+    fc, gc = combined(c_ff, fb, c_fg, gb, c_fh, hb), combined(c_fg, fb, c_gg, gb, c_gh, hb)
+    hc = combined(c_fh, fb, c_gh, gb, c_hh, hb)
+    GG, (x, y, z) = dot(G, Gb), times(f, cross(G, Gb))
+    unity, turned = c_1 * GG + c_2 * dot(fa, fb), ((0.0, z, -y), (-z, 0.0, x), (y, -x, 0.0))
     for i in range(3):
         for k in range(3):
             whole[row + i, column + k] = (
