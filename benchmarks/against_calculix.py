@@ -33,6 +33,7 @@ from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.laws.registry import make_law
 from softtact.mechanics.free_body import FreeBody, RigidContact
 from softtact.mechanics.free_press import FreeSettings, press_to_indentations
+from softtact.mechanics.parallel import Workers
 from softtact.mechanics.rough_solver import RoughSolver
 from softtact.mechanics.tetrahedra import LinearTetrahedra
 
@@ -118,10 +119,12 @@ def press(mesh, load, threads):
         contacts = [RigidContact(mesh.points, mesh.near, values, areas, HeightField(mesh.sphere), moves=True,
                                  stiffness=CONTACT_STIFFNESS, smoothing=SHARP_MM)]
     solver = RoughSolver(threads=threads, quick_analysis=True)
-    body = FreeBody(mesh.points, parts, held=held, contacts=contacts, follows=follows, solver=solver, apart=True)
+    workers = Workers(threads)
+    body = FreeBody(mesh.points, parts, held=held, contacts=contacts, follows=follows, solver=solver, apart=True, workers=workers)
     settings = FreeSettings(relative_residual=5e-3, relative_correction=1e-2)
     levels = list(press_to_indentations(body, depths(), settings=settings))
     body.solver.close()
+    workers.close()
     return {"unknowns": len(body.free), "force_n": [float(level.state.object_force) for level in levels],
             "iterations": [level.iterations for level in levels], "factorisations": [level.factorisations for level in levels],
             "residual": [level.residual_n / level.state.mean_force for level in levels]}

@@ -110,6 +110,20 @@ def test_tetrahedra_turned_inside_out_are_refused_and_noticed():
     assert LinearTetrahedra(points, tets, LAWS["yeoh"]).add_force(-2.0 * points, np.zeros_like(points)) is None
 
 
+@pytest.mark.parametrize("stretch", [0.375, 0.6, 1.0, 1.7, 2.66])
+def test_tetrahedra_know_volumes_from_a_nineteenth_to_the_nineteenfold(stretch):
+    points, tets = block()
+    energy, _ = LinearTetrahedra(points, tets, LAWS["yeoh"]).add_force((stretch - 1) * points, np.zeros_like(points))
+    # The energy of a change of volume; the rounding of F's other invariants is 1e-15 of K V.
+    assert energy == pytest.approx(18 * 0.5 * 7.0 * (stretch**3 - 1) ** 2, rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("stretch", [0.36, 2.7])
+def test_tetrahedra_beyond_that_count_as_inside_out(stretch):
+    points, tets = block()
+    assert LinearTetrahedra(points, tets, LAWS["yeoh"]).add_force((stretch - 1) * points, np.zeros_like(points)) is None
+
+
 def pressed_block(*, law="mooney_rivlin", glued=False, board=False, **options):
     """A brick on a board or held below, pressed by a plate or with its top glued to it."""
     points, tets = block()

@@ -21,7 +21,8 @@ LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, 
 # No share with the fine mesh: elements split in plan, twice as many layers, two of the cover's bound, edges split five times.
 FINER = MeshSettings(refinement=1, frustum_levels=(0.0, 0.1, 0.3, 0.6, 1.0), cover_levels=(0.0, 0.25, 0.5, 0.75, 1.0),
                      cover_splits=(1, 4))
-LARGEST_PERCENT = {"fine": 2.5, "production": 5.0, "draft": 10.0}     # what the README promises
+LARGEST_PERCENT = {"fine": 2.0, "production": 5.0, "draft": 10.0}     # what the README promises
+SMALL_PUNCH_PERCENT = 3.0      # on the fine mesh, where a frustum is a quarter of the contact; the default has 3.5
 
 
 def map_under_a_punch(mesh):
@@ -39,7 +40,7 @@ def test_the_fine_mesh_is_near_to_a_finer_one_and_the_default_less(record):
     for name, got in error.items():
         record(f"3 x 3 frusta, flat punch, 1 N: largest error of the map on the {name} mesh, % of its maximum", expected=0.0,
                source="a mesh split everywhere", got=got)
-    assert error["fine"] < LARGEST_PERCENT["fine"] < error["default"]
+    assert error["fine"] < SMALL_PUNCH_PERCENT < error["default"]
 
 
 @pytest.mark.parametrize("mesh", LARGEST_PERCENT)

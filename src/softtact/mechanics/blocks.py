@@ -33,20 +33,25 @@ _AT_ONCE = 400   # elements whose fields at the points are in memory at once, mo
 
 @dataclass(frozen=True)
 class BlockState:
-    """What one evaluation leaves for the tangent: energy (mJ), force (e, 3 m) in N, and the fields at the points."""
+    """What one evaluation leaves: the elements' energies (e,) in mJ, force (e, 3 m) in N, and displacement."""
 
-    energy: float
+    energies: np.ndarray
     force: np.ndarray
     displacement: np.ndarray
+
+    @property
+    def energy(self):
+        """Energy of all elements in mJ."""
+        return float(self.energies.sum())
 
 
 @dataclass(frozen=True)
 class Volumetric:
-    """Energy (mJ) of volume changes, pressure (e, g) by which it changes with J, in MPa, and the second derivative (e, g) of its
-    growing part by what the projection does not see, in MPa; (0, 0) where there is none.
+    """Energies (e,) in mJ of volume changes, pressure (e, g) by which they change with J, in MPa, and the second derivative (e, g)
+    of their growing part by what the projection does not see, in MPa; (0, 0) where there is none.
     """
 
-    energy: float
+    energies: np.ndarray
     pressure: np.ndarray
     growing: np.ndarray
 
@@ -86,13 +91,14 @@ class SolidBlock:
         """K - k in MPa."""
         return self.law.bulk_modulus - self.local_modulus
 
-    def evaluate(self, displacement, *, workers=SERIAL):
-        """Energy and internal force; None if an element is turned inside out (J <= 0 at a quadrature point)."""
-        parts = workers.map(lambda part: self._evaluate(displacement[part], self.shapes[part]), slices(len(self.shapes), _AT_ONCE))
+    def evaluate(self, displacement, elements=slice(None), *, workers=SERIAL):
+        """Energies and internal forces of the chosen elements; None if one is turned inside out (J <= 0 at a quadrature point)."""
+        shapes = self.shapes[elements]
+        parts = workers.map(lambda part: self._evaluate(displacement[part], shapes[part]), slices(len(shapes), _AT_ONCE))
         if any(part is None for part in parts):
             return None
         energies, forces = zip(*parts, strict=True)
-        return BlockState(energy=sum(energies), force=np.concatenate(forces), displacement=displacement)
+        return BlockState(energies=np.concatenate(energies), force=np.concatenate(forces), displacement=displacement)
 
     def _evaluate(self, displacement, shapes):
         F, C, J = self.loops.deformation(displacement, self.gradients, shapes)
@@ -100,8 +106,8 @@ class SolidBlock:
             return None
         response = self.law.isochoric(C, tangent=False)
         volumetric = self._volumetric(J, shapes)
-        energy = float(self.volumes[shapes].ravel() @ response.energy + volumetric.energy)
-        return energy, self.loops.internal_force(F, C, J, self.gradients, self.volumes, shapes, response.stress,
+        energies = (self.volumes[shapes] * response.energy.reshape(J.shape)).sum(axis=1) + volumetric.energies
+        return energies, self.loops.internal_force(F, C, J, self.gradients, self.volumes, shapes, response.stress,
                                                  volumetric.pressure)
 
     def tangent(self, displacement, elements=slice(None), *, precision=np.float64):
@@ -143,7 +149,7 @@ class SolidBlock:
             pressure += held - self._projected(held, shapes)
             density += 0.25 * q * square * square
             growing = 3 * q * square
-        return Volumetric(energy=float((volumes * density).sum()), pressure=pressure, growing=growing)
+        return Volumetric(energies=(volumes * density).sum(axis=1), pressure=pressure, growing=growing)
 
     def _projected(self, field, shapes):
         """A field (e, g) projected, element by element, on the functions of the pressure."""

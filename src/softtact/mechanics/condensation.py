@@ -63,21 +63,25 @@ class Condensation:
              self.outer, self._modified, _SMALLEST_STIFFNESS, lapack.LETTERS, lapack.FACTORS, lapack.POTRF, lapack.TRSM,
              lapack.SYRK)
 
-    def residual(self, inner, *, workers=SERIAL):
-        """What the inner residuals (bodies, n) leave on the outer unknowns (bodies, m), and the part to keep for `recover`."""
-        half = np.array(inner, dtype=np.float32, order="C")
-        passed_on = np.empty(self.outer.shape[:2], dtype=np.float32)
-        workers.map(lambda part: _reduce(self._rows[part], half[part], passed_on[part], lapack.LETTERS, lapack.FACTORS, lapack.TRSV,
-                                         lapack.GEMV), slices(len(half), _AT_ONCE))
+    def residual(self, inner, *, bodies=None, workers=SERIAL):
+        """What inner residuals (b, n) of some bodies (b,), or of all, leave on their outer unknowns (b, m), and the part to keep
+        for `recover`."""
+        half, bodies = np.array(inner, dtype=np.float32, order="C"), self._chosen(bodies)
+        passed_on = np.empty((len(half), self.outer.shape[1]), dtype=np.float32)
+        workers.map(lambda part: _reduce(self._rows, bodies[part], half[part], passed_on[part], lapack.LETTERS, lapack.FACTORS,
+                                         lapack.TRSV, lapack.GEMV), slices(len(half), _AT_ONCE))
         return passed_on, half
 
-    def recover(self, half, outer_step, *, workers=SERIAL):
-        """Newton step (bodies, n) of the inner unknowns for that of the outer ones (bodies, m)."""
-        step = half.astype(np.float32)     # a copy; a half that was cut is in double precision
+    def recover(self, half, outer_step, *, bodies=None, workers=SERIAL):
+        """Newton step (b, n) of the inner unknowns of some bodies (b,), or of all, for that of their outer ones (b, m)."""
+        step, bodies = half.astype(np.float32), self._chosen(bodies)     # a copy; a half that was cut is in double precision
         outer = np.ascontiguousarray(outer_step, dtype=np.float32)
-        workers.map(lambda part: _recover(self._rows[part], step[part], outer[part], lapack.LETTERS, lapack.FACTORS, lapack.TRSV,
-                                          lapack.GEMV), slices(len(step), _AT_ONCE))
+        workers.map(lambda part: _recover(self._rows, bodies[part], step[part], outer[part], lapack.LETTERS, lapack.FACTORS,
+                                          lapack.TRSV, lapack.GEMV), slices(len(step), _AT_ONCE))
         return -step
+
+    def _chosen(self, bodies):
+        return np.arange(len(self._rows)) if bodies is None else bodies
 
     def positive_outer(self):
         """The condensed matrices without their modes of negative stiffness."""
@@ -167,27 +171,27 @@ def _made_positive(matrix, smallest):
 
 
 @njit(cache=True, nogil=True)
-def _reduce(rows, half, passed_on, letters, factors, trsv, gemv):
+def _reduce(rows, bodies, half, passed_on, letters, factors, trsv, gemv):
     n, m = rows.shape[1], passed_on.shape[1]
     size = np.array([n, m, n + m, 1], dtype=np.int32)
     (L, N, _, _), (_, minus_one, zero, _) = _addresses(letters, 1), _addresses(factors, 4)
     _n, _m, _lead, _one = _addresses(size, 4)
-    for body in range(len(rows)):
-        A, h = rows[body], half[body].ctypes.data
+    for b in range(len(bodies)):
+        A, h = rows[bodies[b]], half[b].ctypes.data
         trsv(L, N, N, _n, A.ctypes.data, _lead, h, _one)
-        gemv(N, _m, _n, minus_one, A[:, n:].ctypes.data, _lead, h, _one, zero, passed_on[body].ctypes.data, _one)
+        gemv(N, _m, _n, minus_one, A[:, n:].ctypes.data, _lead, h, _one, zero, passed_on[b].ctypes.data, _one)
     return size[0]
 
 
 @njit(cache=True, nogil=True)
-def _recover(rows, step, outer_step, letters, factors, trsv, gemv):
+def _recover(rows, bodies, step, outer_step, letters, factors, trsv, gemv):
     n, m = rows.shape[1], outer_step.shape[1]
     size = np.array([n, m, n + m, 1], dtype=np.int32)
     (L, N, _, T), (one, _, _, _) = _addresses(letters, 1), _addresses(factors, 4)
     _n, _m, _lead, _one = _addresses(size, 4)
-    for body in range(len(rows)):
-        A, s = rows[body], step[body].ctypes.data
-        gemv(T, _m, _n, one, A[:, n:].ctypes.data, _lead, outer_step[body].ctypes.data, _one, one, s, _one)
+    for b in range(len(bodies)):
+        A, s = rows[bodies[b]], step[b].ctypes.data
+        gemv(T, _m, _n, one, A[:, n:].ctypes.data, _lead, outer_step[b].ctypes.data, _one, one, s, _one)
         trsv(L, T, N, _n, A.ctypes.data, _lead, s, _one)
     return size[0]
 

@@ -67,19 +67,20 @@ class LayerwiseElimination:
             stage.condensed.set(bodies, [*tangents, *carried], springs, damping=damping)
             carried = [stage.condensed.outer[bodies][:, None]]
 
-    def residual(self, force, *, workers=SERIAL):
-        """Pass the inner forces (bodies, n) on to the outer unknowns, in place; returns what `recover` needs."""
+    def residual(self, force, *, bodies=None, workers=SERIAL):
+        """Pass the inner forces (b, n) of some bodies (b,), or of all, on to the outer unknowns, in place; returns what `recover`
+        needs."""
         halves = []
         for stage in self.stages:
-            passed_on, half = stage.condensed.residual(force[:, stage.inner], workers=workers)
+            passed_on, half = stage.condensed.residual(force[:, stage.inner], bodies=bodies, workers=workers)
             force[:, stage.outer] += passed_on
             halves.append(half)
         return halves
 
-    def recover(self, halves, step, *, workers=SERIAL):
-        """Fill in the inner unknowns of a Newton step (bodies, n) whose outer ones are given, in place."""
+    def recover(self, halves, step, *, bodies=None, workers=SERIAL):
+        """Fill in the inner unknowns of a Newton step (b, n) of some bodies, or of all, whose outer ones are given, in place."""
         for stage, half in zip(self.stages[::-1], halves[::-1], strict=True):
-            step[:, stage.inner] = stage.condensed.recover(half, step[:, stage.outer], workers=workers)
+            step[:, stage.inner] = stage.condensed.recover(half, step[:, stage.outer], bodies=bodies, workers=workers)
 
 
 def _members(groups):

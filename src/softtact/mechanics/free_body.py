@@ -11,6 +11,7 @@ import numpy as np
 from softtact.contact.penalty import penalty
 from softtact.mechanics.contact_correction import ContactCorrection
 from softtact.mechanics.linear_solvers import make_solver
+from softtact.mechanics.parallel import SERIAL
 from softtact.mechanics.rough_solver import point_at_mkl
 from softtact.mechanics.sparsity import SymmetricPattern, add_upper
 
@@ -141,9 +142,10 @@ class FreeBody:
     parts: `SolidElements` or `LinearTetrahedra`; held (n, 3): components that are given: zero, or -d times `follows` (n, 3).
     apart: keep the moving contact out of the factor (see `contact_correction`): worth it for some hundred touching nodes, as long
     as the rubber alone, under the pressure it has, is stable.
+    workers: for the places of the elements' entries in the matrix
     """
 
-    def __init__(self, points, parts, *, held, contacts=(), follows=None, solver=None, apart=False):
+    def __init__(self, points, parts, *, held, contacts=(), follows=None, solver=None, apart=False, workers=SERIAL):
         self.points, self.parts, self.contacts = points, parts, contacts
         self._follows = np.zeros(points.shape) if follows is None else -np.where(held, follows, 0.0)
         used = np.zeros(len(points), dtype=bool)
@@ -153,7 +155,7 @@ class FreeBody:
         self.free = np.flatnonzero(free.ravel())
         pattern = SymmetricPattern(free, [part.nodes for part in parts])
         self._matrix = pattern.matrix()
-        self._positions = [pattern.positions(part.nodes) for part in (*parts, *contacts)]
+        self._positions = workers.map(lambda part: pattern.positions(part.nodes), (*parts, *contacts))
         self._components = sum(3 * part.nodes.size for part in parts)
         point_at_mkl()
         self.solver = solver or make_solver()

@@ -47,7 +47,7 @@ class BedGeometry:
 class BedState:
     """energy (mJ), force (n, nodes, 3) on the frusta's nodes, gaps (n, p) at the contact points, displacement.
 
-    elastic: energy and force of the rubber alone;  drag: friction at the points on the board (n, b), None without.
+    elastic: energies (n,) and force of the rubber alone;  drag: friction at the points on the board (n, b), None without.
     """
 
     elastic: tuple
@@ -172,23 +172,35 @@ class FrustumBed:
 
     def evaluate(self, displacement, *, workers=SERIAL):
         """Energy, nodal forces and gaps for displacement (n, nodes, 3); None if an element is inside out."""
-        body = self.block.evaluate(self.per_element(displacement), workers=workers)
+        elastic = self.rubber(displacement, workers=workers)
+        return None if elastic is None else self.with_contact(displacement, elastic)
+
+    def rubber(self, displacement, frusta=slice(None), *, workers=SERIAL):
+        """Energies (k,) in mJ and nodal forces (k, nodes, 3) of the rubber of the given frusta, or of all; None if inside out."""
+        elements = np.arange(len(self._element_nodes)).reshape(self.count, -1)[frusta].ravel()
+        body = self.block.evaluate(self.per_element(displacement), elements, workers=workers)
         if body is None:
             return None
-        force = np.zeros((self.count, self.nodes, 3))
-        add_forces(force.reshape(-1, 3), self._element_nodes, body.force.reshape(-1, 27, 3))
-        return self._with_contact(displacement, (body.energy, force))
+        force = np.zeros((len(displacement), self.nodes, 3))
+        add_forces(force.reshape(-1, 3), self._element_nodes[:len(elements)], body.force.reshape(-1, 27, 3))
+        return body.energies.reshape(len(displacement), -1).sum(axis=1), force
+
+    def potentials(self, displacement, elastic, frusta):
+        """Energies (k,) in mJ of the given frusta with their contacts, from the `rubber`'s; without friction's."""
+        energy, _, _ = self.contact.at(frusta).response(self.gap0[frusta] + self._along(displacement))
+        return elastic[0] + (energy * self.point_area[frusta]).sum(axis=1)
 
     def again(self, state):
         """The same displacements after the contact's or friction's own state has changed."""
-        return self._with_contact(state.displacement, state.elastic)
+        return self.with_contact(state.displacement, state.elastic)
 
-    def _with_contact(self, displacement, elastic):
+    def with_contact(self, displacement, elastic):
+        """The state at displacement (n, nodes, 3), with the `rubber`'s energies and forces there."""
         gaps, force = self.gap0 + self._along(displacement), elastic[1].copy()
         energy, pressure, _ = self.contact.response(gaps)
         _scatter_contact(force, -pressure * self.point_area, self.point_nodes, self.point_weights, self.point_axis)
-        state = BedState(elastic=elastic, energy=elastic[0] + float((energy * self.point_area).sum()), force=force, gaps=gaps,
-                         displacement=displacement)
+        state = BedState(elastic=elastic, energy=float(elastic[0].sum() + (energy * self.point_area).sum()), force=force,
+                         gaps=gaps, displacement=displacement)
         return state if self.grip is None else self._with_friction(state)
 
     def _with_friction(self, state):
@@ -285,6 +297,13 @@ class FrustumBed:
         step[:, self.root_dofs] = root_step
         self.elimination.recover(halves, step, workers=workers)
         return step.reshape(self.count, self.nodes, 3)
+
+    def own_step(self, state, frusta, *, workers=SERIAL):
+        """Newton step (k, nodes, 3) of the given frusta by their last condensed tangents, with their roots held."""
+        force, step = state.force[frusta].reshape(len(frusta), -1), np.zeros((len(frusta), 3 * self.nodes))
+        halves = self.elimination.residual(force, bodies=frusta, workers=workers)
+        self.elimination.recover(halves, step, bodies=frusta, workers=workers)
+        return step.reshape(len(frusta), self.nodes, 3)
 
     def inner_residual(self, state):
         """Unbalanced forces (n, inner) of the inner unknowns."""

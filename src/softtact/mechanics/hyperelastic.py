@@ -44,7 +44,7 @@ class NewtonSettings:
     first_touch_mm: float = 0.01
     first_touch_tolerance_n: float = 0.1   # a start for the first level, not a result
     refacing_iterations: int = 6
-    kept_tangent_mm: float = 4e-3      # with 16 and 32 um small objects, which fold frusta, take up to a third more iterations
+    kept_tangent_mm: float = 0.016     # as many iterations as with 4 um, since frusta far from balance take steps of their own
     friction_tolerance: float = 0.3    # sliding is soft: with 1 the indentation is 0.4 % off at 1 N on 20 frusta, with this 0.01 %
     friction_growth: float = 2.0       # a single step to 4 N is 1.8 % off, two are less than 0.1 %
     friction_passes: int = 30
@@ -220,7 +220,7 @@ def _newton(body, surface, state, force, tolerance, settings):
             state = _lowered_until_felt(body, state, settings.first_touch_mm)
             continue
         state = body.reface(state, step.planes)
-        trial = _line_search(body, state, step, force, residual, settings) if np.isfinite(step.largest()) else None
+        trial = _line_search(body, state, step, force, residual, tolerance, settings) if np.isfinite(step.largest()) else None
         if trial is None and fresh and looks is None:
             return None, iteration, residual
         if trial is None:
@@ -236,7 +236,7 @@ def _potential(state, force):
     return state.energy - (force or 0.0) * state.indentation
 
 
-def _line_search(body, state, step, force, residual, settings):
+def _line_search(body, state, step, force, residual, tolerance, settings):
     """The first of the shares 1, 1/2, 1/4 ... of the step that lowers the potential.
 
     Close to equilibrium the potential no longer resolves the difference; there a smaller residual decides.
@@ -248,6 +248,7 @@ def _line_search(body, state, step, force, residual, settings):
         trial = body.evaluate(state.slab.displacement + share * step.slab, state.bed.displacement + share * step.bed,
                               state.indentation + share * step.indentation, step.planes)
         if trial is not None:
+            trial = body.balanced(trial, tolerance)
             change = _potential(trial, force) - before
             if change < -resolution or (change <= resolution and body.residual_norm(trial, force) < residual):
                 return trial

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from softtact.mechanics import kernels
+from softtact.mechanics.bed_balance import balanced
 from softtact.mechanics.body_friction import BodyFriction
 from softtact.mechanics.contact_step import ContactStepper
 from softtact.mechanics.frustum_bed import BedState
@@ -102,6 +103,19 @@ class LayeredBody:
         """The same displacements after the contact's or friction's own state has changed: the rubber is not evaluated anew."""
         return BodyState(slab=self.slab.reface(state.slab, state.slab.planes, state.indentation), bed=self.bed.again(state.bed),
                          indentation=state.indentation)
+
+    def balanced(self, state, tolerance_n):
+        """The state with each frustum in balance over its root, where nothing else keeps the body from it.
+
+        A frustum that rocks or folds needs steps of its own; as long as sheet or cover do, too, it takes them with these. With
+        friction on the board frusta wait for the steps of all: what holds them does not see one alone.
+        """
+        rest = max(tolerance_n, self._slab_residual(state))
+        if self.bed.friction is not None or np.abs(self.bed.inner_residual(state.bed)).max() <= rest:
+            return state
+        bed, moved = balanced(self.bed, state.bed, tolerance_n, workers=self.workers)
+        self.cells.forget(moved)
+        return replace(state, bed=bed)
 
     def reface(self, state, planes):
         """The same state with the object's contact on other planes."""
@@ -202,10 +216,13 @@ class LayeredBody:
 
     def residual_norm(self, state, force_n):
         """Largest unbalanced nodal force in N, over slab, frusta and the object."""
-        parts = [np.abs(self.slab_force(state).ravel()[self.slab.free]).max(), np.abs(self.bed.inner_residual(state.bed)).max()]
+        parts = [self._slab_residual(state), np.abs(self.bed.inner_residual(state.bed)).max()]
         if force_n is not None:
             parts.append(abs(state.force - force_n))
         return float(max(parts))
+
+    def _slab_residual(self, state):
+        return np.abs(self.slab_force(state).ravel()[self.slab.free]).max()
 
     def slab_force(self, state):
         """Forces (n, 3) on the slab's nodes, those of the frusta's roots among them."""

@@ -81,11 +81,12 @@ class MeshSettings:
 
     @classmethod
     def fine(cls):
-        """Within 2.2 % of the map's maximum everywhere, for 2.4 to 2.8 times the default's time (docs/discretisation.md).
+        """Within 2 % of the map's maximum at every point, for twice the default's time (docs/discretisation.md).
 
-        The cover has a layer more and is fine at edges, frusta have two rings.
+        The cover has a layer more and is finer at edges, frusta have two rings and, these being thinner, a wide core.
         """
-        return cls(cover_levels=(0.0, 0.45, 0.8, 1.0), cover_splits=(1, 3), frustum_rings=2)
+        return cls(cover_levels=(0.0, 0.4, 0.75, 1.0), cover_splits=(1, 2), frustum_rings=2, frustum_core=0.6,
+                   frustum_levels=(0.0, 0.2, 0.7, 1.0))
 
     @classmethod
     def converging(cls, *, local_over_shear=0.1, **changes):

@@ -71,9 +71,12 @@ class SheetCells:
             self._damping = np.where(self._damping > _LEAST_DAMPING, self._damping / _DAMPING_GROWTH, 0.0)
         return bool(thrown.any())
 
-    def forget(self):
-        """Let the next `refresh` recompute all cells."""
-        self._tangent_at = None
+    def forget(self, cells=None):
+        """Let the next `refresh` recompute the given cells, or all."""
+        if cells is None:
+            self._tangent_at = None
+        elif self._tangent_at is not None:
+            self._tangent_at[cells] = np.inf
 
     def _stale(self, state, kept_mm):
         slope, limit = self._slope(state)

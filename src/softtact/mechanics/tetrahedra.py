@@ -38,7 +38,8 @@ class LinearTetrahedra:
     def add_force(self, displacement, force):
         """Add nodal forces (n, 3) in N for displacement (n, 3) in mm.
 
-        Returns the energy (mJ) and the sum of the magnitudes of all elements' force components (N); None where a J <= 0.
+        Returns the energy (mJ) and the sum of the magnitudes of all elements' force components (N); None where a
+        J <= 0, or farther from 1 than a nineteenth or nineteenfold.
         """
         def share(part):
             own = force if part.start == 0 else np.zeros_like(force)
