@@ -17,13 +17,14 @@ _AT_ONCE = 8             # frusta that a thread condenses at once
 
 
 def balanced(bed, state, tolerance_n, *, workers=SERIAL):
-    """The `BedState` after each frustum beyond the tolerance (N) went to its own balance, and which frusta did (k,)."""
+    """The `BedState` after each frustum beyond the tolerance (N) went to its own balance, and which frusta did (k,).
+
+    These have their condensed tangents anew, on the way and not where they came to.
+    """
     loose, moved = _loose(bed, state, tolerance_n), np.zeros(bed.count, dtype=bool)
     for _ in range(_STEPS):
         if not len(loose):
             break
-        now = state
-        workers.map(lambda part: bed.condense(now, part), chunks(loose, _AT_ONCE))     # noqa: B023
         moved[loose] = True
         state, lowered = _step(bed, state, loose, workers)
         loose = np.intersect1d(loose[lowered], _loose(bed, state, _SHARE * tolerance_n))
@@ -37,6 +38,7 @@ def _loose(bed, state, tolerance_n):
 
 def _step(bed, state, frusta, workers):
     """The state after a step of the frusta (k,), each halved until its own energy falls, and for which (k,) it did."""
+    workers.map(lambda part: bed.condense(state, part), chunks(frusta, _AT_ONCE))
     step = bed.own_step(state, frusta, workers=workers)
     step *= np.minimum(1.0, _FARTHEST_MM / np.maximum(np.abs(step).max(axis=(1, 2)), 1e-300))[:, None, None]
     displacement, (energies, forces) = state.displacement.copy(), tuple(part.copy() for part in state.elastic)
