@@ -81,9 +81,10 @@ class MeshSettings:
 
     @classmethod
     def fine(cls):
-        """Within 2 % of the map's maximum at every point, for 1.8 times the default's time (docs/discretisation.md).
+        """Within 2 % of the map's maximum at every point under punch, sphere and ridges, for 1.8 times the default's time.
 
-        The cover has a layer more and is finer at edges, frusta have two rings.
+        The cover has a layer more and is finer at edges, frusta have two rings. Under a punch as wide as two frusta 3 %
+        (docs/discretisation.md).
         """
         return cls(cover_levels=(0.0, 0.4, 0.75, 1.0), cover_splits=(1, 2), frustum_rings=2, frustum_core=0.6,
                    frustum_levels=(0.0, 0.2, 0.7, 1.0))
