@@ -4,8 +4,7 @@ A sensor of 6 x 6 frusta is pressed with a flat punch, a sphere and a ridged blo
 the difference of the deformation map over the map's maximum, largest and in the root mean square, against the last mesh asked for.
 "two rings" is the production mesh with finer frusta, "three layers" has two layers above the cover's lowest one and is finer at
 edges, "tied cover" has these three on the sheet, "fine" three layers and two rings, and "finer edges" is split once more there.
-"reference" keeps to the plan in two
-layers, splits all in plan and has more layers everywhere.
+"reference" keeps to the plan in two layers, splits all in plan and has more layers everywhere; it is solved more exactly.
 """
 
 import sys

@@ -1,45 +1,29 @@
 """Frusta find their own balance between the steps of the whole sensor: the same as a step of all finds, and nothing else moves."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+import six_frusta
 import trimesh
+from six_frusta import CORO, LAW
 
-from softtact.geometry.sensor_spec import SensorSpec
-from softtact.materials.laws.registry import make_law
 from softtact.mechanics.bed_balance import balanced
 from softtact.mechanics.layered_body import LayeredBody
 from softtact.mechanics.mesh_settings import MeshSettings
 from softtact.mechanics.parallel import Workers
-from softtact.mechanics.sensor_bodies import build_sensor_body
 from softtact.sensor import Sensor
 
-CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
-SMALL = CORO.model_copy(update={"footprint_mm": (3.6, 2.4), "map_shape": (5, 7)})   # 3 x 2 frusta
-LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492)
-COARSE = MeshSettings(cover_levels=(0.0, 1.0), cover_splits=(0,), far_pitches=1, frustum_levels=(0.0, 0.35, 1.0))
 TOLERANCE_N = 1e-5
 FIRST, THIRD = 0, 2
 
 
-def plate(x, y):
-    """A level plate over everything."""
-    return np.zeros(len(x)), np.tile([0.0, 0.0, -1.0], (len(x), 1))
-
-
 @pytest.fixture
 def body():
-    return build_sensor_body(SMALL, dielectric_law=LAW, cover_law=LAW, mesh=COARSE)
+    return six_frusta.six_frusta()
 
 
 def bent(body, *, by_mm):
-    """The body at rest but for some frusta bent sideways in their middle, {frustum: mm}."""
-    slab, bed = body.rest()
-    z = body.bed.coordinates[0, :, 2]
-    for frustum, much in by_mm.items():
-        bed[frustum, :, 0] += much * np.sin(np.pi * (z - z.min()) / np.ptp(z))
-    return body.evaluate(slab, bed, -1.0, body.slab.facing(slab, plate))
+    """The body at rest, the plate a millimetre above it, but for some frusta bent sideways, {frustum: mm}."""
+    return six_frusta.bent(body, by_mm=by_mm, depth_mm=-1.0)
 
 
 def unbalanced(bed, state):

@@ -1,39 +1,20 @@
 """Steps of single cells: cut where they go too far on their own, damped where a soft mode throws them; always downhill."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+import six_frusta
 
-from softtact.geometry.sensor_spec import SensorSpec
-from softtact.materials.laws.registry import make_law
-from softtact.mechanics.mesh_settings import MeshSettings
-from softtact.mechanics.sensor_bodies import build_sensor_body
-
-CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
-SMALL = CORO.model_copy(update={"footprint_mm": (3.6, 2.4), "map_shape": (5, 7)})   # 3 x 2 frusta
-LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492)
-COARSE = MeshSettings(cover_levels=(0.0, 1.0), cover_splits=(0,), far_pitches=1, frustum_levels=(0.0, 0.35, 1.0))
 DEPTH_MM = 0.05
-
-
-def plate(x, y):
-    """A level plate over everything."""
-    return np.zeros(len(x)), np.tile([0.0, 0.0, -1.0], (len(x), 1))
 
 
 @pytest.fixture
 def body():
-    return build_sensor_body(SMALL, dielectric_law=LAW, cover_law=LAW, mesh=COARSE)
+    return six_frusta.six_frusta()
 
 
 def bent(body, *, by):
     """The body under a plate held at DEPTH_MM, the first frustum bent sideways by so many mm in its middle."""
-    slab, bed = body.rest()
-    z = body.bed.coordinates[0, :, 2]
-    middle = np.sin(np.pi * (z - z.min()) / np.ptp(z))
-    bed[0, :, 0] += by * middle
-    return body.evaluate(slab, bed, DEPTH_MM, body.slab.facing(slab, plate))
+    return six_frusta.bent(body, by_mm={0: by}, depth_mm=DEPTH_MM)
 
 
 def change_of_energy(body, state, step, share=1e-4):
