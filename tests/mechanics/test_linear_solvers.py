@@ -75,4 +75,4 @@ def test_a_condensed_inverse_is_the_inverse_at_what_is_kept():
 
 
 def test_the_solver_is_named():
-    assert make_solver().name == "pardiso" and make_solver(rough=True).name == "pardiso, single precision"
+    assert make_solver().name == "pardiso" and RoughSolver().name == "pardiso, single precision"

@@ -14,7 +14,8 @@ import scipy.sparse as sp
 _INNER_STEPS = 12
 _FACINGS = 4                 # lookups of what the points face; an edge that slides over them moves forces from point to point
 _INNER_TOLERANCE = 0.1       # of the residual that the step is to cut
-_FORCING = 0.3               # conjugate gradients end when the preconditioned residual has fallen to this share
+_FORCING = 0.3               # conjugate gradients end when the preconditioned residual has fallen to this share, or the residual
+                             # itself is as small as the gradient has to be in the end, which costs no further solve to see ...
 _MOST_ITERATIONS = 40        # ... or when they would take more than so many; then a new factor follows
 _JUDGED_AFTER = 3            # iterations after which it is judged how many it would take
 _LEAST_CORNER = 1e-9         # N/mm: rounding must not turn the object's own stiffness negative
@@ -166,6 +167,8 @@ class ContactStepper:
                 return found, False
             found = found.plus(size / curvature, along)
             r = r - (size / curvature) * q
+            if problem.small(r):
+                return found, True
             z = self._precondition(r, held=problem.held)
             size, before = r @ z, size
             if size <= _FORCING**2 * first:
@@ -210,7 +213,11 @@ class _Problem:
         self._enough = _INNER_TOLERANCE * np.abs(self.gradient(at)).max()
 
     def solved(self, at):
-        return np.abs(self.gradient(at)).max() <= self._enough
+        return self.small(self.gradient(at))
+
+    def small(self, gradient):
+        """Whether a gradient is as small as the step's is to be in the end."""
+        return np.abs(gradient).max() <= self._enough
 
     def hold(self, at):
         """Keep a free object where it is: no longer is its force to be balanced, only those of the body."""

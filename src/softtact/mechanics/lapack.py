@@ -29,6 +29,7 @@ TRSM = Routine("cython_blas", "strsm", 11)
 SYRK = Routine("cython_blas", "ssyrk", 10)
 TRSV = Routine("cython_blas", "strsv", 8)
 GEMV = Routine("cython_blas", "sgemv", 11)
+GEMM = Routine("cython_blas", "sgemm", 13)
 
 # What the routines are told, as memory that they can point at.
 LETTERS = np.array([ord(letter) for letter in "LNRT"], dtype=np.uint8)

@@ -8,8 +8,8 @@ from softtact.mechanics import kernels
 from softtact.mechanics.bed_balance import balanced
 from softtact.mechanics.body_friction import BodyFriction
 from softtact.mechanics.contact_step import ContactStepper
+from softtact.mechanics.dissected_solver import DissectedSolver
 from softtact.mechanics.frustum_bed import BedState
-from softtact.mechanics.linear_solvers import make_solver
 from softtact.mechanics.parallel import Workers
 from softtact.mechanics.sheet_cells import SheetCells
 from softtact.mechanics.slab import SlabState
@@ -70,7 +70,7 @@ class LayeredBody:
         self.friction = BodyFriction(slab.top, bed)
         self.cells = SheetCells(slab, bed, roots)
         slab.build_pattern(self.cells.eliminated, self.cells.outer_dofs)
-        self.solver = make_solver(threads=threads, rough=True)
+        self.solver = DissectedSolver(slab.points[slab.unknowns // 3, :2], workers=self.workers)
         self.stepper = ContactStepper(self.solver)
 
     def sum_with(self, loops):

@@ -1,6 +1,7 @@
 """One small interface to sparse direct solvers for symmetric matrices: analyse once, factor often.
 
-PARDISO (MKL) where it installs (x86), SuperLU of scipy elsewhere. `solver.name` tells which one it was.
+PARDISO (MKL) where it installs (x86), SuperLU of scipy elsewhere. `solver.name` tells which one it was. A press, whose unknowns stand
+where they are known to, has a solver of its own: `dissected_solver`.
 """
 
 import ctypes
@@ -11,13 +12,9 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 
-def make_solver(*, threads=1, rough=False):
-    """The fastest direct solver that this machine offers; `rough`: seven digits will do, for steps that are corrected."""
+def make_solver(*, threads=1):
+    """The fastest direct solver for any matrix that this machine offers."""
     try:
-        if rough:
-            from softtact.mechanics.rough_solver import RoughSolver
-
-            return RoughSolver(threads=threads)
         return PardisoSolver(threads=threads)
     except (ImportError, OSError):   # no MKL for this processor
         return SuperLUSolver()

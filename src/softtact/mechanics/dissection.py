@@ -1,0 +1,62 @@
+"""Nested dissection of a body that is wide and thin: it is cut along lines in plan, again and again, and the cuts come last.
+
+Of unknowns on a plane the best such order is known (George, SIAM J. Numer. Anal. 10, 1973). A general ordering has to find the
+lines first: it takes five times as long for a third more operations on a sensor's lattice (docs/performance.md).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+_LEAST_SHARE = 0.1           # of the unknowns on either side of a cut
+_PRICE_OF_IMBALANCE = 2.0    # a cut between unlike parts counts as so much longer
+_SMALLEST = 200              # unknowns: what has fewer is not cut; smaller ones have fewer operations, in slower pieces
+_GRID_MM = 1e-6              # columns of nodes stand where their places round to the same
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A cut, or a part that was not cut again: unknowns (k,) that it eliminates, and the pieces that come before it."""
+
+    own: np.ndarray
+    before: tuple
+
+
+def dissect(indptr, indices, places):
+    """`Piece`s of a symmetric matrix, each behind those before it; the first cut is the last piece.
+
+    indptr, indices: pattern of its upper triangle (csr);  places (n, 2): where each unknown stands in plan, in mm
+    """
+    columns, column_of = np.unique(np.round(places / _GRID_MM).astype(np.int64), axis=0, return_inverse=True)
+    members = sp.csr_matrix((np.ones(len(places)), (column_of.ravel(), np.arange(len(places)))))
+    pattern = sp.csr_matrix((np.ones(len(indices), dtype=np.float32), indices, indptr), shape=(len(places),) * 2)
+    graph = members @ pattern @ members.T
+    graph = (graph + graph.T).tocsr()
+    pieces = []
+    _cut(graph, columns, np.diff(members.indptr), np.arange(len(columns)), pieces)
+    return [Piece(own=members[piece.own].indices, before=piece.before) for piece in pieces]
+
+
+def _cut(graph, places, weight, here, pieces):
+    """Append the pieces of some columns (c,), and return the number of the last."""
+    part = _best_cut(graph[here][:, here], places[here], weight[here]) if weight[here].sum() > _SMALLEST else None
+    before = () if part is None else tuple(_cut(graph, places, weight, here[part == side], pieces) for side in (-1, 1))
+    pieces.append(Piece(own=here if part is None else here[part == 0], before=before))
+    return len(pieces) - 1
+
+
+def _best_cut(graph, places, weight):
+    """For each column (c,) whether it lies on the cut (0) or on which side of it (-1, 1); None where nothing can be cut."""
+    whole, best, part = weight.sum(), np.inf, None
+    for place in places.T:
+        # A column is on the cut at a line where it does not lie beyond, but one of its neighbours does.
+        reach = np.maximum.reduceat(place[graph.indices], graph.indptr[:-1])
+        for line in np.unique(place):
+            beyond, on_cut = place > line, (place <= line) & (reach > line)
+            far, cut = weight[beyond].sum(), weight[on_cut].sum()
+            near = whole - far - cut
+            cost = cut * (1 + _PRICE_OF_IMBALANCE * abs(far - near) / whole)
+            if cost < best and min(near, far) >= _LEAST_SHARE * whole:
+                best, part = cost, np.where(on_cut, 0, np.where(beyond, 1, -1))
+    return part
