@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
-
 from six_frusta import six_frusta
 
 from softtact.mechanics import dissection
@@ -80,7 +79,7 @@ def test_the_panels_hold_the_factor(size, workers):
     for p in range(len(fronts.own_at) - 1):
         first, end = fronts.own_at[p], fronts.own_at[p + 1]
         bound = fronts.bound[fronts.bound_at[p]:fronts.bound_at[p + 1]]
-        panel = solver._panels[fronts.panel_at[p]:fronts.panel_at[p + 1]].reshape(end - first, -1)
+        panel = solver._store.panels[fronts.panel_at[p]:fronts.panel_at[p + 1]].reshape(end - first, -1)
         factor[first:end, first:end] = np.triu(panel[:, :end - first])
         factor[first:end, bound] = panel[:, end - first:]
     np.testing.assert_allclose(factor.T @ factor, whole[order][:, order].toarray(), atol=1e-5)
@@ -127,20 +126,21 @@ def test_only_what_changed_is_factored_again_and_the_factor_is_that_of_a_new_sol
     changed.data[changed.indptr[corner]] += 1.0
     changed = sp.csr_matrix((changed.data, upper.indices, upper.indptr), shape=upper.shape)
     assert kept.factor(changed)
-    again = kept._state.mean()
+    again = kept._store.state.mean()
     new = DissectedSolver(places, workers=workers)
     assert new.factor(changed)
     np.testing.assert_array_equal(kept.solve(right), new.solve(right))
-    assert 0 < again < 0.3 and new._state.all()
-    assert kept.factor(changed) and not kept._state.any()
+    assert 0 < again < 0.3 and new._store.state.all()
+    assert kept.factor(changed) and not kept._store.state.any()
 
 
-def test_a_matrix_that_is_not_positive_definite_is_told_and_the_next_one_factored(workers):
+@pytest.mark.parametrize("diagonal", [-50.0, np.nan])
+def test_a_matrix_that_is_not_positive_definite_is_told_and_the_next_one_factored(diagonal, workers):
     whole, upper, places = plate(60, 40)
     solver, right = DissectedSolver(places, workers=workers), np.ones(len(places))
     for place in (0, len(places) // 2, len(places) - 1):
         indefinite = sp.csr_matrix((upper.data.copy(), upper.indices, upper.indptr), shape=upper.shape)
-        indefinite.data[indefinite.indptr[place]] = -50.0
+        indefinite.data[indefinite.indptr[place]] = diagonal
         assert solver.factor(upper) and not solver.factor(indefinite) and solver.factor(upper)
         np.testing.assert_allclose(whole @ solver.solve(right), right, atol=1e-3)
 

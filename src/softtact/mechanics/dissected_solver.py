@@ -1,8 +1,7 @@
-"""Cholesky's method for the matrix of a wide and thin body, whose unknowns stand where they are known to: twice as fast as a general
-solver.
+"""Cholesky's method for the matrix of a wide and thin body, of which it is known where each unknown stands.
 
-In single precision, for steps that are corrected by a residual in double precision. What did not change since the last factor is
-not factored again.
+In single precision, and solved from 16 bits, for steps that are corrected by a residual in double precision. What did not change
+since the last factor is not factored again. What it gains over a general solver: docs/performance.md.
 """
 
 from dataclasses import replace
@@ -12,6 +11,7 @@ import numpy as np
 from softtact.mechanics import fronts as kernels
 from softtact.mechanics.dissection import dissect
 from softtact.mechanics.front_layout import lay_out
+from softtact.mechanics.fronts import Store
 from softtact.mechanics.parallel import SERIAL, slices
 
 _PARTS = 32              # of all operations: what takes less than such a share is one thread's, from its first piece to its last
@@ -20,7 +20,7 @@ _COLUMNS = 256           # of a large front that one thread couples at once
 
 
 class DissectedSolver:
-    """The interface of `linear_solvers`, with factors and solutions of about seven digits."""
+    """The interface of `linear_solvers`; a solution is off by some 3e-4 of its energy norm: it serves conjugate gradients."""
 
     name = "dissected Cholesky, single precision"
     precision = np.float32
@@ -34,32 +34,38 @@ class DissectedSolver:
         pattern = (upper.indptr, upper.indices)
         if self._pattern is None or not all(map(_same, pattern, self._pattern)):
             self._analyse(*pattern)
-        fronts, values, state = self._fronts, self._values, self._state
-        state[:] = kernels.AS_BEFORE if self._valid else kernels.NEW
-        kernels.mark_changed(fronts, upper.data.astype(np.float32, copy=False), self._source, values, state)
-        letters, factors, potrf, trsm, syrk, gemm = kernels.BLAS
-        panels, short, scale, updates = self._panels, self._short, self._scale, self._updates
-        self._valid = all(self._workers.map(
-            lambda pieces: kernels.factor_pieces(pieces, fronts, values, state, panels, short, scale, updates, *kernels.BLAS),
-            self._parts))
-        for pieces, blocks in self._large if self._valid else []:
-            self._workers.map(lambda p: kernels.begin(p, fronts, values, state, panels, updates, letters, potrf), pieces)
-            if (state[pieces] == kernels.FAILED).any():
-                self._valid = False
-                break
-            self._workers.map(lambda block: kernels.couple(*block, fronts, state, panels, letters, factors, trsm), blocks)
-            self._workers.map(lambda p: kernels.shorten(p, fronts, state, panels, short, scale), pieces)
-            self._workers.map(lambda block: kernels.update(*block, fronts, state, panels, updates, letters, factors, syrk, gemm),
-                              blocks)
+        fronts, store, workers = self._fronts, self._store, self._workers
+        store.state[:] = kernels.AS_BEFORE if self._valid else kernels.NEW
+        kernels.mark_changed(fronts, store, upper.data.astype(np.float32, copy=False), self._source)
+        self._valid = all(workers.map(lambda pieces: kernels.factor_pieces(pieces, fronts, store, *kernels.BLAS), self._parts)) \
+            and all(self._factor_large(pieces, blocks) for pieces, blocks in self._large)
         return self._valid
 
+    def _factor_large(self, pieces, blocks):
+        """Factor pieces that do not wait for each other, by blocks (piece, start, end) on all threads.
+
+        False where one is not positive definite.
+        """
+        fronts, store, workers = self._fronts, self._store, self._workers
+        letters, factors, potrf, trsm, syrk, gemm = kernels.BLAS
+        states = workers.map(lambda p: kernels.begin(p, fronts, store, letters, potrf), pieces)
+        if kernels.FAILED in states:
+            return False
+        workers.map(lambda block: kernels.couple(*block, fronts, store, letters, factors, trsm), blocks)
+        workers.map(lambda p: kernels.shorten(p, fronts, store), pieces)
+        workers.map(lambda block: kernels.update(*block, fronts, store, letters, factors, syrk, gemm), blocks)
+        return True
+
     def solve(self, right):
-        """Solve for one (n,) or several (n, k) right-hand sides, scaled to the range of single precision."""
+        """Solve for one (n,) or several (n, k) right-hand sides, scaled to the range of single precision: see the class.
+
+        All operations come in the same order, whatever the number of threads.
+        """
         if right.ndim > 1:
             return np.column_stack([self.solve(column) for column in right.T])
         size = float(np.abs(right).max()) or 1.0
         x = (right[self._order] / size).astype(np.float32)
-        factor, first = (self._fronts, self._panels, self._short, self._scale), self._first_shared
+        factor, first = (self._fronts, self._store), self._first_shared
         beyond = np.zeros((len(self._apart), len(x) - first), dtype=np.float32)
         self._workers.map(lambda k: kernels.forward(self._apart[k], *factor, x, beyond[k], first, *kernels.SOLVES),
                           range(len(self._apart)))
@@ -80,14 +86,15 @@ class DissectedSolver:
         bound = np.diff(fronts.bound_at)
         self._large = [(level, [(p, part.start, part.stop) for p in level for part in slices(int(bound[p]), _COLUMNS)])
                        for level in large]
-        self._values, self._state = np.zeros(len(source), dtype=np.float32), np.zeros(len(pieces), dtype=np.int8)
-        self._panels, self._updates = (np.zeros(int(at[-1]), dtype=np.float32) for at in (fronts.panel_at, fronts.update_at))
-        self._short, self._scale = np.zeros(int(fronts.short_at[-1]), dtype=np.int16), np.zeros(len(order), dtype=np.float32)
+        self._store = Store(
+            values=np.zeros(len(source), dtype=np.float32), state=np.zeros(len(pieces), dtype=np.int8),
+            panels=np.zeros(int(fronts.panel_at[-1]), dtype=np.float32), short=np.zeros(int(fronts.short_at[-1]), dtype=np.int16),
+            scale=np.zeros(len(order), dtype=np.float32), updates=np.zeros(int(fronts.update_at[-1]), dtype=np.float32))
         self._pattern, self._valid = (indptr, indices), False
 
     def close(self):
         """Forget the factors."""
-        self._pattern = self._fronts = self._panels = self._short = self._updates = None
+        self._pattern = self._fronts = self._store = None
 
 
 def _same(one, other):

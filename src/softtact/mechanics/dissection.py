@@ -1,7 +1,7 @@
 """Nested dissection of a body that is wide and thin: it is cut along lines in plan, again and again, and the cuts come last.
 
-Of unknowns on a plane the best such order is known (George, SIAM J. Numer. Anal. 10, 1973). A general ordering has to find the
-lines first: it takes five times as long for a third more operations on a sensor's lattice (docs/performance.md).
+On a plane no order needs fewer operations, but for a factor (George, SIAM J. Numer. Anal. 10, 1973). A general ordering has to find
+the lines first: it takes five times as long for a third more operations on a sensor's lattice (docs/performance.md).
 """
 
 from dataclasses import dataclass

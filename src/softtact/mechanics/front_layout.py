@@ -14,7 +14,8 @@ def lay_out(indptr, indices, pieces):
     """
     order = np.concatenate([piece.own for piece in pieces])
     own_at = _starts([len(piece.own) for piece in pieces])
-    rank, owner = np.empty(len(order), dtype=np.int64), np.repeat(np.arange(len(pieces), dtype=np.int16), np.diff(own_at))
+    rank = np.empty(len(order), dtype=np.int64)
+    owner = np.repeat(np.arange(len(pieces), dtype=np.min_scalar_type(len(pieces))), np.diff(own_at))     # short: sorted below
     rank[order] = np.arange(len(order))
     bound = _bound(indptr, indices, pieces, rank, own_at)
     bound_at, widths = _starts(map(len, bound)), np.diff(own_at) + [len(b) for b in bound]
@@ -23,12 +24,14 @@ def lay_out(indptr, indices, pieces):
     source = np.argsort(owner[low], kind="stable").astype(np.int32)
     entry_at = np.searchsorted(owner[low[source]], np.arange(len(pieces) + 1))
     flat = np.concatenate(bound)
-    return Fronts(
+    fronts = Fronts(
         own_at=own_at, bound_at=bound_at, bound=flat, panel_at=_starts(np.diff(own_at) * widths),
         update_at=_starts([len(b)**2 for b in bound]), child_at=_starts(len(piece.before) for piece in pieces),
-        child=np.array([child for piece in pieces for child in piece.before], dtype=np.int64), place=_places_in_parents(pieces, bound, own_at), entry_at=entry_at,
+        child=np.array([child for piece in pieces for child in piece.before], dtype=np.int64),
+        place=_places_in_parents(pieces, bound, own_at), entry_at=entry_at,
         target=_targets(own_at, bound_at, flat, entry_at, low[source], high[source]),
-        short_at=_starts(np.diff(own_at) * np.diff(bound_at))), order, source
+        short_at=_starts(np.diff(own_at) * np.diff(bound_at)))
+    return fronts, order, source
 
 
 def _starts(counts):

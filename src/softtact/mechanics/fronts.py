@@ -22,6 +22,9 @@ from softtact.mechanics import lapack
 #   entry_at (p + 1,), target: the matrix' entries that are its own, and where in its panel they stand
 #   short_at (p + 1,): its panel's bound columns (k, b) in 16 bits
 Fronts = namedtuple("Fronts", "own_at bound_at bound panel_at update_at child_at child place entry_at target short_at")
+#   values: the matrix' entries, in the order of `target`;  state (p,): of each piece
+#   panels, short, updates: as above, flat;  scale (n,): what a unit in a row of `short` stands for
+Store = namedtuple("Store", "values state panels short scale updates")
 
 BLAS = (lapack.LETTERS, lapack.FACTORS, lapack.POTRF, lapack.TRSM, lapack.SYRK, lapack.GEMM)
 SOLVES = (lapack.LETTERS, lapack.TRSV)
@@ -30,82 +33,84 @@ _LONGEST = 32767                     # of a number in 16 bits
 
 
 @njit(cache=True, nogil=True)
-def factor_pieces(pieces, fronts, values, state, panels, short, scale, updates, letters, factors, potrf, trsm, syrk, gemm):
+def factor_pieces(pieces, fronts, store, letters, factors, potrf, trsm, syrk, gemm):
     """Factor pieces, one after the other; False where one is not positive definite."""
     for p in pieces:
-        if begin(p, fronts, values, state, panels, updates, letters, potrf) == FAILED:
+        if begin(p, fronts, store, letters, potrf) == FAILED:
             return False
         bound = fronts.bound_at[p + 1] - fronts.bound_at[p]
-        couple(p, 0, bound, fronts, state, panels, letters, factors, trsm)
-        shorten(p, fronts, state, panels, short, scale)
-        update(p, 0, bound, fronts, state, panels, updates, letters, factors, syrk, gemm)
+        couple(p, 0, bound, fronts, store, letters, factors, trsm)
+        shorten(p, fronts, store)
+        update(p, 0, bound, fronts, store, letters, factors, syrk, gemm)
     return True
 
 
 @njit(cache=True, nogil=True)
-def begin(p, fronts, values, state, panels, updates, letters, potrf):
+def begin(p, fronts, store, letters, potrf):
     """Sum up a piece's panel and factor its own unknowns, if its entries or what it takes over have changed; its new state.
 
     state: NEW where the entries have changed
     """
     for c in fronts.child[fronts.child_at[p]:fronts.child_at[p + 1]]:
-        state[p] = max(state[p], state[c])
-    if state[p] != NEW:
-        return state[p]
+        store.state[p] = max(store.state[p], store.state[c])
+    if store.state[p] != NEW:
+        return store.state[p]
     own, width = _shape(p, fronts)
-    panel = panels[fronts.panel_at[p]:fronts.panel_at[p + 1]]
+    panel = store.panels[fronts.panel_at[p]:fronts.panel_at[p + 1]]
     panel[:] = 0.0
     for e in range(fronts.entry_at[p], fronts.entry_at[p + 1]):
-        panel[fronts.target[e]] = values[e]
+        panel[fronts.target[e]] = store.values[e]
     for c in fronts.child[fronts.child_at[p]:fronts.child_at[p + 1]]:
-        _take_over(c, 0, own, fronts, updates, panel, 0, width)
+        _take_over(c, 0, own, fronts, store, panel, 0, width)
     size = np.array([own, width, 0], dtype=np.int32)
     potrf(_address(letters, 0), _address(size, 0), _address(panel, 0), _address(size, 1), _address(size, 2))
-    if size[2] != 0:
-        state[p] = FAILED
-    return state[p]
+    # BLAS libraries differ in whether they tell of what is not a number; it goes through to the last pivot.
+    if size[2] != 0 or not np.isfinite(panel[(own - 1) * (width + 1)]):
+        store.state[p] = FAILED
+    return store.state[p]
 
 
 @njit(cache=True, nogil=True)
-def couple(p, start, end, fronts, state, panels, letters, factors, trsm):
+def couple(p, start, end, fronts, store, letters, factors, trsm):
     """The panel's columns from `start` to `end` of the bound unknowns."""
-    if state[p] != NEW or start == end:
+    if store.state[p] != NEW or start == end:
         return
     own, width = _shape(p, fronts)
-    panel = panels[fronts.panel_at[p]:fronts.panel_at[p + 1]]
+    panel = store.panels[fronts.panel_at[p]:fronts.panel_at[p + 1]]
     size = np.array([own, width, end - start], dtype=np.int32)
     L, N, R, T = _address(letters, 0), _address(letters, 1), _address(letters, 2), _address(letters, 3)
     trsm(R, L, T, N, _address(size, 2), _address(size, 0), _address(factors, 0), _address(panel, 0), _address(size, 1),
          _address(panel, own + start), _address(size, 1))
+    _keep(size)
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def shorten(p, fronts, state, panels, short, scale):
+def shorten(p, fronts, store):
     """Keep the panel's bound columns in 16 bits, and the size (n,) of a unit in each row."""
-    if state[p] != NEW:
+    if store.state[p] != NEW:
         return
     own, width = _shape(p, fronts)
     bound = width - own
     for k in range(own if bound else 0):
-        row = panels[fronts.panel_at[p] + k * width + own:fronts.panel_at[p] + (k + 1) * width]
-        out = short[fronts.short_at[p] + k * bound:fronts.short_at[p] + (k + 1) * bound]
+        row = store.panels[fronts.panel_at[p] + k * width + own:fronts.panel_at[p] + (k + 1) * width]
+        out = store.short[fronts.short_at[p] + k * bound:fronts.short_at[p] + (k + 1) * bound]
         largest = np.float32(0.0)
         for j in range(bound):
             largest = max(largest, abs(row[j]))
         per_unit = np.float32(_LONGEST) / max(largest, np.float32(1e-30))
         for j in range(bound):
             out[j] = np.int16(np.rint(row[j] * per_unit))
-        scale[fronts.own_at[p] + k] = np.float32(1.0) / per_unit
+        store.scale[fronts.own_at[p] + k] = np.float32(1.0) / per_unit
 
 
 @njit(cache=True, nogil=True)
-def update(p, start, end, fronts, state, panels, updates, letters, factors, syrk, gemm):
+def update(p, start, end, fronts, store, letters, factors, syrk, gemm):
     """The update's rows from `start` to `end`."""
-    if state[p] != NEW or start == end:
+    if store.state[p] != NEW or start == end:
         return
     own, width = _shape(p, fronts)
     bound = width - own
-    panel, out = panels[fronts.panel_at[p]:fronts.panel_at[p + 1]], updates[fronts.update_at[p]:fronts.update_at[p + 1]]
+    panel, out = store.panels[fronts.panel_at[p]:fronts.panel_at[p + 1]], store.updates[fronts.update_at[p]:fronts.update_at[p + 1]]
     size = np.array([own, width, end - start, bound, bound - end], dtype=np.int32)
     L, N, T = _address(letters, 0), _address(letters, 1), _address(letters, 3)
     minus_one, zero, rows = _address(factors, 1), _address(factors, 2), _address(panel, own + start)
@@ -114,17 +119,18 @@ def update(p, start, end, fronts, state, panels, updates, letters, factors, syrk
     if bound > end:
         gemm(N, T, _address(size, 4), _address(size, 2), _address(size, 0), minus_one, _address(panel, own + end),
              _address(size, 1), rows, _address(size, 1), zero, _address(out, start * bound + end), _address(size, 3))
+    _keep(size)
     for c in fronts.child[fronts.child_at[p]:fronts.child_at[p + 1]]:
-        _take_over(c, own + start, own + end, fronts, updates, out, own, bound)
+        _take_over(c, own + start, own + end, fronts, store, out, own, bound)
 
 
 @njit(cache=True, nogil=True)
-def _take_over(c, start, end, fronts, updates, out, skipped, width):
+def _take_over(c, start, end, fronts, store, out, skipped, width):
     """Add the rows of a piece's update that stand from `start` to `end` in a front.
 
     out: the front's rows, `width` wide, without those and the columns that are `skipped`
     """
-    place, given = fronts.place[fronts.bound_at[c]:fronts.bound_at[c + 1]], updates[fronts.update_at[c]:fronts.update_at[c + 1]]
+    place, given = _bound_of(c, fronts, fronts.place), store.updates[fronts.update_at[c]:fronts.update_at[c + 1]]
     bound, runs = len(place), _runs(place)
     for i in range(np.searchsorted(place, start), np.searchsorted(place, end)):
         row = (place[i] - skipped) * width - skipped
@@ -149,15 +155,16 @@ def _runs(places):
 
 
 @njit(cache=True, nogil=True)
-def forward(pieces, fronts, panels, short, scale, right, beyond, first, letters, trsv):
-    """Eliminate the pieces' unknowns from a right-hand side (n,), in place; what unknowns from `first` on are left goes to `beyond`."""
+def forward(pieces, fronts, store, right, beyond, first, letters, trsv):
+    """Eliminate the pieces' unknowns from a right-hand side (n,), in place.
+
+    What is left on unknowns from `first` on, which other pieces may change at the same time, goes to `beyond`.
+    """
     for p in pieces:
-        own, width = _shape(p, fronts)
-        bound = fronts.bound[fronts.bound_at[p]:fronts.bound_at[p + 1]]
-        x = right[fronts.own_at[p]:fronts.own_at[p + 1]]
-        _solve_own(p, fronts, panels, x, letters, 1, trsv)
+        bound, x = _bound_of(p, fronts, fronts.bound), _own_of(p, fronts, right)
+        _solve_own(p, fronts, store, x, letters, 1, trsv)
         passed_on = np.zeros(len(bound), np.float32)
-        _add_rows(short[fronts.short_at[p]:fronts.short_at[p + 1]], x * scale[fronts.own_at[p]:fronts.own_at[p + 1]], passed_on)
+        _add_rows(_short_of(p, fronts, store), x * _own_of(p, fronts, store.scale), passed_on)
         for i in range(len(bound)):
             if bound[i] < first:
                 right[bound[i]] -= passed_on[i]
@@ -166,23 +173,23 @@ def forward(pieces, fronts, panels, short, scale, right, beyond, first, letters,
 
 
 @njit(cache=True, nogil=True)
-def backward(pieces, fronts, panels, short, scale, right, letters, trsv):
+def backward(pieces, fronts, store, right, letters, trsv):
     """The pieces' unknowns, from the last on, in place; later ones are known."""
     for p in pieces[::-1]:
-        x = right[fronts.own_at[p]:fronts.own_at[p + 1]]
-        known = right[fronts.bound[fronts.bound_at[p]:fronts.bound_at[p + 1]]]
-        _subtract_products(short[fronts.short_at[p]:fronts.short_at[p + 1]], scale[fronts.own_at[p]:fronts.own_at[p + 1]], known, x)
-        _solve_own(p, fronts, panels, x, letters, 3, trsv)
+        x, known = _own_of(p, fronts, right), right[_bound_of(p, fronts, fronts.bound)]
+        _subtract_products(_short_of(p, fronts, store), _own_of(p, fronts, store.scale), known, x)
+        _solve_own(p, fronts, store, x, letters, 3, trsv)
 
 
 @njit(cache=True, nogil=True)
-def _solve_own(p, fronts, panels, x, letters, letter, trsv):
+def _solve_own(p, fronts, store, x, letters, letter, trsv):
     """Solve with the triangle of a piece's own unknowns, or with its transpose, as the letter says."""
-    panel = panels[fronts.panel_at[p]:fronts.panel_at[p + 1]]
+    panel = store.panels[fronts.panel_at[p]:fronts.panel_at[p + 1]]
     own, width = _shape(p, fronts)
     size = np.array([own, width, 1], dtype=np.int32)
     trsv(_address(letters, 0), _address(letters, letter), _address(letters, 1), _address(size, 0), _address(panel, 0),
          _address(size, 1), _address(x, 0), _address(size, 2))
+    _keep(size)
 
 
 @njit(cache=True, nogil=True, fastmath=True)
@@ -213,13 +220,13 @@ def _subtract_products(rows, scale, known, x):
 
 
 @njit(cache=True, nogil=True)
-def mark_changed(fronts, values, source, before, state):
+def mark_changed(fronts, store, values, source):
     """Take over a matrix' values as each piece's entries, and let those be NEW where one has changed."""
-    for p in range(len(state)):
+    for p in range(len(store.state)):
         for e in range(fronts.entry_at[p], fronts.entry_at[p + 1]):
-            if before[e] != values[source[e]]:
-                state[p] = NEW
-                before[e] = values[source[e]]
+            if store.values[e] != values[source[e]]:
+                store.state[p] = NEW
+                store.values[e] = values[source[e]]
 
 
 @njit(cache=True, nogil=True)
@@ -230,5 +237,28 @@ def _shape(p, fronts):
 
 
 @njit(cache=True, nogil=True)
+def _own_of(p, fronts, values):
+    """Those of a piece's own unknowns, of values (n,)."""
+    return values[fronts.own_at[p]:fronts.own_at[p + 1]]
+
+
+@njit(cache=True, nogil=True)
+def _bound_of(p, fronts, values):
+    """Those of a piece's bound unknowns, of values as `bound`."""
+    return values[fronts.bound_at[p]:fronts.bound_at[p + 1]]
+
+
+@njit(cache=True, nogil=True)
+def _short_of(p, fronts, store):
+    return store.short[fronts.short_at[p]:fronts.short_at[p + 1]]
+
+
+@njit(cache=True, nogil=True)
 def _address(array, place):
     return np.uintp(array.ctypes.data) + np.uintp(place * array.itemsize)
+
+
+@njit(cache=True, nogil=True, inline="never")
+def _keep(array):
+    """Use an array that a routine was pointed at: until here it must not be freed."""
+    return array[0]

@@ -1,7 +1,7 @@
 """One small interface to sparse direct solvers for symmetric matrices: analyse once, factor often.
 
-PARDISO (MKL) where it installs (x86), SuperLU of scipy elsewhere. `solver.name` tells which one it was. A press, whose unknowns stand
-where they are known to, has a solver of its own: `dissected_solver`.
+PARDISO (MKL) where it installs (x86), SuperLU of scipy elsewhere. `solver.name` tells which one it was. A press has a solver of its
+own, which knows where the unknowns stand: `dissected_solver`.
 """
 
 import ctypes
