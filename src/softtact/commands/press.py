@@ -44,7 +44,7 @@ def add(commands):
     command.add_argument("--mesh-quality", choices=("default", "draft", "stable", "fine"), default="default",
                          help="of the hyperelastic model: default is 1 to 4 %% off in the map's root mean square, draft 2 to 6 %% "
                               "and several times quicker; stable presses frusta deeper than half of their height; fine is 1 %% "
-                              "off, 2 %% at single points, for 1.8 times the default's time and 2.5 GB")
+                              "off, 2 %% at single points, for 1.9 times the default's time and 3 GB")
     command.add_argument("--device", default="cpu", metavar="DEVICE",
                          help="of the hyperelastic model: cpu (default), cuda, or auto, a GPU where there is one, sums up elements")
     command.add_argument("--card", action="append", metavar="LAYER=CARD.json",
