@@ -145,6 +145,18 @@ def test_a_matrix_that_is_not_positive_definite_is_told_and_the_next_one_factore
         np.testing.assert_allclose(whole @ solver.solve(right), right, atol=1e-3)
 
 
+def test_plates_that_nothing_joins_are_solved_together():
+    # Apart by more than either is wide, so that a cut between them has no unknowns of its own.
+    (one, _, here), (other, _, there) = plate(20, 12), plate(12, 20)
+    whole, places = sp.block_diag([one, other], format="csr"), np.vstack([here, there + [40.0, 0.0]])
+    upper = sp.triu(whole, format="csr")
+    upper.sort_indices()
+    assert any(not len(piece.own) for piece in dissect(upper.indptr, upper.indices, places))
+    solver, right = DissectedSolver(places), np.random.default_rng(0).normal(size=len(places))
+    assert solver.factor(upper)
+    np.testing.assert_allclose(whole @ solver.solve(right), right, atol=1e-3)
+
+
 def test_a_new_pattern_gets_an_analysis_of_its_own():
     whole, upper, places = plate(20, 12, layers=1)
     solver, right = DissectedSolver(places), np.ones(len(places))

@@ -74,6 +74,7 @@ def test_forces_and_newton_steps_are_the_slopes_of_the_potential_of_a_press_with
     # A press goes on from there, to a step that is exact in the contact, and solves less exactly.
     monkeypatch.setattr(contact_step, "_INNER_STEPS", 1)
     monkeypatch.setattr(contact_step, "_FORCING", 1e-9)
+    monkeypatch.setattr(contact_step, "_INNER_TOLERANCE", 1e-9)
     monkeypatch.setattr(contact_step._Problem, "best_share", lambda *_: 1.0)
     monkeypatch.setattr(sheet_cells, "_FARTHEST_MM", np.inf)        # nor damps or cuts the steps of single cells
     monkeypatch.setattr(sheet_cells, "_FARTHEST_OUTER_MM", np.inf)

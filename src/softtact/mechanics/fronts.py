@@ -62,6 +62,8 @@ def begin(p, fronts, store, letters, potrf):
         panel[fronts.target[e]] = store.values[e]
     for c in fronts.child[fronts.child_at[p]:fronts.child_at[p + 1]]:
         _take_over(c, 0, own, fronts, store, panel, 0, width)
+    if own == 0:     # a cut where nothing is coupled
+        return NEW
     size = np.array([own, width, 0], dtype=np.int32)
     potrf(_address(letters, 0), _address(size, 0), _address(panel, 0), _address(size, 1), _address(size, 2))
     # BLAS libraries differ in whether they tell of what is not a number; it goes through to the last pivot.
@@ -186,6 +188,8 @@ def _solve_own(p, fronts, store, x, letters, letter, trsv):
     """Solve with the triangle of a piece's own unknowns, or with its transpose, as the letter says."""
     panel = store.panels[fronts.panel_at[p]:fronts.panel_at[p + 1]]
     own, width = _shape(p, fronts)
+    if own == 0:
+        return
     size = np.array([own, width, 1], dtype=np.int32)
     trsv(_address(letters, 0), _address(letters, letter), _address(letters, 1), _address(size, 0), _address(panel, 0),
          _address(size, 1), _address(x, 0), _address(size, 2))
