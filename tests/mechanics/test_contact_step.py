@@ -139,6 +139,14 @@ def test_a_factor_serves_the_next_step_too():
     assert stepper.factors == factors
 
 
+def test_it_takes_no_further_solve_to_see_that_a_step_is_good_enough():
+    scene, solver = Scene(3), DenseSolver()
+    scene.points = replace(scene.points, gaps=np.full(POINTS, 0.1))
+    step, _ = scene.step(ContactStepper(solver), excess=None)
+    np.testing.assert_allclose(scene.matrix @ step, -scene.residual, rtol=1e-9)
+    assert solver.solves == 2     # of what the object's lowering does, and of the step itself
+
+
 def test_a_step_with_an_old_factor_is_the_same_step(exact):
     scene, other, stepper = Scene(3), Scene(4), ContactStepper(DenseSolver())
     new = scene.step(ContactStepper(DenseSolver()))
