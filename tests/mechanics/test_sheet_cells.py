@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 import six_frusta
 
+from softtact.mechanics import contact_step
+
 DEPTH_MM = 0.05
 
 
@@ -45,7 +47,8 @@ def test_a_cell_that_moved_less_than_allowed_keeps_its_tangent(body):
     assert body.cells.refresh(bent_by_10_um, kept_mm=0.004) == 0
 
 
-def test_a_cell_that_was_thrown_too_far_is_damped_until_it_is_not(body):
+def test_a_cell_that_was_thrown_too_far_is_damped_until_it_is_not(body, monkeypatch):
+    monkeypatch.setattr(contact_step, "_INNER_TOLERANCE", 1e-6)     # from so deep in the plate a tenth of the forces is much
     state = bent(body, by=0.02)
     free = body.newton_step(state, None)
     thrown = np.zeros_like(free.bed)
