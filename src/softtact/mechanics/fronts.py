@@ -47,9 +47,9 @@ def factor_pieces(pieces, fronts, store, letters, factors, potrf, trsm, syrk, ge
 
 @njit(cache=True, nogil=True)
 def begin(p, fronts, store, letters, potrf):
-    """Sum up a piece's panel and factor its own unknowns, if its entries or what it takes over have changed; its new state.
+    """Sum up a piece's panel and factor its own unknowns, if its entries (see `mark_changed`) or what it takes over have changed.
 
-    state: NEW where the entries have changed
+    Returns the piece's state.
     """
     for c in fronts.child[fronts.child_at[p]:fronts.child_at[p + 1]]:
         store.state[p] = max(store.state[p], store.state[c])
