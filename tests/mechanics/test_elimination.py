@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from softtact.mechanics.condensation import Condensation, Springs
+from softtact.mechanics.condensation import Condensation, Springs, packed
 from softtact.mechanics.elimination import LayerwiseElimination
 from softtact.mechanics.parallel import Workers
 
@@ -30,7 +30,7 @@ class Bodies:
 
     def set(self, bodies, **options):
         springs = Springs(self.spring[bodies], self.elimination.stages[0].place[SPRING], np.array([[1.0, -1.0]]))
-        tangents = [[group[bodies].astype(np.float32) for group in groups] for groups in self.tangents]
+        tangents = [[packed(group[bodies]) for group in groups] for groups in self.tangents]
         self.elimination.set(bodies, zip(tangents, [springs, None, None], strict=True), **options)
 
     def whole(self, body):
@@ -138,7 +138,7 @@ def test_soft_modes_that_go_down_stay_so_beside_one_of_any_stiffness(stiffest):
     matrix[:inner, inner:] = rng.normal(size=(inner, outer))
     matrix[inner:, :inner] = matrix[:inner, inner:].T
     body = Condensation(1, inner, outer, [np.arange(inner + outer)[None]])
-    body.set(np.array([0]), [matrix.astype(np.float32)[None, None]])
+    body.set(np.array([0]), [packed(matrix[None, None])])
     assert body.modified == 1
     force = rng.normal(size=(1, inner))
     _, half = body.residual(force)

@@ -50,8 +50,9 @@ class Condensation:
     def set(self, bodies, tangents, springs=None, *, damping=None):
         """Assemble, factor and condense the matrices of the given bodies (b,).
 
-        tangents: for each group of elements (b, k, w, w) in N/mm;  springs: `Springs` of these bodies;  damping: stiffness (b,)
-        in N/mm to add on each inner unknown, which shortens steps along soft modes (Levenberg and Marquardt)
+        tangents: for each group of elements (b, k, w (w + 1) / 2) in N/mm, as `packed` has them;  springs: `Springs` of these
+        bodies;  damping: stiffness (b,) in N/mm to add on each inner unknown, which shortens steps along soft modes (Levenberg and
+        Marquardt)
 
         Where folding made a matrix indefinite its eigenvalues are made positive: with |matrix| every Newton step lowers the
         energy, and goes as far along a mode of negative stiffness as along one of positive; at equilibrium only the rate
@@ -94,6 +95,24 @@ class Condensation:
         return int(self._modified.sum())
 
 
+def packed(matrices):
+    """Upper triangles (..., w (w + 1) / 2) of symmetric matrices (..., w, w), row after row, in single precision."""
+    *like, width, _ = matrices.shape
+    out = np.empty((int(np.prod(like)), width * (width + 1) // 2), dtype=np.float32)
+    _pack(matrices.reshape(-1, width, width), out)
+    return out.reshape(*like, -1)
+
+
+@njit(cache=True, nogil=True)
+def _pack(matrices, out):
+    width = matrices.shape[1]
+    for k in range(len(matrices)):
+        start = 0
+        for i in range(width):
+            out[k, start:start + width - i] = matrices[k, i, i:]
+            start += width - i
+
+
 @njit(cache=True, nogil=True)
 def _set(bodies, damping, tangents, dofs, stiffness, places, weights, rows, outer, modified, smallest, letters, factors, potrf,
          trsm, syrk):
@@ -114,12 +133,21 @@ def _set(bodies, damping, tangents, dofs, stiffness, places, weights, rows, oute
 
 @njit(cache=True, nogil=True)
 def _add_element(matrix, tangent, dofs):
+    """Add a packed tangent to an upper triangle; an unknown may stand in several of an element's places."""
+    first = 0
     for i in range(len(dofs)):
         row = dofs[i]
         if row >= 0:
-            for j in range(len(dofs)):
-                if dofs[j] >= row:
-                    matrix[row, dofs[j]] += tangent[i, j]
+            matrix[row, row] += tangent[first]
+            for j in range(i + 1, len(dofs)):
+                column, value = dofs[j], tangent[first + j - i]
+                if column > row:
+                    matrix[row, column] += value
+                elif column == row:
+                    matrix[row, row] += 2 * value
+                elif column >= 0:
+                    matrix[column, row] += value
+        first += len(dofs) - i
 
 
 @njit(cache=True, nogil=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from softtact.mechanics.condensation import Condensation
+from softtact.mechanics.condensation import Condensation, packed
 from softtact.mechanics.parallel import SERIAL
 
 
@@ -59,13 +59,13 @@ class LayerwiseElimination:
     def set(self, bodies, layers, *, damping=None):
         """Eliminate anew in the given bodies (b,).
 
-        layers: for each layer the tangents (b, k, w, w) of its groups, in N/mm, and its `Springs` or None; one layer is asked for
-        after the other;  damping: see `Condensation.set`
+        layers: for each layer the tangents of its groups and its `Springs` or None; one layer is asked for after the other
+        For these and the damping see `Condensation.set`.
         """
         carried = []
         for stage, (tangents, springs) in zip(self.stages, layers, strict=True):
             stage.condensed.set(bodies, [*tangents, *carried], springs, damping=damping)
-            carried = [stage.condensed.outer[bodies][:, None]]
+            carried = [packed(stage.condensed.outer[bodies][:, None])]
 
     def residual(self, force, *, bodies=None, workers=SERIAL):
         """Pass the inner forces (b, n) of some bodies (b,), or of all, on to the outer unknowns, in place; returns what `recover`

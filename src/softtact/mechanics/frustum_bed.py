@@ -21,6 +21,7 @@ from softtact.mechanics.condensation import Springs
 from softtact.mechanics.elements import HEX27_BOTTOM, HEX27_SIDES, gauss, quad9
 from softtact.mechanics.elimination import LayerwiseElimination
 from softtact.mechanics.hex_mesh import CORE_RADIUS, disc_plan, extrude
+from softtact.mechanics.kept_tangents import KeptTangents
 from softtact.mechanics.kernels import add_forces
 from softtact.mechanics.parallel import SERIAL
 
@@ -81,6 +82,7 @@ class FrustumBed:
         self._element_nodes = (self.nodes * np.arange(self.count)[:, None, None] + self.mesh.hexes).reshape(-1, 27)
         self.block = HexBlock(self.per_element(self.coordinates), law, trilinear=trilinear, local_over_shear=local_over_shear,
                               growing_over_shear=growing_over_shear)
+        self._tangents = KeptTangents(self.block)
         self._contact_points(pcb_z_mm)
         self._number_unknowns(tips_held)
         self.elimination = self._elimination()
@@ -240,15 +242,15 @@ class FrustumBed:
         """Stiffness (n, p) of the contact points in N/mm3."""
         return self.contact.response(gaps)[2]
 
-    def condense(self, state, frusta, damping=None):
+    def condense(self, state, frusta, damping=None, *, kept_mm=0.0):
         """Recompute the condensed tangents of the given frusta (k,).
 
-        damping: stiffness (k,) in N/mm on their inner unknowns, see `Condensation.set`
+        damping: stiffness (k,) in N/mm on their inner unknowns, see `Condensation.set`;  kept_mm: see `KeptTangents`
         """
         slope = self.contact.at(frusta).response(state.gaps[frusta])[2] * self.point_area[frusta]
         displacement = state.displacement[frusta]
         friction = None if state.drag is None else state.drag.stiffness(frusta)
-        layers = (([self._layer_tangents(k, displacement, frusta)], self._springs(k, frusta, slope, friction))
+        layers = (([self._layer_tangents(k, displacement, frusta, kept_mm)], self._springs(k, frusta, slope, friction))
                   for k in range(self.mesh.layers))
         self.elimination.set(frusta, layers, damping=damping)
 
@@ -278,12 +280,12 @@ class FrustumBed:
                        np.vstack([np.hstack([x, held]), np.hstack([held, y]), np.hstack([x, y])]),
                        np.tile(weights, (3, 2)))
 
-    def _layer_tangents(self, k, displacement, frusta):
-        """Tangents (b, h, 81, 81) of the k-th layer's h elements in frusta (b,)."""
+    def _layer_tangents(self, k, displacement, frusta, kept_mm):
+        """Packed tangents (b, h, w) of the k-th layer's h elements in frusta (b,)."""
         hexes = self.mesh.layer(k)
         elements = frusta[:, None] * len(self.mesh.hexes) + k * len(hexes) + np.arange(len(hexes))
-        tangents = self.block.tangent(displacement[:, hexes].reshape(-1, 27, 3), elements.ravel(), precision=np.float32)
-        return tangents.reshape(*elements.shape, 81, 81)
+        tangents = self._tangents.at(displacement[:, hexes].reshape(-1, 27, 3), elements.ravel(), kept_mm=kept_mm)
+        return tangents.reshape(*elements.shape, -1)
 
     def condensed_residual(self, state, *, workers=SERIAL):
         """Root forces (n, 75) after the inner residual has been eliminated, and what `inner_step` needs again."""

@@ -6,10 +6,13 @@ matrix are the cells' walls and the cover. Cells under parts of the cover that a
 
 import numpy as np
 
+from softtact.mechanics.condensation import packed
 from softtact.mechanics.elimination import LayerwiseElimination
+from softtact.mechanics.kept_tangents import KeptTangents
 from softtact.mechanics.parallel import SERIAL, chunks
 
 _CHUNK = 8                          # cells that one thread condenses at once
+_ELEMENTS_KEEP_MM = 0.004           # by which an element's nodes may move against each other before its tangent is found anew
 _REFRESH_SLOPE = 0.2                # a cell keeps no tangent where a contact point's stiffness changed by this share of the penalty
 _REFRESH_WITH_FRICTION = 20.0       # ... or, with friction, by this many N/mm3: with 100 light presses creep and fail
 # A cell is thrown too far where its inner nodes go so far beyond this multiple of its walls' step, or its walls farther than that.
@@ -52,9 +55,10 @@ class SheetCells:
         """
         stale = self._stale(state, kept_mm)
         frusta = chunks(np.flatnonzero(stale), _CHUNK)
-        workers.map(lambda part: self.bed.condense(state.bed, part, self._damping[part]), frusta)
+        kept = min(kept_mm, _ELEMENTS_KEEP_MM)
+        workers.map(lambda part: self.bed.condense(state.bed, part, self._damping[part], kept_mm=kept), frusta)
         tasks = [(kind, part) for kind in self.kinds for part in chunks(np.flatnonzero(stale[kind.cells]), _CHUNK)]
-        workers.map(lambda task: task[0].condense(state, self.bed, task[1], self._damping), tasks)
+        workers.map(lambda task: task[0].condense(state, self.bed, task[1], self._damping, kept_mm=kept), tasks)
         self._damped_with = self._damping.copy()
         return int(stale.sum())
 
@@ -154,7 +158,8 @@ class CellKind:
     """Cells (c,) that are translations of each other, with the sheet's elements in them; nodes (c, n) of each."""
 
     def __init__(self, slab, group, roots):
-        self.cells, self._layers = group.cells, group.layers
+        self.cells = group.cells
+        self._layers = [[(nodes, KeptTangents(block)) for nodes, block in layer] for layer in group.layers]
         members = [nodes.reshape(len(self.cells), -1) for nodes, _ in group.parts]
         self.nodes, local = _same_in_all(np.hstack([*members, roots]))
         *groups, root = np.split(local, np.cumsum([m.shape[1] for m in members]))
@@ -186,23 +191,23 @@ class CellKind:
         self.elimination.recover(halves, step)
         return step[:, self._inner_places]
 
-    def condense(self, state, bed, chosen, damping):
+    def condense(self, state, bed, chosen, damping, *, kept_mm=0.0):
         """Recompute the condensed tangents of some of these cells (k,), counted among them, from those of their frusta.
 
-        damping: of all cells, in N/mm
+        damping: of all cells, in N/mm;  kept_mm: see `KeptTangents`
         """
-        frusta = [bed.root_stiffness[self.cells[chosen], None]]
-        layers = (((frusta if k == 0 else []) + [self._tangents(state, part, chosen) for part in layer], None)
+        frusta = [packed(bed.root_stiffness[self.cells[chosen], None])]
+        layers = (((frusta if k == 0 else []) + [self._tangents(state, part, chosen, kept_mm) for part in layer], None)
                   for k, layer in enumerate(self._layers))
         self.elimination.set(chosen, layers, damping=damping[self.cells[chosen]])
 
-    def _tangents(self, state, part, chosen):
-        """Tangents (b, k, w, w) of like elements in some of the cells (b,)."""
-        nodes, block = part
+    def _tangents(self, state, part, chosen, kept_mm):
+        """Packed tangents (b, k, w) of like elements in some of the cells (b,)."""
+        nodes, kept = part
         per_cell = len(nodes) // len(self.cells)
         elements = (chosen[:, None] * per_cell + np.arange(per_cell)).ravel()
-        each = block.tangent(state.slab.displacement[nodes[elements]], elements, precision=np.float32)
-        return each.reshape(len(chosen), per_cell, *each.shape[1:])
+        each = kept.at(state.slab.displacement[nodes[elements]], elements, kept_mm=kept_mm)
+        return each.reshape(len(chosen), per_cell, -1)
 
 
 def _dofs(nodes):
