@@ -9,6 +9,7 @@ import scipy.sparse as sp
 
 from softtact.contact.penalty import Contact, penalty
 from softtact.mechanics import contact_step
+from softtact.mechanics.contact_factor import ContactFactor
 from softtact.mechanics.contact_step import ContactStepper, LinearGaps
 from softtact.mechanics.sparsity import SymmetricProduct
 
@@ -36,6 +37,11 @@ class DenseSolver:
         return self._inverse @ right
 
 
+def dense_stepper(solver=None):
+    """A stepper whose factor is new for each contact."""
+    return ContactStepper(ContactFactor(solver or DenseSolver()))
+
+
 class Scene:
     """A random positive definite body under a free object, its points between 2 um in the object and 2 um away."""
 
@@ -51,9 +57,6 @@ class Scene:
     def step(self, stepper, **changes):
         arguments = {"excess": self.excess, **changes}
         return stepper.step(sp.csr_matrix(np.triu(self.matrix)), self.residual, self, **arguments)
-
-    def pressed(self, rubber, slope):
-        return rubber + sp.csr_matrix(np.triu(self.rows.T @ (slope[:, None] * self.rows)))
 
     def rubber_forces(self, rubber, step):
         return SymmetricProduct(rubber.indptr, rubber.indices)(rubber.data, step)
@@ -82,7 +85,7 @@ def exact(monkeypatch):
 @pytest.mark.parametrize("seed", range(5))
 def test_a_step_is_the_least_energy_that_a_general_minimiser_finds(exact, seed):
     scene = Scene(seed)
-    step, lowering = scene.step(ContactStepper(DenseSolver()))
+    step, lowering = scene.step(dense_stepper())
     found = np.append(step, lowering)
     general = scipy.optimize.minimize(scene.energy, np.zeros(UNKNOWNS + 1), method="BFGS", options={"gtol": 1e-9, "maxiter": 4000})
     scale = abs(general.fun)
@@ -93,8 +96,8 @@ def test_a_step_is_the_least_energy_that_a_general_minimiser_finds(exact, seed):
 @pytest.mark.parametrize("seed", range(3))
 def test_an_object_that_would_go_too_far_stops_and_the_body_is_in_balance_at_that_depth(exact, seed):
     scene = Scene(seed)
-    _, free = scene.step(ContactStepper(DenseSolver()))
-    step, lowering = scene.step(ContactStepper(DenseSolver()), largest=0.3 * abs(free))
+    _, free = scene.step(dense_stepper())
+    step, lowering = scene.step(dense_stepper(), largest=0.3 * abs(free))
     assert lowering == pytest.approx(0.3 * free, rel=1e-12)
     at_depth = scipy.optimize.approx_fprime(np.append(step, lowering), scene.energy, 1e-9)
     assert np.abs(at_depth[:-1]).max() < 1e-4    # the differences' own rounding
@@ -102,12 +105,12 @@ def test_an_object_that_would_go_too_far_stops_and_the_body_is_in_balance_at_tha
 
 
 def test_a_limit_that_the_object_does_not_reach_changes_nothing():
-    (step, lowering), (limited, lowered) = (Scene(1).step(ContactStepper(DenseSolver()), largest=far) for far in (np.inf, 1.0))
+    (step, lowering), (limited, lowered) = (Scene(1).step(dense_stepper(), largest=far) for far in (np.inf, 1.0))
     assert lowered == lowering and (limited == step).all()
 
 
 def test_an_object_that_is_held_is_not_lowered():
-    step, lowering = Scene(1).step(ContactStepper(DenseSolver()), excess=None)
+    step, lowering = Scene(1).step(dense_stepper(), excess=None)
     assert lowering == 0.0 and np.abs(step).max() > 0
 
 
@@ -117,7 +120,7 @@ def test_a_point_that_would_fly_into_the_object_is_stopped_within_one_step(exact
     scene.matrix, scene.rows, scene.residual = np.eye(1), np.array([[-1.0]]), np.array([-1.0])
     scene.points = LinearGaps(gaps=np.array([1e-3]), rows=sp.csr_matrix(scene.rows), lowering=np.array([-1.0]),
                               area=np.array([0.02]), contact=CONTACT)
-    step, _ = scene.step(ContactStepper(DenseSolver()), excess=None)
+    step, _ = scene.step(dense_stepper(), excess=None)
     depth = step[0] - 1e-3
     # 1 N = step + area k (depth - t / 2): by hand, depth = (1 - 1e-3 + 60 t / 2) / 61
     assert depth == pytest.approx((1 - 1e-3 + 60 / 6000) / 61, rel=1e-6)
@@ -126,12 +129,12 @@ def test_a_point_that_would_fly_into_the_object_is_stopped_within_one_step(exact
 def test_a_free_object_that_touches_nothing_is_told_by_nan():
     scene = Scene(2)
     scene.points = replace(scene.points, gaps=np.full(POINTS, 0.1))
-    _, lowering = scene.step(ContactStepper(DenseSolver()), excess=-1.0)
+    _, lowering = scene.step(dense_stepper(), excess=-1.0)
     assert np.isnan(lowering)
 
 
 def test_a_factor_serves_the_next_step_too():
-    scene, stepper = Scene(3), ContactStepper(DenseSolver())
+    scene, stepper = Scene(3), dense_stepper()
     scene.step(stepper)
     factors = stepper.factors
     scene.matrix = 1.02 * scene.matrix     # rubber that has stiffened a little
@@ -142,14 +145,14 @@ def test_a_factor_serves_the_next_step_too():
 def test_it_takes_no_further_solve_to_see_that_a_step_is_good_enough():
     scene, solver = Scene(3), DenseSolver()
     scene.points = replace(scene.points, gaps=np.full(POINTS, 0.1))
-    step, _ = scene.step(ContactStepper(solver), excess=None)
+    step, _ = scene.step(dense_stepper(solver), excess=None)
     np.testing.assert_allclose(scene.matrix @ step, -scene.residual, rtol=1e-9)
     assert solver.solves == 2     # of what the object's lowering does, and of the step itself
 
 
 def test_a_step_with_an_old_factor_is_the_same_step(exact):
-    scene, other, stepper = Scene(3), Scene(4), ContactStepper(DenseSolver())
-    new = scene.step(ContactStepper(DenseSolver()))
+    scene, other, stepper = Scene(3), Scene(4), dense_stepper()
+    new = scene.step(dense_stepper())
     other.step(stepper)
     old = scene.step(stepper)
     assert np.abs(new[0] - old[0]).max() < 1e-6 * np.abs(new[0]).max() and old[1] == pytest.approx(new[1], rel=1e-6)
@@ -158,7 +161,7 @@ def test_a_step_with_an_old_factor_is_the_same_step(exact):
 def test_a_body_that_is_not_stable_has_no_step():
     scene = Scene(5)
     scene.matrix = scene.matrix - 3 * np.linalg.eigvalsh(scene.matrix)[-1] * np.eye(UNKNOWNS)
-    assert scene.step(ContactStepper(DenseSolver())) is None
+    assert scene.step(dense_stepper()) is None
 
 
 @pytest.mark.parametrize("components", [1, 2, 3, 4])
@@ -185,7 +188,7 @@ class SlidingScene(Scene):
 def test_a_step_is_in_balance_with_what_the_points_face_where_it_leads(exact):
     scene = SlidingScene(6)
     before, rows, lowering = scene.points.pressure(0.0), scene.points.rows, scene.points.lowering
-    step, down = scene.step(ContactStepper(DenseSolver()))
+    step, down = scene.step(dense_stepper())
     carried = scene.points.pressure(rows @ step + lowering * down)
     left = scene.residual + scene.matrix @ step - rows.T @ (carried - before)
     assert np.abs(left).max() < 1e-8 * np.abs(scene.residual).max()

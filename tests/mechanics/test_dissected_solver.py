@@ -1,11 +1,13 @@
-"""Cholesky's method on dissected bodies: the factor is one, the order is cheap, and nothing unchanged is factored again."""
+"""Cholesky's method on dissected bodies: the factor is one, the order is cheap, and what comes last may be left open."""
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from plates import plate
 from six_frusta import six_frusta
 
 from softtact.mechanics import dissection
+from softtact.mechanics.contact_factor import ContactFactor
 from softtact.mechanics.dissected_solver import DissectedSolver
 from softtact.mechanics.dissection import dissect
 from softtact.mechanics.front_layout import lay_out
@@ -14,22 +16,9 @@ from softtact.mechanics.linear_solvers import make_solver
 from softtact.mechanics.parallel import Workers
 
 
-def plate(width, length, *, layers=2, stiffness=(1.0, 1.0, 1.0), shift=0.2):
-    """A Laplacian on a plate of points, which resists differently along x, y and z: whole, upper triangle, and places in plan."""
-    lines = [sp.diags([-s, 2 * s, -s], [-1, 0, 1], shape=(n, n))
-             for n, s in zip((width, length, layers), stiffness, strict=True)]
-    one = [sp.eye(n) for n in (width, length, layers)]
-    whole = (sp.kron(sp.kron(lines[0], one[1]), one[2]) + sp.kron(sp.kron(one[0], lines[1]), one[2])
-             + sp.kron(sp.kron(one[0], one[1]), lines[2]) + shift * sp.eye(width * length * layers)).tocsr()
-    upper = sp.triu(whole, format="csr")
-    upper.sort_indices()
-    x, y, _ = np.meshgrid(*map(np.arange, (width, length, layers)), indexing="ij")
-    return whole, upper, np.column_stack([x.ravel(), y.ravel()]).astype(float)
-
-
 def operations(pattern, places):
     """How many operations and entries a factor in the order of the dissection takes."""
-    fronts, _, _ = lay_out(pattern.indptr, pattern.indices, dissect(pattern.indptr, pattern.indices, places))
+    fronts, _ = lay_out(pattern.indptr, pattern.indices, dissect(pattern.indptr, pattern.indices, places))
     own, bound = np.diff(fronts.own_at).astype(float), np.diff(fronts.bound_at)
     return np.sum(own**3 / 3 + own**2 * bound + own * bound**2), np.sum(own * (own + 1) / 2 + own * bound)
 
@@ -70,19 +59,21 @@ def test_operations_grow_with_the_cube_of_a_plates_width_and_entries_with_its_ar
 
 
 @pytest.mark.parametrize("size", [(3, 2), (30, 17), (60, 40)])
-def test_the_panels_hold_the_factor(size, workers):
+def test_triangles_and_rows_of_16_bits_hold_the_factor(size, workers):
     whole, upper, places = plate(*size)
     solver = DissectedSolver(places, workers=workers)
     assert solver.factor(upper)
-    fronts, order, n = solver._fronts, solver._order, len(places)
+    fronts, store, order, n = solver._fronts, solver._store, solver._order, len(places)
     factor = np.zeros((n, n))
     for p in range(len(fronts.own_at) - 1):
         first, end = fronts.own_at[p], fronts.own_at[p + 1]
         bound = fronts.bound[fronts.bound_at[p]:fronts.bound_at[p + 1]]
-        panel = solver._store.panels[fronts.panel_at[p]:fronts.panel_at[p + 1]].reshape(end - first, -1)
-        factor[first:end, first:end] = np.triu(panel[:, :end - first])
-        factor[first:end, bound] = panel[:, end - first:]
-    np.testing.assert_allclose(factor.T @ factor, whole[order][:, order].toarray(), atol=1e-5)
+        triangle = store.triangles[fronts.triangle_at[p]:fronts.triangle_at[p + 1]].reshape(end - first, -1)
+        short = store.short[fronts.short_at[p]:fronts.short_at[p + 1]].reshape(end - first, -1)
+        factor[first:end, first:end] = np.triu(triangle)
+        factor[first:end, bound] = store.scale[first:end, None] * short
+    # An entry is off by half a unit of 16 bits, 1.5e-5 of its row's largest, which is 1 here; up to 70 of them meet.
+    np.testing.assert_allclose(factor.T @ factor, whole[order][:, order].toarray(), atol=1e-4)
 
 
 @pytest.mark.parametrize("columns", [None, 3])
@@ -115,24 +106,6 @@ def test_as_many_threads_give_the_same_to_the_last_digit():
         pool.close()
     np.testing.assert_array_equal(found[0], found[1])
     np.testing.assert_array_equal(found[0], found[2])
-
-
-@pytest.mark.parametrize(("middle", "at_most"), [((0, 0), 0.1), ((30, 20), 0.4)])     # far from all cuts, and across the first ones
-def test_only_what_changed_is_factored_again_and_the_factor_is_that_of_a_new_solver(middle, at_most, workers):
-    _, upper, places = plate(60, 40)
-    kept, right = DissectedSolver(places, workers=workers), np.random.default_rng(0).normal(size=len(places))
-    assert kept.factor(upper)
-    changed = upper.copy()
-    here = np.flatnonzero((np.abs(places - middle) < 6).all(axis=1))
-    changed.data[changed.indptr[here]] += 1.0
-    changed = sp.csr_matrix((changed.data, upper.indices, upper.indptr), shape=upper.shape)
-    assert kept.factor(changed)
-    again = kept._store.state.mean()
-    new = DissectedSolver(places, workers=workers)
-    assert new.factor(changed)
-    np.testing.assert_array_equal(kept.solve(right), new.solve(right))
-    assert 0 < again < at_most and new._store.state.all()
-    assert kept.factor(changed) and not kept._store.state.any()
 
 
 @pytest.mark.parametrize("diagonal", [-50.0, np.nan])
@@ -181,7 +154,8 @@ def test_a_press_ends_where_it_does_with_a_general_solver_in_double_precision():
     for general in (False, True):
         body = six_frusta()
         if general:
-            body.solver = body.stepper.solver = make_solver()
+            body.solver = make_solver()
+            body.stepper.factor = ContactFactor(body.solver)
         settings = NewtonSettings(relative_tolerance=1e-8)
         ends.append([level.state for level in press_levels(body, round_head, [0.5, 1.5], settings=settings)])
         assert (body.method == DissectedSolver.name) is not general

@@ -1,9 +1,9 @@
-"""Newton steps that are linear in the rubber and exact in the object's contact, with one factor for many of them.
+"""Newton steps that are linear in the rubber and exact in the object's contact, with one factor of the rubber for many of them.
 
 Where an object touches changes far more within a step than how the rubber resists: a tangent that has lost a contact point
 lets it fly into the object. So a step s minimises r.s + s.A s/2 + Phi(gaps + B s), with the rubber's tangent A, the residual r
 and the contact's energy Phi: a convex problem whose Newton systems A + B'.W.B are solved by conjugate gradients. They are
-preconditioned by the factor of an earlier such matrix, which also serves the next steps: a solve takes a fiftieth of its time.
+preconditioned by the rubber of an earlier step with the contact of now (`contact_factor`).
 """
 
 from dataclasses import dataclass, replace
@@ -16,10 +16,8 @@ _FACINGS = 4                 # lookups of what the points face; an edge that sli
 _INNER_TOLERANCE = 0.1       # of the residual that the step is to cut
 _FORCING = 0.3               # conjugate gradients end when the preconditioned residual has fallen to this share, or the residual
                              # itself is as small as the gradient has to be in the end, which costs no further solve to see ...
-_MOST_ITERATIONS = 40        # ... or when they would take more than so many; then a new factor follows
+_MOST_ITERATIONS = 6         # ... or when they would take more than so many; then a new factor follows
 _JUDGED_AFTER = 3            # iterations after which it is judged how many it would take
-_LEAST_CORNER = 1e-9         # N/mm: rounding must not turn the object's own stiffness negative
-_MOST_CHANGED = 0.05         # share of the points in contact that may have changed since a factor that begins a step
 
 
 @dataclass(frozen=True)
@@ -62,20 +60,18 @@ class _Move:
 
 
 class ContactStepper:
-    """Steps of one body; keeps the last factor for the next step. solver: of `linear_solvers`."""
+    """Steps of one body; keeps the last factor for the next step. factor: of `contact_factor`."""
 
-    def __init__(self, solver):
-        self.solver = solver
+    def __init__(self, factor):
+        self.factor, self._factored = factor, False
         self.factors, self.iterations = 0, 0     # so far, of the matrix and of conjugate gradients
-        self._along = None                       # the factored matrix's solution for the object's lowering
 
     def step(self, rubber, residual, contact, *, drag=(0.0, 0.0), excess=None, largest=np.inf):
         """Step (n,) in mm of the unknowns, and how far the object is lowered with it; None if A is not positive definite.
 
         rubber: A, upper triangle (csr), with friction;  residual (n,) in N
-        contact: its `points` are `LinearGaps`, its `pressed(rubber, slope)` the upper triangle of A + B'.W.B for slope (p,) in
-        N/mm, its `rubber_forces(rubber, step)` A times a step (n,), its `follow(step, lowering)` looks up what the points face
-        where a step leads, and says whether that was done
+        contact: its `points` are `LinearGaps`, its `rubber_forces(rubber, step)` A times a step (n,), its `follow(step, lowering)`
+        looks up what the points face where a step leads, and says whether that was done; its `frames` are for `contact_factor`
         drag: friction's border (n,) and corner in N/mm, between the unknowns and the object's lowering
         excess: the object's force less the wanted one in N; None holds the object where it is. A free object that touches
         nothing finds no stiffness: it is lowered by nan.
@@ -87,7 +83,7 @@ class ContactStepper:
             return problem.parts(np.append(at.x[:-1], np.nan))
         problem.judge(at)
         for number in range(_FACINGS):
-            at = self._least(problem, at, largest, first=number == 0)
+            at = self._least(problem, at, largest)
             if at is None or number == _FACINGS - 1 or not contact.follow(*problem.parts(at.x)):
                 break
             at = problem.faced_anew(at)
@@ -95,12 +91,12 @@ class ContactStepper:
                 break
         return None if at is None else problem.parts(at.x)
 
-    def _least(self, problem, at, largest, *, first):
+    def _least(self, problem, at, largest):
         """The step of least energy, from one on, until its gradient is small enough; None if A is not positive definite."""
-        for number in range(_INNER_STEPS):
+        for _ in range(_INNER_STEPS):
             if problem.solved(at):
                 break
-            direction = self._direction(problem, at, first=first and number == 0)
+            direction = self._direction(problem, at)
             if direction is None:
                 return None
             share = problem.best_share(at, direction)
@@ -113,49 +109,24 @@ class ContactStepper:
                 problem.hold(at)
         return at
 
-    def _direction(self, problem, at, *, first):
+    def _direction(self, problem, at):
         """Newton's step of the convex problem, with the present factor if it still serves."""
         slope, gradient = problem.points.slope(at.change), problem.gradient(at)
-        if self._along is not None and not (first and self._outdated(slope)):
+        if self._factored and self.factor.follow(problem, slope):
             direction, good = self._conjugate_gradients(problem, slope, -gradient)
             if good:
                 return direction
-        if not self._factor(problem, slope):
+        self.factors += 1
+        self._factored = self.factor.renew(problem, slope)
+        if not self._factored:
             return None
         direction, good = self._conjugate_gradients(problem, slope, -gradient)
         return direction if good or direction.x.any() else None
 
-    def _outdated(self, slope):
-        """Whether so many points have come into contact, or lost it, that conjugate gradients would not pay."""
-        touching = slope > 0
-        return np.count_nonzero(touching != self._touching) > _MOST_CHANGED * np.count_nonzero(touching)
-
-    def _factor(self, problem, slope):
-        self.factors += 1
-        if not self.solver.factor(problem.contact.pressed(problem.rubber, slope)):
-            self._along = None
-            return False
-        lowering, (border, corner) = problem.points.lowering, problem.drag
-        self._touching = slope > 0
-        self._border = problem.points.rows.T @ (slope * lowering) + border
-        self._along = self.solver.solve(self._border)
-        self._corner = max(slope @ lowering**2 + corner - self._border @ self._along, _LEAST_CORNER)
-        return True
-
-    def _precondition(self, right, *, held):
-        """The factored matrix's inverse; with the object free, of the matrix bordered by its lowering."""
-        inner = self.solver.solve(right[:len(self._border)])
-        if len(right) == len(inner):
-            return inner
-        if held:
-            return np.append(inner, 0.0)
-        lowered = (right[-1] - self._border @ inner) / self._corner
-        return np.append(inner - lowered * self._along, lowered)
-
     def _conjugate_gradients(self, problem, slope, right):
         """Approximate solution of the Newton system, and whether it is as good as wanted; given up where it would take too long."""
         found, r = problem.nowhere(), right
-        z = self._precondition(r, held=problem.held)
+        z = self.factor.solve(r, held=problem.held)
         p, size = z, r @ z
         first = size
         for iteration in range(_MOST_ITERATIONS):
@@ -169,7 +140,7 @@ class ContactStepper:
             r = r - (size / curvature) * q
             if problem.small(r):
                 return found, True
-            z = self._precondition(r, held=problem.held)
+            z = self.factor.solve(r, held=problem.held)
             size, before = r @ z, size
             if size <= _FORCING**2 * first:
                 return found, True

@@ -1,22 +1,40 @@
 """Cholesky's method for the matrix of a wide and thin body, of which it is known where each unknown stands.
 
-In single precision, and solved from 16 bits, for steps that are corrected by a residual in double precision. What did not change
-since the last factor is not factored again. What it gains over a general solver: docs/performance.md.
+In single precision, and solved from 16 bits, for steps that are corrected by a residual in double precision. What it gains over a
+general solver: docs/performance.md.
+
+Some unknowns may be left for last, what nodes of the surface do along given directions: the factor ends before them, and leaves a
+small dense matrix on them. What stiffens them, like a contact, can then change without a new factor.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
 
 from softtact.mechanics import fronts as kernels
-from softtact.mechanics.dissection import dissect
-from softtact.mechanics.front_layout import lay_out
+from softtact.mechanics.dissection import Piece, dissect
+from softtact.mechanics.front_layout import lay_out, with_room
 from softtact.mechanics.fronts import Store
+from softtact.mechanics.node_frames import NodeFrames
 from softtact.mechanics.parallel import SERIAL, slices
 
 _PARTS = 32              # of all operations: what takes less than such a share is one thread's, from its first piece to its last
 _SOLVED_APART = 4        # parts that are solved on threads of their own
+_SLACK = 1.05            # of arrays, for the next pattern
 _COLUMNS = 256           # of a large front that one thread couples at once
+
+
+@dataclass(frozen=True)
+class Bordered:
+    """A matrix bordered by one more unknown: its upper triangle (csr), and a column (n + 1,) with the diagonal's entry at its end.
+
+    frames: the nodes whose movements along their directions are left for last; the bordering unknown comes behind them
+    """
+
+    upper: sp.csr_matrix
+    column: np.ndarray
+    frames: NodeFrames
 
 
 class DissectedSolver:
@@ -27,34 +45,55 @@ class DissectedSolver:
 
     def __init__(self, places, *, workers=SERIAL):
         """places (n, 2): where each unknown stands in plan, in mm"""
-        self._places, self._workers, self._pattern = places, workers, None
+        self._places, self._workers, self._pattern, self._frames = places, workers, None, None
+        self._store = None
+
+    @property
+    def unknowns(self):
+        return len(self._places)
 
     def factor(self, upper):
         """Factor the matrix whose upper triangle (csr, sorted, with its diagonal) is given; False if not positive definite."""
-        pattern = (upper.indptr, upper.indices)
-        if self._pattern is None or not all(map(_same, pattern, self._pattern)):
-            self._analyse(*pattern)
-        fronts, store, workers = self._fronts, self._store, self._workers
-        store.state[:] = kernels.AS_BEFORE if self._valid else kernels.NEW
-        kernels.mark_changed(fronts, store, upper.data.astype(np.float32, copy=False), self._source)
-        self._valid = all(workers.map(lambda pieces: kernels.factor_pieces(pieces, fronts, store, *kernels.BLAS), self._parts)) \
-            and all(self._factor_large(pieces, blocks) for pieces, blocks in self._large)
-        return self._valid
+        self._frames = None
+        return self._factor((upper.indptr, upper.indices), upper.data, None)
 
-    def _factor_large(self, pieces, blocks):
+    def factor_bordered(self, matrix):
+        """Factor a `Bordered` matrix but for its last unknowns; False if what comes before them is not positive definite."""
+        upper, self._frames = matrix.upper, matrix.frames
+        values = np.concatenate([self._frames.turned_matrix(upper), self._frames.turned(matrix.column)])
+        return self._factor((upper.indptr, upper.indices), values, self._frames.last)
+
+    def _factor(self, pattern, values, last):
+        if self._pattern is None or not all(map(_same, (*pattern, last), self._pattern)):
+            self._analyse(*pattern, last)
+        of_pieces = self._fronts, self._store, values.astype(np.float32, copy=False)
+        done = self._workers.map(lambda pieces: kernels.factor_pieces(pieces, *of_pieces, *kernels.BLAS), self._parts)
+        if not (all(done) and all(self._factor_large(of_pieces, pieces, blocks) for pieces, blocks in self._large)):
+            return False
+        if last is not None:
+            kernels.sum_up(len(self._fronts.own_at) - 2, *of_pieces)
+        return True
+
+    def _factor_large(self, of_pieces, pieces, blocks):
         """Factor pieces that do not wait for each other, by blocks (piece, start, end) on all threads.
 
         False where one is not positive definite.
         """
-        fronts, store, workers = self._fronts, self._store, self._workers
+        (fronts, store, _), workers = of_pieces, self._workers
         letters, factors, potrf, trsm, syrk, gemm = kernels.BLAS
-        states = workers.map(lambda p: kernels.begin(p, fronts, store, letters, potrf), pieces)
-        if kernels.FAILED in states:
+        if not all(workers.map(lambda p: kernels.begin(p, *of_pieces, letters, potrf), pieces)):
             return False
         workers.map(lambda block: kernels.couple(*block, fronts, store, letters, factors, trsm), blocks)
-        workers.map(lambda p: kernels.shorten(p, fronts, store), pieces)
+        workers.map(lambda p: kernels.keep(p, fronts, store), pieces)
         workers.map(lambda block: kernels.update(*block, fronts, store, letters, factors, syrk, gemm), blocks)
         return True
+
+    @property
+    def left(self):
+        """What the factor leaves on the k nodes' movements and the bordering unknown: (k + 1, k + 1), its upper triangle."""
+        size = len(self._frames.last) + 1
+        start = self._fronts.panel_at[-1]
+        return self._store.work[start:start + size * size].reshape(size, size)
 
     def solve(self, right):
         """Solve for one (n,) or several (n, k) right-hand sides, scaled to the range of single precision: see the class.
@@ -63,34 +102,55 @@ class DissectedSolver:
         """
         if right.ndim > 1:
             return np.column_stack([self.solve(column) for column in right.T])
+        return self._solved(right, lambda rest: rest)
+
+    def solve_bordered(self, right, finish):
+        """Solve for a right-hand side (n + 1,), if `finish` solves for what is left of it on the last unknowns (k + 1,)."""
+        return self._frames.turned_back(self._solved(self._frames.turned(right), finish))
+
+    def _solved(self, right, finish):
         size = float(np.abs(right).max()) or 1.0
         x = (right[self._order] / size).astype(np.float32)
-        factor, first = (self._fronts, self._store), self._first_shared
+        factor, first, last = (self._fronts, self._store), self._first_shared, self._first_last
         beyond = np.zeros((len(self._apart), len(x) - first), dtype=np.float32)
         self._workers.map(lambda k: kernels.forward(self._apart[k], *factor, x, beyond[k], first, *kernels.SOLVES),
                           range(len(self._apart)))
         x[first:] += beyond.sum(axis=0)
         kernels.forward(self._shared, *factor, x, beyond[0], len(x), *kernels.SOLVES)
+        x[last:] = finish(x[last:])
         kernels.backward(self._shared, *factor, x, *kernels.SOLVES)
         self._workers.map(lambda pieces: kernels.backward(pieces, *factor, x, *kernels.SOLVES), self._apart)
         out = np.empty(len(x))
         out[self._order] = x
         return size * out
 
-    def _analyse(self, indptr, indices):
-        pieces = dissect(indptr, indices, self._places)
-        pieces, self._apart, self._shared = _apart_first(pieces, _SOLVED_APART)
-        self._fronts, self._order, self._source = fronts, order, source = lay_out(indptr, indices, pieces)
-        self._first_shared = int(fronts.own_at[len(pieces) - len(self._shared)])
-        self._parts, large = _share_out(pieces, fronts)
+    def _analyse(self, indptr, indices, last):
+        pieces = dissect(indptr, indices, self._places, without=last)
+        if last is not None:
+            pieces.append(Piece(own=np.append(last, self.unknowns), before=(len(pieces) - 1,)))
+        pieces, self._apart, shared = _apart_first(pieces, _SOLVED_APART)
+        fronts, self._order = lay_out(indptr, indices, pieces, bordered=last is not None)
+        self._parts, levels = _share_out(pieces, fronts)
+        self._fronts, room = with_room(fronts, self._parts, levels)
+        self._first_shared, self._first_last = int(fronts.own_at[len(pieces) - len(shared)]), len(self._order)
+        self._shared = shared
+        if last is not None:     # the last piece is not factored here
+            self._shared, levels, self._first_last = shared[:-1], levels[:-1], int(fronts.own_at[-2])
         bound = np.diff(fronts.bound_at)
         self._large = [(level, [(p, part.start, part.stop) for p in level for part in slices(int(bound[p]), _COLUMNS)])
-                       for level in large]
-        self._store = Store(
-            values=np.zeros(len(source), dtype=np.float32), state=np.zeros(len(pieces), dtype=np.int8),
-            panels=np.zeros(int(fronts.panel_at[-1]), dtype=np.float32), short=np.zeros(int(fronts.short_at[-1]), dtype=np.int16),
-            scale=np.zeros(len(order), dtype=np.float32), updates=np.zeros(int(fronts.update_at[-1]), dtype=np.float32))
-        self._pattern, self._valid = (indptr, indices), False
+                       for level in levels]
+        self._store = self._stored(work=room, triangles=int(fronts.triangle_at[-1 if last is None else -2]),
+                                   short=int(fronts.short_at[-1]), scale=len(self._order))
+        self._pattern = (indptr, indices, last)
+
+    def _stored(self, **sizes):
+        """`Store` with arrays of these sizes, those of before where they are as large: new memory costs as much as a factor."""
+        old, self._store = self._store._asdict() if self._store else {}, None
+        for name, size in sizes.items():
+            if name not in old or len(old[name]) < size:
+                old.pop(name, None)     # before there is a new one
+                old[name] = np.empty(int(_SLACK * size), dtype=np.int16 if name == "short" else np.float32)
+        return Store(**old)
 
     def close(self):
         """Forget the factors."""

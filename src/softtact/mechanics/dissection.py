@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
+from numba import njit
 
 _LEAST_SHARE = 0.1           # of the unknowns on either side of a cut
 _PRICE_OF_IMBALANCE = 2.0    # a cut between unlike parts counts as so much longer
@@ -23,19 +24,50 @@ class Piece:
     before: tuple
 
 
-def dissect(indptr, indices, places):
+def dissect(indptr, indices, places, *, without=None):
     """`Piece`s of a symmetric matrix, each behind those before it; the first cut is the last piece.
 
     indptr, indices: pattern of its upper triangle (csr);  places (n, 2): where each unknown stands in plan, in mm
+    without: unknowns (k,) that are to be in none
     """
     columns, column_of = np.unique(np.round(places / _GRID_MM).astype(np.int64), axis=0, return_inverse=True)
-    members = sp.csr_matrix((np.ones(len(places)), (column_of.ravel(), np.arange(len(places)))))
-    pattern = sp.csr_matrix((np.ones(len(indices), dtype=np.float32), indices, indptr), shape=(len(places),) * 2)
-    graph = members @ pattern @ members.T
-    graph = (graph + graph.T).tocsr()
+    column_of = column_of.ravel()
+    if without is not None:
+        column_of[without] = -1
+    members = np.argsort(column_of, kind="stable")[np.count_nonzero(column_of < 0):]
+    weight = np.bincount(column_of[members], minlength=len(columns))
+    member_at = np.cumsum([0, *weight])
     pieces = []
-    _cut(graph, columns, np.diff(members.indptr), np.arange(len(columns)), pieces)
-    return [Piece(own=members[piece.own].indices, before=piece.before) for piece in pieces]
+    _cut(_graph_of_columns(indptr, indices, column_of, members, member_at), columns, weight, np.flatnonzero(weight), pieces)
+    return [Piece(own=_members_of(piece.own, members, member_at), before=piece.before) for piece in pieces]
+
+
+def _members_of(columns, members, member_at):
+    return np.concatenate([np.zeros(0, dtype=np.int64), *(members[member_at[c]:member_at[c + 1]] for c in columns)])
+
+
+def _graph_of_columns(indptr, indices, column_of, members, member_at):
+    """Which columns the pattern couples, in both directions, as a sparse matrix of ones."""
+    pairs, size = _neighbours(indptr, indices, column_of, members, member_at), len(member_at) - 1
+    graph = sp.csr_matrix((np.ones(len(pairs), dtype=np.float32), pairs.T), shape=(size, size))
+    return (graph + graph.T).tocsr()
+
+
+@njit(cache=True, nogil=True)
+def _neighbours(indptr, indices, column_of, members, member_at):
+    """Pairs (e, 2) of columns of which the first one's rows have entries in the second, each once."""
+    pairs, count, seen = np.empty((len(members), 2), np.int64), 0, np.full(len(member_at) - 1, -1, np.int64)
+    for column in range(len(member_at) - 1):
+        for row in members[member_at[column]:member_at[column + 1]]:
+            for e in range(indptr[row], indptr[row + 1]):
+                other = column_of[indices[e]]
+                if other >= 0 and seen[other] != column:
+                    seen[other] = column
+                    if count == len(pairs):
+                        pairs = np.concatenate((pairs, np.empty_like(pairs)))
+                    pairs[count] = column, other
+                    count += 1
+    return pairs[:count]
 
 
 def _cut(graph, places, weight, here, pieces):

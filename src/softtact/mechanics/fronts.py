@@ -1,11 +1,11 @@
 """Cholesky's method on the fronts of a dissection, in single precision: compiled loops around BLAS and LAPACK.
 
-A piece's front is a dense matrix over its own k unknowns and the b later ones that they are coupled with. `panels` hold its first
-k rows (k, k + b), in the end the factor's; `updates` what is left of the others (b, b), which later fronts take over (Duff and
+A piece's front is a dense matrix over its own k unknowns and the b later ones that they are coupled with. Its panel are the first
+k rows (k, k + b), in the end the factor's; its update is what is left of the others (b, b), which later fronts take over (Duff and
 Reid, ACM Trans. Math. Softw. 9, 1983). Of both only the upper triangle counts, row by row; to Fortran that is a lower one.
 
-A solve reads the factor twice and does little else. So the panels' bound columns are kept once more in 16 bits, as shares of each
-row's largest entry: half as much to read, and a solution off by 3e-4 of its energy norm, where single precision leaves 6e-6.
+A solve reads the factor twice and does little else. So the panels' bound columns are kept in 16 bits, as shares of each row's
+largest entry: half as much to read, and a solution off by 3e-4 of its energy norm, where single precision leaves 6e-6.
 """
 
 from collections import namedtuple
@@ -17,68 +17,68 @@ from softtact.mechanics import lapack
 
 # Of all pieces one behind the other: piece p has those from at[p] to at[p + 1]. Unknowns are numbered as they are eliminated.
 #   own_at (p + 1,): its unknowns;  bound_at (p + 1,), bound: later unknowns of its front, rising
-#   panel_at, update_at (p + 1,): its panel and its update;  child_at (p + 1,), child: pieces whose updates it takes over
+#   child_at (p + 1,), child: pieces whose updates it takes over
 #   place: where its bound stand in the front that takes over its update
-#   entry_at (p + 1,), target: the matrix' entries that are its own, and where in its panel they stand
-#   short_at (p + 1,): its panel's bound columns (k, b) in 16 bits
-Fronts = namedtuple("Fronts", "own_at bound_at bound panel_at update_at child_at child place entry_at target short_at")
-#   values: the matrix' entries, in the order of `target`;  state (p,): of each piece
-#   panels, short, updates: as above, flat;  scale (n,): what a unit in a row of `short` stands for
-Store = namedtuple("Store", "values state panels short scale updates")
+#   entry_at (p + 1,), source, target: which of the matrix' values are its own, and where in its panel they stand
+#   triangle_at, short_at (p + 1,): its own triangle (k, k), and its panel's bound columns (k, b) in 16 bits
+#   panel_at, update_at (p,): where in `work` its panel and its update are
+Fronts = namedtuple("Fronts", "own_at bound_at bound child_at child place entry_at source target triangle_at short_at panel_at "
+                              "update_at")
+#   work: panels and updates, each as long as it is needed;  triangles, short: as above, flat
+#   scale (n,): what a unit in a row of `short` stands for
+Store = namedtuple("Store", "work triangles short scale")
 
 BLAS = (lapack.LETTERS, lapack.FACTORS, lapack.POTRF, lapack.TRSM, lapack.SYRK, lapack.GEMM)
 SOLVES = (lapack.LETTERS, lapack.TRSV)
-AS_BEFORE, NEW, FAILED = 0, 1, 2     # a piece's state
 _LONGEST = 32767                     # of a number in 16 bits
 
 
 @njit(cache=True, nogil=True)
-def factor_pieces(pieces, fronts, store, letters, factors, potrf, trsm, syrk, gemm):
-    """Factor pieces, one after the other; False where one is not positive definite."""
+def factor_pieces(pieces, fronts, store, values, letters, factors, potrf, trsm, syrk, gemm):
+    """Factor pieces of a matrix, whose values are given, one after the other; False where one is not positive definite."""
     for p in pieces:
-        if begin(p, fronts, store, letters, potrf) == FAILED:
+        if not begin(p, fronts, store, values, letters, potrf):
             return False
         bound = fronts.bound_at[p + 1] - fronts.bound_at[p]
         couple(p, 0, bound, fronts, store, letters, factors, trsm)
-        shorten(p, fronts, store)
+        keep(p, fronts, store)
         update(p, 0, bound, fronts, store, letters, factors, syrk, gemm)
     return True
 
 
 @njit(cache=True, nogil=True)
-def begin(p, fronts, store, letters, potrf):
-    """Sum up a piece's panel and factor its own unknowns, if its entries (see `mark_changed`) or what it takes over have changed.
-
-    Returns the piece's state.
-    """
-    for c in fronts.child[fronts.child_at[p]:fronts.child_at[p + 1]]:
-        store.state[p] = max(store.state[p], store.state[c])
-    if store.state[p] != NEW:
-        return store.state[p]
+def sum_up(p, fronts, store, values):
+    """Sum up a piece's panel (k, k + b): the matrix' values, and what earlier pieces have left."""
     own, width = _shape(p, fronts)
-    panel = store.panels[fronts.panel_at[p]:fronts.panel_at[p + 1]]
+    panel = _panel_of(p, fronts, store)
     panel[:] = 0.0
     for e in range(fronts.entry_at[p], fronts.entry_at[p + 1]):
-        panel[fronts.target[e]] = store.values[e]
+        panel[fronts.target[e]] = values[fronts.source[e]]
     for c in fronts.child[fronts.child_at[p]:fronts.child_at[p + 1]]:
         _take_over(c, 0, own, fronts, store, panel, 0, width)
+
+
+@njit(cache=True, nogil=True)
+def begin(p, fronts, store, values, letters, potrf):
+    """`sum_up` a piece's panel, and factor its own unknowns; False if they are not positive definite."""
+    sum_up(p, fronts, store, values)
+    own, width = _shape(p, fronts)
     if own == 0:     # a cut where nothing is coupled
-        return NEW
+        return True
+    panel = _panel_of(p, fronts, store)
     size = np.array([own, width, 0], dtype=np.int32)
     potrf(_address(letters, 0), _address(size, 0), _address(panel, 0), _address(size, 1), _address(size, 2))
     # BLAS libraries differ in whether they tell of what is not a number; it goes through to the last pivot.
-    if size[2] != 0 or not np.isfinite(panel[(own - 1) * (width + 1)]):
-        store.state[p] = FAILED
-    return store.state[p]
+    return size[2] == 0 and np.isfinite(panel[(own - 1) * (width + 1)])
 
 
 @njit(cache=True, nogil=True)
 def couple(p, start, end, fronts, store, letters, factors, trsm):
     """The panel's columns from `start` to `end` of the bound unknowns."""
-    if store.state[p] != NEW or start == end:
-        return
     own, width = _shape(p, fronts)
-    panel = store.panels[fronts.panel_at[p]:fronts.panel_at[p + 1]]
+    if own == 0 or start == end:
+        return
+    panel = _panel_of(p, fronts, store)
     size = np.array([own, width, end - start], dtype=np.int32)
     L, N, R, T = _address(letters, 0), _address(letters, 1), _address(letters, 2), _address(letters, 3)
     trsm(R, L, T, N, _address(size, 2), _address(size, 0), _address(factors, 0), _address(panel, 0), _address(size, 1),
@@ -87,14 +87,15 @@ def couple(p, start, end, fronts, store, letters, factors, trsm):
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def shorten(p, fronts, store):
-    """Keep the panel's bound columns in 16 bits, and the size (n,) of a unit in each row."""
-    if store.state[p] != NEW:
-        return
+def keep(p, fronts, store):
+    """Keep what a solve needs of a panel: the own triangle, the bound columns in 16 bits, and the size of a unit in each row."""
     own, width = _shape(p, fronts)
-    bound = width - own
+    bound, panel = width - own, _panel_of(p, fronts, store)
+    triangle = store.triangles[fronts.triangle_at[p]:fronts.triangle_at[p + 1]]
+    for k in range(own):
+        triangle[k * own + k:(k + 1) * own] = panel[k * width + k:k * width + own]
     for k in range(own if bound else 0):
-        row = store.panels[fronts.panel_at[p] + k * width + own:fronts.panel_at[p] + (k + 1) * width]
+        row = panel[k * width + own:(k + 1) * width]
         out = store.short[fronts.short_at[p] + k * bound:fronts.short_at[p] + (k + 1) * bound]
         largest = np.float32(0.0)
         for j in range(bound):
@@ -108,11 +109,10 @@ def shorten(p, fronts, store):
 @njit(cache=True, nogil=True)
 def update(p, start, end, fronts, store, letters, factors, syrk, gemm):
     """The update's rows from `start` to `end`."""
-    if store.state[p] != NEW or start == end:
+    if start == end:
         return
     own, width = _shape(p, fronts)
-    bound = width - own
-    panel, out = store.panels[fronts.panel_at[p]:fronts.panel_at[p + 1]], store.updates[fronts.update_at[p]:fronts.update_at[p + 1]]
+    bound, panel, out = width - own, _panel_of(p, fronts, store), _update_of(p, fronts, store)
     size = np.array([own, width, end - start, bound, bound - end], dtype=np.int32)
     L, N, T = _address(letters, 0), _address(letters, 1), _address(letters, 3)
     minus_one, zero, rows = _address(factors, 1), _address(factors, 2), _address(panel, own + start)
@@ -132,7 +132,7 @@ def _take_over(c, start, end, fronts, store, out, skipped, width):
 
     out: the front's rows, `width` wide, without those and the columns that are `skipped`
     """
-    place, given = _bound_of(c, fronts, fronts.place), store.updates[fronts.update_at[c]:fronts.update_at[c + 1]]
+    place, given = _bound_of(c, fronts, fronts.place), _update_of(c, fronts, store)
     bound, runs = len(place), _runs(place)
     for i in range(np.searchsorted(place, start), np.searchsorted(place, end)):
         row = (place[i] - skipped) * width - skipped
@@ -186,13 +186,12 @@ def backward(pieces, fronts, store, right, letters, trsv):
 @njit(cache=True, nogil=True)
 def _solve_own(p, fronts, store, x, letters, letter, trsv):
     """Solve with the triangle of a piece's own unknowns, or with its transpose, as the letter says."""
-    panel = store.panels[fronts.panel_at[p]:fronts.panel_at[p + 1]]
-    own, width = _shape(p, fronts)
+    own, triangle = len(x), store.triangles[fronts.triangle_at[p]:fronts.triangle_at[p + 1]]
     if own == 0:
         return
-    size = np.array([own, width, 1], dtype=np.int32)
-    trsv(_address(letters, 0), _address(letters, letter), _address(letters, 1), _address(size, 0), _address(panel, 0),
-         _address(size, 1), _address(x, 0), _address(size, 2))
+    size = np.array([own, 1], dtype=np.int32)
+    trsv(_address(letters, 0), _address(letters, letter), _address(letters, 1), _address(size, 0), _address(triangle, 0),
+         _address(size, 0), _address(x, 0), _address(size, 1))
     _keep(size)
 
 
@@ -224,20 +223,22 @@ def _subtract_products(rows, scale, known, x):
 
 
 @njit(cache=True, nogil=True)
-def mark_changed(fronts, store, values, source):
-    """Take over a matrix' values as each piece's entries, and let those be NEW where one has changed."""
-    for p in range(len(store.state)):
-        for e in range(fronts.entry_at[p], fronts.entry_at[p + 1]):
-            if store.values[e] != values[source[e]]:
-                store.state[p] = NEW
-                store.values[e] = values[source[e]]
-
-
-@njit(cache=True, nogil=True)
 def _shape(p, fronts):
     """How many unknowns a piece eliminates, and how many its front has."""
     own = fronts.own_at[p + 1] - fronts.own_at[p]
     return own, own + fronts.bound_at[p + 1] - fronts.bound_at[p]
+
+
+@njit(cache=True, nogil=True)
+def _panel_of(p, fronts, store):
+    own, width = _shape(p, fronts)
+    return store.work[fronts.panel_at[p]:fronts.panel_at[p] + own * width]
+
+
+@njit(cache=True, nogil=True)
+def _update_of(p, fronts, store):
+    bound = fronts.bound_at[p + 1] - fronts.bound_at[p]
+    return store.work[fronts.update_at[p]:fronts.update_at[p] + bound * bound]
 
 
 @njit(cache=True, nogil=True)

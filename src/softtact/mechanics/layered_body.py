@@ -7,6 +7,7 @@ import numpy as np
 from softtact.mechanics import kernels
 from softtact.mechanics.bed_balance import balanced
 from softtact.mechanics.body_friction import BodyFriction
+from softtact.mechanics.contact_factor import DissectedContact
 from softtact.mechanics.contact_step import ContactStepper
 from softtact.mechanics.dissected_solver import DissectedSolver
 from softtact.mechanics.frustum_bed import BedState
@@ -71,7 +72,7 @@ class LayeredBody:
         self.cells = SheetCells(slab, bed, roots)
         slab.build_pattern(self.cells.eliminated, self.cells.outer_dofs)
         self.solver = DissectedSolver(slab.points[slab.unknowns // 3, :2], workers=self.workers)
-        self.stepper = ContactStepper(self.solver)
+        self.stepper = ContactStepper(DissectedContact(self.solver, workers=self.workers))
 
     def sum_with(self, loops):
         """Let elements be summed by `loops`: `kernels`, as from the start, or `device_kernels`."""

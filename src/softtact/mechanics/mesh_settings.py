@@ -81,7 +81,7 @@ class MeshSettings:
 
     @classmethod
     def fine(cls):
-        """Within 2 % of the map's maximum at every point under punch, sphere and ridges, for 1.9 times the default's time.
+        """Within 2 % of the map's maximum at every point under punch, sphere and ridges, for twice the default's time.
 
         The cover has a layer more and is finer at edges, frusta have two rings. Under a punch as wide as two frusta 3 %
         (docs/discretisation.md).

@@ -18,10 +18,14 @@ from softtact.mechanics.cover_mesh import cover_mesh
 from softtact.mechanics.elements import quad8
 from softtact.mechanics.hex_mesh import extrude
 from softtact.mechanics.kernels import add_forces
+from softtact.mechanics.node_frames import NodeFrames
 from softtact.mechanics.parallel import SERIAL
 from softtact.mechanics.plan_location import plan_interpolation
 from softtact.mechanics.sparsity import SymmetricProduct, add_upper, upper_pattern, upper_positions
 from softtact.mechanics.top_contact import FacingPlanes, TopContact
+
+_SOON_MM, _NEAR_MM = 0.01, 0.1     # gaps of points that may touch within a step or two, and within some levels
+_BENT, _SLIGHTLY_BENT = 0.02, 0.005
 
 
 @dataclass(frozen=True)
@@ -253,18 +257,20 @@ class Slab:
         number[keep] = np.arange(len(keep))
         *groups, top = [(3 * nodes[..., None] + np.arange(3)).reshape(len(nodes), -1)
                         for nodes in [*(nodes for nodes, _ in self.groups), self.top.faces]]
+        self._number = number.reshape(-1, 3)
         members, self._top_dofs = [number[dofs] for dofs in [*groups, *cells]], number[top]
         indptr, indices = upper_pattern([*members, self._top_dofs], len(keep))
         self._positions = [upper_positions(indptr, indices, dofs) for dofs in members]
         self._top_positions = upper_positions(indptr, indices, self._top_dofs)
-        self._matrix, self._pressed = (
-            sp.csr_matrix((np.zeros(len(indices), dtype=precision), indices, indptr), shape=(len(keep),) * 2) for _ in range(2))
+        self._matrix = sp.csr_matrix((np.zeros(len(indices), dtype=precision), indices, indptr), shape=(len(keep),) * 2)
         self.product = SymmetricProduct(indptr, indices)
 
     def tangent(self, state, condensed, *, workers=SERIAL):
         """Upper triangle (csr) of the tangent with the cells' condensed blocks [(f, k, k)] and the object's contact."""
-        rubber = self.rubber_tangent(state, condensed, workers=workers)
-        return self.pressed(rubber, self.top.stiffness(state), state.planes)
+        whole, shapes = self.rubber_tangent(state, condensed, workers=workers).copy(), self.top.normal_shapes(state.planes)
+        weighted = shapes * self.top.stiffness(state).reshape(len(shapes), -1, 1)
+        add_upper(whole.data, np.matmul(weighted.transpose(0, 2, 1), shapes), self._top_positions)
+        return whole
 
     def rubber_tangent(self, state, condensed, *, workers=SERIAL):
         """Upper triangle (csr) of the tangent with friction, but without the object's pressure; valid until the next call."""
@@ -277,14 +283,6 @@ class Slab:
             add_upper(matrix.data, self.top.friction_tangent(state)[0], self._top_positions)
         return matrix
 
-    def pressed(self, rubber, stiffness, planes):
-        """The rubber's tangent and that of contact points of given stiffness (p,) in N/mm; valid until the next call."""
-        shapes = self.top.normal_shapes(planes)
-        blocks = np.matmul((shapes * stiffness.reshape(len(shapes), -1, 1)).transpose(0, 2, 1), shapes)
-        self._pressed.data[:] = rubber.data
-        add_upper(self._pressed.data, blocks, self._top_positions)
-        return self._pressed
-
     def linear_gaps(self, displacement, planes, indentation):
         """The gaps of the object's contact points as they depend on a step of the global unknowns, a `LinearGaps`."""
         shapes, gaps = self.top.normal_shapes(planes), self.top.gaps(displacement, planes, indentation)
@@ -294,6 +292,26 @@ class Slab:
         rows = sp.csr_matrix((shapes[free], (points, columns)), shape=(len(gaps), len(self.unknowns)))
         return LinearGaps(gaps=gaps, rows=rows, lowering=planes.normals[:, 2], area=self.top.area * planes.covered,
                           contact=self.top.contact_on(planes))
+
+    def facing_frames(self, gaps, planes, kept):
+        """`NodeFrames` of the nodes whose contact with the object may change, along the normals that they face.
+
+        kept: frames of before, whose nodes and numbers of vectors stay if they are enough for the nodes that may touch soon
+        """
+        now = self._frames_within(_SOON_MM, _BENT, gaps, planes)
+        if kept is not None and kept.covers(now):
+            return kept.turned_as(now)
+        return self._frames_within(_NEAR_MM, _SLIGHTLY_BENT, gaps, planes)
+
+    def _frames_within(self, within_mm, bent, gaps, planes):
+        nodes, normals = self.top.facing_nodes(gaps, planes, within_mm)
+        unknowns = self._number[nodes]
+        free = (unknowns >= 0).all(axis=1)
+        size, turns = np.linalg.eigh(normals[free])
+        upright = (size[:, 1] < 1e-9 * size[:, 2]) & (np.abs(turns[:, 2, 2]) > 1 - 1e-9)
+        turns[upright] = np.eye(3)
+        return NodeFrames(first=unknowns[free, 0], turns=turns, wanted=(size > bent * size[:, 2:]).sum(axis=1),
+                          others=unknowns[~free][unknowns[~free] >= 0])
 
     def friction_border(self, state):
         """How friction ties the unknowns to the object's lowering: derivative (unknowns,) of their residual by it, and its own."""

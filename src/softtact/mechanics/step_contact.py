@@ -16,9 +16,9 @@ class StepContact:
     def _face(self, planes):
         self.planes, self.points = planes, self._slab.linear_gaps(self._state.displacement, planes, self._indentation)
 
-    def pressed(self, rubber, stiffness):
-        """The rubber's tangent with points of a stiffness (p,) in N/mm."""
-        return self._slab.pressed(rubber, stiffness, self.planes)
+    def frames(self, kept):
+        """`NodeFrames` of the nodes that the object touches or is near; the `kept` nodes if they are enough."""
+        return self._slab.facing_frames(self.points.gaps, self.planes, kept)
 
     def rubber_forces(self, rubber, step):
         """Forces (unknowns,) of the rubber's tangent against a step (unknowns,) in mm."""

@@ -191,6 +191,20 @@ class TopContact:
         normal = planes.normals.reshape(*self.values.shape[:2], 3)
         return np.einsum("tga,tgd->tgad", self.values, normal).reshape(*normal.shape[:2], -1)
 
+    def facing_nodes(self, gaps, planes, within_mm):
+        """Free nodes (k,) of faces with points under the object whose gaps are less, and how the planes before each lie.
+
+        That is the sum (k, 3, 3) of n n' over the normals, in mm2 of the points' areas.
+        """
+        near = (gaps < within_mm) & (planes.covered > 0)
+        weight = (self.area * planes.covered * near).reshape(len(self.faces), -1)
+        normals = planes.normals.reshape(*weight.shape, 3)
+        of_faces = np.einsum("tg,tga,tgi,tgj->taij", weight, np.abs(self.values), normals, normals, optimize=True)
+        total = np.zeros((self.faces.max() + 1, 3, 3))
+        np.add.at(total, self.faces, of_faces)
+        nodes = np.flatnonzero(np.trace(total, axis1=1, axis2=2) > 0)
+        return nodes, total[nodes]
+
     def friction_tangent(self, state):
         """Friction's blocks (t, 3 w, 3 w) of the faces, border (t, 3 w) and corner.
 

@@ -1,0 +1,115 @@
+"""Nodes of which one or more directions of their own are to be unknowns of their own: their coordinates are turned for that."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+from numba import njit
+
+
+@dataclass(frozen=True)
+class NodeFrames:
+    """first (k,): the first of each node's three unknowns x, y, z, rising;  turns (k, 3, 3): unit vectors in columns
+
+    wanted (k,): how many of the vectors are meant, from the last on, 1 to 3;  others (o,): further unknowns that are meant
+    """
+
+    first: np.ndarray
+    turns: np.ndarray
+    wanted: np.ndarray
+    others: np.ndarray
+
+    @cached_property
+    def _meant(self):
+        """Nodes (m,) and their vectors (m,)."""
+        return np.nonzero(np.arange(3) >= 3 - self.wanted[:, None])
+
+    @cached_property
+    def last(self):
+        """The unknowns (m + o,) that are movements along the vectors meant, once the nodes are turned, and the others."""
+        node, vector = self._meant
+        return np.append(self.first[node] + vector, self.others)
+
+    def movements(self, unknowns):
+        """Sparse matrix (unknowns, m + o): a unit of each of the movements meant."""
+        (node, vector), along, (m, o) = self._meant, np.arange(3), (len(self._meant[0]), len(self.others))
+        rows = np.append(self.first[node, None] + along, self.others)
+        values = np.append(self.turns[node[:, None], along, vector[:, None]], np.ones(o))
+        return sp.csr_matrix((values, (rows, np.append(np.repeat(np.arange(m), 3), m + np.arange(o)))), shape=(unknowns, m + o))
+
+    def covers(self, others):
+        """Whether all that other frames mean is meant here, too, but for the vectors' directions."""
+        if not (np.isin(others.first, self.first).all() and np.isin(others.others, self.others).all()):
+            return False
+        return bool((others.wanted <= self.wanted[np.searchsorted(self.first, others.first)]).all())
+
+    def turned_as(self, others):
+        """These with the vectors of others that they cover."""
+        turns = self.turns.copy()
+        turns[np.searchsorted(self.first, others.first)] = others.turns
+        return replace(self, turns=turns)
+
+    @cached_property
+    def _upright(self):
+        return bool((self.turns == np.eye(3)).all())
+
+    def turned(self, vector):
+        """Components of a vector (unknowns,) in the turned coordinates."""
+        return self._changed(vector, "kji,kj->ki")
+
+    def turned_back(self, vector):
+        """The inverse of `turned`."""
+        return self._changed(vector, "kij,kj->ki")
+
+    def _changed(self, vector, how):
+        if self._upright:
+            return vector
+        out, places = vector.copy(), self.first[:, None] + np.arange(3)
+        out[places] = np.einsum(how, self.turns, vector[places])
+        return out
+
+    def turned_matrix(self, upper):
+        """Values of an upper triangle (csr, sorted) in the turned coordinates; what a node couples with, all its three do."""
+        if self._upright:
+            return upper.data
+        frame = np.full(upper.shape[0], -1, dtype=np.int64)
+        frame[self.first] = np.arange(len(self.first))
+        values = upper.data.copy()
+        _turn(upper.indptr, upper.indices, values, frame, self.turns.astype(values.dtype))
+        return values
+
+
+@njit(cache=True, nogil=True)
+def _turn(indptr, indices, values, frame, turns):
+    for row in range(len(indptr) - 1):
+        e = indptr[row]
+        while e < indptr[row + 1]:
+            k = frame[indices[e]]
+            if k >= 0 and indices[e] > row:     # beside the diagonal's block: three columns of one node
+                values[e], values[e + 1], values[e + 2] = _times(values[e], values[e + 1], values[e + 2], turns[k])
+                e += 3
+            else:
+                e += 1
+    for row in range(len(indptr) - 1):
+        if frame[row] >= 0:
+            _turn_rows(indptr[row], indptr[row + 1], indptr[row + 2], indptr[row + 1] - indptr[row] - 3, values, turns[frame[row]])
+
+
+@njit(cache=True, nogil=True)
+def _times(x, y, z, turn):
+    return (x * turn[0, 0] + y * turn[1, 0] + z * turn[2, 0], x * turn[0, 1] + y * turn[1, 1] + z * turn[2, 1],
+            x * turn[0, 2] + y * turn[1, 2] + z * turn[2, 2])
+
+
+@njit(cache=True, nogil=True)
+def _turn_rows(x, y, z, others, values, turn):
+    """A node's three rows, which begin at x, y and z with the upper half of its own block, before `others` columns."""
+    block = np.empty((3, 3), values.dtype)
+    block[0], block[1, 1:], block[2, 2] = values[x:x + 3], values[y:y + 2], values[z]
+    block[1, 0], block[2, 0], block[2, 1] = block[0, 1], block[0, 2], block[1, 2]
+    block = turn.T @ block @ turn
+    values[x:x + 3], values[y:y + 2], values[z] = block[0], block[1, 1:], block[2, 2]
+    for k in range(others):
+        a, b, c = x + 3 + k, y + 2 + k, z + 1 + k
+        values[a], values[b], values[c] = _times(values[a], values[b], values[c], turn)
