@@ -1,5 +1,6 @@
 """Two ways to factor a contact: what a dissected solver leaves for last, against a new factor in double precision."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,7 +10,7 @@ from plates import plate
 from scipy.spatial.transform import Rotation
 from six_frusta import six_frusta
 
-from softtact.mechanics import contact_factor
+from softtact.mechanics import contact_factor, slab
 from softtact.mechanics.contact_factor import ContactFactor, DissectedContact
 from softtact.mechanics.dissected_solver import DissectedSolver
 from softtact.mechanics.hyperelastic import NewtonSettings, press_levels
@@ -157,3 +158,21 @@ def test_a_sinking_ball_finds_nodes_of_its_own_and_ends_where_a_general_solver_d
         # Forces of 1e-8 of 2 N are left, on modes of 0.03 N/mm and more.
         assert one.indentation == pytest.approx(other.indentation, abs=1e-6)
         np.testing.assert_allclose(one.slab.displacement, other.slab.displacement, atol=3e-6)
+
+
+def test_nodes_that_are_enough_stay_and_are_turned_to_the_normals_of_now():
+    body = six_frusta()
+    rest, _ = body.rest()
+    planes, turn = body.slab.facing(rest, ball), Rotation.from_rotvec([0.03, 0.0, 0.0])
+    gaps = body.slab.top.gaps(rest, planes, 0.02)
+    turned = replace(planes, normals=turn.apply(planes.normals))
+    kept = body.slab.facing_frames(gaps, planes, None)
+    now = body.slab.facing_frames(gaps, turned, kept)
+    soon = body.slab._frames_within(slab._SOON_MM, slab._BENT, gaps, turned)
+    body.close()
+    np.testing.assert_array_equal(now.last, kept.last)
+    touched = np.isin(now.first, soon.first)
+    assert 0 < touched.sum() < len(touched)
+    np.testing.assert_array_equal(now.turns[touched], soon.turns)
+    np.testing.assert_array_equal(now.turns[~touched], kept.turns[~touched])
+    assert (now.turns[touched] != kept.turns[touched]).any()
