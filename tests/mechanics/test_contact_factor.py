@@ -10,13 +10,14 @@ from plates import plate
 from scipy.spatial.transform import Rotation
 from six_frusta import six_frusta
 
-from softtact.mechanics import contact_factor, slab
+from softtact.mechanics import contact_factor, step_contact
 from softtact.mechanics.contact_factor import ContactFactor, DissectedContact
 from softtact.mechanics.dissected_solver import DissectedSolver
 from softtact.mechanics.hyperelastic import NewtonSettings, press_levels
 from softtact.mechanics.linear_solvers import make_solver
 from softtact.mechanics.node_frames import NodeFrames
 from softtact.mechanics.parallel import Workers
+from softtact.mechanics.step_contact import StepContact
 
 WIDTH, LENGTH = 14, 9
 UNKNOWNS = 3 * 2 * WIDTH * LENGTH - 2     # the last node is held along y and z
@@ -148,8 +149,7 @@ def test_a_sinking_ball_finds_nodes_of_its_own_and_ends_where_a_general_solver_d
         if general:
             body.stepper.factor = ContactFactor(make_solver())
         else:
-            facing, slab = body.slab.facing_frames, body.slab
-            monkeypatch.setattr(slab, "facing_frames", lambda *a, find=facing: frames.append(find(*a)) or frames[-1])
+            monkeypatch.setattr(StepContact, "frames", lambda *a, find=StepContact.frames: frames.append(find(*a)) or frames[-1])
         settings = NewtonSettings(relative_tolerance=1e-8)
         ends.append([level.state for level in press_levels(body, ball, [0.3, 1.0, 2.0], settings=settings)])
         body.close()
@@ -164,11 +164,11 @@ def test_nodes_that_are_enough_stay_and_are_turned_to_the_normals_of_now():
     body = six_frusta()
     rest, _ = body.rest()
     planes, turn = body.slab.facing(rest, ball), Rotation.from_rotvec([0.03, 0.0, 0.0])
-    gaps = body.slab.top.gaps(rest, planes, 0.02)
-    turned = replace(planes, normals=turn.apply(planes.normals))
-    kept = body.slab.facing_frames(gaps, planes, None)
-    now = body.slab.facing_frames(gaps, turned, kept)
-    soon = body.slab._frames_within(slab._SOON_MM, slab._BENT, gaps, turned)
+    before, turned = (StepContact(body.slab, body.slab.evaluate(rest, facing, 0.02), 0.02)
+                      for facing in (planes, replace(planes, normals=turn.apply(planes.normals))))
+    kept = before.frames(None)
+    now = turned.frames(kept)
+    soon = turned._frames_within(step_contact._SOON_MM, step_contact._BENT)
     body.close()
     np.testing.assert_array_equal(now.last, kept.last)
     touched = np.isin(now.first, soon.first)

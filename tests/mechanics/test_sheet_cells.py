@@ -47,6 +47,21 @@ def test_a_cell_that_moved_less_than_allowed_keeps_its_tangent(body):
     assert body.cells.refresh(bent_by_10_um, kept_mm=0.004) == 0
 
 
+def test_cells_that_are_forgotten_get_the_tangents_of_their_place_to_the_last_digit(body):
+    at_rest, bent_by_1_um = (bent(body, by=by) for by in (0.0, 0.001))
+    new = six_frusta.six_frusta()
+    new.cells.refresh(bent_by_1_um)
+    exact = new.cells.outer
+    body.cells.refresh(at_rest, kept_mm=0.03)
+    body.cells._tangent_at[:] = np.inf                        # all cells stale, but for what their elements keep
+    body.cells.refresh(bent_by_1_um, kept_mm=0.03)
+    assert any((found != expected).any() for found, expected in zip(body.cells.outer, exact, strict=True))
+    body.cells.forget()
+    body.cells.refresh(bent_by_1_um, kept_mm=0.03)
+    for found, expected in zip(body.cells.outer, exact, strict=True):
+        np.testing.assert_array_equal(found, expected)
+
+
 def test_a_cell_that_was_thrown_too_far_is_damped_until_it_is_not(body, monkeypatch):
     monkeypatch.setattr(contact_step, "_INNER_TOLERANCE", 1e-6)     # from so deep in the plate a tenth of the forces is much
     state = bent(body, by=0.02)

@@ -7,6 +7,7 @@ import numpy as np
 from numba import njit
 
 from softtact.mechanics import lapack
+from softtact.mechanics.lapack import address, keep_alive
 from softtact.mechanics.parallel import SERIAL, slices
 
 _BLOCK = 384
@@ -29,7 +30,7 @@ def factor_in_place(matrix, *, workers=SERIAL):
 @njit(cache=True, nogil=True)
 def _begin(matrix, start, stop, letters, potrf):
     size = np.array([stop - start, len(matrix), 0], dtype=np.int32)
-    potrf(_address(letters, 0), _address(size, 0), matrix[start:, start:].ctypes.data, _address(size, 1), _address(size, 2))
+    potrf(address(letters, 0), address(size, 0), matrix[start:, start:].ctypes.data, address(size, 1), address(size, 2))
     return size[2] == 0 and np.isfinite(matrix[stop - 1, stop - 1])
 
 
@@ -37,27 +38,22 @@ def _begin(matrix, start, stop, letters, potrf):
 def _couple(matrix, start, stop, first, end, letters, factors, trsm):
     """Columns from `first` to `end` of the rows from `start` to `stop`."""
     size = np.array([stop - start, len(matrix), end - first], dtype=np.int32)
-    trsm(_address(letters, 2), _address(letters, 0), _address(letters, 3), _address(letters, 1), _address(size, 2),
-         _address(size, 0), _address(factors, 0), matrix[start:, start:].ctypes.data, _address(size, 1),
-         matrix[start:, first:].ctypes.data, _address(size, 1))
-    return size[0]     # pointed at: alive until here
+    trsm(address(letters, 2), address(letters, 0), address(letters, 3), address(letters, 1), address(size, 2),
+         address(size, 0), address(factors, 0), matrix[start:, start:].ctypes.data, address(size, 1),
+         matrix[start:, first:].ctypes.data, address(size, 1))
+    keep_alive(size)
 
 
 @njit(cache=True, nogil=True)
 def _update(matrix, start, stop, first, end, letters, factors, syrk, gemm):
     """Subtract from the rows from `first` to `end` what the rows from `start` to `stop` give."""
     size = np.array([stop - start, len(matrix), end - first, len(matrix) - end], dtype=np.int32)
-    L, N, T, minus_one, one = (_address(letters, 0), _address(letters, 1), _address(letters, 3), _address(factors, 1),
-                               _address(factors, 0))
+    L, N, T, minus_one, one = (address(letters, 0), address(letters, 1), address(letters, 3), address(factors, 1),
+                               address(factors, 0))
     rows = matrix[start:, first:].ctypes.data
-    syrk(L, N, _address(size, 2), _address(size, 0), minus_one, rows, _address(size, 1), one, matrix[first:, first:].ctypes.data,
-         _address(size, 1))
+    syrk(L, N, address(size, 2), address(size, 0), minus_one, rows, address(size, 1), one, matrix[first:, first:].ctypes.data,
+         address(size, 1))
     if size[3] > 0:
-        gemm(N, T, _address(size, 3), _address(size, 2), _address(size, 0), minus_one, matrix[start:, end:].ctypes.data,
-             _address(size, 1), rows, _address(size, 1), one, matrix[first:, end:].ctypes.data, _address(size, 1))
-    return size[0]
-
-
-@njit(cache=True, nogil=True)
-def _address(array, place):
-    return np.uintp(array.ctypes.data) + np.uintp(place * array.itemsize)
+        gemm(N, T, address(size, 3), address(size, 2), address(size, 0), minus_one, matrix[start:, end:].ctypes.data,
+             address(size, 1), rows, address(size, 1), one, matrix[first:, end:].ctypes.data, address(size, 1))
+    keep_alive(size)

@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 
 from softtact.mechanics import lapack
+from softtact.mechanics.lapack import address, keep_alive
 
 # Of all pieces one behind the other: piece p has those from at[p] to at[p + 1]. Unknowns are numbered as they are eliminated.
 #   own_at (p + 1,): its unknowns;  bound_at (p + 1,), bound: later unknowns of its front, rising
@@ -67,7 +68,7 @@ def begin(p, fronts, store, values, letters, potrf):
         return True
     panel = _panel_of(p, fronts, store)
     size = np.array([own, width, 0], dtype=np.int32)
-    potrf(_address(letters, 0), _address(size, 0), _address(panel, 0), _address(size, 1), _address(size, 2))
+    potrf(address(letters, 0), address(size, 0), address(panel, 0), address(size, 1), address(size, 2))
     # BLAS libraries differ in whether they tell of what is not a number; it goes through to the last pivot.
     return size[2] == 0 and np.isfinite(panel[(own - 1) * (width + 1)])
 
@@ -80,10 +81,10 @@ def couple(p, start, end, fronts, store, letters, factors, trsm):
         return
     panel = _panel_of(p, fronts, store)
     size = np.array([own, width, end - start], dtype=np.int32)
-    L, N, R, T = _address(letters, 0), _address(letters, 1), _address(letters, 2), _address(letters, 3)
-    trsm(R, L, T, N, _address(size, 2), _address(size, 0), _address(factors, 0), _address(panel, 0), _address(size, 1),
-         _address(panel, own + start), _address(size, 1))
-    _keep(size)
+    L, N, R, T = address(letters, 0), address(letters, 1), address(letters, 2), address(letters, 3)
+    trsm(R, L, T, N, address(size, 2), address(size, 0), address(factors, 0), address(panel, 0), address(size, 1),
+         address(panel, own + start), address(size, 1))
+    keep_alive(size)
 
 
 @njit(cache=True, nogil=True, fastmath=True)
@@ -114,14 +115,14 @@ def update(p, start, end, fronts, store, letters, factors, syrk, gemm):
     own, width = _shape(p, fronts)
     bound, panel, out = width - own, _panel_of(p, fronts, store), _update_of(p, fronts, store)
     size = np.array([own, width, end - start, bound, bound - end], dtype=np.int32)
-    L, N, T = _address(letters, 0), _address(letters, 1), _address(letters, 3)
-    minus_one, zero, rows = _address(factors, 1), _address(factors, 2), _address(panel, own + start)
-    syrk(L, N, _address(size, 2), _address(size, 0), minus_one, rows, _address(size, 1), zero, _address(out, start * bound + start),
-         _address(size, 3))
+    L, N, T = address(letters, 0), address(letters, 1), address(letters, 3)
+    minus_one, zero, rows = address(factors, 1), address(factors, 2), address(panel, own + start)
+    syrk(L, N, address(size, 2), address(size, 0), minus_one, rows, address(size, 1), zero, address(out, start * bound + start),
+         address(size, 3))
     if bound > end:
-        gemm(N, T, _address(size, 4), _address(size, 2), _address(size, 0), minus_one, _address(panel, own + end),
-             _address(size, 1), rows, _address(size, 1), zero, _address(out, start * bound + end), _address(size, 3))
-    _keep(size)
+        gemm(N, T, address(size, 4), address(size, 2), address(size, 0), minus_one, address(panel, own + end),
+             address(size, 1), rows, address(size, 1), zero, address(out, start * bound + end), address(size, 3))
+    keep_alive(size)
     for c in fronts.child[fronts.child_at[p]:fronts.child_at[p + 1]]:
         _take_over(c, own + start, own + end, fronts, store, out, own, bound)
 
@@ -190,9 +191,9 @@ def _solve_own(p, fronts, store, x, letters, letter, trsv):
     if own == 0:
         return
     size = np.array([own, 1], dtype=np.int32)
-    trsv(_address(letters, 0), _address(letters, letter), _address(letters, 1), _address(size, 0), _address(triangle, 0),
-         _address(size, 0), _address(x, 0), _address(size, 1))
-    _keep(size)
+    trsv(address(letters, 0), address(letters, letter), address(letters, 1), address(size, 0), address(triangle, 0),
+         address(size, 0), address(x, 0), address(size, 1))
+    keep_alive(size)
 
 
 @njit(cache=True, nogil=True, fastmath=True)
@@ -256,14 +257,3 @@ def _bound_of(p, fronts, values):
 @njit(cache=True, nogil=True)
 def _short_of(p, fronts, store):
     return store.short[fronts.short_at[p]:fronts.short_at[p + 1]]
-
-
-@njit(cache=True, nogil=True)
-def _address(array, place):
-    return np.uintp(array.ctypes.data) + np.uintp(place * array.itemsize)
-
-
-@njit(cache=True, nogil=True, inline="never")
-def _keep(array):
-    """Use an array that a routine was pointed at: until here it must not be freed."""
-    return array[0]

@@ -254,6 +254,10 @@ class FrustumBed:
                   for k in range(self.mesh.layers))
         self.elimination.set(frusta, layers, damping=damping)
 
+    def forget(self):
+        """Let the next `condense` find the tangents of all elements anew."""
+        self._tangents.forget()
+
     @property
     def root_stiffness(self):
         """What the condensed frusta leave on their roots (n, 3 r, 3 r) in N/mm, r nodes each."""

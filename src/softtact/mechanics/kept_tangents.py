@@ -29,3 +29,7 @@ class KeptTangents:
             self._tangents[anew] = packed(self._block.tangent(displacement[~same], anew, precision=np.float32))
             self._found_at[anew] = shape[~same]
         return self._tangents[elements]
+
+    def forget(self):
+        """Let each element's next tangent be found anew."""
+        self._found_at[:] = np.nan

@@ -6,7 +6,7 @@ A compiled function takes the routines it needs as arguments: numba caches it th
 
 import numba.experimental.function_type  # noqa: F401  teaches numba the type of such arguments
 import numpy as np
-from numba import types
+from numba import njit, types
 from numba.extending import get_cython_function_address
 
 
@@ -34,3 +34,15 @@ GEMM = Routine("cython_blas", "sgemm", 13)
 # What the routines are told, as memory that they can point at.
 LETTERS = np.array([ord(letter) for letter in "LNRT"], dtype=np.uint8)
 FACTORS = np.array([1.0, -1.0, 0.0], dtype=np.float32)
+
+
+@njit(cache=True, nogil=True)
+def address(array, place):
+    """Where an entry of a flat array stands in memory."""
+    return np.uintp(array.ctypes.data) + np.uintp(place * array.itemsize)
+
+
+@njit(cache=True, nogil=True, inline="never")
+def keep_alive(array):
+    """Use an array that a routine was pointed at: until here it must not be freed."""
+    return array[0]

@@ -76,9 +76,12 @@ class SheetCells:
         return bool(thrown.any())
 
     def forget(self, cells=None):
-        """Let the next `refresh` recompute the given cells, or all."""
+        """Let the next `refresh` recompute the given cells, or all, then also the tangents that their elements keep."""
         if cells is None:
             self._tangent_at = None
+            self.bed.forget()
+            for kind in self.kinds:
+                kind.forget()
         elif self._tangent_at is not None:
             self._tangent_at[cells] = np.inf
 
@@ -200,6 +203,12 @@ class CellKind:
         layers = (((frusta if k == 0 else []) + [self._tangents(state, part, chosen, kept_mm) for part in layer], None)
                   for k, layer in enumerate(self._layers))
         self.elimination.set(chosen, layers, damping=damping[self.cells[chosen]])
+
+    def forget(self):
+        """Let the next `condense` find the tangents of all elements anew."""
+        for layer in self._layers:
+            for _, kept in layer:
+                kept.forget()
 
     def _tangents(self, state, part, chosen, kept_mm):
         """Packed tangents (b, k, w) of like elements in some of the cells (b,)."""

@@ -18,14 +18,10 @@ from softtact.mechanics.cover_mesh import cover_mesh
 from softtact.mechanics.elements import quad8
 from softtact.mechanics.hex_mesh import extrude
 from softtact.mechanics.kernels import add_forces
-from softtact.mechanics.node_frames import NodeFrames
 from softtact.mechanics.parallel import SERIAL
 from softtact.mechanics.plan_location import plan_interpolation
 from softtact.mechanics.sparsity import SymmetricProduct, add_upper, upper_pattern, upper_positions
 from softtact.mechanics.top_contact import FacingPlanes, TopContact
-
-_SOON_MM, _NEAR_MM = 0.01, 0.1     # gaps of points that may touch within a step or two, and within some levels
-_BENT, _SLIGHTLY_BENT = 0.02, 0.005
 
 
 @dataclass(frozen=True)
@@ -293,25 +289,9 @@ class Slab:
         return LinearGaps(gaps=gaps, rows=rows, lowering=planes.normals[:, 2], area=self.top.area * planes.covered,
                           contact=self.top.contact_on(planes))
 
-    def facing_frames(self, gaps, planes, kept):
-        """`NodeFrames` of the nodes whose contact with the object may change, along the normals that they face.
-
-        kept: frames of before, whose nodes and numbers of vectors stay if they are enough for the nodes that may touch soon
-        """
-        now = self._frames_within(_SOON_MM, _BENT, gaps, planes)
-        if kept is not None and kept.covers(now):
-            return kept.turned_as(now)
-        return self._frames_within(_NEAR_MM, _SLIGHTLY_BENT, gaps, planes)
-
-    def _frames_within(self, within_mm, bent, gaps, planes):
-        nodes, normals = self.top.facing_nodes(gaps, planes, within_mm)
-        unknowns = self._number[nodes]
-        free = (unknowns >= 0).all(axis=1)
-        size, turns = np.linalg.eigh(normals[free])
-        upright = (size[:, 1] < 1e-9 * size[:, 2]) & (np.abs(turns[:, 2, 2]) > 1 - 1e-9)
-        turns[upright] = np.eye(3)
-        return NodeFrames(first=unknowns[free, 0], turns=turns, wanted=(size > bent * size[:, 2:]).sum(axis=1),
-                          others=unknowns[~free][unknowns[~free] >= 0])
+    def unknowns_of(self, nodes):
+        """The global matrix' unknowns (k, 3) of nodes (k,), -1 where a movement is none."""
+        return self._number[nodes]
 
     def friction_border(self, state):
         """How friction ties the unknowns to the object's lowering: derivative (unknowns,) of their residual by it, and its own."""
