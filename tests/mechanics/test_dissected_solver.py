@@ -68,9 +68,11 @@ def test_triangles_and_rows_of_16_bits_hold_the_factor(size, workers):
     for p in range(len(fronts.own_at) - 1):
         first, end = fronts.own_at[p], fronts.own_at[p + 1]
         bound = fronts.bound[fronts.bound_at[p]:fronts.bound_at[p + 1]]
-        triangle = store.triangles[fronts.triangle_at[p]:fronts.triangle_at[p + 1]].reshape(end - first, -1)
+        own = np.zeros((end - first, end - first))
+        own[np.triu_indices(end - first)] = store.triangles[fronts.triangle_at[p]:fronts.triangle_at[p + 1]]
+        np.fill_diagonal(own, 1.0 / own.diagonal())
         short = store.short[fronts.short_at[p]:fronts.short_at[p + 1]].reshape(end - first, -1)
-        factor[first:end, first:end] = np.triu(triangle)
+        factor[first:end, first:end] = own
         factor[first:end, bound] = store.scale[first:end, None] * short
     # An entry is off by half a unit of 16 bits, 1.5e-5 of its row's largest, which is 1 here; up to 70 of them meet.
     np.testing.assert_allclose(factor.T @ factor, whole[order][:, order].toarray(), atol=1e-4)

@@ -11,6 +11,7 @@ from numba import njit
 
 from softtact.mechanics import lapack
 from softtact.mechanics.parallel import SERIAL, slices
+from softtact.mechanics.row_loops import add_row, row_product
 
 _AT_ONCE = 60                # bodies that one thread reduces or recovers at once
 _SMALLEST_STIFFNESS = 0.02   # N/mm of a mode of a folding body; the softest mode of a frustum at rest has 0.03
@@ -69,16 +70,14 @@ class Condensation:
         for `recover`."""
         half, bodies = np.array(inner, dtype=np.float32, order="C"), self._chosen(bodies)
         passed_on = np.empty((len(half), self.outer.shape[1]), dtype=np.float32)
-        workers.map(lambda part: _reduce(self._rows, bodies[part], half[part], passed_on[part], lapack.LETTERS, lapack.FACTORS,
-                                         lapack.TRSV, lapack.GEMV), slices(len(half), _AT_ONCE))
+        workers.map(lambda part: _reduce(self._rows, bodies[part], half[part], passed_on[part]), slices(len(half), _AT_ONCE))
         return passed_on, half
 
     def recover(self, half, outer_step, *, bodies=None, workers=SERIAL):
         """Newton step (b, n) of the inner unknowns of some bodies (b,), or of all, for that of their outer ones (b, m)."""
         step, bodies = half.astype(np.float32), self._chosen(bodies)     # a copy; a half that was cut is in double precision
         outer = np.ascontiguousarray(outer_step, dtype=np.float32)
-        workers.map(lambda part: _recover(self._rows, bodies[part], step[part], outer[part], lapack.LETTERS, lapack.FACTORS,
-                                          lapack.TRSV, lapack.GEMV), slices(len(step), _AT_ONCE))
+        workers.map(lambda part: _recover(self._rows, bodies[part], step[part], outer[part]), slices(len(step), _AT_ONCE))
         return -step
 
     def _chosen(self, bodies):
@@ -199,29 +198,26 @@ def _made_positive(matrix, smallest):
 
 
 @njit(cache=True, nogil=True)
-def _reduce(rows, bodies, half, passed_on, letters, factors, trsv, gemv):
-    n, m = rows.shape[1], passed_on.shape[1]
-    size = np.array([n, m, n + m, 1], dtype=np.int32)
-    (L, N, _, _), (_, minus_one, zero, _) = _addresses(letters, 1), _addresses(factors, 4)
-    _n, _m, _lead, _one = _addresses(size, 4)
+def _reduce(rows, bodies, half, passed_on):
+    n, whole = rows.shape[1], np.zeros(rows.shape[2], np.float32)
     for b in range(len(bodies)):
-        A, h = rows[bodies[b]], half[b].ctypes.data
-        trsv(L, N, N, _n, A.ctypes.data, _lead, h, _one)
-        gemv(N, _m, _n, minus_one, A[:, n:].ctypes.data, _lead, h, _one, zero, passed_on[b].ctypes.data, _one)
-    return size[0]
+        whole[:n], whole[n:] = half[b], 0.0
+        for i in range(n):
+            row = rows[bodies[b], i]
+            whole[i] /= row[i]
+            add_row(row[i + 1:], -whole[i], whole[i + 1:])
+        half[b], passed_on[b] = whole[:n], whole[n:]
 
 
 @njit(cache=True, nogil=True)
-def _recover(rows, bodies, step, outer_step, letters, factors, trsv, gemv):
-    n, m = rows.shape[1], outer_step.shape[1]
-    size = np.array([n, m, n + m, 1], dtype=np.int32)
-    (L, N, _, T), (one, _, _, _) = _addresses(letters, 1), _addresses(factors, 4)
-    _n, _m, _lead, _one = _addresses(size, 4)
+def _recover(rows, bodies, step, outer_step):
+    n, whole = rows.shape[1], np.zeros(rows.shape[2], np.float32)
     for b in range(len(bodies)):
-        A, s = rows[bodies[b]], step[b].ctypes.data
-        gemv(T, _m, _n, one, A[:, n:].ctypes.data, _lead, outer_step[b].ctypes.data, _one, one, s, _one)
-        trsv(L, T, N, _n, A.ctypes.data, _lead, s, _one)
-    return size[0]
+        whole[:n], whole[n:] = step[b], -outer_step[b]
+        for i in range(n - 1, -1, -1):
+            row = rows[bodies[b], i]
+            whole[i] = (whole[i] - row_product(row[i + 1:], whole[i + 1:])) / row[i]
+        step[b] = whole[:n]
 
 
 @njit(cache=True, nogil=True)

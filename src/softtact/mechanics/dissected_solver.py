@@ -113,13 +113,13 @@ class DissectedSolver:
         x = (right[self._order] / size).astype(np.float32)
         factor, first, last = (self._fronts, self._store), self._first_shared, self._first_last
         beyond = np.zeros((len(self._apart), len(x) - first), dtype=np.float32)
-        self._workers.map(lambda k: kernels.forward(self._apart[k], *factor, x, beyond[k], first, *kernels.SOLVES),
+        self._workers.map(lambda k: kernels.forward(self._apart[k], *factor, x, beyond[k], first),
                           range(len(self._apart)))
         x[first:] += beyond.sum(axis=0)
-        kernels.forward(self._shared, *factor, x, beyond[0], len(x), *kernels.SOLVES)
+        kernels.forward(self._shared, *factor, x, beyond[0], len(x))
         x[last:] = finish(x[last:])
-        kernels.backward(self._shared, *factor, x, *kernels.SOLVES)
-        self._workers.map(lambda pieces: kernels.backward(pieces, *factor, x, *kernels.SOLVES), self._apart)
+        kernels.backward(self._shared, *factor, x)
+        self._workers.map(lambda pieces: kernels.backward(pieces, *factor, x), self._apart)
         out = np.empty(len(x))
         out[self._order] = x
         return size * out

@@ -26,8 +26,8 @@ def lay_out(indptr, indices, pieces, *, bordered=False):
         child=np.array([child for piece in pieces for child in piece.before], dtype=np.int64),
         place=_places_in_parents(pieces, bound, own_at), entry_at=entry_at, source=source,
         target=_targets(own_at, bound_at, flat, entry_at, low, high),
-        triangle_at=_starts(np.diff(own_at)**2), short_at=_starts(np.diff(own_at) * np.diff(bound_at)), panel_at=None,
-        update_at=None)
+        triangle_at=_starts(np.diff(own_at) * (np.diff(own_at) + 1) // 2),
+        short_at=_starts(np.diff(own_at) * np.diff(bound_at)), panel_at=None, update_at=None)
     return fronts, order
 
 

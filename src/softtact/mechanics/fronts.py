@@ -5,7 +5,9 @@ k rows (k, k + b), in the end the factor's; its update is what is left of the ot
 Reid, ACM Trans. Math. Softw. 9, 1983). Of both only the upper triangle counts, row by row; to Fortran that is a lower one.
 
 A solve reads the factor twice and does little else. So the panels' bound columns are kept in 16 bits, as shares of each row's
-largest entry: half as much to read, and a solution off by 3e-4 of its energy norm, where single precision leaves 6e-6.
+largest entry: half as much to read, and a solution off by 3e-4 of its energy norm, where single precision leaves 6e-6. It goes
+through them row by row: loops over several rows at once are not made of vector instructions, and BLAS's own triangular solves
+read a quarter as fast (`row_loops`).
 """
 
 from collections import namedtuple
@@ -15,22 +17,22 @@ from numba import njit
 
 from softtact.mechanics import lapack
 from softtact.mechanics.lapack import address, keep_alive
+from softtact.mechanics.row_loops import add_row, row_product
 
 # Of all pieces one behind the other: piece p has those from at[p] to at[p + 1]. Unknowns are numbered as they are eliminated.
 #   own_at (p + 1,): its unknowns;  bound_at (p + 1,), bound: later unknowns of its front, rising
 #   child_at (p + 1,), child: pieces whose updates it takes over
 #   place: where its bound stand in the front that takes over its update
 #   entry_at (p + 1,), source, target: which of the matrix' values are its own, and where in its panel they stand
-#   triangle_at, short_at (p + 1,): its own triangle (k, k), and its panel's bound columns (k, b) in 16 bits
+#   triangle_at, short_at (p + 1,): its own triangle, row after row (k (k + 1) / 2,), its panel's bound columns (k, b) in 16 bits
 #   panel_at, update_at (p,): where in `work` its panel and its update are
 Fronts = namedtuple("Fronts", "own_at bound_at bound child_at child place entry_at source target triangle_at short_at panel_at "
                               "update_at")
-#   work: panels and updates, each as long as it is needed;  triangles, short: as above, flat
+#   work: panels and updates, each as long as it is needed;  triangles, short: as above, flat; diagonals are inverted
 #   scale (n,): what a unit in a row of `short` stands for
 Store = namedtuple("Store", "work triangles short scale")
 
 BLAS = (lapack.LETTERS, lapack.FACTORS, lapack.POTRF, lapack.TRSM, lapack.SYRK, lapack.GEMM)
-SOLVES = (lapack.LETTERS, lapack.TRSV)
 _LONGEST = 32767                     # of a number in 16 bits
 
 
@@ -92,9 +94,11 @@ def keep(p, fronts, store):
     """Keep what a solve needs of a panel: the own triangle, the bound columns in 16 bits, and the size of a unit in each row."""
     own, width = _shape(p, fronts)
     bound, panel = width - own, _panel_of(p, fronts, store)
-    triangle = store.triangles[fronts.triangle_at[p]:fronts.triangle_at[p + 1]]
+    triangle, at = _triangle_of(p, fronts, store), 0
     for k in range(own):
-        triangle[k * own + k:(k + 1) * own] = panel[k * width + k:k * width + own]
+        triangle[at] = np.float32(1.0) / panel[k * width + k]
+        triangle[at + 1:at + own - k] = panel[k * width + k + 1:k * width + own]
+        at += own - k
     for k in range(own if bound else 0):
         row = panel[k * width + own:(k + 1) * width]
         out = store.short[fronts.short_at[p] + k * bound:fronts.short_at[p] + (k + 1) * bound]
@@ -158,17 +162,18 @@ def _runs(places):
 
 
 @njit(cache=True, nogil=True)
-def forward(pieces, fronts, store, right, beyond, first, letters, trsv):
+def forward(pieces, fronts, store, right, beyond, first):
     """Eliminate the pieces' unknowns from a right-hand side (n,), in place.
 
     What is left on unknowns from `first` on, which other pieces may change at the same time, goes to `beyond`.
     """
     for p in pieces:
-        bound, x = _bound_of(p, fronts, fronts.bound), _own_of(p, fronts, right)
-        _solve_own(p, fronts, store, x, letters, 1, trsv)
-        passed_on = np.zeros(len(bound), np.float32)
-        _add_rows(_short_of(p, fronts, store), x * _own_of(p, fronts, store.scale), passed_on)
-        for i in range(len(bound)):
+        bound, x, rows = _bound_of(p, fronts, fronts.bound), _own_of(p, fronts, right), _short_of(p, fronts, store)
+        _eliminate_own(_triangle_of(p, fronts, store), x)
+        scale, b, passed_on = _own_of(p, fronts, store.scale), len(bound), np.zeros(len(bound), np.float32)
+        for k in range(len(x)):
+            add_row(rows[k * b:(k + 1) * b], x[k] * scale[k], passed_on)
+        for i in range(b):
             if bound[i] < first:
                 right[bound[i]] -= passed_on[i]
             else:
@@ -176,51 +181,35 @@ def forward(pieces, fronts, store, right, beyond, first, letters, trsv):
 
 
 @njit(cache=True, nogil=True)
-def backward(pieces, fronts, store, right, letters, trsv):
+def backward(pieces, fronts, store, right):
     """The pieces' unknowns, from the last on, in place; later ones are known."""
     for p in pieces[::-1]:
-        x, known = _own_of(p, fronts, right), right[_bound_of(p, fronts, fronts.bound)]
-        _subtract_products(_short_of(p, fronts, store), _own_of(p, fronts, store.scale), known, x)
-        _solve_own(p, fronts, store, x, letters, 3, trsv)
+        x, known, rows = _own_of(p, fronts, right), right[_bound_of(p, fronts, fronts.bound)], _short_of(p, fronts, store)
+        scale, b = _own_of(p, fronts, store.scale), len(known)
+        for k in range(len(x)):
+            x[k] -= scale[k] * row_product(rows[k * b:(k + 1) * b], known)
+        _recover_own(_triangle_of(p, fronts, store), x)
 
 
 @njit(cache=True, nogil=True)
-def _solve_own(p, fronts, store, x, letters, letter, trsv):
-    """Solve with the triangle of a piece's own unknowns, or with its transpose, as the letter says."""
-    own, triangle = len(x), store.triangles[fronts.triangle_at[p]:fronts.triangle_at[p + 1]]
-    if own == 0:
-        return
-    size = np.array([own, 1], dtype=np.int32)
-    trsv(address(letters, 0), address(letters, letter), address(letters, 1), address(size, 0), address(triangle, 0),
-         address(size, 0), address(x, 0), address(size, 1))
-    keep_alive(size)
-
-
-@njit(cache=True, nogil=True, fastmath=True)
-def _add_rows(rows, x, out):
-    """Add x (k,) times rows (k, b) of 16 bits to `out` (b,), four rows at a time."""
-    b, whole = len(out), len(x) - len(x) % 4
-    for k in range(0, whole, 4):
-        x0, x1, x2, x3 = x[k], x[k + 1], x[k + 2], x[k + 3]
-        r0, r1, r2, r3 = (rows[k * b:(k + 1) * b], rows[(k + 1) * b:(k + 2) * b], rows[(k + 2) * b:(k + 3) * b],
-                          rows[(k + 3) * b:(k + 4) * b])
-        for j in range(b):
-            out[j] += x0 * np.float32(r0[j]) + x1 * np.float32(r1[j]) + (x2 * np.float32(r2[j]) + x3 * np.float32(r3[j]))
-    for k in range(whole, len(x)):
-        row = rows[k * b:(k + 1) * b]
-        for j in range(b):
-            out[j] += x[k] * np.float32(row[j])
-
-
-@njit(cache=True, nogil=True, fastmath=True)
-def _subtract_products(rows, scale, known, x):
-    """Subtract from x (k,) what rows (k, b) of 16 bits, in units of `scale` (k,), give for `known` (b,)."""
-    b = len(known)
+def _eliminate_own(triangle, x):
+    """Solve R'.y = x (k,) in place for a triangle R, row after row with its diagonal inverted."""
+    at = 0
     for k in range(len(x)):
-        row, total = rows[k * b:(k + 1) * b], np.float32(0.0)
-        for j in range(b):
-            total += known[j] * np.float32(row[j])
-        x[k] -= scale[k] * total
+        rest = len(x) - k - 1
+        x[k] *= triangle[at]
+        add_row(triangle[at + 1:at + 1 + rest], -x[k], x[k + 1:])
+        at += rest + 1
+
+
+@njit(cache=True, nogil=True)
+def _recover_own(triangle, x):
+    """Solve R.y = x (k,) in place."""
+    at = len(triangle)
+    for k in range(len(x) - 1, -1, -1):
+        rest = len(x) - k - 1
+        at -= rest + 1
+        x[k] = (x[k] - row_product(triangle[at + 1:at + 1 + rest], x[k + 1:])) * triangle[at]
 
 
 @njit(cache=True, nogil=True)
@@ -257,3 +246,8 @@ def _bound_of(p, fronts, values):
 @njit(cache=True, nogil=True)
 def _short_of(p, fronts, store):
     return store.short[fronts.short_at[p]:fronts.short_at[p + 1]]
+
+
+@njit(cache=True, nogil=True)
+def _triangle_of(p, fronts, store):
+    return store.triangles[fronts.triangle_at[p]:fronts.triangle_at[p + 1]]

@@ -27,8 +27,6 @@ class Routine(types.WrapperAddressProtocol):
 POTRF = Routine("cython_lapack", "spotrf", 5)
 TRSM = Routine("cython_blas", "strsm", 11)
 SYRK = Routine("cython_blas", "ssyrk", 10)
-TRSV = Routine("cython_blas", "strsv", 8)
-GEMV = Routine("cython_blas", "sgemv", 11)
 GEMM = Routine("cython_blas", "sgemm", 13)
 
 # What the routines are told, as memory that they can point at.
