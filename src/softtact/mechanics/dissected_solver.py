@@ -60,7 +60,8 @@ class DissectedSolver:
     def factor_bordered(self, matrix):
         """Factor a `Bordered` matrix but for its last unknowns; False if what comes before them is not positive definite."""
         upper, self._frames = matrix.upper, matrix.frames
-        values = np.concatenate([self._frames.turned_matrix(upper), self._frames.turned(matrix.column)])
+        column = self._frames.turned(matrix.column).astype(np.float32)
+        values = np.concatenate([self._frames.turned_matrix(upper).astype(np.float32, copy=False), column])
         return self._factor((upper.indptr, upper.indices), values, self._frames.last)
 
     def _factor(self, pattern, values, last):
