@@ -106,8 +106,10 @@ def press_hyperelastic(sensor, placed, forces, *, label, threads, keep_body=Fals
     sampling = body.slab.sampling(grid)
     announce(f"{label}: {body.bed.count} frusta, {len(forces)} force levels of the hyperelastic model, some seconds each")
     record, times, bodies = [], [], []
+    lowest = _lowest_over(placed, sensor.spec.footprint_mm)
 
     def read(level):
+        _refuse_beyond_the_board(level, lowest, sensor.spec.thickness_mm)
         record.append(_read_level(body, sampling, level))
         if keep_body:
             bodies.append(pressed_body(body, level.state))
@@ -122,6 +124,21 @@ def press_hyperelastic(sensor, placed, forces, *, label, threads, keep_body=Fals
     finally:
         body.close()
     return _of_record(sensor, body, record, forces, times, bodies)
+
+
+def _lowest_over(placed, footprint_mm):
+    """Height (mm) of the lowest vertex over the sensor; infinite where there is none."""
+    half = np.asarray(footprint_mm) / 2
+    return placed.vertices[(np.abs(placed.vertices[:, :2]) <= half).all(axis=1), 2].min(initial=np.inf)
+
+
+def _refuse_beyond_the_board(level, lowest_mm, thickness_mm):
+    """Raise ConvergenceError where a tip that no contact point feels has gone farther down than the sensor is thick."""
+    depth = level.state.indentation - lowest_mm
+    if depth > thickness_mm:
+        raise ConvergenceError(f"The level of {level.force_n:g} N was not reached: the object's tip would be {depth:.3g} mm deep "
+                               f"in a sensor {thickness_mm:g} mm thick, for it slips in between the points of the cover that feel "
+                               "contact. Ask for smaller forces, a finer cover (--mesh-quality fine), or use a blunter tip.")
 
 
 def _of_record(sensor, body, record, forces, times, bodies):

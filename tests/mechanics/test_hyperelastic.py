@@ -74,12 +74,23 @@ def test_a_tip_between_the_contact_points_finds_its_first_touch():
     assert (np.diff(result.indentation_mm) > 0).all()
 
 
+SPIKE = trimesh.creation.cone(radius=0.8, height=2.5, sections=64).apply_transform(np.diag([1.0, -1.0, -1.0, 1.0]))
+BETWEEN_POINTS = Pose.from_values([0.17, 0.11, 0, 0, 0, 0])
+
+
 def test_a_spike_that_goes_in_between_the_contact_points_is_lowered_until_they_feel_it():
-    spike = trimesh.creation.cone(radius=0.8, height=2.5, sections=64)
-    spike.apply_transform(np.diag([1.0, -1.0, -1.0, 1.0]))
-    result = press_small(spike, [0.05, 0.1], pose=Pose.from_values([0.17, 0.11, 0, 0, 0, 0]))
+    # With more force it slips on between them, and where it stops is chance.
+    result = press_small(SPIKE, [0.01, 0.02], pose=BETWEEN_POINTS)
     assert (np.diff(result.indentation_mm) > 0).all() and result.residual_n.max() < 3e-3
     assert not result.within_validity.any()     # a handful of points does not resolve it
+
+
+def test_a_tip_deeper_than_the_sensor_is_thick_is_no_level_and_the_levels_before_are_kept(monkeypatch):
+    tip = 2.5 + press_small(SPIKE, [0.01, 0.02], pose=BETWEEN_POINTS).indentation_mm     # its height below the origin
+    monkeypatch.setattr(SensorSpec, "thickness_mm", tip.mean())
+    with pytest.raises(ConvergenceError, match=rf"0\.02 N was not reached.* {tip[1]:.3g} mm deep") as caught:
+        press_small(SPIKE, [0.01, 0.02], pose=BETWEEN_POINTS)
+    np.testing.assert_array_equal(caught.value.result.force_n, [0.01])
 
 
 def test_a_cone_whose_tip_is_between_the_contact_points_goes_deeper_with_more_force():
