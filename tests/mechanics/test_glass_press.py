@@ -115,7 +115,8 @@ def test_four_frusta_with_free_borders_share_a_plate_alike_and_spread():
     """A patch of 2 x 2 has two mirrors: four equal shares of the force. Its free sheet is softer than the endless lattice's."""
     forces = 4 * np.array([20.0, 60.0]) / 540
     body = build_patch(CORO, (2, 2), dielectric_law=LAW, mesh=COARSE)
-    levels = list(press_levels(body, HeightField(plate_over(CORO)), forces, settings=SETTINGS))
+    exact = replace(SETTINGS, relative_tolerance=1e-6)     # a node may else carry more than what shares are compared to
+    levels = list(press_levels(body, HeightField(plate_over(CORO)), forces, settings=exact))
     areas = np.array([[contact_area(body.bed, level.state.bed.displacement, frustum=k) for k in range(4)] for level in levels])
     carried = levels[-1].state.bed.force[:, body.bed.root, 2].sum(axis=1)
     body.close()
