@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 
 from softtact.mechanics import lapack
+from softtact.mechanics.lapack import address, keep_alive
 from softtact.mechanics.parallel import SERIAL, slices
 from softtact.mechanics.row_loops import add_row, row_product
 
@@ -168,8 +169,9 @@ def _condense(matrix, rows, outer, smallest, letters, factors, potrf, trsm, syrk
     """Fill a body's rows and outer matrix; True where its inner matrix was not positive definite."""
     n, m = len(rows), len(outer)
     size = np.array([n, m, n + m, 0], dtype=np.int32)
-    (L, N, R, T), (one, minus_one, _, _) = _addresses(letters, 1), _addresses(factors, 4)
-    _n, _m, _lead, info = _addresses(size, 4)
+    L, N, R, T = address(letters, 0), address(letters, 1), address(letters, 2), address(letters, 3)
+    one, minus_one = address(factors, 0), address(factors, 1)
+    _n, _m, _lead, info = address(size, 0), address(size, 1), address(size, 2), address(size, 3)
     rows[:] = matrix[:n]
     outer[:] = matrix[n:, n:]
     potrf(L, _n, rows.ctypes.data, _lead, info)
@@ -180,10 +182,11 @@ def _condense(matrix, rows, outer, smallest, letters, factors, potrf, trsm, syrk
     coupling = rows[:, n:].ctypes.data
     trsm(R, L, T, N, _m, _n, one, rows.ctypes.data, _lead, coupling, _lead)
     syrk(L, N, _m, _n, minus_one, coupling, _lead, one, outer.ctypes.data, _m)
+    keep_alive(size)
     for i in range(m):
         for j in range(i):
             outer[i, j] = outer[j, i]
-    return modified and size[0] > 0      # `size` is pointed at: alive until here
+    return modified
 
 
 @njit(cache=True, nogil=True)
@@ -218,10 +221,3 @@ def _recover(rows, bodies, step, outer_step):
             row = rows[bodies[b], i]
             whole[i] = (whole[i] - row_product(row[i + 1:], whole[i + 1:])) / row[i]
         step[b] = whole[:n]
-
-
-@njit(cache=True, nogil=True)
-def _addresses(array, size):
-    """Where the first four entries of an array stand, each of `size` bytes."""
-    start = np.uintp(array.ctypes.data)
-    return start, start + np.uintp(size), start + np.uintp(2 * size), start + np.uintp(3 * size)
