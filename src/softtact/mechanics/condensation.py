@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from softtact.mechanics import lapack
-from softtact.mechanics.lapack import address, keep_alive
+from softtact.mechanics.lapack import address, call, keep_alive
 from softtact.mechanics.parallel import SERIAL, slices
 from softtact.mechanics.row_loops import add_row, row_product
 
@@ -174,14 +174,14 @@ def _condense(matrix, rows, outer, smallest, letters, factors, potrf, trsm, syrk
     _n, _m, _lead, info = address(size, 0), address(size, 1), address(size, 2), address(size, 3)
     rows[:] = matrix[:n]
     outer[:] = matrix[n:, n:]
-    potrf(L, _n, rows.ctypes.data, _lead, info)
+    call(potrf, (L, _n, rows.ctypes.data, _lead, info))
     modified = size[3] != 0
     if modified:
         rows[:, :n] = _made_positive(matrix[:n, :n].astype(np.float64), smallest)
-        potrf(L, _n, rows.ctypes.data, _lead, info)
+        call(potrf, (L, _n, rows.ctypes.data, _lead, info))
     coupling = rows[:, n:].ctypes.data
-    trsm(R, L, T, N, _m, _n, one, rows.ctypes.data, _lead, coupling, _lead)
-    syrk(L, N, _m, _n, minus_one, coupling, _lead, one, outer.ctypes.data, _m)
+    call(trsm, (R, L, T, N, _m, _n, one, rows.ctypes.data, _lead, coupling, _lead))
+    call(syrk, (L, N, _m, _n, minus_one, coupling, _lead, one, outer.ctypes.data, _m))
     keep_alive(size)
     for i in range(m):
         for j in range(i):

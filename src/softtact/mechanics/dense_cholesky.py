@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 
 from softtact.mechanics import lapack
-from softtact.mechanics.lapack import address, keep_alive
+from softtact.mechanics.lapack import address, call, keep_alive
 from softtact.mechanics.parallel import SERIAL, slices
 
 _BLOCK = 384
@@ -30,7 +30,8 @@ def factor_in_place(matrix, *, workers=SERIAL):
 @njit(cache=True, nogil=True)
 def _begin(matrix, start, stop, letters, potrf):
     size = np.array([stop - start, len(matrix), 0], dtype=np.int32)
-    potrf(address(letters, 0), address(size, 0), matrix[start:, start:].ctypes.data, address(size, 1), address(size, 2))
+    corner = matrix[start:, start:].ctypes.data
+    call(potrf, (address(letters, 0), address(size, 0), corner, address(size, 1), address(size, 2)))
     return size[2] == 0 and np.isfinite(matrix[stop - 1, stop - 1])
 
 
@@ -38,9 +39,9 @@ def _begin(matrix, start, stop, letters, potrf):
 def _couple(matrix, start, stop, first, end, letters, factors, trsm):
     """Columns from `first` to `end` of the rows from `start` to `stop`."""
     size = np.array([stop - start, len(matrix), end - first], dtype=np.int32)
-    trsm(address(letters, 2), address(letters, 0), address(letters, 3), address(letters, 1), address(size, 2),
-         address(size, 0), address(factors, 0), matrix[start:, start:].ctypes.data, address(size, 1),
-         matrix[start:, first:].ctypes.data, address(size, 1))
+    call(trsm, (address(letters, 2), address(letters, 0), address(letters, 3), address(letters, 1), address(size, 2),
+                address(size, 0), address(factors, 0), matrix[start:, start:].ctypes.data, address(size, 1),
+                matrix[start:, first:].ctypes.data, address(size, 1)))
     keep_alive(size)
 
 
@@ -51,9 +52,9 @@ def _update(matrix, start, stop, first, end, letters, factors, syrk, gemm):
     L, N, T, minus_one, one = (address(letters, 0), address(letters, 1), address(letters, 3), address(factors, 1),
                                address(factors, 0))
     rows = matrix[start:, first:].ctypes.data
-    syrk(L, N, address(size, 2), address(size, 0), minus_one, rows, address(size, 1), one, matrix[first:, first:].ctypes.data,
-         address(size, 1))
+    call(syrk, (L, N, address(size, 2), address(size, 0), minus_one, rows, address(size, 1), one,
+                matrix[first:, first:].ctypes.data, address(size, 1)))
     if size[3] > 0:
-        gemm(N, T, address(size, 3), address(size, 2), address(size, 0), minus_one, matrix[start:, end:].ctypes.data,
-             address(size, 1), rows, address(size, 1), one, matrix[first:, end:].ctypes.data, address(size, 1))
+        call(gemm, (N, T, address(size, 3), address(size, 2), address(size, 0), minus_one, matrix[start:, end:].ctypes.data,
+                    address(size, 1), rows, address(size, 1), one, matrix[first:, end:].ctypes.data, address(size, 1)))
     keep_alive(size)

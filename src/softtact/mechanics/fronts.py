@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 
 from softtact.mechanics import lapack
-from softtact.mechanics.lapack import address, keep_alive
+from softtact.mechanics.lapack import address, call, keep_alive
 from softtact.mechanics.row_loops import add_row, row_product
 
 # Of all pieces one behind the other: piece p has those from at[p] to at[p + 1]. Unknowns are numbered as they are eliminated.
@@ -70,7 +70,7 @@ def begin(p, fronts, store, values, letters, potrf):
         return True
     panel = _panel_of(p, fronts, store)
     size = np.array([own, width, 0], dtype=np.int32)
-    potrf(address(letters, 0), address(size, 0), address(panel, 0), address(size, 1), address(size, 2))
+    call(potrf, (address(letters, 0), address(size, 0), address(panel, 0), address(size, 1), address(size, 2)))
     # BLAS libraries differ in whether they tell of what is not a number; it goes through to the last pivot.
     return size[2] == 0 and np.isfinite(panel[(own - 1) * (width + 1)])
 
@@ -84,8 +84,8 @@ def couple(p, start, end, fronts, store, letters, factors, trsm):
     panel = _panel_of(p, fronts, store)
     size = np.array([own, width, end - start], dtype=np.int32)
     L, N, R, T = address(letters, 0), address(letters, 1), address(letters, 2), address(letters, 3)
-    trsm(R, L, T, N, address(size, 2), address(size, 0), address(factors, 0), address(panel, 0), address(size, 1),
-         address(panel, own + start), address(size, 1))
+    call(trsm, (R, L, T, N, address(size, 2), address(size, 0), address(factors, 0), address(panel, 0), address(size, 1),
+                address(panel, own + start), address(size, 1)))
     keep_alive(size)
 
 
@@ -121,11 +121,11 @@ def update(p, start, end, fronts, store, letters, factors, syrk, gemm):
     size = np.array([own, width, end - start, bound, bound - end], dtype=np.int32)
     L, N, T = address(letters, 0), address(letters, 1), address(letters, 3)
     minus_one, zero, rows = address(factors, 1), address(factors, 2), address(panel, own + start)
-    syrk(L, N, address(size, 2), address(size, 0), minus_one, rows, address(size, 1), zero, address(out, start * bound + start),
-         address(size, 3))
+    call(syrk, (L, N, address(size, 2), address(size, 0), minus_one, rows, address(size, 1), zero,
+                address(out, start * bound + start), address(size, 3)))
     if bound > end:
-        gemm(N, T, address(size, 4), address(size, 2), address(size, 0), minus_one, address(panel, own + end),
-             address(size, 1), rows, address(size, 1), zero, address(out, start * bound + end), address(size, 3))
+        call(gemm, (N, T, address(size, 4), address(size, 2), address(size, 0), minus_one, address(panel, own + end),
+                    address(size, 1), rows, address(size, 1), zero, address(out, start * bound + end), address(size, 3)))
     keep_alive(size)
     for c in fronts.child[fronts.child_at[p]:fronts.child_at[p + 1]]:
         _take_over(c, own + start, own + end, fronts, store, out, own, bound)
