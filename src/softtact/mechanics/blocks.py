@@ -193,6 +193,23 @@ def _unlike(coordinates):
     return unique_rows((coordinates - coordinates[:, :1]).reshape(len(coordinates), -1))
 
 
+def _distinct(numbers):
+    """The numbers of each row of (r, k), each once and rising, (r, w), short rows with their last one again; where each stands.
+
+    Negative ones count for nothing, and stand at -1 in the places (r, k).
+    """
+    order = np.argsort(numbers, axis=1, kind="stable")
+    rising = np.take_along_axis(numbers, order, axis=1)
+    new = (rising >= 0) & (np.diff(rising, axis=1, prepend=-1) > 0)
+    place = np.cumsum(new, axis=1) - 1
+    rows, _ = np.nonzero(new)
+    found = np.full((len(numbers), place.max() + 1), -1, dtype=numbers.dtype)
+    found[rows, place[new]] = rising[new]
+    back = np.empty_like(place)
+    np.put_along_axis(back, order, place, axis=1)
+    return np.maximum.accumulate(found, axis=1), back
+
+
 class HexBlock(SolidBlock):
     """Hexahedra of 20 or 27 nodes given by coordinates (e, 20 or 27, 3) in mm; options as `SolidBlock` has them."""
 
@@ -217,14 +234,11 @@ class WedgeBlock(SolidBlock):
 def of_masters(masters, weights, elements, block):
     """Nodes (e, w) that elements (e, m) hang on, and the block in terms of these."""
     masters, weights = masters[elements], weights[elements]
-    used = np.abs(weights) > 1e-12
-    needed = [np.unique(m[u]) for m, u in zip(masters, used, strict=True)]
-    width = max(map(len, needed))
-    nodes = np.stack([np.pad(n, (0, width - len(n)), mode="edge") for n in needed])
-    follow = np.zeros((*elements.shape, width))
-    for e, unique in enumerate(needed):
-        rows, columns = np.nonzero(used[e])
-        np.add.at(follow[e], (rows, np.searchsorted(unique, masters[e][rows, columns])), weights[e][rows, columns])
+    nodes, column = _distinct(np.where(np.abs(weights) > 1e-12, masters, -1).reshape(len(elements), -1))
+    follow = np.zeros((*elements.shape, nodes.shape[1]))
+    element, node, _ = np.indices(masters.shape, sparse=True)
+    column, used = column.reshape(masters.shape), column.reshape(masters.shape) >= 0
+    np.add.at(follow, tuple(np.broadcast_to(index, masters.shape)[used] for index in (element, node, column)), weights[used])
     table = np.hstack([block.shapes[:, None], follow.reshape(len(follow), -1)])
     first, block.shapes = unique_rows(table)
     own = table[first, 0].astype(int)
