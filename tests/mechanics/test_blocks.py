@@ -57,3 +57,30 @@ def test_tangents_in_single_precision_are_those_in_double_precision_to_seven_dig
     exact, rough = block.tangent(field), block.tangent(field, precision=np.float32)
     assert rough.dtype == np.float32
     assert np.abs(rough - exact).max() < 2e-6 * np.abs(exact).max()      # sums of 81 products of seven digits
+
+
+def projected(block, field):
+    """A field (e, g) at all elements' points, projected on the pressure's functions: a least-squares fit, points by volume."""
+    rows = []
+    for values, volumes in zip(field, block.volumes[block.shapes], strict=True):
+        root = np.sqrt(volumes)
+        rows.append(block.basis @ np.linalg.lstsq(root[:, None] * block.basis, root * values, rcond=None)[0])
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("options", [{}, {"local_over_shear": 0.5}, {"growing_over_shear": 100.0},
+                                     {"local_over_shear": 4.0, "growing_over_shear": 100.0, "trilinear": True}])
+def test_the_energy_of_volume_changes_is_that_of_the_formulas_written_down_plainly(options):
+    points = 0.5 * HEX27_NODES + 0.02 * np.random.default_rng(2).normal(size=(3, 27, 3))
+    block = HexBlock(points, LAWS[0], **options)
+    J = 1 + 0.2 * np.random.default_rng(3).normal(size=(3, 27)).clip(-2, 2)
+    K, k, q = block.law.bulk_modulus, block.local_modulus, block.growing_modulus
+    seen = projected(block, J - 1)
+    density = (K - k) / 2 * seen**2 + k / 4 * (J**2 - 1 - 2 * np.log(J)) + q / 4 * (J - 1 - seen) ** 4
+    held = q * (J - 1 - seen) ** 3
+    pressure = (K - k) * seen + k / 2 * (J - 1 / J) + held - projected(block, held)
+    found = block._volumetric(J, block.shapes)
+    np.testing.assert_allclose(found.energies, (block.volumes[block.shapes] * density).sum(axis=1), rtol=1e-12)
+    np.testing.assert_allclose(found.pressure, pressure, rtol=1e-11, atol=1e-12 * np.abs(pressure).max())
+    assert found.growing.shape == ((3, 27) if q else (0, 0))
+    np.testing.assert_allclose(found.growing, 3 * q * (J - 1 - seen) ** 2 if q else found.growing, rtol=1e-9, atol=1e-12 * (q + 1))

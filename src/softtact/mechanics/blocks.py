@@ -136,25 +136,9 @@ class SolidBlock:
 
     def _volumetric(self, J, shapes):
         """The volumetric part of the energy of elements with volume changes J (e, g), a `Volumetric`."""
-        volumes, k, q = self.volumes[shapes], self.local_modulus, self.growing_modulus
-        change = J - 1
-        seen = self._projected(change, shapes)
-        pressure = self.projected_modulus * seen + 0.5 * k * (J - 1 / J)
-        density = 0.5 * self.projected_modulus * seen**2 + 0.25 * k * (J * J - 1 - 2 * np.log(J))
-        growing = np.empty((0, 0))
-        if q > 0:
-            unseen = change - seen
-            square = unseen * unseen     # a power of 3 or 4 would take longer than all else here
-            held = q * square * unseen
-            pressure += held - self._projected(held, shapes)
-            density += 0.25 * q * square * square
-            growing = 3 * q * square
-        return Volumetric(energies=(volumes * density).sum(axis=1), pressure=pressure, growing=growing)
-
-    def _projected(self, field, shapes):
-        """A field (e, g) projected, element by element, on the functions of the pressure."""
-        moments = (field * self.volumes[shapes]) @ self.basis
-        return np.einsum("epq,eq->ep", self.gram_inverse[shapes], moments) @ self.basis.T
+        k, q = self.local_modulus, self.growing_modulus
+        return Volumetric(*kernels.volumetric(J, self.volumes, shapes, self.basis, self.gram_inverse,
+                                              self.law.bulk_modulus - k, k, q))
 
 
 def joined(parts):

@@ -291,6 +291,53 @@ def tangent(F, C, J, gradients, volumes, shapes, stress, moduli, pressure, basis
 
 
 @njit(cache=True, nogil=True)
+def volumetric(J, volumes, shapes, basis, gram_inverse, bulk_modulus, local_modulus, growing_modulus):
+    """What `blocks.Volumetric` holds, of elements with volume changes J (e, g), by the energy told in `blocks`; moduli in MPa."""
+    elements, points = J.shape
+    grows = growing_modulus > 0
+    energies, pressure = np.zeros(elements), np.empty((elements, points))
+    growing = np.empty((elements, points) if grows else (0, 0))
+    seen, held, share = np.empty(points), np.empty(points), np.empty(points)
+    for e in range(elements):
+        w, inverse = volumes[shapes[e]], gram_inverse[shapes[e]]
+        _project(J[e] - 1.0, w, basis, inverse, seen)
+        for g in range(points):
+            j = J[e, g]
+            pressure[e, g], density = bulk_modulus * seen[g], 0.5 * bulk_modulus * seen[g] ** 2
+            if local_modulus > 0:
+                pressure[e, g] += 0.5 * local_modulus * (j - 1.0 / j)
+                density += 0.25 * local_modulus * (j * j - 1.0 - 2.0 * np.log(j))
+            if grows:
+                unseen = j - 1.0 - seen[g]
+                held[g] = growing_modulus * unseen * unseen * unseen
+                growing[e, g] = 3.0 * growing_modulus * unseen * unseen
+                density += 0.25 * held[g] * unseen
+            energies[e] += w[g] * density
+        if grows:
+            _project(held, w, basis, inverse, share)
+            pressure[e] += held - share
+    return energies, pressure, growing
+
+
+@njit(cache=True, nogil=True)
+def _project(field, w, basis, gram_inverse, out):
+    """An element's field (g,) projected on the functions of the pressure, into `out` (g,)."""
+    points, modes = basis.shape
+    moments, amounts = np.zeros(modes), np.zeros(modes)
+    for g in range(points):
+        for p in range(modes):
+            moments[p] += w[g] * field[g] * basis[g, p]
+    for p in range(modes):
+        for q in range(modes):
+            amounts[q] += gram_inverse[p, q] * moments[p]     # symmetric: row by row
+    for g in range(points):
+        total = 0.0
+        for p in range(modes):
+            total += amounts[p] * basis[g, p]
+        out[g] = total
+
+
+@njit(cache=True, nogil=True)
 def _sym(tensor, i, j):
     """Component (i, j) of a symmetric tensor stored as xx, yy, zz, xy, yz, zx."""
     if i == j:
