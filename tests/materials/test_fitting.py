@@ -90,7 +90,7 @@ def test_constants_that_the_curves_cannot_tell_apart_have_no_covariance(curves_o
 def test_constants_that_the_curves_do_not_hold_are_named(curves_of):
     """A second and third Ogden term may have any exponent; whether they have a covariance, a huge one, is a matter of rounding."""
     fit = fit_law("ogden3", curves_of("neo_hooke", {"c10": 0.2}, noise=0.01), nonnegative=True)
-    assert fit.not_identifiable
+    assert any(name.startswith("alpha") for name in fit.not_identifiable)
 
 
 def test_constants_can_be_kept_from_being_negative(curves_of):

@@ -59,6 +59,24 @@ def test_tangents_in_single_precision_are_those_in_double_precision_to_seven_dig
     assert np.abs(rough - exact).max() < 2e-6 * np.abs(exact).max()      # sums of 81 products of seven digits
 
 
+def test_elements_that_hang_on_other_nodes_feel_the_displacement_that_these_give_them():
+    """Up to three masters a node, some twice in an element, some without weight."""
+    rng, points = np.random.default_rng(4), 0.5 * HEX27_NODES + np.zeros((4, 1, 1))
+    masters, weights = rng.integers(0, 40, size=(60, 3)), rng.normal(size=(60, 3)) * rng.integers(0, 2, size=(60, 3))
+    weights[:, 0] = 1.0
+    elements, field = rng.integers(0, 60, size=(4, 27)), 0.002 * rng.normal(size=(40, 3))
+    own = np.einsum("nw,nwi->ni", weights, field[masters])
+    expected = HexBlock(points, LAWS[0]).evaluate(own[elements])
+    nodes, block = of_masters(masters, weights, elements, HexBlock(points, LAWS[0]))
+    found = block.evaluate(field[nodes])
+    np.testing.assert_allclose(found.energies, expected.energies, rtol=1e-11)
+    passed_on, force = np.zeros((40, 3)), np.zeros((40, 3))
+    each = expected.force.reshape(-1, 1, 3) * weights[elements].reshape(-1, 3, 1)
+    np.add.at(passed_on, masters[elements].ravel(), each.reshape(-1, 3))
+    np.add.at(force, nodes.ravel(), found.force.reshape(-1, 3))
+    np.testing.assert_allclose(force, passed_on, atol=1e-11 * np.abs(passed_on).max())
+
+
 def projected(block, field):
     """A field (e, g) at all elements' points, projected on the pressure's functions: a least-squares fit, points by volume."""
     rows = []

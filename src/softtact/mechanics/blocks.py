@@ -136,9 +136,8 @@ class SolidBlock:
 
     def _volumetric(self, J, shapes):
         """The volumetric part of the energy of elements with volume changes J (e, g), a `Volumetric`."""
-        k, q = self.local_modulus, self.growing_modulus
-        return Volumetric(*kernels.volumetric(J, self.volumes, shapes, self.basis, self.gram_inverse,
-                                              self.law.bulk_modulus - k, k, q))
+        return Volumetric(*kernels.volumetric(J, self.volumes, shapes, self.basis, self.gram_inverse, self.projected_modulus,
+                                              self.local_modulus, self.growing_modulus))
 
 
 def joined(parts):
