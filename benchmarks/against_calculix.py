@@ -29,13 +29,13 @@ from threadpoolctl import threadpool_limits
 from softtact.contact.height_field import HeightField
 from softtact.decks import keywords
 from softtact.decks.laws import law_card
-from softtact.geometry.sensor_spec import SensorSpec
+from softtact.linalg.direct_single import RoughSolver
+from softtact.linalg.workers import Workers
 from softtact.materials.laws.registry import make_law
-from softtact.mechanics.free_body import FreeBody, RigidContact
-from softtact.mechanics.free_press import FreeSettings, press_to_indentations
-from softtact.mechanics.parallel import Workers
-from softtact.mechanics.rough_solver import RoughSolver
-from softtact.mechanics.tetrahedra import LinearTetrahedra
+from softtact.models.solid.body import FreeBody, RigidContact
+from softtact.models.solid.newton import FreeSettings, press_to_indentations
+from softtact.models.solid.tetrahedra import LinearTetrahedra
+from softtact.sensors.specification import SensorSpec
 
 SENSOR = Path(__file__).parents[1] / "config/sensors/coro.yaml"
 LAWS = {"dielectric": {"c10": 0.1706, "c01": 0.0040}, "cover": {"c10": 0.1786, "c01": 0.0022}}

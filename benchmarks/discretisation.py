@@ -1,6 +1,6 @@
 """Which element for the sensor? Error against unknowns and time: `python benchmarks/discretisation.py` (an hour on one thread).
 
-Every kind of element on meshes of the same cells, in the same press (`softtact.mechanics.free_press`):
+Every kind of element on meshes of the same cells, in the same press (`softtact.models.solid.newton`):
   cell   one frustum of an endless lattice with its sheet and cover, tip held, its side on the PCB, the top lowered to 0.2 mm in
          eight steps: error of the mean pressure, at K = 20 mu0 and at nu = 0.4995
   patch  6 x 6 frusta, sides symmetric, tips held sideways, tips and cone sides on the PCB; a flat punch of 3 mm radius at 8 N:
@@ -22,11 +22,11 @@ from scipy.spatial import cKDTree
 from sensor_meshes import Stack, layered_mesh, octagon_cell
 
 from softtact.errors import ConvergenceError
-from softtact.geometry.sensor_spec import SensorSpec
+from softtact.fem.extruded_mesh import cell_plan
 from softtact.materials.laws.registry import make_law
-from softtact.mechanics.free_body import FreeBody, RigidContact, flat_surface, ground
-from softtact.mechanics.free_press import FreeSettings, press_to_forces, press_to_indentations
-from softtact.mechanics.hex_mesh import cell_plan
+from softtact.models.solid.body import FreeBody, RigidContact, flat_surface, ground
+from softtact.models.solid.newton import FreeSettings, press_to_forces, press_to_indentations
+from softtact.sensors.specification import SensorSpec
 
 PAGE = Path(__file__).parents[1] / "docs/discretisation.md"
 SPEC = SensorSpec.from_yaml(Path(__file__).parents[1] / "config/sensors/coro.yaml")

@@ -12,9 +12,9 @@ import numpy as np
 import record
 from scipy.ndimage import gaussian_filter
 
-from softtact.optics import pooling
-from softtact.optics.discs import PASSES, Scene, grey
-from softtact.optics.frames import expose, illumination
+from softtact.imaging import pooling
+from softtact.imaging.discs import PASSES, Scene, grey
+from softtact.imaging.frames import expose, illumination
 
 SUB = 8          # points per pixel side that tell a shape's coverage
 COUNT = 10       # discs along each side

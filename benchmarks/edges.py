@@ -10,7 +10,7 @@ import numpy as np
 import record
 import trimesh
 
-from softtact.mechanics.mesh_settings import MeshSettings
+from softtact.models.hyperelastic.mesh_settings import MeshSettings
 
 FORCE_N = 1.5
 HALF_WIDTHS_MM = np.round(np.arange(2.40, 2.77, 0.04), 2)     # elements end at 2.4, 2.7 and 3.0 mm

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from sensor_meshes import compressed, tetrahedra_of, wedges_of
 
-from softtact.mechanics.blocks import SolidBlock
-from softtact.mechanics.elements import (
+from softtact.fem.elements import (
     HEX20_NODES,
     HEX27_NODES,
     gauss,
@@ -23,8 +22,9 @@ from softtact.mechanics.elements import (
     wedge18,
     wedge_rule,
 )
-from softtact.mechanics.free_body import SolidElements
-from softtact.mechanics.tetrahedra import LinearTetrahedra
+from softtact.fem.solid_block import SolidBlock
+from softtact.models.solid.body import SolidElements
+from softtact.models.solid.tetrahedra import LinearTetrahedra
 
 _TET_EDGES = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
 _TET_FACES = np.array([[0, 1, 2, 4, 5, 6], [0, 1, 3, 4, 8, 7], [1, 2, 3, 5, 9, 8], [2, 0, 3, 6, 7, 9]])

@@ -54,7 +54,7 @@ def many(sensor, count, *, seed=1):
     poses = [_random_pose(mesh, rng) for mesh in meshes]
     ways = [(model, "cpu", workers) for model in MODELS for workers in (1, 2)]
     if torch.cuda.is_available():
-        ways.append(("elastic", "cuda", softtact.sensor.cores()))
+        ways.append(("elastic", "cuda", softtact.press.sensor.cores()))
         sensor.press_many(meshes[:2], poses[:2], force_n=[20.0], model="elastic", device="cuda", label="")     # starts CUDA
     rows = []
     for model, device, workers in ways:

@@ -11,9 +11,9 @@ import trimesh
 from glass_mesh import LAWS, SPEC
 
 from softtact.contact.height_field import HeightField
-from softtact.mechanics.glass_press import GLASS_MESH, contact_area, press_cell_on_glass
-from softtact.mechanics.hyperelastic import NewtonSettings, press_levels
-from softtact.mechanics.sensor_bodies import build_patch
+from softtact.models.ftir.unit_cell import GLASS_MESH, contact_area, press_cell_on_glass
+from softtact.models.hyperelastic.build import build_patch
+from softtact.models.hyperelastic.newton import NewtonSettings, press_levels
 
 SIZES = (4, 6)
 FORCES = np.array([10.0, 40.0, 80.0, 140.0]) / 540      # N on the mean frustum

@@ -11,11 +11,11 @@ import numpy as np
 import record
 
 from softtact.contact.height_field import HeightField
-from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.laws.registry import make_law
-from softtact.mechanics.glass_press import DARK_GAP_MM, GLASS_MESH, SETTINGS, contact_area, plate_over
-from softtact.mechanics.hyperelastic import press_levels
-from softtact.mechanics.sensor_bodies import build_unit_cell
+from softtact.models.ftir.unit_cell import DARK_GAP_MM, GLASS_MESH, SETTINGS, contact_area, plate_over
+from softtact.models.hyperelastic.build import build_unit_cell
+from softtact.models.hyperelastic.newton import press_levels
+from softtact.sensors.specification import SensorSpec
 
 SPEC = SensorSpec.from_yaml(Path(__file__).parents[1] / "config/sensors/coro.yaml")
 LAWS = {"mooney_rivlin": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_over_shear=20.0),

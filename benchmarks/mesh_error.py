@@ -16,9 +16,9 @@ import record
 import trimesh
 
 import softtact
-from softtact.mechanics.hyperelastic import NewtonSettings
-from softtact.mechanics.mesh_settings import MeshSettings
-from softtact.sensor import Sensor
+from softtact.models.hyperelastic.mesh_settings import MeshSettings
+from softtact.models.hyperelastic.newton import NewtonSettings
+from softtact.press.sensor import Sensor
 
 FORCES_N = {"flat punch": [2.0, 4.0, 8.0], "sphere": [2.0, 4.0, 6.0], "ridges": [1.0, 2.0, 4.0]}
 OVERLAP_MM = 1e-3       # what is pressed apart

@@ -21,8 +21,8 @@ import yaml
 import softtact
 from softtact.errors import ConvergenceError
 from softtact.geometry.meshes import read_mesh
-from softtact.mechanics.hyperelastic import NewtonSettings
-from softtact.mechanics.mesh_settings import MeshSettings
+from softtact.models.hyperelastic.mesh_settings import MeshSettings
+from softtact.models.hyperelastic.newton import NewtonSettings
 
 CONFIG = Path(__file__).resolve().parents[1] / "config"
 FORCES_N = [5, 10, 20, 35, 50]

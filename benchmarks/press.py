@@ -19,8 +19,8 @@ import record
 import softtact
 from softtact.devices import find_device
 from softtact.geometry.meshes import read_mesh
-from softtact.mechanics.hyperelastic import NewtonSettings
-from softtact.mechanics.mesh_settings import MeshSettings
+from softtact.models.hyperelastic.mesh_settings import MeshSettings
+from softtact.models.hyperelastic.newton import NewtonSettings
 
 OBJECTS = ["config/objects/indenters/circle_m.stl"]
 MESHES = {"production": MeshSettings(), "draft": MeshSettings.draft(), "fine": MeshSettings.fine()}

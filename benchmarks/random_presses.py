@@ -24,13 +24,13 @@ from scipy.spatial.transform import Rotation
 from softtact.errors import ConvergenceError, InputError
 from softtact.geometry.meshes import read_mesh
 from softtact.geometry.pose import Pose
-from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.laws.registry import make_law
-from softtact.mechanics.elastic import elastic_compliance
-from softtact.mechanics.foundation import foundation_flexibility
-from softtact.mechanics.hyperelastic import NewtonSettings
-from softtact.mechanics.mesh_settings import MeshSettings
-from softtact.sensor import Sensor
+from softtact.models.elastic.compliance import elastic_compliance
+from softtact.models.foundation.compliance import foundation_flexibility
+from softtact.models.hyperelastic.mesh_settings import MeshSettings
+from softtact.models.hyperelastic.newton import NewtonSettings
+from softtact.press.sensor import Sensor
+from softtact.sensors.specification import SensorSpec
 
 CONFIG = Path(__file__).resolve().parents[1] / "config"
 OBJECTS = sorted(CONFIG.glob("objects/*/*.stl"))

@@ -16,8 +16,8 @@ from threadpoolctl import threadpool_limits
 import softtact
 from softtact.contact.height_field import HeightField
 from softtact.geometry.meshes import place
-from softtact.mechanics.hyperelastic import press_levels
-from softtact.sensor import Sensor
+from softtact.models.hyperelastic.newton import press_levels
+from softtact.press.sensor import Sensor
 
 SENSORS = ((4, 4), (8, 8), (12, 16), (18, 30), (30, 50))
 PUNCH = trimesh.creation.cylinder(radius=2.0, height=2.0, sections=48)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from softtact.mechanics.hex_mesh import cell_plan, extrude, merge, refine
+from softtact.fem.extruded_mesh import cell_plan, extrude, merge, refine
 
 _NO_QUADS = np.zeros((0, 9, 2))
 

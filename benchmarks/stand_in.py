@@ -16,7 +16,7 @@ from softtact.geometry.meshes import read_mesh
 from softtact.geometry.pose import Pose
 from softtact.learning.dataset import SPLITS, build_datasets
 from softtact.learning.samples import read_samples
-from softtact.sensing.virtual_sensor import read_virtual_sensor
+from softtact.readout.virtual_sensor import read_virtual_sensor
 
 SOURCE = "virtual sensor on foundation presses"
 FORCES = np.linspace(5, 50, 10)

@@ -23,11 +23,11 @@ import trimesh
 import softtact
 from softtact.errors import ConvergenceError
 from softtact.geometry.meshes import read_mesh
-from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.laws.registry import make_law
-from softtact.mechanics.hyperelastic import NewtonSettings
-from softtact.mechanics.mesh_settings import MeshSettings
-from softtact.sensor import Sensor
+from softtact.models.hyperelastic.mesh_settings import MeshSettings
+from softtact.models.hyperelastic.newton import NewtonSettings
+from softtact.press.sensor import Sensor
+from softtact.sensors.specification import SensorSpec
 
 OBJECTS = ["config/objects/indenters/circle_m.stl"]
 PAGE = Path(__file__).parents[1] / "docs/unknowns.md"

@@ -9,9 +9,9 @@ import record
 
 import softtact
 from softtact.geometry.meshes import read_mesh
+from softtact.readout.capacitance import capacitance_per_area, ideal_counts
+from softtact.readout.virtual_sensor import VirtualSensorSettings, read_branches
 from softtact.reporting.style import pyplot, save
-from softtact.sensing.capacitance import capacitance_per_area, ideal_counts
-from softtact.sensing.virtual_sensor import VirtualSensorSettings, read_branches
 
 FORCES = np.arange(2.5, 51.0, 2.5)
 OBJECT, SEED, TRIALS, TAXEL = "circle_m", 20250, 5, (3, 1)

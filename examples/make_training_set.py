@@ -19,7 +19,7 @@ import softtact
 from softtact.files import write_dataset
 from softtact.geometry.meshes import read_mesh
 from softtact.geometry.pose import Pose
-from softtact.sensing.virtual_sensor import read_virtual_sensor
+from softtact.readout.virtual_sensor import read_virtual_sensor
 
 INDENTER = Path(__file__).parents[1] / "config/objects/indenters/circle_s.stl"
 FORCES_N = [5.0, 10.0, 20.0, 30.0]

@@ -16,10 +16,10 @@ import numpy as np
 import pandas as pd
 
 import softtact
-from softtact.mechanics.frustum_law import frustum_law
-from softtact.mechanics.mesh_settings import MeshSettings
+from softtact.models.foundation.frustum_spring import frustum_law
+from softtact.models.hyperelastic.mesh_settings import MeshSettings
+from softtact.readout.capacitance import capacitance_per_area
 from softtact.reporting.style import pyplot, save
-from softtact.sensing.capacitance import capacitance_per_area
 
 COARSE = MeshSettings(frustum_levels=(0.0, 0.35, 1.0), local_over_shear=4.0, coarse_walls=True)     # the studies' draft mesh
 PRESSURES_KPA = np.array([2.0, 5.0, 10.0, 20.0, 40.0, 60.0, 80.0, 100.0])

@@ -16,7 +16,6 @@ import trimesh
 import yaml
 
 from softtact import cli
-from softtact.choice import TOLERANCE_MM
 from softtact.cli import COMMANDS, main
 from softtact.commands import complexity
 from softtact.commands import press as press_command
@@ -24,7 +23,8 @@ from softtact.commands.common import EXIT_STATUS
 from softtact.commands.fit import LAYOUTS as LAYOUTS_OFFERED
 from softtact.errors import ConvergenceError, InputError
 from softtact.materials.readers import LAYOUTS
-from softtact.sensor import MODELS, Sensor
+from softtact.press.choice import TOLERANCE_MM
+from softtact.press.sensor import MODELS, Sensor
 
 ROOT = Path(__file__).resolve().parents[1]
 OBJECT = ROOT / "config/objects/grasped/object_5.stl"
@@ -354,8 +354,8 @@ def test_the_draft_mesh_comes_with_what_counts_as_solved_on_it():
     from types import SimpleNamespace
 
     from softtact.commands.press import _quality
-    from softtact.mechanics.hyperelastic import NewtonSettings
-    from softtact.mechanics.mesh_settings import MeshSettings
+    from softtact.models.hyperelastic.mesh_settings import MeshSettings
+    from softtact.models.hyperelastic.newton import NewtonSettings
 
     draft, fine = (_quality(SimpleNamespace(mesh_quality=name)) for name in ("draft", "fine"))
     assert draft == {"mesh": MeshSettings.draft(), "solver": NewtonSettings.draft()}

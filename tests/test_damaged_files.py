@@ -13,10 +13,10 @@ import xarray
 
 from softtact.errors import InputError, OutputError
 from softtact.files import atomic_path, read_dataset, read_json, write_csv, write_dataset, write_json
-from softtact.mechanics.elastic import Compliance
-from softtact.mechanics.foundation import FoundationFlexibility
-from softtact.mechanics.frustum_law import FrustumLaw
-from softtact.pressed_mesh import read_vtu
+from softtact.models.elastic.compliance import Compliance
+from softtact.models.foundation.compliance import FoundationFlexibility
+from softtact.models.foundation.frustum_spring import FrustumLaw
+from softtact.press.vtu import read_vtu
 
 ROOT = Path(__file__).parents[1]
 MAPS = xarray.Dataset({"deformation_map_mm": (("force", "y", "x"), np.arange(5 * 57 * 33, dtype=float).reshape(5, 57, 33))})

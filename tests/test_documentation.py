@@ -18,8 +18,8 @@ import trimesh
 
 import softtact
 from softtact.cli import main
+from softtact.imaging.frames import render_frame
 from softtact.learning.network import TactileNetwork, save_network
-from softtact.optics.frames import render_frame
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -125,6 +125,6 @@ def test_the_site_builds_without_a_warning_and_loads_nothing_from_elsewhere(tmp_
                           capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     pages = {path.stem: path.read_text(encoding="utf-8") for path in (tmp_path / "site").glob("*.html")}
-    assert pages["theory"].count("<math") > 50 and "softtact.sensor.load_sensor" in pages["api"]
+    assert pages["theory"].count("<math") > 50 and "softtact.press.sensor.load_sensor" in pages["api"]
     for name, page in pages.items():
         assert not re.search(r"""(?:src=|<link[^>]*href=)["']?(?:https?:)?//""", page), name

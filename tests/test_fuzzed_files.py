@@ -14,13 +14,13 @@ from hypothesis import strategies as st
 
 from softtact.errors import SofttactError
 from softtact.geometry.repair import read_mended
-from softtact.geometry.sensor_spec import SensorSpec
 from softtact.learning.network import load_network
 from softtact.learning.prediction import read_maps
 from softtact.materials.cards import law_from_card, load_card
 from softtact.materials.config import load_material
 from softtact.materials.readers import read_curves
 from softtact.reporting.press_view import read_view
+from softtact.sensors.specification import SensorSpec
 from softtact.study.config import load_study
 
 ROOT = Path(__file__).resolve().parents[1]

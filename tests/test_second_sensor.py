@@ -12,11 +12,11 @@ from test_study_config import merged
 import softtact
 from softtact.errors import InputError
 from softtact.learning.network import ARCHITECTURES
-from softtact.mechanics.elastic import elastic_compliance
-from softtact.mechanics.foundation import foundation_flexibility
+from softtact.models.elastic.compliance import elastic_compliance
+from softtact.models.foundation.compliance import foundation_flexibility
+from softtact.readout.capacitance import ideal_counts
+from softtact.readout.virtual_sensor import read_virtual_sensor
 from softtact.reporting.press_plot import plot_press
-from softtact.sensing.capacitance import ideal_counts
-from softtact.sensing.virtual_sensor import read_virtual_sensor
 from softtact.study.config import load_study
 
 ROOT = Path(__file__).resolve().parents[1]

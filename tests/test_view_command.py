@@ -12,10 +12,10 @@ import xarray
 import softtact
 from softtact.cli import main
 from softtact.commands import view as view_command
-from softtact.geometry.sensor_spec import SensorSpec
-from softtact.mechanics.mesh_settings import MeshSettings
-from softtact.pressed_mesh import LAYERS, of_bodies, of_map, read_vtu
+from softtact.models.hyperelastic.mesh_settings import MeshSettings
+from softtact.press.vtu import LAYERS, of_bodies, of_map, read_vtu
 from softtact.reporting.press_view import _draw_with_matplotlib, read_view
+from softtact.sensors.specification import SensorSpec
 
 ROOT = Path(__file__).resolve().parents[1]
 X, Y = np.linspace(-2, 2, 5), np.linspace(-3, 3, 7)

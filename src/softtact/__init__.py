@@ -7,7 +7,7 @@ __all__ = ["load_sensor", "__version__"]
 def __getattr__(name):
     # `import softtact` stays fast: the solvers load when a sensor is first asked for.
     if name == "load_sensor":
-        from softtact.sensor import load_sensor
+        from softtact.press.sensor import load_sensor
 
         return load_sensor
     raise AttributeError(f"module 'softtact' has no attribute {name!r}")

@@ -8,8 +8,8 @@ import trimesh
 from softtact.contact.height_field import HeightField
 from softtact.contact.underside import Underside
 from softtact.geometry.pose import Pose
-from softtact.mechanics.elastic import surface_grid
-from softtact.mechanics.quarter_slab import PARITIES, ElasticLayer, ParityBlocks, QuarterSlab
+from softtact.models.elastic.compliance import surface_grid
+from softtact.models.quarter_symmetry import PARITIES, ElasticLayer, ParityBlocks, QuarterSlab
 
 SIDE, THICKNESS = 12.0, 2.5     # mm
 LAYER = ElasticLayer(THICKNESS, bulk_modulus=0.66, shear_modulus=0.55, shares=(0.5, 0.3, 0.2))     # E 1.29 MPa, nu 0.17

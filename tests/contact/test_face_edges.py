@@ -5,7 +5,7 @@ import pytest
 
 from softtact.contact.face_edges import ENDS, own_areas, softness
 from softtact.contact.penalty import Contact
-from softtact.mechanics.elements import gauss
+from softtact.fem.elements import gauss
 
 WIDTH = np.ones(1)
 

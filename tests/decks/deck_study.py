@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.laws.registry import make_law
+from softtact.sensors.specification import SensorSpec
 
 CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
 POLYURETHANE = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492)

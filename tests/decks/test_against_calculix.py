@@ -15,13 +15,13 @@ from softtact.contact.height_field import HeightField
 from softtact.decks import keywords
 from softtact.decks.laws import law_card
 from softtact.decks.model import deck_model
+from softtact.fem.elements import HEX20_NODES
+from softtact.fem.solid_block import HexBlock
 from softtact.geometry.meshes import place
-from softtact.geometry.sensor_spec import Friction
-from softtact.mechanics.blocks import HexBlock
-from softtact.mechanics.elements import HEX20_NODES
-from softtact.mechanics.hyperelastic import NewtonSettings, press_levels
-from softtact.mechanics.mesh_settings import MeshSettings
-from softtact.mechanics.sensor_bodies import build_sensor_body, build_unit_cell
+from softtact.models.hyperelastic.build import build_sensor_body, build_unit_cell
+from softtact.models.hyperelastic.mesh_settings import MeshSettings
+from softtact.models.hyperelastic.newton import NewtonSettings, press_levels
+from softtact.sensors.specification import Friction
 
 pytestmark = needs_ccx
 PATCH = CORO.model_copy(update={"footprint_mm": (4.8, 4.8)})     # 4 x 4 frusta

@@ -10,8 +10,8 @@ from deck_study import Tables, needs_ccx
 from softtact.decks import keywords
 from softtact.decks.laws import law_card
 from softtact.errors import InputError
+from softtact.fem.elements import HEX20_BOTTOM, HEX20_NODES, HEX20_TOP
 from softtact.materials.laws.registry import LAWS, make_law
-from softtact.mechanics.elements import HEX20_BOTTOM, HEX20_NODES, HEX20_TOP
 
 CONSTANTS = {
     "neo_hooke": {"c10": 0.17},

@@ -13,12 +13,12 @@ from softtact.decks.laws import law_card
 from softtact.decks.model import deck_model
 from softtact.decks.read import read_deck
 from softtact.errors import InputError
+from softtact.fem.elements import HEX20_BOTTOM, HEX20_SIDES, HEX20_TOP
 from softtact.geometry.meshes import place
-from softtact.geometry.sensor_spec import Friction
-from softtact.mechanics.elements import HEX20_BOTTOM, HEX20_SIDES, HEX20_TOP
-from softtact.mechanics.mesh_settings import MeshSettings
-from softtact.mechanics.sensor_bodies import build_unit_cell
-from softtact.sensor import Sensor
+from softtact.models.hyperelastic.build import build_unit_cell
+from softtact.models.hyperelastic.mesh_settings import MeshSettings
+from softtact.press.sensor import Sensor
+from softtact.sensors.specification import Friction
 
 SMALL = CORO.model_copy(update={"footprint_mm": (2.4, 3.6), "map_shape": (7, 5)})   # 2 x 3 frusta
 SENSOR = Sensor(SMALL, {"dielectric": POLYURETHANE, "cover": NEOPRENE},

@@ -11,9 +11,9 @@ from softtact.cli import main
 from softtact.errors import InputError
 from softtact.files import read_dataset
 from softtact.geometry.repair import read_mended
-from softtact.geometry.sensor_spec import SensorSpec
-from softtact.mechanics.elastic import elastic_compliance
-from softtact.sensor import Sensor
+from softtact.models.elastic.compliance import elastic_compliance
+from softtact.press.sensor import Sensor
+from softtact.sensors.specification import SensorSpec
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = os.environ.get("SOFTTACT_TEST_DATA")

@@ -9,8 +9,8 @@ from small_archive import Archive
 
 from softtact.errors import InputError
 from softtact.files import read_dataset
-from softtact.geometry.sensor_spec import SensorSpec
 from softtact.learning.samples import read_samples
+from softtact.sensors.specification import SensorSpec
 from softtact.stages import build_dataset, import_published
 
 SENSOR = "config/sensors/coro.yaml"

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from softtact.errors import InputError
-from softtact.geometry.sensor_spec import SensorSpec
-from softtact.mechanics.mesh_settings import MeshSettings
-from softtact.mechanics.pressed_body import REGIONS, pressed_body
-from softtact.mechanics.sensor_bodies import build_sensor_body
-from softtact.pressed_mesh import of_bodies, of_map, read_vtu
+from softtact.models.hyperelastic.build import build_sensor_body
+from softtact.models.hyperelastic.deformed_mesh import REGIONS, pressed_body
+from softtact.models.hyperelastic.mesh_settings import MeshSettings
+from softtact.press.vtu import of_bodies, of_map, read_vtu
 from softtact.reporting.section import row_under_load, section, top_surface
+from softtact.sensors.specification import SensorSpec
 
 CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
 SMALL = CORO.model_copy(update={"footprint_mm": (6.0, 8.4)})   # 5 x 7 frusta

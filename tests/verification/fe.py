@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from softtact.mechanics.blocks import HexBlock
-from softtact.mechanics.elements import gauss, quad8
-from softtact.mechanics.hex_mesh import PlanMesh, disc_plan
-from softtact.mechanics.linear_solvers import SuperLUSolver, make_solver
+from softtact.fem.elements import gauss, quad8
+from softtact.fem.extruded_mesh import PlanMesh, disc_plan
+from softtact.fem.solid_block import HexBlock
+from softtact.linalg.direct import SuperLUSolver, make_solver
 
 
 @dataclass(frozen=True)

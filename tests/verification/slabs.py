@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from softtact.contact.penalty import Contact
-from softtact.mechanics.hex_mesh import SheetPlan, grid_plan, merge, with_centres
-from softtact.mechanics.linear_solvers import make_solver
-from softtact.mechanics.slab import Layer, Slab
+from softtact.fem.extruded_mesh import SheetPlan, grid_plan, merge, with_centres
+from softtact.linalg.direct import make_solver
+from softtact.models.hyperelastic.slab import Layer, Slab
 
 _LOOKED_UP = 10     # steps
 

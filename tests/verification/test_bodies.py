@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from fe import equilibrium, face_load, fine_disc, mapped, small_strain, solid
 
+from softtact.fem.elements import HEX20_SIDES
+from softtact.fem.extruded_mesh import extrude, grid_plan
 from softtact.materials.laws.registry import make_law
-from softtact.mechanics.elements import HEX20_SIDES
-from softtact.mechanics.hex_mesh import extrude, grid_plan
 
 UNIAXIAL = {   # one CalculiX 2.20 element, K = 20 mu0, stretches 0.7 and 1.5, printed to six digits
     "mooney_rivlin": ({"c10": 0.1706, "c01": 0.0040}, {0.7: -0.466273, 1.5: 0.356118}),

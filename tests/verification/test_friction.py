@@ -18,16 +18,16 @@ from softtact.contact.height_field import HeightField
 from softtact.decks import keywords
 from softtact.decks.laws import law_card
 from softtact.errors import InputError
+from softtact.fem.extruded_mesh import extrude, grid_plan
 from softtact.geometry.meshes import place
-from softtact.geometry.sensor_spec import Friction, SensorSpec
+from softtact.linalg.direct import make_solver
 from softtact.materials.laws.registry import make_law
-from softtact.mechanics import contact_step, sheet_cells
-from softtact.mechanics.body_friction import BodyFriction
-from softtact.mechanics.hex_mesh import extrude, grid_plan
-from softtact.mechanics.hyperelastic import NewtonSettings, press_levels
-from softtact.mechanics.linear_solvers import make_solver
-from softtact.mechanics.sensor_bodies import build_sensor_body
-from softtact.sensor import Sensor
+from softtact.models.hyperelastic import newton_step, unit_cells
+from softtact.models.hyperelastic.build import build_sensor_body
+from softtact.models.hyperelastic.friction import BodyFriction
+from softtact.models.hyperelastic.newton import NewtonSettings, press_levels
+from softtact.press.sensor import Sensor
+from softtact.sensors.specification import Friction, SensorSpec
 
 COULOMB = "Coulomb's law"
 FINE = NewtonSettings(relative_tolerance=1e-6)
@@ -72,12 +72,12 @@ def test_the_traction_is_the_slope_of_the_energy_and_the_stiffness_that_of_the_t
 def test_forces_and_newton_steps_are_the_slopes_of_the_potential_of_a_press_with_friction(under, surface, record, monkeypatch):
     """Along a Newton step s the potential falls at the rate residual . s, and the residual at its own size."""
     # A press goes on from there, to a step that is exact in the contact, and solves less exactly.
-    monkeypatch.setattr(contact_step, "_INNER_STEPS", 1)
-    monkeypatch.setattr(contact_step, "_FORCING", 1e-9)
-    monkeypatch.setattr(contact_step, "_INNER_TOLERANCE", 1e-9)
-    monkeypatch.setattr(contact_step._Problem, "best_share", lambda *_: 1.0)
-    monkeypatch.setattr(sheet_cells, "_FARTHEST_MM", np.inf)        # nor damps or cuts the steps of single cells
-    monkeypatch.setattr(sheet_cells, "_FARTHEST_OUTER_MM", np.inf)
+    monkeypatch.setattr(newton_step, "_INNER_STEPS", 1)
+    monkeypatch.setattr(newton_step, "_FORCING", 1e-9)
+    monkeypatch.setattr(newton_step, "_INNER_TOLERANCE", 1e-9)
+    monkeypatch.setattr(newton_step._Problem, "best_share", lambda *_: 1.0)
+    monkeypatch.setattr(unit_cells, "_FARTHEST_MM", np.inf)        # nor damps or cuts the steps of single cells
+    monkeypatch.setattr(unit_cells, "_FARTHEST_OUTER_MM", np.inf)
     body, h = body_with(board=0.3, on_object=0.3), 1e-6
     level = last_level(body, [0.5, 1.0], surface=surface)
     covered = level.state.slab.planes.covered[level.state.slab.gaps < 0]

@@ -15,10 +15,10 @@ import pytest
 from softtact.contact.penalty import Contact
 from softtact.decks import keywords
 from softtact.decks.laws import law_card
+from softtact.fem.extruded_mesh import grid_plan
 from softtact.materials.laws.registry import make_law
-from softtact.mechanics.frustum_bed import BedGeometry, FrustumBed
-from softtact.mechanics.hex_mesh import grid_plan
-from softtact.mechanics.mesh_settings import MeshSettings
+from softtact.models.hyperelastic.frusta import BedGeometry, FrustumBed
+from softtact.models.hyperelastic.mesh_settings import MeshSettings
 
 TIP, ROOT, HEIGHT = 0.3, 0.6, 0.5        # radii and height in mm
 LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492)

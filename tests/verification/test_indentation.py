@@ -12,7 +12,7 @@ from tetrahedral_layer import layer_compliance
 from softtact.contact.penalty import penalty
 from softtact.contact.unilateral import active_set
 from softtact.materials.laws.registry import make_law
-from softtact.mechanics.quarter_slab import ElasticLayer, QuarterSlab
+from softtact.models.quarter_symmetry import ElasticLayer, QuarterSlab
 
 YOUNG, POISSON = 1.0, 0.3
 MODULUS = YOUNG / (1 - POISSON**2)      # E*, MPa

@@ -9,7 +9,7 @@ import pytest
 
 from softtact.geometry.meshes import read_mesh
 from softtact.materials.config import law_from_printed
-from softtact.sensor import load_sensor
+from softtact.press.sensor import load_sensor
 
 CONFIG = Path(__file__).parents[2] / "config"
 LOWER = {"object_5": (22, 16), "object_6": (33, 16)}     # row and column of the map in the middle of a lower ridge, a lower disc

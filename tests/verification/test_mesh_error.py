@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.laws.registry import make_law
-from softtact.mechanics.hyperelastic import NewtonSettings
-from softtact.mechanics.mesh_settings import MeshSettings
-from softtact.sensor import Sensor
+from softtact.models.hyperelastic.mesh_settings import MeshSettings
+from softtact.models.hyperelastic.newton import NewtonSettings
+from softtact.press.sensor import Sensor
+from softtact.sensors.specification import SensorSpec
 
 ROOT = Path(__file__).parents[2]
 CORO = SensorSpec.from_yaml(ROOT / "config/sensors/coro.yaml")

@@ -8,10 +8,10 @@ import pytest
 from fe import equilibrium, mapped, small_strain, solid
 from scipy.spatial.transform import Rotation
 
+from softtact.fem.elements import HEX20_NODES
+from softtact.fem.extruded_mesh import disc_plan, extrude, grid_plan
+from softtact.fem.solid_block import HexBlock
 from softtact.materials.laws.registry import make_law
-from softtact.mechanics.blocks import HexBlock
-from softtact.mechanics.elements import HEX20_NODES
-from softtact.mechanics.hex_mesh import disc_plan, extrude, grid_plan
 
 MOONEY = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040})
 FRUSTA = {"local_over_shear": 0.5, "growing_over_shear": 100.0, "trilinear": True}     # as in `MeshSettings`

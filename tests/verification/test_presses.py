@@ -14,14 +14,14 @@ from naive_sensor import NaiveSensor
 from softtact.contact.height_field import HeightField
 from softtact.geometry.meshes import place
 from softtact.geometry.pose import Pose
-from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.laws.registry import make_law
-from softtact.mechanics.hyperelastic import NewtonSettings, press_levels
-from softtact.mechanics.layered_body import LayeredBody
-from softtact.mechanics.mesh_settings import MeshSettings
-from softtact.mechanics.sensor_bodies import build_sensor_body, build_unit_cell
-from softtact.mechanics.slab import Slab
-from softtact.sensor import Sensor
+from softtact.models.hyperelastic.body import LayeredBody
+from softtact.models.hyperelastic.build import build_sensor_body, build_unit_cell
+from softtact.models.hyperelastic.mesh_settings import MeshSettings
+from softtact.models.hyperelastic.newton import NewtonSettings, press_levels
+from softtact.models.hyperelastic.slab import Slab
+from softtact.press.sensor import Sensor
+from softtact.sensors.specification import SensorSpec
 
 CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
 LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492),

@@ -14,12 +14,12 @@ import scipy.sparse as sp
 from fe import assemble, fine_disc, solid, solve_linear
 from naive_sensor import NaiveSensor
 
-from softtact.geometry.sensor_spec import SensorSpec
+from softtact.fem.elements import quad8
+from softtact.fem.extruded_mesh import extrude, grid_plan
 from softtact.materials.laws.registry import make_law
-from softtact.mechanics.elements import quad8
-from softtact.mechanics.hex_mesh import extrude, grid_plan
-from softtact.mechanics.mesh_settings import MeshSettings
-from softtact.mechanics.sensor_bodies import build_unit_cell
+from softtact.models.hyperelastic.build import build_unit_cell
+from softtact.models.hyperelastic.mesh_settings import MeshSettings
+from softtact.sensors.specification import SensorSpec
 
 CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
 LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040})

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from softtact.mechanics.linear_solvers import make_solver
+from softtact.linalg.direct import make_solver
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from softtact.code_closure import code_closure
+from softtact.study.code_closure import code_closure
 
 STAGES = Path(__file__).resolve().parents[2] / "src/softtact/stages"
 FIGURES = sorted(path.stem for path in STAGES.glob("draw_*.py"))

@@ -7,9 +7,9 @@ import re
 import sys
 from pathlib import Path
 
-from softtact.code_closure import code_closure
+from softtact.study.code_closure import code_closure
 from softtact.study.config import load_study
-from softtact.cost import cost_lines, read_costs, study_costs
+from softtact.study.cost import cost_lines, read_costs, study_costs
 from softtact.errors import InputError
 
 try:

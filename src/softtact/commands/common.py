@@ -118,7 +118,7 @@ def numbers(option, text, count):
 
 def sensor_spec(name):
     """The description of a sensor by its name or its YAML file, without its solvers."""
-    from softtact.geometry.sensor_spec import SensorSpec
+    from softtact.sensors.specification import SensorSpec
     from softtact.study.config import sensor_file
 
     return SensorSpec.from_yaml(sensor_file(name))

@@ -34,8 +34,8 @@ def _schema(options):
 
 def schema_of(kind):
     """The JSON schema of a kind of file, generated from the types that read it."""
-    from softtact.geometry.sensor_spec import SensorSpec
     from softtact.materials.config import MaterialConfig
+    from softtact.sensors.specification import SensorSpec
     from softtact.study.keys import Values
 
     model = {"study": Values, "sensor": SensorSpec, "material": MaterialConfig}[kind]

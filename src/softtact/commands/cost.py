@@ -22,8 +22,8 @@ def add(commands):
 def _cost(options):
     from dataclasses import asdict
 
-    from softtact.cost import cost_lines, read_costs, study_costs
     from softtact.study.config import load_study, read_values
+    from softtact.study.cost import cost_lines, read_costs, study_costs
 
     study, measured = load_study(read_values(options.configfile)), read_costs()
     costs = study_costs(study, measured)

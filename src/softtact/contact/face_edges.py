@@ -2,8 +2,8 @@
 
 A row of points that is held makes the contact wider by a row, one that is free does not; that is how blunt a mesh is, and a flat
 punch's indentation jumps by a tenth when its edge passes a row. A row with a spring of (1/r - 1) times its own flexibility among
-the held ones stores the energy of an edge a share r of the way from the row before (as in `mechanics/soft_edges`, for nodes). As
-a pressure on the covered share r of the row's area that is a softness of the flexibility times the area times 1 - r.
+the held ones stores the energy of an edge a share r of the way from the row before (as in `models/foundation/partial_contact`,
+for nodes). As a pressure on the covered share r of the row's area that is a softness of the flexibility times the area times 1 - r.
 
 What is not derived, for the three rows of a Gauss rule across a face, was taken from a punch's edge that moves across it by tenths
 on the default mesh, against elements an eighth as wide (benchmarks/edges.py): where one row's share ends and the next one's

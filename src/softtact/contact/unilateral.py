@@ -4,7 +4,7 @@ Unknown are the forces f >= 0 at the contact points:  gap = gap0 - depth + A f >
 with the flexibility A among the points. Primal-dual active sets, that is a semismooth Newton method: points that penetrate join,
 points that pull leave. The equations of a set are solved by conjugate gradients on the plane sum f = const, in single precision
 with the residual in double (iterative refinement). A product with A for twenty levels takes seven times as long as for one,
-which is what makes the levels cheap; many presses on a GPU are more columns still (`mechanics/elastic_batch`). Many points that
+which is what makes the levels cheap; many presses on a GPU are more columns still (`models/elastic/batch`). Many points that
 settle together suit this; few and changing ones `active_set`, which is the plain method and its specification.
 References: Hintermueller, Ito and Kunisch, SIAM J. Optim. 13 (2003) 865; Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23
 (2001) 1376 (projected conjugate gradients); Johnson, Contact Mechanics, sec. 5.9.

@@ -13,10 +13,10 @@ from softtact.contact.height_field import NO_CONTACT_MM, HeightField
 from softtact.contact.penalty import Contact
 from softtact.decks.mesh import body_mesh
 from softtact.errors import InputError
+from softtact.fem.elements import HEX27_BOTTOM
+from softtact.fem.extruded_mesh import PlanMesh
 from softtact.geometry.meshes import facets_over
-from softtact.mechanics.elements import HEX27_BOTTOM
-from softtact.mechanics.frustum_bed import DIRECTIONS
-from softtact.mechanics.hex_mesh import PlanMesh
+from softtact.models.hyperelastic.frusta import DIRECTIONS
 
 # Faces of a brick in Abaqus and CalculiX alike: S1 bottom, S2 top, S3 to S6 the sides eta = -1, xi = 1, eta = 1, xi = -1. A wedge
 # has the same first two.

@@ -8,7 +8,7 @@ error to expect is calibrated on one set of presses (the indenters) and tested o
 import numpy as np
 import pandas as pd
 
-from softtact.choice import calibrate, cheapest, expected_errors, rms
+from softtact.press.choice import calibrate, cheapest, expected_errors, rms
 
 MODELS = ("elastic", "foundation", "hyperelastic")
 CALIBRATION_SET = "indenters"

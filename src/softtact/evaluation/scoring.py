@@ -6,9 +6,9 @@ import xarray
 
 from softtact.evaluation.bootstrap import interval_of_mean
 from softtact.evaluation.overlap import contact_patch_overlap
-from softtact.evaluation.ssim import leave_one_out_ssim, map_ssim, mean_absolute_counts
 from softtact.learning.network import predict
 from softtact.learning.samples import object_of
+from softtact.readout.ssim import leave_one_out_ssim, map_ssim, mean_absolute_counts
 
 SSIM_COLUMNS = ["model", "set", "item", "trial", "force_n", "ssim", "mae_counts", "overlap"]
 CEILING_COLUMNS = ["set", "item", "force_n", "ssim"]

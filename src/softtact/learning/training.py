@@ -15,10 +15,10 @@ import numpy as np
 import torch
 
 from softtact.errors import ConvergenceError
-from softtact.evaluation.ssim import map_ssim
 from softtact.files import digest
 from softtact.learning.network import ARCHITECTURES, load, predict, save, summed_l1
 from softtact.progress import progress
+from softtact.readout.ssim import map_ssim
 
 
 @dataclass

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from softtact.optics.discs import grey
+from softtact.imaging.discs import grey
 from softtact.reporting.style import pyplot, save
 
 COLOURS = {"whole": "#3fd0ff", "touching": "#ffb000", "clipped": "#ff4d6d"}   # apart in brightness and for the colour-blind

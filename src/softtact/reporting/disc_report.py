@@ -11,8 +11,8 @@ import pandas as pd
 
 from softtact.errors import InputError
 from softtact.files import write_csv
-from softtact.optics.discs import discs_and_outlines
-from softtact.optics.reading import read_frames
+from softtact.imaging.discs import discs_and_outlines
+from softtact.imaging.reading import read_frames
 from softtact.progress import progress
 from softtact.reporting.disc_picture import draw_discs
 

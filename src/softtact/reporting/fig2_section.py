@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from softtact.mechanics.pressed_body import REGIONS
-from softtact.pressed_mesh import LAYERS
+from softtact.models.hyperelastic.deformed_mesh import REGIONS
+from softtact.press.vtu import LAYERS
 from softtact.reporting.style import pyplot
 
 # Light to dark from the cover down: apart in grey, too.

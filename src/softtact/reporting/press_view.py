@@ -8,7 +8,7 @@ import numpy as np
 
 from softtact.errors import InputError
 from softtact.files import atomic_path, read_dataset
-from softtact.pressed_mesh import of_map, read_vtu
+from softtact.press.vtu import of_map, read_vtu
 from softtact.reporting.view3d import html_view
 
 UNIT = "displacement towards the PCB (mm)"

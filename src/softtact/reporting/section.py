@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from softtact.errors import InputError
-from softtact.mechanics.elements import hex20, hex27, wedge18
-from softtact.mechanics.pressed_body import VTK_HEX27, VTK_WEDGE18
-from softtact.pressed_mesh import LAYERS
+from softtact.fem.elements import hex20, hex27, wedge18
+from softtact.models.hyperelastic.deformed_mesh import VTK_HEX27, VTK_WEDGE18
+from softtact.press.vtu import LAYERS
 
 _FACE_TRIANGLES = np.array([[0, 4, 7], [4, 1, 5], [5, 2, 6], [6, 3, 7], [4, 5, 6], [4, 6, 7]])     # of corners, then mid-sides
 _BESIDE_MM = 0.01     # a plane exactly through the frusta's axes would run along faces of elements

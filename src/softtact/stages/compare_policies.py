@@ -11,7 +11,7 @@ import pandas as pd
 
 from softtact.evaluation.policies import CALIBRATION_SET, MODELS, policy_table, press_table, told_over_true
 from softtact.files import read_dataset, write_csv, write_json
-from softtact.geometry.sensor_spec import SensorSpec
+from softtact.sensors.specification import SensorSpec
 
 
 def run(*, inputs, outputs, settings, threads=1):

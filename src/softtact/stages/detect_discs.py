@@ -8,9 +8,9 @@ import pandas as pd
 from skimage import io
 
 from softtact.files import read_dataset, write_csv
-from softtact.optics.discs import COLUMNS, detect_discs
-from softtact.optics.frames import render_frame
-from softtact.optics.reading import read_frame
+from softtact.imaging.discs import COLUMNS, detect_discs
+from softtact.imaging.frames import render_frame
+from softtact.imaging.reading import read_frame
 from softtact.progress import progress
 
 MARGIN_MM = 1.0   # of glass seen around the outermost frusta's centres

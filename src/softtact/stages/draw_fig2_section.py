@@ -8,11 +8,11 @@ import numpy as np
 from softtact.files import read_json
 from softtact.geometry.meshes import place, read_mesh
 from softtact.geometry.pose import Pose
-from softtact.geometry.sensor_spec import SensorSpec
-from softtact.pressed_mesh import read_vtu
+from softtact.press.vtu import read_vtu
 from softtact.reporting.fig2_section import draw
 from softtact.reporting.section import row_under_load, section
 from softtact.reporting.style import save
+from softtact.sensors.specification import SensorSpec
 
 
 def run(*, inputs, outputs, settings, threads=1):

@@ -8,7 +8,7 @@ import numpy as np
 from softtact.files import atomic_path, read_json
 from softtact.geometry.meshes import place, read_mesh
 from softtact.geometry.pose import Pose
-from softtact.pressed_mesh import read_vtu
+from softtact.press.vtu import read_vtu
 from softtact.reporting.section import top_surface
 from softtact.reporting.view3d import html_view
 

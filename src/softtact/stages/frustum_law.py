@@ -4,10 +4,10 @@ inputs: card_dielectric;  outputs: law;  settings: sensor, law, mesh (of the cel
 """
 
 from softtact.files import atomic_path
-from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.cards import law_from_card, load_card
-from softtact.mechanics.frustum_law import frustum_law
-from softtact.mechanics.layered_mesh import mesh_settings
+from softtact.models.foundation.frustum_spring import frustum_law
+from softtact.models.meshes import mesh_settings
+from softtact.sensors.specification import SensorSpec
 
 
 def run(*, inputs, outputs, settings, threads=1):

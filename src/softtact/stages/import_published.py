@@ -9,7 +9,6 @@ import shutil
 
 from softtact.errors import InputError
 from softtact.files import write_csv, write_dataset, write_json
-from softtact.geometry.sensor_spec import SensorSpec
 from softtact.progress import announce
 from softtact.published.archive import find_archive
 from softtact.published.counts import counts_sentence, counts_table
@@ -24,6 +23,7 @@ from softtact.published.importing import (
     tactile_dataset,
 )
 from softtact.published.pairing import MAP_COLUMNS, MAP_ROWS, TAXELS
+from softtact.sensors.specification import SensorSpec
 
 TOLD = 20   # findings in the log; all stand in the table
 

@@ -4,8 +4,8 @@ outputs: mesh;  settings: sensor, model, kind, mesh (its resolution, where the k
 """
 
 from softtact.files import atomic_path
-from softtact.geometry.sensor_spec import SensorSpec
-from softtact.mechanics.layered_mesh import MESHES
+from softtact.models.meshes import MESHES
+from softtact.sensors.specification import SensorSpec
 
 
 def run(*, inputs, outputs, settings, threads=1):

@@ -4,11 +4,11 @@ inputs: for a foundation frustum_law, card_dielectric, card_cover;  outputs: com
 """
 
 from softtact.files import atomic_path
-from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.cards import law_from_card, load_card
-from softtact.mechanics.elastic import elastic_compliance
-from softtact.mechanics.foundation import foundation_flexibility
-from softtact.mechanics.frustum_law import FrustumLaw
+from softtact.models.elastic.compliance import elastic_compliance
+from softtact.models.foundation.compliance import foundation_flexibility
+from softtact.models.foundation.frustum_spring import FrustumLaw
+from softtact.sensors.specification import SensorSpec
 
 
 def run(*, inputs, outputs, settings, threads=1):

@@ -10,12 +10,12 @@ import xarray
 
 from softtact.errors import InputError
 from softtact.files import write_dataset
-from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.cards import law_from_card, load_card
 from softtact.materials.laws.registry import make_law
-from softtact.mechanics.glass_dielectric import cell_family, press_specimen, scattered_specimen
-from softtact.mechanics.glass_press import glass_mesh, press_cell_on_glass
+from softtact.models.ftir.specimen import cell_family, press_specimen, scattered_specimen
+from softtact.models.ftir.unit_cell import glass_mesh, press_cell_on_glass
 from softtact.progress import progress
+from softtact.sensors.specification import SensorSpec
 
 
 def run(*, inputs, outputs, settings, threads=1):

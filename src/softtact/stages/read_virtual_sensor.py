@@ -6,8 +6,8 @@ inputs: press;  outputs: tactile;  settings: sensor, virtual_sensor, trials, see
 import xarray
 
 from softtact.files import read_dataset, write_dataset
-from softtact.geometry.sensor_spec import SensorSpec
-from softtact.sensing.virtual_sensor import VirtualSensorSettings, read_branches
+from softtact.readout.virtual_sensor import VirtualSensorSettings, read_branches
+from softtact.sensors.specification import SensorSpec
 
 
 def run(*, inputs, outputs, settings, threads=1):

@@ -7,12 +7,12 @@ outputs: press;  settings: item {name, set, unit, pose}, sensor, model, kind, la
 from softtact.errors import ConvergenceError
 from softtact.geometry.meshes import read_mesh
 from softtact.geometry.pose import Pose
-from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.cards import law_from_card, load_card
-from softtact.mechanics.elastic import Compliance
-from softtact.mechanics.foundation import FoundationFlexibility
-from softtact.mechanics.layered_mesh import frustum_scatter, mesh_settings, newton_settings, specimen_of
-from softtact.sensor import Sensor
+from softtact.models.elastic.compliance import Compliance
+from softtact.models.foundation.compliance import FoundationFlexibility
+from softtact.models.meshes import frustum_scatter, mesh_settings, newton_settings, specimen_of
+from softtact.press.sensor import Sensor
+from softtact.sensors.specification import SensorSpec
 
 COMPLIANCES = {"elastic": Compliance, "foundation": FoundationFlexibility}
 

@@ -9,14 +9,14 @@ from itertools import groupby
 from pathlib import Path
 
 from softtact.errors import InputError
-from softtact.evaluation.ssim import check_window
 from softtact.files import read_yaml
-from softtact.geometry.sensor_spec import SensorSpec
 from softtact.materials.config import load_material
 from softtact.progress import announce
 from softtact.published.archive import SOURCE as PUBLISHED
 from softtact.published.archive import Archive, find_archive
-from softtact.sensing.virtual_sensor import VirtualSensorSettings, make_specimen
+from softtact.readout.ssim import check_window
+from softtact.readout.virtual_sensor import VirtualSensorSettings, make_specimen
+from softtact.sensors.specification import SensorSpec
 from softtact.study.faults import existing, refuse_unknown, validated
 from softtact.study.keys import CENTRED, Values
 from softtact.study.objects import Item, check_shapes, items_of_set, make_item, read_catalogue

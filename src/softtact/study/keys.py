@@ -15,11 +15,11 @@ from pydantic import (
     model_validator,
 )
 
-from softtact.geometry.sensor_spec import READINGS
 from softtact.learning.settings import LearningCurve, Network, Search, Ssim, Training
 from softtact.materials.laws.registry import LAWS
 from softtact.published.arrangement import ARRANGEMENTS
-from softtact.sensing.virtual_sensor import VirtualSensorSettings
+from softtact.readout.virtual_sensor import VirtualSensorSettings
+from softtact.sensors.specification import READINGS
 from softtact.unknown_names import unknown
 
 CENTRED = "centred"  # the pose that gives an item its object's plain name

@@ -1,0 +1,285 @@
+"""Meshes made by lifting a plan of quadratic quadrilaterals and triangles through levels of height."""
+
+import itertools
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from softtact.fem.elements import QUAD9_NODES, TRI6_NODES, quad8, quad9, tri6
+
+_SAME = 1e-7   # mm: nodes nearer than this are one
+NO_TRIANGLES = np.zeros((0, 6, 2))
+
+
+@dataclass(frozen=True)
+class PlanMesh:
+    """points (n, 2), of which the first `corners` are element corners; quads (q, 8 or 9), triangles (t, 6).
+
+    Elements list corners, mid-sides, and the 9-node quad its centre.
+    """
+
+    points: np.ndarray
+    quads: np.ndarray
+    corners: int
+    triangles: np.ndarray = field(default_factory=lambda: np.zeros((0, 6), dtype=np.int64))
+
+    def outer_sides(self):
+        """Quads (k,) and their sides (k,), in the order eta=-1, xi=1, eta=1, xi=-1, that belong to no other element."""
+        sides = np.sort(np.stack([self.quads[:, [k, (k + 1) % 4]] for k in range(4)], axis=1), axis=2)
+        others = np.sort(np.stack([self.triangles[:, [k, (k + 1) % 3]] for k in range(3)], axis=1), axis=2)
+        _, where, counts = np.unique(np.vstack([sides.reshape(-1, 2), others.reshape(-1, 2)]), axis=0, return_inverse=True,
+                                     return_counts=True)
+        return np.nonzero(counts[where.ravel()[:sides[..., 0].size]].reshape(-1, 4) == 1)
+
+
+@dataclass(frozen=True)
+class HexMesh:
+    """points (n, 3) in mm; hexes (e, 20 or 27), wedges (w, 18), layer by layer from below.
+
+    `planes` (levels, plan points): node numbers between the layers.
+    """
+
+    points: np.ndarray
+    hexes: np.ndarray
+    planes: np.ndarray
+    wedges: np.ndarray
+
+    @property
+    def layers(self):
+        """Number of element layers."""
+        return len(self.planes) - 1
+
+    @property
+    def inner_planes(self):
+        """Node numbers (2 layers, plan points) of the planes below the top, those in the middle of layers among them.
+
+        Only of a mesh whose layers have all the plan's points in their middle.
+        """
+        return np.vstack([self.planes[:-1], *(self.middle(k) for k in range(self.layers))])
+
+    def middle(self, index):
+        """Node numbers (plan points,) in the middle of one layer, of a mesh that has them all."""
+        count = self.planes.shape[1]
+        return self.planes.size + index * count + np.arange(count)
+
+    def layer(self, index):
+        """Hexes of one layer (q, 20 or 27)."""
+        return self.hexes.reshape(self.layers, -1, self.hexes.shape[1])[index]
+
+    def wedge_layer(self, index):
+        """Wedges of one layer (t, 18)."""
+        return self.wedges.reshape(self.layers, -1, 18)[index]
+
+
+def extrude(plan, levels, *, scale=None):
+    """Lift a plan mesh through `levels` (increasing z in mm); `scale(z)` multiplies the plan's coordinates.
+
+    8-node quads become 20-node hexahedra, 9-node quads 27-node ones, triangles 18-node wedges.
+    """
+    levels = np.asarray(levels, dtype=float)
+    middles = 0.5 * (levels[:-1] + levels[1:])
+    full = plan.quads.shape[1] == 9
+    count, upright = len(plan.points), len(plan.points) if full else plan.corners
+
+    def lifted(points, z):
+        return np.column_stack([points * (scale(z) if scale else 1.0), np.full(len(points), z)])
+
+    planes = np.arange(len(levels) * count).reshape(len(levels), count)
+    between = planes.size + np.arange(len(middles) * upright).reshape(len(middles), upright)
+    points = np.vstack([lifted(plan.points, z) for z in levels] + [lifted(plan.points[:upright], z) for z in middles])
+
+    def lift(elements):
+        layers = [_full_element(low, high, edge, elements) if full else _serendipity(low, high, edge, elements)
+                  for low, high, edge in zip(planes[:-1], planes[1:], between, strict=True)]
+        return np.vstack([np.zeros((0, 3 * elements.shape[1] if full else 20), dtype=np.int64), *layers])
+
+    return HexMesh(points=points, hexes=lift(plan.quads), planes=planes,
+                   wedges=lift(plan.triangles) if len(plan.triangles) else np.zeros((0, 18), dtype=np.int64))
+
+
+def _full_element(low, high, middle, elements):
+    return np.hstack([low[elements], high[elements], middle[elements]])
+
+
+def _serendipity(low, high, middle, quads):
+    corner, mid = quads[:, :4], quads[:, 4:]
+    return np.hstack([low[corner], high[corner], low[mid], high[mid], middle[corner]])
+
+
+def grid_plan(x_lines, y_lines):
+    """Rectangles between grid lines (increasing, mm), numbered x fastest."""
+    nx, ny = len(x_lines), len(y_lines)
+    corner = np.arange(nx * ny).reshape(ny, nx)
+    along_x = nx * ny + np.arange((nx - 1) * ny).reshape(ny, nx - 1)
+    along_y = nx * ny + (nx - 1) * ny + np.arange(nx * (ny - 1)).reshape(ny - 1, nx)
+    xm, ym = 0.5 * (x_lines[:-1] + x_lines[1:]), 0.5 * (y_lines[:-1] + y_lines[1:])
+
+    def points(x, y):
+        gx, gy = np.meshgrid(x, y)
+        return np.column_stack([gx.ravel(), gy.ravel()])
+
+    quads = np.stack([corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1],
+                      along_x[:-1], along_y[:, 1:], along_x[1:], along_y[:, :-1]], axis=-1).reshape(-1, 8)
+    return PlanMesh(np.vstack([points(x_lines, y_lines), points(xm, y_lines), points(x_lines, ym)]), quads, nx * ny)
+
+
+def merge(quads, triangles=NO_TRIANGLES):
+    """Plan mesh of elements given by their nodes' coordinates, quads (q, 9, 2) and triangles (t, 6, 2) in mm."""
+    corners = np.vstack([quads[:, :4].reshape(-1, 2), triangles[:, :3].reshape(-1, 2)])
+    others = np.vstack([quads[:, 4:].reshape(-1, 2), triangles[:, 3:].reshape(-1, 2)])
+    corner_points, corner = _unique(corners)
+    other_points, other = _unique(others)
+    other = other + len(corner_points)
+    ends = (4 * len(quads), 5 * len(quads))
+    quad = np.hstack([corner[:ends[0]].reshape(-1, 4), other[:ends[1]].reshape(-1, 5)])
+    triangle = np.hstack([corner[ends[0]:].reshape(-1, 3), other[ends[1]:].reshape(-1, 3)])
+    return PlanMesh(np.vstack([corner_points, other_points]), quad, len(corner_points), triangle)
+
+
+def with_centres(quads):
+    """8-node quads (q, 8, 2) with their centres as ninth nodes (the 8-node map's centre, so that the shape is the same)."""
+    centre = quad8(np.zeros((1, 2)))[0] @ quads
+    return np.concatenate([quads, centre], axis=1)
+
+
+def _unique(points):
+    _, first, where = np.unique(np.round(points / _SAME).astype(np.int64), axis=0, return_index=True, return_inverse=True)
+    return points[first], where.ravel()
+
+
+def refine(plan, times=1):
+    """Split every element of a plan mesh into four, on the same curves."""
+    for _ in range(times):
+        plan = merge(_split(plan.points[plan.quads], quad9, QUAD9_NODES, _QUAD_CHILDREN),
+                     _split(plan.points[plan.triangles], tri6, TRI6_NODES, _TRIANGLE_CHILDREN))
+    return plan
+
+
+_QUAD_CHILDREN = [(0.5 * np.eye(2), np.array([0.5 * x, 0.5 * y])) for y in (-1, 1) for x in (-1, 1)]
+_TRIANGLE_CHILDREN = ([(0.5 * np.eye(2), np.array(shift)) for shift in ((0.0, 0.0), (0.5, 0.0), (0.0, 0.5))]
+                      + [(-0.5 * np.eye(2), np.array([0.5, 0.5]))])
+
+
+def _split(nodes, shape, parent, children):
+    """Nodes (4 e, m, 2) of the children of elements (e, m, 2): the parent's map at each child's parent coordinates."""
+    parts = [np.einsum("pa,ead->epd", shape(parent @ matrix.T + shift)[0], nodes) for matrix, shift in children]
+    return np.stack(parts, axis=1).reshape(-1, len(parent), 2)
+
+
+_AXES = np.deg2rad([0, 90, 180, 270])
+_DIAGONALS = _AXES + np.pi / 4
+CORE_RADIUS = 0.5   # of the inner square's corners: all five quads of similar size
+# A quadratic arc over 90 degrees with its mid-side node on the circle encloses 1.2 % too little. The ends stay on the circle, where
+# frusta touch; the middle moves out to this radius, so that the disc's area is exactly pi: 8/3 sqrt(2) m - 2/3 = pi.
+DISC_MIDDLE_RADIUS = (np.pi + 2 / 3) * 3 / (8 * np.sqrt(2))
+
+
+def _ring(radius, angles):
+    return radius * np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+def _ring_quads(inner, inner_mid, outer, outer_mid):
+    """The four quads between two closed curves, each given by corners (4, 2) and the mid-sides (4, 2) after them."""
+    quads = []
+    for k in range(4):
+        n = (k + 1) % 4
+        quads.append([inner[k], outer[k], outer[n], inner[n],
+                      0.5 * (inner[k] + outer[k]), outer_mid[k], 0.5 * (inner[n] + outer[n]), inner_mid[k]])
+    return np.array(quads)
+
+
+def disc_quads(rings=1, core=CORE_RADIUS):
+    """Unit disc as an O-grid of a square core and `rings` rings of four quads (1 + 4 rings, 9, 2), the thinner the farther out.
+
+    Corners of the outer sides lie at 0, 90, 180 and 270 degrees.
+    """
+    inner = _ring(core, _AXES)
+    inner_mid = _ring(0.5 * core * (np.cos(np.pi / 4) + 0.5), _DIAGONALS)
+    outer, outer_mid = _ring(1.0, _AXES), _ring(DISC_MIDDLE_RADIUS, _DIAGONALS)
+    shares = 1.0 - (1.0 - np.arange(rings + 1) / rings) ** 2
+    curves = [(inner + share * (outer - inner), inner_mid + share * (outer_mid - inner_mid)) for share in shares]
+    between = [_ring_quads(*low, *high) for low, high in itertools.pairwise(curves)]
+    return with_centres(np.vstack([[[*inner, *inner_mid]], *between]))
+
+
+def disc_plan(refinement=0, rings=1, core=CORE_RADIUS):
+    """Unit disc as an O-grid of `disc_quads`, each split into four `refinement` times."""
+    return refine(merge(disc_quads(rings, core)), refinement)
+
+
+def cell_plan(pitch, diameter, rings=1, core=CORE_RADIUS):
+    """One cell of a lattice of discs: quads (q, 9, 2) and triangles (4, 6, 2) in mm, the first quads being `disc_quads`.
+
+    Along each side of the cell lie two elements. Where the discs of neighbours do not touch a ring of quads surrounds the disc.
+    """
+    half, radius = 0.5 * pitch, 0.5 * diameter
+    quads = [radius * disc_quads(rings, core)]
+    if radius < half * (1 - 1e-9):
+        quads.append(with_centres(_ring_quads(*(r * _ring(1.0, a) if a is _AXES else r * _ring(DISC_MIDDLE_RADIUS, a)
+                                                for r in (radius, half) for a in (_AXES, _DIAGONALS)))))
+    touch, arc = half * _ring(1.0, _AXES), half * _ring(DISC_MIDDLE_RADIUS, _DIAGONALS)
+    corner = half * np.sqrt(2) * _ring(1.0, _DIAGONALS)
+    triangles = []
+    for k in range(4):
+        n = (k + 1) % 4
+        triangles.append([touch[k], corner[k], touch[n], 0.5 * (touch[k] + corner[k]), 0.5 * (corner[k] + touch[n]), arc[k]])
+    return np.vstack(quads), np.array(triangles)
+
+
+@dataclass(frozen=True)
+class SheetPlan:
+    """Plan of the sheet over a lattice of frusta: its quads and triangles cell by cell, then the strips at the edges.
+
+    roots (f, disc nodes): each frustum's own, in the order of `disc_plan`; cell_quads: how many quads a cell has.
+    quarters: nodes (k, 4) at the quarters of the cells' walls, each with the nearer corner, the middle and the farther
+    corner, and the three weights of a quadratic curve through these; none in a refined plan.
+    """
+
+    plan: PlanMesh
+    roots: np.ndarray
+    cell_quads: int
+    quarters: tuple
+
+
+def sheet_plan(centres, counts, pitch, diameter, footprint, *, refinement=0, rings=1, core=CORE_RADIUS):
+    """Cells at `centres` (f, 2) of a lattice `counts`, and strips of quads to the edges of the footprint (mm)."""
+    quads, triangles = cell_plan(pitch, diameter, rings, core)
+    strips = _strips(counts, pitch, footprint)
+    plan = refine(merge(np.vstack([(quads[None] + centres[:, None, None]).reshape(-1, 9, 2), strips]),
+                        (triangles[None] + centres[:, None, None]).reshape(-1, 6, 2)), refinement)
+    disc = 0.5 * diameter * disc_plan(refinement, rings, core).points
+    roots = _find(plan.points, (centres[:, None] + disc).reshape(-1, 2)).reshape(len(centres), -1)
+    return SheetPlan(plan, roots, len(quads) * 4**refinement, _quarters(plan, centres, pitch, refinement))
+
+
+def _quarters(plan, centres, pitch, refinement):
+    weights = np.array([0.375, 0.75, -0.125])
+    if refinement:
+        return np.zeros((0, 4), dtype=np.int64), weights
+    walls = 0.5 * pitch * np.array([[[c, side * 0.5], [c, side], [c, 0.0], [c, -side]] for c in (-1, 1) for side in (-1, 1)])
+    walls = np.concatenate([walls, walls[..., ::-1]])                        # (8, 4, 2): quarter, near corner, middle, far corner
+    nodes = _find(plan.points, (centres[:, None, None] + walls).reshape(-1, 2)).reshape(-1, 4)
+    return np.unique(nodes, axis=0), weights
+
+
+def _find(points, wanted):
+    """Numbers (n,) of the points that lie at the wanted places."""
+    from scipy.spatial import cKDTree
+
+    distance, index = cKDTree(points).query(wanted)
+    if distance.max() > 1e-6:
+        raise ValueError("The disc's nodes are not nodes of the plan.")
+    return index
+
+
+def _strips(counts, pitch, footprint):
+    """Quads (q, 9, 2) between the lattice and the footprint's edges, two along each pitch; none where there is no room."""
+    lines = []
+    for side, count in zip(footprint, counts, strict=True):
+        inner = 0.5 * pitch * (np.arange(2 * count + 1) - count)
+        room = 0.5 * side - 0.5 * pitch * count > 1e-6
+        lines.append(np.concatenate([[-0.5 * side], inner, [0.5 * side]]) if room else inner)
+    plan = grid_plan(*lines)
+    middle = plan.points[plan.quads[:, :4]].mean(axis=1)
+    outside = (np.abs(middle) > 0.5 * pitch * np.asarray(counts)).any(axis=1)
+    return with_centres(plan.points[plan.quads[outside]])

@@ -1,0 +1,223 @@
+"""Static condensation: inner unknowns of many small bodies eliminated one body at a time, exact within Newton's method.
+
+The matrix (n + m, n + m) of a body lists n inner unknowns first, then m outer ones that others share. Only its upper triangle is
+filled, row by row; to Fortran that is a lower triangle column by column.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from softtact.linalg import lapack
+from softtact.linalg.lapack import address, call, keep_alive
+from softtact.linalg.row_loops import add_row, row_product
+from softtact.linalg.workers import SERIAL, slices
+
+_AT_ONCE = 60                # bodies that one thread reduces or recovers at once
+_SMALLEST_STIFFNESS = 0.02   # N/mm of a mode of a folding body; the softest mode of a frustum at rest has 0.03
+_ROUNDING = float(np.finfo(np.float32).eps)
+
+
+@dataclass(frozen=True)
+class Springs:
+    """Stiffness (b, s) in N/mm of weighted sums of unknowns: places (s, c) in the matrix, -1 where held, weights (s, c)."""
+
+    stiffness: np.ndarray
+    places: np.ndarray
+    weights: np.ndarray
+
+    def with_others(self, others):
+        """These springs and the others, which act on as many unknowns or more."""
+        more = ((0, 0), (0, others.places.shape[1] - self.places.shape[1]))
+        return Springs(np.hstack([self.stiffness, others.stiffness]),
+                       np.vstack([np.pad(self.places, more, constant_values=-1), others.places]),
+                       np.vstack([np.pad(self.weights, more), others.weights]))
+
+
+class Condensation:
+    """Bodies of n inner and m outer unknowns; `outer` (bodies, m, m) are their condensed matrices.
+
+    element_dofs: for each group of like elements the places (k, w) of their unknowns in a body's matrix, -1 where held.
+    All in single precision: it serves steps that are corrected by a residual in double precision.
+    """
+
+    def __init__(self, bodies, inner, outer, element_dofs):
+        self._dofs = tuple(np.ascontiguousarray(dofs) for dofs in element_dofs)
+        # The factor L' and the coupling L^-1 K_inner,outer side by side.
+        self._rows = np.zeros((bodies, inner, inner + outer), dtype=np.float32)
+        self.outer = np.zeros((bodies, outer, outer), dtype=np.float32)
+        self._modified = np.zeros(bodies, dtype=bool)
+
+    def set(self, bodies, tangents, springs=None, *, damping=None):
+        """Assemble, factor and condense the matrices of the given bodies (b,).
+
+        tangents: for each group of elements (b, k, w (w + 1) / 2) in N/mm, as `packed` has them;  springs: `Springs` of these
+        bodies;  damping: stiffness (b,) in N/mm to add on each inner unknown, which shortens steps along soft modes (Levenberg and
+        Marquardt)
+
+        Where folding made a matrix indefinite its eigenvalues are made positive: with |matrix| every Newton step lowers the
+        energy, and goes as far along a mode of negative stiffness as along one of positive; at equilibrium only the rate
+        of convergence depends on it. Nocedal and Wright, Numerical Optimization, sec. 3.4.
+        """
+        springs = springs or Springs(np.zeros((len(bodies), 0)), np.zeros((0, 1), dtype=np.int64), np.zeros((0, 1)))
+        damping = np.zeros(len(bodies)) if damping is None else damping
+        _set(bodies, damping, tuple(tangents), self._dofs, springs.stiffness, springs.places, springs.weights, self._rows,
+             self.outer, self._modified, _SMALLEST_STIFFNESS, lapack.LETTERS, lapack.FACTORS, lapack.POTRF, lapack.TRSM,
+             lapack.SYRK)
+
+    def residual(self, inner, *, bodies=None, workers=SERIAL):
+        """What inner residuals (b, n) of some bodies (b,), or of all, leave on their outer unknowns (b, m), and the part to keep
+        for `recover`."""
+        half, bodies = np.array(inner, dtype=np.float32, order="C"), self._chosen(bodies)
+        passed_on = np.empty((len(half), self.outer.shape[1]), dtype=np.float32)
+        workers.map(lambda part: _reduce(self._rows, bodies[part], half[part], passed_on[part]), slices(len(half), _AT_ONCE))
+        return passed_on, half
+
+    def recover(self, half, outer_step, *, bodies=None, workers=SERIAL):
+        """Newton step (b, n) of the inner unknowns of some bodies (b,), or of all, for that of their outer ones (b, m)."""
+        step, bodies = half.astype(np.float32), self._chosen(bodies)     # a copy; a half that was cut is in double precision
+        outer = np.ascontiguousarray(outer_step, dtype=np.float32)
+        workers.map(lambda part: _recover(self._rows, bodies[part], step[part], outer[part]), slices(len(step), _AT_ONCE))
+        return -step
+
+    def _chosen(self, bodies):
+        return np.arange(len(self._rows)) if bodies is None else bodies
+
+    def positive_outer(self):
+        """The condensed matrices without their modes of negative stiffness."""
+        values, vectors = np.linalg.eigh(self.outer)
+        return np.matmul(vectors * np.maximum(values, 0.0)[:, None, :], vectors.transpose(0, 2, 1))
+
+    @property
+    def modified(self):
+        """How many bodies had modes of negative stiffness."""
+        return int(self._modified.sum())
+
+
+def packed(matrices):
+    """Upper triangles (..., w (w + 1) / 2) of symmetric matrices (..., w, w), row after row, in single precision."""
+    *like, width, _ = matrices.shape
+    out = np.empty((int(np.prod(like)), width * (width + 1) // 2), dtype=np.float32)
+    _pack(matrices.reshape(-1, width, width), out)
+    return out.reshape(*like, -1)
+
+
+@njit(cache=True, nogil=True)
+def _pack(matrices, out):
+    width = matrices.shape[1]
+    for k in range(len(matrices)):
+        start = 0
+        for i in range(width):
+            out[k, start:start + width - i] = matrices[k, i, i:]
+            start += width - i
+
+
+@njit(cache=True, nogil=True)
+def _set(bodies, damping, tangents, dofs, stiffness, places, weights, rows, outer, modified, smallest, letters, factors, potrf,
+         trsm, syrk):
+    n, m = rows.shape[1], outer.shape[1]
+    matrix = np.empty((n + m, n + m), np.float32)
+    for b in range(len(bodies)):
+        for i in range(n + m):
+            matrix[i, i:] = 0.0
+        for group in range(len(dofs)):
+            for element in range(len(dofs[group])):
+                _add_element(matrix, tangents[group][b, element], dofs[group][element])
+        _add_springs(matrix, stiffness[b], places, weights)
+        for i in range(n):
+            matrix[i, i] += damping[b]
+        body = bodies[b]
+        modified[body] = _condense(matrix, rows[body], outer[body], smallest, letters, factors, potrf, trsm, syrk)
+
+
+@njit(cache=True, nogil=True)
+def _add_element(matrix, tangent, dofs):
+    """Add a packed tangent to an upper triangle; an unknown may stand in several of an element's places."""
+    first = 0
+    for i in range(len(dofs)):
+        row = dofs[i]
+        if row >= 0:
+            matrix[row, row] += tangent[first]
+            for j in range(i + 1, len(dofs)):
+                column, value = dofs[j], tangent[first + j - i]
+                if column > row:
+                    matrix[row, column] += value
+                elif column == row:
+                    matrix[row, row] += 2 * value
+                elif column >= 0:
+                    matrix[column, row] += value
+        first += len(dofs) - i
+
+
+@njit(cache=True, nogil=True)
+def _add_springs(matrix, stiffness, places, weights):
+    for s in range(len(stiffness)):
+        if stiffness[s] == 0.0:
+            continue
+        for i in range(places.shape[1]):
+            row = places[s, i]
+            if row < 0:
+                continue
+            for j in range(places.shape[1]):
+                if places[s, j] >= row:
+                    matrix[row, places[s, j]] += stiffness[s] * weights[s, i] * weights[s, j]
+
+
+@njit(cache=True, nogil=True)
+def _condense(matrix, rows, outer, smallest, letters, factors, potrf, trsm, syrk):
+    """Fill a body's rows and outer matrix; True where its inner matrix was not positive definite."""
+    n, m = len(rows), len(outer)
+    size = np.array([n, m, n + m, 0], dtype=np.int32)
+    L, N, R, T = address(letters, 0), address(letters, 1), address(letters, 2), address(letters, 3)
+    one, minus_one = address(factors, 0), address(factors, 1)
+    _n, _m, _lead, info = address(size, 0), address(size, 1), address(size, 2), address(size, 3)
+    rows[:] = matrix[:n]
+    outer[:] = matrix[n:, n:]
+    call(potrf, (L, _n, rows.ctypes.data, _lead, info))
+    modified = size[3] != 0
+    if modified:
+        rows[:, :n] = _made_positive(matrix[:n, :n].astype(np.float64), smallest)
+        call(potrf, (L, _n, rows.ctypes.data, _lead, info))
+    coupling = rows[:, n:].ctypes.data
+    call(trsm, (R, L, T, N, _m, _n, one, rows.ctypes.data, _lead, coupling, _lead))
+    call(syrk, (L, N, _m, _n, minus_one, coupling, _lead, one, outer.ctypes.data, _m))
+    keep_alive(size)
+    for i in range(m):
+        for j in range(i):
+            outer[i, j] = outer[j, i]
+    return modified
+
+
+@njit(cache=True, nogil=True)
+def _made_positive(matrix, smallest):
+    for i in range(len(matrix)):
+        for j in range(i):
+            matrix[i, j] = matrix[j, i]
+    values, vectors = np.linalg.eigh(matrix)
+    # What a layer close to instability left to this one may be so stiff that, rounded, softer modes would be negative again.
+    least = max(smallest, len(matrix) * _ROUNDING * np.abs(values).max())
+    return ((vectors * np.maximum(np.abs(values), least)) @ vectors.T).astype(np.float32)
+
+
+@njit(cache=True, nogil=True)
+def _reduce(rows, bodies, half, passed_on):
+    n, whole = rows.shape[1], np.zeros(rows.shape[2], np.float32)
+    for b in range(len(bodies)):
+        whole[:n], whole[n:] = half[b], 0.0
+        for i in range(n):
+            row = rows[bodies[b], i]
+            whole[i] /= row[i]
+            add_row(row[i + 1:], -whole[i], whole[i + 1:])
+        half[b], passed_on[b] = whole[:n], whole[n:]
+
+
+@njit(cache=True, nogil=True)
+def _recover(rows, bodies, step, outer_step):
+    n, whole = rows.shape[1], np.zeros(rows.shape[2], np.float32)
+    for b in range(len(bodies)):
+        whole[:n], whole[n:] = step[b], -outer_step[b]
+        for i in range(n - 1, -1, -1):
+            row = rows[bodies[b], i]
+            whole[i] = (whole[i] - row_product(row[i + 1:], whole[i + 1:])) / row[i]
+        step[b] = whole[:n]

@@ -1,0 +1,120 @@
+"""The elastic model: one linear layer, held at its base and sides; the object's contact on the known flexibility of its top.
+
+The vertical flexibility of the top's nodes (mm/N) is computed once for a sensor (`elastic_compliance`), by quarters of the layer
+(`quarter_slab`). The nodes lie at half the map's spacing.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from softtact.contact.node_grid import NodeGrid
+from softtact.contact.stencil import Stencil
+from softtact.contact.unilateral import ContactLevels, press_elastic
+from softtact.files import read_arrays
+from softtact.models.quarter_symmetry import PARITIES, ElasticLayer, ParityBlocks, QuarterSlab
+
+_SHARES = (0.34, 0.3, 0.22, 0.14)     # of the layer's thickness, from below, that its element layers have
+_REACH = 1                            # nodes that the preconditioner looks around; 2 and 3 cost as much as they save
+
+
+@dataclass(frozen=True)
+class Compliance:
+    """What the top does under downwards forces, in mm/N: blocks by parity among the grid's nodes of a quarter.
+
+    bedding: pressure per depth in N/mm3 under a wide punch;  stencil: about the inverse
+    """
+
+    grid: NodeGrid
+    blocks: ParityBlocks
+    bedding: float
+    stencil: Stencil
+
+    def save(self, path):
+        """Write as a NumPy archive, in single precision."""
+        np.savez(path, x=self.grid.x, y=self.grid.y, blocks=self.blocks.blocks, bedding=self.bedding, stencil=self.stencil.values)
+
+    @classmethod
+    def load(cls, path):
+        """Read what `save` wrote."""
+        with read_arrays(path) as data:
+            return cls(grid=NodeGrid(data["x"], data["y"]), blocks=ParityBlocks(data["blocks"]), bedding=float(data["bedding"]),
+                       stencil=Stencil(data["stencil"]))
+
+    def among(self, points):
+        """Flexibility (c, c) among `ObjectPoints`."""
+        places = self.grid.quarter(points.nodes)
+        return self.blocks.between(*places, *places)
+
+    def maps(self, points, force):
+        """Deformation maps (l, ny, nx) in mm of forces (c, l) in N at `ObjectPoints`, with the held edges."""
+        coarse = self.grid.every_second
+        rows = self.blocks.between(*self.grid.quarter(_coarse_nodes(self.grid)), *self.grid.quarter(points.nodes))
+        inner = (rows @ force.astype(np.float32)).T.reshape(-1, *coarse.shape)
+        return np.pad(inner.astype(float), ((0, 0), (1, 1), (1, 1)))
+
+
+def _coarse_nodes(grid):
+    """Numbers of the grid's every second node."""
+    return np.arange(grid.count).reshape(grid.shape)[1::2, 1::2].ravel()
+
+
+def map_cells(spec):
+    """Elements (nx, ny) along a quarter's sides: as many as the map has steps there; nodes lie at half the map's spacing."""
+    spec.check_for("elastic")
+    return tuple((count - 1) // 2 for count in spec.map_shape[::-1])
+
+
+def surface_grid(slab):
+    """The `NodeGrid` of a whole slab's free nodes on one plane, from its `QuarterSlab`."""
+    return NodeGrid(*(np.concatenate([-line[-2:0:-1], line[:-1]]) for line in (slab.x, slab.y)))
+
+
+def elastic_slab(spec, *, cells=None):
+    """The `QuarterSlab` of a sensor's single elastic layer."""
+    layer = spec.elastic_layer
+    bulk, shear = layer.young_mpa / (3 * (1 - 2 * layer.poisson)), layer.young_mpa / (2 * (1 + layer.poisson))
+    return QuarterSlab(spec.footprint_mm, [ElasticLayer(spec.thickness_mm, bulk, shear, _SHARES)], cells or map_cells(spec),
+                       base_held=True)
+
+
+def elastic_compliance(spec, *, threads=1, cells=None):
+    """The `Compliance` of a sensor's elastic layer; `cells`: elements along a quarter's sides, if not as the map asks for."""
+    slab = elastic_slab(spec, cells=cells)
+    kept = 3 * slab.top.ravel() + 2
+    blocks = np.stack([slab.flexibility(slab.stiffness, kept, parity, threads=threads) for parity in PARITIES])
+    layer = spec.elastic_layer
+    confined = layer.young_mpa * (1 - layer.poisson) / ((1 + layer.poisson) * (1 - 2 * layer.poisson))
+    return Compliance(grid=surface_grid(slab), blocks=ParityBlocks(blocks.astype(np.float32)), bedding=confined / spec.thickness_mm,
+                      stencil=_stencil(blocks, slab.top.shape))
+
+
+def _stencil(blocks, shape):
+    """The whole top's stiffness about its middle, cut off `_REACH` nodes away."""
+    inverse = np.zeros_like(blocks)
+    for block, out in zip(blocks, inverse, strict=True):
+        there = np.flatnonzero(np.diag(block) > 0)
+        out[np.ix_(there, there)] = np.linalg.inv(block[np.ix_(there, there)])
+    stiffness, offset = ParityBlocks(inverse), np.arange(-_REACH, _REACH + 1)
+    values = np.zeros((2, 2, len(offset), len(offset)))
+    for j, i in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        row, column = 2 * (shape[0] // 4) + j, 2 * (shape[1] // 4) + i     # in the quarter's middle, far from all sides
+        around = ((row + offset)[:, None] * shape[1] + column + offset).ravel()
+        ones = np.ones((len(around), 2), dtype=int)
+        values[j, i] = stiffness.between(np.array([row * shape[1] + column]), ones[:1], around, ones).reshape(values.shape[2:])
+    return Stencil(values)
+
+
+@dataclass(frozen=True)
+class LayerPress:
+    """maps (l, ny, nx) in mm of all levels, and the contact's `ContactLevels`."""
+
+    maps: np.ndarray
+    contact: ContactLevels
+
+
+def press_layer(compliance, points, forces_n):
+    """Press `ObjectPoints` of the compliance's grid with forces (l,) in N."""
+    contact = press_elastic(compliance.among(points), points.gap, forces_n, area=points.covered * np.prod(compliance.grid.step),
+                            bedding=compliance.bedding, precondition=compliance.stencil.on(compliance.grid, points.nodes))
+    return LayerPress(maps=compliance.maps(points, contact.force), contact=contact)

@@ -1,0 +1,164 @@
+"""What the foundation model knows of a sensor: sheet and cover as a linear slab, on frusta with their unit cell's nonlinear law.
+
+The slab's movements under unit forces at its top and at the frusta are computed once, from one quarter of it (`quarter_slab`). The
+frusta's linear stiffness against all but compression is part of the slab; their compression is a movement of its own, against
+which the press sets the law (`foundation_press`).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from softtact.contact.node_grid import NodeGrid
+from softtact.files import read_arrays
+from softtact.linalg.direct import make_solver
+from softtact.models.elastic.compliance import map_cells, surface_grid
+from softtact.models.foundation.frustum_spring import FrustumLaw, frustum_law
+from softtact.models.quarter_symmetry import PARITIES, ElasticLayer, ParityBlocks, QuarterSlab
+
+SHEET_SHARES, COVER_SHARES = (1.0,), (0.45, 0.35, 0.2)
+_BLOCKS = ("surface", "sideways", "membrane", "lateral", "lateral_self")
+_TIE = 20.0     # N/mm of the springs that tie the frusta's descents to the slab while it is condensed, and are taken off again
+
+
+@dataclass(frozen=True)
+class FoundationFlexibility:
+    """What the slab on its frusta does under downwards forces, by parity (see `quarter_slab`), and the law of the frusta.
+
+    surface: among the grid's nodes in the quarter (a,), the frusta (b,) and the electrode plane at the map's points (c,)
+    sideways: of the grid's every second node, in x and in y (2 c,), from the nodes and frusta (a + b,)
+    membrane: forces N_xx, N_yy, N_xy of the frusta's cells (3 b,) in N/mm, from the same
+    lateral: movement and tilt of the frusta's roots along x, then along y (4 b,), from all of these (a + b + c)
+    lateral_self: the same, from unit forces and moments of the same kind (4 b)
+    grid: the nodes;  counts: frusta along x and y;  bedding: pressure per depth in N/mm3 of the layer at rest
+    """
+
+    grid: NodeGrid
+    counts: tuple
+    bedding: float
+    law: FrustumLaw
+    surface: ParityBlocks
+    sideways: ParityBlocks
+    membrane: ParityBlocks
+    lateral: ParityBlocks
+    lateral_self: ParityBlocks
+
+    def save(self, path):
+        """Write as a NumPy archive."""
+        arrays = {"x": self.grid.x, "y": self.grid.y, "counts": self.counts, "bedding": self.bedding}
+        arrays |= {f"law_{name}": values for name, values in self.law.arrays().items()}
+        arrays |= {name: getattr(self, name).blocks for name in _BLOCKS}
+        np.savez(path, **arrays)
+
+    @classmethod
+    def load(cls, path):
+        """Read what `save` wrote."""
+        with read_arrays(path) as data:
+            law = FrustumLaw(**{name.removeprefix("law_"): data[name] for name in data.files if name.startswith("law_")})
+            blocks = {name: ParityBlocks(data[name]) for name in _BLOCKS}
+            return cls(grid=NodeGrid(data["x"], data["y"]), counts=tuple(data["counts"]),
+                       bedding=float(data["bedding"]), law=law, **blocks)
+
+
+def foundation_flexibility(spec, *, dielectric_law, cover_law, frustum=None, cells=None, threads=1):
+    """The `FoundationFlexibility` of a sensor with its two laws.
+
+    frustum: its `FrustumLaw`, or None to compute it;  cells: elements along the quarter's sides, by default the map's steps there
+    """
+    spec.check_for("foundation")
+    frustum = frustum or frustum_law(spec, dielectric_law)
+    slab = foundation_slab(spec, dielectric_law, cover_law, cells=cells)
+    centres = _quarter_lattice(spec)
+    roots = _roots(slab, centres, frustum)
+    stiffness = slab.stiffness + roots.T @ sp.block_diag([frustum.rest] * len(centres), format="csr") @ roots
+    descents = _cleaned(sp.kron(sp.eye(len(centres)), frustum.descent[None], format="csr") @ roots)
+    followed = sp.vstack([_membrane(slab, spec, centres), _lateral_movement(roots, frustum, centres)]).tocsr()
+    columns = np.concatenate([3 * slab.top.ravel() + 2, slab.unknowns + np.arange(len(centres))])
+    rows = np.concatenate([columns, 3 * slab.plane(len(SHEET_SHARES))[::2, ::2].ravel() + 2,
+                           *(3 * slab.top[::2, ::2].ravel() + axis for axis in (0, 1))])
+    parts = [_of_parity(slab, stiffness, descents, followed, rows, len(columns), parity, threads) for parity in PARITIES]
+    surface, sideways, both, own = (np.stack(blocks).astype(np.float32) for blocks in zip(*parts, strict=True))
+    membrane, lateral = both[:, :3 * len(centres), :len(columns)], both[:, 3 * len(centres):]
+    own = own[:, 3 * len(centres):, 3 * len(centres):]
+    return FoundationFlexibility(
+        grid=surface_grid(slab), counts=spec.frusta_counts, bedding=_bedding(spec, frustum, cover_law),
+        law=frustum, surface=ParityBlocks(surface), sideways=ParityBlocks(sideways), membrane=ParityBlocks(membrane),
+        lateral=ParityBlocks(lateral), lateral_self=ParityBlocks(own))
+
+
+def foundation_slab(spec, dielectric_law, cover_law, *, cells=None):
+    """The `QuarterSlab` of sheet and cover with two laws' linear constants."""
+    layers = [ElasticLayer(spec.dielectric.sheet_thickness_mm, dielectric_law.bulk_modulus, dielectric_law.mu0, SHEET_SHARES),
+              ElasticLayer(spec.cover.thickness_mm, cover_law.bulk_modulus, cover_law.mu0, COVER_SHARES)]
+    return QuarterSlab(spec.footprint_mm, layers, cells or map_cells(spec), base_held=False)
+
+
+def _quarter_lattice(spec):
+    """Centres (b, 2) of the quarter's frusta, x fastest, from the middle outwards."""
+    pitch = spec.dielectric.frusta.pitch_mm
+    x, y = (pitch * (np.arange(count // 2) + 0.5) for count in spec.frusta_counts)
+    return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+
+
+def _roots(slab, centres, frustum):
+    """Displacements of all roots' nodes (3 b m, unknowns); those on a plane of symmetry count as in the quarter."""
+    at = slab.interpolation(np.abs((centres[:, None] + frustum.root_xy).reshape(-1, 2)))
+    roots = sp.kron(sp.kron(sp.eye(len(centres)), frustum.spread, format="csr") @ at, sp.eye(3), format="csr")
+    roots.resize(roots.shape[0], slab.unknowns)
+    return roots
+
+
+def _cleaned(matrix):
+    matrix.data[np.abs(matrix.data) < 1e-12] = 0.0
+    matrix.eliminate_zeros()
+    return matrix.tocsr()
+
+
+def _membrane(slab, spec, centres):
+    """Membrane forces of the quarter's cells (3 b, unknowns)."""
+    pitch, (nx, ny) = spec.dielectric.frusta.pitch_mm, (count // 2 for count in spec.frusta_counts)
+
+    def cells_of(x, y):
+        i, j = (x / pitch).astype(int), (y / pitch).astype(int)
+        return np.where((i < nx) & (j < ny), j * nx + i, -1)
+
+    return sp.vstack(slab.mean_forces(cells_of, len(centres))).tocsr() / pitch**2
+
+
+def _lateral_movement(roots, frustum, centres):
+    """Movement and tilt of the roots along x, then along y (4 b, unknowns), of the displacements of all their nodes."""
+    return sp.vstack([sp.kron(sp.eye(len(centres)), row[None]) @ roots for row in frustum.lateral])
+
+
+def _of_parity(slab, stiffness, descents, followed, rows, loaded, parity, threads):
+    """Blocks of one parity: surface (loaded + c, loaded), sideways (2 c, loaded), followed (f, loaded + c), for downwards forces;
+    and `followed` (f, f) for forces of their own.
+
+    The frusta's descents are unknowns of their own, tied by springs, so that they stay when the rest is condensed.
+    """
+    count = descents.shape[0]
+    tied = sp.bmat([[stiffness + _TIE * descents.T @ descents, -_TIE * descents.T], [-_TIE * descents, _TIE * sp.eye(count)]],
+                   format="csr")
+    whole = slab.flexibility(tied, rows, parity, threads=threads)
+    own = np.arange(loaded - count, loaded)
+    whole[own, own] -= 1 / _TIE
+    place = (len(rows) - loaded) // 3
+    free = slab.free(parity)
+    upper = sp.triu(stiffness[free][:, free], format="csr")
+    upper.sort_indices()
+    solver = make_solver(threads=threads)
+    solver.factor(upper)
+    response = np.zeros((slab.unknowns, followed.shape[0]))
+    response[free] = solver.solve(np.asfortranarray(followed[:, free].toarray().T))
+    solver.close()
+    top, plane = response[rows[:loaded - count]], response[rows[loaded:loaded + place]]
+    forces = np.vstack([top, descents @ response, plane]).T
+    return whole[:loaded + place, :loaded], -whole[loaded + place:, :loaded], -forces, followed @ response
+
+
+def _bedding(spec, frustum, cover_law):
+    """Pressure per depth (N/mm3) of frusta and layers one after the other, at small depths."""
+    frusta = frustum.compression_mm[1] / frustum.force_n[1] * spec.dielectric.frusta.pitch_mm**2
+    layers = (spec.thickness_mm - spec.dielectric.frusta.height_mm) / (cover_law.bulk_modulus + 4 / 3 * cover_law.mu0)
+    return 1.0 / (frusta + layers)

@@ -1,0 +1,249 @@
+"""What one frustum does to the sheet above it: its unit cell's nonlinear law, and its linear stiffness against all else.
+
+The cell is the hyperelastic one: any law and geometry; board, folding sides and neighbours included. Of the stiffness K of the
+root's nodes (tip held, at rest) the part that a straight descent meets is taken out and replaced by the cell's force:
+    K 1 = k b,  1.b = 1:    forces on the root = (K - k b b') u + b p(w),   w = b.u
+so that small displacements of any kind meet the frustum's own linear stiffness, and a compression w meets the cell's force p(w).
+Where the root moves sideways, the tip, held in the plane of the board, would lean, and is kept flat by a moment that the board
+can only give to a tip that is pressed: beyond, the frustum rocks on its tip's rim and lifts the root (`FrustumLaw.rise`).
+The root's nodes lie on another mesh than the slab's. They follow it in the mean, weighted so that the root's forces act on the slab
+as the traction of which they are the nodal forces (mortar coupling; Wohlmuth, SIAM J. Numer. Anal. 38 (2000) 989). Tied to the
+slab at single points instead, they were point loads, under which a slab gives way the more the finer its elements are.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import trimesh
+from scipy.interpolate import PchipInterpolator
+
+from softtact.contact.height_field import HeightField
+from softtact.errors import ConvergenceError
+from softtact.fem.elements import HEX27_TOP, gauss, quad9
+from softtact.files import read_arrays
+from softtact.models.foundation.single_frustum import SingleFrustum
+from softtact.models.hyperelastic.build import build_unit_cell
+from softtact.models.hyperelastic.mesh_settings import MeshSettings
+from softtact.models.hyperelastic.newton import NewtonSettings, press_levels
+
+_FIRST_N, _LEVELS_A_DECADE = 2e-3, 9
+_MORTAR_POINTS = 10      # along a side of a root's face: so dense that elements of a tenth of a pitch do not feel them singly
+_MOVEMENT, _TILT, _LATERAL_LEVELS = 0.25, 0.1, 16   # of the height; about what 50 N do beside a punch's edge
+_PRESSURE_MPA = 2.0      # on the cell, up to which the law is asked for: about five times that of 50 N on a flat punch of 11 mm
+
+
+@dataclass(frozen=True)
+class FrustumLaw:
+    """force_n (f,) of one frustum at compressions compression_mm (f,), both from 0 on; beyond, the last slope goes on.
+
+    root_xy (s, 2) in mm: points of the root about the axis;  spread (m, s): displacements of the root's nodes from those there
+    rest (3 m, 3 m) in N/mm: stiffness against all else;  descent (3 m,): b
+    lateral (4, 3 m): movement (mm) and tilt of the root along x, then along y, of its nodes' displacements
+    stiffness (g, 3): at compressions lateral_at_mm (g,), against movement (N/mm), between it and tilt (N), against tilt (N mm)
+    lean in 1/mm: of a free tip, over the root's movement sideways;  upright in N mm: stiffness of the tip against leaning
+    tip_radius_mm: of the rim that a frustum rocks on
+    """
+
+    force_n: np.ndarray
+    compression_mm: np.ndarray
+    root_xy: np.ndarray
+    spread: np.ndarray
+    rest: np.ndarray
+    descent: np.ndarray
+    lateral: np.ndarray
+    lateral_at_mm: np.ndarray
+    stiffness: np.ndarray
+    lean: float
+    upright: float
+    tip_radius_mm: float
+
+    @cached_property
+    def _curve(self):
+        return PchipInterpolator(self.force_n, self.compression_mm)
+
+    @cached_property
+    def _curve_slope(self):
+        return self._curve.derivative()
+
+    @property
+    def limit_mm(self):
+        """Largest compression that the cell reached."""
+        return float(self.compression_mm[-1])
+
+    def extension(self, force):
+        """Compression in mm under forces >= 0 in N, of any shape."""
+        inside = np.minimum(force, self.force_n[-1])
+        return self._curve(inside) + self._last_slope * (force - inside)
+
+    def slope(self, force):
+        """Derivative of `extension` in mm/N."""
+        return np.where(force < self.force_n[-1], self._curve_slope(np.minimum(force, self.force_n[-1])), self._last_slope)
+
+    def rise(self, sideways, force):
+        """How far roots that have moved `sideways` (mm) are lifted by frusta that rock under forces >= 0 (N), in mm.
+
+        A rigid tip of radius e on a board without tension: its moment is at most e times the force, and what it leans beyond
+        what this moment holds back, turns it about its rim.
+        """
+        return self.tip_radius_mm * np.maximum(self.lean * sideways - self.tip_radius_mm * force / self.upright, 0.0)
+
+    def stiffening(self, force):
+        """By how much frusta under forces (b,) in N are stiffer than at rest against (movement, tilt), (b, 2, 2), and that matrix'
+        derivative by their compression, per mm.
+        """
+        place = np.clip(self.extension(force), 0.0, self.lateral_at_mm[-1])
+        growth = np.where((place < self.lateral_at_mm[-1])[:, None], self._stiffness_slope(place), 0.0)
+        more = self._stiffness(place) - self.stiffness[0]
+        return tuple(values[:, [0, 1, 1, 2]].reshape(-1, 2, 2) for values in (more, growth))
+
+    @cached_property
+    def _stiffness(self):
+        return PchipInterpolator(self.lateral_at_mm, self.stiffness)
+
+    @cached_property
+    def _stiffness_slope(self):
+        return self._stiffness.derivative()
+
+    @cached_property
+    def _last_slope(self):
+        return float(self._curve_slope(self.force_n[-1]))
+
+    def save(self, path):
+        """Write as a NumPy archive."""
+        np.savez(path, **self.arrays())
+
+    @classmethod
+    def load(cls, path):
+        """Read what `save` wrote."""
+        with read_arrays(path) as data:
+            return cls(**dict(data))
+
+    def arrays(self):
+        """All fields by name, to be saved."""
+        return {name: getattr(self, name) for name in self.__dataclass_fields__}
+
+
+def frustum_law(spec, law, *, mesh=None, pressure_mpa=_PRESSURE_MPA):
+    """The `FrustumLaw` of a sensor's frusta of a hyperelastic law, from its unit cell up to a pressure, or as far as it goes.
+
+    mesh: `MeshSettings` of the cell; by default frusta of two rings, which one cell can afford (of one: 2 % too stiff)
+    """
+    body = build_unit_cell(spec, dielectric_law=law, mesh=mesh or MeshSettings(frustum_rings=2))
+    bed = body.bed
+    root_xy, spread, mass = _root_mortar(bed)
+    stiffness = _root_stiffness(bed)
+    straight = np.zeros((len(spread), 3))
+    straight[:, 2] = 1.0
+    straight = straight.ravel()
+    along = stiffness @ straight
+    k = float(straight @ along)
+    descent = along / k
+    lean, upright, radius = _tip(bed)
+    lateral = _lateral(bed, mass)
+    force, compression = _cell_curve(spec, body, descent, pressure_mpa * spec.dielectric.frusta.pitch_mm**2)
+    at, stiffer = _lateral_stiffness(bed, compression[-1])
+    body.close()
+    return FrustumLaw(force_n=force, compression_mm=compression, root_xy=root_xy, spread=spread, descent=descent, lateral=lateral,
+                      lateral_at_mm=at, stiffness=stiffer, rest=stiffness - k * np.outer(descent, descent), lean=lean,
+                      upright=upright, tip_radius_mm=radius)
+
+
+def _root_mortar(bed):
+    """Points (s, 2) of a frustum's root about its axis, and weights (m, s): from a field there to its root nodes' values.
+
+    The values are those whose quadratic interpolation over the root has the same products with its shape functions as the field.
+    """
+    place = np.full(bed.nodes, -1)
+    place[bed.root] = np.arange(len(bed.root))
+    faces = place[bed.mesh.layer(bed.mesh.layers - 1)[:, HEX27_TOP]]
+    xy = (bed.coordinates[0][bed.root, :2] - bed.geometry.centres[0])[faces]
+    points, weights = gauss(_MORTAR_POINTS, 2)
+    values, slopes = quad9(points)
+    areas = weights * np.linalg.det(np.einsum("gad,fai->fgid", slopes, xy))
+    mass, products = np.zeros((len(bed.root),) * 2), np.zeros((len(bed.root), *areas.shape))
+    for f, (face, area) in enumerate(zip(faces, areas, strict=True)):
+        mass[np.ix_(face, face)] += values.T @ (area[:, None] * values)
+        products[face, f] = values.T * area
+    return np.einsum("ga,fai->fgi", values, xy).reshape(-1, 2), np.linalg.solve(mass, products.reshape(len(mass), -1)), mass
+
+
+def _root_stiffness(bed):
+    """Stiffness (3 m, 3 m) of a frustum's root nodes at rest, the tip standing on the board."""
+    return _condensed(_stiffness_at_rest(bed), np.setdiff1d(bed.inner, 3 * bed.tip + 2), bed.root_dofs)
+
+
+def _stiffness_at_rest(bed):
+    """Stiffness (3 n, 3 n) of all of a frustum's nodes."""
+    tangents = bed.block.tangent(bed.per_element(np.zeros((1, bed.nodes, 3))))
+    stiffness = np.zeros((3 * bed.nodes,) * 2)
+    for element, nodes in zip(tangents, bed.mesh.hexes, strict=True):
+        dofs = (3 * nodes[:, None] + np.arange(3)).ravel()
+        stiffness[np.ix_(dofs, dofs)] += element
+    return stiffness
+
+
+def _condensed(stiffness, inner, outer):
+    """Stiffness of the unknowns `outer` once those of `inner` follow them."""
+    coupling = stiffness[np.ix_(inner, outer)]
+    return stiffness[np.ix_(outer, outer)] - coupling.T @ np.linalg.solve(stiffness[np.ix_(inner, inner)], coupling)
+
+
+def _tip(bed):
+    """Lean of a free tip over the root's movement sideways (1/mm), its stiffness against leaning (N mm), and its radius (mm).
+
+    Both by the tip's vertical movements z = x: the work-conjugate moment of a tip that stays plane.
+    """
+    x = bed.coordinates[0][bed.tip, 0] - bed.geometry.centres[0][0]
+    vertical = 3 * bed.tip + 2
+    inner = np.setdiff1d(bed.inner, vertical)
+    kept = np.concatenate([vertical, bed.root_dofs])
+    stiffness = _condensed(_stiffness_at_rest(bed), inner, kept)
+    sideways = np.tile([1.0, 0.0, 0.0], len(bed.root))
+    tips = len(bed.tip)
+    free = -np.linalg.solve(stiffness[:tips, :tips], stiffness[:tips, tips:] @ sideways)
+    return float(abs(free @ x) / (x @ x)), float(x @ stiffness[:tips, :tips] @ x), float(np.abs(x).max())
+
+
+def _lateral(bed, mass):
+    """Movement and tilt along x, then along y, of a root's nodal displacements (4, 3 m): the plane nearest to them in its area."""
+    xy = bed.coordinates[0][bed.root, :2] - bed.geometry.centres[0]
+    rows = []
+    for axis, sideways in enumerate(np.eye(3)[:2]):
+        for shape, direction in ((np.ones(len(xy)), sideways), (xy[:, axis], np.eye(3)[2])):
+            weight = mass @ shape
+            rows.append(np.outer(weight / (weight @ shape), direction).ravel())
+    return np.array(rows)
+
+
+def _lateral_stiffness(bed, largest_mm):
+    """Compressions (g,) in mm, and a root's stiffness (g, 3) there against movement, between it and tilt, and against tilt.
+
+    Not for the smallest of movements but for those of a frustum beside an edge: between them contacts begin. Where a frustum
+    cannot be pressed so far under a rigid root, the stiffness ends there.
+    """
+    movement, descents = _MOVEMENT * bed.geometry.heights[0], np.linspace(0.0, largest_mm, _LATERAL_LEVELS)
+    moved, tilted = ([frustum.move(*place, descent) for descent in descents] for frustum, place in
+                     ((SingleFrustum(bed), (movement, 0.0)), (SingleFrustum(bed), (0.0, _TILT))))
+    both = [(*(a / movement), b[1] / _TILT) for a, b in zip(moved, tilted, strict=True) if a is not None and b is not None]
+    return descents[:len(both)], np.array(both)
+
+
+def _cell_curve(spec, body, descent, largest_n):
+    """Forces and compressions (f,) of the cell under a plate, from 0 up to `largest_n`, or as far as it can be pressed."""
+    plate = trimesh.creation.box((4 * spec.dielectric.frusta.pitch_mm,) * 2 + (1.0,))
+    plate.apply_translation([0, 0, 0.5])
+    forces = np.geomspace(_FIRST_N, largest_n, int(np.ceil(_LEVELS_A_DECADE * np.log10(largest_n / _FIRST_N))))
+    settings = NewtonSettings(contact_passes=0, first_touch_mm=1e-3, smallest_scale_n=0.05, smallest_increment_n=1e-3)
+    reached = [(0.0, 0.0)]
+    try:
+        for level in press_levels(body, HeightField(plate), forces, settings=settings):
+            root = level.state.bed.displacement[0][body.bed.root].ravel()
+            compression = -float(descent @ root)
+            if compression <= reached[-1][1]:
+                break
+            reached.append((level.force_n, compression))
+    except ConvergenceError:
+        if len(reached) < 10:
+            raise
+    return tuple(np.array(reached).T)

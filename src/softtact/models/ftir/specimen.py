@@ -1,0 +1,127 @@
+"""All frusta of a dielectric under one rigid plate on glass, each with its own height and tip: who carries what, and its disc.
+
+The plate keeps its direction and each frustum stands in its own cell: frustum i of height h_i is compressed by
+c_i = max(0, d - (h_max - h_i)) when the plate has gone down by d from its first touch, so
+    sum_i F(c_i; h_i, t_i) = F_total
+is one equation for d. The cell's force F and area A come from `press_cell_on_glass` at a few heights and tip diameters.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.optimize import brentq
+
+from softtact.errors import ConvergenceError
+from softtact.models.ftir.unit_cell import GlassCurve, press_cell_on_glass
+from softtact.models.hyperelastic.build import lattice
+
+_SPARE = 1.25            # cells are pressed so much farther than the mean frustum: the tallest carries more
+_LEVELS = 14            # of force, at which a cell is solved
+
+
+@dataclass(frozen=True)
+class Specimen:
+    """Frusta by centres (n, 2) in mm, height_factor (n,) and tip_factor (n,): shares of the nominal height and tip diameter."""
+
+    centres: np.ndarray
+    height_factor: np.ndarray
+    tip_factor: np.ndarray
+
+
+@dataclass(frozen=True)
+class PressedSpecimen:
+    """descent_mm (f,) of the plate from its first touch; force_n, area_mm2 (f, n) of each frustum at each total force."""
+
+    descent_mm: np.ndarray
+    force_n: np.ndarray
+    area_mm2: np.ndarray
+
+
+def scattered_specimen(spec, *, height_scatter, tip_scatter, seed):
+    """A `Specimen` whose factors are normally distributed about 1 with these standard deviations."""
+    centres, _ = lattice(spec.frusta_counts, spec.dielectric.frusta.pitch_mm)
+    rng = np.random.default_rng([seed, 2])
+    heights, tips = rng.standard_normal((2, len(centres)))
+    return Specimen(centres, 1 + height_scatter * heights, 1 + tip_scatter * tips)
+
+
+class CellFamily:
+    """Force and contact area of a cell by its compression, for frusta near the nominal shape.
+
+    Five cells are solved: the nominal one and two each with other heights and other tips. Between them each quantity is a
+    parabola in the height factor and one in the tip factor, at equal compression per height; their product term is left out.
+    """
+
+    def __init__(self, spec, law, *, largest_n, height_spread, tip_spread, mesh=None):
+        """largest_n: mean force per frustum that will be asked for;  spreads: farthest factors from 1 on either side."""
+        self.height_mm, self.spreads = spec.dielectric.frusta.height_mm, (height_spread, tip_spread)
+
+        def solve(height_factor=1.0, tip_factor=1.0):
+            forces = _SPARE * tip_factor**2 * largest_n * np.linspace(0, 1, _LEVELS + 1)     # all to about the same compression
+            return _Cell(press_cell_on_glass(spec, law, forces, mesh=mesh, height_factor=height_factor, tip_factor=tip_factor,
+                                             as_far_as_it_goes=True), height_factor * self.height_mm)
+
+        self.nominal = solve()
+        self.pairs = [[solve(**{name: 1 + sign * spread}) for sign in (-1, 1)] if spread else None
+                      for name, spread in zip(("height_factor", "tip_factor"), self.spreads, strict=True)]
+
+    @cached_property
+    def limit(self):
+        """Compression per height up to which all cells were solved."""
+        return min(cell.limit for cell in [self.nominal, *(cell for pair in self.pairs if pair for cell in pair)])
+
+    def force(self, compression_mm, height_factor, tip_factor):
+        """Forces (n,) in N of frusta at compressions (n,) >= 0."""
+        return self._at("force", compression_mm, height_factor, tip_factor)
+
+    def area(self, compression_mm, height_factor, tip_factor):
+        """Contact areas (n,) in mm2; none where there is no compression."""
+        return np.where(compression_mm > 0, self._at("area", compression_mm, height_factor, tip_factor), 0.0)
+
+    def _at(self, quantity, compression_mm, height_factor, tip_factor):
+        share = compression_mm / (height_factor * self.height_mm)
+        value = centre = getattr(self.nominal, quantity)(share)
+        for pair, spread, factor in zip(self.pairs, self.spreads, (height_factor, tip_factor), strict=True):
+            if pair is not None:
+                x = (factor - 1) / spread
+                low, high = (getattr(cell, quantity)(share) for cell in pair)
+                value = value + 0.5 * x * (high - low) + 0.5 * x**2 * (high + low - 2 * centre)
+        return value
+
+
+class _Cell:
+    """A solved cell: force (N) and area (mm2) as monotone cubic functions of its compression per height."""
+
+    def __init__(self, curve: GlassCurve, height_mm):
+        share = curve.compression_mm / height_mm
+        self.limit = float(share[-1])
+        self.force = PchipInterpolator(share, curve.force_n)
+        self.area = PchipInterpolator(share[1:], curve.area_mm2[1:])     # at the first touch the area jumps from 0 to the tip's
+
+
+def cell_family(spec, law, specimen, *, largest_n, mesh=None):
+    """The `CellFamily` that spans a specimen's frusta; largest_n: largest total force that will be asked for."""
+    spreads = [float(np.abs(factor - 1).max()) for factor in (specimen.height_factor, specimen.tip_factor)]
+    return CellFamily(spec, law, largest_n=largest_n / len(specimen.centres), height_spread=spreads[0], tip_spread=spreads[1],
+                      mesh=mesh)
+
+
+def press_specimen(family, specimen, forces_n):
+    """The `PressedSpecimen` under total forces (f,) in N, from 0 on."""
+    lag = family.height_mm * (specimen.height_factor.max() - specimen.height_factor)       # mm until the plate meets a frustum
+    shape = specimen.height_factor, specimen.tip_factor
+    deepest = float((family.limit * family.height_mm * specimen.height_factor + lag).min())
+
+    def carried(descent):
+        return family.force(np.maximum(0.0, descent - lag), *shape)
+
+    reach = carried(deepest).sum()
+    if forces_n[-1] > reach:
+        raise ConvergenceError(f"The cells of the dielectric were pressed up to {reach:.4g} N in all, not to {forces_n[-1]:g} N; "
+                               "ask for smaller forces or for less scatter of the heights.")
+    descents = np.array([brentq(lambda d, f=force: carried(d).sum() - f, 0.0, deepest, xtol=1e-13, rtol=1e-13) if force else 0.0
+                         for force in forces_n])
+    areas = np.array([family.area(np.maximum(0.0, d - lag), *shape) for d in descents])
+    return PressedSpecimen(descents, np.array([carried(d) for d in descents]), areas)

@@ -1,0 +1,239 @@
+"""The layered sensor as one body: slab (sheet and cover) tied to the bed of frusta, and one Newton step of it."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from softtact.fem import kernels
+from softtact.linalg.multifrontal_solver import DissectedSolver
+from softtact.linalg.workers import Workers
+from softtact.models.hyperelastic.friction import BodyFriction
+from softtact.models.hyperelastic.frusta import BedState
+from softtact.models.hyperelastic.linearised_contact import StepContact
+from softtact.models.hyperelastic.local_equilibrium import balanced
+from softtact.models.hyperelastic.newton_step import ContactStepper
+from softtact.models.hyperelastic.preconditioner import DissectedContact
+from softtact.models.hyperelastic.rigid_contact import FacingPlanes
+from softtact.models.hyperelastic.slab import SlabState
+from softtact.models.hyperelastic.unit_cells import SheetCells
+
+_DAMPINGS = 4         # steps that are tried with ever more damping of the cells that they throw too far
+_FIRST_SHIFT = 0.01   # N/mm on every free unknown of the slab, doubled until the tangent is positive definite ...
+_MOST_DOUBLINGS = 40  # ... but a tangent that is not even finite will never be
+
+
+@dataclass(frozen=True)
+class BodyState:
+    """Slab and bed at one displacement, and the potential energy (mJ) of both with their contacts and friction."""
+
+    slab: SlabState
+    bed: BedState
+    indentation: float
+
+    @property
+    def energy(self):
+        return self.slab.energy + self.bed.energy
+
+    @property
+    def force(self):
+        """Force (N) that the object exerts downwards."""
+        return self.slab.indentation_force
+
+
+@dataclass(frozen=True)
+class Step:
+    """A Newton step: slab (n, 3), frusta (f, nodes, 3) in mm, indentation in mm, and what the object's contact faces in it."""
+
+    slab: np.ndarray
+    bed: np.ndarray
+    indentation: float
+    planes: FacingPlanes
+
+    def largest(self):
+        return max(np.abs(self.slab).max(), np.abs(self.bed).max(), abs(self.indentation))
+
+
+def _shifts():
+    """What is tried, one after the other, until a tangent is positive definite, so that every step lowers the energy."""
+    yield None
+    yield 0.0
+    for doubling in range(_MOST_DOUBLINGS):
+        yield _FIRST_SHIFT * 2**doubling
+
+
+class LayeredBody:
+    """Slab on frusta on a rigid PCB, pressed from above by a rigid object. Lengths in mm, z = 0 at the top at rest."""
+
+    def __init__(self, slab, bed, roots, *, threads=1):
+        """`roots` (f, k): the slab's nodes that are the frusta's root nodes."""
+        self.slab, self.bed = slab, bed
+        self.workers = Workers(threads)
+        self.friction = BodyFriction(slab.top, bed)
+        self.cells = SheetCells(slab, bed, roots)
+        slab.build_pattern(self.cells.eliminated, self.cells.outer_dofs)
+        self.solver = DissectedSolver(slab.points[slab.unknowns // 3, :2], workers=self.workers)
+        self.stepper = ContactStepper(DissectedContact(self.solver, workers=self.workers))
+
+    def sum_with(self, loops):
+        """Let elements be summed by `loops`: `kernels`, as from the start, or `device_kernels`."""
+        for block in self.slab.blocks + [self.bed.block]:
+            block.loops = loops
+
+    @property
+    def method(self):
+        """Linear solver and device in words."""
+        loops = self.bed.block.loops
+        return self.solver.name if loops is kernels else f"{self.solver.name}; elements on {loops.device}"
+
+    def close(self):
+        """Free the factors, and end the threads."""
+        self.solver.close()
+        self.workers.close()
+
+    def rest(self):
+        """Displacements of slab (n, 3) and frusta (f, nodes, 3) at rest."""
+        return np.zeros((self.slab.nodes, 3)), np.zeros((self.bed.count, self.bed.nodes, 3))
+
+    def evaluate(self, slab_displacement, bed_displacement, indentation, planes):
+        """State at given displacements; None where an element is inside out."""
+        slab = self.slab.evaluate(slab_displacement, planes, indentation, workers=self.workers)
+        bed = self.bed.evaluate(bed_displacement, workers=self.workers) if slab is not None else None
+        return None if bed is None else BodyState(slab=slab, bed=bed, indentation=indentation)
+
+    def again(self, state):
+        """The same displacements after the contact's or friction's own state has changed: the rubber is not evaluated anew."""
+        return BodyState(slab=self.slab.reface(state.slab, state.slab.planes, state.indentation), bed=self.bed.again(state.bed),
+                         indentation=state.indentation)
+
+    def balanced(self, state, tolerance_n):
+        """The state with each frustum in balance over its root, where nothing else keeps the body from it.
+
+        A frustum that rocks or folds needs steps of its own; as long as sheet or cover do, too, it takes them with these. With
+        friction on the board frusta wait for the steps of all: what holds them does not see one alone.
+        """
+        rest = max(tolerance_n, self._slab_residual(state))
+        if self.bed.friction is not None or np.abs(self.bed.inner_residual(state.bed)).max() <= rest:
+            return state
+        bed, moved = balanced(self.bed, state.bed, tolerance_n, workers=self.workers)
+        self.cells.forget(moved)
+        return replace(state, bed=bed)
+
+    def reface(self, state, planes):
+        """The same state with the object's contact on other planes."""
+        return replace(state, slab=self.slab.reface(state.slab, planes, state.indentation))
+
+    def let_down(self, state, force_n):
+        """The state with the object at the depth where its force is `force_n`: the least energy over the indentation."""
+        return self.lowered(state, self.slab.top.balanced(state.slab, state.indentation, force_n) - state.indentation)
+
+    def lowered(self, state, by_mm):
+        """The state with the object lower by so much."""
+        depth = state.indentation + by_mm
+        return replace(state, slab=self.slab.reface(state.slab, state.slab.planes, depth), indentation=depth)
+
+    def newton_step(self, state, force_n, surface=None, *, largest_mm=np.inf, kept_mm=0.0):
+        """The Newton step under a given force (N), or with the indentation kept where `force_n` is None.
+
+        largest_mm: by which the object goes down at most;  kept_mm: cells that moved less since their last tangent keep it
+
+        With a surface the step's contact is with the facets that the points face where it leads, else with those of the state.
+        Where nothing touches, a force finds no stiffness: the step is then not finite.
+        """
+        state = self.friction.for_tangent(state)
+        for _ in range(_DAMPINGS):
+            step = self._newton_step(state, force_n, surface, largest_mm, kept_mm)
+            if not (np.isfinite(step.largest()) and self.cells.damp(step.slab, step.bed)):
+                break
+        return step
+
+    def _newton_step(self, state, force_n, surface, largest_mm, kept_mm):
+        """The step with the cells as they are damped now."""
+        self.cells.refresh(state, kept_mm=kept_mm, workers=self.workers)
+        residual, kept = self.cells.condensed_residual(state, workers=self.workers)
+        contact = StepContact(self.slab, state.slab, state.indentation, surface, workers=self.workers)
+        step, lowering = self._step_of_unknowns(state, residual.ravel()[self.slab.unknowns], contact, force_n,
+                                                 largest_mm)
+        full = np.zeros(3 * self.slab.nodes)
+        full[self.slab.unknowns] = step
+        slab, bed = self.cells.recover(kept, full.reshape(-1, 3), workers=self.workers)
+        return Step(slab=slab, bed=bed, indentation=lowering, planes=contact.planes)
+
+    def _step_of_unknowns(self, state, residual, contact, force_n, largest_mm):
+        """Step of the global unknowns, and how far the object goes down; the tangent is made positive definite where it is not.
+
+        Not a number where that cannot be done, which fails Newton's method there.
+        """
+        excess, drag = None if force_n is None else state.force - force_n, self.slab.friction_border(state.slab)
+        for shift in _shifts():
+            step = self.stepper.step(self._rubber_tangent(state, shift), residual, contact, drag=drag, excess=excess,
+                                     largest=largest_mm)
+            if step is not None:
+                return step
+        return np.full(len(residual), np.nan), np.nan
+
+    def _rubber_tangent(self, state, shift):
+        """The rubber's tangent as it is (None), or without the cells' modes of negative stiffness and stiffened by a shift."""
+        if shift is None:
+            return self.slab.rubber_tangent(state.slab, self.cells.outer, workers=self.workers)
+        rubber = self.slab.rubber_tangent(state.slab, self.cells.positive_outer(), workers=self.workers)
+        self.slab.add_to_diagonal(rubber, shift)
+        return rubber
+
+    def penetration(self, state):
+        """Deepest penetration in mm, of the object into the cover or of frusta into the board or each other."""
+        return float(max(0.0, -self.slab.top.own_gaps(state.slab).min(), -state.bed.gaps.min()))
+
+    def descent(self, state):
+        """How far the cover has come down where it did most, in mm."""
+        return float(-state.slab.displacement[:, 2].min())
+
+    def contact_error(self, state):
+        """Deepest overlap, or widest gap under pressure, in mm."""
+        return max(self.slab.top.error(state.slab), self.bed.contact.error(state.bed.gaps))
+
+    def press_apart(self, state, *, allowed_mm):
+        """Hold the points that overlap where their surfaces just touch, on the object or in the bed, wherever it is too much."""
+        if self.slab.top.error(state.slab) > allowed_mm:
+            self.slab.top.press_apart(state.slab)
+        if self.bed.contact.error(state.bed.gaps) > allowed_mm:
+            self.bed.contact = self.bed.contact.pressed_apart(state.bed.gaps)
+
+    def most_compressed(self, state):
+        """Place x, y (mm) of the most compressed frustum, and its compression as a share of its height."""
+        share = self.bed.compression(state.bed.displacement) / self.bed.geometry.heights
+        worst = int(np.argmax(share))
+        return *self.bed.geometry.centres[worst], float(share[worst])
+
+    def share_outside_window(self, state):
+        """Share of a law's volume that is strained beyond what the law was fitted to, the largest over the laws.
+
+        nan where no law knows what it was fitted to.
+        """
+        volumes = {}
+        for nodes, block in self.slab.solids:
+            _add_volumes(volumes, block, state.slab.displacement[nodes])
+        _add_volumes(volumes, self.bed.block, self.bed.per_element(state.bed.displacement))
+        return max((outside / whole for outside, whole in volumes.values()), default=np.nan)
+
+    def residual_norm(self, state, force_n):
+        """Largest unbalanced nodal force in N, over slab, frusta and the object."""
+        parts = [self._slab_residual(state), np.abs(self.bed.inner_residual(state.bed)).max()]
+        if force_n is not None:
+            parts.append(abs(state.force - force_n))
+        return float(max(parts))
+
+    def _slab_residual(self, state):
+        return np.abs(self.slab_force(state).ravel()[self.slab.free]).max()
+
+    def slab_force(self, state):
+        """Forces (n, 3) on the slab's nodes, those of the frusta's roots among them."""
+        total = state.slab.force.copy()
+        np.add.at(total, self.cells.roots.ravel(), state.bed.force[:, self.bed.root].reshape(-1, 3))
+        return total
+
+
+def _add_volumes(volumes, block, displacement):
+    """Add a block's volume outside its law's window, and its whole volume, to those of the same law."""
+    if block.law.stretch_window is not None:
+        outside, whole = volumes.get(id(block.law), (0.0, 0.0))
+        volumes[id(block.law)] = outside + block.volume_outside(displacement, block.law.stretch_window), whole + block.volume

@@ -1,0 +1,344 @@
+"""The bed of frusta between the sheet and the PCB: every frustum a finite-strain body of its own, tied to the sheet.
+
+A frustum touches the rest of the sensor only through its root. So its inner unknowns are eliminated frustum by frustum, in
+each from the tip upwards layer by layer (static condensation, exact within Newton's method), and the global matrix
+knows the roots only. Contact, all unilateral:
+tip and folding side on the PCB; the side on the symmetric plane towards each neighbour, which moves with the root's outermost
+node: the two neighbours share it when their roots touch. The sheet's lower side on the frusta's sides is left out where roots
+are wider than tips: in the unit cell they come no nearer than 0.01 mm up to 1 MPa. Where tips are wider the sides fold onto the
+sheet; there it is a level plane that moves with the root's outermost node.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numba import njit
+
+from softtact.contact.friction import Drag, Grip
+from softtact.contact.height_field import NO_CONTACT_MM
+from softtact.fem.elements import HEX27_BOTTOM, HEX27_SIDES, gauss, quad9
+from softtact.fem.extruded_mesh import CORE_RADIUS, disc_plan, extrude
+from softtact.fem.kernels import add_forces
+from softtact.fem.solid_block import HexBlock
+from softtact.fem.static_condensation import Springs
+from softtact.fem.substructuring import LayerwiseElimination
+from softtact.fem.tangent_cache import KeptTangents
+from softtact.linalg.workers import SERIAL
+
+BOARD, SHEET = -1, -2                                     # what a contact point faces where it is no neighbour in DIRECTIONS
+DIRECTIONS = ((0, 1.0), (1, 1.0), (0, -1.0), (1, -1.0))   # axis and sign of the four neighbours: +x, +y, -x, -y
+
+
+@dataclass(frozen=True)
+class BedGeometry:
+    """Frusta by their centres (n, 2), heights (n,), tip diameters (n,) in mm, and `neighbours` (n, 4) in DIRECTIONS.
+
+    wall_mm: from the roots' outermost nodes to the planes towards the neighbours, at rest
+    """
+
+    centres: np.ndarray
+    heights: np.ndarray
+    tip_diameters: np.ndarray
+    root_diameter: float
+    neighbours: np.ndarray
+    wall_mm: float = 0.0
+
+
+@dataclass(frozen=True)
+class BedState:
+    """energy (mJ), force (n, nodes, 3) on the frusta's nodes, gaps (n, p) at the contact points, displacement.
+
+    elastic: energies (n,) and force of the rubber alone;  drag: friction at the points on the board (n, b), None without.
+    """
+
+    elastic: tuple
+    energy: float
+    force: np.ndarray
+    gaps: np.ndarray
+    displacement: np.ndarray
+    drag: Drag | None = None
+
+
+class FrustumBed:
+    """All frusta of a sensor with one law. Local node numbers are those of `self.mesh`; roots are `self.root`.
+
+    grip: how friction holds the points on the board during a step, None without.
+    """
+
+    def __init__(self, geometry, law, *, levels, root_z_mm, pcb_z_mm, tips_held, contact, local_over_shear,
+                 growing_over_shear, trilinear, refinement=0, rings=1, core=CORE_RADIUS, friction=None):
+        """local_over_shear, growing_over_shear, trilinear: see `blocks`
+
+        friction: `Coulomb` of the frusta on the board, or None
+        """
+        self.geometry, self.contact, self.friction, self.grip = geometry, contact, friction, None
+        plan = disc_plan(refinement, rings, core)
+        self.mesh = extrude(plan, levels)
+        self.outer_faces = self._outer_faces(plan)
+        self.count = len(geometry.heights)
+        self.nodes = len(self.mesh.points)
+        self.root, self.tip = self.mesh.planes[-1], self.mesh.planes[0]
+        self.coordinates = self._place(levels, root_z_mm)
+        self._element_nodes = (self.nodes * np.arange(self.count)[:, None, None] + self.mesh.hexes).reshape(-1, 27)
+        self.block = HexBlock(self.per_element(self.coordinates), law, trilinear=trilinear, local_over_shear=local_over_shear,
+                              growing_over_shear=growing_over_shear)
+        self._tangents = KeptTangents(self.block)
+        self._contact_points(pcb_z_mm)
+        self._number_unknowns(tips_held)
+        self.elimination = self._elimination()
+
+    def _place(self, levels, root_z):
+        """Nodal coordinates (n, nodes, 3): the unit disc scaled by the cone's radius, the height by each frustum's own."""
+        g = self.geometry
+        fraction = self.mesh.points[:, 2] / levels[-1]
+        radius = 0.5 * (g.tip_diameters[:, None] * (1 - fraction) + g.root_diameter * fraction)
+        plan = self.mesh.points[None, :, :2] * radius[..., None] + g.centres[:, None, :]
+        z = root_z - g.heights[:, None] * (1 - fraction)
+        return np.concatenate([plan, z[..., None]], axis=2)
+
+    def per_element(self, field):
+        """A nodal field (n, nodes, 3) at the elements' nodes (n * elements, 27, 3)."""
+        return np.ascontiguousarray(field[:, self.mesh.hexes].reshape(-1, 27, 3))
+
+    def _outer_faces(self, plan):
+        """Nodes (layers * sides, 9) of the cone's faces."""
+        quads, sides = plan.outer_sides()
+        return np.vstack([self.mesh.layer(k)[quads[:, None], HEX27_SIDES[sides]] for k in range(self.mesh.layers)])
+
+    def _contact_points(self, pcb_z):
+        """Points with their nodes, weights, axis: gap = gap0 + sum(weights * displacement[nodes, axis])."""
+        points, weights = gauss(3, 2)
+        values, slopes = quad9(points)
+        on_pcb = np.vstack([self.mesh.layer(0)[:, HEX27_BOTTOM], self.outer_faces])
+        records = [(face, value, 2, 1.0, face[0], 0.0, BOARD) for face in on_pcb for value in values]
+        root_xy = self.mesh.points[self.root, :2]
+        for k, (axis, sign) in enumerate(DIRECTIONS):
+            plane_node = self.root[np.argmax(sign * root_xy[:, axis])]
+            facing = sign * self.mesh.points[self.outer_faces][..., axis].mean(axis=1) > 1e-6
+            records += [(face, -sign * value, axis, sign, plane_node, sign, k)
+                        for face in self.outer_faces[facing] for value in values]
+            if self.geometry.tip_diameters.min() > self.geometry.root_diameter:
+                records += [(face, -value, 2, 1.0, plane_node, 1.0, SHEET)
+                            for face in self.outer_faces[self._nearest_direction() == k] for value in values]
+        self.point_nodes = np.array([[*r[0], r[4]] for r in records])
+        self.point_weights = np.array([[*r[1], r[5]] for r in records])
+        self.point_axis = np.array([r[2] for r in records])
+        self.point_neighbour = np.array([r[6] for r in records])
+        self.board_points = len(on_pcb) * len(values)     # the first ones
+        in_layer = [np.isin(self.point_nodes[:, 8], self.mesh.layer(k)) for k in range(self.mesh.layers)]   # by the face's centre
+        self.point_layer = np.argmax(in_layer, axis=0)
+        offset = np.choose(np.minimum(self.point_neighbour + 2, 2), [0.0, -pcb_z, self.geometry.wall_mm])
+        self.gap0 = self._along(self.coordinates) + offset
+        self.point_area = self._areas(np.array([r[0] for r in records]).reshape(-1, len(weights), 9)[:, 0], slopes, weights)
+        absent = (self.point_neighbour[None] >= 0) & ~self.geometry.neighbours[:, self.point_neighbour]
+        self.point_area[absent] = 0.0
+        self.gap0[absent] = NO_CONTACT_MM    # a frustum at the lattice's edge may bulge; that is no overlap
+
+    def _nearest_direction(self):
+        """Which of DIRECTIONS (f,) each outer face looks into most."""
+        middle = self.mesh.points[self.outer_faces].mean(axis=1)
+        return np.argmax([sign * middle[:, axis] for axis, sign in DIRECTIONS], axis=0)
+
+    def _along(self, field):
+        """Weighted component (n, p) of a nodal field along each contact point's axis."""
+        return _weighted_component(field, self.point_nodes, self.point_weights, self.point_axis)
+
+    def _areas(self, faces, slopes, weights):
+        """Reference areas (n, p) of the quadrature points of faces (f, 8)."""
+        edges = np.einsum("nfad,gai->nfgdi", self.coordinates[:, faces], slopes, optimize=True)
+        normal = np.cross(edges[..., 0], edges[..., 1])
+        return (np.linalg.norm(normal, axis=-1) * weights).reshape(self.count, -1)
+
+    def _number_unknowns(self, tips_held):
+        """Local order of the unknowns: inner ones first, then the root's; held ones get -1."""
+        number = np.zeros((self.nodes, 3), dtype=np.int64)
+        if tips_held:
+            number[self.tip, :2] = -1
+        number[self.root] = -1
+        self.inner = np.flatnonzero(number.ravel() == 0)
+        self.root_dofs = (3 * self.root[:, None] + np.arange(3)).ravel()
+
+    def _elimination(self):
+        """Layer by layer from the tip up: each leaves the nodes above, and the root's that carry the planes at its points."""
+        eliminated = np.zeros(3 * self.nodes, dtype=bool)
+        eliminated[self.inner] = True
+        moves = eliminated.copy()
+        moves[self.root_dofs] = True
+        layers, planes = [], []
+        for k in range(self.mesh.layers):
+            unknowns = _dofs(self.mesh.layer(k))
+            layers.append([np.where(moves[unknowns], unknowns, -1)])
+            moving = (self.point_layer == k) & (self.point_neighbour != BOARD)
+            planes.append(3 * self.point_nodes[moving, -1] + self.point_axis[moving])
+        return LayerwiseElimination(self.count, eliminated, layers, coupled=planes)
+
+    def evaluate(self, displacement, *, workers=SERIAL):
+        """Energy, nodal forces and gaps for displacement (n, nodes, 3); None if an element is inside out."""
+        elastic = self.rubber(displacement, workers=workers)
+        return None if elastic is None else self.with_contact(displacement, elastic)
+
+    def rubber(self, displacement, frusta=slice(None), *, workers=SERIAL):
+        """Energies (k,) in mJ and nodal forces (k, nodes, 3) of the rubber of the given frusta, or of all; None if inside out."""
+        elements = np.arange(len(self._element_nodes)).reshape(self.count, -1)[frusta].ravel()
+        body = self.block.evaluate(self.per_element(displacement), elements, workers=workers)
+        if body is None:
+            return None
+        force = np.zeros((len(displacement), self.nodes, 3))
+        add_forces(force.reshape(-1, 3), self._element_nodes[:len(elements)], body.force.reshape(-1, 27, 3))
+        return body.energies.reshape(len(displacement), -1).sum(axis=1), force
+
+    def potentials(self, displacement, elastic, frusta):
+        """Energies (k,) in mJ of the given frusta with their contacts, from the `rubber`'s; without friction's."""
+        energy, _, _ = self.contact.at(frusta).response(self.gap0[frusta] + self._along(displacement))
+        return elastic[0] + (energy * self.point_area[frusta]).sum(axis=1)
+
+    def again(self, state):
+        """The same displacements after the contact's or friction's own state has changed."""
+        return self.with_contact(state.displacement, state.elastic)
+
+    def with_contact(self, displacement, elastic):
+        """The state at displacement (n, nodes, 3), with the `rubber`'s energies and forces there."""
+        gaps, force = self.gap0 + self._along(displacement), elastic[1].copy()
+        energy, pressure, _ = self.contact.response(gaps)
+        _scatter_contact(force, -pressure * self.point_area, self.point_nodes, self.point_weights, self.point_axis)
+        state = BedState(elastic=elastic, energy=float(elastic[0].sum() + (energy * self.point_area).sum()), force=force,
+                         gaps=gaps, displacement=displacement)
+        return state if self.grip is None else self._with_friction(state)
+
+    def _with_friction(self, state):
+        """The state with friction's energy and forces."""
+        drag, area = self.grip.drag(self._on_board(state.displacement)), self.point_area[:, :self.board_points]
+        force = state.force.copy()
+        for axis in (0, 1):
+            _scatter_contact(force, drag.traction[..., axis] * area, *self._board_points(axis))
+        return replace(state, energy=state.energy + float((drag.energy * area).sum()), force=force, drag=drag)
+
+    def _board_points(self, axis):
+        """Nodes, weights and axis of the points on the board for a field's component `axis`."""
+        b = self.board_points
+        return self.point_nodes[:b], self.point_weights[:b], np.full(b, axis)
+
+    def _on_board(self, displacement):
+        """Places (n, b, 2) of the points in the board's plane."""
+        position = self.coordinates + displacement
+        return np.stack([_weighted_component(position, *self._board_points(axis)) for axis in (0, 1)], axis=-1)
+
+    def begin_step(self, state):
+        """Let friction hold the points as where a step starts from a `BedState`."""
+        if self.friction is None:
+            return
+        gaps = state.gaps[:, :self.board_points]
+        if state.drag is None:
+            self.grip = Grip.first(self.friction, self._on_board(state.displacement), gaps)
+        else:
+            self.grip = state.drag.next_step(gaps)
+
+    def renewed_grip(self, state):
+        """The grip with the pressures of a `BedState`."""
+        b = self.board_points
+        return state.drag.next_pass(state.gaps[:, :b], self.contact.response(state.gaps)[1][:, :b])
+
+    def contact_slope(self, gaps):
+        """Stiffness (n, p) of the contact points in N/mm3."""
+        return self.contact.response(gaps)[2]
+
+    def condense(self, state, frusta, damping=None, *, kept_mm=0.0):
+        """Recompute the condensed tangents of the given frusta (k,).
+
+        damping: stiffness (k,) in N/mm on their inner unknowns, see `Condensation.set`;  kept_mm: see `KeptTangents`
+        """
+        slope = self.contact.at(frusta).response(state.gaps[frusta])[2] * self.point_area[frusta]
+        displacement = state.displacement[frusta]
+        friction = None if state.drag is None else state.drag.stiffness(frusta)
+        layers = (([self._layer_tangents(k, displacement, frusta, kept_mm)], self._springs(k, frusta, slope, friction))
+                  for k in range(self.mesh.layers))
+        self.elimination.set(frusta, layers, damping=damping)
+
+    def forget(self):
+        """Let the next `condense` find the tangents of all elements anew."""
+        self._tangents.forget()
+
+    @property
+    def root_stiffness(self):
+        """What the condensed frusta leave on their roots (n, 3 r, 3 r) in N/mm, r nodes each."""
+        return self.elimination.matrices
+
+    def _springs(self, k, frusta, slope, friction):
+        """The k-th layer's contact points in frusta (b,), stiffnesses from `slope` (b, p) in N/mm and from `friction`, if any."""
+        at, place = np.flatnonzero(self.point_layer == k), self.elimination.stages[k].place
+        springs = Springs(slope[:, at], place[3 * self.point_nodes[at] + self.point_axis[at, None]], self.point_weights[at])
+        if friction is None:
+            return springs
+        return springs.with_others(self._friction_springs(at[at < self.board_points], place, friction, frusta))
+
+    def _friction_springs(self, at, place, stiffness, frusta):
+        """Friction at points on the board, of stiffness (b, all points on the board, 2, 2) in N/mm3.
+
+        Three springs a point make its symmetric 2 x 2 matrix: along x, along y, and on the sum of both components.
+        """
+        K = stiffness[:, at] * self.point_area[frusta][:, at, None, None]
+        both = K[..., 0, 1]
+        x, y = (place[3 * self.point_nodes[at] + axis] for axis in (0, 1))
+        weights, held = self.point_weights[at], np.full(x.shape, -1)
+        return Springs(np.hstack([K[..., 0, 0] - both, K[..., 1, 1] - both, both]),
+                       np.vstack([np.hstack([x, held]), np.hstack([held, y]), np.hstack([x, y])]),
+                       np.tile(weights, (3, 2)))
+
+    def _layer_tangents(self, k, displacement, frusta, kept_mm):
+        """Packed tangents (b, h, w) of the k-th layer's h elements in frusta (b,)."""
+        hexes = self.mesh.layer(k)
+        elements = frusta[:, None] * len(self.mesh.hexes) + k * len(hexes) + np.arange(len(hexes))
+        tangents = self._tangents.at(displacement[:, hexes].reshape(-1, 27, 3), elements.ravel(), kept_mm=kept_mm)
+        return tangents.reshape(*elements.shape, -1)
+
+    def condensed_residual(self, state, *, workers=SERIAL):
+        """Root forces (n, 75) after the inner residual has been eliminated, and what `inner_step` needs again."""
+        force = state.force.reshape(self.count, -1).copy()
+        halves = self.elimination.residual(force, workers=workers)
+        return force[:, self.root_dofs], halves
+
+    def inner_step(self, halves, root_step, *, workers=SERIAL):
+        """Newton step (n, nodes, 3) of the frusta for the roots' step (n, 75)."""
+        step = np.zeros((self.count, 3 * self.nodes))
+        step[:, self.root_dofs] = root_step
+        self.elimination.recover(halves, step, workers=workers)
+        return step.reshape(self.count, self.nodes, 3)
+
+    def own_step(self, state, frusta, *, workers=SERIAL):
+        """Newton step (k, nodes, 3) of the given frusta by their last condensed tangents, with their roots held."""
+        force, step = state.force[frusta].reshape(len(frusta), -1), np.zeros((len(frusta), 3 * self.nodes))
+        halves = self.elimination.residual(force, bodies=frusta, workers=workers)
+        self.elimination.recover(halves, step, bodies=frusta, workers=workers)
+        return step.reshape(len(frusta), self.nodes, 3)
+
+    def inner_residual(self, state):
+        """Unbalanced forces (n, inner) of the inner unknowns."""
+        return state.force.reshape(self.count, -1)[:, self.inner]
+
+    def compression(self, displacement):
+        """Mean shortening (n,) of each frustum in mm: root against tip."""
+        return displacement[:, self.tip, 2].mean(axis=1) - displacement[:, self.root, 2].mean(axis=1)
+
+
+@njit(cache=True, nogil=True)
+def _weighted_component(field, nodes, weights, axis):
+    out = np.zeros((field.shape[0], nodes.shape[0]))
+    for f in range(field.shape[0]):
+        for p in range(nodes.shape[0]):
+            for k in range(nodes.shape[1]):
+                out[f, p] += weights[p, k] * field[f, nodes[p, k], axis[p]]
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _scatter_contact(force, magnitude, nodes, weights, axis):
+    for f in range(force.shape[0]):
+        for p in range(nodes.shape[0]):
+            if magnitude[f, p] != 0.0:
+                for k in range(nodes.shape[1]):
+                    force[f, nodes[p, k], axis[p]] += magnitude[f, p] * weights[p, k]
+
+
+def _dofs(nodes):
+    """Unknowns (..., 3 k) of nodes (..., k)."""
+    return (3 * nodes[..., None] + np.arange(3)).reshape(*nodes.shape[:-1], -1)

@@ -1,0 +1,58 @@
+"""The object's contact with a slab as a step of Newton's method sees it."""
+
+import numpy as np
+
+from softtact.linalg.nodal_frames import NodeFrames
+from softtact.linalg.workers import SERIAL
+
+_SOON_MM, _NEAR_MM = 0.01, 0.1     # gaps of points that may touch within a step or two, and within some levels
+# Share of the squared normals that a node's own directions may leave out, when asked whether they are enough and when chosen.
+_BENT, _SLIGHTLY_BENT = 0.02, 0.005
+
+
+class StepContact:
+    """The object's contact in the course of a step from a `SlabState`; `planes` and `points` are what it is at present.
+
+    surface: looked up anew where the step leads; None: the points keep the planes that they face
+    """
+
+    def __init__(self, slab, state, indentation, surface=None, *, workers=SERIAL):
+        self._slab, self._state, self._indentation, self._surface, self._workers = slab, state, indentation, surface, workers
+        self._face(state.planes)
+
+    def _face(self, planes):
+        self.planes, self.points = planes, self._slab.linear_gaps(self._state.displacement, planes, self._indentation)
+
+    def frames(self, kept):
+        """`NodeFrames` of the nodes whose contact with the object may change, along the normals that they face.
+
+        kept: frames of before, whose nodes and numbers of vectors stay if they are enough for the nodes that may touch soon
+        """
+        now = self._frames_within(_SOON_MM, _BENT)
+        if kept is not None and kept.covers(now):
+            return kept.turned_as(now)
+        return self._frames_within(_NEAR_MM, _SLIGHTLY_BENT)
+
+    def _frames_within(self, within_mm, bent):
+        """Of nodes with gaps of less; wanted are vectors along which the normals' squares exceed a share `bent` of the most."""
+        nodes, normals = self._slab.top.facing_nodes(self.points.gaps, self.planes, within_mm)
+        unknowns = self._slab.unknowns_of(nodes)
+        free = (unknowns >= 0).all(axis=1)
+        size, turns = np.linalg.eigh(normals[free])
+        upright = (size[:, 1] < 1e-9 * size[:, 2]) & (np.abs(turns[:, 2, 2]) > 1 - 1e-9)
+        turns[upright] = np.eye(3)     # to the last digit, which spares the turning
+        return NodeFrames(first=unknowns[free, 0], turns=turns, wanted=(size > bent * size[:, 2:]).sum(axis=1),
+                          others=unknowns[~free][unknowns[~free] >= 0])
+
+    def rubber_forces(self, rubber, step):
+        """Forces (unknowns,) of the rubber's tangent against a step (unknowns,) in mm."""
+        return self._slab.product(rubber.data, step, workers=self._workers)
+
+    def follow(self, step, lowering):
+        """Look up what the points face after a step (unknowns,) in mm of the slab; True if there is a surface to ask."""
+        if self._surface is None:
+            return False
+        displacement = self._state.displacement.copy()
+        displacement.ravel()[self._slab.unknowns] += step
+        self._face(self._slab.facing(displacement, self._surface))
+        return True

@@ -1,0 +1,232 @@
+"""Contact of a rigid object with the slab's top: quadrature points of the top faces, each before a plane of the object."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from softtact.contact.coverage import continues, covered
+from softtact.contact.face_edges import ROWS, own_areas, softness
+from softtact.contact.friction import Drag, Grip
+from softtact.contact.height_field import NO_CONTACT_MM
+from softtact.fem.elements import gauss, quad8
+
+_NEAR_MM, _LARGEST_SHIFT_MM = 0.2, 0.02   # points that may touch when the object is let down on the cover, and how far at once
+
+
+@dataclass(frozen=True)
+class FacingPlanes:
+    """The planes of the object's facets that points face: anchors (p, 3) in mm at no indentation, outward normals (p, 3).
+
+    covered (p,): share of a point's own area that the object covers;  beside (p,): points that lie beside the object themselves
+    softness (p,): mm/MPa of a spring between point and plane, where an edge covers it in part (`contact/face_edges`)
+    A point keeps its plane during a step of Newton's method, so that each step lowers one potential.
+    """
+
+    anchors: np.ndarray
+    normals: np.ndarray
+    covered: np.ndarray
+    beside: np.ndarray
+    softness: np.ndarray
+
+
+@dataclass(frozen=True)
+class Touch:
+    """Contact at one displacement: energy (mJ), forces (t, w, 3) in N on the faces' nodes, gaps (p,) in mm of the points.
+
+    indentation_force: the object's, N downwards;  drag: friction at the points, None without
+    """
+
+    energy: float
+    force: np.ndarray
+    gaps: np.ndarray
+    indentation_force: float
+    drag: Drag | None = None
+
+
+class TopContact:
+    """The points of a `CoverMesh`'s top faces, flattened (p = t * points): areas (p,) in mm2, places (p, 3) in mm at rest.
+
+    faces (t, w): the free nodes that a face hangs on, values (t, points, w): their shape values at its points.
+    grip: how friction holds the points during a step, None without.
+    """
+
+    def __init__(self, mesh, contact, *, plane_modulus, friction=None):
+        """contact: `Contact`, the law of the points;  friction: `Coulomb` of the object on them, or None.
+
+        plane_modulus: E / (1 - nu^2) in MPa of what the object presses on
+        """
+        self.contact, self.friction, self.grip = contact, friction, None
+        points, weights = gauss(ROWS, 2)
+        values, slopes = quad8(points)
+        edges = np.einsum("tad,gai->tgdi", mesh.points[mesh.top][..., :2], slopes)
+        self.faces, self.values = _of_free_nodes(mesh.follow, mesh.top, np.broadcast_to(values, (len(mesh.top), *values.shape)))
+        self.area = (np.linalg.det(edges) * weights).ravel()
+        self.reference = self.at_points(mesh.points)
+        half = 0.5 * np.ptp(mesh.points[mesh.top[:, :4]][..., :2], axis=1)
+        self._own_area, self._give = own_areas(half, points).reshape(-1, 4, 2), 2.0 * np.sqrt(half.prod(axis=1)) / plane_modulus
+
+    def at_points(self, field):
+        """A nodal field (n, 3) at the points (p, 3)."""
+        return np.matmul(self.values, field[self.faces]).reshape(-1, 3)
+
+    def facing(self, displacement, surface):
+        """The object's facets above the points (see `FacingPlanes`)."""
+        position = self.reference + self.at_points(displacement)
+        height, normals = surface(position[:, 0], position[:, 1])
+        anchors = np.column_stack([position[:, :2], height])
+        share, foot = covered(position[:, None, :2] + self._own_area, surface)
+        # A point beside the object whose area reaches under it faces the plane there.
+        base, foot_normals = surface(*foot.T)
+        beside = ~continues(height, position[:, :2], base, foot)
+        anchors[beside] = np.column_stack([foot, base])[beside]
+        normals[beside] = foot_normals[beside]
+        share[anchors[:, 2] >= NO_CONTACT_MM] = 0.0
+        return FacingPlanes(anchors=anchors, normals=normals, covered=share, beside=beside, softness=softness(share, self._give))
+
+    def contact_on(self, planes):
+        """The points' `Contact` on the planes that they face."""
+        return replace(self.contact, softness=planes.softness)
+
+    def gaps(self, displacement, planes, indentation):
+        """Normal gaps (p,) in mm between the points and the planes they face."""
+        offset = self.reference + self.at_points(displacement) - planes.anchors
+        return np.einsum("pd,pd->p", planes.normals, offset) + indentation * planes.normals[:, 2]
+
+    def own_gaps(self, state):
+        """Gaps (p,) of the points that lie under the object, without what edges give way; of those beside it one that says so."""
+        return np.where(state.planes.beside, NO_CONTACT_MM, self.contact_on(state.planes).own_gaps(state.gaps))
+
+    def error(self, state):
+        """Deepest overlap, or widest gap under pressure, in mm of points that lie under the object."""
+        return self.contact_on(state.planes).error(np.where(state.planes.beside, NO_CONTACT_MM, state.gaps))
+
+    def press_apart(self, state):
+        """From now on hold each point where it just touches the object."""
+        self.contact = self.contact_on(state.planes).pressed_apart(state.gaps)
+
+    def touch(self, displacement, planes, indentation):
+        """The contact with the object lowered by `indentation` mm."""
+        gaps, normals = self.gaps(displacement, planes, indentation), planes.normals
+        density, pressure, _ = self.contact_on(planes).response(gaps)
+        area = self.area * planes.covered
+        push = (pressure * area)[:, None] * normals      # on the slab: along the object's outward normal
+        touch = Touch(energy=float(density @ area), force=-self._on_nodes(push), gaps=gaps,
+                      indentation_force=float(-push[:, 2].sum()))
+        return touch if self.grip is None else self._with_friction(touch, displacement, planes, indentation)
+
+    def _with_friction(self, touch, displacement, planes, indentation):
+        """The contact with friction's energy and forces, on the covered share of area as the pressure's."""
+        area = self.area * planes.covered
+        drag = self.grip.drag(self._in_object(displacement, indentation), planes.normals)
+        pull = drag.traction * area[:, None]
+        # Raising the indentation lifts the points in the object's frame, so the slips' vertical part resists it.
+        return replace(touch, energy=touch.energy + float(drag.energy @ area), force=touch.force + self._on_nodes(pull),
+                       indentation_force=touch.indentation_force + float(pull[:, 2].sum()), drag=drag)
+
+    def _on_nodes(self, forces):
+        """Forces (p, 3) in N at the points as forces (t, w, 3) on the faces' nodes."""
+        return np.matmul(self.values.transpose(0, 2, 1), forces.reshape(len(self.faces), -1, 3))
+
+    def _in_object(self, displacement, indentation):
+        """Places (p, 3) of the points in the frame of the object, which goes down by `indentation`."""
+        return self.reference + self.at_points(displacement) + [0.0, 0.0, indentation]
+
+    def begin_step(self, state, indentation):
+        """Let friction hold the points as where a step starts from a `SlabState`."""
+        if self.friction is None:
+            return
+        if state.drag is None:
+            self.grip = Grip.first(self.friction, self._in_object(state.displacement, indentation), state.gaps)
+        else:
+            self.grip = state.drag.next_step(state.gaps)
+
+    def renewed_grip(self, state):
+        """The grip with the pressures of a `SlabState`."""
+        return state.drag.next_pass(state.gaps, self._pressure(state))
+
+    def _pressure(self, state):
+        """Pressure (p,) in MPa under the contact as it is now, on what is covered of the points' areas."""
+        return self.contact_on(state.planes).response(state.gaps)[1]
+
+    def balanced(self, state, indentation, force_n):
+        """The indentation (mm) at which the object's force, friction aside, is `force_n` on the cover as it is.
+
+        The force grows with the depth, from a square root's slope on: Newton's method with bounded steps.
+        """
+        near = np.flatnonzero(state.gaps < _NEAR_MM)
+        down, area = -state.planes.normals[near, 2], (self.area * state.planes.covered)[near]
+        contact, gaps, shift = self.contact_on(state.planes).at(near), state.gaps[near], 0.0
+        for _ in range(50):
+            _, pressure, slope = contact.response(gaps - shift * down)
+            excess = pressure @ (down * area) - force_n
+            if abs(excess) <= 1e-9 * force_n:
+                break
+            stiffness = slope @ (down**2 * area)
+            shift -= np.clip(excess / max(stiffness, 1e-12), -_LARGEST_SHIFT_MM, _LARGEST_SHIFT_MM)
+        return indentation + shift
+
+    def stiffness(self, state):
+        """Stiffness (p,) in N/mm of the points along their normals."""
+        return self.contact_on(state.planes).response(state.gaps)[2] * self.area * state.planes.covered
+
+    def area_under_pressure(self, state):
+        """Area in mm2 of the points that carry pressure under the contact as it is now, as far as the object covers it.
+
+        By the pressure, not by the gap: where overlaps were pressed apart, touching points have gaps near zero of either sign.
+        """
+        return float((self.area * state.planes.covered)[self.under_pressure(state)].sum())
+
+    def under_pressure(self, state):
+        """Which points (p,) carry pressure."""
+        return self._pressure(state) * state.planes.covered > 0
+
+    def pressure_of_faces(self, state):
+        """Mean pressure (t,) in MPa on each face, under the contact as it is now."""
+        area = self.area.reshape(len(self.faces), -1)
+        force = self._pressure(state) * self.area * state.planes.covered
+        return force.reshape(area.shape).sum(axis=1) / area.sum(axis=1)
+
+    def normal_shapes(self, planes):
+        """Change (t, points, 3 w) of the points' gaps by the faces' unknowns."""
+        normal = planes.normals.reshape(*self.values.shape[:2], 3)
+        return np.einsum("tga,tgd->tgad", self.values, normal).reshape(*normal.shape[:2], -1)
+
+    def facing_nodes(self, gaps, planes, within_mm):
+        """Free nodes (k,) of faces with points under the object whose gaps are less, and how the planes before each lie.
+
+        That is the sum (k, 3, 3) of n n' over the normals, in mm2 of the points' areas.
+        """
+        near = (gaps < within_mm) & (planes.covered > 0)
+        weight = (self.area * planes.covered * near).reshape(len(self.faces), -1)
+        normals = planes.normals.reshape(*weight.shape, 3)
+        of_faces = np.einsum("tg,tga,tgi,tgj->taij", weight, np.abs(self.values), normals, normals, optimize=True)
+        total = np.zeros((self.faces.max() + 1, 3, 3))
+        np.add.at(total, self.faces, of_faces)
+        nodes = np.flatnonzero(np.trace(total, axis1=1, axis2=2) > 0)
+        return nodes, total[nodes]
+
+    def friction_tangent(self, state):
+        """Friction's blocks (t, 3 w, 3 w) of the faces, border (t, 3 w) and corner.
+
+        The border is the derivative of the forces by the indentation, the corner the energy's second derivative by it.
+        """
+        area = (self.area * state.planes.covered)[:, None, None]
+        slope = (state.drag.stiffness() * area).reshape(*self.values.shape[:2], 3, 3)
+        along = np.einsum("tga,tgij->tgaij", self.values, slope)
+        blocks = np.einsum("tgaij,tgb->taibj", along, self.values, optimize=True)
+        size = 3 * self.values.shape[2]
+        return blocks.reshape(-1, size, size), along[..., 2].sum(axis=1).reshape(-1, size), float(slope[..., 2, 2].sum())
+
+
+def _of_free_nodes(follow, faces, values):
+    """Free nodes (t, w) that faces (t, 8) hang on, and values (t, g, 8) in terms of these (t, g, w)."""
+    if (faces < follow.shape[1]).all():
+        return faces, values
+    rows = [follow[face] for face in faces]
+    needed = [np.unique(row.indices) for row in rows]
+    width = max(map(len, needed))
+    nodes = np.stack([np.pad(n, (0, width - len(n)), mode="edge") for n in needed])
+    out = np.zeros((*values.shape[:2], width))
+    for t, (row, used) in enumerate(zip(rows, needed, strict=True)):
+        out[t, :, :len(used)] = values[t] @ row[:, used].toarray()
+    return nodes, out

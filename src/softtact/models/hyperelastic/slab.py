@@ -1,0 +1,357 @@
+"""Sheet and cover as one slab over the frusta, with the contact of a rigid object on its top (`TopContact`).
+
+The sheet's elements meet the frusta's roots node by node. The cover knows nothing of the frusta, so its hexahedra may be
+coarser in plan: the nodes of what is below follow its lower side. Where sheet and cover meet, the field still changes from
+frustum to frustum, and such a tie costs several per cent of the map; so the cover's lowest layers may keep to the sheet's plan.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from softtact.contact.friction import Drag
+from softtact.fem.assembly import SymmetricProduct, add_upper, upper_pattern, upper_positions
+from softtact.fem.elements import quad8
+from softtact.fem.extruded_mesh import extrude
+from softtact.fem.graded_mesh import cover_mesh
+from softtact.fem.kernels import add_forces
+from softtact.fem.point_location import plan_interpolation
+from softtact.fem.solid_block import HexBlock, WedgeBlock, joined, of_masters
+from softtact.linalg.workers import SERIAL
+from softtact.models.hyperelastic.newton_step import LinearGaps
+from softtact.models.hyperelastic.rigid_contact import FacingPlanes, TopContact
+
+
+@dataclass(frozen=True)
+class SlabState:
+    """energy (mJ), force (n, 3) in N, contact quantities at the top's points, displacement (n, 3).
+
+    elastic: energy and force of the rubber alone; planes: what the points face; indentation_force: the object's, N downwards;
+    drag: friction at the points, None without.
+    """
+
+    elastic: tuple
+    energy: float
+    force: np.ndarray
+    gaps: np.ndarray
+    planes: FacingPlanes
+    displacement: np.ndarray
+    indentation_force: float
+    drag: Drag | None = None
+
+
+@dataclass(frozen=True)
+class Layer:
+    """One material's layer: increasing heights z of its element layers (mm), and its law."""
+
+    levels: np.ndarray
+    law: object
+
+
+@dataclass(frozen=True)
+class CellGroup:
+    """Cells (c,) of the sheet under equal pieces of the cover.
+
+    layers: layer by layer from below like elements: nodes (c * elements, w), cell by cell, and their block
+    """
+
+    cells: np.ndarray
+    layers: list
+
+    @property
+    def parts(self):
+        """Those of all layers."""
+        return [part for layer in self.layers for part in layer]
+
+
+class Slab:
+    """Sheet (its plan a `SheetPlan`) under a cover on a grid; a cover of one level is the sheet's top without a cover.
+
+    sheet_mesh: the sheet (`sheet_layers`) and the cover's layers that keep to its plan;  cover_mesh: the cover's other layers
+    Nodes: cover_mesh's first, then sheet_mesh's without its top. `bottom`: those under the sheet, in the plan's order.
+    """
+
+    def __init__(self, sheet, cover, sheet_plan, x_lines, y_lines, *, sides, contact, coarse_walls=True, splits=None,
+                 growing_over_shear=0.0, friction=None):
+        """splits (layers, ny 2^m, nx 2^m): how often the cover's uppermost layers are split where (see `cover_mesh`); the layers
+        below these keep to the sheet's plan. None: none does, and none is split.
+
+        coarse_walls: everywhere (True), nowhere (False), or where a function of places (n, 2) says so (n,)
+        growing_over_shear: see `blocks`;  friction: `Coulomb` of the object on the top, or None
+        """
+        if splits is None:
+            splits = np.zeros((len(cover.levels) - 1, len(y_lines) - 1, len(x_lines) - 1), dtype=np.int64)
+        self.x_lines, self.y_lines = np.asarray(x_lines), np.asarray(y_lines)
+        self.layers, self.sheet_plan = (sheet, cover), sheet_plan
+        bound = len(cover.levels) - 1 - len(splits)
+        self.cover_mesh = cover_mesh(x_lines, y_lines, cover.levels[bound:], splits)
+        self.sheet_mesh = extrude(sheet_plan.plan, np.append(sheet.levels, cover.levels[1:bound + 1]))
+        self.sheet_layers = len(sheet.levels) - 1
+        self._coarse_walls, self._growing_over_shear = coarse_walls, growing_over_shear
+        self._number_nodes(sheet_plan)
+        self.groups, self.cell_groups = [], []   # (nodes, block) outside of cells; a `CellGroup` for each kind of cell
+        self._add_cover(cover.law)
+        self._add_sheet(sheet_plan, [sheet.law] * self.sheet_layers + [cover.law] * bound)
+        self._joined = joined(self.solids)     # to evaluate a hundred small blocks takes twice as long
+        self._number_unknowns(sides)
+        pressed = cover.law or sheet.law     # None in bodies at rest, of which only the mesh is wanted
+        self.top = TopContact(self.cover_mesh, contact, plane_modulus=pressed.plane_modulus if pressed else np.inf,
+                              friction=friction)
+
+    def _number_nodes(self, plan):
+        """Masters (p, 8) and weights (p, 8) of sheet_mesh's nodes: its top follows the cover, the rest its own unknowns.
+
+        Along the walls between cells, two elements a side, the sheet moves as one quadratic curve: the nodes at the quarters
+        follow the corner, the middle and the next corner. (Free quarters: half as many unknowns again, and 1 % softer.)
+        """
+        mesh, first = self.sheet_mesh, self.cover_mesh.free
+        top = mesh.planes[-1]
+        curve, curve_weights = plan.quarters
+        coarse = self._coarse_walls(plan.plan.points[curve[:, 0]]) if callable(self._coarse_walls) else self._coarse_walls
+        curve = curve[np.broadcast_to(coarse, len(curve))]
+        follows = np.zeros(len(mesh.points), dtype=bool)
+        follows[top] = True
+        planes = mesh.inner_planes
+        follows[planes[:, curve[:, 0]]] = True
+        own = np.flatnonzero(~follows)
+        number = np.full(len(mesh.points), -1, dtype=np.int64)
+        number[own] = first + np.arange(len(own))
+        above = self._under_cover(plan.plan.points)
+        width = max(int(np.diff(above.indptr).max()), 3)
+        self._masters, self._weights = np.zeros((len(mesh.points), width), dtype=np.int64), np.zeros((len(mesh.points), width))
+        self._masters[own, 0], self._weights[own, 0] = number[own], 1.0
+        row = np.repeat(np.arange(len(top)), np.diff(above.indptr))
+        place = np.arange(above.nnz) - above.indptr[row]
+        self._masters[top[row], place], self._weights[top[row], place] = above.indices, above.data
+        for plane in planes:
+            self._masters[plane[curve[:, 0]], :3] = number[plane[curve[:, 1:]]]
+            self._weights[plane[curve[:, 0]], :3] = curve_weights
+        self.points = np.vstack([self.cover_mesh.points[:first], mesh.points[own]])
+        self.nodes = len(self.points)
+        self.bottom = number[mesh.planes[0]]
+
+    @cached_property
+    def uses(self):
+        """In how many cells, groups of other elements and top faces each node occurs (n,); 1: a cell's own."""
+        cells = [np.unique(np.hstack([nodes.reshape(len(group.cells), -1) for nodes, _ in group.parts])[k])
+                 for group in self.cell_groups for k in range(len(group.cells))]
+        others = [np.unique(nodes) for nodes, _ in self.groups] + [np.unique(self.top.faces)]
+        return np.bincount(np.concatenate([*cells, *others]), minlength=self.nodes)
+
+    @property
+    def sheet_nodes(self):
+        """Masters (p, 8) and weights (p, 8) of the nodes of `sheet_mesh`: numbers of the slab's nodes that each follows."""
+        return self._masters, self._weights
+
+    def _add_cover(self, law):
+        """Groups of the cover's elements, those among larger ones apart: they hang on more nodes than their own."""
+        mesh = self.cover_mesh
+        if not len(mesh.hexes):
+            return
+        alone = (mesh.hexes < mesh.free).all(axis=1)
+        block = self._cover_block(mesh.hexes[alone], law)
+        self.groups.append((mesh.hexes[alone], block))
+        if not alone.all():
+            hanging = mesh.hexes[~alone]
+            self.groups.append(of_masters(*mesh.masters(), hanging, self._cover_block(hanging, law)))
+
+    def _cover_block(self, hexes, law):
+        return HexBlock(self.cover_mesh.points[hexes], law, points_per_side=2, growing_over_shear=self._growing_over_shear)
+
+    def _add_sheet(self, plan, laws):
+        """Like elements (nodes, block): those of the strips around, and those of each kind of cell, cell by cell; a law a layer."""
+        mesh, cells = self.sheet_mesh, len(plan.roots)
+        in_cells = cells * plan.cell_quads
+        layers = [(mesh.layer(k), mesh.wedge_layer(k), law) for k, law in enumerate(laws)]
+        self.groups += [self._following(hexes[in_cells:], HexBlock, law) for hexes, _, law in layers if len(hexes) > in_cells]
+        if not cells:
+            return
+        pieces = [[(hexes[:in_cells].reshape(cells, -1, 27), HexBlock, law), (wedges.reshape(cells, -1, 18), WedgeBlock, law)]
+                  for hexes, wedges, law in layers]
+        for same in self._like_cells(np.hstack([elements.reshape(cells, -1) for layer in pieces for elements, _, _ in layer])):
+            self.cell_groups.append(CellGroup(same, [
+                [self._following(elements[same].reshape(-1, elements.shape[2]), make, law)
+                 for elements, make, law in layer if elements.size] for layer in pieces]))
+
+    def _following(self, elements, make, law):
+        block = make(self.sheet_mesh.points[elements], law, growing_over_shear=self._growing_over_shear)
+        return of_masters(self._masters, self._weights, elements, block)
+
+    def _like_cells(self, nodes):
+        """Numbers of like cells, kind by kind, of cells with nodes (c, k): those whose nodes follow others in the same way."""
+        used = np.abs(self._weights) > 1e-12
+        kinds = {}
+        for number, cell in enumerate(nodes):
+            _, local = np.unique(np.where(used[cell], self._masters[cell], -1), return_inverse=True)
+            signature = local.tobytes() + np.round(self._weights[cell] * used[cell], 9).tobytes()
+            kinds.setdefault(signature, []).append(number)
+        return [np.array(cells) for cells in kinds.values()]
+
+    @property
+    def solids(self):
+        """All elements with their nodes: [(nodes (e, w), block)]."""
+        return self.groups + [part for group in self.cell_groups for part in group.parts]
+
+    @property
+    def blocks(self):
+        """All blocks of elements: those of `solids`, and the same joined."""
+        return [block for _, block in self.solids + self._joined]
+
+    def _number_unknowns(self, sides):
+        """Free unknowns: all but the sides, which are `held` (sensor shell), `symmetric` (unit cell) or also `free`."""
+        x, y, _ = self.points.T
+        on_x = (np.abs(x - self.x_lines[0]) < 1e-9) | (np.abs(x - self.x_lines[-1]) < 1e-9)
+        on_y = (np.abs(y - self.y_lines[0]) < 1e-9) | (np.abs(y - self.y_lines[-1]) < 1e-9)
+        held = np.zeros((self.nodes, 3), dtype=bool)
+        if sides == "held":
+            held[on_x | on_y] = True
+        elif sides == "symmetric":
+            held[on_x, 0] = held[on_y, 1] = True
+        elif sides != "free":
+            raise ValueError(f"sides must be 'held', 'symmetric' or 'free', not {sides!r}")
+        self.free = np.flatnonzero(~held.ravel())
+        self.number = np.full(held.size, -1, dtype=np.int64)
+        self.number[self.free] = np.arange(len(self.free))
+
+    def facing(self, displacement, surface):
+        """The object's facets above the top's points (see `FacingPlanes`)."""
+        return self.top.facing(displacement, surface)
+
+    def evaluate(self, displacement, planes, indentation, *, workers=SERIAL):
+        """Energy, forces and contact with the object lowered by `indentation` mm; None if an element is inside out."""
+        force = np.zeros((self.nodes, 3))
+        energy = 0.0
+        for nodes, block in self._joined:
+            state = block.evaluate(displacement[nodes], workers=workers)
+            if state is None:
+                return None
+            energy += state.energy
+            add_forces(force, nodes, state.force.reshape(*nodes.shape, 3))
+        return self._with_contact(displacement, (energy, force), planes, indentation)
+
+    def reface(self, state, planes, indentation):
+        """The same displacements in front of other planes."""
+        return self._with_contact(state.displacement, state.elastic, planes, indentation)
+
+    def _with_contact(self, displacement, elastic, planes, indentation):
+        energy, force = elastic[0], elastic[1].copy()
+        touch = self.top.touch(displacement, planes, indentation)
+        add_forces(force, self.top.faces, touch.force.reshape(*self.top.faces.shape, 3))
+        return SlabState(elastic=elastic, energy=energy + touch.energy, force=force, gaps=touch.gaps, planes=planes,
+                         displacement=displacement, indentation_force=touch.indentation_force, drag=touch.drag)
+
+    def build_pattern(self, eliminated, cells, *, precision=np.float32):
+        """Fix the global matrix: its unknowns are the free but the `eliminated` ones; `cells` [(c, k)]: what cells leave.
+
+        precision: of its values; single is enough for steps that a residual in double precision corrects
+        """
+        keep = np.setdiff1d(self.free, eliminated)
+        self.unknowns = keep
+        number = np.full(3 * self.nodes, -1, dtype=np.int64)
+        number[keep] = np.arange(len(keep))
+        *groups, top = [(3 * nodes[..., None] + np.arange(3)).reshape(len(nodes), -1)
+                        for nodes in [*(nodes for nodes, _ in self.groups), self.top.faces]]
+        self._number = number.reshape(-1, 3)
+        members, self._top_dofs = [number[dofs] for dofs in [*groups, *cells]], number[top]
+        indptr, indices = upper_pattern([*members, self._top_dofs], len(keep))
+        self._positions = [upper_positions(indptr, indices, dofs) for dofs in members]
+        self._top_positions = upper_positions(indptr, indices, self._top_dofs)
+        self._matrix = sp.csr_matrix((np.zeros(len(indices), dtype=precision), indices, indptr), shape=(len(keep),) * 2)
+        self.product = SymmetricProduct(indptr, indices)
+
+    def tangent(self, state, condensed, *, workers=SERIAL):
+        """Upper triangle (csr) of the tangent with the cells' condensed blocks [(f, k, k)] and the object's contact."""
+        whole, shapes = self.rubber_tangent(state, condensed, workers=workers).copy(), self.top.normal_shapes(state.planes)
+        weighted = shapes * self.top.stiffness(state).reshape(len(shapes), -1, 1)
+        add_upper(whole.data, np.matmul(weighted.transpose(0, 2, 1), shapes), self._top_positions)
+        return whole
+
+    def rubber_tangent(self, state, condensed, *, workers=SERIAL):
+        """Upper triangle (csr) of the tangent with friction, but without the object's pressure; valid until the next call."""
+        matrix = self._matrix
+        matrix.data[:] = 0.0
+        blocks = workers.map(lambda group: group[1].tangent(state.displacement[group[0]], precision=matrix.dtype.type), self.groups)
+        for part, positions in zip([*blocks, *condensed], self._positions, strict=True):
+            add_upper(matrix.data, part, positions)
+        if state.drag is not None:
+            add_upper(matrix.data, self.top.friction_tangent(state)[0], self._top_positions)
+        return matrix
+
+    def linear_gaps(self, displacement, planes, indentation):
+        """The gaps of the object's contact points as they depend on a step of the global unknowns, a `LinearGaps`."""
+        shapes, gaps = self.top.normal_shapes(planes), self.top.gaps(displacement, planes, indentation)
+        free = np.broadcast_to(self._top_dofs[:, None] >= 0, shapes.shape)
+        points = np.broadcast_to(np.arange(len(gaps)).reshape(*shapes.shape[:2], 1), shapes.shape)[free]
+        columns = np.broadcast_to(self._top_dofs[:, None], shapes.shape)[free]
+        rows = sp.csr_matrix((shapes[free], (points, columns)), shape=(len(gaps), len(self.unknowns)))
+        return LinearGaps(gaps=gaps, rows=rows, lowering=planes.normals[:, 2], area=self.top.area * planes.covered,
+                          contact=self.top.contact_on(planes))
+
+    def unknowns_of(self, nodes):
+        """The global matrix' unknowns (k, 3) of nodes (k,), -1 where a movement is none."""
+        return self._number[nodes]
+
+    def friction_border(self, state):
+        """How friction ties the unknowns to the object's lowering: derivative (unknowns,) of their residual by it, and its own."""
+        if state.drag is None:
+            return np.zeros(len(self.unknowns)), 0.0
+        _, of_faces, corner = self.top.friction_tangent(state)
+        border, here = np.zeros(len(self.unknowns)), self._top_dofs >= 0
+        np.add.at(border, self._top_dofs[here], of_faces[here])
+        return border, corner
+
+    @staticmethod
+    def add_to_diagonal(matrix, value):
+        """Add `value` (N/mm) to each diagonal entry of an upper triangle."""
+        matrix.data[matrix.indptr[:-1]] += value   # sorted upper triangle: each row begins with its diagonal
+
+    def locate(self, points):
+        """Faces (p,) under the cover and shape values (p, 8) at points (p, 2); points on a line belong to the lower side."""
+        cells = self.cover_mesh.bottom_cells
+        fine = cells.shape[0] // (len(self.y_lines) - 1)
+        i, j = (_place(value, lines, fine) for value, lines in zip(points.T, (self.x_lines, self.y_lines), strict=True))
+        faces = cells[j, i]
+        low, _, high, _ = self.cover_mesh.points[self.cover_mesh.bottom[faces, :4], :2].transpose(1, 0, 2)
+        return faces, quad8(2 * (points - low) / (high - low) - 1)[0]
+
+    def _under_cover(self, points):
+        """Sparse matrix (p, free nodes of the cover) that interpolates on the cover's lower side at points (p, 2)."""
+        mesh = self.cover_mesh
+        faces, values = self.locate(points)
+        rows = np.repeat(np.arange(len(points)), 8)
+        all_nodes = sp.csr_matrix((values.ravel(), (rows, mesh.bottom[faces].ravel())), shape=(len(points), len(mesh.points)))
+        return _without_zeros(all_nodes @ mesh.follow)
+
+    def sampling(self, points):
+        """Sparse matrix (p, nodes) that interpolates a nodal field of the plane between sheet and cover at points (p, 2)."""
+        if self.sheet_layers == self.sheet_mesh.layers:
+            at = self._under_cover(points)
+            at.resize(len(points), self.nodes)
+            return at
+        plane = self.sheet_mesh.planes[self.sheet_layers]
+        masters, weights = self._masters[plane], self._weights[plane]
+        rows = np.repeat(np.arange(len(plane)), masters.shape[1])
+        own = sp.csr_matrix((weights.ravel(), (rows, masters.ravel())), shape=(len(plane), self.nodes))
+        return _without_zeros(plan_interpolation(self.sheet_plan.plan, points) @ own)
+
+    @property
+    def interface_nodes(self):
+        """Free nodes (n,) of the plane between sheet and cover."""
+        if self.sheet_layers == self.sheet_mesh.layers:
+            return self.cover_mesh.bottom_nodes
+        plane = self.sheet_mesh.planes[self.sheet_layers]
+        return np.unique(self._masters[plane][np.abs(self._weights[plane]) > 1e-12])
+
+
+def _place(value, lines, fine):
+    """Which interval of lines, each cut into `fine` equal parts, values (p,) lie in."""
+    grid = np.interp(np.arange(fine * (len(lines) - 1) + 1), fine * np.arange(len(lines)), lines)
+    return np.clip(np.searchsorted(grid, value - 1e-9) - 1, 0, len(grid) - 2)
+
+
+def _without_zeros(matrix):
+    matrix.data[np.abs(matrix.data) < 1e-12] = 0.0
+    matrix.eliminate_zeros()
+    return matrix.tocsr()

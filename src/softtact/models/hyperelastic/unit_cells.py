@@ -1,0 +1,233 @@
+"""The sheet over each frustum together with the frustum: one cell of the lattice, seen by the rest through its walls and its top.
+
+Cells repeat, so their inner unknowns are eliminated cell by cell, after the frustum's own. What is left for the global
+matrix are the cells' walls and the cover. Cells under parts of the cover that are split differently are of different kinds.
+"""
+
+import numpy as np
+
+from softtact.fem.static_condensation import packed
+from softtact.fem.substructuring import LayerwiseElimination
+from softtact.fem.tangent_cache import KeptTangents
+from softtact.linalg.workers import SERIAL, chunks
+
+_CHUNK = 8                          # cells that one thread condenses at once
+_ELEMENTS_KEEP_MM = 0.004           # by which an element's nodes may move against each other before its tangent is found anew
+_REFRESH_SLOPE = 0.2                # a cell keeps no tangent where a contact point's stiffness changed by this share of the penalty
+_REFRESH_WITH_FRICTION = 20.0       # ... or, with friction, by this many N/mm3: with 100 light presses creep and fail
+# A cell is thrown too far where its inner nodes go so far beyond this multiple of its walls' step, or its walls farther than that.
+_FARTHEST_MM, _FARTHEST_RATIO, _FARTHEST_OUTER_MM = 0.05, 2.0, 0.4
+_LEAST_DAMPING, _DAMPING_GROWTH = 0.05, 4.0     # N/mm on each unknown; a frustum's softest mode has 0.03 at rest
+
+
+class SheetCells:
+    """Cells of a `Slab` with their frusta; `roots` (f, k) are the slab's nodes of each frustum's root."""
+
+    def __init__(self, slab, bed, roots):
+        self.slab, self.bed, self.roots, self.count = slab, bed, roots, bed.count
+        self.kinds = [CellKind(slab, group, roots[group.cells]) for group in slab.cell_groups]
+        self._tangent_at = None
+        self._damping, self._damped_with = np.zeros(self.count), np.zeros(self.count)
+
+    @property
+    def eliminated(self):
+        """All unknowns that the cells eliminate."""
+        return np.concatenate([kind.inner_dofs.ravel() for kind in self.kinds])
+
+    @property
+    def outer_dofs(self):
+        """Unknowns that the cells leave, kind by kind (c, k)."""
+        return [kind.outer_dofs for kind in self.kinds]
+
+    @property
+    def outer(self):
+        """Condensed matrices, kind by kind (c, k, k)."""
+        return [kind.elimination.matrices for kind in self.kinds]
+
+    def positive_outer(self):
+        """The condensed matrices without their modes of negative stiffness."""
+        return [kind.elimination.positive_matrices() for kind in self.kinds]
+
+    def refresh(self, state, *, kept_mm=0.0, workers=SERIAL):
+        """Recompute the condensed tangents of the cells that moved by more than `kept_mm` or changed contact since their last one.
+
+        Keeping the others is a quasi-Newton step: forces are always exact. Returns how many were recomputed.
+        """
+        stale = self._stale(state, kept_mm)
+        frusta = chunks(np.flatnonzero(stale), _CHUNK)
+        kept = min(kept_mm, _ELEMENTS_KEEP_MM)
+        workers.map(lambda part: self.bed.condense(state.bed, part, self._damping[part], kept_mm=kept), frusta)
+        tasks = [(kind, part) for kind in self.kinds for part in chunks(np.flatnonzero(stale[kind.cells]), _CHUNK)]
+        workers.map(lambda task: task[0].condense(state, self.bed, task[1], self._damping, kept_mm=kept), tasks)
+        self._damped_with = self._damping.copy()
+        return int(stale.sum())
+
+    def damp(self, slab_step, bed_step):
+        """Damp the cells that a step throws too far, for which it is to be found again: whether there are any; free the others.
+
+        A frustum about to snap into a new fold has a soft mode: its step would be of no use, and shorten that of all others.
+        """
+        inner, outer = self._movement(slab_step, bed_step)
+        thrown = (inner > _FARTHEST_MM + _FARTHEST_RATIO * outer) | (outer > _FARTHEST_OUTER_MM)
+        if thrown.any():
+            self._damping = np.where(thrown, np.maximum(_DAMPING_GROWTH * self._damping, _LEAST_DAMPING), self._damping)
+        else:
+            self._damping = np.where(self._damping > _LEAST_DAMPING, self._damping / _DAMPING_GROWTH, 0.0)
+        return bool(thrown.any())
+
+    def forget(self, cells=None):
+        """Let the next `refresh` recompute the given cells, or all, then also the tangents that their elements keep."""
+        if cells is None:
+            self._tangent_at = None
+            self.bed.forget()
+            for kind in self.kinds:
+                kind.forget()
+        elif self._tangent_at is not None:
+            self._tangent_at[cells] = np.inf
+
+    def _stale(self, state, kept_mm):
+        slope, limit = self._slope(state)
+        roots = state.slab.displacement[self.roots].reshape(self.count, -1)
+        place = np.hstack([roots, state.bed.displacement.reshape(self.count, -1)])
+        above = [state.slab.displacement[kind.nodes].reshape(len(kind.cells), -1) for kind in self.kinds]
+        if self._tangent_at is None:
+            self._tangent_at, self._above, self._slope_at = place, above, slope
+            return np.ones(self.count, dtype=bool)
+        stale = np.abs(place - self._tangent_at).max(axis=1) > kept_mm
+        stale |= (np.abs(slope - self._slope_at).max(axis=1) > limit) | (self._damping != self._damped_with)
+        for kind, now, before in zip(self.kinds, above, self._above, strict=True):
+            stale[kind.cells] |= np.abs(now - before).max(axis=1) > kept_mm
+            before[stale[kind.cells]] = now[stale[kind.cells]]
+        self._tangent_at[stale], self._slope_at[stale] = place[stale], slope[stale]
+        return stale
+
+    def _slope(self, state):
+        """Stiffnesses (f, q) in N/mm3 of the contact points with friction's, and by how much they may change."""
+        slope, drag = self.bed.contact_slope(state.bed.gaps), state.bed.drag
+        if drag is not None:
+            slope = np.hstack([slope, drag.stiffness().reshape(self.count, -1)])
+        without = state.slab.drag is None and drag is None
+        return slope, _REFRESH_SLOPE * self.bed.contact.stiffness if without else _REFRESH_WITH_FRICTION
+
+    def condensed_residual(self, state, *, workers=SERIAL):
+        """Residual (n, 3) of the slab with all inner unknowns eliminated, and what `recover` needs again."""
+        root_force, in_frusta = self.bed.condensed_residual(state.bed, workers=workers)
+        residual = state.slab.force.copy()
+        np.add.at(residual, self.roots.ravel(), root_force.reshape(-1, 3))
+        flat = residual.reshape(-1)
+        reduced = workers.map(lambda kind: kind.residual(flat), self.kinds)
+        for kind, (passed_on, _) in zip(self.kinds, reduced, strict=True):
+            np.add.at(flat, kind.outer_dofs.ravel(), passed_on.ravel())
+        return residual, (in_frusta, [halves for _, halves in reduced])
+
+    def recover(self, kept, slab_step, *, workers=SERIAL):
+        """Newton steps of the slab (n, 3), its inner nodes filled in, and of the frusta (f, nodes, 3).
+
+        A cell's step is its answer to its walls' movement and its own way to balance. The latter is cut where it goes farther
+        than `_FARTHEST_MM`: a frustum that snaps into a new fold would else shorten the step of the whole sensor. Since each
+        cell's inner matrix is positive definite, what is left still lowers the energy.
+        """
+        slab, frusta = self._recovered(kept, slab_step, workers)
+        if max(np.abs(slab).max(), np.abs(frusta).max()) <= _FARTHEST_MM:
+            return slab, frusta
+        inner, _ = self._movement(*self._recovered(kept, np.zeros_like(slab_step), workers))
+        if not (inner > _FARTHEST_MM).any():
+            return slab, frusta
+        share, (in_frusta, in_cells) = _FARTHEST_MM / np.maximum(inner, _FARTHEST_MM), kept
+        cut = ([share[:, None] * half for half in in_frusta],
+               [[share[kind.cells, None] * half for half in halves] for kind, halves in zip(self.kinds, in_cells, strict=True)])
+        return self._recovered(cut, slab_step, workers)
+
+    def _movement(self, slab, frusta):
+        """How far (f,) in mm a step moves each cell's inner nodes at most, and its walls."""
+        inner, outer, flat = np.abs(frusta.reshape(self.count, -1)).max(axis=1), np.zeros(self.count), slab.reshape(-1)
+        for kind in self.kinds:
+            inner[kind.cells] = np.maximum(inner[kind.cells], np.abs(flat[kind.inner_dofs]).max(axis=1, initial=0.0))
+            outer[kind.cells] = np.abs(flat[kind.outer_dofs]).max(axis=1, initial=0.0)
+        return inner, outer
+
+    def _recovered(self, kept, slab_step, workers):
+        """The steps of slab and frusta for what cells and frusta keep of their residuals, and for the walls' step."""
+        in_frusta, in_cells = kept
+        flat = slab_step.copy().reshape(-1)
+        steps = workers.map(lambda both: both[0].inner_step(both[1], flat), list(zip(self.kinds, in_cells, strict=True)))
+        for kind, step in zip(self.kinds, steps, strict=True):
+            flat[kind.inner_dofs] = step
+        full = flat.reshape(-1, 3)
+        return full, self.bed.inner_step(in_frusta, full[self.roots].reshape(self.count, -1), workers=workers)
+
+
+class CellKind:
+    """Cells (c,) that are translations of each other, with the sheet's elements in them; nodes (c, n) of each."""
+
+    def __init__(self, slab, group, roots):
+        self.cells = group.cells
+        self._layers = [[(nodes, KeptTangents(block)) for nodes, block in layer] for layer in group.layers]
+        members = [nodes.reshape(len(self.cells), -1) for nodes, _ in group.parts]
+        self.nodes, local = _same_in_all(np.hstack([*members, roots]))
+        *groups, root = np.split(local, np.cumsum([m.shape[1] for m in members]))
+        elements = iter(_dofs(group.reshape(-1, nodes.shape[1])) for group, (nodes, _) in zip(groups, group.parts, strict=True))
+        layers = [[next(elements) for _ in layer] for layer in self._layers]
+        layers[0].insert(0, _dofs(root[None]))
+        inner = self._inner(slab)
+        self.elimination = LayerwiseElimination(len(self.cells), inner, layers)
+        self.inner_dofs, self.outer_dofs = _dofs(self.nodes)[:, inner], _dofs(self.nodes)[:, self.elimination.outer]
+        self._inner_places = np.flatnonzero(inner)
+
+    def _inner(self, slab):
+        """Which unknowns (n,) are of nodes in one cell only, in every cell; the others stay global."""
+        free = np.zeros(3 * slab.nodes, dtype=bool)
+        free[slab.free] = True
+        return (np.repeat(slab.uses[self.nodes] == 1, 3, axis=1) & free[_dofs(self.nodes)]).all(axis=0)
+
+    def residual(self, flat):
+        """What the slab's forces (all unknowns,) on inner unknowns leave on the outer ones (c, k), and what `inner_step` needs."""
+        force = np.zeros((len(self.cells), 3 * self.nodes.shape[1]))
+        force[:, self._inner_places] = flat[self.inner_dofs]
+        halves = self.elimination.residual(force)
+        return force[:, self.elimination.outer], halves
+
+    def inner_step(self, halves, flat):
+        """The Newton step (c, inner) of the inner unknowns for a step (all unknowns,) of the slab's outer ones."""
+        step = np.zeros((len(self.cells), 3 * self.nodes.shape[1]))
+        step[:, self.elimination.outer] = flat[self.outer_dofs]
+        self.elimination.recover(halves, step)
+        return step[:, self._inner_places]
+
+    def condense(self, state, bed, chosen, damping, *, kept_mm=0.0):
+        """Recompute the condensed tangents of some of these cells (k,), counted among them, from those of their frusta.
+
+        damping: of all cells, in N/mm;  kept_mm: see `KeptTangents`
+        """
+        frusta = [packed(bed.root_stiffness[self.cells[chosen], None])]
+        layers = (((frusta if k == 0 else []) + [self._tangents(state, part, chosen, kept_mm) for part in layer], None)
+                  for k, layer in enumerate(self._layers))
+        self.elimination.set(chosen, layers, damping=damping[self.cells[chosen]])
+
+    def forget(self):
+        """Let the next `condense` find the tangents of all elements anew."""
+        for layer in self._layers:
+            for _, kept in layer:
+                kept.forget()
+
+    def _tangents(self, state, part, chosen, kept_mm):
+        """Packed tangents (b, k, w) of like elements in some of the cells (b,)."""
+        nodes, kept = part
+        per_cell = len(nodes) // len(self.cells)
+        elements = (chosen[:, None] * per_cell + np.arange(per_cell)).ravel()
+        each = kept.at(state.slab.displacement[nodes[elements]], elements, kept_mm=kept_mm)
+        return each.reshape(len(chosen), per_cell, -1)
+
+
+def _dofs(nodes):
+    """Unknowns (..., 3 k) of nodes (..., k)."""
+    return (3 * nodes[..., None] + np.arange(3)).reshape(*nodes.shape[:-1], -1)
+
+
+def _same_in_all(members):
+    """Members (f, k) of cells that are translations of each other: each cell's nodes (f, n) and local numbers (k,)."""
+    _, first, local = np.unique(members[0], return_index=True, return_inverse=True)
+    nodes = members[:, first]
+    if (nodes[:, local] != members).any():
+        raise ValueError("The cells of the sheet are not alike.")
+    return nodes, local

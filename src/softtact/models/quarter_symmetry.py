@@ -1,0 +1,199 @@
+"""Linear layers under a rectangle, held at its sides: how the top moves under forces, from one quarter of the body.
+
+The body is symmetric in x and y, so a load falls into four parts that are even or odd in x and in y. Each needs only the quarter
+x > 0, y > 0 with its own conditions on the two planes of symmetry: four systems of a quarter of the size, and four blocks of
+flexibility that hold a quarter of the numbers of the whole one.
+Parity (p, q): 0 even, 1 odd in x and y. With the blocks G_pq between places i, j of the quarter, and signs s, t of x and y:
+    G(i s, j t) = 1/4 sum_pq (s_x t_x)^p (s_y t_y)^q G_pq(i, j)
+Elements: 27-node hexahedra with a discontinuous linear pressure (`blocks`), which do not lock for nearly incompressible rubber.
+Reference: representation of the dihedral group; Healey and Treacy, Int. J. Numer. Meth. Engng 31 (1991) 265.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+import scipy.sparse as sp
+from numba import njit
+
+from softtact.fem.elements import HEX27_NODES, gauss, hex27
+from softtact.fem.solid_block import HexBlock
+from softtact.linalg.direct import condensed_inverse
+from softtact.materials.laws.registry import make_law
+
+PARITIES = tuple(product((0, 1), repeat=2))
+
+
+@dataclass(frozen=True)
+class ElasticLayer:
+    """thickness in mm, bulk and shear modulus in MPa; shares: thicknesses of its element layers from below, in sum 1."""
+
+    thickness: float
+    bulk_modulus: float
+    shear_modulus: float
+    shares: tuple = (1.0,)
+
+
+class QuarterSlab:
+    """The quarter x > 0, y > 0 of a stack of layers, from below, on `footprint_mm`.
+
+    cells (nx, ny): elements along the quarter's sides; nodes lie at their corners, mid-sides and centres. base_held: else free.
+    """
+
+    def __init__(self, footprint_mm, layers, cells, *, base_held):
+        self.layers = [(layer, share * layer.thickness) for layer in layers for share in layer.shares]
+        self.cells, self.base_held = cells, base_held
+        self.x, self.y = (np.linspace(0.0, 0.5 * side, 2 * count + 1) for side, count in zip(footprint_mm, cells, strict=True))
+        self.numbers = np.arange((2 * len(self.layers) + 1) * len(self.y) * len(self.x)).reshape(-1, len(self.y), len(self.x))
+        self.hexes = self._hexes()
+
+    @property
+    def points(self):
+        """Nodes (n, 3) in mm, z = 0 at the top."""
+        levels = np.concatenate([[0.0], np.cumsum([thickness for _, thickness in self.layers])])
+        heights = np.interp(np.arange(2 * len(levels) - 1) / 2, np.arange(len(levels)), levels - levels[-1])
+        z, y, x = np.meshgrid(heights, self.y, self.x, indexing="ij")
+        return np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+
+    @property
+    def unknowns(self):
+        """Three for each node."""
+        return 3 * self.numbers.size
+
+    def plane(self, boundary):
+        """Numbers (ny, nx) of the nodes in the plane over so many element layers, those on the held sides left out."""
+        return self.numbers[2 * boundary, :-1, :-1]
+
+    @property
+    def top(self):
+        """`plane` of the top."""
+        return self.plane(len(self.layers))
+
+    def _hexes(self):
+        """Nodes (layers, nx ny, 27) of the elements."""
+        k, j, i = np.meshgrid(*(np.arange(n) for n in (len(self.layers), self.cells[1], self.cells[0])), indexing="ij")
+        dx, dy, dz = (HEX27_NODES + 1).astype(np.int64).T
+        return self.numbers[2 * k[..., None] + dz, 2 * j[..., None] + dy, 2 * i[..., None] + dx].reshape(len(self.layers), -1, 27)
+
+    def _sizes(self, thickness):
+        return np.array([self.x[2], self.y[2], thickness])
+
+    @cached_property
+    def stiffness(self):
+        """The stiffness (unknowns, unknowns) in N/mm; elements of a layer are all alike."""
+        rows, columns, values = [], [], []
+        for (layer, thickness), hexes in zip(self.layers, self.hexes, strict=True):
+            law = make_law("neo_hooke", {"c10": 0.5 * layer.shear_modulus}, bulk_modulus=layer.bulk_modulus)
+            block = HexBlock(0.5 * HEX27_NODES[None] * self._sizes(thickness), law)
+            element = block.tangent(np.zeros((1, 27, 3)))[0]
+            dofs = _dofs(hexes)
+            rows.append(np.repeat(dofs, 81, axis=1).ravel())
+            columns.append(np.tile(dofs, (1, 81)).ravel())
+            values.append(np.tile(element.ravel(), len(dofs)))
+        return sp.csr_matrix(tuple([np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))]),
+                             shape=(self.unknowns, self.unknowns))
+
+    def free(self, parity):
+        """Unknowns that are not held at the sides, by the base, or by the parity on the planes of symmetry."""
+        free = np.ones((*self.numbers.shape, 3), dtype=bool)
+        free[:, :, -1] = free[:, -1] = False
+        if self.base_held:
+            free[0] = False
+        for axis, odd in enumerate(parity):
+            plane = free[:, :, 0] if axis == 0 else free[:, 0]
+            plane[..., [k for k in range(3) if k != axis] if odd else axis] = False
+        return np.flatnonzero(free.ravel())
+
+    def interpolation(self, points):
+        """Matrix (p, nodes of a plane) that interpolates at points (p, 2) of the quarter, quadratic in each element."""
+        (i, wx), (j, wy) = (_quadratic(line, values) for line, values in zip((self.x, self.y), points.T, strict=True))
+        nodes = (j[:, :, None] * len(self.x) + i[:, None, :]).reshape(len(points), 9)
+        weights = (wy[:, :, None] * wx[:, None, :]).reshape(len(points), 9)
+        return sp.csr_matrix((weights.ravel(), (np.repeat(np.arange(len(points)), 9), nodes.ravel())),
+                             shape=(len(points), len(self.x) * len(self.y)))
+
+    def mean_forces(self, cells_of, count):
+        """Membrane forces in N/mm, over cells of the plan, as functionals of the displacement: three matrices (count, unknowns).
+
+        cells_of(x, y): number of the cell at points of the quarter, -1 where there is none. The forces are the integrals over the
+        height, averaged over the cell, of s_xx, s_yy and s_xy.
+        """
+        points, weights = gauss(3, 3)
+        j, i = (grid.ravel() for grid in np.meshgrid(np.arange(self.cells[1]), np.arange(self.cells[0]), indexing="ij"))
+        entries = [([], [], []) for _ in range(3)]
+        for (layer, thickness), hexes in zip(self.layers, self.hexes, strict=True):
+            size = self._sizes(thickness)
+            gradients, dofs = hex27(points)[1] * (2 / size), _dofs(hexes)
+            for point, weight, gradient in zip(points, weights * np.prod(size) / 8, gradients, strict=True):
+                owner = cells_of((i + 0.5 + 0.5 * point[0]) * size[0], (j + 0.5 + 0.5 * point[1]) * size[1])
+                inside = owner >= 0
+                for (rows, columns, values), row in zip(entries, _membrane_stress(layer, gradient), strict=True):
+                    rows.append(np.repeat(owner[inside], 81))
+                    columns.append(dofs[inside].ravel())
+                    values.append(np.tile(weight * row, inside.sum()))
+        matrices = [sp.csr_matrix((np.concatenate(v), (np.concatenate(r), np.concatenate(c))), shape=(count, self.unknowns))
+                    for r, c, v in entries]
+        return matrices
+
+    def flexibility(self, stiffness, kept, parity, *, threads=1):
+        """Flexibility (k, k) among the unknowns `kept` of a stiffness, in one parity; zero for those that it holds."""
+        free = np.concatenate([self.free(parity), np.arange(self.unknowns, stiffness.shape[0])])
+        place = np.full(stiffness.shape[0], -1)
+        place[free] = np.arange(len(free))
+        there = place[kept] >= 0
+        upper = sp.triu(stiffness[free][:, free], format="csr")
+        upper.sort_indices()
+        out = np.zeros((len(kept), len(kept)))
+        out[np.ix_(there, there)] = condensed_inverse(upper, place[kept[there]], threads=threads)
+        return out
+
+
+def _membrane_stress(layer, gradient):
+    """Rows (3, 81) that give s_xx, s_yy, s_xy from an element's displacement, of gradients (27, 3)."""
+    mu, lam = layer.shear_modulus, layer.bulk_modulus - 2 / 3 * layer.shear_modulus
+    first, second, shear = lam * gradient, lam * gradient, np.zeros_like(gradient)
+    for row, axis in ((first, 0), (second, 1)):
+        row[:, axis] += 2 * mu * gradient[:, axis]
+    shear[:, 0], shear[:, 1] = mu * gradient[:, 1], mu * gradient[:, 0]
+    return first.ravel(), second.ravel(), shear.ravel()
+
+
+def _dofs(hexes):
+    return (3 * hexes[..., None] + np.arange(3)).reshape(len(hexes), -1)
+
+
+def _quadratic(line, values):
+    """Nodes (p, 3) and weights (p, 3) of quadratic interpolation in elements of three nodes on a line of equal steps."""
+    width = line[2]
+    element = np.clip((values / width).astype(np.int64), 0, len(line) // 2 - 1)
+    t = 2 * (values / width - element) - 1
+    return 2 * element[:, None] + np.arange(3), np.column_stack([0.5 * t * (t - 1), 1 - t * t, 0.5 * t * (t + 1)])
+
+
+@dataclass(frozen=True)
+class ParityBlocks:
+    """Flexibility between places on a rectangle, by the parity of load and displacement: blocks (4, k, m), in PARITIES' order."""
+
+    blocks: np.ndarray
+
+    def between(self, rows, row_signs, columns, column_signs):
+        """Flexibility (r, c) of places given by their quarter's number (r,), (c,) and their signs of x and y (r, 2), (c, 2)."""
+        args = [np.ascontiguousarray(values) for values in (rows, row_signs < 0, columns, column_signs < 0)]
+        return _between(self.blocks, *args)
+
+
+@njit(cache=True, nogil=True)
+def _between(blocks, rows, row_negative, columns, column_negative):
+    out = np.empty((len(rows), len(columns)), dtype=blocks.dtype)
+    for a in range(len(rows)):
+        i, ax, ay = rows[a], row_negative[a, 0], row_negative[a, 1]
+        ee, eo, oe, oo = blocks[0, i], blocks[1, i], blocks[2, i], blocks[3, i]
+        for b in range(len(columns)):
+            j, x, y = columns[b], ax != column_negative[b, 0], ay != column_negative[b, 1]
+            total = ee[j]
+            total += -eo[j] if y else eo[j]
+            total += -oe[j] if x else oe[j]
+            total += -oo[j] if x != y else oo[j]
+            out[a, b] = total * 0.25
+    return out

@@ -1,0 +1,41 @@
+"""What a sensor's fast models start from: computed once for a sensor, and kept in the user's cache."""
+
+import os
+from pathlib import Path
+
+from softtact.files import atomic_path, digest
+from softtact.models.elastic.compliance import Compliance, elastic_compliance
+from softtact.models.foundation.compliance import FoundationFlexibility, foundation_flexibility
+from softtact.progress import announce
+
+_FORMAT = 8     # of the files; another one makes them again
+
+
+def _values(spec):
+    """What of a sensor the fast models start from; its readout is none of their business."""
+    return spec.model_dump(mode="json", exclude={"largest_counts"})
+
+
+def cached_compliance(spec, *, threads=1):
+    """The elastic layer's `Compliance`, by the sensor's values."""
+    return _cached("compliance", [_values(spec)], Compliance,
+                   f"{spec.name}: computing the elastic layer's flexibility, once for this sensor (some ten seconds)",
+                   lambda: elastic_compliance(spec, threads=threads))
+
+
+def cached_foundation(spec, laws, *, threads=1):
+    """The `FoundationFlexibility` of a sensor with its laws {"dielectric", "cover"}, by the values of all three."""
+    dielectric, cover = laws["dielectric"], laws["cover"]
+    return _cached("foundation", [_values(spec), repr(dielectric), repr(cover)], FoundationFlexibility,
+                   f"{spec.name}: computing a frustum's law and the slab's flexibility, once for this sensor and these laws (about "
+                   "a minute)", lambda: foundation_flexibility(spec, dielectric_law=dielectric, cover_law=cover, threads=threads))
+
+
+def _cached(kind, values, cls, message, compute):
+    cache = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "softtact"
+    path = cache / f"{kind}-{digest([_FORMAT, *values])}.npz"
+    if not path.exists():
+        announce(message)
+        with atomic_path(path) as temporary:
+            compute().save(temporary)
+    return cls.load(path)

@@ -1,0 +1,130 @@
+"""Many presses at once: over processes, each core on its own on what the sensor prepared once; or as one batch on a GPU."""
+
+import multiprocessing
+import time
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import repeat
+
+import numpy as np
+
+from softtact.contact.height_field import NO_CONTACT_MM, HeightField
+from softtact.contact.underside import Underside
+from softtact.contact.unilateral import not_settled
+from softtact.devices import find_device
+from softtact.errors import ConvergenceError, InputError, SofttactError
+from softtact.geometry.meshes import check_over_sensor, place
+from softtact.press.models import elastic_result
+from softtact.press.validity import flag_buried
+from softtact.progress import progress
+
+_PREPARED = {"elastic": ("elastic",), "foundation": ("foundation",), "hyperelastic": (), "auto": ("elastic", "foundation")}
+
+
+def press_many(sensor, meshes, poses, force_n, *, model, workers, device, label, options):
+    """See `Sensor.press_many`."""
+    jobs = list(zip(meshes, poses, strict=True))
+    if jobs and on_gpu(device, model):
+        return press_batch(sensor, jobs, force_n, device="cuda" if device == "auto" else device, workers=workers, label=label)
+    for name in _PREPARED.get(model, ()):
+        sensor.prepared(name)
+    act = partial(_pressed, force_n=force_n, model=model, options=options)
+    return list(progress(_each(sensor, act, jobs, workers), label=label, total=len(jobs)))
+
+
+def on_gpu(device, model):
+    """Whether presses of a model go to a GPU as one batch: where one is asked for, or is there; only the elastic model's can."""
+    if device == "cpu" or (device == "auto" and model != "elastic"):
+        return False
+    if model != "elastic":
+        raise InputError(f"device={device!r}: only the elastic model presses on a GPU; leave it out for the model {model!r}.")
+    return find_device(device) != "cpu"
+
+
+def press_batch(sensor, jobs, force_n, *, device, workers, label):
+    """Presses of the elastic model, all of them columns of one problem on a torch device; an error in the place of one that fails.
+
+    jobs: (mesh, pose) of each. Their undersides are found by processes.
+    """
+    from softtact.models.elastic.batch import press_layers
+
+    compliance = sensor.prepared("elastic")
+    undersides = list(_each(sensor, _underside, jobs, workers))
+    results = [one if isinstance(one, SofttactError) else None for one in undersides]
+    good = [number for number, one in enumerate(results) if one is None]
+    start = time.perf_counter()
+    presses = press_layers(compliance, [undersides[number].height for number in good], force_n, device=device)
+    for number, press in zip(good, progress(presses, label=label, total=len(good)), strict=True):
+        results[number] = _read(sensor, compliance, press, undersides[number], force_n)
+    seconds = np.full(len(force_n), (time.perf_counter() - start) / max(1, len(good) * len(force_n)))
+    return [one if isinstance(one, SofttactError) else replace(one, wall_time_s=seconds) for one in results]
+
+
+@dataclass(frozen=True)
+class _Underside:
+    """An object's height (n,) in mm over the grid's nodes, lowest height of all, and the height of its top."""
+
+    height: np.ndarray
+    lowest_mm: float
+    top_mm: float
+
+
+def _underside(sensor, job):
+    mesh, pose = job
+    try:
+        placed = place(mesh, pose=pose)
+        check_over_sensor(placed, sensor.spec.footprint_mm)
+        grid = sensor.files["elastic"].grid
+        underside, height = Underside(HeightField(placed), grid), np.full(grid.count, NO_CONTACT_MM)
+        points = underside.nodes(sensor.spec.thickness_mm)
+        height[points.nodes] = points.gap
+        return _Underside(height=height, lowest_mm=underside.lowest_mm, top_mm=placed.bounds[1, 2])
+    except InputError as error:
+        return error.with_traceback(None)
+
+
+def _read(sensor, compliance, press, underside, force_n):
+    settled = press.contact.settled
+    if not settled.all():
+        return ConvergenceError(not_settled(force_n[~settled][0]))
+    result = elastic_result(sensor, compliance, press, force_n, np.zeros(len(force_n)), lowest_mm=underside.lowest_mm)
+    return flag_buried(result, underside.top_mm)
+
+
+def _each(sensor, act, jobs, workers):
+    """act(sensor, job) of each job, in their order, over processes."""
+    workers = min(workers, len(jobs))
+    if workers <= 1:
+        yield from (act(sensor, job) for job in jobs)
+        return
+    # A forked process shares the prepared arrays; where there is no fork each gets its copy.
+    context = multiprocessing.get_context("fork" if "fork" in multiprocessing.get_all_start_methods() else "spawn")
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=_begin, initargs=(sensor,)) as pool:
+        yield from pool.map(_in_process, repeat(act), jobs, chunksize=max(1, len(jobs) // (8 * workers)))
+
+
+def _begin(sensor):
+    global _sensor     # one for each process, which presses with nothing else
+    _sensor = sensor
+
+
+def _in_process(act, job):
+    return act(_sensor, job)
+
+
+def _pressed(sensor, job, *, force_n, model, options):
+    """A result, or the error in its place: one press that fails does not lose the others."""
+    mesh, pose = job
+    try:
+        return sensor.press(mesh, pose=pose, force_n=force_n, model=model, threads=1, label="", **options)
+    except (ConvergenceError, InputError) as error:
+        return error.with_traceback(None)     # its frames hold the press' matrices
+
+
+def raise_first(results):
+    """The results, or the first error among them."""
+    for number, result in enumerate(results):
+        if isinstance(result, SofttactError):
+            raise type(result)(f"press {number} of {len(results)}: {result}")
+    return results

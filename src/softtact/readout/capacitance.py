@@ -1,0 +1,60 @@
+"""Capacitance per area between the PCB and the electrode plane where that plane moved towards the PCB.
+
+Symbols: h, t height of the frusta and thickness of the sheet above them (mm);  u displacement (mm);  stretch = (h - u) / h
+phi(z) area share of the solid at height z;  eps relative permittivity of the solid (air: 1).
+
+Within the height z solid and air lie side by side, so their permittivities add by area: eps(z) = 1 + (eps - 1) phi(z). Slices over
+one another are capacitors in series: C = eps0 / (integral dz / eps(z) + t / eps).
+That every height is an equipotential makes this an upper bound; straight field lines (columns of air and solid in series, side by
+side) make a lower one (J. W. Strutt, Phil. Trans. 161, 1871; J. C. Maxwell, Treatise, 1873, art. 306 to 308). Why the upper one was
+taken, and how far the field of the cell lies from it: docs/virtual_sensor.md.
+
+The solid keeps its volume. The sheet is confined, so the frusta give all the way: each slice spreads as its height shrinks,
+phi = min(1, k phi at rest), until the pocket between the frusta is full; what then still moves compresses solid.
+"""
+
+import functools
+
+import numpy as np
+
+from softtact.readout.electrodes import taxel_means
+
+EPSILON_0_PF_PER_MM = 8.8541878128e-3
+_LEAST_GAP = 0.02         # of the dielectric's thickness: the plates cannot meet
+_SLICES, _STATES = 400, 2001
+
+
+def solid_share(frusta):
+    """Area share phi (slices,) of the solid at the middles of equally thick slices of the frusta at rest, tip first."""
+    height = (np.arange(_SLICES) + 0.5) / _SLICES
+    diameter = frusta.tip_diameter_mm + height * (frusta.root_diameter_mm - frusta.tip_diameter_mm)
+    return np.minimum(0.25 * np.pi * diameter**2 / frusta.pitch_mm**2, 1.0)
+
+
+@functools.lru_cache(maxsize=32)
+def _pocket(frusta, permittivity):
+    """(stretch (states,) rising, mean of 1 / eps(z) (states,)) of the frusta from pulled to twice their height to a full pocket."""
+    phi = solid_share(frusta)
+    k = np.geomspace(0.5, 1 / phi.min(), _STATES)[::-1]
+    spread = np.minimum(1.0, k[:, None] * phi)
+    return phi.mean() / spread.mean(axis=1), (1 / (1 + (permittivity - 1) * spread)).mean(axis=1)
+
+
+def equivalent_air_gap(spec, displacement_mm):
+    """Thickness (mm) of air with the same capacitance per area, where the electrode plane moved by `displacement_mm`."""
+    d, h = spec.dielectric, spec.dielectric.frusta.height_mm
+    moved = np.minimum(displacement_mm, (1 - _LEAST_GAP) * spec.dielectric_thickness_mm)
+    share = np.interp(1 - moved / h, *_pocket(d.frusta, d.relative_permittivity))     # 1 / eps once no air is left
+    return (h - moved) * share + d.sheet_thickness_mm / d.relative_permittivity
+
+
+def capacitance_per_area(spec, displacement_mm):
+    """Capacitance in pF/mm2 where the electrode plane moved towards the PCB by `displacement_mm` (any shape)."""
+    return EPSILON_0_PF_PER_MM / equivalent_air_gap(spec, displacement_mm)
+
+
+def ideal_counts(spec, deformation_map_mm, *, counts_per_relative_change=1000.0):
+    """Counts (..., rows, columns) of a faultless readout: proportional to dC / C0, limited to the converter's range."""
+    rest = capacitance_per_area(spec, 0.0)
+    change = taxel_means(spec, capacitance_per_area(spec, deformation_map_mm)) / rest - 1
+    return np.clip(counts_per_relative_change * change, 0.0, spec.largest_counts)

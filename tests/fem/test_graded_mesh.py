@@ -1,0 +1,97 @@
+"""Meshes of the cover whose elements are split here and there, and where they are split."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from softtact.contact.height_field import HeightField
+from softtact.contact.penalty import Contact
+from softtact.fem.elements import gauss, hex20, reference_gradients
+from softtact.fem.extruded_mesh import SheetPlan, grid_plan, merge, with_centres
+from softtact.fem.graded_mesh import cover_mesh, split_levels
+from softtact.geometry.meshes import place
+from softtact.materials.laws.registry import make_law
+from softtact.models.hyperelastic.refinement import CURVED, EDGE, FAR, FLAT, NEAR, levels_of, zones
+from softtact.models.hyperelastic.slab import Layer, Slab
+
+X, Y = np.array([-3.0, -1.5, -0.5, 1.0, 3.0]), np.array([-2.0, -1.0, 0.0, 2.0])
+HEIGHTS = [-1.5, -0.8, -0.3, 0.0]
+LAW = make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=7.0)
+
+
+def random_levels(seed, caps=(0, 1, 2)):
+    rng = np.random.default_rng(seed)
+    level = split_levels((len(X) - 1, len(Y) - 1), lambda low, size, level: rng.random(len(low)) < 0.4, max(caps))
+    return np.stack([np.minimum(level, cap) for cap in caps])
+
+
+@pytest.mark.parametrize("caps", [(0, 0, 0), (0, 1, 2), (2, 1, 0), (1, 1, 3)])
+@pytest.mark.parametrize("seed", range(3))
+def test_nodes_on_larger_elements_follow_every_quadratic_field(seed, caps):
+    mesh = cover_mesh(X, Y, HEIGHTS, random_levels(seed, caps))
+    for power in ((0, 0, 0), (1, 0, 0), (2, 0, 0), (0, 1, 1), (1, 1, 0), (0, 0, 2), (1, 0, 1)):
+        field = (mesh.points ** np.array(power)).prod(axis=1)
+        assert mesh.follow @ field[:mesh.free] == pytest.approx(field, abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_elements_fill_the_cover_and_its_faces_the_top_and_the_bottom(seed):
+    mesh = cover_mesh(X, Y, HEIGHTS, random_levels(seed))
+    points, weights = gauss(2, 3)
+    _, volumes = reference_gradients(mesh.points[mesh.hexes], hex20(points)[1], weights)
+    assert volumes.sum() == pytest.approx(6 * 4 * 1.5)
+    for faces, height in ((mesh.top, 0.0), (mesh.bottom, -1.5)):
+        corner = mesh.points[faces[:, :4]]
+        assert (corner[..., 2] == height).all()
+        assert np.prod(corner[:, 2, :2] - corner[:, 0, :2], axis=1).sum() == pytest.approx(24.0)
+
+
+@pytest.mark.parametrize("caps", [(0, 1, 2), (1, 0, 2)])
+def test_a_split_slab_passes_the_patch_test(caps):
+    """A linear displacement: no force on nodes inside, to round-off."""
+    none = np.zeros((0, 4), dtype=int)
+    grid = grid_plan(np.linspace(-3, 3, 17), np.linspace(-2, 2, 9))   # each element under one of the cover
+    plan = SheetPlan(merge(with_centres(grid.points[grid.quads])), np.zeros((0, 25), dtype=int), 0, (none, np.zeros(3)))
+    x, y = np.linspace(-3, 3, 5), np.linspace(-2, 2, 5)
+    rng = np.random.default_rng(0)
+    level = split_levels((4, 4), lambda low, size, level: rng.random(len(low)) < 0.4, 2)
+    slab = Slab(Layer(np.array([-2.0, -1.5]), LAW), Layer(np.array(HEIGHTS), LAW), plan, x, y, sides="held", contact=Contact(),
+                splits=np.stack([np.minimum(level, cap) for cap in caps]))
+    gradient = np.array([[0.1, 0.05, 0.0], [-0.02, -0.08, 0.03], [0.04, 0.0, -0.1]])
+    displacement = slab.points @ gradient.T
+    planes = slab.facing(displacement, lambda x, y: (np.full(len(x), 1e3), np.tile([0.0, 0.0, -1.0], (len(x), 1))))
+    force = slab.evaluate(displacement, planes, 0.0).force
+    inside = (np.abs(slab.points - [0, 0, -1.0]) < [2.999, 1.999, 0.999]).all(axis=1)
+    assert inside.sum() > 50 and np.abs(force[~inside]).max() > 0.01
+    assert np.abs(force[inside]).max() < 1e-12
+
+
+def punch_zones(mesh):
+    lines = np.linspace(-9.6, 9.6, 9)
+    return zones(HeightField(place(mesh)), lines, lines, 3), lines
+
+
+def test_a_flat_punch_is_fine_at_its_edge_and_coarse_far_away():
+    zone, lines = punch_zones(trimesh.creation.cylinder(radius=3.0, height=2.0, sections=96))
+    centre = 0.5 * (np.linspace(lines[0], lines[-1], len(zone) + 1)[1:] + np.linspace(lines[0], lines[-1], len(zone) + 1)[:-1])
+    r = np.hypot(*np.meshgrid(centre, centre))
+    assert (zone[np.abs(r - 3.0) < 0.1] == EDGE).all() and (zone[r < 2.0] == FLAT).all()
+    assert (zone[r > 6.5] == FAR).all() and set(np.unique(zone[(r > 4.0) & (r < 5.0)])) == {NEAR}
+    levels = levels_of(np.array([0, 1, 1, 2, 3])[zone], (8, 8), 3)
+    assert (levels[zone == EDGE] == 3).all() and levels[0, 0] == 0
+
+
+@pytest.mark.parametrize("most", [3, 5])
+def test_what_is_curved_does_not_depend_on_how_small_the_elements_become(most):
+    """A ball's underside rises by a fifth beside its tip: far more than a flat one, in elements of any size."""
+    lines = np.linspace(-9.6, 9.6, 9)
+    zone = zones(HeightField(place(trimesh.creation.icosphere(subdivisions=6, radius=6.0))), lines, lines, most)
+    centre = (np.arange(len(zone)) + 0.5) * 19.2 / len(zone) - 9.6
+    r = np.hypot(*np.meshgrid(centre, centre))
+    assert (zone[(r > 1.2) & (r < 2.0)] == CURVED).all()
+
+
+def test_a_sphere_has_curved_ground_and_no_edge_where_it_first_touches():
+    zone, lines = punch_zones(trimesh.creation.icosphere(subdivisions=5, radius=6.0))
+    middle = len(zone) // 2
+    assert (zone[middle - 2:middle + 2, middle - 2:middle + 2] < EDGE).all() and (zone == CURVED).any()

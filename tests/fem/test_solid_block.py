@@ -1,0 +1,104 @@
+"""Blocks of elements: joined ones and single precision give what each alone gives in double precision."""
+
+import numpy as np
+import pytest
+
+from softtact.fem.elements import HEX27_NODES
+from softtact.fem.extruded_mesh import extrude, sheet_plan
+from softtact.fem.solid_block import HexBlock, WedgeBlock, joined, of_masters
+from softtact.materials.laws.registry import make_law
+
+LAWS = [make_law("mooney_rivlin", {"c10": 0.17, "c01": 0.004}, bulk_modulus=7.0),
+        make_law("neo_hooke", {"c10": 0.3}, bulk_modulus=9.0)]
+
+
+def parts():
+    """Elements of a frustum's cell: two laws, hexahedra and wedges, some that hang on nodes of larger ones."""
+    mesh = extrude(sheet_plan(np.zeros((1, 2)), (1, 1), 1.2, 0.9, (1.2, 1.2)).plan, np.array([0.0, 0.2, 0.5]))
+    lower, upper = (mesh.layer(k) for k in (0, 1))
+    found = [(lower, HexBlock(mesh.points[lower], LAWS[0])), (upper, HexBlock(mesh.points[upper], LAWS[0])),
+             (upper[:2], HexBlock(mesh.points[upper[:2]], LAWS[1]))]
+    wedges = mesh.wedge_layer(0)
+    if len(wedges):
+        found.append((wedges, WedgeBlock(mesh.points[wedges], LAWS[0])))
+    masters, weights = np.arange(len(mesh.points))[:, None].repeat(2, axis=1), np.tile([1.0, 0.0], (len(mesh.points), 1))
+    masters[0], weights[0] = (1, 2), (0.5, 0.5)
+    hanging = lower[:1]
+    found.append(of_masters(masters, weights, hanging, HexBlock(mesh.points[hanging], LAWS[0])))
+    return mesh.points, found
+
+
+def total(field, solids):
+    """Energy and nodal forces (n, 3) of all."""
+    states = [(nodes, block.evaluate(field[nodes])) for nodes, block in solids]
+    force = np.zeros_like(field)
+    for nodes, state in states:
+        np.add.at(force, nodes.ravel(), state.force.reshape(-1, 3))
+    return sum(state.energy for _, state in states), force
+
+
+def test_joined_blocks_have_the_energy_and_the_forces_of_their_parts():
+    points, solids = parts()
+    field = 0.002 * np.random.default_rng(0).normal(size=points.shape)
+    energy, force = total(field, solids)
+    whole = joined(solids)
+    assert len(whole) < len(solids)
+    together, forces = total(field, whole)
+    assert together == pytest.approx(energy, rel=1e-12)
+    np.testing.assert_allclose(forces, force, atol=1e-12 * np.abs(force).max())
+    again, _ = total(field, solids)          # the parts live on, in the new arrays
+    assert again == pytest.approx(energy, rel=1e-12)
+
+
+@pytest.mark.parametrize("options", [{}, {"local_over_shear": 0.5}, {"growing_over_shear": 100.0, "trilinear": True}])
+def test_tangents_in_single_precision_are_those_in_double_precision_to_seven_digits(options):
+    block = HexBlock(0.5 * HEX27_NODES[None], LAWS[0], **options)
+    field = 0.02 * np.random.default_rng(1).normal(size=(1, 27, 3))
+    exact, rough = block.tangent(field), block.tangent(field, precision=np.float32)
+    assert rough.dtype == np.float32
+    assert np.abs(rough - exact).max() < 2e-6 * np.abs(exact).max()      # sums of 81 products of seven digits
+
+
+def test_elements_that_hang_on_other_nodes_feel_the_displacement_that_these_give_them():
+    """Up to three masters a node, some twice in an element, some without weight."""
+    rng, points = np.random.default_rng(4), 0.5 * HEX27_NODES + np.zeros((4, 1, 1))
+    masters, weights = rng.integers(0, 40, size=(60, 3)), rng.normal(size=(60, 3)) * rng.integers(0, 2, size=(60, 3))
+    weights[:, 0] = 1.0
+    elements, field = rng.integers(0, 60, size=(4, 27)), 0.002 * rng.normal(size=(40, 3))
+    own = np.einsum("nw,nwi->ni", weights, field[masters])
+    expected = HexBlock(points, LAWS[0]).evaluate(own[elements])
+    nodes, block = of_masters(masters, weights, elements, HexBlock(points, LAWS[0]))
+    found = block.evaluate(field[nodes])
+    np.testing.assert_allclose(found.energies, expected.energies, rtol=1e-11)
+    passed_on, force = np.zeros((40, 3)), np.zeros((40, 3))
+    each = expected.force.reshape(-1, 1, 3) * weights[elements].reshape(-1, 3, 1)
+    np.add.at(passed_on, masters[elements].ravel(), each.reshape(-1, 3))
+    np.add.at(force, nodes.ravel(), found.force.reshape(-1, 3))
+    np.testing.assert_allclose(force, passed_on, atol=1e-11 * np.abs(passed_on).max())
+
+
+def projected(block, field):
+    """A field (e, g) at all elements' points, projected on the pressure's functions: a least-squares fit, points by volume."""
+    rows = []
+    for values, volumes in zip(field, block.volumes[block.shapes], strict=True):
+        root = np.sqrt(volumes)
+        rows.append(block.basis @ np.linalg.lstsq(root[:, None] * block.basis, root * values, rcond=None)[0])
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("options", [{}, {"local_over_shear": 0.5}, {"growing_over_shear": 100.0},
+                                     {"local_over_shear": 4.0, "growing_over_shear": 100.0, "trilinear": True}])
+def test_the_energy_of_volume_changes_is_that_of_the_formulas_written_down_plainly(options):
+    points = 0.5 * HEX27_NODES + 0.02 * np.random.default_rng(2).normal(size=(3, 27, 3))
+    block = HexBlock(points, LAWS[0], **options)
+    J = 1 + 0.2 * np.random.default_rng(3).normal(size=(3, 27)).clip(-2, 2)
+    K, k, q = block.law.bulk_modulus, block.local_modulus, block.growing_modulus
+    seen = projected(block, J - 1)
+    density = (K - k) / 2 * seen**2 + k / 4 * (J**2 - 1 - 2 * np.log(J)) + q / 4 * (J - 1 - seen) ** 4
+    held = q * (J - 1 - seen) ** 3
+    pressure = (K - k) * seen + k / 2 * (J - 1 / J) + held - projected(block, held)
+    found = block._volumetric(J, block.shapes)
+    np.testing.assert_allclose(found.energies, (block.volumes[block.shapes] * density).sum(axis=1), rtol=1e-12)
+    np.testing.assert_allclose(found.pressure, pressure, rtol=1e-11, atol=1e-12 * np.abs(pressure).max())
+    assert found.growing.shape == ((3, 27) if q else (0, 0))
+    np.testing.assert_allclose(found.growing, 3 * q * (J - 1 - seen) ** 2 if q else found.growing, rtol=1e-9, atol=1e-12 * (q + 1))

@@ -1,0 +1,137 @@
+"""The elastic model on a small sensor: the press of its quarters against the whole layer; tests/verification has Hertz."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from whole_layer import WholeLayer
+
+from softtact.contact.height_field import HeightField
+from softtact.contact.underside import Underside
+from softtact.errors import InputError
+from softtact.geometry.meshes import place
+from softtact.geometry.pose import Pose
+from softtact.models.elastic.compliance import Compliance, elastic_compliance, map_cells, press_layer
+from softtact.press.cache import cached_compliance
+from softtact.press.sensor import Sensor
+from softtact.sensors.specification import SensorSpec
+
+CORO = SensorSpec.from_yaml(Path(__file__).parents[3] / "config/sensors/coro.yaml")
+SMALL = CORO.model_copy(update={"footprint_mm": (9.6, 9.6), "map_shape": (13, 13)})      # elements of 0.8 mm
+FORCES = np.array([0.5, 3.0])
+OBJECTS = {
+    "sphere": (trimesh.creation.icosphere(subdivisions=4, radius=5.0), (0, 0, 0, 0, 0, 0)),
+    "punch off the nodes": (trimesh.creation.cylinder(radius=2.1, height=3.0, sections=96), (0.13, -0.29, 0, 0, 0, 0)),
+    "tilted box": (trimesh.creation.box((4.0, 2.7, 3.0)), (0.4, 0.3, 0, 7.0, -4.0, 25.0)),
+    "tilted ring": (trimesh.creation.annulus(r_min=1.3, r_max=3.0, height=2.0, sections=96), (-0.5, 0.2, 0, 2.0, 3.0, 0)),
+    "lying rod over a side": (trimesh.creation.cylinder(radius=2.0, height=8.0, sections=96), (1.5, -2.0, 0, 90, 3.0, 40.0)),
+}
+
+
+@pytest.fixture(scope="module")
+def compliance():
+    return elastic_compliance(SMALL)
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return WholeLayer(SMALL)
+
+
+def placed(name):
+    """One of the objects in its pose, its lowest point at z = 0."""
+    mesh, values = OBJECTS[name]
+    mesh = place(mesh, pose=Pose.from_values(values))
+    mesh.apply_translation([0, 0, -mesh.bounds[0, 2]])
+    return mesh
+
+
+def points_of(name, compliance):
+    return Underside(HeightField(placed(name)), compliance.grid).nodes(SMALL.thickness_mm)
+
+
+@pytest.mark.parametrize("name", OBJECTS)
+def test_a_press_is_that_of_the_whole_layer_on_the_same_mesh(name, compliance, whole):
+    points = points_of(name, compliance)
+    press = press_layer(compliance, points, FORCES)
+    depth, descent = whole.press(points, FORCES[-1])
+    expected = whole.map_of(descent)
+    # single precision, and the penalty: 0.1 N at a point over 1e5 N/mm is 1e-6 mm
+    assert np.abs(press.maps[-1] - expected).max() < 2e-5 * expected.max()
+    assert press.contact.depth[-1] == pytest.approx(depth, rel=2e-5)
+
+
+def test_no_place_is_deeper_than_a_flat_punch(compliance):
+    mesh = place(trimesh.creation.cylinder(radius=2.1, height=3.0, sections=96), pose=None)
+    press = press_layer(compliance, Underside(HeightField(mesh), compliance.grid).nodes(SMALL.thickness_mm), FORCES)
+    assert (press.maps.max(axis=(1, 2)) < (1 + 1e-5) * press.contact.depth).all()      # maps are in single precision
+
+
+def test_the_map_is_held_at_its_edges_and_has_the_sensors_shape(compliance):
+    maps = press_layer(compliance, points_of("tilted box", compliance), FORCES).maps
+    assert maps.shape == (2, *SMALL.map_shape)
+    for edge in (maps[:, 0], maps[:, -1], maps[:, :, 0], maps[:, :, -1]):
+        np.testing.assert_array_equal(edge, 0.0)
+
+
+def test_turning_the_object_by_half_a_turn_turns_the_map(compliance):
+    mesh = placed("tilted box")
+    maps = []
+    for angle in (0.0, np.pi):
+        turned = mesh.copy()
+        turned.apply_transform(trimesh.transformations.rotation_matrix(angle, [0, 0, 1]))
+        points = Underside(HeightField(turned), compliance.grid).nodes(SMALL.thickness_mm)
+        maps.append(press_layer(compliance, points, FORCES).maps[-1])
+    # samples of edges lie alike on both sides; what is left is single precision
+    np.testing.assert_allclose(maps[1], maps[0][::-1, ::-1], atol=1e-5 * maps[0].max())
+
+
+def test_saved_and_loaded_it_presses_the_same(compliance, tmp_path):
+    compliance.save(tmp_path / "compliance.npz")
+    loaded = Compliance.load(tmp_path / "compliance.npz")
+    assert loaded.bedding == compliance.bedding
+    points = points_of("punch off the nodes", compliance)
+    np.testing.assert_array_equal(press_layer(loaded, points, FORCES).maps, press_layer(compliance, points, FORCES).maps)
+
+
+def test_a_map_without_a_middle_is_refused():
+    with pytest.raises(InputError, match="has no middle row and column"):
+        map_cells(SMALL.model_copy(update={"map_shape": (13, 12)}))
+
+
+def test_the_bedding_is_the_confined_modulus_over_the_thickness(compliance):
+    """E (1 - nu) / ((1 + nu) (1 - 2 nu)) = 1.289 * 0.8271 / (1.1729 * 0.6542) = 1.3895 MPa, over 2.5 mm."""
+    assert compliance.bedding == pytest.approx(1.3895 / 2.5, rel=1e-4)
+
+
+def test_the_sensors_press_is_the_layers(compliance):
+    mesh, values = OBJECTS["punch off the nodes"]
+    result = Sensor(SMALL, {}, files={"elastic": compliance}).press(mesh, pose=Pose.from_values((*values[:2], 1.5, 0, 0, 0)),
+                                                                    force_n=list(FORCES), model="elastic")
+    nodes = Underside(HeightField(placed("punch off the nodes")), compliance.grid).nodes(SMALL.thickness_mm)
+    expected = press_layer(compliance, nodes, FORCES)
+    # the sensor asks for points as deep as the object may come; those left out never touch
+    np.testing.assert_allclose(result.deformation_map_mm, expected.maps, atol=1e-5 * expected.maps.max())
+    # the nodes under a flat punch all touch: an area in steps of 0.1 mm2, some of 46 nodes at the edge more or less
+    np.testing.assert_allclose(result.contact_area_mm2, np.pi * 2.1**2, rtol=0.1)
+    assert (result.within_validity == 1).all() and (result.penetration_mm <= 1e-6).all()
+
+
+def test_a_press_deeper_than_half_the_layer_is_out_of_its_validity(compliance):
+    needle = trimesh.creation.cylinder(radius=0.9, height=3.0, sections=64)
+    result = Sensor(SMALL, {}, files={"elastic": compliance}).press(needle, force_n=[0.5, 8.0], model="elastic")
+    assert result.indentation_mm[1] > 0.5 * SMALL.thickness_mm > result.indentation_mm[0]
+    assert result.within_validity.tolist() == [1, 0]
+
+
+def test_a_flexibility_is_computed_once_and_then_read_from_the_users_cache(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    coarse = SMALL.model_copy(update={"map_shape": (9, 9)})
+    first = cached_compliance(coarse)
+    assert "once for this sensor" in capsys.readouterr().err
+    again = cached_compliance(coarse)
+    assert capsys.readouterr().err == ""
+    np.testing.assert_array_equal(again.blocks.blocks, first.blocks.blocks)
+    cached_compliance(coarse.model_copy(update={"footprint_mm": (9.6, 9.0)}))      # another sensor, another file
+    assert len(list(tmp_path.glob("softtact/compliance-*.npz"))) == 2

@@ -1,0 +1,119 @@
+"""Frusta find their own balance between the steps of the whole sensor: the same as a step of all finds, and nothing else moves."""
+
+import numpy as np
+import pytest
+import trimesh
+from support import six_frusta
+from support.six_frusta import CORO, LAW
+
+from softtact.linalg.workers import Workers
+from softtact.models.hyperelastic.body import LayeredBody
+from softtact.models.hyperelastic.local_equilibrium import balanced
+from softtact.models.hyperelastic.mesh_settings import MeshSettings
+from softtact.press.sensor import Sensor
+
+TOLERANCE_N = 1e-5
+FIRST, THIRD = 0, 2
+
+
+@pytest.fixture
+def body():
+    return six_frusta.six_frusta()
+
+
+def bent(body, *, by_mm):
+    """The body at rest, the plate a millimetre above it, but for some frusta bent sideways, {frustum: mm}."""
+    return six_frusta.bent(body, by_mm=by_mm, depth_mm=-1.0)
+
+
+def unbalanced(bed, state):
+    """Largest unbalanced force (n,) in N inside each frustum."""
+    return np.abs(bed.inner_residual(state)).max(axis=1)
+
+
+def newton_of_all(bed, state):
+    """The naive way: Newton's method on all frusta at once, whole steps, all roots held."""
+    for _ in range(12):
+        bed.condense(state, np.arange(bed.count))
+        _, halves = bed.condensed_residual(state)
+        state = bed.evaluate(state.displacement + bed.inner_step(halves, np.zeros((bed.count, 3 * len(bed.root)))))
+    return state
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_bent_frusta_go_back_to_balance_and_the_others_stay_where_they_are(body, threads):
+    state = bent(body, by_mm={FIRST: 0.01, THIRD: -0.02}).bed
+    now, moved = balanced(body.bed, state, TOLERANCE_N, workers=Workers(threads))
+    np.testing.assert_array_equal(moved, [FIRST, THIRD])
+    assert unbalanced(body.bed, state)[moved].min() > 100 * TOLERANCE_N
+    assert unbalanced(body.bed, now).max() <= TOLERANCE_N and now.energy < state.energy
+    others = np.setdiff1d(np.arange(body.bed.count), moved)
+    np.testing.assert_array_equal(now.displacement[others], state.displacement[others])
+    np.testing.assert_array_equal(now.displacement[:, body.bed.root], state.displacement[:, body.bed.root])
+
+
+def test_their_balance_is_that_of_newtons_method_on_all(body):
+    state = bent(body, by_mm={FIRST: 0.01, THIRD: -0.02}).bed
+    one_by_one, _ = balanced(body.bed, state, TOLERANCE_N)
+    together = newton_of_all(body.bed, state)
+    # Forces of the tolerance on the softest mode, 0.03 N/mm, move by 3e-4 mm; these modes are stiffer by ten.
+    np.testing.assert_allclose(one_by_one.displacement, together.displacement, atol=3e-5)
+    assert one_by_one.energy == pytest.approx(together.energy, rel=1e-6, abs=1e-9)
+
+
+def test_a_state_is_the_same_as_one_evaluated_there(body):
+    """Some frusta are evaluated alone, with their own elements and contacts: as all are together."""
+    state = bent(body, by_mm={THIRD: 0.03}).bed
+    now, _ = balanced(body.bed, state, TOLERANCE_N)
+    anew = body.bed.evaluate(now.displacement)
+    assert now.energy == pytest.approx(anew.energy, rel=1e-12)
+    np.testing.assert_allclose(now.force, anew.force, atol=1e-12)
+    np.testing.assert_array_equal(now.gaps, anew.gaps)
+
+
+def test_steps_too_long_are_halved_until_the_energy_of_each_frustum_falls(body, monkeypatch):
+    whole, state = body.bed.own_step, bent(body, by_mm={FIRST: 0.01, THIRD: -0.02}).bed
+    factors = np.ones(body.bed.count)
+    factors[THIRD] = 8.0      # on a parabola a step eight times too long raises the energy, and so do its half and its quarter
+    monkeypatch.setattr(body.bed, "own_step", lambda state, frusta, **options: (
+        factors[frusta, None, None] * whole(state, frusta, **options)))
+    monkeypatch.setattr("softtact.models.hyperelastic.local_equilibrium._FARTHEST_MM", 1.0)
+    now, _ = balanced(body.bed, state, TOLERANCE_N)
+    left = unbalanced(body.bed, now)
+    assert left[FIRST] <= TOLERANCE_N and now.energy < state.energy and (left[THIRD] < unbalanced(body.bed, state)[THIRD])
+
+
+def with_slab_in_balance(body, state, *, but_for_n=0.0):
+    """The same state with the slab's own forces against those of the frusta on their roots, but for one of so many N."""
+    state.slab.force[:] = 0.0
+    np.add.at(state.slab.force, body.cells.roots.ravel(), -state.bed.force[:, body.bed.root].reshape(-1, 3))
+    state.slab.force.reshape(-1)[body.slab.free[0]] += but_for_n
+    return state
+
+
+def test_frusta_wait_for_the_step_of_all_while_the_slab_is_farther_from_balance(body):
+    state = with_slab_in_balance(body, bent(body, by_mm={FIRST: 0.01}))
+    assert body.balanced(state, TOLERANCE_N).energy < state.energy
+    worst = unbalanced(body.bed, state.bed).max()
+    state = with_slab_in_balance(body, state, but_for_n=2 * worst)
+    assert body.balanced(state, TOLERANCE_N) is state
+
+
+def test_a_cell_whose_frustum_moved_alone_gets_a_new_tangent(body):
+    state = with_slab_in_balance(body, bent(body, by_mm={FIRST: 0.01}))
+    assert body.cells.refresh(state, kept_mm=1.0) == body.cells.count
+    assert body.cells.refresh(body.balanced(state, TOLERANCE_N), kept_mm=1.0) == 1
+
+
+def test_a_press_takes_fewer_steps_of_the_whole_sensor_and_gives_the_same_map(monkeypatch):
+    """Frusta of two rings beside a punch rock on their tips."""
+    sensor = Sensor(CORO.model_copy(update={"footprint_mm": (7.2, 7.2), "map_shape": (13, 13)}), {"dielectric": LAW, "cover": LAW},
+                    mesh=MeshSettings(frustum_rings=2))
+    punch = trimesh.creation.cylinder(radius=2.0, height=2.0, sections=96)
+    with_balance = sensor.press(punch, force_n=[2.0], model="hyperelastic")
+    monkeypatch.setattr(LayeredBody, "balanced", lambda body, state, tolerance_n: state)
+    without = sensor.press(punch, force_n=[2.0], model="hyperelastic")
+    assert with_balance.iterations.sum() < without.iterations.sum()
+    # The tolerance of forces, 3e-4 of 10 N, is worth 0.1 % of a map at 2 N.
+    np.testing.assert_allclose(with_balance.deformation_map_mm, without.deformation_map_mm,
+                               atol=2e-3 * without.deformation_map_mm.max())

@@ -1,0 +1,142 @@
+"""The hyperelastic press on a small sensor: first touch, refusal, mesh file; tests/verification has the rest."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from softtact.contact.height_field import HeightField
+from softtact.errors import ConvergenceError
+from softtact.geometry.meshes import place
+from softtact.geometry.pose import Pose
+from softtact.materials.laws.registry import make_law
+from softtact.models.hyperelastic.build import build_sensor_body
+from softtact.models.hyperelastic.mesh_settings import MeshSettings
+from softtact.models.hyperelastic.newton import NewtonSettings, press_levels
+from softtact.models.meshes import layered_mesh
+from softtact.press.sensor import Sensor
+from softtact.sensors.specification import SensorSpec
+
+CORO = SensorSpec.from_yaml(Path(__file__).parents[3] / "config/sensors/coro.yaml")
+SMALL = CORO.model_copy(update={"footprint_mm": (6.0, 8.4), "map_shape": (15, 11)})   # 5 x 7 frusta
+LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492),
+        "cover": make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)}
+COARSE = MeshSettings(cover_levels=(0.0, 1.0), cover_splits=(0,), far_pitches=1, frustum_levels=(0.0, 0.35, 1.0))
+
+
+def small_body():
+    return build_sensor_body(SMALL, dielectric_law=LAWS["dielectric"], cover_law=LAWS["cover"], mesh=COARSE)
+
+
+def press_small(mesh, forces, **where):
+    return Sensor(SMALL, LAWS, mesh=COARSE).press(mesh, force_n=forces, model="hyperelastic", **where)
+
+
+@pytest.fixture(scope="module")
+def cylinder_press():
+    return press_small(trimesh.creation.cylinder(radius=1.8, height=3, sections=64), [0.5, 1.5, 3.0])
+
+
+def test_a_deeper_press_needs_more_force_and_stays_out_of_the_object(cylinder_press):
+    assert (np.diff(cylinder_press.indentation_mm) > 0).all()
+    assert cylinder_press.penetration_mm.max() < 0.01           # penalty: pressure / stiffness = 1 MPa / 500 N/mm3, and its edge
+    assert (cylinder_press.converged == 1).all()
+
+
+def test_the_contact_area_does_not_depend_on_how_far_overlaps_were_pressed_apart():
+    """To a point or two of 0.1 mm2: touching points were once told by their gaps, which are of either sign when pressed apart."""
+    cylinder, areas = trimesh.creation.cylinder(radius=1.8, height=3, sections=64), []
+    for allowed in (1.0, 2e-4):
+        sensor = Sensor(SMALL, LAWS, mesh=COARSE, solver=NewtonSettings(largest_penetration_mm=allowed))
+        result = sensor.press(cylinder, force_n=[0.5, 1.5], model="hyperelastic")
+        areas.append(result.contact_area_mm2)
+    assert result.penetration_mm.max() < 2e-4       # the second was pressed apart
+    np.testing.assert_allclose(areas[1], areas[0], rtol=0.02)
+
+
+def test_a_light_press_overlaps_by_less_in_proportion():
+    cylinder = trimesh.creation.cylinder(radius=1.8, height=3, sections=64)
+    light = press_small(cylinder, [0.1])
+    assert light.penetration_mm[0] <= 1e-3 * light.indentation_mm[0] / 0.2 < 1e-4      # the cover comes down by less
+
+
+def test_overlaps_that_were_not_pressed_apart_are_outside_validity(cylinder_press):
+    solver = NewtonSettings(largest_penetration_mm=0.25 * cylinder_press.penetration_mm.min(), contact_passes=0)
+    cylinder = trimesh.creation.cylinder(radius=1.8, height=3, sections=64)
+    left = Sensor(SMALL, LAWS, mesh=COARSE, solver=solver).press(cylinder, force_n=[0.5], model="hyperelastic")
+    assert cylinder_press.within_validity.all() and not left.within_validity.any()
+
+
+def test_a_tip_between_the_contact_points_finds_its_first_touch():
+    """The cap of a small sphere on a corner of the grid is nearer to the surface than any point that feels contact."""
+    result = press_small(trimesh.creation.icosphere(subdivisions=4, radius=2.0), [0.2, 1.0])
+    assert (np.diff(result.indentation_mm) > 0).all()
+
+
+SPIKE = trimesh.creation.cone(radius=0.8, height=2.5, sections=64).apply_transform(np.diag([1.0, -1.0, -1.0, 1.0]))
+BETWEEN_POINTS = Pose.from_values([0.17, 0.11, 0, 0, 0, 0])
+
+
+def test_a_spike_that_goes_in_between_the_contact_points_is_lowered_until_they_feel_it():
+    # With more force it slips on between them, and where it stops is chance.
+    result = press_small(SPIKE, [0.01, 0.02], pose=BETWEEN_POINTS)
+    assert (np.diff(result.indentation_mm) > 0).all() and result.residual_n.max() < 3e-3
+    assert not result.within_validity.any()     # a handful of points does not resolve it
+
+
+def test_a_tip_deeper_than_the_sensor_is_thick_is_no_level_and_the_levels_before_are_kept(monkeypatch):
+    tip = 2.5 + press_small(SPIKE, [0.01, 0.02], pose=BETWEEN_POINTS).indentation_mm     # its height below the origin
+    monkeypatch.setattr(SensorSpec, "thickness_mm", tip.mean())
+    with pytest.raises(ConvergenceError, match=rf"0\.02 N was not reached.* {tip[1]:.3g} mm deep") as caught:
+        press_small(SPIKE, [0.01, 0.02], pose=BETWEEN_POINTS)
+    np.testing.assert_array_equal(caught.value.result.force_n, [0.01])
+
+
+def test_a_cone_whose_tip_is_between_the_contact_points_goes_deeper_with_more_force():
+    # Unlike the spike's, its flanks are met by several points: without kept tangents 0.3642 and 0.4381 mm.
+    cone = trimesh.creation.cone(radius=0.8, height=1.0, sections=64)
+    cone.apply_transform(np.diag([1.0, -1.0, -1.0, 1.0]))
+    result = press_small(cone, [0.05, 0.1], pose=Pose.from_values([0.17, 0.11, 0, 0, 0, 0]))
+    np.testing.assert_allclose(result.indentation_mm + 1.0, [0.3642, 0.4381], atol=2e-4)     # the tip is 1 mm below the origin
+
+
+def test_a_press_that_stalls_says_between_which_forces_and_gives_no_level():
+    body = small_body()
+    surface = HeightField(place(trimesh.creation.icosphere(radius=3.0), pose=None))
+    levels = press_levels(body, surface, [20.0], settings=NewtonSettings(max_iterations=4, smallest_increment_n=15.0))
+    with pytest.raises(ConvergenceError, match="level of 20 N was not reached: from 0 N on"):
+        next(levels)
+
+
+def test_a_press_that_crawls_ends_after_the_iterations_of_a_level():
+    body = small_body()
+    surface = HeightField(place(trimesh.creation.icosphere(radius=3.0), pose=None))
+    levels = press_levels(body, surface, [20.0], settings=NewtonSettings(max_iterations=4, level_iterations=7))
+    with pytest.raises(ConvergenceError, match=", 8 iterations in all"):     # to 20 N and to 10 N, four each
+        next(levels)
+
+
+def test_a_tangent_that_nothing_makes_positive_definite_fails_the_level_and_is_not_tried_for_ever(monkeypatch):
+    body, shifts = small_body(), []
+    surface = HeightField(place(trimesh.creation.icosphere(radius=3.0), pose=None))
+    levels = press_levels(body, surface, [1.0, 2.0], settings=NewtonSettings(smallest_increment_n=0.6))
+    next(levels)
+    monkeypatch.setattr(body.stepper, "step", lambda rubber, *_, **__: shifts.append(rubber.diagonal().max()))     # None: no step
+    with pytest.raises(ConvergenceError, match="level of 2 N was not reached: from 1 N on"):
+        next(levels)
+    assert max(shifts) > 1e6 * shifts[0]      # N/mm: all was tried
+
+
+def test_the_mesh_file_holds_the_volume_of_sheet_and_cover_and_of_the_frusta():
+    """As VTK sees it, which cuts curved elements into tetrahedra: cones of eight sides, with a tenth less volume."""
+    import pyvista
+
+    grid = pyvista.from_meshio(layered_mesh(SMALL, {"cover_levels": [0.0, 1.0], "cover_splits": [0],
+                                                   "frustum_levels": [0.0, 0.35, 1.0]}))
+    volumes = grid.compute_cell_sizes(length=False, area=False)["Volume"]
+    assert volumes.min() > 0
+    octagon = 8 * np.sin(np.pi / 4) / 2 / np.pi
+    frusta = 35 * np.pi * 0.5 / 3 * (0.3**2 + 0.3 * 0.6 + 0.6**2)
+    for number, expected, tolerance in ((0, octagon * frusta, 0.02), (1, 6.0 * 8.4 * 0.5, 1e-9), (2, 6.0 * 8.4 * 1.5, 1e-9)):
+        assert volumes[grid["layer"] == number].sum() == pytest.approx(expected, rel=tolerance)

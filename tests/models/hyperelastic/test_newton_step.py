@@ -1,0 +1,196 @@
+"""Steps that are exact in the contact: against a general minimiser, and what a factor serves for."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.optimize
+import scipy.sparse as sp
+
+from softtact.contact.penalty import Contact, penalty
+from softtact.fem.assembly import SymmetricProduct
+from softtact.models.hyperelastic import newton_step
+from softtact.models.hyperelastic.newton_step import ContactStepper, LinearGaps
+from softtact.models.hyperelastic.preconditioner import ContactFactor
+
+UNKNOWNS, POINTS = 12, 8
+CONTACT = Contact(stiffness=3000.0, smoothing=1 / 3000)
+
+
+class DenseSolver:
+    """Cholesky of numpy behind the interface of the sparse solvers; counts its solves."""
+
+    def __init__(self):
+        self.solves = 0
+
+    def factor(self, upper):
+        whole = (upper + sp.triu(upper, 1).T).toarray()
+        try:
+            np.linalg.cholesky(whole)
+        except np.linalg.LinAlgError:
+            return False
+        self._inverse = np.linalg.inv(whole)
+        return True
+
+    def solve(self, right):
+        self.solves += 1
+        return self._inverse @ right
+
+
+def dense_stepper(solver=None):
+    """A stepper whose factor is new for each contact."""
+    return ContactStepper(ContactFactor(solver or DenseSolver()))
+
+
+class Scene:
+    """A random positive definite body under a free object, its points between 2 um in the object and 2 um away."""
+
+    def __init__(self, seed, *, stiffness=5.0):
+        rng = np.random.default_rng(seed)
+        root = rng.normal(size=(UNKNOWNS, UNKNOWNS))
+        self.matrix = stiffness * (np.eye(UNKNOWNS) + root @ root.T / UNKNOWNS)
+        self.rows = rng.normal(size=(POINTS, UNKNOWNS))
+        self.points = LinearGaps(gaps=rng.uniform(-2e-3, 2e-3, POINTS), rows=sp.csr_matrix(self.rows),
+                           lowering=-rng.uniform(0.7, 1, POINTS), area=rng.uniform(0.01, 0.03, POINTS), contact=CONTACT)
+        self.residual, self.excess = rng.normal(scale=1e-2, size=UNKNOWNS), -0.05
+
+    def step(self, stepper, **changes):
+        arguments = {"excess": self.excess, **changes}
+        return stepper.step(sp.csr_matrix(np.triu(self.matrix)), self.residual, self, **arguments)
+
+    def rubber_forces(self, rubber, step):
+        return SymmetricProduct(rubber.indptr, rubber.indices)(rubber.data, step)
+
+    def follow(self, step, lowering):
+        """The object is plain: the points always face the same."""
+        return False
+
+    def energy(self, x):
+        """The step's energy (mJ) over that of no step: linear and quadratic in the rubber, exact in the contact."""
+        step, lowering = x[:UNKNOWNS], x[UNKNOWNS]
+        gaps = self.points.gaps + self.rows @ step + self.points.lowering * lowering
+        after, before = (penalty(g, stiffness=CONTACT.stiffness, smoothing=CONTACT.smoothing)[0] for g in (gaps, self.points.gaps))
+        held = self.points.pressure(0.0)      # the residual holds the contact's present forces already
+        linear = self.residual @ step + self.excess * lowering + held @ (self.rows @ step + self.points.lowering * lowering)
+        return linear + 0.5 * step @ self.matrix @ step + self.points.area @ (after - before)
+
+
+@pytest.fixture
+def exact(monkeypatch):
+    """Steps solved to the last digit, where the press asks for less."""
+    for name, value in (("_INNER_TOLERANCE", 1e-9), ("_FORCING", 1e-6), ("_INNER_STEPS", 60)):
+        monkeypatch.setattr(newton_step, name, value)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_step_is_the_least_energy_that_a_general_minimiser_finds(exact, seed):
+    scene = Scene(seed)
+    step, lowering = scene.step(dense_stepper())
+    found = np.append(step, lowering)
+    general = scipy.optimize.minimize(scene.energy, np.zeros(UNKNOWNS + 1), method="BFGS", options={"gtol": 1e-9, "maxiter": 4000})
+    scale = abs(general.fun)
+    assert scene.energy(found) <= general.fun + 1e-9 * scale
+    assert np.abs(scipy.optimize.approx_fprime(found, scene.energy, 1e-9)).max() < 1e-4    # the differences' own rounding
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_an_object_that_would_go_too_far_stops_and_the_body_is_in_balance_at_that_depth(exact, seed):
+    scene = Scene(seed)
+    _, free = scene.step(dense_stepper())
+    step, lowering = scene.step(dense_stepper(), largest=0.3 * abs(free))
+    assert lowering == pytest.approx(0.3 * free, rel=1e-12)
+    at_depth = scipy.optimize.approx_fprime(np.append(step, lowering), scene.energy, 1e-9)
+    assert np.abs(at_depth[:-1]).max() < 1e-4    # the differences' own rounding
+    assert at_depth[-1] < -1e-2                  # N: deeper down the energy is still less
+
+
+def test_a_limit_that_the_object_does_not_reach_changes_nothing():
+    (step, lowering), (limited, lowered) = (Scene(1).step(dense_stepper(), largest=far) for far in (np.inf, 1.0))
+    assert lowered == lowering and (limited == step).all()
+
+
+def test_an_object_that_is_held_is_not_lowered():
+    step, lowering = Scene(1).step(dense_stepper(), excess=None)
+    assert lowering == 0.0 and np.abs(step).max() > 0
+
+
+def test_a_point_that_would_fly_into_the_object_is_stopped_within_one_step(exact):
+    # One unknown, pulled up by 1 N against 1 N/mm, a point 1 um under the object: Newton's tangent does not know of it.
+    scene = Scene(0)
+    scene.matrix, scene.rows, scene.residual = np.eye(1), np.array([[-1.0]]), np.array([-1.0])
+    scene.points = LinearGaps(gaps=np.array([1e-3]), rows=sp.csr_matrix(scene.rows), lowering=np.array([-1.0]),
+                              area=np.array([0.02]), contact=CONTACT)
+    step, _ = scene.step(dense_stepper(), excess=None)
+    depth = step[0] - 1e-3
+    # 1 N = step + area k (depth - t / 2): by hand, depth = (1 - 1e-3 + 60 t / 2) / 61
+    assert depth == pytest.approx((1 - 1e-3 + 60 / 6000) / 61, rel=1e-6)
+
+
+def test_a_free_object_that_touches_nothing_is_told_by_nan():
+    scene = Scene(2)
+    scene.points = replace(scene.points, gaps=np.full(POINTS, 0.1))
+    _, lowering = scene.step(dense_stepper(), excess=-1.0)
+    assert np.isnan(lowering)
+
+
+def test_a_factor_serves_the_next_step_too():
+    scene, stepper = Scene(3), dense_stepper()
+    scene.step(stepper)
+    factors = stepper.factors
+    scene.matrix = 1.02 * scene.matrix     # rubber that has stiffened a little
+    scene.step(stepper)
+    assert stepper.factors == factors
+
+
+def test_it_takes_no_further_solve_to_see_that_a_step_is_good_enough():
+    scene, solver = Scene(3), DenseSolver()
+    scene.points = replace(scene.points, gaps=np.full(POINTS, 0.1))
+    step, _ = scene.step(dense_stepper(solver), excess=None)
+    np.testing.assert_allclose(scene.matrix @ step, -scene.residual, rtol=1e-9)
+    assert solver.solves == 2     # of what the object's lowering does, and of the step itself
+
+
+def test_a_step_with_an_old_factor_is_the_same_step(exact):
+    scene, other, stepper = Scene(3), Scene(4), dense_stepper()
+    new = scene.step(dense_stepper())
+    other.step(stepper)
+    old = scene.step(stepper)
+    assert np.abs(new[0] - old[0]).max() < 1e-6 * np.abs(new[0]).max() and old[1] == pytest.approx(new[1], rel=1e-6)
+
+
+def test_a_body_that_is_not_stable_has_no_step():
+    scene = Scene(5)
+    scene.matrix = scene.matrix - 3 * np.linalg.eigvalsh(scene.matrix)[-1] * np.eye(UNKNOWNS)
+    assert scene.step(dense_stepper()) is None
+
+
+@pytest.mark.parametrize("components", [1, 2, 3, 4])
+def test_a_symmetric_matrix_times_a_vector_is_found_from_its_upper_triangle(components):
+    """Nodes of three components have three rows of the same columns; the last node here is held along its last component."""
+    rng = np.random.default_rng(7)
+    graph = sp.random(20, 20, density=0.1, rng=rng) + sp.eye(20)
+    half = sp.kron(graph, np.ones((components, components))).tocsr()[:-1, :-1]
+    half.data = rng.normal(size=half.nnz)
+    whole, x = (half + half.T).tocsr(), rng.normal(size=half.shape[0])
+    upper = sp.triu(whole, format="csr")
+    upper.sort_indices()
+    np.testing.assert_allclose(SymmetricProduct(upper.indptr, upper.indices)(upper.data, x), whole @ x, rtol=1e-13, atol=1e-13)
+
+
+class SlidingScene(Scene):
+    """The same, but half the points' areas leave the object as soon as a step is taken."""
+
+    def follow(self, step, lowering):
+        self.points = replace(self.points, area=np.where(np.arange(POINTS) % 2, 0.0, self.points.area))
+        return True
+
+
+def test_a_step_is_in_balance_with_what_the_points_face_where_it_leads(exact):
+    scene = SlidingScene(6)
+    before, rows, lowering = scene.points.pressure(0.0), scene.points.rows, scene.points.lowering
+    step, down = scene.step(dense_stepper())
+    carried = scene.points.pressure(rows @ step + lowering * down)
+    left = scene.residual + scene.matrix @ step - rows.T @ (carried - before)
+    assert np.abs(left).max() < 1e-8 * np.abs(scene.residual).max()
+    assert abs(scene.excess - lowering @ (carried - before)) < 1e-8 * abs(scene.excess)
+    assert not carried[1::2].any()

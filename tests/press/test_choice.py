@@ -1,0 +1,69 @@
+"""The choice of a model: the paper's rule, the error to expect, and what a result tells of it."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from softtact.errors import InputError
+from softtact.press.choice import FoundationError, calibrate, cheapest, expected_errors, rms
+from softtact.press.sensor import load_sensor
+
+
+def maps(*amplitudes):
+    """A map for each amplitude: a bump of so many mm."""
+    x = np.linspace(-1, 1, 9)
+    return np.array(amplitudes)[:, None, None] * np.exp(-4 * (x[:, None] ** 2 + x**2))
+
+
+def press(amplitudes, compression):
+    return SimpleNamespace(deformation_map_mm=maps(*amplitudes), frustum_compression_mm=np.array(compression))
+
+
+def test_calibration_finds_the_constants_that_errors_were_made_with():
+    true = FoundationError(at_rest=0.02, growth=0.1)
+    amplitudes, compression = np.linspace(0.05, 0.3, 12), np.linspace(0.02, 0.2, 12)
+    found = calibrate(maps(*amplitudes), compression, true(maps(*amplitudes), compression, 0.5), height_mm=0.5)
+    assert found.at_rest == pytest.approx(0.02, rel=1e-9) and found.growth == pytest.approx(0.1, rel=1e-9)
+
+
+def test_constants_never_promise_less_than_no_error():
+    amplitudes, compression = np.linspace(0.05, 0.3, 12), np.linspace(0.02, 0.2, 12)
+    falling = rms(maps(*amplitudes)) * (0.05 - 0.1 * compression / 0.5)
+    found = calibrate(maps(*amplitudes), compression, falling, height_mm=0.5)
+    assert found.growth == 0.0 and found.at_rest > 0
+
+
+def test_the_elastic_models_error_is_what_the_cheap_models_disagree_by():
+    errors = expected_errors(press([0.3], [0.1]), press([0.2], [0.1]), height_mm=0.5, model=FoundationError(0.0, 0.0))
+    assert errors["foundation"] == pytest.approx([0.0])
+    assert errors["elastic"] == pytest.approx(rms(maps(0.1)))
+
+
+@pytest.mark.parametrize(("tolerance", "model"), [(0.2, "elastic"), (0.05, "foundation"), (0.001, "hyperelastic")])
+def test_the_cheapest_model_within_the_tolerance_is_taken(tolerance, model):
+    errors = {"elastic": np.array([0.05, 0.1]), "foundation": np.array([0.001, 0.004])}
+    assert cheapest(errors, tolerance) == model
+
+
+def test_beyond_the_presses_it_is_known_of_no_error_is_promised():
+    errors = expected_errors(press([0.3], [0.3]), press([0.3], [0.3]), height_mm=0.5)
+    assert np.isinf(errors["foundation"]).all() and cheapest(errors, 10.0) == "hyperelastic"
+
+
+def test_a_policy_or_tolerance_that_makes_no_sense_is_refused():
+    import trimesh
+
+    sensor, ball = load_sensor("coro"), trimesh.creation.icosphere(radius=5.0)
+    with pytest.raises(InputError, match="policy 'cheap' is unknown"):
+        sensor.press(ball, force_n=1.0, policy="cheap")
+    with pytest.raises(InputError, match="tolerance -1 mm is not positive"):
+        sensor.press(ball, force_n=1.0, policy="error", tolerance_mm=-1.0)
+
+
+def test_many_presses_need_as_many_poses_as_meshes():
+    import trimesh
+
+    ball = trimesh.creation.icosphere(radius=5.0)
+    with pytest.raises(InputError, match="2 meshes and 1 poses"):
+        load_sensor("coro").press_many([ball, ball], [None], force_n=1.0, model="elastic")

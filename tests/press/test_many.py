@@ -1,0 +1,144 @@
+"""Many presses at once: the same as one by one, in order, whatever the processes, and none lost to one that fails."""
+
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+import trimesh
+
+from softtact.contact.unilateral import ContactSettings
+from softtact.errors import ConvergenceError, InputError
+from softtact.files import read_dataset
+from softtact.geometry.pose import Pose
+from softtact.models.elastic.compliance import elastic_compliance
+from softtact.press.many import press_batch
+from softtact.press.sensor import Sensor
+from softtact.sensors.specification import SensorSpec
+from softtact.stages import simulate_press, simulate_presses
+
+CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
+SMALL = CORO.model_copy(update={"footprint_mm": (7.2, 7.2), "map_shape": (13, 13)})
+MESHES = [trimesh.creation.cylinder(radius=1.5, height=2.0), trimesh.creation.icosphere(radius=4.0),
+          trimesh.creation.box((2, 3, 2))]
+POSES = [Pose.from_values((0.3, 0, 1.0, 0, 0, 0)), None, Pose.from_values((0, -0.5, 1.2, 3, 0, 20))]
+BESIDE = Pose.from_values((50, 0, 1.0, 0, 0, 0))
+
+
+@pytest.fixture(scope="module")
+def sensor():
+    return Sensor(SMALL, {}, files={"elastic": elastic_compliance(SMALL)})
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_many_presses_are_those_one_by_one_in_their_order(sensor, workers):
+    together = sensor.press_many(MESHES, POSES, force_n=[1.0, 4.0], model="elastic", workers=workers)
+    for mesh, pose, result in zip(MESHES, POSES, together, strict=True):
+        alone = sensor.press(mesh, pose=pose, force_n=[1.0, 4.0], model="elastic")
+        np.testing.assert_allclose(result.deformation_map_mm, alone.deformation_map_mm, rtol=0, atol=1e-6)    # mm, the tolerance
+
+
+def test_one_mesh_goes_through_all_poses(sensor):
+    results = sensor.press_many(MESHES[0], POSES[:2], force_n=2.0, model="elastic", workers=1)
+    assert [len(result.force_n) for result in results] == [1, 1]
+
+
+def test_a_press_that_fails_is_named_after_the_others_are_done_or_kept_in_its_place(sensor):
+    with pytest.raises(InputError, match="press 1 of 2: The object misses the sensor"):
+        sensor.press_many(MESHES[0], [POSES[0], BESIDE], force_n=1.0, model="elastic", workers=1)
+    first, second = sensor.press_many(MESHES[0], [POSES[0], BESIDE], force_n=1.0, model="elastic", workers=1, failures="keep")
+    assert first.converged.all() and isinstance(second, InputError)
+
+
+# --- as a stage of the workflow ---
+
+
+@pytest.fixture
+def stage(sensor, tmp_path):
+    """(inputs, settings) of the stage that presses a cylinder in two places, and of each press alone."""
+    sensor.files["elastic"].save(tmp_path / "compliance.npz")
+    MESHES[0].export(tmp_path / "punch.stl")
+    shared = {"sensor": SMALL.model_dump(mode="json"), "model": "layer", "kind": "elastic", "laws": {}, "mesh": {},
+              "friction": None, "device": "cpu", "forces_n": [1.0, 4.0]}
+    items = [{"name": name, "set": "indenters", "unit": "mm", "pose": pose}
+             for name, pose in (("punch", None), ("punch-1", [0.3, 0.2, 1.0, 0.0, 0.0, 30.0]))]
+    return {"object": tmp_path / "punch.stl", "compliance": tmp_path / "compliance.npz"}, shared, items
+
+
+def test_an_objects_places_pressed_together_are_written_as_each_press_alone(stage, tmp_path):
+    inputs, shared, items = stage
+    together = [tmp_path / f"{item['name']}.nc" for item in items]
+    simulate_presses.run(inputs=inputs, outputs={"press": together}, settings={**shared, "items": items})
+    for path, item in zip(together, items, strict=True):
+        simulate_press.run(inputs=inputs, outputs={"press": tmp_path / "alone.nc"}, settings={**shared, "item": item})
+        one, alone = read_dataset(path), read_dataset(tmp_path / "alone.nc")
+        assert one.attrs == alone.attrs and one.attrs["item"] == item["name"] and one.attrs["model"] == "layer"
+        np.testing.assert_allclose(one.deformation_map_mm, alone.deformation_map_mm, rtol=0, atol=1e-6)
+    first, second = map(read_dataset, together)
+    assert np.abs(first.deformation_map_mm - second.deformation_map_mm).max() > 0.01     # places apart
+
+
+def test_a_place_that_fails_is_named_and_no_press_of_its_job_is_written(stage, tmp_path):
+    inputs, shared, items = stage
+    items = [*items, {**items[1], "name": "punch-2", "pose": [50.0, 0, 1, 0, 0, 0]}]
+    outputs = [tmp_path / f"{item['name']}.nc" for item in items]
+    with pytest.raises(InputError, match="^indenters/punch-2/layer: The object misses the sensor"):
+        simulate_presses.run(inputs=inputs, outputs={"press": outputs}, settings={**shared, "items": items})
+    assert not any(path.exists() for path in outputs)
+    with pytest.raises(InputError, match="2 outputs 'press' for 3 items; give one for each"):
+        simulate_presses.run(inputs=inputs, outputs={"press": outputs[:2]}, settings={**shared, "items": items})
+
+
+# --- as one batch, on any device of torch ---
+
+
+def batch(sensor, jobs, **options):
+    return press_batch(sensor, jobs, np.array([1.0, 4.0]), **{"device": "cpu", "workers": 1, "label": "", **options})
+
+
+def assert_alike(result, alone):
+    """Forces of a contact are known to its tolerance of 1e-6 mm; an area may differ by a node that hardly touches."""
+    np.testing.assert_allclose(result.deformation_map_mm, alone.deformation_map_mm, rtol=0, atol=2e-6)
+    np.testing.assert_allclose(result.indentation_mm, alone.indentation_mm, rtol=0, atol=2e-6)
+    np.testing.assert_allclose(result.contact_area_mm2, alone.contact_area_mm2, rtol=0.02)
+    assert (result.within_validity == alone.within_validity).all() and (result.penetration_mm <= 1e-6).all()
+
+
+def test_a_batch_gives_the_presses_one_by_one(sensor):
+    for job, result in zip(zip(MESHES, POSES, strict=True), batch(sensor, list(zip(MESHES, POSES, strict=True))), strict=True):
+        assert_alike(result, sensor.press(job[0], pose=job[1], force_n=[1.0, 4.0], model="elastic"))
+        assert (result.wall_time_s > 0).all()
+
+
+def test_a_batch_in_several_parts_is_that_in_one(sensor, monkeypatch):
+    monkeypatch.setattr("softtact.models.elastic.batch.COLUMNS_AT_ONCE", 4)     # two presses of two levels
+    jobs = list(zip(MESHES, POSES, strict=True))
+    for result, (mesh, pose) in zip(batch(sensor, jobs, workers=2), jobs, strict=True):
+        assert_alike(result, sensor.press(mesh, pose=pose, force_n=[1.0, 4.0], model="elastic"))
+
+
+def test_a_press_of_a_batch_that_fails_leaves_the_others(sensor, monkeypatch):
+    first, second = batch(sensor, [(MESHES[0], BESIDE), (MESHES[0], POSES[0])])
+    assert isinstance(first, InputError) and second.converged.all()
+    monkeypatch.setattr("softtact.models.elastic.batch.ContactSettings", partial(ContactSettings, max_iterations=1))
+    unsettled, = batch(sensor, [(MESHES[1], None)])
+    assert isinstance(unsettled, ConvergenceError) and "at 1 N" in str(unsettled)
+
+
+@pytest.mark.skipif(torch.cuda.is_available(), reason="a GPU is here")
+def test_a_gpu_that_is_not_there_is_refused(sensor):
+    with pytest.raises(InputError, match="torch finds no GPU here; write 'cpu'"):
+        sensor.press_many(MESHES[0], [None], force_n=1.0, model="elastic", device="cuda")
+
+
+def test_a_model_that_has_no_batch_is_refused_on_a_gpu(sensor):
+    with pytest.raises(InputError, match="only the elastic model presses on a GPU"):
+        sensor.press_many(MESHES[0], [None], force_n=1.0, model="hyperelastic", device="cuda")
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
+def test_a_gpu_gives_the_presses_of_the_processor(sensor):
+    for one, other in zip(sensor.press_many(MESHES, POSES, force_n=[1.0, 4.0], model="elastic", device="cuda"),
+                          sensor.press_many(MESHES, POSES, force_n=[1.0, 4.0], model="elastic", device="cpu"), strict=True):
+        assert_alike(one, other)

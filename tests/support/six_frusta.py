@@ -1,0 +1,35 @@
+"""A sensor of 3 x 2 frusta on a coarse mesh, for tests of single cells."""
+
+from pathlib import Path
+
+import numpy as np
+
+from softtact.materials.laws.registry import make_law
+from softtact.models.hyperelastic.build import build_sensor_body
+from softtact.models.hyperelastic.mesh_settings import MeshSettings
+from softtact.sensors.specification import SensorSpec
+
+CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
+SMALL = CORO.model_copy(update={"footprint_mm": (3.6, 2.4), "map_shape": (5, 7)})
+LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492)
+COARSE = MeshSettings(cover_levels=(0.0, 1.0), cover_splits=(0,), far_pitches=1, frustum_levels=(0.0, 0.35, 1.0))
+
+
+def plate(x, y):
+    """A level plate over everything."""
+    return np.zeros(len(x)), np.tile([0.0, 0.0, -1.0], (len(x), 1))
+
+
+def six_frusta():
+    """The body at rest."""
+    return build_sensor_body(SMALL, dielectric_law=LAW, cover_law=LAW, mesh=COARSE)
+
+
+def bent(body, *, by_mm, depth_mm):
+    """The body under a plate held at a depth, some frusta bent sideways in their middle, {frustum: mm}."""
+    slab, bed = body.rest()
+    z = body.bed.coordinates[0, :, 2]
+    middle = np.sin(np.pi * (z - z.min()) / np.ptp(z))
+    for frustum, much in by_mm.items():
+        bed[frustum, :, 0] += much * middle
+    return body.evaluate(slab, bed, depth_mm, body.slab.facing(slab, plate))
