@@ -78,7 +78,7 @@ class Motion:
 
     @property
     def depth_mm(self) -> float:
-        """Depth (mm) from first touch that the prescribed ways lead to; nan after a step with a loaded z, which nobody knows before."""
+        """Depth (mm) from first touch that the prescribed ways lead to; InputError after a step with a loaded z."""
         depth = 0.0
         for step in self.steps:
             depth = math.nan if "z" in step.loads else depth - step.ways.get("z", 0.0)
@@ -111,8 +111,8 @@ class Motion:
 
     def _terms(self, part: str, terms: list[tuple[str, float]], count: int) -> "Motion":
         if unknown := [name for name, _ in terms if name not in FREEDOMS + LOADS]:
-            raise InputError(f"motion: {unknown[0]!r} in the step {part!r} is no freedom; use one of {', '.join(FREEDOMS)} for a way, "
-                             f"{', '.join(LOADS)} for a load.")
+            raise InputError(f"motion: {unknown[0]!r} in the step {part!r} is no freedom; use one of "
+                             f"{', '.join(FREEDOMS)} for a way, {', '.join(LOADS)} for a load.")
         loads = {FREEDOMS[LOADS.index(name)]: value for name, value in terms if name in LOADS}
         ways, motion = {name: value / count for name, value in terms if name in FREEDOMS}, self
         for _ in range(count):
