@@ -4,7 +4,7 @@
 
 Writes pairs of deformation map (mm, what a simulation gives) and tactile map (counts, what a sensor would read), with force and
 pose of each. The presses are the elastic model's: some tenths of a second each. The readings are the virtual sensor's, a simulation
-with creep, scatter and noise of its own (docs/virtual_sensor.md); `--ideal` takes a faultless readout of the same map. Neither is a
+with creep, scatter and noise of its own (docs/virtual_sensor.md); `--ideal` takes a ideal readout of the same map. Neither is a
 measurement. A network that learns from readings of its own input's maps learns the readout only: the studies therefore read a
 press of another law and mesh.
 """
@@ -52,12 +52,12 @@ def pairs(sensor, results, poses, *, ideal, seed):
     counts = [result.tactile_map if ideal else read_virtual_sensor(sensor.spec, result.deformation_map_mm, force_n=result.force_n,
                                                                    trials=1, seed=seed, item=f"press {k}")[0]
               for k, result in enumerate(results)]
-    levels = len(FORCES_N)
+    load_steps = len(FORCES_N)
     return xarray.Dataset({
         "deformation_map_mm": (("sample", "y", "x"), np.concatenate([r.deformation_map_mm for r in results]), {"units": "mm"}),
         "tactile_map": (("sample", "row", "column"), np.concatenate(counts), {"units": "counts"}),
         "force_n": ("sample", np.concatenate([r.force_n for r in results]), {"units": "N"}),
-        "pose": (("sample", "six"), np.repeat(poses, levels, axis=0), {"units": "mm, degrees"}),
+        "pose": (("sample", "six"), np.repeat(poses, load_steps, axis=0), {"units": "mm, degrees"}),
     }, coords={"x": results[0].x_mm, "y": results[0].y_mm},
         attrs={"model": results[0].model, "sensor": results[0].sensor, "source": "ideal readout" if ideal else "virtual sensor"})
 
@@ -67,7 +67,7 @@ def parse(arguments):
     parser.add_argument("--presses", type=int, default=40)
     parser.add_argument("--sensor", default="coro")
     parser.add_argument("--model", default="elastic", choices=("elastic", "foundation"))
-    parser.add_argument("--ideal", action="store_true", help="a faultless readout in place of the virtual sensor")
+    parser.add_argument("--ideal", action="store_true", help="a ideal readout in place of the virtual sensor")
     parser.add_argument("--workers", type=int, help="processes; by default one for each core")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--out", type=Path, default=Path("training_set.nc"))

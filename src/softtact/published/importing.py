@@ -8,7 +8,7 @@ import xarray
 from softtact.errors import InputError
 from softtact.published.archive import MODELS, SETS, SOURCE
 from softtact.published.arrangement import ARRANGEMENTS, arrange, correlations
-from softtact.published.odd import Odd
+from softtact.published.outliers import Odd
 from softtact.published.pairing import MAP_COLUMNS, MAP_ROWS, TAXELS, object_name, pair
 from softtact.published.table import read_table
 
