@@ -59,7 +59,8 @@ class Sensor:
     """A sensor with one law per layer; `mesh` sets the layered body's resolution, `solver` what counts as solved.
 
     device: where the hyperelastic model sums up its elements: `cpu`, `cuda`, or `auto`: a GPU where torch finds one
-    prepared_models: {"elastic": Compliance, "foundation": FoundationCompliance}, what the fast models start from; else the user's cache
+    prepared_models: {"elastic": Compliance, "foundation": FoundationCompliance}, what the fast models start from; else the
+    user's cache
     """
 
     spec: SensorSpec

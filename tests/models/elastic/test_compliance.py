@@ -107,8 +107,8 @@ def test_the_bedding_is_the_confined_modulus_over_the_thickness(compliance):
 
 def test_the_sensors_press_is_the_layers(compliance):
     mesh, values = OBJECTS["punch off the nodes"]
-    result = Sensor(SMALL, {}, prepared_models={"elastic": compliance}).press(mesh, pose=Pose.from_values((*values[:2], 1.5, 0, 0, 0)),
-                                                                    force_n=list(FORCES), model="elastic")
+    sensor, pose = Sensor(SMALL, {}, prepared_models={"elastic": compliance}), Pose.from_values((*values[:2], 1.5, 0, 0, 0))
+    result = sensor.press(mesh, pose=pose, force_n=list(FORCES), model="elastic")
     nodes = Underside(HeightField(placed("punch off the nodes")), compliance.grid).nodes(SMALL.thickness_mm)
     expected = press_layer(compliance, nodes, FORCES)
     # the sensor asks for points as deep as the object may come; those left out never touch
