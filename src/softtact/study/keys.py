@@ -239,8 +239,8 @@ class Data(Section):
     unseen: list[Name] = Field([], description="the archive's indenters that training never sees, donut_m for its DonutM")
     without: list[str] = Field([], description="tests, by their Path, and objects, by their item's name, that are not used")
     taxel_order: Arrangement = Field("rows", description="of tax1 to tax28 under the map; the import says which one fits best")
-    odd: Literal["leave_out", "refuse"] = Field("leave_out", description="tests that are odd")
-    largest_odd_share: Annotated[float, Field(ge=0.0, le=1.0)] = Field(0.1, description="of tests that may be left out")
+    outliers: Literal["leave_out", "refuse"] = Field("leave_out", description="tests that are odd")
+    largest_outlier_share: Annotated[float, Field(ge=0.0, le=1.0)] = Field(0.1, description="of tests that may be left out")
 
     @model_validator(mode="after")
     def _has_unseen_indenters(self):
