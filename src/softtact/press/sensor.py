@@ -5,6 +5,7 @@
 """
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -16,6 +17,7 @@ from softtact.devices import find_device
 from softtact.errors import ConvergenceError, InputError
 from softtact.geometry.meshes import check_over_sensor, place
 from softtact.materials.config import law_from_printed
+from softtact.materials.laws.base import Law
 from softtact.models.hyperelastic import newton
 from softtact.models.hyperelastic.build import build_sensor_body
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
@@ -24,34 +26,26 @@ from softtact.press.choice import TOLERANCE_MM, press_auto
 from softtact.press.many import press_many, raise_first
 from softtact.press.models import PRESSES
 from softtact.press.validity import flag_buried
+from softtact.sensors.library import material_file, sensor_file
 from softtact.sensors.specification import SensorSpec
 
 MODELS = ("auto", *PRESSES)
-PROJECT = Path(__file__).parents[3]
 
 
-def load_sensor(name_or_yaml, *, materials=None):
-    """The `Sensor` of a name (config/sensors/NAME.yaml) or of a YAML file.
+def load_sensor(name_or_yaml: str | Path, *, materials: Mapping[str, Law] | None = None) -> "Sensor":
+    """The `Sensor` of a name or of a YAML file.
 
+    name_or_yaml: config/sensors/NAME.yaml of the working folder comes first, then what ships with the package: coro (its product's
+    name, tsf85, means the same sensor) and pad; materials that a sensor names are found in the same way
     materials: {"dielectric": Law, "cover": Law} to replace the Mooney-Rivlin constants printed for its materials
+    Raises InputError that lists the known names, or names the file and the field that is wrong.
     """
-    path = _config_file("sensors", name_or_yaml)
-    spec = SensorSpec.from_yaml(path)
+    spec = SensorSpec.from_yaml(sensor_file(name_or_yaml))
     laws = dict(materials or {})
     for layer in ("dielectric", "cover"):
         if layer not in laws:
-            laws[layer] = law_from_printed(_config_file("materials", getattr(spec, layer).material), "mooney_rivlin")
+            laws[layer] = law_from_printed(material_file(getattr(spec, layer).material), "mooney_rivlin")
     return Sensor(spec, laws)
-
-
-def _config_file(kind, name):
-    if Path(name).suffix in (".yaml", ".yml"):
-        return Path(name)
-    for folder in (Path("config"), PROJECT / "config"):
-        path = folder / kind / f"{name}.yaml"
-        if path.exists():
-            return path
-    raise InputError(f"There is no config/{kind}/{name}.yaml; give one of the names there or the path of a YAML file.")
 
 
 @dataclass

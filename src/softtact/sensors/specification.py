@@ -191,5 +191,5 @@ class SensorSpec(_Strict):
         path = Path(path)
         values = read_yaml(path, missing="there is no such sensor file.")
         if not isinstance(values, dict):
-            raise InputError(f"{path}: a sensor file must hold keys and values; see config/sensors/coro.yaml.")
+            raise InputError(f"{path}: a sensor file must hold keys and values; see docs/bring_your_sensor.md.")
         return cls.from_dict(values, where=str(path))
