@@ -17,7 +17,8 @@ def add(commands):
     """Add the command to the parser."""
     command = add_command(commands, "fit", _fit, "Fit hyperelastic laws to test curves and write a material card.", EXAMPLES)
     command.add_argument("curves", nargs="+", metavar="CURVES",
-                         help="CSV files, one test each, MODE=FILE to state a file's mode; or one material: its name, or its YAML file")
+                         help="CSV files, one test each, MODE=FILE to state a file's mode; or one material by its name or its "
+                              "YAML file")
     command.add_argument("--law", help="a law's name, several with commas, or all (default)")
     command.add_argument("--choose", help="the law that solvers take (default: best of the ranking)")
     command.add_argument("--material", help="the material's name in the card")

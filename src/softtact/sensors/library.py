@@ -1,6 +1,6 @@
 """Sensors and materials by name: a user's own in `config/` of the working folder first, then those that ship with the package.
 
-    config/sensors/NAME.yaml, config/materials/NAME.yaml     a user's own; they add to what ships, and replace a file of the same name
+    config/sensors/NAME.yaml, config/materials/NAME.yaml     a user's own; they add to what ships or replace it by their name
     softtact/sensors/data/                                   what ships
 """
 
@@ -57,5 +57,5 @@ def _file(kind: str, name: str | Path, own: Path) -> Path:
             if known in {path.stem for path in folder.glob("*.yaml")}:     # by comparison: a name is no path
                 return folder / f"{known}.yaml"
     known = known_names(kind, own=own)
-    raise InputError(f"There is no {kind.removesuffix('s')} {str(name)!r}{nearest(name, known)}; known are {', '.join(known)}; write one "
-                     f"of them, the path of a YAML file, or put yours at {own / kind / f'{name}.yaml'}.")
+    raise InputError(f"There is no {kind.removesuffix('s')} {str(name)!r}{nearest(name, known)}; known are {', '.join(known)}; "
+                     f"write one of them, the path of a YAML file, or put yours at {own / kind / f'{name}.yaml'}.")
