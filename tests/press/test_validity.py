@@ -1,6 +1,5 @@
 """Which levels of a press are flagged: each criterion by itself, at its limit, and the object that has sunk in as a press."""
 
-
 import numpy as np
 import pytest
 import trimesh

@@ -1,6 +1,5 @@
 """Capacitance per area: closed forms in the limits, bounds by a finite-volume field, what compression does."""
 
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,6 +1,5 @@
 """Means over electrodes, edges and neighbours against closed forms and balances."""
 
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,6 +1,5 @@
 """A sensor of 3 x 2 frusta on a coarse mesh, for tests of single cells."""
 
-
 import numpy as np
 from support.sensors import CORO
 

@@ -6,7 +6,6 @@ frustum's side meets the sheet the stress is singular, so both converge slowly, 
 direction is refined together, and the reference's limit is extrapolated.
 """
 
-
 import numpy as np
 import pytest
 import scipy.sparse as sp

@@ -52,10 +52,10 @@ def _folders(kind: str, own: Path) -> tuple[Path, Path]:
 def _file(kind: str, name: str | Path, own: Path) -> Path:
     if Path(name).suffix in YAML:
         return Path(name)
-    for known in (str(name), ALIASES[kind].get(str(name), str(name))):
+    for asked in (str(name), ALIASES[kind].get(str(name), str(name))):
         for folder in _folders(kind, own):
-            if known in {path.stem for path in folder.glob("*.yaml")}:     # by comparison: a name is no path
-                return folder / f"{known}.yaml"
+            if asked in {path.stem for path in folder.glob("*.yaml")}:     # by comparison: a name is no path
+                return folder / f"{asked}.yaml"
     known = known_names(kind, own=own)
     raise InputError(f"There is no {kind.removesuffix('s')} {str(name)!r}{nearest(name, known)}; known are {', '.join(known)}; "
                      f"write one of them, the path of a YAML file, or put yours at {own / kind / f'{name}.yaml'}.")

@@ -1,6 +1,5 @@
 """The elastic surface on a torch device: what it does to forces at all nodes is what the compliance's own matrix does."""
 
-
 import numpy as np
 import pytest
 import torch

@@ -1,6 +1,5 @@
 """The elastic model on a small sensor: the press of its quarters against the whole layer; tests/verification has Hertz."""
 
-
 import numpy as np
 import pytest
 import trimesh

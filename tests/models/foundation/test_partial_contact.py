@@ -1,6 +1,5 @@
 """Nodes beside an edge, neither held nor free: an edge counts where it is, wherever it lies between the nodes."""
 
-
 import numpy as np
 import pytest
 import trimesh

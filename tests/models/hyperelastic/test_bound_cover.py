@@ -1,6 +1,5 @@
 """A cover whose lowest layer keeps to the sheet's plan: balance across the interface, the map's plane, parts, mesh settings."""
 
-
 import numpy as np
 import pytest
 import trimesh

@@ -1,6 +1,5 @@
 """The hyperelastic press feels a punch's edge where it is, wherever it crosses an element of the cover."""
 
-
 import numpy as np
 import pytest
 import trimesh

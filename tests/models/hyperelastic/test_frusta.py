@@ -1,6 +1,5 @@
 """Contacts of the frusta at rest, for both readings of the printed diameters."""
 
-
 import numpy as np
 import pytest
 from support.sensors import CORO

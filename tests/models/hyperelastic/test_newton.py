@@ -1,6 +1,5 @@
 """The hyperelastic press on a small sensor: first touch, refusal, mesh file; tests/verification has the rest."""
 
-
 import numpy as np
 import pytest
 import trimesh
