@@ -1,4 +1,4 @@
-"""Cholesky's method by layers of the matrix' graph, in dense blocks: a direct solver of SciPy and LAPACK alone, where MKL is missing.
+"""Cholesky's method by layers of the matrix' graph, in dense blocks of LAPACK: a direct solver where MKL is missing.
 
 Unknowns at the same distance from one end of the body form a layer. A layer couples to the next one only, so the matrix is block
 tridiagonal (A. George, J. W. Liu, Computer Solution of Large Sparse Positive Definite Systems, 1981, ch. 4):
