@@ -83,7 +83,7 @@ def main():
         return
     mesh = options.mesh
     for name in options.objects or default_objects():
-        if options.again or not any(_is(row, name, mesh) for row in recorded()):
+        if options.reevaluate_contact or not any(_is(row, name, mesh) for row in recorded()):
             run = subprocess.run([sys.executable, __file__, "--one", name, mesh], capture_output=True, text=True,
                                  env=record.threads_of(1), check=False)
             if run.returncode:

@@ -1,11 +1,10 @@
 """A cover whose lowest layer keeps to the sheet's plan: balance across the interface, the map's plane, parts, mesh settings."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import trimesh
 from scipy.spatial import cKDTree
+from support.sensors import CORO
 
 from softtact.contact.height_field import HeightField
 from softtact.decks.mesh import body_mesh
@@ -19,9 +18,7 @@ from softtact.models.hyperelastic.newton import NewtonSettings, _augment
 from softtact.models.meshes import mesh_settings
 from softtact.models.newton import Solution
 from softtact.press.sensor import Sensor
-from softtact.sensors.specification import SensorSpec
 
-CORO = SensorSpec.from_yaml(Path(__file__).parents[3] / "config/sensors/coro.yaml")
 SMALL = CORO.model_copy(update={"footprint_mm": (6.0, 6.0), "map_shape": (11, 11)})     # 5 x 5 frusta
 LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492)
 THREE = (0.0, 0.45, 0.8, 1.0)
