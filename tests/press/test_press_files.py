@@ -19,7 +19,8 @@ def made_up_press():
     return PressResult(deformation_map_mm=rng.random((2, 5, 3)), tactile_map=rng.random((2, 7, 4)), force_n=np.array([5.0, 20.0]),
                        residual_n=np.full(2, np.nan), iterations=np.array([3, 4]), converged=np.ones(2, dtype=np.int8),
                        within_validity=np.array([1, 0], dtype=np.int8), x_mm=np.linspace(-11, 11, 3),
-                       y_mm=np.linspace(-18.5, 18.5, 5), model="hyperelastic", sensor="coro", solver="dense", selection_reason="two words",
+                       y_mm=np.linspace(-18.5, 18.5, 5), model="hyperelastic", sensor="coro", solver="dense",
+                       selection_reason="two words",
                        largest_counts=3000.0, **numbers,
                        attributes={"thickness_mm": 2.5, "tips_bonded": 1, "mesh_repairs": "", "friction": "none"})
 
