@@ -122,7 +122,7 @@ def nonsense(result, sensor):
              "less depth at more force": np.append(falls, False) | np.append(False, falls),
              "overlap": result.penetration_mm > 2 * ALLOWED_MM,
              "no contact": result.contact_area_mm2 <= 0,
-             "a balance that is none": result.residual_n > 1e-2 * np.maximum(result.force_n, 1)}
+             "a balance that is none": result.residual_n > 1e-2 * np.maximum(result.normal_force_n, 1)}
     return {name: where for name, where in found.items() if where.any()}
 
 

@@ -166,7 +166,7 @@ def measure(case, conditions, default_maps=None):
                "largest_difference_mm": difference.max(axis=(1, 2)), "mean_difference_mm": difference.mean(axis=(1, 2)),
                "map_minimum_mm": maps.min(axis=(1, 2)),
                "frustum_compression_mm": result.frustum_compression_mm, "overlap_mm": result.penetration_mm}
-    whole = {"force_n": result.force_n.tolist(), "iterations": result.iterations.tolist(),
+    whole = {"force_n": result.normal_force_n.tolist(), "iterations": result.iterations.tolist(),
              "within_validity": result.within_validity.tolist()}
     return row | whole | {key: np.round(values, 6).tolist() for key, values in numbers.items()}, maps
 

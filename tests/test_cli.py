@@ -163,7 +163,7 @@ def test_a_press_that_stops_early_writes_and_prints_the_forces_before(capsys, tm
     status = main(["press", str(OBJECT), "--unit", "mm", "--force", "5", "--force", "20", "--model", "elastic", "--json",
                    "--out", str(tmp_path / "p.nc")])
     captured = capsys.readouterr()
-    assert status == 3 and json.loads(captured.out)["force_n"] == [5.0] and (tmp_path / "p.nc").exists()
+    assert status == 3 and json.loads(captured.out)["normal_force_n"] == [5.0] and (tmp_path / "p.nc").exists()
     assert captured.err.endswith("softtact press: The load step of 20 N was not reached.\n")
 
 

@@ -219,7 +219,7 @@ def test_the_wheel_presses_the_shipped_sensor_in_an_empty_folder(softtact_in, pa
                                            "elastic", "--out", "press.nc", "--plot", "press.png")
     assert status == 0, complained
     assert "model: elastic" in said and (tmp_path / "press.png").stat().st_size > 0
-    assert softtact.read_press(tmp_path / "press.nc").force_n.tolist() == [5.0]
+    assert softtact.read_press(tmp_path / "press.nc").normal_force_n.tolist() == [5.0]
 
 
 @pytest.mark.slow

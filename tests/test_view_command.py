@@ -24,7 +24,7 @@ MAPS = np.stack([k * np.outer(np.hanning(7), np.hanning(5)) for k in (0.2, 0.5)]
 
 @pytest.fixture
 def press_nc(tmp_path):
-    data = xarray.Dataset({"deformation_map_mm": (("force", "y", "x"), MAPS), "force_n": ("force", [5.0, 20.0])},
+    data = xarray.Dataset({"deformation_map_mm": (("step", "y", "x"), MAPS), "normal_force_n": ("step", [5.0, 20.0])},
                           coords={"x": X, "y": Y}, attrs={"thickness_mm": 2.5})
     data.to_netcdf(tmp_path / "press.nc", engine="h5netcdf")
     return tmp_path / "press.nc"
@@ -61,7 +61,7 @@ def test_paraview_reads_the_whole_mesh_with_displacements_and_the_pressure_of_th
 
 
 def test_cover_sheet_and_frusta_move_alike_where_they_meet(hyperelastic):
-    mesh = of_bodies(hyperelastic[0].bodies, hyperelastic[0].force_n)
+    mesh = of_bodies(hyperelastic[0].bodies, hyperelastic[0].normal_force_n)
     _, place = np.unique(np.round(mesh.points, 6), axis=0, return_inverse=True)
     most, least = (np.full((place.max() + 1, 3), start) for start in (-np.inf, np.inf))
     np.maximum.at(most, place.ravel(), mesh.displacement_mm[1])

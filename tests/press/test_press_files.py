@@ -16,7 +16,8 @@ def made_up_press():
     rng = np.random.default_rng(4)
     numbers = {name: rng.random(2) for name in ("indentation_mm", "contact_area_mm2", "penetration_mm", "frustum_compression_mm",
                                                 "wall_time_s", "extrapolated_volume_fraction", "expected_error_mm")}
-    return PressResult(deformation_map_mm=rng.random((2, 5, 3)), tactile_map=rng.random((2, 7, 4)), force_n=np.array([5.0, 20.0]),
+    return PressResult(deformation_map_mm=rng.random((2, 5, 3)), tactile_map=rng.random((2, 7, 4)),
+                       normal_force_n=np.array([5.0, 20.0]),
                        residual_n=np.full(2, np.nan), iterations=np.array([3, 4]), converged=np.ones(2, dtype=np.int8),
                        within_validity=np.array([1, 0], dtype=np.int8), x_mm=np.linspace(-11, 11, 3),
                        y_mm=np.linspace(-18.5, 18.5, 5), model="hyperelastic", sensor="coro", solver="dense",
@@ -58,7 +59,7 @@ def test_every_field_is_written_but_the_bodies_and_every_array_has_units(tmp_pat
         names = {one.name for one in fields(PressResult)} - {"bodies", "attributes", "x_mm", "y_mm"}
         assert names | {"x", "y"} <= {*data.variables, *data.attrs}
         assert all(variable.attrs.get("units") for variable in data.variables.values())
-        assert data.force_n.attrs["units"] == "N" and data.tactile_map.dims == ("force", "row", "column")
+        assert data.force_n.attrs["units"] == "N" and data.tactile_map.dims == ("step", "row", "column")
 
 
 def test_the_chosen_models_error_is_nan_where_no_policy_tells(tmp_path):
@@ -69,7 +70,7 @@ def test_the_chosen_models_error_is_nan_where_no_policy_tells(tmp_path):
 @pytest.mark.parametrize(("change", "said"), [
     (lambda data: data.drop_vars("force_n"), "it holds no whole press ('force_n' is missing)"),
     (lambda data: data.assign_attrs(solver=None), "it holds no whole press ('solver' is missing)"),
-    (lambda data: data.transpose("x", "y", "force", "row", "column"), "'deformation_map_mm' has the dimensions"),
+    (lambda data: data.transpose("axis", "x", "y", "step", "row", "column"), "'deformation_map_mm' has the dimensions"),
 ])
 def test_a_file_without_a_whole_press_is_refused_by_its_name_and_what_is_missing(change, said, tmp_path):
     data = change(made_up_press().to_dataset())

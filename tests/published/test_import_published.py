@@ -44,7 +44,7 @@ def test_every_object_has_its_maps_and_readings_with_the_forces_of_its_tests(imp
     reading = read_dataset(outputs["tactile"] / "indenters/echo_h.nc")
     assert dict(press.sizes) == {"force": 10, "y": 57, "x": 33}
     assert list(np.unique(press.path)) == ["EchoH/test_0", "EchoH/test_1"]
-    assert np.array_equal(press.force_n, reading.force_n)
+    assert np.array_equal(press.normal_force_n, reading.force_n)
     assert reading.tactile_map.shape == (1, 10, 7, 4)
     assert press.attrs["source"] == reading.attrs["source"] == "published archive"
     real = archive.real["Flat"]

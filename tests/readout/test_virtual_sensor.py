@@ -224,7 +224,7 @@ def test_settings_that_the_sensor_cannot_have_are_refused(values, said):
 
 
 def test_the_stage_writes_readings_of_the_way_up_and_the_way_down(tmp_path):
-    press = xarray.Dataset({"deformation_map_mm": (("force", "y", "x"), PRESS), "force_n": ("force", FORCES)},
+    press = xarray.Dataset({"deformation_map_mm": (("step", "y", "x"), PRESS), "normal_force_n": ("step", FORCES)},
                            attrs={"set": "indenters", "item": "a"})
     write_dataset(tmp_path / "press.nc", press, seed=0, settings={})
     rules = {"sensor": CORO.model_dump(mode="json"), "virtual_sensor": {"relaxation": [0.1], "relaxation_s": [2.0]}, "trials": 2,

@@ -25,7 +25,8 @@ from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic import newton_step, unit_cells
 from softtact.models.hyperelastic.build import build_sensor_body
 from softtact.models.hyperelastic.friction import BodyFriction
-from softtact.models.hyperelastic.newton import NewtonSettings, press_load_steps
+from softtact.models.hyperelastic.newton import NewtonSettings
+from softtact.models.hyperelastic.path import press_load_steps
 from softtact.press.sensor import Sensor
 from softtact.sensors.specification import Friction, SensorSpec
 

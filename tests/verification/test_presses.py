@@ -18,7 +18,8 @@ from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic.body import LayeredBody
 from softtact.models.hyperelastic.build import build_sensor_body, build_unit_cell
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
-from softtact.models.hyperelastic.newton import NewtonSettings, press_load_steps
+from softtact.models.hyperelastic.newton import NewtonSettings
+from softtact.models.hyperelastic.path import press_load_steps
 from softtact.models.hyperelastic.slab import Slab
 from softtact.press.sensor import Sensor
 

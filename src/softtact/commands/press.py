@@ -116,7 +116,7 @@ def _cards(options):
 
 def _press_summary(result):
     """What a press gave at each force, as plain JSON values."""
-    load_steps = {"force_n": result.force_n, "indentation_mm": result.indentation_mm,
+    load_steps = {"normal_force_n": result.normal_force_n, "force_n": result.force_n, "indentation_mm": result.indentation_mm,
               "contact_area_mm2": result.contact_area_mm2,
               "largest_deformation_mm": result.deformation_map_mm.max(axis=(1, 2)),
               "tactile_map": result.tactile_map}
@@ -139,7 +139,7 @@ def _press_lines(summary):
     if summary["selection_reason"]:
         yield f"chosen because: {summary['selection_reason']}"
     yield f"{'force, N':>10}{'indentation, mm':>18}{'contact, mm2':>15}{'deepest, mm':>14}{'counts, sum':>14}"
-    names = ("force_n", "indentation_mm", "contact_area_mm2", "largest_deformation_mm", "tactile_map")
+    names = ("normal_force_n", "indentation_mm", "contact_area_mm2", "largest_deformation_mm", "tactile_map")
     for force, depth, area, deepest, counts in zip(*(summary[name] for name in names), strict=True):
         yield f"{force:10.4g}{depth:18.4f}{area:15.1f}{deepest:14.4f}{sum(map(sum, counts)):14.0f}"
     yield from _quality_lines(summary)
@@ -155,7 +155,7 @@ def _quality_lines(summary):
     if None not in summary["expected_error_mm"]:
         yield f"error to expect against the hyperelastic model: {1e3 * max(summary['expected_error_mm']):.2g} um, root mean square"
     if not all(summary["within_validity"]):
-        forces = ", ".join(f"{force:g}" for force, valid in zip(summary["force_n"], summary["within_validity"], strict=True)
+        forces = ", ".join(f"{force:g}" for force, valid in zip(summary["normal_force_n"], summary["within_validity"], strict=True)
                            if not valid)
         yield f"beyond what the model is valid for: {forces} N"
     if None not in summary["extrapolated_volume_fraction"]:

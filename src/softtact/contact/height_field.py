@@ -59,6 +59,23 @@ class MovedSurface:
         return self.surface(x - self.offset_mm[0], y - self.offset_mm[1])
 
 
+@dataclass(frozen=True)
+class SweptSurface:
+    """The lowest underside of an object over all places that a motion takes it to."""
+
+    surface: Callable
+    """Heights (n,) and normals (n, 3) of the object's underside over points, as `HeightField`."""
+    offsets_mm: np.ndarray
+    """The ways (k, 2) from its first place."""
+
+    def __call__(self, x, y):
+        """Heights (n,) and normals (n, 3) over points (n,), (n,) of the sensor."""
+        each = [self.surface(x - way[0], y - way[1]) for way in self.offsets_mm]
+        lowest = np.argmin([height for height, _ in each], axis=0)
+        every = np.arange(len(x))
+        return np.stack([height for height, _ in each])[lowest, every], np.stack([normal for _, normal in each])[lowest, every]
+
+
 def lowest_crossing_naive(x, y, mesh):
     """The same heights by testing every triangle: the executable specification of `HeightField`."""
     heights = np.full(len(x), NO_CONTACT_MM)

@@ -26,34 +26,34 @@ _FACT = {"fact": True}      # a field that stands in a file as an attribute
 
 @dataclass(frozen=True)
 class PressResult:
-    """One press through a list of forces. A field is one line here: its metadata say how it is written and read back."""
+    """One press, load step by load step. A field is one line here: its metadata say how it is written and read back."""
 
-    deformation_map_mm: np.ndarray = field(metadata=_array("mm", "force", "y", "x"))
-    """(force, y, x) in mm: how far the sensing surface moved towards the board, positive."""
-    tactile_map: np.ndarray = field(metadata=_array("counts", "force", "row", "column"))
-    """(force, row, column) in counts: the taxels' ideal reading."""
-    force_n: np.ndarray = field(metadata=_array("N", "force"))
-    """(force,) in N: how hard the object was pressed, positive into the sensor."""
-    indentation_mm: np.ndarray = field(metadata=_array("mm", "force"))
-    """(force,) in mm: how far the object came down from where it just touches."""
-    contact_area_mm2: np.ndarray = field(metadata=_array("mm2", "force"))
-    """(force,) in mm2: area of the sensing surface that bears pressure."""
-    penetration_mm: np.ndarray = field(metadata=_array("mm", "force"))
-    """(force,) in mm: deepest overlap of object and surface that the solver left."""
-    frustum_compression_mm: np.ndarray = field(metadata=_array("mm", "force"))
-    """(force,) in mm: of the most compressed frustum; nan where the model has none."""
-    residual_n: np.ndarray = field(metadata=_array("N", "force"))
-    """(force,) in N: largest unbalanced nodal force; nan where the model does not tell."""
-    extrapolated_volume_fraction: np.ndarray = field(metadata=_array("1", "force"))
-    """(force,) share of a layer's volume strained beyond the data its law was fitted to, the larger of the layers'; or nan."""
-    iterations: np.ndarray = field(metadata=_array("1", "force"))
-    """(force,) iterations of the solver."""
-    converged: np.ndarray = field(metadata=_array("1", "force"))
-    """(force,) 1 where the solver reached its tolerance."""
-    within_validity: np.ndarray = field(metadata=_array("1", "force"))
-    """(force,) 0 where the numbers are not to be relied on; why: docs/command_line.md, "What is flagged"."""
-    wall_time_s: np.ndarray = field(metadata=_array("s", "force"))
-    """(force,) in s: wall time of the load step; the solver's preparation counts to the first."""
+    deformation_map_mm: np.ndarray = field(metadata=_array("mm", "step", "y", "x"))
+    """(step, y, x) in mm: how far the sensing surface moved towards the board, positive."""
+    tactile_map: np.ndarray = field(metadata=_array("counts", "step", "row", "column"))
+    """(step, row, column) in counts: the taxels' ideal reading."""
+    normal_force_n: np.ndarray = field(metadata=_array("N", "step"))
+    """(step,) in N: how hard the object was pressed, positive into the sensor."""
+    indentation_mm: np.ndarray = field(metadata=_array("mm", "step"))
+    """(step,) in mm: how far the object came down from where it just touches."""
+    contact_area_mm2: np.ndarray = field(metadata=_array("mm2", "step"))
+    """(step,) in mm2: area of the sensing surface that bears pressure."""
+    penetration_mm: np.ndarray = field(metadata=_array("mm", "step"))
+    """(step,) in mm: deepest overlap of object and surface that the solver left."""
+    frustum_compression_mm: np.ndarray = field(metadata=_array("mm", "step"))
+    """(step,) in mm: of the most compressed frustum; nan where the model has none."""
+    residual_n: np.ndarray = field(metadata=_array("N", "step"))
+    """(step,) in N: largest unbalanced nodal force; nan where the model does not tell."""
+    extrapolated_volume_fraction: np.ndarray = field(metadata=_array("1", "step"))
+    """(step,) share of a layer's volume strained beyond the data its law was fitted to, the larger of the layers'; or nan."""
+    iterations: np.ndarray = field(metadata=_array("1", "step"))
+    """(step,) iterations of the solver."""
+    converged: np.ndarray = field(metadata=_array("1", "step"))
+    """(step,) 1 where the solver reached its tolerance."""
+    within_validity: np.ndarray = field(metadata=_array("1", "step"))
+    """(step,) 0 where the numbers are not to be relied on; why: docs/command_line.md, "What is flagged"."""
+    wall_time_s: np.ndarray = field(metadata=_array("s", "step"))
+    """(step,) in s: wall time of the load step; the solver's preparation counts to the first."""
     x_mm: np.ndarray = field(metadata=_array("mm", "x", coordinate="x"))
     """(x,) in mm: the map's columns in the sensor frame."""
     y_mm: np.ndarray = field(metadata=_array("mm", "y", coordinate="y"))
@@ -64,8 +64,17 @@ class PressResult:
     """The sensor's name."""
     solver: str = field(metadata=_FACT)
     """The linear solver's name."""
-    expected_error_mm: np.ndarray | None = field(default=None, metadata=_array("mm", "force"))
-    """(force,) in mm: error to expect against the hyperelastic model, root mean square over the map, where the model was chosen by
+    force_n: np.ndarray | None = field(default=None, metadata=_array("N", "step", "axis"))
+    """(step, 3) in N: the object's force on the sensor's surface along x, y, z; z is negative where it presses."""
+    torque_nmm: np.ndarray | None = field(default=None, metadata=_array("N mm", "step", "axis"))
+    """(step, 3) in N mm: the torque of that force about the origin of the sensor frame; nan where the model does not tell."""
+    displacement_mm: np.ndarray | None = field(default=None, metadata=_array("mm", "step", "y", "x", "axis"))
+    """(step, y, x, 3) in mm: how the map's plane moved along x, y, z; nan in x and y where the model tells the map alone."""
+    slip: np.ndarray | None = field(default=None, metadata=_array("mm", "step", "y", "x"))
+    """(step, y, x) in mm: how far the surface slid along the object since it came to touch; nan where it does not touch, and where
+    the model knows no friction."""
+    expected_error_mm: np.ndarray | None = field(default=None, metadata=_array("mm", "step"))
+    """(step,) in mm: error to expect against the hyperelastic model, root mean square over the map, where the model was chosen by
     it; else nan."""
     selection_reason: str = field(default="", metadata=_FACT)
     """What made the choice of the model, where it was not the user's."""
@@ -77,18 +86,25 @@ class PressResult:
     """A `PressedBody` for each force where `Sensor.press` was asked to keep them, else none; not written with the maps."""
 
     def __post_init__(self) -> None:
-        if self.expected_error_mm is None:
-            object.__setattr__(self, "expected_error_mm", np.full(len(self.force_n), np.nan))
+        steps, vertical = len(self.normal_force_n), np.array([0.0, 0.0, 1.0])
+        unknown = np.where(vertical == 0, np.nan, 1.0)
+        defaults = {"force_n": lambda: -self.normal_force_n[:, None] * vertical, "torque_nmm": lambda: np.full((steps, 3), np.nan),
+                    "displacement_mm": lambda: -self.deformation_map_mm[..., None] * unknown,
+                    "slip": lambda: np.full(self.deformation_map_mm.shape, np.nan),
+                    "expected_error_mm": lambda: np.full(steps, np.nan)}
+        for name, default in defaults.items():
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, default())
 
     def pressed_body(self, load_step: int = -1) -> "PressedBody":
-        """The `PressedBody` at the force of number `load_step`, by default the last one: nodes, cells and displacements."""
+        """The `PressedBody` at the load step of number `load_step`, by default the last one: nodes, cells and displacements."""
         if not self.bodies:
             raise InputError(f"This result of the {self.model} model keeps no body; press with model='hyperelastic' and "
                              "keep_body=True.")
         return self.bodies[load_step]
 
     def to_dataset(self) -> "xarray.Dataset":
-        """The result as an xarray dataset with dimensions force, y, x, row, column and the units of each array."""
+        """The result as an xarray dataset with dimensions step, y, x, axis, row, column and the units of each array."""
         import xarray
 
         arrays: dict[str, Any] = {}
@@ -108,9 +124,10 @@ class PressResult:
     def write_vtu(self, path: str | Path) -> None:
         """Write the pressed sensor as VTU: the solver's mesh where it was kept, else the map's surface (see `pressed_mesh`)."""
         if self.bodies:
-            mesh = of_bodies(self.bodies, self.force_n)
+            mesh = of_bodies(self.bodies, self.normal_force_n)
         else:
-            mesh = of_map(self.deformation_map_mm, self.x_mm, self.y_mm, self.force_n, thickness_mm=self.attributes["thickness_mm"])
+            mesh = of_map(self.deformation_map_mm, self.x_mm, self.y_mm, self.normal_force_n,
+                          thickness_mm=self.attributes["thickness_mm"])
         mesh.write(path)
 
 

@@ -16,6 +16,7 @@ import trimesh
 from threadpoolctl import threadpool_limits
 
 from softtact.contact.height_field import HeightField
+from softtact.contact.motion import Motion
 from softtact.devices import find_device
 from softtact.errors import ConvergenceError, InputError
 from softtact.geometry.meshes import check_over_sensor, place
@@ -29,7 +30,7 @@ from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.press.cache import cached_compliance, cached_foundation
 from softtact.press.choice import TOLERANCE_MM, press_auto
 from softtact.press.many import press_many, raise_first
-from softtact.press.models import PRESSES
+from softtact.press.models import MOTIONS, PRESSES
 from softtact.press.result import PressResult
 from softtact.press.validity import flag_buried
 from softtact.sensors.library import material_file, sensor_file
@@ -72,10 +73,13 @@ class Sensor:
     attributes: dict = field(default_factory=dict)
     device: str = "cpu"
 
-    def press(self, mesh: trimesh.Trimesh, *, pose: Pose | None = None, force_n: float | Sequence[float], model: str = "auto",
-              policy: str = "paper", tolerance_mm: float = TOLERANCE_MM, label: str = "press", threads: int | None = None,
-              keep_body: bool = False) -> PressResult:
-        """Press a mesh (trimesh, mm) through forces (N, one or an increasing list) and return a `PressResult`.
+    def press(self, mesh: trimesh.Trimesh, *, pose: Pose | None = None, force_n: float | Sequence[float] | None = None,
+              motion: Motion | None = None, model: str = "auto", policy: str = "paper", tolerance_mm: float = TOLERANCE_MM,
+              label: str = "press", threads: int | None = None, keep_body: bool = False) -> PressResult:
+        """Press a mesh (trimesh, mm) through forces (N, one or an increasing list) or a `Motion`; return a `PressResult`.
+
+        motion: steps down by force or to a depth, and aside, with friction where the sensor's `friction.object` states it; the
+        elastic and the hyperelastic model take any, `auto` then means the hyperelastic one, the foundation model only forces.
 
         pose: `Pose` of the mesh in the sensor frame; by default its bounding box is centred over the sensor, its lowest
         side down. model: elastic, foundation, hyperelastic, or auto: chosen by a policy, `paper` (complexity of the contact)
@@ -87,6 +91,12 @@ class Sensor:
         """
         if model not in MODELS:
             raise InputError(f"Model {model!r} is unknown; use one of {', '.join(MODELS)}.")
+        if (force_n is None) == (motion is None):
+            raise InputError("A press takes either force_n or motion; give one of them.")
+        if motion is not None and motion.forces_n:
+            force_n, motion = motion.forces_n, None
+        if motion is not None:
+            return self._press_motion(mesh, pose, motion, model, label=label, threads=threads or cores(), keep_body=keep_body)
         forces = self.checked_forces(force_n)
         placed = place(mesh, pose=pose)
         check_over_sensor(placed, self.spec.footprint_mm)
@@ -97,6 +107,24 @@ class Sensor:
             with threadpool_limits(limits=threads if model == "elastic" else 1):
                 result = press(self, placed, forces, label=label, threads=threads, keep_body=keep_body)
                 return flag_buried(result, placed.bounds[1, 2])
+        except ConvergenceError as error:
+            error.result = error.result and flag_buried(error.result, placed.bounds[1, 2])
+            raise
+
+    def _press_motion(self, mesh, pose, motion, model, *, label, threads, keep_body):
+        """A press that does more than go straight down by growing forces."""
+        press = MOTIONS.get("hyperelastic" if model == "auto" else model)
+        if press is None:
+            raise InputError(f"model={model!r}: the {model} model presses straight down by force only; use elastic or hyperelastic "
+                             "for this motion, or give force_n.")
+        for force in (-step.loads["z"] for step in motion.steps if "z" in step.loads):
+            self.checked_forces(force)
+        placed = place(mesh, pose=pose)
+        check_over_sensor(placed, self.spec.footprint_mm)
+        try:
+            with threadpool_limits(limits=threads if model == "elastic" else 1):
+                return flag_buried(press(self, placed, motion, label=label, threads=threads, keep_body=keep_body),
+                                   placed.bounds[1, 2])
         except ConvergenceError as error:
             error.result = error.result and flag_buried(error.result, placed.bounds[1, 2])
             raise

@@ -23,14 +23,14 @@ def valid_foundation(compression_mm, depth_mm, *, frustum_mm, thickness_mm, law_
     return (compression_mm < min(law_limit_mm, _HARDLY_COMPRESSED * frustum_mm)) & (depth_mm < _DEEPEST_LINEAR * thickness_mm)
 
 
-def valid_hyperelastic(*, compression_mm, contact_error_mm, points, depth_mm, frustum_mm, allowed_mm):
+def valid_hyperelastic(*, compression_mm, contact_error_mm, points, depth_mm, forces_n, frustum_mm, allowed_mm):
     """Which load steps (l,) of a hyperelastic press hold, by its most compressed frustum, contacts and course.
 
     contact_error_mm (l,): deepest overlap, or widest gap under pressure, of which `allowed_mm` were asked for
-    points (l,): of the cover that carry the object
+    points (l,): of the cover that carry the object;  forces_n (l,): where they do not grow, depths need not either
     """
     return ((compression_mm < _FULL_POCKET * frustum_mm) & (contact_error_mm < _OVERLAP_LEFT * allowed_mm)
-            & (points >= _FEWEST_POINTS) & _grows(depth_mm, slack_mm=allowed_mm))
+            & (points >= _FEWEST_POINTS) & ((np.diff(forces_n) <= 0).any() | _grows(depth_mm, slack_mm=allowed_mm)))
 
 
 def _grows(depth, *, slack_mm):

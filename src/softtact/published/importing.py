@@ -152,9 +152,9 @@ def press_dataset(tables, key, tests, *, model, sensor, sign):
     maps = sign * np.concatenate([tables.maps_mm(model, *test) for test in tests])
     ones = np.ones(len(maps), dtype=np.int8)
     return xarray.Dataset(
-        {"deformation_map_mm": (("force", "y", "x"), maps.astype(np.float32), {"units": "mm"}),
-         "force_n": ("force", _forces(tables, tests), {"units": "N"}), "path": ("force", _paths(tests)),
-         "converged": ("force", ones), "within_validity": ("force", ones)},
+        {"deformation_map_mm": (("step", "y", "x"), maps.astype(np.float32), {"units": "mm"}),
+         "normal_force_n": ("step", _forces(tables, tests), {"units": "N"}), "path": ("step", _paths(tests)),
+         "converged": ("step", ones), "within_validity": ("step", ones)},
         coords={"y": sensor.map_y_mm, "x": sensor.map_x_mm},
         attrs={"model": model, "set": key[0], "item": key[1], "source": SOURCE, "solver": SOLVERS[model]})
 

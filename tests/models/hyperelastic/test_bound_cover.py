@@ -14,7 +14,7 @@ from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic.build import build_sensor_body
 from softtact.models.hyperelastic.deformed_mesh import pressed_body
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
-from softtact.models.hyperelastic.newton import NewtonSettings, _augment
+from softtact.models.hyperelastic.newton import NewtonSettings, augment
 from softtact.models.meshes import mesh_settings
 from softtact.models.newton import Solution
 from softtact.press.sensor import Sensor
@@ -158,7 +158,7 @@ class Overlapping:
     ([5, 5, 5, 5, 5, 5, 1], [0, 0, 0, 0, 0, 1], 6)])         # those that move nothing add up
 def test_overlaps_are_pressed_apart_as_long_as_it_helps(monkeypatch, overlaps, spent, passes):
     body = Overlapping([1e-3 * depth for depth in overlaps], spent)
-    monkeypatch.setattr("softtact.models.hyperelastic.newton._settle",
+    monkeypatch.setattr("softtact.models.hyperelastic.newton.settle",
                         lambda body, *_: Solution("state", body.spent[body.passes - 1], 0.0))
-    found = _augment(body, None, Solution("state", 0, 0.0), 1.0, NewtonSettings())
+    found = augment(body, None, Solution("state", 0, 0.0), 1.0, NewtonSettings())
     assert (found.state, body.passes, found.iterations) == ("state", passes, sum(spent[:passes]))

@@ -16,7 +16,8 @@ from softtact.linalg.nodal_frames import NodeFrames
 from softtact.linalg.workers import Workers
 from softtact.models.hyperelastic import linearised_contact, preconditioner
 from softtact.models.hyperelastic.linearised_contact import StepContact
-from softtact.models.hyperelastic.newton import NewtonSettings, press_load_steps
+from softtact.models.hyperelastic.newton import NewtonSettings
+from softtact.models.hyperelastic.path import press_load_steps
 from softtact.models.hyperelastic.preconditioner import ContactFactor, DissectedContact
 
 WIDTH, LENGTH = 14, 9

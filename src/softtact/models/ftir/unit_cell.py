@@ -10,7 +10,8 @@ from softtact.errors import ConvergenceError
 from softtact.fem.elements import HEX27_BOTTOM, quad9
 from softtact.models.hyperelastic.build import build_unit_cell
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
-from softtact.models.hyperelastic.newton import NewtonSettings, press_load_steps
+from softtact.models.hyperelastic.newton import NewtonSettings
+from softtact.models.hyperelastic.path import press_load_steps
 
 # A gap this wide ends total reflection: the evanescent wave's intensity falls to 1/e in lambda / (4 pi sqrt(n^2 sin^2 theta - 1)),
 # for green light (0.53 um) in acrylic (n = 1.49) 0.13 um at 45 degrees and 0.05 um at 60 degrees.

@@ -1,15 +1,13 @@
-"""Presses under force control: Newton's method with line search, adaptive steps."""
+"""Balance of the body under an object that is held by a force or at an indentation: Newton's method and augmentations."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from softtact.errors import ConvergenceError
-from softtact.models.hyperelastic.body import BodyState
 from softtact.models.newton import Solution, lowers_potential, solve
 
 _STILL_MM = 1e-3       # after a step of less no point faces another facet but those that slide to and fro past an edge
-_DEEP = 0.55           # of a frustum's height: from here on elements of the default mesh may be unstable
 _MOST_INCREMENTS = 100  # of the first touch's depth, until a point of the cover feels the object
 # Pressing apart is in vain where so many passes that moved anything have not brought the overlap below this share of the least
 # before. Passes that move nothing add up: the force of a single point at an edge is below the tolerance.
@@ -27,6 +25,7 @@ class NewtonSettings:
     largest_step_mm: largest movement of a node in one iteration;  smallest_increment_n: force steps are halved down to this
     load_step_iterations: a load step ends where it took so many in all its steps: one that crawls would go on for hours
     first_touch_mm, first_touch_tolerance_n: overlap at which the press begins, and the residual that is good enough there
+    largest_way_mm: way of an object at once where a `Motion` moves it down or aside
     projection_iterations: iterations that look anew which facet each point faces
     kept_tangent_mm: a cell that moved less since its last tangent keeps it
     With friction
@@ -43,6 +42,7 @@ class NewtonSettings:
     largest_step_mm: float = 0.12
     smallest_increment_n: float = 0.02
     smallest_scale_n: float = 10.0
+    largest_way_mm: float = 0.05       # of a motion at once, down or aside: friction depends on the way
     first_touch_mm: float = 0.01
     first_touch_tolerance_n: float = 0.1   # a start for the first load step, not a result
     projection_iterations: int = 6
@@ -58,36 +58,7 @@ class NewtonSettings:
         return cls(relative_tolerance=1e-3, largest_penetration_mm=4e-3, kept_tangent_mm=0.03)
 
 
-@dataclass(frozen=True)
-class LoadStep:
-    """One converged load step; residual_n is the largest unbalanced nodal force."""
-
-    force_n: float
-    state: BodyState
-    iterations: int
-    residual_n: float
-    penetration_mm: float
-
-
-@dataclass(frozen=True)
-class Reached:
-    """The last converged force (N) along the path, and its state."""
-
-    force: float
-    state: BodyState
-
-
-def press_load_steps(body, surface, forces_n, *, settings=NewtonSettings()):
-    """Yield a `LoadStep` for each force (N, increasing). Raises ConvergenceError naming the load step that was not reached."""
-    body.begin()
-    reached = Reached(0.0, _first_touch(body, surface, settings))
-    for force in forces_n:
-        load_step = _advance(body, surface, reached, float(force), settings)
-        reached = Reached(load_step.force_n, load_step.state)
-        yield load_step
-
-
-def _first_touch(body, surface, settings):
+def first_touch(body, surface, settings):
     """Equilibrium at a small given indentation: under force control alone the free object has no stiffness."""
     slab, support = body.rest()
     projection = body.slab.project(slab, surface)
@@ -96,7 +67,7 @@ def _first_touch(body, surface, settings):
     if body.friction.active:
         before = body.evaluate(slab, support, start.indentation - settings.first_touch_mm, projection)
         start = body.reevaluate_contact(start, body.friction.begin_step(before))
-    found = _settle(body, surface, start, None, settings.first_touch_tolerance_n, settings)
+    found = settle(body, surface, start, None, settings.first_touch_tolerance_n, settings)
     if found.state is None:
         raise ConvergenceError("The first touch of the object did not converge.")
     return found.state
@@ -112,54 +83,7 @@ def _indented_until_contact(body, state, step_mm):
                            f"{_MOST_INCREMENTS * step_mm:g} mm; press with a finer cover (cover_splits) or with a larger object.")
 
 
-def _advance(body, surface, reached, target, settings):
-    """Reach `target`, halving the increment where Newton's method fails and growing it again where it succeeds.
-
-    A step starts from the last state: displacements continued along the path, whole or in part, start in worse contact and took
-    as many iterations or more, once the step itself is exact in the contact (benchmarks/mesh_error.py's bodies, ten load steps).
-    """
-    iterations, increment = 0, target - reached.force
-    while True:
-        force = min(target, reached.force + increment, _reach(body, reached.force, target, settings))
-        start = reached.state
-        if settings.max_augmentations and reached.force > 0:
-            start = body.augmented(start, allowed_mm=0.0)     # what overlaps is no start: more of it comes with more force
-        growth = force / reached.force if reached.force > 0 else 1.0
-        start = body.reevaluate_contact(start, body.friction.begin_step(start, growth=growth))
-        found = _settle(body, surface, start, force, _tolerance(force, settings), settings)
-        iterations += found.iterations
-        if found.state is not None and force >= target:
-            found = _augment(body, surface, found, force, settings)
-            iterations += found.iterations
-        if found.state is not None and force >= target:
-            return LoadStep(force_n=target, state=found.state, iterations=iterations, residual_n=found.residual_n,
-                            penetration_mm=body.penetration(found.state))
-        increment = 2 * increment if found.state is not None else 0.5 * (force - reached.force)
-        if found.state is None and (increment < settings.smallest_increment_n or iterations >= settings.load_step_iterations):
-            raise ConvergenceError(_failure(body, reached, force, target, found.residual_n, iterations))
-        if found.state is not None:
-            reached = Reached(force, found.state)
-
-
-def _reach(body, force, target, settings):
-    """The largest force (N) that one step may go to: friction depends on the way, so with it forces grow by doubling."""
-    if not body.friction.active:
-        return target
-    growth = settings.friction_growth
-    return max(growth * force, target / growth**2)
-
-
-def _failure(body, reached, force, target, residual, iterations):
-    x, y, share = body.most_compressed(reached.state)
-    remedy = "Ask for smaller forces or for load steps nearer to each other"
-    if share > _DEEP:
-        remedy += ", or press with MeshSettings.stable() (--mesh-quality stable)"
-    return (f"The load step of {target:g} N was not reached: from {reached.force:.4g} N on no step towards {force:.4g} N found a "
-            f"balance (unbalanced force {residual:.2g} N, {iterations} iterations in all); the frustum at x {x:.1f}, y {y:.1f} mm "
-            f"is compressed by {share:.0%} of its height. {remedy}.")
-
-
-def _augment(body, surface, found, force, settings):
+def augment(body, surface, found, force, settings):
     """The load step once more with its overlaps augmented, as long as they are deeper than allowed and become less."""
     iterations, spent, least, in_vain = 0, 0, np.inf, 0
     for _ in range(settings.max_augmentations):
@@ -173,17 +97,17 @@ def _augment(body, surface, found, force, settings):
         start = body.augmented(found.state, allowed_mm=allowed)
         if force is not None:
             start = body.indented_to(start, force)
-        found = _settle(body, surface, start, force, _tolerance(force, settings), settings)
+        found = settle(body, surface, start, force, tolerance_at(force, settings), settings)
         spent = found.iterations
         iterations += spent
     return replace(found, iterations=iterations)
 
 
-def _tolerance(force, settings):
+def tolerance_at(force, settings):
     return settings.relative_tolerance * max(force or 0.0, settings.smallest_scale_n)
 
 
-def _settle(body, surface, state, force, tolerance, settings):
+def settle(body, surface, state, force, tolerance, settings):
     """The `Solution` under a force (N) or at the state's indentation; with friction until friction and pressures agree."""
     if not body.friction.active:
         return _newton(body, surface, state, force, tolerance, settings)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from softtact.contact.coverage import continues, covered
 from softtact.contact.face_edges import ROWS, contact_compliance, own_areas
@@ -199,6 +200,28 @@ class TopContact:
     def under_pressure(self, state):
         """Which points (p,) carry pressure."""
         return self._pressure(state) * state.projection.covered > 0
+
+    def resultant(self, state):
+        """Force (3,) in N of the object on the surface, and its torque (3,) in N mm about the sensor frame's origin."""
+        area = (self.area * state.projection.covered)[:, None]
+        force = self._pressure(state)[:, None] * state.projection.normals * area
+        if state.friction_response is not None:
+            force = force - state.friction_response.traction * area
+        return force.sum(axis=0), np.cross(self.reference + self.at_points(state.displacement), force).sum(axis=0)
+
+    def slip_at(self, state, places):
+        """How far (n,) in mm the surface has slid along the object at places (n, 2); nan where it bears no pressure.
+
+        Told by the nearest contact point, as far as its own area may reach; nan everywhere without friction.
+        """
+        slip, touching = np.full(len(places), np.nan), self.under_pressure(state)
+        if state.friction_response is None or not touching.any():
+            return slip
+        points = (self.reference + self.at_points(state.displacement))[:, :2]
+        distance, nearest = cKDTree(points).query(places)
+        here = touching[nearest] & (distance <= np.sqrt(self.area[nearest]))
+        slip[here] = state.friction_response.slid[nearest[here]]
+        return slip
 
     def pressure_of_faces(self, state):
         """Mean pressure (t,) in MPa on each face, under the contact as it is now."""
