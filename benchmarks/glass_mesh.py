@@ -1,4 +1,4 @@
-"""How the contact area of a frustum on glass depends on its mesh, and on how contact is asked for (the tables of docs/ftir.md).
+"""How the contact area of a frustum on glass depends on its mesh, and on how contact is asked for (the tables of docs/explanation/ftir.md).
 
     python benchmarks/glass_mesh.py        (some minutes; benchmarks/results/glass_mesh.json)
 """

@@ -77,7 +77,7 @@ def test_every_commands_help_has_examples_and_the_exit_statuses(command, capsys)
 
 
 def test_the_docs_hold_the_exit_statuses_as_they_are():
-    page = (ROOT / "docs/command_line.md").read_text()
+    page = (ROOT / "docs/reference/command_line.md").read_text()
     assert all(f"| {status} | {meaning} |" in page for status, meaning in EXIT_STATUS.items())
 
 

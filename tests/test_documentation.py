@@ -22,7 +22,7 @@ from softtact.imaging.frames import render_frame
 from softtact.learning.network import TactileNetwork, save_network
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 BLOCK = re.compile(r"(?P<mark><!-- not run: [^>]+ -->\n\n?)?"
                    r"(?:^```(?P<kind>\w+)\n(?P<fenced>.*?)^```|(?P<indented>(?:^    [^\n]*\n)+))", re.MULTILINE | re.DOTALL)
 
@@ -124,7 +124,7 @@ def test_the_site_builds_without_a_warning_and_loads_nothing_from_elsewhere(tmp_
     done = subprocess.run([sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html", *folders],
                           capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    pages = {path.stem: path.read_text(encoding="utf-8") for path in (tmp_path / "site").glob("*.html")}
+    pages = {path.stem: path.read_text(encoding="utf-8") for path in (tmp_path / "site").rglob("*.html")}
     assert pages["theory"].count("<math") > 50 and "softtact.press.sensor.load_sensor" in pages["api"]
     for name, page in pages.items():
         assert not re.search(r"""(?:src=|<link[^>]*href=)["']?(?:https?:)?//""", page), name

@@ -1,4 +1,4 @@
-"""The verification's ledger: each comparison is recorded, and `--write-docs` turns the rows into docs/verification.md."""
+"""The verification's ledger: each comparison is recorded, and `--write-docs` turns the rows into docs/reference/verification.md."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,7 +8,7 @@ import pytest
 from softtact.files import atomic_path
 
 HERE = Path(__file__).parent
-DOCUMENT = HERE.parents[1] / "docs" / "verification.md"
+DOCUMENT = HERE.parents[1] / "docs" / "reference" / "verification.md"
 INTRODUCTION = """\
 # Verification: are the equations solved right?
 
@@ -45,7 +45,7 @@ class Row:
 
 
 def pytest_addoption(parser):
-    parser.addoption("--write-docs", action="store_true", help="write docs/verification.md from the numbers of this run")
+    parser.addoption("--write-docs", action="store_true", help="write docs/reference/verification.md from the numbers of this run")
 
 
 def pytest_configure(config):
@@ -76,11 +76,11 @@ def pytest_terminal_summary(terminalreporter, exitstatus, config):
     if not config.getoption("--write-docs", default=False):
         return
     if exitstatus != 0:
-        terminalreporter.write_line("docs/verification.md is not written: not every test passed.", red=True)
+        terminalreporter.write_line("docs/reference/verification.md is not written: not every test passed.", red=True)
     elif config.getoption("numprocesses", default=None):
-        terminalreporter.write_line("docs/verification.md is not written: its rows are of one process; leave -n out.", red=True)
+        terminalreporter.write_line("docs/reference/verification.md is not written: its rows are of one process; leave -n out.", red=True)
     elif missing := _files_left_out(config):
-        terminalreporter.write_line(f"docs/verification.md is not written: {', '.join(missing)} did not run in full.", red=True)
+        terminalreporter.write_line(f"docs/reference/verification.md is not written: {', '.join(missing)} did not run in full.", red=True)
     else:
         with atomic_path(DOCUMENT) as temporary:
             temporary.write_text(document(config.verification_rows), encoding="utf-8")
