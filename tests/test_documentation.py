@@ -5,6 +5,7 @@ that what they name is there.
 """
 
 import re
+import runpy
 import shlex
 import subprocess
 import sys
@@ -116,6 +117,19 @@ def test_what_a_page_links_or_tells_to_run_is_there(page):
     makefile = (ROOT / "Makefile").read_text()
     for target in re.findall(r"^    make (\w+)", text, flags=re.MULTILINE):
         assert re.search(rf"^{target}:", makefile, flags=re.MULTILINE), target
+
+
+def test_the_numbers_in_the_pages_are_those_of_the_records():
+    write_numbers = runpy.run_path(str(ROOT / "scripts/write_numbers.py"))
+    page = write_numbers["NUMBERS"].read_text(encoding="utf-8")
+    counts = {folder: int(number) for folder, number in re.findall(r"^\| ([a-z_()]+) \| (\d+) \|$", page, flags=re.MULTILINE)}
+    assert len(counts) > 10 and page == write_numbers["numbers_page"](counts), "run: make numbers"
+    page = write_numbers["PERFORMANCE"].read_text(encoding="utf-8")
+    assert "| fine | 20 |" in page and page == write_numbers["performance_page"](page), "run: make numbers"
+
+
+def test_the_page_about_costs_is_short():
+    assert (ROOT / "docs/performance.md").stat().st_size <= 4096 and (ROOT / "README.md").stat().st_size <= 5120
 
 
 def test_the_site_builds_without_a_warning_and_loads_nothing_from_elsewhere(tmp_path):
