@@ -22,7 +22,7 @@ from softtact.materials.making import curves_of
 from softtact.materials.readers import read_curves
 
 PROJECT = Path(__file__).parents[1]
-PAGE = PROJECT / "docs" / "reference" / "materials.md"
+PAGE = PROJECT / "docs" / "notebook" / "2026-11-22-laws-on-published-tests.md"
 RUBBERS = ("Treloar_1944", "Kawabata_1981")
 WINDOW = (1.0, 2.0)     # strains up to 100 %
 # Ogden, Proc. R. Soc. A 326 (1972) 565, for Treloar's rubber; in Abaqus' convention mu = mu_p alpha_p / 2.
