@@ -1,7 +1,7 @@
 """Fits of published test curves: errors of the family, predictions of a test left out, and how long a card takes.
 
     SOFTTACT_TEST_DATA=folder python benchmarks/materials.py               (half a minute)
-    python benchmarks/materials.py --write-docs    (the tables of docs/reference/materials.md from the last record)
+    python benchmarks/materials.py --write-docs    (the tables of its page in docs/notebook/ from the last record)
 
 The folder holds `materials/literature` (Treloar 1944, Kawabata 1981) and `materials/soro_db` (Marechal et al. 2021).
 """
@@ -116,7 +116,7 @@ def write_page(found):
 def main():
     """Measure, or write the page."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--write-docs", action="store_true", help="put the last record into docs/reference/materials.md")
+    options.add_argument("--write-docs", action="store_true", help="put the last record into its page in docs/notebook/")
     if options.parse_args().write_docs:
         return write_page(record.read("materials"))
     if "SOFTTACT_TEST_DATA" not in os.environ:
