@@ -94,7 +94,7 @@ def thickness(layer, key, value, usual):
 def loose(board):
     """Tips that may slide on the board."""
     spec = {"tips_held": False, "friction.board": board}
-    return Case(f"free_{board:g}", "tips on the board, held sideways by default",
+    return Case(f"free_{board:g}", "tips on the board, bonded by default",
                 f"free, friction {board:g}" if board else "free, no friction", spec)
 
 
@@ -279,7 +279,7 @@ def troubles(rows):
         outside = [force for force, valid in zip(row["force_n"], row.get("within_validity", []), strict=True) if not valid]
         if outside:
             lost, overlap = max(row["frustum_compression_mm"]), 1e3 * max(row["overlap_mm"])
-            lines.append(f"* {name}: outside the model's validity (docs/reference/command_line.md) from {outside[0]:g} N on; the most "
+            lines.append(f"* {name}: outside the model's validity ([list](../reference/command_line.md#what-is-flagged)) from {outside[0]:g} N on; the most "
                          f"compressed frustum has lost {lost:.2f} mm, the deepest overlap is {overlap:.1f} um.")
     return "\n".join(lines) or "Every press reached 50 N, within the model's validity."
 
@@ -293,7 +293,7 @@ def in_order(rows):
 
 def section(name, rows):
     """What the page holds of an object."""
-    forces = f"{TOLD_N[-1]:g} N (at {TOLD_N[0]:g} N where a press did not come so far)"
+    forces = f"{TOLD_N[-1]:g} N (at {TOLD_N[0]:g} N where the press stopped earlier)"
     missing = [case.name for case in cases() if case.name not in {row["case"] for row in rows}]
     absent = [f"Not pressed yet (`--resume` does): {', '.join(missing)}."] if missing else []
     return "\n\n".join([f"## {name}", table(rows), f"By the largest change of the indentation at {forces}:", ranking(rows),
