@@ -279,8 +279,8 @@ def troubles(rows):
         outside = [force for force, valid in zip(row["force_n"], row.get("within_validity", []), strict=True) if not valid]
         if outside:
             lost, overlap = max(row["frustum_compression_mm"]), 1e3 * max(row["overlap_mm"])
-            lines.append(f"* {name}: outside the model's validity ([list](../reference/command_line.md#what-is-flagged)) from {outside[0]:g} N on; the most "
-                         f"compressed frustum has lost {lost:.2f} mm, the deepest overlap is {overlap:.1f} um.")
+            lines.append(f"* {name}: outside the model's validity ([list](../reference/command_line.md#what-is-flagged)) from "
+                         f"{outside[0]:g} N on; the most compressed frustum has lost {lost:.2f} mm, the deepest overlap is {overlap:.1f} um.")
     return "\n".join(lines) or "Every press reached 50 N, within the model's validity."
 
 
