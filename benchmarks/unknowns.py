@@ -4,8 +4,8 @@ The default sensor on the default mesh is pressed with the default assumptions a
 compressibility of the two materials, thickness of the sheet and of the cover, hold of the tips, friction, and which face of a
 frustum is the tip. About a minute a press on one thread, several where the dielectric is very compressible. Each row is written to
 benchmarks/results/unknowns.json as soon as it is there: `--resume` presses only what that record lacks, `--cases NAME ...` only
-these, `--write-docs` puts the record's tables into docs/explanation/unknowns.md without a press. `--mesh draft` takes half of the time, and
-keeps its own record, unknowns_draft.json: how far the two differ tells what the mesh is worth in these tables.
+these, `--write-docs` puts the record's tables into docs/explanation/unknowns.md without a press. `--mesh draft`
+takes half of the time, and keeps its own record, unknowns_draft.json: the difference is the mesh's effect on these tables.
 """
 
 import argparse
@@ -280,7 +280,8 @@ def troubles(rows):
         if outside:
             lost, overlap = max(row["frustum_compression_mm"]), 1e3 * max(row["overlap_mm"])
             lines.append(f"* {name}: outside the model's validity ([list](../reference/command_line.md#what-is-flagged)) from "
-                         f"{outside[0]:g} N on; the most compressed frustum has lost {lost:.2f} mm, the deepest overlap is {overlap:.1f} um.")
+                         f"{outside[0]:g} N on; the most compressed frustum has lost {lost:.2f} mm, "
+                         f"the deepest overlap is {overlap:.1f} um.")
     return "\n".join(lines) or "Every press reached 50 N, within the model's validity."
 
 

@@ -2,8 +2,7 @@
 
     python scripts/write_numbers.py            (`make numbers`; `make docs` runs it first)
 
-Sources: the records in benchmarks/results/, and pytest's collection for the number of tests. The pages hold these numbers; other pages
-link to them.
+Sources: the records in benchmarks/results/, and pytest's collection for the number of tests. Other pages link to these numbers.
 """
 
 import json
@@ -21,8 +20,8 @@ BLOCK = r"(<!-- numbers: {} -->\n).*?(<!-- end of numbers -->)"
 HEAD = """\
 # Numbers that change
 
-This page is written by `make numbers`. Do not edit it. Each table names its record in `benchmarks/results/`, which holds the machine,
-the versions and every single number. Times depend on the machine: compare numbers of one table only. Times of single presses:
+`make numbers` writes this page. Do not edit it. Each table names its record in `benchmarks/results/`, which holds the machine, the
+versions and every single number. Times depend on the machine, so compare numbers of one table only. Times of single presses:
 [what a press costs](../performance.md).
 """
 
@@ -71,8 +70,8 @@ def whole_runs() -> str:
 
 def presses() -> str:
     """Time and memory of a hyperelastic press on each mesh."""
-    rows = [[MESHES[row["mesh"]], row["levels"], row["threads"], f"{row['seconds']:.0f}", row["iterations"], f"{row['memory_gb']:.1f}"]
-            for row in record("press")["rows"]]
+    rows = [[MESHES[row["mesh"]], row["levels"], row["threads"], f"{row['seconds']:.0f}", row["iterations"],
+             f"{row['memory_gb']:.1f}"] for row in record("press")["rows"]]
     return f"{source('press')}\n\n" + table("mesh, load steps, threads, seconds, iterations, peak memory (GB)", rows)
 
 
@@ -82,8 +81,9 @@ def fast_presses() -> str:
     rows = []
     for model in ("elastic", "foundation"):
         seconds = sorted(row[model] for row in read["seconds"])
-        rate = {entry["workers"]: entry["per_second"] for entry in read["many"] if entry["model"] == model and entry["batch"] == 1000}
-        rows.append([model, f"{median(seconds):.2f}", f"{seconds[0]:.2f} to {seconds[-1]:.2f}", f"{rate[1]:.2g}", f"{rate[2]:.2g}"])
+        rate = {entry["workers"]: f"{entry['per_second']:.2g}" for entry in read["many"]
+                if entry["model"] == model and entry["batch"] == 1000}
+        rows.append([model, f"{median(seconds):.2f}", f"{seconds[0]:.2f} to {seconds[-1]:.2f}", rate[1], rate[2]])
     head = "model, median (s), range (s), presses per second with 1 process, with 2 processes"
     return f"{source('fast_models')} One process, {read['levels']} load steps to 50 N.\n\n" + table(head, rows)
 
@@ -96,11 +96,12 @@ def growth() -> str:
     rows = []
     for frusta, threads in by_size.items():
         pair = [threads[1], threads[2]]
-        parts = [" / ".join(f"{row[name]:.2g}" for row in pair) for name in ("condense_s", "factor_s", "solve_s", "residual_s", "press_s")]
+        parts = [" / ".join(f"{row[name]:.2g}" for row in pair)
+                 for name in ("condense_s", "factor_s", "solve_s", "residual_s", "press_s")]
         rows.append([frusta, f"{pair[0]['unknowns_all']:,}", f"{pair[0]['unknowns_global']:,}", *parts, pair[0]["iterations"],
                      f"{pair[0]['memory_gb']:.1f}"])
-    head = ("frusta, unknowns, of the matrix, all cells condensed (s), factor (s), solve (s), residual (s), whole press (s), iterations, "
-            "memory (GB)")
+    head = ("frusta, unknowns, of the matrix, all cells condensed (s), factor (s), solve (s), residual (s), whole press (s), "
+            "iterations, memory (GB)")
     return (f"{source('scaling')} A flat punch of 2 mm radius at 4 N, default mesh, one / two threads.\n\n" + table(head, rows))
 
 
@@ -118,7 +119,8 @@ def mesh_errors() -> str:
 def random_presses() -> str:
     """Outcomes of random presses."""
     outcomes = ["presses", "reached", "outside", "flagged", "stopped", "refused", "nonsense", "hung", "crashed"]
-    rows = [[model, *(counts[outcome] for outcome in outcomes)] for model, counts in record("random_presses")["models"].items()]
+    models = record("random_presses")["models"]
+    rows = [[model, *(counts[outcome] for outcome in outcomes)] for model, counts in models.items()]
     return f"{source('random_presses')}\n\n" + table("model, " + ", ".join(outcomes), rows)
 
 
