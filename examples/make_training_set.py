@@ -4,7 +4,7 @@
 
 Writes pairs of deformation map (mm, what a simulation gives) and tactile map (counts, what a sensor would read), with force and
 pose of each. The presses are the elastic model's: some tenths of a second each. The readings are the virtual sensor's, a simulation
-with creep, scatter and noise of its own (docs/virtual_sensor.md); `--ideal` takes a faultless readout of the same map. Neither is a
+with creep, scatter and noise of its own; `--ideal` takes a faultless readout of the same map. Neither is a
 measurement. A network that learns from readings of its own input's maps learns the readout only: the studies therefore read a
 press of another law and mesh.
 """

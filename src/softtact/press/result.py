@@ -17,7 +17,7 @@ class PressResult:
     force_n, indentation_mm, contact_area_mm2, penetration_mm, wall_time_s, iterations, converged, within_validity (force,)
     frustum_compression_mm (force,): of the most compressed frustum;  residual_n (force,): largest unbalanced nodal force
     outside_card (force,): share of a layer's volume strained beyond the data its law was fitted to, the larger of the layers'
-    within_validity: 0 where the numbers are not to be relied on, and why: docs/command_line.md, "What is flagged"
+    within_validity: 0 where the numbers are not to be relied on, and why: docs/reference/command_line.md, "What is flagged"
     expected_error_mm (force,): root mean square over the map, against the hyperelastic model, where the model was chosen by it
     The last four are nan where the model, the law or the policy does not tell.
     why: what made the choice of the model, where it was not the user's
