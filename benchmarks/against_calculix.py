@@ -29,7 +29,7 @@ from threadpoolctl import threadpool_limits
 from softtact.contact.height_field import HeightField
 from softtact.decks import keywords
 from softtact.decks.laws import law_card
-from softtact.linalg.direct_single import RoughSolver
+from softtact.linalg.direct_single import PardisoSingle
 from softtact.linalg.workers import Workers
 from softtact.materials.laws.registry import make_law
 from softtact.models.solid.body import FreeBody, RigidContact
@@ -118,16 +118,17 @@ def press(mesh, load, threads):
         values, areas = _triangle_points(mesh.points[mesh.near])
         contacts = [RigidContact(mesh.points, mesh.near, values, areas, HeightField(mesh.sphere), moves=True,
                                  stiffness=CONTACT_STIFFNESS, smoothing=SHARP_MM)]
-    solver = RoughSolver(threads=threads, quick_analysis=True)
+    solver = PardisoSingle(threads=threads, quick_analysis=True)
     workers = Workers(threads)
     body = FreeBody(mesh.points, parts, held=held, contacts=contacts, follows=follows, solver=solver, apart=True, workers=workers)
     settings = FreeSettings(relative_residual=5e-3, relative_correction=1e-2)
-    levels = list(press_to_indentations(body, depths(), settings=settings))
+    load_steps = list(press_to_indentations(body, depths(), settings=settings))
     body.solver.close()
     workers.close()
-    return {"unknowns": len(body.free), "force_n": [float(level.state.object_force) for level in levels],
-            "iterations": [level.iterations for level in levels], "factorisations": [level.factorisations for level in levels],
-            "residual": [level.residual_n / level.state.mean_force for level in levels]}
+    return {"unknowns": len(body.free), "force_n": [float(load_step.state.object_force) for load_step in load_steps],
+            "iterations": [load_step.iterations for load_step in load_steps],
+            "factorisations": [load_step.factorisations for load_step in load_steps],
+            "residual": [load_step.residual_n / load_step.state.mean_force for load_step in load_steps]}
 
 
 def _triangle_points(corners, parts=4):

@@ -22,7 +22,7 @@ from scipy.spatial import cKDTree
 from sensor_meshes import Stack, layered_mesh, octagon_cell
 
 from softtact.errors import ConvergenceError
-from softtact.fem.extruded_mesh import cell_plan
+from softtact.fem.extruded_mesh import cell_mesh_2d
 from softtact.materials.laws.registry import make_law
 from softtact.models.solid.body import FreeBody, RigidContact, flat_surface, ground
 from softtact.models.solid.newton import FreeSettings, press_to_forces, press_to_indentations
@@ -50,7 +50,8 @@ class Mesh:
     def build(self, counts, bulk_over_shear):
         kind = KINDS[self.kind]
         octagon = self.kind == "tet4"
-        mesh = layered_mesh(SPEC, counts, cell=octagon_cell if octagon else cell_plan, refinement=self.refinement, stack=self.stack,
+        mesh = layered_mesh(SPEC, counts, cell=octagon_cell if octagon else cell_mesh_2d, refinement=self.refinement,
+                            stack=self.stack,
                             straight=kind.linear and not octagon)
         laws = {name: make_law("mooney_rivlin", c, bulk_modulus=2 * sum(c.values()) * bulk_over_shear) for name, c in LAWS.items()}
         return mesh, discretise(mesh, kind, laws)

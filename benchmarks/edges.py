@@ -14,7 +14,7 @@ from softtact.models.hyperelastic.mesh_settings import MeshSettings
 
 FORCE_N = 1.5
 HALF_WIDTHS_MM = np.round(np.arange(2.40, 2.77, 0.04), 2)     # elements end at 2.4, 2.7 and 3.0 mm
-LAYERS = {"cover_levels": mesh_error.THREE_LAYERS}
+LAYERS = {"cover_heights": mesh_error.THREE_LAYERS}
 MESHES = {"elements of 0.3 mm": MeshSettings(cover_splits=(1, 1, 2), **LAYERS),
           "an eighth": MeshSettings(cover_splits=(1, 1, 5), **LAYERS)}
 

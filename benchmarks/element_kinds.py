@@ -126,7 +126,7 @@ class Kind:
     wedge: tuple = ()            # (columns of the 18 nodes, shape, rule)
     tet: tuple = ()              # (number of nodes, rule)
     modes: object = _none
-    local_over_shear: tuple = (0.0, 0.0)   # in sheet and cover, in cones: see `blocks`
+    unprojected_penalty_ratio: tuple = (0.0, 0.0)   # in sheet and cover, in cones: see `blocks`
 
     @property
     def linear(self):
@@ -146,9 +146,10 @@ KINDS = {
                   hex=(_HEX20, hex20, gauss(2, 3)), wedge=(_WEDGE15, wedge15, small_wedge_rule(3))),
     "hex27": Kind("27-node hexahedra and 18-node wedges, linear pressure", "brick", modes=_linear,
                   hex=(_ALL27, hex27, gauss(3, 3)), wedge=(_ALL18, wedge18, wedge_rule())),
-    "hex27local": Kind("the 27-node row, in cones 4 mu of K at every point", "brick", modes=_linear, local_over_shear=(0.0, 4.0),
+    "hex27local": Kind("the 27-node row, in cones 4 mu of K at every point", "brick", modes=_linear,
+                       unprojected_penalty_ratio=(0.0, 4.0),
                        hex=(_ALL27, hex27, gauss(3, 3)), wedge=(_ALL18, wedge18, wedge_rule())),
-    "reference": Kind("the 27-node row, mu of K at every point", "brick", modes=_linear, local_over_shear=(1.0, 1.0),
+    "reference": Kind("the 27-node row, mu of K at every point", "brick", modes=_linear, unprojected_penalty_ratio=(1.0, 1.0),
                       hex=(_ALL27, hex27, gauss(3, 3)), wedge=(_ALL18, wedge18, wedge_rule())),
 }
 
@@ -197,7 +198,7 @@ def _in_bricks(mesh, kind, laws):
     for name, law in laws.items():
         for whole, (columns, shape, rule) in ((mesh.hexes[name], kind.hex), (mesh.wedges[name], kind.wedge)):
             in_cones = mesh.points[whole].mean(axis=1)[:, 2] < mesh.z_root
-            for share, chosen in zip(kind.local_over_shear, (~in_cones, in_cones), strict=True):
+            for share, chosen in zip(kind.unprojected_penalty_ratio, (~in_cones, in_cones), strict=True):
                 if chosen.any():
                     groups.append((np.ascontiguousarray(whole[chosen][:, columns]), shape, rule, law, share))
     in_quad = {8: 4, 20: 8, 27: 9}[len(kind.hex[0])]
@@ -206,7 +207,7 @@ def _in_bricks(mesh, kind, laws):
              for f in (mesh.top, mesh.tips, mesh.cone_sides)]
     flat = [face for group in faces for face in group.values()]
     points, *rest = compressed(mesh.points, *(nodes for nodes, *_ in groups), *flat, mesh.interface)
-    parts = [_block(points, nodes, shape, rule, kind.modes, law, local_over_shear=share)
+    parts = [_block(points, nodes, shape, rule, kind.modes, law, unprojected_penalty_ratio=share)
              for nodes, (_, shape, rule, law, share) in zip(rest, groups, strict=False)]
     rest = rest[len(groups):]
     top, tips, sides = ({in_quad: rest[2 * k], in_triangle: rest[2 * k + 1]} for k in range(3))

@@ -1,5 +1,5 @@
-"""Seconds of twenty levels to 50 N with the fast models, and presses per second: `python benchmarks/fast_models.py` from the
-project's folder; `--many N` presses as many random poses of ten indenters (default 1000, of one level each), over one and two
+"""Seconds of twenty load steps to 50 N with the fast models, and presses per second: `python benchmarks/fast_models.py` from the
+project's folder; `--many N` presses as many random poses of ten indenters (default 1000, of one load step each), over one and two
 processes, and with the elastic model as one batch on a GPU where there is one; 0 keeps what the record holds of them.
 
 Preparation that is made once per sensor, and compiled kernels, are made before the clock starts. Times depend on the machine and on
@@ -25,7 +25,7 @@ FORCES = np.linspace(2.5, 50.0, 20)
 MANY = ("circle_m", "circle_xs", "square", "star", "cruz", "donut_m", "triangle", "sphere", "bordes_h", "echo_x")
 
 
-def twenty_levels(sensor, files):
+def twenty_load_steps(sensor, files):
     """Seconds of each model and object; the better of two, since the first may wait for others."""
     rows = []
     for file in files:
@@ -97,10 +97,10 @@ def main():
         prepared[model] = round(time.perf_counter() - start, 1)
     files = sorted(Path("config/objects/indenters").glob("*.stl"))
     _seconds(sensor, read_mesh(files[0], unit="mm"), "foundation"), _seconds(sensor, read_mesh(files[0], unit="mm"), "elastic")
-    rows = twenty_levels(sensor, files)
+    rows = twenty_load_steps(sensor, files)
     median = {model: float(np.median([row[model] for row in rows if row[model]])) for model in MODELS}
     print("median", median)
-    record.write("fast_models", prepared_or_loaded_s=prepared, levels=len(FORCES), seconds=rows, median_s=median,
+    record.write("fast_models", prepared_or_loaded_s=prepared, load_steps=len(FORCES), seconds=rows, median_s=median,
                  many=many(sensor, options.many) if options.many else record.read("fast_models")["many"])
 
 

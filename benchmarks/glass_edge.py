@@ -13,11 +13,11 @@ from glass_mesh import LAWS, SPEC
 from softtact.contact.height_field import HeightField
 from softtact.models.ftir.unit_cell import GLASS_MESH, contact_area, press_cell_on_glass
 from softtact.models.hyperelastic.build import build_patch
-from softtact.models.hyperelastic.newton import NewtonSettings, press_levels
+from softtact.models.hyperelastic.newton import NewtonSettings, press_load_steps
 
 SIZES = (4, 6)
 FORCES = np.array([10.0, 40.0, 80.0, 140.0]) / 540      # N on the mean frustum
-MESH = replace(GLASS_MESH, frustum_levels=(0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.6, 1.0), frustum_rings=2)
+MESH = replace(GLASS_MESH, frustum_heights=(0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.6, 1.0), frustum_rings=2)
 
 
 def press_patch(law, size):
@@ -25,13 +25,13 @@ def press_patch(law, size):
     body = build_patch(SPEC, (size, size), dielectric_law=law, mesh=MESH)
     plate = trimesh.creation.box((2 * size, 2 * size, 1.0))
     plate.apply_translation([0, 0, 0.5])
-    settings = NewtonSettings(contact_passes=0, first_touch_mm=1e-3, smallest_scale_n=0.1 * size**2, smallest_increment_n=0.02)
-    border = ~body.bed.geometry.neighbours.all(axis=1)
+    settings = NewtonSettings(max_augmentations=0, first_touch_mm=1e-3, smallest_scale_n=0.1 * size**2, smallest_increment_n=0.02)
+    border = ~body.support.geometry.neighbours.all(axis=1)
     rows, way = [], []
-    for level in press_levels(body, HeightField(plate), FORCES * size**2, settings=settings):
-        areas = np.array([contact_area(body.bed, level.state.bed.displacement, frustum=k) for k in range(size**2)])
+    for load_step in press_load_steps(body, HeightField(plate), FORCES * size**2, settings=settings):
+        areas = np.array([contact_area(body.support, load_step.state.support.displacement, frustum=k) for k in range(size**2)])
         rows.append((areas.mean(), areas[border].mean(), areas[~border].mean()))
-        way.append(level.state.indentation)
+        way.append(load_step.state.indentation)
     body.close()
     return np.array(rows), np.array(way)
 

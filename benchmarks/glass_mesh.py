@@ -15,7 +15,7 @@ from softtact.contact.height_field import HeightField
 from softtact.materials.laws.registry import make_law
 from softtact.models.ftir.unit_cell import DARK_GAP_MM, GLASS_MESH, SETTINGS, contact_area, plate_over
 from softtact.models.hyperelastic.build import build_unit_cell
-from softtact.models.hyperelastic.newton import press_levels
+from softtact.models.hyperelastic.newton import press_load_steps
 from softtact.sensors.specification import SensorSpec
 
 SPEC = SensorSpec.from_yaml(Path(__file__).parents[1] / "config/sensors/coro.yaml")
@@ -24,7 +24,7 @@ LAWS = {"mooney_rivlin": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040
 FORCES = np.arange(10.0, 141.0, 10.0) / 540     # N on one frustum
 GAPS_MM = (2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1.5e-3)
 CHOSEN_GAP = GAPS_MM.index(DARK_GAP_MM)
-FORMER = replace(GLASS_MESH, frustum_levels=(0.0, 0.1, 0.3, 0.6, 1.0), frustum_rings=1)
+FORMER = replace(GLASS_MESH, frustum_heights=(0.0, 0.1, 0.3, 0.6, 1.0), frustum_rings=1)
 
 
 def layers(count, above):
@@ -32,19 +32,19 @@ def layers(count, above):
     return (*np.linspace(0, 0.4, count + 1), *np.linspace(0.4, 1.0, above + 1)[1:])
 
 
-FINEST = replace(GLASS_MESH, frustum_levels=layers(24, 4), frustum_rings=6, contact_stiffness=10000.0)
+FINEST = replace(GLASS_MESH, frustum_heights=layers(24, 4), frustum_rings=6, contact_stiffness=10000.0)
 MESHES = {
     "24 thin layers, 6 rings, penalty 10000 N/mm3 (finest)": FINEST,
     "4 layers, 1 ring (before)": FORMER,
     "4 layers, 1 ring, all split once in plan": replace(FORMER, refinement=1),
-    "16 thin layers, 1 ring": replace(GLASS_MESH, frustum_levels=layers(16, 4), frustum_rings=1),
-    "8 thin layers, 2 rings": replace(GLASS_MESH, frustum_levels=layers(8, 2), frustum_rings=2),
-    "8 thin layers, 3 rings": replace(GLASS_MESH, frustum_levels=layers(8, 2), frustum_rings=3),
-    "12 thin layers, 3 rings": replace(GLASS_MESH, frustum_levels=layers(12, 3), frustum_rings=3),
-    "16 thin layers, 4 rings": replace(GLASS_MESH, frustum_levels=layers(16, 4), frustum_rings=4),
+    "16 thin layers, 1 ring": replace(GLASS_MESH, frustum_heights=layers(16, 4), frustum_rings=1),
+    "8 thin layers, 2 rings": replace(GLASS_MESH, frustum_heights=layers(8, 2), frustum_rings=2),
+    "8 thin layers, 3 rings": replace(GLASS_MESH, frustum_heights=layers(8, 2), frustum_rings=3),
+    "12 thin layers, 3 rings": replace(GLASS_MESH, frustum_heights=layers(12, 3), frustum_rings=3),
+    "16 thin layers, 4 rings": replace(GLASS_MESH, frustum_heights=layers(16, 4), frustum_rings=4),
     "**chosen**: 17 graded layers, 4 rings": GLASS_MESH,
-    "chosen, local_over_shear 0": replace(GLASS_MESH, local_over_shear=0.0),
-    "chosen, local_over_shear 0.5": replace(GLASS_MESH, local_over_shear=0.5),
+    "chosen, unprojected_penalty_ratio 0": replace(GLASS_MESH, unprojected_penalty_ratio=0.0),
+    "chosen, unprojected_penalty_ratio 0.5": replace(GLASS_MESH, unprojected_penalty_ratio=0.5),
     "chosen, penalty 10000 N/mm3": replace(GLASS_MESH, contact_stiffness=10000.0),
 }
 
@@ -52,11 +52,12 @@ MESHES = {
 def solve(law, mesh):
     """Areas (gaps, f) in mm2, compressions (f,) in mm, and seconds."""
     start, body = time.perf_counter(), build_unit_cell(SPEC, dielectric_law=law, mesh=mesh)
-    levels = list(press_levels(body, HeightField(plate_over(SPEC)), FORCES, settings=SETTINGS))
+    load_steps = list(press_load_steps(body, HeightField(plate_over(SPEC)), FORCES, settings=SETTINGS))
     seconds = time.perf_counter() - start
-    areas = [[contact_area(body.bed, level.state.bed.displacement, gap_mm=gap) for level in levels] for gap in GAPS_MM]
+    areas = [[contact_area(body.support, load_step.state.support.displacement, gap_mm=gap) for load_step in load_steps]
+             for gap in GAPS_MM]
     body.close()
-    return np.array(areas), np.array([level.state.indentation for level in levels]), seconds
+    return np.array(areas), np.array([load_step.state.indentation for load_step in load_steps]), seconds
 
 
 def measured(law):

@@ -24,14 +24,14 @@ FORCES_N = {"flat punch": [2.0, 4.0, 8.0], "sphere": [2.0, 4.0, 6.0], "ridges": 
 OVERLAP_MM = 1e-3       # what is pressed apart
 TRUTH_TOLERANCE = 1e-5  # of the last mesh's forces; that of the others, 3e-4, is worth up to 0.2 % of these light presses' maps
 FRUSTA = (6, 6)
-MORE_LAYERS = {"frustum_levels": (0.0, 0.1, 0.3, 0.6, 1.0), "sheet_layers": 2, "cover_levels": (0.0, 0.25, 0.5, 0.75, 1.0)}
+MORE_LAYERS = {"frustum_heights": (0.0, 0.1, 0.3, 0.6, 1.0), "sheet_layers": 2, "cover_heights": (0.0, 0.25, 0.5, 0.75, 1.0)}
 THREE_LAYERS = (0.0, 0.45, 0.8, 1.0)
 MESHES = {
     "draft": MeshSettings.draft(),
     "production": MeshSettings(),
     "two rings": MeshSettings(frustum_rings=2),
-    "tied cover": MeshSettings(cover_levels=THREE_LAYERS, cover_splits=(1, 1, 2)),
-    "three layers": MeshSettings(cover_levels=THREE_LAYERS, cover_splits=(1, 2)),
+    "tied cover": MeshSettings(cover_heights=THREE_LAYERS, cover_splits=(1, 1, 2)),
+    "three layers": MeshSettings(cover_heights=THREE_LAYERS, cover_splits=(1, 2)),
     "fine": MeshSettings.fine(),
     "finer edges": replace(MeshSettings.fine(), cover_splits=(1, 3)),
     "reference": MeshSettings(cover_splits=(1, 4), refinement=1, **MORE_LAYERS),
@@ -65,7 +65,7 @@ def press(mesh, body, **solver):
 
 
 def row_of(mesh, body, result, seconds, truth):
-    """What the record keeps of a press: errors of each level against the last mesh's, in % of the map's maximum."""
+    """What the record keeps of a press: errors of each load step against the last mesh's, in % of the map's maximum."""
     difference, largest = result.deformation_map_mm - truth.deformation_map_mm, truth.deformation_map_mm.max(axis=(1, 2))
     return {"mesh": mesh, "object": body, "force_n": FORCES_N[body], "iterations": int(result.iterations.sum()),
             "processor_s": round(seconds, 1), "indentation_mm": np.round(result.indentation_mm, 5).tolist(),
@@ -80,7 +80,7 @@ def main(names):
     presses |= {(names[-1], body): press(names[-1], body, relative_tolerance=TRUTH_TOLERANCE) for body in bodies}
     rows = [row_of(name, body, *presses[name, body], presses[names[-1], body][0]) for name in names for body in bodies]
     print(f"\nlargest error of the map, % of its maximum, against {names[-1]!r}")
-    print(f"{'mesh':14}{'object':12}" + "".join(f"{f'level {k}':>11}" for k in (1, 2, 3)))
+    print(f"{'mesh':14}{'object':12}" + "".join(f"{f'load step {k}':>11}" for k in (1, 2, 3)))
     for row in rows[:-len(bodies)]:
         print(f"{row['mesh']:14}{row['object']:12}" + "".join(f"{error:11.2f}" for error in row["largest_error_percent"]))
     print(record.write("mesh_error", against=names[-1], rows=rows))

@@ -37,7 +37,7 @@ def default_objects():
 
 
 def measure(name, mesh):
-    """One press in this process: what each level that was reached says, and what stopped it, if anything did."""
+    """One press in this process: what each load step that was reached says, and what stopped it, if anything did."""
     file = next((CONFIG / "objects").glob(f"*/{name}.stl"))
     sensor = softtact.load_sensor("coro")
     sensor.mesh, sensor.solver = MESHES[mesh](), NewtonSettings.draft() if mesh == "draft" else NewtonSettings()
@@ -51,7 +51,7 @@ def measure(name, mesh):
            "solver": getattr(result, "solver", None)}
     if result:
         save_maps(MAPS / mesh / f"{name}.npz", result)
-    return {**row, **(_levels(result, sensor) if result else {"force_n": []})}
+    return {**row, **(_load_steps(result, sensor) if result else {"force_n": []})}
 
 
 def save_maps(path, result):
@@ -62,7 +62,7 @@ def save_maps(path, result):
     Path(file.name).replace(path)
 
 
-def _levels(result, sensor):
+def _load_steps(result, sensor):
     height = sensor.spec.dielectric.frusta.height_mm
     lists = {"force_n": (result.force_n, 3), "indentation_mm": (result.indentation_mm, 4), "iterations": (result.iterations, 0),
              "overlap_um": (1e3 * result.penetration_mm, 2), "residual_n": (result.residual_n, 5),
@@ -83,7 +83,7 @@ def main():
         return
     mesh = options.mesh
     for name in options.objects or default_objects():
-        if options.again or not any(_is(row, name, mesh) for row in recorded()):
+        if options.reevaluate_contact or not any(_is(row, name, mesh) for row in recorded()):
             run = subprocess.run([sys.executable, __file__, "--one", name, mesh], capture_output=True, text=True,
                                  env=record.threads_of(1), check=False)
             if run.returncode:

@@ -30,15 +30,16 @@ ON_GPU = [("draft", 20, 2, "cuda"), ("production", 20, 2, "cuda"), ("fine", 20, 
 LARGEST_N = 50.0
 
 
-def measure(file, mesh, levels, threads, device):
+def measure(file, mesh, load_steps, threads, device):
     """One press in this process: seconds, iterations, memory, and where it went."""
     sensor, body = softtact.load_sensor("coro"), read_mesh(file, unit="mm")
     sensor.device = device
     sensor.mesh, sensor.solver = MESHES[mesh], NewtonSettings.draft() if mesh == "draft" else NewtonSettings()
     sensor.press(body, force_n=[0.5], model="hyperelastic", threads=threads)
     start = time.perf_counter()
-    result = sensor.press(body, force_n=np.linspace(LARGEST_N / levels, LARGEST_N, levels), model="hyperelastic", threads=threads)
-    return {"object": Path(file).stem, "mesh": mesh, "levels": levels, "threads": threads, "device": device,
+    result = sensor.press(body, force_n=np.linspace(LARGEST_N / load_steps, LARGEST_N, load_steps), model="hyperelastic",
+                          threads=threads)
+    return {"object": Path(file).stem, "mesh": mesh, "levels": load_steps, "threads": threads, "device": device,
             "solver": result.solver, "seconds": round(time.perf_counter() - start, 2), "iterations": int(result.iterations.sum()),
             "indentation_mm": round(float(result.indentation_mm[-1]), 5), "residual_n": float(result.residual_n.max()),
             "overlap_um": round(1e3 * float(result.penetration_mm.max()), 3),
@@ -46,7 +47,7 @@ def measure(file, mesh, levels, threads, device):
 
 
 def main(files):
-    """Print a row per object and case (mesh, levels, threads, device), and write benchmarks/results/press.json after each."""
+    """Print a row per object and case (mesh, load steps, threads, device), and write benchmarks/results/press.json after each."""
     rows, path = [], "No press was made."
     print(f"{'object':12}{'mesh':12}{'levels':>7}{'threads':>8}{'device':>8}{'seconds':>9}", "iterations memory, GB")
     for file, case in itertools.product(files, CASES + (ON_GPU if find_device("auto") != "cpu" else [])):
@@ -57,15 +58,15 @@ def main(files):
             continue
         row = json.loads(run.stdout)
         rows.append(row)
-        print(f"{row['object']:12}{row['mesh']:12}{row['levels']:7}{row['threads']:8}{row['device']:>8}{row['seconds']:9.1f}{row['iterations']:11}"
-              f"{row['memory_gb']:11.2f}", flush=True)
+        print(f"{row['object']:12}{row['mesh']:12}{row['levels']:7}{row['threads']:8}{row['device']:>8}{row['seconds']:9.1f}"
+              f"{row['iterations']:11}{row['memory_gb']:11.2f}", flush=True)
         path = record.write("press", rows=rows)
     print(path)
 
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--one"]:
-        file, mesh, levels, threads, device = sys.argv[2:]
-        print(json.dumps(measure(file, mesh, int(levels), int(threads), device)))
+        file, mesh, load_steps, threads, device = sys.argv[2:]
+        print(json.dumps(measure(file, mesh, int(load_steps), int(threads), device)))
     else:
         main(sys.argv[1:] or OBJECTS)

@@ -27,7 +27,7 @@ from softtact.geometry.meshes import read_mesh
 from softtact.geometry.pose import Pose
 from softtact.materials.laws.registry import make_law
 from softtact.models.elastic.compliance import elastic_compliance
-from softtact.models.foundation.compliance import foundation_flexibility
+from softtact.models.foundation.compliance import foundation_compliance
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.press.sensor import Sensor
@@ -42,7 +42,7 @@ LARGEST_MPA = 6 / 9.6**2   # 50 N on the default sensor, 22 x 37 mm, and somewha
 A_SENSOR = 25              # presses
 ALLOWED_MM = 0.02          # of overlap, as the studies have it; less depth than this is none
 HANGS_S = 300              # for a press of a few seconds
-# outside: without a fault, but with levels that are told to be outside validity;  flagged: with faults, at such levels only
+# outside: without a fault, but with load steps that are told to be outside validity;  flagged: with faults, at such load steps only
 OUTCOMES = ("reached", "outside", "flagged", "stopped", "refused", "nonsense", "hung", "crashed")
 
 
@@ -57,9 +57,9 @@ def random_sensor(number, model):
     sensor = Sensor(spec, {name: random_law(rng) for name in ("dielectric", "cover")}, mesh=MeshSettings.draft(),
                     solver=NewtonSettings(largest_penetration_mm=ALLOWED_MM))
     if model == "elastic":
-        sensor.files["elastic"] = elastic_compliance(spec)
+        sensor.prepared_models["elastic"] = elastic_compliance(spec)
     if model == "foundation":
-        sensor.files["foundation"] = foundation_flexibility(spec, dielectric_law=sensor.laws["dielectric"],
+        sensor.prepared_models["foundation"] = foundation_compliance(spec, dielectric_law=sensor.laws["dielectric"],
                                                             cover_law=sensor.laws["cover"])
     return sensor
 
@@ -103,16 +103,16 @@ def outcome(sensor, model, number):
 
 
 def judged(result, sensor):
-    """The outcome of a press that has a result: all its levels with a fault must be flagged."""
+    """The outcome of a press that has a result: all its load steps with a fault must be flagged."""
     faults, told = nonsense(result, sensor), result.within_validity == 0
     if faults:
         which = ", ".join(faults)
         return ("flagged", which) if told[np.any(list(faults.values()), axis=0)].all() else ("nonsense", which)
-    return ("outside", f"{np.count_nonzero(told)} of {len(told)} levels") if told.any() else ("reached", "")
+    return ("outside", f"{np.count_nonzero(told)} of {len(told)} load steps") if told.any() else ("reached", "")
 
 
 def nonsense(result, sensor):
-    """What cannot be of a result: {what: at which levels (l,)}; empty where all can."""
+    """What cannot be of a result: {what: at which load steps (l,)}; empty where all can."""
     maps, depth = result.deformation_map_mm, result.indentation_mm
     falls = np.diff(depth) < -ALLOWED_MM
     finite = np.isfinite(maps).all(axis=(1, 2)) & np.isfinite(depth) & np.isfinite(result.tactile_map).all(axis=(1, 2))
@@ -153,10 +153,10 @@ def measure(model, presses, jobs):
         for rows, seconds in pool.imap(partial(press_block, model), blocks):
             row["presses"] += len(rows)
             row["processor_s"] = round(row["processor_s"] + seconds, 1)
-            for number, what, why in rows:
+            for number, what, selection_reason in rows:
                 row[what] += 1
                 if what not in ("reached", "outside"):
-                    row["notes"].append([number, what, why[:300]])
+                    row["notes"].append([number, what, selection_reason[:300]])
             record.write("random_presses", models=told() | {model: row})     # another process may count another model
             print(model, {name: row[name] for name in ("presses", *OUTCOMES)}, flush=True)
 

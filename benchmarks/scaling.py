@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 import softtact
 from softtact.contact.height_field import HeightField
 from softtact.geometry.meshes import place
-from softtact.models.hyperelastic.newton import press_levels
+from softtact.models.hyperelastic.newton import press_load_steps
 from softtact.press.sensor import Sensor
 
 SENSORS = ((4, 4), (8, 8), (12, 16), (18, 30), (30, 50))
@@ -47,9 +47,9 @@ def parts_of_iteration(counts, threads):
     body = sensor_of(counts).body(threads=threads, surface=HeightField(place(PUNCH, pose=None)))
     built = time.perf_counter() - start
     start = time.perf_counter()
-    level, = press_levels(body, HeightField(place(PUNCH, pose=None)), [FORCE_N])
+    load_step, = press_load_steps(body, HeightField(place(PUNCH, pose=None)), [FORCE_N])
     pressed = time.perf_counter() - start
-    state, cells, slab = level.state, body.cells, body.slab
+    state, cells, slab = load_step.state, body.cells, body.slab
     everyone = np.arange(cells.count)
 
     def condense():
@@ -58,14 +58,14 @@ def parts_of_iteration(counts, threads):
 
     matrix = slab.tangent(state.slab, cells.outer, workers=body.workers)
     right = np.ones(len(slab.unknowns))
-    row = {"frusta": len(everyone), "threads": threads, "solver": body.solver.name, "iterations": level.iterations,
+    row = {"frusta": len(everyone), "threads": threads, "solver": body.solver.name, "iterations": load_step.iterations,
            "unknowns_global": len(slab.unknowns),
-           "unknowns_all": len(slab.free) + cells.count * (len(body.bed.inner)),
+           "unknowns_all": len(slab.free) + cells.count * (len(body.support.inner)),
            "build_s": built, "press_s": pressed, "condense_s": least(condense),
            "assemble_s": least(lambda: slab.tangent(state.slab, cells.outer, workers=body.workers)),
            "factor_s": least(lambda: body.solver.factor(matrix)), "solve_s": least(lambda: body.solver.solve(right)),
-           "residual_s": least(lambda: body.evaluate(state.slab.displacement, state.bed.displacement, state.indentation,
-                                                     state.slab.planes)),
+           "residual_s": least(lambda: body.evaluate(state.slab.displacement, state.support.displacement, state.indentation,
+                                                     state.slab.projection)),
            "memory_gb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6}
     body.close()
     return row

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from softtact.fem.extruded_mesh import cell_plan, extrude, merge, refine
+from softtact.fem.extruded_mesh import cell_mesh_2d, extrude, merge, refine
 
 _NO_QUADS = np.zeros((0, 9, 2))
 
@@ -66,7 +66,7 @@ def octagon_cell(pitch, diameter):
     return _NO_QUADS, np.concatenate([corners, 0.5 * (corners + np.roll(corners, -1, axis=1))], axis=1)
 
 
-def layered_mesh(spec, counts, *, cell=cell_plan, refinement=0, stack=Stack(), straight=False):
+def layered_mesh(spec, counts, *, cell=cell_mesh_2d, refinement=0, stack=Stack(), straight=False):
     """Mesh of a lattice `counts` of a `SensorSpec`; `cell(pitch, diameter)` gives a cell's quads and triangles.
 
     straight: the rims' nodes are moved so that the polygon of the corners has the circle's area (linear elements, refined plans).
@@ -77,17 +77,17 @@ def layered_mesh(spec, counts, *, cell=cell_plan, refinement=0, stack=Stack(), s
     x, y = (frusta.pitch_mm * (np.arange(n) - 0.5 * (n - 1)) for n in counts)
     centres = np.column_stack([grid.ravel() for grid in np.meshgrid(x, y)])
     coarse = merge(_tiled(quads, centres), _tiled(triangles, centres))
-    plan = refine(coarse, refinement)
+    mesh_2d = refine(coarse, refinement)
     disc = refine(merge(quads[:on_disc[0]], triangles[:on_disc[1]]), refinement)
     if straight:
         radius, corners = 0.5 * frusta.root_diameter_mm, 4 * 2**refinement
-        plan, disc = _widened(plan, centres, radius, corners), _widened(disc, np.zeros((1, 2)), radius, corners)
+        mesh_2d, disc = _widened(mesh_2d, centres, radius, corners), _widened(disc, np.zeros((1, 2)), radius, corners)
     levels = np.concatenate([np.linspace(z_root, -spec.cover.thickness_mm, stack.sheet + 1),
                              np.linspace(-spec.cover.thickness_mm, 0, stack.cover + 1)[1:]])
-    slab = extrude(plan, levels)
+    slab = extrude(mesh_2d, levels)
     ratio = frusta.tip_diameter_mm / frusta.root_diameter_mm
     cone = extrude(disc, np.asarray(stack.cone), scale=lambda share: ratio + (1 - ratio) * share)
-    return _joined(slab, cone, plan, disc, centres, coarse, z_root, frusta.height_mm, stack.sheet,
+    return _joined(slab, cone, mesh_2d, disc, centres, coarse, z_root, frusta.height_mm, stack.sheet,
                    0.5 * frusta.pitch_mm * np.asarray(counts))
 
 
@@ -95,32 +95,32 @@ def _tiled(elements, centres):
     return (elements[None] + centres[:, None, None]).reshape(-1, *elements.shape[1:])
 
 
-def _widened(plan, centres, radius, corners):
+def _widened(mesh_2d, centres, radius, corners):
     """The plan with its rims moved out between the points where discs touch: a polygon of `corners` with the circle's area.
 
     A corner at radius 1 and the next at f, or both at f: the area is sin(2 pi / corners) (8 f + (corners - 8) f^2) / 2 = pi.
     The nodes along the cells' walls make room: they slide towards the cells' corners.
     """
-    distance, owner = cKDTree(centres).query(plan.points)
-    offset = plan.points - centres[owner]
+    distance, owner = cKDTree(centres).query(mesh_2d.points)
+    offset = mesh_2d.points - centres[owner]
     touching = np.abs(offset).min(axis=1) < 1e-9
     moved = (np.abs(distance - radius) < 0.02 * radius) & ~touching
     factor = max(np.roots([corners - 8, 8, -2 * np.pi / np.sin(2 * np.pi / corners)]))
-    points = plan.points.copy()
+    points = mesh_2d.points.copy()
     points[moved] = centres[owner[moved]] + factor * radius * offset[moved] / distance[moved, None]
     share = np.abs(offset) / radius
     slide = np.where((share.max(axis=1) > 1 - 1e-9)[:, None] & (share < 1 - 1e-9), 5 * (factor - 1) * share * (1 - share), 0.0)
     points += radius * slide * np.sign(offset)
-    return type(plan)(points, plan.quads, plan.corners, plan.triangles)
+    return type(mesh_2d)(points, mesh_2d.quads, mesh_2d.corners, mesh_2d.triangles)
 
 
-def _joined(slab, cone, plan, disc, centres, coarse, z_root, height, sheet_layers, extent):
+def _joined(slab, cone, mesh_2d, disc, centres, coarse, z_root, height, sheet_layers, extent):
     """Slab and cones on one set of nodes: each cone's uppermost plane is the slab's lowest there."""
     own = np.setdiff1d(np.arange(len(cone.points)), cone.planes[-1])
     first = len(slab.points)
     z = z_root + height * (cone.points[own, 2] - 1)
     placed = [np.column_stack([cone.points[own, :2] + c, z]) for c in centres]
-    roots = _find(plan.points, _tiled(disc.points[None], centres).reshape(-1, 2)).reshape(len(centres), -1)
+    roots = _find(mesh_2d.points, _tiled(disc.points[None], centres).reshape(-1, 2)).reshape(len(centres), -1)
     number = np.empty((len(centres), len(cone.points)), dtype=np.int64)
     number[:, own] = first + np.arange(len(centres) * len(own)).reshape(len(centres), -1)
     number[:, cone.planes[-1]] = slab.planes[0][roots]
@@ -134,8 +134,8 @@ def _joined(slab, cone, plan, disc, centres, coarse, z_root, height, sheet_layer
     hexes["dielectric"] = np.vstack([hexes["dielectric"], placed_cone(cone.hexes)])
     wedges["dielectric"] = np.vstack([wedges["dielectric"], placed_cone(cone.wedges)])
     tips = {9: placed_cone(cone.planes[0][disc.quads]), 6: placed_cone(cone.planes[0][disc.triangles])}
-    top = {9: slab.planes[-1][plan.quads], 6: slab.planes[-1][plan.triangles]}
-    seen = _find(plan.points, coarse.points[:coarse.corners])
+    top = {9: slab.planes[-1][mesh_2d.quads], 6: slab.planes[-1][mesh_2d.triangles]}
+    seen = _find(mesh_2d.points, coarse.points[:coarse.corners])
     return LayeredMesh(np.vstack([slab.points, *placed]), hexes, wedges, top, tips, _cone_sides(cone, disc, placed_cone),
                        slab.planes[sheet_layers][seen], extent, z_root)
 

@@ -93,7 +93,7 @@ def thickness(layer, key, value, usual):
 
 def loose(board):
     """Tips that may slide on the board."""
-    spec = {"tips_held": False, "friction.board": board}
+    spec = {"tips_bonded": False, "friction.board": board}
     return Case(f"free_{board:g}", "tips on the board, bonded by default",
                 f"free, friction {board:g}" if board else "free, no friction", spec)
 
@@ -120,7 +120,7 @@ def limited(seconds):
     start = time.process_time()
 
     def stop(*_):
-        raise ConvergenceError(f"The next level was given up after {time.process_time() - start:.0f} processor seconds in all.")
+        raise ConvergenceError(f"The next load step was given up after {time.process_time() - start:.0f} processor seconds in all.")
 
     signal.signal(signal.SIGPROF, stop)
     signal.setitimer(signal.ITIMER_PROF, seconds)
@@ -141,7 +141,9 @@ class Conditions:
 
 
 def press(case, conditions):
-    """The `PressResult` of a case as far as it came, None where no level did, and the reason why it stopped, None if it did not."""
+    """The `PressResult` of a case as far as it came, None where no load step did, and the reason why it stopped, None if it did
+    not.
+    """
     try:
         with limited(conditions.limit_s):
             sensor = case.sensor(conditions.mesh)
@@ -151,7 +153,7 @@ def press(case, conditions):
 
 
 def measure(case, conditions, default_maps=None):
-    """One row, and the maps (levels, y, x) in mm that it is of; without `default_maps` it is the default itself."""
+    """One row, and the maps (load steps, y, x) in mm that it is of; without `default_maps` it is the default itself."""
     start = time.process_time()
     result, fault = press(case, conditions)
     row = {"object": conditions.name, "case": case.name, "assumption": case.assumption, "value": case.value, "failed": fault,
@@ -274,7 +276,7 @@ def troubles(rows):
     for row in rows:
         name = f"{row['assumption']}: {row['value']}" if row["assumption"] else "default"
         if row["failed"]:
-            reached = f"{row['force_n'][-1]:g} N" if row["force_n"] else "no level"
+            reached = f"{row['force_n'][-1]:g} N" if row["force_n"] else "no load step"
             lines.append(f"* {name} reached {reached}. {row['failed']}")
         outside = [force for force, valid in zip(row["force_n"], row.get("within_validity", []), strict=True) if not valid]
         if outside:

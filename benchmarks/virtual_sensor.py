@@ -1,7 +1,7 @@
 """What each effect of the virtual sensor is worth: `python benchmarks/virtual_sensor.py` from the project's folder.
 
 Writes docs/virtual_sensor.png and benchmarks/results/virtual_sensor.json in half a minute: circle_m is pressed by the elastic
-model, 20 levels to 50 N.
+model, 20 load steps to 50 N.
 """
 
 import numpy as np
@@ -31,8 +31,8 @@ def readings(press, settings):
 def alone(press, names):
     """Root mean square and largest change of the counts at the highest force by the effects `names` at their defaults."""
     default = VirtualSensorSettings()
-    changed = readings(press, VirtualSensorSettings.faultless(**{name: getattr(default, name) for name in names}))
-    change = changed.loading[:, -1] - readings(press, VirtualSensorSettings.faultless()).loading[:, -1]
+    changed = readings(press, VirtualSensorSettings.ideal(**{name: getattr(default, name) for name in names}))
+    change = changed.loading[:, -1] - readings(press, VirtualSensorSettings.ideal()).loading[:, -1]
     return {"rms_counts": round(float(np.sqrt(np.mean(change**2))), 2), "largest_counts": round(float(np.abs(change).max()), 1)}
 
 
@@ -40,7 +40,7 @@ def loop(press, **changes):
     """Counts (2 branches, force) of one taxel with the lag alone, the way up first."""
     default = VirtualSensorSettings()
     lag = {name: getattr(default, name) for name in (*EFFECTS["creep"], "rate_n_per_s", "level_s")}
-    both = readings(press, VirtualSensorSettings.faultless(**lag | changes))
+    both = readings(press, VirtualSensorSettings.ideal(**lag | changes))
     return np.stack([both.loading[0][:, *TAXEL], both.unloading[0][:, *TAXEL]])
 
 

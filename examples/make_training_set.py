@@ -4,7 +4,7 @@
 
 Writes pairs of deformation map (mm, what a simulation gives) and tactile map (counts, what a sensor would read), with force and
 pose of each. The presses are the elastic model's: some tenths of a second each. The readings are the virtual sensor's, a simulation
-with creep, scatter and noise of its own; `--ideal` takes a faultless readout of the same map. Neither is a
+with creep, scatter and noise of its own; `--ideal` takes an ideal readout of the same map. Neither is a
 measurement. A network that learns from readings of its own input's maps learns the readout only: the studies therefore read a
 press of another law and mesh.
 """
@@ -67,7 +67,7 @@ def parse(arguments):
     parser.add_argument("--presses", type=int, default=40)
     parser.add_argument("--sensor", default="coro")
     parser.add_argument("--model", default="elastic", choices=("elastic", "foundation"))
-    parser.add_argument("--ideal", action="store_true", help="a faultless readout in place of the virtual sensor")
+    parser.add_argument("--ideal", action="store_true", help="an ideal readout in place of the virtual sensor")
     parser.add_argument("--workers", type=int, help="processes; by default one for each core")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--out", type=Path, default=Path("training_set.nc"))

@@ -25,7 +25,7 @@ INDENTER = Path(__file__).parents[1] / "config/objects/indenters/circle_s.stl"
 
 @dataclass
 class TactileSensor:
-    """Call it with poses (n, 6) of the object (x, y, z mm; rx, ry, rz degrees) and a grip force in N.
+    """Call it with poses (n, 6) of the object (x, y, z mm; rx, ry, rz degrees) and a friction_state force in N.
 
     It gives tactile maps (n, row, column) in counts.
     sensor: a `softtact` sensor;  mesh: the object, in mm;  network: or None for the ideal readout
@@ -93,7 +93,7 @@ def parse(arguments):
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--steps", type=int, default=5)
     parser.add_argument("--batch", type=int, default=16, help="contacts at once")
-    parser.add_argument("--force", type=float, default=15.0, help="of every grip, in N")
+    parser.add_argument("--force", type=float, default=15.0, help="of every friction_state, in N")
     parser.add_argument("--network", type=Path, help="model.pt of a study, trained on the elastic model's maps")
     parser.add_argument("--workers", type=int, default=1, help="processes")
     parser.add_argument("--seed", type=int, default=1)

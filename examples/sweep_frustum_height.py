@@ -21,7 +21,8 @@ from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.readout.capacitance import capacitance_per_area
 from softtact.reporting.style import pyplot, save
 
-COARSE = MeshSettings(frustum_levels=(0.0, 0.35, 1.0), local_over_shear=4.0, coarse_walls=True)     # the studies' draft mesh
+# the studies' draft mesh
+COARSE = MeshSettings(frustum_heights=(0.0, 0.35, 1.0), unprojected_penalty_ratio=4.0, constrained_cell_edges=True)
 PRESSURES_KPA = np.array([2.0, 5.0, 10.0, 20.0, 40.0, 60.0, 80.0, 100.0])
 
 

@@ -139,7 +139,7 @@ def test_json_stands_alone_on_stdout_and_messages_on_stderr(capsys, tmp_path):
 
 
 @pytest.mark.parametrize(("fault", "status"), [
-    (ConvergenceError("The level of 20 N was not reached."), 3), (InputError("no."), 1), (KeyboardInterrupt(), 130),
+    (ConvergenceError("The load step of 20 N was not reached."), 3), (InputError("no."), 1), (KeyboardInterrupt(), 130),
     (OSError(28, "No space left on device", "press.nc"), 4),
 ])
 def test_what_stops_a_command_has_its_exit_status(fault, status, refused, monkeypatch):
@@ -156,14 +156,14 @@ def test_a_press_that_stops_early_writes_and_prints_the_forces_before(capsys, tm
 
     def stops(self, mesh, **options):
         result = whole(self, mesh, **options | {"force_n": [5.0]})
-        raise ConvergenceError("The level of 20 N was not reached.", result=result)
+        raise ConvergenceError("The load step of 20 N was not reached.", result=result)
 
     monkeypatch.setattr(Sensor, "press", stops)
     status = main(["press", str(OBJECT), "--unit", "mm", "--force", "5", "--force", "20", "--model", "elastic", "--json",
                    "--out", str(tmp_path / "p.nc")])
     captured = capsys.readouterr()
     assert status == 3 and json.loads(captured.out)["force_n"] == [5.0] and (tmp_path / "p.nc").exists()
-    assert captured.err.endswith("softtact press: The level of 20 N was not reached.\n")
+    assert captured.err.endswith("softtact press: The load step of 20 N was not reached.\n")
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

@@ -14,7 +14,7 @@ import xarray
 from softtact.errors import InputError, OutputError
 from softtact.files import atomic_path, read_dataset, read_json, write_csv, write_dataset, write_json
 from softtact.models.elastic.compliance import Compliance
-from softtact.models.foundation.compliance import FoundationFlexibility
+from softtact.models.foundation.compliance import FoundationCompliance
 from softtact.models.foundation.frustum_spring import FrustumLaw
 from softtact.press.vtu import read_vtu
 
@@ -32,7 +32,7 @@ def write_arrays(path):
     ("press.nc", lambda path: write_dataset(path, MAPS, seed=1, settings={}), read_dataset),
     ("card.json", lambda path: write_json(path, {"laws": list(range(100))}), read_json),
     ("compliance.npz", write_arrays, Compliance.load),
-    ("flexibility.npz", write_arrays, FoundationFlexibility.load),
+    ("compliance.npz", write_arrays, FoundationCompliance.load),
     ("law.npz", write_arrays, FrustumLaw.load),
     ("body.vtu", TETRAHEDRON.write, read_vtu)])
 def test_a_truncated_file_is_refused_by_its_name_and_with_a_remedy(tmp_path, name, write, read):

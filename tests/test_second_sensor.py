@@ -13,7 +13,7 @@ import softtact
 from softtact.errors import InputError
 from softtact.learning.network import ARCHITECTURES
 from softtact.models.elastic.compliance import elastic_compliance
-from softtact.models.foundation.compliance import foundation_flexibility
+from softtact.models.foundation.compliance import foundation_compliance
 from softtact.readout.capacitance import ideal_counts
 from softtact.readout.virtual_sensor import read_virtual_sensor
 from softtact.reporting.press_plot import plot_press
@@ -35,7 +35,7 @@ def pad():
     sensor.spec = sensor.spec.model_copy(update={"footprint_mm": (16.5, 10.0), "map_shape": MAP})
     law, cover = sensor.laws["dielectric"], sensor.laws["cover"]
     sensor.files = {"elastic": elastic_compliance(sensor.spec),
-                    "foundation": foundation_flexibility(sensor.spec, dielectric_law=law, cover_law=cover)}
+                    "foundation": foundation_compliance(sensor.spec, dielectric_law=law, cover_law=cover)}
     return sensor
 
 
@@ -80,7 +80,7 @@ def test_both_fast_models_displace_a_like_volume(pressed):
 
 
 def test_the_hyperelastic_body_has_its_frusta(pad):
-    assert pad.body().bed.count == 10 * 6
+    assert pad.body().support.count == 10 * 6
 
 
 @pytest.mark.parametrize("architecture", ARCHITECTURES)

@@ -24,5 +24,5 @@ class ConvergenceError(SofttactError):
         self.result = result
 
 
-class OutsideCardWarning(UserWarning):
+class ExtrapolationWarning(UserWarning):
     """A law is used where the data behind its material card do not reach."""

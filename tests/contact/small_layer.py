@@ -16,11 +16,11 @@ LAYER = ElasticLayer(THICKNESS, bulk_modulus=0.66, shear_modulus=0.55, shares=(0
 
 
 @cache
-def layer_flexibility():
-    """The `NodeGrid` of a layer's top, nodes 0.75 mm apart, and the flexibility (n, n) among them in mm/N."""
+def layer_compliance():
+    """The `NodeGrid` of a layer's top, nodes 0.75 mm apart, and the compliance (n, n) among them in mm/N."""
     slab = QuarterSlab((SIDE, SIDE), [LAYER], (4, 4), base_held=True)
     kept = 3 * slab.top.ravel() + 2
-    blocks = ParityBlocks(np.stack([slab.flexibility(slab.stiffness, kept, parity) for parity in PARITIES]))
+    blocks = ParityBlocks(np.stack([slab.compliance(slab.stiffness, kept, parity) for parity in PARITIES]))
     grid = surface_grid(slab)
     places = grid.quarter(np.arange(grid.count))
     return grid, blocks.between(*places, *places)

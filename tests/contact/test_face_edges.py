@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from softtact.contact.face_edges import ENDS, own_areas, softness
+from softtact.contact.face_edges import ENDS, contact_compliance, own_areas
 from softtact.contact.penalty import Contact
 from softtact.fem.elements import gauss
 
@@ -12,7 +12,7 @@ WIDTH = np.ones(1)
 
 def of_columns(low, middle, high):
     """Softness (3, 3) of a face whose columns of points, along x, are covered by these shares."""
-    return softness(np.repeat([low, middle, high], 3).astype(float), WIDTH).reshape(3, 3)
+    return contact_compliance(np.repeat([low, middle, high], 3).astype(float), WIDTH).reshape(3, 3)
 
 
 def test_points_that_are_covered_wholly_are_hard():
@@ -34,12 +34,14 @@ def test_a_mirrored_edge_is_felt_alike():
 
 def test_rows_and_columns_are_felt_alike():
     share = np.array([[1, 1, 1], [0.6, 0.6, 0.6], [0, 0, 0]], dtype=float)
-    assert np.allclose(softness(share.ravel(), WIDTH).reshape(3, 3), softness(share.T.ravel(), WIDTH).reshape(3, 3).T)
+    assert np.allclose(contact_compliance(share.ravel(), WIDTH).reshape(3, 3),
+                       contact_compliance(share.T.ravel(), WIDTH).reshape(3, 3).T)
 
 
 def test_softness_grows_with_the_face():
     share = np.repeat([1, 0.5, 0], 3)
-    assert np.allclose(softness(np.tile(share, 2), np.array([1.0, 2.0])).reshape(2, 9)[1], 2 * softness(share, WIDTH))
+    assert np.allclose(contact_compliance(np.tile(share, 2), np.array([1.0, 2.0])).reshape(2, 9)[1],
+                       2 * contact_compliance(share, WIDTH))
 
 
 def test_the_own_areas_of_a_faces_points_fill_it():
@@ -51,14 +53,14 @@ def test_the_own_areas_of_a_faces_points_fill_it():
 
 def test_a_points_spring_gives_way_by_its_softness_times_the_pressure():
     """In series with a penalty of 1 / 3000 mm/MPa, at twice the depth where it is linear."""
-    contact, gap = Contact(softness=np.array([0.0, 0.01])), np.array([-2e-3, -2e-3])
+    contact, gap = Contact(contact_compliance=np.array([0.0, 0.01])), np.array([-2e-3, -2e-3])
     _, pressure, _ = contact.response(gap)
     assert np.allclose(contact.own_gaps(gap), gap + [0.0, 0.01 * pressure[1]]) and pressure[1] < pressure[0] / 20
 
 
 def test_what_a_spring_gives_way_is_not_pressed_apart():
-    contact, gap = Contact(softness=np.array([0.01])), np.array([-4e-3])
+    contact, gap = Contact(contact_compliance=np.array([0.01])), np.array([-4e-3])
     _, pressure, _ = contact.response(gap)
-    held, there = contact.pressed_apart(gap), -0.01 * pressure     # the surface where the spring alone gives way
+    held, there = contact.augmented(gap), -0.01 * pressure     # the surface where the spring alone gives way
     assert held.response(there)[1] == pytest.approx(pressure) and held.error(there) == pytest.approx(0.0, abs=1e-12)
     assert contact.error(gap) == pytest.approx(-(gap + 0.01 * pressure)[0])

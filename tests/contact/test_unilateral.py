@@ -1,11 +1,11 @@
-"""Unilateral contact: the fast method against the plain one, the conditions of contact over random objects, and its levels."""
+"""Unilateral contact: the fast method against the plain one, the conditions of contact over random objects, and its load steps."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
-from small_layer import THICKNESS, ball, flat_box, layer_flexibility, placed, punch, underside
+from small_layer import THICKNESS, ball, flat_box, layer_compliance, placed, punch, underside
 
 from softtact.contact.unilateral import ContactSettings, active_set, press_elastic
 from softtact.errors import ConvergenceError
@@ -23,21 +23,21 @@ SHAPES = {
 
 
 def layer_contact(mesh):
-    """Flexibility (c, c) and gaps (c,) of a placed mesh's points on the small layer."""
-    grid, flexibility = layer_flexibility()
+    """Compliance (c, c) and gaps (c,) of a placed mesh's points on the small layer."""
+    grid, compliance = layer_compliance()
     points = underside(mesh, grid).nodes(THICKNESS)
-    return flexibility[np.ix_(points.nodes, points.nodes)], points.gap
+    return compliance[np.ix_(points.nodes, points.nodes)], points.gap
 
 
 # --- against the plain method ---
 
 
-def assert_both_methods_agree(flexibility, gap0, forces):
-    fast, plain = press_elastic(flexibility, gap0, forces), list(active_set(flexibility, gap0, forces))
-    for number, level in enumerate(plain):
-        assert fast.depth[number] == pytest.approx(level.indentation, abs=TOLERANCE_MM)
+def assert_both_methods_agree(compliance, gap0, forces):
+    fast, plain = press_elastic(compliance, gap0, forces), list(active_set(compliance, gap0, forces))
+    for number, load_step in enumerate(plain):
+        assert fast.depth[number] == pytest.approx(load_step.indentation, abs=TOLERANCE_MM)
         # a gap of 1e-6 mm, on depths of a millimetre, shifts forces by some 1e-6 of the whole
-        assert np.abs(fast.force[:, number] - level.nodal_force).max() < 1e-5 * level.force_n
+        assert np.abs(fast.force[:, number] - load_step.nodal_force).max() < 1e-5 * load_step.force_n
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -46,8 +46,8 @@ def test_the_fast_method_equals_the_plain_one_on_random_decaying_flexibilities(s
     rng = np.random.default_rng(seed)
     places = rng.uniform(0, 10, (150, 2))
     scale = np.exp(0.3 * rng.standard_normal(len(places)))
-    flexibility = np.outer(scale, scale) * np.exp(-cdist(places, places) / rng.uniform(0.5, 3.0))
-    assert_both_methods_agree(flexibility, rng.uniform(0, 2, len(places)), [0.5, 3.0, 20.0, 100.0])
+    compliance = np.outer(scale, scale) * np.exp(-cdist(places, places) / rng.uniform(0.5, 3.0))
+    assert_both_methods_agree(compliance, rng.uniform(0, 2, len(places)), [0.5, 3.0, 20.0, 100.0])
 
 
 @pytest.mark.parametrize("shape", SHAPES)
@@ -82,14 +82,14 @@ def rising_forces(draw):
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(mesh=placed_objects(), forces=rising_forces())
 def test_the_conditions_of_contact_hold_under_any_object(mesh, forces):
-    flexibility, gap0 = layer_contact(mesh)
-    levels = press_elastic(flexibility, gap0, forces)
-    gap = gap0[:, None] - levels.depth + flexibility @ levels.force
-    assert levels.gap == pytest.approx(gap, abs=1e-12)          # what it states is what its forces make
-    assert levels.penetration.max() <= TOLERANCE_MM and gap.min() >= -TOLERANCE_MM - 1e-12
-    assert levels.force.min() >= 0
-    np.testing.assert_allclose(levels.force.sum(axis=0), forces, rtol=1e-8)
-    assert np.abs(gap[levels.force > 0]).max() <= TOLERANCE_MM + 1e-12      # force only where it touches
+    compliance, gap0 = layer_contact(mesh)
+    load_steps = press_elastic(compliance, gap0, forces)
+    gap = gap0[:, None] - load_steps.depth + compliance @ load_steps.force
+    assert load_steps.gap == pytest.approx(gap, abs=1e-12)          # what it states is what its forces make
+    assert load_steps.penetration.max() <= TOLERANCE_MM and gap.min() >= -TOLERANCE_MM - 1e-12
+    assert load_steps.force.min() >= 0
+    np.testing.assert_allclose(load_steps.force.sum(axis=0), forces, rtol=1e-8)
+    assert np.abs(gap[load_steps.force > 0]).max() <= TOLERANCE_MM + 1e-12      # force only where it touches
 
 
 @settings(max_examples=30, deadline=None, derandomize=True)
@@ -102,11 +102,11 @@ def test_a_growing_force_never_lets_the_object_rise(mesh, forces):
 
 @settings(max_examples=30, deadline=None, derandomize=True)
 @given(mesh=placed_objects(), forces=rising_forces())
-def test_a_level_does_not_depend_on_which_others_are_asked_for(mesh, forces):
-    flexibility, gap0 = layer_contact(mesh)
-    together = press_elastic(flexibility, gap0, forces)
+def test_a_load_step_does_not_depend_on_which_others_are_asked_for(mesh, forces):
+    compliance, gap0 = layer_contact(mesh)
+    together = press_elastic(compliance, gap0, forces)
     for number, force in enumerate(forces):
-        alone = press_elastic(flexibility, gap0, [force])
+        alone = press_elastic(compliance, gap0, [force])
         assert alone.depth[0] == pytest.approx(together.depth[number], abs=2 * TOLERANCE_MM)
         assert np.abs(alone.force[:, 0] - together.force[:, number]).max() < 2e-5 * force
 
@@ -115,21 +115,21 @@ def test_a_level_does_not_depend_on_which_others_are_asked_for(mesh, forces):
 
 
 def test_first_guess_and_preconditioner_change_the_way_and_not_the_end():
-    flexibility, gap0 = layer_contact(SHAPES["tilted box"])
-    plain = press_elastic(flexibility, gap0, FORCES)
-    diagonal = 1 / np.diag(flexibility)[:, None].astype(np.float32)
-    other = press_elastic(flexibility, gap0, FORCES, area=np.linspace(0.2, 1.0, len(gap0)), bedding=30.0,
+    compliance, gap0 = layer_contact(SHAPES["tilted box"])
+    plain = press_elastic(compliance, gap0, FORCES)
+    diagonal = 1 / np.diag(compliance)[:, None].astype(np.float32)
+    other = press_elastic(compliance, gap0, FORCES, area=np.linspace(0.2, 1.0, len(gap0)), foundation_modulus=30.0,
                           precondition=lambda x: diagonal * x)
     np.testing.assert_allclose(other.depth, plain.depth, atol=2 * TOLERANCE_MM)
     assert np.abs(other.force - plain.force).max() < 2e-5 * FORCES[-1]
 
 
 def test_one_point_carries_everything():
-    levels = press_elastic(np.array([[0.5]]), np.array([0.1]), [1.0, 2.0])
-    np.testing.assert_allclose(levels.depth, [0.6, 1.1])
-    np.testing.assert_allclose(levels.force, [[1.0, 2.0]])
+    load_steps = press_elastic(np.array([[0.5]]), np.array([0.1]), [1.0, 2.0])
+    np.testing.assert_allclose(load_steps.depth, [0.6, 1.1])
+    np.testing.assert_allclose(load_steps.force, [[1.0, 2.0]])
 
 
-def test_a_level_that_does_not_settle_is_named():
+def test_a_load_step_that_does_not_settle_is_named():
     with pytest.raises(ConvergenceError, match="at 0.3 N in 1 iterations"):
         press_elastic(*layer_contact(SHAPES["sphere"]), FORCES, settings=ContactSettings(max_iterations=1))

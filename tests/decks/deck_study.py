@@ -62,5 +62,5 @@ def gaussian_chains(shear_modulus):
 
 def sharp(body):
     """The body with the contact law of a CalculiX deck: no smooth start of 0.001 mm."""
-    body.bed.contact, body.slab.top.contact = (replace(part.contact, smoothing=2e-5) for part in (body.bed, body.slab.top))
+    body.support.contact, body.slab.top.contact = (replace(part.contact, smoothing=2e-5) for part in (body.support, body.slab.top))
     return body

@@ -20,7 +20,7 @@ from softtact.fem.solid_block import HexBlock
 from softtact.geometry.meshes import place
 from softtact.models.hyperelastic.build import build_sensor_body, build_unit_cell
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
-from softtact.models.hyperelastic.newton import NewtonSettings, press_levels
+from softtact.models.hyperelastic.newton import NewtonSettings, press_load_steps
 from softtact.sensors.specification import Friction
 
 pytestmark = needs_ccx
@@ -31,16 +31,16 @@ SPHERE = place(trimesh.creation.icosphere(subdivisions=4, radius=3.0))
 
 def press(body, placed, forces):
     settings = NewtonSettings(smallest_scale_n=0.1, smallest_increment_n=1e-3)
-    return list(press_levels(body, HeightField(placed), forces, settings=settings))
+    return list(press_load_steps(body, HeightField(placed), forces, settings=settings))
 
 
-def interface_error(body, levels, tables):
-    """Largest and root mean square difference (levels, 2) of the interface's deflection, as shares of its largest."""
+def interface_error(body, load_steps, tables):
+    """Largest and root mean square difference (load steps, 2) of the interface's deflection, as shares of its largest."""
     plane = np.sort(body.slab.cover_mesh.bottom_nodes)      # the cover's nodes come first in a deck, too
     errors = []
-    for level, table in zip(levels, tables, strict=True):
+    for load_step, table in zip(load_steps, tables, strict=True):
         assert (table[:, 0] == plane + 1).all()
-        ours = level.state.slab.displacement[plane, 2]
+        ours = load_step.state.slab.displacement[plane, 2]
         difference = (table[:, 3] - ours) / np.abs(ours).max()
         errors.append((np.abs(difference).max(), np.sqrt((difference**2).mean())))
     return np.array(errors)
@@ -63,7 +63,7 @@ def test_a_distorted_element_has_the_nodal_forces_of_ccx(kind, points, tmp_path)
     (tmp_path / "one.inp").write_text("\n".join(lines) + "\n")
     subprocess.run(["ccx", "one"], cwd=tmp_path, capture_output=True, check=True)
     found = Tables(tmp_path / "one.dat").of("NODES")[0][:, 1:]
-    block = HexBlock(coordinates[None], law, points_per_side=points, local_over_shear=20.0)
+    block = HexBlock(coordinates[None], law, points_per_side=points, unprojected_penalty_ratio=20.0)
     expected = block.evaluate(displacement[None]).force.reshape(20, 3)
     assert found == pytest.approx(expected, abs=2e-6 * np.abs(expected).max())
 
@@ -71,7 +71,7 @@ def test_a_distorted_element_has_the_nodal_forces_of_ccx(kind, points, tmp_path)
 def cell_error(mesh, forces, solve, **elements):
     """Error (f,) of the force that CalculiX needs at the indentations of our unit cell under a plate."""
     body = sharp(build_unit_cell(CORO, dielectric_law=POLYURETHANE, mesh=mesh))
-    depths = [level.state.indentation for level in press(body, PLATE, forces)]
+    depths = [load_step.state.indentation for load_step in press(body, PLATE, forces)]
     return solve(deck_model(body, PLATE, indentations_mm=depths), **elements).force / forces - 1
 
 
@@ -91,9 +91,9 @@ def test_what_the_elements_differ_by_halves_with_every_element_split(solve):
     elements lose an order where they are distorted, as the wedges between roots are.
     """
     forces = np.array([0.05])
-    coarse = cell_error(MeshSettings.converging(coarse_walls=True), forces, solve)
+    coarse = cell_error(MeshSettings.converging(constrained_cell_edges=True), forces, solve)
     fine = cell_error(MeshSettings.converging(refinement=1, sheet_layers=2,
-                                              frustum_levels=(0.0, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)), forces, solve)
+                                              frustum_heights=(0.0, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)), forces, solve)
     assert (coarse > 0).all() and (np.abs(fine) < 0.6 * coarse).all()
 
 
@@ -109,12 +109,12 @@ def test_a_small_sensor_gives_way_as_in_calculix(solve):
     """
     forces = [2.0, 4.0]
     body = sharp(build_sensor_body(PATCH, dielectric_law=POLYURETHANE, cover_law=NEOPRENE, surface=HeightField(SPHERE),
-                                   mesh=MeshSettings(cover_levels=(0.0, 0.45, 0.8, 1.0), cover_splits=(0, 1, 2))))
-    levels = press(body, SPHERE, forces)
+                                   mesh=MeshSettings(cover_heights=(0.0, 0.45, 0.8, 1.0), cover_splits=(0, 1, 2))))
+    load_steps = press(body, SPHERE, forces)
     tables = solve(deck_model(body, SPHERE, forces_n=forces))
     assert tables.force[1:] == pytest.approx(forces, rel=1e-4)
-    assert tables.indentation[1:] == pytest.approx([level.state.indentation for level in levels], rel=0.02)
-    largest, rms = interface_error(body, levels, tables.of("INTERFACE")[1:]).T
+    assert tables.indentation[1:] == pytest.approx([load_step.state.indentation for load_step in load_steps], rel=0.02)
+    largest, rms = interface_error(body, load_steps, tables.of("INTERFACE")[1:]).T
     assert largest.max() < 0.07 and rms.max() < 0.02
 
 
@@ -124,9 +124,10 @@ def test_a_rough_sphere_on_frusta_that_may_slide_needs_nearly_the_force_of_calcu
 
     At these indentations a press without friction takes 4 and 6 % less.
     """
-    spec, forces = PATCH.model_copy(update={"tips_held": False, "friction": Friction(object=0.3, board=0.3)}), np.array([1.0, 2.0])
+    spec = PATCH.model_copy(update={"tips_bonded": False, "friction": Friction(object=0.3, board=0.3)})
+    forces = np.array([1.0, 2.0])
     body = sharp(build_sensor_body(spec, dielectric_law=POLYURETHANE, cover_law=NEOPRENE, surface=HeightField(SPHERE),
-                                   mesh=MeshSettings(cover_levels=(0.0, 0.45, 0.8, 1.0), cover_splits=(0, 1, 2))))
-    depths = [level.state.indentation for level in press(body, SPHERE, forces)]
+                                   mesh=MeshSettings(cover_heights=(0.0, 0.45, 0.8, 1.0), cover_splits=(0, 1, 2))))
+    depths = [load_step.state.indentation for load_step in press(body, SPHERE, forces)]
     tables = solve(deck_model(body, SPHERE, indentations_mm=depths))
     assert np.abs(tables.force / forces - 1).max() < 0.025

@@ -22,7 +22,7 @@ from softtact.sensors.specification import Friction
 
 SMALL = CORO.model_copy(update={"footprint_mm": (2.4, 3.6), "map_shape": (7, 5)})   # 2 x 3 frusta
 SENSOR = Sensor(SMALL, {"dielectric": POLYURETHANE, "cover": NEOPRENE},
-                mesh=MeshSettings(cover_levels=(0.0, 1.0), cover_splits=(0,), far_pitches=1))
+                mesh=MeshSettings(cover_heights=(0.0, 1.0), cover_splits=(0,), far_pitches=1))
 SPHERE = trimesh.creation.icosphere(subdivisions=2, radius=2.0)
 # Corner nodes of faces, and ends of the edges that the further nodes halve: Abaqus Elements Guide, "Three-dimensional solid element
 # library"; ccx has the same.
@@ -148,7 +148,7 @@ def test_surfaces_name_the_faces_that_touch(pair):
 
     assert corners("TOP")[:, 2] == pytest.approx(0.0, abs=1e-12)
     assert corners("FRUSTA_TIPS")[:, 2] == pytest.approx(-2.5)
-    centres = SENSOR.body().bed.geometry.centres
+    centres = SENSOR.body().support.geometry.centres
     sides = corners("FRUSTA_SIDES")
     assert np.linalg.norm(sides[:, None, :2] - centres, axis=2).min(axis=1) == pytest.approx(cone_radius(sides), rel=1e-6)
     even, odd = ({tuple(face) for face in model.surfaces[f"FRUSTA_SIDES_{half}"].tolist()} for half in ("EVEN", "ODD"))
@@ -188,7 +188,7 @@ def test_contacts_have_the_penalty_of_the_press(pair, dialect):
 def test_a_deck_has_the_friction_of_the_sensor_and_none_without(pair, dialect, tmp_path):
     """Abaqus: elastic slip and coefficient;  CalculiX: coefficient and stick slope, mu times 1 MPa over our slip tolerance."""
     assert pair[1].friction == {}
-    rough = replace(SENSOR, spec=SMALL.model_copy(update={"tips_held": False, "friction": Friction(object=0.2, board=0.3)}))
+    rough = replace(SENSOR, spec=SMALL.model_copy(update={"tips_bonded": False, "friction": Friction(object=0.2, board=0.3)}))
     export_press(rough, SPHERE, force_n=[1.0], dialect=dialect, path=tmp_path / "rough.inp")
     deck = read_deck(tmp_path / "rough.inp")
     numbers = {"abaqus": lambda mu: [5e-4, mu], "calculix": lambda mu: [mu, mu / 5e-4]}[dialect]
@@ -241,7 +241,7 @@ def test_a_refined_cell_has_its_finer_sides_and_no_coarse_walls(dialect):
     body = build_unit_cell(CORO, dielectric_law=POLYURETHANE, mesh=MeshSettings(refinement=1))
     model = deck_model(body, place(trimesh.creation.box((5.0, 5.0, 1.0))), indentations_mm=[0.02])
     sides = np.vstack(face_corners(model, "FRUSTA_SIDES")) - [0, 0, 1.5]      # no cover: 1.5 mm higher than in a sensor
-    assert len(sides) == 4 * 8 * body.bed.mesh.layers
+    assert len(sides) == 4 * 8 * body.support.mesh.layers
     assert np.linalg.norm(sides[:, :2], axis=1) == pytest.approx(cone_radius(sides), rel=0.01)   # parabolic arcs: 0.8 %
     assert {model.points[tie.slave, 2] for tie in model.ties} == {0.0}
 

@@ -29,7 +29,7 @@ def table():
     return press_table(presses, {"ring": "elastic", "star": "elastic", "cup": "hyperelastic"}, height_mm=0.5)[0]
 
 
-def test_a_press_counts_with_its_worst_level_and_the_time_of_all(table):
+def test_a_press_counts_with_its_worst_load_step_and_the_time_of_all(table):
     cup = table[table.item == "cup"].iloc[0]
     assert cup.foundation_error_mm == pytest.approx(0.2 * 0.03 * SIZE)
     assert cup.elastic_error_mm == pytest.approx(0.2 * SIZE)

@@ -84,7 +84,7 @@ def test_predictions_are_labelled_and_stand_beside_the_sensors_mean():
     assert data.force_n.values.tolist() == FORCES and data.attrs["source"] == "virtual sensor"
 
 
-def test_a_level_that_an_object_lacks_is_nan():
+def test_a_load_step_that_an_object_lacks_is_nan():
     samples = make_samples()
     kept = ~((samples.labels["item"] == "object_1") & (samples.labels.force_n == 20)).to_numpy()
     fewer = Samples(samples.maps_mm[kept], samples.counts[kept], samples.labels[kept].reset_index(drop=True),

@@ -7,11 +7,11 @@ import trimesh
 from softtact.contact.height_field import HeightField
 from softtact.contact.penalty import Contact
 from softtact.fem.elements import gauss, hex20, reference_gradients
-from softtact.fem.extruded_mesh import SheetPlan, grid_plan, merge, with_centres
-from softtact.fem.graded_mesh import cover_mesh, split_levels
+from softtact.fem.extruded_mesh import SheetMesh2D, grid_mesh_2d, merge, with_centres
+from softtact.fem.graded_mesh import cover_mesh, split_depths
 from softtact.geometry.meshes import place
 from softtact.materials.laws.registry import make_law
-from softtact.models.hyperelastic.refinement import CURVED, EDGE, FAR, FLAT, NEAR, levels_of, zones
+from softtact.models.hyperelastic.refinement import CURVED, EDGE, FAR, FLAT, NEAR, split_depths_of, zones
 from softtact.models.hyperelastic.slab import Layer, Slab
 
 X, Y = np.array([-3.0, -1.5, -0.5, 1.0, 3.0]), np.array([-2.0, -1.0, 0.0, 2.0])
@@ -21,8 +21,8 @@ LAW = make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=7.0
 
 def random_levels(seed, caps=(0, 1, 2)):
     rng = np.random.default_rng(seed)
-    level = split_levels((len(X) - 1, len(Y) - 1), lambda low, size, level: rng.random(len(low)) < 0.4, max(caps))
-    return np.stack([np.minimum(level, cap) for cap in caps])
+    depth = split_depths((len(X) - 1, len(Y) - 1), lambda low, size, depth: rng.random(len(low)) < 0.4, max(caps))
+    return np.stack([np.minimum(depth, cap) for cap in caps])
 
 
 @pytest.mark.parametrize("caps", [(0, 0, 0), (0, 1, 2), (2, 1, 0), (1, 1, 3)])
@@ -50,16 +50,16 @@ def test_the_elements_fill_the_cover_and_its_faces_the_top_and_the_bottom(seed):
 def test_a_split_slab_passes_the_patch_test(caps):
     """A linear displacement: no force on nodes inside, to round-off."""
     none = np.zeros((0, 4), dtype=int)
-    grid = grid_plan(np.linspace(-3, 3, 17), np.linspace(-2, 2, 9))   # each element under one of the cover
-    plan = SheetPlan(merge(with_centres(grid.points[grid.quads])), np.zeros((0, 25), dtype=int), 0, (none, np.zeros(3)))
+    grid = grid_mesh_2d(np.linspace(-3, 3, 17), np.linspace(-2, 2, 9))   # each element under one of the cover
+    mesh_2d = SheetMesh2D(merge(with_centres(grid.points[grid.quads])), np.zeros((0, 25), dtype=int), 0, (none, np.zeros(3)))
     x, y = np.linspace(-3, 3, 5), np.linspace(-2, 2, 5)
     rng = np.random.default_rng(0)
-    level = split_levels((4, 4), lambda low, size, level: rng.random(len(low)) < 0.4, 2)
-    slab = Slab(Layer(np.array([-2.0, -1.5]), LAW), Layer(np.array(HEIGHTS), LAW), plan, x, y, sides="held", contact=Contact(),
-                splits=np.stack([np.minimum(level, cap) for cap in caps]))
+    depth = split_depths((4, 4), lambda low, size, depth: rng.random(len(low)) < 0.4, 2)
+    slab = Slab(Layer(np.array([-2.0, -1.5]), LAW), Layer(np.array(HEIGHTS), LAW), mesh_2d, x, y, sides="held", contact=Contact(),
+                splits=np.stack([np.minimum(depth, cap) for cap in caps]))
     gradient = np.array([[0.1, 0.05, 0.0], [-0.02, -0.08, 0.03], [0.04, 0.0, -0.1]])
     displacement = slab.points @ gradient.T
-    planes = slab.facing(displacement, lambda x, y: (np.full(len(x), 1e3), np.tile([0.0, 0.0, -1.0], (len(x), 1))))
+    planes = slab.project(displacement, lambda x, y: (np.full(len(x), 1e3), np.tile([0.0, 0.0, -1.0], (len(x), 1))))
     force = slab.evaluate(displacement, planes, 0.0).force
     inside = (np.abs(slab.points - [0, 0, -1.0]) < [2.999, 1.999, 0.999]).all(axis=1)
     assert inside.sum() > 50 and np.abs(force[~inside]).max() > 0.01
@@ -77,8 +77,8 @@ def test_a_flat_punch_is_fine_at_its_edge_and_coarse_far_away():
     r = np.hypot(*np.meshgrid(centre, centre))
     assert (zone[np.abs(r - 3.0) < 0.1] == EDGE).all() and (zone[r < 2.0] == FLAT).all()
     assert (zone[r > 6.5] == FAR).all() and set(np.unique(zone[(r > 4.0) & (r < 5.0)])) == {NEAR}
-    levels = levels_of(np.array([0, 1, 1, 2, 3])[zone], (8, 8), 3)
-    assert (levels[zone == EDGE] == 3).all() and levels[0, 0] == 0
+    splits = split_depths_of(np.array([0, 1, 1, 2, 3])[zone], (8, 8), 3)
+    assert (splits[zone == EDGE] == 3).all() and splits[0, 0] == 0
 
 
 @pytest.mark.parametrize("most", [3, 5])

@@ -41,9 +41,9 @@ def elements(count, nodes, seed):
 
 BLOCKS = {
     "27 nodes, all of the volume's parts": (HexBlock, HEX27_NODES, MOONEY,
-                                            {"trilinear": True, "local_over_shear": 0.5, "growing_over_shear": 100.0}),
+                                            {"trilinear": True, "unprojected_penalty_ratio": 0.5, "quartic_penalty_ratio": 100.0}),
     "20 nodes, 8 points": (HexBlock, HEX20_NODES, MOONEY, {"points_per_side": 2}),
-    "wedge, a law of stretches": (WedgeBlock, WEDGE18_NODES, OGDEN, {"growing_over_shear": 10.0}),
+    "wedge, a law of stretches": (WedgeBlock, WEDGE18_NODES, OGDEN, {"quartic_penalty_ratio": 10.0}),
 }
 
 

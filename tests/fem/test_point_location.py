@@ -5,18 +5,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from softtact.fem.extruded_mesh import refine, sheet_plan
-from softtact.fem.point_location import plan_interpolation
+from softtact.fem.extruded_mesh import refine, sheet_mesh_2d
+from softtact.fem.point_location import interpolation_2d
 
 CENTRES = np.array([(x, y) for y in (-0.6, 0.6) for x in (-1.2, 0.0, 1.2)])
 
 
-def plan(rings=1, diameter=1.2):
+def mesh_2d(rings=1, diameter=1.2):
     """3 x 2 cells with strips around: 4.0 x 2.9 mm. With 1.2 mm the discs touch, and triangles between them have cusps."""
-    return sheet_plan(CENTRES, (3, 2), 1.2, diameter, (4.0, 2.9), rings=rings).plan
+    return sheet_mesh_2d(CENTRES, (3, 2), 1.2, diameter, (4.0, 2.9), rings=rings).mesh_2d
 
 
-PLANS = {"discs that touch": plan(), "two rings": plan(rings=2), "discs apart": plan(diameter=0.9)}
+PLANS = {"discs that touch": mesh_2d(), "two rings": mesh_2d(rings=2), "discs apart": mesh_2d(diameter=0.9)}
 
 
 def smooth(points):
@@ -26,14 +26,14 @@ def smooth(points):
 @pytest.mark.parametrize("name", PLANS)
 def test_a_node_is_found_at_itself(name):
     mesh = PLANS[name]
-    assert abs(plan_interpolation(mesh, mesh.points) - np.eye(len(mesh.points))).max() < 1e-6
+    assert abs(interpolation_2d(mesh, mesh.points) - np.eye(len(mesh.points))).max() < 1e-6
 
 
 @given(x=st.floats(-2.0, 2.0), y=st.floats(-1.45, 1.45), name=st.sampled_from(sorted(PLANS)))
 @settings(max_examples=150, deadline=None)
 def test_linear_fields_are_interpolated_exactly_everywhere(x, y, name):
     mesh = PLANS[name]
-    got = plan_interpolation(mesh, np.array([[x, y]])) @ np.column_stack([np.ones(len(mesh.points)), mesh.points])
+    got = interpolation_2d(mesh, np.array([[x, y]])) @ np.column_stack([np.ones(len(mesh.points)), mesh.points])
     np.testing.assert_allclose(got, [[1.0, x, y]], atol=1e-8)
 
 
@@ -43,11 +43,11 @@ def test_a_smooth_field_is_interpolated_to_third_order():
     errors = []
     for times in (1, 2):
         mesh = refine(PLANS["discs that touch"], times)
-        error = plan_interpolation(mesh, points) @ smooth(mesh.points) - smooth(points)
+        error = interpolation_2d(mesh, points) @ smooth(mesh.points) - smooth(points)
         errors.append(np.sqrt(np.mean(error**2)))
     assert 6 < errors[0] / errors[1] < 12
 
 
 def test_a_point_outside_is_named():
     with pytest.raises(ValueError, match="x 2.1, y 0 mm lies outside"):
-        plan_interpolation(PLANS["discs apart"], np.array([[0.0, 0.0], [2.1, 0.0]]))
+        interpolation_2d(PLANS["discs apart"], np.array([[0.0, 0.0], [2.1, 0.0]]))

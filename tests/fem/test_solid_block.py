@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from softtact.fem.elements import HEX27_NODES
-from softtact.fem.extruded_mesh import extrude, sheet_plan
-from softtact.fem.solid_block import HexBlock, WedgeBlock, joined, of_masters
+from softtact.fem.extruded_mesh import extrude, sheet_mesh_2d
+from softtact.fem.solid_block import HexBlock, WedgeBlock, hanging_node_constraints, joined
 from softtact.materials.laws.registry import make_law
 
 LAWS = [make_law("mooney_rivlin", {"c10": 0.17, "c01": 0.004}, bulk_modulus=7.0),
@@ -14,7 +14,7 @@ LAWS = [make_law("mooney_rivlin", {"c10": 0.17, "c01": 0.004}, bulk_modulus=7.0)
 
 def parts():
     """Elements of a frustum's cell: two laws, hexahedra and wedges, some that hang on nodes of larger ones."""
-    mesh = extrude(sheet_plan(np.zeros((1, 2)), (1, 1), 1.2, 0.9, (1.2, 1.2)).plan, np.array([0.0, 0.2, 0.5]))
+    mesh = extrude(sheet_mesh_2d(np.zeros((1, 2)), (1, 1), 1.2, 0.9, (1.2, 1.2)).mesh_2d, np.array([0.0, 0.2, 0.5]))
     lower, upper = (mesh.layer(k) for k in (0, 1))
     found = [(lower, HexBlock(mesh.points[lower], LAWS[0])), (upper, HexBlock(mesh.points[upper], LAWS[0])),
              (upper[:2], HexBlock(mesh.points[upper[:2]], LAWS[1]))]
@@ -24,7 +24,7 @@ def parts():
     masters, weights = np.arange(len(mesh.points))[:, None].repeat(2, axis=1), np.tile([1.0, 0.0], (len(mesh.points), 1))
     masters[0], weights[0] = (1, 2), (0.5, 0.5)
     hanging = lower[:1]
-    found.append(of_masters(masters, weights, hanging, HexBlock(mesh.points[hanging], LAWS[0])))
+    found.append(hanging_node_constraints(masters, weights, hanging, HexBlock(mesh.points[hanging], LAWS[0])))
     return mesh.points, found
 
 
@@ -50,7 +50,7 @@ def test_joined_blocks_have_the_energy_and_the_forces_of_their_parts():
     assert again == pytest.approx(energy, rel=1e-12)
 
 
-@pytest.mark.parametrize("options", [{}, {"local_over_shear": 0.5}, {"growing_over_shear": 100.0, "trilinear": True}])
+@pytest.mark.parametrize("options", [{}, {"unprojected_penalty_ratio": 0.5}, {"quartic_penalty_ratio": 100.0, "trilinear": True}])
 def test_tangents_in_single_precision_are_those_in_double_precision_to_seven_digits(options):
     block = HexBlock(0.5 * HEX27_NODES[None], LAWS[0], **options)
     field = 0.02 * np.random.default_rng(1).normal(size=(1, 27, 3))
@@ -67,7 +67,7 @@ def test_elements_that_hang_on_other_nodes_feel_the_displacement_that_these_give
     elements, field = rng.integers(0, 60, size=(4, 27)), 0.002 * rng.normal(size=(40, 3))
     own = np.einsum("nw,nwi->ni", weights, field[masters])
     expected = HexBlock(points, LAWS[0]).evaluate(own[elements])
-    nodes, block = of_masters(masters, weights, elements, HexBlock(points, LAWS[0]))
+    nodes, block = hanging_node_constraints(masters, weights, elements, HexBlock(points, LAWS[0]))
     found = block.evaluate(field[nodes])
     np.testing.assert_allclose(found.energies, expected.energies, rtol=1e-11)
     passed_on, force = np.zeros((40, 3)), np.zeros((40, 3))
@@ -86,8 +86,8 @@ def projected(block, field):
     return np.array(rows)
 
 
-@pytest.mark.parametrize("options", [{}, {"local_over_shear": 0.5}, {"growing_over_shear": 100.0},
-                                     {"local_over_shear": 4.0, "growing_over_shear": 100.0, "trilinear": True}])
+@pytest.mark.parametrize("options", [{}, {"unprojected_penalty_ratio": 0.5}, {"quartic_penalty_ratio": 100.0},
+                                     {"unprojected_penalty_ratio": 4.0, "quartic_penalty_ratio": 100.0, "trilinear": True}])
 def test_the_energy_of_volume_changes_is_that_of_the_formulas_written_down_plainly(options):
     points = 0.5 * HEX27_NODES + 0.02 * np.random.default_rng(2).normal(size=(3, 27, 3))
     block = HexBlock(points, LAWS[0], **options)

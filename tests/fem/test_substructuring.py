@@ -80,11 +80,11 @@ def test_each_layer_eliminates_what_no_later_one_knows(bodies):
 def test_forces_and_steps_are_those_of_the_whole_system(bodies, threads):
     workers = Workers(threads)
     force = bodies.force.copy()
-    halves = bodies.elimination.residual(force, workers=workers)
+    forward_solved = bodies.elimination.residual(force, workers=workers)
     step = np.zeros((BODIES, UNKNOWNS))
     for body in range(BODIES):
         step[body, LEFT] = -np.linalg.solve(schur(bodies.whole(body)), force[body, LEFT])
-    bodies.elimination.recover(halves, step, workers=workers)
+    bodies.elimination.recover(forward_solved, step, workers=workers)
     workers.close()
     for body in range(BODIES):
         expected = -np.linalg.solve(bodies.whole(body), bodies.force[body])
@@ -92,9 +92,10 @@ def test_forces_and_steps_are_those_of_the_whole_system(bodies, threads):
 
 
 def test_a_half_that_was_cut_in_double_precision_gives_that_share_of_the_step(bodies):
-    halves, step, share = bodies.elimination.residual(bodies.force.copy()), np.zeros((2, BODIES, UNKNOWNS)), np.float64(0.25)
-    bodies.elimination.recover(halves, step[0])
-    bodies.elimination.recover([share * half for half in halves], step[1])
+    forward_solved = bodies.elimination.residual(bodies.force.copy())
+    step, share = np.zeros((2, BODIES, UNKNOWNS)), np.float64(0.25)
+    bodies.elimination.recover(forward_solved, step[0])
+    bodies.elimination.recover([share * half for half in forward_solved], step[1])
     np.testing.assert_allclose(step[1], 0.25 * step[0], atol=EPSILON * np.abs(step[0]).max())
 
 
@@ -113,8 +114,8 @@ def test_a_body_of_negative_stiffness_keeps_steps_that_go_down(bodies):
     force = weak.force.copy()
     force[:, LEFT] = 0.0
     inner = force.copy()
-    halves, step = weak.elimination.residual(inner), np.zeros((BODIES, UNKNOWNS))
-    weak.elimination.recover(halves, step)       # the outer unknowns held: each body's own way to balance
+    forward_solved, step = weak.elimination.residual(inner), np.zeros((BODIES, UNKNOWNS))
+    weak.elimination.recover(forward_solved, step)       # the outer unknowns held: each body's own way to balance
     assert ((step * force).sum(axis=1) < 0).all()
     assert weak.elimination.stages[0].condensed.modified == BODIES
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from softtact.fem.extruded_mesh import extrude, sheet_plan
+from softtact.fem.extruded_mesh import extrude, sheet_mesh_2d
 from softtact.fem.solid_block import HexBlock
 from softtact.fem.static_condensation import Condensation, packed
-from softtact.fem.tangent_cache import KeptTangents
+from softtact.fem.tangent_cache import TangentCache
 from softtact.materials.laws.registry import make_law
 
 LAW = make_law("mooney_rivlin", {"c10": 0.17, "c01": 0.004}, bulk_modulus=7.0)
@@ -15,7 +15,7 @@ KEPT_MM = 1e-3
 
 @pytest.fixture
 def block():
-    mesh = extrude(sheet_plan(np.zeros((1, 2)), (1, 1), 1.2, 0.9, (1.2, 1.2)).plan, np.array([0.0, 0.2]))
+    mesh = extrude(sheet_mesh_2d(np.zeros((1, 2)), (1, 1), 1.2, 0.9, (1.2, 1.2)).mesh_2d, np.array([0.0, 0.2]))
     return HexBlock(mesh.points[mesh.layer(0)], LAW)
 
 
@@ -40,13 +40,13 @@ def test_an_unknown_that_stands_twice_in_an_element_gets_all_four_entries():
 
 def test_the_first_tangents_are_those_of_the_place(block, displacement):
     chosen = np.array([1, 4, 2])
-    found = KeptTangents(block).at(displacement[chosen], chosen, kept_mm=KEPT_MM)
+    found = TangentCache(block).at(displacement[chosen], chosen, kept_mm=KEPT_MM)
     np.testing.assert_array_equal(found, tangents(block, displacement[chosen], chosen))
 
 
 @pytest.mark.parametrize(("moved_mm", "kept"), [(0.9 * KEPT_MM, True), (1.2 * KEPT_MM, False)])
 def test_a_tangent_is_kept_until_a_node_has_moved_against_the_others(block, displacement, moved_mm, kept):
-    keeper, chosen = KeptTangents(block), np.array([0, 3])
+    keeper, chosen = TangentCache(block), np.array([0, 3])
     before = keeper.at(displacement[chosen], chosen, kept_mm=KEPT_MM)
     displacement[3, 5, 2] += moved_mm
     after = keeper.at(displacement[chosen], chosen, kept_mm=KEPT_MM)
@@ -55,7 +55,7 @@ def test_a_tangent_is_kept_until_a_node_has_moved_against_the_others(block, disp
 
 
 def test_many_small_moves_are_one_large_one(block, displacement):
-    keeper, chosen = KeptTangents(block), np.array([3])
+    keeper, chosen = TangentCache(block), np.array([3])
     for _ in range(6):
         found = keeper.at(displacement[chosen], chosen, kept_mm=KEPT_MM)
         displacement[3, 5, 2] += 0.3 * KEPT_MM
@@ -65,13 +65,13 @@ def test_many_small_moves_are_one_large_one(block, displacement):
 
 
 def test_what_all_nodes_share_changes_no_tangent(block, displacement):
-    keeper, chosen = KeptTangents(block), np.array([3])
+    keeper, chosen = TangentCache(block), np.array([3])
     before = keeper.at(displacement[chosen], chosen, kept_mm=KEPT_MM)
     np.testing.assert_array_equal(keeper.at(displacement[chosen] + 0.5, chosen, kept_mm=KEPT_MM), before)
 
 
 def test_nothing_is_kept_where_nothing_may_move(block, displacement):
-    keeper, chosen = KeptTangents(block), np.array([3])
+    keeper, chosen = TangentCache(block), np.array([3])
     keeper.at(displacement[chosen], chosen, kept_mm=0.0)
     displacement[3, 5, 2] += 1e-5
     found = keeper.at(displacement[chosen], chosen, kept_mm=0.0)

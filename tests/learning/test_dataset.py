@@ -15,7 +15,7 @@ def build(study, **changes):
     return build_datasets(study.presses, study.tactile, **{**study.settings, **changes})
 
 
-def levels_of(data):
+def split_depths_of(data):
     """{(item, force)} of a split."""
     return set(zip(data["item"].values.tolist(), data.force_n.values.tolist(), strict=True))
 
@@ -27,13 +27,13 @@ def run_stage(study, folder, **changes):
     return outputs
 
 
-def test_four_fifths_of_the_indenters_levels_train_and_the_rest_validates(study):
+def test_four_fifths_of_the_indenters_load_steps_train_and_the_rest_validates(study):
     datasets, _ = build(study)
-    train, validation = levels_of(datasets["elastic", "train"]), levels_of(datasets["elastic", "validation"])
+    train, validation = split_depths_of(datasets["elastic", "train"]), split_depths_of(datasets["elastic", "validation"])
     assert len(train) == round(0.8 * 18) and len(train | validation) == 18 and not train & validation
 
 
-def test_trials_of_one_level_stay_on_one_side(study):
+def test_trials_of_one_load_step_stay_on_one_side(study):
     datasets, _ = build(study)
     maps = {split: {image.tobytes() for image in datasets["elastic", split].deformation_map_mm.values}
             for split in SPLITS}
@@ -63,11 +63,11 @@ def test_each_sample_is_its_own_press_and_reading(study):
     data = datasets["elastic", "train"]
     for k in range(data.sizes["sample"]):
         key = ("indenters", data["item"].values[k])
-        level = [10.0, 20.0, 30.0].index(data.force_n.values[k])
+        load_step = [10.0, 20.0, 30.0].index(data.force_n.values[k])
         assert np.array_equal(data.deformation_map_mm.values[k],
-                              np.float32(study.presses["elastic", *key].deformation_map_mm.values[level]))
+                              np.float32(study.presses["elastic", *key].deformation_map_mm.values[load_step]))
         assert np.array_equal(data.tactile_map.values[k],
-                              np.float32(study.tactile[key].tactile_map.values[data.trial.values[k], level]))
+                              np.float32(study.tactile[key].tactile_map.values[data.trial.values[k], load_step]))
 
 
 def test_training_samples_are_shuffled(study):
@@ -76,34 +76,34 @@ def test_training_samples_are_shuffled(study):
 
 
 def test_the_split_depends_on_the_seed_and_not_on_the_order_of_the_items(study):
-    first = levels_of(build(study)[0]["elastic", "train"])
-    assert levels_of(build(study, items=study.settings["items"][::-1])[0]["elastic", "train"]) == first
-    assert levels_of(build(study, seed=4)[0]["elastic", "train"]) != first
+    first = split_depths_of(build(study)[0]["elastic", "train"])
+    assert split_depths_of(build(study, items=study.settings["items"][::-1])[0]["elastic", "train"]) == first
+    assert split_depths_of(build(study, seed=4)[0]["elastic", "train"]) != first
 
 
 def test_the_mean_over_the_trials_may_stand_for_them_in_training_only(study):
     datasets, _ = build(study, training_trials="mean")
     data = datasets["elastic", "train"]
-    assert len(levels_of(data)) == data.sizes["sample"] and set(data.trial.values) == {-1}
+    assert len(split_depths_of(data)) == data.sizes["sample"] and set(data.trial.values) == {-1}
     reading = study.tactile["indenters", data["item"].values[0]]
-    level = [10.0, 20.0, 30.0].index(data.force_n.values[0])
-    assert data.tactile_map.values[0] == pytest.approx(reading.tactile_map.values[:, level].mean(axis=0), rel=1e-5)
+    load_step = [10.0, 20.0, 30.0].index(data.force_n.values[0])
+    assert data.tactile_map.values[0] == pytest.approx(reading.tactile_map.values[:, load_step].mean(axis=0), rel=1e-5)
     assert set(datasets["elastic", "validation"].trial.values) == {0, 1, 2}
 
 
-def test_a_level_outside_one_models_validity_is_left_out_for_all_and_stands_in_the_manifest(study):
+def test_a_load_step_outside_one_models_validity_is_left_out_for_all_and_stands_in_the_manifest(study):
     key = ("elastic", "indenters", "form_0")
     study.presses[key]["within_validity"].values[2] = 0
     datasets, manifest = build(study)
     for model in MODELS:
-        used = levels_of(datasets[model, "train"]) | levels_of(datasets[model, "validation"])
+        used = split_depths_of(datasets[model, "train"]) | split_depths_of(datasets[model, "validation"])
         assert ("form_0", 30.0) not in used and ("form_0", 20.0) in used
     left_out = manifest[manifest.split == "out_of_range"]
     assert len(left_out) == 2 * 3
     assert left_out.groupby("model").within_validity.first().to_dict() == {"elastic": 0, "hyperelastic": 1}
 
 
-def test_the_manifest_has_a_row_per_model_level_and_trial(study):
+def test_the_manifest_has_a_row_per_model_load_step_and_trial(study):
     manifest = build(study)[1]
     assert manifest.columns.tolist()[:7] == ["set", "item", "model", "force_n", "trial", "split", "converged"]
     assert len(manifest) == 2 * 8 * 3 * 3 and not manifest.duplicated(["set", "item", "model", "force_n", "trial"]).any()
@@ -165,7 +165,7 @@ def mix_sources(study):
     (spoil_map, "the press of unseen/hexagon with the model elastic: .* not finite"),
     (spoil_reading, "the reading of unseen/hexagon: .* not finite"),
     (leak, "grasps/object_1: its deformation map at 10 N is that of the training indenter form_1"),
-    (leave_nothing, "no level is left for unseen"),
+    (leave_nothing, "no load step is left for unseen"),
     (mix_sources, "published archive and virtual sensor; do not mix"),
 ])
 def test_what_cannot_be_used_is_refused_in_one_sentence(study, fault, sentence):

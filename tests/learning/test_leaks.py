@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from softtact.errors import InputError
-from softtact.learning.dataset import assign_splits, check_items, list_levels
+from softtact.learning.dataset import assign_splits, check_items, list_load_steps
 from softtact.learning.samples import object_of
 from softtact.study.config import load_study
 
@@ -28,44 +28,44 @@ def study(request):
 
 
 @pytest.fixture(params=["map", "press", "object"])
-def levels(study, request):
-    """All levels of a study, split in each of the ways, as if every press were valid; and the way."""
+def load_steps(study, request):
+    """All load steps of a study, split in each of the ways, as if every press were valid; and the way."""
     items = [(item.set, item.id) for item in study.items()]
     check_items(items)
     forces = np.array(study.values.forces_n)
     press = SimpleNamespace(force_n=SimpleNamespace(values=forces), within_validity=SimpleNamespace(values=np.ones(len(forces))))
     presses = {("elastic", *key): press for key in items}
-    split = assign_splits(list_levels(items, presses, ["elastic"]), train_fraction=0.8, seed=study.values.seed,
+    split = assign_splits(list_load_steps(items, presses, ["elastic"]), train_fraction=0.8, seed=study.values.seed,
                           split_by=request.param)
     return split.assign(object=split["item"].map(object_of)), request.param
 
 
-def of(levels, *splits):
-    return levels[levels.split.isin(splits)]
+def of(load_steps, *splits):
+    return load_steps[load_steps.split.isin(splits)]
 
 
-def shared(levels, column):
+def shared(load_steps, column):
     """What of a column stands both in training and in validation."""
-    return set(of(levels, "train")[column]) & set(of(levels, "validation")[column])
+    return set(of(load_steps, "train")[column]) & set(of(load_steps, "validation")[column])
 
 
-def test_no_object_press_or_mesh_of_a_test_was_trained_on_or_chosen_by(study, levels):
-    levels, _ = levels
-    learnt, tests = of(levels, "train", "validation"), of(levels, "unseen", "grasps")
-    assert len(learnt) + len(tests) == len(levels) and len(tests) > 0
+def test_no_object_press_or_mesh_of_a_test_was_trained_on_or_chosen_by(study, load_steps):
+    load_steps, _ = load_steps
+    learnt, tests = of(load_steps, "train", "validation"), of(load_steps, "unseen", "grasps")
+    assert len(learnt) + len(tests) == len(load_steps) and len(tests) > 0
     for column in ("object", "item"):
         assert not set(learnt[column]) & set(tests[column])
     meshes = {name: {Path(item.file).read_bytes() for item in items.values()} for name, items in study.items_of.items()}
     assert not meshes["indenters"] & (meshes["unseen"] | meshes["grasps"]) and not meshes["unseen"] & meshes["grasps"]
 
 
-def test_training_and_validation_share_no_map_and_no_more_than_the_way_of_splitting_says(levels):
-    levels, way = levels
-    pairs = levels.assign(pair=levels["item"] + " " + levels.force_n.astype(str))
+def test_training_and_validation_share_no_map_and_no_more_than_the_way_of_splitting_says(load_steps):
+    load_steps, way = load_steps
+    pairs = load_steps.assign(pair=load_steps["item"] + " " + load_steps.force_n.astype(str))
     assert not shared(pairs, "pair") and pairs.pair.is_unique
-    assert bool(shared(levels, "item")) == (way == "map")
-    assert bool(shared(levels, "object")) == (way != "object")
-    assert abs(len(of(levels, "train")) / len(of(levels, "train", "validation")) - 0.8) < 0.05
+    assert bool(shared(load_steps, "item")) == (way == "map")
+    assert bool(shared(load_steps, "object")) == (way != "object")
+    assert abs(len(of(load_steps, "train")) / len(of(load_steps, "train", "validation")) - 0.8) < 0.05
 
 
 def test_no_object_is_pressed_twice_in_one_place(study):

@@ -33,7 +33,7 @@ def model(network, tmp_path):
 
 @pytest.fixture
 def press(tmp_path):
-    """A press of three levels, as `softtact press` writes it."""
+    """A press of three load steps, as `softtact press` writes it."""
     return write_press(tmp_path / "press.nc")
 
 
@@ -88,7 +88,7 @@ def test_counts_are_written_as_netcdf_and_csv_and_drawn(capsys, network, model, 
     ({"deformation_map_mm": (("force", "y", "x"), np.stack([2 * bump(0)] * 3))},
      "3 of 3 maps lie outside the training maps' range, 0.05 to 0.5 mm deep at most"),
     ({"force_n": ("force", [10.0, 20.0, 50.0])}, "1 of 3 maps lie outside the training maps' range, 5 to 40 N (the first with 50)"),
-    ({"within_validity": ("force", [1, 1, 0])}, "1 of 3 levels are beyond what the press' model is valid for"),
+    ({"within_validity": ("force", [1, 1, 0])}, "1 of 3 load steps are beyond what the press' model is valid for"),
 ])
 def test_what_training_has_not_seen_is_predicted_with_a_warning(capsys, model, tmp_path, changes, sentence):
     status, out, err = run(capsys, write_press(tmp_path / "far.nc", **changes), "--network", model, "--json")
@@ -138,7 +138,7 @@ def test_a_file_that_holds_no_map_is_refused(capsys, model, tmp_path, name, valu
 @pytest.mark.parametrize(("changes", "sentence"), [
     ({"deformation_map_mm": (("force", "y", "x"), np.zeros((3, 57, 33)), {"units": "m"})}, "its maps are in 'm'; give them in mm"),
     ({"deformation_map_mm": (("sample", "y", "x"), np.zeros((3, 57, 33)))}, "not a press with deformation_map_mm (force, y, x)"),
-    ({"converged": ("force", [1, 1, 0])}, "a level of the press did not converge"),
+    ({"converged": ("force", [1, 1, 0])}, "a load step of the press did not converge"),
 ])
 def test_a_press_that_may_not_be_used_is_refused(capsys, model, tmp_path, changes, sentence):
     status, _, err = run(capsys, write_press(tmp_path / "p.nc", **changes), "--network", model)

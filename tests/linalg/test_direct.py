@@ -7,9 +7,9 @@ import scipy.sparse as sp
 from softtact.linalg.direct import PardisoSolver, SuperLUSolver, condensed_inverse, make_solver
 
 pytest.importorskip("pypardiso")
-from softtact.linalg.direct_single import RoughSolver
+from softtact.linalg.direct_single import PardisoSingle
 
-SOLVERS = {"pardiso": (PardisoSolver, 1e-12), "rough": (RoughSolver, 1e-4), "superlu": (SuperLUSolver, 1e-12)}
+SOLVERS = {"pardiso": (PardisoSolver, 1e-12), "rough": (PardisoSingle, 1e-4), "superlu": (SuperLUSolver, 1e-12)}
 
 
 def box(cells=8, *, shift=0.2):
@@ -75,4 +75,4 @@ def test_a_condensed_inverse_is_the_inverse_at_what_is_kept():
 
 
 def test_the_solver_is_named():
-    assert make_solver().name == "pardiso" and RoughSolver().name == "pardiso, single precision"
+    assert make_solver().name == "pardiso" and PardisoSingle().name == "pardiso, single precision"

@@ -12,7 +12,7 @@ from softtact.linalg.multifrontal_solver import DissectedSolver
 from softtact.linalg.nested_dissection import dissect
 from softtact.linalg.symbolic import lay_out
 from softtact.linalg.workers import Workers
-from softtact.models.hyperelastic.newton import NewtonSettings, press_levels
+from softtact.models.hyperelastic.newton import NewtonSettings, press_load_steps
 from softtact.models.hyperelastic.preconditioner import ContactFactor
 
 
@@ -159,7 +159,7 @@ def test_a_press_ends_where_it_does_with_a_general_solver_in_double_precision():
             body.solver = make_solver()
             body.stepper.factor = ContactFactor(body.solver)
         settings = NewtonSettings(relative_tolerance=1e-8)
-        ends.append([level.state for level in press_levels(body, round_head, [0.5, 1.5], settings=settings)])
+        ends.append([level.state for level in press_load_steps(body, round_head, [0.5, 1.5], settings=settings)])
         assert (body.method == DissectedSolver.name) is not general
         body.close()
     for one, other in zip(*ends, strict=True):

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from softtact.errors import InputError, OutsideCardWarning
+from softtact.errors import ExtrapolationWarning, InputError
 from softtact.files import write_json
 from softtact.materials.agreement import difference, partings, paths_inside, paths_outside
 from softtact.materials.bulk import bulk_modulus
@@ -16,7 +16,7 @@ from softtact.materials.curves import VolumetricCurve, synthetic_curve
 from softtact.materials.laws.registry import make_law
 from softtact.materials.linear import LinearConstants, young_modulus
 from softtact.materials.readers import read_curve, read_curves
-from softtact.press.models import _warn_outside_card
+from softtact.press.models import _warn_extrapolation
 
 TRUTH = {"c10": 0.1706, "c01": 0.0040}
 
@@ -278,7 +278,8 @@ def test_a_law_used_outside_its_card_warns_and_inside_it_does_not(card, recwarn)
     law = law_from_card(card)
     law.nominal_stress("uniaxial", np.array([0.7, 1.5]))
     assert not recwarn.list
-    with pytest.warns(OutsideCardWarning, match="used at principal stretches 0.577 to 3; its card rests on data from 0.51 to 1.6"):
+    with pytest.warns(ExtrapolationWarning,
+                      match="used at principal stretches 0.577 to 3; its card rests on data from 0.51 to 1.6"):
         law.nominal_stress("uniaxial", np.array([1.0, 3.0]))
 
 
@@ -314,8 +315,8 @@ def test_three_terms_fit_best_and_predict_worst(published):
 
 
 def test_a_press_warns_of_the_first_force_at_which_more_than_a_corner_is_outside_the_card(recwarn):
-    _warn_outside_card(np.array([0.0, 0.005]), [5.0, 10.0])
-    _warn_outside_card(np.array([np.nan, np.nan]), [5.0, 10.0])      # laws without a card
+    _warn_extrapolation(np.array([0.0, 0.005]), [5.0, 10.0])
+    _warn_extrapolation(np.array([np.nan, np.nan]), [5.0, 10.0])      # laws without a card
     assert not recwarn.list
-    with pytest.warns(OutsideCardWarning, match="At 20 N 3.0% of a layer is strained beyond the data behind its material card"):
-        _warn_outside_card(np.array([0.0, 0.03, 0.2]), [5.0, 20.0, 50.0])
+    with pytest.warns(ExtrapolationWarning, match="At 20 N 3.0% of a layer is strained beyond the data behind its material card"):
+        _warn_extrapolation(np.array([0.0, 0.03, 0.2]), [5.0, 20.0, 50.0])

@@ -20,7 +20,7 @@ def dofs(nodes, axis):
 
 
 def blocks_of(slab, kept):
-    return ParityBlocks(np.stack([slab.flexibility(slab.stiffness, kept, parity) for parity in PARITIES]))
+    return ParityBlocks(np.stack([slab.compliance(slab.stiffness, kept, parity) for parity in PARITIES]))
 
 
 class WholeSlab:
@@ -49,13 +49,13 @@ class WholeSlab:
 def test_the_parities_give_the_displacements_of_the_whole_slab(base_held):
     slab = QuarterSlab(FOOTPRINT, [SOFT, STIFF], CELLS, base_held=base_held)
     whole, grid = WholeSlab(FOOTPRINT, [SOFT, STIFF], CELLS, base_held=base_held), surface_grid(slab)
-    flexibility, nodes = blocks_of(slab, dofs(slab.top, 2)), np.arange(grid.count)
+    compliance, nodes = blocks_of(slab, dofs(slab.top, 2)), np.arange(grid.count)
     middle = grid.count // 2                                 # where both lines of symmetry cross
     for loaded in (middle, middle + 2, middle - 2 * grid.shape[1], 0, grid.shape[1] + 3, grid.count - 2):
         force = np.zeros(whole.unknowns)
         force[dofs(whole.top[loaded], 2)] = -1.0
         expected = -whole.displacement(force)[dofs(whole.top, 2)]
-        got = flexibility.between(*grid.quarter(nodes), *grid.quarter(np.array([loaded])))[:, 0]
+        got = compliance.between(*grid.quarter(nodes), *grid.quarter(np.array([loaded])))[:, 0]
         np.testing.assert_allclose(got, expected, atol=ROUND_OFF * expected.max())
 
 

@@ -28,7 +28,7 @@ BESIDE = Pose.from_values((50, 0, 1.0, 0, 0, 0))
 
 @pytest.fixture(scope="module")
 def sensor():
-    return Sensor(SMALL, {}, files={"elastic": elastic_compliance(SMALL)})
+    return Sensor(SMALL, {}, prepared_models={"elastic": elastic_compliance(SMALL)})
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -57,7 +57,7 @@ def test_a_press_that_fails_is_named_after_the_others_are_done_or_kept_in_its_pl
 @pytest.fixture
 def stage(sensor, tmp_path):
     """(inputs, settings) of the stage that presses a cylinder in two places, and of each press alone."""
-    sensor.files["elastic"].save(tmp_path / "compliance.npz")
+    sensor.prepared_models["elastic"].save(tmp_path / "compliance.npz")
     MESHES[0].export(tmp_path / "punch.stl")
     shared = {"sensor": SMALL.model_dump(mode="json"), "model": "layer", "kind": "elastic", "laws": {}, "mesh": {},
               "friction": None, "device": "cpu", "forces_n": [1.0, 4.0]}
@@ -112,7 +112,7 @@ def test_a_batch_gives_the_presses_one_by_one(sensor):
 
 
 def test_a_batch_in_several_parts_is_that_in_one(sensor, monkeypatch):
-    monkeypatch.setattr("softtact.models.elastic.batch.COLUMNS_AT_ONCE", 4)     # two presses of two levels
+    monkeypatch.setattr("softtact.models.elastic.batch.COLUMNS_AT_ONCE", 4)     # two presses of two load steps
     jobs = list(zip(MESHES, POSES, strict=True))
     for result, (mesh, pose) in zip(batch(sensor, jobs, workers=2), jobs, strict=True):
         assert_alike(result, sensor.press(mesh, pose=pose, force_n=[1.0, 4.0], model="elastic"))

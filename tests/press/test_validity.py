@@ -1,4 +1,4 @@
-"""Which levels of a press are flagged: each criterion by itself, at its limit, and the object that has sunk in as a press."""
+"""Which load steps of a press are flagged: each criterion by itself, at its limit, and the object that has sunk in as a press."""
 
 from pathlib import Path
 
@@ -18,24 +18,24 @@ CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yam
 SMALL = CORO.model_copy(update={"footprint_mm": (6.0, 8.4), "map_shape": (15, 11)})   # 5 x 7 frusta
 LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492),
         "cover": make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)}
-COARSE = MeshSettings(cover_levels=(0.0, 1.0), cover_splits=(0,), far_pitches=1, frustum_levels=(0.0, 0.35, 1.0))
+COARSE = MeshSettings(cover_heights=(0.0, 1.0), cover_splits=(0,), far_pitches=1, frustum_heights=(0.0, 0.35, 1.0))
 GOOD = {"compression_mm": [0.1, 0.2, 0.3], "contact_error_mm": [0.0, 0.001, 0.001], "points": [9, 40, 80],
         "depth_mm": [0.1, 0.2, 0.3]}
 
 
 def valid(**changed):
-    """Levels of a press in which frusta of 0.5 mm may be compressed by 0.4 mm, and overlaps of 0.001 mm were asked for."""
-    levels = {name: np.array(values) for name, values in (GOOD | changed).items()}
-    return valid_hyperelastic(**levels, frustum_mm=0.5, allowed_mm=0.001).tolist()
+    """Load steps of a press in which frusta of 0.5 mm may be compressed by 0.4 mm, and overlaps of 0.001 mm were asked for."""
+    load_steps = {name: np.array(values) for name, values in (GOOD | changed).items()}
+    return valid_hyperelastic(**load_steps, frustum_mm=0.5, allowed_mm=0.001).tolist()
 
 
-def test_all_levels_of_a_good_press_hold():
+def test_all_load_steps_of_a_good_press_hold():
     assert valid() == [True, True, True]
 
 
 @pytest.mark.parametrize("changed", [
     {"compression_mm": [0.1, 0.2, 0.41]}, {"contact_error_mm": [0.0, 0.001, 0.0021]}, {"points": [9, 40, 8]}])
-def test_each_criterion_flags_its_own_level_alone(changed):
+def test_each_criterion_flags_its_own_load_step_alone(changed):
     assert valid(**changed) == [True, True, False]
 
 
@@ -44,15 +44,15 @@ def test_each_criterion_flags_its_own_level_alone(changed):
     ([0.3, 0.1, 0.2], [False, False, False]),     # the first contradicts both
     ([0.1, 0.2, 0.1995], [True, True, True]),     # by less than the overlap that was asked for
     ([0.1, 0.1, 0.1], [True, True, True])])
-def test_levels_that_do_not_grow_with_the_force_are_flagged(depth, expected):
+def test_load_steps_that_do_not_grow_with_the_force_are_flagged(depth, expected):
     assert valid(depth_mm=depth) == expected
 
 
-def test_elastic_levels_hold_to_half_of_the_layer():
+def test_elastic_load_steps_hold_to_half_of_the_layer():
     assert valid_elastic(np.array([0.1, 1.24, 1.26]), thickness_mm=2.5).tolist() == [True, True, False]
 
 
-def test_foundation_levels_hold_within_their_law_and_what_was_compared():
+def test_foundation_load_steps_hold_within_their_law_and_what_was_compared():
     compression = np.array([0.05, 0.164, 0.166])
     sensor, hardly = {"frustum_mm": 0.5, "thickness_mm": 2.0}, np.zeros(3)
     assert valid_foundation(compression, hardly, **sensor, law_limit_mm=1.0).tolist() == [True, True, False]    # 0.33 of 0.5 mm
@@ -69,7 +69,7 @@ def test_an_object_whose_top_has_sunk_in_is_flagged(height, expected):
     assert result.indentation_mm[0] > 0.1 and result.within_validity[0] == expected
 
 
-def test_the_levels_before_a_force_that_is_not_reached_are_flagged_alike():
+def test_the_load_steps_before_a_force_that_is_not_reached_are_flagged_alike():
     disc = trimesh.creation.cylinder(radius=1.8, height=0.1, sections=64)
     sensor = Sensor(SMALL, LAWS, mesh=COARSE, solver=NewtonSettings(smallest_increment_n=100))     # so no smaller step is tried
     with pytest.raises(ConvergenceError) as stopped:

@@ -55,15 +55,15 @@ def test_work_is_lost_over_a_cycle_of_a_deformation_that_stiffens_with_force():
 
 def test_a_staircase_climbs_and_descends_by_its_rate_and_holds():
     history = staircase([10.0, 30.0], rate_n_per_s=10.0, hold_s=2.0)
-    assert history.level.tolist() == [0, 1, 1, 2, 2, 2, 2, 1, 1]
+    assert history.load_step.tolist() == [0, 1, 1, 2, 2, 2, 2, 1, 1]
     assert history.times_s.tolist() == [0, 1, 3, 5, 7, 7, 9, 11, 13]
-    assert history.level[history.loading].tolist() == history.level[history.unloading].tolist() == [1, 2]
+    assert history.load_step[history.loading].tolist() == history.load_step[history.unloading].tolist() == [1, 2]
     assert history.times_s[history.loading].tolist() == [3, 7] and history.times_s[history.unloading].tolist() == [13, 9]
 
 
 def test_cycles_before_a_press_go_to_the_top_and_back_and_rest():
     history = staircase([10.0, 30.0], rate_n_per_s=10.0, hold_s=2.0, cycles_before=2, rest_s=7.0)
-    assert history.level[:11].tolist() == [0, 1, 2, 1, 0, 0, 1, 2, 1, 0, 0]
+    assert history.load_step[:11].tolist() == [0, 1, 2, 1, 0, 0, 1, 2, 1, 0, 0]
     assert history.times_s[:12].tolist() == [0, 1, 3, 5, 6, 13, 14, 16, 18, 19, 26, 27]
     assert history.times_s[history.loading].tolist() == [29, 33]
 

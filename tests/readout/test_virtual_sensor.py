@@ -28,7 +28,7 @@ X, Y = np.meshgrid(SPEC.map_x_mm, SPEC.map_y_mm)
 BUMP = np.exp(-((X / 6) ** 2) - ((Y / 9) ** 2))                        # a smooth press, 1 mm in its middle
 PRESS = np.array([0.1, 0.18, 0.3])[:, None, None] * BUMP
 AREA = 5.5 * 37 / 7
-FAULTLESS = VirtualSensorSettings.faultless()
+IDEAL = VirtualSensorSettings.ideal()
 
 SPECIMEN = {"electrode_spacing_mm": 0.3, "outer_fringe": 1.0, "inner_fringe": 0.1, "coupling": 0.05, "sheet_scatter": 0.02,
             "relaxation": 0.1, "gain_scatter": 0.03, "offset_counts": 5.0, "dead_taxels": [9], "step_counts": 8.0,
@@ -41,7 +41,7 @@ def branches(maps=PRESS, *, trials=2, seed=1, item="a", force_n=FORCES, **effect
     if "relaxation" in effects:
         effects = {"relaxation_s": 2.0} | effects
     return read_branches(SPEC, maps, force_n=force_n, trials=trials, seed=seed, item=item,
-                         settings=VirtualSensorSettings.faultless(**effects))
+                         settings=VirtualSensorSettings.ideal(**effects))
 
 
 def default(maps=PRESS, **changes):
@@ -69,29 +69,29 @@ def test_an_effect_of_the_trial_makes_repeated_trials_scatter(effect):
 
 def test_zeros_in_a_configuration_switch_every_effect_off():
     values = {name: 0.0 for name in VirtualSensorSettings.__dataclass_fields__ if name not in ("relaxation_s", "dead_taxels")}
-    values |= {"rate_n_per_s": 10.0, "level_s": 1.0, "counts_per_relative_change": 1000.0, "largest_counts": np.inf}
-    assert VirtualSensorSettings.from_dict(values) == FAULTLESS
+    values |= {"rate_n_per_s": 10.0, "load_step_s": 1.0, "counts_per_relative_change": 1000.0, "largest_counts": np.inf}
+    assert VirtualSensorSettings.from_dict(values) == IDEAL
 
 
 def test_every_effect_has_its_place_in_the_tests_above():
-    others = {"relaxation_s", "rate_n_per_s", "level_s", "cycles_before", "rest_s", "counts_per_relative_change", "dead_share"}
+    others = {"relaxation_s", "rate_n_per_s", "load_step_s", "cycles_before", "rest_s", "counts_per_relative_change", "dead_share"}
     assert set(VirtualSensorSettings.__dataclass_fields__) == set(SPECIMEN) | set(TRIAL) | others
 
 
 def test_a_uniform_gap_is_a_plate_capacitor():
     gap = equivalent_air_gap(SPEC, 0.2)
-    assert taxel_capacitance(SPEC, np.full(BUMP.shape, 0.2), settings=FAULTLESS) == pytest.approx(
+    assert taxel_capacitance(SPEC, np.full(BUMP.shape, 0.2), settings=IDEAL) == pytest.approx(
         np.full((7, 4), EPSILON_0_PF_PER_MM * AREA / gap))
 
 
 def test_a_thicker_sheet_is_one_more_capacitor_in_series():
     excess = np.linspace(-0.02, 0.02, 28).reshape(7, 4)
     expected = EPSILON_0_PF_PER_MM * AREA / (equivalent_air_gap(SPEC, 0.1) + excess / 3.5)
-    assert taxel_capacitance(SPEC, np.full(BUMP.shape, 0.1), sheet_excess_mm=excess, settings=FAULTLESS) == pytest.approx(expected)
+    assert taxel_capacitance(SPEC, np.full(BUMP.shape, 0.1), sheet_excess_mm=excess, settings=IDEAL) == pytest.approx(expected)
 
 
 def test_electrodes_apart_with_free_edges_are_plates_with_edges():
-    alone = VirtualSensorSettings.faultless(electrode_spacing_mm=0.5, outer_fringe=1.0, inner_fringe=1.0)
+    alone = VirtualSensorSettings.ideal(electrode_spacing_mm=0.5, outer_fringe=1.0, inner_fringe=1.0)
     sides, gap = (5.0, 37 / 7 - 0.5), SPEC.dielectric_thickness_mm - 0.1
     edges = 1 + sum(edge_excess(side, gap) for side in sides)
     expected = EPSILON_0_PF_PER_MM * np.prod(sides) * edges / equivalent_air_gap(SPEC, 0.1)
@@ -99,13 +99,13 @@ def test_electrodes_apart_with_free_edges_are_plates_with_edges():
 
 
 def test_coupling_shares_capacitance_and_loses_none():
-    plain, shared = (taxel_capacitance(SPEC, 0.3 * BUMP, settings=VirtualSensorSettings.faultless(coupling=c)) for c in (0, 0.05))
+    plain, shared = (taxel_capacitance(SPEC, 0.3 * BUMP, settings=VirtualSensorSettings.ideal(coupling=c)) for c in (0, 0.05))
     assert shared == pytest.approx(coupled(plain, 0.05)) and shared.sum() == pytest.approx(plain.sum())
 
 
 def test_a_step_of_force_creeps_as_its_prony_series():
     shares, taus, hold = (0.2, 0.1), (0.5, 4.0), 1.5
-    read = branches(np.full((1, *BUMP.shape), 0.2), force_n=[30.0], trials=1, rate_n_per_s=np.inf, level_s=hold,
+    read = branches(np.full((1, *BUMP.shape), 0.2), force_n=[30.0], trials=1, rate_n_per_s=np.inf, load_step_s=hold,
                     relaxation=shares, relaxation_s=taus).loading[0, 0]
     arrived = 1 - sum(g * np.exp(-hold / tau) for g, tau in zip(shares, taus, strict=True))
     assert read == pytest.approx(ideal_counts(SPEC, np.full(BUMP.shape, 0.2 * arrived)))
@@ -118,7 +118,7 @@ def test_on_the_way_down_more_is_read_than_on_the_way_up():
 
 
 def test_faster_loading_lags_more():
-    slow, fast = (branches(relaxation=0.15, rate_n_per_s=rate, level_s=0.1).loading[0, -1, 3, 1] for rate in (1.0, 100.0))
+    slow, fast = (branches(relaxation=0.15, rate_n_per_s=rate, load_step_s=0.1).loading[0, -1, 3, 1] for rate in (1.0, 100.0))
     assert fast < slow < branches().loading[0, -1, 3, 1]
 
 
@@ -137,7 +137,7 @@ def test_a_misplaced_object_is_read_as_an_object_elsewhere():
 
 
 def test_gain_and_zero_are_the_specimens_in_every_press():
-    of = VirtualSensorSettings.faultless(gain_scatter=0.03, offset_counts=5.0)
+    of = VirtualSensorSettings.ideal(gain_scatter=0.03, offset_counts=5.0)
     specimen, first = make_specimen(SPEC, seed=1, settings=of), branches(gain_scatter=0.03, offset_counts=5.0).loading[0]
     expected = np.maximum(specimen.gain * ideal_counts(SPEC, PRESS) + specimen.offset_counts, 0)
     assert first == pytest.approx(expected)
@@ -198,7 +198,7 @@ def test_a_deeper_press_never_reads_less_but_for_the_zero_of_the_converter(seed,
         ({"nose_counts": 1}, "key 'nose_counts' is unknown; use one of electrode_spacing_mm"),
         ({"drift": -0.1}, "drift is -0.1; give one number of 0 or more"),
         ({"drift": [0.1, 0.2]}, "drift is [0.1, 0.2]; give one number"),
-        ({"level_s": float("inf")}, "level_s is inf; give one number"),
+        ({"load_step_s": float("inf")}, "load_step_s is inf; give one number"),
         ({"rate_n_per_s": 0}, "rate_n_per_s and largest_counts must be above 0"),
         ({"coupling": 0.3}, "coupling is 0.3; four neighbours can take 0.25 each"),
         ({"sheet_scatter": 0.4}, "sheet_scatter is 0.4; from 0.4 on a sheet could vanish"),

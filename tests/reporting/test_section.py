@@ -22,7 +22,7 @@ SQUEEZE = 0.1
 @pytest.fixture(scope="module")
 def body(tmp_path_factory):
     """A small sensor shortened by a tenth, and most in the row at y = 2.4 mm."""
-    mesh = MeshSettings(cover_levels=(0.0, 1.0), cover_splits=(0,), frustum_levels=(0.0, 0.35, 1.0))
+    mesh = MeshSettings(cover_heights=(0.0, 1.0), cover_splits=(0,), frustum_heights=(0.0, 0.35, 1.0))
     rest = pressed_body(build_sensor_body(SMALL, dielectric_law=None, cover_law=None, mesh=mesh))
     above = rest.points_mm[:, 2] + 2.5
     bump = 0.01 * np.exp(-((rest.points_mm[:, 1] - 2.4) ** 2)) * above

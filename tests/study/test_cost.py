@@ -31,9 +31,9 @@ def test_the_paper_study_costs_710_presses_of_each_model_and_days():
     presses = {stage: cost for stage, cost in costs.items() if stage.startswith("simulate_press")}
     assert set(presses) == {f"simulate_press, {model}" for model in ("elastic", "foundation", "hyperelastic", "reference")}
     assert {(cost.jobs, cost.left) for cost in presses.values()} == {(710, 710)}
-    # 20 levels of 57 x 33 numbers of 8 bytes each
+    # 20 load steps of 57 x 33 numbers of 8 bytes each
     assert presses["simulate_press, elastic"].disk_mb == pytest.approx(710 * 20 * 57 * 33 * 8 / 1e6)
-    # 13,000 maps of which 10,400 train once, 2,600 validate twice; 400 cases twice; 40 presses x 20 levels x 50 readings
+    # 13,000 maps of which 10,400 train once, 2,600 validate twice; 400 cases twice; 40 presses x 20 load steps x 50 readings
     samples = 10_400 + 5_200 + 800 + 40_000
     assert costs["build_dataset"].disk_mb == pytest.approx(3 * samples * (57 * 33 + 28) * 4 / 1e6)
     assert sum(cost.hours for cost in costs.values()) > 48
@@ -41,7 +41,7 @@ def test_the_paper_study_costs_710_presses_of_each_model_and_days():
     assert "days on 2 cores" in lines[-1] and len(lines) == len(costs) + 3
 
 
-def test_the_tiny_study_costs_minutes_and_more_levels_cost_more():
+def test_the_tiny_study_costs_minutes_and_more_load_steps_cost_more():
     _, costs = costs_of("tiny")
     assert sum(cost.hours for cost in costs.values()) < 0.5
     each = costs_of("paper")[1]["simulate_press, hyperelastic"].each_s
@@ -68,7 +68,7 @@ def test_presses_that_share_a_job_share_its_time(tmp_path):
     assert [len(items) for items in study.press_jobs("hyperelastic")] == [1] * len(study.items())
     times = read_costs()["presses"]["elastic"]
     start_s = times["fixed_s"] * len(jobs) / len(study.items())
-    assert told["simulate_press, elastic"].each_s == pytest.approx(start_s + 5 * times["level_s"])     # five levels
+    assert told["simulate_press, elastic"].each_s == pytest.approx(start_s + 5 * times["load_step_s"])     # five load steps
     two = next(items[0] for items in jobs if len(items) == 2)
     path = tmp_path / study.name / f"benchmarks/simulate_presses/{two.set}/{two.id}/elastic.tsv"
     path.parent.mkdir(parents=True)

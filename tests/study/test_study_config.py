@@ -69,8 +69,8 @@ def test_the_paper_study_has_the_papers_numbers():
     presses = {name: len(items) for name, items in study.items_of.items()}
     objects = {name: len({item.object for item in items.values()}) for name, items in study.items_of.items()}
     assert objects == {"indenters": 49, "unseen": 10, "grasps": 12}
-    levels = len(study.values.forces_n)
-    assert (presses["indenters"] * levels, presses["unseen"] * levels) == (13_000, 400)
+    load_steps = len(study.values.forces_n)
+    assert (presses["indenters"] * load_steps, presses["unseen"] * load_steps) == (13_000, 400)
     assert presses["grasps"] * study.trials_of("grasps") == 2_000 and study.trials_of("grasps") == 50
 
 
@@ -119,13 +119,15 @@ def test_assumed_values_and_their_reasons_reach_the_stages_as_plain_numbers():
         ("training.epoch", 3, "at 'training': there is no key 'epoch'; did you mean 'epochs'?"),
         ("models.hyperelastic.mesh", {"sheet_layer": 1}, "there is no key 'sheet_layer'; did you mean 'sheet_layers'?"),
         ("models.hyperelastic.mesh.refinement", -1, "at 'models.hyperelastic.mesh.refinement' (it is -1)"),
-        ("models.hyperelastic.mesh.coarse_walls", "some", "at 'models.hyperelastic.mesh.coarse_walls' (it is 'some')"),
-        ("models.hyperelastic.mesh.coarse_wall", True, "there is no key 'coarse_wall'; did you mean 'coarse_walls'?"),
+        ("models.hyperelastic.mesh.constrained_cell_edges", "some",
+         "at 'models.hyperelastic.mesh.constrained_cell_edges' (it is 'some')"),
+        ("models.hyperelastic.mesh.constrained_cell_edge", True,
+         "there is no key 'constrained_cell_edge'; did you mean 'constrained_cell_edges'?"),
         ("models.elastic.friction", {"object": 0.3}, "at 'models.elastic': a model of kind 'elastic' knows no friction"),
         ("models.hyperelastic.mesh.preset", "drft", "at 'models.hyperelastic.mesh.preset' (it is 'drft')"),
         ("models.elastic.device", "cuda", "at 'models.elastic': a model of kind 'elastic' has no 'device'; leave it out"),
         ("models.hyperelastic.device", "gpu", "at 'models.hyperelastic.device' (it is 'gpu')"),
-        ("models.reference.friction", {"board": 0.3}, "tips that are held cannot slide with a friction of 0.3 on the board"),
+        ("models.reference.friction", {"board": 0.3}, "bonded tips cannot slide with a friction of 0.3 on the board"),
         ("models.reference.friction", {"objct": 0.3}, "there is no key 'objct'; did you mean 'object'?"),
         ("models.reference.mesh.thickness_scatter", 0.5, "at 'models.reference.mesh.thickness_scatter' (it is 0.5)"),
         ("virtual_sensor", {"noise_counts": -1}, "virtual_sensor: noise_counts is -1.0; give one number of 0 or more."),
@@ -144,8 +146,9 @@ def test_assumed_values_and_their_reasons_reach_the_stages_as_plain_numbers():
         ("forces_n", [0, 5], "at 'forces_n.0' (it is 0): Input should be greater than 0"),
         ("forces_n", [10, 5], "at 'forces_n' (it is [10, 5]): the values must rise"),
         ("ftir.law", "ogden", "there is no law 'ogden'; did you mean 'ogden"),
-        ("ftir.reading", "printed", "there is no reading 'printed'; did you mean 'as_printed'?"),
-        ("ftir.readings", ["as_printed"], "reading 'default' of the model under test is not among the readings as_printed; add it"),
+        ("ftir.orientation", "printed", "there is no orientation 'printed'; did you mean 'as_printed'?"),
+        ("ftir.orientations", ["as_printed"],
+         "orientation 'default' of the model under test is not among the orientations as_printed; add it"),
         ("ftir.forces_n", [0], "forces_n holds 0 N only; add a force above"),
         ("ftir.laws", ["yeoh"], "law 'mooney_rivlin' of the model under test is not among the laws yeoh; add it"),
         ("ftir.mesh", {"frustum_ring": 2}, "there is no key 'frustum_ring'; did you mean 'frustum_rings'?"),

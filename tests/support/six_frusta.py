@@ -12,11 +12,11 @@ from softtact.sensors.specification import SensorSpec
 CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
 SMALL = CORO.model_copy(update={"footprint_mm": (3.6, 2.4), "map_shape": (5, 7)})
 LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492)
-COARSE = MeshSettings(cover_levels=(0.0, 1.0), cover_splits=(0,), far_pitches=1, frustum_levels=(0.0, 0.35, 1.0))
+COARSE = MeshSettings(cover_heights=(0.0, 1.0), cover_splits=(0,), far_pitches=1, frustum_heights=(0.0, 0.35, 1.0))
 
 
 def plate(x, y):
-    """A level plate over everything."""
+    """A load step plate over everything."""
     return np.zeros(len(x)), np.tile([0.0, 0.0, -1.0], (len(x), 1))
 
 
@@ -27,9 +27,9 @@ def six_frusta():
 
 def bent(body, *, by_mm, depth_mm):
     """The body under a plate held at a depth, some frusta bent sideways in their middle, {frustum: mm}."""
-    slab, bed = body.rest()
-    z = body.bed.coordinates[0, :, 2]
+    slab, support = body.rest()
+    z = body.support.coordinates[0, :, 2]
     middle = np.sin(np.pi * (z - z.min()) / np.ptp(z))
     for frustum, much in by_mm.items():
-        bed[frustum, :, 0] += much * middle
-    return body.evaluate(slab, bed, depth_mm, body.slab.facing(slab, plate))
+        support[frustum, :, 0] += much * middle
+    return body.evaluate(slab, support, depth_mm, body.slab.project(slab, plate))

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from softtact.fem.elements import gauss, quad8
-from softtact.fem.extruded_mesh import PlanMesh, disc_plan
+from softtact.fem.extruded_mesh import Mesh2D, disc_mesh_2d
 from softtact.fem.solid_block import HexBlock
 from softtact.linalg.direct import SuperLUSolver, make_solver
 
@@ -114,11 +114,11 @@ _EDGES = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4)
 
 
 def fine_disc(parts):
-    """Unit disc: each quad of `disc_plan` cut into parts x parts, its outer nodes put on the circle."""
+    """Unit disc: each quad of `disc_mesh_2d` cut into parts x parts, its outer nodes put on the circle."""
     side = np.linspace(-1, 1, 2 * parts + 1)
     xi, eta = np.meshgrid(side, side)
     values = quad8(np.column_stack([xi.ravel(), eta.ravel()]))[0]
-    coarse = disc_plan()
+    coarse = disc_mesh_2d()
     patches = np.einsum("pa,qad->qpd", values, coarse.points[coarse.quads[:, :8]])
     outer = np.tile(np.isclose(xi.ravel(), 1.0), (5, 1))
     outer[0] = False                                              # the first quad is the core, the others the ring
@@ -139,4 +139,4 @@ def _merged(points, quads):
     order = np.concatenate([corners, np.setdiff1d(np.unique(quads), corners)])
     number = np.full(len(first), -1)
     number[order] = np.arange(len(order))
-    return PlanMesh(points[first[order]], number[quads], len(corners))
+    return Mesh2D(points[first[order]], number[quads], len(corners))

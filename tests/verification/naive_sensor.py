@@ -17,8 +17,8 @@ class NaiveSensor:
 
     def __init__(self, body, surface):
         self.body = body
-        self.nodes = body.slab.nodes + body.bed.count * body.bed.nodes       # slab first, then frustum by frustum
-        self.planes = body.slab.facing(np.zeros((body.slab.nodes, 3)), surface)
+        self.nodes = body.slab.nodes + body.support.count * body.support.nodes       # slab first, then frustum by frustum
+        self.projection = body.slab.project(np.zeros((body.slab.nodes, 3)), surface)
         self.T = self._unknowns_to_nodes()
         self.parts = self._elements()
         self.board, self.board_gap0, self.board_area = self._board_points()
@@ -26,39 +26,39 @@ class NaiveSensor:
         self.u, self.depth = np.zeros(3 * self.nodes), 0.0
 
     def _frustum_node(self, frustum, node):
-        return self.body.slab.nodes + frustum * self.body.bed.nodes + node
+        return self.body.slab.nodes + frustum * self.body.support.nodes + node
 
     def _unknowns_to_nodes(self):
         """Sparse matrix (3 nodes, unknowns): free slab nodes, inner frustum nodes, and roots that are slab nodes."""
-        body, bed = self.body, self.body.bed
+        body, support = self.body, self.body.support
         full = sp.lil_matrix((3 * self.nodes, 3 * self.nodes))
         full.setdiag(1.0)
-        for f in range(bed.count):
-            for r, root in enumerate(bed.root):
+        for f in range(support.count):
+            for r, root in enumerate(support.root):
                 for i in range(3):
                     row = 3 * self._frustum_node(f, root) + i
                     full[row, row] = 0.0
                     full[row, 3 * body.cells.roots[f, r] + i] = 1.0
-        inner = [3 * self._frustum_node(f, 0) + dof for f in range(bed.count) for dof in bed.inner]
+        inner = [3 * self._frustum_node(f, 0) + dof for f in range(support.count) for dof in support.inner]
         self.unknowns = np.concatenate([body.slab.free, inner]).astype(int)      # the third of three is vertical
         return full.tocsc()[:, self.unknowns].tocsr()
 
     def _elements(self):
         """(node numbers (e, m), block) of slab and frusta."""
-        bed = self.body.bed
-        frusta = np.concatenate([self._frustum_node(f, bed.mesh.hexes) for f in range(bed.count)])
-        return [*self.body.slab.solids, (frusta, bed.block)]
+        support = self.body.support
+        frusta = np.concatenate([self._frustum_node(f, support.mesh.hexes) for f in range(support.count)])
+        return [*self.body.slab.solids, (frusta, support.block)]
 
     def _board_points(self):
         """Matrix (points, 3 nodes) of the gaps at the frusta, gaps at rest, areas (mm2)."""
-        bed = self.body.bed
-        points = len(bed.point_axis)
-        B = sp.lil_matrix((bed.count * points, 3 * self.nodes))
-        for f in range(bed.count):
+        support = self.body.support
+        points = len(support.point_axis)
+        B = sp.lil_matrix((support.count * points, 3 * self.nodes))
+        for f in range(support.count):
             for p in range(points):
-                for node, weight in zip(bed.point_nodes[p], bed.point_weights[p], strict=True):
-                    B[f * points + p, 3 * self._frustum_node(f, node) + bed.point_axis[p]] += weight
-        return B.tocsr(), bed.gap0.ravel(), bed.point_area.ravel()
+                for node, weight in zip(support.point_nodes[p], support.point_weights[p], strict=True):
+                    B[f * points + p, 3 * self._frustum_node(f, node) + support.point_axis[p]] += weight
+        return B.tocsr(), support.gap0.ravel(), support.point_area.ravel()
 
     def _top_points(self):
         """Matrix (points, 3 nodes) of the gaps to the object, areas (mm2)."""
@@ -69,17 +69,18 @@ class NaiveSensor:
                 point = slab.top.values.shape[1] * t + g
                 for node, value in zip(face, values, strict=True):
                     for i in range(3):
-                        B[point, 3 * node + i] += value * self.planes.normals[point, i]
-        return B.tocsr(), slab.top.area * self.planes.covered
+                        B[point, 3 * node + i] += value * self.projection.normals[point, i]
+        return B.tocsr(), slab.top.area * self.projection.covered
 
     def _contacts(self, u, depth):
         """(matrix, gaps, areas, settings, gap's slope by depth) of board and object."""
         body = self.body
-        rest = np.einsum("pd,pd->p", self.planes.normals, body.slab.top.reference - self.planes.anchors)
-        lowering = self.planes.normals[:, 2]
-        below = replace(body.bed.contact, offset=np.ravel(body.bed.contact.offset))
+        rest = np.einsum("pd,pd->p", self.projection.normals, body.slab.top.reference - self.projection.anchors)
+        indentation_increment = self.projection.normals[:, 2]
+        below = replace(body.support.contact, offset=np.ravel(body.support.contact.offset))
         return [(self.board, self.board_gap0 + self.board @ u, self.board_area, below, 0.0 * self.board_gap0),
-                (self.top, rest + self.top @ u + depth * lowering, self.top_area, body.slab.top.contact, lowering)]
+                (self.top, rest + self.top @ u + depth * indentation_increment, self.top_area, body.slab.top.contact,
+                 indentation_increment)]
 
     def _potential(self, u, depth):
         """Energy (mJ), its gradient by u and depth; energy infinite where an element is inside out."""
@@ -90,11 +91,11 @@ class NaiveSensor:
                 return np.inf, None, None
             energy += state.energy
             np.add.at(gradient.reshape(-1, 3), hexes.ravel(), state.force.reshape(-1, 3))
-        for B, gaps, area, contact, lowering in self._contacts(u, depth):
+        for B, gaps, area, contact, indentation_increment in self._contacts(u, depth):
             density, pressure, _ = contact.response(gaps)
             energy += density @ area
             gradient -= B.T @ (pressure * area)
-            by_depth -= lowering @ (pressure * area)
+            by_depth -= indentation_increment @ (pressure * area)
         return energy, gradient, by_depth
 
     def _hessian(self, u, depth):
@@ -102,11 +103,11 @@ class NaiveSensor:
         K, border, corner = 0, 0, 0.0
         for hexes, block in self.parts:
             K = K + assemble(block.tangent(u.reshape(-1, 3)[hexes]), hexes, self.nodes)
-        for B, gaps, area, contact, lowering in self._contacts(u, depth):
+        for B, gaps, area, contact, indentation_increment in self._contacts(u, depth):
             weight = contact.response(gaps)[2] * area
             K = K + B.T @ sp.diags(weight) @ B
-            border = border + B.T @ (weight * lowering)
-            corner += weight @ lowering**2
+            border = border + B.T @ (weight * indentation_increment)
+            corner += weight @ indentation_increment**2
         border = (self.T.T @ border)[:, None]
         return sp.bmat([[self.T.T @ K @ self.T, border], [border.T, np.array([[corner]])]], format="csc")
 
@@ -135,7 +136,7 @@ class NaiveSensor:
 
     def _touch(self, *, object_mm=0.02, board_mm=1e-3):
         """A start at which object and board touch: without touch nothing holds the object, or the slab where it may glide."""
-        self.depth = self.planes.anchors[:, 2].min() + object_mm
+        self.depth = self.projection.anchors[:, 2].min() + object_mm
         self.u = self.T @ np.where(self.unknowns % 3 == 2, -board_mm, 0.0)
 
     def _smaller(self, trial, residual, force):
@@ -150,22 +151,22 @@ class NaiveSensor:
         return self.u.reshape(-1, 3)[:self.body.slab.nodes]
 
     @property
-    def bed(self):
+    def support(self):
         """Displacement (f, nodes, 3) of the frusta, mm."""
-        return self.u.reshape(-1, 3)[self.body.slab.nodes:].reshape(self.body.bed.count, -1, 3)
+        return self.u.reshape(-1, 3)[self.body.slab.nodes:].reshape(self.body.support.count, -1, 3)
 
     def board_force(self, bed_state):
-        """Force (N) of a bed's frusta on the board."""
-        bed = self.body.bed
-        pressure = bed.contact.response(bed_state.gaps)[1]
-        return float((pressure * bed.point_area)[:, bed.point_neighbour < 0].sum())
+        """Force (N) of a support's frusta on the board."""
+        support = self.body.support
+        pressure = support.contact.response(bed_state.gaps)[1]
+        return float((pressure * support.point_area)[:, support.point_neighbour < 0].sum())
 
     def side_reaction(self, state):
         """Upward force (N) of the shell on the slab's held nodes."""
         body = self.body
-        total = np.concatenate([state.slab.force, state.bed.force.reshape(-1, 3)]).ravel()
+        total = np.concatenate([state.slab.force, state.support.force.reshape(-1, 3)]).ravel()
         spread = total[:3 * body.slab.nodes].reshape(-1, 3).copy()
-        roots = total[3 * body.slab.nodes:].reshape(body.bed.count, -1, 3)[:, body.bed.root]
+        roots = total[3 * body.slab.nodes:].reshape(body.support.count, -1, 3)[:, body.support.root]
         np.add.at(spread, body.cells.roots.ravel(), roots.reshape(-1, 3))
         held = np.ones(3 * body.slab.nodes, dtype=bool)
         held[body.slab.free] = False

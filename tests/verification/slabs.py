@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from softtact.contact.penalty import Contact
-from softtact.fem.extruded_mesh import SheetPlan, grid_plan, merge, with_centres
+from softtact.fem.extruded_mesh import SheetMesh2D, grid_mesh_2d, merge, with_centres
 from softtact.linalg.direct import make_solver
 from softtact.models.hyperelastic.slab import Layer, Slab
 
@@ -81,7 +81,7 @@ class HeldSlab:
         solver = make_solver()
         for iteration in range(iterations):
             if iteration < _LOOKED_UP:
-                planes = slab.facing(displacement, surface)
+                planes = slab.project(displacement, surface)
             state = slab.evaluate(displacement, planes, depth)
             residual = state.force.ravel()[slab.free]
             if np.abs(residual).max() < tolerance * abs(state.indentation_force):
@@ -106,16 +106,16 @@ class HeldSlab:
         return share
 
     def _pressure(self, state):
-        c = self.slab.top.contact_on(state.planes)
-        depth, stiffness = np.maximum(-state.gaps, 0.0), 1 / (1 / c.stiffness + c.softness)
+        c = self.slab.top.contact_on(state.projection)
+        depth, stiffness = np.maximum(-state.gaps, 0.0), 1 / (1 / c.stiffness + c.contact_compliance)
         return stiffness * np.where(depth > c.smoothing, depth - c.smoothing / 2, depth**2 / (2 * c.smoothing))
 
 
 def _without_frusta(x, y):
     """Plan of a sheet on a grid, without cells."""
-    grid = grid_plan(x, y)
+    grid = grid_mesh_2d(x, y)
     none = np.zeros((0, 4), dtype=int)
-    return SheetPlan(merge(with_centres(grid.points[grid.quads])), np.zeros((0, 25), dtype=int), 0, (none, np.zeros(3)))
+    return SheetMesh2D(merge(with_centres(grid.points[grid.quads])), np.zeros((0, 25), dtype=int), 0, (none, np.zeros(3)))
 
 
 def interpolate(slab, field, points):

@@ -17,7 +17,7 @@ from test_frustum_on_glass import HARD, HEIGHT, LAW, ROOT, TIP, equilibrium, fru
 
 from softtact.decks import keywords
 from softtact.decks.laws import law_card
-from softtact.fem.extruded_mesh import grid_plan
+from softtact.fem.extruded_mesh import grid_mesh_2d
 from softtact.materials.laws.registry import make_law
 from softtact.models.ftir.unit_cell import DARK_GAP_MM, GLASS_MESH, contact_area
 
@@ -39,15 +39,15 @@ def section(out, low, high):
     """Plan mesh of the section, x the radius and y the height; lines gather at the rim of the tip."""
     outwards = 1 - (1 - np.linspace(0, 1, out + 1)) ** 2
     folding, rest = 0.3 * np.linspace(0, 1, low + 1) ** 1.3, 0.3 + 0.7 * (1 - (1 - np.linspace(0, 1, high + 1)[1:]) ** 1.5)
-    plan = grid_plan(outwards, HEIGHT * np.concatenate([folding, rest]))
-    r, z = plan.points.T
-    return np.column_stack([r * (TIP + (ROOT - TIP) * z / HEIGHT), z]), plan.quads
+    mesh_2d = grid_mesh_2d(outwards, HEIGHT * np.concatenate([folding, rest]))
+    r, z = mesh_2d.points.T
+    return np.column_stack([r * (TIP + (ROOT - TIP) * z / HEIGHT), z]), mesh_2d.quads
 
 
 def deck(law, parts, depths):
     """Lines of a deck that lowers the root through depths (mm), the points, and the side's nodes from the tip upwards."""
     points, quads = section(*parts)
-    glass = grid_plan(np.linspace(0.0, 1.0, 21), np.array([-0.2, 0.0]))
+    glass = grid_mesh_2d(np.linspace(0.0, 1.0, 21), np.array([-0.2, 0.0]))
     r, z = points.T
     side = np.flatnonzero(np.abs(r - (TIP + (ROOT - TIP) * z / HEIGHT)) < 1e-9)
     sets = {"ROOT": np.flatnonzero(z > HEIGHT - 1e-9), "TIP": np.flatnonzero(z < 1e-9), "AXIS": np.flatnonzero(r < 1e-9),
@@ -117,13 +117,13 @@ def test_the_kept_areas_hardly_change_with_calculix_s_mesh(name):
 
 def bonded(law, depths):
     """Forces (N) and areas (mm2) of our frustum, meshed as the stage meshes it, lowered through depths (mm)."""
-    bed = frustum(law=law, mesh=GLASS_MESH, contact=GLASS_MESH.contact)
-    displacement, forces, areas = np.zeros((1, bed.nodes, 3)), [], []
+    support = frustum(law=law, mesh=GLASS_MESH, contact=GLASS_MESH.contact)
+    displacement, forces, areas = np.zeros((1, support.nodes, 3)), [], []
     for start, end in itertools.pairwise([0.0, *depths]):
         for depth in np.linspace(start, end, round((end - start) / 0.01) + 1)[1:]:
-            displacement = equilibrium(bed, displacement, depth)
-        forces.append(-bed.evaluate(displacement).force[0, bed.root, 2].sum())
-        areas.append(contact_area(bed, displacement))
+            displacement = equilibrium(support, displacement, depth)
+        forces.append(-support.evaluate(displacement).force[0, support.root, 2].sum())
+        areas.append(contact_area(support, displacement))
     return np.array(forces), np.array(areas)
 
 

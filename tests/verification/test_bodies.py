@@ -8,7 +8,7 @@ import pytest
 from fe import equilibrium, face_load, fine_disc, mapped, small_strain, solid
 
 from softtact.fem.elements import HEX20_SIDES
-from softtact.fem.extruded_mesh import extrude, grid_plan
+from softtact.fem.extruded_mesh import extrude, grid_mesh_2d
 from softtact.materials.laws.registry import make_law
 
 UNIAXIAL = {   # one CalculiX 2.20 element, K = 20 mu0, stretches 0.7 and 1.5, printed to six digits
@@ -26,7 +26,7 @@ def linear_material(young, poisson):
 def box(cells, sizes, law, **options):
     """A box with a corner at the origin, of cells (3,) equal hexahedra."""
     x, y, z = (np.linspace(0, size, count + 1) for size, count in zip(sizes, cells, strict=True))
-    return solid(extrude(grid_plan(x, y), z), law, **options)
+    return solid(extrude(grid_mesh_2d(x, y), z), law, **options)
 
 
 def on_symmetry_planes(points):
@@ -71,7 +71,7 @@ def cooks_membrane(cells, law, *, thickness, plane_strain, **options):
         x, y = 48 * p[:, 0], p[:, 1]
         return np.column_stack([x, (44 / 48) * x + y * (44 - 28 / 48 * x), p[:, 2]])
 
-    body = solid(mapped(extrude(grid_plan(lines, lines), [0.0, thickness]), to_membrane), law, **options)
+    body = solid(mapped(extrude(grid_mesh_2d(lines, lines), [0.0, thickness]), to_membrane), law, **options)
     held = np.repeat((body.points[:, 0] < 1e-9)[:, None], 3, axis=1)
     held[:, 2] = plane_strain | (body.points[:, 2] < 1e-9)       # plane stress: free to thin, symmetric about z = 0
     right = body.hexes[:, HEX20_SIDES[1]]
@@ -112,7 +112,8 @@ def test_cooks_membrane_tends_to_the_same_limit_as_an_element_without_projection
     """nu = 0.4995, plane strain. The plain displacement element locks, but in the limit of refinement it is right too."""
     source = "limit of the displacement element (J at every point, no projection), 8 to 32 elements a side"
     law = linear_material(1.0, 0.4995)
-    plain = [cooks_membrane(cells, law, thickness=1.0, plane_strain=True, local_over_shear=1e9)[1] for cells in (8, 16, 32)]
+    plain = [cooks_membrane(cells, law, thickness=1.0, plane_strain=True, unprojected_penalty_ratio=1e9)[1]
+             for cells in (8, 16, 32)]
     expected = limit_of(plain)
     projected = [cooks_membrane(cells, law, thickness=1.0, plane_strain=True)[1] for cells in (8, 16, 32)]
     error = record("Cook's membrane, nu = 0.4995, limit of refinement", expected=expected, source=source,
@@ -129,15 +130,15 @@ def test_cooks_membrane_does_not_lock_as_poissons_ratio_tends_to_one_half(record
     error = record("Cook's membrane, 4 x 4 elements: displacement at nu = 0.4999995 over that at 0.4995", expected=expected,
                    source=source, got=got)
     assert error < 2e-3           # the exact displacement itself falls by 0.1 %
-    plain = [cooks_membrane(4, linear_material(1.0, nu), thickness=1.0, plane_strain=True, local_over_shear=1e9)[1]
+    plain = [cooks_membrane(4, linear_material(1.0, nu), thickness=1.0, plane_strain=True, unprojected_penalty_ratio=1e9)[1]
              for nu in (0.4995, 0.4999995)]
     assert plain[1] / plain[0] < 0.95      # the test can tell a locking element from one that does not
 
 
-def bonded_compression(plan, half_height, law, *, layers, plane_strain):
+def bonded_compression(mesh_2d, half_height, law, *, layers, plane_strain):
     """Mean stress over strain (MPa) of a block between bonded rigid plates, at small strain; plan of a unit cross-section."""
-    levels = half_height * (1 - np.linspace(1, 0, layers + 1) ** 2)       # finer at the plate, where shear is greatest
-    body = solid(extrude(plan, levels), law)
+    load_steps = half_height * (1 - np.linspace(1, 0, layers + 1) ** 2)       # finer at the plate, where shear is greatest
+    body = solid(extrude(mesh_2d, load_steps), law)
     z = body.points[:, 2]
     plate, middle = z > half_height - 1e-9, z < 1e-9
     held = np.zeros(body.points.shape, dtype=bool)
@@ -167,6 +168,6 @@ def test_a_bonded_strip_is_stiffened_as_gent_and_lindley_say(shape, record):
     expected, source = 4 / 3 * (1 + shape**2), "Gent and Lindley: 4/3 E (1 + S^2), E = 1 MPa"
     x = 1 - np.linspace(1, 0, 25) ** 2
     law = linear_material(1.0, 0.5 - 1e-8)
-    got = bonded_compression(grid_plan(x, np.array([0.0, 1.0])), 1 / (2 * shape), law, layers=6, plane_strain=True)
+    got = bonded_compression(grid_mesh_2d(x, np.array([0.0, 1.0])), 1 / (2 * shape), law, layers=6, plane_strain=True)
     error = record(f"bonded strip, S = {shape:g}: apparent modulus", expected=expected, source=source, got=got)
     assert error < 0.15 / shape

@@ -18,14 +18,14 @@ from softtact.contact.height_field import HeightField
 from softtact.decks import keywords
 from softtact.decks.laws import law_card
 from softtact.errors import InputError
-from softtact.fem.extruded_mesh import extrude, grid_plan
+from softtact.fem.extruded_mesh import extrude, grid_mesh_2d
 from softtact.geometry.meshes import place
 from softtact.linalg.direct import make_solver
 from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic import newton_step, unit_cells
 from softtact.models.hyperelastic.build import build_sensor_body
 from softtact.models.hyperelastic.friction import BodyFriction
-from softtact.models.hyperelastic.newton import NewtonSettings, press_levels
+from softtact.models.hyperelastic.newton import NewtonSettings, press_load_steps
 from softtact.press.sensor import Sensor
 from softtact.sensors.specification import Friction, SensorSpec
 
@@ -35,13 +35,13 @@ FINE = NewtonSettings(relative_tolerance=1e-6)
 
 def body_with(*, board=0.0, on_object=0.0, held=False, columns=2, rows=2):
     """A small sensor with coefficients of friction; tips slide unless `held`."""
-    options = {"tips_held": held, "friction": Friction(object=on_object, board=board)}
+    options = {"tips_bonded": held, "friction": Friction(object=on_object, board=board)}
     spec = small_spec(columns, rows, margin=0.4).model_copy(update=options)
     return build_sensor_body(spec, dielectric_law=LAWS["dielectric"], cover_law=LAWS["cover"], mesh=COARSE)
 
 
-def last_level(body, forces, *, surface=tilted_plate, settings=FINE):
-    return list(press_levels(body, surface, forces, settings=settings))[-1]
+def last_load_step(body, forces, *, surface=tilted_plate, settings=FINE):
+    return list(press_load_steps(body, surface, forces, settings=settings))[-1]
 
 
 # --- the law ---
@@ -79,14 +79,15 @@ def test_forces_and_newton_steps_are_the_slopes_of_the_potential_of_a_press_with
     monkeypatch.setattr(unit_cells, "_FARTHEST_MM", np.inf)        # nor damps or cuts the steps of single cells
     monkeypatch.setattr(unit_cells, "_FARTHEST_OUTER_MM", np.inf)
     body, h = body_with(board=0.3, on_object=0.3), 1e-6
-    level = last_level(body, [0.5, 1.0], surface=surface)
-    covered = level.state.slab.planes.covered[level.state.slab.gaps < 0]
+    load_step = last_load_step(body, [0.5, 1.0], surface=surface)
+    covered = load_step.state.slab.projection.covered[load_step.state.slab.gaps < 0]
     assert (covered < 1).any() == ("punch" in under)
-    body.friction.begin_step(level.state)
-    moved = shifted(body, level.state, random_step(body, 6e-4), 1.0)
+    body.friction.begin_step(load_step.state)
+    moved = shifted(body, load_step.state, random_step(body, 6e-4), 1.0)
     body.friction.renew(moved)
     state = shifted(body, moved, random_step(body, 0.0), 0.0)
-    assert (np.linalg.norm(state.bed.drag.slip, axis=-1) > SLIP_TOLERANCE_MM)[state.bed.drag.grip.pressure > 0].mean() > 0.1
+    assert (np.linalg.norm(state.support.friction_response.slip,
+                           axis=-1) > SLIP_TOLERANCE_MM)[state.support.friction_response.friction_state.pressure > 0].mean() > 0.1
     body.cells.forget()                                # every cell's tangent anew
     step = body.newton_step(state, 1.1)
     up, down = (shifted(body, state, step, sign * h) for sign in (1, -1))
@@ -104,22 +105,22 @@ def test_forces_and_newton_steps_are_the_slopes_of_the_potential_of_a_press_with
 
 def random_step(body, size):
     rng = np.random.default_rng(5)
-    slab, bed = (size * rng.standard_normal(zero.shape) for zero in body.rest())
+    slab, support = (size * rng.standard_normal(zero.shape) for zero in body.rest())
     slab.ravel()[np.setdiff1d(np.arange(slab.size), body.slab.free)] = 0.0
-    bed[:, body.bed.root] = slab[body.cells.roots]
-    return Step(slab, bed, 0.5 * size)
+    support[:, body.support.root] = slab[body.cells.roots]
+    return Step(slab, support, 0.5 * size)
 
 
 @dataclass(frozen=True)
 class Step:
     slab: np.ndarray
-    bed: np.ndarray
+    support: np.ndarray
     indentation: float
 
 
 def shifted(body, state, step, share):
-    return body.evaluate(state.slab.displacement + share * step.slab, state.bed.displacement + share * step.bed,
-                         state.indentation + share * step.indentation, state.slab.planes)
+    return body.evaluate(state.slab.displacement + share * step.slab, state.support.displacement + share * step.support,
+                         state.indentation + share * step.indentation, state.slab.projection)
 
 
 def potential(state, force):
@@ -128,12 +129,12 @@ def potential(state, force):
 
 def residual(body, state, force):
     """Unbalanced forces on the slab's free unknowns, inside the frusta, and on the object."""
-    return np.concatenate([body.slab_force(state).ravel()[body.slab.free], body.bed.inner_residual(state.bed).ravel(),
+    return np.concatenate([body.slab_force(state).ravel()[body.slab.free], body.support.inner_residual(state.support).ravel(),
                            [state.force - force]])
 
 
 def flat(body, step):
-    inner = step.bed.reshape(body.bed.count, -1)[:, body.bed.inner]
+    inner = step.support.reshape(body.support.count, -1)[:, body.support.inner]
     return np.concatenate([step.slab.ravel()[body.slab.free], inner.ravel(), [step.indentation]])
 
 
@@ -144,9 +145,9 @@ def test_a_coefficient_of_nothing_changes_nothing(record):
     """The friction's own path through the program with mu = 0, against the press without friction."""
     expected, source = 0.0, "the press without friction"
     free, none = body_with(), body_with()
-    none.slab.top.friction = none.bed.friction = Coulomb(0.0)
-    settings = replace(TIGHT, contact_passes=0)      # with friction there are more steps, and each presses apart
-    states = [last_level(body, [0.5, 2.0], settings=settings).state for body in (free, none)]
+    none.slab.top.friction = none.support.friction = Coulomb(0.0)
+    settings = replace(TIGHT, max_augmentations=0)      # with friction there are more steps, and each presses apart
+    states = [last_load_step(body, [0.5, 2.0], settings=settings).state for body in (free, none)]
     got = np.abs(states[1].slab.displacement - states[0].slab.displacement).max()
     record("coefficients 0: largest deviation of a displacement, mm", expected=expected, source=source, got=got)
     assert got < 1e-6      # unbalanced forces of up to 1e-7 N over the softest stiffness
@@ -154,7 +155,7 @@ def test_a_coefficient_of_nothing_changes_nothing(record):
 
 def ball_on(body, forces):
     ball, pose = sphere(3.0, at=(0.3, -0.2))
-    return press_levels(body, HeightField(place(ball, pose=pose)), forces, settings=FINE)
+    return press_load_steps(body, HeightField(place(ball, pose=pose)), forces, settings=FINE)
 
 
 def test_tips_with_much_friction_do_as_held_tips_do(record):
@@ -163,32 +164,37 @@ def test_tips_with_much_friction_do_as_held_tips_do(record):
     bodies = {"held": body_with(held=True, columns=3, rows=3), "rough": body_with(board=2.0, columns=3, rows=3),
               "free": body_with(columns=3, rows=3)}
     states = {name: list(ball_on(body, forces))[-1].state for name, body in bodies.items()}
-    assert not sides_touch(bodies["held"], states["held"].bed)      # held tips say nothing about folded sides
+    assert not sides_touch(bodies["held"], states["held"].support)      # held tips say nothing about folded sides
     expected, got = states["held"].indentation, states["rough"].indentation
     error = record("ball on 3 x 3 frusta, board mu = 2, 0.8 N: indentation", expected=expected, source=source, got=got)
     deviation = np.abs(states["rough"].slab.displacement - states["held"].slab.displacement).max()
     record("ball on 3 x 3 frusta, board mu = 2, 0.8 N: largest deviation in the slab, mm", expected=0.0, source=source,
            got=deviation)
     assert error * expected < SLIP_TOLERANCE_MM and deviation < SLIP_TOLERANCE_MM
-    tips = bodies["free"].bed.tip
-    assert np.abs(states["free"].bed.displacement[:, tips, :2]).max() > 50 * SLIP_TOLERANCE_MM      # without friction they slide
+    tips = bodies["free"].support.tip
+    # without friction they slide
+    assert np.abs(states["free"].support.displacement[:, tips, :2]).max() > 50 * SLIP_TOLERANCE_MM
 
 
 @pytest.fixture(scope="module")
 def rough_press():
-    """Sensor and levels of a ball on 3 x 3 frusta, friction above and below (with 0.3 above, all of its 29 points would stick)."""
+    """Sensor and load steps of a ball on 3 x 3 frusta, friction above and below (with 0.3 above, all of its 29 points would
+    stick).
+    """
     body = body_with(board=0.2, on_object=0.1, columns=3, rows=3)
     return body, list(ball_on(body, np.linspace(0.5, 4.0, 15)))
 
 
 def test_no_point_carries_more_than_coulomb_allows_and_sliding_ones_carry_all_of_it(rough_press, record):
-    body, levels = rough_press
-    for name, part, state in (("top", body.slab.top, levels[-1].state.slab), ("board", body.bed, levels[-1].state.bed)):
-        drag = state.drag
-        pressure = part.contact.response(state.gaps)[1][..., :drag.slip.shape[-2]]      # of the frusta's points those on the board
+    body, load_steps = rough_press
+    for name, part, state in (("top", body.slab.top, load_steps[-1].state.slab),
+                              ("board", body.support, load_steps[-1].state.support)):
+        friction_response = state.friction_response
+        # of the frusta's points those on the board
+        pressure = part.contact.response(state.gaps)[1][..., :friction_response.slip.shape[-2]]
         pressed = pressure > 1e-4
-        ratio = np.linalg.norm(drag.traction[pressed], axis=-1) / (part.friction.coefficient * pressure[pressed])
-        sliding = np.linalg.norm(drag.slip[pressed], axis=-1) > SLIP_TOLERANCE_MM
+        ratio = np.linalg.norm(friction_response.traction[pressed], axis=-1) / (part.friction.coefficient * pressure[pressed])
+        sliding = np.linalg.norm(friction_response.slip[pressed], axis=-1) > SLIP_TOLERANCE_MM
         error = record(f"ball on 3 x 3 frusta, {name}: largest traction over mu times pressure", expected=1.0, source=COULOMB,
                        got=ratio.max())
         assert error < 1e-9                            # the friction is that of the state's own pressure, to round-off
@@ -196,14 +202,15 @@ def test_no_point_carries_more_than_coulomb_allows_and_sliding_ones_carry_all_of
         assert 0.02 < sliding.mean() < 0.98            # some slide, some stick
 
 
-def dissipated(body, levels):
-    """Work (mJ) of friction between successive levels, by the trapezoidal rule on every point's way."""
-    areas = {"slab": body.slab.top.area, "bed": body.bed.point_area[:, :body.bed.board_points]}     # the plate covers all points
+def dissipated(body, load_steps):
+    """Work (mJ) of friction between successive load steps, by the trapezoidal rule on every point's way."""
+    # the plate covers all points
+    areas = {"slab": body.slab.top.area, "support": body.support.point_area[:, :body.support.board_points]}
     work = []
-    for a, b in zip(levels[:-1], levels[1:], strict=True):
+    for a, b in zip(load_steps[:-1], load_steps[1:], strict=True):
         work.append(0.0)
         for name, area in areas.items():
-            before, after = getattr(a.state, name).drag, getattr(b.state, name).drag
+            before, after = getattr(a.state, name).friction_response, getattr(b.state, name).friction_response
             way = after.position - before.position
             work[-1] += 0.5 * (((before.traction + after.traction) * way).sum(axis=-1) * area).sum()
     return np.array(work)
@@ -214,10 +221,11 @@ def test_work_is_stored_or_dissipated(record):
     source, errors = "energy stored in rubber and contacts, and friction's work: conservation of energy", []
     for steps in (6, 12, 24):
         body, forces = body_with(board=0.2, on_object=0.2), np.linspace(2.0, 6.0, steps + 1)
-        levels = list(press_levels(body, tilted_plate, forces, settings=replace(FINE, contact_passes=0)))   # its potential stays
-        work = np.trapezoid(forces, [level.state.indentation for level in levels])
-        lost = dissipated(body, levels)
-        expected = elastic(body, levels[-1].state) - elastic(body, levels[0].state) + lost.sum()
+        # its potential stays
+        load_steps = list(press_load_steps(body, tilted_plate, forces, settings=replace(FINE, max_augmentations=0)))
+        work = np.trapezoid(forces, [load_step.state.indentation for load_step in load_steps])
+        lost = dissipated(body, load_steps)
+        expected = elastic(body, load_steps[-1].state) - elastic(body, load_steps[0].state) + lost.sum()
         errors.append(record(f"friction: work between 2 N and 6 N in {steps} steps, mJ", expected=expected, source=source,
                              got=work))
         assert (lost > 0).all()
@@ -227,8 +235,8 @@ def test_work_is_stored_or_dissipated(record):
 
 def elastic(body, state):
     """Energy (mJ) in rubber and contacts, without friction's potential."""
-    top = (state.slab.drag.energy * body.slab.top.area).sum()
-    board = (state.bed.drag.energy * body.bed.point_area[:, :body.bed.board_points]).sum()
+    top = (state.slab.friction_response.energy * body.slab.top.area).sum()
+    board = (state.support.friction_response.energy * body.support.point_area[:, :body.support.board_points]).sum()
     return state.energy - float(top + board)
 
 
@@ -248,8 +256,8 @@ def test_a_step_that_begins_with_the_pressures_of_its_end_takes_fewer_iterations
     coarse, small = [1.0, 2.0, 4.0], np.linspace(0.25, 4.0, 16)
 
     def pressed(forces):
-        levels = list(ball_on(body_with(board=0.3, on_object=0.3, columns=3, rows=3), forces))
-        return levels[-1].state.indentation, sum(level.iterations for level in levels)
+        load_steps = list(ball_on(body_with(board=0.3, on_object=0.3, columns=3, rows=3), forces))
+        return load_steps[-1].state.indentation, sum(load_step.iterations for load_step in load_steps)
 
     (expected, _), (got, spent) = pressed(small), pressed(coarse)
     error = record("friction: ball on 3 x 3 frusta, indentation at 4 N by doubled forces, mm", expected=expected,
@@ -274,29 +282,29 @@ class RoughSlab(HeldSlab):
     def slide(self, surface, depths, *, tolerance=1e-9, passes=60):
         """Friction's `SlabState` after the object was lowered to each depth (mm), and its force (N)."""
         slab, top, u = self.slab, self.slab.top, np.zeros((self.slab.nodes, 3))
-        state, last = slab.evaluate(u, slab.facing(u, surface), 0.0), 0.0
+        state, last = slab.evaluate(u, slab.project(u, surface), 0.0), 0.0
         for depth in depths:
-            planes = slab.facing(state.displacement, surface)
-            top.begin_step(slab.reface(state, planes, last), last)
+            planes = slab.project(state.displacement, surface)
+            top.begin_step(slab.update_normals(state, planes, last), last)
             for k in range(passes):
                 state = self._balance(state.displacement, planes, depth, tolerance)
-                before, top.grip = top.grip, top.renewed_grip(state)
-                state = slab.reface(state, planes, depth)
+                before, top.friction_state = top.friction_state, top.renewed_friction_state(state)
+                state = slab.update_normals(state, planes, depth)
                 if np.abs(state.force.ravel()[slab.free]).max() < tolerance * abs(state.indentation_force):
                     break
                 if k >= 3:
-                    top.grip = before.halfway(top.grip)
+                    top.friction_state = before.halfway(top.friction_state)
             else:
                 raise ArithmeticError("friction does not settle")
             last = depth
         return state
 
     def _balance(self, u, planes, depth, tolerance, iterations=60):
-        slab, solver, drag = self.slab, make_solver(), None
+        slab, solver, friction_response = self.slab, make_solver(), None
         for _ in range(iterations):
             state = slab.evaluate(u, planes, depth)
-            state = replace(state, drag=state.drag.after(drag))
-            residual, drag = state.force.ravel()[slab.free], state.drag
+            state = replace(state, friction_response=state.friction_response.after(friction_response))
+            residual, friction_response = state.force.ravel()[slab.free], state.friction_response
             if np.abs(residual).max() < 0.1 * tolerance * abs(state.indentation_force):
                 solver.close()
                 return state
@@ -308,7 +316,7 @@ class RoughSlab(HeldSlab):
 
 
 def teeth(slope):
-    """A level plate whose underside is everywhere inclined by `slope`: teeth too fine to see, all leaning towards x."""
+    """A load step plate whose underside is everywhere inclined by `slope`: teeth too fine to see, all leaning towards x."""
     normal = np.array([np.sin(slope), 0.0, -np.cos(slope)])
 
     def surface(x, y):
@@ -322,10 +330,10 @@ def test_friction_acts_on_the_share_of_area_that_the_object_covers_as_the_pressu
     mu, depth, x = 0.3, 1e-3, np.linspace(-1.5, 1.5, 7)
     slab = RoughSlab(x, x, np.linspace(-1.0, 0.0, 2), [BLOCK_LAW], sides="held", stiffness=100.0, law=Coulomb(mu)).slab
     u = np.zeros((slab.nodes, 3))
-    planes = slab.facing(u, flat_punch(1.0))
+    planes = slab.project(u, flat_punch(1.0))
     assert ((planes.covered > 0) & (planes.covered < 1)).any()
     slab.top.begin_step(slab.evaluate(u, planes, depth), depth)
-    slab.top.grip = slab.top.renewed_grip(slab.evaluate(u, planes, depth))
+    slab.top.friction_state = slab.top.renewed_friction_state(slab.evaluate(u, planes, depth))
     state = slab.evaluate(u + [10 * SLIP_TOLERANCE_MM, 0.0, 0.0], planes, depth)
     expected, got = mu * state.indentation_force, state.force[:, 0].sum()
     assert expected > 0.05
@@ -355,7 +363,7 @@ def test_teeth_push_a_layer_aside_until_friction_holds_them(mu, record):
     state = slab.slide(teeth(angle), [depth], tolerance=1e-8)
     middle = np.abs(slab.slab.top.reference[:, 0]) < 0.5
     expected = p * press if lean > 0 else straight
-    push = -slab.slab.top.contact.response(state.gaps)[1][:, None] * state.planes.normals + state.drag.traction
+    push = -slab.slab.top.contact.response(state.gaps)[1][:, None] * state.projection.normals + state.friction_response.traction
     got = push[middle, 2].mean()
     error = record(f"layer under teeth of slope 0.2, mu = {mu:g}: downward traction, MPa", expected=expected, source=source,
                    got=got)
@@ -394,7 +402,7 @@ CORNERS = {"under the plate": [1.0, 0.0, 0.0], "on the ground": [1.0, 0.0, -BLOC
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
 def test_a_block_under_a_rough_plate_resists_and_spreads_as_in_another_program(tmp_path, record):
     """A quarter of a block of 2 x 2 x 0.5 mm on smooth ground, a fifth lower under a plate with mu = 0.2, which takes 20 % more
-    force than a smooth one. There C3D20R and 20 increments or more, here our elements and four levels.
+    force than a smooth one. There C3D20R and 20 increments or more, here our elements and four load steps.
     """
     source = "CalculiX 2.20, 3 x 3 x 2 C3D20R"
     force, ways = block_in_calculix(tmp_path)
@@ -428,7 +436,7 @@ def block_here():
 
 def block_in_calculix(folder):
     """The same by ccx; the plate is one stiff element whose nodes are all prescribed."""
-    mesh = extrude(grid_plan(BLOCK_LINES, BLOCK_LINES), BLOCK_LEVELS)
+    mesh = extrude(grid_mesh_2d(BLOCK_LINES, BLOCK_LINES), BLOCK_LEVELS)
     count, n = len(mesh.hexes), len(mesh.points)
     square = np.array([[-0.5, -0.5], [2.0, -0.5], [2.0, 2.0], [-0.5, 2.0]])
     plate = np.vstack([np.column_stack([square, np.full(4, z)]) for z in (0.0, 1.0)])
@@ -461,9 +469,9 @@ def block_in_calculix(folder):
 
 def test_friction_under_held_tips_is_refused():
     values = small_spec(2, 2, margin=0.4).model_dump(mode="json") | {"friction": {"object": 0.0, "board": 0.3}}
-    with pytest.raises(InputError, match="bonded tips cannot slide .* set 'tips_held' to false"):
+    with pytest.raises(InputError, match="bonded tips cannot slide .* set 'tips_bonded' to false"):
         SensorSpec.from_dict(values)
-    assert SensorSpec.from_dict(values | {"tips_held": False}).friction.board == 0.3
+    assert SensorSpec.from_dict(values | {"tips_bonded": False}).friction.board == 0.3
 
 
 @pytest.mark.parametrize("value", [-0.1, float("inf"), "much", {"value": 0.3, "assumed": True}])
@@ -477,4 +485,4 @@ def test_a_result_states_its_friction():
     ball, pose = sphere(2.5)
     spec = small_spec(2, 2, margin=0.4).model_copy(update={"friction": Friction(object=0.3)})
     result = Sensor(spec, LAWS, mesh=COARSE).press(ball, pose=pose, force_n=1.0, model="hyperelastic")
-    assert result.attributes == {"friction_object": 0.3, "friction_board": 0.0, "tips_held": 1, "thickness_mm": 2.5}
+    assert result.attributes == {"friction_object": 0.3, "friction_board": 0.0, "tips_bonded": 1, "thickness_mm": 2.5}

@@ -15,9 +15,9 @@ import pytest
 from softtact.contact.penalty import Contact
 from softtact.decks import keywords
 from softtact.decks.laws import law_card
-from softtact.fem.extruded_mesh import grid_plan
+from softtact.fem.extruded_mesh import grid_mesh_2d
 from softtact.materials.laws.registry import make_law
-from softtact.models.hyperelastic.frusta import BedGeometry, FrustumBed
+from softtact.models.hyperelastic.frusta import FrustumArray, FrustumGeometry
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 
 TIP, ROOT, HEIGHT = 0.3, 0.6, 0.5        # radii and height in mm
@@ -35,15 +35,15 @@ def section():
     """Plan mesh of the section, x the radius and y the height; lines gather at tip, root and side, where stresses peak."""
     even = np.linspace(0, 1, PARTS + 1)
     outwards, upwards = 1 - (1 - even) ** 2, 0.5 * (1 + np.sign(2 * even - 1) * (1 - (1 - np.abs(2 * even - 1)) ** 2))
-    plan = grid_plan(outwards, HEIGHT * upwards)
-    r, z = plan.points.T
-    return np.column_stack([r * (TIP + (ROOT - TIP) * z / HEIGHT), z]), plan.quads
+    mesh_2d = grid_mesh_2d(outwards, HEIGHT * upwards)
+    r, z = mesh_2d.points.T
+    return np.column_stack([r * (TIP + (ROOT - TIP) * z / HEIGHT), z]), mesh_2d.quads
 
 
 def axisymmetric_deck():
     """Lines of a deck that lowers the root through DEPTHS, written for this test alone."""
     points, quads = section()
-    glass = grid_plan(np.linspace(0.0, 1.0, 21), np.array([-0.2, 0.0]))
+    glass = grid_mesh_2d(np.linspace(0.0, 1.0, 21), np.array([-0.2, 0.0]))
     r, z = points.T
     sets = {"ROOT": z > HEIGHT - 1e-9, "TIP": z < 1e-9, "AXIS": r < 1e-9}
     numbers = np.arange(1, len(quads) + 1)
@@ -80,39 +80,39 @@ def test_calculix_finds_the_forces_that_are_kept_here(tmp_path):
 
 
 def frustum(*, law=LAW, mesh=None, contact=HARD, **settings):
-    """A bed of one frustum without neighbours over the glass at z = 0; settings are those of `MeshSettings`."""
+    """A support of one frustum without neighbours over the glass at z = 0; settings are those of `MeshSettings`."""
     mesh = mesh or MeshSettings(**settings)
-    geometry = BedGeometry(centres=np.zeros((1, 2)), heights=np.array([HEIGHT]), tip_diameters=np.array([2 * TIP]),
+    geometry = FrustumGeometry(centres=np.zeros((1, 2)), heights=np.array([HEIGHT]), tip_diameters=np.array([2 * TIP]),
                            root_diameter=2 * ROOT, neighbours=np.zeros((1, 4), dtype=bool))
-    return FrustumBed(geometry, law, levels=HEIGHT * np.asarray(mesh.frustum_levels), root_z_mm=HEIGHT, pcb_z_mm=0.0,
-                      tips_held=True, contact=contact, local_over_shear=mesh.local_over_shear,
-                      growing_over_shear=mesh.growing_over_shear,
+    return FrustumArray(geometry, law, load_steps=HEIGHT * np.asarray(mesh.frustum_heights), root_z_mm=HEIGHT, pcb_z_mm=0.0,
+                      tips_bonded=True, contact=contact, unprojected_penalty_ratio=mesh.unprojected_penalty_ratio,
+                      quartic_penalty_ratio=mesh.quartic_penalty_ratio,
                       trilinear=mesh.trilinear_pressure,
                       refinement=mesh.refinement, rings=mesh.frustum_rings, core=mesh.core)
 
 
-def bonded_forces(bed, *, step_mm=0.01):
+def bonded_forces(support, *, step_mm=0.01):
     """Forces (N) that lower the root through DEPTHS."""
-    displacement, forces = np.zeros((1, bed.nodes, 3)), []
+    displacement, forces = np.zeros((1, support.nodes, 3)), []
     for start, end in itertools.pairwise([0.0, *DEPTHS]):
         for depth in np.linspace(start, end, round((end - start) / step_mm) + 1)[1:]:
-            displacement = equilibrium(bed, displacement, depth)
-        forces.append(-bed.evaluate(displacement).force[0, bed.root, 2].sum())
+            displacement = equilibrium(support, displacement, depth)
+        forces.append(-support.evaluate(displacement).force[0, support.root, 2].sum())
     return np.array(forces)
 
 
-def equilibrium(bed, displacement, depth, *, tolerance_n=1e-8):
+def equilibrium(support, displacement, depth, *, tolerance_n=1e-8):
     """Displacement (1, nodes, 3) with the root lowered to `depth`: Newton's method, steps halved until the energy falls."""
-    root_step = np.zeros((1, len(bed.root), 3))
-    root_step[..., 2] = -depth - displacement[:, bed.root, 2]
+    root_step = np.zeros((1, len(support.root), 3))
+    root_step[..., 2] = -depth - displacement[:, support.root, 2]
     for _ in range(60):
-        state = bed.evaluate(displacement)
-        if np.abs(bed.inner_residual(state)).max() < tolerance_n and not root_step.any():
+        state = support.evaluate(displacement)
+        if np.abs(support.inner_residual(state)).max() < tolerance_n and not root_step.any():
             return displacement
-        bed.condense(state, np.arange(1))
-        step = bed.inner_step(bed.condensed_residual(state)[1], root_step.reshape(1, -1))
+        support.condense(state, np.arange(1))
+        step = support.inner_step(support.condensed_residual(state)[1], root_step.reshape(1, -1))
         share = 1.0
-        while not root_step.any() and not _lower(bed.evaluate(displacement + share * step), state):
+        while not root_step.any() and not _lower(support.evaluate(displacement + share * step), state):
             share *= 0.5
         displacement, root_step = displacement + share * step, np.zeros_like(root_step)
     raise ArithmeticError(f"no equilibrium at {depth} mm")
@@ -134,7 +134,7 @@ def compare(mesh, name, record):
 @pytest.mark.slow
 def test_a_refined_frustum_meets_calculix(record):
     """Both sides are within 0.5 % of their limits, and the side folds on the glass in steps of a contact point."""
-    mesh = MeshSettings.converging(refinement=1, frustum_levels=(0.0, 0.1, 0.3, 0.6, 1.0), local_over_shear=0.0)
+    mesh = MeshSettings.converging(refinement=1, frustum_heights=(0.0, 0.1, 0.3, 0.6, 1.0), unprojected_penalty_ratio=0.0)
     errors = compare(frustum(mesh=mesh), "refined mesh", record)
     assert np.abs(errors).max() < 0.01
 

@@ -47,12 +47,12 @@ def tetrahedral_blocks():
 
 
 def tetrahedral_depth(compliance, surface):
-    level, = active_set(compliance.flexibility, surface(*compliance.points.T)[0], [FORCE])
-    return level.indentation
+    load_step, = active_set(compliance.compliance, surface(*compliance.points.T)[0], [FORCE])
+    return load_step.indentation
 
 
 def test_a_sphere_on_boussinesqs_half_space_indents_as_hertz_says_and_better_on_a_finer_grid(record):
-    """The contact solver alone: the closed flexibility of a half-space in place of a mesh."""
+    """The contact solver alone: the closed compliance of a half-space in place of a mesh."""
     expected, source = DEPTH, HERTZ
     depths, radii = zip(*(boussinesq_press(cells) for cells in (5, 10, 20)), strict=True)
     for cells, depth in zip((5, 10, 20), depths, strict=True):
@@ -70,8 +70,8 @@ def boussinesq_press(cells):
     points = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
     distance = np.linalg.norm(points[:, None] - points[None], axis=2)
     np.fill_diagonal(distance, h / (4 * np.log(1 + np.sqrt(2))))      # the mean of 1/r over the square, from its centre
-    level, = active_set(1 / (np.pi * MODULUS * distance), paraboloid(RADIUS)(*points.T)[0], [FORCE])
-    return level.indentation, np.sqrt((level.nodal_force > 0).sum() * h * h / np.pi)
+    load_step, = active_set(1 / (np.pi * MODULUS * distance), paraboloid(RADIUS)(*points.T)[0], [FORCE])
+    return load_step.indentation, np.sqrt((load_step.nodal_force > 0).sum() * h * h / np.pi)
 
 
 def test_a_sphere_on_a_block_of_tetrahedra_indents_as_hertz_says(tetrahedral_blocks, record):
@@ -87,13 +87,13 @@ def test_contact_radius_and_pressure_on_tetrahedra_converge_to_hertz(tetrahedral
     blocks = {CELLS: tetrahedral_blocks[0], 5: tetrahedral_block(5, 8.0, 5)}
     errors = []
     for cells, compliance in blocks.items():
-        level, = active_set(compliance.flexibility, paraboloid(RADIUS)(*compliance.points.T)[0], [FORCE])
+        load_step, = active_set(compliance.compliance, paraboloid(RADIUS)(*compliance.points.T)[0], [FORCE])
         area = (A / cells) ** 2
-        radius = np.sqrt((level.nodal_force > 0).sum() * area / np.pi)
+        radius = np.sqrt((load_step.nodal_force > 0).sum() * area / np.pi)
         # the contact's edge lies between two nodes: half a cell at most
         assert record(f"tetrahedra, {cells} cells along a: contact radius", expected=A, source=HERTZ, got=radius) < 0.5 / cells
         shape = np.sqrt(np.maximum(1 - (compliance.points**2).sum(axis=1) / A**2, 0.0))
-        peak = (level.nodal_force @ shape) / (shape @ shape * area)       # of the nearest Hertzian distribution
+        peak = (load_step.nodal_force @ shape) / (shape @ shape * area)       # of the nearest Hertzian distribution
         errors.append(record(f"tetrahedra, {cells} cells along a: greatest pressure", expected=PEAK, source=HERTZ, got=peak))
     assert errors[1] < errors[0] < 0.2 / CELLS and errors[1] < 0.2 / 5      # first order: lumped at nodes, edge between them
 
@@ -112,9 +112,9 @@ def test_the_work_on_a_block_of_tetrahedra_is_its_stored_energy(tetrahedral_bloc
     source, errors, compliance = "conservation of energy, half of force times displacement", [], tetrahedral_blocks[0]
     for steps in (4, 16):
         forces = np.linspace(0.5 * FORCE, FORCE, steps + 1)
-        levels = list(active_set(compliance.flexibility, paraboloid(RADIUS)(*compliance.points.T)[0], forces))
-        first, last = (0.5 * level.nodal_force @ level.displacement for level in (levels[0], levels[-1]))
-        work = np.trapezoid(forces, [level.indentation for level in levels])
+        load_steps = list(active_set(compliance.compliance, paraboloid(RADIUS)(*compliance.points.T)[0], forces))
+        first, last = (0.5 * load_step.nodal_force @ load_step.displacement for load_step in (load_steps[0], load_steps[-1]))
+        work = np.trapezoid(forces, [load_step.indentation for load_step in load_steps])
         errors.append(record(f"tetrahedra: work in {steps} steps", expected=last - first, source=source, got=work))
     assert errors[1] < errors[0] / 8      # second order would be a sixteenth; nodes that come into touch make kinks
     assert errors[1] < 1e-4
@@ -134,9 +134,9 @@ def elastic_depth(far):
     slab = QuarterSlab((2 * far, 2 * far), [layer], (cells, cells), base_held=True)
     x, y = np.meshgrid(slab.x[:-1], slab.y[:-1])
     near = np.hypot(x, y) < 1.3 * A
-    flexibility = slab.flexibility(slab.stiffness, 3 * slab.top[near] + 2, (0, 0)) / 4
-    level, = active_set(flexibility, paraboloid(RADIUS)(x[near], y[near])[0], [FORCE])
-    return level.indentation
+    compliance = slab.compliance(slab.stiffness, 3 * slab.top[near] + 2, (0, 0)) / 4
+    load_step, = active_set(compliance, paraboloid(RADIUS)(x[near], y[near])[0], [FORCE])
+    return load_step.indentation
 
 
 def test_a_sphere_on_the_elastic_models_block_indents_as_hertz_says(record):
@@ -245,13 +245,13 @@ def test_a_wide_smooth_punch_on_a_thin_layer_compresses_it_as_if_confined(record
     source = "confined compression: pressure = (K + 4 mu/3) depth / thickness"
     lines, z = np.arange(-5.0, 5.5, 0.5), np.linspace(-thickness, 0, 5)
     compliance = layer_compliance(lines, lines, z, young=young, poisson=poisson)
-    level, = active_set(compliance.flexibility, np.where(np.abs(compliance.points).max(axis=1) < 4.1, 0.0, 1e3), [0.1])
+    load_step, = active_set(compliance.compliance, np.where(np.abs(compliance.points).max(axis=1) < 4.1, 0.0, 1e3), [0.1])
     middle = np.abs(compliance.points).max(axis=1) < 1.1
-    got = level.nodal_force[middle].sum() / (middle.sum() * 0.25) / (level.indentation / thickness)
+    got = load_step.nodal_force[middle].sum() / (middle.sum() * 0.25) / (load_step.indentation / thickness)
     error = record("tetrahedra, wide punch on a thin layer: modulus in the middle", expected=expected, source=source, got=got)
     assert error < 5e-3      # three thicknesses from the edge its influence has died away
     error = record("tetrahedra, wide punch on a thin layer: contact area", expected=17**2 * 0.5**2,
-                   source="17 x 17 pressed nodes, 0.5 mm apart", got=compliance.area[level.nodal_force > 0].sum())
+                   source="17 x 17 pressed nodes, 0.5 mm apart", got=compliance.area[load_step.nodal_force > 0].sum())
     assert error < 0.03      # the triangles' diagonals share out the cells of the rim unevenly
     quarter = lines[lines >= 0]
     slab = HeldSlab(quarter, quarter, z, [linear_law(young, poisson)] * 4, sides="symmetric", stiffness=1e5)
@@ -283,5 +283,5 @@ def tetrahedral_press(young, poisson, surface, force, cells):
     """Depth, and displacement in the middle, of a layer of tetrahedra of 6 x 6 x 2 mm: (2,) in mm."""
     lines = np.linspace(-3, 3, cells + 1)
     compliance = layer_compliance(lines, lines, np.linspace(-2, 0, cells // 3 + 1), young=young, poisson=poisson)
-    level, = active_set(compliance.flexibility, surface(*compliance.points.T)[0], [force])
-    return np.array([level.indentation, level.displacement[np.hypot(*compliance.points.T) < 1e-9][0]])
+    load_step, = active_set(compliance.compliance, surface(*compliance.points.T)[0], [force])
+    return np.array([load_step.indentation, load_step.displacement[np.hypot(*compliance.points.T) < 1e-9][0]])

@@ -9,12 +9,12 @@ from fe import equilibrium, mapped, small_strain, solid
 from scipy.spatial.transform import Rotation
 
 from softtact.fem.elements import HEX20_NODES
-from softtact.fem.extruded_mesh import disc_plan, extrude, grid_plan
+from softtact.fem.extruded_mesh import disc_mesh_2d, extrude, grid_mesh_2d
 from softtact.fem.solid_block import HexBlock
 from softtact.materials.laws.registry import make_law
 
 MOONEY = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040})
-FRUSTA = {"local_over_shear": 0.5, "growing_over_shear": 100.0, "trilinear": True}     # as in `MeshSettings`
+FRUSTA = {"unprojected_penalty_ratio": 0.5, "quartic_penalty_ratio": 100.0, "trilinear": True}     # as in `MeshSettings`
 GRADIENT = np.array([[0.05, 0.10, 0.0], [-0.02, -0.10, 0.03], [0.04, 0.0, 0.08]])
 POINTS = pytest.mark.parametrize("points", [2, 3])
 
@@ -28,7 +28,7 @@ def distorted_mesh():
         inside = ((points > 0) & (points < 3)).all(axis=1)
         return points + 0.2 * rng.uniform(-1, 1, points.shape) * inside[:, None]
 
-    return mapped(extrude(grid_plan(lines, lines), lines), moved)
+    return mapped(extrude(grid_mesh_2d(lines, lines), lines), moved)
 
 
 def on_the_faces_of_its_box(points):
@@ -44,7 +44,7 @@ def bent_element(seed=0):
 def test_distorted_elements_pass_the_patch_test_at_finite_strain(points, record):
     """Faces moved by an affine map, the inside off by 0.02 mm: Newton's method has to find the same map there."""
     expected, source = 0.0, "an affine map is in balance in a uniform body (Irons)"
-    body = solid(distorted_mesh(), MOONEY, points_per_side=points, local_over_shear=0.5)
+    body = solid(distorted_mesh(), MOONEY, points_per_side=points, unprojected_penalty_ratio=0.5)
     affine = body.points @ GRADIENT.T
     held = np.repeat(on_the_faces_of_its_box(body.points)[:, None], 3, axis=1)
     start = affine + 0.02 * np.random.default_rng(4).standard_normal(affine.shape)
@@ -57,8 +57,8 @@ def test_distorted_elements_pass_the_patch_test_at_finite_strain(points, record)
 def test_a_frustum_passes_the_patch_test_although_its_sides_are_curved(record):
     """Inner nodal forces of an affine map vanish; 27 points integrate the curved elements' gradients exactly."""
     expected, source = 0.0, "an affine map is in balance in a uniform body (Irons)"
-    mesh = extrude(disc_plan(), [0.0, 0.2, 0.5], scale=lambda z: 0.3 + 0.6 * z)
-    body = solid(mesh, MOONEY, local_over_shear=4.0)
+    mesh = extrude(disc_mesh_2d(), [0.0, 0.2, 0.5], scale=lambda z: 0.3 + 0.6 * z)
+    body = solid(mesh, MOONEY, unprojected_penalty_ratio=4.0)
     force = body.energy_and_force(body.points @ GRADIENT.T)[1]
     r = np.hypot(*mesh.points[:, :2].T) / (0.3 + 0.6 * mesh.points[:, 2])
     inside = (r < 0.9) & (mesh.points[:, 2] > 1e-9) & (mesh.points[:, 2] < 0.5 - 1e-9)
@@ -75,7 +75,7 @@ def test_the_energy_of_an_affine_map_is_volume_times_density(points, record):
     isochoric = MOONEY.isochoric(C[[0, 1, 2, 0, 1, 2], [0, 1, 2, 1, 2, 0]][None]).energy[0]
     k, K = 0.5 * MOONEY.mu0, MOONEY.bulk_modulus
     expected = 27.0 * (isochoric + 0.5 * (K - k) * (J - 1) ** 2 + 0.25 * k * (J**2 - 1 - 2 * np.log(J)))
-    body = solid(distorted_mesh(), MOONEY, points_per_side=points, local_over_shear=0.5)
+    body = solid(distorted_mesh(), MOONEY, points_per_side=points, unprojected_penalty_ratio=0.5)
     got = body.energy_and_force(body.points @ GRADIENT.T)[0]
     error = record(f"energy of an affine map, distorted hexahedra, {points}^3 points", expected=expected,
                    source="27 mm3 times the energy density", got=got)
@@ -84,7 +84,7 @@ def test_the_energy_of_an_affine_map_is_volume_times_density(points, record):
 
 @POINTS
 @pytest.mark.parametrize("name", ["mooney_rivlin", "ogden2"])
-@pytest.mark.parametrize("held", [{"local_over_shear": 0.5}, FRUSTA], ids=["linear", "frusta"])
+@pytest.mark.parametrize("held", [{"unprojected_penalty_ratio": 0.5}, FRUSTA], ids=["linear", "frusta"])
 def test_force_is_the_slope_of_energy_and_tangent_the_slope_of_force(points, name, held, record):
     law = {"mooney_rivlin": MOONEY,
            "ogden2": make_law("ogden2", {"mu1": 0.1351, "alpha1": 1.4538, "mu2": 0.2223, "alpha2": -4.9910})}[name]
@@ -138,7 +138,7 @@ def harmonic(points):
 def error_at_nodes(cells, law, points):
     """Root mean square over the free nodes of the error in displacement, relative to the displacement's."""
     lines = np.linspace(0.0, 1.0, cells + 1)
-    mesh = mapped(extrude(grid_plan(lines, lines), lines), lambda p: p + 0.08 * np.sin(np.pi * p) @ np.array(
+    mesh = mapped(extrude(grid_mesh_2d(lines, lines), lines), lambda p: p + 0.08 * np.sin(np.pi * p) @ np.array(
         [[0, 1.0, 0], [0, 0, 1.0], [1.0, 0, 0]]) * np.sin(np.pi * p))
     body = solid(mesh, law, points_per_side=points)
     exact = harmonic(body.points)

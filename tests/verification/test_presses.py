@@ -18,7 +18,7 @@ from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic.body import LayeredBody
 from softtact.models.hyperelastic.build import build_sensor_body, build_unit_cell
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
-from softtact.models.hyperelastic.newton import NewtonSettings, press_levels
+from softtact.models.hyperelastic.newton import NewtonSettings, press_load_steps
 from softtact.models.hyperelastic.slab import Slab
 from softtact.press.sensor import Sensor
 from softtact.sensors.specification import SensorSpec
@@ -26,8 +26,8 @@ from softtact.sensors.specification import SensorSpec
 CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
 LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492),
         "cover": make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)}
-COARSE = MeshSettings(cover_levels=(0.0, 1.0), cover_splits=(0,), far_pitches=1, frustum_levels=(0.0, 0.35, 1.0))
-BOUND = MeshSettings(cover_levels=(0.0, 0.5, 1.0), cover_splits=(0,), far_pitches=1, frustum_levels=(0.0, 0.35, 1.0))
+COARSE = MeshSettings(cover_heights=(0.0, 1.0), cover_splits=(0,), far_pitches=1, frustum_heights=(0.0, 0.35, 1.0))
+BOUND = MeshSettings(cover_heights=(0.0, 0.5, 1.0), cover_splits=(0,), far_pitches=1, frustum_heights=(0.0, 0.35, 1.0))
 TIGHT = NewtonSettings(relative_tolerance=1e-8)
 
 
@@ -60,9 +60,9 @@ def folding_body():
     """2 x 2 frusta whose slab glides on its sides, so that the frusta take the whole force and fold."""
     body = build_sensor_body(small_spec(2, 2, margin=0.0), dielectric_law=LAWS["dielectric"], cover_law=LAWS["cover"], mesh=COARSE)
     fixed = body.slab
-    slab = Slab(*fixed.layers, fixed.sheet_plan, fixed.x_lines, fixed.y_lines, sides="symmetric", contact=fixed.top.contact,
-                coarse_walls=COARSE.coarse_walls)
-    return LayeredBody(slab, body.bed, body.cells.roots)
+    slab = Slab(*fixed.layers, fixed.sheet_mesh_2d, fixed.x_lines, fixed.y_lines, sides="symmetric", contact=fixed.top.contact,
+                constrained_cell_edges=COARSE.constrained_cell_edges)
+    return LayeredBody(slab, body.support, body.cells.roots)
 
 
 CASES = {"sides held": (lambda: small_body(2, 2), [0.5, 1.0, 2.0, 4.0, 8.0]),
@@ -72,29 +72,29 @@ CASES = {"sides held": (lambda: small_body(2, 2), [0.5, 1.0, 2.0, 4.0, 8.0]),
 
 @pytest.mark.parametrize("case", CASES)
 def test_condensing_the_frusta_changes_nothing(case, record):
-    """All unknowns in one matrix, plain Newton steps, own contact sums: the states have to agree at every level."""
+    """All unknowns in one matrix, plain Newton steps, own contact sums: the states have to agree at every load step."""
     source = "the same energies with all unknowns in one sparse matrix"
     build, forces = CASES[case]
     body = build()
     naive = NaiveSensor(body, tilted_plate)
-    for level in press_levels(body, tilted_plate, forces, settings=TIGHT):
-        naive.press_to(level.force_n)
-        slab, bed = level.state.slab.displacement, level.state.bed.displacement
+    for load_step in press_load_steps(body, tilted_plate, forces, settings=TIGHT):
+        naive.press_to(load_step.force_n)
+        slab, support = load_step.state.slab.displacement, load_step.state.support.displacement
         # unbalanced forces of up to 1e-7 N over the softest stiffness of 0.03 N/mm
-        assert max(np.abs(naive.slab - slab).max(), np.abs(naive.bed - bed).max()) < 4e-6
-    deviation = max(np.abs(naive.slab - slab).max(), np.abs(naive.bed - bed).max())
-    record(f"2 x 2 frusta, {case}, {level.force_n:g} N: largest deviation of a displacement, mm", expected=0.0, source=source,
+        assert max(np.abs(naive.slab - slab).max(), np.abs(naive.support - support).max()) < 4e-6
+    deviation = max(np.abs(naive.slab - slab).max(), np.abs(naive.support - support).max())
+    record(f"2 x 2 frusta, {case}, {load_step.force_n:g} N: largest deviation of a displacement, mm", expected=0.0, source=source,
            got=deviation)
-    record(f"2 x 2 frusta, {case}: depth", expected=naive.depth, source=source, got=level.state.indentation)
-    error = record(f"2 x 2 frusta, {case}: stored energy", expected=naive.energy, source=source, got=level.state.energy)
+    record(f"2 x 2 frusta, {case}: depth", expected=naive.depth, source=source, got=load_step.state.indentation)
+    error = record(f"2 x 2 frusta, {case}: stored energy", expected=naive.energy, source=source, got=load_step.state.energy)
     assert error < 1e-6
-    assert ("folded" in case) == sides_touch(body, level.state.bed)
+    assert ("folded" in case) == sides_touch(body, load_step.state.support)
 
 
 def sides_touch(body, state):
     """Whether a frustum's side lies on the board."""
-    touching = (state.gaps < 0) & (body.bed.point_area > 0) & (body.bed.point_neighbour < 0)
-    tips = 9 * len(body.bed.mesh.layer(0))                # the first points are those of the tips
+    touching = (state.gaps < 0) & (body.support.point_area > 0) & (body.support.point_neighbour < 0)
+    tips = 9 * len(body.support.mesh.layer(0))                # the first points are those of the tips
     return bool(touching[:, tips:].any())
 
 
@@ -109,10 +109,11 @@ def test_the_work_of_the_force_is_the_stored_energy_to_second_order_in_the_load_
 
 
 def work_and_energy(body, forces):
-    """Work (mJ) of the force from the first level to the last, and the growth of the stored energy."""
-    levels = list(press_levels(body, tilted_plate, forces, settings=replace(TIGHT, contact_passes=0)))    # its potential stays
-    depth = [level.state.indentation for level in levels]
-    return np.trapezoid(forces, depth), levels[-1].state.energy - levels[0].state.energy
+    """Work (mJ) of the force from the first load step to the last, and the growth of the stored energy."""
+    # its potential stays
+    load_steps = list(press_load_steps(body, tilted_plate, forces, settings=replace(TIGHT, max_augmentations=0)))
+    depth = [load_step.state.indentation for load_step in load_steps]
+    return np.trapezoid(forces, depth), load_steps[-1].state.energy - load_steps[0].state.energy
 
 
 @pytest.fixture(scope="module")
@@ -153,28 +154,28 @@ def test_board_and_shell_carry_the_force(record):
     expected, source = 2.0, "balance of forces"
     body = small_body(3, 3)
     ball, pose = sphere(3.0, at=(0.3, -0.2))
-    level, = press_levels(body, HeightField(place(ball, pose=pose)), [expected], settings=TIGHT)
+    load_step, = press_load_steps(body, HeightField(place(ball, pose=pose)), [expected], settings=TIGHT)
     naive = NaiveSensor(body, tilted_plate)
-    got = naive.board_force(level.state.bed) + naive.side_reaction(level.state)
+    got = naive.board_force(load_step.state.support) + naive.side_reaction(load_step.state)
     error = record("force of board and sides", expected=expected, source=source, got=got)
     assert error < 1e-6      # Newton's tolerance of 1e-8 of 10 N at each node
 
 
 def test_the_frusta_feel_contact_on_their_whole_surface(record):
-    bed = small_body(1, 1).bed
+    support = small_body(1, 1).support
     tip, root, slant = 0.3, 0.6, np.hypot(0.5, 0.3)
-    tips = np.arange(len(bed.point_axis)) < 9 * len(bed.mesh.layer(0))
+    tips = np.arange(len(support.point_axis)) < 9 * len(support.mesh.layer(0))
     for name, expected, points in (("tip", np.pi * tip**2, tips), ("side", np.pi * (tip + root) * slant, ~tips)):
-        chosen = points & (bed.point_neighbour < 0)
+        chosen = points & (support.point_neighbour < 0)
         error = record(f"area of contact points, {name} of a frustum, mm2", expected=expected, source="truncated cone",
-                       got=bed.point_area[0, chosen].sum())
+                       got=support.point_area[0, chosen].sum())
         assert error < 2e-3      # the side is four parabolic arcs, not quite as long as the circle
 
 
 def test_the_unit_cell_meets_the_law_of_a_refined_cell(record):
     """Far beyond folding, where sides lie on the board and on their neighbours."""
     expected, source = 0.40, "another program: refined cell of 27-node hexahedra with self-contact, 0.40 mm at 0.52 MPa"
-    got = cell_compression(MeshSettings.converging(frustum_levels=(0.0, 0.1, 0.3, 0.6, 1.0)))
+    got = cell_compression(MeshSettings.converging(frustum_heights=(0.0, 0.1, 0.3, 0.6, 1.0)))
     error = record("compression of cell and cover at 0.52 MPa, four layers a frustum", expected=expected, source=source, got=got)
     assert error < 0.02      # two digits are known, and this mesh is not refined in plan
 
@@ -189,5 +190,6 @@ def cell_compression(mesh):
     """Compression (mm) of one frustum of an endless lattice, with its share of sheet and cover, at 0.52 MPa."""
     body = build_unit_cell(CORO, dielectric_law=LAWS["dielectric"], cover_law=LAWS["cover"], mesh=mesh)
     plate = HeightField(place(trimesh.creation.box((5.0, 5.0, 1.0)), pose=None))
-    levels = press_levels(body, plate, np.array([0.1, 0.22, 0.37, 0.52]) * 1.2**2, settings=NewtonSettings(smallest_scale_n=0.1))
-    return list(levels)[-1].state.indentation
+    load_steps = press_load_steps(body, plate, np.array([0.1, 0.22, 0.37, 0.52]) * 1.2**2,
+                                  settings=NewtonSettings(smallest_scale_n=0.1))
+    return list(load_steps)[-1].state.indentation

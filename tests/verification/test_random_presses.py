@@ -54,13 +54,13 @@ def test_presses_that_went_wrong_in_a_long_run_are_mended_or_flagged(benchmark, 
     """24: contact not solved at a sharp corner; 41: lost touch on the way; 86, 330: small and deep, in two states of balance.
 
     Which of two states is found depends on the last digits of the sums: with other threads it may be the same one at all forces, or
-    none within the steps that a level may take, which is told.
+    none within the steps that a load step may take, which is told.
     """
     sensor = benchmark.random_sensor(number // benchmark.A_SENSOR, "hyperelastic")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        found, why = benchmark.outcome(sensor, "hyperelastic", number)
-    assert found in ("reached", "outside", "flagged", *(["stopped"] if number in (86, 330) else [])), why
+        found, selection_reason = benchmark.outcome(sensor, "hyperelastic", number)
+    assert found in ("reached", "outside", "flagged", *(["stopped"] if number in (86, 330) else [])), selection_reason
 
 
 def test_nonsense_is_called_so(benchmark):
@@ -79,7 +79,7 @@ def test_nonsense_is_called_so(benchmark):
     assert "no contact" in benchmark.nonsense(replace(good, contact_area_mm2=0 * good.contact_area_mm2), sensor)
 
 
-def test_a_fault_is_flagged_only_where_its_own_levels_are(benchmark):
+def test_a_fault_is_flagged_only_where_its_own_load_steps_are(benchmark):
     from dataclasses import replace
 
     sensor = benchmark.random_sensor(0, "elastic")
@@ -88,4 +88,4 @@ def test_a_fault_is_flagged_only_where_its_own_levels_are(benchmark):
     bad = replace(good, contact_area_mm2=good.contact_area_mm2 * [1, 1, 0])
     for flags, said in (([1, 1, 1], "nonsense"), ([0, 1, 1], "nonsense"), ([1, 1, 0], "flagged"), ([0, 1, 0], "flagged")):
         assert benchmark.judged(replace(bad, within_validity=np.array(flags)), sensor) == (said, "no contact")
-    assert benchmark.judged(replace(good, within_validity=np.array([1, 0, 1])), sensor) == ("outside", "1 of 3 levels")
+    assert benchmark.judged(replace(good, within_validity=np.array([1, 0, 1])), sensor) == ("outside", "1 of 3 load steps")

@@ -15,7 +15,7 @@ from fe import assemble, fine_disc, solid, solve_linear
 from naive_sensor import NaiveSensor
 
 from softtact.fem.elements import quad8
-from softtact.fem.extruded_mesh import extrude, grid_plan
+from softtact.fem.extruded_mesh import extrude, grid_mesh_2d
 from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic.build import build_unit_cell
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
@@ -31,8 +31,8 @@ SOURCE = "naive solver, limit of a sheet of 4 x 4 x 2 and 8 x 8 x 4 elements, ti
 def refined(refinement):
     """Settings of the sensor's mesh with every element split so often in all directions."""
     finer = 2**refinement
-    return MeshSettings.converging(sheet_layers=finer * SHEET_LAYERS, local_over_shear=0.0, refinement=refinement,
-                                   frustum_levels=tuple(np.linspace(0, 1, finer * LAYERS + 1)))
+    return MeshSettings.converging(sheet_layers=finer * SHEET_LAYERS, unprojected_penalty_ratio=0.0, refinement=refinement,
+                                   frustum_heights=tuple(np.linspace(0, 1, finer * LAYERS + 1)))
 
 
 def cell_stiffness(mesh):
@@ -41,7 +41,7 @@ def cell_stiffness(mesh):
     naive = NaiveSensor(body, lambda x, y: (0 * x, np.tile([0.0, 0.0, -1.0], (len(x), 1))))
     matrix = sum(assemble(block.tangent(np.zeros((*nodes.shape, 3))), nodes, naive.nodes) for nodes, block in naive.parts)
     top = 3 * body.slab.cover_mesh.top_nodes + 2
-    tips = 3 * (body.slab.nodes + body.bed.tip) + 2
+    tips = 3 * (body.slab.nodes + body.support.tip) + 2
     return _lowered(naive.T.T @ matrix @ naive.T, np.isin(naive.unknowns, top), np.isin(naive.unknowns, tips))
 
 
@@ -50,8 +50,8 @@ def reference_stiffness(finer):
     cells = parts = 4 * finer
     layers, sheet_layers = finer * LAYERS, finer * SHEET_LAYERS
     lines = np.linspace(-0.5 * PITCH, 0.5 * PITCH, cells + 1)
-    plan = grid_plan(lines, lines)
-    sheet_mesh = extrude(plan, np.linspace(0, HEIGHT, sheet_layers + 1))
+    mesh_2d = grid_mesh_2d(lines, lines)
+    sheet_mesh = extrude(mesh_2d, np.linspace(0, HEIGHT, sheet_layers + 1))
     sheet = solid(sheet_mesh, LAW)
     slope = (ROOT_RADIUS - TIP_RADIUS) / HEIGHT
     frustum = solid(extrude(fine_disc(parts), np.linspace(-HEIGHT, 0, layers + 1), scale=lambda z: ROOT_RADIUS + slope * z), LAW)
@@ -65,12 +65,12 @@ def reference_stiffness(finer):
     held[tip, :2] = True
     held[roots] = True                               # no unknowns of their own
     keep = np.flatnonzero(~held.ravel())
-    T = _tied(points, roots, lines, plan, sheet_mesh.planes[0]).tocsc()[:, keep]
+    T = _tied(points, roots, lines, mesh_2d, sheet_mesh.planes[0]).tocsc()[:, keep]
     vertical = np.arange(3) == 2
     return _lowered(T.T @ matrix @ T, (top[:, None] & vertical).ravel()[keep], (tip[:, None] & vertical).ravel()[keep])
 
 
-def _tied(points, roots, lines, plan, plane):
+def _tied(points, roots, lines, mesh_2d, plane):
     """Sparse matrix (3 n, 3 n): every node its own, but the roots interpolated on the sheet's lower plane."""
     T = sp.lil_matrix((3 * len(points), 3 * len(points)))
     T.setdiag(np.where(np.isin(np.arange(len(points)), roots), 0.0, 1.0).repeat(3))
@@ -78,7 +78,7 @@ def _tied(points, roots, lines, plan, plane):
     for root in roots:
         i, j = np.clip(((points[root, :2] - lines[0]) / size).astype(int), 0, count - 1)
         local = 2 * (points[root, :2] - lines[[i, j]]) / size - 1
-        for node, weight in zip(plane[plan.quads[j * count + i]], quad8(local[None])[0][0], strict=True):
+        for node, weight in zip(plane[mesh_2d.quads[j * count + i]], quad8(local[None])[0][0], strict=True):
             for k in range(3):
                 T[3 * root + k, 3 * node + k] += weight
     return T

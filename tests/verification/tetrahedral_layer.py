@@ -1,6 +1,6 @@
 """A linear layer of structured tetrahedra: a second discretisation, beside the elastic model's hexahedra, and as plain as can be.
 
-The whole layer is solved, no symmetry used; the flexibility is a dense matrix, which `active_set` takes as it is.
+The whole layer is solved, no symmetry used; the compliance is a dense matrix, which `active_set` takes as it is.
 """
 
 from dataclasses import dataclass
@@ -13,10 +13,10 @@ from softtact.linalg.direct import make_solver
 
 @dataclass(frozen=True)
 class DenseCompliance:
-    """points (n, 2): the top's free nodes in mm; flexibility (n, n) downwards in mm/N; area (n,) in mm2 that each stands for."""
+    """points (n, 2): the top's free nodes in mm; compliance (n, n) downwards in mm/N; area (n,) in mm2 that each stands for."""
 
     points: np.ndarray
-    flexibility: np.ndarray
+    compliance: np.ndarray
     area: np.ndarray
 
 
@@ -68,14 +68,14 @@ def surface_compliance(points, tets, *, young_mpa, poisson, chunk=256):
     solver = make_solver()
     solver.factor(upper)
     position = np.searchsorted(free, 3 * top + 2)
-    flexibility = np.empty((len(top), len(top)))
+    compliance = np.empty((len(top), len(top)))
     for start in range(0, len(top), chunk):
         part = position[start:start + chunk]
         right = np.zeros((len(free), len(part)))
         right[part, np.arange(len(part))] = 1.0
-        flexibility[:, start:start + chunk] = solver.solve(right)[position]
+        compliance[:, start:start + chunk] = solver.solve(right)[position]
     solver.close()
-    return DenseCompliance(points[top, :2], 0.5 * (flexibility + flexibility.T), _top_areas(points, tets, high[2] - tolerance)[top])
+    return DenseCompliance(points[top, :2], 0.5 * (compliance + compliance.T), _top_areas(points, tets, high[2] - tolerance)[top])
 
 
 def _top_areas(points, tets, height):

@@ -49,7 +49,7 @@ rule validate_ftir:
         **({"measured": STUDY.values.ftir.measured} if STUDY.values.ftir.measured else {}),
     output:
         area=f"{RESULTS}/ftir/contact_area.csv",
-        readings=f"{RESULTS}/ftir/readings.csv",
+        orientations=f"{RESULTS}/ftir/orientations.csv",
         summary=f"{RESULTS}/ftir/summary.json",
     params:
         files=files,

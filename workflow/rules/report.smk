@@ -155,7 +155,7 @@ rule draw_fig5_ftir:
     input:
         code=code("draw_fig5_ftir"),
         area=rules.validate_ftir.output.area,
-        readings=rules.validate_ftir.output.readings,
+        orientations=rules.validate_ftir.output.orientations,
         summary=rules.validate_ftir.output.summary,
     output:
         **figure_files("fig5_ftir"),

@@ -34,7 +34,7 @@ def add(commands):
     add_mesh(command)
     add_repair(command)
     command.add_argument("--force", type=float, action="append", required=True, metavar="N",
-                         help="force in N; repeat it for several levels")
+                         help="force in N; repeat it for several load steps")
     command.add_argument("--model", choices=MODELS, default="auto",
                          help="auto takes the one that the policy asks for (default)")
     command.add_argument("--policy", choices=("paper", "error"), default="paper",
@@ -88,7 +88,7 @@ def _quality(options):
 
 
 def _show_press(result, options):
-    """Write and print what a press gave, be it the levels before one that was not reached."""
+    """Write and print what a press gave, be it the load steps before one that was not reached."""
     if options.out:
         result.write(options.out)
     if options.vtu:
@@ -116,16 +116,17 @@ def _cards(options):
 
 def _press_summary(result):
     """What a press gave at each force, as plain JSON values."""
-    levels = {"force_n": result.force_n, "indentation_mm": result.indentation_mm,
+    load_steps = {"force_n": result.force_n, "indentation_mm": result.indentation_mm,
               "contact_area_mm2": result.contact_area_mm2,
               "largest_deformation_mm": result.deformation_map_mm.max(axis=(1, 2)),
               "tactile_map": result.tactile_map}
-    names = ("penetration_mm", "frustum_compression_mm", "residual_n", "outside_card", "expected_error_mm", "within_validity",
+    names = ("penetration_mm", "frustum_compression_mm", "residual_n", "extrapolated_volume_fraction", "expected_error_mm",
+             "within_validity",
              "iterations", "wall_time_s")
-    levels |= {name: getattr(result, name) for name in names}
-    facts = {name: getattr(result, name) for name in ("model", "solver", "why")}
+    load_steps |= {name: getattr(result, name) for name in names}
+    facts = {name: getattr(result, name) for name in ("model", "solver", "selection_reason")}
     facts["repairs"] = [repair for repair in result.attributes["mesh_repairs"].split("; ") if repair]
-    return facts | {name: _or_none(values) for name, values in levels.items()}
+    return facts | {name: _or_none(values) for name, values in load_steps.items()}
 
 
 def _or_none(values):
@@ -135,8 +136,8 @@ def _or_none(values):
 
 def _press_lines(summary):
     yield f"model: {summary['model']}, linear solver: {summary['solver']}"
-    if summary["why"]:
-        yield f"chosen because: {summary['why']}"
+    if summary["selection_reason"]:
+        yield f"chosen because: {summary['selection_reason']}"
     yield f"{'force, N':>10}{'indentation, mm':>18}{'contact, mm2':>15}{'deepest, mm':>14}{'counts, sum':>14}"
     names = ("force_n", "indentation_mm", "contact_area_mm2", "largest_deformation_mm", "tactile_map")
     for force, depth, area, deepest, counts in zip(*(summary[name] for name in names), strict=True):
@@ -145,7 +146,7 @@ def _press_lines(summary):
 
 
 def _quality_lines(summary):
-    """How well the levels were solved, by the worst of them."""
+    """How well the load steps were solved, by the worst of them."""
     yield f"iterations: {sum(summary['iterations'])}; deepest overlap in a contact: {1e3 * max(summary['penetration_mm']):.2g} um"
     if None not in summary["residual_n"]:
         yield f"largest unbalanced nodal force: {max(summary['residual_n']):.2g} N"
@@ -157,6 +158,6 @@ def _quality_lines(summary):
         forces = ", ".join(f"{force:g}" for force, valid in zip(summary["force_n"], summary["within_validity"], strict=True)
                            if not valid)
         yield f"beyond what the model is valid for: {forces} N"
-    if None not in summary["outside_card"]:
-        yield f"strained beyond the data behind its law: {max(summary['outside_card']):.1%} of a layer"
+    if None not in summary["extrapolated_volume_fraction"]:
+        yield f"strained beyond the data behind its law: {max(summary['extrapolated_volume_fraction']):.1%} of a layer"
     yield from (f"written: {path}" for path in summary["written"])

@@ -8,7 +8,7 @@ phi' is that of Li et al., Incremental Potential Contact, ACM Trans. Graph. 39 (
 potential is minimised (p inside would make the tangent unsymmetric) and brought up to date afterwards, until both agree.
 
 The slip counts from an anchor, a place on the rigid body, which stays where it is while the point sticks and follows a sliding
-point at the distance e: e is elastic slip, once, and does not add up from level to level.
+point at the distance e: e is elastic slip, once, and does not add up from load step to load step.
 """
 
 from dataclasses import dataclass, replace
@@ -38,7 +38,7 @@ class Coulomb:
         return (self.coefficient * pressure * self._secant(slip))[..., None] * slip
 
     def stiffness(self, slip, pressure, plane, share):
-        """Slope of the traction (p, d, d) in N/mm3, if `share` (p, d) is the traction's part of its limit (see `Drag`).
+        """Slope of the traction (p, d, d) in N/mm3, if `share` (p, d) is the traction's part of its limit (see `FrictionResponse`).
 
         plane (d, d) or (p, d, d) projects on the tangential directions.
         """
@@ -72,7 +72,7 @@ def _direction(slip):
 
 
 @dataclass(frozen=True)
-class Grip:
+class FrictionState:
     """How friction holds points (p,) on a rigid body during one step.
 
     anchor, start (p, d) in mm, in the rigid body's frame: where a point holds to, and where it was when the step began;
@@ -88,14 +88,14 @@ class Grip:
 
     @classmethod
     def first(cls, law, position, gap):
-        """The grip of a body at rest, which will hold every point to where it comes to touch."""
+        """The friction state of a body at rest, which will hold every point to where it comes to touch."""
         return cls(law, position, position, gap, np.zeros(gap.shape), np.zeros(gap.shape, dtype=bool))
 
-    def drag(self, position, normal=None):
+    def friction_response(self, position, normal=None):
         """Friction on points at positions (p, d) before normals (p, d) of the rigid body; None: all d directions are tangential."""
         way = position - self.anchor
         slip = way if normal is None else way - (way * normal).sum(axis=-1, keepdims=True) * normal
-        return Drag(self, position, slip, normal)
+        return FrictionResponse(self, position, slip, normal)
 
     def halfway(self, other):
         """`other` with the pressures halfway between both."""
@@ -103,14 +103,14 @@ class Grip:
 
 
 @dataclass(frozen=True)
-class Drag:
-    """Friction at one state: the grip it comes from, positions and tangential ways from the anchors (p, d) in mm.
+class FrictionResponse:
+    """Friction at one state: the friction state it comes from, positions and tangential ways from the anchors (p, d) in mm.
 
-    normal (p, d): see `Grip.drag`
+    normal (p, d): see `FrictionState.friction_response`
     share (p, d): the traction's part of its limit as Newton's method expected it, see `after`; None: as it is.
     """
 
-    grip: Grip
+    friction_state: FrictionState
     position: np.ndarray
     slip: np.ndarray
     normal: np.ndarray | None = None
@@ -119,22 +119,23 @@ class Drag:
     @property
     def energy(self):
         """mJ/mm2 (p,)."""
-        return self.grip.law.energy(self.slip, self.grip.pressure)
+        return self.friction_state.law.energy(self.slip, self.friction_state.pressure)
 
     @property
     def traction(self):
         """MPa (p, d), against which the points slide."""
-        return self.grip.law.traction(self.slip, self.grip.pressure)
+        return self.friction_state.law.traction(self.slip, self.friction_state.pressure)
 
     def stiffness(self, points=...):
         """N/mm3 (p, d, d) of all points or of some."""
         plane = np.eye(self.slip.shape[-1])
         if self.normal is not None:
             plane = plane - (self.normal[..., :, None] * self.normal[..., None, :])[points]
-        return self.grip.law.stiffness(self.slip[points], self.grip.pressure[points], plane, self._share(points))
+        return self.friction_state.law.stiffness(self.slip[points], self.friction_state.pressure[points], plane,
+                                                 self._share(points))
 
     def _share(self, points=...):
-        return self.grip.law.share(self.slip[points]) if self.share is None else self.share[points]
+        return self.friction_state.law.share(self.slip[points]) if self.share is None else self.share[points]
 
     def after(self, before):
         """The same for the next tangent, where the last was taken at `before`.
@@ -143,25 +144,28 @@ class Drag:
         tolerance. With the share as an unknown of its own, linearised too, they do not (Chan, Golub and Mulet, SIAM J. Sci.
         Comput. 20 (1999) 1964): a third to a half of the iterations. At equilibrium the tangent is the same.
         """
-        if before is None or before.grip is not self.grip:
+        if before is None or before.friction_state is not self.friction_state:
             return self
-        return replace(self, share=self.grip.law.next_share(self.slip, before._share(), before.slip))
+        return replace(self, share=self.friction_state.law.next_share(self.slip, before._share(), before.slip))
 
     def next_step(self, gap):
-        """The grip of a step that starts here, with gaps (p,): anchors follow what slid further than the tolerance."""
-        grip, length = self.grip, np.linalg.norm(self.slip, axis=-1, keepdims=True)
-        kept = self.slip * np.minimum(1.0, grip.law.slip_tolerance_mm / np.maximum(length, 1e-300))
-        touching = grip.pressure > 0
+        """The friction state of a step that starts here, with gaps (p,): anchors follow what slid further than the tolerance."""
+        friction_state, length = self.friction_state, np.linalg.norm(self.slip, axis=-1, keepdims=True)
+        kept = self.slip * np.minimum(1.0, friction_state.law.slip_tolerance_mm / np.maximum(length, 1e-300))
+        touching = friction_state.pressure > 0
         anchor = np.where(touching[..., None], self.position - kept, self.position)
-        return replace(grip, anchor=anchor, start=self.position, start_gap=gap, touching=touching)
+        return replace(friction_state, anchor=anchor, start=self.position, start_gap=gap, touching=touching)
 
     def next_pass(self, gap, pressure):
-        """The same step's grip with newer pressures; a point that came to touch holds to where its path met the rigid body."""
-        grip, new = self.grip, ~self.grip.touching & (pressure > 0)
-        way = np.where(new, np.maximum(grip.start_gap - gap, 1e-300), 1.0)
-        share = np.clip(np.where(new, grip.start_gap, 0.0) / way, 0.0, 1.0)[..., None]
-        anchor = np.where(new[..., None], grip.start + share * (self.position - grip.start), grip.anchor)
-        return replace(grip, anchor=anchor, pressure=pressure, touching=grip.touching | new)
+        """The same step's friction state with newer pressures; a point that came to touch holds to where its path met the rigid
+        body.
+        """
+        friction_state, new = self.friction_state, ~self.friction_state.touching & (pressure > 0)
+        way = np.where(new, np.maximum(friction_state.start_gap - gap, 1e-300), 1.0)
+        share = np.clip(np.where(new, friction_state.start_gap, 0.0) / way, 0.0, 1.0)[..., None]
+        anchor = np.where(new[..., None], friction_state.start + share * (self.position - friction_state.start),
+                          friction_state.anchor)
+        return replace(friction_state, anchor=anchor, pressure=pressure, touching=friction_state.touching | new)
 
 
 def coulomb(coefficient):

@@ -36,24 +36,26 @@ class Contact:
     stiffness: float = 3000.0
     smoothing: float = 1.0 / 3000.0
     offset: float | np.ndarray = 0.0
-    softness: float | np.ndarray = 0.0
+    contact_compliance: float | np.ndarray = 0.0
 
     def response(self, gaps):
         """`penalty` of the points, the offset added to their overlap."""
-        return penalty(gaps - self.offset, stiffness=1.0 / (1.0 / self.stiffness + self.softness), smoothing=self.smoothing)
+        return penalty(gaps - self.offset, stiffness=1.0 / (1.0 / self.stiffness + self.contact_compliance),
+                       smoothing=self.smoothing)
 
     def own_gaps(self, gaps):
         """Gaps in mm without what the points' springs give way."""
-        return gaps + self.softness * self.response(gaps)[1] if np.any(self.softness) else gaps
+        return gaps + self.contact_compliance * self.response(gaps)[1] if np.any(self.contact_compliance) else gaps
 
     def at(self, points):
         """The contact of some of the points."""
-        return replace(self, **{name: value[points] for name in ("offset", "softness") if np.ndim(value := getattr(self, name))})
+        fields = ("offset", "contact_compliance")
+        return replace(self, **{name: value[points] for name in fields if np.ndim(value := getattr(self, name))})
 
     def error(self, gaps):
         """Deepest overlap, or widest gap under pressure, in mm."""
         return float(np.where(gaps < self.offset, np.abs(self.own_gaps(gaps)), 0.0).max(initial=0.0))
 
-    def pressed_apart(self, gaps):
+    def augmented(self, gaps):
         """The contact with offsets that hold each point where its surfaces just touch."""
         return replace(self, offset=np.maximum(0.0, self.offset - self.own_gaps(gaps)))

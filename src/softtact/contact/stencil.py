@@ -1,4 +1,4 @@
-"""About the inverse of a surface's flexibility: what a node feels of its neighbours when all surface nodes are given their depth.
+"""About the inverse of a surface's compliance: what a node feels of its neighbours when all surface nodes are given their depth.
 
 A surface's stiffness reaches hardly further than its elements, so a few neighbours make a good preconditioner.
 """

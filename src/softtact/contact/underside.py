@@ -33,11 +33,13 @@ class Underside:
         if self.lowest_mm >= NO_CONTACT_MM:
             raise InputError("The object misses every free point of the sensor's surface; move it over the sensor.")
 
-    def depth_on_springs(self, force_n, bedding):
-        """How far (mm) the object sinks from its first touch into a bed of springs of `bedding` N/mm3: a first guess."""
+    def depth_on_springs(self, force_n, foundation_modulus):
+        """How far (mm) the object sinks from its first touch into a support of springs of `foundation_modulus` N/mm3: a first
+        guess.
+        """
         there = self._coarse < NO_CONTACT_MM
         area = np.broadcast_to(np.outer(_TRAPEZOID, _TRAPEZOID).ravel() * np.prod(self._grid.step), there.shape)[there]
-        return depth_on_springs(self._coarse[there] - self.lowest_mm, area, force_n / bedding)
+        return depth_on_springs(self._coarse[there] - self.lowest_mm, area, force_n / foundation_modulus)
 
     def points(self, reach_mm):
         """The `ObjectPoints` as far as the object is lower than `reach_mm` over its lowest point."""
@@ -103,7 +105,7 @@ class Underside:
     def _above(self, nodes, heights, places):
         """Gaps (e,), slopes (e, 2) and windows of nodes on the planes of the facets over places (e, 2) in steps from them.
 
-        Facets too steep to stand for a node's surroundings count as level at their place; none over a place: infinitely high.
+        Facets too steep to stand for a node's surroundings count as load step at their place; none over a place: infinitely high.
         """
         step, samples = self._grid.step, window_places()
         height, slope = self._facets(self._grid.points[nodes] + places * step)

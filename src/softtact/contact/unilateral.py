@@ -1,10 +1,10 @@
-"""A rigid object pressed on an elastic surface of known flexibility, all force levels at once.
+"""A rigid object pressed on an elastic surface of known compliance, all load steps at once.
 
 Unknown are the forces f >= 0 at the contact points:  gap = gap0 - depth + A f >= 0,  f gap = 0,  sum f = F,
-with the flexibility A among the points. Primal-dual active sets, that is a semismooth Newton method: points that penetrate join,
+with the compliance A among the points. Primal-dual active sets, that is a semismooth Newton method: points that penetrate join,
 points that pull leave. The equations of a set are solved by conjugate gradients on the plane sum f = const, in single precision
-with the residual in double (iterative refinement). A product with A for twenty levels takes seven times as long as for one,
-which is what makes the levels cheap; many presses on a GPU are more columns still (`models/elastic/batch`). Many points that
+with the residual in double (iterative refinement). A product with A for twenty load steps takes seven times as long as for one,
+which is what makes the load steps cheap; many presses on a GPU are more columns still (`models/elastic/batch`). Many points that
 settle together suit this; few and changing ones `active_set`, which is the plain method and its specification.
 References: Hintermueller, Ito and Kunisch, SIAM J. Optim. 13 (2003) 865; Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23
 (2001) 1376 (projected conjugate gradients); Johnson, Contact Mechanics, sec. 5.9.
@@ -17,7 +17,7 @@ from array_api_compat import array_namespace, device
 
 from softtact.errors import ConvergenceError
 
-_AS_WIDE = 0.8    # share of the last level's points from which on a level starts with the last level's forces, scaled
+_AS_WIDE = 0.8    # share of the last load step's points from which on a load step starts with the last load step's forces, scaled
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,8 @@ class ContactSettings:
 
 
 @dataclass(frozen=True)
-class ContactLevels:
-    """Levels l: forces (c, l) in N, depth (l,) in mm, gaps (c, l) in mm, iterations (l,), settled (l,): which were reached."""
+class ContactLoadSteps:
+    """Load steps l: forces (c, l) in N, depth (l,) in mm, gaps (c, l) in mm, iterations (l,), settled (l,): which were reached."""
 
     force: np.ndarray
     depth: np.ndarray
@@ -46,7 +46,7 @@ class ContactLevels:
         return np.maximum(0.0, -self.gap.min(axis=0))
 
 
-class DenseFlexibility:
+class DenseCompliance:
     """What a matrix (c, c) in mm/N does to forces (c, l), in double and in single precision."""
 
     def __init__(self, matrix):
@@ -65,36 +65,37 @@ class DenseFlexibility:
         return x
 
 
-def press_elastic(flexibility, gap0, forces_n, *, area=None, bedding=1.0, precondition=None, settings=ContactSettings()):
-    """`ContactLevels` of points with gaps gap0 (c,) in mm under forces (l,) in N.
+def press_elastic(compliance, gap0, forces_n, *, area=None, foundation_modulus=1.0, precondition=None, settings=ContactSettings()):
+    """`ContactLoadSteps` of points with gaps gap0 (c,) in mm under forces (l,) in N.
 
-    flexibility (c, c): mm/N;  area (c,): in any unit, and bedding: force per area and depth, for a first guess
-    precondition: approximate inverse of the flexibility, of (c, l), or None. Raises ConvergenceError naming a level not reached.
+    compliance (c, c): mm/N;  area (c,): in any unit, and foundation_modulus: force per area and depth, for a first guess
+    precondition: approximate inverse of the compliance, of (c, l), or None. Raises ConvergenceError naming a load step not reached.
     """
-    forces_n, acting = np.asarray(forces_n, dtype=float), DenseFlexibility(flexibility)
+    forces_n, acting = np.asarray(forces_n, dtype=float), DenseCompliance(compliance)
     if precondition is not None:
         acting.precondition = precondition
     area = np.ones(len(gap0)) if area is None else area
-    depth = depth_on_springs(gap0 - gap0.min(), area, forces_n / bedding) + gap0.min()
-    levels = press_columns(acting, gap0[:, None], forces_n[None], depth[None], area=area, settings=settings)
-    if not levels.settled.all():
-        raise ConvergenceError(not_settled(forces_n[~levels.settled][0], settings))
-    return levels
+    depth = depth_on_springs(gap0 - gap0.min(), area, forces_n / foundation_modulus) + gap0.min()
+    load_steps = press_columns(acting, gap0[:, None], forces_n[None], depth[None], area=area, settings=settings)
+    if not load_steps.settled.all():
+        raise ConvergenceError(not_settled(forces_n[~load_steps.settled][0], settings))
+    return load_steps
 
 
 def not_settled(force_n, settings=ContactSettings()):
-    """What is said of a level that is not reached."""
+    """What is said of a load step that is not reached."""
     return f"The elastic press did not settle its contact at {force_n:g} N in {settings.max_iterations} iterations."
 
 
-def press_columns(flexibility, gap0, forces_n, depth, *, area, settings=ContactSettings()):
-    """`ContactLevels` of many presses on one surface, with a column for each press and level, a press' levels side by side.
+def press_columns(compliance, gap0, forces_n, depth, *, area, settings=ContactSettings()):
+    """`ContactLoadSteps` of many presses on one surface, with a column for each press and load step, a press' load steps side by
+    side.
 
-    flexibility: has `double`, `single`, `precondition`, of (c, columns);  gap0 (c, p): in mm, far above any depth where an object
+    compliance: has `double`, `single`, `precondition`, of (c, columns);  gap0 (c, p): in mm, far above any depth where an object
     has no point;  forces_n (p, l): in N, rising;  depth (p, l): first guesses in mm;  area (c,): of the points, in any unit
-    All are arrays of one kind, NumPy's or torch's on any device; so are the levels' fields.
+    All are arrays of one kind, NumPy's or torch's on any device; so are the load steps' fields.
     """
-    return _Press(flexibility, gap0, forces_n, settings).run(depth, area)
+    return _Press(compliance, gap0, forces_n, settings).run(depth, area)
 
 
 @dataclass
@@ -110,15 +111,15 @@ class _State:
 
 
 class _Press:
-    """The method on columns m, whose presses and last levels are `press` and `last` (m,)."""
+    """The method on columns m, whose presses and last load steps are `press` and `last` (m,)."""
 
-    def __init__(self, flexibility, gap0, forces, settings):
+    def __init__(self, compliance, gap0, forces, settings):
         self.xp = array_namespace(gap0)
-        self.flexibility, self.gap0, self.settings = flexibility, gap0, settings
-        self.forces, levels = self.xp.reshape(forces, (-1,)), forces.shape[1]
+        self.compliance, self.gap0, self.settings = compliance, gap0, settings
+        self.forces, load_steps = self.xp.reshape(forces, (-1,)), forces.shape[1]
         self.columns = self.xp.arange(len(self.forces), device=device(gap0))
-        self.press, self.level = self.columns // levels, self.columns % levels
-        self.last = self.press * levels + levels - 1
+        self.press, self.load_step = self.columns // load_steps, self.columns % load_steps
+        self.last = self.press * load_steps + load_steps - 1
 
     def run(self, depth, area):
         state = self._first(self.xp.reshape(depth, (-1,)), area)
@@ -127,7 +128,7 @@ class _Press:
         if len(below):
             self._scale_down(state, below)
             self._settle(state, below)
-        return ContactLevels(force=state.f, depth=state.depth, gap=state.gap, iterations=state.iterations, settled=state.settled)
+        return ContactLoadSteps(force=state.f, depth=state.depth, gap=state.gap, iterations=state.iterations, settled=state.settled)
 
     def _first(self, depth, area):
         """Forces of springs side by side under the object, as deep as each force asks for."""
@@ -138,7 +139,7 @@ class _Press:
                       iterations=xp.zeros_like(self.columns), settled=self.columns < 0)
 
     def _scale_down(self, state, below):
-        """Start the levels below the last one with its forces, scaled, where the contact is about as wide at first guess."""
+        """Start the load steps below the last one with its forces, scaled, where the contact is about as wide at first guess."""
         xp, last = self.xp, self.last[below]
         points = xp.sum(xp.astype(state.active, xp.int64), axis=0)
         like = points[below] > _AS_WIDE * points[last]
@@ -159,7 +160,7 @@ class _Press:
         """Gaps of some columns, with points joined that penetrate and left that pull; which of the columns have settled."""
         xp, tolerance = self.xp, self.settings.tolerance_mm
         f, active, forces = state.f[:, columns], state.active[:, columns], self.forces[columns]
-        gap = self.gap0[:, self.press[columns]] + self.flexibility.double(f)
+        gap = self.gap0[:, self.press[columns]] + self.compliance.double(f)
         depth = xp.sum(xp.where(active, gap, 0.0), axis=0) / xp.sum(xp.astype(active, gap.dtype), axis=0)
         gap -= depth
         joining, pulling = ~active & (gap < -tolerance), active & (f < 0)
@@ -169,7 +170,7 @@ class _Press:
 
     def _newton(self, state, columns):
         """One step of the forces of some columns; what acts no more loses its force."""
-        xp, single, precondition = self.xp, self.flexibility.single, self.flexibility.precondition
+        xp, single, precondition = self.xp, self.compliance.single, self.compliance.precondition
         active, before = state.active[:, columns], state.f[:, columns]
         f = xp.where(active, before, 0.0)
         lost = xp.astype(f - before, xp.float32)
@@ -183,15 +184,16 @@ class _Press:
         state.iterations[columns] += 1
 
 
-def depth_on_springs(gap, area, force_over_bedding):
-    """Depth at which springs side by side, under gaps (c,) >= 0 that begin at 0 and of areas (c,), take a force over their bedding.
+def depth_on_springs(gap, area, force_over_modulus):
+    """Depth at which springs side by side, under gaps (c,) >= 0 that begin at 0 and of areas (c,), take a force over their
+    foundation_modulus.
 
-    force_over_bedding: area times depth, a number or (l,); a first guess for what an object does on a surface.
+    force_over_modulus: area times depth, a number or (l,); a first guess for what an object does on a surface.
     """
     order = np.argsort(gap)
     weight, moment = np.cumsum(area[order]), np.cumsum((area * gap)[order])
-    last = np.searchsorted(gap[order] * weight - moment, force_over_bedding, side="left") - 1     # the last one that is pressed
-    return (force_over_bedding + moment[last]) / weight[last]
+    last = np.searchsorted(gap[order] * weight - moment, force_over_modulus, side="left") - 1     # the last one that is pressed
+    return (force_over_modulus + moment[last]) / weight[last]
 
 
 def projected_conjugate_gradients(apply, precondition, mask, right, total, settings):
@@ -229,8 +231,8 @@ def _dot(a, b):
 
 
 @dataclass(frozen=True)
-class ElasticLevel:
-    """One force level: forces (c,) in N, displacement (c,) of the points in mm, indentation in mm."""
+class ElasticLoadStep:
+    """One load step: forces (c,) in N, displacement (c,) of the points in mm, indentation in mm."""
 
     force_n: float
     nodal_force: np.ndarray
@@ -240,38 +242,38 @@ class ElasticLevel:
     penetration: float
 
 
-def active_set(flexibility, gap0, forces_n, *, max_iterations=200):
-    """Yield an `ElasticLevel` for each force: the plain method, level by level, with direct solutions.
+def active_set(compliance, gap0, forces_n, *, max_iterations=200):
+    """Yield an `ElasticLoadStep` for each force: the plain method, load step by load step, with direct solutions.
 
     Solve the touching points' equations, drop those that pull, add those that penetrate; the set of one force starts the next.
     """
     active = gap0 <= gap0.min() + 1e-9
     for force in forces_n:
-        level, active = _solve_level(flexibility, gap0, active, float(force), max_iterations)
-        yield level
+        load_step, active = _solve_load_step(compliance, gap0, active, float(force), max_iterations)
+        yield load_step
 
 
-def _solve_level(flexibility, gap0, active, force, max_iterations):
+def _solve_load_step(compliance, gap0, active, force, max_iterations):
     tolerance = 1e-9
     for iteration in range(1, max_iterations + 1):
         nodes = np.flatnonzero(active)
-        pressing, indentation = _bordered(flexibility[np.ix_(nodes, nodes)], gap0[nodes], force)
+        pressing, indentation = _bordered(compliance[np.ix_(nodes, nodes)], gap0[nodes], force)
         if (pressing < -tolerance * force).any():
             active[nodes[pressing < 0]] = False
             continue
-        displacement = flexibility[:, nodes] @ pressing
+        displacement = compliance[:, nodes] @ pressing
         gap = gap0 - indentation + displacement
         entering = (gap < -tolerance) & ~active
         if not entering.any():
             nodal = np.zeros(len(gap0))
             nodal[nodes] = np.maximum(pressing, 0.0)
-            return ElasticLevel(force, nodal, displacement, indentation, iteration, float(max(0.0, -gap.min()))), active
+            return ElasticLoadStep(force, nodal, displacement, indentation, iteration, float(max(0.0, -gap.min()))), active
         active |= entering
     raise ConvergenceError(f"The elastic press did not settle its contact at {force:g} N in {max_iterations} iterations.")
 
 
-def _bordered(flexibility, gap0, force):
-    """Forces of touching points and indentation: flexibility f - indentation = -gap0, sum f = force."""
-    solution = np.linalg.solve(flexibility, np.column_stack([np.ones(len(gap0)), gap0]))
+def _bordered(compliance, gap0, force):
+    """Forces of touching points and indentation: compliance f - indentation = -gap0, sum f = force."""
+    solution = np.linalg.solve(compliance, np.column_stack([np.ones(len(gap0)), gap0]))
     indentation = (force + solution[:, 1].sum()) / solution[:, 0].sum()
     return indentation * solution[:, 0] - solution[:, 1], indentation

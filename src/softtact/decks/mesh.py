@@ -64,17 +64,18 @@ class BodyMesh:
 
 def body_mesh(body):
     """The `BodyMesh` of a `LayeredBody`."""
-    slab, bed = body.slab, body.bed
+    slab, support = body.slab, body.support
     cover, hanging = _cover_numbers(slab)
     sheet, followers = _sheet_numbers(slab, slab.nodes + len(hanging))
-    own = slab.nodes + len(hanging) + len(followers) + np.arange(bed.count * bed.nodes).reshape(bed.count, bed.nodes)
-    own[:, bed.root] = body.cells.roots
+    first = slab.nodes + len(hanging) + len(followers)
+    own = first + np.arange(support.count * support.nodes).reshape(support.count, support.nodes)
+    own[:, support.root] = body.cells.roots
     points = np.vstack([slab.points, slab.cover_mesh.points[hanging], slab.sheet_mesh.points[followers],
-                        bed.coordinates.reshape(-1, 3)])
+                        support.coordinates.reshape(-1, 3)])
     ties = _ties(slab.nodes, hanging, *slab.cover_mesh.masters())
     ties += _ties(slab.nodes + len(hanging), followers, *slab.sheet_nodes)
     number = _numbers_in_use([sheet[_hexes(slab.sheet_mesh)], sheet[_wedges(slab.sheet_mesh)], cover,
-                              own[:, _hexes(bed.mesh)], *(tie.masters for tie in ties)], len(points))
+                              own[:, _hexes(support.mesh)], *(tie.masters for tie in ties)], len(points))
     ties = [Tie(int(number[tie.slave]), number[tie.masters], tie.weights) for tie in ties if number[tie.slave] >= 0]
     frusta = number[own]
     return BodyMesh(points[number >= 0], _parts(body, number[sheet], number[cover], frusta), ties, number[:slab.nodes], frusta)
@@ -124,13 +125,13 @@ def _numbers_in_use(members, count):
 
 
 def _parts(body, sheet, cover, frusta):
-    slab, bed = body.slab, body.bed
+    slab, support = body.slab, body.support
     none, mesh = np.zeros((0, 15), dtype=np.int64), slab.sheet_mesh
     (hexes, more_hexes), (wedges, more_wedges) = (np.split(sheet[kind], [len(kind) // mesh.layers * slab.sheet_layers])
                                                   for kind in (_hexes(mesh), _wedges(mesh)))     # the cover's are above
     pieces = [("SHEET", hexes, wedges, slab.layers[0].law),
               ("COVER", np.vstack([more_hexes, cover]), more_wedges, slab.layers[1].law),
-              ("FRUSTA", frusta[:, _hexes(bed.mesh)].reshape(-1, 20), none, bed.block.law)]
+              ("FRUSTA", frusta[:, _hexes(support.mesh)].reshape(-1, 20), none, support.block.law)]
     parts, first = [], 0
     for name, hexes, wedges, law in pieces:
         if len(hexes):

@@ -14,7 +14,7 @@ from softtact.contact.penalty import Contact
 from softtact.decks.mesh import body_mesh
 from softtact.errors import InputError
 from softtact.fem.elements import HEX27_BOTTOM
-from softtact.fem.extruded_mesh import PlanMesh
+from softtact.fem.extruded_mesh import Mesh2D
 from softtact.geometry.meshes import facets_over
 from softtact.models.hyperelastic.frusta import DIRECTIONS
 
@@ -90,11 +90,11 @@ def deck_model(body, placed, *, forces_n=None, indentations_mm=None, title="pres
     surfaces = _surfaces(body, mesh)
     rigid, contacts = [_object(body, surface), _board(body)], _contacts(body)
     if "FRUSTA_SIDES_ODD" in surfaces:
-        contacts.append(ContactPair("NEIGHBOURS", "FRUSTA_SIDES_EVEN", "FRUSTA_SIDES_ODD", body.bed.contact))
+        contacts.append(ContactPair("NEIGHBOURS", "FRUSTA_SIDES_EVEN", "FRUSTA_SIDES_ODD", body.support.contact))
     walls = _walls(body)
     if walls is not None:
         rigid.append(walls)
-        contacts.append(ContactPair("WALLS", "FRUSTA_SIDES", "WALLS", body.bed.contact))
+        contacts.append(ContactPair("WALLS", "FRUSTA_SIDES", "WALLS", body.support.contact))
     held = _held(body, mesh)
     return DeckModel(title=title, points=mesh.points, parts=mesh.parts, ties=mesh.ties, held=held,
                      node_sets=_node_sets(body, mesh, held), surfaces=surfaces, rigid=rigid, contacts=contacts,
@@ -106,7 +106,7 @@ def _node_sets(body, mesh, held):
     sets = {part.name: part.nodes for part in mesh.parts}
     interface = mesh.slab[body.slab.interface_nodes]
     sets["INTERFACE"] = np.sort(interface[interface >= 0])     # a deck leaves out nodes in the middle of faces
-    tips = mesh.frusta[:, body.bed.tip]
+    tips = mesh.frusta[:, body.support.tip]
     return sets | {"TIPS": tips[tips >= 0], "TIED": np.array([tie.slave for tie in mesh.ties], dtype=int),
                    "HELD": np.unique(held[:, 0])}
 
@@ -116,25 +116,25 @@ def _held(body, mesh):
     slab = np.ones(3 * body.slab.nodes, dtype=bool)
     slab[body.slab.free] = False
     node, component = np.divmod(np.flatnonzero(slab), 3)
-    free = np.zeros(3 * body.bed.nodes, dtype=bool)
-    free[body.bed.inner], free[body.bed.root_dofs] = True, True
+    free = np.zeros(3 * body.support.nodes, dtype=bool)
+    free[body.support.inner], free[body.support.root_dofs] = True, True
     local, axis = np.divmod(np.flatnonzero(~free), 3)
     pairs = np.vstack([np.column_stack([mesh.slab[node], component]),
-                       np.column_stack([mesh.frusta[:, local].ravel(), np.tile(axis, body.bed.count)])])
+                       np.column_stack([mesh.frusta[:, local].ravel(), np.tile(axis, body.support.count)])])
     return pairs[pairs[:, 0] >= 0]
 
 
 def _surfaces(body, mesh):
     """Faces that may touch something: the slab's top, and per frustum its tip and its sides."""
-    bed = body.bed
-    plan = PlanMesh(bed.mesh.points[:, :2], bed.mesh.layer(0)[:, HEX27_BOTTOM], 0)
-    quads, sides = plan.outer_sides()
-    elements = mesh.parts[-1].elements.reshape(bed.count, bed.mesh.layers, -1)
+    support = body.support
+    mesh_2d = Mesh2D(support.mesh.points[:, :2], support.mesh.layer(0)[:, HEX27_BOTTOM], 0)
+    quads, sides = mesh_2d.outer_sides()
+    elements = mesh.parts[-1].elements.reshape(support.count, support.mesh.layers, -1)
     tips, around = _faces(elements[:, 0], BOTTOM), _faces(elements[:, :, quads], FIRST_SIDE + sides)
     surfaces = {"TOP": _top_faces(body, mesh.parts), "FRUSTA_TIPS": tips, "FRUSTA_SIDES": around,
                 "FRUSTA_FOOT": np.vstack([tips, around])}
-    if bed.count > 1 and bed.geometry.neighbours.any():
-        odd = _odd(bed.geometry.centres)
+    if support.count > 1 and support.geometry.neighbours.any():
+        odd = _odd(support.geometry.centres)
         surfaces["FRUSTA_SIDES_EVEN"] = _faces(elements[~odd][:, :, quads], FIRST_SIDE + sides)
         surfaces["FRUSTA_SIDES_ODD"] = _faces(elements[odd][:, :, quads], FIRST_SIDE + sides)
     return surfaces
@@ -165,7 +165,7 @@ def _object(body, surface):
     """The object's facets that look down, lie over the slab and are as near as the sensor is thick, slivers left out."""
     lowest = surface.triangles[..., 2].min(axis=1) if len(surface.triangles) else np.zeros(0)
     footprint = [2 * max(abs(lines[0]), abs(lines[-1])) for lines in (body.slab.x_lines, body.slab.y_lines)]
-    reach = -body.bed.coordinates[..., 2].min()
+    reach = -body.support.coordinates[..., 2].min()
     near = facets_over(surface.triangles, footprint) & (lowest <= lowest.min(initial=np.inf) + reach)
     near &= _widths(surface.triangles) > SLIVER_MM
     if not near.any():
@@ -189,30 +189,30 @@ def _board(body):
     """The PCB under the longest frustum."""
     (x0, x1), (y0, y1) = ((lines[0] - _BOARD_MARGIN_MM, lines[-1] + _BOARD_MARGIN_MM)
                           for lines in (body.slab.x_lines, body.slab.y_lines))
-    z = body.bed.coordinates[..., 2].min()
+    z = body.support.coordinates[..., 2].min()
     return _rectangle("BOARD", [[x0, y0, z], [x1, y0, z], [x1, y1, z], [x0, y1, z]])
 
 
 def _contacts(body):
     return [ContactPair("OBJECT_ON_TOP", "TOP", "OBJECT", body.slab.top.contact, body.slab.top.friction),
-            ContactPair("FRUSTA_ON_BOARD", "FRUSTA_FOOT", "BOARD", body.bed.contact, body.bed.friction)]
+            ContactPair("FRUSTA_ON_BOARD", "FRUSTA_FOOT", "BOARD", body.support.contact, body.support.friction)]
 
 
 def _walls(body):
     """Planes of symmetry towards neighbours that are not modelled (the unit cell); None where all of them are."""
-    bed = body.bed
-    if bed.count > 1 or not bed.geometry.neighbours.any():
+    support = body.support
+    if support.count > 1 or not support.geometry.neighbours.any():
         return None
-    bottom, top = bed.coordinates[..., 2].min() - 0.1, bed.coordinates[..., 2].max()
-    half = 0.5 * bed.geometry.root_diameter + bed.geometry.wall_mm
+    bottom, top = support.coordinates[..., 2].min() - 0.1, support.coordinates[..., 2].max()
+    half = 0.5 * support.geometry.root_diameter + support.geometry.wall_mm
     reach = 2 * half
     points, facets = [], []
     for k, (axis, sign) in enumerate(DIRECTIONS):
-        if not bed.geometry.neighbours[0, k]:
+        if not support.geometry.neighbours[0, k]:
             continue
         corners = np.zeros((4, 3))
-        corners[:, axis] = bed.geometry.centres[0, axis] + sign * half
-        corners[:, 1 - axis] = bed.geometry.centres[0, 1 - axis] + reach * np.array([-1, -1, 1, 1])
+        corners[:, axis] = support.geometry.centres[0, axis] + sign * half
+        corners[:, 1 - axis] = support.geometry.centres[0, 1 - axis] + reach * np.array([-1, -1, 1, 1])
         corners[:, 2] = [bottom, top, top, bottom]
         if np.cross(corners[1] - corners[0], corners[2] - corners[0])[axis] * sign > 0:   # the normal looks at the frustum
             corners = corners[::-1]
@@ -227,7 +227,7 @@ def _steps(body, surface, forces_n, indentations_mm, touch_mm):
     if forces_n is None:
         depths = np.atleast_1d(indentations_mm)
         return [Step(f"INDENTATION_{k + 1}", "indentation", float(depth)) for k, depth in enumerate(depths)]
-    clearance = body.slab.facing(body.rest()[0], surface).anchors[:, 2].min()
+    clearance = body.slab.project(body.rest()[0], surface).anchors[:, 2].min()
     if clearance >= NO_CONTACT_MM:
         raise InputError("The object is nowhere over a point of the cover that feels contact; correct its pose or refine the mesh.")
     touch = Step("TOUCH", "indentation", float(clearance + touch_mm))
@@ -235,7 +235,7 @@ def _steps(body, surface, forces_n, indentations_mm, touch_mm):
 
 
 def _remarks(body):
-    block = body.bed.block
+    block = body.support.block
     share = f"{block.local_modulus / block.law.bulk_modulus:.2g}"
     return ("units: mm, N, MPa",
             "*EQUATION: the sheet's upper nodes follow the cover's lower side; where walls between cells are coarse, nodes at "

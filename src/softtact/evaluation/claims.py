@@ -90,14 +90,14 @@ def _ftir(ftir):
 
 
 def _curve_shapes(ftir):
-    """A row per reading of the printed frustum: does the area grow as the paper's words have it, with any law?"""
-    for reading in dict.fromkeys(record["reading"] for record in ftir["readings"]):
-        records = [record for record in ftir["readings"] if record["reading"] == reading]
-        yield row(f"Frusta read as {reading}: the contact area grows with the force, in discs", "sec. 4.1, fig. 5",
+    """A row per orientation of the printed frustum: does the area grow as the paper's words have it, with any law?"""
+    for orientation in dict.fromkeys(record["orientation"] for record in ftir["orientations"]):
+        records = [record for record in ftir["orientations"] if record["orientation"] == orientation]
+        yield row(f"Frusta read as {orientation}: the contact area grows with the force, in discs", "sec. 4.1, fig. 5",
                    "increases, not necessarily linearly", " ".join(record["sentence"] for record in records),
                    verdict_of(any(record["allowed"] for record in records)),
                    "with one law at least: rises at every force, by 0.04 mm2 or more, discs two pixels apart, no step steeper than "
-                   "four times the mean", "ftir/readings.csv", uncertainty="none: one simulation of each law, without scatter")
+                   "four times the mean", "ftir/orientations.csv", uncertainty="none: one simulation of each law, without scatter")
 
 
 def _complexity(complexity, choose, printed):

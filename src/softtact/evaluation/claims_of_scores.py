@@ -153,4 +153,4 @@ def _repeats(ceiling, source):
     mean, error = ceiling.ssim.mean(), ceiling.ssim.std(ddof=1) / np.sqrt(len(ceiling))
     return row(claim, "sec. 4.2", printed, f"SSIM of trials against each other {mean:.4f}, {source}",
                ARCHIVE if source == VIRTUAL else verdict_of(mean < 0.999), rule, evidence,
-               uncertainty=f"standard error {error:.4f} over {len(ceiling)} levels")
+               uncertainty=f"standard error {error:.4f} over {len(ceiling)} load steps")

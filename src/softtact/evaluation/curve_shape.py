@@ -67,20 +67,22 @@ def verdict(name, found, *, pixel_mm):
             "discs.")
 
 
-def judge(readings, *, pitch_mm, pixel_mm):
-    """Records {reading, law, allowed, sentence, and the measures} of a long table (reading, law, force_n, area_per_frustum_mm2)."""
+def judge(orientations, *, pitch_mm, pixel_mm):
+    """Records {orientation, law, allowed, sentence, and the measures} of a long table (orientation, law, force_n,
+    area_per_frustum_mm2).
+    """
     records = []
-    for (reading, law), curve in readings.groupby(["reading", "law"], sort=False):
+    for (orientation, law), curve in orientations.groupby(["orientation", "law"], sort=False):
         found = measures(curve.force_n, curve.area_per_frustum_mm2, pitch_mm=pitch_mm)
-        records.append({"reading": reading, "law": law, "allowed": not objections(found, pixel_mm=pixel_mm),
-                        "sentence": verdict(f"{reading}, {law}", found, pixel_mm=pixel_mm), **found})
+        records.append({"orientation": orientation, "law": law, "allowed": not objections(found, pixel_mm=pixel_mm),
+                        "sentence": verdict(f"{orientation}, {law}", found, pixel_mm=pixel_mm), **found})
     return records
 
 
 def summary_sentence(records):
-    """What the paper's words allow, of all readings and laws judged."""
-    allowed = [f"{r['reading']} with {r['law']}" for r in records if r["allowed"]]
-    readings = list(dict.fromkeys(r["reading"] for r in records))
-    out = [name for name in readings if not any(r["allowed"] for r in records if r["reading"] == name)]
+    """What the paper's words allow, of all orientations and laws judged."""
+    allowed = [f"{r['orientation']} with {r['law']}" for r in records if r["allowed"]]
+    orientations = list(dict.fromkeys(r["orientation"] for r in records))
+    out = [name for name in orientations if not any(r["allowed"] for r in records if r["orientation"] == name)]
     text = f"The paper's words allow {', '.join(allowed)}." if allowed else "The paper's words allow none of the curves."
-    return text + (f" They hardly allow the reading {' or '.join(out)} with any law." if out else "")
+    return text + (f" They hardly allow the orientation {' or '.join(out)} with any law." if out else "")

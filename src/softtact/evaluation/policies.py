@@ -1,8 +1,8 @@
 """What choosing a model costs and what error it accepts: the paper's rule, the expected error, and always the same model.
 
-The error of a press is the root mean square of a map's difference from the hyperelastic model's in mm, of the worst of its levels;
-its time is that of all levels together, under the `error` policy with both cheap models, which that policy presses first. The
-error to expect is calibrated on one set of presses (the indenters) and tested on the others.
+The error of a press is the root mean square of a map's difference from the hyperelastic model's in mm, of the worst of its load
+steps; its time is that of all load steps together, under the `error` policy with both cheap models, which that policy presses
+first. The error to expect is calibrated on one set of presses (the indenters) and tested on the others.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ CALIBRATION_SET = "indenters"
 
 
 def press_table(presses, paper_choice, *, height_mm):
-    """A row per press and its worst level: set, item, paper's model, time and error of each model, errors to expect.
+    """A row per press and its worst load step: set, item, paper's model, time and error of each model, errors to expect.
 
     presses: list of {model: data set of `simulate_press`};  paper_choice: {item: model};  height_mm: of a frustum
     Returns the table and the calibrated `FoundationError`.
@@ -32,7 +32,7 @@ def _calibrated(presses, height_mm):
 
 
 def _errors(press):
-    """{model: true errors (levels,) in mm}."""
+    """{model: true errors (load steps,) in mm}."""
     truth = press["hyperelastic"].deformation_map_mm.values
     return {model: rms(press[model].deformation_map_mm.values - truth) for model in MODELS}
 

@@ -28,7 +28,7 @@ def score_samples(network, samples, *, ssim):
 
 
 def score_sensor(samples, *, ssim):
-    """A row per level with at least two trials: set, item, force_n, ssim.
+    """A row per load step with at least two trials: set, item, force_n, ssim.
 
     ssim: mean over the trials of each one's SSIM against the mean of the others. A network's scores can
     lie above it by chance, and by the noise that is left in the mean of few trials.
@@ -45,23 +45,23 @@ def predict_grasps(networks, grasps):
 
     networks, grasps: {model: network}, {model: samples}
     Returns a data set tactile_map (model, item, force, row, column) and sensor_map (item, force, row, column), the mean
-    over the trials, in counts; nan where a level is outside a model's validity.
+    over the trials, in counts; nan where a load step is outside a model's validity.
     """
     labels = next(iter(grasps.values())).labels
     items, forces = sorted(labels["item"].unique()), np.sort(labels.force_n.unique())
-    tables = {model: level_means(samples, predict(networks[model], samples.maps_mm), items, forces)
+    tables = {model: load_step_means(samples, predict(networks[model], samples.maps_mm), items, forces)
               for model, samples in grasps.items()}
     some = next(iter(grasps.values()))
     dims = ("item", "force", "row", "column")
     return xarray.Dataset(
         {"tactile_map": (("model", *dims), np.stack(list(tables.values())), {"units": "counts"}),
-         "sensor_map": (dims, level_means(some, some.counts, items, forces), {"units": "counts"}),
+         "sensor_map": (dims, load_step_means(some, some.counts, items, forces), {"units": "counts"}),
          "force_n": ("force", forces, {"units": "N"})},
         coords={"model": np.array(list(tables), dtype=object), "item": np.array(items, dtype=object)},
         attrs={"source": some.source})
 
 
-def level_means(samples, maps, items, forces):
+def load_step_means(samples, maps, items, forces):
     """Mean over the trials of `maps` (n, row, column) per item and force: (item, force, row, column)."""
     means = np.full((len(items), len(forces), *maps.shape[1:]), np.nan, dtype=np.float32)
     for (item, force), chosen in samples.labels.groupby(["item", "force_n"]).indices.items():

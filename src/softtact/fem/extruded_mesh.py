@@ -12,7 +12,7 @@ NO_TRIANGLES = np.zeros((0, 6, 2))
 
 
 @dataclass(frozen=True)
-class PlanMesh:
+class Mesh2D:
     """points (n, 2), of which the first `corners` are element corners; quads (q, 8 or 9), triangles (t, 6).
 
     Elements list corners, mid-sides, and the 9-node quad its centre.
@@ -71,30 +71,30 @@ class HexMesh:
         return self.wedges.reshape(self.layers, -1, 18)[index]
 
 
-def extrude(plan, levels, *, scale=None):
+def extrude(mesh_2d, heights, *, scale=None):
     """Lift a plan mesh through `levels` (increasing z in mm); `scale(z)` multiplies the plan's coordinates.
 
     8-node quads become 20-node hexahedra, 9-node quads 27-node ones, triangles 18-node wedges.
     """
-    levels = np.asarray(levels, dtype=float)
-    middles = 0.5 * (levels[:-1] + levels[1:])
-    full = plan.quads.shape[1] == 9
-    count, upright = len(plan.points), len(plan.points) if full else plan.corners
+    heights = np.asarray(heights, dtype=float)
+    middles = 0.5 * (heights[:-1] + heights[1:])
+    full = mesh_2d.quads.shape[1] == 9
+    count, upright = len(mesh_2d.points), len(mesh_2d.points) if full else mesh_2d.corners
 
     def lifted(points, z):
         return np.column_stack([points * (scale(z) if scale else 1.0), np.full(len(points), z)])
 
-    planes = np.arange(len(levels) * count).reshape(len(levels), count)
+    planes = np.arange(len(heights) * count).reshape(len(heights), count)
     between = planes.size + np.arange(len(middles) * upright).reshape(len(middles), upright)
-    points = np.vstack([lifted(plan.points, z) for z in levels] + [lifted(plan.points[:upright], z) for z in middles])
+    points = np.vstack([lifted(mesh_2d.points, z) for z in heights] + [lifted(mesh_2d.points[:upright], z) for z in middles])
 
     def lift(elements):
         layers = [_full_element(low, high, edge, elements) if full else _serendipity(low, high, edge, elements)
                   for low, high, edge in zip(planes[:-1], planes[1:], between, strict=True)]
         return np.vstack([np.zeros((0, 3 * elements.shape[1] if full else 20), dtype=np.int64), *layers])
 
-    return HexMesh(points=points, hexes=lift(plan.quads), planes=planes,
-                   wedges=lift(plan.triangles) if len(plan.triangles) else np.zeros((0, 18), dtype=np.int64))
+    return HexMesh(points=points, hexes=lift(mesh_2d.quads), planes=planes,
+                   wedges=lift(mesh_2d.triangles) if len(mesh_2d.triangles) else np.zeros((0, 18), dtype=np.int64))
 
 
 def _full_element(low, high, middle, elements):
@@ -106,7 +106,7 @@ def _serendipity(low, high, middle, quads):
     return np.hstack([low[corner], high[corner], low[mid], high[mid], middle[corner]])
 
 
-def grid_plan(x_lines, y_lines):
+def grid_mesh_2d(x_lines, y_lines):
     """Rectangles between grid lines (increasing, mm), numbered x fastest."""
     nx, ny = len(x_lines), len(y_lines)
     corner = np.arange(nx * ny).reshape(ny, nx)
@@ -120,7 +120,7 @@ def grid_plan(x_lines, y_lines):
 
     quads = np.stack([corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1],
                       along_x[:-1], along_y[:, 1:], along_x[1:], along_y[:, :-1]], axis=-1).reshape(-1, 8)
-    return PlanMesh(np.vstack([points(x_lines, y_lines), points(xm, y_lines), points(x_lines, ym)]), quads, nx * ny)
+    return Mesh2D(np.vstack([points(x_lines, y_lines), points(xm, y_lines), points(x_lines, ym)]), quads, nx * ny)
 
 
 def merge(quads, triangles=NO_TRIANGLES):
@@ -133,7 +133,7 @@ def merge(quads, triangles=NO_TRIANGLES):
     ends = (4 * len(quads), 5 * len(quads))
     quad = np.hstack([corner[:ends[0]].reshape(-1, 4), other[:ends[1]].reshape(-1, 5)])
     triangle = np.hstack([corner[ends[0]:].reshape(-1, 3), other[ends[1]:].reshape(-1, 3)])
-    return PlanMesh(np.vstack([corner_points, other_points]), quad, len(corner_points), triangle)
+    return Mesh2D(np.vstack([corner_points, other_points]), quad, len(corner_points), triangle)
 
 
 def with_centres(quads):
@@ -147,12 +147,12 @@ def _unique(points):
     return points[first], where.ravel()
 
 
-def refine(plan, times=1):
+def refine(mesh_2d, times=1):
     """Split every element of a plan mesh into four, on the same curves."""
     for _ in range(times):
-        plan = merge(_split(plan.points[plan.quads], quad9, QUAD9_NODES, _QUAD_CHILDREN),
-                     _split(plan.points[plan.triangles], tri6, TRI6_NODES, _TRIANGLE_CHILDREN))
-    return plan
+        mesh_2d = merge(_split(mesh_2d.points[mesh_2d.quads], quad9, QUAD9_NODES, _QUAD_CHILDREN),
+                     _split(mesh_2d.points[mesh_2d.triangles], tri6, TRI6_NODES, _TRIANGLE_CHILDREN))
+    return mesh_2d
 
 
 _QUAD_CHILDREN = [(0.5 * np.eye(2), np.array([0.5 * x, 0.5 * y])) for y in (-1, 1) for x in (-1, 1)]
@@ -202,12 +202,12 @@ def disc_quads(rings=1, core=CORE_RADIUS):
     return with_centres(np.vstack([[[*inner, *inner_mid]], *between]))
 
 
-def disc_plan(refinement=0, rings=1, core=CORE_RADIUS):
+def disc_mesh_2d(refinement=0, rings=1, core=CORE_RADIUS):
     """Unit disc as an O-grid of `disc_quads`, each split into four `refinement` times."""
     return refine(merge(disc_quads(rings, core)), refinement)
 
 
-def cell_plan(pitch, diameter, rings=1, core=CORE_RADIUS):
+def cell_mesh_2d(pitch, diameter, rings=1, core=CORE_RADIUS):
     """One cell of a lattice of discs: quads (q, 9, 2) and triangles (4, 6, 2) in mm, the first quads being `disc_quads`.
 
     Along each side of the cell lie two elements. Where the discs of neighbours do not touch a ring of quads surrounds the disc.
@@ -227,38 +227,38 @@ def cell_plan(pitch, diameter, rings=1, core=CORE_RADIUS):
 
 
 @dataclass(frozen=True)
-class SheetPlan:
+class SheetMesh2D:
     """Plan of the sheet over a lattice of frusta: its quads and triangles cell by cell, then the strips at the edges.
 
-    roots (f, disc nodes): each frustum's own, in the order of `disc_plan`; cell_quads: how many quads a cell has.
+    roots (f, disc nodes): each frustum's own, in the order of `disc_mesh_2d`; cell_quads: how many quads a cell has.
     quarters: nodes (k, 4) at the quarters of the cells' walls, each with the nearer corner, the middle and the farther
     corner, and the three weights of a quadratic curve through these; none in a refined plan.
     """
 
-    plan: PlanMesh
+    mesh_2d: Mesh2D
     roots: np.ndarray
     cell_quads: int
     quarters: tuple
 
 
-def sheet_plan(centres, counts, pitch, diameter, footprint, *, refinement=0, rings=1, core=CORE_RADIUS):
+def sheet_mesh_2d(centres, counts, pitch, diameter, footprint, *, refinement=0, rings=1, core=CORE_RADIUS):
     """Cells at `centres` (f, 2) of a lattice `counts`, and strips of quads to the edges of the footprint (mm)."""
-    quads, triangles = cell_plan(pitch, diameter, rings, core)
+    quads, triangles = cell_mesh_2d(pitch, diameter, rings, core)
     strips = _strips(counts, pitch, footprint)
-    plan = refine(merge(np.vstack([(quads[None] + centres[:, None, None]).reshape(-1, 9, 2), strips]),
+    mesh_2d = refine(merge(np.vstack([(quads[None] + centres[:, None, None]).reshape(-1, 9, 2), strips]),
                         (triangles[None] + centres[:, None, None]).reshape(-1, 6, 2)), refinement)
-    disc = 0.5 * diameter * disc_plan(refinement, rings, core).points
-    roots = _find(plan.points, (centres[:, None] + disc).reshape(-1, 2)).reshape(len(centres), -1)
-    return SheetPlan(plan, roots, len(quads) * 4**refinement, _quarters(plan, centres, pitch, refinement))
+    disc = 0.5 * diameter * disc_mesh_2d(refinement, rings, core).points
+    roots = _find(mesh_2d.points, (centres[:, None] + disc).reshape(-1, 2)).reshape(len(centres), -1)
+    return SheetMesh2D(mesh_2d, roots, len(quads) * 4**refinement, _quarters(mesh_2d, centres, pitch, refinement))
 
 
-def _quarters(plan, centres, pitch, refinement):
+def _quarters(mesh_2d, centres, pitch, refinement):
     weights = np.array([0.375, 0.75, -0.125])
     if refinement:
         return np.zeros((0, 4), dtype=np.int64), weights
     walls = 0.5 * pitch * np.array([[[c, side * 0.5], [c, side], [c, 0.0], [c, -side]] for c in (-1, 1) for side in (-1, 1)])
     walls = np.concatenate([walls, walls[..., ::-1]])                        # (8, 4, 2): quarter, near corner, middle, far corner
-    nodes = _find(plan.points, (centres[:, None, None] + walls).reshape(-1, 2)).reshape(-1, 4)
+    nodes = _find(mesh_2d.points, (centres[:, None, None] + walls).reshape(-1, 2)).reshape(-1, 4)
     return np.unique(nodes, axis=0), weights
 
 
@@ -279,7 +279,7 @@ def _strips(counts, pitch, footprint):
         inner = 0.5 * pitch * (np.arange(2 * count + 1) - count)
         room = 0.5 * side - 0.5 * pitch * count > 1e-6
         lines.append(np.concatenate([[-0.5 * side], inner, [0.5 * side]]) if room else inner)
-    plan = grid_plan(*lines)
-    middle = plan.points[plan.quads[:, :4]].mean(axis=1)
+    mesh_2d = grid_mesh_2d(*lines)
+    middle = mesh_2d.points[mesh_2d.quads[:, :4]].mean(axis=1)
     outside = (np.abs(middle) > 0.5 * pitch * np.asarray(counts)).any(axis=1)
-    return with_centres(plan.points[plan.quads[outside]])
+    return with_centres(mesh_2d.points[mesh_2d.quads[outside]])

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from softtact.fem.elements import HEX20_BOTTOM, HEX20_NODES, HEX20_TOP, hex20
-from softtact.fem.extruded_mesh import grid_plan
+from softtact.fem.extruded_mesh import grid_mesh_2d
 
 _ROUNDS = 20   # nodes may follow nodes that follow others; each round resolves one generation
 
@@ -57,23 +57,23 @@ class CoverMesh:
         return nodes, weights
 
 
-def split_levels(shape, wanted, most):
+def split_depths(shape, wanted, most):
     """How often each place of a grid is split (ny 2^most, nx 2^most), for a grid of `shape` (nx, ny).
 
     `wanted(low, size, level)` tells of cells, by their lower corners (c, 2) and size in units of the grid, whether to split them.
     """
     nx, ny = shape
-    level = np.zeros((ny << most, nx << most), dtype=np.int64)
+    depth = np.zeros((ny << most, nx << most), dtype=np.int64)
     for current in range(most):
         block = 1 << (most - current)
-        j, i = np.nonzero(level[::block, ::block] == current)
+        j, i = np.nonzero(depth[::block, ::block] == current)
         chosen = wanted(np.column_stack([i, j]) / (1 << current), 1.0 / (1 << current), current)
         for row, column in zip(j[chosen] * block, i[chosen] * block, strict=True):
-            level[row:row + block, column:column + block] = current + 1
-    return level
+            depth[row:row + block, column:column + block] = current + 1
+    return depth
 
 
-def cover_mesh(x_lines, y_lines, heights, levels):
+def cover_mesh(x_lines, y_lines, heights, splits):
     """Hexahedra between `heights` (k + 1,) in mm over a grid.
 
     levels (k, ny 2^m, nx 2^m): how often the cells are split where, layer by layer from below.
@@ -81,8 +81,8 @@ def cover_mesh(x_lines, y_lines, heights, levels):
     """
     if len(heights) == 1:
         return _faces_alone(x_lines, y_lines, heights[0])
-    most = int(np.log2(levels.shape[2] // (len(x_lines) - 1)))
-    cells = [_leaves(layer, most) for layer in levels]
+    most = int(np.log2(splits.shape[2] // (len(x_lines) - 1)))
+    cells = [_leaves(layer, most) for layer in splits]
     low = np.vstack([np.column_stack([leaf[:, :2], np.full(len(leaf), 2 * k)]) for k, leaf in enumerate(cells)])
     size = np.concatenate([leaf[:, 2] for leaf in cells])
     # Whole numbers stand for places: 2 in x and y for the side of the smallest cell, 2 in z for a layer.
@@ -99,16 +99,16 @@ def cover_mesh(x_lines, y_lines, heights, levels):
     points = np.column_stack([line[places[order, axis]] for axis, line in enumerate(lines)])
     layer = low[:, 2] // 2
     return CoverMesh(points=points, hexes=number[hexes], follow=follow[order].tocsr(),
-                     top=number[hexes[layer == len(levels) - 1][:, HEX20_TOP]], bottom=number[hexes[layer == 0][:, HEX20_BOTTOM]],
-                     bottom_cells=_owners(cells[0], levels[0].shape))
+                     top=number[hexes[layer == len(splits) - 1][:, HEX20_TOP]], bottom=number[hexes[layer == 0][:, HEX20_BOTTOM]],
+                     bottom_cells=_owners(cells[0], splits[0].shape))
 
 
 def _faces_alone(x_lines, y_lines, height):
-    plan = grid_plan(np.asarray(x_lines), np.asarray(y_lines))
-    points = np.column_stack([plan.points, np.full(len(plan.points), float(height))])
+    mesh_2d = grid_mesh_2d(np.asarray(x_lines), np.asarray(y_lines))
+    points = np.column_stack([mesh_2d.points, np.full(len(mesh_2d.points), float(height))])
     return CoverMesh(points=points, hexes=np.zeros((0, 20), dtype=np.int64), follow=sp.eye(len(points), format="csr"),
-                     top=plan.quads, bottom=plan.quads,
-                     bottom_cells=np.arange(len(plan.quads)).reshape(len(y_lines) - 1, len(x_lines) - 1))
+                     top=mesh_2d.quads, bottom=mesh_2d.quads,
+                     bottom_cells=np.arange(len(mesh_2d.quads)).reshape(len(y_lines) - 1, len(x_lines) - 1))
 
 
 def _owners(leaves, shape):
@@ -125,12 +125,12 @@ def _subdivided(lines, parts):
     return np.interp(np.arange(parts * (len(lines) - 1) + 1), parts * np.arange(len(lines)), lines)
 
 
-def _leaves(level, most):
+def _leaves(depth, most):
     """Cells (c, 3) of one layer: lower corner in half sides of the smallest cell, and half their side in the same unit."""
     leaves = []
     for current in range(most + 1):
         block = 1 << (most - current)
-        j, i = np.nonzero(level[::block, ::block] == current)
+        j, i = np.nonzero(depth[::block, ::block] == current)
         leaves.append(np.column_stack([2 * block * i, 2 * block * j, np.full(len(i), block)]))
     return np.vstack(leaves)
 

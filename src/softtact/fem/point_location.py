@@ -13,16 +13,16 @@ _SAME = 1e-9         # mm
 _STARTS = np.linspace(0.0, 1.0, 9)
 
 
-def plan_interpolation(plan, points):
-    """Sparse matrix (p, plan points) that interpolates a nodal field of a full quadratic `PlanMesh` at points (p, 2) in mm.
+def interpolation_2d(mesh_2d, points):
+    """Sparse matrix (p, plan points) that interpolates a nodal field of a full quadratic `Mesh2D` at points (p, 2) in mm.
 
     Raises ValueError for a point outside the plan.
     """
     rows, nodes, values = [], [], []
     missing = np.arange(len(points))
-    for elements, kind in ((plan.quads, _Quads), (plan.triangles, _Triangles)):
+    for elements, kind in ((mesh_2d.quads, _Quads), (mesh_2d.triangles, _Triangles)):
         if len(elements) and len(missing):
-            found, element, shape = _search(kind, elements, plan.points[elements], points[missing])
+            found, element, shape = _search(kind, elements, mesh_2d.points[elements], points[missing])
             rows.append(np.repeat(missing[found], elements.shape[1]))
             nodes.append(elements[element].ravel())
             values.append(shape.ravel())
@@ -31,7 +31,7 @@ def plan_interpolation(plan, points):
         x, y = points[missing[0]]
         raise ValueError(f"The point x {x:g}, y {y:g} mm lies outside the plan.")
     entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(nodes))
-    return sp.csr_matrix(entries, shape=(len(points), len(plan.points)))
+    return sp.csr_matrix(entries, shape=(len(points), len(mesh_2d.points)))
 
 
 class _Quads:

@@ -60,16 +60,16 @@ class SolidBlock:
     """Elements of one kind and one law, by their shape functions' gradients.
 
     gradients (u, g, m, 3) in 1/mm, kept as (u, g, 3, m), and volumes (u, g) in mm3 of the shapes that occur; shapes (e,): which is
-    an element's, by default each its own; points (g, 3) of the quadrature in parent coordinates; local_over_shear: k / mu;
-    growing_over_shear: q / mu; trilinear: project on trilinear instead of linear functions. Displacements come per element
+    an element's, by default each its own; points (g, 3) of the quadrature in parent coordinates; unprojected_penalty_ratio: k / mu;
+    quartic_penalty_ratio: q / mu; trilinear: project on trilinear instead of linear functions. Displacements come per element
     (e, m, 3) in mm. loops: what sums over points and nodes, `kernels` or `device_kernels`.
     """
 
     loops = kernels
 
-    def __init__(self, gradients, volumes, points, law, *, shapes=None, local_over_shear=0.0, growing_over_shear=0.0,
+    def __init__(self, gradients, volumes, points, law, *, shapes=None, unprojected_penalty_ratio=0.0, quartic_penalty_ratio=0.0,
                  trilinear=False):
-        self.law, self._local_over_shear, self._growing_over_shear = law, local_over_shear, growing_over_shear
+        self.law, self._local_over_shear, self._quartic_penalty_ratio = law, unprojected_penalty_ratio, quartic_penalty_ratio
         self.gradients, self.volumes = np.ascontiguousarray(gradients.transpose(0, 1, 3, 2)), np.ascontiguousarray(volumes)
         self.shapes = np.arange(len(gradients)) if shapes is None else shapes
         self.basis = _pressure_modes(points, trilinear)
@@ -84,7 +84,7 @@ class SolidBlock:
     @property
     def growing_modulus(self):
         """q in MPa."""
-        return self._growing_over_shear * self.law.mu0
+        return self._quartic_penalty_ratio * self.law.mu0
 
     @property
     def projected_modulus(self):
@@ -214,7 +214,7 @@ class WedgeBlock(SolidBlock):
         super().__init__(gradients, volumes, points, law, shapes=shapes, **options)
 
 
-def of_masters(masters, weights, elements, block):
+def hanging_node_constraints(masters, weights, elements, block):
     """Nodes (e, w) that elements (e, m) hang on, and the block in terms of these."""
     masters, weights = masters[elements], weights[elements]
     nodes, column = _distinct(np.where(np.abs(weights) > 1e-12, masters, -1).reshape(len(elements), -1))

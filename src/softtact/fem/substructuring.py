@@ -70,16 +70,16 @@ class LayerwiseElimination:
     def residual(self, force, *, bodies=None, workers=SERIAL):
         """Pass the inner forces (b, n) of some bodies (b,), or of all, on to the outer unknowns, in place; returns what `recover`
         needs."""
-        halves = []
+        forward_solved = []
         for stage in self.stages:
             passed_on, half = stage.condensed.residual(force[:, stage.inner], bodies=bodies, workers=workers)
             force[:, stage.outer] += passed_on
-            halves.append(half)
-        return halves
+            forward_solved.append(half)
+        return forward_solved
 
-    def recover(self, halves, step, *, bodies=None, workers=SERIAL):
+    def recover(self, forward_solved, step, *, bodies=None, workers=SERIAL):
         """Fill in the inner unknowns of a Newton step (b, n) of some bodies, or of all, whose outer ones are given, in place."""
-        for stage, half in zip(self.stages[::-1], halves[::-1], strict=True):
+        for stage, half in zip(self.stages[::-1], forward_solved[::-1], strict=True):
             step[:, stage.inner] = stage.condensed.recover(half, step[:, stage.outer], bodies=bodies, workers=workers)
 
 

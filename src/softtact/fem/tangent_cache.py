@@ -8,7 +8,7 @@ import numpy as np
 from softtact.fem.static_condensation import packed
 
 
-class KeptTangents:
+class TangentCache:
     """Of the elements (e,) of a block of `blocks`; in single precision, upper triangles as `packed` has them."""
 
     def __init__(self, block):

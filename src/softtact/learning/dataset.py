@@ -1,9 +1,9 @@
 """Data sets: deformation maps of each model paired with the sensor's readings, split so that nothing leaks.
 
-A *level* is one press at one force. Levels of the set `indenters` are shuffled with the seed and split into train and
+A *load step* is one press at one force. Load steps of the set `indenters` are shuffled with the seed and split into train and
 validation: each for itself (the paper's way), or all of a press, or of an object, together (`split_by`). `unseen` and `grasps` are
-tests, whose objects training never sees. All trials of a level are on one side, for they share its deformation map.
-All models share the split, and a level is used only where it is within every model's validity: the networks see the
+tests, whose objects training never sees. All trials of a load step are on one side, for they share its deformation map.
+All models share the split, and a load step is used only where it is within every model's validity: the networks see the
 same samples.
 """
 
@@ -27,22 +27,22 @@ def build_datasets(presses, tactile, *, models, items, train_fraction, seed, tra
 
     presses {(model, set, item): dataset};  tactile {(set, item): dataset};  items: [{"set", "item"}, ...]
     split_by: what goes to training or validation as a whole, map, press or object
-    training_trials: "each" makes every trial a training sample, "mean" the mean over a level's trials
-    Returns {(model, split): dataset} and the manifest, a row per model, level and trial.
+    training_trials: "each" makes every trial a training sample, "mean" the mean over a load step's trials
+    Returns {(model, split): dataset} and the manifest, a row per model, load step and trial.
     """
     _check_choices(train_fraction, training_trials)
     items = [(entry["set"], entry["item"]) for entry in items]
     check_items(items)
     for key in items:
         check_item(key, presses, tactile, models)
-    levels = assign_splits(list_levels(items, presses, models), train_fraction=train_fraction, seed=seed, split_by=split_by)
-    check_splits(levels)
-    check_no_map_leaks(levels, presses, models)
-    samples = {split: order_samples(levels, tactile, split, seed=seed, training_trials=training_trials)
+    load_steps = assign_splits(list_load_steps(items, presses, models), train_fraction=train_fraction, seed=seed, split_by=split_by)
+    check_splits(load_steps)
+    check_no_map_leaks(load_steps, presses, models)
+    samples = {split: order_samples(load_steps, tactile, split, seed=seed, training_trials=training_trials)
                for split in SPLITS}
     datasets = {(model, split): gather(rows, presses, tactile, model=model, split=split)
                 for model in models for split, rows in samples.items()}
-    return datasets, manifest(levels, presses, tactile, models)
+    return datasets, manifest(load_steps, presses, tactile, models)
 
 
 def read_presses(paths):
@@ -65,7 +65,7 @@ def read_tactile(paths):
 
 
 def check_converged(press, path):
-    """Refuse a press with a level that the solver did not finish: nothing of it may be used."""
+    """Refuse a press with a load step that the solver did not finish: nothing of it may be used."""
     failed = press.force_n.values[press.converged.values == 0]
     if len(failed):
         raise ConvergenceError(f"{path}: the press of {press.attrs.get('item')} with the model "
@@ -100,44 +100,44 @@ def check_item(key, presses, tactile, models):
                              f"read at {_list(forces)} N; make both at the same forces.")
 
 
-def list_levels(items, presses, models):
-    """Frame of all levels, in the order of set, item and force: set, item, level (index of the force), force_n, usable."""
+def list_load_steps(items, presses, models):
+    """Frame of all load steps, in the order of set, item and force: set, item, load step (index of the force), force_n, usable."""
     rows = []
     for key in sorted(items):
         of_models = [presses[model, *key] for model in models]
         usable = np.all([press.within_validity.values == 1 for press in of_models], axis=0)
-        for level, force in enumerate(of_models[0].force_n.values):
-            rows.append((*key, level, float(force), bool(usable[level])))
-    return pd.DataFrame(rows, columns=["set", "item", "level", "force_n", "usable"])
+        for load_step, force in enumerate(of_models[0].force_n.values):
+            rows.append((*key, load_step, float(force), bool(usable[load_step])))
+    return pd.DataFrame(rows, columns=["set", "item", "load_step", "force_n", "usable"])
 
 
-def assign_splits(levels, *, train_fraction, seed, split_by="map"):
-    """`levels` with the column split: train or validation by lot for indenters, else the level's set."""
-    levels = levels.assign(split=levels["set"].where(levels.usable, OUT_OF_RANGE))
-    candidates = levels[levels.usable & (levels["set"] == TRAINING_SET)]
+def assign_splits(load_steps, *, train_fraction, seed, split_by="map"):
+    """`load_steps` with the column split: train or validation by lot for indenters, else the load step's set."""
+    load_steps = load_steps.assign(split=load_steps["set"].where(load_steps.usable, OUT_OF_RANGE))
+    candidates = load_steps[load_steps.usable & (load_steps["set"] == TRAINING_SET)]
     item = candidates["item"]
     units = {"map": candidates.index.to_series(), "press": item, "object": item.map(object_of)}[split_by]
     shuffled = np.random.default_rng([seed, 0]).permutation(units.unique())
     trained = units.isin(shuffled[:round(train_fraction * len(shuffled))])
-    levels.loc[candidates.index, "split"] = np.where(trained, "train", "validation")
-    return levels
+    load_steps.loc[candidates.index, "split"] = np.where(trained, "train", "validation")
+    return load_steps
 
 
-def check_splits(levels):
-    """Refuse a split without a level."""
+def check_splits(load_steps):
+    """Refuse a split without a load step."""
     for split in SPLITS:
-        if not (levels.split == split).any():
-            dropped = int((levels.split == OUT_OF_RANGE).sum())
-            raise InputError(f"the data set: no level is left for {split} ({dropped} of {len(levels)} lie outside a "
+        if not (load_steps.split == split).any():
+            dropped = int((load_steps.split == OUT_OF_RANGE).sum())
+            raise InputError(f"the data set: no load step is left for {split} ({dropped} of {len(load_steps)} lie outside a "
                              "model's validity); add items or smaller forces.")
 
 
-def check_no_map_leaks(levels, presses, models):
+def check_no_map_leaks(load_steps, presses, models):
     """Refuse a test whose deformation map is one of the training set: the same shape under two names.
 
     A map of zeros, before an object touches, is every object's and tells nothing.
     """
-    usable = levels[levels.usable]
+    usable = load_steps[load_steps.usable]
     for model in models:
         owners = {}
         for row in usable[usable["set"] == TRAINING_SET].itertuples():
@@ -150,13 +150,13 @@ def check_no_map_leaks(levels, presses, models):
                                  f"training indenter {owner}; leave one of the two out.")
 
 
-def order_samples(levels, tactile, split, *, seed, training_trials):
-    """Samples of one split as a frame set, item, level, force_n, trial; shuffled with the seed where a network trains."""
-    chosen = levels[levels.split == split]
+def order_samples(load_steps, tactile, split, *, seed, training_trials):
+    """Samples of one split as a frame set, item, load step, force_n, trial; shuffled with the seed where a network trains."""
+    chosen = load_steps[load_steps.split == split]
     mean = split == "train" and training_trials == "mean"
-    rows = [(row.set, row.item, row.level, row.force_n, trial) for row in chosen.itertuples()
+    rows = [(row.set, row.item, row.load_step, row.force_n, trial) for row in chosen.itertuples()
             for trial in ([MEAN] if mean else range(tactile[row.set, row.item].sizes["trial"]))]
-    samples = pd.DataFrame(rows, columns=["set", "item", "level", "force_n", "trial"])
+    samples = pd.DataFrame(rows, columns=["set", "item", "load_step", "force_n", "trial"])
     if split in ("train", "validation"):
         order = np.random.default_rng([seed, 1]).permutation(len(samples))
         samples = samples.iloc[order].reset_index(drop=True)
@@ -165,9 +165,9 @@ def order_samples(levels, tactile, split, *, seed, training_trials):
 
 def gather(samples, presses, tactile, *, model, split):
     """The data set (sample, ...) of one model and split, in the order of the frame `samples`."""
-    keys = list(zip(samples["set"], samples["item"], samples["level"], samples["trial"], strict=True))
-    maps = [presses[model, s, i].deformation_map_mm.values[level] for s, i, level, _ in keys]
-    counts = [_reading(tactile[s, i].tactile_map.values[:, level], trial) for s, i, level, trial in keys]
+    keys = list(zip(samples["set"], samples["item"], samples["load_step"], samples["trial"], strict=True))
+    maps = [presses[model, s, i].deformation_map_mm.values[load_step] for s, i, load_step, _ in keys]
+    counts = [_reading(tactile[s, i].tactile_map.values[:, load_step], trial) for s, i, load_step, trial in keys]
     first = presses[model, *keys[0][:2]]
     return xarray.Dataset(
         {"deformation_map_mm": (("sample", "y", "x"), np.float32(maps), {"units": "mm"}),
@@ -180,13 +180,13 @@ def gather(samples, presses, tactile, *, model, split):
         attrs={"model": model, "split": split, "source": _one_source(tactile)})
 
 
-def manifest(levels, presses, tactile, models):
-    """A row per model, level and trial with the split that it went to; also of what was left out."""
+def manifest(load_steps, presses, tactile, models):
+    """A row per model, load step and trial with the split that it went to; also of what was left out."""
     rows = []
     for model in models:
-        for row in levels.itertuples():
+        for row in load_steps.itertuples():
             press = presses[model, row.set, row.item]
-            flags = int(press.converged.values[row.level]), int(press.within_validity.values[row.level])
+            flags = int(press.converged.values[row.load_step]), int(press.within_validity.values[row.load_step])
             rows += [(row.set, row.item, model, row.force_n, trial, row.split, *flags)
                      for trial in range(tactile[row.set, row.item].sizes["trial"])]
     return pd.DataFrame(rows, columns=MANIFEST)
@@ -217,7 +217,7 @@ def _add(found, key, data, path):
 
 
 def _map_of(presses, model, row):
-    return presses[model, row.set, row.item].deformation_map_mm.values[row.level]
+    return presses[model, row.set, row.item].deformation_map_mm.values[row.load_step]
 
 
 def _reading(trials, trial):

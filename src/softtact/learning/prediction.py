@@ -56,7 +56,7 @@ def _read_press(path):
     if unit != "mm":
         raise InputError(f"{path}: its maps are in {unit!r}; give them in mm.")
     if "converged" in data and not data.converged.values.all():
-        raise InputError(f"{path}: a level of the press did not converge; press it again with smaller force steps.")
+        raise InputError(f"{path}: a load step of the press did not converge; press it again with smaller force steps.")
     valid = data.within_validity.values == 1 if "within_validity" in data else None
     grid = {f"{side}_mm": data[side].values if side in data.coords else None for side in "xy"}
     return Maps(data.deformation_map_mm.values, data.force_n.values, valid, data.attrs.get("model"), **grid)
@@ -91,7 +91,7 @@ def outside_training(maps, facts):
     if maps.model and maps.model != facts.get("model", maps.model):
         said.append(f"the maps are of the model {maps.model} and the network was trained on {facts['model']}.")
     if maps.valid is not None and not maps.valid.all():
-        said.append(f"{(~maps.valid).sum()} of {len(maps.valid)} levels are beyond what the press' model is valid for.")
+        said.append(f"{(~maps.valid).sum()} of {len(maps.valid)} load steps are beyond what the press' model is valid for.")
     known = facts.get("range", {})
     for name, values, unit in (("map_max_mm", maps.maps_mm.max(axis=(1, 2)), "mm deep at most"), ("force_n", maps.force_n, "N")):
         if values is not None and name in known:

@@ -14,7 +14,7 @@ _ORDERING, _SINGLE = 2, 28   # numbers of PARDISO's input parameters, counted fr
 _MINIMUM_DEGREE = 0
 
 
-class RoughSolver(PardisoSolver):
+class PardisoSingle(PardisoSolver):
     """The interface of `linear_solvers`, with factors and solutions of about seven digits."""
 
     name = "pardiso, single precision"

@@ -2,7 +2,7 @@
 
 The body is symmetric in x and y, so a load falls into four parts that are even or odd in x and in y. Each needs only the quarter
 x > 0, y > 0 with its own conditions on the two planes of symmetry: four systems of a quarter of the size, and four blocks of
-flexibility that hold a quarter of the numbers of the whole one.
+compliance that hold a quarter of the numbers of the whole one.
 Parity (p, q): 0 even, 1 odd in x and y. With the blocks G_pq between places i, j of the quarter, and signs s, t of x and y:
     G(i s, j t) = 1/4 sum_pq (s_x t_x)^p (s_y t_y)^q G_pq(i, j)
 Elements: 27-node hexahedra with a discontinuous linear pressure (`blocks`), which do not lock for nearly incompressible rubber.
@@ -136,8 +136,8 @@ class QuarterSlab:
                     for r, c, v in entries]
         return matrices
 
-    def flexibility(self, stiffness, kept, parity, *, threads=1):
-        """Flexibility (k, k) among the unknowns `kept` of a stiffness, in one parity; zero for those that it holds."""
+    def compliance(self, stiffness, kept, parity, *, threads=1):
+        """Compliance (k, k) among the unknowns `kept` of a stiffness, in one parity; zero for those that it holds."""
         free = np.concatenate([self.free(parity), np.arange(self.unknowns, stiffness.shape[0])])
         place = np.full(stiffness.shape[0], -1)
         place[free] = np.arange(len(free))
@@ -173,12 +173,12 @@ def _quadratic(line, values):
 
 @dataclass(frozen=True)
 class ParityBlocks:
-    """Flexibility between places on a rectangle, by the parity of load and displacement: blocks (4, k, m), in PARITIES' order."""
+    """Compliance between places on a rectangle, by the parity of load and displacement: blocks (4, k, m), in PARITIES' order."""
 
     blocks: np.ndarray
 
     def between(self, rows, row_signs, columns, column_signs):
-        """Flexibility (r, c) of places given by their quarter's number (r,), (c,) and their signs of x and y (r, 2), (c, 2)."""
+        """Compliance (r, c) of places given by their quarter's number (r,), (c,) and their signs of x and y (r, 2), (c, 2)."""
         args = [np.ascontiguousarray(values) for values in (rows, row_signs < 0, columns, column_signs < 0)]
         return _between(self.blocks, *args)
 

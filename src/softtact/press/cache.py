@@ -5,10 +5,10 @@ from pathlib import Path
 
 from softtact.files import atomic_path, digest
 from softtact.models.elastic.compliance import Compliance, elastic_compliance
-from softtact.models.foundation.compliance import FoundationFlexibility, foundation_flexibility
+from softtact.models.foundation.compliance import FoundationCompliance, foundation_compliance
 from softtact.progress import announce
 
-_FORMAT = 8     # of the files; another one makes them again
+_FORMAT = 9     # of the files; another one makes them again
 
 
 def _values(spec):
@@ -19,16 +19,16 @@ def _values(spec):
 def cached_compliance(spec, *, threads=1):
     """The elastic layer's `Compliance`, by the sensor's values."""
     return _cached("compliance", [_values(spec)], Compliance,
-                   f"{spec.name}: computing the elastic layer's flexibility, once for this sensor (some ten seconds)",
+                   f"{spec.name}: computing the elastic layer's compliance, once for this sensor (some ten seconds)",
                    lambda: elastic_compliance(spec, threads=threads))
 
 
 def cached_foundation(spec, laws, *, threads=1):
-    """The `FoundationFlexibility` of a sensor with its laws {"dielectric", "cover"}, by the values of all three."""
+    """The `FoundationCompliance` of a sensor with its laws {"dielectric", "cover"}, by the values of all three."""
     dielectric, cover = laws["dielectric"], laws["cover"]
-    return _cached("foundation", [_values(spec), repr(dielectric), repr(cover)], FoundationFlexibility,
-                   f"{spec.name}: computing a frustum's law and the slab's flexibility, once for this sensor and these laws (about "
-                   "a minute)", lambda: foundation_flexibility(spec, dielectric_law=dielectric, cover_law=cover, threads=threads))
+    return _cached("foundation", [_values(spec), repr(dielectric), repr(cover)], FoundationCompliance,
+                   f"{spec.name}: computing a frustum's law and the slab's compliance, once for this sensor and these laws (about "
+                   "a minute)", lambda: foundation_compliance(spec, dielectric_law=dielectric, cover_law=cover, threads=threads))
 
 
 def _cached(kind, values, cls, message, compute):

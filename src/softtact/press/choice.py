@@ -4,7 +4,7 @@
 `error`: both cheap models are pressed first, in about a second. What they disagree by is the elastic model's error, for the
 foundation model is nearer to the hyperelastic one by an order of magnitude; the foundation model's own error grows with how far
 the frusta are compressed, and is read from presses of indenters (`calibrate`). The cheapest model within the tolerance is taken.
-Errors are root mean squares over the map, in mm, against the hyperelastic model; the largest of a press' levels counts.
+Errors are root mean squares over the map, in mm, against the hyperelastic model; the largest of a press' load steps counts.
 """
 
 from dataclasses import dataclass, replace
@@ -28,7 +28,7 @@ class FoundationError:
 
     compression: of the most compressed frustum; of the powers 1 to 4 the third and fourth follow the indenters best. The values
     given here are those of ten indenters (bordes_v, circle_g, circle_m, cruz, donut_m, echo_v, glasses, square, star, triangle) at
-    five levels to 50 N on the sensor `coro`, against the hyperelastic model's fine mesh (benchmarks/choice.py).
+    five load steps to 50 N on the sensor `coro`, against the hyperelastic model's fine mesh (benchmarks/choice.py).
     """
 
     at_rest: float = 0.0128
@@ -93,9 +93,9 @@ def _by_counts(sensor, placed, forces, **how):
     counts = score(placed.triangles, footprint_mm=sensor.spec.footprint_mm, reach_mm=sensor.spec.thickness_mm)
     model = choose_model(counts.NPt, counts.CHt, counts.NPo, counts.CHo)
     result = PRESSES[model](sensor, placed, forces, **how)
-    why = (f"the paper's rule: NPt / CHt = {counts.ratio_total:.3g} ({TOTAL_THRESHOLD:g} asks for the hyperelastic model), "
-           f"NPo / CHo = {counts.ratio_overlap:.3g} ({OVERLAP_THRESHOLD:g})")
-    return replace(result, why=why)
+    reason = (f"the paper's rule: NPt / CHt = {counts.ratio_total:.3g} ({TOTAL_THRESHOLD:g} asks for the hyperelastic model), "
+              f"NPo / CHo = {counts.ratio_overlap:.3g} ({OVERLAP_THRESHOLD:g})")
+    return replace(result, selection_reason=reason)
 
 
 def _by_error(sensor, placed, forces, tolerance_mm, **how):
@@ -104,16 +104,18 @@ def _by_error(sensor, placed, forces, tolerance_mm, **how):
         foundation = PRESSES["foundation"](sensor, placed, forces, **how)
     except ConvergenceError as error:
         result = PRESSES["hyperelastic"](sensor, placed, forces, **how)
-        return replace(result, why=f"the foundation model tells no error: {error}", expected_error_mm=np.zeros(len(forces)))
+        return replace(result, selection_reason=f"the foundation model tells no error: {error}",
+                       expected_error_mm=np.zeros(len(forces)))
     errors = expected_errors(elastic, foundation, height_mm=sensor.spec.dielectric.frusta.height_mm)
     model = cheapest(errors, tolerance_mm)
     told = "; ".join(f"{name} {1e3 * values.max():.3g} um" for name, values in errors.items())
-    why = f"expected errors: {told}; asked for {1e3 * tolerance_mm:.3g} um"
+    reason = f"expected errors: {told}; asked for {1e3 * tolerance_mm:.3g} um"
     if sensor.spec.name != CALIBRATED_ON:
-        why += f" (calibrated on presses of the sensor {CALIBRATED_ON}, not of {sensor.spec.name})"
+        reason += f" (calibrated on presses of the sensor {CALIBRATED_ON}, not of {sensor.spec.name})"
     if model == "hyperelastic":
         result = PRESSES[model](sensor, placed, forces, **how)
         spent = result.wall_time_s + elastic.wall_time_s + foundation.wall_time_s
-        return replace(result, why=why, expected_error_mm=np.zeros(len(forces)), wall_time_s=spent)
+        return replace(result, selection_reason=reason, expected_error_mm=np.zeros(len(forces)), wall_time_s=spent)
     result = {"elastic": elastic, "foundation": foundation}[model]
-    return replace(result, why=why, expected_error_mm=errors[model], wall_time_s=elastic.wall_time_s + foundation.wall_time_s)
+    return replace(result, selection_reason=reason, expected_error_mm=errors[model],
+                   wall_time_s=elastic.wall_time_s + foundation.wall_time_s)

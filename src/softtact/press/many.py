@@ -75,7 +75,7 @@ def _underside(sensor, job):
     try:
         placed = place(mesh, pose=pose)
         check_over_sensor(placed, sensor.spec.footprint_mm)
-        grid = sensor.files["elastic"].grid
+        grid = sensor.prepared_models["elastic"].grid
         underside, height = Underside(HeightField(placed), grid), np.full(grid.count, NO_CONTACT_MM)
         points = underside.nodes(sensor.spec.thickness_mm)
         height[points.nodes] = points.gap

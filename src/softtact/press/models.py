@@ -8,7 +8,7 @@ import numpy as np
 
 from softtact.contact.height_field import HeightField
 from softtact.contact.underside import Underside
-from softtact.errors import ConvergenceError, OutsideCardWarning
+from softtact.errors import ConvergenceError, ExtrapolationWarning
 from softtact.models.elastic.compliance import press_layer
 from softtact.models.foundation.solve import FoundationMaps, press_foundation
 from softtact.models.hyperelastic import newton
@@ -24,10 +24,10 @@ _RISE = 1.15              # of the object's depth: points within may touch
 
 
 def press_elastic(sensor, placed, forces, *, label, threads, keep_body=False):
-    """All levels at once with the elastic model, which has no body to keep: the surface's flexibility is all that it knows."""
+    """All load steps at once with the elastic model, which has no body to keep: the surface's compliance is all that it knows."""
     start, compliance = time.perf_counter(), sensor.prepared("elastic", threads)
     underside = Underside(HeightField(placed), compliance.grid)
-    points, press = _within_reach(underside, underside.nodes, compliance.bedding, forces, sensor.spec.thickness_mm,
+    points, press = _within_reach(underside, underside.nodes, compliance.foundation_modulus, forces, sensor.spec.thickness_mm,
                                   lambda points: press_layer(compliance, points, forces), lambda press: press.contact.depth[-1])
     seconds = np.full(len(forces), (time.perf_counter() - start) / len(forces))
     return elastic_result(sensor, compliance, press, forces, seconds, lowest_mm=underside.lowest_mm)
@@ -40,52 +40,53 @@ def elastic_result(sensor, compliance, press, forces, seconds, *, lowest_mm):
                        contact_area_mm2=np.prod(compliance.grid.step) * np.count_nonzero(contact.force > 0, axis=0),
                        penetration_mm=contact.penetration,
                        within_validity=valid_elastic(contact.depth - lowest_mm, thickness_mm=thickness),
-                       frustum_compression_mm=unknown, residual_n=unknown, outside_card=unknown, iterations=contact.iterations)
+                       frustum_compression_mm=unknown, residual_n=unknown, extrapolated_volume_fraction=unknown,
+                       iterations=contact.iterations)
 
 
 def press_on_foundation(sensor, placed, forces, *, label, threads, keep_body=False):
-    """Level by level with the foundation model, which has no body to keep."""
-    start, flexibility = time.perf_counter(), sensor.prepared("foundation", threads)
-    underside = Underside(HeightField(placed), flexibility.grid)
-    levels, times = [], []
+    """Load step by load step with the foundation model, which has no body to keep."""
+    start, compliance = time.perf_counter(), sensor.prepared("foundation", threads)
+    underside = Underside(HeightField(placed), compliance.grid)
+    load_steps, times = [], []
 
     def solve(points):
-        levels.clear()
+        load_steps.clear()
         times.clear()
-        record = (levels.append(level) for level in press_foundation(flexibility, points, forces))
+        record = (load_steps.append(load_step) for load_step in press_foundation(compliance, points, forces))
         try:
             _timed(record, forces, label, times, start=start)
         except ConvergenceError as error:
-            error.result = _of_levels(sensor, flexibility, points, levels, forces, times) if levels else None
+            error.result = _of_load_steps(sensor, compliance, points, load_steps, forces, times) if load_steps else None
             raise
 
-    points, _ = _within_reach(underside, underside.points, flexibility.bedding, forces, sensor.spec.thickness_mm, solve,
-                              lambda _: levels[-1].depth)
-    return _of_levels(sensor, flexibility, points, levels, forces, times)
+    points, _ = _within_reach(underside, underside.points, compliance.foundation_modulus, forces, sensor.spec.thickness_mm, solve,
+                              lambda _: load_steps[-1].depth)
+    return _of_load_steps(sensor, compliance, points, load_steps, forces, times)
 
 
-def _of_levels(sensor, flexibility, points, levels, forces, times):
-    """The result of a foundation press' levels, be it those before one that was not reached."""
-    area, count = points.covered * np.prod(flexibility.grid.step), len(levels)
-    compression = np.array([level.compression.max() for level in levels])
-    depth = np.array([level.depth for level in levels])
+def _of_load_steps(sensor, compliance, points, load_steps, forces, times):
+    """The result of a foundation press' load steps, be it those before one that was not reached."""
+    area, count = points.covered * np.prod(compliance.grid.step), len(load_steps)
+    compression = np.array([load_step.compression.max() for load_step in load_steps])
+    depth = np.array([load_step.depth for load_step in load_steps])
     valid = valid_foundation(compression, depth - points.gap.min(), frustum_mm=sensor.spec.dielectric.frusta.height_mm,
-                             thickness_mm=sensor.spec.thickness_mm, law_limit_mm=flexibility.law.limit_mm)
+                             thickness_mm=sensor.spec.thickness_mm, law_limit_mm=compliance.law.limit_mm)
     unknown = np.full(count, np.nan)
-    numbers = {"indentation_mm": depth, "penetration_mm": [level.penetration for level in levels],
-               "contact_area_mm2": [area[level.touching].sum() for level in levels],
-               "iterations": [level.iterations for level in levels], "frustum_compression_mm": compression}
-    return make_result(sensor, "foundation", "dense", FoundationMaps(flexibility, points)(levels), forces[:count],
-                       np.array(times[:count]), within_validity=valid, residual_n=unknown, outside_card=unknown,
+    numbers = {"indentation_mm": depth, "penetration_mm": [load_step.penetration for load_step in load_steps],
+               "contact_area_mm2": [area[load_step.touching].sum() for load_step in load_steps],
+               "iterations": [load_step.iterations for load_step in load_steps], "frustum_compression_mm": compression}
+    return make_result(sensor, "foundation", "dense", FoundationMaps(compliance, points)(load_steps), forces[:count],
+                       np.array(times[:count]), within_validity=valid, residual_n=unknown, extrapolated_volume_fraction=unknown,
                        **numbers)
 
 
-def _within_reach(underside, points_within, bedding, forces, deepest, solve, depth_of):
+def _within_reach(underside, points_within, foundation_modulus, forces, deepest, solve, depth_of):
     """Points as far as the object may come down, and what `solve` makes of them; again with more where it came down further.
 
     Beside the object the surface rises, so points a little above its depth can touch, too.
     """
-    reach = _MARGIN * underside.depth_on_springs(forces[-1], bedding) + _LEAST_MARGIN_MM
+    reach = _MARGIN * underside.depth_on_springs(forces[-1], foundation_modulus) + _LEAST_MARGIN_MM
     while True:
         reach = min(reach, deepest)
         points = points_within(reach)
@@ -96,28 +97,28 @@ def _within_reach(underside, points_within, bedding, forces, deepest, solve, dep
 
 
 def press_hyperelastic(sensor, placed, forces, *, label, threads, keep_body=False):
-    """Level by level with the hyperelastic model; a ConvergenceError holds the levels before.
+    """Load step by load step with the hyperelastic model; a ConvergenceError holds the load steps before.
 
-    keep_body: let the result hold the whole body's displacements at each level
+    keep_body: let the result hold the whole body's displacements at each load step
     """
     surface = HeightField(placed)
     body = sensor.body(threads=threads, surface=surface)
     grid = np.stack(np.meshgrid(sensor.spec.map_x_mm, sensor.spec.map_y_mm), axis=-1).reshape(-1, 2)
     sampling = body.slab.sampling(grid)
-    announce(f"{label}: {body.bed.count} frusta, {len(forces)} force levels of the hyperelastic model, some seconds each")
+    announce(f"{label}: {body.support.count} frusta, {len(forces)} load steps of the hyperelastic model, some seconds each")
     record, times, bodies = [], [], []
     lowest = _lowest_over(placed, sensor.spec.footprint_mm)
 
-    def read(level):
-        _refuse_beyond_the_board(level, lowest, sensor.spec.thickness_mm)
-        record.append(_read_level(body, sampling, level))
+    def read(load_step):
+        _refuse_beyond_the_board(load_step, lowest, sensor.spec.thickness_mm)
+        record.append(_read_load_step(body, sampling, load_step))
         if keep_body:
-            bodies.append(pressed_body(body, level.state))
+            bodies.append(pressed_body(body, load_step.state))
 
-    levels = (read(level)
-              for level in newton.press_levels(body, surface, forces, settings=sensor.solver))
+    load_steps = (read(load_step)
+              for load_step in newton.press_load_steps(body, surface, forces, settings=sensor.solver))
     try:
-        _timed(levels, forces, label, times)
+        _timed(load_steps, forces, label, times)
     except ConvergenceError as error:
         error.result = _of_record(sensor, body, record, forces, times, bodies) if record else None
         raise
@@ -132,19 +133,20 @@ def _lowest_over(placed, footprint_mm):
     return placed.vertices[(np.abs(placed.vertices[:, :2]) <= half).all(axis=1), 2].min(initial=np.inf)
 
 
-def _refuse_beyond_the_board(level, lowest_mm, thickness_mm):
+def _refuse_beyond_the_board(load_step, lowest_mm, thickness_mm):
     """Raise ConvergenceError where a tip that no contact point feels has gone farther down than the sensor is thick."""
-    depth = level.state.indentation - lowest_mm
+    depth = load_step.state.indentation - lowest_mm
     if depth > thickness_mm:
-        raise ConvergenceError(f"The level of {level.force_n:g} N was not reached: the object's tip would be {depth:.3g} mm deep "
-                               f"in a sensor {thickness_mm:g} mm thick, for it slips in between the points of the cover that feel "
-                               "contact. Ask for smaller forces, a finer cover (--mesh-quality fine), or use a blunter tip.")
+        raise ConvergenceError(
+            f"The load step of {load_step.force_n:g} N was not reached: the object's tip would be {depth:.3g} mm deep in a sensor "
+            f"{thickness_mm:g} mm thick, for it slips in between the points of the cover that feel contact. Ask for smaller "
+            "forces, a finer cover (--mesh-quality fine), or use a blunter tip.")
 
 
 def _of_record(sensor, body, record, forces, times, bodies):
-    maps, levels = zip(*record, strict=True)
-    numbers = {name: np.array([level[name] for level in levels]) for name in levels[0]}
-    _warn_outside_card(numbers["outside_card"], forces)
+    maps, load_steps = zip(*record, strict=True)
+    numbers = {name: np.array([load_step[name] for load_step in load_steps]) for name in load_steps[0]}
+    _warn_extrapolation(numbers["extrapolated_volume_fraction"], forces)
     valid = valid_hyperelastic(compression_mm=numbers["frustum_compression_mm"], depth_mm=numbers["indentation_mm"],
                                contact_error_mm=numbers.pop("contact_error_mm"), points=numbers.pop("points"),
                                frustum_mm=sensor.spec.dielectric.frusta.height_mm,
@@ -154,24 +156,26 @@ def _of_record(sensor, body, record, forces, times, bodies):
     return replace(result, bodies=tuple(bodies))
 
 
-def _warn_outside_card(shares, forces):
-    """Warn of the first level at which a layer is strained beyond the data behind its card in more than a corner."""
+def _warn_extrapolation(shares, forces):
+    """Warn of the first load step at which a layer is strained beyond the data behind its card in more than a corner."""
     outside = [(force, share) for force, share in zip(forces, shares, strict=False) if share > _CORNER]
     if outside:
         force, share = outside[0]
         warnings.warn(f"At {force:g} N {share:.1%} of a layer is strained beyond the data behind its material card"
-                      " (`result.outside_card`): what its law says there is extrapolated.", OutsideCardWarning, stacklevel=5)
+                      " (`result.extrapolated_volume_fraction`): what its law says there is extrapolated.",
+                      ExtrapolationWarning, stacklevel=5)
 
 
-def _read_level(body, sampling, level):
-    """The map (y * x,) in mm of a level, and its numbers by their names."""
-    slab, bed, top = level.state.slab, level.state.bed, body.slab.top
+def _read_load_step(body, sampling, load_step):
+    """The map (y * x,) in mm of a load step, and its numbers by their names."""
+    slab, support, top = load_step.state.slab, load_step.state.support, body.slab.top
     return -(sampling @ slab.displacement[:, 2]), {
-        "indentation_mm": level.state.indentation, "contact_area_mm2": top.area_under_pressure(slab),
-        "penetration_mm": level.penetration_mm, "contact_error_mm": body.contact_error(level.state),
+        "indentation_mm": load_step.state.indentation, "contact_area_mm2": top.area_under_pressure(slab),
+        "penetration_mm": load_step.penetration_mm, "contact_error_mm": body.contact_error(load_step.state),
         "points": np.count_nonzero(top.under_pressure(slab)),
-        "frustum_compression_mm": body.bed.compression(bed.displacement).max(),
-        "residual_n": level.residual_n, "outside_card": body.share_outside_window(level.state), "iterations": level.iterations}
+        "frustum_compression_mm": body.support.compression(support.displacement).max(),
+        "residual_n": load_step.residual_n,
+        "extrapolated_volume_fraction": body.share_outside_window(load_step.state), "iterations": load_step.iterations}
 
 
 PRESSES = {"elastic": press_elastic, "foundation": press_on_foundation, "hyperelastic": press_hyperelastic}
@@ -193,15 +197,15 @@ def _friction(spec, model):
     """Attributes that state the friction of a result."""
     if model != "hyperelastic":
         return {"friction": f"none: the {model} model knows no friction"}
-    return {"friction_object": spec.friction.object, "friction_board": spec.friction.board, "tips_held": int(spec.tips_held)}
+    return {"friction_object": spec.friction.object, "friction_board": spec.friction.board, "tips_bonded": int(spec.tips_bonded)}
 
 
-def _timed(levels, forces, label, times, *, start=None):
-    """The levels as a list, and into `times` the seconds that each took; the solver's preparation counts to the first."""
+def _timed(load_steps, forces, label, times, *, start=None):
+    """The load steps as a list, and into `times` the seconds that each took; the solver's preparation counts to the first."""
     out, start = [], start or time.perf_counter()
-    for level in progress(levels, label=label, total=len(forces)):
+    for load_step in progress(load_steps, label=label, total=len(forces)):
         now = time.perf_counter()
-        out.append(level)
+        out.append(load_step)
         times.append(now - start)
         start = now
     return out

@@ -1,4 +1,4 @@
-"""What a press gives: maps and numbers per force level, with names and units."""
+"""What a press gives: maps and numbers per load step, with names and units."""
 
 from dataclasses import dataclass, field
 
@@ -16,7 +16,8 @@ class PressResult:
     deformation_map_mm (force, y, x): towards the PCB, positive;  tactile_map (force, row, column): ideal counts
     force_n, indentation_mm, contact_area_mm2, penetration_mm, wall_time_s, iterations, converged, within_validity (force,)
     frustum_compression_mm (force,): of the most compressed frustum;  residual_n (force,): largest unbalanced nodal force
-    outside_card (force,): share of a layer's volume strained beyond the data its law was fitted to, the larger of the layers'
+    extrapolated_volume_fraction (force,): share of a layer's volume strained beyond the data its law was fitted to, the larger of
+    the layers'
     within_validity: 0 where the numbers are not to be relied on, and why: docs/reference/command_line.md, "What is flagged"
     expected_error_mm (force,): root mean square over the map, against the hyperelastic model, where the model was chosen by it
     The last four are nan where the model, the law or the policy does not tell.
@@ -34,7 +35,7 @@ class PressResult:
     penetration_mm: np.ndarray
     frustum_compression_mm: np.ndarray
     residual_n: np.ndarray
-    outside_card: np.ndarray
+    extrapolated_volume_fraction: np.ndarray
     iterations: np.ndarray
     converged: np.ndarray
     within_validity: np.ndarray
@@ -45,7 +46,7 @@ class PressResult:
     sensor: str
     solver: str
     expected_error_mm: np.ndarray | None = None
-    why: str = ""
+    selection_reason: str = ""
     largest_counts: float = 2400.0
     attributes: dict = field(default_factory=dict)
     bodies: tuple = ()
@@ -55,14 +56,14 @@ class PressResult:
             object.__setattr__(self, "expected_error_mm", np.full(len(self.force_n), np.nan))
 
     _PER_FORCE = ("indentation_mm", "contact_area_mm2", "penetration_mm", "frustum_compression_mm", "residual_n",
-                  "outside_card", "expected_error_mm", "iterations", "converged", "within_validity", "wall_time_s")
+                  "extrapolated_volume_fraction", "expected_error_mm", "iterations", "converged", "within_validity", "wall_time_s")
 
-    def pressed_body(self, level=-1):
-        """The `PressedBody` at the force of number `level`, by default the last one: nodes, cells and displacements."""
+    def pressed_body(self, load_step=-1):
+        """The `PressedBody` at the force of number `load_step`, by default the last one: nodes, cells and displacements."""
         if not self.bodies:
             raise InputError(f"This result of the {self.model} model keeps no body; press with model='hyperelastic' and "
                              "keep_body=True.")
-        return self.bodies[level]
+        return self.bodies[load_step]
 
     def to_dataset(self):
         """The result as an xarray dataset with dimensions force, y, x, row, column."""
@@ -72,7 +73,8 @@ class PressResult:
         variables["deformation_map_mm"] = (("force", "y", "x"), self.deformation_map_mm, {"units": "mm"})
         variables["tactile_map"] = (("force", "row", "column"), self.tactile_map, {"units": "counts"})
         variables["force_n"] = ("force", self.force_n, {"units": "N"})
-        attributes = {"model": self.model, "sensor": self.sensor, "solver": self.solver, "why": self.why, **self.attributes}
+        attributes = {"model": self.model, "sensor": self.sensor, "solver": self.solver, "selection_reason": self.selection_reason,
+                      **self.attributes}
         return xarray.Dataset(variables, coords={"x": self.x_mm, "y": self.y_mm}, attrs=attributes)
 
     def write(self, path, *, settings=None, seed=None):

@@ -59,14 +59,15 @@ class Sensor:
     """A sensor with one law per layer; `mesh` sets the layered body's resolution, `solver` what counts as solved.
 
     device: where the hyperelastic model sums up its elements: `cpu`, `cuda`, or `auto`: a GPU where torch finds one
-    files: {"elastic": Compliance, "foundation": FoundationFlexibility}, what the fast models start from; else the user's cache
+    prepared_models: {"elastic": Compliance, "foundation": FoundationCompliance}, what the fast models start from; else the
+    user's cache
     """
 
     spec: SensorSpec
     laws: dict
     mesh: MeshSettings = MeshSettings()
     solver: newton.NewtonSettings = newton.NewtonSettings()
-    files: dict = field(default_factory=dict)
+    prepared_models: dict = field(default_factory=dict)
     scatter: tuple | None = None
     attributes: dict = field(default_factory=dict)
     device: str = "cpu"
@@ -120,11 +121,11 @@ class Sensor:
         return raise_first(results) if failures == "raise" else results
 
     def prepared(self, model, threads=1):
-        """What a fast model starts from: `Compliance` or `FoundationFlexibility`, computed on first use."""
-        if model not in self.files:
-            self.files[model] = (cached_compliance(self.spec, threads=threads) if model == "elastic"
+        """What a fast model starts from: `Compliance` or `FoundationCompliance`, computed on first use."""
+        if model not in self.prepared_models:
+            self.prepared_models[model] = (cached_compliance(self.spec, threads=threads) if model == "elastic"
                                  else cached_foundation(self.spec, self.laws, threads=threads))
-        return self.files[model]
+        return self.prepared_models[model]
 
     def body(self, *, threads=1, surface=None):
         """The `LayeredBody` that the hyperelastic model presses on."""

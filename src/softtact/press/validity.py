@@ -12,19 +12,19 @@ _FEWEST_POINTS = 9          # of the cover that carry the object: fewer do not r
 
 
 def valid_elastic(depth_mm, *, thickness_mm):
-    """Which levels (l,) of an elastic press hold: depth_mm (l,) is how far the object's lowest point has come down."""
+    """Which load steps (l,) of an elastic press hold: depth_mm (l,) is how far the object's lowest point has come down."""
     return depth_mm < _DEEPEST_LINEAR * thickness_mm
 
 
 def valid_foundation(compression_mm, depth_mm, *, frustum_mm, thickness_mm, law_limit_mm):
-    """Which levels (l,) of a foundation press hold, by its most compressed frustum (l,), frustum_mm high, and by how far the
+    """Which load steps (l,) of a foundation press hold, by its most compressed frustum (l,), frustum_mm high, and by how far the
     object's lowest point has come down (l,): the slab is linear, too, and a corner sinks into it without end.
     """
     return (compression_mm < min(law_limit_mm, _HARDLY_COMPRESSED * frustum_mm)) & (depth_mm < _DEEPEST_LINEAR * thickness_mm)
 
 
 def valid_hyperelastic(*, compression_mm, contact_error_mm, points, depth_mm, frustum_mm, allowed_mm):
-    """Which levels (l,) of a hyperelastic press hold, by its most compressed frustum, contacts and course.
+    """Which load steps (l,) of a hyperelastic press hold, by its most compressed frustum, contacts and course.
 
     contact_error_mm (l,): deepest overlap, or widest gap under pressure, of which `allowed_mm` were asked for
     points (l,): of the cover that carry the object
@@ -40,6 +40,8 @@ def _grows(depth, *, slack_mm):
 
 
 def flag_buried(result, top_mm):
-    """The result with the levels flagged at which the object's top has sunk below the surface at rest: no model feels that side."""
+    """The result with the load steps flagged at which the object's top has sunk below the surface at rest: no model feels that
+    side.
+    """
     above = result.indentation_mm < top_mm
     return replace(result, within_validity=result.within_validity & above.astype(np.int8))

@@ -77,14 +77,14 @@ def read_vtu(path):
     except Exception as error:     # the reader fails in many ways
         raise InputError(f"{path}: not readable as VTU ({' '.join(str(error).split())[:120] or type(error).__name__}); "
                          "write it again.") from None
-    levels = sorted((float(match[1]), name) for name in mesh.point_data if (match := _LEVEL.fullmatch(name)))
-    if not levels:
+    load_steps = sorted((float(match[1]), name) for name in mesh.point_data if (match := _LEVEL.fullmatch(name)))
+    if not load_steps:
         raise InputError(f"{path}: it holds no pressed sensor (no displacements); give a file of softtact press --vtu.")
     layers = mesh.cell_data.get("layer", [np.zeros(len(block.data)) for block in mesh.cells])
     cells = [(block.type, block.data[layer == own], int(own))     # a file has one block for all neighbouring cells of a kind
              for block, layer in zip(mesh.cells, layers, strict=True) for own in np.unique(layer)]
-    return PressedMesh(points=mesh.points, cells=cells, force_n=np.array([force for force, _ in levels]),
-                       displacement_mm=np.stack([mesh.point_data[name] for _, name in levels]))
+    return PressedMesh(points=mesh.points, cells=cells, force_n=np.array([force for force, _ in load_steps]),
+                       displacement_mm=np.stack([mesh.point_data[name] for _, name in load_steps]))
 
 
 def of_map(maps_mm, x_mm, y_mm, force_n, *, thickness_mm):

@@ -54,7 +54,7 @@ def capacitance_per_area(spec, displacement_mm):
 
 
 def ideal_counts(spec, deformation_map_mm, *, counts_per_relative_change=1000.0):
-    """Counts (..., rows, columns) of a faultless readout: proportional to dC / C0, limited to the converter's range."""
+    """Counts (..., rows, columns) of a ideal readout: proportional to dC / C0, limited to the converter's range."""
     rest = capacitance_per_area(spec, 0.0)
     change = taxel_means(spec, capacitance_per_area(spec, deformation_map_mm)) / rest - 1
     return np.clip(counts_per_relative_change * change, 0.0, spec.largest_counts)

@@ -22,32 +22,32 @@ import numpy as np
 class LoadHistory:
     """Corners of a history of force that is piecewise linear in time.
 
-    times_s (n,): never falling; two alike are a jump;  level (n,): index of the force level, 0 no force, 1 the first level
-    loading, unloading (levels,): which corner is read, in the order of the levels
+    times_s (n,): never falling; two alike are a jump;  load step (n,): index of the load step, 0 no force, 1 the first load step
+    loading, unloading (load steps,): which corner is read, in the order of the load steps
     """
 
     times_s: np.ndarray
-    level: np.ndarray
+    load_step: np.ndarray
     loading: np.ndarray
     unloading: np.ndarray
 
 
 def staircase(force_n, *, rate_n_per_s, hold_s, cycles_before=0, rest_s=0.0):
-    """The `LoadHistory` of a press: up the levels (N, rising) and down again, each held and read at the end of its hold.
+    """The `LoadHistory` of a press: up the load steps (N, rising) and down again, each held and read at the end of its hold.
 
-    cycles_before: to the highest level and back without holds, `rest_s` without force after each;  rate_n_per_s: inf for jumps
+    cycles_before: to the highest load step and back without holds, `rest_s` without force after each;  rate_n_per_s: inf for jumps
     """
     count = len(force_n)
     cycle = [*range(1, count + 1), *range(count - 1, -1, -1), 0]
     stairs = np.repeat([*range(1, count + 1), *range(count, 0, -1)], 2)
-    level = np.concatenate([[0], np.tile(cycle, cycles_before), stairs]).astype(int)
-    force = np.concatenate([[0.0], force_n])[level]
+    load_step = np.concatenate([[0], np.tile(cycle, cycles_before), stairs]).astype(int)
+    force = np.concatenate([[0.0], force_n])[load_step]
     duration = np.abs(np.diff(force)) / rate_n_per_s
     first = 1 + cycles_before * len(cycle)
     duration[len(cycle) - 1:first - 1:len(cycle)] = rest_s
     duration[first::2] = hold_s
     read = first + 1 + 2 * np.arange(2 * count)
-    return LoadHistory(np.concatenate([[0.0], np.cumsum(duration)]), level, read[:count], read[count:][::-1])
+    return LoadHistory(np.concatenate([[0.0], np.cumsum(duration)]), load_step, read[:count], read[count:][::-1])
 
 
 def lagged(values, times_s, *, shares, time_constants_s):
@@ -72,7 +72,7 @@ def _not_yet_arrived(values, steps, share):
 
 
 def felt_branches(maps, history, *, shares, time_constants_s):
-    """Maps (levels, ...) felt on the way up and on the way down, for elastic maps (levels, ...) of the same levels."""
-    elastic = np.concatenate([np.zeros((1, *maps.shape[1:])), maps])[history.level]
+    """Maps (load steps, ...) felt on the way up and on the way down, for elastic maps (load steps, ...) of the same load steps."""
+    elastic = np.concatenate([np.zeros((1, *maps.shape[1:])), maps])[history.load_step]
     felt = lagged(elastic, history.times_s, shares=shares, time_constants_s=time_constants_s)
     return felt[history.loading], felt[history.unloading]

@@ -29,8 +29,8 @@ class VirtualSensorSettings:
     between neighbours;  coupling: share of their difference that neighbours exchange;  sheet_scatter: standard deviation of the
     sheet's thickness over the taxels, as a share, as the field sees it
     relaxation, relaxation_s: numbers or lists, shares of the deformation that creep in late, and their time constants
-    rate_n_per_s: of ramps between levels (.inf: steps);  level_s: hold at a level, read at its end;  cycles_before, rest_s: to the
-    highest level and back before the press, and the rest after each
+    rate_n_per_s: of ramps between load steps (.inf: steps);  load_step_s: hold at a load step, read at its end;  cycles_before,
+    rest_s: to the highest load step and back before the press, and the rest after each
     placement_mm, force_scatter: standard deviations of a trial's place (x, y) and of its forces, as a share
     counts_per_relative_change: counts at dC/C0 = 1;  gain_scatter, offset_counts: standard deviations over taxels
     drift, drift_counts: standard deviations of each taxel's change of gain and zero from trial to trial
@@ -46,7 +46,7 @@ class VirtualSensorSettings:
     relaxation: tuple = (0.08, 0.06)
     relaxation_s: tuple = (1.0, 10.0)
     rate_n_per_s: float = 10.0
-    level_s: float = 1.0
+    load_step_s: float = 1.0
     cycles_before: int = 1
     rest_s: float = 10.0
     placement_mm: float = 0.1
@@ -72,10 +72,10 @@ class VirtualSensorSettings:
         return cls(**values)
 
     @classmethod
-    def faultless(cls, **changes):
+    def ideal(cls, **changes):
         """Every effect off, but for `changes`: the ideal counts, without limit above."""
         off = {field.name: () if field.name in _LISTS else 0.0 for field in dataclasses.fields(cls)}
-        kept = {name: getattr(cls, name) for name in ("rate_n_per_s", "level_s", "counts_per_relative_change")}
+        kept = {name: getattr(cls, name) for name in ("rate_n_per_s", "load_step_s", "counts_per_relative_change")}
         return cls(**off | kept | {"largest_counts": np.inf} | changes)
 
     def __post_init__(self):
@@ -140,7 +140,7 @@ def read_virtual_sensor(spec, deformation_map_mm, *, force_n, trials, seed, item
 def read_branches(spec, deformation_map_mm, *, force_n, trials, seed, item, settings=VirtualSensorSettings()):
     """`Branches` of counts for maps (force, y, x) in mm at rising forces (force,) in N; `item` tells presses apart."""
     specimen = make_specimen(spec, seed=seed, settings=settings)
-    history = staircase(np.asarray(force_n, dtype=float), rate_n_per_s=settings.rate_n_per_s, hold_s=settings.level_s,
+    history = staircase(np.asarray(force_n, dtype=float), rate_n_per_s=settings.rate_n_per_s, hold_s=settings.load_step_s,
                         cycles_before=settings.cycles_before, rest_s=settings.rest_s)
     draws = [np.random.default_rng([seed, 1, trial, *item.encode()]) for trial in range(trials)]
     true = np.stack([_true_counts(spec, specimen, deformation_map_mm, force_n, history, rng, settings) for rng in draws])
@@ -185,7 +185,7 @@ def taxel_capacitance(spec, displacement_mm, *, sheet_excess_mm=0.0, shift_mm=(0
 
 
 def _true_counts(spec, specimen, maps, force_n, history, rng, s):
-    """Counts (2 levels, row, column) of one trial before the readout's faults: way up, then way down, each by rising force."""
+    """Counts (2 load steps, row, column) of one trial before the readout's faults: way up, then way down, each by rising force."""
     shift, force_error = s.placement_mm * rng.standard_normal(2), s.force_scatter * rng.standard_normal()
     maps = _at_force(np.asarray(maps), np.asarray(force_n, dtype=float), 1 + force_error)
     felt = np.concatenate(felt_branches(maps, history, shares=s.relaxation, time_constants_s=s.relaxation_s))
@@ -195,7 +195,7 @@ def _true_counts(spec, specimen, maps, force_n, history, rng, s):
 
 
 def _at_force(maps, force_n, factor):
-    """Maps (force, y, x) at `factor` times their forces (N): linear between levels and from rest, and on beyond the last."""
+    """Maps (force, y, x) at `factor` times their forces (N): linear between load steps and from rest, and on beyond the last."""
     if factor == 1:
         return maps
     force, maps = np.concatenate([[0.0], force_n]), np.concatenate([np.zeros((1, *maps.shape[1:])), maps])
@@ -206,7 +206,7 @@ def _at_force(maps, force_n, factor):
 
 
 def _read_out(true, specimen, draws, s, *, largest):
-    """Counts as the converter gives them, of true ones (trial, level, row, column)."""
+    """Counts as the converter gives them, of true ones (trial, load step, row, column)."""
     taxels = true.shape[2:]
     steps = np.stack([rng.standard_normal((2, *taxels)) for rng in draws])[:, :, None]                # (trial, 2, 1, row, column)
     noise = s.noise_counts * np.stack([rng.standard_normal((true.shape[1], *taxels)) for rng in draws])

@@ -7,10 +7,10 @@ _STROKES = (("--", 1.0), ((0, (1, 4)), 2.4), ("-", 0.7), ("-.", 1.0))     # two 
 _FAR = 1.5                                   # times the largest area of the main curves: drawn in a panel of its own above
 
 
-def draw(area, summary, *, readings=None):
-    """Figure from contact_area.csv, its summary, and readings.csv (all readings and laws), if there is one."""
+def draw(area, summary, *, orientations=None):
+    """Figure from contact_area.csv, its summary, and orientations.csv (all orientations and laws), if there is one."""
     main = ["area_per_frustum_mm2", "area_measured_mm2", "area_image_mm2"]
-    others = [] if readings is None else _others(readings, summary["under_test"])
+    others = [] if orientations is None else _others(orientations, summary["under_test"])
     bound = _FAR * area[main].to_numpy().max()
     far = [record for record in others if record[1].area_per_frustum_mm2.min() > bound]
     figure, panels = _panels(bool(far))
@@ -56,10 +56,11 @@ def _total_on_the_right(panels, count):
 
 def _name(summary):
     chosen = summary.get("under_test")
-    return f" ({chosen['reading']}, {chosen['law']})" if chosen else ""
+    return f" ({chosen['orientation']}, {chosen['law']})" if chosen else ""
 
 
-def _others(readings, chosen):
-    """(label, curve) of the readings and laws that are not under test."""
-    return [(f"{reading}, {law}", curve) for (reading, law), curve in readings.groupby(["reading", "law"], sort=False)
-            if (reading, law) != (chosen["reading"], chosen["law"])]
+def _others(orientations, chosen):
+    """(label, curve) of the orientations and laws that are not under test."""
+    return [(f"{orientation}, {law}", curve) for (orientation, law),
+            curve in orientations.groupby(["orientation", "law"], sort=False)
+            if (orientation, law) != (chosen["orientation"], chosen["law"])]

@@ -11,7 +11,7 @@ from softtact.files import read_yaml
 from softtact.unknown_names import first_fault, known_keys, unknown
 
 # How the frustum's two printed diameters are read: the narrow end, or (as the words of the text have it) the wide one as the tip.
-READINGS = ("default", "as_printed")
+ORIENTATIONS = ("default", "as_printed")
 T = TypeVar("T")
 
 
@@ -109,11 +109,11 @@ class SensorSpec(_Strict):
     taxels: Taxels
     dielectric: Dielectric
     cover: Cover
-    tips_held: _or_stated(bool) = True
+    tips_bonded: _or_stated(bool) = True
     friction: Friction = Friction()
     elastic_layer: ElasticLayer
 
-    def read_as(self, reading):
+    def with_frustum_orientation(self, reading):
         """The same sensor with the `default` reading of its frustum's diameters, the narrow end as tip, or `as_printed`."""
         narrow, wide = sorted((self.dielectric.frusta.tip_diameter_mm, self.dielectric.frusta.root_diameter_mm))
         tip, root = {"default": (narrow, wide), "as_printed": (wide, narrow)}[reading]
@@ -180,9 +180,9 @@ class SensorSpec(_Strict):
         if min(spec.frusta_counts) < 1:
             raise InputError(f"{where}: no frustum of pitch {spec.dielectric.frusta.pitch_mm} mm fits on the footprint "
                              f"{spec.footprint_mm} mm; enlarge the footprint or reduce the pitch.")
-        if spec.tips_held and spec.friction.board > 0:
-            raise InputError(f"{where}: tips that are held cannot slide with a friction of {spec.friction.board:g} on the board; "
-                             "set 'tips_held' to false, or 'friction.board' to 0.")
+        if spec.tips_bonded and spec.friction.board > 0:
+            raise InputError(f"{where}: bonded tips cannot slide with a friction of {spec.friction.board:g} on the board; "
+                             "set 'tips_bonded' to false, or 'friction.board' to 0.")
         return spec
 
     @classmethod

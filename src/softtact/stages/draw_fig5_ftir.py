@@ -1,6 +1,6 @@
 """Figure 5.
 
-inputs: area, readings, summary;  outputs: png, svg
+inputs: area, orientations, summary;  outputs: png, svg
 """
 
 import pandas as pd
@@ -12,5 +12,5 @@ from softtact.reporting.style import save
 
 def run(*, inputs, outputs, settings, threads=1):
     """Draw."""
-    figure = draw(pd.read_csv(inputs["area"]), read_json(inputs["summary"]), readings=pd.read_csv(inputs["readings"]))
+    figure = draw(pd.read_csv(inputs["area"]), read_json(inputs["summary"]), orientations=pd.read_csv(inputs["orientations"]))
     save(figure, outputs["png"], outputs["svg"])

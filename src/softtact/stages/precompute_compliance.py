@@ -1,4 +1,4 @@
-"""What a fast model's presses start from, once per sensor: the elastic layer's flexibility, or the slab's on its frusta.
+"""What a fast model's presses start from, once per sensor: the elastic layer's compliance, or the slab's on its frusta.
 
 inputs: for a foundation frustum_law, card_dielectric, card_cover;  outputs: compliance;  settings: sensor, kind, laws {layer: law}
 """
@@ -6,7 +6,7 @@ inputs: for a foundation frustum_law, card_dielectric, card_cover;  outputs: com
 from softtact.files import atomic_path
 from softtact.materials.cards import law_from_card, load_card
 from softtact.models.elastic.compliance import elastic_compliance
-from softtact.models.foundation.compliance import foundation_flexibility
+from softtact.models.foundation.compliance import foundation_compliance
 from softtact.models.foundation.frustum_spring import FrustumLaw
 from softtact.sensors.specification import SensorSpec
 
@@ -18,7 +18,7 @@ def run(*, inputs, outputs, settings, threads=1):
         compliance = elastic_compliance(spec, threads=threads)
     else:
         laws = {layer: law_from_card(load_card(inputs[f"card_{layer}"]), law) for layer, law in settings["laws"].items()}
-        compliance = foundation_flexibility(spec, dielectric_law=laws["dielectric"], cover_law=laws["cover"],
+        compliance = foundation_compliance(spec, dielectric_law=laws["dielectric"], cover_law=laws["cover"],
                                             frustum=FrustumLaw.load(inputs["frustum_law"]), threads=threads)
     with atomic_path(outputs["compliance"]) as temporary:
         compliance.save(temporary)

@@ -1,7 +1,8 @@
-"""The dielectric pressed on glass: the models' contact area in each reading and law, and a virtual specimen's with scatter.
+"""The dielectric pressed on glass: the models' contact area in each orientation and law, and a virtual specimen's with scatter.
 
 inputs: card;  outputs: state, virtual
-settings: sensor, forces_n, readings, laws, constants (printed, fitted), reading, law, virtual_law, height_scatter, tip_scatter,
+settings: sensor, forces_n, orientations, laws, constants (printed, fitted), orientation, law, virtual_law, height_scatter,
+tip_scatter,
     mesh, seed
 """
 
@@ -19,29 +20,31 @@ from softtact.sensors.specification import SensorSpec
 
 
 def run(*, inputs, outputs, settings, threads=1):
-    """Solve one cell per reading and law, then a specimen whose frusta differ in height and tip diameter."""
+    """Solve one cell per orientation and law, then a specimen whose frusta differ in height and tip diameter."""
     spec, card = SensorSpec.from_dict(settings["sensor"]), load_card(inputs["card"])
     changes = {key: value for key, value in settings["mesh"].items() if value is not None}
     forces = np.asarray(settings["forces_n"], dtype=float)
     _write(outputs["state"], _models(spec, card, forces, settings, changes), settings)
-    _write(outputs["virtual"], _virtual(spec.read_as(settings["reading"]), card, forces, settings, changes), settings)
+    _write(outputs["virtual"], _virtual(spec.with_frustum_orientation(settings["orientation"]), card, forces, settings, changes),
+           settings)
 
 
 def _models(spec, card, forces, settings, changes):
-    """Data set (reading, law, force) of a cell that carries its share of the force."""
-    shape = len(settings["readings"]), len(settings["laws"]), len(forces)
+    """Data set (orientation, law, force) of a cell that carries its share of the force."""
+    shape = len(settings["orientations"]), len(settings["laws"]), len(forces)
     area, compression, each = np.zeros(shape), np.zeros(shape), forces / np.prod(spec.frusta_counts)
     for i, j in progress(list(np.ndindex(shape[:2])), label="frusta on glass"):
-        read, law = spec.read_as(settings["readings"][i]), _law(card, settings["laws"][j], settings["constants"])
+        read = spec.with_frustum_orientation(settings["orientations"][i])
+        law = _law(card, settings["laws"][j], settings["constants"])
         curve = press_cell_on_glass(read, law, each, mesh=glass_mesh(read, **changes))
         area[i, j], compression[i, j] = curve.area_mm2, curve.compression_mm
     gap = spec.dielectric.frusta.pitch_mm - 2 * np.sqrt(area / np.pi)
-    axes = ("reading", "law", "force")
+    axes = ("orientation", "law", "force")
     data = {"area_per_frustum_mm2": area, "compression_mm": compression, "disc_gap_mm": gap}
     return xarray.Dataset({"force_n": ("force", forces, {"units": "N"}),
                            **{name: (axes, values, {"units": name.rsplit("_", 1)[1]}) for name, values in data.items()}},
-                          coords={"reading": settings["readings"], "law": settings["laws"]},
-                          attrs={"reading_under_test": settings["reading"], "law_under_test": settings["law"],
+                          coords={"orientation": settings["orientations"], "law": settings["laws"]},
+                          attrs={"orientation_under_test": settings["orientation"], "law_under_test": settings["law"],
                                  "frusta": int(np.prod(spec.frusta_counts)), "pitch_mm": spec.dielectric.frusta.pitch_mm})
 
 
@@ -71,7 +74,7 @@ def _virtual(spec, card, forces, settings, changes):
         "disc_area_mm2": (both, pressed.area_mm2, {"units": "mm2"}), "frustum_force_n": (both, pressed.force_n, {"units": "N"}),
         "x_mm": ("frustum", specimen.centres[:, 0]), "y_mm": ("frustum", specimen.centres[:, 1]),
         "height_factor": ("frustum", specimen.height_factor), "tip_factor": ("frustum", specimen.tip_factor)},
-        attrs={"reading": settings["reading"], "law": settings["virtual_law"]})
+        attrs={"orientation": settings["orientation"], "law": settings["virtual_law"]})
 
 
 def _write(path, data, settings):

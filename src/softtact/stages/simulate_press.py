@@ -9,12 +9,12 @@ from softtact.geometry.meshes import read_mesh
 from softtact.geometry.pose import Pose
 from softtact.materials.cards import law_from_card, load_card
 from softtact.models.elastic.compliance import Compliance
-from softtact.models.foundation.compliance import FoundationFlexibility
+from softtact.models.foundation.compliance import FoundationCompliance
 from softtact.models.meshes import frustum_scatter, mesh_settings, newton_settings, specimen_of
 from softtact.press.sensor import Sensor
 from softtact.sensors.specification import SensorSpec
 
-COMPLIANCES = {"elastic": Compliance, "foundation": FoundationFlexibility}
+COMPLIANCES = {"elastic": Compliance, "foundation": FoundationCompliance}
 
 
 def run(*, inputs, outputs, settings, threads=1):
@@ -38,7 +38,7 @@ def make_sensor(inputs, settings):
     kind, mesh, names = settings["kind"], settings["mesh"], names_of(settings)
     spec = SensorSpec.from_dict(settings["sensor"])
     if kind in COMPLIANCES:     # a press needs no laws then: the compliance knows them
-        return Sensor(spec, laws={}, files={kind: COMPLIANCES[kind].load(inputs["compliance"])}, attributes=names)
+        return Sensor(spec, laws={}, prepared_models={kind: COMPLIANCES[kind].load(inputs["compliance"])}, attributes=names)
     if settings["friction"] is not None:
         spec = SensorSpec.from_dict({**settings["sensor"], "friction": settings["friction"]})
     spec = specimen_of(spec, mesh)

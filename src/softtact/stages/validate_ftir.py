@@ -1,8 +1,8 @@
-"""Contact area per frustum against force: the model's, the image's, and the measured one; and which readings the paper allows.
+"""Contact area per frustum against force: the model's, the image's, and the measured one; and which orientations the paper allows.
 
 inputs: state, virtual, discs (list), measured (CSV force_n, area_mm2 of the mean frustum; without it the virtual dielectric
     stands in)
-outputs: area (CSV), readings (CSV, long: each reading and law), summary (JSON);  settings: pixel_mm of the camera
+outputs: area (CSV), orientations (CSV, long: each orientation and law), summary (JSON);  settings: pixel_mm of the camera
 """
 
 import numpy as np
@@ -14,31 +14,32 @@ from softtact.files import read_dataset, write_csv, write_json
 
 
 def run(*, inputs, outputs, settings, threads=1):
-    """Join the three curves, report their differences, and judge the readings by the paper's words."""
+    """Join the three curves, report their differences, and judge the orientations by the paper's words."""
     state, virtual = read_dataset(inputs["state"]), read_dataset(inputs["virtual"])
     count = virtual.sizes["frustum"]
-    readings = long_table(state, count)
-    write_csv(outputs["readings"], readings)
+    orientations = long_table(state, count)
+    write_csv(outputs["orientations"], orientations)
     table, found, source = _curves(inputs, state, virtual, count)
     write_csv(outputs["area"], table)
-    judged = judge(readings, pitch_mm=state.attrs["pitch_mm"], pixel_mm=settings["pixel_mm"])
+    judged = judge(orientations, pitch_mm=state.attrs["pitch_mm"], pixel_mm=settings["pixel_mm"])
     write_json(outputs["summary"], _errors(table, virtual, count) | {
-        "discs_found": found, "source": source, "frusta": count, "verdict": summary_sentence(judged), "readings": judged,
-        "under_test": {"reading": state.attrs["reading_under_test"], "law": state.attrs["law_under_test"]}})
+        "discs_found": found, "source": source, "frusta": count, "verdict": summary_sentence(judged), "orientations": judged,
+        "under_test": {"orientation": state.attrs["orientation_under_test"], "law": state.attrs["law_under_test"]}})
 
 
 def long_table(state, count):
-    """Every reading's and law's curve, one row a force."""
+    """Every orientation's and law's curve, one row a force."""
     names = ["area_per_frustum_mm2", "compression_mm", "disc_gap_mm"]
     table = state[[*names, "force_n"]].to_dataframe().reset_index()
     table["area_total_mm2"] = count * table.area_per_frustum_mm2
-    return table[["reading", "law", "force_n", "area_per_frustum_mm2", "area_total_mm2", "compression_mm", "disc_gap_mm"]]
+    return table[["orientation", "law", "force_n", "area_per_frustum_mm2", "area_total_mm2", "compression_mm", "disc_gap_mm"]]
 
 
 def _curves(inputs, state, virtual, count):
     """Table of the model under test, the image and the measurement; discs found by force; where the measurement is from."""
     forces = state.force_n.values
-    model = state.area_per_frustum_mm2.sel(reading=state.attrs["reading_under_test"], law=state.attrs["law_under_test"]).values
+    model = state.area_per_frustum_mm2.sel(orientation=state.attrs["orientation_under_test"],
+                                           law=state.attrs["law_under_test"]).values
     discs = pd.concat([pd.read_csv(path) for path in inputs["discs"]])
     image = discs.groupby("force_n").area_mm2.sum().reindex(forces, fill_value=0.0).to_numpy() / count
     measured, source = _measured(inputs.get("measured"), forces, virtual)

@@ -75,18 +75,18 @@ def _words(hours):
 
 def _presses(study, measured, folder):
     values = study.values
-    levels, grid = len(values.forces_n), math.prod(study.spec.map_shape)
+    load_steps, grid = len(values.forces_n), math.prod(study.spec.map_shape)
     for model in study.pressed_with:
         files = [folder / "presses" / item.set / item.id / f"{model}.nc" for item in study.items()]
         times, jobs = measured["presses"].get(model) or measured["presses"][values.models[model].kind], study.press_jobs(model)
-        seconds = _own_press_s(folder, model, jobs) or times["fixed_s"] * len(jobs) / len(files) + levels * times["level_s"]
-        yield Cost(f"simulate_press, {model}", len(files), _left(files), seconds, len(files) * levels * grid * 2 * BYTES / 1e6)
+        seconds = _own_press_s(folder, model, jobs) or times["fixed_s"] * len(jobs) / len(files) + load_steps * times["load_step_s"]
+        yield Cost(f"simulate_press, {model}", len(files), _left(files), seconds, len(files) * load_steps * grid * 2 * BYTES / 1e6)
 
 
 def _readings(study, measured, folder):
     files = [folder / "tactile" / item.set / f"{item.id}.nc" for item in study.items()]
-    trials, levels = {name: study.trials_of(name) for name in SETS}, len(study.values.forces_n)
-    numbers = sum(trials[item.set] for item in study.items()) * levels * READING_NUMBERS
+    trials, load_steps = {name: study.trials_of(name) for name in SETS}, len(study.values.forces_n)
+    numbers = sum(trials[item.set] for item in study.items()) * load_steps * READING_NUMBERS
     taxels = study.spec.taxels.rows * study.spec.taxels.columns
     seconds = _own(folder, "read_virtual_sensor/*/*.tsv") or measured["reading_s"]
     return Cost("read_virtual_sensor", len(files), _left(files), seconds, numbers * taxels * 2 * BYTES / 1e6)
@@ -103,8 +103,8 @@ class Sizes:
     @classmethod
     def of(cls, study):
         """As many as the study has where all presses are within their models' validity."""
-        levels, dataset = len(study.values.forces_n), study.values.dataset
-        maps = {name: len(items) * levels for name, items in study.items_of.items()}
+        load_steps, dataset = len(study.values.forces_n), study.values.dataset
+        maps = {name: len(items) * load_steps for name, items in study.items_of.items()}
         trained = round(dataset.train_fraction * maps["indenters"])
         each = study.trials_of("indenters")
         return cls(train=trained * (1 if dataset.training_trials == "mean" else each),

@@ -19,7 +19,7 @@ from softtact.learning.settings import LearningCurve, Network, Search, Ssim, Tra
 from softtact.materials.laws.registry import LAWS
 from softtact.published.arrangement import ARRANGEMENTS
 from softtact.readout.virtual_sensor import VirtualSensorSettings
-from softtact.sensors.specification import READINGS
+from softtact.sensors.specification import ORIENTATIONS
 from softtact.unknown_names import unknown
 
 CENTRED = "centred"  # the pose that gives an item its object's plain name
@@ -48,7 +48,7 @@ NotNegative = Annotated[float, Field(ge=0.0)]
 Forces = Annotated[list[PositiveFloat], Field(min_length=1), AfterValidator(_rising)]
 ForcesFromZero = Annotated[list[NotNegative], Field(min_length=1), AfterValidator(_rising)]
 Law = _one_of(LAWS, kind="law")
-Reading = _one_of(READINGS, kind="reading")
+FrustumOrientation = _one_of(ORIENTATIONS, kind="orientation")
 Arrangement = _one_of(ARRANGEMENTS, kind="arrangement")
 VirtualSensorKey = _one_of(VirtualSensorSettings.__dataclass_fields__, kind="key")
 Six = Annotated[list[float], Field(min_length=6, max_length=6)]
@@ -72,7 +72,7 @@ class Camera(Section):
 class GlassMesh(Section):
     """Resolution of the frustum on glass; what is not said is the default for its shape."""
 
-    frustum_levels: Annotated[list[float], AfterValidator(_rising)] | None = Field(
+    frustum_heights: Annotated[list[float], AfterValidator(_rising)] | None = Field(
         None, description="heights of its layers of elements, from 0 to 1")
     frustum_rings: PositiveInt | None = Field(None, description="rings of elements around its core, thin at its rim")
     refinement: Annotated[int, Field(ge=0)] | None = Field(None, description="how often all elements are split in plan")
@@ -82,11 +82,12 @@ class Ftir(Section):
     """The dielectric pressed on glass, as a model and as a virtual specimen, and the camera that looks at it."""
 
     forces_n: ForcesFromZero = Field(description="on the whole dielectric")
-    readings: Annotated[list[Reading], Field(min_length=1)] = Field(
+    orientations: Annotated[list[FrustumOrientation], Field(min_length=1)] = Field(
         ["default", "as_printed"], description="of the printed frustum: its narrow or its wide end on the glass")
-    laws: Annotated[list[Law], Field(min_length=1)] = Field(["mooney_rivlin", "ogden2"], description="each solves each reading")
+    laws: Annotated[list[Law], Field(min_length=1)] = Field(["mooney_rivlin", "ogden2"], description="each solves each orientation")
     constants: Literal["printed", "fitted"] = Field("printed", description="of the laws: as published, or the card's fit")
-    reading: Reading = Field("default", description="of the model under test and of the virtual specimen; one of `readings`")
+    orientation: FrustumOrientation = Field(
+        "default", description="of the model under test and of the virtual specimen; one of `orientations`")
     law: Law = Field(description="of the model under test; one of `laws`")
     virtual_law: Law = Field(description="of the virtual specimen")
     height_scatter: NotNegative = Field(0.01, description="standard deviation of its frusta's heights, share of the height")
@@ -97,7 +98,7 @@ class Ftir(Section):
 
     @model_validator(mode="after")
     def _tests_what_it_solves(self):
-        for key, chosen, among in (("reading", self.reading, self.readings), ("law", self.law, self.laws)):
+        for key, chosen, among in (("orientation", self.orientation, self.orientations), ("law", self.law, self.laws)):
             if chosen not in among:
                 raise ValueError(f"{key} {chosen!r} of the model under test is not among the {key}s {', '.join(among)}; add it")
         if not self.forces_n[-1] > 0:
@@ -175,26 +176,26 @@ class Mesh(Section):
     preset: Literal["default", "draft", "stable", "fine"] | None = Field(
         None, description="mesh and tolerances, which the other keys change (docs/explanation/discretisation.md)")
     sheet_layers: PositiveInt | None = None
-    cover_levels: Annotated[list[float], AfterValidator(_rising)] | None = Field(
+    cover_heights: Annotated[list[float], AfterValidator(_rising)] | None = Field(
         None, description="heights of the cover's layers of elements, from 0 to 1")
     cover_splits: list[Annotated[int, Field(ge=0, le=5)]] | None = Field(
         None, description="how often the elements, a pitch wide, of the uppermost of these layers are split under the object and "
                           "at its edges; layers below, without a number here, keep to the sheet's plan")
     far_pitches: Literal[1, 2, 4] | None = Field(None, description="pitches that an element of the cover spans far from the object")
-    frustum_levels: Annotated[list[float], AfterValidator(_rising)] | None = Field(
+    frustum_heights: Annotated[list[float], AfterValidator(_rising)] | None = Field(
         None, description="heights of a frustum's layers of elements, from 0 to 1")
     frustum_rings: PositiveInt | None = Field(None, description="rings of elements around a frustum's core, thin at its rim")
     frustum_core: Annotated[float, Field(ge=0.3, le=0.8)] | None = Field(
         None, description="corners of this core over the frustum's radius; with 0.5 frusta may be pressed flatter than with 0.6")
-    local_over_shear: NotNegative | None = Field(None, description="volumetric stiffness of frusta at each point, over mu")
-    growing_over_shear: NotNegative | None = Field(
+    unprojected_penalty_ratio: NotNegative | None = Field(None, description="volumetric stiffness of frusta at each point, over mu")
+    quartic_penalty_ratio: NotNegative | None = Field(
         None, description="stiffness of frusta against large volume changes that their elements' pressure misses, over mu")
-    slab_growing_over_shear: NotNegative | None = Field(None, description="the same of sheet and cover")
+    slab_quartic_penalty_ratio: NotNegative | None = Field(None, description="the same of sheet and cover")
     trilinear_pressure: bool | None = Field(None, description="pressure in the frusta's elements: trilinear (default), or linear")
     refinement: Annotated[int, Field(ge=0)] | None = Field(
         None, description="how often all elements are split into four in plan")
     contact_stiffness: PositiveFloat | None = Field(None, description="N/mm3 of the contacts' penalty")
-    coarse_walls: bool | None = Field(
+    constrained_cell_edges: bool | None = Field(
         None, description="along all walls between cells, not only far from the object, the sheet moves as one quadratic curve: "
                           "half the work, and 2 to 2.5 % of the map; without effect in a refined plan")
     largest_penetration_mm: PositiveFloat | None = Field(None, description="deeper overlaps in contacts are pressed apart")
@@ -238,8 +239,8 @@ class Data(Section):
     unseen: list[Name] = Field([], description="the archive's indenters that training never sees, donut_m for its DonutM")
     without: list[str] = Field([], description="tests, by their Path, and objects, by their item's name, that are not used")
     taxel_order: Arrangement = Field("rows", description="of tax1 to tax28 under the map; the import says which one fits best")
-    odd: Literal["leave_out", "refuse"] = Field("leave_out", description="tests that are odd")
-    largest_odd_share: Annotated[float, Field(ge=0.0, le=1.0)] = Field(0.1, description="of tests that may be left out")
+    outliers: Literal["leave_out", "refuse"] = Field("leave_out", description="tests that are odd")
+    largest_outlier_share: Annotated[float, Field(ge=0.0, le=1.0)] = Field(0.1, description="of tests that may be left out")
 
     @model_validator(mode="after")
     def _has_unseen_indenters(self):

@@ -90,7 +90,7 @@ def test_turning_the_object_by_half_a_turn_turns_the_map(compliance):
 def test_saved_and_loaded_it_presses_the_same(compliance, tmp_path):
     compliance.save(tmp_path / "compliance.npz")
     loaded = Compliance.load(tmp_path / "compliance.npz")
-    assert loaded.bedding == compliance.bedding
+    assert loaded.foundation_modulus == compliance.foundation_modulus
     points = points_of("punch off the nodes", compliance)
     np.testing.assert_array_equal(press_layer(loaded, points, FORCES).maps, press_layer(compliance, points, FORCES).maps)
 
@@ -102,13 +102,13 @@ def test_a_map_without_a_middle_is_refused():
 
 def test_the_bedding_is_the_confined_modulus_over_the_thickness(compliance):
     """E (1 - nu) / ((1 + nu) (1 - 2 nu)) = 1.289 * 0.8271 / (1.1729 * 0.6542) = 1.3895 MPa, over 2.5 mm."""
-    assert compliance.bedding == pytest.approx(1.3895 / 2.5, rel=1e-4)
+    assert compliance.foundation_modulus == pytest.approx(1.3895 / 2.5, rel=1e-4)
 
 
 def test_the_sensors_press_is_the_layers(compliance):
     mesh, values = OBJECTS["punch off the nodes"]
-    result = Sensor(SMALL, {}, files={"elastic": compliance}).press(mesh, pose=Pose.from_values((*values[:2], 1.5, 0, 0, 0)),
-                                                                    force_n=list(FORCES), model="elastic")
+    sensor, pose = Sensor(SMALL, {}, prepared_models={"elastic": compliance}), Pose.from_values((*values[:2], 1.5, 0, 0, 0))
+    result = sensor.press(mesh, pose=pose, force_n=list(FORCES), model="elastic")
     nodes = Underside(HeightField(placed("punch off the nodes")), compliance.grid).nodes(SMALL.thickness_mm)
     expected = press_layer(compliance, nodes, FORCES)
     # the sensor asks for points as deep as the object may come; those left out never touch
@@ -120,7 +120,7 @@ def test_the_sensors_press_is_the_layers(compliance):
 
 def test_a_press_deeper_than_half_the_layer_is_out_of_its_validity(compliance):
     needle = trimesh.creation.cylinder(radius=0.9, height=3.0, sections=64)
-    result = Sensor(SMALL, {}, files={"elastic": compliance}).press(needle, force_n=[0.5, 8.0], model="elastic")
+    result = Sensor(SMALL, {}, prepared_models={"elastic": compliance}).press(needle, force_n=[0.5, 8.0], model="elastic")
     assert result.indentation_mm[1] > 0.5 * SMALL.thickness_mm > result.indentation_mm[0]
     assert result.within_validity.tolist() == [1, 0]
 

@@ -15,7 +15,7 @@ from softtact.geometry.meshes import place
 from softtact.geometry.pose import Pose
 from softtact.materials.laws.registry import make_law
 from softtact.models.foundation import solve
-from softtact.models.foundation.compliance import FoundationFlexibility, foundation_flexibility
+from softtact.models.foundation.compliance import FoundationCompliance, foundation_compliance
 from softtact.models.foundation.dof_maps import Places, Sideways, lattice_places
 from softtact.models.foundation.finite_displacement import membrane_loads
 from softtact.models.foundation.frustum_spring import FrustumLaw, _root_stiffness, _stiffness_at_rest, frustum_law
@@ -42,8 +42,8 @@ def law():
 
 
 @pytest.fixture(scope="module")
-def flexibility(law):
-    return foundation_flexibility(SMALL, dielectric_law=LAWS["dielectric"], cover_law=LAWS["cover"], frustum=law)
+def compliance(law):
+    return foundation_compliance(SMALL, dielectric_law=LAWS["dielectric"], cover_law=LAWS["cover"], frustum=law)
 
 
 @pytest.fixture(scope="module")
@@ -51,10 +51,10 @@ def whole(law):
     return WholeFoundation(SMALL, LAWS, law)
 
 
-def points_of(mesh, flexibility, values=(0, 0, 0, 0, 0, 0)):
+def points_of(mesh, compliance, values=(0, 0, 0, 0, 0, 0)):
     mesh = place(mesh, pose=Pose.from_values(values))
     mesh.apply_translation([0, 0, -mesh.bounds[0, 2]])
-    return Underside(HeightField(mesh), flexibility.grid).points(1.0)
+    return Underside(HeightField(mesh), compliance.grid).points(1.0)
 
 
 def force_of(law, compression):
@@ -80,11 +80,11 @@ def test_a_frustum_takes_more_force_the_more_it_is_compressed(law):
 
 def test_the_first_slope_is_the_linear_stiffness_of_a_frustum_at_rest(law):
     body = build_unit_cell(SMALL, dielectric_law=LAWS["dielectric"], mesh=MeshSettings(frustum_rings=2))
-    stiffness = _root_stiffness(body.bed)
+    stiffness = _root_stiffness(body.support)
     body.close()
     straight = np.tile([0.0, 0.0, 1.0], len(law.spread))
     expected = straight @ stiffness @ straight      # N/mm: the root comes down as a plane, the tip stands
-    # Up to 2e-3 N the tip sinks into the board's smoothed penalty by sqrt(2 p / 3000**2 mm2/MPa), 3 % of the first level.
+    # Up to 2e-3 N the tip sinks into the board's smoothed penalty by sqrt(2 p / 3000**2 mm2/MPa), 3 % of the first load step.
     slope = (law.force_n[3] - law.force_n[1]) / (law.compression_mm[3] - law.compression_mm[1])
     assert slope == pytest.approx(expected, rel=0.02)
     assert law.force_n[1] / law.compression_mm[1] == pytest.approx(expected, rel=0.04)
@@ -98,7 +98,7 @@ def test_the_slope_is_the_derivative_of_the_extension(law):
     assert (law.slope(forces) > 0).all()
 
 
-def test_the_extension_passes_through_the_cells_levels_and_goes_on_straight(law):
+def test_the_extension_passes_through_the_cells_load_steps_and_goes_on_straight(law):
     np.testing.assert_allclose(law.extension(law.force_n), law.compression_mm, atol=1e-12)
     ends = law.extension(law.force_n[-1] * np.array([1.0, 1.5, 2.0]))
     assert np.diff(ends)[0] == pytest.approx(np.diff(ends)[1], rel=1e-12)
@@ -127,60 +127,60 @@ def test_a_frustum_rocks_only_under_a_force_too_small_to_hold_its_tip_down(law):
 
 def test_the_lean_of_a_free_tip_balances_the_moment_that_would_hold_it_flat(law):
     """Of the frustum held flat: the tip's moment under a root moved sideways is its stiffness times the lean."""
-    bed = build_unit_cell(SMALL, dielectric_law=LAWS["dielectric"], mesh=MeshSettings(frustum_rings=2)).bed
-    moved = np.zeros((1, bed.nodes, 3))
-    moved[0, bed.root, 0] = 1e-5
-    inner, stiffness = np.setdiff1d(bed.inner, 3 * bed.tip + 2), _stiffness_at_rest(bed)
+    support = build_unit_cell(SMALL, dielectric_law=LAWS["dielectric"], mesh=MeshSettings(frustum_rings=2)).support
+    moved = np.zeros((1, support.nodes, 3))
+    moved[0, support.root, 0] = 1e-5
+    inner, stiffness = np.setdiff1d(support.inner, 3 * support.tip + 2), _stiffness_at_rest(support)
     flat = moved.ravel()
     flat[inner] = -np.linalg.solve(stiffness[np.ix_(inner, inner)], stiffness[inner] @ flat)
-    x = bed.coordinates[0][bed.tip, 0] - bed.geometry.centres[0][0]
-    moment = (bed.evaluate(flat.reshape(moved.shape)).elastic[1][0, bed.tip, 2] * x).sum()
+    x = support.coordinates[0][support.tip, 0] - support.geometry.centres[0][0]
+    moment = (support.evaluate(flat.reshape(moved.shape)).elastic[1][0, support.tip, 2] * x).sum()
     assert abs(moment) / 1e-5 == pytest.approx(law.upright * law.lean, rel=0.1)     # free, the tip bends besides
 
 
 @pytest.fixture(scope="module")
-def bed():
+def support():
     body = build_unit_cell(SMALL, dielectric_law=LAWS["dielectric"], mesh=MeshSettings(frustum_rings=2))
-    yield body.bed
+    yield body.support
     body.close()
 
 
-def test_a_frustum_under_a_rigid_root_answers_small_movements_with_its_linear_stiffness(bed):
+def test_a_frustum_under_a_rigid_root_answers_small_movements_with_its_linear_stiffness(support):
     """Pressed by a hundredth of its height, so that its tip stands, and by two, and continued to none: the coupling grows by as
     much as the force, 3 % at the first (P-Delta).
     """
-    x = bed.coordinates[0][bed.root, 0] - bed.geometry.centres[0][0]
+    x = support.coordinates[0][support.root, 0] - support.geometry.centres[0][0]
     modes = np.zeros((2, len(x), 3))
     modes[0, :, 0], modes[1, :, 2] = 1.0, x
     modes = modes.reshape(2, -1)
-    linear = modes @ _root_stiffness(bed) @ modes.T
-    frustum, found = SingleFrustum(bed), []
+    linear = modes @ _root_stiffness(support) @ modes.T
+    frustum, found = SingleFrustum(support), []
     for descent in (0.005, 0.01):
         frustum.move(0, 0, descent)
         found.append(np.array([frustum.move(*place, descent) for place in ((1e-4, 0), (0, 1e-4))]) / 1e-4)
     np.testing.assert_allclose(2 * found[0] - found[1], linear, rtol=0.01)
 
 
-def test_what_holds_a_single_frustums_root_does_not_depend_on_the_way_there(bed):
+def test_what_holds_a_single_frustums_root_does_not_depend_on_the_way_there(support):
     ways = [[(0.05, 0, 0), (0.05, 0.04, 0), (0.05, 0.04, 0.12)], [(0, 0, 0.12), (0, 0.04, 0.12), (0.05, 0.04, 0.12)]]
     ends = []
     for way in ways:
-        frustum = SingleFrustum(bed)
+        frustum = SingleFrustum(support)
         ends.append([frustum.move(*place) for place in way][-1])
     np.testing.assert_allclose(*ends, rtol=1e-4)
 
 
-def test_movement_tilts_a_pressed_frustum_as_much_as_tilt_moves_it(bed):
+def test_movement_tilts_a_pressed_frustum_as_much_as_tilt_moves_it(support):
     """Forces of an energy, so its second derivatives are symmetric: to the differences' error, some (0.005 / 0.5)^2."""
-    frustum = SingleFrustum(bed)
+    frustum = SingleFrustum(support)
     frustum.move(0, 0, 0.1)
     moment = [frustum.move(u, 0, 0.1)[1] for u in (-0.005, 0.005)]
     force = [frustum.move(0, t, 0.1)[0] for t in (-0.01, 0.01)]
     assert np.diff(moment)[0] / 0.01 == pytest.approx(np.diff(force)[0] / 0.02, rel=1e-3)
 
 
-def test_a_single_frustum_that_cannot_be_pressed_so_far_says_so(bed):
-    frustum = SingleFrustum(bed)
+def test_a_single_frustum_that_cannot_be_pressed_so_far_says_so(support):
+    frustum = SingleFrustum(support)
     assert frustum.move(0, 0, 0.9 * SMALL.dielectric.frusta.height_mm) is None
     assert frustum.move(0, 0, 0.0) is None
 
@@ -240,12 +240,12 @@ def test_a_frustum_sinks_hardly_deeper_into_a_slab_of_finer_elements(law):
     sunk = []
     for count in (9, 17, 25):      # elements of a half, a quarter and a sixth of a pitch
         spec = SMALL.model_copy(update={"footprint_mm": (4.8, 4.8), "map_shape": (count, count)})
-        flexibility = foundation_flexibility(spec, dielectric_law=LAWS["dielectric"], cover_law=LAWS["cover"], frustum=law)
-        places, signs = lattice_places(flexibility.counts)
-        nodes_of_quarter = (len(flexibility.grid.x) // 2 + 1) * (len(flexibility.grid.y) // 2 + 1)
+        compliance = foundation_compliance(spec, dielectric_law=LAWS["dielectric"], cover_law=LAWS["cover"], frustum=law)
+        places, signs = lattice_places(compliance.counts)
+        nodes_of_quarter = (len(compliance.grid.x) // 2 + 1) * (len(compliance.grid.y) // 2 + 1)
         innermost = np.flatnonzero(places == 0)[:1]
         own = nodes_of_quarter + places[innermost], signs[innermost]
-        sunk.append(flexibility.surface.between(*own, *own)[0, 0])
+        sunk.append(compliance.surface.between(*own, *own)[0, 0])
     first, second = np.diff(sunk) / sunk[-1]
     assert 0 < first < 0.01 and 0 < second < 0.5 * first
 
@@ -262,16 +262,16 @@ def test_every_frustum_is_found_from_its_number_in_the_quarter_and_its_signs():
 
 
 @pytest.fixture(scope="module")
-def loaded(flexibility, whole):
+def loaded(compliance, whole):
     """A press' places, loads without symmetry on nodes and frusta, lateral ones on roots, and the whole slab's displacement under
     both and under the first alone.
     """
-    points = points_of(BOX, flexibility, TILTED)
+    points = points_of(BOX, compliance, TILTED)
     load = np.random.default_rng(3).uniform(0.0, 1.0, len(points.nodes) + 36)
     load[-36:] *= -0.3
     lateral = np.random.default_rng(4).uniform(-0.1, 0.1, 4 * 36)
     moved = whole.displacement(whole.forces(points.nodes, load, lateral))
-    return Places(flexibility, points), load, lateral, moved, whole.displacement(whole.forces(points.nodes, load))
+    return Places(compliance, points), load, lateral, moved, whole.displacement(whole.forces(points.nodes, load))
 
 
 def assert_close(got, expected, relative):
@@ -287,9 +287,9 @@ def test_maps_and_compressions_are_those_of_the_whole_slab(loaded, whole):
     assert_close((places.surface() @ load + lateral @ places.lateral())[-36:], -(whole.descents @ moved), 1e-5)
 
 
-def test_movements_sideways_are_those_of_the_whole_slab(loaded, whole, flexibility):
+def test_movements_sideways_are_those_of_the_whole_slab(loaded, whole, compliance):
     places, load, _, _, moved = loaded
-    coarse = flexibility.grid.every_second
+    coarse = compliance.grid.every_second
     got = (places.sideways(np.arange(coarse.count)) @ load).reshape(2, *coarse.shape)
     top = whole.slab.numbers[-1][2:-2:2, 2:-2:2]
     for axis in (0, 1):
@@ -324,19 +324,19 @@ def test_membrane_loads_are_the_gradient_of_their_energy():
         assert loads[place_] == pytest.approx((energy(down + step) - energy(down - step)) / 2e-4, abs=1e-9)
 
 
-def test_a_flexibility_is_read_as_it_was_written(flexibility, tmp_path):
-    flexibility.save(tmp_path / "foundation.npz")
-    again = FoundationFlexibility.load(tmp_path / "foundation.npz")
-    assert (tuple(again.counts), again.bedding) == (flexibility.counts, flexibility.bedding)
-    points = points_of(PUNCH, flexibility)
-    first, second = (FoundationMaps(f, points)(list(press_foundation(f, points, [0.5, 2.0]))) for f in (flexibility, again))
+def test_a_flexibility_is_read_as_it_was_written(compliance, tmp_path):
+    compliance.save(tmp_path / "foundation.npz")
+    again = FoundationCompliance.load(tmp_path / "foundation.npz")
+    assert (tuple(again.counts), again.foundation_modulus) == (compliance.counts, compliance.foundation_modulus)
+    points = points_of(PUNCH, compliance)
+    first, second = (FoundationMaps(f, points)(list(press_foundation(f, points, [0.5, 2.0]))) for f in (compliance, again))
     np.testing.assert_array_equal(first, second)
 
 
 def test_a_lattice_with_a_row_in_the_middle_is_refused(law):
     odd = SMALL.model_copy(update={"footprint_mm": (6.0, 7.2)})
     with pytest.raises(InputError, match="lattice of 5 x 6 frusta has a row in the middle"):
-        foundation_flexibility(odd, dielectric_law=LAWS["dielectric"], cover_law=LAWS["cover"], frustum=law)
+        foundation_compliance(odd, dielectric_law=LAWS["dielectric"], cover_law=LAWS["cover"], frustum=law)
 
 
 # --- presses ---
@@ -347,89 +347,89 @@ POSES = {"punch": (PUNCH, (0, 0, 0, 0, 0, 0)), "tilted box": (BOX, TILTED),
 
 @pytest.mark.parametrize("name", POSES)
 @pytest.mark.parametrize("follow", [False, True])
-def test_the_conditions_of_contact_hold_for_object_and_frusta(name, follow, flexibility):
+def test_the_conditions_of_contact_hold_for_object_and_frusta(name, follow, compliance):
     mesh, values = POSES[name]
-    points = points_of(mesh, flexibility, values)
-    for level in press_foundation(flexibility, points, [0.3, 1.5, 4.0], settings=FoundationSettings(follow=follow)):
-        nodes = level.load[:-36]
+    points = points_of(mesh, compliance, values)
+    for load_step in press_foundation(compliance, points, [0.3, 1.5, 4.0], settings=FoundationSettings(follow=follow)):
+        nodes = load_step.load[:-36]
         assert nodes.min() >= 0
-        assert nodes.sum() == pytest.approx(level.force_n, rel=1e-6)      # weights in single precision
-        assert level.penetration <= 3e-5
-        assert level.touching.any() and level.iterations > 0
+        assert nodes.sum() == pytest.approx(load_step.force_n, rel=1e-6)      # weights in single precision
+        assert load_step.penetration <= 3e-5
+        assert load_step.touching.any() and load_step.iterations > 0
 
 
 @pytest.mark.parametrize("name", POSES)
-def test_the_frusta_and_the_held_sides_carry_the_objects_force(name, flexibility, whole):
+def test_the_frusta_and_the_held_sides_carry_the_objects_force(name, compliance, whole):
     """The whole slab under the press' loads comes down on the frusta as the press says, and these push back by their law."""
     mesh, values = POSES[name]
-    points = points_of(mesh, flexibility, values)
-    level, = press_foundation(flexibility, points, [3.0], settings=FoundationSettings(follow=False))
-    forces = whole.forces(points.nodes, level.load)
+    points = points_of(mesh, compliance, values)
+    load_step, = press_foundation(compliance, points, [3.0], settings=FoundationSettings(follow=False))
+    forces = whole.forces(points.nodes, load_step.load)
     moved = whole.displacement(forces)
-    pushed = -level.load[-36:]
-    assert_close(level.compression, -(whole.descents @ moved), 1e-4)
-    assert_close(pushed, force_of(flexibility.law, level.compression), 1e-4)
+    pushed = -load_step.load[-36:]
+    assert_close(load_step.compression, -(whole.descents @ moved), 1e-4)
+    assert_close(pushed, force_of(compliance.law, load_step.compression), 1e-4)
     assert pushed.min() >= 0
     assert pushed.sum() + whole.sides_carry(moved, forces) == pytest.approx(3.0, rel=1e-4)
     assert 0.9 * 3.0 < pushed.sum() < 1.1 * 3.0      # the held sides push or hold down only a little
 
 
-def test_rocking_frusta_push_where_the_rims_of_their_tips_meet_the_board(flexibility):
+def test_rocking_frusta_push_where_the_rims_of_their_tips_meet_the_board(compliance):
     """With tips thirty times as stiff against being held flat, so that some rock on so small a sensor; nothing else followed."""
-    law = replace(flexibility.law, upright=30 * flexibility.law.upright)
-    points = points_of(PUNCH, flexibility)
-    level, = press_foundation(replace(flexibility, law=law), points, [3.0], settings=FoundationSettings(follow=False))
-    sideways = np.hypot(*(Places(flexibility, points).lateral() @ level.load).reshape(2, 2, -1)[:, 0])
-    q = -level.load[-36:]
+    law = replace(compliance.law, upright=30 * compliance.law.upright)
+    points = points_of(PUNCH, compliance)
+    load_step, = press_foundation(replace(compliance, law=law), points, [3.0], settings=FoundationSettings(follow=False))
+    sideways = np.hypot(*(Places(compliance, points).lateral() @ load_step.load).reshape(2, 2, -1)[:, 0])
+    q = -load_step.load[-36:]
     rise = law.rise(sideways, q)
     assert ((rise > 0) & (q > 0)).any() and (rise == 0).any()
-    short = level.compression + rise
+    short = load_step.compression + rise
     np.testing.assert_allclose(law.extension(q)[q > 0], short[q > 0], atol=2e-4 * short.max())     # what an iteration may leave
     assert (short[q == 0] < 1e-5).all()
 
 
 @pytest.mark.parametrize("name", POSES)
-def test_with_all_that_finite_displacement_adds_frusta_and_whole_slab_are_in_balance(name, flexibility, whole):
+def test_with_all_that_finite_displacement_adds_frusta_and_whole_slab_are_in_balance(name, compliance, whole):
     """The whole slab moves under the press' loads; what these should be by the movement, law and formulas is what they are."""
     mesh, values = POSES[name]
-    points, law = points_of(mesh, flexibility, values), flexibility.law
-    level, = press_foundation(flexibility, points, [3.0], settings=FoundationSettings(rocking=False, tolerance=1e-6))
-    moved = whole.displacement(whole.forces(points.nodes, level.load, level.lateral.ravel()))
+    points, law = points_of(mesh, compliance, values), compliance.law
+    load_step, = press_foundation(compliance, points, [3.0], settings=FoundationSettings(rocking=False, tolerance=1e-6))
+    moved = whole.displacement(whole.forces(points.nodes, load_step.load, load_step.lateral.ravel()))
     down, roots = -(whole.descents @ moved), (whole.lateral @ moved).reshape(2, 2, -1).transpose(2, 0, 1)
-    assert_close(level.compression, down, 1e-4)
+    assert_close(load_step.compression, down, 1e-4)
     # Membrane forces are followed without those of the lateral loads, which are of second order themselves.
-    linear = whole.displacement(whole.forces(points.nodes, level.load))
+    linear = whole.displacement(whole.forces(points.nodes, load_step.load))
     q = force_of(law, down)
     more, growth = law.stiffening(q)
     by_slope = membrane_loads(down.reshape(6, 6), whole.membrane(linear).reshape(3, 6, 6)).ravel()
     pushed = q + by_slope + 0.5 * np.einsum("bai,bij,baj->b", roots, growth, roots)
-    assert_close(-level.load[-36:], pushed, 2e-3)      # forces turn steep: a frusta's 1e-4 mm are 1e-3 of its force
+    assert_close(-load_step.load[-36:], pushed, 2e-3)      # forces turn steep: a frusta's 1e-4 mm are 1e-3 of its force
     by_movement = -np.einsum("bij,baj->aib", more, roots).reshape(4, -1)
     by_pressure = np.stack([q * roots[:, 0, 1], q * roots[:, 0, 0], q * roots[:, 1, 1], q * roots[:, 1, 0]])
-    assert_close(level.lateral, by_movement + by_pressure, 2e-3)
-    assert np.abs(level.lateral).max() > 1e-3
+    assert_close(load_step.lateral, by_movement + by_pressure, 2e-3)
+    assert np.abs(load_step.lateral).max() > 1e-3
 
 
-def test_a_force_that_is_not_reached_at_once_is_reached_by_way_of_smaller_ones(flexibility):
+def test_a_force_that_is_not_reached_at_once_is_reached_by_way_of_smaller_ones(compliance):
     """With few iterations allowed a tilted box does not reach 4 N from rest; the map is the same as if it had."""
-    points = points_of(BOX, flexibility, TILTED)
-    at_once, in_steps = (next(press_foundation(flexibility, points, [4.0], settings=FoundationSettings(max_iterations=count)))
+    points = points_of(BOX, compliance, TILTED)
+    at_once, in_steps = (next(press_foundation(compliance, points, [4.0], settings=FoundationSettings(max_iterations=count)))
                          for count in (60, 5))
     assert at_once.iterations > 5 and in_steps.iterations > at_once.iterations
-    maps = FoundationMaps(flexibility, points)([at_once, in_steps])
+    maps = FoundationMaps(compliance, points)([at_once, in_steps])
     assert_close(maps[1], maps[0], 1e-2)      # edges are looked at again only where points moved by 3 % of a step
 
 
-def test_a_force_that_is_not_reached_says_from_which_one_on(flexibility):
-    points = points_of(BOX, flexibility, TILTED)
-    levels = press_foundation(flexibility, points, [4.0], settings=FoundationSettings(max_iterations=1))
+def test_a_force_that_is_not_reached_says_from_which_one_on(compliance):
+    points = points_of(BOX, compliance, TILTED)
+    load_steps = press_foundation(compliance, points, [4.0], settings=FoundationSettings(max_iterations=1))
     with pytest.raises(ConvergenceError, match="did not reach 4 N: from 0 N on .* ask for smaller forces, or for the hyperelastic"):
-        next(levels)
+        next(load_steps)
 
 
 @pytest.mark.parametrize("values", [(0, 0, 0, 0, 0, 0), TILTED])
-def test_steps_that_keep_their_levels_factor_give_the_map_of_steps_with_their_own(flexibility, monkeypatch, values):
-    made, points = [], points_of(BOX, flexibility, values)
+def test_steps_that_keep_their_load_steps_factor_give_the_map_of_steps_with_their_own(compliance, monkeypatch, values):
+    made, points = [], points_of(BOX, compliance, values)
 
     class Counted(solve._Factored):
         def __init__(self, *what):
@@ -437,56 +437,58 @@ def test_steps_that_keep_their_levels_factor_give_the_map_of_steps_with_their_ow
             super().__init__(*what)
 
     monkeypatch.setattr(solve, "_Factored", Counted)
-    levels, counts = [], []
+    load_steps, counts = [], []
     for share in (0.0, FoundationSettings().same_slope):
         made.clear()
         settings = FoundationSettings(same_slope=share)
-        levels.append(list(press_foundation(flexibility, points, [0.3, 0.6, 0.9], settings=settings)))
+        load_steps.append(list(press_foundation(compliance, points, [0.3, 0.6, 0.9], settings=settings)))
         counts.append(len(made))
     assert counts[1] < counts[0]
-    own, kept = (FoundationMaps(flexibility, points)(each) for each in levels)
+    own, kept = (FoundationMaps(compliance, points)(each) for each in load_steps)
     assert_close(kept, own, 1e-3)      # the tolerance's 0.03 % in the root mean square
 
 
 @pytest.mark.filterwarnings("error")
-def test_a_level_whose_patches_have_all_let_go_is_not_reached_and_nothing_is_divided_by_zero(flexibility):
-    press = _Press(flexibility, points_of(BOX, flexibility), FoundationSettings())
+def test_a_load_step_whose_patches_have_all_let_go_is_not_reached_and_nothing_is_divided_by_zero(compliance):
+    press = _Press(compliance, points_of(BOX, compliance), FoundationSettings())
     state = press.first()
     assert state.touching.any()
     state.touching[:] = False
-    assert press.level(state, 1.0) == (None, 1)
+    assert press.load_step(state, 1.0) == (None, 1)
 
 
-def test_the_object_holds_nodes_beside_its_edge_as_softly_as_its_edge_reaches_where_they_have_moved_to(flexibility, whole):
+def test_the_object_holds_nodes_beside_its_edge_as_softly_as_its_edge_reaches_where_they_have_moved_to(compliance, whole):
     """Depth less gap and softness times force is how far the whole slab comes down there; the softness by the movement found."""
-    points = points_of(PUNCH, flexibility)
-    level, = press_foundation(flexibility, points, [10.0], settings=FoundationSettings(rocking=False))
-    down = -whole.displacement(whole.forces(points.nodes, level.load, level.lateral.ravel()))[3 * whole.top[points.nodes] + 2]
-    moved = Sideways(flexibility, points, Places(flexibility, points))(level.load.astype(np.float32))
-    softness, force = SoftEdges(flexibility)(points, moved, level.depth), level.load[:-36]
-    held = (force > 0) & np.isfinite(softness)
-    assert (softness[held] > 0).sum() > 20 and np.abs(moved).max() > 0.02
+    points = points_of(PUNCH, compliance)
+    load_step, = press_foundation(compliance, points, [10.0], settings=FoundationSettings(rocking=False))
+    down = -whole.displacement(whole.forces(points.nodes, load_step.load,
+                                            load_step.lateral.ravel()))[3 * whole.top[points.nodes] + 2]
+    moved = Sideways(compliance, points, Places(compliance, points))(load_step.load.astype(np.float32))
+    contact_compliance, force = SoftEdges(compliance)(points, moved, load_step.depth), load_step.load[:-36]
+    held = (force > 0) & np.isfinite(contact_compliance)
+    assert (contact_compliance[held] > 0).sum() > 20 and np.abs(moved).max() > 0.02
     # edges are looked at again only where points moved by 3 % of a step: a mean over the nodes held softly
-    soft = held & (softness > 0)
-    missing = np.abs(down + softness * force - level.depth)[soft].mean()
-    assert missing < 0.03 * level.depth
-    assert missing < 0.3 * np.abs(down + SoftEdges(flexibility)(points, 0 * moved, level.depth) * force - level.depth)[soft].mean()
+    soft = held & (contact_compliance > 0)
+    missing = np.abs(down + contact_compliance * force - load_step.depth)[soft].mean()
+    assert missing < 0.03 * load_step.depth
+    assert missing < 0.3 * np.abs(down + SoftEdges(compliance)(points, 0 * moved,
+                                                               load_step.depth) * force - load_step.depth)[soft].mean()
 
 
-def test_small_forces_give_a_map_in_proportion(flexibility):
+def test_small_forces_give_a_map_in_proportion(compliance):
     """A flat punch, nothing followed; the first 1e-3 N of 36 frusta lie where their law is straight."""
-    points = points_of(PUNCH, flexibility)
-    levels = list(press_foundation(flexibility, points, [1e-3, 2e-3], settings=FoundationSettings(follow=False, gap_mm=1e-10)))
-    small, large = FoundationMaps(flexibility, points)(levels)
+    points = points_of(PUNCH, compliance)
+    load_steps = list(press_foundation(compliance, points, [1e-3, 2e-3], settings=FoundationSettings(follow=False, gap_mm=1e-10)))
+    small, large = FoundationMaps(compliance, points)(load_steps)
     assert_close(large, 2 * small, 2e-3)
-    assert levels[1].depth == pytest.approx(2 * levels[0].depth, rel=2e-3)
+    assert load_steps[1].depth == pytest.approx(2 * load_steps[0].depth, rel=2e-3)
 
 
-def test_what_follows_the_deformation_vanishes_with_the_force(flexibility):
+def test_what_follows_the_deformation_vanishes_with_the_force(compliance):
     """Membrane forces times slopes, and movements times slopes, are of second order: a tenth of the force, a tenth of the share."""
-    points, shares = points_of(PUNCH, flexibility), []
+    points, shares = points_of(PUNCH, compliance), []
     for force in (0.05, 0.5):
-        maps = [FoundationMaps(flexibility, points)(list(press_foundation(flexibility, points, [force],
+        maps = [FoundationMaps(compliance, points)(list(press_foundation(compliance, points, [force],
                 settings=FoundationSettings(follow=follow))))[0] for follow in (False, True)]
         shares.append(np.abs(maps[1] - maps[0]).max() / maps[0].max())
     assert shares[0] < 0.2 * shares[1]
@@ -494,28 +496,28 @@ def test_what_follows_the_deformation_vanishes_with_the_force(flexibility):
 
 
 @pytest.mark.parametrize("name", ["punch", "sphere"])
-def test_a_centred_object_of_two_symmetries_gives_a_map_that_has_them(name, flexibility):
-    points = points_of(POSES[name][0], flexibility)
-    map_, = FoundationMaps(flexibility, points)(list(press_foundation(flexibility, points, [1.0])))
+def test_a_centred_object_of_two_symmetries_gives_a_map_that_has_them(name, compliance):
+    points = points_of(POSES[name][0], compliance)
+    map_, = FoundationMaps(compliance, points)(list(press_foundation(compliance, points, [1.0])))
     for mirrored in (map_[::-1], map_[:, ::-1]):
         assert_close(map_, mirrored, 1e-3)
 
 
 @pytest.mark.parametrize("name", ["punch", "sphere"])
-def test_without_patches_a_centred_object_of_two_symmetries_gives_a_map_that_has_them(name, flexibility):
-    points = points_of(POSES[name][0], flexibility)
-    levels = list(press_foundation(flexibility, points, [1.0], settings=FoundationSettings(patches=False)))
-    map_, = FoundationMaps(flexibility, points)(levels)
+def test_without_patches_a_centred_object_of_two_symmetries_gives_a_map_that_has_them(name, compliance):
+    points = points_of(POSES[name][0], compliance)
+    load_steps = list(press_foundation(compliance, points, [1.0], settings=FoundationSettings(patches=False)))
+    map_, = FoundationMaps(compliance, points)(load_steps)
     for mirrored in (map_[::-1], map_[:, ::-1]):
         assert_close(map_, mirrored, 1e-3)
 
 
-def test_at_a_small_force_the_foundation_gives_the_hyperelastic_models_map(flexibility):
+def test_at_a_small_force_the_foundation_gives_the_hyperelastic_models_map(compliance):
     """Both start from the same cell and laws; at 1 N strains are a few per cent.
 
     What is left is the punch's edge, where the pressure is singular, and the fine mesh's own 1 to 2 %: 3.1 % measured.
     """
-    sensor = Sensor(SMALL, LAWS, files={"foundation": flexibility}, mesh=MeshSettings.fine())
+    sensor = Sensor(SMALL, LAWS, prepared_models={"foundation": compliance}, mesh=MeshSettings.fine())
     punch = trimesh.creation.cylinder(radius=1.7, height=3.0, sections=96)
     fast, full = (sensor.press(punch, force_n=1.0, model=model, threads=1) for model in ("foundation", "hyperelastic"))
     difference, largest = np.abs(fast.deformation_map_mm - full.deformation_map_mm), full.deformation_map_mm.max()

@@ -10,9 +10,9 @@ from softtact.contact.height_field import HeightField
 from softtact.contact.underside import Underside
 from softtact.materials.laws.registry import make_law
 from softtact.models.elastic.compliance import map_cells
-from softtact.models.foundation.compliance import foundation_flexibility
+from softtact.models.foundation.compliance import foundation_compliance
 from softtact.models.foundation.frustum_spring import frustum_law
-from softtact.models.foundation.partial_contact import SoftEdges, beyond, own_flexibility
+from softtact.models.foundation.partial_contact import SoftEdges, beyond, own_compliance
 from softtact.models.foundation.solve import FoundationMaps, FoundationSettings, press_foundation
 from softtact.sensors.specification import SensorSpec
 
@@ -25,44 +25,44 @@ FINER = 3      # an odd number: nodes of the coarse grid are corners on it where
 
 
 @pytest.fixture(scope="module")
-def flexibilities():
+def compliances():
     """By how many times finer than the sensor's their grid is."""
     law = frustum_law(SMALL, LAWS["dielectric"])
-    return {times: foundation_flexibility(SMALL, dielectric_law=LAWS["dielectric"], cover_law=LAWS["cover"], frustum=law,
+    return {times: foundation_compliance(SMALL, dielectric_law=LAWS["dielectric"], cover_law=LAWS["cover"], frustum=law,
                                           cells=tuple(times * count for count in map_cells(SMALL)))
             for times in (1, FINER)}
 
 
-def points_of(flexibility, width, length=3.1):
+def points_of(compliance, width, length=3.1):
     mesh = trimesh.creation.box((width, length, 2.0))
     mesh.apply_translation([0, 0, 1.0])
-    return Underside(HeightField(mesh), flexibility.grid).points(1.0)
+    return Underside(HeightField(mesh), compliance.grid).points(1.0)
 
 
-def map_of(flexibilities, times, width):
+def map_of(compliances, times, width):
     """The map under a bar of a width in mm at 0.1 N, at the sensor's places."""
-    points = points_of(flexibilities[times], width)
-    level, = press_foundation(flexibilities[times], points, [0.1], settings=LINEAR)
-    return FoundationMaps(flexibilities[times], points)([level])[0][::times, ::times]
+    points = points_of(compliances[times], width)
+    load_step, = press_foundation(compliances[times], points, [0.1], settings=LINEAR)
+    return FoundationMaps(compliances[times], points)([load_step])[0][::times, ::times]
 
 
 @pytest.mark.parametrize("share", [0.0, 0.2, 0.4, 0.6, 0.8])
-def test_an_edge_is_felt_where_it_is_wherever_it_lies_between_two_nodes(share, flexibilities):
+def test_an_edge_is_felt_where_it_is_wherever_it_lies_between_two_nodes(share, compliances):
     """Against a grid three times as fine. Without soft edges a map is off by up to 2.4 %, and an edge by half a step, 0.16 mm."""
     width = 2 * (4 + share) * 0.3
-    fine = map_of(flexibilities, FINER, width)
-    by_width = (map_of(flexibilities, FINER, width + 0.1) - map_of(flexibilities, FINER, width - 0.1)) / 0.2
-    difference = map_of(flexibilities, 1, width) - fine
+    fine = map_of(compliances, FINER, width)
+    by_width = (map_of(compliances, FINER, width + 0.1) - map_of(compliances, FINER, width - 0.1)) / 0.2
+    difference = map_of(compliances, 1, width) - fine
     edge = (difference * by_width).sum() / (by_width**2).sum() / 2
     assert np.sqrt((difference**2).mean()) < 0.007 * fine.max()
     assert abs(edge) < 0.05
 
 
-def test_a_wider_bar_sinks_in_less_by_whichever_part_of_a_step_it_is_wider(flexibilities):
+def test_a_wider_bar_sinks_in_less_by_whichever_part_of_a_step_it_is_wider(compliances):
     depths = []
     for width in np.linspace(2.2, 3.0, 9):
-        level, = press_foundation(flexibilities[1], points_of(flexibilities[1], width), [0.1], settings=LINEAR)
-        depths.append(level.depth)
+        load_step, = press_foundation(compliances[1], points_of(compliances[1], width), [0.1], settings=LINEAR)
+        depths.append(load_step.depth)
     fall = -np.diff(depths) / np.mean(depths)
     assert (fall > 0).all() and fall.max() < 2 * fall.mean()      # samples are an eighth of a step apart
 
@@ -73,25 +73,26 @@ def test_a_hats_covered_share_tells_how_far_the_edge_lies_beyond_the_node_before
     np.testing.assert_allclose(beyond(covered), r, atol=1e-9)
 
 
-def test_a_point_is_the_softer_the_less_of_it_is_covered_and_free_where_nothing_is(flexibilities):
-    points = points_of(flexibilities[1], 2.7)
-    edges = SoftEdges(flexibilities[1])
-    softness = [edges(points, np.array([np.full(points.count, moved), np.zeros(points.count)]), 0.02)
+def test_a_point_is_the_softer_the_less_of_it_is_covered_and_free_where_nothing_is(compliances):
+    points = points_of(compliances[1], 2.7)
+    edges = SoftEdges(compliances[1])
+    contact_compliance = [edges(points, np.array([np.full(points.count, moved), np.zeros(points.count)]), 0.02)
                 for moved in (0.0, 0.05, 0.3)]
-    right = points.edge[flexibilities[1].grid.points[points.nodes[points.edge], 0] > 1.0]
-    assert (softness[1][right] >= softness[0][right]).all() and (softness[1][right] > softness[0][right]).any()
-    assert np.isinf(softness[2][right]).any()      # the outermost have moved out from under the bar
+    right = points.edge[compliances[1].grid.points[points.nodes[points.edge], 0] > 1.0]
+    assert (contact_compliance[1][right] >= contact_compliance[0][right]).all()
+    assert (contact_compliance[1][right] > contact_compliance[0][right]).any()
+    assert np.isinf(contact_compliance[2][right]).any()      # the outermost have moved out from under the bar
     plain = np.setdiff1d(np.arange(points.count), points.edge)
-    assert (softness[0][plain] == 0).all()
+    assert (contact_compliance[0][plain] == 0).all()
 
 
-def test_a_nodes_flexibility_among_held_ones_is_less_than_alone_and_larger_at_elements_corners(flexibilities):
-    flexibility = flexibilities[1]
-    grid = flexibility.grid
+def test_a_nodes_flexibility_among_held_ones_is_less_than_alone_and_larger_at_elements_corners(compliances):
+    compliance = compliances[1]
+    grid = compliance.grid
     alone = []
     for offset in (0, 1):
         place = grid.quarter(np.array([(grid.shape[0] // 2) * grid.shape[1] + grid.shape[1] // 2 + offset]))
-        alone.append(flexibility.surface.between(*place, *place)[0, 0])
+        alone.append(compliance.surface.between(*place, *place)[0, 0])
     for axis in (0, 1):
-        corner, middle = own_flexibility(flexibility, axis)
+        corner, middle = own_compliance(compliance, axis)
         assert corner > middle > 0 and corner < alone[0]

@@ -13,12 +13,12 @@ from softtact.models.ftir.specimen import Specimen, cell_family, press_specimen,
 from softtact.models.ftir.unit_cell import GLASS_MESH, SETTINGS, contact_area, plate_over, press_cell_on_glass
 from softtact.models.hyperelastic.build import build_patch, build_unit_cell
 from softtact.models.hyperelastic.frusta import SHEET
-from softtact.models.hyperelastic.newton import press_levels
+from softtact.models.hyperelastic.newton import press_load_steps
 from softtact.sensors.specification import SensorSpec
 
 CORO = SensorSpec.from_yaml(Path(__file__).parents[3] / "config/sensors/coro.yaml")
 LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492)
-COARSE = replace(GLASS_MESH, frustum_levels=(0.0, 0.1, 0.2, 0.35, 1.0), frustum_rings=1)
+COARSE = replace(GLASS_MESH, frustum_heights=(0.0, 0.1, 0.2, 0.35, 1.0), frustum_rings=1)
 TIP_MM2 = np.pi * 0.3**2
 
 
@@ -51,17 +51,18 @@ def test_no_force_is_no_contact_and_a_light_one_is_the_tip():
 
 def test_a_wide_tip_stands_on_the_same_disc_under_every_force():
     """The held rim cannot spread and the side leans inwards: nothing comes down onto the glass."""
-    curve = press_cell_on_glass(CORO.read_as("as_printed"), LAW, np.array([10.0, 60.0, 110.0]) / 540)
+    curve = press_cell_on_glass(CORO.with_frustum_orientation("as_printed"), LAW, np.array([10.0, 60.0, 110.0]) / 540)
     assert curve.area_mm2 == pytest.approx(np.pi * 0.6**2, rel=2e-3)
     assert np.ptp(curve.area_mm2) < 1e-6
 
 
 def test_a_wide_tip_s_side_faces_the_sheet_and_a_narrow_one_s_does_not():
-    wide, narrow = (build_unit_cell(CORO.read_as(reading), dielectric_law=LAW).bed for reading in ("as_printed", "default"))
+    wide, narrow = (build_unit_cell(CORO.with_frustum_orientation(reading), dielectric_law=LAW).support
+                    for reading in ("as_printed", "default"))
     towards = wide.point_neighbour == SHEET
     assert towards.any() and not (narrow.point_neighbour == SHEET).any()
     lifted = np.zeros((1, wide.nodes, 3))
-    lifted[:, wide.root, 2] = 0.1          # the root, and the level sheet with it
+    lifted[:, wide.root, 2] = 0.1          # the root, and the load step sheet with it
     inner = towards & ~np.isin(wide.point_nodes[:, :9], wide.root).any(axis=1)
     change = wide.evaluate(lifted).gaps - wide.gap0
     assert wide.gap0[:, towards].min() > 0
@@ -116,11 +117,12 @@ def test_four_frusta_with_free_borders_share_a_plate_alike_and_spread():
     forces = 4 * np.array([20.0, 60.0]) / 540
     body = build_patch(CORO, (2, 2), dielectric_law=LAW, mesh=COARSE)
     exact = replace(SETTINGS, relative_tolerance=1e-6)     # a node may else carry more than what shares are compared to
-    levels = list(press_levels(body, HeightField(plate_over(CORO)), forces, settings=exact))
-    areas = np.array([[contact_area(body.bed, level.state.bed.displacement, frustum=k) for k in range(4)] for level in levels])
-    carried = levels[-1].state.bed.force[:, body.bed.root, 2].sum(axis=1)
+    load_steps = list(press_load_steps(body, HeightField(plate_over(CORO)), forces, settings=exact))
+    areas = np.array([[contact_area(body.support, load_step.state.support.displacement, frustum=k) for k in range(4)]
+                      for load_step in load_steps])
+    carried = load_steps[-1].state.support.force[:, body.support.root, 2].sum(axis=1)
     body.close()
     assert np.ptp(areas, axis=1).max() < 1e-4 * areas.mean()
     assert np.abs(carried) == pytest.approx(forces[-1] / 4, rel=1e-4)
     endless = press_cell_on_glass(CORO, LAW, forces / 4, mesh=COARSE)
-    assert (np.array([level.state.indentation for level in levels]) > 1.2 * endless.compression_mm).all()
+    assert (np.array([load_step.state.indentation for load_step in load_steps]) > 1.2 * endless.compression_mm).all()

@@ -15,7 +15,7 @@ from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic.build import build_sensor_body
 from softtact.models.hyperelastic.deformed_mesh import pressed_body
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
-from softtact.models.hyperelastic.newton import NewtonSettings, _press_apart
+from softtact.models.hyperelastic.newton import NewtonSettings, _augment
 from softtact.models.meshes import mesh_settings
 from softtact.press.sensor import Sensor
 from softtact.sensors.specification import SensorSpec
@@ -24,7 +24,7 @@ CORO = SensorSpec.from_yaml(Path(__file__).parents[3] / "config/sensors/coro.yam
 SMALL = CORO.model_copy(update={"footprint_mm": (6.0, 6.0), "map_shape": (11, 11)})     # 5 x 5 frusta
 LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492)
 THREE = (0.0, 0.45, 0.8, 1.0)
-LAYERS = {"cover_levels": (0.0, 0.4, 1.0), "far_pitches": 1, "frustum_levels": (0.0, 0.35, 1.0)}
+LAYERS = {"cover_heights": (0.0, 0.4, 1.0), "far_pitches": 1, "frustum_heights": (0.0, 0.35, 1.0)}
 BOUND, TIED = MeshSettings(cover_splits=(1,), **LAYERS), MeshSettings(cover_splits=(1, 1), **LAYERS)
 PUNCH = trimesh.creation.cylinder(radius=1.5, height=2, sections=64)
 STRETCH = np.array([[0.02, 0.01, 0.03], [-0.01, 0.03, 0.02], [0.015, -0.02, -0.05]])
@@ -107,8 +107,8 @@ def test_parts_of_body_and_deck_are_those_of_the_layers():
     sheet, cover = mesh.parts[:2]
     assert (sheet.name, cover.name) == ("SHEET", "COVER")
     assert mesh.points[sheet.nodes, 2].max() == pytest.approx(-1.5) and mesh.points[cover.nodes, 2].min() == pytest.approx(-1.5)
-    plan = volume(mesh.points, cover.hexes[:len(sheet.hexes)]) / (0.4 * 1.5), volume(mesh.points, sheet.hexes) / 0.5
-    assert plan[0] == pytest.approx(plan[1], rel=1e-9)      # the cover's lowest layer repeats the sheet's bricks
+    mesh_2d = volume(mesh.points, cover.hexes[:len(sheet.hexes)]) / (0.4 * 1.5), volume(mesh.points, sheet.hexes) / 0.5
+    assert mesh_2d[0] == pytest.approx(mesh_2d[1], rel=1e-9)      # the cover's lowest layer repeats the sheet's bricks
     assert len(cover.wedges) == len(sheet.wedges) == 4 * 25
     interface = mesh.slab[body.slab.interface_nodes]
     assert np.allclose(body.slab.points[body.slab.interface_nodes, 2], -1.5)
@@ -118,19 +118,19 @@ def test_parts_of_body_and_deck_are_those_of_the_layers():
 
 @pytest.mark.parametrize(("splits", "bound"), [((1, 1, 2), 0), ((1, 4), 1), ((1,), 2)])
 def test_layers_without_a_number_of_splits_are_bound(splits, bound):
-    assert MeshSettings(cover_levels=THREE, cover_splits=splits).bound_layers == bound
+    assert MeshSettings(cover_heights=THREE, cover_splits=splits).bound_layers == bound
 
 
 @pytest.mark.parametrize("splits", [(), (1, 1, 1, 2)])
 def test_splits_for_no_layer_or_too_many_are_refused(splits):
     with pytest.raises(ValueError, match="cover_splits has . entries for the 3 layers"):
-        MeshSettings(cover_levels=THREE, cover_splits=splits)
+        MeshSettings(cover_heights=THREE, cover_splits=splits)
 
 
 @pytest.mark.parametrize("splits", [(2, 1, 2), (3,)])
 def test_a_lowest_layer_that_would_hang_freely_is_refused(splits):
     with pytest.raises(InputError, match=f"mesh: cover_splits begins with {splits[0]}; give 0 or 1"):
-        mesh_settings({"cover_levels": list(THREE), "cover_splits": list(splits)})
+        mesh_settings({"cover_heights": list(THREE), "cover_splits": list(splits)})
 
 
 class Overlapping:
@@ -145,13 +145,13 @@ class Overlapping:
     def contact_error(self, state):
         return self.overlaps[self.passes]
 
-    def press_apart(self, state, *, allowed_mm):
+    def augment(self, state, *, allowed_mm):
         self.passes += 1
 
-    def again(self, state):
+    def reevaluate_contact(self, state):
         return state
 
-    def let_down(self, state, force):
+    def indented_to(self, state, force):
         return state
 
 
@@ -164,5 +164,5 @@ def test_overlaps_are_pressed_apart_as_long_as_it_helps(monkeypatch, overlaps, s
     body = Overlapping([1e-3 * depth for depth in overlaps], spent)
     monkeypatch.setattr("softtact.models.hyperelastic.newton._settle",
                         lambda body, *_: ("state", body.spent[body.passes - 1], 0.0))
-    state, iterations, _ = _press_apart(body, None, "state", 0.0, 1.0, NewtonSettings())
+    state, iterations, _ = _augment(body, None, "state", 0.0, 1.0, NewtonSettings())
     assert (state, body.passes, iterations) == ("state", passes, sum(spent[:passes]))

@@ -32,9 +32,9 @@ def volumes(body, name, share):
     return sizes[grid["layer"] == ("frusta", "sheet", "cover").index(name)]
 
 
-@pytest.mark.parametrize("level", [0, 1])
-def test_the_body_moves_as_the_map_says_where_a_node_is_at_a_point_of_the_map(press, level):
-    body = press.pressed_body(level)
+@pytest.mark.parametrize("load_step", [0, 1])
+def test_the_body_moves_as_the_map_says_where_a_node_is_at_a_point_of_the_map(press, load_step):
+    body = press.pressed_body(load_step)
     for name in ("sheet", "cover"):     # the map's plane lies between them
         nodes = region(body, name)
         nodes = nodes[np.abs(body.points_mm[nodes, 2] + SMALL.cover.thickness_mm) < 1e-9]
@@ -43,7 +43,7 @@ def test_the_body_moves_as_the_map_says_where_a_node_is_at_a_point_of_the_map(pr
         known = distance < 1e-6
         assert known.sum() > 50
         ours = -body.displacement_mm[nodes[at[known]], 2]
-        np.testing.assert_allclose(ours, press.deformation_map_mm[level].ravel()[known], atol=1e-9)
+        np.testing.assert_allclose(ours, press.deformation_map_mm[load_step].ravel()[known], atol=1e-9)
         assert ours.max() > 0.01
 
 

@@ -22,7 +22,7 @@ def free_nodes(**changes):
 
 
 def test_walls_are_fine_around_the_object_and_coarse_far_from_it():
-    mixed, coarse = free_nodes(), free_nodes(coarse_walls=True)
+    mixed, coarse = free_nodes(), free_nodes(constrained_cell_edges=True)
     more = {tuple(p) for p in np.round(mixed, 6)} - {tuple(p) for p in np.round(coarse, 6)}
     assert more
     assert max(abs(y) for _, y in more) < 6.0       # the punch's edge, 2.4 mm around it, and an element

@@ -17,7 +17,7 @@ CORO = SensorSpec.from_yaml(Path(__file__).parents[3] / "config/sensors/coro.yam
 SMALL = CORO.model_copy(update={"footprint_mm": (6.0, 6.0), "map_shape": (11, 11)})     # 5 x 5 frusta
 DIELECTRIC = make_law("mooney_rivlin", {"c10": 0.17, "c01": 0.004}, bulk_modulus=7.0)
 COVER = make_law("neo_hooke", {"c10": 0.2}, bulk_modulus=8.0)
-HELD = replace(MeshSettings.draft(), slab_growing_over_shear=10.0)
+HELD = replace(MeshSettings.draft(), slab_quartic_penalty_ratio=10.0)
 BODIES = {"sensor": lambda mesh: build_sensor_body(SMALL, dielectric_law=DIELECTRIC, cover_law=COVER, mesh=mesh),
           "unit cell": lambda mesh: build_unit_cell(SMALL, dielectric_law=DIELECTRIC, cover_law=COVER, mesh=mesh),
           "patch": lambda mesh: build_patch(SMALL, (2, 2), dielectric_law=DIELECTRIC, mesh=mesh)}
@@ -29,7 +29,7 @@ def test_every_element_of_sheet_and_cover_is_held_by_its_own_shear_modulus_and_t
     assert held.slab.solids
     for _, block in held.slab.solids:
         assert block.growing_modulus == pytest.approx(10 * block.law.mu0)
-    assert held.bed.block.growing_modulus == pytest.approx(HELD.growing_over_shear * DIELECTRIC.mu0)
+    assert held.support.block.growing_modulus == pytest.approx(HELD.quartic_penalty_ratio * DIELECTRIC.mu0)
     assert all(block.growing_modulus == 0 for _, block in BODIES[body](MeshSettings.draft()).slab.solids)
 
 
@@ -40,7 +40,7 @@ def nodes_of(make):
 @pytest.mark.parametrize("make", [HexBlock, WedgeBlock])
 def test_it_grows_with_the_fourth_power_of_what_an_elements_pressure_misses(make):
     """Ten times the displacement, ten thousand times the energy, but for what is not linear in it (a few per cent)."""
-    free, held = (make(nodes_of(make), DIELECTRIC, growing_over_shear=q) for q in (0.0, 10.0))
+    free, held = (make(nodes_of(make), DIELECTRIC, quartic_penalty_ratio=q) for q in (0.0, 10.0))
     way = np.random.default_rng(5).standard_normal(nodes_of(make).shape)
 
     def added(size):
@@ -52,7 +52,7 @@ def test_it_grows_with_the_fourth_power_of_what_an_elements_pressure_misses(make
 
 @pytest.mark.parametrize("make", [HexBlock, WedgeBlock])
 def test_its_forces_are_the_slope_of_its_energy_and_its_tangent_theirs(make):
-    block = make(nodes_of(make), DIELECTRIC, growing_over_shear=10.0)
+    block = make(nodes_of(make), DIELECTRIC, quartic_penalty_ratio=10.0)
     rng = np.random.default_rng(6)
     place, way = 0.01 * rng.standard_normal(nodes_of(make).shape), rng.standard_normal(nodes_of(make).shape)
     plus, minus = (block.evaluate(place + sign * 1e-6 * way) for sign in (1, -1))

@@ -26,36 +26,37 @@ def bent(body, *, by_mm):
     return six_frusta.bent(body, by_mm=by_mm, depth_mm=-1.0)
 
 
-def unbalanced(bed, state):
+def unbalanced(support, state):
     """Largest unbalanced force (n,) in N inside each frustum."""
-    return np.abs(bed.inner_residual(state)).max(axis=1)
+    return np.abs(support.inner_residual(state)).max(axis=1)
 
 
-def newton_of_all(bed, state):
+def newton_of_all(support, state):
     """The naive way: Newton's method on all frusta at once, whole steps, all roots held."""
     for _ in range(12):
-        bed.condense(state, np.arange(bed.count))
-        _, halves = bed.condensed_residual(state)
-        state = bed.evaluate(state.displacement + bed.inner_step(halves, np.zeros((bed.count, 3 * len(bed.root)))))
+        support.condense(state, np.arange(support.count))
+        _, forward_solved = support.condensed_residual(state)
+        state = support.evaluate(state.displacement + support.inner_step(forward_solved,
+                                                                         np.zeros((support.count, 3 * len(support.root)))))
     return state
 
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_bent_frusta_go_back_to_balance_and_the_others_stay_where_they_are(body, threads):
-    state = bent(body, by_mm={FIRST: 0.01, THIRD: -0.02}).bed
-    now, moved = balanced(body.bed, state, TOLERANCE_N, workers=Workers(threads))
+    state = bent(body, by_mm={FIRST: 0.01, THIRD: -0.02}).support
+    now, moved = balanced(body.support, state, TOLERANCE_N, workers=Workers(threads))
     np.testing.assert_array_equal(moved, [FIRST, THIRD])
-    assert unbalanced(body.bed, state)[moved].min() > 100 * TOLERANCE_N
-    assert unbalanced(body.bed, now).max() <= TOLERANCE_N and now.energy < state.energy
-    others = np.setdiff1d(np.arange(body.bed.count), moved)
+    assert unbalanced(body.support, state)[moved].min() > 100 * TOLERANCE_N
+    assert unbalanced(body.support, now).max() <= TOLERANCE_N and now.energy < state.energy
+    others = np.setdiff1d(np.arange(body.support.count), moved)
     np.testing.assert_array_equal(now.displacement[others], state.displacement[others])
-    np.testing.assert_array_equal(now.displacement[:, body.bed.root], state.displacement[:, body.bed.root])
+    np.testing.assert_array_equal(now.displacement[:, body.support.root], state.displacement[:, body.support.root])
 
 
 def test_their_balance_is_that_of_newtons_method_on_all(body):
-    state = bent(body, by_mm={FIRST: 0.01, THIRD: -0.02}).bed
-    one_by_one, _ = balanced(body.bed, state, TOLERANCE_N)
-    together = newton_of_all(body.bed, state)
+    state = bent(body, by_mm={FIRST: 0.01, THIRD: -0.02}).support
+    one_by_one, _ = balanced(body.support, state, TOLERANCE_N)
+    together = newton_of_all(body.support, state)
     # Forces of the tolerance on the softest mode, 0.03 N/mm, move by 3e-4 mm; these modes are stiffer by ten.
     np.testing.assert_allclose(one_by_one.displacement, together.displacement, atol=3e-5)
     assert one_by_one.energy == pytest.approx(together.energy, rel=1e-6, abs=1e-9)
@@ -63,30 +64,30 @@ def test_their_balance_is_that_of_newtons_method_on_all(body):
 
 def test_a_state_is_the_same_as_one_evaluated_there(body):
     """Some frusta are evaluated alone, with their own elements and contacts: as all are together."""
-    state = bent(body, by_mm={THIRD: 0.03}).bed
-    now, _ = balanced(body.bed, state, TOLERANCE_N)
-    anew = body.bed.evaluate(now.displacement)
+    state = bent(body, by_mm={THIRD: 0.03}).support
+    now, _ = balanced(body.support, state, TOLERANCE_N)
+    anew = body.support.evaluate(now.displacement)
     assert now.energy == pytest.approx(anew.energy, rel=1e-12)
     np.testing.assert_allclose(now.force, anew.force, atol=1e-12)
     np.testing.assert_array_equal(now.gaps, anew.gaps)
 
 
 def test_steps_too_long_are_halved_until_the_energy_of_each_frustum_falls(body, monkeypatch):
-    whole, state = body.bed.own_step, bent(body, by_mm={FIRST: 0.01, THIRD: -0.02}).bed
-    factors = np.ones(body.bed.count)
+    whole, state = body.support.own_step, bent(body, by_mm={FIRST: 0.01, THIRD: -0.02}).support
+    factors = np.ones(body.support.count)
     factors[THIRD] = 8.0      # on a parabola a step eight times too long raises the energy, and so do its half and its quarter
-    monkeypatch.setattr(body.bed, "own_step", lambda state, frusta, **options: (
+    monkeypatch.setattr(body.support, "own_step", lambda state, frusta, **options: (
         factors[frusta, None, None] * whole(state, frusta, **options)))
     monkeypatch.setattr("softtact.models.hyperelastic.local_equilibrium._FARTHEST_MM", 1.0)
-    now, _ = balanced(body.bed, state, TOLERANCE_N)
-    left = unbalanced(body.bed, now)
-    assert left[FIRST] <= TOLERANCE_N and now.energy < state.energy and (left[THIRD] < unbalanced(body.bed, state)[THIRD])
+    now, _ = balanced(body.support, state, TOLERANCE_N)
+    left = unbalanced(body.support, now)
+    assert left[FIRST] <= TOLERANCE_N and now.energy < state.energy and (left[THIRD] < unbalanced(body.support, state)[THIRD])
 
 
 def with_slab_in_balance(body, state, *, but_for_n=0.0):
     """The same state with the slab's own forces against those of the frusta on their roots, but for one of so many N."""
     state.slab.force[:] = 0.0
-    np.add.at(state.slab.force, body.cells.roots.ravel(), -state.bed.force[:, body.bed.root].reshape(-1, 3))
+    np.add.at(state.slab.force, body.cells.roots.ravel(), -state.support.force[:, body.support.root].reshape(-1, 3))
     state.slab.force.reshape(-1)[body.slab.free[0]] += but_for_n
     return state
 
@@ -94,7 +95,7 @@ def with_slab_in_balance(body, state, *, but_for_n=0.0):
 def test_frusta_wait_for_the_step_of_all_while_the_slab_is_farther_from_balance(body):
     state = with_slab_in_balance(body, bent(body, by_mm={FIRST: 0.01}))
     assert body.balanced(state, TOLERANCE_N).energy < state.energy
-    worst = unbalanced(body.bed, state.bed).max()
+    worst = unbalanced(body.support, state.support).max()
     state = with_slab_in_balance(body, state, but_for_n=2 * worst)
     assert body.balanced(state, TOLERANCE_N) is state
 

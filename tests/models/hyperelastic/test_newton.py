@@ -13,7 +13,7 @@ from softtact.geometry.pose import Pose
 from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic.build import build_sensor_body
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
-from softtact.models.hyperelastic.newton import NewtonSettings, press_levels
+from softtact.models.hyperelastic.newton import NewtonSettings, press_load_steps
 from softtact.models.meshes import layered_mesh
 from softtact.press.sensor import Sensor
 from softtact.sensors.specification import SensorSpec
@@ -22,7 +22,7 @@ CORO = SensorSpec.from_yaml(Path(__file__).parents[3] / "config/sensors/coro.yam
 SMALL = CORO.model_copy(update={"footprint_mm": (6.0, 8.4), "map_shape": (15, 11)})   # 5 x 7 frusta
 LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492),
         "cover": make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)}
-COARSE = MeshSettings(cover_levels=(0.0, 1.0), cover_splits=(0,), far_pitches=1, frustum_levels=(0.0, 0.35, 1.0))
+COARSE = MeshSettings(cover_heights=(0.0, 1.0), cover_splits=(0,), far_pitches=1, frustum_heights=(0.0, 0.35, 1.0))
 
 
 def small_body():
@@ -62,7 +62,7 @@ def test_a_light_press_overlaps_by_less_in_proportion():
 
 
 def test_overlaps_that_were_not_pressed_apart_are_outside_validity(cylinder_press):
-    solver = NewtonSettings(largest_penetration_mm=0.25 * cylinder_press.penetration_mm.min(), contact_passes=0)
+    solver = NewtonSettings(largest_penetration_mm=0.25 * cylinder_press.penetration_mm.min(), max_augmentations=0)
     cylinder = trimesh.creation.cylinder(radius=1.8, height=3, sections=64)
     left = Sensor(SMALL, LAWS, mesh=COARSE, solver=solver).press(cylinder, force_n=[0.5], model="hyperelastic")
     assert cylinder_press.within_validity.all() and not left.within_validity.any()
@@ -85,7 +85,7 @@ def test_a_spike_that_goes_in_between_the_contact_points_is_lowered_until_they_f
     assert not result.within_validity.any()     # a handful of points does not resolve it
 
 
-def test_a_tip_deeper_than_the_sensor_is_thick_is_no_level_and_the_levels_before_are_kept(monkeypatch):
+def test_a_tip_deeper_than_the_sensor_is_thick_is_no_load_step_and_the_load_steps_before_are_kept(monkeypatch):
     tip = 2.5 + press_small(SPIKE, [0.01, 0.02], pose=BETWEEN_POINTS).indentation_mm     # its height below the origin
     monkeypatch.setattr(SensorSpec, "thickness_mm", tip.mean())
     with pytest.raises(ConvergenceError, match=rf"0\.02 N was not reached.* {tip[1]:.3g} mm deep") as caught:
@@ -101,30 +101,30 @@ def test_a_cone_whose_tip_is_between_the_contact_points_goes_deeper_with_more_fo
     np.testing.assert_allclose(result.indentation_mm + 1.0, [0.3642, 0.4381], atol=2e-4)     # the tip is 1 mm below the origin
 
 
-def test_a_press_that_stalls_says_between_which_forces_and_gives_no_level():
+def test_a_press_that_stalls_says_between_which_forces_and_gives_no_load_step():
     body = small_body()
     surface = HeightField(place(trimesh.creation.icosphere(radius=3.0), pose=None))
-    levels = press_levels(body, surface, [20.0], settings=NewtonSettings(max_iterations=4, smallest_increment_n=15.0))
-    with pytest.raises(ConvergenceError, match="level of 20 N was not reached: from 0 N on"):
-        next(levels)
+    load_steps = press_load_steps(body, surface, [20.0], settings=NewtonSettings(max_iterations=4, smallest_increment_n=15.0))
+    with pytest.raises(ConvergenceError, match="load step of 20 N was not reached: from 0 N on"):
+        next(load_steps)
 
 
-def test_a_press_that_crawls_ends_after_the_iterations_of_a_level():
+def test_a_press_that_crawls_ends_after_the_iterations_of_a_load_step():
     body = small_body()
     surface = HeightField(place(trimesh.creation.icosphere(radius=3.0), pose=None))
-    levels = press_levels(body, surface, [20.0], settings=NewtonSettings(max_iterations=4, level_iterations=7))
+    load_steps = press_load_steps(body, surface, [20.0], settings=NewtonSettings(max_iterations=4, load_step_iterations=7))
     with pytest.raises(ConvergenceError, match=", 8 iterations in all"):     # to 20 N and to 10 N, four each
-        next(levels)
+        next(load_steps)
 
 
-def test_a_tangent_that_nothing_makes_positive_definite_fails_the_level_and_is_not_tried_for_ever(monkeypatch):
+def test_a_tangent_that_nothing_makes_positive_definite_fails_the_load_step_and_is_not_tried_for_ever(monkeypatch):
     body, shifts = small_body(), []
     surface = HeightField(place(trimesh.creation.icosphere(radius=3.0), pose=None))
-    levels = press_levels(body, surface, [1.0, 2.0], settings=NewtonSettings(smallest_increment_n=0.6))
-    next(levels)
+    load_steps = press_load_steps(body, surface, [1.0, 2.0], settings=NewtonSettings(smallest_increment_n=0.6))
+    next(load_steps)
     monkeypatch.setattr(body.stepper, "step", lambda rubber, *_, **__: shifts.append(rubber.diagonal().max()))     # None: no step
-    with pytest.raises(ConvergenceError, match="level of 2 N was not reached: from 1 N on"):
-        next(levels)
+    with pytest.raises(ConvergenceError, match="load step of 2 N was not reached: from 1 N on"):
+        next(load_steps)
     assert max(shifts) > 1e6 * shifts[0]      # N/mm: all was tried
 
 
@@ -132,8 +132,8 @@ def test_the_mesh_file_holds_the_volume_of_sheet_and_cover_and_of_the_frusta():
     """As VTK sees it, which cuts curved elements into tetrahedra: cones of eight sides, with a tenth less volume."""
     import pyvista
 
-    grid = pyvista.from_meshio(layered_mesh(SMALL, {"cover_levels": [0.0, 1.0], "cover_splits": [0],
-                                                   "frustum_levels": [0.0, 0.35, 1.0]}))
+    grid = pyvista.from_meshio(layered_mesh(SMALL, {"cover_heights": [0.0, 1.0], "cover_splits": [0],
+                                                   "frustum_heights": [0.0, 0.35, 1.0]}))
     volumes = grid.compute_cell_sizes(length=False, area=False)["Volume"]
     assert volumes.min() > 0
     octagon = 8 * np.sin(np.pi / 4) / 2 / np.pi

@@ -51,7 +51,8 @@ class Scene:
         self.matrix = stiffness * (np.eye(UNKNOWNS) + root @ root.T / UNKNOWNS)
         self.rows = rng.normal(size=(POINTS, UNKNOWNS))
         self.points = LinearGaps(gaps=rng.uniform(-2e-3, 2e-3, POINTS), rows=sp.csr_matrix(self.rows),
-                           lowering=-rng.uniform(0.7, 1, POINTS), area=rng.uniform(0.01, 0.03, POINTS), contact=CONTACT)
+                           indentation_increment=-rng.uniform(0.7, 1, POINTS), area=rng.uniform(0.01, 0.03, POINTS),
+                                 contact=CONTACT)
         self.residual, self.excess = rng.normal(scale=1e-2, size=UNKNOWNS), -0.05
 
     def step(self, stepper, **changes):
@@ -61,17 +62,18 @@ class Scene:
     def rubber_forces(self, rubber, step):
         return SymmetricProduct(rubber.indptr, rubber.indices)(rubber.data, step)
 
-    def follow(self, step, lowering):
+    def follow(self, step, indentation_increment):
         """The object is plain: the points always face the same."""
         return False
 
     def energy(self, x):
         """The step's energy (mJ) over that of no step: linear and quadratic in the rubber, exact in the contact."""
-        step, lowering = x[:UNKNOWNS], x[UNKNOWNS]
-        gaps = self.points.gaps + self.rows @ step + self.points.lowering * lowering
+        step, indentation_increment = x[:UNKNOWNS], x[UNKNOWNS]
+        gaps = self.points.gaps + self.rows @ step + self.points.indentation_increment * indentation_increment
         after, before = (penalty(g, stiffness=CONTACT.stiffness, smoothing=CONTACT.smoothing)[0] for g in (gaps, self.points.gaps))
         held = self.points.pressure(0.0)      # the residual holds the contact's present forces already
-        linear = self.residual @ step + self.excess * lowering + held @ (self.rows @ step + self.points.lowering * lowering)
+        change = self.rows @ step + self.points.indentation_increment * indentation_increment
+        linear = self.residual @ step + self.excess * indentation_increment + held @ change
         return linear + 0.5 * step @ self.matrix @ step + self.points.area @ (after - before)
 
 
@@ -85,8 +87,8 @@ def exact(monkeypatch):
 @pytest.mark.parametrize("seed", range(5))
 def test_a_step_is_the_least_energy_that_a_general_minimiser_finds(exact, seed):
     scene = Scene(seed)
-    step, lowering = scene.step(dense_stepper())
-    found = np.append(step, lowering)
+    step, indentation_increment = scene.step(dense_stepper())
+    found = np.append(step, indentation_increment)
     general = scipy.optimize.minimize(scene.energy, np.zeros(UNKNOWNS + 1), method="BFGS", options={"gtol": 1e-9, "maxiter": 4000})
     scale = abs(general.fun)
     assert scene.energy(found) <= general.fun + 1e-9 * scale
@@ -97,28 +99,28 @@ def test_a_step_is_the_least_energy_that_a_general_minimiser_finds(exact, seed):
 def test_an_object_that_would_go_too_far_stops_and_the_body_is_in_balance_at_that_depth(exact, seed):
     scene = Scene(seed)
     _, free = scene.step(dense_stepper())
-    step, lowering = scene.step(dense_stepper(), largest=0.3 * abs(free))
-    assert lowering == pytest.approx(0.3 * free, rel=1e-12)
-    at_depth = scipy.optimize.approx_fprime(np.append(step, lowering), scene.energy, 1e-9)
+    step, indentation_increment = scene.step(dense_stepper(), largest=0.3 * abs(free))
+    assert indentation_increment == pytest.approx(0.3 * free, rel=1e-12)
+    at_depth = scipy.optimize.approx_fprime(np.append(step, indentation_increment), scene.energy, 1e-9)
     assert np.abs(at_depth[:-1]).max() < 1e-4    # the differences' own rounding
     assert at_depth[-1] < -1e-2                  # N: deeper down the energy is still less
 
 
 def test_a_limit_that_the_object_does_not_reach_changes_nothing():
-    (step, lowering), (limited, lowered) = (Scene(1).step(dense_stepper(), largest=far) for far in (np.inf, 1.0))
-    assert lowered == lowering and (limited == step).all()
+    (step, indentation_increment), (limited, lowered) = (Scene(1).step(dense_stepper(), largest=far) for far in (np.inf, 1.0))
+    assert lowered == indentation_increment and (limited == step).all()
 
 
 def test_an_object_that_is_held_is_not_lowered():
-    step, lowering = Scene(1).step(dense_stepper(), excess=None)
-    assert lowering == 0.0 and np.abs(step).max() > 0
+    step, indentation_increment = Scene(1).step(dense_stepper(), excess=None)
+    assert indentation_increment == 0.0 and np.abs(step).max() > 0
 
 
 def test_a_point_that_would_fly_into_the_object_is_stopped_within_one_step(exact):
     # One unknown, pulled up by 1 N against 1 N/mm, a point 1 um under the object: Newton's tangent does not know of it.
     scene = Scene(0)
     scene.matrix, scene.rows, scene.residual = np.eye(1), np.array([[-1.0]]), np.array([-1.0])
-    scene.points = LinearGaps(gaps=np.array([1e-3]), rows=sp.csr_matrix(scene.rows), lowering=np.array([-1.0]),
+    scene.points = LinearGaps(gaps=np.array([1e-3]), rows=sp.csr_matrix(scene.rows), indentation_increment=np.array([-1.0]),
                               area=np.array([0.02]), contact=CONTACT)
     step, _ = scene.step(dense_stepper(), excess=None)
     depth = step[0] - 1e-3
@@ -129,8 +131,8 @@ def test_a_point_that_would_fly_into_the_object_is_stopped_within_one_step(exact
 def test_a_free_object_that_touches_nothing_is_told_by_nan():
     scene = Scene(2)
     scene.points = replace(scene.points, gaps=np.full(POINTS, 0.1))
-    _, lowering = scene.step(dense_stepper(), excess=-1.0)
-    assert np.isnan(lowering)
+    _, indentation_increment = scene.step(dense_stepper(), excess=-1.0)
+    assert np.isnan(indentation_increment)
 
 
 def test_a_factor_serves_the_next_step_too():
@@ -147,7 +149,7 @@ def test_it_takes_no_further_solve_to_see_that_a_step_is_good_enough():
     scene.points = replace(scene.points, gaps=np.full(POINTS, 0.1))
     step, _ = scene.step(dense_stepper(solver), excess=None)
     np.testing.assert_allclose(scene.matrix @ step, -scene.residual, rtol=1e-9)
-    assert solver.solves == 2     # of what the object's lowering does, and of the step itself
+    assert solver.solves == 2     # of what the object's indentation increment does, and of the step itself
 
 
 def test_a_step_with_an_old_factor_is_the_same_step(exact):
@@ -180,17 +182,17 @@ def test_a_symmetric_matrix_times_a_vector_is_found_from_its_upper_triangle(comp
 class SlidingScene(Scene):
     """The same, but half the points' areas leave the object as soon as a step is taken."""
 
-    def follow(self, step, lowering):
+    def follow(self, step, indentation_increment):
         self.points = replace(self.points, area=np.where(np.arange(POINTS) % 2, 0.0, self.points.area))
         return True
 
 
 def test_a_step_is_in_balance_with_what_the_points_face_where_it_leads(exact):
     scene = SlidingScene(6)
-    before, rows, lowering = scene.points.pressure(0.0), scene.points.rows, scene.points.lowering
+    before, rows, indentation_increment = scene.points.pressure(0.0), scene.points.rows, scene.points.indentation_increment
     step, down = scene.step(dense_stepper())
-    carried = scene.points.pressure(rows @ step + lowering * down)
+    carried = scene.points.pressure(rows @ step + indentation_increment * down)
     left = scene.residual + scene.matrix @ step - rows.T @ (carried - before)
     assert np.abs(left).max() < 1e-8 * np.abs(scene.residual).max()
-    assert abs(scene.excess - lowering @ (carried - before)) < 1e-8 * abs(scene.excess)
+    assert abs(scene.excess - indentation_increment @ (carried - before)) < 1e-8 * abs(scene.excess)
     assert not carried[1::2].any()

@@ -16,7 +16,7 @@ from softtact.linalg.nodal_frames import NodeFrames
 from softtact.linalg.workers import Workers
 from softtact.models.hyperelastic import linearised_contact, preconditioner
 from softtact.models.hyperelastic.linearised_contact import StepContact
-from softtact.models.hyperelastic.newton import NewtonSettings, press_levels
+from softtact.models.hyperelastic.newton import NewtonSettings, press_load_steps
 from softtact.models.hyperelastic.preconditioner import ContactFactor, DissectedContact
 
 WIDTH, LENGTH = 14, 9
@@ -42,8 +42,8 @@ class Pressed:
         size = (len(frames.last),) * 2
         share = rng.uniform(0.2, 0.8, size) * (rng.random(size) < 0.1)
         rows = sp.csr_matrix(np.eye(len(share)) + share) @ frames.movements(UNKNOWNS).T
-        self.points = SimpleNamespace(rows=rows.tocsr(), lowering=-rng.uniform(0.7, 1.0, len(share)))
-        self.drag = (0.05 * rng.normal(size=UNKNOWNS), 40.0) if friction else (0.0, 0.0)
+        self.points = SimpleNamespace(rows=rows.tocsr(), indentation_increment=-rng.uniform(0.7, 1.0, len(share)))
+        self.friction_response = (0.05 * rng.normal(size=UNKNOWNS), 40.0) if friction else (0.0, 0.0)
         self.slopes = [rng.choice([0.0, 30.0, 300.0], len(share)) for _ in range(3)]
         self.free = True
 
@@ -90,11 +90,12 @@ def test_what_the_dissected_factor_solves_is_the_matrix_with_the_contact_and_its
     problem, slope = Pressed(friction=True), Pressed().slopes[0]
     _, left = problem.factors(workers)
     assert left.renew(problem, slope)
-    rows, lowering, (border, corner) = problem.points.rows.toarray(), problem.points.lowering, problem.drag
+    rows, indentation_increment = problem.points.rows.toarray(), problem.points.indentation_increment
+    border, corner = problem.friction_response
     rubber = problem.rubber.toarray()
     matrix = rubber + np.triu(rubber, 1).T + rows.T @ (slope[:, None] * rows)
-    column = rows.T @ (slope * lowering) + border
-    whole = np.block([[matrix, column[:, None]], [column[None], np.array([[corner + slope @ lowering**2]])]])
+    column = rows.T @ (slope * indentation_increment) + border
+    whole = np.block([[matrix, column[:, None]], [column[None], np.array([[corner + slope @ indentation_increment**2]])]])
     right = np.random.default_rng(1).normal(size=UNKNOWNS + 1)
     np.testing.assert_allclose(whole @ left.solve(right, held=False), right, atol=2e-3)
 
@@ -151,7 +152,7 @@ def test_a_sinking_ball_finds_nodes_of_its_own_and_ends_where_a_general_solver_d
         else:
             monkeypatch.setattr(StepContact, "frames", lambda *a, find=StepContact.frames: frames.append(find(*a)) or frames[-1])
         settings = NewtonSettings(relative_tolerance=1e-8)
-        ends.append([level.state for level in press_levels(body, ball, [0.3, 1.0, 2.0], settings=settings)])
+        ends.append([load_step.state for load_step in press_load_steps(body, ball, [0.3, 1.0, 2.0], settings=settings)])
         body.close()
     assert len(frames[-1].first) > len(frames[0].first) > 0
     for one, other in zip(*ends, strict=True):
@@ -163,7 +164,7 @@ def test_a_sinking_ball_finds_nodes_of_its_own_and_ends_where_a_general_solver_d
 def test_nodes_that_are_enough_stay_and_are_turned_to_the_normals_of_now():
     body = six_frusta()
     rest, _ = body.rest()
-    planes, turn = body.slab.facing(rest, ball), Rotation.from_rotvec([0.03, 0.0, 0.0])
+    planes, turn = body.slab.project(rest, ball), Rotation.from_rotvec([0.03, 0.0, 0.0])
     before, turned = (StepContact(body.slab, body.slab.evaluate(rest, facing, 0.02), 0.02)
                       for facing in (planes, replace(planes, normals=turn.apply(planes.normals))))
     kept = before.frames(None)

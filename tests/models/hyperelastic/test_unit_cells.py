@@ -21,14 +21,14 @@ def bent(body, *, by):
 
 def change_of_energy(body, state, step, share=1e-4):
     """Of the energy (mJ) by a small share of the step."""
-    trial = body.evaluate(state.slab.displacement + share * step.slab, state.bed.displacement + share * step.bed,
-                          state.indentation + share * step.indentation, step.planes)
+    trial = body.evaluate(state.slab.displacement + share * step.slab, state.support.displacement + share * step.support,
+                          state.indentation + share * step.indentation, step.projection)
     return trial.energy - state.energy
 
 
 def farthest(step):
     """How far (f,) in mm each frustum's nodes go."""
-    return np.abs(step.bed.reshape(len(step.bed), -1)).max(axis=1)
+    return np.abs(step.support.reshape(len(step.support), -1)).max(axis=1)
 
 
 def test_a_cell_far_from_balance_goes_a_bounded_way_and_the_energy_falls(body, monkeypatch):
@@ -66,7 +66,7 @@ def test_a_cell_that_was_thrown_too_far_is_damped_until_it_is_not(body, monkeypa
     monkeypatch.setattr(newton_step, "_INNER_TOLERANCE", 1e-6)     # from so deep in the plate a tenth of the forces is much
     state = bent(body, by=0.02)
     free = body.newton_step(state, None)
-    thrown = np.zeros_like(free.bed)
+    thrown = np.zeros_like(free.support)
     thrown[0] = 1.0
     for _ in range(3):
         assert body.cells.damp(np.zeros_like(free.slab), thrown)
@@ -74,4 +74,4 @@ def test_a_cell_that_was_thrown_too_far_is_damped_until_it_is_not(body, monkeypa
     assert farthest(damped)[0] < 0.8 * farthest(free)[0] and change_of_energy(body, state, damped) < 0
     for _ in range(4):     # steps that throw nothing take the damping off again
         last = body.newton_step(state, None)
-    np.testing.assert_allclose(last.bed, free.bed, atol=1e-3 * farthest(free)[0])     # conjugate gradients are not exact
+    np.testing.assert_allclose(last.support, free.support, atol=1e-3 * farthest(free)[0])     # conjugate gradients are not exact

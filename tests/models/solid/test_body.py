@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from softtact.fem.solid_block import SolidBlock
-from softtact.linalg.direct_single import RoughSolver
+from softtact.linalg.direct_single import PardisoSingle
 from softtact.materials.laws.registry import make_law
 from softtact.models.solid.body import FreeBody, RigidContact, SolidElements, flat_surface, ground
 from softtact.models.solid.newton import FreeSettings, _least_squares, press_to_forces, press_to_indentations
@@ -154,26 +154,28 @@ EXACT = FreeSettings(relative_residual=1e-9, relative_correction=1.0)
 
 def test_contact_kept_out_of_the_factor_gives_the_same_press():
     depths = [0.1, 0.2, 0.3]
-    forces = [[level.state.object_force for level in press_to_indentations(pressed_block(apart=apart), depths, settings=EXACT)]
+    forces = [[load_step.state.object_force for load_step in press_to_indentations(pressed_block(apart=apart), depths,
+                                                                                   settings=EXACT)]
               for apart in (False, True)]
     assert forces[1] == pytest.approx(forces[0], rel=1e-8)
 
 
 def test_single_precision_factors_lead_to_the_same_balance():
-    bodies = [pressed_block(solver=solver) for solver in (None, RoughSolver())]
-    forces = [[level.state.object_force for level in press_to_indentations(body, [0.15, 0.3], settings=EXACT)] for body in bodies]
+    bodies = [pressed_block(solver=solver) for solver in (None, PardisoSingle())]
+    forces = [[load_step.state.object_force for load_step in press_to_indentations(body, [0.15, 0.3], settings=EXACT)]
+              for body in bodies]
     assert forces[1] == pytest.approx(forces[0], rel=1e-8)
 
 
 def test_a_force_is_reached_at_the_depth_that_gives_it():
-    depth = [level.state for level in press_to_indentations(pressed_block(), [0.1, 0.2], settings=EXACT)]
-    force = [level.state for level in press_to_forces(pressed_block(), [s.object_force for s in depth], settings=EXACT)]
+    depth = [load_step.state for load_step in press_to_indentations(pressed_block(), [0.1, 0.2], settings=EXACT)]
+    force = [load_step.state for load_step in press_to_forces(pressed_block(), [s.object_force for s in depth], settings=EXACT)]
     assert [s.indentation for s in force] == pytest.approx([s.indentation for s in depth], rel=1e-7)
 
 
 def test_work_of_a_glued_plate_is_the_stored_energy():
     depths = np.linspace(0, 0.4, 9)
-    states = [level.state for level in press_to_indentations(pressed_block(glued=True), depths[1:], settings=EXACT)]
+    states = [load_step.state for load_step in press_to_indentations(pressed_block(glued=True), depths[1:], settings=EXACT)]
     forces = np.array([0.0] + [s.object_force for s in states])
     simpson = (forces[:-2:2] + 4 * forces[1:-1:2] + forces[2::2]).sum() * (depths[1] - depths[0]) / 3
     assert simpson == pytest.approx(states[-1].energy, rel=1e-4)   # Simpson's rule over eight steps of a smooth curve

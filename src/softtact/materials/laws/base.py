@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from softtact.errors import InputError, OutsideCardWarning
+from softtact.errors import ExtrapolationWarning, InputError
 
 # Exponents (e1, e2, e3) of the incompressible test paths: l_k = stretch ** e_k. Direction 3 is always free of stress.
 TEST_PATHS = {
@@ -106,7 +106,7 @@ class Law:
     def nominal_stress(self, mode, stretch):
         """Nominal stress (MPa) of the incompressible material in a `uniaxial`, `equibiaxial` or `planar` test.
 
-        A law with a `stretch_window` warns (`OutsideCardWarning`) of stretches outside of it.
+        A law with a `stretch_window` warns (`ExtrapolationWarning`) of stretches outside of it.
         """
         stretches = principal_stretches(mode, stretch)
         self._warn_outside(stretches)
@@ -119,7 +119,7 @@ class Law:
         low, high = self.stretch_window
         if stretches.min() < low * (1 - 1e-9) or stretches.max() > high * (1 + 1e-9):
             warnings.warn(f"Law {self.name} is used at principal stretches {stretches.min():.3g} to {stretches.max():.3g}; its card"
-                          f" rests on data from {low:.3g} to {high:.3g}.", OutsideCardWarning, stacklevel=3)
+                          f" rests on data from {low:.3g} to {high:.3g}.", ExtrapolationWarning, stacklevel=3)
 
     def uniaxial_compressible(self, stretch):
         """Nominal stress (MPa) of the uniaxial test with the volume penalty: the lateral stress is solved to zero."""

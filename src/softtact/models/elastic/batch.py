@@ -1,6 +1,6 @@
-"""Many presses of the elastic model at once: a column for each press and level, on a GPU or on any device of torch.
+"""Many presses of the elastic model at once: a column for each press and load step, on a GPU or on any device of torch.
 
-`press_layer` gathers a dense flexibility among one object's points. Here all presses share the surface: a product is four dense
+`press_layer` gathers a dense compliance among one object's points. Here all presses share the surface: a product is four dense
 matrices, one for each parity, of a quarter of the surface's nodes, with as many columns as there are. It takes some four times the
 operations, and is what a GPU is made for. The method is `contact.unilateral`'s own, on torch's arrays.
 """
@@ -11,7 +11,7 @@ import numpy as np
 import torch
 
 from softtact.contact.height_field import NO_CONTACT_MM
-from softtact.contact.unilateral import ContactLevels, ContactSettings, depth_on_springs, press_columns
+from softtact.contact.unilateral import ContactLoadSteps, ContactSettings, depth_on_springs, press_columns
 from softtact.models.elastic.compliance import LayerPress
 
 COLUMNS_AT_ONCE = 4000      # 1 MB each on the coro's grid, most of it in single precision
@@ -84,7 +84,7 @@ def _stencil_weights(compliance):
 def press_layers(compliance, heights, forces_n, *, device, settings=None):
     """Yield the `LayerPress` of each object with `heights` (p, n) in mm over the grid's nodes, in their order.
 
-    forces_n (l,): in N, rising;  device: of torch. A level that does not settle is marked by the contact's `settled`.
+    forces_n (l,): in N, rising;  device: of torch. A load step that does not settle is marked by the contact's `settled`.
     """
     surface = DeviceSurface(compliance, device)
     at_once = max(1, COLUMNS_AT_ONCE // len(forces_n))
@@ -95,19 +95,19 @@ def press_layers(compliance, heights, forces_n, *, device, settings=None):
 
 def _press_some(compliance, surface, heights, forces_n, settings):
     area = np.prod(compliance.grid.step)
-    first = np.stack([_depth_at_first(height, area, forces_n / compliance.bedding) for height in heights])
+    first = np.stack([_depth_at_first(height, area, forces_n / compliance.foundation_modulus) for height in heights])
     on_device = [torch.as_tensor(values, device=surface.device)
                  for values in (np.stack(heights, axis=1), np.tile(forces_n, (len(heights), 1)), first)]
     areas = torch.full((compliance.grid.count,), area, dtype=torch.float64, device=surface.device)
-    levels = press_columns(surface, *on_device, area=areas, settings=settings)
-    every_second = surface.double(levels.force).reshape(*surface.shape, -1)[1::2, 1::2]
+    load_steps = press_columns(surface, *on_device, area=areas, settings=settings)
+    every_second = surface.double(load_steps.force).reshape(*surface.shape, -1)[1::2, 1::2]
     maps = torch.nn.functional.pad(every_second, (0, 0, 1, 1, 1, 1)).permute(2, 0, 1).cpu().numpy()
-    arrays = {field.name: getattr(levels, field.name).cpu().numpy() for field in fields(levels)}
+    arrays = {field.name: getattr(load_steps, field.name).cpu().numpy() for field in fields(load_steps)}
     for press in range(len(heights)):
         own = slice(press * len(forces_n), (press + 1) * len(forces_n))
-        yield LayerPress(maps=maps[own], contact=ContactLevels(**{name: values[..., own] for name, values in arrays.items()}))
+        yield LayerPress(maps=maps[own], contact=ContactLoadSteps(**{name: values[..., own] for name, values in arrays.items()}))
 
 
-def _depth_at_first(height, area, force_over_bedding):
+def _depth_at_first(height, area, force_over_modulus):
     lowest, there = height.min(), height < NO_CONTACT_MM
-    return lowest + depth_on_springs(height[there] - lowest, np.full(there.sum(), area), force_over_bedding)
+    return lowest + depth_on_springs(height[there] - lowest, np.full(there.sum(), area), force_over_modulus)

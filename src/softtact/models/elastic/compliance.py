@@ -1,6 +1,6 @@
-"""The elastic model: one linear layer, held at its base and sides; the object's contact on the known flexibility of its top.
+"""The elastic model: one linear layer, held at its base and sides; the object's contact on the known compliance of its top.
 
-The vertical flexibility of the top's nodes (mm/N) is computed once for a sensor (`elastic_compliance`), by quarters of the layer
+The vertical compliance of the top's nodes (mm/N) is computed once for a sensor (`elastic_compliance`), by quarters of the layer
 (`quarter_slab`). The nodes lie at half the map's spacing.
 """
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from softtact.contact.node_grid import NodeGrid
 from softtact.contact.stencil import Stencil
-from softtact.contact.unilateral import ContactLevels, press_elastic
+from softtact.contact.unilateral import ContactLoadSteps, press_elastic
 from softtact.files import read_arrays
 from softtact.models.quarter_symmetry import PARITIES, ElasticLayer, ParityBlocks, QuarterSlab
 
@@ -22,27 +22,29 @@ _REACH = 1                            # nodes that the preconditioner looks arou
 class Compliance:
     """What the top does under downwards forces, in mm/N: blocks by parity among the grid's nodes of a quarter.
 
-    bedding: pressure per depth in N/mm3 under a wide punch;  stencil: about the inverse
+    foundation_modulus: pressure per depth in N/mm3 under a wide punch;  stencil: about the inverse
     """
 
     grid: NodeGrid
     blocks: ParityBlocks
-    bedding: float
+    foundation_modulus: float
     stencil: Stencil
 
     def save(self, path):
         """Write as a NumPy archive, in single precision."""
-        np.savez(path, x=self.grid.x, y=self.grid.y, blocks=self.blocks.blocks, bedding=self.bedding, stencil=self.stencil.values)
+        np.savez(path, x=self.grid.x, y=self.grid.y, blocks=self.blocks.blocks, foundation_modulus=self.foundation_modulus,
+                 stencil=self.stencil.values)
 
     @classmethod
     def load(cls, path):
         """Read what `save` wrote."""
         with read_arrays(path) as data:
-            return cls(grid=NodeGrid(data["x"], data["y"]), blocks=ParityBlocks(data["blocks"]), bedding=float(data["bedding"]),
+            return cls(grid=NodeGrid(data["x"], data["y"]), blocks=ParityBlocks(data["blocks"]),
+                       foundation_modulus=float(data["foundation_modulus"]),
                        stencil=Stencil(data["stencil"]))
 
     def among(self, points):
-        """Flexibility (c, c) among `ObjectPoints`."""
+        """Compliance (c, c) among `ObjectPoints`."""
         places = self.grid.quarter(points.nodes)
         return self.blocks.between(*places, *places)
 
@@ -82,10 +84,11 @@ def elastic_compliance(spec, *, threads=1, cells=None):
     """The `Compliance` of a sensor's elastic layer; `cells`: elements along a quarter's sides, if not as the map asks for."""
     slab = elastic_slab(spec, cells=cells)
     kept = 3 * slab.top.ravel() + 2
-    blocks = np.stack([slab.flexibility(slab.stiffness, kept, parity, threads=threads) for parity in PARITIES])
+    blocks = np.stack([slab.compliance(slab.stiffness, kept, parity, threads=threads) for parity in PARITIES])
     layer = spec.elastic_layer
     confined = layer.young_mpa * (1 - layer.poisson) / ((1 + layer.poisson) * (1 - 2 * layer.poisson))
-    return Compliance(grid=surface_grid(slab), blocks=ParityBlocks(blocks.astype(np.float32)), bedding=confined / spec.thickness_mm,
+    return Compliance(grid=surface_grid(slab), blocks=ParityBlocks(blocks.astype(np.float32)),
+                      foundation_modulus=confined / spec.thickness_mm,
                       stencil=_stencil(blocks, slab.top.shape))
 
 
@@ -107,14 +110,15 @@ def _stencil(blocks, shape):
 
 @dataclass(frozen=True)
 class LayerPress:
-    """maps (l, ny, nx) in mm of all levels, and the contact's `ContactLevels`."""
+    """maps (l, ny, nx) in mm of all load steps, and the contact's `ContactLoadSteps`."""
 
     maps: np.ndarray
-    contact: ContactLevels
+    contact: ContactLoadSteps
 
 
 def press_layer(compliance, points, forces_n):
     """Press `ObjectPoints` of the compliance's grid with forces (l,) in N."""
     contact = press_elastic(compliance.among(points), points.gap, forces_n, area=points.covered * np.prod(compliance.grid.step),
-                            bedding=compliance.bedding, precondition=compliance.stencil.on(compliance.grid, points.nodes))
+                            foundation_modulus=compliance.foundation_modulus,
+                            precondition=compliance.stencil.on(compliance.grid, points.nodes))
     return LayerPress(maps=compliance.maps(points, contact.force), contact=contact)

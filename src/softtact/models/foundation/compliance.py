@@ -23,7 +23,7 @@ _TIE = 20.0     # N/mm of the springs that tie the frusta's descents to the slab
 
 
 @dataclass(frozen=True)
-class FoundationFlexibility:
+class FoundationCompliance:
     """What the slab on its frusta does under downwards forces, by parity (see `quarter_slab`), and the law of the frusta.
 
     surface: among the grid's nodes in the quarter (a,), the frusta (b,) and the electrode plane at the map's points (c,)
@@ -31,12 +31,12 @@ class FoundationFlexibility:
     membrane: forces N_xx, N_yy, N_xy of the frusta's cells (3 b,) in N/mm, from the same
     lateral: movement and tilt of the frusta's roots along x, then along y (4 b,), from all of these (a + b + c)
     lateral_self: the same, from unit forces and moments of the same kind (4 b)
-    grid: the nodes;  counts: frusta along x and y;  bedding: pressure per depth in N/mm3 of the layer at rest
+    grid: the nodes;  counts: frusta along x and y;  foundation_modulus: pressure per depth in N/mm3 of the layer at rest
     """
 
     grid: NodeGrid
     counts: tuple
-    bedding: float
+    foundation_modulus: float
     law: FrustumLaw
     surface: ParityBlocks
     sideways: ParityBlocks
@@ -46,7 +46,7 @@ class FoundationFlexibility:
 
     def save(self, path):
         """Write as a NumPy archive."""
-        arrays = {"x": self.grid.x, "y": self.grid.y, "counts": self.counts, "bedding": self.bedding}
+        arrays = {"x": self.grid.x, "y": self.grid.y, "counts": self.counts, "foundation_modulus": self.foundation_modulus}
         arrays |= {f"law_{name}": values for name, values in self.law.arrays().items()}
         arrays |= {name: getattr(self, name).blocks for name in _BLOCKS}
         np.savez(path, **arrays)
@@ -58,11 +58,11 @@ class FoundationFlexibility:
             law = FrustumLaw(**{name.removeprefix("law_"): data[name] for name in data.files if name.startswith("law_")})
             blocks = {name: ParityBlocks(data[name]) for name in _BLOCKS}
             return cls(grid=NodeGrid(data["x"], data["y"]), counts=tuple(data["counts"]),
-                       bedding=float(data["bedding"]), law=law, **blocks)
+                       foundation_modulus=float(data["foundation_modulus"]), law=law, **blocks)
 
 
-def foundation_flexibility(spec, *, dielectric_law, cover_law, frustum=None, cells=None, threads=1):
-    """The `FoundationFlexibility` of a sensor with its two laws.
+def foundation_compliance(spec, *, dielectric_law, cover_law, frustum=None, cells=None, threads=1):
+    """The `FoundationCompliance` of a sensor with its two laws.
 
     frustum: its `FrustumLaw`, or None to compute it;  cells: elements along the quarter's sides, by default the map's steps there
     """
@@ -81,8 +81,8 @@ def foundation_flexibility(spec, *, dielectric_law, cover_law, frustum=None, cel
     surface, sideways, both, own = (np.stack(blocks).astype(np.float32) for blocks in zip(*parts, strict=True))
     membrane, lateral = both[:, :3 * len(centres), :len(columns)], both[:, 3 * len(centres):]
     own = own[:, 3 * len(centres):, 3 * len(centres):]
-    return FoundationFlexibility(
-        grid=surface_grid(slab), counts=spec.frusta_counts, bedding=_bedding(spec, frustum, cover_law),
+    return FoundationCompliance(
+        grid=surface_grid(slab), counts=spec.frusta_counts, foundation_modulus=_foundation_modulus(spec, frustum, cover_law),
         law=frustum, surface=ParityBlocks(surface), sideways=ParityBlocks(sideways), membrane=ParityBlocks(membrane),
         lateral=ParityBlocks(lateral), lateral_self=ParityBlocks(own))
 
@@ -140,7 +140,7 @@ def _of_parity(slab, stiffness, descents, followed, rows, loaded, parity, thread
     count = descents.shape[0]
     tied = sp.bmat([[stiffness + _TIE * descents.T @ descents, -_TIE * descents.T], [-_TIE * descents, _TIE * sp.eye(count)]],
                    format="csr")
-    whole = slab.flexibility(tied, rows, parity, threads=threads)
+    whole = slab.compliance(tied, rows, parity, threads=threads)
     own = np.arange(loaded - count, loaded)
     whole[own, own] -= 1 / _TIE
     place = (len(rows) - loaded) // 3
@@ -157,7 +157,7 @@ def _of_parity(slab, stiffness, descents, followed, rows, loaded, parity, thread
     return whole[:loaded + place, :loaded], -whole[loaded + place:, :loaded], -forces, followed @ response
 
 
-def _bedding(spec, frustum, cover_law):
+def _foundation_modulus(spec, frustum, cover_law):
     """Pressure per depth (N/mm3) of frusta and layers one after the other, at small depths."""
     frusta = frustum.compression_mm[1] / frustum.force_n[1] * spec.dielectric.frusta.pitch_mm**2
     layers = (spec.thickness_mm - spec.dielectric.frusta.height_mm) / (cover_law.bulk_modulus + 4 / 3 * cover_law.mu0)

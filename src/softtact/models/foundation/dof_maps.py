@@ -1,4 +1,4 @@
-"""Where a press of the foundation model acts: its nodes and frusta among the flexibility of a quarter, and patches of points."""
+"""Where a press of the foundation model acts: its nodes and frusta among the compliance of a quarter, and patches of points."""
 
 import numpy as np
 import scipy.sparse as sp
@@ -39,32 +39,32 @@ def _pressure_weights(points, grid):
 class Places:
     """A press' nodes and frusta in the quarter's numbers and signs, and the matrices between them and what a press asks for."""
 
-    def __init__(self, flexibility, points):
-        self.flexibility, grid = flexibility, flexibility.grid
+    def __init__(self, compliance, points):
+        self.compliance, grid = compliance, compliance.grid
         nodes, signs = grid.quarter(points.nodes)
-        self.frusta, self.frustum_signs = lattice_places(flexibility.counts)
+        self.frusta, self.frustum_signs = lattice_places(compliance.counts)
         quarter = (len(grid.x) // 2 + 1) * (len(grid.y) // 2 + 1)
         self.columns = np.concatenate([nodes, quarter + self.frusta])
         self.signs = np.vstack([signs, self.frustum_signs])
         self._map_start = quarter + len(self.frusta) // 4
 
     def surface(self):
-        """Flexibility (n + b, n + b) of nodes and frusta."""
-        return self.flexibility.surface.between(self.columns, self.signs, self.columns, self.signs)
+        """Compliance (n + b, n + b) of nodes and frusta."""
+        return self.compliance.surface.between(self.columns, self.signs, self.columns, self.signs)
 
     def maps(self, load, lateral):
         """Deformation maps (l, ny, nx) in mm under loads (n + b, l) and lateral ones of frusta (4 b, l), with the held edges."""
-        coarse = self.flexibility.grid.every_second
+        coarse = self.compliance.grid.every_second
         numbers, signs = coarse.quarter(np.arange(coarse.count))
-        rows = self.flexibility.surface.between(self._map_start + numbers, signs, self.columns, self.signs)
+        rows = self.compliance.surface.between(self._map_start + numbers, signs, self.columns, self.signs)
         by_frusta = self._lateral(self._map_start + numbers, signs).T @ lateral.astype(np.float32)
         down = rows @ load.astype(np.float32) + by_frusta
         return np.pad(down.T.reshape(-1, *coarse.shape).astype(float), ((0, 0), (1, 1), (1, 1)))
 
     def sideways(self, nodes):
         """Movement in x and y (2 k, n + b) of some nodes (k,) of the grid of every second node."""
-        numbers, signs = self.flexibility.grid.every_second.quarter(nodes)
-        block = self.flexibility.sideways
+        numbers, signs = self.compliance.grid.every_second.quarter(nodes)
+        block = self.compliance.sideways
         quarter = block.blocks.shape[1] // 2
         return np.vstack([block.between(axis * quarter + numbers, signs, self.columns, self.signs)
                           * signs[:, axis:axis + 1].astype(np.float32) for axis in (0, 1)])
@@ -75,24 +75,24 @@ class Places:
 
     def _lateral(self, columns, signs):
         """The same from unit forces downwards at places by their numbers (k,) in the quarter and signs (k, 2)."""
-        return np.vstack([self.flexibility.lateral.between(rows, self.frustum_signs, columns, signs) * sign[:, None]
+        return np.vstack([self.compliance.lateral.between(rows, self.frustum_signs, columns, signs) * sign[:, None]
                           for rows, sign in self._lateral_rows()])
 
     def lateral_self(self):
         """The same (4 b, 4 b) from unit forces and moments of the frusta along x, then along y."""
-        block, kinds = self.flexibility.lateral_self, list(self._lateral_rows())
+        block, kinds = self.compliance.lateral_self, list(self._lateral_rows())
         return np.block([[block.between(rows, self.frustum_signs, columns, self.frustum_signs) * np.outer(sign, other)
                           for columns, other in kinds] for rows, sign in kinds])
 
     def _lateral_rows(self):
         """Movement and tilt along x, then along y: their rows (b,) of all frusta among the quarter's, and signs (b,)."""
-        quarter = self.flexibility.lateral.blocks.shape[1] // 4
+        quarter = self.compliance.lateral.blocks.shape[1] // 4
         for kind in range(4):
             yield kind * quarter + self.frusta, self.frustum_signs[:, kind // 2].astype(np.float32)
 
     def membrane(self):
         """Membrane forces (3 b, n + b) of all cells."""
-        block = self.flexibility.membrane
+        block = self.compliance.membrane
         quarter = block.blocks.shape[1] // 3
         rows = [block.between(k * quarter + self.frusta, self.frustum_signs, self.columns, self.signs) for k in range(3)]
         rows[2] *= self.frustum_signs.prod(axis=1).astype(np.float32)[:, None]
@@ -110,8 +110,8 @@ def lattice_places(counts):
 class Sideways:
     """Movement of the points in x and y, interpolated between the nodes around them of the grid of every second node."""
 
-    def __init__(self, flexibility, points, places):
-        grid, coarse = flexibility.grid, flexibility.grid.every_second
+    def __init__(self, compliance, points, places):
+        grid, coarse = compliance.grid, compliance.grid.every_second
         j, i = np.divmod(points.nodes, grid.shape[1])
         at = np.column_stack([i, j]) / 2 - 0.5        # in steps of the coarse grid, whose first node is the grid's second one
         low = np.floor(at).astype(int)

@@ -54,15 +54,15 @@ class Effects:
 class FiniteDisplacement:
     """The effects of one press, of loads (n + b,) on its nodes and frusta."""
 
-    def __init__(self, flexibility, points, places, settings):
+    def __init__(self, compliance, points, places, settings):
         """settings: `FoundationSettings`, of which `follow` and `rocking` count"""
-        self.law, self.settings, self.lattice = flexibility.law, settings, flexibility.counts[::-1]
+        self.law, self.settings, self.lattice = compliance.law, settings, compliance.counts[::-1]
         self.frusta, self.points = len(places.frusta), points
         if settings.follow or settings.rocking:
             self.lateral = places.lateral()
         if settings.follow:
             self.lateral_self, self.membrane = places.lateral_self(), places.membrane()
-            self.sideways, self._own = Sideways(flexibility, points, places), self._own_flexibility()
+            self.sideways, self._own = Sideways(compliance, points, places), self._own_compliance()
 
     def none(self):
         """Those of the unloaded sensor."""
@@ -130,7 +130,7 @@ class FiniteDisplacement:
         resisted = np.linalg.solve(np.eye(2) + stiffness @ self._own, stiffness @ free.transpose(0, 2, 1))
         return -resisted.transpose(2, 1, 0).reshape(4, -1)
 
-    def _own_flexibility(self):
+    def _own_compliance(self):
         """What force and moment on the middle's frustum do to its own movement and tilt along x (2, 2)."""
         middle = np.ravel_multi_index([count // 2 for count in self.lattice], self.lattice)
         both = middle + self.frusta * np.arange(2)

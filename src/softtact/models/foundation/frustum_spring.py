@@ -25,7 +25,7 @@ from softtact.files import read_arrays
 from softtact.models.foundation.single_frustum import SingleFrustum
 from softtact.models.hyperelastic.build import build_unit_cell
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
-from softtact.models.hyperelastic.newton import NewtonSettings, press_levels
+from softtact.models.hyperelastic.newton import NewtonSettings, press_load_steps
 
 _FIRST_N, _LEVELS_A_DECADE = 2e-3, 9
 _MORTAR_POINTS = 10      # along a side of a root's face: so dense that elements of a tenth of a pitch do not feel them singly
@@ -130,54 +130,54 @@ def frustum_law(spec, law, *, mesh=None, pressure_mpa=_PRESSURE_MPA):
     mesh: `MeshSettings` of the cell; by default frusta of two rings, which one cell can afford (of one: 2 % too stiff)
     """
     body = build_unit_cell(spec, dielectric_law=law, mesh=mesh or MeshSettings(frustum_rings=2))
-    bed = body.bed
-    root_xy, spread, mass = _root_mortar(bed)
-    stiffness = _root_stiffness(bed)
+    support = body.support
+    root_xy, spread, mass = _root_mortar(support)
+    stiffness = _root_stiffness(support)
     straight = np.zeros((len(spread), 3))
     straight[:, 2] = 1.0
     straight = straight.ravel()
     along = stiffness @ straight
     k = float(straight @ along)
     descent = along / k
-    lean, upright, radius = _tip(bed)
-    lateral = _lateral(bed, mass)
+    lean, upright, radius = _tip(support)
+    lateral = _lateral(support, mass)
     force, compression = _cell_curve(spec, body, descent, pressure_mpa * spec.dielectric.frusta.pitch_mm**2)
-    at, stiffer = _lateral_stiffness(bed, compression[-1])
+    at, stiffer = _lateral_stiffness(support, compression[-1])
     body.close()
     return FrustumLaw(force_n=force, compression_mm=compression, root_xy=root_xy, spread=spread, descent=descent, lateral=lateral,
                       lateral_at_mm=at, stiffness=stiffer, rest=stiffness - k * np.outer(descent, descent), lean=lean,
                       upright=upright, tip_radius_mm=radius)
 
 
-def _root_mortar(bed):
+def _root_mortar(support):
     """Points (s, 2) of a frustum's root about its axis, and weights (m, s): from a field there to its root nodes' values.
 
     The values are those whose quadratic interpolation over the root has the same products with its shape functions as the field.
     """
-    place = np.full(bed.nodes, -1)
-    place[bed.root] = np.arange(len(bed.root))
-    faces = place[bed.mesh.layer(bed.mesh.layers - 1)[:, HEX27_TOP]]
-    xy = (bed.coordinates[0][bed.root, :2] - bed.geometry.centres[0])[faces]
+    place = np.full(support.nodes, -1)
+    place[support.root] = np.arange(len(support.root))
+    faces = place[support.mesh.layer(support.mesh.layers - 1)[:, HEX27_TOP]]
+    xy = (support.coordinates[0][support.root, :2] - support.geometry.centres[0])[faces]
     points, weights = gauss(_MORTAR_POINTS, 2)
     values, slopes = quad9(points)
     areas = weights * np.linalg.det(np.einsum("gad,fai->fgid", slopes, xy))
-    mass, products = np.zeros((len(bed.root),) * 2), np.zeros((len(bed.root), *areas.shape))
+    mass, products = np.zeros((len(support.root),) * 2), np.zeros((len(support.root), *areas.shape))
     for f, (face, area) in enumerate(zip(faces, areas, strict=True)):
         mass[np.ix_(face, face)] += values.T @ (area[:, None] * values)
         products[face, f] = values.T * area
     return np.einsum("ga,fai->fgi", values, xy).reshape(-1, 2), np.linalg.solve(mass, products.reshape(len(mass), -1)), mass
 
 
-def _root_stiffness(bed):
+def _root_stiffness(support):
     """Stiffness (3 m, 3 m) of a frustum's root nodes at rest, the tip standing on the board."""
-    return _condensed(_stiffness_at_rest(bed), np.setdiff1d(bed.inner, 3 * bed.tip + 2), bed.root_dofs)
+    return _condensed(_stiffness_at_rest(support), np.setdiff1d(support.inner, 3 * support.tip + 2), support.root_dofs)
 
 
-def _stiffness_at_rest(bed):
+def _stiffness_at_rest(support):
     """Stiffness (3 n, 3 n) of all of a frustum's nodes."""
-    tangents = bed.block.tangent(bed.per_element(np.zeros((1, bed.nodes, 3))))
-    stiffness = np.zeros((3 * bed.nodes,) * 2)
-    for element, nodes in zip(tangents, bed.mesh.hexes, strict=True):
+    tangents = support.block.tangent(support.per_element(np.zeros((1, support.nodes, 3))))
+    stiffness = np.zeros((3 * support.nodes,) * 2)
+    for element, nodes in zip(tangents, support.mesh.hexes, strict=True):
         dofs = (3 * nodes[:, None] + np.arange(3)).ravel()
         stiffness[np.ix_(dofs, dofs)] += element
     return stiffness
@@ -189,25 +189,25 @@ def _condensed(stiffness, inner, outer):
     return stiffness[np.ix_(outer, outer)] - coupling.T @ np.linalg.solve(stiffness[np.ix_(inner, inner)], coupling)
 
 
-def _tip(bed):
+def _tip(support):
     """Lean of a free tip over the root's movement sideways (1/mm), its stiffness against leaning (N mm), and its radius (mm).
 
     Both by the tip's vertical movements z = x: the work-conjugate moment of a tip that stays plane.
     """
-    x = bed.coordinates[0][bed.tip, 0] - bed.geometry.centres[0][0]
-    vertical = 3 * bed.tip + 2
-    inner = np.setdiff1d(bed.inner, vertical)
-    kept = np.concatenate([vertical, bed.root_dofs])
-    stiffness = _condensed(_stiffness_at_rest(bed), inner, kept)
-    sideways = np.tile([1.0, 0.0, 0.0], len(bed.root))
-    tips = len(bed.tip)
+    x = support.coordinates[0][support.tip, 0] - support.geometry.centres[0][0]
+    vertical = 3 * support.tip + 2
+    inner = np.setdiff1d(support.inner, vertical)
+    kept = np.concatenate([vertical, support.root_dofs])
+    stiffness = _condensed(_stiffness_at_rest(support), inner, kept)
+    sideways = np.tile([1.0, 0.0, 0.0], len(support.root))
+    tips = len(support.tip)
     free = -np.linalg.solve(stiffness[:tips, :tips], stiffness[:tips, tips:] @ sideways)
     return float(abs(free @ x) / (x @ x)), float(x @ stiffness[:tips, :tips] @ x), float(np.abs(x).max())
 
 
-def _lateral(bed, mass):
+def _lateral(support, mass):
     """Movement and tilt along x, then along y, of a root's nodal displacements (4, 3 m): the plane nearest to them in its area."""
-    xy = bed.coordinates[0][bed.root, :2] - bed.geometry.centres[0]
+    xy = support.coordinates[0][support.root, :2] - support.geometry.centres[0]
     rows = []
     for axis, sideways in enumerate(np.eye(3)[:2]):
         for shape, direction in ((np.ones(len(xy)), sideways), (xy[:, axis], np.eye(3)[2])):
@@ -216,15 +216,15 @@ def _lateral(bed, mass):
     return np.array(rows)
 
 
-def _lateral_stiffness(bed, largest_mm):
+def _lateral_stiffness(support, largest_mm):
     """Compressions (g,) in mm, and a root's stiffness (g, 3) there against movement, between it and tilt, and against tilt.
 
     Not for the smallest of movements but for those of a frustum beside an edge: between them contacts begin. Where a frustum
     cannot be pressed so far under a rigid root, the stiffness ends there.
     """
-    movement, descents = _MOVEMENT * bed.geometry.heights[0], np.linspace(0.0, largest_mm, _LATERAL_LEVELS)
+    movement, descents = _MOVEMENT * support.geometry.heights[0], np.linspace(0.0, largest_mm, _LATERAL_LEVELS)
     moved, tilted = ([frustum.move(*place, descent) for descent in descents] for frustum, place in
-                     ((SingleFrustum(bed), (movement, 0.0)), (SingleFrustum(bed), (0.0, _TILT))))
+                     ((SingleFrustum(support), (movement, 0.0)), (SingleFrustum(support), (0.0, _TILT))))
     both = [(*(a / movement), b[1] / _TILT) for a, b in zip(moved, tilted, strict=True) if a is not None and b is not None]
     return descents[:len(both)], np.array(both)
 
@@ -234,15 +234,15 @@ def _cell_curve(spec, body, descent, largest_n):
     plate = trimesh.creation.box((4 * spec.dielectric.frusta.pitch_mm,) * 2 + (1.0,))
     plate.apply_translation([0, 0, 0.5])
     forces = np.geomspace(_FIRST_N, largest_n, int(np.ceil(_LEVELS_A_DECADE * np.log10(largest_n / _FIRST_N))))
-    settings = NewtonSettings(contact_passes=0, first_touch_mm=1e-3, smallest_scale_n=0.05, smallest_increment_n=1e-3)
+    settings = NewtonSettings(max_augmentations=0, first_touch_mm=1e-3, smallest_scale_n=0.05, smallest_increment_n=1e-3)
     reached = [(0.0, 0.0)]
     try:
-        for level in press_levels(body, HeightField(plate), forces, settings=settings):
-            root = level.state.bed.displacement[0][body.bed.root].ravel()
+        for load_step in press_load_steps(body, HeightField(plate), forces, settings=settings):
+            root = load_step.state.support.displacement[0][body.support.root].ravel()
             compression = -float(descent @ root)
             if compression <= reached[-1][1]:
                 break
-            reached.append((level.force_n, compression))
+            reached.append((load_step.force_n, compression))
     except ConvergenceError:
         if len(reached) < 10:
             raise

@@ -2,7 +2,7 @@
 
 A node that is held makes the contact wider by one step, one that is free does not. In between, with its force a share r of what
 would hold it, the contact's energy lies between by that share, which is that of an edge r steps beyond the node before. So a
-spring of 1/r - 1 times the node's own flexibility among the held ones stands for an edge there (a cut cell, in other methods).
+spring of 1/r - 1 times the node's own compliance among the held ones stands for an edge there (a cut cell, in other methods).
 On a rounded edge contact ends where the surface, falling away with the root of the distance, meets it: the height up to which it
 counts as flat is a share of the depth. Two numbers are not derived: where a held middle of an element puts the edge, taken from
 finer grids of the same model; and that share, chosen by the sixteen presses of
@@ -11,18 +11,18 @@ docs/notebook/2026-11-23-foundation-model.md.
 
 import numpy as np
 
-_AROUND, _DEEP = 6, 6     # nodes along an edge, and held behind it, among which a node's own flexibility is found
+_AROUND, _DEEP = 6, 6     # nodes along an edge, and held behind it, among which a node's own compliance is found
 _ROUNDED = 0.12           # of the depth: height on a rounded edge up to which the object acts as if it had no rounding
 _EVEN_MM = 1e-3           # that lies in a plane: heights over it are in single precision
 _MIDDLE_BEYOND = 0.26     # of a step, that an edge must be beyond an element's middle to hold it: so found on finer grids
 
 
 class SoftEdges:
-    """How soft points on a `FoundationFlexibility`'s grid are beside edges."""
+    """How soft points on a `FoundationCompliance`'s grid are beside edges."""
 
-    def __init__(self, flexibility):
-        self._grid = flexibility.grid
-        self._by_axis = np.stack([own_flexibility(flexibility, axis) for axis in (0, 1)])
+    def __init__(self, compliance):
+        self._grid = compliance.grid
+        self._by_axis = np.stack([own_compliance(compliance, axis) for axis in (0, 1)])
         self._last = None
 
     def __call__(self, points, moved, depth):
@@ -30,15 +30,15 @@ class SoftEdges:
 
         depth: how far the object has come down since its first touch, in mm
         """
-        softness = np.zeros(points.count)
+        contact_compliance = np.zeros(points.count)
         own, held_at = self._of_nodes(points)
         reaches = beyond(points.covered_at(moved, rounding_mm=_ROUNDED * depth + _EVEN_MM)[points.edge])
         with np.errstate(divide="ignore"):
-            softness[points.edge] = own * np.maximum(held_at / reaches - 1, 0.0)
-        return softness
+            contact_compliance[points.edge] = own * np.maximum(held_at / reaches - 1, 0.0)
+        return contact_compliance
 
     def _of_nodes(self, points):
-        """Flexibility (e,) of the nodes near edges among held ones, and how many steps (e,) behind them an edge holds them."""
+        """Compliance (e,) of the nodes near edges among held ones, and how many steps (e,) behind them an edge holds them."""
         if self._last is None or self._last[0] is not points:
             middle = self._grid.from_middle(points.nodes[points.edge]) % 2
             outwards = points.outwards()
@@ -53,11 +53,11 @@ def beyond(covered):
     return np.where(covered < 0.5, inner, 2 - np.sqrt(2 * np.clip(1 - covered, 0.0, 0.5)))
 
 
-def own_flexibility(flexibility, axis):
-    """Flexibility (2,) in mm/N of a row of nodes across an axis (0: x), pushed alike beside rows that are held, in the sensor's
+def own_compliance(compliance, axis):
+    """Compliance (2,) in mm/N of a row of nodes across an axis (0: x), pushed alike beside rows that are held, in the sensor's
     middle: of rows of elements' corners, and of their middles.
     """
-    grid = flexibility.grid
+    grid = compliance.grid
     along, across = (min(_AROUND, (count - 3) // 2) for count in (grid.shape[axis], grid.shape[1 - axis]))
     found = []
     for offset in (0, 1):
@@ -67,7 +67,7 @@ def own_flexibility(flexibility, axis):
         i, j = steps.T if axis == 0 else steps.T[::-1]
         nodes = (j + grid.shape[0] // 2) * grid.shape[1] + i + grid.shape[1] // 2
         places = grid.quarter(nodes)
-        matrix = flexibility.surface.between(*places, *places).astype(float)
+        matrix = compliance.surface.between(*places, *places).astype(float)
         row = steps[:, 0] == offset
         free = matrix[np.ix_(row, row)] - matrix[np.ix_(row, ~row)] @ np.linalg.solve(matrix[np.ix_(~row, ~row)],
                                                                                   matrix[np.ix_(~row, row)])

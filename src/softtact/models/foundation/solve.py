@@ -1,4 +1,4 @@
-"""A press in the foundation model: the object on the slab, the slab on the frusta, level by level.
+"""A press in the foundation model: the object on the slab, the slab on the frusta, load step by load step.
 
 Unknown are the object's forces f >= 0 on patches of the cover and the frusta's forces q >= 0:
     gap  = gap0 - depth + E u + k f >= 0,     f gap = 0,  sum f = F       (k: softness beside edges, `soft_edges`)
@@ -35,7 +35,7 @@ _SHORTEST = 0.004    # share of the force itself: steps that are still shorter a
 
 @dataclass(frozen=True)
 class FoundationSettings:
-    """When a level counts as reached.
+    """When a load step counts as reached.
 
     tolerance: largest change of a frustum's force in the last step, of the whole force;  gap_mm: overlap that joins a contact
     follow: whether the effects of finite displacement are taken in;  rocking: whether frusta rock
@@ -49,12 +49,12 @@ class FoundationSettings:
     follow: bool = True
     rocking: bool = True
     patches: bool = True
-    same_slope: float = 0.05     # a step's error is cut to as much: a level's second step needs no factor of its own
+    same_slope: float = 0.05     # a step's error is cut to as much: a load step's second step needs no factor of its own
 
 
 @dataclass(frozen=True)
-class FoundationLevel:
-    """One force level.
+class FoundationLoadStep:
+    """One load step.
 
     load (n + b,): N at nodes and frusta;  lateral (4, b): see `Effects`;  touching (c,): points under pressure
     compression (b,): of frusta in mm, negative where one is lifted;  penetration in mm: of patches as a whole, softness included
@@ -70,9 +70,11 @@ class FoundationLevel:
     iterations: int
 
 
-def press_foundation(flexibility, points, forces_n, *, settings=FoundationSettings()):
-    """Yield a `FoundationLevel` for each force (N, increasing). Raises ConvergenceError naming the level that was not reached."""
-    press = _Press(flexibility, points, settings)
+def press_foundation(compliance, points, forces_n, *, settings=FoundationSettings()):
+    """Yield a `FoundationLoadStep` for each force (N, increasing). Raises ConvergenceError naming the load step that was not
+    reached.
+    """
+    press = _Press(compliance, points, settings)
     path = [(0.0, press.first())]
     for force in forces_n:
         yield _advance(press, path, float(force))
@@ -86,12 +88,12 @@ def _advance(press, path, target):
     force, spent = target, 0
     while True:
         state, before = _continued(path, force), path[-1][0]
-        level, iterations = press.level(state, force, rough=force < target)
+        load_step, iterations = press.load_step(state, force, rough=force < target)
         spent += iterations
-        if level is not None:
+        if load_step is not None:
             path.append((force, state))
             if force == target:
-                return replace(level, iterations=spent)
+                return replace(load_step, iterations=spent)
             force = target
         elif _SHORTER * (force - before) < _SHORTEST * target:
             raise ConvergenceError(f"The foundation model did not reach {target:g} N: from {before:.3g} N on its corrections for "
@@ -101,15 +103,15 @@ def _advance(press, path, target):
 
 
 class FoundationMaps:
-    """Deformation maps in mm of the levels of one press."""
+    """Deformation maps in mm of the load steps of one press."""
 
-    def __init__(self, flexibility, points):
-        self._places = Places(flexibility, points)
+    def __init__(self, compliance, points):
+        self._places = Places(compliance, points)
 
-    def __call__(self, levels):
-        """Maps (l, ny, nx) of some `FoundationLevel`s, with the held edges."""
-        return self._places.maps(np.stack([level.load for level in levels], axis=1),
-                                 np.stack([level.lateral.ravel() for level in levels], axis=1))
+    def __call__(self, load_steps):
+        """Maps (l, ny, nx) of some `FoundationLoadStep`s, with the held edges."""
+        return self._places.maps(np.stack([load_step.load for load_step in load_steps], axis=1),
+                                 np.stack([load_step.lateral.ravel() for load_step in load_steps], axis=1))
 
 
 @dataclass
@@ -138,14 +140,14 @@ def _continued(path, force):
 
 
 class _Press:
-    def __init__(self, flexibility, points, settings):
-        self.law, self.points, self.settings = flexibility.law, points, settings
-        places = Places(flexibility, points)
+    def __init__(self, compliance, points, settings):
+        self.law, self.points, self.settings = compliance.law, points, settings
+        places = Places(compliance, points)
         self.frusta = len(places.frusta)
-        self.patch = patches_of(points, flexibility.grid, settings.patches)
-        self.slab, self.edges = _Slab(places.surface(), self.patch), SoftEdges(flexibility)
+        self.patch = patches_of(points, compliance.grid, settings.patches)
+        self.slab, self.edges = _Slab(places.surface(), self.patch), SoftEdges(compliance)
         self.possible, self._factored = np.ones(self.patch.shape[0], dtype=bool), None
-        self.finite = FiniteDisplacement(flexibility, points, places, settings)
+        self.finite = FiniteDisplacement(compliance, points, places, settings)
 
     def first(self):
         """Where a press begins: the lowest patches touch."""
@@ -153,8 +155,8 @@ class _Press:
         return _State(gap <= np.sort(gap)[:_FIRST_PATCHES][-1], np.ones(self.frusta, dtype=bool), np.zeros(self.frusta),
                       self.finite.none(), 0.0)
 
-    def level(self, state, force, *, rough=False):
-        """Newton's method from a state, which is brought up to the level; None if it is not reached, and iterations.
+    def load_step(self, state, force, *, rough=False):
+        """Newton's method from a state, which is brought up to the load step; None if it is not reached, and iterations.
 
         rough: on the way to another
         """
@@ -188,7 +190,7 @@ class _Press:
                     continue
                 touched = self.patch.T @ (state.touching * 1.0) > 0
                 overlap = float(max(0.0, -gap[self.possible].min()))
-                return FoundationLevel(force_n=force, depth=depth, load=load, lateral=effects.lateral, touching=touched,
+                return FoundationLoadStep(force_n=force, depth=depth, load=load, lateral=effects.lateral, touching=touched,
                                        iterations=iteration, compression=down, penetration=overlap), iteration
         return None, iteration
 
@@ -198,10 +200,10 @@ class _Press:
         Patches beside which the object ends are softer, and those that it has left cannot touch.
         """
         points = self.points.as_deep(depth)
-        softness = self.patch.power(2) @ np.minimum(self.edges(points, moved, depth), _FREE)
-        self.possible = softness < _SOFTEST
+        contact_compliance = self.patch.power(2) @ np.minimum(self.edges(points, moved, depth), _FREE)
+        self.possible = contact_compliance < _SOFTEST
         state.touching = state.touching & self.possible
-        self.slab.soften(softness)
+        self.slab.soften(contact_compliance)
         self._factored = None
         return self.patch @ (points.gap + (points.slope.T * moved).sum(axis=0))
 
@@ -246,23 +248,23 @@ class _Press:
 
 
 class _Slab:
-    """The flexibility among patches, downwards, and frusta, upwards: matrix (c + b, c + b) in mm/N."""
+    """The compliance among patches, downwards, and frusta, upwards: matrix (c + b, c + b) in mm/N."""
 
-    def __init__(self, flexibility, patch):
-        """flexibility (n + b, n + b) of n nodes and of frusta, downwards;  patch (c, n): shares of nodes in patches"""
+    def __init__(self, compliance, patch):
+        """compliance (n + b, n + b) of n nodes and of frusta, downwards;  patch (c, n): shares of nodes in patches"""
         c, n = patch.shape
         self._patch = at = patch.astype(np.float32)
-        self.matrix = np.empty((c + len(flexibility) - n,) * 2, dtype=np.float32)
-        self.matrix[:c, :c] = at @ np.ascontiguousarray((at @ flexibility[:n, :n]).T)
-        self.matrix[:c, c:] = -(at @ np.ascontiguousarray(flexibility[:n, n:]))
+        self.matrix = np.empty((c + len(compliance) - n,) * 2, dtype=np.float32)
+        self.matrix[:c, :c] = at @ np.ascontiguousarray((at @ compliance[:n, :n]).T)
+        self.matrix[:c, c:] = -(at @ np.ascontiguousarray(compliance[:n, n:]))
         self.matrix[c:, :c] = self.matrix[:c, c:].T
-        self.matrix[c:, c:] = flexibility[n:, n:]
+        self.matrix[c:, c:] = compliance[n:, n:]
         self._hard = np.diag(self.matrix)[:c].copy()
 
-    def soften(self, softness):
+    def soften(self, contact_compliance):
         """Let a spring of softness (c,) in mm/N act in series with each patch."""
-        place = np.arange(len(softness))
-        self.matrix[place, place] = self._hard + softness
+        place = np.arange(len(contact_compliance))
+        self.matrix[place, place] = self._hard + contact_compliance
 
     def seen(self, down):
         """How far patches move down and frusta up (c + b,) where nodes and frusta come down (n + b,)."""

@@ -10,19 +10,19 @@ from softtact.errors import ConvergenceError
 from softtact.fem.elements import HEX27_BOTTOM, quad9
 from softtact.models.hyperelastic.build import build_unit_cell
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
-from softtact.models.hyperelastic.newton import NewtonSettings, press_levels
+from softtact.models.hyperelastic.newton import NewtonSettings, press_load_steps
 
 # A gap this wide ends total reflection: the evanescent wave's intensity falls to 1/e in lambda / (4 pi sqrt(n^2 sin^2 theta - 1)),
 # for green light (0.53 um) in acrylic (n = 1.49) 0.13 um at 45 degrees and 0.05 um at 60 degrees.
 DARK_GAP_MM = 1e-4
 # Where tips are narrow their sides fold onto the glass: thin layers in the lowest third and thin rings at the rim
 # (docs/notebook/2026-11-22-mesh-on-glass.md).
-GLASS_MESH = MeshSettings.converging(frustum_levels=(*np.linspace(0, 0.2, 11), 0.24, 0.28, 0.33, 0.4, 0.5, 0.7, 1.0),
+GLASS_MESH = MeshSettings.converging(frustum_heights=(*np.linspace(0, 0.2, 11), 0.24, 0.28, 0.33, 0.4, 0.5, 0.7, 1.0),
                                      frustum_rings=4)
 # Where tips are wide the sides fold onto the sheet, and thin layers there turn inside out before the paper's 140 N.
-WIDE_TIP_MESH = MeshSettings.converging(frustum_levels=(0.0, 0.1, 0.3, 0.6, 0.9, 1.0))
+WIDE_TIP_MESH = MeshSettings.converging(frustum_heights=(0.0, 0.1, 0.3, 0.6, 0.9, 1.0))
 # Overlaps that are pressed apart ripple by as much as they are allowed to, and the dark area with them.
-SETTINGS = NewtonSettings(contact_passes=0, first_touch_mm=1e-3, smallest_scale_n=0.1, smallest_increment_n=1e-3)
+SETTINGS = NewtonSettings(max_augmentations=0, first_touch_mm=1e-3, smallest_scale_n=0.1, smallest_increment_n=1e-3)
 _GIVE_UP_N = 5e-3    # force step at which a curve that may end early ends: smaller ones cost minutes and win little
 _SAMPLES = 24        # points a side of a face at which contact is asked for
 
@@ -48,9 +48,9 @@ def press_cell_on_glass(spec, law, forces_n, *, mesh=None, height_factor=1.0, ti
     reached = [(0.0, 0.0, 0.0)] if forces[0] == 0 else []
     settings = replace(SETTINGS, smallest_increment_n=_GIVE_UP_N) if as_far_as_it_goes else SETTINGS
     try:
-        for level in press_levels(body, HeightField(plate_over(spec)), forces[forces > 0], settings=settings):
-            area = contact_area(body.bed, level.state.bed.displacement)
-            reached.append((level.force_n, area, level.state.indentation))
+        for load_step in press_load_steps(body, HeightField(plate_over(spec)), forces[forces > 0], settings=settings):
+            area = contact_area(body.support, load_step.state.support.displacement)
+            reached.append((load_step.force_n, area, load_step.state.indentation))
     except ConvergenceError:
         if not as_far_as_it_goes or len(reached) < 2:
             raise
@@ -72,10 +72,10 @@ def plate_over(spec):
     return plate
 
 
-def contact_area(bed, displacement, *, frustum=0, gap_mm=DARK_GAP_MM):
+def contact_area(support, displacement, *, frustum=0, gap_mm=DARK_GAP_MM):
     """Projected area (mm2) of one frustum's surface that is nearer to the glass than `gap_mm`."""
-    position = bed.coordinates[frustum] + displacement[frustum]
-    faces = np.vstack([bed.mesh.layer(0)[:, HEX27_BOTTOM], bed.outer_faces])
+    position = support.coordinates[frustum] + displacement[frustum]
+    faces = np.vstack([support.mesh.layer(0)[:, HEX27_BOTTOM], support.outer_faces])
     side = (np.arange(_SAMPLES) + 0.5) * 2 / _SAMPLES - 1
     points = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
     values, slopes = quad9(points)
@@ -83,5 +83,5 @@ def contact_area(bed, displacement, *, frustum=0, gap_mm=DARK_GAP_MM):
     z = np.einsum("pa,fa->fp", values, nodes[..., 2])
     edges = np.einsum("fad,pai->fpdi", nodes[..., :2], slopes)
     projected = np.abs(np.linalg.det(edges)) * (2 / _SAMPLES) ** 2
-    glass = bed.coordinates[..., 2].min()
+    glass = support.coordinates[..., 2].min()
     return float(projected[z < glass + gap_mm].sum())

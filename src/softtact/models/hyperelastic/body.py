@@ -1,4 +1,4 @@
-"""The layered sensor as one body: slab (sheet and cover) tied to the bed of frusta, and one Newton step of it."""
+"""The layered sensor as one body: slab (sheet and cover) tied to the array of frusta, and one Newton step of it."""
 
 from dataclasses import dataclass, replace
 
@@ -8,12 +8,12 @@ from softtact.fem import kernels
 from softtact.linalg.multifrontal_solver import DissectedSolver
 from softtact.linalg.workers import Workers
 from softtact.models.hyperelastic.friction import BodyFriction
-from softtact.models.hyperelastic.frusta import BedState
+from softtact.models.hyperelastic.frusta import FrustaState
 from softtact.models.hyperelastic.linearised_contact import StepContact
 from softtact.models.hyperelastic.local_equilibrium import balanced
 from softtact.models.hyperelastic.newton_step import ContactStepper
 from softtact.models.hyperelastic.preconditioner import DissectedContact
-from softtact.models.hyperelastic.rigid_contact import FacingPlanes
+from softtact.models.hyperelastic.rigid_contact import ContactProjection
 from softtact.models.hyperelastic.slab import SlabState
 from softtact.models.hyperelastic.unit_cells import SheetCells
 
@@ -24,15 +24,15 @@ _MOST_DOUBLINGS = 40  # ... but a tangent that is not even finite will never be
 
 @dataclass(frozen=True)
 class BodyState:
-    """Slab and bed at one displacement, and the potential energy (mJ) of both with their contacts and friction."""
+    """Slab and support at one displacement, and the potential energy (mJ) of both with their contacts and friction."""
 
     slab: SlabState
-    bed: BedState
+    support: FrustaState
     indentation: float
 
     @property
     def energy(self):
-        return self.slab.energy + self.bed.energy
+        return self.slab.energy + self.support.energy
 
     @property
     def force(self):
@@ -45,12 +45,12 @@ class Step:
     """A Newton step: slab (n, 3), frusta (f, nodes, 3) in mm, indentation in mm, and what the object's contact faces in it."""
 
     slab: np.ndarray
-    bed: np.ndarray
+    support: np.ndarray
     indentation: float
-    planes: FacingPlanes
+    projection: ContactProjection
 
     def largest(self):
-        return max(np.abs(self.slab).max(), np.abs(self.bed).max(), abs(self.indentation))
+        return max(np.abs(self.slab).max(), np.abs(self.support).max(), abs(self.indentation))
 
 
 def _shifts():
@@ -64,25 +64,25 @@ def _shifts():
 class LayeredBody:
     """Slab on frusta on a rigid PCB, pressed from above by a rigid object. Lengths in mm, z = 0 at the top at rest."""
 
-    def __init__(self, slab, bed, roots, *, threads=1):
+    def __init__(self, slab, support, roots, *, threads=1):
         """`roots` (f, k): the slab's nodes that are the frusta's root nodes."""
-        self.slab, self.bed = slab, bed
+        self.slab, self.support = slab, support
         self.workers = Workers(threads)
-        self.friction = BodyFriction(slab.top, bed)
-        self.cells = SheetCells(slab, bed, roots)
+        self.friction = BodyFriction(slab.top, support)
+        self.cells = SheetCells(slab, support, roots)
         slab.build_pattern(self.cells.eliminated, self.cells.outer_dofs)
         self.solver = DissectedSolver(slab.points[slab.unknowns // 3, :2], workers=self.workers)
         self.stepper = ContactStepper(DissectedContact(self.solver, workers=self.workers))
 
     def sum_with(self, loops):
         """Let elements be summed by `loops`: `kernels`, as from the start, or `device_kernels`."""
-        for block in self.slab.blocks + [self.bed.block]:
+        for block in self.slab.blocks + [self.support.block]:
             block.loops = loops
 
     @property
     def method(self):
         """Linear solver and device in words."""
-        loops = self.bed.block.loops
+        loops = self.support.block.loops
         return self.solver.name if loops is kernels else f"{self.solver.name}; elements on {loops.device}"
 
     def close(self):
@@ -92,17 +92,18 @@ class LayeredBody:
 
     def rest(self):
         """Displacements of slab (n, 3) and frusta (f, nodes, 3) at rest."""
-        return np.zeros((self.slab.nodes, 3)), np.zeros((self.bed.count, self.bed.nodes, 3))
+        return np.zeros((self.slab.nodes, 3)), np.zeros((self.support.count, self.support.nodes, 3))
 
-    def evaluate(self, slab_displacement, bed_displacement, indentation, planes):
+    def evaluate(self, slab_displacement, bed_displacement, indentation, projection):
         """State at given displacements; None where an element is inside out."""
-        slab = self.slab.evaluate(slab_displacement, planes, indentation, workers=self.workers)
-        bed = self.bed.evaluate(bed_displacement, workers=self.workers) if slab is not None else None
-        return None if bed is None else BodyState(slab=slab, bed=bed, indentation=indentation)
+        slab = self.slab.evaluate(slab_displacement, projection, indentation, workers=self.workers)
+        support = self.support.evaluate(bed_displacement, workers=self.workers) if slab is not None else None
+        return None if support is None else BodyState(slab=slab, support=support, indentation=indentation)
 
-    def again(self, state):
+    def reevaluate_contact(self, state):
         """The same displacements after the contact's or friction's own state has changed: the rubber is not evaluated anew."""
-        return BodyState(slab=self.slab.reface(state.slab, state.slab.planes, state.indentation), bed=self.bed.again(state.bed),
+        return BodyState(slab=self.slab.update_normals(state.slab, state.slab.projection, state.indentation),
+                         support=self.support.reevaluate_contact(state.support),
                          indentation=state.indentation)
 
     def balanced(self, state, tolerance_n):
@@ -112,24 +113,24 @@ class LayeredBody:
         friction on the board frusta wait for the steps of all: what holds them does not see one alone.
         """
         rest = max(tolerance_n, self._slab_residual(state))
-        if self.bed.friction is not None or np.abs(self.bed.inner_residual(state.bed)).max() <= rest:
+        if self.support.friction is not None or np.abs(self.support.inner_residual(state.support)).max() <= rest:
             return state
-        bed, moved = balanced(self.bed, state.bed, tolerance_n, workers=self.workers)
+        support, moved = balanced(self.support, state.support, tolerance_n, workers=self.workers)
         self.cells.forget(moved)
-        return replace(state, bed=bed)
+        return replace(state, support=support)
 
-    def reface(self, state, planes):
+    def update_normals(self, state, projection):
         """The same state with the object's contact on other planes."""
-        return replace(state, slab=self.slab.reface(state.slab, planes, state.indentation))
+        return replace(state, slab=self.slab.update_normals(state.slab, projection, state.indentation))
 
-    def let_down(self, state, force_n):
+    def indented_to(self, state, force_n):
         """The state with the object at the depth where its force is `force_n`: the least energy over the indentation."""
-        return self.lowered(state, self.slab.top.balanced(state.slab, state.indentation, force_n) - state.indentation)
+        return self.indented(state, self.slab.top.balanced(state.slab, state.indentation, force_n) - state.indentation)
 
-    def lowered(self, state, by_mm):
+    def indented(self, state, by_mm):
         """The state with the object lower by so much."""
         depth = state.indentation + by_mm
-        return replace(state, slab=self.slab.reface(state.slab, state.slab.planes, depth), indentation=depth)
+        return replace(state, slab=self.slab.update_normals(state.slab, state.slab.projection, depth), indentation=depth)
 
     def newton_step(self, state, force_n, surface=None, *, largest_mm=np.inf, kept_mm=0.0):
         """The Newton step under a given force (N), or with the indentation kept where `force_n` is None.
@@ -142,7 +143,7 @@ class LayeredBody:
         state = self.friction.for_tangent(state)
         for _ in range(_DAMPINGS):
             step = self._newton_step(state, force_n, surface, largest_mm, kept_mm)
-            if not (np.isfinite(step.largest()) and self.cells.damp(step.slab, step.bed)):
+            if not (np.isfinite(step.largest()) and self.cells.damp(step.slab, step.support)):
                 break
         return step
 
@@ -151,21 +152,22 @@ class LayeredBody:
         self.cells.refresh(state, kept_mm=kept_mm, workers=self.workers)
         residual, kept = self.cells.condensed_residual(state, workers=self.workers)
         contact = StepContact(self.slab, state.slab, state.indentation, surface, workers=self.workers)
-        step, lowering = self._step_of_unknowns(state, residual.ravel()[self.slab.unknowns], contact, force_n,
+        step, indentation_increment = self._step_of_unknowns(state, residual.ravel()[self.slab.unknowns], contact, force_n,
                                                  largest_mm)
         full = np.zeros(3 * self.slab.nodes)
         full[self.slab.unknowns] = step
-        slab, bed = self.cells.recover(kept, full.reshape(-1, 3), workers=self.workers)
-        return Step(slab=slab, bed=bed, indentation=lowering, planes=contact.planes)
+        slab, support = self.cells.recover(kept, full.reshape(-1, 3), workers=self.workers)
+        return Step(slab=slab, support=support, indentation=indentation_increment, projection=contact.projection)
 
     def _step_of_unknowns(self, state, residual, contact, force_n, largest_mm):
         """Step of the global unknowns, and how far the object goes down; the tangent is made positive definite where it is not.
 
         Not a number where that cannot be done, which fails Newton's method there.
         """
-        excess, drag = None if force_n is None else state.force - force_n, self.slab.friction_border(state.slab)
+        excess, friction_response = None if force_n is None else state.force - force_n, self.slab.friction_border(state.slab)
         for shift in _shifts():
-            step = self.stepper.step(self._rubber_tangent(state, shift), residual, contact, drag=drag, excess=excess,
+            step = self.stepper.step(self._rubber_tangent(state, shift), residual, contact, friction_response=friction_response,
+                                     excess=excess,
                                      largest=largest_mm)
             if step is not None:
                 return step
@@ -181,7 +183,7 @@ class LayeredBody:
 
     def penetration(self, state):
         """Deepest penetration in mm, of the object into the cover or of frusta into the board or each other."""
-        return float(max(0.0, -self.slab.top.own_gaps(state.slab).min(), -state.bed.gaps.min()))
+        return float(max(0.0, -self.slab.top.own_gaps(state.slab).min(), -state.support.gaps.min()))
 
     def descent(self, state):
         """How far the cover has come down where it did most, in mm."""
@@ -189,20 +191,20 @@ class LayeredBody:
 
     def contact_error(self, state):
         """Deepest overlap, or widest gap under pressure, in mm."""
-        return max(self.slab.top.error(state.slab), self.bed.contact.error(state.bed.gaps))
+        return max(self.slab.top.error(state.slab), self.support.contact.error(state.support.gaps))
 
-    def press_apart(self, state, *, allowed_mm):
-        """Hold the points that overlap where their surfaces just touch, on the object or in the bed, wherever it is too much."""
+    def augment(self, state, *, allowed_mm):
+        """Hold the points that overlap where their surfaces just touch, on the object or in the frusta, wherever it is too much."""
         if self.slab.top.error(state.slab) > allowed_mm:
-            self.slab.top.press_apart(state.slab)
-        if self.bed.contact.error(state.bed.gaps) > allowed_mm:
-            self.bed.contact = self.bed.contact.pressed_apart(state.bed.gaps)
+            self.slab.top.augment(state.slab)
+        if self.support.contact.error(state.support.gaps) > allowed_mm:
+            self.support.contact = self.support.contact.augmented(state.support.gaps)
 
     def most_compressed(self, state):
         """Place x, y (mm) of the most compressed frustum, and its compression as a share of its height."""
-        share = self.bed.compression(state.bed.displacement) / self.bed.geometry.heights
+        share = self.support.compression(state.support.displacement) / self.support.geometry.heights
         worst = int(np.argmax(share))
-        return *self.bed.geometry.centres[worst], float(share[worst])
+        return *self.support.geometry.centres[worst], float(share[worst])
 
     def share_outside_window(self, state):
         """Share of a law's volume that is strained beyond what the law was fitted to, the largest over the laws.
@@ -212,12 +214,12 @@ class LayeredBody:
         volumes = {}
         for nodes, block in self.slab.solids:
             _add_volumes(volumes, block, state.slab.displacement[nodes])
-        _add_volumes(volumes, self.bed.block, self.bed.per_element(state.bed.displacement))
+        _add_volumes(volumes, self.support.block, self.support.per_element(state.support.displacement))
         return max((outside / whole for outside, whole in volumes.values()), default=np.nan)
 
     def residual_norm(self, state, force_n):
         """Largest unbalanced nodal force in N, over slab, frusta and the object."""
-        parts = [self._slab_residual(state), np.abs(self.bed.inner_residual(state.bed)).max()]
+        parts = [self._slab_residual(state), np.abs(self.support.inner_residual(state.support)).max()]
         if force_n is not None:
             parts.append(abs(state.force - force_n))
         return float(max(parts))
@@ -228,7 +230,7 @@ class LayeredBody:
     def slab_force(self, state):
         """Forces (n, 3) on the slab's nodes, those of the frusta's roots among them."""
         total = state.slab.force.copy()
-        np.add.at(total, self.cells.roots.ravel(), state.bed.force[:, self.bed.root].reshape(-1, 3))
+        np.add.at(total, self.cells.roots.ravel(), state.support.force[:, self.support.root].reshape(-1, 3))
         return total
 
 

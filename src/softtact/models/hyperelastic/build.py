@@ -5,11 +5,11 @@ import itertools
 import numpy as np
 
 from softtact.contact.friction import coulomb
-from softtact.fem.extruded_mesh import sheet_plan
+from softtact.fem.extruded_mesh import sheet_mesh_2d
 from softtact.models.hyperelastic.body import LayeredBody
-from softtact.models.hyperelastic.frusta import BedGeometry, FrustumBed
+from softtact.models.hyperelastic.frusta import FrustumArray, FrustumGeometry
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
-from softtact.models.hyperelastic.refinement import FAR, NEAR, levels_of, zones
+from softtact.models.hyperelastic.refinement import FAR, NEAR, split_depths_of, zones
 from softtact.models.hyperelastic.slab import Layer, Slab
 
 
@@ -39,15 +39,17 @@ def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), s
     x_lines, y_lines = (_lines(side, count, frusta.pitch_mm, mesh.far_pitches)
                         for side, count in zip(spec.footprint_mm, counts, strict=True))
     sheet = Layer(np.linspace(bottom, -spec.cover.thickness_mm, mesh.sheet_layers + 1), dielectric_law)
-    cover = Layer(spec.cover.thickness_mm * (np.asarray(mesh.cover_levels) - 1), cover_law)
+    cover = Layer(spec.cover.thickness_mm * (np.asarray(mesh.cover_heights) - 1), cover_law)
     splits, zone = _cover_splits(mesh, surface, x_lines, y_lines, frusta.pitch_mm)
     centres, neighbours = lattice(counts, frusta.pitch_mm)
-    plan = sheet_plan(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, spec.footprint_mm, refinement=mesh.refinement,
+    mesh_2d = sheet_mesh_2d(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, spec.footprint_mm,
+                            refinement=mesh.refinement,
                       rings=mesh.frustum_rings, core=mesh.core)
-    slab = Slab(sheet, cover, plan, x_lines, y_lines, sides="held", contact=contact or mesh.object_contact,
-                coarse_walls=mesh.coarse_walls or _far(zone, x_lines, y_lines), splits=splits,
-                growing_over_shear=mesh.slab_growing_over_shear, friction=coulomb(spec.friction.object))
-    return LayeredBody(slab, _bed(spec, centres, neighbours, dielectric_law, mesh, scatter, contact), slab.bottom[plan.roots],
+    slab = Slab(sheet, cover, mesh_2d, x_lines, y_lines, sides="held", contact=contact or mesh.object_contact,
+                constrained_cell_edges=mesh.constrained_cell_edges or _far(zone, x_lines, y_lines), splits=splits,
+                quartic_penalty_ratio=mesh.slab_quartic_penalty_ratio, friction=coulomb(spec.friction.object))
+    return LayeredBody(slab, _frustum_array(spec, centres, neighbours, dielectric_law, mesh, scatter, contact),
+                       slab.bottom[mesh_2d.roots],
                        threads=threads)
 
 
@@ -63,11 +65,11 @@ def _cover_splits(mesh, surface, x_lines, y_lines, pitch):
     zone = np.full((shape[1] << most, shape[0] << most), NEAR) if surface is None else zones(surface, x_lines, y_lines, most)
     narrow = [np.round(np.log2(mesh.far_pitches * pitch / np.diff(lines))).astype(int).clip(0) for lines in (x_lines, y_lines)]
     narrow = np.maximum(*np.meshgrid(*narrow)).repeat(1 << most, axis=0).repeat(1 << most, axis=1)
-    levels, on_sheet = [], mesh.bound_layers == 0
+    depths, on_sheet = [], mesh.bound_layers == 0
     for k, splits in enumerate(mesh.cover_splits):
         of_zone = far + np.array([mesh.refinement - far, 0, splits if k == 0 and on_sheet else 0, min(splits, 1), splits])
-        levels.append(levels_of(np.maximum(of_zone[zone] - narrow, 0), shape, most))
-    return np.stack(levels), zone
+        depths.append(split_depths_of(np.maximum(of_zone[zone] - narrow, 0), shape, most))
+    return np.stack(depths), zone
 
 
 def _far(zone, x_lines, y_lines):
@@ -94,15 +96,17 @@ def build_unit_cell(spec, *, dielectric_law, cover_law=None, mesh=MeshSettings()
     cover_mm = 0.0 if cover_law is None else spec.cover.thickness_mm
     bottom = -(cover_mm + spec.dielectric.sheet_thickness_mm)
     sheet = Layer(np.linspace(bottom, -cover_mm, mesh.sheet_layers + 1), dielectric_law)
-    cover = Layer(cover_mm * (np.asarray(mesh.cover_levels) - 1) if cover_mm else np.zeros(1), cover_law)
+    cover = Layer(cover_mm * (np.asarray(mesh.cover_heights) - 1) if cover_mm else np.zeros(1), cover_law)
     centre = np.zeros((1, 2))
-    plan = sheet_plan(centre, (1, 1), frusta.pitch_mm, frusta.root_diameter_mm, (frusta.pitch_mm,) * 2, refinement=mesh.refinement,
+    mesh_2d = sheet_mesh_2d(centre, (1, 1), frusta.pitch_mm, frusta.root_diameter_mm, (frusta.pitch_mm,) * 2,
+                            refinement=mesh.refinement,
                       rings=mesh.frustum_rings, core=mesh.core)
-    slab = Slab(sheet, cover, plan, lines, lines, sides="symmetric", contact=mesh.contact, coarse_walls=mesh.coarse_walls,
-                splits=splits, growing_over_shear=mesh.slab_growing_over_shear, friction=coulomb(spec.friction.object))
-    bed = _bed(spec, centre, np.ones((1, 4), dtype=bool), dielectric_law, mesh,
+    slab = Slab(sheet, cover, mesh_2d, lines, lines, sides="symmetric", contact=mesh.contact,
+                constrained_cell_edges=mesh.constrained_cell_edges,
+                splits=splits, quartic_penalty_ratio=mesh.slab_quartic_penalty_ratio, friction=coulomb(spec.friction.object))
+    support = _frustum_array(spec, centre, np.ones((1, 4), dtype=bool), dielectric_law, mesh,
                (np.array([height_factor]), np.array([tip_factor])), None, bottom=bottom)
-    return LayeredBody(slab, bed, slab.bottom[plan.roots])
+    return LayeredBody(slab, support, slab.bottom[mesh_2d.roots])
 
 
 def build_patch(spec, counts, *, dielectric_law, mesh=MeshSettings()):
@@ -110,27 +114,28 @@ def build_patch(spec, counts, *, dielectric_law, mesh=MeshSettings()):
     frusta, thickness = spec.dielectric.frusta, spec.dielectric.sheet_thickness_mm
     centres, neighbours = lattice(counts, frusta.pitch_mm)
     lines = [frusta.pitch_mm * (np.arange(count + 1) - 0.5 * count) for count in counts]
-    plan = sheet_plan(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, [np.ptp(line) for line in lines],
+    mesh_2d = sheet_mesh_2d(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, [np.ptp(line) for line in lines],
                       rings=mesh.frustum_rings, core=mesh.core)
-    slab = Slab(Layer(np.linspace(-thickness, 0.0, mesh.sheet_layers + 1), dielectric_law), Layer(np.zeros(1), None), plan, *lines,
-                sides="free", contact=mesh.contact, coarse_walls=mesh.coarse_walls,
-                growing_over_shear=mesh.slab_growing_over_shear)
-    bed = _bed(spec, centres, neighbours, dielectric_law, mesh, None, None, bottom=-thickness)
-    return LayeredBody(slab, bed, slab.bottom[plan.roots])
+    slab = Slab(Layer(np.linspace(-thickness, 0.0, mesh.sheet_layers + 1), dielectric_law), Layer(np.zeros(1), None), mesh_2d,
+                *lines,
+                sides="free", contact=mesh.contact, constrained_cell_edges=mesh.constrained_cell_edges,
+                quartic_penalty_ratio=mesh.slab_quartic_penalty_ratio)
+    support = _frustum_array(spec, centres, neighbours, dielectric_law, mesh, None, None, bottom=-thickness)
+    return LayeredBody(slab, support, slab.bottom[mesh_2d.roots])
 
 
-def _bed(spec, centres, neighbours, law, mesh, scatter, contact, *, bottom=None):
+def _frustum_array(spec, centres, neighbours, law, mesh, scatter, contact, *, bottom=None):
     frusta = spec.dielectric.frusta
     if bottom is None:
         bottom = -(spec.cover.thickness_mm + spec.dielectric.sheet_thickness_mm)
     height_factor, tip_factor = scatter or (np.ones(len(centres)), np.ones(len(centres)))
     heights = frusta.height_mm * height_factor
     # Every cone is built with the same root; where its printed readings are swapped the tip is the wide end.
-    geometry = BedGeometry(centres=centres, heights=heights, tip_diameters=frusta.tip_diameter_mm * tip_factor,
+    geometry = FrustumGeometry(centres=centres, heights=heights, tip_diameters=frusta.tip_diameter_mm * tip_factor,
                            root_diameter=frusta.root_diameter_mm, neighbours=neighbours,
                            wall_mm=0.5 * (frusta.pitch_mm - frusta.root_diameter_mm))
-    return FrustumBed(geometry, law, levels=np.asarray(mesh.frustum_levels) * frusta.height_mm, root_z_mm=bottom,
-                      pcb_z_mm=bottom - heights.max(), tips_held=spec.tips_held, contact=contact or mesh.contact,
-                      local_over_shear=mesh.local_over_shear, growing_over_shear=mesh.growing_over_shear,
+    return FrustumArray(geometry, law, heights=np.asarray(mesh.frustum_heights) * frusta.height_mm, root_z_mm=bottom,
+                      pcb_z_mm=bottom - heights.max(), tips_bonded=spec.tips_bonded, contact=contact or mesh.contact,
+                      unprojected_penalty_ratio=mesh.unprojected_penalty_ratio, quartic_penalty_ratio=mesh.quartic_penalty_ratio,
                       trilinear=mesh.trilinear_pressure, refinement=mesh.refinement, rings=mesh.frustum_rings, core=mesh.core,
                       friction=coulomb(spec.friction.board))

@@ -47,17 +47,19 @@ class PressedBody:
 
 
 def pressed_body(body, state=None):
-    """The `PressedBody` of a `LayeredBody` in a `BodyState`, to be taken before the next level changes the contact; or at rest."""
-    slab, bed = (state.slab.displacement, state.bed.displacement) if state else body.rest()
-    sheet, cover, frusta = body.slab.sheet_mesh, body.slab.cover_mesh, body.bed.mesh
+    """The `PressedBody` of a `LayeredBody` in a `BodyState`, to be taken before the next load step changes the contact; or at
+    rest.
+    """
+    slab, support = (state.slab.displacement, state.support.displacement) if state else body.rest()
+    sheet, cover, frusta = body.slab.sheet_mesh, body.slab.cover_mesh, body.support.mesh
     masters, weights = body.slab.sheet_nodes
     first = np.cumsum([0, len(sheet.points), len(cover.points)])
-    hexes = (frusta.hexes[None] + first[2] + (np.arange(body.bed.count) * body.bed.nodes)[:, None, None]).reshape(-1, 27)
+    hexes = (frusta.hexes[None] + first[2] + (np.arange(body.support.count) * body.support.nodes)[:, None, None]).reshape(-1, 27)
     cells = (Cells("hexahedron27", hexes[:, VTK_HEX27], "frusta"), *_on_plan(body.slab),
              Cells("hexahedron20", cover.hexes + first[1], "cover"))
-    moved = np.vstack([np.einsum("pm,pmd->pd", weights, slab[masters]), cover.follow @ slab[:cover.free], bed.reshape(-1, 3)])
+    moved = np.vstack([np.einsum("pm,pmd->pd", weights, slab[masters]), cover.follow @ slab[:cover.free], support.reshape(-1, 3)])
     pressure = body.slab.top.pressure_of_faces(state.slab) if state else np.zeros(len(cover.top))
-    return PressedBody(points_mm=np.vstack([sheet.points, cover.points, body.bed.coordinates.reshape(-1, 3)]),
+    return PressedBody(points_mm=np.vstack([sheet.points, cover.points, body.support.coordinates.reshape(-1, 3)]),
                        displacement_mm=moved.astype(np.float32), cells=cells, top=cover.top + first[1],
                        pressure_mpa=pressure.astype(np.float32))
 

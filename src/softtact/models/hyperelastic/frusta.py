@@ -1,4 +1,4 @@
-"""The bed of frusta between the sheet and the PCB: every frustum a finite-strain body of its own, tied to the sheet.
+"""The array of frusta between the sheet and the PCB: every frustum a finite-strain body of its own, tied to the sheet.
 
 A frustum touches the rest of the sensor only through its root. So its inner unknowns are eliminated frustum by frustum, in
 each from the tip upwards layer by layer (static condensation, exact within Newton's method), and the global matrix
@@ -14,15 +14,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numba import njit
 
-from softtact.contact.friction import Drag, Grip
+from softtact.contact.friction import FrictionResponse, FrictionState
 from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.fem.elements import HEX27_BOTTOM, HEX27_SIDES, gauss, quad9
-from softtact.fem.extruded_mesh import CORE_RADIUS, disc_plan, extrude
+from softtact.fem.extruded_mesh import CORE_RADIUS, disc_mesh_2d, extrude
 from softtact.fem.kernels import add_forces
 from softtact.fem.solid_block import HexBlock
 from softtact.fem.static_condensation import Springs
 from softtact.fem.substructuring import LayerwiseElimination
-from softtact.fem.tangent_cache import KeptTangents
+from softtact.fem.tangent_cache import TangentCache
 from softtact.linalg.workers import SERIAL
 
 BOARD, SHEET = -1, -2                                     # what a contact point faces where it is no neighbour in DIRECTIONS
@@ -30,7 +30,7 @@ DIRECTIONS = ((0, 1.0), (1, 1.0), (0, -1.0), (1, -1.0))   # axis and sign of the
 
 
 @dataclass(frozen=True)
-class BedGeometry:
+class FrustumGeometry:
     """Frusta by their centres (n, 2), heights (n,), tip diameters (n,) in mm, and `neighbours` (n, 4) in DIRECTIONS.
 
     wall_mm: from the roots' outermost nodes to the planes towards the neighbours, at rest
@@ -45,10 +45,11 @@ class BedGeometry:
 
 
 @dataclass(frozen=True)
-class BedState:
+class FrustaState:
     """energy (mJ), force (n, nodes, 3) on the frusta's nodes, gaps (n, p) at the contact points, displacement.
 
-    elastic: energies (n,) and force of the rubber alone;  drag: friction at the points on the board (n, b), None without.
+    elastic: energies (n,) and force of the rubber alone;  friction_response: friction at the points on the board (n, b), None
+    without.
     """
 
     elastic: tuple
@@ -56,53 +57,54 @@ class BedState:
     force: np.ndarray
     gaps: np.ndarray
     displacement: np.ndarray
-    drag: Drag | None = None
+    friction_response: FrictionResponse | None = None
 
 
-class FrustumBed:
+class FrustumArray:
     """All frusta of a sensor with one law. Local node numbers are those of `self.mesh`; roots are `self.root`.
 
-    grip: how friction holds the points on the board during a step, None without.
+    friction_state: how friction holds the points on the board during a step, None without.
     """
 
-    def __init__(self, geometry, law, *, levels, root_z_mm, pcb_z_mm, tips_held, contact, local_over_shear,
-                 growing_over_shear, trilinear, refinement=0, rings=1, core=CORE_RADIUS, friction=None):
-        """local_over_shear, growing_over_shear, trilinear: see `blocks`
+    def __init__(self, geometry, law, *, heights, root_z_mm, pcb_z_mm, tips_bonded, contact, unprojected_penalty_ratio,
+                 quartic_penalty_ratio, trilinear, refinement=0, rings=1, core=CORE_RADIUS, friction=None):
+        """unprojected_penalty_ratio, quartic_penalty_ratio, trilinear: see `blocks`
 
         friction: `Coulomb` of the frusta on the board, or None
         """
-        self.geometry, self.contact, self.friction, self.grip = geometry, contact, friction, None
-        plan = disc_plan(refinement, rings, core)
-        self.mesh = extrude(plan, levels)
-        self.outer_faces = self._outer_faces(plan)
+        self.geometry, self.contact, self.friction, self.friction_state = geometry, contact, friction, None
+        mesh_2d = disc_mesh_2d(refinement, rings, core)
+        self.mesh = extrude(mesh_2d, heights)
+        self.outer_faces = self._outer_faces(mesh_2d)
         self.count = len(geometry.heights)
         self.nodes = len(self.mesh.points)
         self.root, self.tip = self.mesh.planes[-1], self.mesh.planes[0]
-        self.coordinates = self._place(levels, root_z_mm)
+        self.coordinates = self._place(heights, root_z_mm)
         self._element_nodes = (self.nodes * np.arange(self.count)[:, None, None] + self.mesh.hexes).reshape(-1, 27)
-        self.block = HexBlock(self.per_element(self.coordinates), law, trilinear=trilinear, local_over_shear=local_over_shear,
-                              growing_over_shear=growing_over_shear)
-        self._tangents = KeptTangents(self.block)
+        self.block = HexBlock(self.per_element(self.coordinates), law, trilinear=trilinear,
+                              unprojected_penalty_ratio=unprojected_penalty_ratio,
+                              quartic_penalty_ratio=quartic_penalty_ratio)
+        self._tangents = TangentCache(self.block)
         self._contact_points(pcb_z_mm)
-        self._number_unknowns(tips_held)
+        self._number_unknowns(tips_bonded)
         self.elimination = self._elimination()
 
-    def _place(self, levels, root_z):
+    def _place(self, heights, root_z):
         """Nodal coordinates (n, nodes, 3): the unit disc scaled by the cone's radius, the height by each frustum's own."""
         g = self.geometry
-        fraction = self.mesh.points[:, 2] / levels[-1]
+        fraction = self.mesh.points[:, 2] / heights[-1]
         radius = 0.5 * (g.tip_diameters[:, None] * (1 - fraction) + g.root_diameter * fraction)
-        plan = self.mesh.points[None, :, :2] * radius[..., None] + g.centres[:, None, :]
+        mesh_2d = self.mesh.points[None, :, :2] * radius[..., None] + g.centres[:, None, :]
         z = root_z - g.heights[:, None] * (1 - fraction)
-        return np.concatenate([plan, z[..., None]], axis=2)
+        return np.concatenate([mesh_2d, z[..., None]], axis=2)
 
     def per_element(self, field):
         """A nodal field (n, nodes, 3) at the elements' nodes (n * elements, 27, 3)."""
         return np.ascontiguousarray(field[:, self.mesh.hexes].reshape(-1, 27, 3))
 
-    def _outer_faces(self, plan):
+    def _outer_faces(self, mesh_2d):
         """Nodes (layers * sides, 9) of the cone's faces."""
-        quads, sides = plan.outer_sides()
+        quads, sides = mesh_2d.outer_sides()
         return np.vstack([self.mesh.layer(k)[quads[:, None], HEX27_SIDES[sides]] for k in range(self.mesh.layers)])
 
     def _contact_points(self, pcb_z):
@@ -149,10 +151,10 @@ class FrustumBed:
         normal = np.cross(edges[..., 0], edges[..., 1])
         return (np.linalg.norm(normal, axis=-1) * weights).reshape(self.count, -1)
 
-    def _number_unknowns(self, tips_held):
+    def _number_unknowns(self, tips_bonded):
         """Local order of the unknowns: inner ones first, then the root's; held ones get -1."""
         number = np.zeros((self.nodes, 3), dtype=np.int64)
-        if tips_held:
+        if tips_bonded:
             number[self.tip, :2] = -1
         number[self.root] = -1
         self.inner = np.flatnonzero(number.ravel() == 0)
@@ -192,7 +194,7 @@ class FrustumBed:
         energy, _, _ = self.contact.at(frusta).response(self.gap0[frusta] + self._along(displacement))
         return elastic[0] + (energy * self.point_area[frusta]).sum(axis=1)
 
-    def again(self, state):
+    def reevaluate_contact(self, state):
         """The same displacements after the contact's or friction's own state has changed."""
         return self.with_contact(state.displacement, state.elastic)
 
@@ -201,17 +203,18 @@ class FrustumBed:
         gaps, force = self.gap0 + self._along(displacement), elastic[1].copy()
         energy, pressure, _ = self.contact.response(gaps)
         _scatter_contact(force, -pressure * self.point_area, self.point_nodes, self.point_weights, self.point_axis)
-        state = BedState(elastic=elastic, energy=float(elastic[0].sum() + (energy * self.point_area).sum()), force=force,
+        state = FrustaState(elastic=elastic, energy=float(elastic[0].sum() + (energy * self.point_area).sum()), force=force,
                          gaps=gaps, displacement=displacement)
-        return state if self.grip is None else self._with_friction(state)
+        return state if self.friction_state is None else self._with_friction(state)
 
     def _with_friction(self, state):
         """The state with friction's energy and forces."""
-        drag, area = self.grip.drag(self._on_board(state.displacement)), self.point_area[:, :self.board_points]
+        response = self.friction_state.friction_response(self._on_board(state.displacement))
+        area = self.point_area[:, :self.board_points]
         force = state.force.copy()
         for axis in (0, 1):
-            _scatter_contact(force, drag.traction[..., axis] * area, *self._board_points(axis))
-        return replace(state, energy=state.energy + float((drag.energy * area).sum()), force=force, drag=drag)
+            _scatter_contact(force, response.traction[..., axis] * area, *self._board_points(axis))
+        return replace(state, energy=state.energy + float((response.energy * area).sum()), force=force, friction_response=response)
 
     def _board_points(self, axis):
         """Nodes, weights and axis of the points on the board for a field's component `axis`."""
@@ -224,19 +227,19 @@ class FrustumBed:
         return np.stack([_weighted_component(position, *self._board_points(axis)) for axis in (0, 1)], axis=-1)
 
     def begin_step(self, state):
-        """Let friction hold the points as where a step starts from a `BedState`."""
+        """Let friction hold the points as where a step starts from a `FrustaState`."""
         if self.friction is None:
             return
         gaps = state.gaps[:, :self.board_points]
-        if state.drag is None:
-            self.grip = Grip.first(self.friction, self._on_board(state.displacement), gaps)
+        if state.friction_response is None:
+            self.friction_state = FrictionState.first(self.friction, self._on_board(state.displacement), gaps)
         else:
-            self.grip = state.drag.next_step(gaps)
+            self.friction_state = state.friction_response.next_step(gaps)
 
-    def renewed_grip(self, state):
-        """The grip with the pressures of a `BedState`."""
+    def renewed_friction_state(self, state):
+        """The friction state with the pressures of a `FrustaState`."""
         b = self.board_points
-        return state.drag.next_pass(state.gaps[:, :b], self.contact.response(state.gaps)[1][:, :b])
+        return state.friction_response.next_pass(state.gaps[:, :b], self.contact.response(state.gaps)[1][:, :b])
 
     def contact_slope(self, gaps):
         """Stiffness (n, p) of the contact points in N/mm3."""
@@ -245,11 +248,11 @@ class FrustumBed:
     def condense(self, state, frusta, damping=None, *, kept_mm=0.0):
         """Recompute the condensed tangents of the given frusta (k,).
 
-        damping: stiffness (k,) in N/mm on their inner unknowns, see `Condensation.set`;  kept_mm: see `KeptTangents`
+        damping: stiffness (k,) in N/mm on their inner unknowns, see `Condensation.set`;  kept_mm: see `TangentCache`
         """
         slope = self.contact.at(frusta).response(state.gaps[frusta])[2] * self.point_area[frusta]
         displacement = state.displacement[frusta]
-        friction = None if state.drag is None else state.drag.stiffness(frusta)
+        friction = None if state.friction_response is None else state.friction_response.stiffness(frusta)
         layers = (([self._layer_tangents(k, displacement, frusta, kept_mm)], self._springs(k, frusta, slope, friction))
                   for k in range(self.mesh.layers))
         self.elimination.set(frusta, layers, damping=damping)
@@ -294,21 +297,21 @@ class FrustumBed:
     def condensed_residual(self, state, *, workers=SERIAL):
         """Root forces (n, 75) after the inner residual has been eliminated, and what `inner_step` needs again."""
         force = state.force.reshape(self.count, -1).copy()
-        halves = self.elimination.residual(force, workers=workers)
-        return force[:, self.root_dofs], halves
+        forward_solved = self.elimination.residual(force, workers=workers)
+        return force[:, self.root_dofs], forward_solved
 
-    def inner_step(self, halves, root_step, *, workers=SERIAL):
+    def inner_step(self, forward_solved, root_step, *, workers=SERIAL):
         """Newton step (n, nodes, 3) of the frusta for the roots' step (n, 75)."""
         step = np.zeros((self.count, 3 * self.nodes))
         step[:, self.root_dofs] = root_step
-        self.elimination.recover(halves, step, workers=workers)
+        self.elimination.recover(forward_solved, step, workers=workers)
         return step.reshape(self.count, self.nodes, 3)
 
     def own_step(self, state, frusta, *, workers=SERIAL):
         """Newton step (k, nodes, 3) of the given frusta by their last condensed tangents, with their roots held."""
         force, step = state.force[frusta].reshape(len(frusta), -1), np.zeros((len(frusta), 3 * self.nodes))
-        halves = self.elimination.residual(force, bodies=frusta, workers=workers)
-        self.elimination.recover(halves, step, bodies=frusta, workers=workers)
+        forward_solved = self.elimination.residual(force, bodies=frusta, workers=workers)
+        self.elimination.recover(forward_solved, step, bodies=frusta, workers=workers)
         return step.reshape(len(frusta), self.nodes, 3)
 
     def inner_residual(self, state):

@@ -5,7 +5,7 @@ import numpy as np
 from softtact.linalg.nodal_frames import NodeFrames
 from softtact.linalg.workers import SERIAL
 
-_SOON_MM, _NEAR_MM = 0.01, 0.1     # gaps of points that may touch within a step or two, and within some levels
+_SOON_MM, _NEAR_MM = 0.01, 0.1     # gaps of points that may touch within a step or two, and within some load steps
 # Share of the squared normals that a node's own directions may leave out, when asked whether they are enough and when chosen.
 _BENT, _SLIGHTLY_BENT = 0.02, 0.005
 
@@ -18,10 +18,10 @@ class StepContact:
 
     def __init__(self, slab, state, indentation, surface=None, *, workers=SERIAL):
         self._slab, self._state, self._indentation, self._surface, self._workers = slab, state, indentation, surface, workers
-        self._face(state.planes)
+        self._face(state.projection)
 
-    def _face(self, planes):
-        self.planes, self.points = planes, self._slab.linear_gaps(self._state.displacement, planes, self._indentation)
+    def _face(self, projection):
+        self.projection, self.points = projection, self._slab.linear_gaps(self._state.displacement, projection, self._indentation)
 
     def frames(self, kept):
         """`NodeFrames` of the nodes whose contact with the object may change, along the normals that they face.
@@ -35,7 +35,7 @@ class StepContact:
 
     def _frames_within(self, within_mm, bent):
         """Of nodes with gaps of less; wanted are vectors along which the normals' squares exceed a share `bent` of the most."""
-        nodes, normals = self._slab.top.facing_nodes(self.points.gaps, self.planes, within_mm)
+        nodes, normals = self._slab.top.projected_nodes(self.points.gaps, self.projection, within_mm)
         unknowns = self._slab.unknowns_of(nodes)
         free = (unknowns >= 0).all(axis=1)
         size, turns = np.linalg.eigh(normals[free])
@@ -48,11 +48,11 @@ class StepContact:
         """Forces (unknowns,) of the rubber's tangent against a step (unknowns,) in mm."""
         return self._slab.product(rubber.data, step, workers=self._workers)
 
-    def follow(self, step, lowering):
+    def follow(self, step, indentation_increment):
         """Look up what the points face after a step (unknowns,) in mm of the slab; True if there is a surface to ask."""
         if self._surface is None:
             return False
         displacement = self._state.displacement.copy()
         displacement.ravel()[self._slab.unknowns] += step
-        self._face(self._slab.facing(displacement, self._surface))
+        self._face(self._slab.project(displacement, self._surface))
         return True

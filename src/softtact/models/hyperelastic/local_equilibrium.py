@@ -16,43 +16,43 @@ _SHARE = 0.3             # of the tolerance that a frustum keeps at most: what m
 _AT_ONCE = 8             # frusta that a thread condenses at once
 
 
-def balanced(bed, state, tolerance_n, *, workers=SERIAL):
-    """The `BedState` after each frustum beyond the tolerance (N) went to its own balance, and which frusta did (k,).
+def balanced(support, state, tolerance_n, *, workers=SERIAL):
+    """The `FrustaState` after each frustum beyond the tolerance (N) went to its own balance, and which frusta did (k,).
 
     These have their condensed tangents anew, on the way and not where they came to.
     """
-    loose, moved = _loose(bed, state, tolerance_n), np.zeros(bed.count, dtype=bool)
+    loose, moved = _loose(support, state, tolerance_n), np.zeros(support.count, dtype=bool)
     for _ in range(_STEPS):
         if not len(loose):
             break
         moved[loose] = True
-        state, lowered = _step(bed, state, loose, workers)
-        loose = np.intersect1d(loose[lowered], _loose(bed, state, _SHARE * tolerance_n))
+        state, lowered = _step(support, state, loose, workers)
+        loose = np.intersect1d(loose[lowered], _loose(support, state, _SHARE * tolerance_n))
     return state, np.flatnonzero(moved)
 
 
-def _loose(bed, state, tolerance_n):
+def _loose(support, state, tolerance_n):
     """Numbers (k,) of the frusta with unbalanced forces of more than the tolerance."""
-    return np.flatnonzero(np.abs(bed.inner_residual(state)).max(axis=1, initial=0.0) > tolerance_n)
+    return np.flatnonzero(np.abs(support.inner_residual(state)).max(axis=1, initial=0.0) > tolerance_n)
 
 
-def _step(bed, state, frusta, workers):
+def _step(support, state, frusta, workers):
     """The state after a step of the frusta (k,), each halved until its own energy falls, and for which (k,) it did."""
-    workers.map(lambda part: bed.condense(state, part), chunks(frusta, _AT_ONCE))
-    step = bed.own_step(state, frusta, workers=workers)
+    workers.map(lambda part: support.condense(state, part), chunks(frusta, _AT_ONCE))
+    step = support.own_step(state, frusta, workers=workers)
     step *= np.minimum(1.0, _FARTHEST_MM / np.maximum(np.abs(step).max(axis=(1, 2)), 1e-300))[:, None, None]
     displacement, (energies, forces) = state.displacement.copy(), tuple(part.copy() for part in state.elastic)
-    before = bed.potentials(displacement[frusta], (energies[frusta], None), frusta)
+    before = support.potentials(displacement[frusta], (energies[frusta], None), frusta)
     waiting = np.arange(len(frusta))
     for halving in range(_HALVINGS):
         here = frusta[waiting]
         trial = state.displacement[here] + 0.5**halving * step[waiting]
-        elastic = bed.rubber(trial, here, workers=workers)
+        elastic = support.rubber(trial, here, workers=workers)
         if elastic is None:     # one of them is inside out
             continue
-        lower = bed.potentials(trial, elastic, here) < before[waiting]
+        lower = support.potentials(trial, elastic, here) < before[waiting]
         displacement[here[lower]], energies[here[lower]], forces[here[lower]] = trial[lower], elastic[0][lower], elastic[1][lower]
         waiting = waiting[~lower]
         if not len(waiting):
             break
-    return bed.with_contact(displacement, (energies, forces)), ~np.isin(np.arange(len(frusta)), waiting)
+    return support.with_contact(displacement, (energies, forces)), ~np.isin(np.arange(len(frusta)), waiting)

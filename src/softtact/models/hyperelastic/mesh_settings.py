@@ -13,41 +13,42 @@ _CORE_IN_ONE_RING = 0.6     # docs/notebook/2026-11-24-choice-of-the-meshes.md
 class MeshSettings:
     """Resolution of the layered body.
 
-    cover_levels: heights of the cover's element layers as shares of its thickness; cover_splits: how often the elements, a pitch
+    cover_heights: heights of the cover's element layers as shares of its thickness; cover_splits: how often the elements, a pitch
     wide, of its uppermost layers are split in plan: at the object's edges, and the lowest of them under the object where it lies on
     the sheet. Layers below these, for which cover_splits has no number, keep to the sheet's plan;
     far_pitches: pitches (1, 2, 4) that an element far from the object spans; contact_stiffness: N/mm3 of the contacts' penalty,
     a third of it takes a quarter fewer iterations and leaves three times the overlap; sheet_layers: elements through the sheet;
-    frustum_levels: heights of the frustum's element layers as shares of its height; local_over_shear, growing_over_shear:
-    what holds volume changes in the frusta that their elements' pressure does not see, over mu (see `blocks`);
-    slab_growing_over_shear: the latter in sheet and cover, where frusta are pressed to two thirds of their height;
+    frustum_heights: heights of the frustum's element layers as shares of its height; unprojected_penalty_ratio,
+    quartic_penalty_ratio: what holds volume changes in the frusta that their elements' pressure does not see, over mu (see
+    `blocks`);
+    slab_quartic_penalty_ratio: the latter in sheet and cover, where frusta are pressed to two thirds of their height;
     trilinear_pressure: or linear, which is softer by 2 % for small movements, and fails under deep objects.
     refinement: how often all elements are split in plan. frustum_rings: rings of elements around a frustum's core, the
     thinner the farther out; frustum_core: corners of this square core over the radius, by default 0.6 in one ring, which so
-    follows the rim, else 0.5: wider ones give way earlier where frusta are pressed flat. coarse_walls: along all walls between
-    cells, not only far from the object, the sheet moves as one
+    follows the rim, else 0.5: wider ones give way earlier where frusta are pressed flat. constrained_cell_edges: along all walls
+    between cells, not only far from the object, the sheet moves as one
     quadratic curve: half a factor's operations, and 2 to 2.5 % of the map; without effect where refined.
     """
 
     sheet_layers: int = 1
-    frustum_levels: tuple = (0.0, 0.2, 0.6, 1.0)
-    local_over_shear: float = 0.5
-    growing_over_shear: float = 100.0
-    slab_growing_over_shear: float = 0.0
+    frustum_heights: tuple = (0.0, 0.2, 0.6, 1.0)
+    unprojected_penalty_ratio: float = 0.5
+    quartic_penalty_ratio: float = 100.0
+    slab_quartic_penalty_ratio: float = 0.0
     trilinear_pressure: bool = True
     refinement: int = 0
     frustum_rings: int = 1
     frustum_core: float | None = None
-    coarse_walls: bool = False
-    cover_levels: tuple = (0.0, 0.5, 1.0)
+    constrained_cell_edges: bool = False
+    cover_heights: tuple = (0.0, 0.5, 1.0)
     cover_splits: tuple = (1,)
     far_pitches: int = 2
     contact_stiffness: float = 3000.0
 
     def __post_init__(self):
-        if not 1 <= len(self.cover_splits) <= len(self.cover_levels) - 1:
-            raise ValueError(f"cover_splits has {len(self.cover_splits)} entries for the {len(self.cover_levels) - 1} layers of "
-                             "cover_levels; give a number for each, or for the uppermost ones")
+        if not 1 <= len(self.cover_splits) <= len(self.cover_heights) - 1:
+            raise ValueError(f"cover_splits has {len(self.cover_splits)} entries for the {len(self.cover_heights) - 1} layers of "
+                             "cover_heights; give a number for each, or for the uppermost ones")
         if self.cover_splits[0] > 1:
             raise ValueError(f"cover_splits begins with {self.cover_splits[0]}; give 0 or 1, for a layer finer than what is below "
                              "hangs freely there, and the map is wrong by up to a third")
@@ -62,7 +63,7 @@ class MeshSettings:
     @property
     def bound_layers(self):
         """How many of the cover's layers, the lowest ones, keep to the sheet's plan."""
-        return len(self.cover_levels) - 1 - len(self.cover_splits)
+        return len(self.cover_heights) - 1 - len(self.cover_splits)
 
     @property
     def contact(self):
@@ -77,7 +78,7 @@ class MeshSettings:
     @classmethod
     def draft(cls):
         """For quick studies: a layer less in frusta, a cover tied to the sheet, walls as one curve; see `NewtonSettings.draft`."""
-        return cls(frustum_levels=(0.0, 0.35, 1.0), coarse_walls=True, cover_splits=(0, 1), contact_stiffness=1000.0)
+        return cls(frustum_heights=(0.0, 0.35, 1.0), constrained_cell_edges=True, cover_splits=(0, 1), contact_stiffness=1000.0)
 
     @classmethod
     def fine(cls):
@@ -86,13 +87,14 @@ class MeshSettings:
         The cover has a layer more and is finer at edges, frusta have two rings. Under a punch as wide as two frusta 3 %
         (docs/explanation/discretisation.md).
         """
-        return cls(cover_levels=(0.0, 0.4, 0.75, 1.0), cover_splits=(1, 2), frustum_rings=2, frustum_core=0.6,
-                   frustum_levels=(0.0, 0.2, 0.7, 1.0))
+        return cls(cover_heights=(0.0, 0.4, 0.75, 1.0), cover_splits=(1, 2), frustum_rings=2, frustum_core=0.6,
+                   frustum_heights=(0.0, 0.2, 0.7, 1.0))
 
     @classmethod
-    def converging(cls, *, local_over_shear=0.1, **changes):
+    def converging(cls, *, unprojected_penalty_ratio=0.1, **changes):
         """To be refined: linear pressure, which does not lock, and little else; single frusta and cells, but no whole sensor."""
-        return cls(local_over_shear=local_over_shear, growing_over_shear=0.0, trilinear_pressure=False, **changes)
+        return cls(unprojected_penalty_ratio=unprojected_penalty_ratio, quartic_penalty_ratio=0.0, trilinear_pressure=False,
+                   **changes)
 
     @classmethod
     def stable(cls):
@@ -101,4 +103,4 @@ class MeshSettings:
         A sphere to 50 N; under a flat punch the map is within 1.4 % of its maximum of the default mesh's
         (docs/notebook/2026-11-23-folding-frusta.md).
         """
-        return cls(growing_over_shear=400.0, slab_growing_over_shear=10.0)
+        return cls(quartic_penalty_ratio=400.0, slab_quartic_penalty_ratio=10.0)

@@ -9,7 +9,7 @@ from softtact.models.hyperelastic.body import BodyState
 
 _STILL_MM = 1e-3       # after a step of less no point faces another facet but those that slide to and fro past an edge
 _DEEP = 0.55           # of a frustum's height: from here on elements of the default mesh may be unstable
-_MOST_LOWERINGS = 100  # of the first touch's depth, until a point of the cover feels the object
+_MOST_INCREMENTS = 100  # of the first touch's depth, until a point of the cover feels the object
 # Pressing apart is in vain where so many passes that moved anything have not brought the overlap below this share of the least
 # before. Passes that move nothing add up: the force of a single point at an edge is below the tolerance.
 _WORTH_A_PASS, _PASSES_IN_VAIN = 0.8, 3
@@ -17,15 +17,16 @@ _WORTH_A_PASS, _PASSES_IN_VAIN = 0.8, 3
 
 @dataclass(frozen=True)
 class NewtonSettings:
-    """When a level counts as reached, and how Newton's method goes there.
+    """When a load step counts as reached, and how Newton's method goes there.
 
     relative_tolerance: largest unbalanced nodal force as a share of the force, at least of smallest_scale_n
-    largest_penetration_mm, contact_passes: with deeper overlaps they are pressed apart and the level is solved again, so often
+    largest_penetration_mm, max_augmentations: with deeper overlaps they are pressed apart and the load step is solved again, so
+    often
     full_depth_mm: where the cover has come down by less, so much less may overlap: a micrometre is 4 % of a light press
     largest_step_mm: largest movement of a node in one iteration;  smallest_increment_n: force steps are halved down to this
-    level_iterations: a level ends where it took so many in all its steps: one that crawls would go on for hours
+    load_step_iterations: a load step ends where it took so many in all its steps: one that crawls would go on for hours
     first_touch_mm, first_touch_tolerance_n: overlap at which the press begins, and the residual that is good enough there
-    refacing_iterations: iterations that look anew which facet each point faces
+    projection_iterations: iterations that look anew which facet each point faces
     kept_tangent_mm: a cell that moved less since its last tangent keeps it
     With friction
     friction_tolerance: share of the tolerance;  friction_growth: how far a step's force may exceed the last one's
@@ -35,15 +36,15 @@ class NewtonSettings:
     relative_tolerance: float = 3e-4   # of a nodal force; 1e-4 changes the indentation by 3e-4 of itself, the map by 0.03 % (rms)
     largest_penetration_mm: float = 1e-3
     full_depth_mm: float = 0.2
-    contact_passes: int = 20
+    max_augmentations: int = 20
     max_iterations: int = 40
-    level_iterations: int = 300
+    load_step_iterations: int = 300
     largest_step_mm: float = 0.12
     smallest_increment_n: float = 0.02
     smallest_scale_n: float = 10.0
     first_touch_mm: float = 0.01
-    first_touch_tolerance_n: float = 0.1   # a start for the first level, not a result
-    refacing_iterations: int = 6
+    first_touch_tolerance_n: float = 0.1   # a start for the first load step, not a result
+    projection_iterations: int = 6
     kept_tangent_mm: float = 0.016     # as many iterations as with 4 um, since frusta far from balance take steps of their own
     friction_tolerance: float = 0.3    # sliding is soft: with 1 the indentation is 0.4 % off at 1 N on 20 frusta, with this 0.01 %
     friction_growth: float = 2.0       # a single step to 4 N is 1.8 % off, two are less than 0.1 %
@@ -57,8 +58,8 @@ class NewtonSettings:
 
 
 @dataclass(frozen=True)
-class Level:
-    """One converged force level; residual_n is the largest unbalanced nodal force."""
+class LoadStep:
+    """One converged load step; residual_n is the largest unbalanced nodal force."""
 
     force_n: float
     state: BodyState
@@ -75,63 +76,65 @@ class Reached:
     state: BodyState
 
 
-def press_levels(body, surface, forces_n, *, settings=NewtonSettings()):
-    """Yield a `Level` for each force (N, increasing). Raises ConvergenceError naming the level that was not reached."""
+def press_load_steps(body, surface, forces_n, *, settings=NewtonSettings()):
+    """Yield a `LoadStep` for each force (N, increasing). Raises ConvergenceError naming the load step that was not reached."""
     reached = Reached(0.0, _first_touch(body, surface, settings))
     for force in forces_n:
-        level = _advance(body, surface, reached, float(force), settings)
-        reached = Reached(level.force_n, level.state)
-        yield level
+        load_step = _advance(body, surface, reached, float(force), settings)
+        reached = Reached(load_step.force_n, load_step.state)
+        yield load_step
 
 
 def _first_touch(body, surface, settings):
     """Equilibrium at a small given indentation: under force control alone the free object has no stiffness."""
-    slab, bed = body.rest()
-    planes = body.slab.facing(slab, surface)
+    slab, support = body.rest()
+    projection = body.slab.project(slab, surface)
     if body.friction.active:
         body.friction.release()
-    start = _lowered_until_felt(body, body.evaluate(slab, bed, planes.anchors[:, 2].min(), planes), settings.first_touch_mm)
+    start = _indented_until_contact(body, body.evaluate(slab, support, projection.anchors[:, 2].min(), projection),
+                                    settings.first_touch_mm)
     if body.friction.active:
-        body.friction.begin_step(body.evaluate(slab, bed, start.indentation - settings.first_touch_mm, planes))
-        start = body.again(start)
+        body.friction.begin_step(body.evaluate(slab, support, start.indentation - settings.first_touch_mm, projection))
+        start = body.reevaluate_contact(start)
     state, _, _ = _settle(body, surface, start, None, settings.first_touch_tolerance_n, settings)
     if state is None:
         raise ConvergenceError("The first touch of the object did not converge.")
     return state
 
 
-def _lowered_until_felt(body, state, step_mm):
+def _indented_until_contact(body, state, step_mm):
     """The state with the object a step lower, or more steps: a tip may lie between the points that feel contact."""
-    for _ in range(_MOST_LOWERINGS):
-        state = body.lowered(state, step_mm)
+    for _ in range(_MOST_INCREMENTS):
+        state = body.indented(state, step_mm)
         if state.force > 0:
             return state
     raise ConvergenceError(f"None of the cover's contact points feels the object, though it was lowered by "
-                           f"{_MOST_LOWERINGS * step_mm:g} mm; press with a finer cover (cover_splits) or with a larger object.")
+                           f"{_MOST_INCREMENTS * step_mm:g} mm; press with a finer cover (cover_splits) or with a larger object.")
 
 
 def _advance(body, surface, reached, target, settings):
     """Reach `target`, halving the increment where Newton's method fails and growing it again where it succeeds.
 
     A step starts from the last state: displacements continued along the path, whole or in part, start in worse contact and took
-    as many iterations or more, once the step itself is exact in the contact (benchmarks/mesh_error.py's bodies, ten levels).
+    as many iterations or more, once the step itself is exact in the contact (benchmarks/mesh_error.py's bodies, ten load steps).
     """
     iterations, increment = 0, target - reached.force
     while True:
         force = min(target, reached.force + increment, _reach(body, reached.force, target, settings))
-        if settings.contact_passes and reached.force > 0:
-            body.press_apart(reached.state, allowed_mm=0.0)     # what overlaps is no start: more of it comes with more force
+        if settings.max_augmentations and reached.force > 0:
+            body.augment(reached.state, allowed_mm=0.0)     # what overlaps is no start: more of it comes with more force
         body.friction.begin_step(reached.state, growth=force / reached.force if reached.force > 0 else 1.0)
-        state, spent, residual = _settle(body, surface, body.again(reached.state), force, _tolerance(force, settings), settings)
+        state, spent, residual = _settle(body, surface, body.reevaluate_contact(reached.state), force, _tolerance(force, settings),
+                                         settings)
         iterations += spent
         if state is not None and force >= target:
-            state, spent, residual = _press_apart(body, surface, state, residual, force, settings)
+            state, spent, residual = _augment(body, surface, state, residual, force, settings)
             iterations += spent
         if state is not None and force >= target:
-            return Level(force_n=target, state=state, iterations=iterations, residual_n=residual,
+            return LoadStep(force_n=target, state=state, iterations=iterations, residual_n=residual,
                          penetration_mm=body.penetration(state))
         increment = 2 * increment if state is not None else 0.5 * (force - reached.force)
-        if state is None and (increment < settings.smallest_increment_n or iterations >= settings.level_iterations):
+        if state is None and (increment < settings.smallest_increment_n or iterations >= settings.load_step_iterations):
             raise ConvergenceError(_failure(body, reached, force, target, residual, iterations))
         if state is not None:
             reached = Reached(force, state)
@@ -147,18 +150,18 @@ def _reach(body, force, target, settings):
 
 def _failure(body, reached, force, target, residual, iterations):
     x, y, share = body.most_compressed(reached.state)
-    remedy = "Ask for smaller forces or for levels nearer to each other"
+    remedy = "Ask for smaller forces or for load steps nearer to each other"
     if share > _DEEP:
         remedy += ", or press with MeshSettings.stable() (--mesh-quality stable)"
-    return (f"The level of {target:g} N was not reached: from {reached.force:.4g} N on no step towards {force:.4g} N found a "
+    return (f"The load step of {target:g} N was not reached: from {reached.force:.4g} N on no step towards {force:.4g} N found a "
             f"balance (unbalanced force {residual:.2g} N, {iterations} iterations in all); the frustum at x {x:.1f}, y {y:.1f} mm "
             f"is compressed by {share:.0%} of its height. {remedy}.")
 
 
-def _press_apart(body, surface, state, residual, force, settings):
-    """The level once more with its overlaps pressed apart, as long as they are deeper than allowed and become less."""
+def _augment(body, surface, state, residual, force, settings):
+    """The load step once more with its overlaps pressed apart, as long as they are deeper than allowed and become less."""
     iterations, spent, least, in_vain = 0, 0, np.inf, 0
-    for _ in range(settings.contact_passes):
+    for _ in range(settings.max_augmentations):
         overlap = body.contact_error(state) if state is not None else 0.0
         in_vain = in_vain + (spent > 0) if overlap > _WORTH_A_PASS * least else 0
         least = min(least, overlap)
@@ -166,8 +169,8 @@ def _press_apart(body, surface, state, residual, force, settings):
         allowed = settings.largest_penetration_mm * min(1.0, depth / settings.full_depth_mm)
         if overlap <= allowed or in_vain == _PASSES_IN_VAIN:
             break
-        body.press_apart(state, allowed_mm=allowed)
-        start = body.let_down(body.again(state), force)
+        body.augment(state, allowed_mm=allowed)
+        start = body.indented_to(body.reevaluate_contact(state), force)
         state, spent, residual = _settle(body, surface, start, force, _tolerance(force, settings), settings)
         iterations += spent
     return state, iterations, residual
@@ -184,19 +187,19 @@ def _settle(body, surface, state, force, tolerance, settings):
     tolerance, iterations = settings.friction_tolerance * tolerance, 0
     for k in range(settings.friction_passes):
         if k == 1:     # a point at an edge would face now one facet, now the other, and no pass agree with the one before
-            settings = replace(settings, refacing_iterations=0)
+            settings = replace(settings, projection_iterations=0)
         state, spent, residual = _newton(body, surface, state, force, tolerance, settings)
         iterations += spent
         if state is None:
             break
         body.friction.renew(state)
-        own = body.again(state)
+        own = body.reevaluate_contact(state)
         residual = body.residual_norm(own, force)
         if residual <= tolerance:
             return own, iterations, residual
         if k >= settings.whole_passes:     # what is left now swings: more friction, less pressure, less friction
             body.friction.renew(state, halfway=True)
-            own = body.again(state)
+            own = body.reevaluate_contact(state)
         state = own
     return None, iterations, residual
 
@@ -209,17 +212,17 @@ def _newton(body, surface, state, force, tolerance, settings):
     """
     looking, fresh = True, False
     for iteration in range(settings.max_iterations):
-        looks = surface if looking and iteration < settings.refacing_iterations else None
+        looks = surface if looking and iteration < settings.projection_iterations else None
         if looks is not None:
-            state = body.reface(state, body.slab.facing(state.slab.displacement, surface))
+            state = body.update_normals(state, body.slab.project(state.slab.displacement, surface))
         residual = body.residual_norm(state, force)
         if residual <= tolerance:
             return state, iteration, residual
         step = body.newton_step(state, force, looks, largest_mm=settings.largest_step_mm, kept_mm=settings.kept_tangent_mm)
         if np.isnan(step.indentation) and not state.force > 0:     # a free object that lost its touch on the way
-            state = _lowered_until_felt(body, state, settings.first_touch_mm)
+            state = _indented_until_contact(body, state, settings.first_touch_mm)
             continue
-        state = body.reface(state, step.planes)
+        state = body.update_normals(state, step.projection)
         trial = _line_search(body, state, step, force, residual, tolerance, settings) if np.isfinite(step.largest()) else None
         if trial is None and fresh and looks is None:
             return None, iteration, residual
@@ -245,8 +248,8 @@ def _line_search(body, state, step, force, residual, tolerance, settings):
     before = _potential(state, force)
     resolution = 1e-11 * (abs(state.energy) + abs(before))
     for _ in range(10):
-        trial = body.evaluate(state.slab.displacement + share * step.slab, state.bed.displacement + share * step.bed,
-                              state.indentation + share * step.indentation, step.planes)
+        trial = body.evaluate(state.slab.displacement + share * step.slab, state.support.displacement + share * step.support,
+                              state.indentation + share * step.indentation, step.projection)
         if trial is not None:
             trial = body.balanced(trial, tolerance)
             change = _potential(trial, force) - before

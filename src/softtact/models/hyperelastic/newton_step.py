@@ -24,12 +24,12 @@ _JUDGED_AFTER = 3            # iterations after which it is judged how many it w
 class LinearGaps:
     """Contact points (p,) as they depend on a step: gaps (mm) at none, rows (p, n) of their change by each unknown.
 
-    lowering (p,): their change when the object is lowered by 1 mm;  area (p,) in mm2;  contact: a `Contact`
+    indentation increment (p,): their change when the object is lowered by 1 mm;  area (p,) in mm2;  contact: a `Contact`
     """
 
     gaps: np.ndarray
     rows: sp.csr_matrix
-    lowering: np.ndarray
+    indentation_increment: np.ndarray
     area: np.ndarray
     contact: object
 
@@ -66,18 +66,19 @@ class ContactStepper:
         self.factor, self._factored = factor, False
         self.factors, self.iterations = 0, 0     # so far, of the matrix and of conjugate gradients
 
-    def step(self, rubber, residual, contact, *, drag=(0.0, 0.0), excess=None, largest=np.inf):
+    def step(self, rubber, residual, contact, *, friction_response=(0.0, 0.0), excess=None, largest=np.inf):
         """Step (n,) in mm of the unknowns, and how far the object is lowered with it; None if A is not positive definite.
 
         rubber: A, upper triangle (csr), with friction;  residual (n,) in N
-        contact: its `points` are `LinearGaps`, its `rubber_forces(rubber, step)` A times a step (n,), its `follow(step, lowering)`
-        looks up what the points face where a step leads, and says whether that was done; its `frames` are for `contact_factor`
-        drag: friction's border (n,) and corner in N/mm, between the unknowns and the object's lowering
+        contact: its `points` are `LinearGaps`, its `rubber_forces(rubber, step)` A times a step (n,), its `follow(step, indentation
+        increment)` looks up what the points face where a step leads, and says whether that was done; its `frames` are for
+        `contact_factor`
+        friction_response: friction's border (n,) and corner in N/mm, between the unknowns and the object's indentation increment
         excess: the object's force less the wanted one in N; None holds the object where it is. A free object that touches
         nothing finds no stiffness: it is lowered by nan.
         largest: mm, by which a free object is moved at most; farther steps end there with the contact of that depth
         """
-        problem = _Problem(rubber, contact, residual, drag, excess)
+        problem = _Problem(rubber, contact, residual, friction_response, excess)
         at = problem.move(problem.rest())
         if problem.free and not contact.points.slope(0.0).any():
             return problem.parts(np.append(at.x[:-1], np.nan))
@@ -86,7 +87,7 @@ class ContactStepper:
             at = self._least(problem, at, largest)
             if at is None or number == _FACINGS - 1 or not contact.follow(*problem.parts(at.x)):
                 break
-            at = problem.faced_anew(at)
+            at = problem.projected_anew(at)
             if problem.solved(at):
                 break
         return None if at is None else problem.parts(at.x)
@@ -151,10 +152,10 @@ class ContactStepper:
 
 
 class _Problem:
-    """The convex problem of one step, in the unknowns and, where the object is free, its lowering behind them."""
+    """The convex problem of one step, in the unknowns and, where the object is free, its indentation increment behind them."""
 
-    def __init__(self, rubber, contact, residual, drag, excess):
-        self.rubber, self.contact, self.drag = rubber, contact, drag
+    def __init__(self, rubber, contact, residual, friction_response, excess):
+        self.rubber, self.contact, self.friction_response = rubber, contact, friction_response
         self.size, self.free, self.held = len(residual), excess is not None, False
         # What the points face may change under way: the residual less the contact's share in it stays.
         residual = np.append(residual, excess) if self.free else residual
@@ -175,7 +176,7 @@ class _Problem:
         """The `_Move` of a step."""
         return _Move(x, self._change(x), self._elastic(x))
 
-    def faced_anew(self, move):
+    def projected_anew(self, move):
         """The same step after the points came to face something else."""
         return replace(move, change=self._change(move.x))
 
@@ -200,19 +201,19 @@ class _Problem:
 
     def _change(self, x):
         change = self.points.rows @ x[:self.size]
-        return change + self.points.lowering * x[-1] if self.free else change
+        return change + self.points.indentation_increment * x[-1] if self.free else change
 
     def _spread(self, forces):
         """Forces (p,) of the points on the unknowns."""
         spread = self.points.rows.T @ forces
-        return np.append(spread, self.points.lowering @ forces) if self.free else spread
+        return np.append(spread, self.points.indentation_increment @ forces) if self.free else spread
 
     def _elastic(self, x):
         u = x[:self.size]
         product = self.contact.rubber_forces(self.rubber, u)
         if not self.free:
             return product
-        border, corner = self.drag
+        border, corner = self.friction_response
         return np.append(product + border * x[-1], np.sum(border * u) + corner * x[-1])
 
     def gradient(self, at):

@@ -1,9 +1,10 @@
-"""What preconditions a step's Newton systems A + B'.W.B, bordered by the object's lowering, for one contact after the other.
+"""What preconditions a step's Newton systems A + B'.W.B, bordered by the object's indentation increment, for one contact after the
+other.
 
 How the object touches changes some seven times within a step and much, the rubber's tangent A hardly in several steps: with A of
 a step or two before and the contact of now, conjugate gradients take one to three iterations, the other way round twenty. So the
-surface nodes' movements along the object's normals and the lowering come last in the elimination. What is left on them is a
-dense matrix, small beside the whole; the contact changes that matrix alone, as far as its normals are the nodes' own.
+surface nodes' movements along the object's normals and the indentation increment come last in the elimination. What is left on them
+is a dense matrix, small beside the whole; the contact changes that matrix alone, as far as its normals are the nodes' own.
 """
 
 import numpy as np
@@ -27,14 +28,15 @@ class ContactFactor:
 
     def renew(self, problem, slope):
         """Factor with the rubber's tangent and the points' stiffness (p,) of now; False if that is not positive definite."""
-        rows, lowering, (border, corner) = problem.points.rows, problem.points.lowering, problem.drag
+        rows, indentation_increment, (border,
+                                      corner) = problem.points.rows, problem.points.indentation_increment, problem.friction_response
         upper = (problem.rubber + sp.triu(rows.T @ sp.diags_array(slope) @ rows)).tocsr()
         upper.sort_indices()
         if not self.solver.factor(upper):
             return False
-        self._border = rows.T @ (slope * lowering) + border
+        self._border = rows.T @ (slope * indentation_increment) + border
         self._along = self.solver.solve(self._border)
-        self._corner = max(slope @ lowering**2 + corner - self._border @ self._along, _LEAST_CORNER)
+        self._corner = max(slope @ indentation_increment**2 + corner - self._border @ self._along, _LEAST_CORNER)
         return True
 
     def follow(self, problem, slope):
@@ -59,7 +61,7 @@ class DissectedContact:
     def renew(self, problem, slope):
         """Factor with the rubber's tangent and the points' stiffness (p,) of now; False if that is not positive definite."""
         self._frames, self._points, self._slope = problem.contact.frames(self._frames), None, None
-        border, corner = problem.drag
+        border, corner = problem.friction_response
         column = np.append(np.broadcast_to(border, self.solver.unknowns), corner)
         if not self.solver.factor_bordered(Bordered(upper=problem.rubber, column=column, frames=self._frames)):
             return False
@@ -99,9 +101,9 @@ class DissectedContact:
         if self._points is not points:
             self._points, self._rows = points, points.rows @ self._frames.movements(self.solver.unknowns)
         left = self.solver.left
-        matrix, border = left[:-1, :-1].copy(), left[:-1, -1] + self._rows.T @ (slope * points.lowering)
+        matrix, border = left[:-1, :-1].copy(), left[:-1, -1] + self._rows.T @ (slope * points.indentation_increment)
         _add_points(matrix, self._rows.indptr, self._rows.indices, self._rows.data, slope)
-        return matrix, border, float(left[-1, -1]) + slope @ points.lowering**2
+        return matrix, border, float(left[-1, -1]) + slope @ points.indentation_increment**2
 
 
 @njit(cache=True, nogil=True)

@@ -8,7 +8,7 @@ pitch cannot follow: 6 % of the map. Both are needed where the object presses, a
 import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from softtact.fem.graded_mesh import split_levels
+from softtact.fem.graded_mesh import split_depths
 
 REACH_MM = 1.0        # what stands higher above the object's lowest point is taken to stay off the cover
 AROUND_MM = 0.3       # the zone under the object ends so far from it
@@ -54,13 +54,13 @@ def _sampled(lines, parts):
     return fine[1::2]
 
 
-def levels_of(zone, shape, most):
+def split_depths_of(zone, shape, most):
     """How often each place is split for wanted levels (ny 2^most, nx 2^most), in a grid of `shape` (nx, ny)."""
 
-    def wanted(low, size, level):
+    def wanted(low, size, depth):
         block = int(size * (1 << most))
         i, j = (low * (1 << most)).astype(int).T
         whole = zone.reshape(zone.shape[0] // block, block, zone.shape[1] // block, block).max(axis=(1, 3))
-        return whole[j // block, i // block] > level
+        return whole[j // block, i // block] > depth
 
-    return split_levels(shape, wanted, most)
+    return split_depths(shape, wanted, most)

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from softtact.contact.coverage import continues, covered
-from softtact.contact.face_edges import ROWS, own_areas, softness
-from softtact.contact.friction import Drag, Grip
+from softtact.contact.face_edges import ROWS, contact_compliance, own_areas
+from softtact.contact.friction import FrictionResponse, FrictionState
 from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.fem.elements import gauss, quad8
 
@@ -14,7 +14,7 @@ _NEAR_MM, _LARGEST_SHIFT_MM = 0.2, 0.02   # points that may touch when the objec
 
 
 @dataclass(frozen=True)
-class FacingPlanes:
+class ContactProjection:
     """The planes of the object's facets that points face: anchors (p, 3) in mm at no indentation, outward normals (p, 3).
 
     covered (p,): share of a point's own area that the object covers;  beside (p,): points that lie beside the object themselves
@@ -26,28 +26,28 @@ class FacingPlanes:
     normals: np.ndarray
     covered: np.ndarray
     beside: np.ndarray
-    softness: np.ndarray
+    contact_compliance: np.ndarray
 
 
 @dataclass(frozen=True)
 class Touch:
     """Contact at one displacement: energy (mJ), forces (t, w, 3) in N on the faces' nodes, gaps (p,) in mm of the points.
 
-    indentation_force: the object's, N downwards;  drag: friction at the points, None without
+    indentation_force: the object's, N downwards;  friction_response: friction at the points, None without
     """
 
     energy: float
     force: np.ndarray
     gaps: np.ndarray
     indentation_force: float
-    drag: Drag | None = None
+    friction_response: FrictionResponse | None = None
 
 
 class TopContact:
     """The points of a `CoverMesh`'s top faces, flattened (p = t * points): areas (p,) in mm2, places (p, 3) in mm at rest.
 
     faces (t, w): the free nodes that a face hangs on, values (t, points, w): their shape values at its points.
-    grip: how friction holds the points during a step, None without.
+    friction_state: how friction holds the points during a step, None without.
     """
 
     def __init__(self, mesh, contact, *, plane_modulus, friction=None):
@@ -55,7 +55,7 @@ class TopContact:
 
         plane_modulus: E / (1 - nu^2) in MPa of what the object presses on
         """
-        self.contact, self.friction, self.grip = contact, friction, None
+        self.contact, self.friction, self.friction_state = contact, friction, None
         points, weights = gauss(ROWS, 2)
         values, slopes = quad8(points)
         edges = np.einsum("tad,gai->tgdi", mesh.points[mesh.top][..., :2], slopes)
@@ -69,8 +69,8 @@ class TopContact:
         """A nodal field (n, 3) at the points (p, 3)."""
         return np.matmul(self.values, field[self.faces]).reshape(-1, 3)
 
-    def facing(self, displacement, surface):
-        """The object's facets above the points (see `FacingPlanes`)."""
+    def project(self, displacement, surface):
+        """The object's facets above the points (see `ContactProjection`)."""
         position = self.reference + self.at_points(displacement)
         height, normals = surface(position[:, 0], position[:, 1])
         anchors = np.column_stack([position[:, :2], height])
@@ -81,47 +81,49 @@ class TopContact:
         anchors[beside] = np.column_stack([foot, base])[beside]
         normals[beside] = foot_normals[beside]
         share[anchors[:, 2] >= NO_CONTACT_MM] = 0.0
-        return FacingPlanes(anchors=anchors, normals=normals, covered=share, beside=beside, softness=softness(share, self._give))
+        return ContactProjection(anchors=anchors, normals=normals, covered=share, beside=beside,
+                                 contact_compliance=contact_compliance(share, self._give))
 
-    def contact_on(self, planes):
+    def contact_on(self, projection):
         """The points' `Contact` on the planes that they face."""
-        return replace(self.contact, softness=planes.softness)
+        return replace(self.contact, contact_compliance=projection.contact_compliance)
 
-    def gaps(self, displacement, planes, indentation):
+    def gaps(self, displacement, projection, indentation):
         """Normal gaps (p,) in mm between the points and the planes they face."""
-        offset = self.reference + self.at_points(displacement) - planes.anchors
-        return np.einsum("pd,pd->p", planes.normals, offset) + indentation * planes.normals[:, 2]
+        offset = self.reference + self.at_points(displacement) - projection.anchors
+        return np.einsum("pd,pd->p", projection.normals, offset) + indentation * projection.normals[:, 2]
 
     def own_gaps(self, state):
         """Gaps (p,) of the points that lie under the object, without what edges give way; of those beside it one that says so."""
-        return np.where(state.planes.beside, NO_CONTACT_MM, self.contact_on(state.planes).own_gaps(state.gaps))
+        return np.where(state.projection.beside, NO_CONTACT_MM, self.contact_on(state.projection).own_gaps(state.gaps))
 
     def error(self, state):
         """Deepest overlap, or widest gap under pressure, in mm of points that lie under the object."""
-        return self.contact_on(state.planes).error(np.where(state.planes.beside, NO_CONTACT_MM, state.gaps))
+        return self.contact_on(state.projection).error(np.where(state.projection.beside, NO_CONTACT_MM, state.gaps))
 
-    def press_apart(self, state):
+    def augment(self, state):
         """From now on hold each point where it just touches the object."""
-        self.contact = self.contact_on(state.planes).pressed_apart(state.gaps)
+        self.contact = self.contact_on(state.projection).augmented(state.gaps)
 
-    def touch(self, displacement, planes, indentation):
+    def touch(self, displacement, projection, indentation):
         """The contact with the object lowered by `indentation` mm."""
-        gaps, normals = self.gaps(displacement, planes, indentation), planes.normals
-        density, pressure, _ = self.contact_on(planes).response(gaps)
-        area = self.area * planes.covered
+        gaps, normals = self.gaps(displacement, projection, indentation), projection.normals
+        density, pressure, _ = self.contact_on(projection).response(gaps)
+        area = self.area * projection.covered
         push = (pressure * area)[:, None] * normals      # on the slab: along the object's outward normal
         touch = Touch(energy=float(density @ area), force=-self._on_nodes(push), gaps=gaps,
                       indentation_force=float(-push[:, 2].sum()))
-        return touch if self.grip is None else self._with_friction(touch, displacement, planes, indentation)
+        return touch if self.friction_state is None else self._with_friction(touch, displacement, projection, indentation)
 
-    def _with_friction(self, touch, displacement, planes, indentation):
+    def _with_friction(self, touch, displacement, projection, indentation):
         """The contact with friction's energy and forces, on the covered share of area as the pressure's."""
-        area = self.area * planes.covered
-        drag = self.grip.drag(self._in_object(displacement, indentation), planes.normals)
-        pull = drag.traction * area[:, None]
+        area = self.area * projection.covered
+        friction_response = self.friction_state.friction_response(self._in_object(displacement, indentation), projection.normals)
+        pull = friction_response.traction * area[:, None]
         # Raising the indentation lifts the points in the object's frame, so the slips' vertical part resists it.
-        return replace(touch, energy=touch.energy + float(drag.energy @ area), force=touch.force + self._on_nodes(pull),
-                       indentation_force=touch.indentation_force + float(pull[:, 2].sum()), drag=drag)
+        return replace(touch, energy=touch.energy + float(friction_response.energy @ area),
+                       force=touch.force + self._on_nodes(pull),
+                       indentation_force=touch.indentation_force + float(pull[:, 2].sum()), friction_response=friction_response)
 
     def _on_nodes(self, forces):
         """Forces (p, 3) in N at the points as forces (t, w, 3) on the faces' nodes."""
@@ -135,18 +137,18 @@ class TopContact:
         """Let friction hold the points as where a step starts from a `SlabState`."""
         if self.friction is None:
             return
-        if state.drag is None:
-            self.grip = Grip.first(self.friction, self._in_object(state.displacement, indentation), state.gaps)
+        if state.friction_response is None:
+            self.friction_state = FrictionState.first(self.friction, self._in_object(state.displacement, indentation), state.gaps)
         else:
-            self.grip = state.drag.next_step(state.gaps)
+            self.friction_state = state.friction_response.next_step(state.gaps)
 
-    def renewed_grip(self, state):
-        """The grip with the pressures of a `SlabState`."""
-        return state.drag.next_pass(state.gaps, self._pressure(state))
+    def renewed_friction_state(self, state):
+        """The friction state with the pressures of a `SlabState`."""
+        return state.friction_response.next_pass(state.gaps, self._pressure(state))
 
     def _pressure(self, state):
         """Pressure (p,) in MPa under the contact as it is now, on what is covered of the points' areas."""
-        return self.contact_on(state.planes).response(state.gaps)[1]
+        return self.contact_on(state.projection).response(state.gaps)[1]
 
     def balanced(self, state, indentation, force_n):
         """The indentation (mm) at which the object's force, friction aside, is `force_n` on the cover as it is.
@@ -154,8 +156,8 @@ class TopContact:
         The force grows with the depth, from a square root's slope on: Newton's method with bounded steps.
         """
         near = np.flatnonzero(state.gaps < _NEAR_MM)
-        down, area = -state.planes.normals[near, 2], (self.area * state.planes.covered)[near]
-        contact, gaps, shift = self.contact_on(state.planes).at(near), state.gaps[near], 0.0
+        down, area = -state.projection.normals[near, 2], (self.area * state.projection.covered)[near]
+        contact, gaps, shift = self.contact_on(state.projection).at(near), state.gaps[near], 0.0
         for _ in range(50):
             _, pressure, slope = contact.response(gaps - shift * down)
             excess = pressure @ (down * area) - force_n
@@ -167,38 +169,38 @@ class TopContact:
 
     def stiffness(self, state):
         """Stiffness (p,) in N/mm of the points along their normals."""
-        return self.contact_on(state.planes).response(state.gaps)[2] * self.area * state.planes.covered
+        return self.contact_on(state.projection).response(state.gaps)[2] * self.area * state.projection.covered
 
     def area_under_pressure(self, state):
         """Area in mm2 of the points that carry pressure under the contact as it is now, as far as the object covers it.
 
         By the pressure, not by the gap: where overlaps were pressed apart, touching points have gaps near zero of either sign.
         """
-        return float((self.area * state.planes.covered)[self.under_pressure(state)].sum())
+        return float((self.area * state.projection.covered)[self.under_pressure(state)].sum())
 
     def under_pressure(self, state):
         """Which points (p,) carry pressure."""
-        return self._pressure(state) * state.planes.covered > 0
+        return self._pressure(state) * state.projection.covered > 0
 
     def pressure_of_faces(self, state):
         """Mean pressure (t,) in MPa on each face, under the contact as it is now."""
         area = self.area.reshape(len(self.faces), -1)
-        force = self._pressure(state) * self.area * state.planes.covered
+        force = self._pressure(state) * self.area * state.projection.covered
         return force.reshape(area.shape).sum(axis=1) / area.sum(axis=1)
 
-    def normal_shapes(self, planes):
+    def normal_shapes(self, projection):
         """Change (t, points, 3 w) of the points' gaps by the faces' unknowns."""
-        normal = planes.normals.reshape(*self.values.shape[:2], 3)
+        normal = projection.normals.reshape(*self.values.shape[:2], 3)
         return np.einsum("tga,tgd->tgad", self.values, normal).reshape(*normal.shape[:2], -1)
 
-    def facing_nodes(self, gaps, planes, within_mm):
+    def projected_nodes(self, gaps, projection, within_mm):
         """Free nodes (k,) of faces with points under the object whose gaps are less, and how the planes before each lie.
 
         That is the sum (k, 3, 3) of n n' over the normals, in mm2 of the points' areas.
         """
-        near = (gaps < within_mm) & (planes.covered > 0)
-        weight = (self.area * planes.covered * near).reshape(len(self.faces), -1)
-        normals = planes.normals.reshape(*weight.shape, 3)
+        near = (gaps < within_mm) & (projection.covered > 0)
+        weight = (self.area * projection.covered * near).reshape(len(self.faces), -1)
+        normals = projection.normals.reshape(*weight.shape, 3)
         of_faces = np.einsum("tg,tga,tgi,tgj->taij", weight, np.abs(self.values), normals, normals, optimize=True)
         total = np.zeros((self.faces.max() + 1, 3, 3))
         np.add.at(total, self.faces, of_faces)
@@ -210,8 +212,8 @@ class TopContact:
 
         The border is the derivative of the forces by the indentation, the corner the energy's second derivative by it.
         """
-        area = (self.area * state.planes.covered)[:, None, None]
-        slope = (state.drag.stiffness() * area).reshape(*self.values.shape[:2], 3, 3)
+        area = (self.area * state.projection.covered)[:, None, None]
+        slope = (state.friction_response.stiffness() * area).reshape(*self.values.shape[:2], 3, 3)
         along = np.einsum("tga,tgij->tgaij", self.values, slope)
         blocks = np.einsum("tgaij,tgb->taibj", along, self.values, optimize=True)
         size = 3 * self.values.shape[2]

@@ -11,42 +11,42 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from softtact.contact.friction import Drag
+from softtact.contact.friction import FrictionResponse
 from softtact.fem.assembly import SymmetricProduct, add_upper, upper_pattern, upper_positions
 from softtact.fem.elements import quad8
 from softtact.fem.extruded_mesh import extrude
 from softtact.fem.graded_mesh import cover_mesh
 from softtact.fem.kernels import add_forces
-from softtact.fem.point_location import plan_interpolation
-from softtact.fem.solid_block import HexBlock, WedgeBlock, joined, of_masters
+from softtact.fem.point_location import interpolation_2d
+from softtact.fem.solid_block import HexBlock, WedgeBlock, hanging_node_constraints, joined
 from softtact.linalg.workers import SERIAL
 from softtact.models.hyperelastic.newton_step import LinearGaps
-from softtact.models.hyperelastic.rigid_contact import FacingPlanes, TopContact
+from softtact.models.hyperelastic.rigid_contact import ContactProjection, TopContact
 
 
 @dataclass(frozen=True)
 class SlabState:
     """energy (mJ), force (n, 3) in N, contact quantities at the top's points, displacement (n, 3).
 
-    elastic: energy and force of the rubber alone; planes: what the points face; indentation_force: the object's, N downwards;
-    drag: friction at the points, None without.
+    elastic: energy and force of the rubber alone; projection: what the points face; indentation_force: the object's, N downwards;
+    friction_response: friction at the points, None without.
     """
 
     elastic: tuple
     energy: float
     force: np.ndarray
     gaps: np.ndarray
-    planes: FacingPlanes
+    projection: ContactProjection
     displacement: np.ndarray
     indentation_force: float
-    drag: Drag | None = None
+    friction_response: FrictionResponse | None = None
 
 
 @dataclass(frozen=True)
 class Layer:
     """One material's layer: increasing heights z of its element layers (mm), and its law."""
 
-    levels: np.ndarray
+    heights: np.ndarray
     law: object
 
 
@@ -67,40 +67,40 @@ class CellGroup:
 
 
 class Slab:
-    """Sheet (its plan a `SheetPlan`) under a cover on a grid; a cover of one level is the sheet's top without a cover.
+    """Sheet (its plan a `SheetMesh2D`) under a cover on a grid; a cover of one level is the sheet's top without a cover.
 
     sheet_mesh: the sheet (`sheet_layers`) and the cover's layers that keep to its plan;  cover_mesh: the cover's other layers
     Nodes: cover_mesh's first, then sheet_mesh's without its top. `bottom`: those under the sheet, in the plan's order.
     """
 
-    def __init__(self, sheet, cover, sheet_plan, x_lines, y_lines, *, sides, contact, coarse_walls=True, splits=None,
-                 growing_over_shear=0.0, friction=None):
+    def __init__(self, sheet, cover, sheet_mesh_2d, x_lines, y_lines, *, sides, contact, constrained_cell_edges=True, splits=None,
+                 quartic_penalty_ratio=0.0, friction=None):
         """splits (layers, ny 2^m, nx 2^m): how often the cover's uppermost layers are split where (see `cover_mesh`); the layers
         below these keep to the sheet's plan. None: none does, and none is split.
 
-        coarse_walls: everywhere (True), nowhere (False), or where a function of places (n, 2) says so (n,)
-        growing_over_shear: see `blocks`;  friction: `Coulomb` of the object on the top, or None
+        constrained_cell_edges: everywhere (True), nowhere (False), or where a function of places (n, 2) says so (n,)
+        quartic_penalty_ratio: see `blocks`;  friction: `Coulomb` of the object on the top, or None
         """
         if splits is None:
-            splits = np.zeros((len(cover.levels) - 1, len(y_lines) - 1, len(x_lines) - 1), dtype=np.int64)
+            splits = np.zeros((len(cover.heights) - 1, len(y_lines) - 1, len(x_lines) - 1), dtype=np.int64)
         self.x_lines, self.y_lines = np.asarray(x_lines), np.asarray(y_lines)
-        self.layers, self.sheet_plan = (sheet, cover), sheet_plan
-        bound = len(cover.levels) - 1 - len(splits)
-        self.cover_mesh = cover_mesh(x_lines, y_lines, cover.levels[bound:], splits)
-        self.sheet_mesh = extrude(sheet_plan.plan, np.append(sheet.levels, cover.levels[1:bound + 1]))
-        self.sheet_layers = len(sheet.levels) - 1
-        self._coarse_walls, self._growing_over_shear = coarse_walls, growing_over_shear
-        self._number_nodes(sheet_plan)
+        self.layers, self.sheet_mesh_2d = (sheet, cover), sheet_mesh_2d
+        bound = len(cover.heights) - 1 - len(splits)
+        self.cover_mesh = cover_mesh(x_lines, y_lines, cover.heights[bound:], splits)
+        self.sheet_mesh = extrude(sheet_mesh_2d.mesh_2d, np.append(sheet.heights, cover.heights[1:bound + 1]))
+        self.sheet_layers = len(sheet.heights) - 1
+        self._constrained_cell_edges, self._quartic_penalty_ratio = constrained_cell_edges, quartic_penalty_ratio
+        self._number_nodes(sheet_mesh_2d)
         self.groups, self.cell_groups = [], []   # (nodes, block) outside of cells; a `CellGroup` for each kind of cell
         self._add_cover(cover.law)
-        self._add_sheet(sheet_plan, [sheet.law] * self.sheet_layers + [cover.law] * bound)
+        self._add_sheet(sheet_mesh_2d, [sheet.law] * self.sheet_layers + [cover.law] * bound)
         self._joined = joined(self.solids)     # to evaluate a hundred small blocks takes twice as long
         self._number_unknowns(sides)
         pressed = cover.law or sheet.law     # None in bodies at rest, of which only the mesh is wanted
         self.top = TopContact(self.cover_mesh, contact, plane_modulus=pressed.plane_modulus if pressed else np.inf,
                               friction=friction)
 
-    def _number_nodes(self, plan):
+    def _number_nodes(self, mesh_2d):
         """Masters (p, 8) and weights (p, 8) of sheet_mesh's nodes: its top follows the cover, the rest its own unknowns.
 
         Along the walls between cells, two elements a side, the sheet moves as one quadratic curve: the nodes at the quarters
@@ -108,8 +108,10 @@ class Slab:
         """
         mesh, first = self.sheet_mesh, self.cover_mesh.free
         top = mesh.planes[-1]
-        curve, curve_weights = plan.quarters
-        coarse = self._coarse_walls(plan.plan.points[curve[:, 0]]) if callable(self._coarse_walls) else self._coarse_walls
+        curve, curve_weights = mesh_2d.quarters
+        coarse = self._constrained_cell_edges
+        if callable(coarse):
+            coarse = coarse(mesh_2d.mesh_2d.points[curve[:, 0]])
         curve = curve[np.broadcast_to(coarse, len(curve))]
         follows = np.zeros(len(mesh.points), dtype=bool)
         follows[top] = True
@@ -118,7 +120,7 @@ class Slab:
         own = np.flatnonzero(~follows)
         number = np.full(len(mesh.points), -1, dtype=np.int64)
         number[own] = first + np.arange(len(own))
-        above = self._under_cover(plan.plan.points)
+        above = self._under_cover(mesh_2d.mesh_2d.points)
         width = max(int(np.diff(above.indptr).max()), 3)
         self._masters, self._weights = np.zeros((len(mesh.points), width), dtype=np.int64), np.zeros((len(mesh.points), width))
         self._masters[own, 0], self._weights[own, 0] = number[own], 1.0
@@ -155,15 +157,15 @@ class Slab:
         self.groups.append((mesh.hexes[alone], block))
         if not alone.all():
             hanging = mesh.hexes[~alone]
-            self.groups.append(of_masters(*mesh.masters(), hanging, self._cover_block(hanging, law)))
+            self.groups.append(hanging_node_constraints(*mesh.masters(), hanging, self._cover_block(hanging, law)))
 
     def _cover_block(self, hexes, law):
-        return HexBlock(self.cover_mesh.points[hexes], law, points_per_side=2, growing_over_shear=self._growing_over_shear)
+        return HexBlock(self.cover_mesh.points[hexes], law, points_per_side=2, quartic_penalty_ratio=self._quartic_penalty_ratio)
 
-    def _add_sheet(self, plan, laws):
+    def _add_sheet(self, mesh_2d, laws):
         """Like elements (nodes, block): those of the strips around, and those of each kind of cell, cell by cell; a law a layer."""
-        mesh, cells = self.sheet_mesh, len(plan.roots)
-        in_cells = cells * plan.cell_quads
+        mesh, cells = self.sheet_mesh, len(mesh_2d.roots)
+        in_cells = cells * mesh_2d.cell_quads
         layers = [(mesh.layer(k), mesh.wedge_layer(k), law) for k, law in enumerate(laws)]
         self.groups += [self._following(hexes[in_cells:], HexBlock, law) for hexes, _, law in layers if len(hexes) > in_cells]
         if not cells:
@@ -176,8 +178,8 @@ class Slab:
                  for elements, make, law in layer if elements.size] for layer in pieces]))
 
     def _following(self, elements, make, law):
-        block = make(self.sheet_mesh.points[elements], law, growing_over_shear=self._growing_over_shear)
-        return of_masters(self._masters, self._weights, elements, block)
+        block = make(self.sheet_mesh.points[elements], law, quartic_penalty_ratio=self._quartic_penalty_ratio)
+        return hanging_node_constraints(self._masters, self._weights, elements, block)
 
     def _like_cells(self, nodes):
         """Numbers of like cells, kind by kind, of cells with nodes (c, k): those whose nodes follow others in the same way."""
@@ -215,11 +217,11 @@ class Slab:
         self.number = np.full(held.size, -1, dtype=np.int64)
         self.number[self.free] = np.arange(len(self.free))
 
-    def facing(self, displacement, surface):
-        """The object's facets above the top's points (see `FacingPlanes`)."""
-        return self.top.facing(displacement, surface)
+    def project(self, displacement, surface):
+        """The object's facets above the top's points (see `ContactProjection`)."""
+        return self.top.project(displacement, surface)
 
-    def evaluate(self, displacement, planes, indentation, *, workers=SERIAL):
+    def evaluate(self, displacement, projection, indentation, *, workers=SERIAL):
         """Energy, forces and contact with the object lowered by `indentation` mm; None if an element is inside out."""
         force = np.zeros((self.nodes, 3))
         energy = 0.0
@@ -229,18 +231,19 @@ class Slab:
                 return None
             energy += state.energy
             add_forces(force, nodes, state.force.reshape(*nodes.shape, 3))
-        return self._with_contact(displacement, (energy, force), planes, indentation)
+        return self._with_contact(displacement, (energy, force), projection, indentation)
 
-    def reface(self, state, planes, indentation):
-        """The same displacements in front of other planes."""
-        return self._with_contact(state.displacement, state.elastic, planes, indentation)
+    def update_normals(self, state, projection, indentation):
+        """The same displacements in front of other projection."""
+        return self._with_contact(state.displacement, state.elastic, projection, indentation)
 
-    def _with_contact(self, displacement, elastic, planes, indentation):
+    def _with_contact(self, displacement, elastic, projection, indentation):
         energy, force = elastic[0], elastic[1].copy()
-        touch = self.top.touch(displacement, planes, indentation)
+        touch = self.top.touch(displacement, projection, indentation)
         add_forces(force, self.top.faces, touch.force.reshape(*self.top.faces.shape, 3))
-        return SlabState(elastic=elastic, energy=energy + touch.energy, force=force, gaps=touch.gaps, planes=planes,
-                         displacement=displacement, indentation_force=touch.indentation_force, drag=touch.drag)
+        return SlabState(elastic=elastic, energy=energy + touch.energy, force=force, gaps=touch.gaps, projection=projection,
+                         displacement=displacement, indentation_force=touch.indentation_force,
+                         friction_response=touch.friction_response)
 
     def build_pattern(self, eliminated, cells, *, precision=np.float32):
         """Fix the global matrix: its unknowns are the free but the `eliminated` ones; `cells` [(c, k)]: what cells leave.
@@ -263,7 +266,7 @@ class Slab:
 
     def tangent(self, state, condensed, *, workers=SERIAL):
         """Upper triangle (csr) of the tangent with the cells' condensed blocks [(f, k, k)] and the object's contact."""
-        whole, shapes = self.rubber_tangent(state, condensed, workers=workers).copy(), self.top.normal_shapes(state.planes)
+        whole, shapes = self.rubber_tangent(state, condensed, workers=workers).copy(), self.top.normal_shapes(state.projection)
         weighted = shapes * self.top.stiffness(state).reshape(len(shapes), -1, 1)
         add_upper(whole.data, np.matmul(weighted.transpose(0, 2, 1), shapes), self._top_positions)
         return whole
@@ -275,27 +278,27 @@ class Slab:
         blocks = workers.map(lambda group: group[1].tangent(state.displacement[group[0]], precision=matrix.dtype.type), self.groups)
         for part, positions in zip([*blocks, *condensed], self._positions, strict=True):
             add_upper(matrix.data, part, positions)
-        if state.drag is not None:
+        if state.friction_response is not None:
             add_upper(matrix.data, self.top.friction_tangent(state)[0], self._top_positions)
         return matrix
 
-    def linear_gaps(self, displacement, planes, indentation):
+    def linear_gaps(self, displacement, projection, indentation):
         """The gaps of the object's contact points as they depend on a step of the global unknowns, a `LinearGaps`."""
-        shapes, gaps = self.top.normal_shapes(planes), self.top.gaps(displacement, planes, indentation)
+        shapes, gaps = self.top.normal_shapes(projection), self.top.gaps(displacement, projection, indentation)
         free = np.broadcast_to(self._top_dofs[:, None] >= 0, shapes.shape)
         points = np.broadcast_to(np.arange(len(gaps)).reshape(*shapes.shape[:2], 1), shapes.shape)[free]
         columns = np.broadcast_to(self._top_dofs[:, None], shapes.shape)[free]
         rows = sp.csr_matrix((shapes[free], (points, columns)), shape=(len(gaps), len(self.unknowns)))
-        return LinearGaps(gaps=gaps, rows=rows, lowering=planes.normals[:, 2], area=self.top.area * planes.covered,
-                          contact=self.top.contact_on(planes))
+        return LinearGaps(gaps=gaps, rows=rows, indentation_increment=projection.normals[:, 2],
+                          area=self.top.area * projection.covered, contact=self.top.contact_on(projection))
 
     def unknowns_of(self, nodes):
         """The global matrix' unknowns (k, 3) of nodes (k,), -1 where a movement is none."""
         return self._number[nodes]
 
     def friction_border(self, state):
-        """How friction ties the unknowns to the object's lowering: derivative (unknowns,) of their residual by it, and its own."""
-        if state.drag is None:
+        """How friction ties the unknowns to the indentation: derivative (unknowns,) of their residual by it, and its own."""
+        if state.friction_response is None:
             return np.zeros(len(self.unknowns)), 0.0
         _, of_faces, corner = self.top.friction_tangent(state)
         border, here = np.zeros(len(self.unknowns)), self._top_dofs >= 0
@@ -334,7 +337,7 @@ class Slab:
         masters, weights = self._masters[plane], self._weights[plane]
         rows = np.repeat(np.arange(len(plane)), masters.shape[1])
         own = sp.csr_matrix((weights.ravel(), (rows, masters.ravel())), shape=(len(plane), self.nodes))
-        return _without_zeros(plan_interpolation(self.sheet_plan.plan, points) @ own)
+        return _without_zeros(interpolation_2d(self.sheet_mesh_2d.mesh_2d, points) @ own)
 
     @property
     def interface_nodes(self):

@@ -8,7 +8,7 @@ import numpy as np
 
 from softtact.fem.static_condensation import packed
 from softtact.fem.substructuring import LayerwiseElimination
-from softtact.fem.tangent_cache import KeptTangents
+from softtact.fem.tangent_cache import TangentCache
 from softtact.linalg.workers import SERIAL, chunks
 
 _CHUNK = 8                          # cells that one thread condenses at once
@@ -23,8 +23,8 @@ _LEAST_DAMPING, _DAMPING_GROWTH = 0.05, 4.0     # N/mm on each unknown; a frustu
 class SheetCells:
     """Cells of a `Slab` with their frusta; `roots` (f, k) are the slab's nodes of each frustum's root."""
 
-    def __init__(self, slab, bed, roots):
-        self.slab, self.bed, self.roots, self.count = slab, bed, roots, bed.count
+    def __init__(self, slab, support, roots):
+        self.slab, self.support, self.roots, self.count = slab, support, roots, support.count
         self.kinds = [CellKind(slab, group, roots[group.cells]) for group in slab.cell_groups]
         self._tangent_at = None
         self._damping, self._damped_with = np.zeros(self.count), np.zeros(self.count)
@@ -56,9 +56,9 @@ class SheetCells:
         stale = self._stale(state, kept_mm)
         frusta = chunks(np.flatnonzero(stale), _CHUNK)
         kept = min(kept_mm, _ELEMENTS_KEEP_MM)
-        workers.map(lambda part: self.bed.condense(state.bed, part, self._damping[part], kept_mm=kept), frusta)
+        workers.map(lambda part: self.support.condense(state.support, part, self._damping[part], kept_mm=kept), frusta)
         tasks = [(kind, part) for kind in self.kinds for part in chunks(np.flatnonzero(stale[kind.cells]), _CHUNK)]
-        workers.map(lambda task: task[0].condense(state, self.bed, task[1], self._damping, kept_mm=kept), tasks)
+        workers.map(lambda task: task[0].condense(state, self.support, task[1], self._damping, kept_mm=kept), tasks)
         self._damped_with = self._damping.copy()
         return int(stale.sum())
 
@@ -79,7 +79,7 @@ class SheetCells:
         """Let the next `refresh` recompute the given cells, or all, then also the tangents that their elements keep."""
         if cells is None:
             self._tangent_at = None
-            self.bed.forget()
+            self.support.forget()
             for kind in self.kinds:
                 kind.forget()
         elif self._tangent_at is not None:
@@ -88,7 +88,7 @@ class SheetCells:
     def _stale(self, state, kept_mm):
         slope, limit = self._slope(state)
         roots = state.slab.displacement[self.roots].reshape(self.count, -1)
-        place = np.hstack([roots, state.bed.displacement.reshape(self.count, -1)])
+        place = np.hstack([roots, state.support.displacement.reshape(self.count, -1)])
         above = [state.slab.displacement[kind.nodes].reshape(len(kind.cells), -1) for kind in self.kinds]
         if self._tangent_at is None:
             self._tangent_at, self._above, self._slope_at = place, above, slope
@@ -103,22 +103,22 @@ class SheetCells:
 
     def _slope(self, state):
         """Stiffnesses (f, q) in N/mm3 of the contact points with friction's, and by how much they may change."""
-        slope, drag = self.bed.contact_slope(state.bed.gaps), state.bed.drag
-        if drag is not None:
-            slope = np.hstack([slope, drag.stiffness().reshape(self.count, -1)])
-        without = state.slab.drag is None and drag is None
-        return slope, _REFRESH_SLOPE * self.bed.contact.stiffness if without else _REFRESH_WITH_FRICTION
+        slope, friction_response = self.support.contact_slope(state.support.gaps), state.support.friction_response
+        if friction_response is not None:
+            slope = np.hstack([slope, friction_response.stiffness().reshape(self.count, -1)])
+        without = state.slab.friction_response is None and friction_response is None
+        return slope, _REFRESH_SLOPE * self.support.contact.stiffness if without else _REFRESH_WITH_FRICTION
 
     def condensed_residual(self, state, *, workers=SERIAL):
         """Residual (n, 3) of the slab with all inner unknowns eliminated, and what `recover` needs again."""
-        root_force, in_frusta = self.bed.condensed_residual(state.bed, workers=workers)
+        root_force, in_frusta = self.support.condensed_residual(state.support, workers=workers)
         residual = state.slab.force.copy()
         np.add.at(residual, self.roots.ravel(), root_force.reshape(-1, 3))
         flat = residual.reshape(-1)
         reduced = workers.map(lambda kind: kind.residual(flat), self.kinds)
         for kind, (passed_on, _) in zip(self.kinds, reduced, strict=True):
             np.add.at(flat, kind.outer_dofs.ravel(), passed_on.ravel())
-        return residual, (in_frusta, [halves for _, halves in reduced])
+        return residual, (in_frusta, [forward_solved for _, forward_solved in reduced])
 
     def recover(self, kept, slab_step, *, workers=SERIAL):
         """Newton steps of the slab (n, 3), its inner nodes filled in, and of the frusta (f, nodes, 3).
@@ -135,7 +135,8 @@ class SheetCells:
             return slab, frusta
         share, (in_frusta, in_cells) = _FARTHEST_MM / np.maximum(inner, _FARTHEST_MM), kept
         cut = ([share[:, None] * half for half in in_frusta],
-               [[share[kind.cells, None] * half for half in halves] for kind, halves in zip(self.kinds, in_cells, strict=True)])
+               [[share[kind.cells, None] * half for half in forward_solved] for kind,
+                forward_solved in zip(self.kinds, in_cells, strict=True)])
         return self._recovered(cut, slab_step, workers)
 
     def _movement(self, slab, frusta):
@@ -154,7 +155,7 @@ class SheetCells:
         for kind, step in zip(self.kinds, steps, strict=True):
             flat[kind.inner_dofs] = step
         full = flat.reshape(-1, 3)
-        return full, self.bed.inner_step(in_frusta, full[self.roots].reshape(self.count, -1), workers=workers)
+        return full, self.support.inner_step(in_frusta, full[self.roots].reshape(self.count, -1), workers=workers)
 
 
 class CellKind:
@@ -162,7 +163,7 @@ class CellKind:
 
     def __init__(self, slab, group, roots):
         self.cells = group.cells
-        self._layers = [[(nodes, KeptTangents(block)) for nodes, block in layer] for layer in group.layers]
+        self._layers = [[(nodes, TangentCache(block)) for nodes, block in layer] for layer in group.layers]
         members = [nodes.reshape(len(self.cells), -1) for nodes, _ in group.parts]
         self.nodes, local = _same_in_all(np.hstack([*members, roots]))
         *groups, root = np.split(local, np.cumsum([m.shape[1] for m in members]))
@@ -184,22 +185,22 @@ class CellKind:
         """What the slab's forces (all unknowns,) on inner unknowns leave on the outer ones (c, k), and what `inner_step` needs."""
         force = np.zeros((len(self.cells), 3 * self.nodes.shape[1]))
         force[:, self._inner_places] = flat[self.inner_dofs]
-        halves = self.elimination.residual(force)
-        return force[:, self.elimination.outer], halves
+        forward_solved = self.elimination.residual(force)
+        return force[:, self.elimination.outer], forward_solved
 
-    def inner_step(self, halves, flat):
+    def inner_step(self, forward_solved, flat):
         """The Newton step (c, inner) of the inner unknowns for a step (all unknowns,) of the slab's outer ones."""
         step = np.zeros((len(self.cells), 3 * self.nodes.shape[1]))
         step[:, self.elimination.outer] = flat[self.outer_dofs]
-        self.elimination.recover(halves, step)
+        self.elimination.recover(forward_solved, step)
         return step[:, self._inner_places]
 
-    def condense(self, state, bed, chosen, damping, *, kept_mm=0.0):
+    def condense(self, state, support, chosen, damping, *, kept_mm=0.0):
         """Recompute the condensed tangents of some of these cells (k,), counted among them, from those of their frusta.
 
-        damping: of all cells, in N/mm;  kept_mm: see `KeptTangents`
+        damping: of all cells, in N/mm;  kept_mm: see `TangentCache`
         """
-        frusta = [packed(bed.root_stiffness[self.cells[chosen], None])]
+        frusta = [packed(support.root_stiffness[self.cells[chosen], None])]
         layers = (((frusta if k == 0 else []) + [self._tangents(state, part, chosen, kept_mm) for part in layer], None)
                   for k, layer in enumerate(self._layers))
         self.elimination.set(chosen, layers, damping=damping[self.cells[chosen]])

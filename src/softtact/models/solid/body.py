@@ -227,9 +227,11 @@ class FreeBody:
         moved = self.evaluate(self.carried(state.displacement, lowered), lowered)
         return ((self.residual(moved) - self.residual(state)) / _PROBE_MM, (moved.object_force - state.object_force) / _PROBE_MM)
 
-    def moved(self, state, step, lowering):
-        """The state after a step (unknowns,) in mm and a lowering of the object in mm; None where an element is inside out."""
+    def moved(self, state, step, indentation_increment):
+        """The state after a step (unknowns,) in mm and an indentation increment of the object in mm; None where an element is
+        inside out.
+        """
         displacement = state.displacement.copy()
         displacement.ravel()[self.free] += step
-        indentation = state.indentation + lowering
+        indentation = state.indentation + indentation_increment
         return self.evaluate(self.carried(displacement, indentation), indentation)

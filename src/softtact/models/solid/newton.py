@@ -26,8 +26,8 @@ class FreeSettings:
 
 
 @dataclass(frozen=True)
-class FreeLevel:
-    """A converged level: its state, iterations, factorisations, and the largest unbalanced force in N."""
+class FreeLoadStep:
+    """A converged load step: its state, iterations, factorisations, and the largest unbalanced force in N."""
 
     state: FreeState
     iterations: int
@@ -36,14 +36,14 @@ class FreeLevel:
 
 
 def press_to_indentations(body, indentations_mm, *, settings=FreeSettings()):
-    """Yield a `FreeLevel` for each indentation (mm, increasing)."""
+    """Yield a `FreeLoadStep` for each indentation (mm, increasing)."""
     press = _Press(body, settings)
     for indentation in indentations_mm:
         yield press.advance(float(indentation), None)
 
 
 def press_to_forces(body, forces_n, *, settings=FreeSettings()):
-    """Yield a `FreeLevel` for each force (N, increasing); the first touch is made by a small indentation."""
+    """Yield a `FreeLoadStep` for each force (N, increasing); the first touch is made by a small indentation."""
     press = _Press(body, settings)
     press.advance(settings.first_touch_mm, None)
     for force in forces_n:
@@ -78,9 +78,9 @@ class _Press:
         body, last = self.body, self.states[-1]
         body.face(last.displacement)
         start = self._start(indentation) if force is None else body.evaluate(last.displacement, last.indentation)
-        level = self._newton(start, force)
-        self.states = [*self.states[-3:], level.state]
-        return level
+        load_step = self._newton(start, force)
+        self.states = [*self.states[-3:], load_step.state]
+        return load_step
 
     def _start(self, indentation):
         """Displacements continued to the next indentation: along the tangent at first, then by a curve through the last states."""
@@ -122,14 +122,14 @@ class _Press:
         for iteration in range(settings.max_iterations):
             moved = float(np.abs(state.displacement - last.displacement).max())
             if residual <= settings.relative_residual * state.mean_force and correction <= settings.relative_correction * moved:
-                return FreeLevel(state, iteration, factorisations, residual)
+                return FreeLoadStep(state, iteration, factorisations, residual)
             if not reuse:
                 body.factor(state)
                 self.factored, factorisations, memory = True, factorisations + 1, _Memory()
-            step, lowering = self._step(state, force, reuse)
+            step, indentation_increment = self._step(state, force, reuse)
             if force is None and not body.contacts:   # a mean of steps would not fulfil the contact
                 step = memory.improved(step)
-            trial = self._line_search(state, step, lowering, force, residual)
+            trial = self._line_search(state, step, indentation_increment, force, residual)
             if trial is None and not reuse and not body.join_contact():
                 break
             reuse = trial is not None and self._norm(trial, force) < settings.good_reduction * residual
@@ -138,7 +138,7 @@ class _Press:
         raise ConvergenceError(f"No balance at an indentation of {state.indentation:.4g} mm: {residual:.3g} N are left.")
 
     def _step(self, state, force, reuse):
-        """Step (unknowns,) and lowering of the object (mm)."""
+        """Step (unknowns,) and indentation increment of the object (mm)."""
         body = self.body
         if force is None:
             return body.step(state), 0.0
@@ -149,19 +149,19 @@ class _Press:
         else:
             step = -body.solver.solve(residual)
         stiffness = abs(self._corner + self._border @ self._along)
-        lowering = (force - state.object_force - self._border @ step) / stiffness
-        return step + lowering * self._along, lowering
+        indentation_increment = (force - state.object_force - self._border @ step) / stiffness
+        return step + indentation_increment * self._along, indentation_increment
 
     def _norm(self, state, force):
         largest = float(np.abs(self.body.residual(state)).max())
         return largest if force is None else max(largest, abs(state.object_force - force))
 
-    def _line_search(self, state, step, lowering, force, residual):
+    def _line_search(self, state, step, indentation_increment, force, residual):
         """The first of the shares 1, 1/2, 1/4 ... of the step that lowers the residual or the potential."""
-        share = min(1.0, self.settings.largest_step_mm / max(float(np.abs(step).max()), abs(lowering), 1e-30))
+        share = min(1.0, self.settings.largest_step_mm / max(float(np.abs(step).max()), abs(indentation_increment), 1e-30))
         before = state.energy - (force or 0.0) * state.indentation
         for _ in range(10):
-            trial = self.body.moved(state, share * step, share * lowering)
+            trial = self.body.moved(state, share * step, share * indentation_increment)
             if trial is not None:
                 change = trial.energy - (force or 0.0) * trial.indentation - before
                 if self._norm(trial, force) < residual or change < -1e-11 * abs(before):
