@@ -328,7 +328,7 @@ def test_fit_refuses_options_without_meaning_and_writes_no_card(refused, tmp_pat
 
 def test_a_materials_yaml_is_given_alone(refused, tmp_path):
     status, said = refused("fit", "config/materials/neoprene.yaml", "--mode", "uniaxial", "--out", tmp_path / "card.json")
-    assert status == 1 and "says itself what its files are; give it alone" in said
+    assert status == 1 and "names its own files and options; give it without others" in said
 
 
 @pytest.mark.parametrize(("card", "sentence"), [("lid=card.json", "the layer is 'lid'; give dielectric or cover"),
