@@ -128,6 +128,19 @@ def test_the_numbers_in_the_pages_are_those_of_the_records():
     assert "| fine | 20 |" in page and page == write_numbers["performance_page"](page), "run: make numbers"
 
 
+def test_packages_import_downwards_only_as_the_page_about_the_code_draws_them():
+    picture = (ROOT / "docs/explanation/code_layout.md").read_text(encoding="utf-8").split("```")[1]
+    rows = [re.findall(r"\b([a-z]+)/(?=\s|$)", row, flags=re.MULTILINE) for row in re.split("─+", picture)]
+    depth = {package: number for number, row in enumerate(rows) for package in row}
+    source = ROOT / "src/softtact"
+    packages = {path.parent.name for path in source.glob("*/__init__.py")}
+    assert set(depth) == packages
+    upwards = [f"{path.relative_to(source)} imports softtact.{name}" for path in source.glob("*/**/*.py")
+               for name in re.findall(r"(?:from|import) softtact\.(\w+)", path.read_text(encoding="utf-8"))
+               if name in packages and depth[name] < depth[path.relative_to(source).parts[0]]]
+    assert not upwards
+
+
 def test_the_page_about_costs_is_short():
     assert (ROOT / "docs/performance.md").stat().st_size <= 4096 and (ROOT / "README.md").stat().st_size <= 5120
 
