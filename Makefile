@@ -27,16 +27,17 @@ bench: .venv/installed
 
 lint: .venv/tested
 	$(BIN)/ruff check .
+	$(BIN)/mypy
 	$(BIN)/snakemake --lint
 
 # The workflow finds its own interpreter; the environment need not be activated.
 .venv/installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet -c constraints.txt -e .
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[workflow,learn,view,optics,mkl]'
 	touch $@
 
 .venv/tested: .venv/installed
-	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[test,docs]'
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[all,test,docs]'
 	touch $@
 
 # The documentation as a site, from docs/ into site/; a warning is an error.

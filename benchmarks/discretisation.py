@@ -26,11 +26,12 @@ from softtact.fem.extruded_mesh import cell_mesh_2d
 from softtact.materials.laws.registry import make_law
 from softtact.models.solid.body import FreeBody, RigidContact, flat_surface, ground
 from softtact.models.solid.newton import FreeSettings, press_to_forces, press_to_indentations
+from softtact.sensors.library import sensor_file
 from softtact.sensors.specification import SensorSpec
 
 PAGE = Path(__file__).parents[1] / "docs/notebook/2026-11-21-which-element.md"
 FIGURE = Path(__file__).parents[1] / "docs/discretisation.png"
-SPEC = SensorSpec.from_yaml(Path(__file__).parents[1] / "config/sensors/coro.yaml")
+SPEC = SensorSpec.from_yaml(sensor_file("coro"))
 LAWS = {"dielectric": {"c10": 0.1706, "c01": 0.0040}, "cover": {"c10": 0.1786, "c01": 0.0022}}
 STIFF = 2 * (1 + 0.4995) / (3 * (1 - 2 * 0.4995))      # K / mu0 at nu = 0.4995
 DEPTHS_MM = 0.025 * np.arange(1, 9)

@@ -20,6 +20,7 @@ from softtact.materials.fitting import collect, errors_of, fit_law, rms
 from softtact.materials.laws.registry import make_law
 from softtact.materials.making import curves_of
 from softtact.materials.readers import read_curves
+from softtact.sensors.library import material_file
 
 PROJECT = Path(__file__).parents[1]
 PAGE = PROJECT / "docs" / "notebook" / "2026-11-22-laws-on-published-tests.md"
@@ -65,7 +66,7 @@ def silicone(path):
 
 def seconds():
     """Time of a whole card, predictions of tests left out included, and of the fits alone, for the project's own curves."""
-    config = load_material(PROJECT / "config" / "materials" / "polyurethane.yaml")
+    config = load_material(material_file("polyurethane"))
     curves, times = curves_of(config.curve_settings), {}
     for name, left_out in (("card", True), ("fits", False)):
         start = time.perf_counter()

@@ -31,6 +31,7 @@ from softtact.models.foundation.compliance import foundation_compliance
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.press.sensor import Sensor
+from softtact.sensors.library import sensor_file
 from softtact.sensors.specification import SensorSpec
 
 CONFIG = Path(__file__).resolve().parents[1] / "config"
@@ -49,7 +50,7 @@ OUTCOMES = ("reached", "outside", "flagged", "stopped", "refused", "nonsense", "
 def random_sensor(number, model):
     """The sensor of a block of presses: a law of its own in each layer, and an elastic layer of its own."""
     rng, side = np.random.default_rng([1, number]), PITCH_MM * FRUSTA[model]
-    spec = SensorSpec.from_yaml(CONFIG / "sensors/coro.yaml").model_copy(
+    spec = SensorSpec.from_yaml(sensor_file("coro")).model_copy(
         update={"footprint_mm": (side, side), "map_shape": (2 * FRUSTA[model] + 1,) * 2,
                 "force_range_n": (0.0, LARGEST_MPA * side**2)})
     layer = spec.elastic_layer.model_copy(update={"young_mpa": rng.uniform(0.5, 3.0), "poisson": rng.uniform(0.1, 0.45)})

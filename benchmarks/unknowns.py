@@ -102,7 +102,7 @@ def cases():
     """All of them, the default first."""
     both, ratios = tuple(LAYERS), (1.0, 2.0, 5.0, 10.0)
     swapped = {"dielectric.frusta.tip_diameter_mm": 1.2, "dielectric.frusta.root_diameter_mm": 0.6}
-    return [Case(DEFAULT, "", "all assumptions as in config/sensors/coro.yaml"),
+    return [Case(DEFAULT, "", "all assumptions as in the file of the sensor coro"),
             *(compressible(ratio, *layers) for layers in (both, both[:1], both[1:]) for ratio in ratios),
             *(thickness("sheet", "dielectric.sheet_thickness_mm", value, 0.5) for value in (0.25, 1.0)),
             *(thickness("cover", "cover.thickness_mm", value, 1.5) for value in (1.0, 2.0)),

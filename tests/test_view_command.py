@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 import xarray
+from support.sensors import CORO
 
 import softtact
 from softtact.cli import main
@@ -15,7 +16,6 @@ from softtact.commands import view as view_command
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.press.vtu import LAYERS, of_bodies, of_map, read_vtu
 from softtact.reporting.press_view import _draw_with_matplotlib, read_view
-from softtact.sensors.specification import SensorSpec
 
 ROOT = Path(__file__).resolve().parents[1]
 X, Y = np.linspace(-2, 2, 5), np.linspace(-3, 3, 7)
@@ -33,8 +33,8 @@ def press_nc(tmp_path):
 @pytest.fixture(scope="module")
 def hyperelastic(tmp_path_factory):
     """A press on four frusta whose mesh was kept, as result and as VTU."""
-    sensor = softtact.load_sensor(ROOT / "config/sensors/coro.yaml")
-    spec = SensorSpec.from_yaml(ROOT / "config/sensors/coro.yaml").model_copy(update={"footprint_mm": (2.4, 2.4)})
+    sensor = softtact.load_sensor("coro")
+    spec = CORO.model_copy(update={"footprint_mm": (2.4, 2.4)})
     sensor = replace(sensor, spec=spec, mesh=MeshSettings.draft())
     ball = trimesh.creation.icosphere(subdivisions=3, radius=3.0)
     result = sensor.press(ball, force_n=[0.2, 0.5], model="hyperelastic", label="", threads=1, keep_body=True)

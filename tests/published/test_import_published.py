@@ -6,19 +6,18 @@ import numpy as np
 import pandas as pd
 import pytest
 from small_archive import Archive
+from support.sensors import CORO
 
 from softtact.errors import InputError
 from softtact.files import read_dataset
 from softtact.learning.samples import read_samples
-from softtact.sensors.specification import SensorSpec
 from softtact.stages import build_dataset, import_published
 
-SENSOR = "config/sensors/coro.yaml"
 SPLITS = ("train", "validation", "unseen", "grasps")
 
 
 def settings_for(folder, **changes):
-    sensor = SensorSpec.from_yaml(SENSOR).model_dump(mode="json")
+    sensor = CORO.model_dump(mode="json")
     return {"folder": str(folder), "variant": None, "models": ["elastic", "hyperelastic"], "unseen": ["donut_m"],
             "without": [], "taxel_order": "rows", "outliers": "leave_out", "largest_outlier_share": 0.1, "sensor": sensor,
             "seed": 5} | changes

@@ -82,10 +82,9 @@ def test_forces_and_newton_steps_are_the_slopes_of_the_potential_of_a_press_with
     load_step = last_load_step(body, [0.5, 1.0], surface=surface)
     covered = load_step.state.slab.projection.covered[load_step.state.slab.gaps < 0]
     assert (covered < 1).any() == ("punch" in under)
-    body.friction.begin_step(load_step.state)
-    moved = shifted(body, load_step.state, random_step(body, 6e-4), 1.0)
-    body.friction.renew(moved)
-    state = shifted(body, moved, random_step(body, 0.0), 0.0)
+    begun = body.reevaluate_contact(load_step.state, body.friction.begin_step(load_step.state))
+    moved = shifted(body, begun, random_step(body, 6e-4), 1.0)
+    state = body.reevaluate_contact(moved, body.friction.renewed(moved))
     assert (np.linalg.norm(state.support.friction_response.slip,
                            axis=-1) > SLIP_TOLERANCE_MM)[state.support.friction_response.friction_state.pressure > 0].mean() > 0.1
     body.cells.forget()                                # every cell's tangent anew
@@ -120,7 +119,7 @@ class Step:
 
 def shifted(body, state, step, share):
     return body.evaluate(state.slab.displacement + share * step.slab, state.support.displacement + share * step.support,
-                         state.indentation + share * step.indentation, state.slab.projection)
+                         state.indentation + share * step.indentation, state.slab.projection, state.history)
 
 
 def potential(state, force):
@@ -191,7 +190,7 @@ def test_no_point_carries_more_than_coulomb_allows_and_sliding_ones_carry_all_of
                               ("board", body.support, load_steps[-1].state.support)):
         friction_response = state.friction_response
         # of the frusta's points those on the board
-        pressure = part.contact.response(state.gaps)[1][..., :friction_response.slip.shape[-2]]
+        pressure = state.history.contact.response(state.gaps)[1][..., :friction_response.slip.shape[-2]]
         pressed = pressure > 1e-4
         ratio = np.linalg.norm(friction_response.traction[pressed], axis=-1) / (part.friction.coefficient * pressure[pressed])
         sliding = np.linalg.norm(friction_response.slip[pressed], axis=-1) > SLIP_TOLERANCE_MM
@@ -285,24 +284,24 @@ class RoughSlab(HeldSlab):
         state, last = slab.evaluate(u, slab.project(u, surface), 0.0), 0.0
         for depth in depths:
             planes = slab.project(state.displacement, surface)
-            top.begin_step(slab.update_normals(state, planes, last), last)
+            before = slab.update_normals(state, planes, last)
+            history = state.history.held_by(top.first_friction_state(before, last))
             for k in range(passes):
-                state = self._balance(state.displacement, planes, depth, tolerance)
-                before, top.friction_state = top.friction_state, top.renewed_friction_state(state)
-                state = slab.update_normals(state, planes, depth)
+                state = self._balance(state.displacement, planes, depth, history, tolerance)
+                renewed = history.held_by(top.renewed_friction_state(state))
+                state = slab.update_normals(state, planes, depth, renewed)
                 if np.abs(state.force.ravel()[slab.free]).max() < tolerance * abs(state.indentation_force):
                     break
-                if k >= 3:
-                    top.friction_state = before.halfway(top.friction_state)
+                history = history.held_by(history.friction.halfway(renewed.friction)) if k >= 3 else renewed
             else:
                 raise ArithmeticError("friction does not settle")
             last = depth
         return state
 
-    def _balance(self, u, planes, depth, tolerance, iterations=60):
+    def _balance(self, u, planes, depth, history, tolerance, iterations=60):
         slab, solver, friction_response = self.slab, make_solver(), None
         for _ in range(iterations):
-            state = slab.evaluate(u, planes, depth)
+            state = slab.evaluate(u, planes, depth, history)
             state = replace(state, friction_response=state.friction_response.after(friction_response))
             residual, friction_response = state.force.ravel()[slab.free], state.friction_response
             if np.abs(residual).max() < 0.1 * tolerance * abs(state.indentation_force):
@@ -332,9 +331,10 @@ def test_friction_acts_on_the_share_of_area_that_the_object_covers_as_the_pressu
     u = np.zeros((slab.nodes, 3))
     planes = slab.project(u, flat_punch(1.0))
     assert ((planes.covered > 0) & (planes.covered < 1)).any()
-    slab.top.begin_step(slab.evaluate(u, planes, depth), depth)
-    slab.top.friction_state = slab.top.renewed_friction_state(slab.evaluate(u, planes, depth))
-    state = slab.evaluate(u + [10 * SLIP_TOLERANCE_MM, 0.0, 0.0], planes, depth)
+    start = slab.evaluate(u, planes, depth)
+    begun = start.history.held_by(slab.top.first_friction_state(start, depth))
+    pressed = begun.held_by(slab.top.renewed_friction_state(slab.evaluate(u, planes, depth, begun)))
+    state = slab.evaluate(u + [10 * SLIP_TOLERANCE_MM, 0.0, 0.0], planes, depth, pressed)
     expected, got = mu * state.indentation_force, state.force[:, 0].sum()
     assert expected > 0.05
     error = record("punch that slides over the edge of points' areas: friction, N", expected=expected, source=COULOMB, got=got)
@@ -363,7 +363,7 @@ def test_teeth_push_a_layer_aside_until_friction_holds_them(mu, record):
     state = slab.slide(teeth(angle), [depth], tolerance=1e-8)
     middle = np.abs(slab.slab.top.reference[:, 0]) < 0.5
     expected = p * press if lean > 0 else straight
-    push = -slab.slab.top.contact.response(state.gaps)[1][:, None] * state.projection.normals + state.friction_response.traction
+    push = -state.history.contact.response(state.gaps)[1][:, None] * state.projection.normals + state.friction_response.traction
     got = push[middle, 2].mean()
     error = record(f"layer under teeth of slope 0.2, mu = {mu:g}: downward traction, MPa", expected=expected, source=source,
                    got=got)

@@ -6,15 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from support.sensors import CORO
 
 from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.press.sensor import Sensor
-from softtact.sensors.specification import SensorSpec
 
 ROOT = Path(__file__).parents[2]
-CORO = SensorSpec.from_yaml(ROOT / "config/sensors/coro.yaml")
 SMALL = CORO.model_copy(update={"footprint_mm": (3.6, 3.6), "map_shape": (13, 13)})      # 3 x 3 frusta, a map as dense as theirs
 LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492),
         "cover": make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)}

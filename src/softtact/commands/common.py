@@ -118,8 +118,8 @@ def numbers(option, text, count):
 
 def sensor_spec(name):
     """The description of a sensor by its name or its YAML file, without its solvers."""
+    from softtact.sensors.library import sensor_file
     from softtact.sensors.specification import SensorSpec
-    from softtact.study.config import sensor_file
 
     return SensorSpec.from_yaml(sensor_file(name))
 

@@ -3,6 +3,9 @@
 Vertical lines through query points are cut with the triangles found in a grid of bins; no sampling of the surface takes place.
 """
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
 from numba import njit
 
@@ -40,6 +43,20 @@ class HeightField:
         hit = index >= 0
         normal[hit] = self.normals[index[hit]]
         return height, normal
+
+
+@dataclass(frozen=True)
+class MovedSurface:
+    """An object's underside after a way along x and y."""
+
+    surface: Callable
+    """Heights (n,) and normals (n, 3) of the object's underside over points, as `HeightField`."""
+    offset_mm: np.ndarray
+    """The way (2,)."""
+
+    def __call__(self, x, y):
+        """Heights (n,) and normals (n, 3) over points (n,), (n,) of the sensor."""
+        return self.surface(x - self.offset_mm[0], y - self.offset_mm[1])
 
 
 def lowest_crossing_naive(x, y, mesh):

@@ -1,11 +1,10 @@
 """A cover whose lowest layer keeps to the sheet's plan: balance across the interface, the map's plane, parts, mesh settings."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import trimesh
 from scipy.spatial import cKDTree
+from support.sensors import CORO
 
 from softtact.contact.height_field import HeightField
 from softtact.decks.mesh import body_mesh
@@ -17,10 +16,9 @@ from softtact.models.hyperelastic.deformed_mesh import pressed_body
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.models.hyperelastic.newton import NewtonSettings, _augment
 from softtact.models.meshes import mesh_settings
+from softtact.models.newton import Solution
 from softtact.press.sensor import Sensor
-from softtact.sensors.specification import SensorSpec
 
-CORO = SensorSpec.from_yaml(Path(__file__).parents[3] / "config/sensors/coro.yaml")
 SMALL = CORO.model_copy(update={"footprint_mm": (6.0, 6.0), "map_shape": (11, 11)})     # 5 x 5 frusta
 LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492)
 THREE = (0.0, 0.45, 0.8, 1.0)
@@ -145,10 +143,8 @@ class Overlapping:
     def contact_error(self, state):
         return self.overlaps[self.passes]
 
-    def augment(self, state, *, allowed_mm):
+    def augmented(self, state, *, allowed_mm):
         self.passes += 1
-
-    def reevaluate_contact(self, state):
         return state
 
     def indented_to(self, state, force):
@@ -163,6 +159,6 @@ class Overlapping:
 def test_overlaps_are_pressed_apart_as_long_as_it_helps(monkeypatch, overlaps, spent, passes):
     body = Overlapping([1e-3 * depth for depth in overlaps], spent)
     monkeypatch.setattr("softtact.models.hyperelastic.newton._settle",
-                        lambda body, *_: ("state", body.spent[body.passes - 1], 0.0))
-    state, iterations, _ = _augment(body, None, "state", 0.0, 1.0, NewtonSettings())
-    assert (state, body.passes, iterations) == ("state", passes, sum(spent[:passes]))
+                        lambda body, *_: Solution("state", body.spent[body.passes - 1], 0.0))
+    found = _augment(body, None, Solution("state", 0, 0.0), 1.0, NewtonSettings())
+    assert (found.state, body.passes, found.iterations) == ("state", passes, sum(spent[:passes]))

@@ -1,10 +1,9 @@
 """The hyperelastic press on a small sensor: first touch, refusal, mesh file; tests/verification has the rest."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import trimesh
+from support.sensors import CORO
 
 from softtact.contact.height_field import HeightField
 from softtact.errors import ConvergenceError
@@ -18,7 +17,6 @@ from softtact.models.meshes import layered_mesh
 from softtact.press.sensor import Sensor
 from softtact.sensors.specification import SensorSpec
 
-CORO = SensorSpec.from_yaml(Path(__file__).parents[3] / "config/sensors/coro.yaml")
 SMALL = CORO.model_copy(update={"footprint_mm": (6.0, 8.4), "map_shape": (15, 11)})   # 5 x 7 frusta
 LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492),
         "cover": make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)}

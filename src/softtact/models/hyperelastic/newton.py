@@ -6,6 +6,7 @@ import numpy as np
 
 from softtact.errors import ConvergenceError
 from softtact.models.hyperelastic.body import BodyState
+from softtact.models.newton import Solution, lowers_potential, solve
 
 _STILL_MM = 1e-3       # after a step of less no point faces another facet but those that slide to and fro past an edge
 _DEEP = 0.55           # of a frustum's height: from here on elements of the default mesh may be unstable
@@ -78,6 +79,7 @@ class Reached:
 
 def press_load_steps(body, surface, forces_n, *, settings=NewtonSettings()):
     """Yield a `LoadStep` for each force (N, increasing). Raises ConvergenceError naming the load step that was not reached."""
+    body.begin()
     reached = Reached(0.0, _first_touch(body, surface, settings))
     for force in forces_n:
         load_step = _advance(body, surface, reached, float(force), settings)
@@ -89,17 +91,15 @@ def _first_touch(body, surface, settings):
     """Equilibrium at a small given indentation: under force control alone the free object has no stiffness."""
     slab, support = body.rest()
     projection = body.slab.project(slab, surface)
-    if body.friction.active:
-        body.friction.release()
     start = _indented_until_contact(body, body.evaluate(slab, support, projection.anchors[:, 2].min(), projection),
                                     settings.first_touch_mm)
     if body.friction.active:
-        body.friction.begin_step(body.evaluate(slab, support, start.indentation - settings.first_touch_mm, projection))
-        start = body.reevaluate_contact(start)
-    state, _, _ = _settle(body, surface, start, None, settings.first_touch_tolerance_n, settings)
-    if state is None:
+        before = body.evaluate(slab, support, start.indentation - settings.first_touch_mm, projection)
+        start = body.reevaluate_contact(start, body.friction.begin_step(before))
+    found = _settle(body, surface, start, None, settings.first_touch_tolerance_n, settings)
+    if found.state is None:
         raise ConvergenceError("The first touch of the object did not converge.")
-    return state
+    return found.state
 
 
 def _indented_until_contact(body, state, step_mm):
@@ -121,23 +121,24 @@ def _advance(body, surface, reached, target, settings):
     iterations, increment = 0, target - reached.force
     while True:
         force = min(target, reached.force + increment, _reach(body, reached.force, target, settings))
+        start = reached.state
         if settings.max_augmentations and reached.force > 0:
-            body.augment(reached.state, allowed_mm=0.0)     # what overlaps is no start: more of it comes with more force
-        body.friction.begin_step(reached.state, growth=force / reached.force if reached.force > 0 else 1.0)
-        state, spent, residual = _settle(body, surface, body.reevaluate_contact(reached.state), force, _tolerance(force, settings),
-                                         settings)
-        iterations += spent
-        if state is not None and force >= target:
-            state, spent, residual = _augment(body, surface, state, residual, force, settings)
-            iterations += spent
-        if state is not None and force >= target:
-            return LoadStep(force_n=target, state=state, iterations=iterations, residual_n=residual,
-                         penetration_mm=body.penetration(state))
-        increment = 2 * increment if state is not None else 0.5 * (force - reached.force)
-        if state is None and (increment < settings.smallest_increment_n or iterations >= settings.load_step_iterations):
-            raise ConvergenceError(_failure(body, reached, force, target, residual, iterations))
-        if state is not None:
-            reached = Reached(force, state)
+            start = body.augmented(start, allowed_mm=0.0)     # what overlaps is no start: more of it comes with more force
+        growth = force / reached.force if reached.force > 0 else 1.0
+        start = body.reevaluate_contact(start, body.friction.begin_step(start, growth=growth))
+        found = _settle(body, surface, start, force, _tolerance(force, settings), settings)
+        iterations += found.iterations
+        if found.state is not None and force >= target:
+            found = _augment(body, surface, found, force, settings)
+            iterations += found.iterations
+        if found.state is not None and force >= target:
+            return LoadStep(force_n=target, state=found.state, iterations=iterations, residual_n=found.residual_n,
+                            penetration_mm=body.penetration(found.state))
+        increment = 2 * increment if found.state is not None else 0.5 * (force - reached.force)
+        if found.state is None and (increment < settings.smallest_increment_n or iterations >= settings.load_step_iterations):
+            raise ConvergenceError(_failure(body, reached, force, target, found.residual_n, iterations))
+        if found.state is not None:
+            reached = Reached(force, found.state)
 
 
 def _reach(body, force, target, settings):
@@ -158,102 +159,115 @@ def _failure(body, reached, force, target, residual, iterations):
             f"is compressed by {share:.0%} of its height. {remedy}.")
 
 
-def _augment(body, surface, state, residual, force, settings):
-    """The load step once more with its overlaps pressed apart, as long as they are deeper than allowed and become less."""
+def _augment(body, surface, found, force, settings):
+    """The load step once more with its overlaps augmented, as long as they are deeper than allowed and become less."""
     iterations, spent, least, in_vain = 0, 0, np.inf, 0
     for _ in range(settings.max_augmentations):
-        overlap = body.contact_error(state) if state is not None else 0.0
+        overlap = body.contact_error(found.state) if found.state is not None else 0.0
         in_vain = in_vain + (spent > 0) if overlap > _WORTH_A_PASS * least else 0
         least = min(least, overlap)
-        depth = body.descent(state) if state is not None else 0.0
+        depth = body.descent(found.state) if found.state is not None else 0.0
         allowed = settings.largest_penetration_mm * min(1.0, depth / settings.full_depth_mm)
         if overlap <= allowed or in_vain == _PASSES_IN_VAIN:
             break
-        body.augment(state, allowed_mm=allowed)
-        start = body.indented_to(body.reevaluate_contact(state), force)
-        state, spent, residual = _settle(body, surface, start, force, _tolerance(force, settings), settings)
+        start = body.augmented(found.state, allowed_mm=allowed)
+        if force is not None:
+            start = body.indented_to(start, force)
+        found = _settle(body, surface, start, force, _tolerance(force, settings), settings)
+        spent = found.iterations
         iterations += spent
-    return state, iterations, residual
+    return replace(found, iterations=iterations)
 
 
 def _tolerance(force, settings):
-    return settings.relative_tolerance * max(force, settings.smallest_scale_n)
+    return settings.relative_tolerance * max(force or 0.0, settings.smallest_scale_n)
 
 
 def _settle(body, surface, state, force, tolerance, settings):
-    """`_newton`; with friction again and again, until the state is in balance under the friction of its own pressures."""
+    """The `Solution` under a force (N) or at the state's indentation; with friction until friction and pressures agree."""
     if not body.friction.active:
         return _newton(body, surface, state, force, tolerance, settings)
     tolerance, iterations = settings.friction_tolerance * tolerance, 0
     for k in range(settings.friction_passes):
         if k == 1:     # a point at an edge would face now one facet, now the other, and no pass agree with the one before
             settings = replace(settings, projection_iterations=0)
-        state, spent, residual = _newton(body, surface, state, force, tolerance, settings)
-        iterations += spent
-        if state is None:
+        found = _newton(body, surface, state, force, tolerance, settings)
+        iterations += found.iterations
+        if found.state is None:
             break
-        body.friction.renew(state)
-        own = body.reevaluate_contact(state)
+        own = body.reevaluate_contact(found.state, body.friction.renewed(found.state))
         residual = body.residual_norm(own, force)
         if residual <= tolerance:
-            return own, iterations, residual
+            return Solution(own, iterations, residual)
         if k >= settings.whole_passes:     # what is left now swings: more friction, less pressure, less friction
-            body.friction.renew(state, halfway=True)
-            own = body.reevaluate_contact(state)
+            own = body.reevaluate_contact(found.state, body.friction.renewed(found.state, halfway=True))
         state = own
-    return None, iterations, residual
+    return Solution(None, iterations, found.residual_n)
 
 
 def _newton(body, surface, state, force, tolerance, settings):
-    """Equilibrium state (None if not reached), iterations, and the last residual in N.
+    return solve(_Press(body, surface, force, tolerance, settings), state, max_iterations=settings.max_iterations)
+
+
+class _Press:
+    """The body's balance under a force (N), or at its indentation where that is None, as a `Problem`.
 
     The points' facing planes are found anew before and within each of the first steps. A point that slides to and fro past an
     edge sees the object's height jump each time; so the planes are kept later on, and where no step lowers the potential.
     """
-    looking, fresh = True, False
-    for iteration in range(settings.max_iterations):
-        looks = surface if looking and iteration < settings.projection_iterations else None
-        if looks is not None:
-            state = body.update_normals(state, body.slab.project(state.slab.displacement, surface))
-        residual = body.residual_norm(state, force)
-        if residual <= tolerance:
-            return state, iteration, residual
-        step = body.newton_step(state, force, looks, largest_mm=settings.largest_step_mm, kept_mm=settings.kept_tangent_mm)
+
+    def __init__(self, body, surface, force, tolerance, settings):
+        self.body, self.surface, self.force, self.tolerance, self.settings = body, surface, force, tolerance, settings
+        self.projecting, self.fresh, self.projected = True, False, False
+
+    def prepared(self, state, iteration):
+        self.projected = self.projecting and iteration < self.settings.projection_iterations
+        if not self.projected:
+            return state
+        return self.body.update_normals(state, self.body.slab.project(state.slab.displacement, self.surface))
+
+    def residual(self, state):
+        return self.body.residual_norm(state, self.force)
+
+    def balanced(self, state, residual):
+        return residual <= self.tolerance
+
+    def step(self, state):
+        body, settings = self.body, self.settings
+        surface = self.surface if self.projected else None
+        step = body.newton_step(state, self.force, surface, largest_mm=settings.largest_step_mm, kept_mm=settings.kept_tangent_mm)
         if np.isnan(step.indentation) and not state.force > 0:     # a free object that lost its touch on the way
             state = _indented_until_contact(body, state, settings.first_touch_mm)
-            continue
-        state = body.update_normals(state, step.projection)
-        trial = _line_search(body, state, step, force, residual, tolerance, settings) if np.isfinite(step.largest()) else None
-        if trial is None and fresh and looks is None:
-            return None, iteration, residual
-        if trial is None:
-            body.cells.forget()     # of cells that hardly moved the tangents were kept
-            looking = False         # and a step that looks elsewhere need not lower the energy from here
-        elif np.abs(trial.slab.displacement - state.slab.displacement).max() < _STILL_MM:
-            looking = False
-        fresh, state = trial is None, trial or state
-    return None, settings.max_iterations, residual
+            step = body.newton_step(state, self.force, surface, largest_mm=settings.largest_step_mm,
+                                    kept_mm=settings.kept_tangent_mm)
+        return body.update_normals(state, step.projection), step if np.isfinite(step.largest()) else None
 
+    def first_share(self, step):
+        return min(1.0, self.settings.largest_step_mm / max(step.largest(), 1e-30))
 
-def _potential(state, force):
-    return state.energy - (force or 0.0) * state.indentation
+    def moved(self, state, step, share):
+        trial = self.body.evaluate(state.slab.displacement + share * step.slab, state.support.displacement + share * step.support,
+                                   state.indentation + share * step.indentation, step.projection, state.history)
+        return None if trial is None else self.body.balanced(trial, self.tolerance)
 
+    def better(self, trial, state, residual):
+        """Close to equilibrium the potential no longer resolves the difference; there a smaller residual decides."""
+        before = self._potential(state)
+        lower = lowers_potential(before, self._potential(trial), abs(state.energy) + abs(before))
+        return self.residual(trial) < residual if lower is None else lower
 
-def _line_search(body, state, step, force, residual, tolerance, settings):
-    """The first of the shares 1, 1/2, 1/4 ... of the step that lowers the potential.
+    def _potential(self, state):
+        return state.energy - (self.force or 0.0) * state.indentation
 
-    Close to equilibrium the potential no longer resolves the difference; there a smaller residual decides.
-    """
-    share = min(1.0, settings.largest_step_mm / max(step.largest(), 1e-30))
-    before = _potential(state, force)
-    resolution = 1e-11 * (abs(state.energy) + abs(before))
-    for _ in range(10):
-        trial = body.evaluate(state.slab.displacement + share * step.slab, state.support.displacement + share * step.support,
-                              state.indentation + share * step.indentation, step.projection)
-        if trial is not None:
-            trial = body.balanced(trial, tolerance)
-            change = _potential(trial, force) - before
-            if change < -resolution or (change <= resolution and body.residual_norm(trial, force) < residual):
-                return trial
-        share *= 0.5
-    return None
+    def accepted(self, state, trial):
+        if np.abs(trial.slab.displacement - state.slab.displacement).max() < _STILL_MM:
+            self.projecting = False
+        self.fresh = False
+
+    def recovered(self, state):
+        """A new tangent of the cells that hardly moved may help; a step that projects anew need not lower the energy."""
+        if self.fresh and not self.projected:
+            return False
+        self.body.cells.forget()
+        self.projecting, self.fresh = False, True
+        return True
