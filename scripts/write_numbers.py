@@ -47,7 +47,9 @@ def source(name: str) -> str:
 def count_tests() -> dict[str, int]:
     """Folder of tests/ to its number of tests, as `make test` runs them."""
     command = [sys.executable, "-m", "pytest", "--collect-only", "-qq", "-o", "addopts=-m 'not gold'"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False)
+    if done.returncode:
+        sys.exit(f"pytest cannot collect the tests; correct this first:\n{done.stdout[-2000:]}")
     counts: dict[str, int] = {}
     for path, number in re.findall(r"^tests/(\S+): (\d+)$", done.stdout, flags=re.MULTILINE):
         folder = path.partition("/")[0] if "/" in path else "(top)"
