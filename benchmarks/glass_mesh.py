@@ -1,4 +1,5 @@
-"""How the contact area of a frustum on glass depends on its mesh, and on how contact is asked for (the tables of docs/ftir.md).
+"""How the contact area of a frustum on glass depends on its mesh, and on how contact is asked for.
+The tables stand in docs/notebook/2026-11-22-mesh-on-glass.md.
 
     python benchmarks/glass_mesh.py        (some minutes; benchmarks/results/glass_mesh.json)
 """

@@ -5,7 +5,8 @@
 Objects of config/objects, from a third of the sensor's side to all of it, in any turn, tilted by up to 25 degrees, anywhere over
 it; forces up to the sensor's pressure at full range; laws and constants anew every 25 presses. The sensor is a piece of the
 default one, 8 x 8 frusta, 4 x 4 for the hyperelastic model on the draft mesh. The seed is the press' number: `--one MODEL NUMBER`
-presses it again, and an ended run goes on. Counts: benchmarks/results/random_presses.json, from there docs/verification.md.
+presses it again, and an ended run goes on. Counts: benchmarks/results/random_presses.json, from there
+docs/reference/verification.md.
 """
 
 import argparse

@@ -78,7 +78,7 @@ def test_every_commands_help_has_examples_and_the_exit_statuses(command, capsys)
 
 
 def test_the_docs_hold_the_exit_statuses_as_they_are():
-    page = (ROOT / "docs/command_line.md").read_text()
+    page = (ROOT / "docs/reference/command_line.md").read_text()
     assert all(f"| {status} | {meaning} |" in page for status, meaning in EXIT_STATUS.items())
 
 
@@ -329,7 +329,7 @@ def test_fit_refuses_options_without_meaning_and_writes_no_card(refused, tmp_pat
 
 def test_a_materials_yaml_is_given_alone(refused, tmp_path):
     status, said = refused("fit", material_file("neoprene"), "--mode", "uniaxial", "--out", tmp_path / "card.json")
-    assert status == 1 and "says itself what its files are; give it alone" in said
+    assert status == 1 and "names its own files and options; give it without others" in said
 
 
 @pytest.mark.parametrize(("card", "sentence"), [("lid=card.json", "the layer is 'lid'; give dielectric or cover"),

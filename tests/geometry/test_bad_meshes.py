@@ -217,7 +217,7 @@ def test_the_command_says_its_repairs_on_stderr_and_in_the_result(tmp_path, caps
     with_a_hole(punch()).export(tmp_path / "bad.stl")
     press = ["press", str(tmp_path / "bad.stl"), "--unit", "mm", "--force", "5", "--model", "elastic"]
     assert main([*press, "--out", str(tmp_path / "p.nc")]) == 0
-    assert "bad.stl was mended: closed 1 hole" in capsys.readouterr().err
+    assert "bad.stl was repaired: closed 1 hole" in capsys.readouterr().err
     assert read_dataset(tmp_path / "p.nc").attrs["mesh_repairs"].startswith("closed 1 hole")
     assert main([*press, "--no-repair"]) == 1
     assert "the surface is not closed" in capsys.readouterr().err

@@ -241,7 +241,7 @@ def test_an_archive_odder_than_allowed_is_refused(archive, tmp_path, options, re
     drop(archive, FLAT_MAPS, [3])
     outliers = read(archive.write(tmp_path)).outliers
     if refused:
-        assert "1 of 16 tests of the archive are odd" in refusal(outliers.refuse, 16, **options)
+        assert "1 of 16 tests of the archive are outliers" in refusal(outliers.refuse, 16, **options)
     else:
         outliers.refuse(16, **options)
 

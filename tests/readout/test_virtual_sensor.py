@@ -238,7 +238,7 @@ def test_the_stage_writes_readings_of_the_way_up_and_the_way_down(tmp_path):
 
 
 def test_the_guide_names_every_setting_with_its_default():
-    guide = (Path(__file__).parents[2] / "docs/virtual_sensor.md").read_text(encoding="utf-8")
+    guide = (Path(__file__).parents[2] / "docs/explanation/virtual_sensor.md").read_text(encoding="utf-8")
     for name in VirtualSensorSettings.__dataclass_fields__:
         value = getattr(VirtualSensorSettings(), name)
         shown = f"[{', '.join(f'{v:g}' for v in value)}]" if isinstance(value, tuple) else str(value)

@@ -128,7 +128,7 @@ def test_assumed_values_and_their_reasons_reach_the_stages_as_plain_numbers():
         ("models.hyperelastic.mesh.preset", "drft", "at 'models.hyperelastic.mesh.preset' (it is 'drft')"),
         ("models.elastic.device", "cuda", "at 'models.elastic': a model of kind 'elastic' has no 'device'; leave it out"),
         ("models.hyperelastic.device", "gpu", "at 'models.hyperelastic.device' (it is 'gpu')"),
-        ("models.reference.friction", {"board": 0.3}, "tips that are held cannot slide with a friction of 0.3 on the board"),
+        ("models.reference.friction", {"board": 0.3}, "bonded tips cannot slide with a friction of 0.3 on the board"),
         ("models.reference.friction", {"objct": 0.3}, "there is no key 'objct'; did you mean 'object'?"),
         ("models.reference.mesh.thickness_scatter", 0.5, "at 'models.reference.mesh.thickness_scatter' (it is 0.5)"),
         ("virtual_sensor", {"noise_counts": -1}, "virtual_sensor: noise_counts is -1.0; give one number of 0 or more."),

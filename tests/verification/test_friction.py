@@ -1,4 +1,4 @@
-"""Friction: law, tangent, stick and slip, dissipation, a plate of teeth, a rough punch.
+"""Friction: law, tangent, stick and slip, dissipation, a toothed plate, a rough punch.
 
 Coulomb's law as a lagged and regularised potential, on the slab alone and on small sensors of a few frusta.
 """
@@ -98,7 +98,7 @@ def test_forces_and_newton_steps_are_the_slopes_of_the_potential_of_a_press_with
     assert error < 1e-6
     change = (residual(body, up, 1.1) - residual(body, down, 1.1)) / (2 * h)
     got = np.abs(change + residual(body, state, 1.1)).max() / np.abs(residual(body, state, 1.1)).max()
-    record(f"{under} with friction: what is left of the residual's slope after a Newton step, over the residual", expected=0.0,
+    record(f"{under} with friction: remaining slope of the residual after a Newton step, over the residual", expected=0.0,
            source="central differences", got=got)
     assert got < 1e-4
 
@@ -160,7 +160,7 @@ def ball_on(body, forces):
 
 def test_tips_with_much_friction_do_as_held_tips_do(record):
     """Where nothing slides only the slip that builds the traction up is left, less than its tolerance."""
-    source, forces = "tips that are held", [0.4, 0.8]
+    source, forces = "bonded tips", [0.4, 0.8]
     bodies = {"held": body_with(held=True, columns=3, rows=3), "rough": body_with(board=2.0, columns=3, rows=3),
               "free": body_with(columns=3, rows=3)}
     states = {name: list(ball_on(body, forces))[-1].state for name, body in bodies.items()}
@@ -245,7 +245,7 @@ def test_the_more_friction_the_smaller_the_indentation_between_free_and_held_tip
     bodies = [*(body_with(board=mu, columns=3, rows=3) for mu in coefficients), body_with(held=True, columns=3, rows=3)]
     *depths, held = (list(ball_on(body, forces))[-1].state.indentation for body in bodies)
     for mu, depth, before in zip(coefficients[1:], depths[1:], depths[:-1], strict=True):
-        record(f"ball on 3 x 3 frusta, 2 N, board mu = {mu:g}: what the indentation falls short of that with less friction, mm",
+        record(f"ball on 3 x 3 frusta, 2 N, board mu = {mu:g}: reduction of the indentation by the added friction, mm",
                expected=0.0, source=source, got=before - depth, at_least=True)
     assert (np.diff(depths) < 0).all()
     assert depths[-1] > held - SLIP_TOLERANCE_MM
@@ -370,7 +370,7 @@ def test_teeth_push_a_layer_aside_until_friction_holds_them(mu, record):
                    got=got)
     assert error < 2e-3
     top = slab.slab.top.at_points(state.displacement)[middle, 0].mean()
-    error = record(f"layer under teeth of slope 0.2, mu = {mu:g}: way aside, mm", expected=aside, source=source, got=top)
+    error = record(f"layer under teeth of slope 0.2, mu = {mu:g}: lateral displacement, mm", expected=aside, source=source, got=top)
     assert abs(top - aside) < 2e-3 * depth
 
 
@@ -412,8 +412,8 @@ def test_a_block_under_a_rough_plate_resists_and_spreads_as_in_another_program(t
     assert error < 1e-3
     # The pressure is singular at the plate's edge: there the nodes' ways differ, and change by 15 % with the mesh in both.
     for place_, bound in (("on the ground", 1e-3), ("under the plate", 0.07)):
-        error = record(f"block under a plate with mu = 0.2: way of its side {place_}, mm", expected=ways[place_], source=source,
-                       got=our_ways[place_])
+        error = record(f"block under a plate with mu = 0.2: displacement of its side {place_}, mm", expected=ways[place_],
+                       source=source, got=our_ways[place_])
         assert error < bound
 
 
@@ -470,7 +470,7 @@ def block_in_calculix(folder):
 
 def test_friction_under_held_tips_is_refused():
     values = small_spec(2, 2, margin=0.4).model_dump(mode="json") | {"friction": {"object": 0.0, "board": 0.3}}
-    with pytest.raises(InputError, match="tips that are held cannot slide .* set 'tips_bonded' to false"):
+    with pytest.raises(InputError, match="bonded tips cannot slide .* set 'tips_bonded' to false"):
         SensorSpec.from_dict(values)
     assert SensorSpec.from_dict(values | {"tips_bonded": False}).friction.board == 0.3
 

@@ -1,4 +1,4 @@
-"""How far the map on each mesh is from that on a much finer one: a small press here, the long comparison from its record."""
+"""Error of the map on each mesh against a much finer mesh: a small press, and the record of many."""
 
 import json
 from pathlib import Path
@@ -50,6 +50,5 @@ def test_the_errors_of_the_long_comparison_are_what_is_promised(mesh, record):
     assert {row["object"] for row in rows} == {"flat punch", "sphere", "ridges"} and kept["against"] == "reference"
     worst = max(max(row["largest_error_percent"]) for row in rows)
     record(f"36 frusta, three objects, three load steps: largest error of the map on the {mesh} mesh, % of its maximum",
-           expected=0.0,
-           source="benchmarks/mesh_error.py", got=worst)
+           expected=0.0, source="benchmarks/mesh_error.py", got=worst)
     assert 0.5 < worst < LARGEST_PERCENT[mesh]

@@ -1,4 +1,4 @@
-"""The layered sensor: condensed core against a naive one, work, symmetry, quarter turn.
+"""The layered sensor: condensed against uncondensed solution, work, symmetry, rotation by 90 degrees.
 
 Small sensors of a few frusta with the default sensor's measures.
 """

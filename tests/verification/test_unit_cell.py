@@ -1,4 +1,4 @@
-"""Unit cell under refinement: stiffness at small strain of one frustum of an endless lattice with its sheet.
+"""Unit cell under refinement: stiffness at small strain of one frustum with its sheet in an endless lattice.
 
 A smooth plate presses it, the tip is held on the board. The sensor's sheet meets the frustum node by node. The reference is
 another discretisation: 20-node hexahedra, a square grid for the sheet, and a much finer root that is tied to it. Where the

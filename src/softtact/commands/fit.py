@@ -82,7 +82,7 @@ def _yaml_curves(options):
     from softtact.sensors.library import material_file
 
     if len(options.curves) > 1 or any(_reading(options)[key] for key in ("mode", "columns", "sort", "compression")):
-        raise InputError(f"{options.curves[0]}: a material's YAML says itself what its files are; give it alone.")
+        raise InputError(f"{options.curves[0]}: a material's YAML names its own files and options; give it without others.")
     config = load_material(material_file(options.curves[0]))
     return curves_of(config.curve_settings), config.fit_settings
 

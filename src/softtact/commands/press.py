@@ -36,17 +36,17 @@ def add(commands):
     command.add_argument("--force", type=float, action="append", required=True, metavar="N",
                          help="force in N; repeat it for several load steps")
     command.add_argument("--model", choices=MODELS, default="auto",
-                         help="auto takes the one that the policy asks for (default)")
+                         help="a model by its name; auto (default) lets the policy choose")
     command.add_argument("--policy", choices=("paper", "error"), default="paper",
-                         help="of auto: the mesh's complexity as in the paper (default), or the error to expect")
+                         help="how auto chooses: by the mesh's complexity as in the paper (default), or by the error to expect")
     command.add_argument("--tolerance", type=float, default=0.01, metavar="MM",
-                         help="of --policy error: root mean square over the map, in mm (default: 0.01)")
+                         help="for --policy error: root mean square error over the map, in mm (default: 0.01)")
     command.add_argument("--mesh-quality", choices=("default", "draft", "stable", "fine"), default="default",
-                         help="of the hyperelastic model: default is 1 to 4 %% off in the map's root mean square, draft 2 to 6 %% "
-                              "and several times quicker; stable presses frusta deeper than half of their height; fine is 1 %% "
-                              "off, 2 %% at single points, for 1.9 times the default's time and 3 GB")
+                         help="mesh of the hyperelastic model: default (error 1 to 2 %% of the map's maximum), draft (2 to 5 %%, "
+                              "half of the time), fine (1 %%, twice the time) or stable (for frusta pressed deeper than "
+                              "half of their height)")
     command.add_argument("--device", default="cpu", metavar="DEVICE",
-                         help="of the hyperelastic model: cpu (default), cuda, or auto, a GPU where there is one, sums up elements")
+                         help="where the hyperelastic model sums up elements: cpu (default), cuda, or auto (a GPU if there is one)")
     command.add_argument("--card", action="append", metavar="LAYER=CARD.json",
                          help="a card of `softtact fit` for the dielectric or the cover, in place of the printed constants")
     command.add_argument("--out", type=Path, metavar="FILE.nc", help="write the maps as NetCDF")

@@ -51,7 +51,7 @@ class PressResult:
     converged: np.ndarray = field(metadata=_array("1", "step"))
     """(step,) 1 where the solver reached its tolerance."""
     within_validity: np.ndarray = field(metadata=_array("1", "step"))
-    """(step,) 0 where the numbers are not to be relied on; why: docs/command_line.md, "What is flagged"."""
+    """(step,) 0 where the numbers are not to be relied on; why: docs/reference/command_line.md, "What is flagged"."""
     wall_time_s: np.ndarray = field(metadata=_array("s", "step"))
     """(step,) in s: wall time of the load step; the solver's preparation counts to the first."""
     x_mm: np.ndarray = field(metadata=_array("mm", "x", coordinate="x"))

@@ -1,4 +1,4 @@
-"""What is odd in the archive: each by file and row, counted, and with what was done about it."""
+"""Outliers of the archive: each by file and row, counted, and with what was done about it."""
 
 from dataclasses import asdict, dataclass, fields
 
@@ -9,7 +9,7 @@ from softtact.errors import InputError
 
 @dataclass(frozen=True)
 class Finding:
-    """One oddity. row: the line of its first occurrence, 1 being the header;  path: the test, '' for a file;  count: occurrences
+    """One outlier. row: the line of its first occurrence, 1 being the header;  path: the test, '' for a file;  count: occurrences
     done: "left out" (the test) or "kept"."""
 
     file: str
@@ -55,5 +55,5 @@ class Outliers:
             first = [str(f) for f in self.findings if f.done == "left out"][:3]
             allowed = "none may be" if outliers == "refuse" else f"at most {largest_share:.0%} may be"
             remedy = "set 'data.outliers' to leave_out" if outliers == "refuse" else "raise 'data.largest_outlier_share'"
-            raise InputError(f"{left} of {tests} tests of the archive are odd, and {allowed} ({'; '.join(first)}); "
+            raise InputError(f"{left} of {tests} tests of the archive are outliers, and {allowed} ({'; '.join(first)}); "
                              f"correct the files or {remedy}.")

@@ -184,7 +184,7 @@ class SensorSpec(_Strict):
             raise InputError(f"{where}: no frustum of pitch {spec.dielectric.frusta.pitch_mm} mm fits on the footprint "
                              f"{spec.footprint_mm} mm; enlarge the footprint or reduce the pitch.")
         if spec.tips_bonded and spec.friction.board > 0:
-            raise InputError(f"{where}: tips that are held cannot slide with a friction of {spec.friction.board:g} on the board; "
+            raise InputError(f"{where}: bonded tips cannot slide with a friction of {spec.friction.board:g} on the board; "
                              "set 'tips_bonded' to false, or 'friction.board' to 0.")
         return spec
 
@@ -194,5 +194,5 @@ class SensorSpec(_Strict):
         path = Path(path)
         values = read_yaml(path, missing="there is no such sensor file.")
         if not isinstance(values, dict):
-            raise InputError(f"{path}: a sensor file must hold keys and values; see docs/bring_your_sensor.md.")
+            raise InputError(f"{path}: a sensor file must hold keys and values; see docs/how-to/bring_your_sensor.md.")
         return cls.from_dict(values, where=str(path))

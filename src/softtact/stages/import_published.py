@@ -58,7 +58,7 @@ def tell(outliers):
     for finding in outliers.findings[:TOLD]:
         announce(f"{finding} ({finding.done})")
     if len(outliers.findings) > TOLD:
-        announce(f"and {len(outliers.findings) - TOLD} more oddities")
+        announce(f"and {len(outliers.findings) - TOLD} more outliers")
 
 
 def inventory(tables, items, *, tests, sensor, settings):

@@ -78,7 +78,7 @@ def test_the_map_is_that_of_the_plane_between_sheet_and_cover(press):
 
 
 def test_bound_and_tied_covers_agree_but_for_the_tie(press):
-    """Apart from the tie, one problem: 36 frusta differ by 3 % of the map (docs/discretisation.md), a coarse plan by more."""
+    """Apart from the tie, one problem: 36 frusta differ by 3 % of the map, a coarse 2-D mesh by more."""
     tied = Sensor(SMALL, {"dielectric": LAW, "cover": LAW}, mesh=TIED).press(PUNCH, force_n=[1.0, 3.0], model="hyperelastic")
     np.testing.assert_allclose(tied.indentation_mm, press.indentation_mm, rtol=0.03)
     assert np.abs(tied.deformation_map_mm - press.deformation_map_mm).max() < 0.08 * press.deformation_map_mm.max()
