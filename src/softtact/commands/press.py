@@ -16,6 +16,7 @@ from softtact.commands.common import (
     sensor_spec,
     show,
 )
+from softtact.contact.motion import Motion
 from softtact.errors import ConvergenceError, InputError
 
 EXAMPLES = """
@@ -24,6 +25,7 @@ EXAMPLES = """
   softtact press part.ply --unit m --pose=-2,1.5,0,0,0,30 --force 10 --model foundation --vtu press.vtu
   softtact press part.stl --unit mm --force 20 --sensor my_sensor.yaml --policy error --tolerance 0.02
   softtact press part.stl --unit mm --force 5 --model elastic --json > press.json
+  softtact press part.stl --unit mm --motion "z -0.5; x 1.0 in 10" --model elastic --out slide.nc
 """
 MODELS = ("auto", "elastic", "foundation", "hyperelastic")
 
@@ -33,8 +35,10 @@ def add(commands):
     command = add_command(commands, "press", _press, "Press a mesh on the sensor: deformation map and taxels.", EXAMPLES)
     add_mesh(command)
     add_repair(command)
-    command.add_argument("--force", type=float, action="append", required=True, metavar="N",
-                         help="force in N; repeat it for several load steps")
+    how = command.add_mutually_exclusive_group(required=True)
+    how.add_argument("--force", type=float, action="append", metavar="N", help="force in N; repeat it for several load steps")
+    how.add_argument("--motion", metavar="STEPS",
+                     help='steps between semicolons: ways in mm ("z -1.0" is down), "fz -20" a force in N, "x 1.0 in 10" ten steps')
     command.add_argument("--model", choices=MODELS, default="auto",
                          help="a model by its name; auto (default) lets the policy choose")
     command.add_argument("--policy", choices=("paper", "error"), default="paper",
@@ -61,8 +65,8 @@ def _press(options):
 
     from softtact.geometry.meshes import check_over_sensor, place
 
-    spec, forces, pose = sensor_spec(options.sensor), sorted(set(options.force)), pose_of(options)
-    check_forces(forces, spec)
+    spec, pose = sensor_spec(options.sensor), pose_of(options)
+    how = _how(options, spec)
     check_folders(options.out, options.vtu, options.plot)
     check_names({options.out: (".nc",), options.vtu: (".vtu",), options.plot: (".png", ".svg")})
     mesh, repairs = read_object(options)
@@ -70,13 +74,22 @@ def _press(options):
     try:
         sensor = replace(softtact.load_sensor(options.sensor, materials=_cards(options)),
                          **_quality(options), device=options.device, attributes={"mesh_repairs": "; ".join(repairs)})
-        result = sensor.press(mesh, pose=pose, force_n=forces, model=options.model,
+        result = sensor.press(mesh, pose=pose, **how, model=options.model,
                               policy=options.policy, tolerance_mm=options.tolerance, keep_body=options.vtu is not None)
     except ConvergenceError as error:
         if error.result is not None:
             _show_press(error.result, options)
         raise
     _show_press(result, options)
+
+
+def _how(options, spec):
+    """Forces or a motion, by the names of `Sensor.press`."""
+    if options.motion is not None:
+        return {"motion": Motion.parse(options.motion)}
+    forces = sorted(set(options.force))
+    check_forces(forces, spec)
+    return {"force_n": forces}
 
 
 def _quality(options):
@@ -124,6 +137,7 @@ def _press_summary(result):
              "within_validity",
              "iterations", "wall_time_s")
     load_steps |= {name: getattr(result, name) for name in names}
+    load_steps |= {"torque_nmm": result.torque_nmm}
     facts = {name: getattr(result, name) for name in ("model", "solver", "selection_reason")}
     facts["repairs"] = [repair for repair in result.attributes["mesh_repairs"].split("; ") if repair]
     return facts | {name: _or_none(values) for name, values in load_steps.items()}
@@ -131,7 +145,9 @@ def _press_summary(result):
 
 def _or_none(values):
     """Numbers as lists; what a model does not tell, nan, as null: JSON has no nan."""
-    return [None if value != value else value for value in values.tolist()] if values.ndim == 1 else values.tolist()
+    if values.ndim > 1:
+        return [_or_none(row) for row in values]
+    return [None if value != value else value for value in values.tolist()]
 
 
 def _press_lines(summary):

@@ -117,8 +117,8 @@ class Sensor:
         if press is None:
             raise InputError(f"model={model!r}: the {model} model presses straight down by force only; use elastic or hyperelastic "
                              "for this motion, or give force_n.")
-        for force in (-step.loads["z"] for step in motion.steps if "z" in step.loads):
-            self.checked_forces(force)
+        for load in (step.loads["z"] for step in motion.steps if step.loads.get("z", 0.0) < 0):
+            self.checked_forces(-load)
         placed = place(mesh, pose=pose)
         check_over_sensor(placed, self.spec.footprint_mm)
         try:
