@@ -23,6 +23,19 @@ NAMES = ["ConvergenceError", "InputError", "Motion", "Pose", "PressResult", "Sen
 ALONE = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}     # no path to these sources
 BROUGHT_BY_EXTRAS = sorted(set(EXTRAS) - {"pypardiso"})     # that one is tried where it is, and SciPy takes its place
 
+NOT_FOUND = """\
+import sys
+
+
+class NotInstalled:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {names!r}:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+
+
+sys.meta_path.insert(0, NotInstalled())
+"""
+
 
 def python(code, *, cwd=None):
     """What a program in a process of its own says: (exit status, stdout, stderr)."""
@@ -181,7 +194,7 @@ def installed(wheel, tmp_path_factory):
                     str(wheel)], check=True, timeout=120, env=ALONE)
     own = next(folder.glob("lib/python*/site-packages"))
     (own / "packages.pth").write_text(sysconfig.get_path("purelib"))
-    (own / "sitecustomize.py").write_text(f"import sys\nsys.modules.update(dict.fromkeys({BROUGHT_BY_EXTRAS!r}))\n")
+    (own / "sitecustomize.py").write_text(NOT_FOUND.format(names=BROUGHT_BY_EXTRAS))
     return folder / "bin/softtact"
 
 
