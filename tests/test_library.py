@@ -20,7 +20,21 @@ from softtact.sensors.library import known_names, material_file, sensor_file
 ROOT = Path(__file__).resolve().parents[1]
 NAMES = ["ConvergenceError", "InputError", "Motion", "Pose", "PressResult", "Sensor", "__version__", "load_sensor", "read_mesh",
          "read_press"]
+ALONE = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}     # no path to these sources
 BROUGHT_BY_EXTRAS = sorted(set(EXTRAS) - {"pypardiso"})     # that one is tried where it is, and SciPy takes its place
+
+NOT_FOUND = """\
+import sys
+
+
+class NotInstalled:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {names!r}:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+
+
+sys.meta_path.insert(0, NotInstalled())
+"""
 
 
 def python(code, *, cwd=None):
@@ -166,7 +180,7 @@ def wheel(tmp_path_factory):
     for file in ("pyproject.toml", "README.md", "LICENSE"):
         shutil.copy2(ROOT / file, folder)
     subprocess.run([sys.executable, "-m", "pip", "wheel", "--quiet", "--no-index", "--no-deps", "--no-build-isolation",
-                    "--wheel-dir", str(folder / "dist"), str(folder)], check=True, timeout=300)
+                    "--wheel-dir", str(folder / "dist"), str(folder)], check=True, timeout=300, env=ALONE)
     return next((folder / "dist").glob("*.whl"))
 
 
@@ -174,23 +188,21 @@ def wheel(tmp_path_factory):
 def installed(wheel, tmp_path_factory):
     """A fresh environment with the wheel: its own softtact, the packages of this one, and none that an extra brings."""
     folder = tmp_path_factory.mktemp("environment")
-    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(folder)], check=True, timeout=120)
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(folder)], check=True, timeout=120, env=ALONE)
     program = folder / "bin/python"
     subprocess.run([sys.executable, "-m", "pip", "--quiet", "--python", str(program), "install", "--no-index", "--no-deps",
-                    str(wheel)], check=True, timeout=120)
+                    str(wheel)], check=True, timeout=120, env=ALONE)
     own = next(folder.glob("lib/python*/site-packages"))
     (own / "packages.pth").write_text(sysconfig.get_path("purelib"))
-    (own / "sitecustomize.py").write_text(f"import sys\nsys.modules.update(dict.fromkeys({BROUGHT_BY_EXTRAS!r}))\n")
+    (own / "sitecustomize.py").write_text(NOT_FOUND.format(names=BROUGHT_BY_EXTRAS))
     return folder / "bin/softtact"
 
 
 @pytest.fixture
 def softtact_in(installed, tmp_path):
     """Run the wheel's command in an empty folder; (exit status, stdout, stderr)."""
-    environment = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "PYTHONSAFEPATH")}
-
     def run(*arguments):
-        done = subprocess.run([str(installed), *map(str, arguments)], cwd=tmp_path, env=environment, capture_output=True, text=True,
+        done = subprocess.run([str(installed), *map(str, arguments)], cwd=tmp_path, env=ALONE, capture_output=True, text=True,
                               check=False, timeout=900)
         return done.returncode, done.stdout, done.stderr
 

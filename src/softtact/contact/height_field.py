@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import trimesh
 from numba import njit
 
 NO_CONTACT_MM = 1e3   # height reported where the object is not above the point
@@ -15,7 +16,7 @@ NO_CONTACT_MM = 1e3   # height reported where the object is not above the point
 class HeightField:
     """Height z (mm) and unit normal of an object's underside over points (x, y) in the object's placed position."""
 
-    def __init__(self, mesh, *, bins=128):
+    def __init__(self, mesh: trimesh.Trimesh, *, bins: int = 128) -> None:
         triangles = np.ascontiguousarray(mesh.triangles, dtype=float)
         cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         area = np.linalg.norm(cross, axis=1)
@@ -34,7 +35,7 @@ class HeightField:
         points = self.triangles[..., :2].reshape(-1, 2)
         return points.min(axis=0) - 1e-9, points.max(axis=0) + 1e-9
 
-    def __call__(self, x, y):
+    def __call__(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Heights (n,) and normals (n, 3) pointing out of the object (downwards) for points (n,), (n,)."""
         x, y = np.ascontiguousarray(x, dtype=float), np.ascontiguousarray(y, dtype=float)
         height, index = _lowest_crossing(x, y, self.triangles, self._origin, self._size, self._bins,
@@ -76,7 +77,7 @@ class SweptSurface:
         return np.stack([height for height, _ in each])[lowest, every], np.stack([normal for _, normal in each])[lowest, every]
 
 
-def lowest_crossing_naive(x, y, mesh):
+def lowest_crossing_naive(x: np.ndarray, y: np.ndarray, mesh: trimesh.Trimesh) -> np.ndarray:
     """The same heights by testing every triangle: the executable specification of `HeightField`."""
     heights = np.full(len(x), NO_CONTACT_MM)
     for triangle in mesh.triangles:

@@ -22,70 +22,94 @@ class BlockTridiagonalSolver:
 
     def factor(self, upper):
         """Factor the matrix whose upper triangle (csr, with its diagonal) is given; False if not positive definite."""
-        full = (upper + sp.triu(upper, 1).T).tocsr().astype(float)
-        layer = layers(full)
-        entries = full.tocoo()
-        forward = np.zeros(len(layer), dtype=bool)
-        forward[entries.row[layer[entries.row] < layer[entries.col]]] = True
-        self._order = np.lexsort((forward, layer))
-        ends = np.cumsum(np.bincount(layer))
-        self._parts = [slice(start, end) for start, end in zip([0, *ends[:-1]], ends, strict=True)]
-        self._tails = np.bincount(layer, weights=forward).astype(int)      # unknowns of each layer that couple to the next one
-        return self._factor(full[self._order][:, self._order].tocsr())
-
-    def _factor(self, ordered):
-        self._factors, self._couplings, update = [], [], 0.0
-        for own, after, tail in zip(self._parts, [*self._parts[1:], None], self._tails, strict=True):
-            factor, fault = sla.lapack.dpotrf(np.asfortranarray(ordered[own, own].toarray() - update), lower=1, overwrite_a=1)
-            if fault:
-                return False
-            self._factors.append(factor)
-            if after is not None:
-                last = factor[len(factor) - tail:, len(factor) - tail:]
-                self._couplings.append(_lower(last, ordered[own.stop - tail:own.stop, after].toarray()))
-                update = self._couplings[-1].T @ self._couplings[-1]
-        return True
+        self._blocks = _Blocks(upper)
+        self._factors = list(self._blocks.factors())
+        return len(self._factors) == len(self._blocks.parts)
 
     def solve(self, right):
         """Solve for one (n,) or several (n, k) right-hand sides."""
-        found = np.array(right, dtype=float).reshape(len(right), -1)[self._order]
-        for number, own in enumerate(self._parts):
-            found[own] = _lower(self._factors[number], found[own])
-            self._pass_on(number, found, slice(None))
-        for number, own in reversed(list(enumerate(self._parts))):
-            if number < len(self._couplings):
-                found[own.stop - self._tails[number]:own.stop] -= self._couplings[number] @ found[self._parts[number + 1]]
-            found[own] = sla.solve_triangular(self._factors[number], found[own], lower=True, trans="T", check_finite=False)
+        blocks = self._blocks
+        found = np.array(right, dtype=float).reshape(len(right), -1)[blocks.order]
+        for number, (factor, coupling) in enumerate(self._factors):
+            own = blocks.parts[number]
+            found[own] = _lower(factor, found[own])
+            if coupling is not None:
+                found[blocks.parts[number + 1]] -= coupling.T @ found[blocks.tail(number)]
+        for number, (factor, coupling) in reversed(list(enumerate(self._factors))):
+            own = blocks.parts[number]
+            if coupling is not None:
+                found[blocks.tail(number)] -= coupling @ found[blocks.parts[number + 1]]
+            found[own] = sla.solve_triangular(factor, found[own], lower=True, trans="T", check_finite=False)
         out = np.empty_like(found)
-        out[self._order] = found
+        out[blocks.order] = found
         return out.reshape(right.shape)
-
-    def inverse_among(self, kept):
-        """Rows and columns `kept` (k,) of the inverse, (k, k): Y^T Y with L Y = their columns of the unit matrix."""
-        place = np.empty(len(self._order), dtype=int)
-        place[self._order] = np.arange(len(self._order))
-        rows, by_layer = np.sort(place[kept]), np.argsort(place[kept])
-        columns = np.zeros((len(self._order), len(kept)))
-        columns[rows, np.arange(len(kept))] = 1.0
-        inverse = np.zeros((len(kept), len(kept)))
-        for number, own in enumerate(self._parts):
-            begun = slice(0, np.searchsorted(rows, own.stop))      # columns that are no longer zero
-            columns[own, begun] = _lower(self._factors[number], columns[own, begun])
-            inverse[begun, begun] += columns[own, begun].T @ columns[own, begun]
-            self._pass_on(number, columns, begun)
-        out = np.empty_like(inverse)
-        out[np.ix_(by_layer, by_layer)] = inverse
-        return out
-
-    def _pass_on(self, number, columns, begun):
-        """Take what a layer's solution asks of the next layer off its right-hand side."""
-        if number < len(self._couplings):
-            own, after = self._parts[number], self._parts[number + 1]
-            columns[after, begun] -= self._couplings[number].T @ columns[own.stop - self._tails[number]:own.stop, begun]
 
     def close(self):
         """Forget the factors."""
-        self._factors, self._couplings = [], []
+        self._factors = []
+
+
+def inverse_among(upper, kept):
+    """Rows and columns `kept` (k,) of the inverse of a matrix by its upper triangle (csr), (k, k); None if not positive definite.
+
+    It is Y^T Y with L Y = their columns of the unit matrix. One layer's factor and rows of Y are in memory at a time.
+    """
+    blocks = _Blocks(upper)
+    place = np.empty(len(blocks.order), dtype=int)
+    place[blocks.order] = np.arange(len(place))
+    rows, by_place = np.sort(place[kept]), np.argsort(place[kept])
+    inverse, passed_on, done = np.zeros((len(kept), len(kept))), 0.0, 0
+    for own, (factor, coupling) in zip(blocks.parts, blocks.factors(), strict=False):
+        first, begun = np.searchsorted(rows, [own.start, own.stop])     # columns beyond are still zero
+        columns = np.zeros((own.stop - own.start, begun))
+        columns[:, :first] = passed_on
+        columns[rows[first:begun] - own.start, np.arange(first, begun)] = 1.0
+        columns = _lower(factor, columns)
+        inverse[:begun, :begun] += columns.T @ columns
+        if coupling is not None:
+            passed_on = -coupling.T @ columns[len(columns) - len(coupling):]
+        done += 1
+    if done < len(blocks.parts):
+        return None
+    out = np.empty_like(inverse)
+    out[np.ix_(by_place, by_place)] = inverse
+    return out
+
+
+class _Blocks:
+    """A matrix in the order of its layers: `order` (n,), and the `parts` (slices) of the layers in it."""
+
+    def __init__(self, upper):
+        full = (upper + sp.triu(upper, 1).T).tocsr().astype(float)
+        layer, entries = layers(full), full.tocoo()
+        forward = np.zeros(len(layer), dtype=bool)
+        forward[entries.row[layer[entries.row] < layer[entries.col]]] = True
+        self.order = np.lexsort((forward, layer))
+        ends = np.cumsum(np.bincount(layer))
+        self.parts = [slice(start, end) for start, end in zip([0, *ends[:-1]], ends, strict=True)]
+        self._tails = np.bincount(layer, weights=forward).astype(int)
+        self._ordered = full[self.order][:, self.order].tocsr()
+
+    def tail(self, number):
+        """The unknowns of a layer that couple to the next one, its last ones."""
+        stop = self.parts[number].stop
+        return slice(stop - self._tails[number], stop)
+
+    def factors(self):
+        """(L_i, C_i) of the layers in turn, C_i by its rows that are not zero, None of the last; ends where it is not definite."""
+        update = 0.0
+        for number, own in enumerate(self.parts):
+            factor, fault = sla.lapack.dpotrf(np.asfortranarray(self._ordered[own, own].toarray() - update), lower=1, overwrite_a=1)
+            if fault:
+                return
+            if number + 1 == len(self.parts):
+                yield factor, None
+                return
+            size, tail = len(factor), self.tail(number)
+            last = factor[size - (tail.stop - tail.start):, size - (tail.stop - tail.start):]
+            coupling = _lower(last, self._ordered[tail, self.parts[number + 1]].toarray())
+            update = coupling.T @ coupling
+            yield factor, coupling
 
 
 def layers(matrix):

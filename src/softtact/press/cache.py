@@ -36,8 +36,8 @@ def _cached(kind, values, cls, message, compute):
     cache = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "softtact"
     path = cache / f"{kind}-{digest([_FORMAT, *values])}.npz"
     if not path.exists():
-        announce(message if importlib.util.find_spec("pypardiso") else f"{message}; without MKL some "
-                 "minutes; pip install 'softtact[mkl]' brings it")
+        announce(message if importlib.util.find_spec("pypardiso") else f"{message}; without MKL "
+                 "some minutes; pip install 'softtact[mkl]' brings it")
         with atomic_path(path) as temporary:
             compute().save(temporary)
     return cls.load(path)
