@@ -56,9 +56,16 @@ def test_the_card_has_our_energy_by_the_formulas_of_abaqus(name):
     C = np.array([[*stretches**2, 0, 0, 0]])
     J = np.prod(stretches)
     # Arruda-Boyce: (K/2) ((J^2 - 1)/2 - ln J) instead of (K/2) (J-1)^2
-    volumetric = law.volumetric(J)[0] if name != "arruda_boyce" else law.bulk_modulus / 2 * ((J**2 - 1) / 2 - np.log(J))
+    volumetric = law.volumetric.energy(J - 1) if name != "arruda_boyce" else law.bulk_modulus / 2 * ((J**2 - 1) / 2 - np.log(J))
     ours = law.isochoric(C).energy[0] + volumetric
     assert abaqus_energy(law_card(law, no_term=0.0, dialect="Abaqus"), stretches) == pytest.approx(ours, rel=1e-12)
+
+
+def test_only_an_arruda_boyce_law_is_written_with_a_logarithmic_volumetric_function():
+    arruda_boyce = make_law("arruda_boyce", PARAMETERS["arruda_boyce"], bulk_modulus=4.0, volumetric="logarithmic")
+    assert law_card(arruda_boyce, no_term=0.0, dialect="Abaqus").constants[-1] == 0.5
+    with pytest.raises(InputError, match="'neo_hooke' has the volumetric function 'logarithmic', which Abaqus does not take; use quad"):
+        law_card(make_law("neo_hooke", {"c10": 0.2}, volumetric="logarithmic"), no_term=0.0, dialect="Abaqus")
 
 
 def test_every_law_of_ours_has_its_card_and_another_is_refused():
