@@ -18,6 +18,7 @@ from softtact.fem.kernels_torch import DeviceKernels
 from softtact.fem.solid_block import HexBlock, WedgeBlock
 from softtact.materials.laws.mooney_rivlin import MooneyRivlin
 from softtact.materials.laws.ogden import Ogden2
+from softtact.materials.laws.volumetric import Logarithmic
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.press.sensor import Sensor
@@ -43,6 +44,9 @@ BLOCKS = {
     "27 nodes, all of the volume's parts": (HexBlock, HEX27_NODES, MOONEY,
                                             {"trilinear": True, "unprojected_penalty_ratio": 0.5, "quartic_penalty_ratio": 100.0}),
     "20 nodes, 8 points": (HexBlock, HEX20_NODES, MOONEY, {"points_per_side": 2}),
+    "27 nodes, a volumetric function that is not quadratic": (
+        HexBlock, HEX27_NODES, MooneyRivlin({"c10": 0.08, "c01": 0.02}, bulk_modulus=4.0, volumetric=Logarithmic),
+        {"trilinear": True, "quartic_penalty_ratio": 100.0}),
     "wedge, a law of stretches": (WedgeBlock, WEDGE18_NODES, OGDEN, {"quartic_penalty_ratio": 10.0}),
 }
 
@@ -78,7 +82,8 @@ def test_all_that_the_sums_make_lies_on_the_device_of_their_arguments():
     A, inverse = kernels_torch._moduli(F, w, stress, moduli, w, w)
     basis, gram_inverse = torch.empty(g, 4, **there), torch.empty(e, 4, 4, **there)
     change = torch.empty(e, g, 3 * m, **there)
-    K = [kernels_torch._volumetric(change, basis, gram_inverse, 1.0, w, growing) for growing in (None, w)]
+    K = [kernels_torch._volumetric(change, basis, gram_inverse, w, stiffness, quartic)
+         for stiffness in (1.0, w) for quartic in (None, w)]
     results = [C, J, force, inverse, kernels_torch._products(A, G), *K]
     assert {str(one.device) for one in results} == {"meta"} and force.shape == (e, 3 * m) and K[0].shape == (e, 3 * m, 3 * m)
 

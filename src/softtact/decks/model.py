@@ -236,7 +236,7 @@ def _steps(body, surface, forces_n, indentations_mm, touch_mm):
 
 def _remarks(body):
     block = body.support.block
-    share = f"{block.local_modulus / block.law.bulk_modulus:.2g}"
+    share = f"{block.unprojected_modulus / block.law.bulk_modulus:.2g}"
     return ("units: mm, N, MPa",
             "*EQUATION: the sheet's upper nodes follow the cover's lower side; where walls between cells are coarse, nodes at "
             "their quarters follow the curve through the corner, the middle and the next corner; small elements of the "
@@ -246,5 +246,5 @@ def _remarks(body):
             "upper sides.",
             f"Facets of the object narrower than {SLIVER_MM} mm are left out.",
             f"softtact lets the share {share} of the frusta's bulk modulus act at every point and projects the rest on "
-            f"{'tri' * (block.basis.shape[1] > 4)}linear functions; these elements have one volumetric energy. Its bricks and "
+            f"{'tri' * (block.at_rest.basis.shape[1] > 4)}linear functions; these elements have one volumetric energy. Its bricks and "
             "wedges under the cover have nodes in faces and bodies, too.")

@@ -28,9 +28,9 @@ def test_every_element_of_sheet_and_cover_is_held_by_its_own_shear_modulus_and_t
     held = BODIES[body](HELD)
     assert held.slab.solids
     for _, block in held.slab.solids:
-        assert block.growing_modulus == pytest.approx(10 * block.law.mu0)
-    assert held.support.block.growing_modulus == pytest.approx(HELD.quartic_penalty_ratio * DIELECTRIC.mu0)
-    assert all(block.growing_modulus == 0 for _, block in BODIES[body](MeshSettings.draft()).slab.solids)
+        assert block.quartic_modulus == pytest.approx(10 * block.law.mu0)
+    assert held.support.block.quartic_modulus == pytest.approx(HELD.quartic_penalty_ratio * DIELECTRIC.mu0)
+    assert all(block.quartic_modulus == 0 for _, block in BODIES[body](MeshSettings.draft()).slab.solids)
 
 
 def nodes_of(make):
