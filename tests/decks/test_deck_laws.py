@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from deck_study import Tables, needs_ccx
+from law_constants import PARAMETERS
 
 from softtact.decks import keywords
 from softtact.decks.laws import law_card
