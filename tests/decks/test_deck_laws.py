@@ -11,7 +11,7 @@ from law_constants import PARAMETERS
 from softtact.decks import keywords
 from softtact.decks.laws import law_card
 from softtact.errors import InputError
-from softtact.fem.elements import HEX20_BOTTOM, HEX20_NODES, HEX20_TOP
+from softtact.fem.elements import HEX20
 from softtact.materials.laws.registry import LAWS, make_law
 
 CONSTANTS = {
@@ -81,11 +81,11 @@ def test_one_hexahedron_of_ccx_in_tension_and_compression_has_our_stress(name, t
     """Expected: `Law.uniaxial_compressible`, a root of the lateral stress, without finite elements."""
     law = make_law(name, CONSTANTS[name])
     stretches = (0.8, 1.3)
-    lines = keywords.nodes(0.5 * (HEX20_NODES + 1), 1) + keywords.elements("C3D20R", "ALL", [1], [np.arange(1, 21)])
+    lines = keywords.nodes(0.5 * (HEX20.nodes + 1), 1) + keywords.elements("C3D20R", "ALL", [1], [np.arange(1, 21)])
     lines += keywords.material("RUBBER", law_card(law, no_term=1e20, dialect="CalculiX"))
-    lines += ["*SOLID SECTION, ELSET=ALL, MATERIAL=RUBBER", *keywords.node_set("TOP", HEX20_TOP + 1)]
-    fixed = [f"{n + 1}, 3" for n in HEX20_BOTTOM]
-    fixed += [f"{n + 1}, {axis + 1}" for axis in (0, 1) for n in np.flatnonzero(HEX20_NODES[:, axis] == -1)]
+    lines += ["*SOLID SECTION, ELSET=ALL, MATERIAL=RUBBER", *keywords.node_set("TOP", HEX20.top + 1)]
+    fixed = [f"{n + 1}, 3" for n in HEX20.bottom]
+    fixed += [f"{n + 1}, {axis + 1}" for axis in (0, 1) for n in np.flatnonzero(HEX20.nodes[:, axis] == -1)]
     for stretch in stretches:
         lines += ["*STEP, NLGEOM", "*STATIC", "0.2, 1", "*BOUNDARY", *fixed, f"TOP, 3, 3, {stretch - 1}",
                   "*NODE PRINT, NSET=TOP, TOTALS=ONLY, FREQUENCY=1000", "RF", "*END STEP"]

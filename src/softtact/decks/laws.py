@@ -39,7 +39,7 @@ def law_card(law, *, no_term, dialect):
     form, names, terms = _FORMS[law.name]
     written = ("quadratic", *(("logarithmic",) if form == "ARRUDA-BOYCE" else ()))
     if law.volumetric.name not in written:
-        raise InputError(f"The law {law.name!r} has the volumetric function {law.volumetric.name!r}, which {dialect} does not take; "
-                         f"use {' or '.join(written)}.")
+        raise InputError(f"The law {law.name!r} has the volumetric function {law.volumetric.name!r}, which {dialect} does not take;"
+                         f" use {' or '.join(written)}.")
     volumetric = (2 / law.bulk_modulus, *[no_term] * (terms - 1))
     return LawCard(form, (*(law.parameters[name] for name in names), *volumetric))

@@ -25,7 +25,7 @@ from functools import cached_property
 import numpy as np
 
 from softtact.fem import kernels
-from softtact.fem.elements import gauss, hex20, hex27, reference_gradients, wedge18, wedge_rule
+from softtact.fem.elements import HEX20, HEX27, WEDGE18, reference_gradients
 from softtact.fem.kernel_records import ElementArrays, VolumePenalties, VolumeResponse
 from softtact.fem.volume_kernels import add_penalties, project
 from softtact.linalg.workers import SERIAL, slices, unique_rows
@@ -191,25 +191,30 @@ def _distinct(numbers):
     return np.maximum.accumulate(found, axis=1), back
 
 
-class HexBlock(SolidBlock):
-    """Hexahedra of 20 or 27 nodes given by coordinates (e, 20 or 27, 3) in mm; options as `SolidBlock` has them."""
+class _ElementBlock(SolidBlock):
+    """Elements of a kind at coordinates (e, m, 3) in mm, with their full quadrature or the reduced one."""
 
-    def __init__(self, coordinates, law, *, points_per_side=3, **options):
-        points, weights = gauss(points_per_side, 3)
-        shape = {20: hex20, 27: hex27}[coordinates.shape[1]]
-        first, shapes = _unlike(coordinates)
-        gradients, volumes = reference_gradients(coordinates[first], shape(points)[1], weights)
-        super().__init__(gradients, volumes, points, law, shapes=shapes, **options)
+    def __init__(self, element, coordinates, law, *, reduced=False, **options):
+        rule, (first, shapes) = element.reduced if reduced else element.quadrature, _unlike(coordinates)
+        gradients, volumes = reference_gradients(coordinates[first], element.shape(rule.points)[1], rule.weights)
+        super().__init__(gradients, volumes, rule.points, law, shapes=shapes, **options)
 
 
-class WedgeBlock(SolidBlock):
-    """18-node wedges given by coordinates (e, 18, 3) in mm; options as `SolidBlock` has them."""
+class HexBlock(_ElementBlock):
+    """Hexahedra HEX20 or HEX27 given by coordinates (e, 20 or 27, 3) in mm; options as `SolidBlock` has them.
+
+    reduced: 2 x 2 x 2 points instead of 3 x 3 x 3
+    """
 
     def __init__(self, coordinates, law, **options):
-        points, weights = wedge_rule()
-        first, shapes = _unlike(coordinates)
-        gradients, volumes = reference_gradients(coordinates[first], wedge18(points)[1], weights)
-        super().__init__(gradients, volumes, points, law, shapes=shapes, **options)
+        super().__init__({20: HEX20, 27: HEX27}[coordinates.shape[1]], coordinates, law, **options)
+
+
+class WedgeBlock(_ElementBlock):
+    """Wedges WEDGE18 given by coordinates (e, 18, 3) in mm; options as `SolidBlock` has them."""
+
+    def __init__(self, coordinates, law, **options):
+        super().__init__(WEDGE18, coordinates, law, **options)
 
 
 def hanging_node_constraints(masters, weights, elements, block):

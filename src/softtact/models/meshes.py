@@ -3,11 +3,12 @@
 import meshio
 import numpy as np
 
+from softtact.fem.elements import HEX27
 from softtact.materials.laws.neo_hooke import NeoHooke
 from softtact.models.elastic.compliance import elastic_slab, map_cells
 from softtact.models.foundation.compliance import foundation_slab
 from softtact.models.hyperelastic.build import build_sensor_body
-from softtact.models.hyperelastic.deformed_mesh import VTK_HEX27, pressed_body
+from softtact.models.hyperelastic.deformed_mesh import pressed_body
 from softtact.models.hyperelastic.presets import mesh_settings
 from softtact.models.hyperelastic.specimen import frustum_scatter, specimen_of
 
@@ -28,7 +29,8 @@ def slab_mesh(spec, kind):
     slab = elastic_slab(double, cells=cells) if kind == "elastic" else foundation_slab(double, _NO_LAW, _NO_LAW, cells=cells)
     points = slab.points - [*(0.5 * side for side in spec.footprint_mm), 0.0]
     layer = np.repeat(np.arange(len(slab.hexes)), slab.hexes.shape[1])
-    return meshio.Mesh(points, [("hexahedron27", slab.hexes.reshape(-1, 27)[:, VTK_HEX27])], cell_data={"layer": [layer]})
+    hexes = slab.hexes.reshape(-1, 27)[:, HEX27.vtk_order]
+    return meshio.Mesh(points, [(HEX27.meshio_name, hexes)], cell_data={"layer": [layer]})
 
 
 _NO_LAW = NeoHooke({"c10": 1.0}, bulk_modulus=1.0)     # a mesh has no material

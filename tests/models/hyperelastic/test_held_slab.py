@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from softtact.fem.elements import HEX27_NODES, WEDGE18_NODES
+from softtact.fem.elements import HEX27, WEDGE18
 from softtact.fem.solid_block import HexBlock, WedgeBlock
 from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic.build import build_patch, build_sensor_body, build_unit_cell
@@ -34,7 +34,7 @@ def test_every_element_of_sheet_and_cover_is_held_by_its_own_shear_modulus_and_t
 
 
 def nodes_of(make):
-    return {HexBlock: HEX27_NODES, WedgeBlock: WEDGE18_NODES}[make][None] * 0.3
+    return {HexBlock: HEX27.nodes, WedgeBlock: WEDGE18.nodes}[make][None] * 0.3
 
 
 @pytest.mark.parametrize("make", [HexBlock, WedgeBlock])
