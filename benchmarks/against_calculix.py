@@ -29,6 +29,7 @@ from threadpoolctl import threadpool_limits
 from softtact.contact.height_field import HeightField
 from softtact.decks import keywords
 from softtact.decks.laws import law_card
+from softtact.fem.elements import TET4
 from softtact.linalg.direct_single import PardisoSingle
 from softtact.linalg.workers import Workers
 from softtact.materials.laws.registry import make_law
@@ -166,7 +167,7 @@ def deck(mesh, load, solver):
     """The deck's lines."""
     lines, first = ["*HEADING", "race"] + keywords.nodes(mesh.points, 1, name="RUBBER"), 1
     for name, tets in mesh.tetrahedra.items():
-        lines += keywords.elements("C3D4", name.upper(), first + np.arange(len(tets)), tets + 1)
+        lines += keywords.elements(TET4.abaqus_name, name.upper(), first + np.arange(len(tets)), tets + 1)
         lines += keywords.material(f"RUBBER_{name.upper()}", law_card(law(name), no_term=1e20, dialect="CalculiX"))
         lines += [f"*SOLID SECTION, ELSET={name.upper()}, MATERIAL=RUBBER_{name.upper()}"]
         first += len(tets)
@@ -189,7 +190,7 @@ def _sphere(mesh, first):
     tets = np.column_stack([mesh.sphere.faces[:, ::-1], len(mesh.sphere.vertices) + np.arange(len(apex))])
     numbers = first + np.arange(len(tets))
     lines = keywords.nodes(points, len(mesh.points) + 1, name="PUNCH")
-    lines += keywords.elements("C3D4", "SPHERE", numbers, tets + len(mesh.points) + 1)
+    lines += keywords.elements(TET4.abaqus_name, "SPHERE", numbers, tets + len(mesh.points) + 1)
     lines += ["*MATERIAL, NAME=RIGID", "*ELASTIC", "1000, 0.3", "*SOLID SECTION, ELSET=SPHERE, MATERIAL=RIGID"]
     lines += keywords.surface("UNDERSIDE", [(n, 1) for n in numbers]) + keywords.surface("TOP", _faces(mesh))
     return lines + ["*SURFACE INTERACTION, NAME=PRESS", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR",
@@ -197,7 +198,7 @@ def _sphere(mesh, first):
                     "TOP, UNDERSIDE"]
 
 
-_C3D4_FACES = np.array([[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]])
+_C3D4_FACES = np.array([face.nodes for face in TET4.faces])
 
 
 def _faces(mesh):

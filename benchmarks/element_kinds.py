@@ -9,19 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from sensor_meshes import compressed, tetrahedra_of, wedges_of
 
-from softtact.fem.elements import (
-    HEX20_NODES,
-    HEX27_NODES,
-    gauss,
-    hex20,
-    hex27,
-    quad8,
-    quad9,
-    reference_gradients,
-    tri6,
-    wedge18,
-    wedge_rule,
-)
+from softtact.fem.elements import HEX20, HEX27, QUAD8, QUAD9, TRI6, WEDGE18, reference_gradients
+from softtact.fem.quadrature import gauss, wedge_rule
 from softtact.fem.solid_block import SolidBlock
 from softtact.models.solid.body import SolidElements
 from softtact.models.solid.tetrahedra import LinearTetrahedra
@@ -29,14 +18,13 @@ from softtact.models.solid.tetrahedra import LinearTetrahedra
 _TET_EDGES = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
 _TET_FACES = np.array([[0, 1, 2, 4, 5, 6], [0, 1, 3, 4, 8, 7], [1, 2, 3, 5, 9, 8], [2, 0, 3, 6, 7, 9]])
 # Of the full quadratic elements' nodes: those of the smaller kinds, in their usual order.
-_HEX20 = [int(np.flatnonzero((HEX27_NODES == node).all(axis=1))[0]) for node in HEX20_NODES]
+_HEX20, _WEDGE15 = HEX27.abaqus_nodes.tolist(), WEDGE18.abaqus_nodes.tolist()
 _HEX8, _WEDGE6 = _HEX20[:8], [0, 1, 2, 6, 7, 8]
-_WEDGE15 = [0, 1, 2, 6, 7, 8, 3, 4, 5, 9, 10, 11, 12, 13, 14]
 
 
 def hex8(points):
     """Values (n, 8) and derivatives (n, 8, 3) of the trilinear hexahedron."""
-    corners = HEX20_NODES[:8]
+    corners = HEX20.nodes[:8]
     factor = 0.5 * (1 + np.asarray(points)[:, None, :] * corners)
     slopes = [0.5 * corners[:, i] * np.delete(factor, i, axis=2).prod(axis=2) for i in range(3)]
     return factor.prod(axis=2), np.stack(slopes, axis=2)
@@ -56,7 +44,7 @@ def wedge6(points):
 
 def wedge15(points):
     """Values (n, 15) and derivatives (n, 15, 3) of the serendipity wedge: the full one's functions, its bubbles passed on."""
-    full, slopes = wedge18(points)
+    full, slopes = WEDGE18.shape(points)
     # A full element's face centre takes the mean that a serendipity quadrilateral has there: corners -1/4, mid-sides 1/2.
     follow = np.zeros((18, 15))
     follow[_WEDGE15, np.arange(15)] = 1.0
@@ -143,14 +131,14 @@ KINDS = {
     "hex8": Kind("8-node hexahedra and 6-node wedges, mean dilatation", "brick", modes=_constant,
                  hex=(_HEX8, hex8, gauss(2, 3)), wedge=(_WEDGE6, wedge6, small_wedge_rule(2))),
     "hex20": Kind("20-node hexahedra of 8 points and 15-node wedges, linear pressure", "brick", modes=_linear,
-                  hex=(_HEX20, hex20, gauss(2, 3)), wedge=(_WEDGE15, wedge15, small_wedge_rule(3))),
+                  hex=(_HEX20, HEX20.shape, gauss(2, 3)), wedge=(_WEDGE15, wedge15, small_wedge_rule(3))),
     "hex27": Kind("27-node hexahedra and 18-node wedges, linear pressure", "brick", modes=_linear,
-                  hex=(_ALL27, hex27, gauss(3, 3)), wedge=(_ALL18, wedge18, wedge_rule())),
+                  hex=(_ALL27, HEX27.shape, gauss(3, 3)), wedge=(_ALL18, WEDGE18.shape, wedge_rule())),
     "hex27local": Kind("the 27-node row, in cones 4 mu of K at every point", "brick", modes=_linear,
                        unprojected_penalty_ratio=(0.0, 4.0),
-                       hex=(_ALL27, hex27, gauss(3, 3)), wedge=(_ALL18, wedge18, wedge_rule())),
+                       hex=(_ALL27, HEX27.shape, gauss(3, 3)), wedge=(_ALL18, WEDGE18.shape, wedge_rule())),
     "reference": Kind("the 27-node row, mu of K at every point", "brick", modes=_linear, unprojected_penalty_ratio=(1.0, 1.0),
-                      hex=(_ALL27, hex27, gauss(3, 3)), wedge=(_ALL18, wedge18, wedge_rule())),
+                      hex=(_ALL27, HEX27.shape, gauss(3, 3)), wedge=(_ALL18, WEDGE18.shape, wedge_rule())),
 }
 
 
@@ -230,7 +218,7 @@ def _tri3(points):
     return np.column_stack([1 - points.sum(axis=1), points]), np.tile(slopes, (len(points), 1, 1))
 
 
-_FACE_SHAPES = {3: _tri3, 4: _quad4, 6: tri6, 8: quad8, 9: quad9}
+_FACE_SHAPES = {3: _tri3, 4: _quad4, 6: TRI6.shape, 8: QUAD8.shape, 9: QUAD9.shape}
 
 
 def face_points(points, faces, along):

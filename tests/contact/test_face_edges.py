@@ -5,7 +5,7 @@ import pytest
 
 from softtact.contact.face_edges import ENDS, contact_compliance, own_areas
 from softtact.contact.penalty import Contact
-from softtact.fem.elements import gauss
+from softtact.fem.quadrature import gauss
 
 WIDTH = np.ones(1)
 

@@ -16,7 +16,7 @@ from softtact.contact.height_field import HeightField
 from softtact.decks import keywords
 from softtact.decks.laws import law_card
 from softtact.decks.model import deck_model
-from softtact.fem.elements import HEX20_NODES
+from softtact.fem.elements import HEX20
 from softtact.fem.solid_block import HexBlock
 from softtact.geometry.meshes import place
 from softtact.models.hyperelastic.build import build_sensor_body, build_unit_cell
@@ -55,7 +55,7 @@ def test_a_distorted_element_has_the_nodal_forces_of_ccx(kind, points, tmp_path)
     Tolerance: the printed digits.
     """
     rng = np.random.default_rng(0)
-    coordinates, displacement = HEX20_NODES + 0.05 * rng.standard_normal((20, 3)), 0.1 * rng.standard_normal((20, 3))
+    coordinates, displacement = HEX20.nodes + 0.05 * rng.standard_normal((20, 3)), 0.1 * rng.standard_normal((20, 3))
     law = gaussian_chains(0.35)
     lines = keywords.nodes(coordinates, 1, name="NODES") + keywords.elements(kind, "ALL", [1], [np.arange(1, 21)])
     lines += keywords.material("RUBBER", law_card(law, no_term=1e20, dialect="CalculiX"))
@@ -65,7 +65,7 @@ def test_a_distorted_element_has_the_nodal_forces_of_ccx(kind, points, tmp_path)
     (tmp_path / "one.inp").write_text("\n".join(lines) + "\n")
     subprocess.run(["ccx", "one"], cwd=tmp_path, capture_output=True, check=True)
     found = Tables(tmp_path / "one.dat").of("NODES")[0][:, 1:]
-    block = HexBlock(coordinates[None], law, points_per_side=points, unprojected_penalty_ratio=20.0)
+    block = HexBlock(coordinates[None], law, reduced=points == 2, unprojected_penalty_ratio=20.0)
     expected = block.evaluate(displacement[None]).force.reshape(20, 3)
     assert found == pytest.approx(expected, abs=2e-6 * np.abs(expected).max())
 

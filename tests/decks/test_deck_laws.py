@@ -6,11 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from deck_study import Tables, needs_ccx
+from law_constants import PARAMETERS
 
 from softtact.decks import keywords
 from softtact.decks.laws import law_card
 from softtact.errors import InputError
-from softtact.fem.elements import HEX20_BOTTOM, HEX20_NODES, HEX20_TOP
+from softtact.fem.elements import HEX20
 from softtact.materials.laws.registry import LAWS, make_law
 
 CONSTANTS = {
@@ -56,9 +57,16 @@ def test_the_card_has_our_energy_by_the_formulas_of_abaqus(name):
     C = np.array([[*stretches**2, 0, 0, 0]])
     J = np.prod(stretches)
     # Arruda-Boyce: (K/2) ((J^2 - 1)/2 - ln J) instead of (K/2) (J-1)^2
-    volumetric = law.volumetric(J)[0] if name != "arruda_boyce" else law.bulk_modulus / 2 * ((J**2 - 1) / 2 - np.log(J))
+    volumetric = law.volumetric.energy(J - 1) if name != "arruda_boyce" else law.bulk_modulus / 2 * ((J**2 - 1) / 2 - np.log(J))
     ours = law.isochoric(C).energy[0] + volumetric
     assert abaqus_energy(law_card(law, no_term=0.0, dialect="Abaqus"), stretches) == pytest.approx(ours, rel=1e-12)
+
+
+def test_only_an_arruda_boyce_law_is_written_with_a_logarithmic_volumetric_function():
+    arruda_boyce = make_law("arruda_boyce", PARAMETERS["arruda_boyce"], bulk_modulus=4.0, volumetric="logarithmic")
+    assert law_card(arruda_boyce, no_term=0.0, dialect="Abaqus").constants[-1] == 0.5
+    with pytest.raises(InputError, match="'neo_hooke' has the volumetric function 'logarithmic', which Abaqus does not take"):
+        law_card(make_law("neo_hooke", {"c10": 0.2}, volumetric="logarithmic"), no_term=0.0, dialect="Abaqus")
 
 
 def test_every_law_of_ours_has_its_card_and_another_is_refused():
@@ -73,11 +81,11 @@ def test_one_hexahedron_of_ccx_in_tension_and_compression_has_our_stress(name, t
     """Expected: `Law.uniaxial_compressible`, a root of the lateral stress, without finite elements."""
     law = make_law(name, CONSTANTS[name])
     stretches = (0.8, 1.3)
-    lines = keywords.nodes(0.5 * (HEX20_NODES + 1), 1) + keywords.elements("C3D20R", "ALL", [1], [np.arange(1, 21)])
+    lines = keywords.nodes(0.5 * (HEX20.nodes + 1), 1) + keywords.elements("C3D20R", "ALL", [1], [np.arange(1, 21)])
     lines += keywords.material("RUBBER", law_card(law, no_term=1e20, dialect="CalculiX"))
-    lines += ["*SOLID SECTION, ELSET=ALL, MATERIAL=RUBBER", *keywords.node_set("TOP", HEX20_TOP + 1)]
-    fixed = [f"{n + 1}, 3" for n in HEX20_BOTTOM]
-    fixed += [f"{n + 1}, {axis + 1}" for axis in (0, 1) for n in np.flatnonzero(HEX20_NODES[:, axis] == -1)]
+    lines += ["*SOLID SECTION, ELSET=ALL, MATERIAL=RUBBER", *keywords.node_set("TOP", HEX20.top + 1)]
+    fixed = [f"{n + 1}, 3" for n in HEX20.bottom]
+    fixed += [f"{n + 1}, {axis + 1}" for axis in (0, 1) for n in np.flatnonzero(HEX20.nodes[:, axis] == -1)]
     for stretch in stretches:
         lines += ["*STEP, NLGEOM", "*STATIC", "0.2, 1", "*BOUNDARY", *fixed, f"TOP, 3, 3, {stretch - 1}",
                   "*NODE PRINT, NSET=TOP, TOTALS=ONLY, FREQUENCY=1000", "RF", "*END STEP"]

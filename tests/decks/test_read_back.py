@@ -14,7 +14,7 @@ from softtact.decks.laws import law_card
 from softtact.decks.model import deck_model
 from softtact.decks.read import read_deck
 from softtact.errors import InputError
-from softtact.fem.elements import HEX20_BOTTOM, HEX20_SIDES, HEX20_TOP
+from softtact.fem.elements import HEX20
 from softtact.geometry.meshes import place
 from softtact.models.hyperelastic.build import build_unit_cell
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
@@ -218,7 +218,7 @@ def test_the_objects_facets_look_at_the_rubber(pair, dialect):
 
 def test_our_faces_are_those_of_abaqus():
     """S1 bottom, S2 top, S3 to S6 the sides eta = -1, xi = 1, eta = 1, xi = -1."""
-    ours = [HEX20_BOTTOM, HEX20_TOP, *HEX20_SIDES]
+    ours = [HEX20.bottom, HEX20.top, *HEX20.sides]
     assert [set((face[:4] + 1).tolist()) for face in ours] == list(ABAQUS_FACES.values())
 
 

@@ -1,105 +1,205 @@
-"""The elements and their meshes: interpolation, volumes, refusal. Their mechanics is in tests/verification."""
+"""Each element's record held to itself: shape functions, quadrature, faces, and the orders of VTK and of decks."""
+
+from itertools import product
 
 import numpy as np
 import pytest
+from meshio._vtk_common import meshio_to_vtk_type
+from vtkmodules.vtkCommonDataModel import vtkGenericCell
 
-from softtact.fem.elements import (
-    HEX20_NODES,
-    HEX27_NODES,
-    QUAD8_NODES,
-    QUAD9_NODES,
-    TRI6_NODES,
-    WEDGE18_NODES,
-    gauss,
-    hex20,
-    hex27,
-    quad8,
-    quad9,
-    reference_gradients,
-    tri6,
-    wedge18,
-    wedge_rule,
-)
-from softtact.fem.extruded_mesh import disc_mesh_2d, extrude, sheet_mesh_2d
+from softtact.fem import elements
+from softtact.fem.elements import HEX20, HEX27, LINE3, QUAD8, QUAD9, TET4, TRI3, TRI6, WEDGE18, Element, reference_gradients
+from softtact.fem.quadrature import gauss
 from softtact.fem.solid_block import HexBlock
 from softtact.materials.laws.registry import make_law
-from softtact.models.hyperelastic.build import lattice
-from softtact.models.hyperelastic.mesh_settings import MeshSettings
 
+ELEMENTS = {name: value for name, value in vars(elements).items() if isinstance(value, Element)}
+EVERY_ELEMENT = pytest.mark.parametrize("element", ELEMENTS.values(), ids=list(ELEMENTS))
+EVERY_SOLID = pytest.mark.parametrize("element", [HEX20, HEX27, WEDGE18, TET4], ids=["HEX20", "HEX27", "WEDGE18", "TET4"])
+SIMPLICES, WEDGES = (TRI3, TRI6, TET4), (WEDGE18,)
 LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040})
 
 
-SHAPES = {"hex20": (hex20, HEX20_NODES), "hex27": (hex27, HEX27_NODES), "wedge18": (wedge18, WEDGE18_NODES),
-          "quad8": (quad8, QUAD8_NODES), "quad9": (quad9, QUAD9_NODES), "tri6": (tri6, TRI6_NODES)}
+def inner_points(element, count=7):
+    """Points (n, d) inside of the element."""
+    weights = np.random.default_rng(1).dirichlet(np.ones(len(element.nodes)), count)
+    return weights @ element.nodes
 
 
-@pytest.mark.parametrize("name", SHAPES)
-def test_shape_functions_are_one_at_their_node_and_sum_to_one(name):
-    shape, nodes = SHAPES[name]
-    values, derivatives = shape(nodes)
-    assert values == pytest.approx(np.eye(len(nodes)), abs=1e-14)
-    assert derivatives.sum(axis=1) == pytest.approx(np.zeros(nodes.shape), abs=1e-13)
+def integral(element, powers):
+    """Of the product of the coordinates' powers over the parent element, by formula."""
+    def line(power):
+        return (1 - (-1) ** (power + 1)) / (power + 1)
+
+    def simplex(some):     # prod(p!) / (d + sum(p))!
+        factorial = np.cumprod([1, *range(1, 20)])
+        return np.prod(factorial[list(some)]) / factorial[len(some) + sum(some)]
+
+    if element in SIMPLICES:
+        return simplex(powers)
+    if element in WEDGES:
+        return simplex(powers[:2]) * line(powers[2])
+    return np.prod([line(power) for power in powers])
 
 
-@pytest.mark.parametrize("name", SHAPES)
-def test_derivatives_agree_with_finite_differences(name):
-    shape, nodes = SHAPES[name]
-    point, step = np.array([[0.3, 0.2, 0.6]])[:, :nodes.shape[1]], 1e-6
-    for axis in range(nodes.shape[1]):
-        shift = step * np.eye(nodes.shape[1])[axis]
-        slope = (shape(point + shift)[0] - shape(point - shift)[0]) / (2 * step)
-        assert shape(point)[1][..., axis] == pytest.approx(slope, abs=1e-9)
+def test_all_records_are_here():
+    assert set(ELEMENTS) == {"LINE3", "QUAD8", "QUAD9", "TRI3", "TRI6", "HEX20", "HEX27", "WEDGE18", "TET4"}
+    assert ELEMENTS["LINE3"] is LINE3
 
 
-def test_the_wedges_rule_integrates_the_square_of_its_quadratic_functions():
-    points, weights = wedge_rule()
+@EVERY_ELEMENT
+def test_shape_functions_are_one_at_their_node_and_zero_at_the_others(element):
+    assert element.shape(element.nodes)[0] == pytest.approx(np.eye(len(element.nodes)), abs=1e-14)
+
+
+@EVERY_ELEMENT
+def test_shape_functions_sum_to_one_and_give_back_the_coordinates(element):
+    points = inner_points(element)
+    values, slopes = element.shape(points)
+    assert values.sum(axis=1) == pytest.approx(np.ones(len(points)), abs=1e-13)
+    assert values @ element.nodes == pytest.approx(points, abs=1e-13)
+    identity = np.tile(np.eye(points.shape[1]), (len(points), 1, 1))
+    assert np.einsum("nmi,mj->nji", slopes, element.nodes) == pytest.approx(identity, abs=1e-12)
+
+
+@EVERY_ELEMENT
+def test_derivatives_agree_with_finite_differences(element):
+    """Central differences, exact for quadratic functions but for rounding over the step and the third power in HEX20."""
+    points, step = inner_points(element), 1e-6
+    for axis in range(points.shape[1]):
+        shift = step * np.eye(points.shape[1])[axis]
+        slope = (element.shape(points + shift)[0] - element.shape(points - shift)[0]) / (2 * step)
+        assert element.shape(points)[1][..., axis] == pytest.approx(slope, abs=1e-9)
+
+
+@EVERY_ELEMENT
+@pytest.mark.parametrize("reduced", [False, True])
+def test_quadrature_integrates_all_polynomials_of_its_degree(element, reduced):
+    rule = element.reduced if reduced else element.quadrature
+    if rule is None:
+        return
+    dimension = element.nodes.shape[1]
+    for powers in product(range(rule.degree + 1), repeat=dimension):
+        if sum(powers) <= rule.degree:
+            assert rule.weights @ np.prod(rule.points**powers, axis=1) == pytest.approx(integral(element, powers), abs=1e-14)
+    over = (2 * ((rule.degree + 2) // 2), *[0] * (dimension - 1))     # even: odd powers vanish on [-1, 1] for every rule
+    assert rule.weights @ np.prod(rule.points**over, axis=1) != pytest.approx(integral(element, over), abs=1e-6)
+
+
+def test_the_wedges_quadrature_integrates_the_square_of_its_quadratic_functions():
+    points, weights, _ = WEDGE18.quadrature
     r, s, t = points.T
     # integral of r^2 s^2 over the triangle is 4/6! = 1/180, of t^4 over [-1, 1] 2/5
     assert weights @ (r**2 * s**2 * t**4) == pytest.approx(2 / 5 / 180, rel=1e-10)
 
 
-def volume(mesh):
-    points, weights = gauss(3, 3)
-    total = reference_gradients(mesh.points[mesh.hexes], hex27(points)[1], weights)[1].sum()
-    if len(mesh.wedges):
-        points, weights = wedge_rule()
-        total += reference_gradients(mesh.points[mesh.wedges], wedge18(points)[1], weights)[1].sum()
-    return total
+@EVERY_ELEMENT
+def test_a_faces_nodes_lie_on_it_in_the_order_of_the_faces_own_element(element):
+    """A face is where one function that is linear on the parent element vanishes; its nodes are its element's, mapped linearly."""
+    for face in element.faces:
+        own, parent = element.nodes[face.nodes], face.element.nodes
+        plane = np.column_stack([parent, np.ones(len(parent))])
+        mapped = plane @ np.linalg.lstsq(plane, own, rcond=None)[0]
+        assert mapped == pytest.approx(own, abs=1e-14)
+        across = np.linalg.svd(own - own.mean(axis=0))[2][-1]
+        height = (element.nodes - own.mean(axis=0)) @ across
+        assert height[face.nodes] == pytest.approx(0, abs=1e-14)
+        others = np.delete(height, face.nodes)
+        assert (others > 0.1).all() or (others < -0.1).all()     # all nodes that lie on the face are listed
+    if element.faces:
+        assert set(np.concatenate([face.nodes for face in element.faces])) == set(np.flatnonzero(on_boundary(element)))
 
 
-@pytest.mark.parametrize(("refinement", "rings", "core"), [(0, 1, 0.5), (1, 1, 0.5), (0, 1, 0.8), (0, 2, 0.4)])
-def test_the_disc_of_quadratic_quads_has_the_area_of_a_circle(refinement, rings, core):
-    assert volume(extrude(disc_mesh_2d(refinement, rings, core), [0.0, 1.0])) == pytest.approx(np.pi, rel=1e-12)
+def on_boundary(element):
+    """Which nodes (m,) are not inside."""
+    inside = (element.shape(np.array([element.nodes.mean(axis=0)]))[0][0] > 1 - 1e-12)
+    return ~inside
 
 
-@pytest.mark.parametrize(("mesh", "core"), [(MeshSettings(), 0.6), (MeshSettings(frustum_rings=2), 0.5),
-                                            (MeshSettings(frustum_core=0.7), 0.7)])
-def test_a_frustums_core_is_as_wide_as_asked_for_or_as_its_rings_want_it(mesh, core):
-    innermost = disc_mesh_2d(0, mesh.frustum_rings, mesh.core).quads[0, :4]
-    corners = disc_mesh_2d(0, mesh.frustum_rings, mesh.core).points[innermost]
-    assert np.hypot(*corners.T) == pytest.approx(np.full(4, core))
+@EVERY_SOLID
+def test_faces_are_counter_clockwise_from_inside_at_the_bottom_and_from_outside_elsewhere(element):
+    """So their normals add up to twice the bottom's: the flux of a constant field through a closed surface is zero."""
+    flux, middle = [], element.nodes.mean(axis=0)
+    for number, face in enumerate(element.faces):
+        points, weights, _ = face.element.quadrature
+        values, slopes = face.element.shape(points)
+        own = element.nodes[face.nodes]
+        normals = np.cross(*(np.einsum("gm,mi->gi", slopes[..., axis], own) for axis in (0, 1)))
+        outward = np.einsum("gi,gi->g", normals, values @ own - middle)
+        assert (outward < 0).all() if number == 0 else (outward > 0).all()
+        flux.append(weights @ normals)
+    assert sum(flux[1:]) - flux[0] == pytest.approx(np.zeros(3), abs=1e-12)
 
 
-def test_a_frustum_has_the_volume_of_a_truncated_cone():
-    mesh = extrude(disc_mesh_2d(), [0.0, 0.2, 0.5], scale=lambda z: 0.3 + 0.6 * z)
-    assert volume(mesh) == pytest.approx(np.pi * 0.5 / 3 * (0.3**2 + 0.3 * 0.6 + 0.6**2), rel=1e-10)
+@pytest.mark.parametrize("element", [HEX20, HEX27, WEDGE18], ids=["HEX20", "HEX27", "WEDGE18"])
+def test_bottom_top_and_sides_lie_where_their_names_say(element):
+    height = element.nodes[:, 2]
+    assert (height[element.bottom] == -1).all() and (height[element.top] == 1).all()
+    base = element.faces[0].element
+    ends = np.array([element.nodes[side, :2].mean(axis=0) for side in element.sides])
+    assert ends == pytest.approx(np.array([base.nodes[side].mean(axis=0) for side in base.sides]))
+    if base.nodes.shape[0] > 6:
+        assert np.sign(np.round(ends, 9)).tolist() == [[0, -1], [1, 0], [0, 1], [-1, 0]]     # eta = -1, xi = 1, eta = 1, xi = -1
 
 
-@pytest.mark.parametrize("diameter", [1.2, 0.9])
-@pytest.mark.parametrize("refinement", [0, 1])
-def test_the_sheets_plan_fills_its_footprint_and_holds_every_frustums_root(diameter, refinement):
-    centres, _ = lattice((3, 2), 1.2)
-    sheet = sheet_mesh_2d(centres, (3, 2), 1.2, diameter, (4.0, 2.9), refinement=refinement)
-    assert volume(extrude(sheet.mesh_2d, [0.0, 1.0])) == pytest.approx(4.0 * 2.9, rel=1e-12)
-    root = sheet.mesh_2d.points[sheet.roots[4]] - centres[4]
-    assert root == pytest.approx(0.5 * diameter * disc_mesh_2d(refinement).points, abs=1e-9)
+@EVERY_ELEMENT
+def test_in_vtks_order_an_element_is_vtks_own_cell_with_vtks_own_shape_functions(element):
+    """VTK counts parent coordinates from 0 to 1 where ours go from -1 to 1."""
+    cell = vtkGenericCell()
+    cell.SetCellType(meshio_to_vtk_type[element.meshio_name])
+    assert cell.GetNumberOfPoints() == len(element.nodes)
+
+    def vtk_coordinates(points):
+        out = np.zeros((len(points), 3))
+        out[:, :points.shape[1]] = points if element in SIMPLICES else 0.5 * (points + 1)
+        if element in WEDGES:
+            out[:, :2] = points[:, :2]
+        return out
+
+    nodes = np.reshape([cell.GetParametricCoords()[k] for k in range(3 * len(element.nodes))], (-1, 3))
+    assert nodes == pytest.approx(vtk_coordinates(element.nodes[element.vtk_order]))
+    points, weights = inner_points(element), np.zeros(len(element.nodes))
+    for point, values in zip(vtk_coordinates(points), element.shape(points)[0], strict=True):
+        cell.InterpolateFunctions(point.tolist(), weights)
+        assert weights == pytest.approx(values[element.vtk_order], abs=1e-12)
 
 
-def test_the_outer_sides_of_a_disc_lie_on_its_circle():
-    quads, sides = disc_mesh_2d(1).outer_sides()
-    assert len(quads) == 8 and (sides == 1).all()
+@EVERY_SOLID
+def test_in_a_decks_order_an_element_is_the_one_of_that_name(element):
+    kept = element.nodes[element.abaqus_nodes]
+    assert len(kept) == int(element.abaqus_name.removeprefix("C3D"))
+    if element in (HEX20, HEX27):
+        assert (kept == HEX20.nodes).all()
+    if element is WEDGE18:     # corners of both triangles, then the mid-sides of bottom, top and uprights, as in C3D20
+        bottom, top = kept[:3], kept[3:6]
+        around = [1, 2, 0]
+        mids = [0.5 * (bottom + bottom[around]), 0.5 * (top + top[around]), 0.5 * (bottom + top)]
+        assert kept[6:] == pytest.approx(np.vstack(mids))
+
+
+@EVERY_SOLID
+def test_the_volume_of_a_sheared_element_is_that_of_the_parent_times_the_determinant(element):
+    shear = np.array([[1.0, 0.3, 0.0], [0.0, 2.0, 0.4], [0.1, 0.0, 0.5]])
+    points, weights, _ = element.quadrature
+    gradients, volumes = reference_gradients((element.nodes @ shear.T)[None], element.shape(points)[1], weights)
+    assert volumes.sum() == pytest.approx(np.linalg.det(shear) * integral(element, (0, 0, 0)))
+    field = element.nodes @ shear.T @ np.array([1.0, -2.0, 3.0])
+    assert np.einsum("egmi,m->egi", gradients, field) == pytest.approx(np.tile([1.0, -2.0, 3.0], (*volumes.shape, 1)))
+
+
+def test_an_inverted_element_is_refused():
+    points, weights, _ = HEX20.quadrature
+    with pytest.raises(ValueError, match="element 1 is inverted"):
+        reference_gradients(np.stack([HEX20.nodes, HEX20.nodes * [1, 1, -1]]), HEX20.shape(points)[1], weights)
+
+
+def test_full_elements_contain_the_serendipity_ones_in_the_plane_too():
+    assert (QUAD9.nodes[:8] == QUAD8.nodes).all()
+    points = gauss(4, 2)[0]
+    along_a_side = np.column_stack([points[:, 0], -np.ones(len(points))])
+    assert QUAD9.shape(along_a_side)[0][:, :8] == pytest.approx(QUAD8.shape(along_a_side)[0], abs=1e-14)
 
 
 def test_an_element_turned_inside_out_is_reported():
-    block = HexBlock(HEX20_NODES[None].copy(), LAW)
-    assert block.evaluate((-2.0 * HEX20_NODES * np.array([1, 0, 0]))[None]) is None
+    block = HexBlock(HEX20.nodes[None].copy(), LAW)
+    assert block.evaluate((-2.0 * HEX20.nodes * np.array([1, 0, 0]))[None]) is None

@@ -6,9 +6,10 @@ import trimesh
 
 from softtact.contact.height_field import HeightField
 from softtact.contact.penalty import Contact
-from softtact.fem.elements import gauss, hex20, reference_gradients
+from softtact.fem.elements import HEX20, reference_gradients
 from softtact.fem.extruded_mesh import SheetMesh2D, grid_mesh_2d, merge, with_centres
 from softtact.fem.graded_mesh import cover_mesh, split_depths
+from softtact.fem.quadrature import gauss
 from softtact.geometry.meshes import place
 from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic.refinement import CURVED, EDGE, FAR, FLAT, NEAR, split_depths_of, zones
@@ -38,7 +39,7 @@ def test_nodes_on_larger_elements_follow_every_quadratic_field(seed, caps):
 def test_the_elements_fill_the_cover_and_its_faces_the_top_and_the_bottom(seed):
     mesh = cover_mesh(X, Y, HEIGHTS, random_levels(seed))
     points, weights = gauss(2, 3)
-    _, volumes = reference_gradients(mesh.points[mesh.hexes], hex20(points)[1], weights)
+    _, volumes = reference_gradients(mesh.points[mesh.hexes], HEX20.shape(points)[1], weights)
     assert volumes.sum() == pytest.approx(6 * 4 * 1.5)
     for faces, height in ((mesh.top, 0.0), (mesh.bottom, -1.5)):
         corner = mesh.points[faces[:, :4]]

@@ -13,18 +13,18 @@ from support.sensors import CORO
 
 from softtact.errors import InputError
 from softtact.fem import kernels_torch, solid_block
-from softtact.fem.elements import HEX20_NODES, HEX27_NODES, TRI6_NODES
+from softtact.fem.elements import HEX20, HEX27, WEDGE18
 from softtact.fem.kernels_torch import DeviceKernels
 from softtact.fem.solid_block import HexBlock, WedgeBlock
 from softtact.materials.laws.mooney_rivlin import MooneyRivlin
 from softtact.materials.laws.ogden import Ogden2
+from softtact.materials.laws.volumetric import Logarithmic
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.press.sensor import Sensor
 
 MOONEY = MooneyRivlin({"c10": 0.08, "c01": 0.02}, bulk_modulus=4.0)
 OGDEN = Ogden2({"mu1": 0.15, "alpha1": 2.5, "mu2": 0.05, "alpha2": -3.0}, bulk_modulus=4.0)
-WEDGE18_NODES = np.vstack([np.column_stack([TRI6_NODES, np.full(6, z)]) for z in (-1.0, 1.0, 0.0)])
 SMALL = CORO.model_copy(update={"footprint_mm": (2.4, 2.4), "map_shape": (9, 9)})
 GPU = pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
 
@@ -38,10 +38,13 @@ def elements(count, nodes, seed):
 
 
 BLOCKS = {
-    "27 nodes, all of the volume's parts": (HexBlock, HEX27_NODES, MOONEY,
+    "27 nodes, all of the volume's parts": (HexBlock, HEX27.nodes, MOONEY,
                                             {"trilinear": True, "unprojected_penalty_ratio": 0.5, "quartic_penalty_ratio": 100.0}),
-    "20 nodes, 8 points": (HexBlock, HEX20_NODES, MOONEY, {"points_per_side": 2}),
-    "wedge, a law of stretches": (WedgeBlock, WEDGE18_NODES, OGDEN, {"quartic_penalty_ratio": 10.0}),
+    "20 nodes, 8 points": (HexBlock, HEX20.nodes, MOONEY, {"reduced": True}),
+    "27 nodes, a volumetric function that is not quadratic": (
+        HexBlock, HEX27.nodes, MooneyRivlin({"c10": 0.08, "c01": 0.02}, bulk_modulus=4.0, volumetric=Logarithmic),
+        {"trilinear": True, "quartic_penalty_ratio": 100.0}),
+    "wedge, a law of stretches": (WedgeBlock, WEDGE18.nodes, OGDEN, {"quartic_penalty_ratio": 10.0}),
 }
 
 
@@ -76,13 +79,14 @@ def test_all_that_the_sums_make_lies_on_the_device_of_their_arguments():
     A, inverse = kernels_torch._moduli(F, w, stress, moduli, w, w)
     basis, gram_inverse = torch.empty(g, 4, **there), torch.empty(e, 4, 4, **there)
     change = torch.empty(e, g, 3 * m, **there)
-    K = [kernels_torch._volumetric(change, basis, gram_inverse, 1.0, w, growing) for growing in (None, w)]
+    K = [kernels_torch._volumetric(change, basis, gram_inverse, w, stiffness, quartic)
+         for stiffness in (1.0, w) for quartic in (None, w)]
     results = [C, J, force, inverse, kernels_torch._products(A, G), *K]
     assert {str(one.device) for one in results} == {"meta"} and force.shape == (e, 3 * m) and K[0].shape == (e, 3 * m, 3 * m)
 
 
 def test_an_element_turned_inside_out_is_seen_on_a_device(loops):
-    coordinates, displacement = elements(3, HEX27_NODES, seed=3)
+    coordinates, displacement = elements(3, HEX27.nodes, seed=3)
     displacement[1] = -2 * coordinates[1]
     block = HexBlock(coordinates, MOONEY)
     block.loops = loops
@@ -120,4 +124,4 @@ def test_a_device_of_an_unknown_name_is_refused():
 
 
 def test_a_blocks_loops_are_the_compiled_ones_unless_told_otherwise():
-    assert HexBlock(*elements(1, HEX20_NODES, seed=1)[:1], MOONEY).loops is solid_block.kernels
+    assert HexBlock(*elements(1, HEX20.nodes, seed=1)[:1], MOONEY).loops is solid_block.kernels

@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
-from softtact.fem.elements import HEX27_NODES
+from softtact.fem.elements import HEX27
 from softtact.fem.extruded_mesh import extrude, sheet_mesh_2d
 from softtact.fem.solid_block import HexBlock, WedgeBlock, hanging_node_constraints, joined
 from softtact.materials.laws.registry import make_law
+from softtact.materials.laws.volumetric import VOLUMETRIC_FUNCTIONS
 
 LAWS = [make_law("mooney_rivlin", {"c10": 0.17, "c01": 0.004}, bulk_modulus=7.0),
         make_law("neo_hooke", {"c10": 0.3}, bulk_modulus=9.0)]
@@ -52,7 +54,7 @@ def test_joined_blocks_have_the_energy_and_the_forces_of_their_parts():
 
 @pytest.mark.parametrize("options", [{}, {"unprojected_penalty_ratio": 0.5}, {"quartic_penalty_ratio": 100.0, "trilinear": True}])
 def test_tangents_in_single_precision_are_those_in_double_precision_to_seven_digits(options):
-    block = HexBlock(0.5 * HEX27_NODES[None], LAWS[0], **options)
+    block = HexBlock(0.5 * HEX27.nodes[None], LAWS[0], **options)
     field = 0.02 * np.random.default_rng(1).normal(size=(1, 27, 3))
     exact, rough = block.tangent(field), block.tangent(field, precision=np.float32)
     assert rough.dtype == np.float32
@@ -61,7 +63,7 @@ def test_tangents_in_single_precision_are_those_in_double_precision_to_seven_dig
 
 def test_elements_that_hang_on_other_nodes_feel_the_displacement_that_these_give_them():
     """Up to three masters a node, some twice in an element, some without weight."""
-    rng, points = np.random.default_rng(4), 0.5 * HEX27_NODES + np.zeros((4, 1, 1))
+    rng, points = np.random.default_rng(4), 0.5 * HEX27.nodes + np.zeros((4, 1, 1))
     masters, weights = rng.integers(0, 40, size=(60, 3)), rng.normal(size=(60, 3)) * rng.integers(0, 2, size=(60, 3))
     weights[:, 0] = 1.0
     elements, field = rng.integers(0, 60, size=(4, 27)), 0.002 * rng.normal(size=(40, 3))
@@ -80,25 +82,74 @@ def test_elements_that_hang_on_other_nodes_feel_the_displacement_that_these_give
 def projected(block, field):
     """A field (e, g) at all elements' points, projected on the pressure's functions: a least-squares fit, points by volume."""
     rows = []
-    for values, volumes in zip(field, block.volumes[block.shapes], strict=True):
-        root = np.sqrt(volumes)
-        rows.append(block.basis @ np.linalg.lstsq(root[:, None] * block.basis, root * values, rcond=None)[0])
+    for values, volumes in zip(field, block.at_rest.volumes[block.at_rest.shapes], strict=True):
+        root, basis = np.sqrt(volumes), block.at_rest.basis
+        rows.append(basis @ np.linalg.lstsq(root[:, None] * basis, root * values, rcond=None)[0])
     return np.array(rows)
 
 
 @pytest.mark.parametrize("options", [{}, {"unprojected_penalty_ratio": 0.5}, {"quartic_penalty_ratio": 100.0},
                                      {"unprojected_penalty_ratio": 4.0, "quartic_penalty_ratio": 100.0, "trilinear": True}])
 def test_the_energy_of_volume_changes_is_that_of_the_formulas_written_down_plainly(options):
-    points = 0.5 * HEX27_NODES + 0.02 * np.random.default_rng(2).normal(size=(3, 27, 3))
+    points = 0.5 * HEX27.nodes + 0.02 * np.random.default_rng(2).normal(size=(3, 27, 3))
     block = HexBlock(points, LAWS[0], **options)
     J = 1 + 0.2 * np.random.default_rng(3).normal(size=(3, 27)).clip(-2, 2)
-    K, k, q = block.law.bulk_modulus, block.local_modulus, block.growing_modulus
+    K, k, q = block.law.bulk_modulus, block.unprojected_modulus, block.quartic_modulus
     seen = projected(block, J - 1)
     density = (K - k) / 2 * seen**2 + k / 4 * (J**2 - 1 - 2 * np.log(J)) + q / 4 * (J - 1 - seen) ** 4
     held = q * (J - 1 - seen) ** 3
     pressure = (K - k) * seen + k / 2 * (J - 1 / J) + held - projected(block, held)
-    found = block._volumetric(J, block.shapes)
-    np.testing.assert_allclose(found.energies, (block.volumes[block.shapes] * density).sum(axis=1), rtol=1e-12)
+    found = block._volumetric(J, block.at_rest)
+    np.testing.assert_allclose(found.energies, (block.at_rest.volumes[block.at_rest.shapes] * density).sum(axis=1), rtol=1e-12)
     np.testing.assert_allclose(found.pressure, pressure, rtol=1e-11, atol=1e-12 * np.abs(pressure).max())
-    assert found.growing.shape == ((3, 27) if q else (0, 0))
-    np.testing.assert_allclose(found.growing, 3 * q * (J - 1 - seen) ** 2 if q else found.growing, rtol=1e-9, atol=1e-12 * (q + 1))
+    assert found.quartic.shape == ((3, 27) if q else (0, 0))
+    np.testing.assert_allclose(found.quartic, 3 * q * (J - 1 - seen) ** 2 if q else found.quartic, rtol=1e-9, atol=1e-12 * (q + 1))
+
+
+VOLUMES = [make_law("mooney_rivlin", {"c10": 0.17, "c01": 0.004}, bulk_modulus=7.0, volumetric=name)
+           for name in VOLUMETRIC_FUNCTIONS]
+
+
+@pytest.mark.parametrize("law", VOLUMES, ids=list(VOLUMETRIC_FUNCTIONS))
+@pytest.mark.parametrize("options", [{}, {"unprojected_penalty_ratio": 0.5, "quartic_penalty_ratio": 100.0, "trilinear": True}])
+def test_forces_and_tangents_are_the_energys_derivatives_for_every_volumetric_function(law, options):
+    """Central differences: errors of step^2 and of rounding over step, both below 1e-8 of the largest entry."""
+    rng = np.random.default_rng(6)
+    points = 0.5 * HEX27.nodes[None] + 0.02 * rng.normal(size=(1, 27, 3))
+    block, field, step = HexBlock(points, law, **options), 0.03 * rng.normal(size=(1, 27, 3)), 1e-5
+    state, K = block.evaluate(field), block.tangent(field)[0]
+    for way in rng.normal(size=(4, 1, 27, 3)):
+        ahead, behind = (block.evaluate(field + sign * step * way) for sign in (1, -1))
+        assert (ahead.energy - behind.energy) / (2 * step) == pytest.approx(state.force.ravel() @ way.ravel(), rel=1e-6, abs=1e-8)
+        slope = (ahead.force - behind.force)[0] / (2 * step)
+        np.testing.assert_allclose(K @ way.ravel(), slope, atol=1e-7 * np.abs(slope).max())
+    assert np.abs(K - K.T).max() < 1e-12 * np.abs(K).max()
+
+
+@pytest.mark.parametrize("law", VOLUMES, ids=list(VOLUMETRIC_FUNCTIONS))
+def test_an_element_pressed_between_free_sides_has_the_stress_of_the_uniaxial_test(law):
+    points, stretch = 0.5 * HEX27.nodes[None], 0.6
+    block = HexBlock(points, law, trilinear=True)
+
+    def forces(lateral):
+        force = block.evaluate(points * (np.array([lateral, lateral, stretch]) - 1)).force.reshape(27, 3)
+        return [force[points[0, :, axis] > 0.49, axis].sum() for axis in (0, 2)]
+
+    lateral = brentq(lambda value: forces(value)[0], 1.0, 1.5, xtol=1e-13)
+    assert forces(lateral)[1] == pytest.approx(law.uniaxial_compressible(stretch), rel=1e-9)     # on a face of 1 mm2
+
+
+def test_volumetric_functions_differ_where_an_element_is_pressed_in_a_rigid_box():
+    """Height 0.8 of what it was, sides held: U' is -1.4 MPa against K/2 (J - 1/J) = -1.575 MPa, the shape's part is the same."""
+    points = 0.5 * HEX27.nodes[None]
+    forces = [HexBlock(points, law).evaluate(points * np.array([0.0, 0.0, -0.2])).force.reshape(27, 3) for law in VOLUMES]
+    top = [force[points[0, :, 2] > 0.49, 2].sum() for force in forces]
+    assert top[1] - top[0] == pytest.approx(-1.575 + 1.4, rel=1e-10)
+
+
+def test_an_element_whose_projected_volume_vanishes_has_no_logarithmic_energy():
+    """J > 0 at every point and yet a projection below 0: what the linear functions make of a strong bend."""
+    block = HexBlock(0.5 * HEX27.nodes[None], VOLUMES[1])
+    J = np.full((1, 27), 0.01)
+    J[0, :9] = 3.0
+    assert block._volumetric(J, block.at_rest) is None

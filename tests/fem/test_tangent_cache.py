@@ -21,7 +21,7 @@ def block():
 
 @pytest.fixture
 def displacement(block):
-    return np.random.default_rng(0).normal(scale=0.01, size=(len(block.shapes), 27, 3))
+    return np.random.default_rng(0).normal(scale=0.01, size=(len(block.at_rest.shapes), 27, 3))
 
 
 def tangents(block, displacement, elements):

@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from softtact.errors import InputError
 from softtact.materials.laws.registry import LAWS, make_law
+from softtact.materials.laws.volumetric import VOLUMETRIC_FUNCTIONS
 
 EVERY_LAW = pytest.mark.parametrize("name", PARAMETERS)
 
@@ -178,8 +179,32 @@ def test_bulk_modulus_is_the_stated_multiple_of_mu0_or_the_stated_value(name):
 
 
 def test_volumetric_energy_is_a_parabola_in_J():
-    energy, first, second = make_law("neo_hooke", {"c10": 1.0}, bulk_modulus=8.0).volumetric(np.array([0.5, 1.0]))
+    energy, first, second = make_law("neo_hooke", {"c10": 1.0}, bulk_modulus=8.0).volumetric.at(np.array([0.5, 1.0]))
     assert (energy.tolist(), first.tolist(), second.tolist()) == ([1.0, 0.0], [-4.0, 0.0], [8.0, 8.0])
+
+
+@pytest.mark.parametrize("name", VOLUMETRIC_FUNCTIONS)
+def test_a_volumetric_function_has_its_derivatives_and_the_bulk_modulus_at_rest(name):
+    """Central differences of step 1e-5: within 1e-8 of K, and 1e-5 for the energy's, which has few digits near J = 1."""
+    function, J, step = VOLUMETRIC_FUNCTIONS[name](7.0), np.array([0.4, 0.9, 1.0, 1.3, 2.0]), 1e-5
+    ahead, behind = function.at(J + step), function.at(J - step)
+    energy, pressure, stiffness = function.at(J)
+    assert (ahead[0] - behind[0]) / (2 * step) == pytest.approx(pressure, abs=1e-8 * 7.0)
+    assert (ahead[1] - behind[1]) / (2 * step) == pytest.approx(stiffness, rel=1e-7)
+    assert (energy[2], pressure[2], stiffness[2]) == (0.0, 0.0, 7.0)
+    assert function.linear == (len(set(stiffness)) == 1)
+    assert function.with_modulus(3.0).at(J)[0] == pytest.approx(3.0 / 7.0 * energy)
+
+
+def test_the_logarithmic_function_is_as_its_formula_says():
+    J = np.array([0.3, 0.8, 1.7])
+    energy, pressure, _ = VOLUMETRIC_FUNCTIONS["logarithmic"](4.0).at(J)
+    assert energy == pytest.approx(J**2 - 1 - 2 * np.log(J)) and pressure == pytest.approx(2 * (J - 1 / J))
+
+
+def test_a_law_of_an_unknown_volumetric_function_is_refused():
+    with pytest.raises(InputError, match="Volumetric function 'cubic' is unknown; use one of quadratic, logarithmic"):
+        make_law("neo_hooke", {"c10": 0.1}, volumetric="cubic")
 
 
 def test_gent_with_long_chains_is_neo_hooke():

@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from softtact.fem.elements import gauss, quad8
+from softtact.fem.elements import QUAD8
 from softtact.fem.extruded_mesh import Mesh2D, disc_mesh_2d
+from softtact.fem.quadrature import gauss
 from softtact.fem.solid_block import HexBlock
 from softtact.linalg.direct import SuperLUSolver, make_solver
 
@@ -91,7 +92,7 @@ def equilibrium(body, held, prescribed, load=0.0, *, start=None, tolerance=1e-13
 def face_load(points, quads, traction):
     """Nodal forces (n, 3) in N of a traction (3,) in MPa on faces (f, 8)."""
     where, weights = gauss(3, 2)
-    values, slopes = quad8(where)
+    values, slopes = QUAD8.shape(where)
     edges = np.einsum("fad,gai->fgdi", points[quads], slopes)
     area = np.linalg.norm(np.cross(edges[..., 0], edges[..., 1]), axis=-1) * weights
     load = np.zeros_like(points)
@@ -117,7 +118,7 @@ def fine_disc(parts):
     """Unit disc: each quad of `disc_mesh_2d` cut into parts x parts, its outer nodes put on the circle."""
     side = np.linspace(-1, 1, 2 * parts + 1)
     xi, eta = np.meshgrid(side, side)
-    values = quad8(np.column_stack([xi.ravel(), eta.ravel()]))[0]
+    values = QUAD8.shape(np.column_stack([xi.ravel(), eta.ravel()]))[0]
     coarse = disc_mesh_2d()
     patches = np.einsum("pa,qad->qpd", values, coarse.points[coarse.quads[:, :8]])
     outer = np.tile(np.isclose(xi.ravel(), 1.0), (5, 1))

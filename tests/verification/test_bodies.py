@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from fe import equilibrium, face_load, fine_disc, mapped, small_strain, solid
 
-from softtact.fem.elements import HEX20_SIDES
+from softtact.fem.elements import HEX20
 from softtact.fem.extruded_mesh import extrude, grid_mesh_2d
 from softtact.materials.laws.registry import make_law
 
@@ -74,7 +74,7 @@ def cooks_membrane(cells, law, *, thickness, plane_strain, **options):
     body = solid(mapped(extrude(grid_mesh_2d(lines, lines), [0.0, thickness]), to_membrane), law, **options)
     held = np.repeat((body.points[:, 0] < 1e-9)[:, None], 3, axis=1)
     held[:, 2] = plane_strain | (body.points[:, 2] < 1e-9)       # plane stress: free to thin, symmetric about z = 0
-    right = body.hexes[:, HEX20_SIDES[1]]
+    right = body.hexes[:, HEX20.sides[1]]
     right = right[(body.points[right][..., 0] > 48 - 1e-9).all(axis=1)]
     load = face_load(body.points, right, [0.0, 1 / 16, 0.0])
     displacement = small_strain(body, held, 0.0, load)

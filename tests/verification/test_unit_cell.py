@@ -13,7 +13,7 @@ from fe import assemble, fine_disc, solid, solve_linear
 from naive_sensor import NaiveSensor
 from support.sensors import CORO
 
-from softtact.fem.elements import quad8
+from softtact.fem.elements import QUAD8
 from softtact.fem.extruded_mesh import extrude, grid_mesh_2d
 from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic.build import build_unit_cell
@@ -75,7 +75,7 @@ def _tied(points, roots, lines, mesh_2d, plane):
     for root in roots:
         i, j = np.clip(((points[root, :2] - lines[0]) / size).astype(int), 0, count - 1)
         local = 2 * (points[root, :2] - lines[[i, j]]) / size - 1
-        for node, weight in zip(plane[mesh_2d.quads[j * count + i]], quad8(local[None])[0][0], strict=True):
+        for node, weight in zip(plane[mesh_2d.quads[j * count + i]], QUAD8.shape(local[None])[0][0], strict=True):
             for k in range(3):
                 T[3 * root + k, 3 * node + k] += weight
     return T

@@ -13,10 +13,11 @@ import numpy as np
 from softtact.contact.penalty import penalty
 from softtact.decks import keywords
 from softtact.decks.laws import law_card
+from softtact.fem.elements import HEX20, WEDGE18
 
 PROGRAM = "Abaqus"
-ELEMENTS = ("C3D20RH", "C3D20H")
-WEDGE = "C3D15H"
+ELEMENTS = (f"{HEX20.abaqus_name}RH", f"{HEX20.abaqus_name}H")     # R: 2 x 2 x 2 points, H: a pressure of its own
+WEDGE = f"{WEDGE18.abaqus_name}H"
 _NO_TERM = 0.0
 _PARABOLA_STEPS, _LINE_MM = 8, 1.0   # of the contact law: points on its parabola, length of its straight line
 _FIRST_INCREMENT, _LARGEST_INCREMENT, _SMALLEST_INCREMENT = 0.1, 0.25, 1e-6

@@ -19,10 +19,11 @@ import numpy as np
 
 from softtact.decks import keywords
 from softtact.decks.laws import law_card
+from softtact.fem.elements import HEX20, TET4, WEDGE18
 
 PROGRAM = "CalculiX"
-ELEMENTS = ("C3D20R", "C3D20")
-WEDGE = "C3D15"
+ELEMENTS = (f"{HEX20.abaqus_name}R", HEX20.abaqus_name)     # R: 2 x 2 x 2 points
+WEDGE = WEDGE18.abaqus_name
 _NO_TERM = 1e20              # a zero D_i would be replaced by a default
 _STIFF = "1000, 0.3"         # of the rigid bodies' elements, whose nodes are all prescribed
 _FIRST_INCREMENT, _LARGEST_INCREMENT, _SMALLEST_INCREMENT = 0.1, 0.25, 1e-6
@@ -60,7 +61,7 @@ def _rigid_bodies(model):
         points, tetrahedra = _tetrahedra(body)
         numbers = np.arange(element, element + len(tetrahedra))
         lines += keywords.nodes(points, node, name=f"{body.name}_NODES")
-        lines += keywords.elements("C3D4", body.name, numbers, tetrahedra + node)
+        lines += keywords.elements(TET4.abaqus_name, body.name, numbers, tetrahedra + node)
         lines += [f"*SOLID SECTION, ELSET={body.name}, MATERIAL=RIGID"]
         lines += keywords.surface(f"{body.name}_SURFACE", [(n, 1) for n in numbers])
         last = node + len(points)

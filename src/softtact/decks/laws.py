@@ -1,8 +1,8 @@
 """Hyperelastic laws as Abaqus and CalculiX take them: the form's name and its constants in the order of the keyword's data.
 
-Both programs split the energy as we do, psi of the isochoric stretches plus U(J), and take U = sum (J-1)^(2i) / D_i. Ours is
-K/2 (J-1)^2, so D_1 = 2/K and the further D_i stand for "no term". Only Arruda-Boyce differs there:
-U = ((J^2 - 1)/2 - ln J) / D, which agrees with ours to second order in J - 1.
+Both programs split the energy as we do, psi of the isochoric stretches plus U(J), and take U = sum (J-1)^(2i) / D_i. Our
+quadratic U is K/2 (J-1)^2, so D_1 = 2/K and the further D_i stand for "no term". Only Arruda-Boyce differs there:
+U = ((J^2 - 1)/2 - ln J) / D, which is our logarithmic U, and agrees with the quadratic one to second order in J - 1.
 The Ogden constants are those of Abaqus in all three: psi = sum 2 mu_k / alpha_k^2 (...).
 """
 
@@ -37,5 +37,9 @@ def law_card(law, *, no_term, dialect):
         name = getattr(law, "name", None)
         raise InputError(f"The law {name!r} cannot be written for {dialect}; use one of {', '.join(_FORMS)}.")
     form, names, terms = _FORMS[law.name]
+    written = ("quadratic", *(("logarithmic",) if form == "ARRUDA-BOYCE" else ()))
+    if law.volumetric.name not in written:
+        raise InputError(f"The law {law.name!r} has the volumetric function {law.volumetric.name!r}, which {dialect} does not take;"
+                         f" use {' or '.join(written)}.")
     volumetric = (2 / law.bulk_modulus, *[no_term] * (terms - 1))
     return LawCard(form, (*(law.parameters[name] for name in names), *volumetric))

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-HEX20_OF_27 = np.array([0, 1, 2, 3, 9, 10, 11, 12, 4, 5, 6, 7, 13, 14, 15, 16, 18, 19, 20, 21])
-WEDGE15_OF_18 = np.array([0, 1, 2, 6, 7, 8, 3, 4, 5, 9, 10, 11, 12, 13, 14])
+from softtact.fem.elements import HEX27, WEDGE18
+
 _NO_WEIGHT = 1e-10
 
 
@@ -82,11 +82,11 @@ def body_mesh(body):
 
 
 def _hexes(mesh):
-    return mesh.hexes[:, HEX20_OF_27]
+    return mesh.hexes[:, HEX27.abaqus_nodes]
 
 
 def _wedges(mesh):
-    return mesh.wedges[:, WEDGE15_OF_18]
+    return mesh.wedges[:, WEDGE18.abaqus_nodes]
 
 
 def _cover_numbers(slab):

@@ -13,13 +13,12 @@ from softtact.contact.height_field import NO_CONTACT_MM, HeightField
 from softtact.contact.penalty import Contact
 from softtact.decks.mesh import body_mesh
 from softtact.errors import InputError
-from softtact.fem.elements import HEX27_BOTTOM
+from softtact.fem.elements import HEX27
 from softtact.fem.extruded_mesh import Mesh2D
 from softtact.geometry.meshes import facets_over
 from softtact.models.hyperelastic.frusta import DIRECTIONS
 
-# Faces of a brick in Abaqus and CalculiX alike: S1 bottom, S2 top, S3 to S6 the sides eta = -1, xi = 1, eta = 1, xi = -1. A wedge
-# has the same first two.
+# Numbers of a brick's and a wedge's faces in Abaqus and CalculiX alike, S1 to S6: those of `Element.faces`, counted from 1.
 BOTTOM, TOP, FIRST_SIDE = 1, 2, 3
 TOUCH_MM = 0.01                   # overlap of object and cover after the first step: a force alone holds no free object
 SLIVER_MM = 0.01                  # narrower facets are left out: the contact search of CalculiX does not end on them
@@ -127,7 +126,7 @@ def _held(body, mesh):
 def _surfaces(body, mesh):
     """Faces that may touch something: the slab's top, and per frustum its tip and its sides."""
     support = body.support
-    mesh_2d = Mesh2D(support.mesh.points[:, :2], support.mesh.layer(0)[:, HEX27_BOTTOM], 0)
+    mesh_2d = Mesh2D(support.mesh.points[:, :2], support.mesh.layer(0)[:, HEX27.bottom], 0)
     quads, sides = mesh_2d.outer_sides()
     elements = mesh.parts[-1].elements.reshape(support.count, support.mesh.layers, -1)
     tips, around = _faces(elements[:, 0], BOTTOM), _faces(elements[:, :, quads], FIRST_SIDE + sides)
@@ -236,7 +235,8 @@ def _steps(body, surface, forces_n, indentations_mm, touch_mm):
 
 def _remarks(body):
     block = body.support.block
-    share = f"{block.local_modulus / block.law.bulk_modulus:.2g}"
+    functions = "trilinear" if block.at_rest.basis.shape[1] > 4 else "linear"
+    share = f"{block.unprojected_modulus / block.law.bulk_modulus:.2g}"
     return ("units: mm, N, MPa",
             "*EQUATION: the sheet's upper nodes follow the cover's lower side; where walls between cells are coarse, nodes at "
             "their quarters follow the curve through the corner, the middle and the next corner; small elements of the "
@@ -246,5 +246,5 @@ def _remarks(body):
             "upper sides.",
             f"Facets of the object narrower than {SLIVER_MM} mm are left out.",
             f"softtact lets the share {share} of the frusta's bulk modulus act at every point and projects the rest on "
-            f"{'tri' * (block.basis.shape[1] > 4)}linear functions; these elements have one volumetric energy. Its bricks and "
+            f"{functions} functions; these elements have one volumetric energy. Its bricks and "
             "wedges under the cover have nodes in faces and bodies, too.")

@@ -1,155 +1,66 @@
-"""Shape functions and quadrature of the elements in use: 20- and 27-node hexahedra, 18-node wedge, and their faces."""
+"""The elements in use, a record each: nodes, shape functions, faces, quadrature, and their names and orders in other programs.
+
+The 20-node hexahedron is cheap, and keeps its order where it is a parallelepiped. The full quadratic elements, HEX27 and WEDGE18,
+are a plane element at the bottom, the top and the middle; they stay quadratic where they are distorted (Arnold, Boffi and Falk,
+Math. Comp. 71 (2002) 909).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, partial
 
 import numpy as np
 
-# Parent coordinates: 8 corners, then the mid-side nodes of the bottom, of the top, and of the vertical edges.
-_CORNERS = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float)
-_MIDS = np.array([[0, -1], [1, 0], [0, 1], [-1, 0]], dtype=float)
+from softtact.fem.quadrature import Quadrature, gauss_rule, tetrahedron_rule, triangle_rule, wedge_rule
+from softtact.fem.shape_functions import lifted, linear_simplex, quadratic, quadratic_triangle, serendipity
 
 
-def _at_height(plan, zeta):
-    return np.column_stack([plan, np.full(len(plan), float(zeta))])
+@dataclass(frozen=True, eq=False)
+class Face:
+    """A face: the element that it is, and which nodes of the whole element (k,) are its own, in that element's order."""
+
+    element: "Element"
+    nodes: np.ndarray
 
 
-HEX20_NODES = np.vstack([_at_height(_CORNERS, -1), _at_height(_CORNERS, 1), _at_height(_MIDS, -1),
-                         _at_height(_MIDS, 1), _at_height(_CORNERS, 0)])
-QUAD8_NODES = np.vstack([_CORNERS, _MIDS])
-HEX20_BOTTOM = np.array([0, 1, 2, 3, 8, 9, 10, 11])   # each face in the order of QUAD8_NODES
-HEX20_TOP = np.array([4, 5, 6, 7, 12, 13, 14, 15])
-HEX20_SIDES = np.array([[0, 1, 5, 4, 8, 17, 12, 16],   # the sides eta=-1, xi=1, eta=1, xi=-1
-                        [1, 2, 6, 5, 9, 18, 13, 17],
-                        [2, 3, 7, 6, 10, 19, 14, 18],
-                        [3, 0, 4, 7, 11, 16, 15, 19]])
+@dataclass(frozen=True, eq=False)
+class Element:
+    """A kind of element.
 
-
-def gauss(points, dimension):
-    """Gauss rule on [-1, 1]^dimension: points (n, dimension) and weights (n,)."""
-    x, w = np.polynomial.legendre.leggauss(points)
-    grids = np.meshgrid(*[x] * dimension, indexing="ij")
-    weights = np.meshgrid(*[w] * dimension, indexing="ij")
-    return np.column_stack([g.ravel() for g in grids]), np.prod([g.ravel() for g in weights], axis=0)
-
-
-def serendipity(points, nodes):
-    """Quadratic serendipity shape functions in 2 or 3 dimensions.
-
-    points (n, d) parent coordinates; nodes (m, d) parent coordinates of the nodes (0 marks a mid-side direction).
-    Returns values (n, m) and derivatives (n, m, d). (Zienkiewicz and Taylor, vol. 1, ch. 8.)
+    nodes: (m, d) parent coordinates
+    shape: function of points (n, d) that gives the shape functions' values (n, m) and derivatives (n, m, d)
+    quadrature: the full rule;  reduced: the rule with a point less along each side, None where it is not used
+    faces: in Abaqus' order S1, S2, ...: of a solid its bottom, counter-clockwise seen from inside, then its top where it has one
+        and its sides, counter-clockwise seen from outside; of a plane element its sides
+    meshio_name, vtk_order: the cell's name in meshio, and which of our nodes stands where in VTK's order: cells[:, vtk_order]
+    abaqus_name, abaqus_nodes: the element of Abaqus and CalculiX of the same shape, and which of our nodes it has, in its order;
+        dialects add letters to the name
     """
-    points, nodes = np.asarray(points, dtype=float), np.asarray(nodes, dtype=float)
-    dimension = nodes.shape[1]
-    linear = 1 + points[:, None, :] * nodes                       # factors of the directions in which a node is a corner
-    bubble = 1 - points[:, None, :] ** 2 + 0 * nodes              # factor of the direction in which it is mid-side
-    mid = nodes == 0
-    factor = np.where(mid, bubble, linear)
-    slope = np.where(mid, -2 * points[:, None, :], nodes)
-    corner = ~mid.any(axis=1)
-    extra = (points[:, None, :] * nodes).sum(axis=2) - (dimension - 1)
-    scale = np.where(corner, 0.5**dimension, 0.5 ** (dimension - 1))
-    product = factor.prod(axis=2)
-    values = scale * product * np.where(corner, extra, 1.0)
-    derivatives = np.empty(points.shape[:1] + nodes.shape)
-    for i in range(dimension):
-        others = np.delete(factor, i, axis=2).prod(axis=2)
-        derivatives[..., i] = scale * (slope[..., i] * others * np.where(corner, extra, 1.0)
-                                       + np.where(corner, product * nodes[:, i], 0.0))
-    return values, derivatives
 
+    nodes: np.ndarray
+    shape: Callable
+    quadrature: Quadrature
+    meshio_name: str
+    vtk_order: np.ndarray
+    faces: tuple = ()
+    reduced: Quadrature | None = None
+    abaqus_name: str | None = None
+    abaqus_nodes: np.ndarray | None = None
 
-def hex20(points):
-    """Values (n, 20) and parent derivatives (n, 20, 3) of the 20-node hexahedron."""
-    return serendipity(points, HEX20_NODES)
+    @property
+    def bottom(self) -> np.ndarray:
+        """Nodes of a solid's face S1."""
+        return self.faces[0].nodes
 
+    @property
+    def top(self) -> np.ndarray:
+        """Nodes of the face S2 of a hexahedron or wedge."""
+        return self.faces[1].nodes
 
-def quad8(points):
-    """Values (n, 8) and parent derivatives (n, 8, 2) of the 8-node quadrilateral."""
-    return serendipity(points, QUAD8_NODES)
-
-
-# Full quadratic elements: a plan of 9-node quadrilaterals or 6-node triangles at the bottom, the top and the middle.
-# Unlike the 20-node hexahedron they stay quadratic where they are distorted (Arnold, Boffi and Falk, Math. Comp. 71 (2002) 909).
-QUAD9_NODES = np.vstack([_CORNERS, _MIDS, [[0.0, 0.0]]])
-TRI6_NODES = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0], [0.5, 0.5], [0, 0.5]], dtype=float)
-_LEVELS = (-1, 1, 0)
-HEX27_NODES = np.vstack([_at_height(QUAD9_NODES, z) for z in _LEVELS])
-WEDGE18_NODES = np.vstack([_at_height(TRI6_NODES, z) for z in _LEVELS])
-HEX27_BOTTOM, HEX27_TOP = np.arange(9), np.arange(9, 18)
-WEDGE18_TOP = np.arange(6, 12)
-
-
-def _side(a, b, middle):
-    """A side over the plan's edge a-b, in the order of QUAD9_NODES."""
-    low, high, between = 0, 9, 18
-    return [a + low, b + low, b + high, a + high, middle + low, b + between, middle + high, a + between, middle + between]
-
-
-HEX27_SIDES = np.array([_side(k, (k + 1) % 4, 4 + k) for k in range(4)])   # eta=-1, xi=1, eta=1, xi=-1
-_TRIANGLE_SIDES = np.array([[0, 1], [1, 2], [2, 0]])
-
-
-def _area_coordinates(points):
-    """Values (n, 3) and derivatives (3, 2) of the triangle's linear shape functions."""
-    r, s = np.asarray(points, dtype=float).T[:2]
-    return np.column_stack([1 - r - s, r, s]), np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
-
-
-def tri6(points):
-    """Values (n, 6) and parent derivatives (n, 6, 2) of the 6-node triangle."""
-    L, dL = _area_coordinates(points)
-    a, b = _TRIANGLE_SIDES.T
-    values = np.hstack([L * (2 * L - 1), 4 * L[:, a] * L[:, b]])
-    slopes = np.concatenate([(4 * L - 1)[..., None] * dL,
-                             4 * (L[:, a, None] * dL[b] + L[:, b, None] * dL[a])], axis=1)
-    return values, slopes
-
-
-def _line3(t):
-    """Values (n, 3) and derivatives (n, 3) of the quadratic shape functions at -1, 1 and 0."""
-    t = np.asarray(t, dtype=float)[:, None]
-    return np.hstack([0.5 * t * (t - 1), 0.5 * t * (t + 1), 1 - t**2]), np.hstack([t - 0.5, t + 0.5, -2 * t])
-
-
-_QUAD9_FACTORS = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [2, 0], [1, 2], [2, 1], [0, 2], [2, 2]])   # of _line3 in xi and eta
-
-
-def quad9(points):
-    """Values (n, 9) and parent derivatives (n, 9, 2) of the 9-node quadrilateral."""
-    points = np.asarray(points, dtype=float)
-    (x, dx), (y, dy) = _line3(points[:, 0]), _line3(points[:, 1])
-    i, j = _QUAD9_FACTORS.T
-    return x[:, i] * y[:, j], np.stack([dx[:, i] * y[:, j], x[:, i] * dy[:, j]], axis=2)
-
-
-def _lifted(plan, points):
-    """Product of a plan's shape functions with the quadratic ones in height."""
-    points = np.asarray(points, dtype=float)
-    values, slopes = plan(points[:, :2])
-    z, dz = _line3(points[:, 2])
-    product = (z[:, :, None] * values[:, None, :]).reshape(len(points), -1)
-    in_plan = (z[:, :, None, None] * slopes[:, None]).reshape(len(points), -1, 2)
-    upwards = (dz[:, :, None] * values[:, None, :]).reshape(len(points), -1, 1)
-    return product, np.concatenate([in_plan, upwards], axis=2)
-
-
-def hex27(points):
-    """Values (n, 27) and parent derivatives (n, 27, 3) of the 27-node hexahedron."""
-    return _lifted(quad9, points)
-
-
-def wedge18(points):
-    """Values (n, 18) and parent derivatives (n, 18, 3) of the 18-node wedge."""
-    return _lifted(tri6, points)
-
-
-def wedge_rule():
-    """Quadrature of the wedge: six points of the triangle (degree 4, Dunavant) times three: points (18, 3), weights (18,)."""
-    near, far = (0.445948490915965, 0.223381589678011), (0.091576213509771, 0.109951743655322)
-    plane = np.array([[c, c] for c, _ in (near, far)] + [[1 - 2 * c, c] for c, _ in (near, far)]
-                     + [[c, 1 - 2 * c] for c, _ in (near, far)])
-    weight = 0.5 * np.array([w for _, w in (near, far)] * 3)
-    z, wz = np.polynomial.legendre.leggauss(3)
-    points = np.column_stack([np.tile(plane, (3, 1)), np.repeat(z, 6)])
-    return points, np.tile(weight, 3) * np.repeat(wz, 6)
+    @cached_property
+    def sides(self) -> np.ndarray:
+        """Nodes (s, k) of the sides: those of a plane element, or those of a hexahedron or wedge over its bottom's sides."""
+        return np.array([face.nodes for face in (self.faces[2:] if self.nodes.shape[1] == 3 else self.faces)])
 
 
 def reference_gradients(coordinates, derivatives, weights):
@@ -164,3 +75,136 @@ def reference_gradients(coordinates, derivatives, weights):
         raise ValueError(f"element {int(np.argmin(determinant.min(axis=1)))} is inverted")
     inverse = np.linalg.inv(jacobian)
     return np.ascontiguousarray(np.matmul(derivatives[None], inverse)), determinant * weights
+
+
+_CORNERS = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float)
+_MIDS = np.array([[0, -1], [1, 0], [0, 1], [-1, 0]], dtype=float)
+
+
+def _at_height(plane, zeta):
+    return np.column_stack([plane, np.full(len(plane), float(zeta))])
+
+
+def _faces(element, nodes):
+    return tuple(Face(element, np.array(own)) for own in nodes)
+
+
+_LINE3_NODES = np.array([[-1.0], [1.0], [0.0]])
+LINE3 = Element(_LINE3_NODES, partial(quadratic, nodes=_LINE3_NODES), gauss_rule(3, 1), "line3", np.arange(3))
+"""Quadratic line::
+
+    0 --- 2 --- 1     xi from -1 to 1
+"""
+
+_QUAD8_NODES = np.vstack([_CORNERS, _MIDS])
+_QUAD_SIDES = _faces(LINE3, [[0, 1, 4], [1, 2, 5], [2, 3, 6], [3, 0, 7]])
+QUAD8 = Element(_QUAD8_NODES, partial(serendipity, nodes=_QUAD8_NODES), gauss_rule(3, 2), "quad8", np.arange(8), _QUAD_SIDES)
+"""Serendipity quadrilateral on [-1, 1]^2; sides eta = -1, xi = 1, eta = 1, xi = -1::
+
+    3 --- 6 --- 2     eta
+    |           |      |
+    7           5      |
+    |           |      +---- xi
+    0 --- 4 --- 1
+"""
+
+_QUAD9_NODES = np.vstack([_QUAD8_NODES, [[0.0, 0.0]]])
+QUAD9 = Element(_QUAD9_NODES, partial(quadratic, nodes=_QUAD9_NODES), gauss_rule(3, 2), "quad9", np.arange(9), _QUAD_SIDES)
+"""Full quadratic quadrilateral on [-1, 1]^2; sides as those of QUAD8::
+
+    3 --- 6 --- 2     eta
+    |           |      |
+    7     8     5      |
+    |           |      +---- xi
+    0 --- 4 --- 1
+"""
+
+TRI6 = Element(np.array([[0, 0], [1, 0], [0, 1], [0.5, 0], [0.5, 0.5], [0, 0.5]]), quadratic_triangle, triangle_rule(), "triangle6",
+               np.arange(6), _faces(LINE3, [[0, 1, 3], [1, 2, 4], [2, 0, 5]]))
+"""Quadratic triangle with corners (0, 0), (1, 0), (0, 1); its sides begin at nodes 0, 1 and 2::
+
+    2
+    |`.             eta
+    5   4            |
+    |     `.         |
+    0 -- 3 -- 1      +---- xi
+"""
+
+_HEX20_NODES = np.vstack([_at_height(_CORNERS, -1), _at_height(_CORNERS, 1), _at_height(_MIDS, -1), _at_height(_MIDS, 1),
+                          _at_height(_CORNERS, 0)])
+HEX20 = Element(
+    _HEX20_NODES, partial(serendipity, nodes=_HEX20_NODES), gauss_rule(3, 3), "hexahedron20", np.arange(20),
+    _faces(QUAD8, [[0, 1, 2, 3, 8, 9, 10, 11], [4, 5, 6, 7, 12, 13, 14, 15], [0, 1, 5, 4, 8, 17, 12, 16],
+                   [1, 2, 6, 5, 9, 18, 13, 17], [2, 3, 7, 6, 10, 19, 14, 18], [3, 0, 4, 7, 11, 16, 15, 19]]),
+    reduced=gauss_rule(2, 3), abaqus_name="C3D20", abaqus_nodes=np.arange(20))
+"""Serendipity hexahedron on [-1, 1]^3; sides eta = -1, xi = 1, eta = 1, xi = -1::
+
+          7 ---14--- 6
+         /|         /|
+       15 |       13 |        zeta
+       /  19      /  18         |  eta
+      4 ---12--- 5   |          | /
+      |   |      |   |          |/
+      |   3 ---10|-- 2          +---- xi
+     16  /      17  /
+      | 11       | 9
+      |/         |/
+      0 --- 8--- 1
+"""
+
+
+def _side(a, b, middle, plane):
+    """Nodes of the side over the edge from a to b of a plane element of so many nodes, in the order of QUAD9."""
+    low, high, between = 0, plane, 2 * plane
+    return [a + low, b + low, b + high, a + high, middle + low, b + between, middle + high, a + between, middle + between]
+
+
+_HEX27_NODES = np.vstack([_at_height(_QUAD9_NODES, zeta) for zeta in (-1, 1, 0)])
+HEX27 = Element(
+    _HEX27_NODES, partial(quadratic, nodes=_HEX27_NODES), gauss_rule(3, 3), "hexahedron27",
+    np.array([0, 1, 2, 3, 9, 10, 11, 12, 4, 5, 6, 7, 13, 14, 15, 16, 18, 19, 20, 21, 25, 23, 22, 24, 8, 17, 26]),
+    _faces(QUAD9, [np.arange(9), np.arange(9, 18), *(_side(*face.nodes, 9) for face in _QUAD_SIDES)]),
+    reduced=gauss_rule(2, 3), abaqus_name="C3D20",
+    abaqus_nodes=np.array([0, 1, 2, 3, 9, 10, 11, 12, 4, 5, 6, 7, 13, 14, 15, 16, 18, 19, 20, 21]))
+"""Full quadratic hexahedron on [-1, 1]^3: QUAD9 at the bottom, the top and the middle; sides as those of HEX20::
+
+       bottom, zeta = -1          top, zeta = 1            middle, zeta = 0
+
+      3 ---- 6 ---- 2          12 ----15 ----11          21 ----24 ----20       eta
+      |             |           |             |           |             |        |
+      7      8      5          16     17     14          25     26     23        |
+      |             |           |             |           |             |        +---- xi
+      0 ---- 4 ---- 1           9 ----13 ----10          18 ----22 ----19
+"""
+
+WEDGE18 = Element(
+    np.vstack([_at_height(TRI6.nodes, zeta) for zeta in (-1, 1, 0)]), partial(lifted, base=quadratic_triangle), wedge_rule(),
+    "wedge18",
+    np.array([0, 1, 2, 6, 7, 8, 3, 4, 5, 9, 10, 11, 12, 13, 14, 15, 16, 17]),
+    _faces(TRI6, [np.arange(6), np.arange(6, 12)]) + _faces(QUAD9, [_side(*face.nodes, 6) for face in TRI6.faces]),
+    abaqus_name="C3D15", abaqus_nodes=np.array([0, 1, 2, 6, 7, 8, 3, 4, 5, 9, 10, 11, 12, 13, 14]))
+"""Full quadratic wedge, zeta from -1 to 1: TRI6 at the bottom, the top and the middle; sides over those of TRI6::
+
+       bottom, zeta = -1     top, zeta = 1       middle, zeta = 0
+
+      2                      8                   14
+      |`.                    |`.                  |`.               eta
+      5   4                 11   10              17   16             |
+      |     `.               |     `.             |     `.           |
+      0 -- 3 -- 1            6 -- 9 -- 7         12 --15 --13        +---- xi
+"""
+
+TRI3 = Element(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), linear_simplex, triangle_rule(), "triangle", np.arange(3))
+"""Linear triangle: TRI6 without its mid-sides."""
+
+TET4 = Element(np.vstack([np.zeros(3), np.eye(3)]), linear_simplex, tetrahedron_rule(), "tetra", np.arange(4),
+               _faces(TRI3, [[0, 1, 2], [0, 1, 3], [1, 2, 3], [2, 0, 3]]), abaqus_name="C3D4", abaqus_nodes=np.arange(4))
+"""Linear tetrahedron with corners at the origin and the unit vectors::
+
+    3
+    |`.
+    |  `.          zeta
+    | 2  `.          |  eta
+    |/     `.        | /
+    0 ------- 1      +---- xi
+"""

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from softtact.fem.elements import QUAD9_NODES, TRI6_NODES, quad8, quad9, tri6
+from softtact.fem.elements import QUAD8, QUAD9, TRI6
 
 _SAME = 1e-7   # mm: nodes nearer than this are one
 NO_TRIANGLES = np.zeros((0, 6, 2))
@@ -24,9 +24,9 @@ class Mesh2D:
     triangles: np.ndarray = field(default_factory=lambda: np.zeros((0, 6), dtype=np.int64))
 
     def outer_sides(self):
-        """Quads (k,) and their sides (k,), in the order eta=-1, xi=1, eta=1, xi=-1, that belong to no other element."""
-        sides = np.sort(np.stack([self.quads[:, [k, (k + 1) % 4]] for k in range(4)], axis=1), axis=2)
-        others = np.sort(np.stack([self.triangles[:, [k, (k + 1) % 3]] for k in range(3)], axis=1), axis=2)
+        """Quads (k,) and their sides (k,), numbered as in `QUAD9.faces`, that belong to no other element."""
+        sides = np.sort(self.quads[:, QUAD9.sides[:, :2]], axis=2)     # by their corners
+        others = np.sort(self.triangles[:, TRI6.sides[:, :2]], axis=2)
         _, where, counts = np.unique(np.vstack([sides.reshape(-1, 2), others.reshape(-1, 2)]), axis=0, return_inverse=True,
                                      return_counts=True)
         return np.nonzero(counts[where.ravel()[:sides[..., 0].size]].reshape(-1, 4) == 1)
@@ -138,7 +138,7 @@ def merge(quads, triangles=NO_TRIANGLES):
 
 def with_centres(quads):
     """8-node quads (q, 8, 2) with their centres as ninth nodes (the 8-node map's centre, so that the shape is the same)."""
-    centre = quad8(np.zeros((1, 2)))[0] @ quads
+    centre = QUAD8.shape(np.zeros((1, 2)))[0] @ quads
     return np.concatenate([quads, centre], axis=1)
 
 
@@ -150,8 +150,8 @@ def _unique(points):
 def refine(mesh_2d, times=1):
     """Split every element of a plan mesh into four, on the same curves."""
     for _ in range(times):
-        mesh_2d = merge(_split(mesh_2d.points[mesh_2d.quads], quad9, QUAD9_NODES, _QUAD_CHILDREN),
-                     _split(mesh_2d.points[mesh_2d.triangles], tri6, TRI6_NODES, _TRIANGLE_CHILDREN))
+        mesh_2d = merge(_split(mesh_2d.points[mesh_2d.quads], QUAD9.shape, QUAD9.nodes, _QUAD_CHILDREN),
+                     _split(mesh_2d.points[mesh_2d.triangles], TRI6.shape, TRI6.nodes, _TRIANGLE_CHILDREN))
     return mesh_2d
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from softtact.fem.elements import HEX20_BOTTOM, HEX20_NODES, HEX20_TOP, hex20
+from softtact.fem.elements import HEX20
 from softtact.fem.extruded_mesh import grid_mesh_2d
 
 _ROUNDS = 20   # nodes may follow nodes that follow others; each round resolves one generation
@@ -87,7 +87,7 @@ def cover_mesh(x_lines, y_lines, heights, splits):
     size = np.concatenate([leaf[:, 2] for leaf in cells])
     # Whole numbers stand for places: 2 in x and y for the side of the smallest cell, 2 in z for a layer.
     half = np.column_stack([size, size, np.ones_like(size)])
-    nodes = low[:, None] + ((HEX20_NODES[None] + 1) * half[:, None]).astype(np.int64)
+    nodes = low[:, None] + ((HEX20.nodes[None] + 1) * half[:, None]).astype(np.int64)
     places, hexes = np.unique(nodes.reshape(-1, 3), axis=0, return_inverse=True)
     hexes = hexes.reshape(-1, 20)
     rows, masters, weights = _hanging(places, hexes, low, half, cells)
@@ -99,7 +99,7 @@ def cover_mesh(x_lines, y_lines, heights, splits):
     points = np.column_stack([line[places[order, axis]] for axis, line in enumerate(lines)])
     layer = low[:, 2] // 2
     return CoverMesh(points=points, hexes=number[hexes], follow=follow[order].tocsr(),
-                     top=number[hexes[layer == len(splits) - 1][:, HEX20_TOP]], bottom=number[hexes[layer == 0][:, HEX20_BOTTOM]],
+                     top=number[hexes[layer == len(splits) - 1][:, HEX20.top]], bottom=number[hexes[layer == 0][:, HEX20.bottom]],
                      bottom_cells=_owners(cells[0], splits[0].shape))
 
 
@@ -155,7 +155,7 @@ def _hanging(places, hexes, low, half, cells):
     rows = np.flatnonzero(best >= 0)
     element = best[rows]
     parent = (places[rows] - low[element]) / half[element] - 1.0
-    return rows, hexes[element], hex20(parent)[0]
+    return rows, hexes[element], HEX20.shape(parent)[0]
 
 
 def _resolve(count, rows, masters, weights):

@@ -1,12 +1,12 @@
-"""Compiled loops over elements: kinematics, internal forces and tangents. Plain arrays in, plain arrays out.
+"""Compiled loops over elements: kinematics, internal forces and tangents. They take the records of `kernel_records`.
 
-Symmetric tensors are stored as xx, yy, zz, xy, yz, zx. Many elements are translations of each other: gradients (u, g, 3, m)
-and volumes (u, g) are kept once for each shape, `shapes` (e,) tells which is an element's. All kernels run on one core and
-release the GIL.
+Symmetric tensors are stored as xx, yy, zz, xy, yz, zx. All kernels run on one core and release the GIL.
 """
 
 import numpy as np
 from numba import njit
+
+from softtact.fem.kernel_records import Deformation
 
 _ROW = np.array([0, 1, 2, 0, 1, 2])
 _COL = np.array([0, 1, 2, 1, 2, 0])
@@ -28,8 +28,9 @@ def _gradient(along, slopes):
 
 
 @njit(cache=True, nogil=True)
-def deformation(displacement, gradients, shapes):
-    """Deformation gradient F (e, g, 3, 3), C (e*g, 6) and J (e, g) from nodal displacement (e, m, 3)."""
+def deformation(displacement, at_rest):
+    """`Deformation` of elements, given by their `ElementArrays`, from nodal displacement (e, m, 3) in mm."""
+    gradients, shapes = at_rest.gradients, at_rest.shapes
     elements, nodes, _ = displacement.shape
     along = np.empty((3, nodes))
     points = gradients.shape[1]
@@ -54,7 +55,7 @@ def deformation(displacement, gradients, shapes):
             c[0], c[1], c[2] = xx * xx + yx * yx + zx * zx, xy * xy + yy * yy + zy * zy, xz * xz + yz * yz + zz * zz
             c[3], c[4], c[5] = xx * xy + yx * yy + zx * zy, xy * xz + yy * yz + zy * zz, xz * xx + yz * yx + zz * zx
             J[e, g] = xx * (yy * zz - yz * zy) - xy * (yx * zz - yz * zx) + xz * (yx * zy - yy * zx)
-    return F, C, J
+    return Deformation(F, C, J)
 
 
 @njit(cache=True, nogil=True)
@@ -82,8 +83,10 @@ def inverse_symmetric(c):
 
 
 @njit(cache=True, nogil=True)
-def internal_force(F, C, J, gradients, volumes, shapes, stress, pressure):
-    """Nodal forces (e, 3 m): isochoric second Piola-Kirchhoff stress (e*g, 6) plus pressure (e, g) J C^-1."""
+def internal_force(deformed, at_rest, stress, pressure):
+    """Nodal forces (e, 3 m) in N: isochoric second Piola-Kirchhoff stress (e*g, 6) plus pressure (e, g) J C^-1, both in MPa."""
+    F, C, J = deformed.F, deformed.C, deformed.J
+    gradients, volumes, shapes = at_rest.gradients, at_rest.volumes, at_rest.shapes
     elements, points = J.shape
     nodes = gradients.shape[3]
     force = np.empty((elements, 3 * nodes))
@@ -206,21 +209,35 @@ def _add_modes(blocks, nodes, left, right):
 
 
 @njit(cache=True, nogil=True)
-def _add_volumetric(blocks, nodes, change, basis, gram_inverse, bulk_modulus, volumes, growing):
-    """Blocks plus those of the pressure's projected part, and of its growing part but for what stands at the points."""
+def _add_volumetric(blocks, nodes, change, modes, volumes, volume, e):
+    """Blocks plus those of an element's projected changes of volume, and of the quartic penalty but for what stands at the points.
+
+    change (g, 3 width): see `_volume_change`;  modes: basis (g, p) and inverse Gram matrix (p, p);  volume: `VolumeResponse`
+    """
+    basis, gram_inverse = modes
     seen = basis.T @ change
     projected = gram_inverse @ seen
-    bulk_modulus = change.dtype.type(bulk_modulus)
-    if len(growing) == 0:
-        _add_modes(blocks, nodes, projected, bulk_modulus * seen)
+    if volume.stiffness.size > 0:
+        stiff = (_weighted(basis, volumes).T @ _weighted(basis, volume.stiffness[e])) @ projected
+    else:
+        stiff = change.dtype.type(volume.modulus) * seen
+    if volume.quartic.size == 0:
+        _add_modes(blocks, nodes, projected, stiff)
         return
-    weighted, measured = np.empty_like(basis), np.empty_like(basis)
-    for g in range(len(growing)):
-        weighted[g], measured[g] = growing[g] * basis[g], volumes[g] * basis[g]
+    weighted, measured = _weighted(basis, volume.quartic[e]), _weighted(basis, volumes)
     # P^T (k seen + inner P) - P^T cross - cross^T P as one symmetric sum of two products.
-    half = (bulk_modulus * seen + (measured.T @ weighted) @ projected) * change.dtype.type(0.5) - weighted.T @ change
+    half = (stiff + (measured.T @ weighted) @ projected) * change.dtype.type(0.5) - weighted.T @ change
     _add_modes(blocks, nodes, projected, half)
     _add_modes(blocks, nodes, half, projected)
+
+
+@njit(cache=True, nogil=True)
+def _weighted(basis, weights):
+    """Functions (g, p), each times its point's weight (g,), in the functions' precision."""
+    out = np.empty_like(basis)
+    for g in range(len(weights)):
+        out[g] = weights[g] * basis[g]
+    return out
 
 
 @njit(cache=True, nogil=True)
@@ -244,26 +261,28 @@ def _padded(values, rows, columns, like):
 
 
 @njit(cache=True, nogil=True)
-def tangent(F, C, J, gradients, volumes, shapes, stress, moduli, pressure, basis, gram_inverse, bulk_modulus, local_modulus,
-            growing, like):
-    """Tangent (e, 3 m, 3 m) of `internal_force` with the pressure of `SolidBlock`: a projected, a local and a growing part.
+def tangent(deformed, at_rest, stress, moduli, volume, like):
+    """Tangent (e, 3 m, 3 m) in N/mm of `internal_force` with the pressure of a `VolumeResponse`.
 
-    projected = bulk_modulus P(J - 1), P = basis . gram_inverse . integral(basis ...), basis (g, p): symmetric, rank p per element
-    local = local_modulus (J - 1/J) / 2;  both moduli in MPa
-    growing: derivative (1 - P) growing (1 - P), a modulus (e, g) in MPa, or (0, 0) where there is none
+    stress (e*g, 6), moduli (e*g, 6, 6) in MPa: of the law without its volume
+    Derivatives of the pressure by J, with P = basis . gram_inverse . integral(basis ...): P U'' P of rank p per element; of the
+    unprojected penalty k (1 + 1/J^2) / 2 at each point; of the quartic one (1 - P) quartic (1 - P).
     like: an array in whose precision the products are taken; what stands at a point is found in double precision
 
     The products run over blocks of components (i, j >= i): K_ij = G^T A_ij G with the gradients G (3 g, m), six blocks side by side
     in rows of whole vectors instead of one product with the strain-displacement matrix, which has a third of zeros.
     """
+    F, C, J = deformed.F, deformed.C, deformed.J
+    gradients, volumes, shapes = at_rest.gradients, at_rest.volumes, at_rest.shapes
+    pressure, growing, unprojected = volume.pressure, volume.quartic, volume.unprojected
     elements, points = J.shape
     nodes = gradients.shape[3]
     width = -(-nodes // _LANES) * _LANES
     out = np.empty((elements, 3 * nodes, 3 * nodes), like.dtype)
     blocks, right = np.empty((nodes + nodes % 2, 6 * width), like.dtype), np.empty((6, 6 * width), like.dtype)
     G, change = np.zeros((3 * points + 3, width), like.dtype), np.empty((points, 3 * width), like.dtype)
-    several = -(-basis.shape[1] // _AT_ONCE) * _AT_ONCE
-    modes = _padded(basis, points, several, like)
+    several = -(-at_rest.basis.shape[1] // _AT_ONCE) * _AT_ONCE
+    basis = _padded(at_rest.basis, points, several, like)
     A, D, S = np.empty((3, 6, 3), like.dtype), np.empty((6, 6)), np.empty((3, 3))
     grows = growing.size > 0
     for e in range(elements):
@@ -271,7 +290,7 @@ def tangent(F, C, J, gradients, volumes, shapes, stress, moduli, pressure, basis
         for g in range(points):
             n, j, w, own = e * points + g, J[e, g], volumes[shapes[e], g], G[3 * g:3 * g + 3]
             inverse = inverse_symmetric(C[n])
-            local = 0.5 * local_modulus * (j * j + 1.0)
+            local = 0.5 * unprojected * (j * j + 1.0)
             if grows:
                 local += growing[e, g] * j * j
             _moduli(D, S, stress[n], moduli[n], inverse, w, pressure[e, g] * j, local)
@@ -284,57 +303,10 @@ def tangent(F, C, J, gradients, volumes, shapes, stress, moduli, pressure, basis
         if points % 2 == 1:
             right[3:] = 0.0
             _add_products(blocks, G[3 * points - 3:], right)
-        inverse_of_gram = _padded(gram_inverse[shapes[e]], several, several, like)
-        _add_volumetric(blocks, nodes, change, modes, inverse_of_gram, bulk_modulus, volumes[shapes[e]], growing[e:e + 1].ravel())
+        modes = basis, _padded(at_rest.gram_inverse[shapes[e]], several, several, like)
+        _add_volumetric(blocks, nodes, change, modes, volumes[shapes[e]], volume, e)
         _spread(out[e], blocks, width)
     return out
-
-
-@njit(cache=True, nogil=True)
-def volumetric(J, volumes, shapes, basis, gram_inverse, bulk_modulus, local_modulus, growing_modulus):
-    """What `blocks.Volumetric` holds, of elements with volume changes J (e, g), by the energy told in `blocks`; moduli in MPa."""
-    elements, points = J.shape
-    grows = growing_modulus > 0
-    energies, pressure = np.zeros(elements), np.empty((elements, points))
-    growing = np.empty((elements, points) if grows else (0, 0))
-    seen, held, share = np.empty(points), np.empty(points), np.empty(points)
-    for e in range(elements):
-        w, inverse = volumes[shapes[e]], gram_inverse[shapes[e]]
-        _project(J[e] - 1.0, w, basis, inverse, seen)
-        for g in range(points):
-            j = J[e, g]
-            pressure[e, g], density = bulk_modulus * seen[g], 0.5 * bulk_modulus * seen[g] ** 2
-            if local_modulus > 0:
-                pressure[e, g] += 0.5 * local_modulus * (j - 1.0 / j)
-                density += 0.25 * local_modulus * (j * j - 1.0 - 2.0 * np.log(j))
-            if grows:
-                unseen = j - 1.0 - seen[g]
-                held[g] = growing_modulus * unseen * unseen * unseen
-                growing[e, g] = 3.0 * growing_modulus * unseen * unseen
-                density += 0.25 * held[g] * unseen
-            energies[e] += w[g] * density
-        if grows:
-            _project(held, w, basis, inverse, share)
-            pressure[e] += held - share
-    return energies, pressure, growing
-
-
-@njit(cache=True, nogil=True)
-def _project(field, w, basis, gram_inverse, out):
-    """An element's field (g,) projected on the functions of the pressure, into `out` (g,)."""
-    points, modes = basis.shape
-    moments, amounts = np.zeros(modes), np.zeros(modes)
-    for g in range(points):
-        for p in range(modes):
-            moments[p] += w[g] * field[g] * basis[g, p]
-    for p in range(modes):
-        for q in range(modes):
-            amounts[q] += gram_inverse[p, q] * moments[p]     # symmetric: row by row
-    for g in range(points):
-        total = 0.0
-        for p in range(modes):
-            total += amounts[p] * basis[g, p]
-        out[g] = total
 
 
 @njit(cache=True, nogil=True)

@@ -6,6 +6,8 @@ run in double precision but for the products of a tangent in single precision, a
 
 import torch
 
+from softtact.fem.kernel_records import Deformation
+
 _ROW, _COL = [0, 1, 2, 0, 1, 2], [0, 1, 2, 1, 2, 0]     # of xx, yy, zz, xy, yz, zx
 _VOIGT = [[0, 3, 5], [3, 1, 4], [5, 4, 2]]
 
@@ -17,33 +19,36 @@ class DeviceKernels:
         self.device = torch.device(device)
         self._kept = {}
 
-    def deformation(self, displacement, gradients, shapes):
+    def deformation(self, displacement, at_rest):
         """See `kernels.deformation`."""
-        F, C, J = _kinematics(self._constant(gradients)[self._there(shapes)], self._there(displacement))
-        return F, _back(C), _back(J)
+        F, C, J = _kinematics(self._constant(at_rest.gradients)[self._there(at_rest.shapes)], self._there(displacement))
+        return Deformation(F, _back(C), _back(J))
 
-    def internal_force(self, F, C, J, gradients, volumes, shapes, stress, pressure):
+    def internal_force(self, deformed, at_rest, stress, pressure):
         """See `kernels.internal_force`."""
-        which = self._there(shapes)
-        force = _forces(F, self._there(J), self._constant(gradients)[which], self._constant(volumes)[which],
+        (F, _, J), which = deformed, self._there(at_rest.shapes)
+        force = _forces(F, self._there(J), self._constant(at_rest.gradients)[which], self._constant(at_rest.volumes)[which],
                         self._per_point(stress, J), self._there(pressure))
         return _back(force)
 
-    def tangent(self, F, C, J, gradients, volumes, shapes, stress, moduli, pressure, basis, gram_inverse, bulk_modulus,
-                local_modulus, growing, like):
+    def tangent(self, deformed, at_rest, stress, moduli, volume, like):
         """See `kernels.tangent`."""
-        which, precision = self._there(shapes), torch.from_numpy(like).dtype
-        G, w, J_there = self._constant(gradients)[which], self._constant(volumes)[which], self._there(J)
-        pj, growing = self._there(pressure) * J_there, self._there(growing) if growing.size else None
-        local = 0.5 * local_modulus * (J_there**2 + 1)
-        if growing is not None:
-            local = local + growing * J_there**2
+        (F, _, J), which, precision = deformed, self._there(at_rest.shapes), torch.from_numpy(like).dtype
+        G, w, J_there = self._constant(at_rest.gradients)[which], self._constant(at_rest.volumes)[which], self._there(J)
+        pj, quartic, stiffness = self._there(volume.pressure) * J_there, self._some(volume.quartic), self._some(volume.stiffness)
+        local = 0.5 * volume.unprojected * (J_there**2 + 1)
+        if quartic is not None:
+            local = local + quartic * J_there**2
         A, inverse = _moduli(F, w, self._per_point(stress, J), self._per_point(moduli, J), pj, local)
         change = torch.einsum("egij,egjm->egmi", (w * J_there)[..., None, None] * (F @ inverse), G).flatten(2)
-        volumetric = _volumetric(change.to(precision), self._constant(basis).to(precision),
-                                 self._constant(gram_inverse)[which].to(precision), bulk_modulus, w.to(precision),
-                                 None if growing is None else growing.to(precision))
+        modes = [values.to(precision) for values in (self._constant(at_rest.basis), self._constant(at_rest.gram_inverse)[which], w)]
+        volumetric = _volumetric(change.to(precision), *modes, volume.modulus if stiffness is None else stiffness.to(precision),
+                                 None if quartic is None else quartic.to(precision))
         return _back(volumetric + _products(A.to(precision), G.to(precision)))
+
+    def _some(self, values):
+        """The values, None where there are none."""
+        return self._there(values) if values.size else None
 
     def _there(self, values):
         return torch.as_tensor(values, device=self.device)
@@ -111,13 +116,20 @@ def _products(A, G):
     return K.reshape(elements, nodes, 3, 3, nodes).permute(0, 1, 2, 4, 3).reshape(elements, 3 * nodes, 3 * nodes)
 
 
-def _volumetric(change, basis, gram_inverse, bulk_modulus, w, growing):
-    """The pressure's part of K, see `kernels._volumetric`, from how the points' volumes change with the nodes (e, g, 3 m)."""
+def _volumetric(change, basis, gram_inverse, w, stiffness, quartic):
+    """The pressure's part of K, see `kernels._add_volumetric`, from how the points' volumes change with the nodes (e, g, 3 m).
+
+    stiffness: U'', a number or at the points (e, g);  quartic: (e, g), or None
+    """
     seen = basis.T @ change
-    projected = gram_inverse @ seen
-    if growing is None:
-        return bulk_modulus * (projected.mT @ seen)
-    weighted, measured = growing[..., None] * basis, w[..., None] * basis
-    half = 0.5 * (bulk_modulus * seen + (measured.mT @ weighted) @ projected) - weighted.mT @ change
+    projected, measured = gram_inverse @ seen, w[..., None] * basis
+    if isinstance(stiffness, torch.Tensor):
+        stiff = (measured.mT @ (stiffness[..., None] * basis)) @ projected
+    else:
+        stiff = stiffness * seen
+    if quartic is None:
+        return projected.mT @ stiff
+    weighted = quartic[..., None] * basis
+    half = 0.5 * (stiff + (measured.mT @ weighted) @ projected) - weighted.mT @ change
     return torch.cat([projected, half], dim=1).mT @ torch.cat([half, projected], dim=1)
 

@@ -4,7 +4,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from softtact.fem.elements import quad9, tri6
+from softtact.fem.elements import QUAD9, TRI6
 
 _NEAREST = 16        # elements, by their middles, in which a point is looked for
 _NEWTON_STEPS = 30
@@ -35,7 +35,7 @@ def interpolation_2d(mesh_2d, points):
 
 
 class _Quads:
-    shape = staticmethod(quad9)
+    shape = staticmethod(QUAD9.shape)
     starts = np.array([(2 * x - 1, 2 * y - 1) for x in _STARTS for y in _STARTS])
 
     @staticmethod
@@ -44,7 +44,7 @@ class _Quads:
 
 
 class _Triangles:
-    shape = staticmethod(tri6)
+    shape = staticmethod(TRI6.shape)
     starts = np.array([(x, y) for x in _STARTS for y in _STARTS if x + y <= 1])
 
     @staticmethod

@@ -1,9 +1,9 @@
 """A block of elements of one material: energy, internal force and tangent at finite strain.
 
-The volumetric energy (K - k)/2 (J-1)^2 sees J only through its projection on some functions in each element: linear ones
-(four modes: discontinuous linear pressure), or trilinear ones (eight). The pressure needs no unknown of its own, and the tangent
-stays symmetric (Sussman and Bathe, Computers & Structures 26 (1987) 357). With linear functions the element does not lock
-for any bulk modulus (Q2/P-1 is stable); trilinear ones do not pass that test, and are 1 to 3 % stiffer at K = 20 mu.
+The law's volumetric energy U(J), with the modulus K - k, sees J only through its projection on some functions in each element:
+linear ones (four modes: discontinuous linear pressure), or trilinear ones (eight). The pressure needs no unknown of its own, and
+the tangent stays symmetric (Sussman and Bathe, Computers & Structures 26 (1987) 357). With linear functions the element does not
+lock for any bulk modulus (Q2/P-1 is stable); trilinear ones do not pass that test, and are 1 to 3 % stiffer at K = 20 mu.
 
 Volume changes that the functions do not see have no stiffness but the shear's. Where the pressure is several mu that is too
 little: elements collapse to J = 0.1, where no further step converges. Frusta under sharp or deep objects are pressed so far.
@@ -20,14 +20,18 @@ at 0.4 MPa) and Newton's method stalls.
 
 import copy
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from softtact.fem import kernels
-from softtact.fem.elements import gauss, hex20, hex27, reference_gradients, wedge18, wedge_rule
+from softtact.fem.elements import HEX20, HEX27, WEDGE18, reference_gradients
+from softtact.fem.kernel_records import ElementArrays, VolumePenalties, VolumeResponse
+from softtact.fem.volume_kernels import add_penalties, project
 from softtact.linalg.workers import SERIAL, slices, unique_rows
 from softtact.materials.laws.stretches import stretch_range
 
+_NONE = np.zeros((0, 0))
 _AT_ONCE = 400   # elements whose fields at the points are in memory at once, mostly in the processor's cache
 
 
@@ -45,99 +49,93 @@ class BlockState:
         return float(self.energies.sum())
 
 
-@dataclass(frozen=True)
-class Volumetric:
-    """Energies (e,) in mJ of volume changes, pressure (e, g) by which they change with J, in MPa, and the second derivative (e, g)
-    of their growing part by what the projection does not see, in MPa; (0, 0) where there is none.
-    """
-
-    energies: np.ndarray
-    pressure: np.ndarray
-    growing: np.ndarray
-
-
 class SolidBlock:
     """Elements of one kind and one law, by their shape functions' gradients.
 
-    gradients (u, g, m, 3) in 1/mm, kept as (u, g, 3, m), and volumes (u, g) in mm3 of the shapes that occur; shapes (e,): which is
-    an element's, by default each its own; points (g, 3) of the quadrature in parent coordinates; unprojected_penalty_ratio: k / mu;
+    gradients (u, g, m, 3) in 1/mm and volumes (u, g) in mm3 of the shapes that occur; shapes (e,): which is an element's, by
+    default each its own; points (g, 3) of the quadrature in parent coordinates; unprojected_penalty_ratio: k / mu;
     quartic_penalty_ratio: q / mu; trilinear: project on trilinear instead of linear functions. Displacements come per element
-    (e, m, 3) in mm. loops: what sums over points and nodes, `kernels` or `device_kernels`.
+    (e, m, 3) in mm. at_rest: all this as `ElementArrays`. loops: what sums over points and nodes, `kernels` or a `DeviceKernels`.
     """
 
     loops = kernels
 
     def __init__(self, gradients, volumes, points, law, *, shapes=None, unprojected_penalty_ratio=0.0, quartic_penalty_ratio=0.0,
                  trilinear=False):
-        self.law, self._local_over_shear, self._quartic_penalty_ratio = law, unprojected_penalty_ratio, quartic_penalty_ratio
-        self.gradients, self.volumes = np.ascontiguousarray(gradients.transpose(0, 1, 3, 2)), np.ascontiguousarray(volumes)
-        self.shapes = np.arange(len(gradients)) if shapes is None else shapes
-        self.basis = _pressure_modes(points, trilinear)
-        gram = np.einsum("eg,gp,gq->epq", self.volumes, self.basis, self.basis, optimize=True)
-        self.gram_inverse = np.linalg.inv(gram)
+        self.law = law
+        self._unprojected_penalty_ratio, self._quartic_penalty_ratio = unprojected_penalty_ratio, quartic_penalty_ratio
+        volumes, basis = np.ascontiguousarray(volumes), _pressure_modes(points, trilinear)
+        gram = np.einsum("eg,gp,gq->epq", volumes, basis, basis, optimize=True)
+        self.at_rest = ElementArrays(np.ascontiguousarray(gradients.transpose(0, 1, 3, 2)), volumes,
+                                     np.arange(len(gradients)) if shapes is None else shapes, basis, np.linalg.inv(gram))
 
     @property
-    def local_modulus(self):
+    def unprojected_modulus(self):
         """k in MPa."""
-        return min(self._local_over_shear * self.law.mu0, self.law.bulk_modulus)
+        return min(self._unprojected_penalty_ratio * self.law.mu0, self.law.bulk_modulus)
 
     @property
-    def growing_modulus(self):
+    def quartic_modulus(self):
         """q in MPa."""
         return self._quartic_penalty_ratio * self.law.mu0
 
-    @property
-    def projected_modulus(self):
-        """K - k in MPa."""
-        return self.law.bulk_modulus - self.local_modulus
+    @cached_property
+    def _volume_law(self):
+        """The law's U with the modulus K - k, and the penalties."""
+        penalties = VolumePenalties(self.unprojected_modulus, self.quartic_modulus)
+        return self.law.volumetric.with_modulus(self.law.bulk_modulus - penalties.unprojected), penalties
 
     def evaluate(self, displacement, elements=slice(None), *, workers=SERIAL):
         """Energies and internal forces of the chosen elements; None if one is turned inside out (J <= 0 at a quadrature point)."""
-        shapes = self.shapes[elements]
-        parts = workers.map(lambda part: self._evaluate(displacement[part], shapes[part]), slices(len(shapes), _AT_ONCE))
+        shapes = self.at_rest.shapes[elements]
+        parts = workers.map(lambda part: self._evaluate(displacement[part], self.at_rest._replace(shapes=shapes[part])),
+                            slices(len(shapes), _AT_ONCE))
         if any(part is None for part in parts):
             return None
         energies, forces = zip(*parts, strict=True)
         return BlockState(energies=np.concatenate(energies), force=np.concatenate(forces), displacement=displacement)
 
-    def _evaluate(self, displacement, shapes):
-        F, C, J = self.loops.deformation(displacement, self.gradients, shapes)
-        if not J.min() > 0:
+    def _evaluate(self, displacement, at_rest):
+        deformed = self.loops.deformation(displacement, at_rest)
+        if not deformed.J.min() > 0:
             return None
-        response = self.law.isochoric(C, tangent=False)
-        volumetric = self._volumetric(J, shapes)
-        energies = (self.volumes[shapes] * response.energy.reshape(J.shape)).sum(axis=1) + volumetric.energies
-        return energies, self.loops.internal_force(F, C, J, self.gradients, self.volumes, shapes, response.stress,
-                                                 volumetric.pressure)
+        response, volume = self.law.isochoric(deformed.C, tangent=False), self._volumetric(deformed.J, at_rest)
+        if volume is None:
+            return None
+        energies = (at_rest.volumes[at_rest.shapes] * response.energy.reshape(deformed.J.shape)).sum(axis=1) + volume.energies
+        return energies, self.loops.internal_force(deformed, at_rest, response.stress, volume.pressure)
 
     def tangent(self, displacement, elements=slice(None), *, precision=np.float64):
         """Tangent (e, 3 m, 3 m) in N/mm of the chosen elements, whose displacement (e, m, 3) is given.
 
         precision: float32 takes two thirds of the time, for steps that are corrected by a residual in double precision
         """
-        shapes = self.shapes[elements]
-        F, C, J = self.loops.deformation(displacement, self.gradients, shapes)
-        response = self.law.isochoric(C, tangent=True)
-        volumetric = self._volumetric(J, shapes)
-        return self.loops.tangent(F, C, J, self.gradients, self.volumes, shapes, response.stress, response.tangent,
-                                  volumetric.pressure, self.basis, self.gram_inverse, self.projected_modulus,
-                                  self.local_modulus, volumetric.growing, np.empty(0, precision))
+        at_rest = self.at_rest._replace(shapes=self.at_rest.shapes[elements])
+        deformed = self.loops.deformation(displacement, at_rest)
+        response, volume = self.law.isochoric(deformed.C, tangent=True), self._volumetric(deformed.J, at_rest)
+        return self.loops.tangent(deformed, at_rest, response.stress, response.tangent, volume, np.empty(0, precision))
 
     @property
     def volume(self):
         """Volume of all elements in mm3."""
-        return float(self.volumes.sum(axis=1)[self.shapes].sum())
+        return float(self.at_rest.volumes.sum(axis=1)[self.at_rest.shapes].sum())
 
     def volume_outside(self, displacement, window):
         """Volume (mm3) in which an isochoric principal stretch lies outside of `window` (lowest, highest)."""
-        _, C, _ = kernels.deformation(displacement, self.gradients, self.shapes)
-        low, high = stretch_range(C)
-        return float(self.volumes[self.shapes].ravel() @ ((low < window[0]) | (high > window[1])))
+        low, high = stretch_range(kernels.deformation(displacement, self.at_rest).C)
+        return float(self.at_rest.volumes[self.at_rest.shapes].ravel() @ ((low < window[0]) | (high > window[1])))
 
-    def _volumetric(self, J, shapes):
-        """The volumetric part of the energy of elements with volume changes J (e, g), a `Volumetric`."""
-        return Volumetric(*kernels.volumetric(J, self.volumes, shapes, self.basis, self.gram_inverse, self.projected_modulus,
-                                              self.local_modulus, self.growing_modulus))
+    def _volumetric(self, J, at_rest):
+        """`VolumeResponse` of elements with volume ratios J (e, g); None where U does not exist at a projected J."""
+        projected, penalties = self._volume_law
+        seen = project(J - 1.0, at_rest)
+        if not projected.linear and not seen.min() > projected.least_change:
+            return None
+        # U' of a projected J is that of all points; unless it is linear, only its projection changes the nodes' forces.
+        pressure = projected.pressure(seen) if projected.linear else project(projected.pressure(seen), at_rest)
+        energies, quartic = add_penalties(J, at_rest, seen, projected.energy(seen), pressure, penalties)
+        stiffness = _NONE if projected.linear else projected.stiffness(seen)
+        return VolumeResponse(energies, pressure, projected.bulk_modulus, stiffness, penalties.unprojected, quartic)
 
 
 def joined(parts):
@@ -147,18 +145,18 @@ def joined(parts):
     """
     kinds = {}
     for nodes, block in parts:
-        kinds.setdefault((id(block.law), type(block), *block.gradients.shape[1:]), []).append((nodes, block))
+        kinds.setdefault((id(block.law), type(block), *block.at_rest.gradients.shape[1:]), []).append((nodes, block))
     return [(np.vstack([nodes for nodes, _ in alike]), _joined_block([block for _, block in alike])) for alike in kinds.values()]
 
 
 def _joined_block(blocks):
-    whole, first = copy.copy(blocks[0]), np.cumsum([0, *(len(block.gradients) for block in blocks)])
-    whole.shapes = np.concatenate([block.shapes + start for block, start in zip(blocks, first, strict=False)])
-    for name in ("gradients", "volumes", "gram_inverse"):
-        values = np.concatenate([getattr(block, name) for block in blocks])
-        setattr(whole, name, values)
-        for k, block in enumerate(blocks):
-            setattr(block, name, values[first[k]:first[k + 1]])
+    whole, first = copy.copy(blocks[0]), np.cumsum([0, *(len(block.at_rest.gradients) for block in blocks)])
+    arrays = {name: np.concatenate([getattr(block.at_rest, name) for block in blocks])
+              for name in ("gradients", "volumes", "gram_inverse")}
+    whole.at_rest = whole.at_rest._replace(
+        shapes=np.concatenate([block.at_rest.shapes + start for block, start in zip(blocks, first, strict=False)]), **arrays)
+    for k, block in enumerate(blocks):
+        block.at_rest = block.at_rest._replace(**{name: values[first[k]:first[k + 1]] for name, values in arrays.items()})
     return whole
 
 
@@ -193,25 +191,30 @@ def _distinct(numbers):
     return np.maximum.accumulate(found, axis=1), back
 
 
-class HexBlock(SolidBlock):
-    """Hexahedra of 20 or 27 nodes given by coordinates (e, 20 or 27, 3) in mm; options as `SolidBlock` has them."""
+class _ElementBlock(SolidBlock):
+    """Elements of a kind at coordinates (e, m, 3) in mm, with their full quadrature or the reduced one."""
 
-    def __init__(self, coordinates, law, *, points_per_side=3, **options):
-        points, weights = gauss(points_per_side, 3)
-        shape = {20: hex20, 27: hex27}[coordinates.shape[1]]
-        first, shapes = _unlike(coordinates)
-        gradients, volumes = reference_gradients(coordinates[first], shape(points)[1], weights)
-        super().__init__(gradients, volumes, points, law, shapes=shapes, **options)
+    def __init__(self, element, coordinates, law, *, reduced=False, **options):
+        rule, (first, shapes) = element.reduced if reduced else element.quadrature, _unlike(coordinates)
+        gradients, volumes = reference_gradients(coordinates[first], element.shape(rule.points)[1], rule.weights)
+        super().__init__(gradients, volumes, rule.points, law, shapes=shapes, **options)
 
 
-class WedgeBlock(SolidBlock):
-    """18-node wedges given by coordinates (e, 18, 3) in mm; options as `SolidBlock` has them."""
+class HexBlock(_ElementBlock):
+    """Hexahedra HEX20 or HEX27 given by coordinates (e, 20 or 27, 3) in mm; options as `SolidBlock` has them.
+
+    reduced: 2 x 2 x 2 points instead of 3 x 3 x 3
+    """
 
     def __init__(self, coordinates, law, **options):
-        points, weights = wedge_rule()
-        first, shapes = _unlike(coordinates)
-        gradients, volumes = reference_gradients(coordinates[first], wedge18(points)[1], weights)
-        super().__init__(gradients, volumes, points, law, shapes=shapes, **options)
+        super().__init__({20: HEX20, 27: HEX27}[coordinates.shape[1]], coordinates, law, **options)
+
+
+class WedgeBlock(_ElementBlock):
+    """Wedges WEDGE18 given by coordinates (e, 18, 3) in mm; options as `SolidBlock` has them."""
+
+    def __init__(self, coordinates, law, **options):
+        super().__init__(WEDGE18, coordinates, law, **options)
 
 
 def hanging_node_constraints(masters, weights, elements, block):
@@ -222,9 +225,11 @@ def hanging_node_constraints(masters, weights, elements, block):
     element, node, _ = np.indices(masters.shape, sparse=True)
     column, used = column.reshape(masters.shape), column.reshape(masters.shape) >= 0
     np.add.at(follow, tuple(np.broadcast_to(index, masters.shape)[used] for index in (element, node, column)), weights[used])
-    table = np.hstack([block.shapes[:, None], follow.reshape(len(follow), -1)])
-    first, block.shapes = unique_rows(table)
+    at_rest = block.at_rest
+    table = np.hstack([at_rest.shapes[:, None], follow.reshape(len(follow), -1)])
+    first, shapes = unique_rows(table)
     own = table[first, 0].astype(int)
-    block.gradients = np.ascontiguousarray(np.einsum("egdm,emw->egdw", block.gradients[own], follow[first], optimize=True))
-    block.volumes, block.gram_inverse = block.volumes[own], block.gram_inverse[own]
+    gradients = np.ascontiguousarray(np.einsum("egdm,emw->egdw", at_rest.gradients[own], follow[first], optimize=True))
+    block.at_rest = at_rest._replace(gradients=gradients, volumes=at_rest.volumes[own], shapes=shapes,
+                                     gram_inverse=at_rest.gram_inverse[own])
     return nodes, block

@@ -4,13 +4,12 @@ The matrix (n + m, n + m) of a body lists n inner unknowns first, then m outer o
 filled, row by row; to Fortran that is a lower triangle column by column.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-from softtact.linalg import lapack
-from softtact.linalg.lapack import address, call, keep_alive
+from softtact.linalg.lapack import ROUTINES, address, call, keep_alive
 from softtact.linalg.row_loops import add_row, row_product
 from softtact.linalg.workers import SERIAL, slices
 
@@ -19,8 +18,7 @@ _SMALLEST_STIFFNESS = 0.02   # N/mm of a mode of a folding body; the softest mod
 _ROUNDING = float(np.finfo(np.float32).eps)
 
 
-@dataclass(frozen=True)
-class Springs:
+class Springs(NamedTuple):
     """Stiffness (b, s) in N/mm of weighted sums of unknowns: places (s, c) in the matrix, -1 where held, weights (s, c)."""
 
     stiffness: np.ndarray
@@ -35,6 +33,16 @@ class Springs:
                        np.vstack([np.pad(self.weights, more), others.weights]))
 
 
+class _Store(NamedTuple):
+    """Of n inner and m outer unknowns: rows (bodies, n, n + m), the factor L' and the coupling L^-1 K_inner,outer side by side;
+    outer (bodies, m, m), the condensed matrices; modified (bodies,), where the inner matrix was not positive definite.
+    """
+
+    rows: np.ndarray
+    outer: np.ndarray
+    modified: np.ndarray
+
+
 class Condensation:
     """Bodies of n inner and m outer unknowns; `outer` (bodies, m, m) are their condensed matrices.
 
@@ -44,10 +52,13 @@ class Condensation:
 
     def __init__(self, bodies, inner, outer, element_dofs):
         self._dofs = tuple(np.ascontiguousarray(dofs) for dofs in element_dofs)
-        # The factor L' and the coupling L^-1 K_inner,outer side by side.
-        self._rows = np.zeros((bodies, inner, inner + outer), dtype=np.float32)
-        self.outer = np.zeros((bodies, outer, outer), dtype=np.float32)
-        self._modified = np.zeros(bodies, dtype=bool)
+        self._store = _Store(rows=np.zeros((bodies, inner, inner + outer), dtype=np.float32),
+                             outer=np.zeros((bodies, outer, outer), dtype=np.float32), modified=np.zeros(bodies, dtype=bool))
+
+    @property
+    def outer(self):
+        """The condensed matrices (bodies, m, m) in N/mm."""
+        return self._store.outer
 
     def set(self, bodies, tangents, springs=None, *, damping=None):
         """Assemble, factor and condense the matrices of the given bodies (b,).
@@ -62,27 +73,25 @@ class Condensation:
         """
         springs = springs or Springs(np.zeros((len(bodies), 0)), np.zeros((0, 1), dtype=np.int64), np.zeros((0, 1)))
         damping = np.zeros(len(bodies)) if damping is None else damping
-        _set(bodies, damping, tuple(tangents), self._dofs, springs.stiffness, springs.places, springs.weights, self._rows,
-             self.outer, self._modified, _SMALLEST_STIFFNESS, lapack.LETTERS, lapack.FACTORS, lapack.POTRF, lapack.TRSM,
-             lapack.SYRK)
+        _set(bodies, damping, tuple(tangents), self._dofs, springs, self._store, ROUTINES)
 
     def residual(self, inner, *, bodies=None, workers=SERIAL):
         """What inner residuals (b, n) of some bodies (b,), or of all, leave on their outer unknowns (b, m), and the part to keep
         for `recover`."""
         half, bodies = np.array(inner, dtype=np.float32, order="C"), self._chosen(bodies)
         passed_on = np.empty((len(half), self.outer.shape[1]), dtype=np.float32)
-        workers.map(lambda part: _reduce(self._rows, bodies[part], half[part], passed_on[part]), slices(len(half), _AT_ONCE))
+        workers.map(lambda part: _reduce(self._store.rows, bodies[part], half[part], passed_on[part]), slices(len(half), _AT_ONCE))
         return passed_on, half
 
     def recover(self, half, outer_step, *, bodies=None, workers=SERIAL):
         """Newton step (b, n) of the inner unknowns of some bodies (b,), or of all, for that of their outer ones (b, m)."""
         step, bodies = half.astype(np.float32), self._chosen(bodies)     # a copy; a half that was cut is in double precision
         outer = np.ascontiguousarray(outer_step, dtype=np.float32)
-        workers.map(lambda part: _recover(self._rows, bodies[part], step[part], outer[part]), slices(len(step), _AT_ONCE))
+        workers.map(lambda part: _recover(self._store.rows, bodies[part], step[part], outer[part]), slices(len(step), _AT_ONCE))
         return -step
 
     def _chosen(self, bodies):
-        return np.arange(len(self._rows)) if bodies is None else bodies
+        return np.arange(len(self._store.rows)) if bodies is None else bodies
 
     def positive_outer(self):
         """The condensed matrices without their modes of negative stiffness."""
@@ -92,7 +101,7 @@ class Condensation:
     @property
     def modified(self):
         """How many bodies had modes of negative stiffness."""
-        return int(self._modified.sum())
+        return int(self._store.modified.sum())
 
 
 def packed(matrices):
@@ -114,9 +123,8 @@ def _pack(matrices, out):
 
 
 @njit(cache=True, nogil=True)
-def _set(bodies, damping, tangents, dofs, stiffness, places, weights, rows, outer, modified, smallest, letters, factors, potrf,
-         trsm, syrk):
-    n, m = rows.shape[1], outer.shape[1]
+def _set(bodies, damping, tangents, dofs, springs, store, blas):
+    n, m = store.rows.shape[1], store.outer.shape[1]
     matrix = np.empty((n + m, n + m), np.float32)
     for b in range(len(bodies)):
         for i in range(n + m):
@@ -124,11 +132,11 @@ def _set(bodies, damping, tangents, dofs, stiffness, places, weights, rows, oute
         for group in range(len(dofs)):
             for element in range(len(dofs[group])):
                 _add_element(matrix, tangents[group][b, element], dofs[group][element])
-        _add_springs(matrix, stiffness[b], places, weights)
+        _add_springs(matrix, springs.stiffness[b], springs.places, springs.weights)
         for i in range(n):
             matrix[i, i] += damping[b]
         body = bodies[b]
-        modified[body] = _condense(matrix, rows[body], outer[body], smallest, letters, factors, potrf, trsm, syrk)
+        store.modified[body] = _condense(matrix, store.rows[body], store.outer[body], blas)
 
 
 @njit(cache=True, nogil=True)
@@ -165,23 +173,23 @@ def _add_springs(matrix, stiffness, places, weights):
 
 
 @njit(cache=True, nogil=True)
-def _condense(matrix, rows, outer, smallest, letters, factors, potrf, trsm, syrk):
+def _condense(matrix, rows, outer, blas):
     """Fill a body's rows and outer matrix; True where its inner matrix was not positive definite."""
     n, m = len(rows), len(outer)
-    size = np.array([n, m, n + m, 0], dtype=np.int32)
+    size, letters, factors = np.array([n, m, n + m, 0], dtype=np.int32), blas.letters, blas.factors
     L, N, R, T = address(letters, 0), address(letters, 1), address(letters, 2), address(letters, 3)
     one, minus_one = address(factors, 0), address(factors, 1)
     _n, _m, _lead, info = address(size, 0), address(size, 1), address(size, 2), address(size, 3)
     rows[:] = matrix[:n]
     outer[:] = matrix[n:, n:]
-    call(potrf, (L, _n, rows.ctypes.data, _lead, info))
+    call(blas.potrf, (L, _n, rows.ctypes.data, _lead, info))
     modified = size[3] != 0
     if modified:
-        rows[:, :n] = _made_positive(matrix[:n, :n].astype(np.float64), smallest)
-        call(potrf, (L, _n, rows.ctypes.data, _lead, info))
+        rows[:, :n] = _made_positive(matrix[:n, :n].astype(np.float64))
+        call(blas.potrf, (L, _n, rows.ctypes.data, _lead, info))
     coupling = rows[:, n:].ctypes.data
-    call(trsm, (R, L, T, N, _m, _n, one, rows.ctypes.data, _lead, coupling, _lead))
-    call(syrk, (L, N, _m, _n, minus_one, coupling, _lead, one, outer.ctypes.data, _m))
+    call(blas.trsm, (R, L, T, N, _m, _n, one, rows.ctypes.data, _lead, coupling, _lead))
+    call(blas.syrk, (L, N, _m, _n, minus_one, coupling, _lead, one, outer.ctypes.data, _m))
     keep_alive(size)
     for i in range(m):
         for j in range(i):
@@ -190,13 +198,13 @@ def _condense(matrix, rows, outer, smallest, letters, factors, potrf, trsm, syrk
 
 
 @njit(cache=True, nogil=True)
-def _made_positive(matrix, smallest):
+def _made_positive(matrix):
     for i in range(len(matrix)):
         for j in range(i):
             matrix[i, j] = matrix[j, i]
     values, vectors = np.linalg.eigh(matrix)
     # What a layer close to instability left to this one may be so stiff that, rounded, softer modes would be negative again.
-    least = max(smallest, len(matrix) * _ROUNDING * np.abs(values).max())
+    least = max(_SMALLEST_STIFFNESS, len(matrix) * _ROUNDING * np.abs(values).max())
     return ((vectors * np.maximum(np.abs(values), least)) @ vectors.T).astype(np.float32)
 
 

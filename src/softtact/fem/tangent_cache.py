@@ -12,7 +12,7 @@ class TangentCache:
     """Of the elements (e,) of a block of `blocks`; in single precision, upper triangles as `packed` has them."""
 
     def __init__(self, block):
-        elements, nodes = len(block.shapes), block.gradients.shape[3]
+        elements, nodes = len(block.at_rest.shapes), block.at_rest.gradients.shape[3]
         self._block = block
         self._found_at = np.full((elements, nodes, 3), np.nan, dtype=np.float32)
         self._tangents = np.empty((elements, 3 * nodes * (3 * nodes + 1) // 2), dtype=np.float32)

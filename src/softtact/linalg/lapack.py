@@ -5,6 +5,8 @@ A compiled function takes the addresses of the routines that it needs as argumen
 address in it. (Numba's own type for functions as arguments takes 20 us to recognise at every call; a number takes none.)
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from llvmlite import ir
 from numba import njit, types
@@ -16,14 +18,21 @@ def _address_of(module, name):
     return get_cython_function_address(f"scipy.linalg.{module}", name)
 
 
-POTRF = _address_of("cython_lapack", "spotrf")
-TRSM = _address_of("cython_blas", "strsm")
-SYRK = _address_of("cython_blas", "ssyrk")
-GEMM = _address_of("cython_blas", "sgemm")
+class Routines(NamedTuple):
+    """The routines' addresses, and what they are told as memory that they can point at: letters L, N, R, T; factors 1, -1, 0."""
 
-# What the routines are told, as memory that they can point at.
-LETTERS = np.array([ord(letter) for letter in "LNRT"], dtype=np.uint8)
-FACTORS = np.array([1.0, -1.0, 0.0], dtype=np.float32)
+    letters: np.ndarray
+    factors: np.ndarray
+    potrf: int
+    trsm: int
+    syrk: int
+    gemm: int
+
+
+ROUTINES = Routines(letters=np.array([ord(letter) for letter in "LNRT"], dtype=np.uint8),
+                    factors=np.array([1.0, -1.0, 0.0], dtype=np.float32),
+                    potrf=_address_of("cython_lapack", "spotrf"), trsm=_address_of("cython_blas", "strsm"),
+                    syrk=_address_of("cython_blas", "ssyrk"), gemm=_address_of("cython_blas", "sgemm"))
 
 
 @intrinsic

@@ -15,7 +15,6 @@ from collections import namedtuple
 import numpy as np
 from numba import njit
 
-from softtact.linalg import lapack
 from softtact.linalg.lapack import address, call, keep_alive
 from softtact.linalg.row_loops import add_row, row_product
 
@@ -32,20 +31,22 @@ Fronts = namedtuple("Fronts", "own_at bound_at bound child_at child place entry_
 #   scale (n,): what a unit in a row of `short` stands for
 Store = namedtuple("Store", "work triangles short scale")
 
-BLAS = (lapack.LETTERS, lapack.FACTORS, lapack.POTRF, lapack.TRSM, lapack.SYRK, lapack.GEMM)
 _LONGEST = 32767                     # of a number in 16 bits
 
 
 @njit(cache=True, nogil=True)
-def factor_pieces(pieces, fronts, store, values, letters, factors, potrf, trsm, syrk, gemm):
-    """Factor pieces of a matrix, whose values are given, one after the other; False where one is not positive definite."""
+def factor_pieces(pieces, fronts, store, values, blas):
+    """Factor pieces of a matrix, whose values are given, one after the other; False where one is not positive definite.
+
+    blas: `lapack.Routines`
+    """
     for p in pieces:
-        if not begin(p, fronts, store, values, letters, potrf):
+        if not begin(p, fronts, store, values, blas):
             return False
         bound = fronts.bound_at[p + 1] - fronts.bound_at[p]
-        couple(p, 0, bound, fronts, store, letters, factors, trsm)
+        couple(p, 0, bound, fronts, store, blas)
         keep(p, fronts, store)
-        update(p, 0, bound, fronts, store, letters, factors, syrk, gemm)
+        update(p, 0, bound, fronts, store, blas)
     return True
 
 
@@ -62,7 +63,7 @@ def sum_up(p, fronts, store, values):
 
 
 @njit(cache=True, nogil=True)
-def begin(p, fronts, store, values, letters, potrf):
+def begin(p, fronts, store, values, blas):
     """`sum_up` a piece's panel, and factor its own unknowns; False if they are not positive definite."""
     sum_up(p, fronts, store, values)
     own, width = _shape(p, fronts)
@@ -70,21 +71,22 @@ def begin(p, fronts, store, values, letters, potrf):
         return True
     panel = _panel_of(p, fronts, store)
     size = np.array([own, width, 0], dtype=np.int32)
-    call(potrf, (address(letters, 0), address(size, 0), address(panel, 0), address(size, 1), address(size, 2)))
+    call(blas.potrf, (address(blas.letters, 0), address(size, 0), address(panel, 0), address(size, 1), address(size, 2)))
     # BLAS libraries differ in whether they tell of what is not a number; it goes through to the last pivot.
     return size[2] == 0 and np.isfinite(panel[(own - 1) * (width + 1)])
 
 
 @njit(cache=True, nogil=True)
-def couple(p, start, end, fronts, store, letters, factors, trsm):
+def couple(p, start, end, fronts, store, blas):
     """The panel's columns from `start` to `end` of the bound unknowns."""
     own, width = _shape(p, fronts)
     if own == 0 or start == end:
         return
     panel = _panel_of(p, fronts, store)
     size = np.array([own, width, end - start], dtype=np.int32)
+    letters, factors = blas.letters, blas.factors
     L, N, R, T = address(letters, 0), address(letters, 1), address(letters, 2), address(letters, 3)
-    call(trsm, (R, L, T, N, address(size, 2), address(size, 0), address(factors, 0), address(panel, 0), address(size, 1),
+    call(blas.trsm, (R, L, T, N, address(size, 2), address(size, 0), address(factors, 0), address(panel, 0), address(size, 1),
                 address(panel, own + start), address(size, 1)))
     keep_alive(size)
 
@@ -112,19 +114,20 @@ def keep(p, fronts, store):
 
 
 @njit(cache=True, nogil=True)
-def update(p, start, end, fronts, store, letters, factors, syrk, gemm):
+def update(p, start, end, fronts, store, blas):
     """The update's rows from `start` to `end`."""
     if start == end:
         return
     own, width = _shape(p, fronts)
     bound, panel, out = width - own, _panel_of(p, fronts, store), _update_of(p, fronts, store)
     size = np.array([own, width, end - start, bound, bound - end], dtype=np.int32)
+    letters, factors = blas.letters, blas.factors
     L, N, T = address(letters, 0), address(letters, 1), address(letters, 3)
     minus_one, zero, rows = address(factors, 1), address(factors, 2), address(panel, own + start)
-    call(syrk, (L, N, address(size, 2), address(size, 0), minus_one, rows, address(size, 1), zero,
+    call(blas.syrk, (L, N, address(size, 2), address(size, 0), minus_one, rows, address(size, 1), zero,
                 address(out, start * bound + start), address(size, 3)))
     if bound > end:
-        call(gemm, (N, T, address(size, 4), address(size, 2), address(size, 0), minus_one, address(panel, own + end),
+        call(blas.gemm, (N, T, address(size, 4), address(size, 2), address(size, 0), minus_one, address(panel, own + end),
                     address(size, 1), rows, address(size, 1), zero, address(out, start * bound + end), address(size, 3)))
     keep_alive(size)
     for c in fronts.child[fronts.child_at[p]:fronts.child_at[p + 1]]:

@@ -13,6 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from softtact.linalg import multifrontal as kernels
+from softtact.linalg.lapack import ROUTINES
 from softtact.linalg.multifrontal import Store
 from softtact.linalg.nested_dissection import Piece, dissect
 from softtact.linalg.nodal_frames import NodeFrames
@@ -68,7 +69,7 @@ class DissectedSolver:
         if self._pattern is None or not all(map(_same, (*pattern, last), self._pattern)):
             self._analyse(*pattern, last)
         of_pieces = self._fronts, self._store, values.astype(np.float32, copy=False)
-        done = self._workers.map(lambda pieces: kernels.factor_pieces(pieces, *of_pieces, *kernels.BLAS), self._parts)
+        done = self._workers.map(lambda pieces: kernels.factor_pieces(pieces, *of_pieces, ROUTINES), self._parts)
         if not (all(done) and all(self._factor_large(of_pieces, pieces, blocks) for pieces, blocks in self._large)):
             return False
         if last is not None:
@@ -81,12 +82,11 @@ class DissectedSolver:
         False where one is not positive definite.
         """
         (fronts, store, _), workers = of_pieces, self._workers
-        letters, factors, potrf, trsm, syrk, gemm = kernels.BLAS
-        if not all(workers.map(lambda p: kernels.begin(p, *of_pieces, letters, potrf), pieces)):
+        if not all(workers.map(lambda p: kernels.begin(p, *of_pieces, ROUTINES), pieces)):
             return False
-        workers.map(lambda block: kernels.couple(*block, fronts, store, letters, factors, trsm), blocks)
+        workers.map(lambda block: kernels.couple(*block, fronts, store, ROUTINES), blocks)
         workers.map(lambda p: kernels.keep(p, fronts, store), pieces)
-        workers.map(lambda block: kernels.update(*block, fronts, store, letters, factors, syrk, gemm), blocks)
+        workers.map(lambda block: kernels.update(*block, fronts, store, ROUTINES), blocks)
         return True
 
     @property

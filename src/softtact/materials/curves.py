@@ -106,7 +106,7 @@ def synthetic_curve(law, mode, window, *, points, noise, seed):
     seed: int or sequence of int for numpy's generator
     """
     x = np.linspace(*window, points)
-    stress = -law.volumetric(x)[1] if mode == VOLUMETRIC else law.nominal_stress(mode, x)
+    stress = -law.volumetric.pressure(x - 1) if mode == VOLUMETRIC else law.nominal_stress(mode, x)
     error = noise * np.abs(stress).max() * np.random.default_rng(seed).standard_normal(points)
     values = ", ".join(f"{name} {value:g}" for name, value in law.parameters.items())
     volume = f"bulk modulus {law.bulk_modulus:g}" if mode == VOLUMETRIC else "incompressible"

@@ -17,7 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 from numba import njit
 
-from softtact.fem.elements import HEX27_NODES, gauss, hex27
+from softtact.fem.elements import HEX27
 from softtact.fem.solid_block import HexBlock
 from softtact.linalg.direct import condensed_inverse
 from softtact.materials.laws.registry import make_law
@@ -73,7 +73,7 @@ class QuarterSlab:
     def _hexes(self):
         """Nodes (layers, nx ny, 27) of the elements."""
         k, j, i = np.meshgrid(*(np.arange(n) for n in (len(self.layers), self.cells[1], self.cells[0])), indexing="ij")
-        dx, dy, dz = (HEX27_NODES + 1).astype(np.int64).T
+        dx, dy, dz = (HEX27.nodes + 1).astype(np.int64).T
         return self.numbers[2 * k[..., None] + dz, 2 * j[..., None] + dy, 2 * i[..., None] + dx].reshape(len(self.layers), -1, 27)
 
     def _sizes(self, thickness):
@@ -85,7 +85,7 @@ class QuarterSlab:
         rows, columns, values = [], [], []
         for (layer, thickness), hexes in zip(self.layers, self.hexes, strict=True):
             law = make_law("neo_hooke", {"c10": 0.5 * layer.shear_modulus}, bulk_modulus=layer.bulk_modulus)
-            block = HexBlock(0.5 * HEX27_NODES[None] * self._sizes(thickness), law)
+            block = HexBlock(0.5 * HEX27.nodes[None] * self._sizes(thickness), law)
             element = block.tangent(np.zeros((1, 27, 3)))[0]
             dofs = _dofs(hexes)
             rows.append(np.repeat(dofs, 81, axis=1).ravel())
@@ -119,12 +119,12 @@ class QuarterSlab:
         cells_of(x, y): number of the cell at points of the quarter, -1 where there is none. The forces are the integrals over the
         height, averaged over the cell, of s_xx, s_yy and s_xy.
         """
-        points, weights = gauss(3, 3)
+        points, weights, _ = HEX27.quadrature
         j, i = (grid.ravel() for grid in np.meshgrid(np.arange(self.cells[1]), np.arange(self.cells[0]), indexing="ij"))
         entries = [([], [], []) for _ in range(3)]
         for (layer, thickness), hexes in zip(self.layers, self.hexes, strict=True):
             size = self._sizes(thickness)
-            gradients, dofs = hex27(points)[1] * (2 / size), _dofs(hexes)
+            gradients, dofs = HEX27.shape(points)[1] * (2 / size), _dofs(hexes)
             for point, weight, gradient in zip(points, weights * np.prod(size) / 8, gradients, strict=True):
                 owner = cells_of((i + 0.5 + 0.5 * point[0]) * size[0], (j + 0.5 + 0.5 * point[1]) * size[1])
                 inside = owner >= 0

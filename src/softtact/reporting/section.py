@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from softtact.errors import InputError
-from softtact.fem.elements import hex20, hex27, wedge18
-from softtact.models.hyperelastic.deformed_mesh import VTK_HEX27, VTK_WEDGE18
+from softtact.fem.elements import HEX20, HEX27, WEDGE18
 from softtact.press.vtu import LAYERS
 
 _FACE_TRIANGLES = np.array([[0, 4, 7], [4, 1, 5], [5, 2, 6], [6, 3, 7], [4, 5, 6], [4, 6, 7]])     # of corners, then mid-sides
@@ -76,7 +75,7 @@ def _refined(kind, points, displacement, parts):
             numbers.reshape(-1, cells.shape[1]), cell_type)
 
 
-def _hexes(shape, order):
+def _hexes(element):
     def lattice(parts):
         line = np.linspace(-1, 1, parts + 1)
         z, y, x = np.meshgrid(line, line, line, indexing="ij")
@@ -85,7 +84,7 @@ def _hexes(shape, order):
         k, j, i = (grid.ravel() for grid in np.meshgrid(*[np.arange(parts)] * 3, indexing="ij"))
         corners = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
         cells = np.column_stack([(i + a) + n * (j + b) + n * n * (k + c) for a, b, c in corners])
-        return at, cells, shape(at)[0][:, order], 12
+        return at, cells, element.shape(at)[0][:, element.vtk_order], 12
     return lattice
 
 
@@ -97,7 +96,7 @@ def _wedges(parts):
     plan, triangles = np.array(steps) / parts, np.array(up + down)
     at = np.vstack([np.column_stack([plan, np.full(len(plan), z)]) for z in np.linspace(-1, 1, parts + 1)])
     cells = np.vstack([np.hstack([triangles + k * len(plan), triangles + (k + 1) * len(plan)]) for k in range(parts)])
-    return at, cells, wedge18(at)[0][:, VTK_WEDGE18], 13
+    return at, cells, WEDGE18.shape(at)[0][:, WEDGE18.vtk_order], 13
 
 
-_LATTICES = {"hexahedron27": _hexes(hex27, VTK_HEX27), "hexahedron20": _hexes(hex20, np.arange(20)), "wedge18": _wedges}
+_LATTICES = {HEX27.meshio_name: _hexes(HEX27), HEX20.meshio_name: _hexes(HEX20), WEDGE18.meshio_name: _wedges}

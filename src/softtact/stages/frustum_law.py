@@ -6,7 +6,7 @@ inputs: card_dielectric;  outputs: law;  settings: sensor, law, mesh (of the cel
 from softtact.files import atomic_path
 from softtact.materials.cards import law_from_card, load_card
 from softtact.models.foundation.frustum_spring import frustum_law
-from softtact.models.meshes import mesh_settings
+from softtact.models.hyperelastic.presets import mesh_settings
 from softtact.sensors.specification import SensorSpec
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.sensors import CORO
 
-from softtact.fem.elements import HEX27_NODES, WEDGE18_NODES
+from softtact.fem.elements import HEX27, WEDGE18
 from softtact.fem.solid_block import HexBlock, WedgeBlock
 from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic.build import build_patch, build_sensor_body, build_unit_cell
@@ -26,13 +26,13 @@ def test_every_element_of_sheet_and_cover_is_held_by_its_own_shear_modulus_and_t
     held = BODIES[body](HELD)
     assert held.slab.solids
     for _, block in held.slab.solids:
-        assert block.growing_modulus == pytest.approx(10 * block.law.mu0)
-    assert held.support.block.growing_modulus == pytest.approx(HELD.quartic_penalty_ratio * DIELECTRIC.mu0)
-    assert all(block.growing_modulus == 0 for _, block in BODIES[body](MeshSettings.draft()).slab.solids)
+        assert block.quartic_modulus == pytest.approx(10 * block.law.mu0)
+    assert held.support.block.quartic_modulus == pytest.approx(HELD.quartic_penalty_ratio * DIELECTRIC.mu0)
+    assert all(block.quartic_modulus == 0 for _, block in BODIES[body](MeshSettings.draft()).slab.solids)
 
 
 def nodes_of(make):
-    return {HexBlock: HEX27_NODES, WedgeBlock: WEDGE18_NODES}[make][None] * 0.3
+    return {HexBlock: HEX27.nodes, WedgeBlock: WEDGE18.nodes}[make][None] * 0.3
 
 
 @pytest.mark.parametrize("make", [HexBlock, WedgeBlock])

@@ -103,6 +103,12 @@ def test_a_tangent_is_the_difference_of_the_forces():
         assert np.abs(tangent[k] - slope).max() < 1e-8 * np.abs(tangent).max()
 
 
+def test_tetrahedra_of_a_law_whose_volumetric_function_is_not_quadratic_are_refused():
+    law = make_law("neo_hooke", {"c10": 0.2}, volumetric="logarithmic")
+    with pytest.raises(ValueError, match="the volumetric function 'logarithmic' is not that of linear tetrahedra; use 'quadratic'"):
+        LinearTetrahedra(np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 1, 2, 3]]), law)
+
+
 def test_tetrahedra_turned_inside_out_are_refused_and_noticed():
     points, tets = block((1, 1, 1))
     with pytest.raises(ValueError, match="inverted"):

@@ -2,7 +2,7 @@
 
 Symbols: C right Cauchy-Green tensor, J = sqrt(det C), l1 l2 l3 principal stretches, lb = J^(-1/3) l their isochoric
 parts, psi(lb) isochoric energy per reference volume (MPa), K bulk modulus (MPa).
-The whole energy is psi + U with U(J) = K/2 (J - 1)^2; `isochoric` never includes U.
+The whole energy is psi + U(J), with U the law's volumetric function (`volumetric.py`); `isochoric` never includes U.
 """
 
 import warnings
@@ -12,6 +12,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from softtact.errors import ExtrapolationWarning, InputError
+from softtact.materials.laws.volumetric import Quadratic
 
 # Exponents (e1, e2, e3) of the incompressible test paths: l_k = stretch ** e_k. Direction 3 is always free of stress.
 TEST_PATHS = {
@@ -50,8 +51,9 @@ class IsochoricResponse:
 
 
 class Law:
-    """A law psi of the isochoric stretches, with the penalty U(J) = K/2 (J - 1)^2 on the volume.
+    """A law psi of the isochoric stretches, with an energy U(J) of the volume.
 
+    volumetric: U, a `VolumetricFunction`
     stretch_window: lowest and highest principal stretch of the data it was fitted to; None where that is not known
     """
 
@@ -59,9 +61,10 @@ class Law:
     name: str
     constants: tuple[Parameter, ...]
 
-    def __init__(self, parameters, *, bulk_modulus):
+    def __init__(self, parameters, *, bulk_modulus, volumetric=Quadratic):
+        """parameters {constant: MPa or 1};  bulk_modulus in MPa;  volumetric: the class of U."""
         self.parameters = {constant.name: float(parameters[constant.name]) for constant in self.constants}
-        self.bulk_modulus = float(bulk_modulus)
+        self.volumetric = volumetric(float(bulk_modulus))
 
     @classmethod
     def in_order(cls, parameters):
@@ -75,7 +78,13 @@ class Law:
 
     def __repr__(self):
         values = ", ".join(f"{name}={value:g}" for name, value in self.parameters.items())
-        return f"{type(self).__name__}({values}, bulk_modulus={self.bulk_modulus:g})"
+        volume = "" if isinstance(self.volumetric, Quadratic) else f", volumetric={type(self.volumetric).__name__}"
+        return f"{type(self).__name__}({values}, bulk_modulus={self.bulk_modulus:g}{volume})"
+
+    @property
+    def bulk_modulus(self):
+        """K = U''(1), MPa."""
+        return self.volumetric.bulk_modulus
 
     @property
     def mu0(self):
@@ -99,10 +108,6 @@ class Law:
         """
         raise NotImplementedError
 
-    def volumetric(self, J):
-        """U (MPa) and its first and second derivative by J."""
-        return self.bulk_modulus / 2 * (J - 1) ** 2, self.bulk_modulus * (J - 1), self.bulk_modulus * np.ones_like(J)
-
     def nominal_stress(self, mode, stretch):
         """Nominal stress (MPa) of the incompressible material in a `uniaxial`, `equibiaxial` or `planar` test.
 
@@ -122,7 +127,7 @@ class Law:
                           f" rests on data from {low:.3g} to {high:.3g}.", ExtrapolationWarning, stacklevel=3)
 
     def uniaxial_compressible(self, stretch):
-        """Nominal stress (MPa) of the uniaxial test with the volume penalty: the lateral stress is solved to zero."""
+        """Nominal stress (MPa) of the uniaxial test with U: the lateral stress is solved to zero."""
         axial = np.atleast_1d(np.asarray(stretch, float))
         stress = np.array([self._axial_stress(value) for value in axial])
         return stress.reshape(np.shape(stretch))
@@ -135,7 +140,7 @@ class Law:
         """Principal Kirchhoff stresses (3,) at the axial stretch and the volume ratio J, lateral stretches equal."""
         lateral = np.sqrt(J / axial)
         stress = self.principal_stress(J ** (-1 / 3) * np.array([axial, lateral, lateral]))
-        return stress - stress.mean() + J * self.bulk_modulus * (J - 1)
+        return stress - stress.mean() + J * self.volumetric.pressure(J - 1)
 
 
 def principal_stretches(mode, stretch):

@@ -23,8 +23,8 @@ class Ogden1(Law):
     name = "ogden1"
     constants = _constants([1])
 
-    def __init__(self, parameters, *, bulk_modulus):
-        super().__init__(parameters, bulk_modulus=bulk_modulus)
+    def __init__(self, parameters, **volume):
+        super().__init__(parameters, **volume)
         self._mu, self._alpha = np.array(list(self.parameters.values())).reshape(-1, 2).T.copy()
         self._alpha[self._alpha == 0] = 1e-9  # a search may touch 0, whose limit is finite; `make_law` refuses it
 

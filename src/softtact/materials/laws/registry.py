@@ -9,6 +9,7 @@ from softtact.materials.laws.mooney_rivlin import MooneyRivlin
 from softtact.materials.laws.neo_hooke import NeoHooke
 from softtact.materials.laws.ogden import Ogden1, Ogden2, Ogden3
 from softtact.materials.laws.reduced_polynomial2 import ReducedPolynomial2
+from softtact.materials.laws.volumetric import VOLUMETRIC_FUNCTIONS
 from softtact.materials.laws.yeoh import Yeoh
 
 LAWS = {
@@ -23,18 +24,23 @@ def law_class(name):
     return LAWS[name]
 
 
-def make_law(name, parameters, *, bulk_modulus=None, bulk_over_shear=20.0):
-    """A law with its constants (MPa, 1). The bulk modulus (MPa) is `bulk_modulus`, or `bulk_over_shear` * mu0."""
+def make_law(name, parameters, *, bulk_modulus=None, bulk_over_shear=20.0, volumetric="quadratic"):
+    """A law with its constants (MPa, 1). The bulk modulus (MPa) is `bulk_modulus`, or `bulk_over_shear` * mu0.
+
+    volumetric: name of its U(J) in VOLUMETRIC_FUNCTIONS
+    """
     kind = law_class(name)
     _check(kind, parameters)
-    law = kind(parameters, bulk_modulus=1.0 if bulk_modulus is None else bulk_modulus)
+    if volumetric not in VOLUMETRIC_FUNCTIONS:
+        raise InputError(f"Volumetric function {volumetric!r} is unknown; use one of {', '.join(VOLUMETRIC_FUNCTIONS)}.")
+    law = kind(parameters, bulk_modulus=1.0 if bulk_modulus is None else bulk_modulus, volumetric=VOLUMETRIC_FUNCTIONS[volumetric])
     if law.mu0 <= 0:
         raise InputError(
             f"Law {name} with {_listing(parameters)} has the initial shear modulus {law.mu0:g} MPa;"
             " choose constants that make it positive."
         )
     if bulk_modulus is None:
-        law.bulk_modulus = bulk_over_shear * law.mu0
+        law.volumetric = law.volumetric.with_modulus(bulk_over_shear * law.mu0)
     if not law.bulk_modulus > 0:
         raise InputError(f"Law {name} has the bulk modulus {law.bulk_modulus:g} MPa; give a positive one.")
     return law

@@ -20,7 +20,8 @@ from scipy.interpolate import PchipInterpolator
 
 from softtact.contact.height_field import HeightField
 from softtact.errors import ConvergenceError
-from softtact.fem.elements import HEX27_TOP, gauss, quad9
+from softtact.fem.elements import HEX27, QUAD9
+from softtact.fem.quadrature import gauss
 from softtact.files import read_arrays
 from softtact.models.foundation.single_frustum import SingleFrustum
 from softtact.models.hyperelastic.build import build_unit_cell
@@ -157,10 +158,10 @@ def _root_mortar(support):
     """
     place = np.full(support.nodes, -1)
     place[support.root] = np.arange(len(support.root))
-    faces = place[support.mesh.layer(support.mesh.layers - 1)[:, HEX27_TOP]]
+    faces = place[support.mesh.layer(support.mesh.layers - 1)[:, HEX27.top]]
     xy = (support.coordinates[0][support.root, :2] - support.geometry.centres[0])[faces]
     points, weights = gauss(_MORTAR_POINTS, 2)
-    values, slopes = quad9(points)
+    values, slopes = QUAD9.shape(points)
     areas = weights * np.linalg.det(np.einsum("gad,fai->fgid", slopes, xy))
     mass, products = np.zeros((len(support.root),) * 2), np.zeros((len(support.root), *areas.shape))
     for f, (face, area) in enumerate(zip(faces, areas, strict=True)):

@@ -7,7 +7,7 @@ import trimesh
 
 from softtact.contact.height_field import HeightField
 from softtact.errors import ConvergenceError
-from softtact.fem.elements import HEX27_BOTTOM, quad9
+from softtact.fem.elements import HEX27, QUAD9
 from softtact.models.hyperelastic.build import build_unit_cell
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.models.hyperelastic.newton import NewtonSettings
@@ -76,10 +76,10 @@ def plate_over(spec):
 def contact_area(support, displacement, *, frustum=0, gap_mm=DARK_GAP_MM):
     """Projected area (mm2) of one frustum's surface that is nearer to the glass than `gap_mm`."""
     position = support.coordinates[frustum] + displacement[frustum]
-    faces = np.vstack([support.mesh.layer(0)[:, HEX27_BOTTOM], support.outer_faces])
+    faces = np.vstack([support.mesh.layer(0)[:, HEX27.bottom], support.outer_faces])
     side = (np.arange(_SAMPLES) + 0.5) * 2 / _SAMPLES - 1
     points = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
-    values, slopes = quad9(points)
+    values, slopes = QUAD9.shape(points)
     nodes = position[faces]                                                     # (f, 9, 3)
     z = np.einsum("pa,fa->fp", values, nodes[..., 2])
     edges = np.einsum("fad,pai->fpdi", nodes[..., :2], slopes)

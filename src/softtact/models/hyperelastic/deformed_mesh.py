@@ -8,11 +8,9 @@ from dataclasses import dataclass
 import meshio
 import numpy as np
 
-REGIONS = ("frusta", "sheet", "cover")     # from below; their numbers are the cell data `layer`
+from softtact.fem.elements import HEX20, HEX27, WEDGE18
 
-# VTK's order of the nodes, by ours (bottom, top, middle of a plan of corners, mid-sides and centre).
-VTK_HEX27 = np.array([0, 1, 2, 3, 9, 10, 11, 12, 4, 5, 6, 7, 13, 14, 15, 16, 18, 19, 20, 21, 25, 23, 22, 24, 8, 17, 26])
-VTK_WEDGE18 = np.array([0, 1, 2, 6, 7, 8, 3, 4, 5, 9, 10, 11, 12, 13, 14, 15, 16, 17])
+REGIONS = ("frusta", "sheet", "cover")     # from below; their numbers are the cell data `layer`
 
 
 @dataclass(frozen=True)
@@ -55,8 +53,7 @@ def pressed_body(body, state=None):
     masters, weights = body.slab.sheet_nodes
     first = np.cumsum([0, len(sheet.points), len(cover.points)])
     hexes = (frusta.hexes[None] + first[2] + (np.arange(body.support.count) * body.support.nodes)[:, None, None]).reshape(-1, 27)
-    cells = (Cells("hexahedron27", hexes[:, VTK_HEX27], "frusta"), *_on_plan(body.slab),
-             Cells("hexahedron20", cover.hexes + first[1], "cover"))
+    cells = (_cells(HEX27, hexes, "frusta"), *_on_plan(body.slab), _cells(HEX20, cover.hexes + first[1], "cover"))
     moved = np.vstack([np.einsum("pm,pmd->pd", weights, slab[masters]), cover.follow @ slab[:cover.free], support.reshape(-1, 3)])
     pressure = body.slab.top.pressure_of_faces(state.slab) if state else np.zeros(len(cover.top))
     return PressedBody(points_mm=np.vstack([sheet.points, cover.points, body.support.coordinates.reshape(-1, 3)]),
@@ -68,6 +65,11 @@ def _on_plan(slab):
     """`Cells` of the sheet, and of the cover's layers that keep to its plan."""
     mesh = slab.sheet_mesh
     for region, layers in (("sheet", range(slab.sheet_layers)), ("cover", range(slab.sheet_layers, mesh.layers))):
-        for kind, order, of_layer in (("hexahedron27", VTK_HEX27, mesh.layer), ("wedge18", VTK_WEDGE18, mesh.wedge_layer)):
+        for element, of_layer in ((HEX27, mesh.layer), (WEDGE18, mesh.wedge_layer)):
             if layers:
-                yield Cells(kind, np.vstack([of_layer(k) for k in layers])[:, order], region)
+                yield _cells(element, np.vstack([of_layer(k) for k in layers]), region)
+
+
+def _cells(element, nodes, region):
+    """`Cells` of elements whose nodes (e, w) are in their own order."""
+    return Cells(element.meshio_name, nodes[:, element.vtk_order], region)

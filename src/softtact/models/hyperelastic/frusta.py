@@ -17,9 +17,10 @@ from numba import njit
 from softtact.contact.friction import FrictionResponse, FrictionState
 from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.contact.history import ContactHistory
-from softtact.fem.elements import HEX27_BOTTOM, HEX27_SIDES, gauss, quad9
+from softtact.fem.elements import HEX27, QUAD9
 from softtact.fem.extruded_mesh import CORE_RADIUS, disc_mesh_2d, extrude
 from softtact.fem.kernels import add_forces
+from softtact.fem.quadrature import gauss
 from softtact.fem.solid_block import HexBlock
 from softtact.fem.static_condensation import Springs
 from softtact.fem.substructuring import LayerwiseElimination
@@ -104,13 +105,13 @@ class FrustumArray:
     def _outer_faces(self, mesh_2d):
         """Nodes (layers * sides, 9) of the cone's faces."""
         quads, sides = mesh_2d.outer_sides()
-        return np.vstack([self.mesh.layer(k)[quads[:, None], HEX27_SIDES[sides]] for k in range(self.mesh.layers)])
+        return np.vstack([self.mesh.layer(k)[quads[:, None], HEX27.sides[sides]] for k in range(self.mesh.layers)])
 
     def _contact_points(self, pcb_z):
         """Points with their nodes, weights, axis: gap = gap0 + sum(weights * displacement[nodes, axis])."""
         points, weights = gauss(3, 2)
-        values, slopes = quad9(points)
-        on_pcb = np.vstack([self.mesh.layer(0)[:, HEX27_BOTTOM], self.outer_faces])
+        values, slopes = QUAD9.shape(points)
+        on_pcb = np.vstack([self.mesh.layer(0)[:, HEX27.bottom], self.outer_faces])
         records = [(face, value, 2, 1.0, face[0], 0.0, BOARD) for face in on_pcb for value in values]
         root_xy = self.mesh.points[self.root, :2]
         for k, (axis, sign) in enumerate(DIRECTIONS):

@@ -10,7 +10,8 @@ from softtact.contact.face_edges import ROWS, contact_compliance, own_areas
 from softtact.contact.friction import FrictionResponse, FrictionState
 from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.contact.history import ContactHistory
-from softtact.fem.elements import gauss, quad8
+from softtact.fem.elements import QUAD8
+from softtact.fem.quadrature import gauss
 
 _NEAR_MM, _LARGEST_SHIFT_MM = 0.2, 0.02   # points that may touch when the object is let down on the cover, and how far at once
 
@@ -64,7 +65,7 @@ class TopContact:
         """
         self.contact, self.friction = contact, friction
         points, weights = gauss(ROWS, 2)
-        values, slopes = quad8(points)
+        values, slopes = QUAD8.shape(points)
         edges = np.einsum("tad,gai->tgdi", mesh.points[mesh.top][..., :2], slopes)
         self.faces, self.values = _of_free_nodes(mesh.follow, mesh.top, np.broadcast_to(values, (len(mesh.top), *values.shape)))
         self.area = (np.linalg.det(edges) * weights).ravel()

@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from softtact.contact.friction import FrictionResponse
 from softtact.contact.history import ContactHistory
 from softtact.fem.assembly import SymmetricProduct, add_upper, upper_pattern, upper_positions
-from softtact.fem.elements import quad8
+from softtact.fem.elements import QUAD8
 from softtact.fem.extruded_mesh import extrude
 from softtact.fem.graded_mesh import cover_mesh
 from softtact.fem.kernels import add_forces
@@ -162,7 +162,7 @@ class Slab:
             self.groups.append(hanging_node_constraints(*mesh.masters(), hanging, self._cover_block(hanging, law)))
 
     def _cover_block(self, hexes, law):
-        return HexBlock(self.cover_mesh.points[hexes], law, points_per_side=2, quartic_penalty_ratio=self._quartic_penalty_ratio)
+        return HexBlock(self.cover_mesh.points[hexes], law, reduced=True, quartic_penalty_ratio=self._quartic_penalty_ratio)
 
     def _add_sheet(self, mesh_2d, laws):
         """Like elements (nodes, block): those of the strips around, and those of each kind of cell, cell by cell; a law a layer."""
@@ -322,7 +322,7 @@ class Slab:
         i, j = (_place(value, lines, fine) for value, lines in zip(points.T, (self.x_lines, self.y_lines), strict=True))
         faces = cells[j, i]
         low, _, high, _ = self.cover_mesh.points[self.cover_mesh.bottom[faces, :4], :2].transpose(1, 0, 2)
-        return faces, quad8(2 * (points - low) / (high - low) - 1)[0]
+        return faces, QUAD8.shape(2 * (points - low) / (high - low) - 1)[0]
 
     def _under_cover(self, points):
         """Sparse matrix (p, free nodes of the cover) that interpolates on the cover's lower side at points (p, 2)."""

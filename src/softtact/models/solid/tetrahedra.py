@@ -26,6 +26,8 @@ class LinearTetrahedra:
     """Linear tetrahedra (e, 4) at points (n, 3) in mm, of a law psi(i1, i2) of the invariants; `threads` share the elements."""
 
     def __init__(self, points, tetrahedra, law, *, threads=1):
+        if not law.volumetric.linear:
+            raise ValueError(f"the volumetric function {law.volumetric.name!r} is not that of linear tetrahedra; use 'quadratic'")
         self.law, self.nodes = law, np.ascontiguousarray(tetrahedra, dtype=np.int32)
         self.gradients, self.volumes = _gradients(points, self.nodes)
         if self.volumes.min() <= 0:

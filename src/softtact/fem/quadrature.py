@@ -1,0 +1,47 @@
+"""Quadrature rules in parent coordinates."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Quadrature(NamedTuple):
+    """points (g, d) and weights (g,), exact for polynomials up to `degree`, counted over all coordinates together."""
+
+    points: np.ndarray
+    weights: np.ndarray
+    degree: int
+
+
+def gauss(points, dimension):
+    """Gauss rule on [-1, 1]^dimension: points (n, dimension) and weights (n,)."""
+    x, w = np.polynomial.legendre.leggauss(points)
+    grids = np.meshgrid(*[x] * dimension, indexing="ij")
+    weights = np.meshgrid(*[w] * dimension, indexing="ij")
+    return np.column_stack([g.ravel() for g in grids]), np.prod([g.ravel() for g in weights], axis=0)
+
+
+def gauss_rule(points, dimension):
+    """The same as a `Quadrature`."""
+    return Quadrature(*gauss(points, dimension), degree=2 * points - 1)
+
+
+def triangle_rule():
+    """Six points of the triangle (0, 0), (1, 0), (0, 1), of degree 4. (Dunavant, Int. J. Numer. Meth. Engng 21 (1985) 1129.)"""
+    near, far = (0.445948490915965, 0.223381589678011), (0.091576213509771, 0.109951743655322)
+    plane = np.array([[c, c] for c, _ in (near, far)] + [[1 - 2 * c, c] for c, _ in (near, far)]
+                     + [[c, 1 - 2 * c] for c, _ in (near, far)])
+    return Quadrature(plane, 0.5 * np.array([w for _, w in (near, far)] * 3), degree=4)
+
+
+def wedge_rule():
+    """The triangle's six points times three along the height: 18 points."""
+    plane, weight, degree = triangle_rule()
+    z, wz = np.polynomial.legendre.leggauss(3)
+    points = np.column_stack([np.tile(plane, (3, 1)), np.repeat(z, 6)])
+    return Quadrature(points, np.tile(weight, 3) * np.repeat(wz, 6), degree)
+
+
+def tetrahedron_rule():
+    """The one point in the middle of the tetrahedron of the origin and the unit vectors, of degree 1."""
+    return Quadrature(np.full((1, 3), 0.25), np.array([1 / 6]), degree=1)
