@@ -56,8 +56,9 @@ def move_on_layer(compliance: SurfaceCompliance, underside, motion: Motion, *, f
     """The `ElasticMotion` of an object with an `underside(x, y)` (heights (n,) in mm and normals) over a layer.
 
     first_touch_mm: height of its lowest point over the surface;  friction: Coulomb's coefficient
-    deepest_mm: the layer's thickness;  on_step: called with each step's `SlidingState`. Raises InputError for freedoms that the model does not know, ConvergenceError
-    with `result`, the `ElasticMotion` of the steps before (or None), where a step is not reached.
+    deepest_mm: the layer's thickness;  on_step: called with each step's `SlidingState`
+    Raises InputError for freedoms that the model does not know, and ConvergenceError with `result`, the `ElasticMotion` of the
+    steps before (or None), where a step is not reached.
     """
     check_motion(motion)
     mover = SlidingObject(compliance, underside, first_touch_mm=first_touch_mm, friction=friction, deepest_mm=deepest_mm,

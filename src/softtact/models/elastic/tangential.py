@@ -20,6 +20,7 @@ from softtact.sensors.specification import SensorSpec
 
 _SIGNS = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])                                     # of x and y
 _HADAMARD = np.array([[s[0]**p * s[1]**q for s in _SIGNS] for p, q in PARITIES], float)     # (parity, signs)
+_QUARTER_HADAMARD = 0.25 * _HADAMARD.T                                                      # its inverse
 
 
 @dataclass(frozen=True)
@@ -66,11 +67,11 @@ class _Folding:
         """(4, m a): the parities' parts of values (c, a)."""
         images = np.zeros((4, *self.shape))
         images[self._image, self._slot] = values * self._turned
-        return np.tensordot(_HADAMARD, images, axes=1).reshape(4, -1)
+        return _HADAMARD @ images.reshape(4, -1)
 
     def unfold(self, parts):
         """Values (c, a) of the parities' parts (4, m a)."""
-        images = 0.25 * np.tensordot(_HADAMARD.T, parts.reshape(4, *self.shape), axes=1)
+        images = (_QUARTER_HADAMARD @ parts).reshape(4, *self.shape)
         return images[self._image, self._slot] * self._turned
 
 
