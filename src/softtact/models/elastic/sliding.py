@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from softtact.contact.coulomb import ContactCompliance, CoulombSettings, Increment, solve_increment
+from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.contact.unilateral import depth_on_springs
 from softtact.errors import InputError
 
@@ -20,7 +21,9 @@ _SETTINGS = CoulombSettings()
 _MARGIN, _LEAST_MARGIN_MM = 1.3, 0.1     # of the depth, within which points are looked for at first
 _RISE = 1.15                             # of the depth: points within may touch
 _HALVINGS = 6                            # the moment of touch is found to a 64th of an increment
-_PASSES = 2                              # with the places under the object brought up to date between them
+# With the places under the object brought up to date between them. The first one of a way aside has only nodes that touched
+# before: the others' places follow from how far these drag the surface along.
+_PASSES = 3
 
 
 @dataclass(frozen=True)
@@ -90,15 +93,20 @@ class SlidingObject:
 
         Raises ConvergenceError where the contact does not settle, InputError where the object has nothing below it to carry a load.
         """
-        place, expected = np.where(state.sticks[:, None], state.place, state.place - way), depth
+        place = np.where(state.sticks[:, None], state.place, state.place - way)
+        expected = state.position[2] if depth is None else depth
+        touched = state.normal > 0
+        allowed = touched if self.friction > 0 and way.any() and touched.any() else np.ones_like(touched)
         for _ in range(1 if self.friction == 0 else _PASSES):
-            found = self._solve(state, place, way, depth, load, expected=state.position[2] if expected is None else expected)
-            place, expected = self._places(state, found, way), found.depth
+            found = self._solve(state, place, allowed, way, depth, load, expected=expected)
+            place, expected, allowed = self._places(state, found, place, way), found.depth, np.ones_like(touched)
         return self._finish(state, found, place, way)
 
-    def _solve(self, state, place, way, depth, load, *, expected):
+    def _solve(self, state, place, allowed, way, depth, load, *, expected):
         """The contact for given places, with as many candidate nodes as its depth asks for; expected: its depth in mm."""
         heights = self.heights(place)
+        if (heights[allowed] < self._deepest).any():
+            heights = np.where(allowed, heights, NO_CONTACT_MM)
         reach = _MARGIN * max(self._expected_depth(heights, load) if depth is None else depth, state.position[2]) + _LEAST_MARGIN_MM
         while True:
             nodes = np.flatnonzero(heights < min(reach, self._deepest))
@@ -173,8 +181,11 @@ class SlidingObject:
         zeros = np.zeros_like(state.moved)
         return _Found(np.zeros(0, dtype=int), None, np.zeros(0), zeros, zeros, depth)
 
-    def _places(self, state, found, way):
-        """Places (n, 2) of all nodes under the object after an increment."""
+    def _places(self, state, found, used, way):
+        """Places (n, 2) of all nodes under the object after an increment that was solved with places `used`.
+
+        A node that came to touch keeps what was used where its own traction would carry it back out from under an edge.
+        """
         position, points = state.position[:2] + way, self.compliance.grid.points
         if self.friction == 0:
             return points - position
@@ -183,7 +194,9 @@ class SlidingObject:
         if len(touching):
             stayed, sliding = state.normal[touching] > 0, ~contact.sticks[found.acting]
             along = found.dragged[touching] - state.dragged[touching] - way
+            out = ~stayed & (self.heights(place[touching]) >= self._deepest)
             place[touching[stayed]] = (state.place[touching] + np.where(sliding[:, None], along, 0.0))[stayed]
+            place[touching[out]] = used[touching[out]]
         return place
 
     def _finish(self, state, found, place, way):
