@@ -38,14 +38,23 @@ class GradedSlab(QuarterSlab):
 
 
 def thick_layer(a, far, *, cells, shear, poisson, reach=1.25):
-    """`SurfaceCompliance` in a block of half-width and depth `far`: nodes a / (2 cells) apart within `reach` a of its middle."""
-    fine = round(1.5 * cells)
-    lines = graded(1.5 * a, fine, far, round(np.log(far / (1.5 * a)) / np.log(1.35)) + 1)
+    """`SurfaceCompliance` in a block of half-width and depth `far`: nodes a / (2 cells) apart within `reach` a of its middle.
+
+    For loads that are even in y, with x components that are even or z components that are even in x: the other two parities, which
+    these do not excite, are left out.
+    """
+    lines = graded(1.5 * a, round(1.5 * cells), far, round(np.log(far / (1.5 * a)) / np.log(1.5)) + 1)
     bulk = 2 * shear * (1 + poisson) / (3 * (1 - 2 * poisson))
     slab = GradedSlab(lines, ElasticLayer(far, bulk, shear, tuple(np.diff(lines)[::-1] / far)))
     side = int(reach * 2 * cells) + 1
     kept = (3 * slab.top[:side, :side].ravel()[:, None] + np.arange(3)).ravel()
     lower, down, stiffness = np.tril_indices(len(kept)), np.tile([1.0, 1.0, -1.0], side**2), slab.stiffness
-    triangles = np.stack([(slab.flexibility(stiffness, kept, parity) * down[:, None] * down)[lower] for parity in PARITIES])
+    triangles = np.zeros((len(PARITIES), len(lower[0])))
+    for number, parity in enumerate(PARITIES):
+        if parity in _EXCITED:
+            triangles[number] = (slab.flexibility(stiffness, kept, parity) * down[:, None] * down)[lower]
     x = np.concatenate([-slab.x[side - 1:0:-1], slab.x[:side]])
     return SurfaceCompliance(NodeGrid(x, x), triangles, foundation_modulus=2 * shear / far)
+
+
+_EXCITED = ((0, 0), (1, 0))      # by pressure, which is even; by a force along x, whose mirror image in x is odd
