@@ -85,11 +85,14 @@ def elastic_compliance(spec, *, threads=1, cells=None):
     slab = elastic_slab(spec, cells=cells)
     kept = 3 * slab.top.ravel() + 2
     blocks = np.stack([slab.compliance(slab.stiffness, kept, parity, threads=threads) for parity in PARITIES])
-    layer = spec.elastic_layer
-    confined = layer.young_mpa * (1 - layer.poisson) / ((1 + layer.poisson) * (1 - 2 * layer.poisson))
     return Compliance(grid=surface_grid(slab), blocks=ParityBlocks(blocks.astype(np.float32)),
-                      foundation_modulus=confined / spec.thickness_mm,
+                      foundation_modulus=confined_modulus(spec.elastic_layer) / spec.thickness_mm,
                       stencil=_stencil(blocks, slab.top.shape))
+
+
+def confined_modulus(layer):
+    """Modulus (MPa) of an elastic layer that is compressed and cannot move sideways."""
+    return layer.young_mpa * (1 - layer.poisson) / ((1 + layer.poisson) * (1 - 2 * layer.poisson))
 
 
 def _stencil(blocks, shape):
