@@ -73,7 +73,7 @@ def test_movement_sideways_turns_its_sign_with_the_place():
     np.testing.assert_allclose(got, expected, atol=ROUND_OFF * np.abs(expected).max())
 
 
-def test_the_flexibility_is_symmetric_and_positive():
+def test_the_compliance_is_symmetric_and_positive():
     slab = QuarterSlab(FOOTPRINT, [SOFT, STIFF], CELLS, base_held=True)
     grid, blocks = surface_grid(slab), blocks_of(slab, dofs(slab.top, 2))
     np.testing.assert_allclose(blocks.blocks, blocks.blocks.transpose(0, 2, 1), atol=ROUND_OFF * blocks.blocks.max())

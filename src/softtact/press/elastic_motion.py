@@ -13,9 +13,9 @@ from softtact.press.cache import cached_surface_compliance
 from softtact.progress import announce
 
 
-def press_motion(sensor, placed: Trimesh, motion: Motion, *, label: str = "press",
-                 threads: int = 1) -> tuple[ElasticMotion, np.ndarray]:
-    """The `ElasticMotion` of a mesh placed in the sensor's frame, and the seconds (step,) that each step took.
+def press_motion(sensor, placed: Trimesh, motion: Motion, seconds: list[float], *, label: str = "press",
+                 threads: int = 1) -> ElasticMotion:
+    """The `ElasticMotion` of a mesh placed in the sensor's frame; into `seconds` goes the time that each step took.
 
     Raises InputError for rotations, lateral loads, and an object that misses the sensor; ConvergenceError, with the steps before as
     its `result`, where one is not reached.
@@ -24,15 +24,14 @@ def press_motion(sensor, placed: Trimesh, motion: Motion, *, label: str = "press
     if "elastic_surface" not in sensor.prepared_models:
         sensor.prepared_models["elastic_surface"] = cached_surface_compliance(sensor.spec, threads=threads)
     compliance, spec = sensor.prepared_models["elastic_surface"], sensor.spec
-    field, clock = HeightField(placed), [time.perf_counter()]
+    field, start = HeightField(placed), time.perf_counter()
 
     def note(state):
-        clock.append(time.perf_counter())
-        announce(f"{label}: step {len(clock) - 1} of {len(motion.steps)}, {state.position[2]:.3f} mm deep")
+        seconds.append(time.perf_counter() - start - sum(seconds))
+        announce(f"{label}: step {len(seconds)} of {len(motion.steps)}, {state.position[2]:.3f} mm deep")
 
-    motion = move_on_layer(compliance, field, motion, first_touch_mm=first_touch(placed, field, compliance.grid, spec.footprint_mm),
+    return move_on_layer(compliance, field, motion, first_touch_mm=first_touch(placed, field, compliance.grid, spec.footprint_mm),
                            friction=spec.friction.object, deepest_mm=spec.thickness_mm, on_step=note)
-    return motion, np.diff(clock)
 
 
 def first_touch(placed: Trimesh, field: HeightField, grid, footprint_mm) -> float:

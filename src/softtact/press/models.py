@@ -14,6 +14,7 @@ from softtact.models.elastic.compliance import press_layer
 from softtact.models.foundation.solve import FoundationMaps, press_foundation
 from softtact.models.hyperelastic import path
 from softtact.models.hyperelastic.deformed_mesh import pressed_body
+from softtact.press.elastic_motion import press_motion
 from softtact.press.result import PressResult
 from softtact.press.validity import valid_elastic, valid_foundation, valid_hyperelastic
 from softtact.progress import announce, progress
@@ -114,7 +115,7 @@ def press_hyperelastic(sensor, placed, forces, *, label, threads, keep_body=Fals
 
     def read(load_step):
         _refuse_beyond_the_board(load_step, lowest, sensor.spec.thickness_mm)
-        record.append(_read_load_step(body, sampling, grid, load_step))
+        record.append(_read_load_step(body, sampling, grid, load_step, from_mm=lowest if isinstance(forces, Motion) else 0.0))
         if keep_body:
             bodies.append(pressed_body(body, load_step.state))
 
@@ -176,20 +177,48 @@ def _warn_extrapolation(shares, forces):
                       ExtrapolationWarning, stacklevel=5)
 
 
-def _read_load_step(body, sampling, grid, load_step):
-    """The numbers of a load step by their names in a result; fields over the map's points (y * x,)."""
+def _read_load_step(body, sampling, grid, load_step, *, from_mm):
+    """The numbers of a load step by their names in a result; fields over the map's points (y * x,).
+
+    from_mm: the indentation from which depths count
+    """
     slab, support, top = load_step.state.slab, load_step.state.support, body.slab.top
     force, torque = top.resultant(slab)
     return {"normal_force_n": load_step.force_n, "force_n": force, "torque_nmm": torque,
             "displacement_mm": sampling @ slab.displacement, "slip": top.slip_at(slab, grid),
-            "indentation_mm": load_step.state.indentation, "contact_area_mm2": top.area_under_pressure(slab),
+            "indentation_mm": load_step.state.indentation - from_mm, "contact_area_mm2": top.area_under_pressure(slab),
             "penetration_mm": load_step.penetration_mm, "contact_error_mm": body.contact_error(load_step.state),
             "points": np.count_nonzero(top.under_pressure(slab)),
             "frustum_compression_mm": body.support.compression(support.displacement).max(), "residual_n": load_step.residual_n,
             "extrapolated_volume_fraction": body.share_outside_window(load_step.state), "iterations": load_step.iterations}
 
 
-MOTIONS = {"hyperelastic": press_hyperelastic}     # those that take a `Motion` in place of forces
+def press_elastic_motion(sensor, placed, motion, *, label, threads, keep_body=False):
+    """Step by step with the elastic model, which has no body to keep; a ConvergenceError holds the steps before."""
+    seconds = []
+    try:
+        moved = press_motion(sensor, placed, motion, seconds, label=label, threads=threads)
+    except ConvergenceError as error:
+        error.result = error.result and _of_motion(sensor, error.result, seconds)
+        raise
+    return _of_motion(sensor, moved, seconds)
+
+
+def _of_motion(sensor, moved, seconds):
+    """The result of an `ElasticMotion`."""
+    unknown = np.full(len(moved.depth_mm), np.nan)
+    attributes = {"friction_object": sensor.spec.friction.object, "friction": "of the object, Coulomb's"}
+    result = make_result(sensor, "elastic", "Panagiotopoulos' turns", -moved.displacement_mm[..., 2], -moved.force_n[:, 2],
+                         np.array(seconds[:len(unknown)]), indentation_mm=moved.depth_mm,
+                         within_validity=valid_elastic(moved.depth_mm, thickness_mm=sensor.spec.thickness_mm),
+                         frustum_compression_mm=unknown, residual_n=unknown, extrapolated_volume_fraction=unknown,
+                         **{name: getattr(moved, name) for name in ("displacement_mm", "force_n", "torque_nmm", "slip", "iterations",
+                                                                    "contact_area_mm2", "penetration_mm")})
+    return replace(result, attributes=result.attributes | attributes)
+
+
+# Those that take a `Motion` in place of forces.
+MOTIONS = {"elastic": press_elastic_motion, "hyperelastic": press_hyperelastic}     # take a `Motion` in place of forces
 PRESSES = {"elastic": press_elastic, "foundation": press_on_foundation, "hyperelastic": press_hyperelastic}
 
 

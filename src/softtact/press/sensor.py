@@ -121,12 +121,12 @@ class Sensor:
             self.checked_forces(-load)
         placed = place(mesh, pose=pose)
         check_over_sensor(placed, self.spec.footprint_mm)
+        height = float(np.ptp(placed.bounds[:, 2]))
         try:
             with threadpool_limits(limits=threads if model == "elastic" else 1):
-                return flag_buried(press(self, placed, motion, label=label, threads=threads, keep_body=keep_body),
-                                   placed.bounds[1, 2])
+                return flag_buried(press(self, placed, motion, label=label, threads=threads, keep_body=keep_body), height)
         except ConvergenceError as error:
-            error.result = error.result and flag_buried(error.result, placed.bounds[1, 2])
+            error.result = error.result and flag_buried(error.result, height)
             raise
 
     def press_many(self, meshes: trimesh.Trimesh | Sequence[trimesh.Trimesh], poses: Sequence[Pose | None] | None = None, *,

@@ -13,7 +13,6 @@ from softtact.errors import ConvergenceError, InputError
 from softtact.models.elastic.compliance import elastic_compliance, press_layer
 from softtact.models.elastic.motion_press import move_on_layer
 from softtact.models.elastic.tangential import surface_compliance
-from softtact.press.elastic_motion import press_motion
 from softtact.press.sensor import load_sensor
 from softtact.sensors.specification import SensorSpec
 
@@ -180,10 +179,13 @@ def test_deeper_than_the_layer_is_not_reached_and_the_steps_before_are_kept(surf
 def test_a_sensor_presses_a_motion_with_its_own_friction_from_first_touch(surface):
     sensor = load_sensor("coro")
     sensor.spec = SMALL.model_copy(update={"friction": SMALL.friction.model_copy(update={"object": 0.3})})
-    sensor.files["elastic_surface"] = surface
+    sensor.prepared_models["elastic_surface"] = surface
     mesh = standing(PUNCH)
     mesh.apply_translation([0, 0, 0.7])                          # 0.7 mm over the surface
     motion = Motion().press(depth_mm=0.2).slide(x_mm=0.2)
-    found, seconds = press_motion(sensor, mesh, motion)
-    np.testing.assert_array_equal(found.force_n, move(surface, standing(PUNCH), motion, friction=0.3).force_n)
-    assert seconds.shape == (2,) and (seconds > 0).all()
+    result, own = sensor.press(mesh, motion=motion, model="elastic", label=""), move(surface, standing(PUNCH), motion, friction=0.3)
+    for name in ("force_n", "torque_nmm", "displacement_mm", "slip"):
+        np.testing.assert_array_equal(getattr(result, name), getattr(own, name))
+    np.testing.assert_array_equal(result.deformation_map_mm, -own.displacement_mm[..., 2])
+    assert result.indentation_mm == pytest.approx([0.2, 0.2]) and (result.wall_time_s > 0).all()
+    assert result.normal_force_n == pytest.approx(-own.force_n[:, 2]) and result.attributes["friction_object"] == 0.3
