@@ -27,7 +27,7 @@ def press_elastic(sensor, placed, forces, *, label, threads, keep_body=False):
     """All load steps at once with the elastic model, which has no body to keep: the surface's compliance is all that it knows."""
     start, compliance = time.perf_counter(), sensor.prepared("elastic", threads)
     underside = Underside(HeightField(placed), compliance.grid)
-    points, press = _within_reach(underside, underside.nodes, compliance.foundation_modulus, forces, sensor.spec.thickness_mm,
+    points, press = _within_reach(underside, underside.nodes, compliance.foundation_modulus, forces, sensor.spec.deepest_mm,
                                   lambda points: press_layer(compliance, points, forces), lambda press: press.contact.depth[-1])
     seconds = np.full(len(forces), (time.perf_counter() - start) / len(forces))
     return elastic_result(sensor, compliance, press, forces, seconds, lowest_mm=underside.lowest_mm)
@@ -105,12 +105,12 @@ def press_hyperelastic(sensor, placed, forces, *, label, threads, keep_body=Fals
     body = sensor.body(threads=threads, surface=surface)
     grid = np.stack(np.meshgrid(sensor.spec.map_x_mm, sensor.spec.map_y_mm), axis=-1).reshape(-1, 2)
     sampling = body.slab.sampling(grid)
-    announce(f"{label}: {body.support.count} frusta, {len(forces)} load steps of the hyperelastic model, some seconds each")
+    announce(f"{label}: {sensor.spec.parts_in_words}, {len(forces)} load steps of the hyperelastic model, some seconds each")
     record, times, bodies = [], [], []
     lowest = _lowest_over(placed, sensor.spec.footprint_mm)
 
     def read(load_step):
-        _refuse_beyond_the_board(load_step, lowest, sensor.spec.thickness_mm)
+        _refuse_beyond_the_board(load_step, lowest, sensor.spec.deepest_mm)
         record.append(_read_load_step(body, sampling, load_step))
         if keep_body:
             bodies.append(pressed_body(body, load_step.state))
@@ -149,7 +149,7 @@ def _of_record(sensor, body, record, forces, times, bodies):
     _warn_extrapolation(numbers["extrapolated_volume_fraction"], forces)
     valid = valid_hyperelastic(compression_mm=numbers["frustum_compression_mm"], depth_mm=numbers["indentation_mm"],
                                contact_error_mm=numbers.pop("contact_error_mm"), points=numbers.pop("points"),
-                               frustum_mm=sensor.spec.dielectric.frusta.height_mm,
+                               frustum_mm=sensor.spec.frustum_height_mm,
                                allowed_mm=sensor.solver.largest_penetration_mm)
     result = make_result(sensor, "hyperelastic", body.method, np.stack(maps), forces[:len(maps)], np.array(times),
                          within_validity=valid, **numbers)
@@ -173,7 +173,7 @@ def _read_load_step(body, sampling, load_step):
         "indentation_mm": load_step.state.indentation, "contact_area_mm2": top.area_under_pressure(slab),
         "penetration_mm": load_step.penetration_mm, "contact_error_mm": body.contact_error(load_step.state),
         "points": np.count_nonzero(top.under_pressure(slab)),
-        "frustum_compression_mm": body.support.compression(support.displacement).max(),
+        "frustum_compression_mm": body.support.largest_compression(support.displacement),
         "residual_n": load_step.residual_n,
         "extrapolated_volume_fraction": body.share_outside_window(load_step.state), "iterations": load_step.iterations}
 
@@ -197,7 +197,7 @@ def _friction(spec, model):
     """Attributes that state the friction of a result."""
     if model != "hyperelastic":
         return {"friction": f"none: the {model} model knows no friction"}
-    return {"friction_object": spec.friction.object, "friction_board": spec.friction.board, "tips_bonded": int(spec.tips_bonded)}
+    return spec.support_facts
 
 
 def _timed(load_steps, forces, label, times, *, start=None):

@@ -1,4 +1,4 @@
-"""The elastic model: one linear layer, held at its base and sides; the object's contact on the known compliance of its top.
+"""The elastic model: one linear layer, held at its base (unless the sensor is free below) and sides; the object's contact on the known compliance of its top.
 
 The vertical compliance of the top's nodes (mm/N) is computed once for a sensor (`elastic_compliance`), by quarters of the layer
 (`quarter_slab`). The nodes lie at half the map's spacing.
@@ -77,7 +77,7 @@ def elastic_slab(spec, *, cells=None):
     layer = spec.elastic_layer
     bulk, shear = layer.young_mpa / (3 * (1 - 2 * layer.poisson)), layer.young_mpa / (2 * (1 + layer.poisson))
     return QuarterSlab(spec.footprint_mm, [ElasticLayer(spec.thickness_mm, bulk, shear, _SHARES)], cells or map_cells(spec),
-                       base_held=True)
+                       base_held=spec.base_held)
 
 
 def elastic_compliance(spec, *, threads=1, cells=None):

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numba import njit
 
-from softtact.contact.friction import FrictionResponse, FrictionState
+from softtact.contact.friction import FrictionState
 from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.contact.history import ContactHistory
 from softtact.fem.elements import HEX27_BOTTOM, HEX27_SIDES, gauss, quad9
@@ -25,6 +25,7 @@ from softtact.fem.static_condensation import Springs
 from softtact.fem.substructuring import LayerwiseElimination
 from softtact.fem.tangent_cache import TangentCache
 from softtact.linalg.workers import SERIAL
+from softtact.models.hyperelastic.support import SupportState
 
 BOARD, SHEET = -1, -2                                     # what a contact point faces where it is no neighbour in DIRECTIONS
 DIRECTIONS = ((0, 1.0), (1, 1.0), (0, -1.0), (1, -1.0))   # axis and sign of the four neighbours: +x, +y, -x, -y
@@ -43,23 +44,6 @@ class FrustumGeometry:
     root_diameter: float
     neighbours: np.ndarray
     wall_mm: float = 0.0
-
-
-@dataclass(frozen=True)
-class FrustaState:
-    """energy (mJ), force (n, nodes, 3) on the frusta's nodes, gaps (n, p) at the contact points, displacement.
-
-    elastic: energies (n,) and force of the rubber alone;  history: of the contacts, see `ContactHistory`
-    friction_response: friction at the points on the board (n, b), None without
-    """
-
-    elastic: tuple
-    energy: float
-    force: np.ndarray
-    gaps: np.ndarray
-    displacement: np.ndarray
-    history: ContactHistory
-    friction_response: FrictionResponse | None = None
 
 
 class FrustumArray:
@@ -100,6 +84,16 @@ class FrustumArray:
     def per_element(self, field):
         """A nodal field (n, nodes, 3) at the elements' nodes (n * elements, 27, 3)."""
         return np.ascontiguousarray(field[:, self.mesh.hexes].reshape(-1, 27, 3))
+
+    @property
+    def blocks(self):
+        """The one block of all frusta."""
+        return [self.block]
+
+    @property
+    def in_words(self):
+        """How many frusta there are, for messages."""
+        return f"{self.count} frusta"
 
     def _outer_faces(self, mesh_2d):
         """Nodes (layers * sides, 9) of the cone's faces."""
@@ -209,7 +203,7 @@ class FrustumArray:
         gaps, force = self.gap0 + self._along(displacement), elastic[1].copy()
         energy, pressure, _ = history.contact.response(gaps)
         _scatter_contact(force, -pressure * self.point_area, self.point_nodes, self.point_weights, self.point_axis)
-        state = FrustaState(elastic=elastic, energy=float(elastic[0].sum() + (energy * self.point_area).sum()), force=force,
+        state = SupportState(elastic=elastic, energy=float(elastic[0].sum() + (energy * self.point_area).sum()), force=force,
                             gaps=gaps, displacement=displacement, history=history)
         return state if history.friction is None else self._with_friction(state)
 
@@ -233,7 +227,7 @@ class FrustumArray:
         return np.stack([_weighted_component(position, *self._board_points(axis)) for axis in (0, 1)], axis=-1)
 
     def first_friction_state(self, state):
-        """The friction state in which a step starts from a `FrustaState`, None without friction."""
+        """The friction state in which a step starts from a `SupportState`, None without friction."""
         if self.friction is None:
             return None
         gaps = state.gaps[:, :self.board_points]
@@ -242,7 +236,7 @@ class FrustumArray:
         return state.friction_response.next_step(gaps)
 
     def renewed_friction_state(self, state):
-        """The friction state with the pressures of a `FrustaState`."""
+        """The friction state with the pressures of a `SupportState`."""
         b = self.board_points
         return state.friction_response.next_pass(state.gaps[:, :b], state.history.contact.response(state.gaps)[1][:, :b])
 
@@ -334,6 +328,17 @@ class FrustumArray:
     def compression(self, displacement):
         """Mean shortening (n,) of each frustum in mm: root against tip."""
         return displacement[:, self.tip, 2].mean(axis=1) - displacement[:, self.root, 2].mean(axis=1)
+
+    def largest_compression(self, displacement):
+        """By how much (mm) the most compressed frustum is shortened."""
+        return self.compression(displacement).max()
+
+    def most_compressed(self, state):
+        """Share of its height by which the most compressed frustum is shortened, and which one in words."""
+        share = self.compression(state.displacement) / self.geometry.heights
+        worst = int(np.argmax(share))
+        x, y = self.geometry.centres[worst]
+        return float(share[worst]), f"the frustum at x {x:.1f}, y {y:.1f} mm is compressed by {share[worst]:.0%} of its height"
 
 
 @njit(cache=True, nogil=True)

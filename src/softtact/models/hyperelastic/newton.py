@@ -9,7 +9,7 @@ from softtact.models.hyperelastic.body import BodyState
 from softtact.models.newton import Solution, lowers_potential, solve
 
 _STILL_MM = 1e-3       # after a step of less no point faces another facet but those that slide to and fro past an edge
-_DEEP = 0.55           # of a frustum's height: from here on elements of the default mesh may be unstable
+_DEEP = 0.55           # of a frustum's height, or of the layers': from here on elements of the default mesh may be unstable
 _MOST_INCREMENTS = 100  # of the first touch's depth, until a point of the cover feels the object
 # Pressing apart is in vain where so many passes that moved anything have not brought the overlap below this share of the least
 # before. Passes that move nothing add up: the force of a single point at an edge is below the tolerance.
@@ -150,13 +150,12 @@ def _reach(body, force, target, settings):
 
 
 def _failure(body, reached, force, target, residual, iterations):
-    x, y, share = body.most_compressed(reached.state)
+    share, most_compressed = body.most_compressed(reached.state)
     remedy = "Ask for smaller forces or for load steps nearer to each other"
     if share > _DEEP:
         remedy += ", or press with MeshSettings.stable() (--mesh-quality stable)"
     return (f"The load step of {target:g} N was not reached: from {reached.force:.4g} N on no step towards {force:.4g} N found a "
-            f"balance (unbalanced force {residual:.2g} N, {iterations} iterations in all); the frustum at x {x:.1f}, y {y:.1f} mm "
-            f"is compressed by {share:.0%} of its height. {remedy}.")
+            f"balance (unbalanced force {residual:.2g} N, {iterations} iterations in all); {most_compressed}. {remedy}.")
 
 
 def _augment(body, surface, found, force, settings):
