@@ -12,6 +12,7 @@ from softtact.errors import ConvergenceError, ExtrapolationWarning
 from softtact.models.elastic.compliance import press_layer
 from softtact.models.foundation.solve import FoundationMaps, press_foundation
 from softtact.models.hyperelastic import newton
+from softtact.models.hyperelastic.build_plain import lower_side
 from softtact.models.hyperelastic.deformed_mesh import pressed_body
 from softtact.press.result import PressResult
 from softtact.press.validity import valid_elastic, valid_foundation, valid_hyperelastic
@@ -41,7 +42,7 @@ def elastic_result(sensor, compliance, press, forces, seconds, *, lowest_mm):
                        penetration_mm=contact.penetration,
                        within_validity=valid_elastic(contact.depth - lowest_mm, thickness_mm=thickness),
                        frustum_compression_mm=unknown, residual_n=unknown, extrapolated_volume_fraction=unknown,
-                       iterations=contact.iterations)
+                       lower_maps=press.lower_maps, iterations=contact.iterations)
 
 
 def press_on_foundation(sensor, placed, forces, *, label, threads, keep_body=False):
@@ -104,14 +105,14 @@ def press_hyperelastic(sensor, placed, forces, *, label, threads, keep_body=Fals
     surface = HeightField(placed)
     body = sensor.body(threads=threads, surface=surface)
     grid = np.stack(np.meshgrid(sensor.spec.map_x_mm, sensor.spec.map_y_mm), axis=-1).reshape(-1, 2)
-    sampling = body.slab.sampling(grid)
+    sampling, lower = body.slab.sampling(grid), None if sensor.spec.base_held else lower_side(body.slab, grid)
     announce(f"{label}: {sensor.spec.parts_in_words}, {len(forces)} load steps of the hyperelastic model, some seconds each")
     record, times, bodies = [], [], []
     lowest = _lowest_over(placed, sensor.spec.footprint_mm)
 
     def read(load_step):
         _refuse_beyond_the_board(load_step, lowest, sensor.spec.deepest_mm)
-        record.append(_read_load_step(body, sampling, load_step))
+        record.append(_read_load_step(body, sampling, lower, load_step))
         if keep_body:
             bodies.append(pressed_body(body, load_step.state))
 
@@ -166,10 +167,11 @@ def _warn_extrapolation(shares, forces):
                       ExtrapolationWarning, stacklevel=5)
 
 
-def _read_load_step(body, sampling, load_step):
-    """The map (y * x,) in mm of a load step, and its numbers by their names."""
+def _read_load_step(body, sampling, lower, load_step):
+    """The map (y * x,) in mm of a load step, and its numbers by their names; that of the lower side among them if it is free."""
     slab, support, top = load_step.state.slab, load_step.state.support, body.slab.top
-    return -(sampling @ slab.displacement[:, 2]), {
+    free_below = {} if lower is None else {"lower_maps": -(lower @ slab.displacement[:, 2])}
+    return -(sampling @ slab.displacement[:, 2]), free_below | {
         "indentation_mm": load_step.state.indentation, "contact_area_mm2": top.area_under_pressure(slab),
         "penetration_mm": load_step.penetration_mm, "contact_error_mm": body.contact_error(load_step.state),
         "points": np.count_nonzero(top.under_pressure(slab)),
@@ -182,11 +184,16 @@ PRESSES = {"elastic": press_elastic, "foundation": press_on_foundation, "hyperel
 
 
 def make_result(sensor, model, solver, maps, forces, times, **numbers):
-    """A `PressResult` of maps (l, points) or (l, ny, nx) and numbers by the result's names."""
+    """A `PressResult` of maps (l, points) or (l, ny, nx) and numbers by the result's names.
+
+    lower_maps among these: of the lower side where it moves; capacitance follows the change of thickness
+    """
     spec, maps = sensor.spec, maps.reshape(len(forces), *sensor.spec.map_shape)
+    lower_maps = numbers.pop("lower_maps", None)
+    thinning = maps if lower_maps is None else maps - lower_maps.reshape(maps.shape)
     flags = {"converged": np.ones(len(forces), dtype=np.int8),
              "within_validity": np.asarray(numbers.pop("within_validity"), dtype=np.int8)}
-    return PressResult(deformation_map_mm=maps, tactile_map=ideal_counts(spec, maps), force_n=forces, wall_time_s=times,
+    return PressResult(deformation_map_mm=maps, tactile_map=ideal_counts(spec, thinning), force_n=forces, wall_time_s=times,
                        x_mm=spec.map_x_mm, y_mm=spec.map_y_mm, model=model, sensor=spec.name, solver=solver,
                        largest_counts=spec.largest_counts,
                        attributes={"thickness_mm": spec.thickness_mm, **_friction(spec, model), **sensor.attributes}, **flags,

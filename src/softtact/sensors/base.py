@@ -109,8 +109,8 @@ class BaseSpec(Section):
         """Refuse a sensor of another kind than this class."""
         own = cls.model_fields["kind"].annotation.__args__[0]     # type: ignore[union-attr]
         if values.get("kind", "frusta") != own:
-            raise InputError(f"{where}, at 'kind': {values.get('kind', 'frusta')!r} is another kind of sensor than {own!r}, which is "
-                             f"asked for here; give a sensor of kind {own}.")
+            raise InputError(f"{where}, at 'kind': {values.get('kind', 'frusta')!r} is not the kind that is needed here; give a "
+                             f"sensor of kind {own}.")
 
     @classmethod
     def from_yaml(cls, path: str | Path) -> Self:

@@ -16,7 +16,8 @@ from softtact.sensors.frusta import ORIENTATIONS, SensorSpec
 from softtact.sensors.layers import LayersSpec
 from softtact.unknown_names import nearest
 
-__all__ = ["KINDS", "ORIENTATIONS", "AnySpec", "BaseSpec", "LayersSpec", "SensorSpec", "read_spec", "sensor_schema", "spec_from_dict"]
+__all__ = ["KINDS", "ORIENTATIONS", "AnySpec", "BaseSpec", "LayersSpec", "SensorSpec", "read_spec", "sensor_schema",
+           "spec_from_dict"]
 
 KINDS: dict[str, type[BaseSpec]] = {"frusta": SensorSpec, "layers": LayersSpec}
 AnySpec = SensorSpec | LayersSpec

@@ -227,7 +227,7 @@ class LayeredBody:
         return self.reevaluate_contact(state, BodyHistory(top, support))
 
     def most_compressed(self, state):
-        """The largest share of its height by which a frustum is shortened, or the layers where there is none; and which in words."""
+        """The largest share of its height by which a frustum, or without any the layers, are shortened; and which in words."""
         of_support = self.support.most_compressed(state.support)
         if of_support is not None:
             return of_support

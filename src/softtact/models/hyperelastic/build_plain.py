@@ -34,10 +34,10 @@ class SingleLayerSlab(Slab):
 
 
 def build_plain_body(spec, *, dielectric_law, cover_law=None, mesh=MeshSettings(), scatter=None, contact=None, threads=1,
-                     surface=None):
+                     surface=None, sides="held"):
     """The body of a `LayersSpec`; arguments as for `build_sensor_body`.
 
-    scatter: must be None, there are no frusta that could differ
+    scatter: must be None, there are no frusta that could differ;  sides: see `Slab`, for pieces of a wider layer
     """
     if scatter is not None:
         spec.need_frusta("a scatter of frusta", "leave height_scatter and tip_scatter out")
@@ -46,7 +46,7 @@ def build_plain_body(spec, *, dielectric_law, cover_law=None, mesh=MeshSettings(
     splits, _ = cover_splits(mesh, surface, x_lines, y_lines, 2 * spec.element_size_mm)
     kind = Slab if spec.cover else SingleLayerSlab
     slab = kind(sheet, cover, grid_without_cells(*(_fine(lines, mesh) for lines in (x_lines, y_lines))), x_lines, y_lines,
-                sides="held", contact=contact or mesh.object_contact, splits=splits,
+                sides=sides, contact=contact or mesh.object_contact, splits=splits,
                 quartic_penalty_ratio=mesh.slab_quartic_penalty_ratio, friction=coulomb(spec.friction.object))
     if spec.base_held:
         slab.hold(slab.bottom)
