@@ -58,7 +58,7 @@ def test_where_frusta_are_needed_a_sensor_without_is_refused():
     with pytest.raises(InputError, match="at 'kind': 'layers' is not the kind that is needed here; give a sensor of kind frusta"):
         SensorSpec.from_yaml(sensor_file("sheet"))
     part = trimesh.creation.icosphere(radius=3.0)
-    with pytest.raises(InputError, match="sheet has no frusta, which the foundation model needs; press with elastic or hyperelastic"):
+    with pytest.raises(InputError, match="sheet has no frusta, which the foundation model needs; press with elastic or hyper"):
         softtact.load_sensor("sheet").press(part, force_n=1.0, model="foundation")
     with pytest.raises(InputError, match="sheet has no layer 'cover'"):
         softtact.load_sensor("sheet", materials={"cover": softtact.load_sensor("coro").laws["cover"]})
@@ -78,9 +78,9 @@ def presses(tmp_path_factory):
         patch.setenv("XDG_CACHE_HOME", str(folder))
         sensor = softtact.load_sensor(written(folder, values_of(element_mm=1.0, map_shape=[17, 11])))
         part = trimesh.creation.icosphere(subdivisions=4, radius=5.0)
-        return {model: sensor.press(part, force_n=[0.5, 2.0], threads=1, **how)
-                for model, how in (("elastic", {"model": "elastic"}), ("hyperelastic", {"model": "hyperelastic", "keep_body": True}),
-                                   ("error", {"policy": "error"}))}
+        ways = {"elastic": {"model": "elastic"}, "hyperelastic": {"model": "hyperelastic", "keep_body": True},
+                "error": {"policy": "error"}}
+        return {name: sensor.press(part, force_n=[0.5, 2.0], threads=1, **how) for name, how in ways.items()}
 
 
 def test_both_models_press_a_users_own_file(presses):

@@ -14,7 +14,6 @@ from softtact.errors import InputError
 from softtact.sensors.base import BaseSpec, read_mapping
 from softtact.sensors.frusta import ORIENTATIONS, SensorSpec
 from softtact.sensors.layers import LayersSpec
-from softtact.unknown_names import nearest
 
 __all__ = ["KINDS", "ORIENTATIONS", "AnySpec", "BaseSpec", "LayersSpec", "SensorSpec", "read_spec", "sensor_schema",
            "spec_from_dict"]
@@ -32,7 +31,7 @@ def spec_from_dict(values: dict[str, Any], *, where: str = "sensor") -> AnySpec:
     """The specification of a mapping, of the class that its `kind` names."""
     kind = values.get("kind", "frusta")
     if kind not in KINDS:
-        raise InputError(f"{where}, at 'kind': {kind!r} is unknown{nearest(kind, list(KINDS))}; use {' or '.join(KINDS)}.")
+        raise InputError(f"{where}, at 'kind': {kind!r} is unknown; use {' or '.join(KINDS)}.")
     return KINDS[kind].from_dict(values, where=where)     # type: ignore[return-value]
 
 

@@ -59,7 +59,7 @@ def held_forces(body, state):
     ((1.0, 0.5), 1.0 / CONFINED + 0.5 / (SOFT.bulk_modulus + 4 / 3 * SOFT.mu0)),
 ])
 def test_a_wide_plate_on_a_bonded_layer_finds_the_confined_modulus(thicknesses, compliance):
-    """Depth = p sum h / (K + 4/3 mu), linear elasticity. 1 % strain: the laws' own curvature is of that order, 1 %; 1.5 % allowed."""
+    """Depth = p sum h / (K + 4/3 mu), linear elasticity. At 1 % strain the laws curve by about as much: 1.5 % allowed."""
     of = spec(*thicknesses)
     body = build_plain_body(of, **laws(of), sides="symmetric")
     force = 0.01 * of.thickness_mm / compliance * 16.0
@@ -71,7 +71,7 @@ def test_a_wide_plate_on_a_bonded_layer_finds_the_confined_modulus(thicknesses, 
 
 
 def test_the_elastic_and_the_hyperelastic_model_agree_under_a_light_ball():
-    """Same E and nu, 3 % of the thickness deep: both solve the same linear problem but for their meshes (1.5 % of depth and map)."""
+    """Same E and nu, 3 % of the thickness deep: both solve the same problem but for their meshes (1.5 % of depth and map)."""
     of = spec(2.0, side_mm=12.0, points=41, element_mm=0.5)
     sensor = Sensor(of, {"dielectric": LAW}, prepared_models={"elastic": elastic_compliance(of)})
     elastic, hyper = (sensor.press(ball(8.0), force_n=0.2, model=model, threads=1) for model in ("elastic", "hyperelastic"))

@@ -76,5 +76,6 @@ def _on_plan(slab):
     mesh = slab.sheet_mesh
     for region, layers in zip(slab.regions, (range(slab.sheet_layers), range(slab.sheet_layers, mesh.layers)), strict=True):
         for kind, order, of_layer in (("hexahedron27", VTK_HEX27, mesh.layer), ("wedge18", VTK_WEDGE18, mesh.wedge_layer)):
-            if layers:
-                yield Cells(kind, np.vstack([of_layer(k) for k in layers])[:, order], region)
+            nodes = np.vstack([of_layer(k) for k in layers]) if layers else []
+            if len(nodes):
+                yield Cells(kind, nodes[:, order], region)
