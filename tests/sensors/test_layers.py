@@ -8,6 +8,7 @@ import yaml
 import softtact
 from softtact.errors import InputError
 from softtact.readout.capacitance import EPSILON_0_PF_PER_MM, capacitance_per_area
+from softtact.readout.virtual_sensor import make_specimen
 from softtact.sensors.library import sensor_file
 from softtact.sensors.specification import LayersSpec, SensorSpec, read_spec, spec_from_dict
 
@@ -60,6 +61,8 @@ def test_where_frusta_are_needed_a_sensor_without_is_refused():
     part = trimesh.creation.icosphere(radius=3.0)
     with pytest.raises(InputError, match="sheet has no frusta, which the foundation model needs; press with elastic or hyper"):
         softtact.load_sensor("sheet").press(part, force_n=1.0, model="foundation")
+    with pytest.raises(InputError, match="sheet has no frusta, which the virtual sensor needs"):
+        make_specimen(read_spec(sensor_file("sheet")), seed=1)
     with pytest.raises(InputError, match="sheet has no layer 'cover'"):
         softtact.load_sensor("sheet", materials={"cover": softtact.load_sensor("coro").laws["cover"]})
 

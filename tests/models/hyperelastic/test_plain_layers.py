@@ -47,7 +47,7 @@ def pressed(body, mesh, force_n):
 
 
 def held_forces(body, state):
-    """Forces (3,) in N of what holds the slab: its sides and, where it is bonded, the board."""
+    """Forces (3,) in N on the slab of what holds it: its sides and, where it is bonded, the board."""
     held = np.setdiff1d(np.arange(3 * body.slab.nodes), body.slab.free)
     force = np.zeros(3 * body.slab.nodes)
     force[held] = state.slab.force.ravel()[held]
@@ -71,12 +71,12 @@ def test_a_wide_plate_on_a_bonded_layer_finds_the_confined_modulus(thicknesses, 
 
 
 def test_the_elastic_and_the_hyperelastic_model_agree_under_a_light_ball():
-    """Same E and nu, 3 % of the thickness deep: both solve the same problem but for their meshes (1.5 % of depth and map)."""
-    of = spec(2.0, side_mm=12.0, points=41, element_mm=0.5)
+    """Same E and nu, 3 % of the thickness deep: 2 % of depth and map, for meshes (1 %) and stiffening (1 %)."""
+    of = spec(2.0, side_mm=9.0, points=31, element_mm=0.5)
     sensor = Sensor(of, {"dielectric": LAW}, prepared_models={"elastic": elastic_compliance(of)})
-    elastic, hyper = (sensor.press(ball(8.0), force_n=0.2, model=model, threads=1) for model in ("elastic", "hyperelastic"))
-    assert hyper.indentation_mm == pytest.approx(elastic.indentation_mm, rel=0.015)
-    assert hyper.deformation_map_mm.max() == pytest.approx(elastic.deformation_map_mm.max(), rel=0.015)
+    elastic, hyper = (sensor.press(ball(20.0), force_n=0.15, model=model, threads=1) for model in ("elastic", "hyperelastic"))
+    assert hyper.indentation_mm == pytest.approx(elastic.indentation_mm, rel=0.02)
+    assert hyper.deformation_map_mm.max() == pytest.approx(elastic.deformation_map_mm.max(), rel=0.02)
     assert np.abs(hyper.deformation_map_mm - elastic.deformation_map_mm).max() < 0.03 * elastic.deformation_map_mm.max()
     assert np.isnan(hyper.frustum_compression_mm).all() and hyper.within_validity.all()
     assert hyper.tactile_map == pytest.approx(elastic.tactile_map, abs=0.03 * elastic.tactile_map.max())
@@ -84,12 +84,12 @@ def test_the_elastic_and_the_hyperelastic_model_agree_under_a_light_ball():
 
 @pytest.mark.parametrize("support", ["base", "none"])
 def test_what_holds_the_layers_carries_the_object(support):
-    """Balance of the whole body: reactions of sides and board against the object, to the solver's tolerance (3e-3 N a node)."""
+    """Balance of the whole body: reactions of sides and board against the object. The solver leaves up to 3e-3 N at a node."""
     of = spec(1.0, 1.0, side_mm=8.0, support=support, element_mm=0.5)
     body = build_plain_body(of, **laws(of))
     load_step = pressed(body, ball(4.0), 0.5)
     assert load_step.state.force == pytest.approx(0.5, abs=3e-3)
-    assert held_forces(body, load_step.state) == pytest.approx([0.0, 0.0, -0.5], abs=0.01)
+    assert held_forces(body, load_step.state) == pytest.approx([0.0, 0.0, 0.5], abs=0.003)     # upwards
     moved = -load_step.state.slab.displacement[body.slab.bottom, 2]
     assert moved.max() > 0.02 if support == "none" else (moved == 0).all()
 
@@ -97,16 +97,18 @@ def test_what_holds_the_layers_carries_the_object(support):
 def test_a_sheet_free_below_bends_like_a_clamped_plate():
     """w = 0.00560 P a^2 / D under a load in the middle (Timoshenko, Theory of Plates and Shells, table 37), thin plate.
 
-    Side over thickness is 20: shear adds some per cent to it, and the load is spread; 6 % allowed. Both models, and their
-    lower sides, on which the object leaves no dent.
+    Side over thickness is 20: shear adds some per cent to it, and the load is spread; 6 % allowed for the lower side, on which
+    the object leaves no dent. The top has one of some 0.01 mm, in which the models agree within 5 % of the whole: the
+    elastic one's nodes are 0.5 mm apart, about as wide as the contact.
     """
-    of, force = spec(1.0, side_mm=20.0, points=41, support="none", element_mm=1.0), 0.004
+    of, force = spec(1.0, side_mm=20.0, points=21, support="none", element_mm=1.0), 0.004
     expected = 0.00560 * force * 20.0**2 / (YOUNG / (12 * (1 - POISSON**2)))
     body = build_plain_body(of, **laws(of))
     load_step = pressed(body, ball(20.0), force)
-    middle = -(lower_side(body.slab, np.zeros((1, 2))) @ load_step.state.slab.displacement[:, 2])[0]
+    top, middle = (-(side @ load_step.state.slab.displacement[:, 2])[0]
+                   for side in (body.slab.sampling(np.zeros((1, 2))), lower_side(body.slab, np.zeros((1, 2)))))
     assert middle == pytest.approx(expected, rel=0.06)
     sensor = Sensor(of, {"dielectric": LAW}, prepared_models={"elastic": elastic_compliance(of)})
     elastic = sensor.press(ball(20.0), force_n=force, model="elastic", threads=1)
-    assert elastic.deformation_map_mm[0, 20, 20] == pytest.approx(expected, rel=0.08)
+    assert elastic.deformation_map_mm[0, 10, 10] == pytest.approx(top, rel=0.05)
     assert elastic.tactile_map.max() < 5.0       # it bends, and hardly becomes thinner

@@ -12,7 +12,6 @@ sheet; there it is a level plane that moves with the root's outermost node.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 
 from softtact.contact.friction import FrictionState
 from softtact.contact.height_field import NO_CONTACT_MM
@@ -25,6 +24,7 @@ from softtact.fem.static_condensation import Springs
 from softtact.fem.substructuring import LayerwiseElimination
 from softtact.fem.tangent_cache import TangentCache
 from softtact.linalg.workers import SERIAL
+from softtact.models.hyperelastic.point_loops import scatter_contact, weighted_component
 from softtact.models.hyperelastic.support import SupportState
 
 BOARD, SHEET = -1, -2                                     # what a contact point faces where it is no neighbour in DIRECTIONS
@@ -136,7 +136,7 @@ class FrustumArray:
 
     def _along(self, field):
         """Weighted component (n, p) of a nodal field along each contact point's axis."""
-        return _weighted_component(field, self.point_nodes, self.point_weights, self.point_axis)
+        return weighted_component(field, self.point_nodes, self.point_weights, self.point_axis)
 
     def _areas(self, faces, slopes, weights):
         """Reference areas (n, p) of the quadrature points of faces (f, 8)."""
@@ -202,7 +202,7 @@ class FrustumArray:
         """The state at displacement (n, nodes, 3), with the `rubber`'s energies and forces there."""
         gaps, force = self.gap0 + self._along(displacement), elastic[1].copy()
         energy, pressure, _ = history.contact.response(gaps)
-        _scatter_contact(force, -pressure * self.point_area, self.point_nodes, self.point_weights, self.point_axis)
+        scatter_contact(force, -pressure * self.point_area, self.point_nodes, self.point_weights, self.point_axis)
         state = SupportState(elastic=elastic, energy=float(elastic[0].sum() + (energy * self.point_area).sum()), force=force,
                             gaps=gaps, displacement=displacement, history=history)
         return state if history.friction is None else self._with_friction(state)
@@ -213,7 +213,7 @@ class FrustumArray:
         area = self.point_area[:, :self.board_points]
         force = state.force.copy()
         for axis in (0, 1):
-            _scatter_contact(force, response.traction[..., axis] * area, *self._board_points(axis))
+            scatter_contact(force, response.traction[..., axis] * area, *self._board_points(axis))
         return replace(state, energy=state.energy + float((response.energy * area).sum()), force=force, friction_response=response)
 
     def _board_points(self, axis):
@@ -224,7 +224,7 @@ class FrustumArray:
     def _on_board(self, displacement):
         """Places (n, b, 2) of the points in the board's plane."""
         position = self.coordinates + displacement
-        return np.stack([_weighted_component(position, *self._board_points(axis)) for axis in (0, 1)], axis=-1)
+        return np.stack([weighted_component(position, *self._board_points(axis)) for axis in (0, 1)], axis=-1)
 
     def first_friction_state(self, state):
         """The friction state in which a step starts from a `SupportState`, None without friction."""
@@ -339,25 +339,6 @@ class FrustumArray:
         worst = int(np.argmax(share))
         x, y = self.geometry.centres[worst]
         return float(share[worst]), f"the frustum at x {x:.1f}, y {y:.1f} mm is compressed by {share[worst]:.0%} of its height"
-
-
-@njit(cache=True, nogil=True)
-def _weighted_component(field, nodes, weights, axis):
-    out = np.zeros((field.shape[0], nodes.shape[0]))
-    for f in range(field.shape[0]):
-        for p in range(nodes.shape[0]):
-            for k in range(nodes.shape[1]):
-                out[f, p] += weights[p, k] * field[f, nodes[p, k], axis[p]]
-    return out
-
-
-@njit(cache=True, nogil=True)
-def _scatter_contact(force, magnitude, nodes, weights, axis):
-    for f in range(force.shape[0]):
-        for p in range(nodes.shape[0]):
-            if magnitude[f, p] != 0.0:
-                for k in range(nodes.shape[1]):
-                    force[f, nodes[p, k], axis[p]] += magnitude[f, p] * weights[p, k]
 
 
 def _dofs(nodes):
