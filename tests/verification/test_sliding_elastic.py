@@ -5,11 +5,11 @@ block of half-width and depth L under a contact of radius a, as for Hertz in `te
 kappa Q / (G L) less than on a half-space, all alike under the contact, which two sizes tell (Richardson).
 """
 
-from pathlib import Path
 
 import numpy as np
 import pytest
 from slabs import flat_punch, paraboloid
+from support.sensors import CORO
 from thick_layer import thick_layer
 
 from softtact.contact.coulomb import CoulombSettings
@@ -17,14 +17,12 @@ from softtact.contact.motion import Motion
 from softtact.models.elastic.motion_press import move_on_layer
 from softtact.models.elastic.sliding import SlidingObject
 from softtact.models.elastic.tangential import surface_compliance
-from softtact.sensors.specification import SensorSpec
 
 SHEAR, POISSON, A, RADIUS, FRICTION = 1.0, 0.4999, 1.0, 100.0, 0.3
 FORCE = 4 * 2 * SHEAR * (1 + POISSON) / (1 - POISSON**2) * A**3 / (3 * RADIUS)      # Hertz's for the radius A
 LIMIT = FRICTION * FORCE
 TO_SLIDE = 3 * LIMIT * (2 - POISSON) / (16 * SHEAR * A)                           # mm, where the stick radius is 0
 MINDLIN = "Mindlin; Johnson, Contact Mechanics, sec. 7.2"
-CORO = Path(__file__).parents[2] / "config/sensors/coro.yaml"
 SIZES = (8.0, 16.0)      # of L over A
 SMALL = 0.02             # share of the limit at which all but a thin ring sticks
 SHARES = (SMALL, 0.3, 0.5, 0.7, 0.9)
@@ -132,7 +130,7 @@ def test_a_wide_bonded_layer_that_sticks_is_in_simple_shear(record):
     """tau = G delta / h far from the sides, and there the pressure of the confined layer."""
     thickness, delta = 2.0, 0.1
     layer = {"young_mpa": 1.289, "poisson": 0.1729}
-    coro = SensorSpec.from_yaml(CORO)
+    coro = CORO
     wide = coro.model_copy(update={"footprint_mm": (40.0, 40.0), "map_shape": (13, 13), "cover": coro.cover.model_copy(
         update={"thickness_mm": thickness - coro.dielectric_thickness_mm})})
     surface, states = surface_compliance(wide), []

@@ -5,7 +5,7 @@ import scipy.sparse as sp
 from slabs import graded
 
 from softtact.contact.node_grid import NodeGrid
-from softtact.fem.elements import HEX27_NODES
+from softtact.fem.elements import HEX27
 from softtact.fem.solid_block import HexBlock
 from softtact.materials.laws.registry import make_law
 from softtact.models.elastic.tangential import SurfaceCompliance
@@ -28,7 +28,7 @@ class GradedSlab(QuarterSlab):
         parts = []
         for (layer, thickness), hexes in zip(self.layers, self.hexes, strict=True):
             law = make_law("neo_hooke", {"c10": 0.5 * layer.shear_modulus}, bulk_modulus=layer.bulk_modulus)
-            corners = 0.5 * HEX27_NODES[None] * np.column_stack([dx, dy, np.full_like(dx, thickness)])[:, None]
+            corners = 0.5 * HEX27.nodes[None] * np.column_stack([dx, dy, np.full_like(dx, thickness)])[:, None]
             dofs = (3 * hexes[..., None] + np.arange(3)).reshape(len(hexes), -1)
             parts.append((HexBlock(corners, law).tangent(np.zeros(corners.shape)), dofs))
         values = np.concatenate([tangent.ravel() for tangent, _ in parts])

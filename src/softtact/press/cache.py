@@ -14,8 +14,8 @@ _FORMAT = 9     # of the files; another one makes them again
 
 
 def _values(spec):
-    """What of a sensor the fast models start from; its readout is none of their business."""
-    return spec.model_dump(mode="json", exclude={"largest_counts"})
+    """What of a sensor the fast models start from: not its readout, nor the kind that a file without one is of."""
+    return spec.model_dump(mode="json", exclude={"largest_counts"} | ({"kind"} if spec.kind == "frusta" else set()))
 
 
 def cached_compliance(spec, *, threads=1):

@@ -1,10 +1,10 @@
 """A motion on the elastic layer: history, mirrors, energy, control by force and by depth, and what is refused."""
 
-from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
+from support.sensors import CORO
 
 from softtact.contact.height_field import HeightField
 from softtact.contact.motion import Motion
@@ -14,9 +14,7 @@ from softtact.models.elastic.compliance import elastic_compliance, press_layer
 from softtact.models.elastic.motion_press import move_on_layer
 from softtact.models.elastic.tangential import surface_compliance
 from softtact.press.sensor import load_sensor
-from softtact.sensors.specification import SensorSpec
 
-CORO = SensorSpec.from_yaml(Path(__file__).parents[3] / "config/sensors/coro.yaml")
 SMALL = CORO.model_copy(update={"footprint_mm": (9.6, 9.6), "map_shape": (13, 13)})      # nodes 0.4 mm apart, 2.5 mm thick
 BALL = trimesh.creation.icosphere(subdivisions=4, radius=5.0)
 PUNCH = trimesh.creation.box((3.0, 2.2, 2.0))            # its sides lie between the nodes

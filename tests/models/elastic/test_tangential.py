@@ -1,18 +1,16 @@
 """The layer's compliance to forces in all directions: quarters and parities against the whole layer's stiffness."""
 
-from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from support.sensors import CORO
 from whole_layer import WholeLayer
 
 from softtact.linalg.direct import make_solver
 from softtact.models.elastic.compliance import elastic_compliance
 from softtact.models.elastic.tangential import SurfaceCompliance, surface_compliance
-from softtact.sensors.specification import SensorSpec
 
-CORO = SensorSpec.from_yaml(Path(__file__).parents[3] / "config/sensors/coro.yaml")
 SMALL = CORO.model_copy(update={"footprint_mm": (7.2, 9.6), "map_shape": (13, 9)})
 
 

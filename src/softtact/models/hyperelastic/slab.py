@@ -14,7 +14,6 @@ import scipy.sparse as sp
 from softtact.contact.friction import FrictionResponse
 from softtact.contact.history import ContactHistory
 from softtact.fem.assembly import SymmetricProduct, add_upper, upper_pattern, upper_positions
-from softtact.fem.elements import QUAD8
 from softtact.fem.extruded_mesh import extrude
 from softtact.fem.graded_mesh import cover_mesh
 from softtact.fem.kernels import add_forces
@@ -23,6 +22,7 @@ from softtact.fem.solid_block import HexBlock, WedgeBlock, hanging_node_constrai
 from softtact.linalg.workers import SERIAL
 from softtact.models.hyperelastic.newton_step import LinearGaps
 from softtact.models.hyperelastic.rigid_contact import ContactProjection, TopContact
+from softtact.models.hyperelastic.sampling import interpolation_on_side, located, without_zeros
 
 
 @dataclass(frozen=True)
@@ -74,6 +74,8 @@ class Slab:
     sheet_mesh: the sheet (`sheet_layers`) and the cover's layers that keep to its plan;  cover_mesh: the cover's other layers
     Nodes: cover_mesh's first, then sheet_mesh's without its top. `bottom`: those under the sheet, in the plan's order.
     """
+
+    regions = ("sheet", "cover")     # of the deformed mesh that the two parts belong to
 
     def __init__(self, sheet, cover, sheet_mesh_2d, x_lines, y_lines, *, sides, contact, constrained_cell_edges=True, splits=None,
                  quartic_penalty_ratio=0.0, friction=None):
@@ -219,6 +221,12 @@ class Slab:
         self.number = np.full(held.size, -1, dtype=np.int64)
         self.number[self.free] = np.arange(len(self.free))
 
+    def hold(self, nodes):
+        """Hold nodes (k,) in all directions, before `build_pattern`."""
+        self.number.reshape(-1, 3)[nodes] = -1
+        self.free = np.flatnonzero(self.number >= 0)
+        self.number[self.free] = np.arange(len(self.free))
+
     def project(self, displacement, surface):
         """The object's facets above the top's points (see `ContactProjection`)."""
         return self.top.project(displacement, surface)
@@ -317,20 +325,13 @@ class Slab:
 
     def locate(self, points):
         """Faces (p,) under the cover and shape values (p, 8) at points (p, 2); points on a line belong to the lower side."""
-        cells = self.cover_mesh.bottom_cells
-        fine = cells.shape[0] // (len(self.y_lines) - 1)
-        i, j = (_place(value, lines, fine) for value, lines in zip(points.T, (self.x_lines, self.y_lines), strict=True))
-        faces = cells[j, i]
-        low, _, high, _ = self.cover_mesh.points[self.cover_mesh.bottom[faces, :4], :2].transpose(1, 0, 2)
-        return faces, QUAD8.shape(2 * (points - low) / (high - low) - 1)[0]
+        mesh = self.cover_mesh
+        return located(mesh, mesh.bottom, mesh.bottom_cells, (self.x_lines, self.y_lines), points)
 
     def _under_cover(self, points):
         """Sparse matrix (p, free nodes of the cover) that interpolates on the cover's lower side at points (p, 2)."""
         mesh = self.cover_mesh
-        faces, values = self.locate(points)
-        rows = np.repeat(np.arange(len(points)), 8)
-        all_nodes = sp.csr_matrix((values.ravel(), (rows, mesh.bottom[faces].ravel())), shape=(len(points), len(mesh.points)))
-        return _without_zeros(all_nodes @ mesh.follow)
+        return interpolation_on_side(mesh, mesh.bottom, mesh.bottom_cells, (self.x_lines, self.y_lines), points)
 
     def sampling(self, points):
         """Sparse matrix (p, nodes) that interpolates a nodal field of the plane between sheet and cover at points (p, 2)."""
@@ -342,7 +343,7 @@ class Slab:
         masters, weights = self._masters[plane], self._weights[plane]
         rows = np.repeat(np.arange(len(plane)), masters.shape[1])
         own = sp.csr_matrix((weights.ravel(), (rows, masters.ravel())), shape=(len(plane), self.nodes))
-        return _without_zeros(interpolation_2d(self.sheet_mesh_2d.mesh_2d, points) @ own)
+        return without_zeros(interpolation_2d(self.sheet_mesh_2d.mesh_2d, points) @ own)
 
     @property
     def interface_nodes(self):
@@ -351,15 +352,3 @@ class Slab:
             return self.cover_mesh.bottom_nodes
         plane = self.sheet_mesh.planes[self.sheet_layers]
         return np.unique(self._masters[plane][np.abs(self._weights[plane]) > 1e-12])
-
-
-def _place(value, lines, fine):
-    """Which interval of lines, each cut into `fine` equal parts, values (p,) lie in."""
-    grid = np.interp(np.arange(fine * (len(lines) - 1) + 1), fine * np.arange(len(lines)), lines)
-    return np.clip(np.searchsorted(grid, value - 1e-9) - 1, 0, len(grid) - 2)
-
-
-def _without_zeros(matrix):
-    matrix.data[np.abs(matrix.data) < 1e-12] = 0.0
-    matrix.eliminate_zeros()
-    return matrix.tocsr()
