@@ -8,8 +8,8 @@ with the parts N, C, T of the surface's compliance. `carried` is the surface's t
 the object's way since, so a point that sticks goes where the object goes. History is in `carried` alone.
 
 The normal problem for given q, and the tangential one for given p, are convex; they are solved in turns until both agree
-(Panagiotopoulos' process; Kalker's NORM and TANG), with Aitken's relaxation. Each by active sets with conjugate gradients on the set (`unilateral` has more
-levels at once, but loads only). `solve_block_by_block` is the plain method and the specification of this one.
+(Panagiotopoulos' process; Kalker's NORM and TANG), with Aitken's relaxation. Each is solved by active sets with conjugate gradients
+on the set (`unilateral` has more levels at once, but loads only). `solve_block_by_block` is the plain method and the specification.
 References: Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), ch. 4; Panagiotopoulos, Ing.-Arch. 44 (1975) 421;
 Jourdan, Alart and Jean, Comput. Methods Appl. Mech. Engng 155 (1998) 31 (block Gauss-Seidel).
 """
