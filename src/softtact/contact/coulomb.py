@@ -1,5 +1,4 @@
-"""One increment of a rigid object that presses and friction responses an elastic surface of known compliance, with Coulomb's exact
-law.
+"""One increment of a rigid object that presses and drags an elastic surface of known compliance, with Coulomb's exact law.
 
 Unknown are a normal force p >= 0 and a tangential force q (x, y) at each contact point, both on the surface, p downwards:
     gap  = gap0 - depth + N p + C q >= 0,   p gap = 0            (Signorini)
@@ -9,8 +8,8 @@ with the parts N, C, T of the surface's compliance. `carried` is the surface's t
 the object's way since, so a point that sticks goes where the object goes. History is in `carried` alone.
 
 The normal problem for given q, and the tangential one for given p, are convex; they are solved in turns until both agree
-(Panagiotopoulos' process; Kalker's NORM and TANG). Each by active sets with conjugate gradients on the set (`unilateral` has more
-load steps at once, but loads only). `solve_block_by_block` is the plain method and the specification of this one.
+(Panagiotopoulos' process; Kalker's NORM and TANG), with Aitken's relaxation. Each is solved by active sets with conjugate gradients
+on the set (`unilateral` has more levels at once, but loads only). `solve_block_by_block` is the plain method and the specification.
 References: Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), ch. 4; Panagiotopoulos, Ing.-Arch. 44 (1975) 421;
 Jourdan, Alart and Jean, Comput. Methods Appl. Mech. Engng 155 (1998) 31 (block Gauss-Seidel).
 """
@@ -128,32 +127,51 @@ def solve_increment(compliance: ContactCompliance, increment: Increment, *, norm
     count = len(increment.gap)
     p = _first_guess(compliance, increment) if normal is None or not normal.any() else normal.copy()
     q = np.zeros((count, 2)) if tangential is None else tangential.copy()
-    products, raised = 0, np.zeros(count)
-    for turn in range(1, settings.max_turns + 1):
+    turns, products, raised, relaxation = 0, 0, (compliance.coupling @ q)[:, 0], _Relaxation()
+    while turns < settings.max_turns:
+        turns += 1
         p, depth, own, used = _solve_normal(compliance.normal, increment.gap + raised, p, increment, settings)
         products += used
         if not increment.friction:
-            q, dragged = np.zeros((count, 2)), np.zeros((count, 2))
+            q, dragged, raised = np.zeros((count, 2)), np.zeros((count, 2)), np.zeros(count)
             break
         by_pressure = compliance.coupling.T @ p[:, None] - increment.carried
         bound = increment.bound(p)
-        before, (q, dragged, used) = q, solve_in_discs(compliance.tangential, by_pressure, bound, q, settings=settings)
+        q, dragged, used = solve_in_discs(compliance.tangential, by_pressure, bound, q, settings=settings)
         products += used + 2
-        if turn > _UNDAMPED_TURNS:
-            q = 0.5 * (before + q)
-        last, raised = raised, (compliance.coupling @ q)[:, 0]
-        if np.abs(raised - last)[p > 0].max(initial=0.0) <= settings.tolerance_mm and turn > 1:
+        change = (compliance.coupling @ q)[:, 0] - raised
+        if np.abs(change)[p > 0].max(initial=0.0) <= settings.tolerance_mm:
+            raised = raised + change
             break
+        raised = raised + relaxation.of(change) * change
     else:
         raise ConvergenceError(f"An increment of the elastic model did not settle pressure and friction in {settings.max_turns} "
                                "turns; move the object in more steps.")
     slip = compliance.coupling.T @ p[:, None] + dragged - increment.carried
     sticks = _sticking(q - slip / compliance.tangential.diagonal.max(axis=1, keepdims=True), increment.bound(p))
     slip[sticks] = 0.0
-    return CoulombContact(p, q, depth, increment.gap + raised + own - depth, slip, sticks, turn, products + 2)
+    return CoulombContact(p, q, depth, increment.gap + raised + own - depth, slip, sticks, turns, products + 2)
 
 
-_UNDAMPED_TURNS = 15     # from then on q moves by half of what the tangential problem says: what is left then swings
+class _Relaxation:
+    """Aitken's share of a change that a turn takes over: with much friction whole changes swing, ever wider.
+
+    Kuettler and Wall, Comput. Mech. 43 (2008) 61.
+    """
+
+    _LEAST, _MOST = 0.02, 1.0
+
+    def __init__(self):
+        self._share, self._last = self._MOST, None
+
+    def of(self, change):
+        """The share to take of this turn's change (c,)."""
+        if self._last is not None:
+            turned = change - self._last
+            aitken = -self._share * (self._last @ turned) / max(turned @ turned, 1e-300)
+            self._share = min(max(abs(aitken), self._LEAST), self._MOST)
+        self._last = change
+        return self._share
 
 
 def _sticking(pulled, bound):
