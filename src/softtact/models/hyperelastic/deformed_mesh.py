@@ -50,7 +50,7 @@ def pressed_body(body, state=None):
     """
     slab, support = (state.slab.displacement, state.support.displacement) if state else body.rest()
     sheet, cover, frusta = body.slab.sheet_mesh, body.slab.cover_mesh, body.support.mesh
-    masters, weights = body.slab.sheet_nodes
+    masters, weights = body.slab.sheet_nodes.masters, body.slab.sheet_nodes.weights
     first = np.cumsum([0, len(sheet.points), len(cover.points)])
     hexes = (frusta.hexes[None] + first[2] + (np.arange(body.support.count) * body.support.nodes)[:, None, None]).reshape(-1, 27)
     cells = (_cells(HEX27, hexes, "frusta"), *_on_plan(body.slab), _cells(HEX20, cover.hexes + first[1], "cover"))
