@@ -11,8 +11,8 @@ MOST_LINES = 350
 # From below: a package imports from those of the lines before its own, and from itself; those of one line know nothing of each
 # other.
 ORDER = (
-    ("errors",),
-    ("unknown_names", "progress", "devices", "extras"),
+    ("errors", "extras"),
+    ("unknown_names", "progress", "devices"),
     ("files",),
     ("linalg", "geometry", "materials"),
     ("sensors", "contact", "fem"),
@@ -43,9 +43,12 @@ MODULES = {name_of(path): path for path in sorted(SOURCE.rglob("*.py"))}
 
 
 def imports_of(path):
-    """Modules of softtact that a file imports, in its functions too, and the names that it takes from softtact itself."""
+    """Modules of softtact that a file imports, in its functions too, and the names that it takes from softtact itself.
+
+    What stands under `if TYPE_CHECKING` is imported by no program, and left out.
+    """
     found, names = set(), set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in _nodes(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names if alias.name.split(".")[0] == "softtact"}
         elif isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "softtact":
@@ -60,6 +63,14 @@ def imports_of(path):
                     names.add(alias.name)
         assert not (isinstance(node, ast.ImportFrom) and node.level), f"{path}: imports are written with their whole names"
     return {name.removeprefix("softtact").lstrip(".") for name in found if name != "softtact"}, names
+
+
+def _nodes(tree):
+    """The tree's nodes without those under `if TYPE_CHECKING`."""
+    yield tree
+    for child in ast.iter_child_nodes(tree):
+        if not (isinstance(child, ast.If) and ast.unparse(child.test).endswith("TYPE_CHECKING")):
+            yield from _nodes(child)
 
 
 def package_of(module):
