@@ -1,9 +1,10 @@
 # `make`: the default study.  `make tiny`: the smallest study.  `make test`: the tests.  `make docs`: the documentation.
+# `make numbers`: the measured numbers in docs/, from benchmarks/results/ and a count of the tests.
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 BIN := .venv/bin
 SNAKEMAKE = $(BIN)/snakemake --cores all
 
-.PHONY: study tiny test lint bench docs clean
+.PHONY: study tiny test lint bench docs numbers clean
 
 study: .venv/installed
 	$(SNAKEMAKE)
@@ -26,26 +27,26 @@ bench: .venv/installed
 
 lint: .venv/tested
 	$(BIN)/ruff check .
+	$(BIN)/mypy
 	$(BIN)/snakemake --lint
 
 # The workflow finds its own interpreter; the environment need not be activated.
 .venv/installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet -c constraints.txt -e .
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[workflow,learn,view,optics,mkl]'
 	touch $@
 
 .venv/tested: .venv/installed
-	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[test,docs]'
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[all,test,docs]'
 	touch $@
 
 # The documentation as a site, from docs/ into site/; a warning is an error.
-docs: .venv/documented
+docs: numbers
 	$(BIN)/python -m sphinx -W --keep-going -q -b html -d site/.doctrees docs site
 	@echo "Open site/index.html"
 
-.venv/documented: .venv/installed
-	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[docs]'
-	touch $@
+numbers: .venv/tested
+	$(BIN)/python scripts/write_numbers.py
 
 clean:
 	rm -rf results/*/ .snakemake

@@ -36,9 +36,9 @@ from softtact.materials.laws.registry import make_law
 from softtact.models.solid.body import FreeBody, RigidContact
 from softtact.models.solid.newton import FreeSettings, press_to_indentations
 from softtact.models.solid.tetrahedra import LinearTetrahedra
+from softtact.sensors.library import sensor_file
 from softtact.sensors.specification import SensorSpec
 
-SENSOR = Path(__file__).parents[1] / "config/sensors/coro.yaml"
 LAWS = {"dielectric": {"c10": 0.1706, "c01": 0.0040}, "cover": {"c10": 0.1786, "c01": 0.0022}}
 INDENTATION_MM, INCREMENTS = 0.4, 4
 CONTACT_STIFFNESS = 500.0      # N/mm3
@@ -74,7 +74,7 @@ class Mesh:
 
 def make_mesh(case):
     """168 tetrahedra a cell: 24 in the cone, 48 in the sheet and in each of two cover layers. Tips are held."""
-    spec = SensorSpec.from_yaml(SENSOR)
+    spec = SensorSpec.from_yaml(sensor_file("coro"))
     whole = layered_mesh(spec, case.counts or spec.frusta_counts, cell=octagon_cell, stack=Stack((0.0, 1.0), 1, 2))
     cut = [tetrahedra_of(whole.points, wedges_of(whole.hexes[name], whole.wedges[name]))[:, :4] for name in LAWS]
     points, *cut, top, tips = compressed(whole.points, *cut, triangles_of(whole.top)[:, :3], triangles_of(whole.tips)[:, :3])

@@ -2,7 +2,7 @@
 
 The hyperelastic maps and times are those that `objects.py --mesh fine` left, of indenters and of the paper's objects; the fast
 models are pressed here. The error to expect is calibrated on the indenters (this run's constants are those of
-`softtact.press.choice.FoundationError`) and tested on the objects. Prints the tables of docs/fast_models.md, draws
+`softtact.press.choice.FoundationError`) and tested on the objects. Prints the tables of docs/explanation/fast_models.md, draws
 docs/policies.png, writes benchmarks/results/choice.json.
 """
 

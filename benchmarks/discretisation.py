@@ -7,7 +7,7 @@ Every kind of element on meshes of the same cells, in the same press (`softtact.
          error of the plane between sheet and cover at the nodes that the meshes have in common. By symmetry a quarter is solved.
 References: 27-node elements, the cell's plan refined twice, the patch's once, a share mu of K at every point (without it meshes as
 fine as these do not pass the fold at the tip's rim). Writes benchmarks/results/discretisation.json, the table in
-docs/discretisation.md, and docs/discretisation.png.
+docs/notebook/2026-11-21-which-element.md, and docs/discretisation.png.
 """
 
 import argparse
@@ -26,10 +26,12 @@ from softtact.fem.extruded_mesh import cell_mesh_2d
 from softtact.materials.laws.registry import make_law
 from softtact.models.solid.body import FreeBody, RigidContact, flat_surface, ground
 from softtact.models.solid.newton import FreeSettings, press_to_forces, press_to_indentations
+from softtact.sensors.library import sensor_file
 from softtact.sensors.specification import SensorSpec
 
-PAGE = Path(__file__).parents[1] / "docs/discretisation.md"
-SPEC = SensorSpec.from_yaml(Path(__file__).parents[1] / "config/sensors/coro.yaml")
+PAGE = Path(__file__).parents[1] / "docs/notebook/2026-11-21-which-element.md"
+FIGURE = Path(__file__).parents[1] / "docs/discretisation.png"
+SPEC = SensorSpec.from_yaml(sensor_file("coro"))
 LAWS = {"dielectric": {"c10": 0.1706, "c01": 0.0040}, "cover": {"c10": 0.1786, "c01": 0.0022}}
 STIFF = 2 * (1 + 0.4995) / (3 * (1 - 2 * 0.4995))      # K / mu0 at nu = 0.4995
 DEPTHS_MM = 0.025 * np.arange(1, 9)
@@ -218,7 +220,7 @@ def draw(rows):
         axis.set(xlabel=x, ylabel=y)
         axis.grid(alpha=0.3, which="both")
     figure.legend(*axes[1].get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize=8)
-    figure.savefig(PAGE.with_suffix(".png"), dpi=110)
+    figure.savefig(FIGURE, dpi=110)
 
 
 def main():

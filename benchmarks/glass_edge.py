@@ -13,7 +13,8 @@ from glass_mesh import LAWS, SPEC
 from softtact.contact.height_field import HeightField
 from softtact.models.ftir.unit_cell import GLASS_MESH, contact_area, press_cell_on_glass
 from softtact.models.hyperelastic.build import build_patch
-from softtact.models.hyperelastic.newton import NewtonSettings, press_load_steps
+from softtact.models.hyperelastic.newton import NewtonSettings
+from softtact.models.hyperelastic.path import press_load_steps
 
 SIZES = (4, 6)
 FORCES = np.array([10.0, 40.0, 80.0, 140.0]) / 540      # N on the mean frustum

@@ -1,11 +1,11 @@
-"""How the contact area of a frustum on glass depends on its mesh, and on how contact is asked for (the tables of docs/ftir.md).
+"""How the contact area of a frustum on glass depends on its mesh, and on how contact is asked for.
+The tables stand in docs/notebook/2026-11-22-mesh-on-glass.md.
 
     python benchmarks/glass_mesh.py        (some minutes; benchmarks/results/glass_mesh.json)
 """
 
 import time
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import record
@@ -14,10 +14,11 @@ from softtact.contact.height_field import HeightField
 from softtact.materials.laws.registry import make_law
 from softtact.models.ftir.unit_cell import DARK_GAP_MM, GLASS_MESH, SETTINGS, contact_area, plate_over
 from softtact.models.hyperelastic.build import build_unit_cell
-from softtact.models.hyperelastic.newton import press_load_steps
+from softtact.models.hyperelastic.path import press_load_steps
+from softtact.sensors.library import sensor_file
 from softtact.sensors.specification import SensorSpec
 
-SPEC = SensorSpec.from_yaml(Path(__file__).parents[1] / "config/sensors/coro.yaml")
+SPEC = SensorSpec.from_yaml(sensor_file("coro"))
 LAWS = {"mooney_rivlin": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_over_shear=20.0),
         "ogden2": make_law("ogden2", {"mu1": 0.1351, "alpha1": 1.4538, "mu2": 0.2223, "alpha2": -4.9910}, bulk_over_shear=20.0)}
 FORCES = np.arange(10.0, 141.0, 10.0) / 540     # N on one frustum

@@ -1,7 +1,7 @@
 """Fits of published test curves: errors of the family, predictions of a test left out, and how long a card takes.
 
     SOFTTACT_TEST_DATA=folder python benchmarks/materials.py               (half a minute)
-    python benchmarks/materials.py --write-docs    (the tables of docs/materials.md from the last record)
+    python benchmarks/materials.py --write-docs    (the tables of its page in docs/notebook/ from the last record)
 
 The folder holds `materials/literature` (Treloar 1944, Kawabata 1981) and `materials/soro_db` (Marechal et al. 2021).
 """
@@ -20,9 +20,10 @@ from softtact.materials.fitting import collect, errors_of, fit_law, rms
 from softtact.materials.laws.registry import make_law
 from softtact.materials.making import curves_of
 from softtact.materials.readers import read_curves
+from softtact.sensors.library import material_file
 
 PROJECT = Path(__file__).parents[1]
-PAGE = PROJECT / "docs" / "materials.md"
+PAGE = PROJECT / "docs" / "notebook" / "2026-11-22-laws-on-published-tests.md"
 RUBBERS = ("Treloar_1944", "Kawabata_1981")
 WINDOW = (1.0, 2.0)     # strains up to 100 %
 # Ogden, Proc. R. Soc. A 326 (1972) 565, for Treloar's rubber; in Abaqus' convention mu = mu_p alpha_p / 2.
@@ -65,7 +66,7 @@ def silicone(path):
 
 def seconds():
     """Time of a whole card, predictions of tests left out included, and of the fits alone, for the project's own curves."""
-    config = load_material(PROJECT / "config" / "materials" / "polyurethane.yaml")
+    config = load_material(material_file("polyurethane"))
     curves, times = curves_of(config.curve_settings), {}
     for name, left_out in (("card", True), ("fits", False)):
         start = time.perf_counter()
@@ -116,7 +117,7 @@ def write_page(found):
 def main():
     """Measure, or write the page."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--write-docs", action="store_true", help="put the last record into docs/materials.md")
+    options.add_argument("--write-docs", action="store_true", help="put the last record into its page in docs/notebook/")
     if options.parse_args().write_docs:
         return write_page(record.read("materials"))
     if "SOFTTACT_TEST_DATA" not in os.environ:

@@ -58,13 +58,14 @@ def save_maps(path, result):
     """The maps in mm (single precision: a tenth of a nanometre) with their forces in N, at once or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".part", delete=False) as file:
-        np.savez_compressed(file, force_n=result.force_n, map_mm=result.deformation_map_mm.astype(np.float32))
+        np.savez_compressed(file, force_n=result.normal_force_n, map_mm=result.deformation_map_mm.astype(np.float32))
     Path(file.name).replace(path)
 
 
 def _load_steps(result, sensor):
     height = sensor.spec.dielectric.frusta.height_mm
-    lists = {"force_n": (result.force_n, 3), "indentation_mm": (result.indentation_mm, 4), "iterations": (result.iterations, 0),
+    lists = {"force_n": (result.normal_force_n, 3), "indentation_mm": (result.indentation_mm, 4),
+             "iterations": (result.iterations, 0),
              "overlap_um": (1e3 * result.penetration_mm, 2), "residual_n": (result.residual_n, 5),
              "frustum_compression": (result.frustum_compression_mm / height, 3)}
     return {name: [round(float(value), digits) for value in values] for name, (values, digits) in lists.items()}

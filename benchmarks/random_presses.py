@@ -5,7 +5,8 @@
 Objects of config/objects, from a third of the sensor's side to all of it, in any turn, tilted by up to 25 degrees, anywhere over
 it; forces up to the sensor's pressure at full range; laws and constants anew every 25 presses. The sensor is a piece of the
 default one, 8 x 8 frusta, 4 x 4 for the hyperelastic model on the draft mesh. The seed is the press' number: `--one MODEL NUMBER`
-presses it again, and an ended run goes on. Counts: benchmarks/results/random_presses.json, from there docs/verification.md.
+presses it again, and an ended run goes on. Counts: benchmarks/results/random_presses.json, from there
+docs/reference/verification.md.
 """
 
 import argparse
@@ -30,6 +31,7 @@ from softtact.models.foundation.compliance import foundation_compliance
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.press.sensor import Sensor
+from softtact.sensors.library import sensor_file
 from softtact.sensors.specification import SensorSpec
 
 CONFIG = Path(__file__).resolve().parents[1] / "config"
@@ -48,7 +50,7 @@ OUTCOMES = ("reached", "outside", "flagged", "stopped", "refused", "nonsense", "
 def random_sensor(number, model):
     """The sensor of a block of presses: a law of its own in each layer, and an elastic layer of its own."""
     rng, side = np.random.default_rng([1, number]), PITCH_MM * FRUSTA[model]
-    spec = SensorSpec.from_yaml(CONFIG / "sensors/coro.yaml").model_copy(
+    spec = SensorSpec.from_yaml(sensor_file("coro")).model_copy(
         update={"footprint_mm": (side, side), "map_shape": (2 * FRUSTA[model] + 1,) * 2,
                 "force_range_n": (0.0, LARGEST_MPA * side**2)})
     layer = spec.elastic_layer.model_copy(update={"young_mpa": rng.uniform(0.5, 3.0), "poisson": rng.uniform(0.1, 0.45)})
@@ -121,7 +123,7 @@ def nonsense(result, sensor):
              "less depth at more force": np.append(falls, False) | np.append(False, falls),
              "overlap": result.penetration_mm > 2 * ALLOWED_MM,
              "no contact": result.contact_area_mm2 <= 0,
-             "a balance that is none": result.residual_n > 1e-2 * np.maximum(result.force_n, 1)}
+             "a balance that is none": result.residual_n > 1e-2 * np.maximum(result.normal_force_n, 1)}
     return {name: where for name, where in found.items() if where.any()}
 
 

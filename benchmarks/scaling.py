@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 import softtact
 from softtact.contact.height_field import HeightField
 from softtact.geometry.meshes import place
-from softtact.models.hyperelastic.newton import press_load_steps
+from softtact.models.hyperelastic.path import press_load_steps
 from softtact.press.sensor import Sensor
 
 SENSORS = ((4, 4), (8, 8), (12, 16), (18, 30), (30, 50))

@@ -40,7 +40,7 @@ def make(paths, items):
         maps = {model: sensor.press(mesh, pose=pose, force_n=FORCES, model=model, threads=1, label="")
                 for model in ("elastic", "foundation")}
         valid = maps["elastic"].within_validity & maps["foundation"].within_validity
-        presses["elastic", set_name, item] = maps["elastic"].to_dataset().assign(within_validity=("force", valid))
+        presses["elastic", set_name, item] = maps["elastic"].to_dataset().assign(within_validity=("step", valid))
         counts = read_virtual_sensor(sensor.spec, maps["foundation"].deformation_map_mm, trials=TRIALS, seed=SEED,
                                      item=f"{set_name}/{item}")
         tactile[set_name, item] = xarray.Dataset({"tactile_map": (("trial", "force", "row", "column"), counts),

@@ -4,8 +4,8 @@ The default sensor on the default mesh is pressed with the default assumptions a
 compressibility of the two materials, thickness of the sheet and of the cover, hold of the tips, friction, and which face of a
 frustum is the tip. About a minute a press on one thread, several where the dielectric is very compressible. Each row is written to
 benchmarks/results/unknowns.json as soon as it is there: `--resume` presses only what that record lacks, `--cases NAME ...` only
-these, `--write-docs` puts the record's tables into docs/unknowns.md without a press. `--mesh draft` takes half of the time, and
-keeps its own record, unknowns_draft.json: how far the two differ tells what the mesh is worth in these tables.
+these, `--write-docs` puts the record's tables into docs/explanation/unknowns.md without a press. `--mesh draft`
+takes half of the time, and keeps its own record, unknowns_draft.json: the difference is the mesh's effect on these tables.
 """
 
 import argparse
@@ -30,7 +30,7 @@ from softtact.press.sensor import Sensor
 from softtact.sensors.specification import SensorSpec
 
 OBJECTS = ["config/objects/indenters/circle_m.stl"]
-PAGE = Path(__file__).parents[1] / "docs/unknowns.md"
+PAGE = Path(__file__).parents[1] / "docs/explanation/unknowns.md"
 FORCES_N = [5.0, 10.0, 20.0, 35.0, 50.0]
 TOLD_N = (20.0, 50.0)
 # How a sensor is meshed and pressed; on the draft mesh, as in the studies, only deeper overlaps are pressed apart.
@@ -94,7 +94,7 @@ def thickness(layer, key, value, usual):
 def loose(board):
     """Tips that may slide on the board."""
     spec = {"tips_bonded": False, "friction.board": board}
-    return Case(f"free_{board:g}", "tips on the board, held sideways by default",
+    return Case(f"free_{board:g}", "tips on the board, bonded by default",
                 f"free, friction {board:g}" if board else "free, no friction", spec)
 
 
@@ -102,7 +102,7 @@ def cases():
     """All of them, the default first."""
     both, ratios = tuple(LAYERS), (1.0, 2.0, 5.0, 10.0)
     swapped = {"dielectric.frusta.tip_diameter_mm": 1.2, "dielectric.frusta.root_diameter_mm": 0.6}
-    return [Case(DEFAULT, "", "all assumptions as in config/sensors/coro.yaml"),
+    return [Case(DEFAULT, "", "all assumptions as in the file of the sensor coro"),
             *(compressible(ratio, *layers) for layers in (both, both[:1], both[1:]) for ratio in ratios),
             *(thickness("sheet", "dielectric.sheet_thickness_mm", value, 0.5) for value in (0.25, 1.0)),
             *(thickness("cover", "cover.thickness_mm", value, 1.5) for value in (1.0, 2.0)),
@@ -166,7 +166,7 @@ def measure(case, conditions, default_maps=None):
                "largest_difference_mm": difference.max(axis=(1, 2)), "mean_difference_mm": difference.mean(axis=(1, 2)),
                "map_minimum_mm": maps.min(axis=(1, 2)),
                "frustum_compression_mm": result.frustum_compression_mm, "overlap_mm": result.penetration_mm}
-    whole = {"force_n": result.force_n.tolist(), "iterations": result.iterations.tolist(),
+    whole = {"force_n": result.normal_force_n.tolist(), "iterations": result.iterations.tolist(),
              "within_validity": result.within_validity.tolist()}
     return row | whole | {key: np.round(values, 6).tolist() for key, values in numbers.items()}, maps
 
@@ -281,8 +281,9 @@ def troubles(rows):
         outside = [force for force, valid in zip(row["force_n"], row.get("within_validity", []), strict=True) if not valid]
         if outside:
             lost, overlap = max(row["frustum_compression_mm"]), 1e3 * max(row["overlap_mm"])
-            lines.append(f"* {name}: outside the model's validity (docs/command_line.md) from {outside[0]:g} N on; the most "
-                         f"compressed frustum has lost {lost:.2f} mm, the deepest overlap is {overlap:.1f} um.")
+            lines.append(f"* {name}: outside the model's validity ([list](../reference/command_line.md#what-is-flagged)) from "
+                         f"{outside[0]:g} N on; the most compressed frustum has lost {lost:.2f} mm, "
+                         f"the deepest overlap is {overlap:.1f} um.")
     return "\n".join(lines) or "Every press reached 50 N, within the model's validity."
 
 
@@ -295,7 +296,7 @@ def in_order(rows):
 
 def section(name, rows):
     """What the page holds of an object."""
-    forces = f"{TOLD_N[-1]:g} N (at {TOLD_N[0]:g} N where a press did not come so far)"
+    forces = f"{TOLD_N[-1]:g} N (at {TOLD_N[0]:g} N where the press stopped earlier)"
     missing = [case.name for case in cases() if case.name not in {row["case"] for row in rows}]
     absent = [f"Not pressed yet (`--resume` does): {', '.join(missing)}."] if missing else []
     return "\n\n".join([f"## {name}", table(rows), f"By the largest change of the indentation at {forces}:", ranking(rows),
@@ -321,7 +322,7 @@ def main():
     options.add_argument("--limit-s", type=float, default=1800.0, help="processor seconds of a press, 1800 by default")
     options.add_argument("--resume", action="store_true", help="press only what the last record lacks")
     options.add_argument("--write-docs", action="store_true",
-                         help="put the last record on the default mesh into docs/unknowns.md, without a press")
+                         help="put the last record on the default mesh into docs/explanation/unknowns.md, without a press")
     given = options.parse_args()
     path = record.RESULTS / f"{record_name('default' if given.write_docs else given.mesh)}.json"
     kept = given.resume or given.write_docs or given.cases != names

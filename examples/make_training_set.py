@@ -49,14 +49,15 @@ def random_poses(spec, count, *, seed):
 
 def pairs(sensor, results, poses, *, ideal, seed):
     """Data set with dimensions sample (press by press, force by force), y, x, row, column."""
-    counts = [result.tactile_map if ideal else read_virtual_sensor(sensor.spec, result.deformation_map_mm, force_n=result.force_n,
+    counts = [result.tactile_map if ideal else read_virtual_sensor(sensor.spec, result.deformation_map_mm,
+                                                                   force_n=result.normal_force_n,
                                                                    trials=1, seed=seed, item=f"press {k}")[0]
               for k, result in enumerate(results)]
     load_steps = len(FORCES_N)
     return xarray.Dataset({
         "deformation_map_mm": (("sample", "y", "x"), np.concatenate([r.deformation_map_mm for r in results]), {"units": "mm"}),
         "tactile_map": (("sample", "row", "column"), np.concatenate(counts), {"units": "counts"}),
-        "force_n": ("sample", np.concatenate([r.force_n for r in results]), {"units": "N"}),
+        "force_n": ("sample", np.concatenate([r.normal_force_n for r in results]), {"units": "N"}),
         "pose": (("sample", "six"), np.repeat(poses, load_steps, axis=0), {"units": "mm, degrees"}),
     }, coords={"x": results[0].x_mm, "y": results[0].y_mm},
         attrs={"model": results[0].model, "sensor": results[0].sensor, "source": "ideal readout" if ideal else "virtual sensor"})

@@ -23,7 +23,7 @@ def main(arguments=None):
     pose = Pose.from_values(options.pose) if options.pose else None         # None: centred over the sensor, its lowest side down
     result = sensor.press(mesh, pose=pose, force_n=options.force, model=options.model)
     print(f"{result.model} model on {result.sensor}: maps {result.deformation_map_mm.shape}, taxels {result.tactile_map.shape}")
-    load_steps = zip(result.force_n, result.indentation_mm, result.contact_area_mm2, result.tactile_map, strict=True)
+    load_steps = zip(result.normal_force_n, result.indentation_mm, result.contact_area_mm2, result.tactile_map, strict=True)
     for force, depth, area, counts in load_steps:
         print(f"{force:5.1f} N: {depth:.3f} mm deep, {area:.0f} mm2 in contact, up to {counts.max():.0f} counts")
     plot_press(result, options.out)

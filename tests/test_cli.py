@@ -25,6 +25,7 @@ from softtact.errors import ConvergenceError, InputError
 from softtact.materials.readers import LAYOUTS
 from softtact.press.choice import TOLERANCE_MM
 from softtact.press.sensor import MODELS, Sensor
+from softtact.sensors.library import material_file, sensor_file
 
 ROOT = Path(__file__).resolve().parents[1]
 OBJECT = ROOT / "config/objects/grasped/object_5.stl"
@@ -77,7 +78,7 @@ def test_every_commands_help_has_examples_and_the_exit_statuses(command, capsys)
 
 
 def test_the_docs_hold_the_exit_statuses_as_they_are():
-    page = (ROOT / "docs/command_line.md").read_text()
+    page = (ROOT / "docs/reference/command_line.md").read_text()
     assert all(f"| {status} | {meaning} |" in page for status, meaning in EXIT_STATUS.items())
 
 
@@ -99,7 +100,7 @@ def example_files(tmp_path, monkeypatch):
         mesh.copy().apply_scale(scale).export(tmp_path / name)
     neo_hooke_file(tmp_path / "tension.csv", (0.8, 0.9, 1.1, 1.3, 1.4))
     neo_hooke_file(tmp_path / "shear.csv", (1.1, 1.3, 1.5), exponents=(1, -3))
-    (tmp_path / "my_sensor.yaml").write_text((ROOT / "config/sensors/coro.yaml").read_text())
+    (tmp_path / "my_sensor.yaml").write_text(sensor_file("coro").read_text())
     (tmp_path / "config").symlink_to(ROOT / "config")
     monkeypatch.chdir(tmp_path)
 
@@ -162,7 +163,7 @@ def test_a_press_that_stops_early_writes_and_prints_the_forces_before(capsys, tm
     status = main(["press", str(OBJECT), "--unit", "mm", "--force", "5", "--force", "20", "--model", "elastic", "--json",
                    "--out", str(tmp_path / "p.nc")])
     captured = capsys.readouterr()
-    assert status == 3 and json.loads(captured.out)["force_n"] == [5.0] and (tmp_path / "p.nc").exists()
+    assert status == 3 and json.loads(captured.out)["normal_force_n"] == [5.0] and (tmp_path / "p.nc").exists()
     assert captured.err.endswith("softtact press: The load step of 20 N was not reached.\n")
 
 
@@ -195,8 +196,8 @@ def test_the_schema_in_docs_is_that_of_the_types_and_takes_the_projects_files(ki
     schema = json.loads((ROOT / f"docs/schemas/{kind}.schema.json").read_text())
     again = f"softtact config-schema {kind} --out docs/schemas/{kind}.schema.json"
     assert schema == json.loads(answer("config-schema", kind)), again
-    files = {"study": "config/config.yaml", "sensor": "config/sensors/coro.yaml", "material": "config/materials/neoprene.yaml"}
-    values = yaml.safe_load((ROOT / files[kind]).read_text())
+    files = {"study": ROOT / "config/config.yaml", "sensor": sensor_file("coro"), "material": material_file("neoprene")}
+    values = yaml.safe_load(files[kind].read_text())
     jsonschema.validate(values, schema)
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(values | {"nam": 1}, schema)
@@ -327,8 +328,8 @@ def test_fit_refuses_options_without_meaning_and_writes_no_card(refused, tmp_pat
 
 
 def test_a_materials_yaml_is_given_alone(refused, tmp_path):
-    status, said = refused("fit", "config/materials/neoprene.yaml", "--mode", "uniaxial", "--out", tmp_path / "card.json")
-    assert status == 1 and "says itself what its files are; give it alone" in said
+    status, said = refused("fit", material_file("neoprene"), "--mode", "uniaxial", "--out", tmp_path / "card.json")
+    assert status == 1 and "names its own files and options; give it without others" in said
 
 
 @pytest.mark.parametrize(("card", "sentence"), [("lid=card.json", "the layer is 'lid'; give dielectric or cover"),

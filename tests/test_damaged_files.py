@@ -19,7 +19,7 @@ from softtact.models.foundation.frustum_spring import FrustumLaw
 from softtact.press.vtu import read_vtu
 
 ROOT = Path(__file__).parents[1]
-MAPS = xarray.Dataset({"deformation_map_mm": (("force", "y", "x"), np.arange(5 * 57 * 33, dtype=float).reshape(5, 57, 33))})
+MAPS = xarray.Dataset({"deformation_map_mm": (("step", "y", "x"), np.arange(5 * 57 * 33, dtype=float).reshape(5, 57, 33))})
 TETRAHEDRON = meshio.Mesh(np.eye(4, 3), [("tetra", [[0, 1, 2, 3]])], cell_data={"layer": [np.zeros(1)]},
                           point_data={"displacement_mm_5N": np.zeros((4, 3))})
 

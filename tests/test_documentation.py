@@ -5,6 +5,7 @@ that what they name is there.
 """
 
 import re
+import runpy
 import shlex
 import subprocess
 import sys
@@ -22,7 +23,7 @@ from softtact.imaging.frames import render_frame
 from softtact.learning.network import TactileNetwork, save_network
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 BLOCK = re.compile(r"(?P<mark><!-- not run: [^>]+ -->\n\n?)?"
                    r"(?:^```(?P<kind>\w+)\n(?P<fenced>.*?)^```|(?P<indented>(?:^    [^\n]*\n)+))", re.MULTILINE | re.DOTALL)
 
@@ -118,13 +119,39 @@ def test_what_a_page_links_or_tells_to_run_is_there(page):
         assert re.search(rf"^{target}:", makefile, flags=re.MULTILINE), target
 
 
+def test_the_numbers_in_the_pages_are_those_of_the_records():
+    write_numbers = runpy.run_path(str(ROOT / "scripts/write_numbers.py"))
+    page = write_numbers["NUMBERS"].read_text(encoding="utf-8")
+    counts = {folder: int(number) for folder, number in re.findall(r"^\| ([a-z_()]+) \| (\d+) \|$", page, flags=re.MULTILINE)}
+    assert len(counts) > 10 and page == write_numbers["numbers_page"](counts), "run: make numbers"
+    page = write_numbers["PERFORMANCE"].read_text(encoding="utf-8")
+    assert "| fine | 20 |" in page and page == write_numbers["performance_page"](page), "run: make numbers"
+
+
+def test_packages_import_downwards_only_as_the_page_about_the_code_draws_them():
+    picture = (ROOT / "docs/explanation/code_layout.md").read_text(encoding="utf-8").split("```")[1]
+    rows = [re.findall(r"\b([a-z]+)/(?=\s|$)", row, flags=re.MULTILINE) for row in re.split("─+", picture)]
+    depth = {package: number for number, row in enumerate(rows) for package in row}
+    source = ROOT / "src/softtact"
+    packages = {path.parent.name for path in source.glob("*/__init__.py")}
+    assert set(depth) == packages
+    upwards = [f"{path.relative_to(source)} imports softtact.{name}" for path in source.glob("*/**/*.py")
+               for name in re.findall(r"(?:from|import) softtact\.(\w+)", path.read_text(encoding="utf-8"))
+               if name in packages and depth[name] < depth[path.relative_to(source).parts[0]]]
+    assert not upwards
+
+
+def test_the_page_about_costs_is_short():
+    assert (ROOT / "docs/performance.md").stat().st_size <= 4096 and (ROOT / "README.md").stat().st_size <= 5120
+
+
 def test_the_site_builds_without_a_warning_and_loads_nothing_from_elsewhere(tmp_path):
     pytest.importorskip("myst_parser", reason="pip install -e '.[docs]'")
     folders = ["-d", str(tmp_path / "trees"), str(ROOT / "docs"), str(tmp_path / "site")]
     done = subprocess.run([sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html", *folders],
                           capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    pages = {path.stem: path.read_text(encoding="utf-8") for path in (tmp_path / "site").glob("*.html")}
+    pages = {path.stem: path.read_text(encoding="utf-8") for path in (tmp_path / "site").rglob("*.html")}
     assert pages["theory"].count("<math") > 50 and "softtact.press.sensor.load_sensor" in pages["api"]
     for name, page in pages.items():
         assert not re.search(r"""(?:src=|<link[^>]*href=)["']?(?:https?:)?//""", page), name

@@ -20,6 +20,7 @@ from softtact.materials.cards import law_from_card, load_card
 from softtact.materials.config import load_material
 from softtact.materials.readers import read_curves
 from softtact.reporting.press_view import read_view
+from softtact.sensors.library import material_file, sensor_file
 from softtact.sensors.specification import SensorSpec
 from softtact.study.config import load_study
 
@@ -103,8 +104,8 @@ def test_a_mesh_cut_off_anywhere_is_refused_or_whole(kind, tmp_path):
 @pytest.mark.parametrize(("name", "content", "read"), [
     ("curve.csv", CURVE, lambda path: read_curves([f"uniaxial={path}"])),
     ("card.json", CARD, lambda path: law_from_card(load_card(path))),
-    ("sensor.yaml", (ROOT / "config/sensors/coro.yaml").read_bytes(), SensorSpec.from_yaml),
-    ("neoprene.yaml", (ROOT / "config/materials/neoprene.yaml").read_bytes(), load_material),
+    ("sensor.yaml", sensor_file("coro").read_bytes(), SensorSpec.from_yaml),
+    ("neoprene.yaml", material_file("neoprene").read_bytes(), load_material),
     ("map.csv", b"1,2,3\n4,5,6\n7,8,9\n", lambda path: read_maps(path, shape=(3, 3))),
     ("model.pt", b"PK\x03\x04" + bytes(60), load_network),
     ("press.vtu", b'<?xml version="1.0"?><VTKFile type="UnstructuredGrid"><UnstructuredGrid/></VTKFile>', read_view),
@@ -139,8 +140,8 @@ def test_a_damaged_array_is_refused(array, tmp_path):
 @pytest.mark.parametrize("kind", ["study", "sensor", "material", "card"])
 def test_wrong_values_anywhere_are_refused(kind, tmp_path, monkeypatch):
     monkeypatch.chdir(ROOT)
-    files = {"study": "config/config.yaml", "sensor": "config/sensors/coro.yaml", "material": "config/materials/neoprene.yaml"}
-    values = yaml.safe_load((ROOT / files[kind]).read_text()) if kind in files else json.loads(CARD)
+    files = {"study": ROOT / "config/config.yaml", "sensor": sensor_file("coro"), "material": material_file("neoprene")}
+    values = yaml.safe_load(files[kind].read_text()) if kind in files else json.loads(CARD)
 
     def read(wrong):
         if kind == "study":

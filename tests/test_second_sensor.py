@@ -17,6 +17,7 @@ from softtact.models.foundation.compliance import foundation_compliance
 from softtact.readout.capacitance import ideal_counts
 from softtact.readout.virtual_sensor import read_virtual_sensor
 from softtact.reporting.press_plot import plot_press
+from softtact.sensors.library import sensor_file
 from softtact.study.config import load_study
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -31,7 +32,7 @@ def in_project(monkeypatch):
 @pytest.fixture(scope="module")
 def pad():
     """A piece of the second sensor, 10 x 6 frusta: all of it would take a minute to prepare."""
-    sensor = softtact.load_sensor(str(ROOT / "config/sensors/pad.yaml"))
+    sensor = softtact.load_sensor("pad")
     sensor.spec = sensor.spec.model_copy(update={"footprint_mm": (16.5, 10.0), "map_shape": MAP})
     law, cover = sensor.laws["dielectric"], sensor.laws["cover"]
     sensor.files = {"elastic": elastic_compliance(sensor.spec),
@@ -49,7 +50,7 @@ def pressed(pad):
 def changed(tmp_path, **values):
     """The file of a sensor like the second one but for some values."""
     path = tmp_path / "mine.yaml"
-    path.write_text(yaml.safe_dump(yaml.safe_load((ROOT / "config/sensors/pad.yaml").read_text()) | values))
+    path.write_text(yaml.safe_dump(yaml.safe_load(sensor_file("pad").read_text()) | values))
     return str(path)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 import xarray
+from support.sensors import CORO
 
 import softtact
 from softtact.cli import main
@@ -15,7 +16,6 @@ from softtact.commands import view as view_command
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.press.vtu import LAYERS, of_bodies, of_map, read_vtu
 from softtact.reporting.press_view import _draw_with_matplotlib, read_view
-from softtact.sensors.specification import SensorSpec
 
 ROOT = Path(__file__).resolve().parents[1]
 X, Y = np.linspace(-2, 2, 5), np.linspace(-3, 3, 7)
@@ -24,7 +24,7 @@ MAPS = np.stack([k * np.outer(np.hanning(7), np.hanning(5)) for k in (0.2, 0.5)]
 
 @pytest.fixture
 def press_nc(tmp_path):
-    data = xarray.Dataset({"deformation_map_mm": (("force", "y", "x"), MAPS), "force_n": ("force", [5.0, 20.0])},
+    data = xarray.Dataset({"deformation_map_mm": (("step", "y", "x"), MAPS), "normal_force_n": ("step", [5.0, 20.0])},
                           coords={"x": X, "y": Y}, attrs={"thickness_mm": 2.5})
     data.to_netcdf(tmp_path / "press.nc", engine="h5netcdf")
     return tmp_path / "press.nc"
@@ -33,8 +33,8 @@ def press_nc(tmp_path):
 @pytest.fixture(scope="module")
 def hyperelastic(tmp_path_factory):
     """A press on four frusta whose mesh was kept, as result and as VTU."""
-    sensor = softtact.load_sensor(ROOT / "config/sensors/coro.yaml")
-    spec = SensorSpec.from_yaml(ROOT / "config/sensors/coro.yaml").model_copy(update={"footprint_mm": (2.4, 2.4)})
+    sensor = softtact.load_sensor("coro")
+    spec = CORO.model_copy(update={"footprint_mm": (2.4, 2.4)})
     sensor = replace(sensor, spec=spec, mesh=MeshSettings.draft())
     ball = trimesh.creation.icosphere(subdivisions=3, radius=3.0)
     result = sensor.press(ball, force_n=[0.2, 0.5], model="hyperelastic", label="", threads=1, keep_body=True)
@@ -61,7 +61,7 @@ def test_paraview_reads_the_whole_mesh_with_displacements_and_the_pressure_of_th
 
 
 def test_cover_sheet_and_frusta_move_alike_where_they_meet(hyperelastic):
-    mesh = of_bodies(hyperelastic[0].bodies, hyperelastic[0].force_n)
+    mesh = of_bodies(hyperelastic[0].bodies, hyperelastic[0].normal_force_n)
     _, place = np.unique(np.round(mesh.points, 6), axis=0, return_inverse=True)
     most, least = (np.full((place.max() + 1, 3), start) for start in (-np.inf, np.inf))
     np.maximum.at(most, place.ravel(), mesh.displacement_mm[1])

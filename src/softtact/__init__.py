@@ -1,13 +1,32 @@
 """Simulate a soft capacitive tactile sensor: press a mesh on it, read its deformation and its taxels."""
 
+import importlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from softtact.contact.motion import Motion
+    from softtact.errors import ConvergenceError, InputError
+    from softtact.geometry.meshes import read_mesh
+    from softtact.geometry.pose import Pose
+    from softtact.press.result import PressResult, read_press
+    from softtact.press.sensor import Sensor, load_sensor
+
 __version__ = "0.1.0"
-__all__ = ["load_sensor", "__version__"]
+__all__ = ["ConvergenceError", "InputError", "Motion", "Pose", "PressResult", "Sensor", "__version__", "load_sensor", "read_mesh",
+           "read_press"]
+_MODULES = {"ConvergenceError": "errors", "InputError": "errors", "Motion": "contact.motion", "Pose": "geometry.pose",
+            "PressResult": "press.result", "Sensor": "press.sensor", "load_sensor": "press.sensor",
+            "read_mesh": "geometry.meshes", "read_press": "press.result"}
 
 
-def __getattr__(name):
-    # `import softtact` stays fast: the solvers load when a sensor is first asked for.
-    if name == "load_sensor":
-        from softtact.press.sensor import load_sensor
+def __getattr__(name: str) -> object:
+    # `import softtact` stays fast: a name's module loads when the name is first asked for.
+    if name not in _MODULES:
+        raise AttributeError(f"module 'softtact' has no attribute {name!r}")
+    value = getattr(importlib.import_module(f"softtact.{_MODULES[name]}"), name)
+    globals()[name] = value
+    return value
 
-        return load_sensor
-    raise AttributeError(f"module 'softtact' has no attribute {name!r}")
+
+def __dir__() -> list[str]:
+    return list(__all__)

@@ -24,6 +24,7 @@ from softtact.commands import (
 )
 from softtact.commands.common import EXIT_TEXT
 from softtact.errors import ConvergenceError, SofttactError
+from softtact.extras import missing_extra
 
 COMMANDS = (press, view, predict, complexity, fit, export_deck, detect_discs, cost, stage, config_schema, completion)
 EXAMPLES = """examples:
@@ -50,6 +51,11 @@ def main(arguments=None):
         return _said(options, error, status=3)
     except SofttactError as error:
         return _said(options, error, status=1)
+    except ModuleNotFoundError as error:
+        sentence = missing_extra(error)
+        if sentence is None:
+            raise
+        return _said(options, sentence, status=1)
     except BrokenPipeError:     # `| head` has seen enough; what is still in the buffer must not raise at the end
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as error:

@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 from softtact.errors import InputError
+from softtact.extras import how_to_install
 
 _DRIVERS = ("/dev/nvidiactl", "/dev/dxg", "/dev/kfd")     # NVIDIA's, that of Windows' subsystem for Linux, AMD's
 
@@ -18,8 +19,12 @@ def find_device(name):
         raise InputError(f"device={name!r} is unknown; write 'cpu', 'cuda', 'cuda:1' or 'auto'.")
     if name == "cpu" or (name == "auto" and not _has_driver()):
         return "cpu"
-    import torch  # seconds, which a machine without a driver need not wait for
-
+    try:
+        import torch  # seconds, which a machine without a driver need not wait for
+    except ModuleNotFoundError:
+        if name == "auto":
+            return "cpu"
+        raise InputError(f"device={name!r}: {how_to_install('torch')}") from None
     if not torch.cuda.is_available():
         if name == "auto":
             return "cpu"

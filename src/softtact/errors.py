@@ -1,6 +1,9 @@
 """What softtact raises. Each message is one sentence that names the thing, its value and the remedy."""
 
 
+from typing import Any
+
+
 class SofttactError(Exception):
     """Base of all errors that a user can act upon."""
 
@@ -19,7 +22,7 @@ class ConvergenceError(SofttactError):
     result: what was reached before (a `PressResult` of the lower forces), or None
     """
 
-    def __init__(self, message, *, result=None):
+    def __init__(self, message: str, *, result: Any = None) -> None:
         super().__init__(message)
         self.result = result
 

@@ -16,6 +16,8 @@ import yaml
 import softtact
 from softtact.errors import InputError, OutputError
 
+PROVENANCE = ("softtact_version", "config_digest", "seed")     # attributes of every data set that is written
+
 
 @contextlib.contextmanager
 def atomic_path(path):
@@ -102,11 +104,7 @@ def write_dataset(path, dataset, *, seed, settings):
 
     The same data set gives the same bytes: no time stamp or path is stored.
     """
-    provenance = {
-        "softtact_version": softtact.__version__,
-        "config_digest": digest(settings),
-        "seed": -1 if seed is None else int(seed),
-    }
+    provenance = dict(zip(PROVENANCE, (softtact.__version__, digest(settings), -1 if seed is None else int(seed)), strict=True))
     content = io.BytesIO()    # HDF5 itself leaves the process in ruins where the disk is full
     dataset.assign_attrs(provenance).to_netcdf(content, engine="h5netcdf")
     with atomic_path(path) as temporary:

@@ -13,6 +13,12 @@ def unknown(name, known, *, kind):
     return f"there is no {kind} {name!r}; {remedy}"
 
 
+def nearest(name, known):
+    """The known name that is nearest to `name`, as an aside in a sentence; empty where none is near."""
+    near = difflib.get_close_matches(str(name), known, n=1)
+    return f" (did you mean {near[0]!r}?)" if near else ""
+
+
 def known_keys(model, path):
     """Keys of the section that the keys `path` lead to from a pydantic model; of all, where it may be one of several."""
     models = [model]

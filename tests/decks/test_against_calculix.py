@@ -9,7 +9,8 @@ import subprocess
 import numpy as np
 import pytest
 import trimesh
-from deck_study import CORO, NEOPRENE, POLYURETHANE, Tables, gaussian_chains, needs_ccx, sharp
+from deck_study import NEOPRENE, POLYURETHANE, Tables, gaussian_chains, needs_ccx, sharp
+from support.sensors import CORO
 
 from softtact.contact.height_field import HeightField
 from softtact.decks import keywords
@@ -20,7 +21,8 @@ from softtact.fem.solid_block import HexBlock
 from softtact.geometry.meshes import place
 from softtact.models.hyperelastic.build import build_sensor_body, build_unit_cell
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
-from softtact.models.hyperelastic.newton import NewtonSettings, press_load_steps
+from softtact.models.hyperelastic.newton import NewtonSettings
+from softtact.models.hyperelastic.path import press_load_steps
 from softtact.sensors.specification import Friction
 
 pytestmark = needs_ccx

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
-from deck_study import CORO, NEOPRENE, POLYURETHANE
+from deck_study import NEOPRENE, POLYURETHANE
+from support.sensors import CORO
 
 from softtact.contact.penalty import penalty
 from softtact.decks.export import deck_text, export_press, write_deck

@@ -12,9 +12,9 @@ SIZE = np.sqrt((BUMP**2).mean())
 
 
 def data_set(item, of_set, amplitude, *, time, compression=0.1):
-    return xarray.Dataset({"deformation_map_mm": (("force", "y", "x"), amplitude * (FORCES / 20)[:, None, None] * BUMP),
-                           "frustum_compression_mm": ("force", compression * FORCES / 20), "wall_time_s": ("force", [time, time]),
-                           "within_validity": ("force", [1, 1])}, attrs={"item": item, "set": of_set})
+    return xarray.Dataset({"deformation_map_mm": (("step", "y", "x"), amplitude * (FORCES / 20)[:, None, None] * BUMP),
+                           "frustum_compression_mm": ("step", compression * FORCES / 20), "wall_time_s": ("step", [time, time]),
+                           "within_validity": ("step", [1, 1])}, attrs={"item": item, "set": of_set})
 
 
 def press(item, of_set, *, apart):

@@ -122,8 +122,8 @@ def test_each_item_has_its_own_mean_and_an_interval_over_its_trials():
 
 @pytest.fixture
 def press():
-    return xarray.Dataset({"deformation_map_mm": (("force", "y", "x"), np.zeros((2, 57, 33))),
-                           "force_n": ("force", FORCES), "wall_time_s": ("force", [3.0, 1.0])},
+    return xarray.Dataset({"deformation_map_mm": (("step", "y", "x"), np.zeros((2, 57, 33))),
+                           "normal_force_n": ("step", FORCES), "wall_time_s": ("step", [3.0, 1.0])},
                           attrs={"model": "elastic", "item": "object_1", "set": "grasps"})
 
 

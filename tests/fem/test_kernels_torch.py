@@ -4,12 +4,12 @@ Torch's processor stands for a GPU where there is none: the same text runs on bo
 """
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 import trimesh
+from support.sensors import CORO
 
 from softtact.errors import InputError
 from softtact.fem import kernels_torch, solid_block
@@ -22,11 +22,9 @@ from softtact.materials.laws.volumetric import Logarithmic
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.press.sensor import Sensor
-from softtact.sensors.specification import SensorSpec
 
 MOONEY = MooneyRivlin({"c10": 0.08, "c01": 0.02}, bulk_modulus=4.0)
 OGDEN = Ogden2({"mu1": 0.15, "alpha1": 2.5, "mu2": 0.05, "alpha2": -3.0}, bulk_modulus=4.0)
-CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
 SMALL = CORO.model_copy(update={"footprint_mm": (2.4, 2.4), "map_shape": (9, 9)})
 GPU = pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from support.sensors import CORO
 
 from softtact.cli import main
 from softtact.errors import InputError
@@ -13,7 +14,6 @@ from softtact.files import read_dataset
 from softtact.geometry.repair import read_mended
 from softtact.models.elastic.compliance import elastic_compliance
 from softtact.press.sensor import Sensor
-from softtact.sensors.specification import SensorSpec
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = os.environ.get("SOFTTACT_TEST_DATA")
@@ -106,7 +106,7 @@ MENDED = [
 @pytest.fixture(scope="module")
 def sensor():
     """A piece of the sensor with a map of 17 x 17."""
-    spec = SensorSpec.from_yaml(ROOT / "config/sensors/coro.yaml")
+    spec = CORO
     spec = spec.model_copy(update={"footprint_mm": (9.6, 9.6), "map_shape": (17, 17)})
     return Sensor(spec, laws={}, files={"elastic": elastic_compliance(spec)})
 
@@ -217,7 +217,7 @@ def test_the_command_says_its_repairs_on_stderr_and_in_the_result(tmp_path, caps
     with_a_hole(punch()).export(tmp_path / "bad.stl")
     press = ["press", str(tmp_path / "bad.stl"), "--unit", "mm", "--force", "5", "--model", "elastic"]
     assert main([*press, "--out", str(tmp_path / "p.nc")]) == 0
-    assert "bad.stl was mended: closed 1 hole" in capsys.readouterr().err
+    assert "bad.stl was repaired: closed 1 hole" in capsys.readouterr().err
     assert read_dataset(tmp_path / "p.nc").attrs["mesh_repairs"].startswith("closed 1 hole")
     assert main([*press, "--no-repair"]) == 1
     assert "the surface is not closed" in capsys.readouterr().err

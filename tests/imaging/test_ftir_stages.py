@@ -4,14 +4,14 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from support.sensors import CORO
 
 from softtact.errors import InputError
 from softtact.files import read_dataset, read_json, write_json
-from softtact.sensors.specification import SensorSpec
 from softtact.stages import draw_fig5_ftir, press_on_glass, validate_ftir
 
 ROOT = Path(__file__).parents[2]
-SENSOR = SensorSpec.from_yaml(ROOT / "config/sensors/coro.yaml").model_dump(mode="json")
+SENSOR = CORO.model_dump(mode="json")
 PRINTED = {"mooney_rivlin": {"parameters": {"c10": 0.1706, "c01": 0.0040}},
            "ogden2": {"parameters": {"mu1": 0.1351, "alpha1": 1.4538, "mu2": 0.2223, "alpha2": -4.9910}}}
 FITTED = {"mooney_rivlin": {"parameters": {"c10": 0.3412, "c01": 0.0080}, "bulk_modulus_mpa": 40 * 0.3492}}

@@ -30,8 +30,8 @@ def make_press(set_name, item, model, *, seed, **flags):
     ones = np.ones(len(FORCES), dtype=np.int8)
     per_force = {"converged": ones, "within_validity": ones, "wall_time_s": 1.5 * FORCES, **flags}
     return xarray.Dataset(
-        {"deformation_map_mm": (("force", "y", "x"), maps), "force_n": ("force", FORCES.copy()),
-         **{name: ("force", values) for name, values in per_force.items()}},
+        {"deformation_map_mm": (("step", "y", "x"), maps), "normal_force_n": ("step", FORCES.copy()),
+         **{name: ("step", values) for name, values in per_force.items()}},
         coords={"y": Y, "x": X}, attrs={"model": model, "set": set_name, "item": item})
 
 

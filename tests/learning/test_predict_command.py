@@ -85,10 +85,11 @@ def test_counts_are_written_as_netcdf_and_csv_and_drawn(capsys, network, model, 
 
 
 @pytest.mark.parametrize(("changes", "sentence"), [
-    ({"deformation_map_mm": (("force", "y", "x"), np.stack([2 * bump(0)] * 3))},
+    ({"deformation_map_mm": (("step", "y", "x"), np.stack([2 * bump(0)] * 3))},
      "3 of 3 maps lie outside the training maps' range, 0.05 to 0.5 mm deep at most"),
-    ({"force_n": ("force", [10.0, 20.0, 50.0])}, "1 of 3 maps lie outside the training maps' range, 5 to 40 N (the first with 50)"),
-    ({"within_validity": ("force", [1, 1, 0])}, "1 of 3 load steps are beyond what the press' model is valid for"),
+    ({"normal_force_n": ("step", [10.0, 20.0, 50.0])},
+     "1 of 3 maps lie outside the training maps' range, 5 to 40 N (the first with 50)"),
+    ({"within_validity": ("step", [1, 1, 0])}, "1 of 3 load steps are beyond what the press' model is valid for"),
 ])
 def test_what_training_has_not_seen_is_predicted_with_a_warning(capsys, model, tmp_path, changes, sentence):
     status, out, err = run(capsys, write_press(tmp_path / "far.nc", **changes), "--network", model, "--json")
@@ -136,9 +137,9 @@ def test_a_file_that_holds_no_map_is_refused(capsys, model, tmp_path, name, valu
 
 
 @pytest.mark.parametrize(("changes", "sentence"), [
-    ({"deformation_map_mm": (("force", "y", "x"), np.zeros((3, 57, 33)), {"units": "m"})}, "its maps are in 'm'; give them in mm"),
-    ({"deformation_map_mm": (("sample", "y", "x"), np.zeros((3, 57, 33)))}, "not a press with deformation_map_mm (force, y, x)"),
-    ({"converged": ("force", [1, 1, 0])}, "a load step of the press did not converge"),
+    ({"deformation_map_mm": (("step", "y", "x"), np.zeros((3, 57, 33)), {"units": "m"})}, "its maps are in 'm'; give them in mm"),
+    ({"deformation_map_mm": (("sample", "y", "x"), np.zeros((3, 57, 33)))}, "not a press with deformation_map_mm (step, y, x)"),
+    ({"converged": ("step", [1, 1, 0])}, "a load step of the press did not converge"),
 ])
 def test_a_press_that_may_not_be_used_is_refused(capsys, model, tmp_path, changes, sentence):
     status, _, err = run(capsys, write_press(tmp_path / "p.nc", **changes), "--network", model)

@@ -7,6 +7,7 @@ import pytest
 
 from softtact.materials.curves import synthetic_curve
 from softtact.materials.laws.registry import make_law
+from softtact.sensors.library import SHIPPED
 
 MODES = {"uniaxial": (0.6, 1.6), "equibiaxial": (1.0, 1.4), "planar": (1.0, 1.6)}
 
@@ -49,5 +50,5 @@ def published():
 
 @pytest.fixture
 def material_yaml():
-    """Function: name -> path of a material that the project brings."""
-    return lambda name: Path(__file__).parents[2] / "config" / "materials" / f"{name}.yaml"
+    """Function: name -> path of a material that ships with the package, be it there or not."""
+    return lambda name: SHIPPED / "materials" / f"{name}.yaml"

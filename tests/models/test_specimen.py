@@ -1,10 +1,10 @@
 """One specimen of the sensor: frusta and layers that differ from the nominal ones, the same for the same seed."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from support.sensors import CORO
 
 from softtact.errors import InputError
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
@@ -12,9 +12,7 @@ from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.models.hyperelastic.presets import mesh_settings, newton_settings
 from softtact.models.hyperelastic.specimen import frustum_scatter, specimen_of
 from softtact.models.meshes import layered_mesh
-from softtact.sensors.specification import SensorSpec
 
-CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
 SCATTER = {"height_scatter": 0.01, "tip_scatter": 0.02, "thickness_scatter": 0.02, "specimen": 7}
 
 

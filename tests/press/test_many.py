@@ -1,12 +1,12 @@
 """Many presses at once: the same as one by one, in order, whatever the processes, and none lost to one that fails."""
 
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 import trimesh
+from support.sensors import CORO
 
 from softtact.contact.unilateral import ContactSettings
 from softtact.errors import ConvergenceError, InputError
@@ -15,10 +15,8 @@ from softtact.geometry.pose import Pose
 from softtact.models.elastic.compliance import elastic_compliance
 from softtact.press.many import press_batch
 from softtact.press.sensor import Sensor
-from softtact.sensors.specification import SensorSpec
 from softtact.stages import simulate_press, simulate_presses
 
-CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
 SMALL = CORO.model_copy(update={"footprint_mm": (7.2, 7.2), "map_shape": (13, 13)})
 MESHES = [trimesh.creation.cylinder(radius=1.5, height=2.0), trimesh.creation.icosphere(radius=4.0),
           trimesh.creation.box((2, 3, 2))]

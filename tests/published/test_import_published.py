@@ -6,27 +6,26 @@ import numpy as np
 import pandas as pd
 import pytest
 from small_archive import Archive
+from support.sensors import CORO
 
 from softtact.errors import InputError
 from softtact.files import read_dataset
 from softtact.learning.samples import read_samples
-from softtact.sensors.specification import SensorSpec
 from softtact.stages import build_dataset, import_published
 
-SENSOR = "config/sensors/coro.yaml"
 SPLITS = ("train", "validation", "unseen", "grasps")
 
 
 def settings_for(folder, **changes):
-    sensor = SensorSpec.from_yaml(SENSOR).model_dump(mode="json")
+    sensor = CORO.model_dump(mode="json")
     return {"folder": str(folder), "variant": None, "models": ["elastic", "hyperelastic"], "unseen": ["donut_m"],
-            "without": [], "taxel_order": "rows", "odd": "leave_out", "largest_odd_share": 0.1, "sensor": sensor,
+            "without": [], "taxel_order": "rows", "outliers": "leave_out", "largest_outlier_share": 0.1, "sensor": sensor,
             "seed": 5} | changes
 
 
 def run_import(folder, results, **changes):
     outputs = {"presses": results / "presses", "tactile": results / "tactile", "item_list": results / "items.json",
-               "inventory": results / "inventory.json", "counts": results / "counts.csv", "odd": results / "odd.csv"}
+               "inventory": results / "inventory.json", "counts": results / "counts.csv", "outliers": results / "outliers.csv"}
     import_published.run(inputs={}, outputs=outputs, settings=settings_for(folder, **changes))
     return outputs
 
@@ -45,7 +44,7 @@ def test_every_object_has_its_maps_and_readings_with_the_forces_of_its_tests(imp
     reading = read_dataset(outputs["tactile"] / "indenters/echo_h.nc")
     assert dict(press.sizes) == {"force": 10, "y": 57, "x": 33}
     assert list(np.unique(press.path)) == ["EchoH/test_0", "EchoH/test_1"]
-    assert np.array_equal(press.force_n, reading.force_n)
+    assert np.array_equal(press.normal_force_n, reading.force_n)
     assert reading.tactile_map.shape == (1, 10, 7, 4)
     assert press.attrs["source"] == reading.attrs["source"] == "published archive"
     real = archive.real["Flat"]
@@ -80,8 +79,9 @@ def test_odd_tests_are_left_out_of_the_files_and_stand_in_the_report(tmp_path):
     archive = Archive()
     archive.maps["Flat", "elastic"] = archive.maps["Flat", "elastic"].iloc[1:]
     outputs = run_import(archive.write(tmp_path / "csv"), tmp_path / "results")
-    (odd,) = pd.read_csv(outputs["odd"]).to_dict("records")
-    assert (odd["file"], odd["row"], odd["path"], odd["done"]) == ("Flat_Simulation_Isaac.csv", 2, "CircleG/test_0", "left out")
+    (outliers,) = pd.read_csv(outputs["outliers"]).to_dict("records")
+    assert (outliers["file"], outliers["row"], outliers["path"], outliers["done"]) == ("Flat_Simulation_Isaac.csv", 2,
+                                                                                       "CircleG/test_0", "left out")
     assert set(read_dataset(outputs["tactile"] / "indenters/circle_g.nc").path.values) == {"CircleG/test_1"}
 
 

@@ -28,7 +28,7 @@ def refusal(call, *arguments, **options):
 
 def test_maps_and_readings_of_a_test_are_paired_by_order(archive, tmp_path):
     tables = read(archive.write(tmp_path))
-    assert tables.odd.findings == []
+    assert tables.outliers.findings == []
     test = next(test for test in tables.tests["flat"] if test.path == "EchoH/test_1")
     frame = archive.maps[MAPS]
     expected = frame[frame.Path == "EchoH/test_1"].drop(columns="Path").to_numpy().reshape(5, 57, 33)
@@ -94,13 +94,13 @@ def test_path_may_stand_anywhere_and_an_index_column_is_passed_over(archive, tmp
     archive.real["Flat"].to_csv(folder / FLAT_REAL)
     tables = read(folder)
     assert len(tables.tests["flat"]) == 12
-    assert [(f.file, f.row, f.done) for f in tables.odd.findings] == [(FLAT_REAL, 1, "kept")]
+    assert [(f.file, f.row, f.done) for f in tables.outliers.findings] == [(FLAT_REAL, 1, "kept")]
 
 
 def test_commas_for_decimals_are_read_and_told(archive, tmp_path):
     plain, comma = read(archive.write(tmp_path / "a")), read(archive.write(tmp_path / "b", sep=";", decimal=","))
     assert np.array_equal(plain.real["flat"][0].values, comma.real["flat"][0].values)
-    assert all("decimals are written with ','" in f.what for f in comma.odd.findings) and len(comma.odd.findings) == 6
+    assert all("decimals are written with ','" in f.what for f in comma.outliers.findings) and len(comma.outliers.findings) == 6
 
 
 # Where the test EchoH/test_0 begins: four tests of five frames go before.
@@ -147,7 +147,7 @@ ODDITIES = [
 def test_an_oddity_is_named_by_file_and_row_and_costs_its_test_only(archive, tmp_path, inject, file, row, said):
     inject(archive)
     tables = read(archive.write(tmp_path))
-    left_out = [f for f in tables.odd.findings if f.done == "left out"]
+    left_out = [f for f in tables.outliers.findings if f.done == "left out"]
     assert (left_out[0].file, left_out[0].path, left_out[0].what) == (file, "EchoH/test_0", said)
     assert left_out[0].row == FIRST.get(file, FIRST[FLAT_MAPS]) + row
     assert {test.path for test in tables.tests["flat"]} == set(archive.real["Flat"].Path) - {"EchoH/test_0"}
@@ -159,7 +159,7 @@ def test_a_surplus_field_is_named_and_shifts_nothing(archive, tmp_path):
     lines = (folder / FLAT_MAPS).read_text().split("\n")
     lines[FIRST[FLAT_MAPS] + 7 - 1] += ",1.0"
     (folder / FLAT_MAPS).write_text("\n".join(lines))
-    (finding,) = read(folder).odd.findings
+    (finding,) = read(folder).outliers.findings
     assert (finding.row, finding.path, finding.what) == (FIRST[FLAT_MAPS] + 7, "EchoH/test_0", "more fields than columns")
 
 
@@ -168,7 +168,7 @@ def test_a_cut_off_row_is_named(archive, tmp_path):
     lines = (folder / FLAT_MAPS).read_text().split("\n")
     lines[FIRST[FLAT_MAPS] + 7 - 1] = "0.1,0.2"
     (folder / FLAT_MAPS).write_text("\n".join(lines))
-    orphan, short = read(folder).odd.findings
+    orphan, short = read(folder).outliers.findings
     assert (orphan.row, orphan.done) == (FIRST[FLAT_MAPS] + 7, "kept") and "names no test" in orphan.what
     assert short.path == "EchoH/test_0" and "284 rows" in short.what
 
@@ -178,7 +178,7 @@ def test_blank_lines_count_as_lines_and_are_no_rows(archive, tmp_path):
     folder = archive.write(tmp_path)
     header, rest = (folder / FLAT_MAPS).read_text().split("\n", 1)
     (folder / FLAT_MAPS).write_text(f"{header}\n\n\n{rest}\n\n")
-    (finding,) = read(folder).odd.findings
+    (finding,) = read(folder).outliers.findings
     assert finding.row == FIRST[FLAT_MAPS] + 60 + 2
 
 
@@ -186,7 +186,7 @@ def test_a_test_in_two_places_is_joined_and_told(archive, tmp_path):
     real = archive.real["Flat"]
     archive.real["Flat"] = real.iloc[[*range(3), *range(5, len(real)), 3, 4]]
     tables = read(archive.write(tmp_path))
-    (finding,) = tables.odd.findings
+    (finding,) = tables.outliers.findings
     assert (finding.row, finding.path, finding.done) == (len(real), "CircleG/test_0", "kept")
     assert len(tables.tests["flat"]) == 12
 
@@ -194,7 +194,7 @@ def test_a_test_in_two_places_is_joined_and_told(archive, tmp_path):
 def test_readings_above_the_papers_scale_are_kept_and_told(archive, tmp_path):
     set_value(archive, FLAT_REAL, 2, "tax9", 2600.0)
     tables = read(archive.write(tmp_path))
-    assert [(f.row, f.done) for f in tables.odd.findings] == [(FIRST[FLAT_REAL] + 2, "kept")]
+    assert [(f.row, f.done) for f in tables.outliers.findings] == [(FIRST[FLAT_REAL] + 2, "kept")]
     assert len(tables.tests["flat"]) == 12
 
 
@@ -204,7 +204,7 @@ def test_readings_beside_isaacs_maps_must_be_the_same(archive, tmp_path, column)
     other = archive.real["Flat"].copy()
     other.loc[7, column] += 3.0
     other.to_csv(folder / "Flat_Real_Issac.csv", index=False)
-    (finding,) = read(folder).odd.findings
+    (finding,) = read(folder).outliers.findings
     assert (finding.path, finding.done) == ("CircleG/test_1", "left out") and "other readings" in finding.what
 
 
@@ -212,7 +212,7 @@ def test_readings_in_another_order_than_the_maps_are_told(archive, tmp_path):
     rows = np.arange(len(archive.real["Flat"]))
     rows[20:25] = rows[20:25][::-1]
     archive.real["Flat"] = archive.real["Flat"].iloc[rows]
-    findings = read(archive.write(tmp_path)).odd.findings
+    findings = read(archive.write(tmp_path)).outliers.findings
     assert [(f.path, f.done) for f in findings] == [("EchoH/test_0", "kept")] * 2
     assert "do not rise with the maps of Isaac (correlation -1.00)" in findings[0].what
 
@@ -220,7 +220,7 @@ def test_readings_in_another_order_than_the_maps_are_told(archive, tmp_path):
 def test_a_grasped_object_that_is_an_indenter_too_is_left_out(tmp_path):
     tables = read(Archive(curved=("Mug", "EchoH")).write(tmp_path))
     assert {test.object for test in tables.tests["curved"]} == {"mug"}
-    assert tables.odd.left_out() == ["EchoH/test_0", "EchoH/test_1"]
+    assert tables.outliers.left_out() == ["EchoH/test_0", "EchoH/test_1"]
 
 
 @pytest.mark.parametrize(("file", "columns", "said"), [
@@ -235,15 +235,15 @@ def test_a_file_with_other_columns_is_refused(archive, tmp_path, file, columns, 
 
 
 @pytest.mark.parametrize(("options", "refused"), [
-    ({"odd": "leave_out", "largest_share": 0.1}, False), ({"odd": "leave_out", "largest_share": 0.01}, True),
-    ({"odd": "refuse", "largest_share": 1.0}, True)])
+    ({"outliers": "leave_out", "largest_share": 0.1}, False), ({"outliers": "leave_out", "largest_share": 0.01}, True),
+    ({"outliers": "refuse", "largest_share": 1.0}, True)])
 def test_an_archive_odder_than_allowed_is_refused(archive, tmp_path, options, refused):
     drop(archive, FLAT_MAPS, [3])
-    odd = read(archive.write(tmp_path)).odd
+    outliers = read(archive.write(tmp_path)).outliers
     if refused:
-        assert "1 of 16 tests of the archive are odd" in refusal(odd.refuse, 16, **options)
+        assert "1 of 16 tests of the archive are outliers" in refusal(outliers.refuse, 16, **options)
     else:
-        odd.refuse(16, **options)
+        outliers.refuse(16, **options)
 
 
 def test_maps_that_are_negative_towards_the_pcb_are_turned_and_metres_refused(archive, tmp_path):

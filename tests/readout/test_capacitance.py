@@ -1,25 +1,22 @@
 """Capacitance per area: closed forms in the limits, bounds by a finite-volume field, what compression does."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from naive_cell import cell_capacitance, column_capacitance
+from support.sensors import CORO
 
 from softtact.readout.capacitance import EPSILON_0_PF_PER_MM, capacitance_per_area, ideal_counts, solid_share
-from softtact.sensors.specification import SensorSpec
 
-SPEC = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
 MAP = (57, 33)
 
 
 def changed(*, permittivity=3.5, **frusta):
     """The sensor with other frusta (mm) or another permittivity."""
-    dielectric = SPEC.dielectric
+    dielectric = CORO.dielectric
     update = {"relative_permittivity": permittivity, "frusta": dielectric.frusta.model_copy(update=frusta)}
-    return SPEC.model_copy(update={"dielectric": dielectric.model_copy(update=update)})
+    return CORO.model_copy(update={"dielectric": dielectric.model_copy(update=update)})
 
 
 def plate(gap_mm, permittivity=1.0):
@@ -52,25 +49,25 @@ def test_straight_posts_become_wider_as_they_become_shorter():
 
 def test_the_solid_of_cones_at_rest_is_their_volume():
     r, R = 0.3, 0.6
-    assert solid_share(SPEC.dielectric.frusta).mean() == pytest.approx(np.pi / 3 * (r * r + r * R + R * R) / 1.44, rel=1e-5)
+    assert solid_share(CORO.dielectric.frusta).mean() == pytest.approx(np.pi / 3 * (r * r + r * R + R * R) / 1.44, rel=1e-5)
 
 
 @pytest.mark.parametrize("moved", [0.28, 0.4, 0.7])
 def test_once_the_pocket_is_full_solid_alone_is_compressed(moved):
-    assert capacitance_per_area(SPEC, moved) == pytest.approx(plate(1.0 - moved, 3.5))
+    assert capacitance_per_area(CORO, moved) == pytest.approx(plate(1.0 - moved, 3.5))
 
 
 def test_plates_that_would_meet_do_not():
-    assert np.isfinite(capacitance_per_area(SPEC, np.array([1.0, 5.0]))).all()
+    assert np.isfinite(capacitance_per_area(CORO, np.array([1.0, 5.0]))).all()
 
 
 @pytest.mark.parametrize("moved", [0.0, 0.05, 0.1])
 def test_the_field_of_a_cell_lies_between_columns_and_slices(moved):
-    assert column_capacitance(SPEC, moved) < cell_capacitance(SPEC, moved) < capacitance_per_area(SPEC, moved)
+    assert column_capacitance(CORO, moved) < cell_capacitance(CORO, moved) < capacitance_per_area(CORO, moved)
 
 
 def test_slices_give_the_relative_change_of_the_field_to_two_per_cent_where_columns_are_off_by_five():
-    changes = [model(SPEC, 0.1) / model(SPEC, 0.0) - 1 for model in (cell_capacitance, capacitance_per_area, column_capacitance)]
+    changes = [model(CORO, 0.1) / model(CORO, 0.0) - 1 for model in (cell_capacitance, capacitance_per_area, column_capacitance)]
     assert changes[1] == pytest.approx(changes[0], rel=0.02)          # 1.5 % measured
     assert abs(changes[2] / changes[0] - 1) > 0.05                    # 6.9 % measured: why slices were taken
 
@@ -92,17 +89,17 @@ def test_coming_nearer_never_lowers_the_capacitance_whatever_the_frusta(moved, m
 def test_more_displacement_never_lowers_an_ideal_count(seed, size):
     rng = np.random.default_rng(seed)
     low = rng.uniform(0, 0.4, MAP)
-    assert (ideal_counts(SPEC, low + size * rng.random(MAP)) >= ideal_counts(SPEC, low) - 1e-9).all()
+    assert (ideal_counts(CORO, low + size * rng.random(MAP)) >= ideal_counts(CORO, low) - 1e-9).all()
 
 
 @given(st.integers(0, 2**32 - 1))
 @settings(max_examples=10, deadline=None)
 def test_a_symmetric_map_gives_symmetric_ideal_counts(seed):
     half = np.random.default_rng(seed).uniform(0, 0.3, MAP)
-    counts = ideal_counts(SPEC, half + half[::-1, ::-1])
+    counts = ideal_counts(CORO, half + half[::-1, ::-1])
     assert counts == pytest.approx(counts[::-1, ::-1])
 
 
 def test_a_uniform_displacement_gives_every_taxel_the_plate_capacitors_change():
-    expected = 1000 * (capacitance_per_area(SPEC, 0.2) / capacitance_per_area(SPEC, 0.0) - 1)
-    assert ideal_counts(SPEC, np.full(MAP, 0.2)) == pytest.approx(np.full((7, 4), expected))
+    expected = 1000 * (capacitance_per_area(CORO, 0.2) / capacitance_per_area(CORO, 0.0) - 1)
+    assert ideal_counts(CORO, np.full(MAP, 0.2)) == pytest.approx(np.full((7, 4), expected))

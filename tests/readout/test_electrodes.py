@@ -1,18 +1,15 @@
 """Means over electrodes, edges and neighbours against closed forms and balances."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from naive_plates import edge_factor
+from support.sensors import CORO
 
 from softtact.readout.electrodes import coupled, edge_excess, electrode_sides, fringe_factor, taxel_means
-from softtact.sensors.specification import SensorSpec
 
-SPEC = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
-X, Y = np.meshgrid(SPEC.map_x_mm, SPEC.map_y_mm)
+X, Y = np.meshgrid(CORO.map_x_mm, CORO.map_y_mm)
 CENTRES = [(np.arange(n) + 0.5) / n * side - side / 2 for n, side in ((4, 22.0), (7, 37.0))]
 
 
@@ -20,25 +17,25 @@ CENTRES = [(np.arange(n) + 0.5) / n * side - side / 2 for n, side in ((4, 22.0),
 @settings(max_examples=30, deadline=None)
 def test_electrodes_average_a_linear_field_exactly(spacing, shift):
     spacing = max(spacing, 2 * abs(shift))     # an electrode that stays within the map
-    means = taxel_means(SPEC, 2 * X + 3 * Y, spacing_mm=spacing, shift_mm=(shift, -shift))
+    means = taxel_means(CORO, 2 * X + 3 * Y, spacing_mm=spacing, shift_mm=(shift, -shift))
     assert means == pytest.approx(2 * (CENTRES[0][None] - shift) + 3 * (CENTRES[1][:, None] + shift), abs=1e-9)
 
 
 def test_an_electrode_averages_the_piecewise_linear_interpolant_exactly():
-    row = np.random.default_rng(0).random(len(SPEC.map_x_mm))
+    row = np.random.default_rng(0).random(len(CORO.map_x_mm))
     fine = CENTRES[0][1] + np.linspace(-0.5, 0.5, 200_001)[:-1] * 4.5 + 0.5 * 4.5 / 200_000
-    means = taxel_means(SPEC, np.broadcast_to(row, X.shape), spacing_mm=1.0)
-    assert means[:, 1] == pytest.approx(np.full(7, np.interp(fine, SPEC.map_x_mm, row).mean()), abs=1e-7)
+    means = taxel_means(CORO, np.broadcast_to(row, X.shape), spacing_mm=1.0)
+    assert means[:, 1] == pytest.approx(np.full(7, np.interp(fine, CORO.map_x_mm, row).mean()), abs=1e-7)
 
 
 def test_an_object_moved_by_a_taxel_is_read_by_the_next_one():
     field = np.maximum(0, 1 - np.hypot(X + 2.75, Y) / 3)
-    moved = taxel_means(SPEC, field, shift_mm=(5.5, 0.0))
-    assert moved[:, 1:] == pytest.approx(taxel_means(SPEC, field)[:, :-1], abs=1e-9)
+    moved = taxel_means(CORO, field, shift_mm=(5.5, 0.0))
+    assert moved[:, 1:] == pytest.approx(taxel_means(CORO, field)[:, :-1], abs=1e-9)
 
 
 def test_a_spacing_shortens_both_sides_of_an_electrode():
-    assert electrode_sides(SPEC, spacing_mm=0.5) == pytest.approx((5.5 - 0.5, 37 / 7 - 0.5))
+    assert electrode_sides(CORO, spacing_mm=0.5) == pytest.approx((5.5 - 0.5, 37 / 7 - 0.5))
 
 
 def test_the_field_at_the_edges_of_a_strip_is_palmers():
@@ -47,7 +44,7 @@ def test_the_field_at_the_edges_of_a_strip_is_palmers():
 
 
 def test_without_edges_the_fringe_factor_is_one():
-    assert (fringe_factor(SPEC, np.ones((7, 4)), outer=0, inner=0) == 1).all()
+    assert (fringe_factor(CORO, np.ones((7, 4)), outer=0, inner=0) == 1).all()
 
 
 @pytest.mark.parametrize("gap", [0.1, 0.15, 0.2])
@@ -58,12 +55,12 @@ def test_the_edges_of_two_pairs_of_sides_add_up_to_the_field_of_square_plates(ga
 
 
 def test_a_taxel_with_free_edges_all_around_has_two_pairs_of_them():
-    factor = fringe_factor(SPEC, np.full((7, 4), 0.8), outer=1, inner=1)
+    factor = fringe_factor(CORO, np.full((7, 4), 0.8), outer=1, inner=1)
     assert factor == pytest.approx(np.full((7, 4), 1 + edge_excess(5.5, 0.8) + edge_excess(37 / 7, 0.8)))
 
 
 def test_neighbours_guard_all_but_the_edges_on_the_border():
-    factor = fringe_factor(SPEC, np.ones((7, 4)), outer=1, inner=0)
+    factor = fringe_factor(CORO, np.ones((7, 4)), outer=1, inner=0)
     assert (factor[1:-1, 1:-1] == 1).all()
     assert factor[0, 0] == pytest.approx(1 + 0.5 * edge_excess(5.5, 1.0) + 0.5 * edge_excess(37 / 7, 1.0))
     assert factor == pytest.approx(factor[::-1, ::-1])

@@ -7,6 +7,7 @@ import pytest
 import xarray
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.sensors import CORO
 
 from softtact.errors import InputError
 from softtact.files import read_dataset, write_dataset
@@ -19,12 +20,10 @@ from softtact.readout.virtual_sensor import (
     read_virtual_sensor,
     taxel_capacitance,
 )
-from softtact.sensors.specification import SensorSpec
 from softtact.stages import read_virtual_sensor as stage
 
-SPEC = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
 FORCES = np.array([10.0, 20.0, 40.0])
-X, Y = np.meshgrid(SPEC.map_x_mm, SPEC.map_y_mm)
+X, Y = np.meshgrid(CORO.map_x_mm, CORO.map_y_mm)
 BUMP = np.exp(-((X / 6) ** 2) - ((Y / 9) ** 2))                        # a smooth press, 1 mm in its middle
 PRESS = np.array([0.1, 0.18, 0.3])[:, None, None] * BUMP
 AREA = 5.5 * 37 / 7
@@ -40,25 +39,25 @@ def branches(maps=PRESS, *, trials=2, seed=1, item="a", force_n=FORCES, **effect
     """Readings with no effect but those given."""
     if "relaxation" in effects:
         effects = {"relaxation_s": 2.0} | effects
-    return read_branches(SPEC, maps, force_n=force_n, trials=trials, seed=seed, item=item,
+    return read_branches(CORO, maps, force_n=force_n, trials=trials, seed=seed, item=item,
                          settings=VirtualSensorSettings.ideal(**effects))
 
 
 def default(maps=PRESS, **changes):
     rules = {"force_n": FORCES, "trials": 3, "seed": 1, "item": "a"} | changes
-    return read_virtual_sensor(SPEC, maps, **rules)
+    return read_virtual_sensor(CORO, maps, **rules)
 
 
 def test_with_every_effect_off_it_reads_the_ideal_counts_in_every_trial_up_and_down():
     readings = branches()
-    assert readings.loading[0] == pytest.approx(ideal_counts(SPEC, PRESS)) and (readings.loading[0] == readings.loading[1]).all()
+    assert readings.loading[0] == pytest.approx(ideal_counts(CORO, PRESS)) and (readings.loading[0] == readings.loading[1]).all()
     assert readings.unloading == pytest.approx(readings.loading)
 
 
 @pytest.mark.parametrize("effect", SPECIMEN)
 def test_an_effect_of_the_specimen_changes_readings_and_all_trials_alike(effect):
     loading = branches(**{effect: SPECIMEN[effect]}).loading
-    assert np.abs(loading[0] - ideal_counts(SPEC, PRESS)).max() > 0.1 and (loading[0] == loading[1]).all()
+    assert np.abs(loading[0] - ideal_counts(CORO, PRESS)).max() > 0.1 and (loading[0] == loading[1]).all()
 
 
 @pytest.mark.parametrize("effect", TRIAL)
@@ -79,27 +78,27 @@ def test_every_effect_has_its_place_in_the_tests_above():
 
 
 def test_a_uniform_gap_is_a_plate_capacitor():
-    gap = equivalent_air_gap(SPEC, 0.2)
-    assert taxel_capacitance(SPEC, np.full(BUMP.shape, 0.2), settings=IDEAL) == pytest.approx(
+    gap = equivalent_air_gap(CORO, 0.2)
+    assert taxel_capacitance(CORO, np.full(BUMP.shape, 0.2), settings=IDEAL) == pytest.approx(
         np.full((7, 4), EPSILON_0_PF_PER_MM * AREA / gap))
 
 
 def test_a_thicker_sheet_is_one_more_capacitor_in_series():
     excess = np.linspace(-0.02, 0.02, 28).reshape(7, 4)
-    expected = EPSILON_0_PF_PER_MM * AREA / (equivalent_air_gap(SPEC, 0.1) + excess / 3.5)
-    assert taxel_capacitance(SPEC, np.full(BUMP.shape, 0.1), sheet_excess_mm=excess, settings=IDEAL) == pytest.approx(expected)
+    expected = EPSILON_0_PF_PER_MM * AREA / (equivalent_air_gap(CORO, 0.1) + excess / 3.5)
+    assert taxel_capacitance(CORO, np.full(BUMP.shape, 0.1), sheet_excess_mm=excess, settings=IDEAL) == pytest.approx(expected)
 
 
 def test_electrodes_apart_with_free_edges_are_plates_with_edges():
     alone = VirtualSensorSettings.ideal(electrode_spacing_mm=0.5, outer_fringe=1.0, inner_fringe=1.0)
-    sides, gap = (5.0, 37 / 7 - 0.5), SPEC.dielectric_thickness_mm - 0.1
+    sides, gap = (5.0, 37 / 7 - 0.5), CORO.dielectric_thickness_mm - 0.1
     edges = 1 + sum(edge_excess(side, gap) for side in sides)
-    expected = EPSILON_0_PF_PER_MM * np.prod(sides) * edges / equivalent_air_gap(SPEC, 0.1)
-    assert taxel_capacitance(SPEC, np.full(BUMP.shape, 0.1), settings=alone) == pytest.approx(np.full((7, 4), expected))
+    expected = EPSILON_0_PF_PER_MM * np.prod(sides) * edges / equivalent_air_gap(CORO, 0.1)
+    assert taxel_capacitance(CORO, np.full(BUMP.shape, 0.1), settings=alone) == pytest.approx(np.full((7, 4), expected))
 
 
 def test_coupling_shares_capacitance_and_loses_none():
-    plain, shared = (taxel_capacitance(SPEC, 0.3 * BUMP, settings=VirtualSensorSettings.ideal(coupling=c)) for c in (0, 0.05))
+    plain, shared = (taxel_capacitance(CORO, 0.3 * BUMP, settings=VirtualSensorSettings.ideal(coupling=c)) for c in (0, 0.05))
     assert shared == pytest.approx(coupled(plain, 0.05)) and shared.sum() == pytest.approx(plain.sum())
 
 
@@ -108,7 +107,7 @@ def test_a_step_of_force_creeps_as_its_prony_series():
     read = branches(np.full((1, *BUMP.shape), 0.2), force_n=[30.0], trials=1, rate_n_per_s=np.inf, load_step_s=hold,
                     relaxation=shares, relaxation_s=taus).loading[0, 0]
     arrived = 1 - sum(g * np.exp(-hold / tau) for g, tau in zip(shares, taus, strict=True))
-    assert read == pytest.approx(ideal_counts(SPEC, np.full(BUMP.shape, 0.2 * arrived)))
+    assert read == pytest.approx(ideal_counts(CORO, np.full(BUMP.shape, 0.2 * arrived)))
 
 
 def test_on_the_way_down_more_is_read_than_on_the_way_up():
@@ -126,20 +125,20 @@ def test_a_wrong_force_reads_what_the_press_gives_at_that_force():
     proportional = FORCES[:, None, None] / 400 * BUMP
     read = branches(proportional, force_scatter=0.05, trials=1).loading[0]
     error = np.random.default_rng([1, 1, 0, *b"a"]).standard_normal(3)[2]
-    assert read == pytest.approx(ideal_counts(SPEC, (1 + 0.05 * error) * proportional))
+    assert read == pytest.approx(ideal_counts(CORO, (1 + 0.05 * error) * proportional))
 
 
 def test_a_misplaced_object_is_read_as_an_object_elsewhere():
     read = branches(0.1 * np.stack([X + 11, 2 * X + 22, 3 * X + 33]) / 33, placement_mm=0.05, trials=1).loading[0]
     shift = 0.05 * np.random.default_rng([1, 1, 0, *b"a"]).standard_normal(3)[0]
-    moved = ideal_counts(SPEC, 0.1 * np.stack([X + 11 - shift, 2 * (X + 11 - shift), 3 * (X + 11 - shift)]) / 33)
+    moved = ideal_counts(CORO, 0.1 * np.stack([X + 11 - shift, 2 * (X + 11 - shift), 3 * (X + 11 - shift)]) / 33)
     assert read[:, :, 1:3] == pytest.approx(moved[:, :, 1:3], abs=0.02)     # inner taxels; counts are linear between map points
 
 
 def test_gain_and_zero_are_the_specimens_in_every_press():
     of = VirtualSensorSettings.ideal(gain_scatter=0.03, offset_counts=5.0)
-    specimen, first = make_specimen(SPEC, seed=1, settings=of), branches(gain_scatter=0.03, offset_counts=5.0).loading[0]
-    expected = np.maximum(specimen.gain * ideal_counts(SPEC, PRESS) + specimen.offset_counts, 0)
+    specimen, first = make_specimen(CORO, seed=1, settings=of), branches(gain_scatter=0.03, offset_counts=5.0).loading[0]
+    expected = np.maximum(specimen.gain * ideal_counts(CORO, PRESS) + specimen.offset_counts, 0)
     assert first == pytest.approx(expected)
     assert branches(gain_scatter=0.03, offset_counts=5.0, item="b").loading[0] == pytest.approx(expected)
 
@@ -153,7 +152,7 @@ def test_dead_taxels_read_zero_and_the_others_do_not_notice():
 
 def test_a_share_of_dead_taxels_is_met_over_many_specimens():
     tenth = VirtualSensorSettings(dead_share=0.1)
-    assert np.mean([make_specimen(SPEC, seed=k, settings=tenth).dead for k in range(200)]) == pytest.approx(0.1, abs=0.012)  # 3 se
+    assert np.mean([make_specimen(CORO, seed=k, settings=tenth).dead for k in range(200)]) == pytest.approx(0.1, abs=0.012)  # 3 se
 
 
 def test_repeated_trials_scatter_though_the_models_input_is_one_map():
@@ -171,12 +170,12 @@ def test_more_trials_leave_the_first_ones_as_they_were():
 
 
 def test_one_effect_switched_off_leaves_the_other_draws_as_they_were():
-    with_sheet, without = (make_specimen(SPEC, seed=4, settings=VirtualSensorSettings(sheet_scatter=s)) for s in (0.02, 0.0))
+    with_sheet, without = (make_specimen(CORO, seed=4, settings=VirtualSensorSettings(sheet_scatter=s)) for s in (0.02, 0.0))
     assert (with_sheet.gain == without.gain).all() and (with_sheet.offset_counts == without.offset_counts).all()
 
 
 def test_by_default_readings_are_whole_counts_in_the_range_and_near_the_ideal_ones():
-    readings, ideal = default(), ideal_counts(SPEC, PRESS)
+    readings, ideal = default(), ideal_counts(CORO, PRESS)
     assert (readings == np.round(readings)).all() and readings.min() >= 0 and readings.max() <= 2400
     strong = ideal > 100
     assert np.abs(readings[:, strong] / ideal[strong] - 1).mean() < 0.15
@@ -220,26 +219,26 @@ def test_unusable_settings_are_refused_by_name(values, said):
 )
 def test_settings_that_the_sensor_cannot_have_are_refused(values, said):
     with pytest.raises(InputError) as refusal:
-        make_specimen(SPEC, seed=0, settings=VirtualSensorSettings.from_dict(values))
+        make_specimen(CORO, seed=0, settings=VirtualSensorSettings.from_dict(values))
     assert said in str(refusal.value)
 
 
 def test_the_stage_writes_readings_of_the_way_up_and_the_way_down(tmp_path):
-    press = xarray.Dataset({"deformation_map_mm": (("force", "y", "x"), PRESS), "force_n": ("force", FORCES)},
+    press = xarray.Dataset({"deformation_map_mm": (("step", "y", "x"), PRESS), "normal_force_n": ("step", FORCES)},
                            attrs={"set": "indenters", "item": "a"})
     write_dataset(tmp_path / "press.nc", press, seed=0, settings={})
-    rules = {"sensor": SPEC.model_dump(mode="json"), "virtual_sensor": {"relaxation": [0.1], "relaxation_s": [2.0]}, "trials": 2,
+    rules = {"sensor": CORO.model_dump(mode="json"), "virtual_sensor": {"relaxation": [0.1], "relaxation_s": [2.0]}, "trials": 2,
              "seed": 1}
     stage.run(inputs={"press": tmp_path / "press.nc"}, outputs={"tactile": tmp_path / "tactile.nc"}, settings=rules)
     written = read_dataset(tmp_path / "tactile.nc")
-    expected = read_branches(SPEC, PRESS, force_n=FORCES, trials=2, seed=1, item="indenters/a",
+    expected = read_branches(CORO, PRESS, force_n=FORCES, trials=2, seed=1, item="indenters/a",
                              settings=VirtualSensorSettings.from_dict(rules["virtual_sensor"]))
     assert (written.tactile_map.values == expected.loading).all()
     assert (written.unloading_tactile_map.values == expected.unloading).all()
 
 
 def test_the_guide_names_every_setting_with_its_default():
-    guide = (Path(__file__).parents[2] / "docs/virtual_sensor.md").read_text(encoding="utf-8")
+    guide = (Path(__file__).parents[2] / "docs/explanation/virtual_sensor.md").read_text(encoding="utf-8")
     for name in VirtualSensorSettings.__dataclass_fields__:
         value = getattr(VirtualSensorSettings(), name)
         shown = f"[{', '.join(f'{v:g}' for v in value)}]" if isinstance(value, tuple) else str(value)

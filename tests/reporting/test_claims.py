@@ -196,8 +196,8 @@ def test_a_lower_feature_is_found_by_its_height_and_features_are_counted():
     heights[5:15, 5:25], heights[30:40, 5:25], heights[45:50, 5:25] = 0.0, 0.5, 2.0
     values = np.zeros((57, 33))
     values[5:15, 5:25], values[30:40, 5:25] = 0.4, 0.1
-    press = xarray.Dataset({"deformation_map_mm": (("force", "y", "x"), values[None]), "force_n": ("force", [50.0]),
-                            "frustum_compression_mm": ("force", [0.2])}, attrs={"item": "object_5", "model": "hyperelastic"})
+    press = xarray.Dataset({"deformation_map_mm": (("step", "y", "x"), values[None]), "normal_force_n": ("step", [50.0]),
+                            "frustum_compression_mm": ("step", [0.2])}, attrs={"item": "object_5", "model": "hyperelastic"})
     row = feature_table([press], {"object_5": heights}, frustum_height_mm=0.5).iloc[0]
     assert (row.features, row.lower_points, row.lower_share, row.frustum_share) == (1, 200, pytest.approx(0.25), 0.4)
 

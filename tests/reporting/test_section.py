@@ -1,10 +1,10 @@
 """A section through the body: its layers' areas at rest, and the same material where the press takes it."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from support.sensors import CORO
 
 from softtact.errors import InputError
 from softtact.models.hyperelastic.build import build_sensor_body
@@ -12,9 +12,7 @@ from softtact.models.hyperelastic.deformed_mesh import REGIONS, pressed_body
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.press.vtu import of_bodies, of_map, read_vtu
 from softtact.reporting.section import row_under_load, section, top_surface
-from softtact.sensors.specification import SensorSpec
 
-CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
 SMALL = CORO.model_copy(update={"footprint_mm": (6.0, 8.4)})   # 5 x 7 frusta
 SQUEEZE = 0.1
 

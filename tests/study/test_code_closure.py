@@ -50,6 +50,12 @@ def test_what_a_package_imports_late_for_its_users_is_not_followed(package):
     assert package("p.a", files) == ["p/__init__.py", "p/a.py"]
 
 
+def test_what_is_imported_for_types_only_does_not_count(package):
+    files = {"p/a.py": "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from p.b import B\nelse:\n    from p import c",
+             "p/b.py": "", "p/c.py": ""}
+    assert package("p.a", files) == ["p/a.py", "p/c.py"]
+
+
 def test_circular_imports_end(package):
     assert package("p.a", {"p/a.py": "import p.b", "p/b.py": "import p.a"}) == ["p/a.py", "p/b.py"]
 

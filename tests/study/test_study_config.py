@@ -9,6 +9,7 @@ import yaml
 from softtact.errors import InputError
 from softtact.materials.config import load_material
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
+from softtact.sensors.library import SHIPPED
 from softtact.sensors.specification import SensorSpec
 from softtact.study.config import load_study
 from softtact.study.keys import Mesh
@@ -127,14 +128,14 @@ def test_assumed_values_and_their_reasons_reach_the_stages_as_plain_numbers():
         ("models.hyperelastic.mesh.preset", "drft", "at 'models.hyperelastic.mesh.preset' (it is 'drft')"),
         ("models.elastic.device", "cuda", "at 'models.elastic': a model of kind 'elastic' has no 'device'; leave it out"),
         ("models.hyperelastic.device", "gpu", "at 'models.hyperelastic.device' (it is 'gpu')"),
-        ("models.reference.friction", {"board": 0.3}, "tips that are held cannot slide with a friction of 0.3 on the board"),
+        ("models.reference.friction", {"board": 0.3}, "bonded tips cannot slide with a friction of 0.3 on the board"),
         ("models.reference.friction", {"objct": 0.3}, "there is no key 'objct'; did you mean 'object'?"),
         ("models.reference.mesh.thickness_scatter", 0.5, "at 'models.reference.mesh.thickness_scatter' (it is 0.5)"),
         ("virtual_sensor", {"noise_counts": -1}, "virtual_sensor: noise_counts is -1.0; give one number of 0 or more."),
         ("virtual_sensor", {"dead_taxels": [3, 28]}, "virtual_sensor: dead_taxels has 28; the taxels are numbered 0 to 27."),
         ("virtual_sensor", {"noise_count": 1}, "there is no key 'noise_count'; did you mean 'noise_counts'?"),
-        ("sensor", "cora", "there is no sensor 'cora'; did you mean 'coro'?"),
-        ("materials", ["polyurethane", "neoprene", "rubber"], "there is no material 'rubber'; known: "),
+        ("sensor", "cora", "at 'sensor': there is no sensor 'cora' (did you mean 'coro'?); known are coro, pad, tsf85; write one"),
+        ("materials", ["polyurethane", "neoprene", "rubber"], "there is no material 'rubber'; known are neoprene, "),
         ("materials", ["polyurethane"], "sensor coro is made of 'neoprene', which is not in the list; add it."),
         ("objects.unseen.names", ["hexagn"], "there is no object of set unseen 'hexagn'; did you mean 'hexagon'?"),
         ("objects.unseen.names", ["square"], "there is no object of set unseen 'square'"),
@@ -179,7 +180,7 @@ def test_a_missing_key_is_named():
     ("materials/neoprene.yaml", "bulk_over_shear:", "bulk_over_sheer:", "did you mean 'bulk_over_shear'?"),
 ])
 def test_a_misspelt_key_of_a_sensor_or_a_material_is_named_with_the_right_one(file, right, wrong, said, tmp_path):
-    text = (ROOT / "config" / file).read_text()
+    text = (SHIPPED / file).read_text()
     assert right in text
     path = tmp_path / Path(file).name
     path.write_text(text.replace(right, wrong, 1))

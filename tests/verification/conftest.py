@@ -1,4 +1,4 @@
-"""The verification's ledger: each comparison is recorded, and `--write-docs` turns the rows into docs/verification.md."""
+"""The verification's ledger: each comparison is recorded, and `--write-docs` turns the rows into docs/reference/verification.md."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,21 +8,21 @@ import pytest
 from softtact.files import atomic_path
 
 HERE = Path(__file__).parent
-DOCUMENT = HERE.parents[1] / "docs" / "verification.md"
+DOCUMENT = HERE.parents[1] / "docs" / "reference" / "verification.md"
 INTRODUCTION = """\
 # Verification: are the equations solved right?
 
-Each row is one comparison of the code with a number that it did not produce itself: a closed form, a published value, another
-program, or a naive solver without the fast one's devices. The tests in `tests/verification/` state the number and its source
-before they compare, and each gives the reason of its tolerance beside it. Whether these are the right equations for a real
-sensor is another question (validation), which this page does not answer.
+Each row compares the code with a number that it did not produce itself: a closed form, a published value, another program, or a
+plain solver without the fast methods. The tests in `tests/verification/` state the number and its source first, then compare, and
+give a reason for each tolerance. Whether these are the right equations for a real sensor (validation) is another question, which
+this page does not answer.
 
-This file is written by the tests themselves, if all of them pass:
+The tests write this page, if all of them pass:
 
     pytest tests/verification --write-docs
 
-Units are mm, N, MPa, mJ unless said. The error is relative to the expected number; where that is 0 it is the value itself,
-whose scale the quantity names. A quantity that is called a known defect is tested too, and is expected to fail.
+Units are mm, N, MPa and mJ unless a row names another. The error is relative to the expected number. Where that is 0, the error
+is the value itself, and the row names its scale. A row that is called a known defect is tested too, and is expected to fail.
 """
 
 
@@ -45,7 +45,7 @@ class Row:
 
 
 def pytest_addoption(parser):
-    parser.addoption("--write-docs", action="store_true", help="write docs/verification.md from the numbers of this run")
+    parser.addoption("--write-docs", action="store_true", help="write docs/reference/verification.md from the numbers of this run")
 
 
 def pytest_configure(config):
@@ -76,11 +76,11 @@ def pytest_terminal_summary(terminalreporter, exitstatus, config):
     if not config.getoption("--write-docs", default=False):
         return
     if exitstatus != 0:
-        terminalreporter.write_line("docs/verification.md is not written: not every test passed.", red=True)
+        terminalreporter.write_line(f"{DOCUMENT.name} is not written: not every test passed.", red=True)
     elif config.getoption("numprocesses", default=None):
-        terminalreporter.write_line("docs/verification.md is not written: its rows are of one process; leave -n out.", red=True)
+        terminalreporter.write_line(f"{DOCUMENT.name} is not written: its rows are of one process; leave -n out.", red=True)
     elif missing := _files_left_out(config):
-        terminalreporter.write_line(f"docs/verification.md is not written: {', '.join(missing)} did not run in full.", red=True)
+        terminalreporter.write_line(f"{DOCUMENT.name} is not written: {', '.join(missing)} did not run in full.", red=True)
     else:
         with atomic_path(DOCUMENT) as temporary:
             temporary.write_text(document(config.verification_rows), encoding="utf-8")

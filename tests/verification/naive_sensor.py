@@ -23,7 +23,7 @@ class NaiveSensor:
         self.parts = self._elements()
         self.board, self.board_gap0, self.board_area = self._board_points()
         self.top, self.top_area = self._top_points()
-        self.u, self.depth = np.zeros(3 * self.nodes), 0.0
+        self.u, self.depth, self.history = np.zeros(3 * self.nodes), 0.0, body.fresh_history()
 
     def _frustum_node(self, frustum, node):
         return self.body.slab.nodes + frustum * self.body.support.nodes + node
@@ -77,9 +77,9 @@ class NaiveSensor:
         body = self.body
         rest = np.einsum("pd,pd->p", self.projection.normals, body.slab.top.reference - self.projection.anchors)
         indentation_increment = self.projection.normals[:, 2]
-        below = replace(body.support.contact, offset=np.ravel(body.support.contact.offset))
+        below = replace(self.history.support.contact, offset=np.ravel(self.history.support.contact.offset))
         return [(self.board, self.board_gap0 + self.board @ u, self.board_area, below, 0.0 * self.board_gap0),
-                (self.top, rest + self.top @ u + depth * indentation_increment, self.top_area, body.slab.top.contact,
+                (self.top, rest + self.top @ u + depth * indentation_increment, self.top_area, self.history.top.contact,
                  indentation_increment)]
 
     def _potential(self, u, depth):
@@ -111,8 +111,9 @@ class NaiveSensor:
         border = (self.T.T @ border)[:, None]
         return sp.bmat([[self.T.T @ K @ self.T, border], [border.T, np.array([[corner]])]], format="csc")
 
-    def press_to(self, force, *, tolerance=1e-10, iterations=60):
-        """Minimise energy - force * depth from the present state; tolerance in N."""
+    def press_to(self, force, history, *, tolerance=1e-10, iterations=60):
+        """Minimise energy - force * depth from the present state, with the contacts' history of another solver; tolerance in N."""
+        self.history = history
         if self.depth == 0.0:
             self._touch()
         energy, gradient, by_depth = self._potential(self.u, self.depth)
@@ -155,10 +156,10 @@ class NaiveSensor:
         """Displacement (f, nodes, 3) of the frusta, mm."""
         return self.u.reshape(-1, 3)[self.body.slab.nodes:].reshape(self.body.support.count, -1, 3)
 
-    def board_force(self, bed_state):
-        """Force (N) of a support's frusta on the board."""
+    def board_force(self, state):
+        """Force (N) of the frusta on the board in a `FrustaState`."""
         support = self.body.support
-        pressure = support.contact.response(bed_state.gaps)[1]
+        pressure = state.history.contact.response(state.gaps)[1]
         return float((pressure * support.point_area)[:, support.point_neighbour < 0].sum())
 
     def side_reaction(self, state):

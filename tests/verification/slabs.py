@@ -106,7 +106,7 @@ class HeldSlab:
         return share
 
     def _pressure(self, state):
-        c = self.slab.top.contact_on(state.projection)
+        c = self.slab.top.contact_of(state)
         depth, stiffness = np.maximum(-state.gaps, 0.0), 1 / (1 / c.stiffness + c.contact_compliance)
         return stiffness * np.where(depth > c.smoothing, depth - c.smoothing / 2, depth**2 / (2 * c.smoothing))
 

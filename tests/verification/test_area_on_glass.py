@@ -1,4 +1,4 @@
-"""Contact area of one frustum on glass: against axisymmetric elements of CalculiX.
+"""Contact area of one frustum on glass against axisymmetric elements of CalculiX.
 
 As in `test_frustum_on_glass` the root is bonded to a plate that goes down and the tip is held across; here the side's own nodes
 tell how far it lies on the glass. The section has OUT quadratic quadrilaterals outwards and LOW + HIGH upwards, LOW of them in the

@@ -1,4 +1,4 @@
-"""Material laws: against textbook energies, finite differences and each other."""
+"""Material laws against textbook energies, finite differences and each other."""
 
 import numpy as np
 import pytest

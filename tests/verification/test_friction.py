@@ -1,4 +1,4 @@
-"""Friction: law, tangent, stick and slip, dissipation, a plate of teeth, a rough punch.
+"""Friction: law, tangent, stick and slip, dissipation, a toothed plate, a rough punch.
 
 Coulomb's law as a lagged and regularised potential, on the slab alone and on small sensors of a few frusta.
 """
@@ -25,7 +25,8 @@ from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic import newton_step, unit_cells
 from softtact.models.hyperelastic.build import build_sensor_body
 from softtact.models.hyperelastic.friction import BodyFriction
-from softtact.models.hyperelastic.newton import NewtonSettings, press_load_steps
+from softtact.models.hyperelastic.newton import NewtonSettings
+from softtact.models.hyperelastic.path import press_load_steps
 from softtact.press.sensor import Sensor
 from softtact.sensors.specification import Friction, SensorSpec
 
@@ -82,10 +83,9 @@ def test_forces_and_newton_steps_are_the_slopes_of_the_potential_of_a_press_with
     load_step = last_load_step(body, [0.5, 1.0], surface=surface)
     covered = load_step.state.slab.projection.covered[load_step.state.slab.gaps < 0]
     assert (covered < 1).any() == ("punch" in under)
-    body.friction.begin_step(load_step.state)
-    moved = shifted(body, load_step.state, random_step(body, 6e-4), 1.0)
-    body.friction.renew(moved)
-    state = shifted(body, moved, random_step(body, 0.0), 0.0)
+    begun = body.reevaluate_contact(load_step.state, body.friction.begin_step(load_step.state))
+    moved = shifted(body, begun, random_step(body, 6e-4), 1.0)
+    state = body.reevaluate_contact(moved, body.friction.renewed(moved))
     assert (np.linalg.norm(state.support.friction_response.slip,
                            axis=-1) > SLIP_TOLERANCE_MM)[state.support.friction_response.friction_state.pressure > 0].mean() > 0.1
     body.cells.forget()                                # every cell's tangent anew
@@ -98,7 +98,7 @@ def test_forces_and_newton_steps_are_the_slopes_of_the_potential_of_a_press_with
     assert error < 1e-6
     change = (residual(body, up, 1.1) - residual(body, down, 1.1)) / (2 * h)
     got = np.abs(change + residual(body, state, 1.1)).max() / np.abs(residual(body, state, 1.1)).max()
-    record(f"{under} with friction: what is left of the residual's slope after a Newton step, over the residual", expected=0.0,
+    record(f"{under} with friction: remaining slope of the residual after a Newton step, over the residual", expected=0.0,
            source="central differences", got=got)
     assert got < 1e-4
 
@@ -120,7 +120,7 @@ class Step:
 
 def shifted(body, state, step, share):
     return body.evaluate(state.slab.displacement + share * step.slab, state.support.displacement + share * step.support,
-                         state.indentation + share * step.indentation, state.slab.projection)
+                         state.indentation + share * step.indentation, state.slab.projection, state.history)
 
 
 def potential(state, force):
@@ -160,7 +160,7 @@ def ball_on(body, forces):
 
 def test_tips_with_much_friction_do_as_held_tips_do(record):
     """Where nothing slides only the slip that builds the traction up is left, less than its tolerance."""
-    source, forces = "tips that are held", [0.4, 0.8]
+    source, forces = "bonded tips", [0.4, 0.8]
     bodies = {"held": body_with(held=True, columns=3, rows=3), "rough": body_with(board=2.0, columns=3, rows=3),
               "free": body_with(columns=3, rows=3)}
     states = {name: list(ball_on(body, forces))[-1].state for name, body in bodies.items()}
@@ -191,7 +191,7 @@ def test_no_point_carries_more_than_coulomb_allows_and_sliding_ones_carry_all_of
                               ("board", body.support, load_steps[-1].state.support)):
         friction_response = state.friction_response
         # of the frusta's points those on the board
-        pressure = part.contact.response(state.gaps)[1][..., :friction_response.slip.shape[-2]]
+        pressure = state.history.contact.response(state.gaps)[1][..., :friction_response.slip.shape[-2]]
         pressed = pressure > 1e-4
         ratio = np.linalg.norm(friction_response.traction[pressed], axis=-1) / (part.friction.coefficient * pressure[pressed])
         sliding = np.linalg.norm(friction_response.slip[pressed], axis=-1) > SLIP_TOLERANCE_MM
@@ -245,7 +245,7 @@ def test_the_more_friction_the_smaller_the_indentation_between_free_and_held_tip
     bodies = [*(body_with(board=mu, columns=3, rows=3) for mu in coefficients), body_with(held=True, columns=3, rows=3)]
     *depths, held = (list(ball_on(body, forces))[-1].state.indentation for body in bodies)
     for mu, depth, before in zip(coefficients[1:], depths[1:], depths[:-1], strict=True):
-        record(f"ball on 3 x 3 frusta, 2 N, board mu = {mu:g}: what the indentation falls short of that with less friction, mm",
+        record(f"ball on 3 x 3 frusta, 2 N, board mu = {mu:g}: reduction of the indentation by the added friction, mm",
                expected=0.0, source=source, got=before - depth, at_least=True)
     assert (np.diff(depths) < 0).all()
     assert depths[-1] > held - SLIP_TOLERANCE_MM
@@ -285,24 +285,24 @@ class RoughSlab(HeldSlab):
         state, last = slab.evaluate(u, slab.project(u, surface), 0.0), 0.0
         for depth in depths:
             planes = slab.project(state.displacement, surface)
-            top.begin_step(slab.update_normals(state, planes, last), last)
+            before = slab.update_normals(state, planes, last)
+            history = state.history.held_by(top.first_friction_state(before, last))
             for k in range(passes):
-                state = self._balance(state.displacement, planes, depth, tolerance)
-                before, top.friction_state = top.friction_state, top.renewed_friction_state(state)
-                state = slab.update_normals(state, planes, depth)
+                state = self._balance(state.displacement, planes, depth, history, tolerance)
+                renewed = history.held_by(top.renewed_friction_state(state))
+                state = slab.update_normals(state, planes, depth, renewed)
                 if np.abs(state.force.ravel()[slab.free]).max() < tolerance * abs(state.indentation_force):
                     break
-                if k >= 3:
-                    top.friction_state = before.halfway(top.friction_state)
+                history = history.held_by(history.friction.halfway(renewed.friction)) if k >= 3 else renewed
             else:
                 raise ArithmeticError("friction does not settle")
             last = depth
         return state
 
-    def _balance(self, u, planes, depth, tolerance, iterations=60):
+    def _balance(self, u, planes, depth, history, tolerance, iterations=60):
         slab, solver, friction_response = self.slab, make_solver(), None
         for _ in range(iterations):
-            state = slab.evaluate(u, planes, depth)
+            state = slab.evaluate(u, planes, depth, history)
             state = replace(state, friction_response=state.friction_response.after(friction_response))
             residual, friction_response = state.force.ravel()[slab.free], state.friction_response
             if np.abs(residual).max() < 0.1 * tolerance * abs(state.indentation_force):
@@ -332,9 +332,10 @@ def test_friction_acts_on_the_share_of_area_that_the_object_covers_as_the_pressu
     u = np.zeros((slab.nodes, 3))
     planes = slab.project(u, flat_punch(1.0))
     assert ((planes.covered > 0) & (planes.covered < 1)).any()
-    slab.top.begin_step(slab.evaluate(u, planes, depth), depth)
-    slab.top.friction_state = slab.top.renewed_friction_state(slab.evaluate(u, planes, depth))
-    state = slab.evaluate(u + [10 * SLIP_TOLERANCE_MM, 0.0, 0.0], planes, depth)
+    start = slab.evaluate(u, planes, depth)
+    begun = start.history.held_by(slab.top.first_friction_state(start, depth))
+    pressed = begun.held_by(slab.top.renewed_friction_state(slab.evaluate(u, planes, depth, begun)))
+    state = slab.evaluate(u + [10 * SLIP_TOLERANCE_MM, 0.0, 0.0], planes, depth, pressed)
     expected, got = mu * state.indentation_force, state.force[:, 0].sum()
     assert expected > 0.05
     error = record("punch that slides over the edge of points' areas: friction, N", expected=expected, source=COULOMB, got=got)
@@ -363,13 +364,13 @@ def test_teeth_push_a_layer_aside_until_friction_holds_them(mu, record):
     state = slab.slide(teeth(angle), [depth], tolerance=1e-8)
     middle = np.abs(slab.slab.top.reference[:, 0]) < 0.5
     expected = p * press if lean > 0 else straight
-    push = -slab.slab.top.contact.response(state.gaps)[1][:, None] * state.projection.normals + state.friction_response.traction
+    push = -state.history.contact.response(state.gaps)[1][:, None] * state.projection.normals + state.friction_response.traction
     got = push[middle, 2].mean()
     error = record(f"layer under teeth of slope 0.2, mu = {mu:g}: downward traction, MPa", expected=expected, source=source,
                    got=got)
     assert error < 2e-3
     top = slab.slab.top.at_points(state.displacement)[middle, 0].mean()
-    error = record(f"layer under teeth of slope 0.2, mu = {mu:g}: way aside, mm", expected=aside, source=source, got=top)
+    error = record(f"layer under teeth of slope 0.2, mu = {mu:g}: lateral displacement, mm", expected=aside, source=source, got=top)
     assert abs(top - aside) < 2e-3 * depth
 
 
@@ -411,8 +412,8 @@ def test_a_block_under_a_rough_plate_resists_and_spreads_as_in_another_program(t
     assert error < 1e-3
     # The pressure is singular at the plate's edge: there the nodes' ways differ, and change by 15 % with the mesh in both.
     for place_, bound in (("on the ground", 1e-3), ("under the plate", 0.07)):
-        error = record(f"block under a plate with mu = 0.2: way of its side {place_}, mm", expected=ways[place_], source=source,
-                       got=our_ways[place_])
+        error = record(f"block under a plate with mu = 0.2: displacement of its side {place_}, mm", expected=ways[place_],
+                       source=source, got=our_ways[place_])
         assert error < bound
 
 
@@ -469,7 +470,7 @@ def block_in_calculix(folder):
 
 def test_friction_under_held_tips_is_refused():
     values = small_spec(2, 2, margin=0.4).model_dump(mode="json") | {"friction": {"object": 0.0, "board": 0.3}}
-    with pytest.raises(InputError, match="tips that are held cannot slide .* set 'tips_bonded' to false"):
+    with pytest.raises(InputError, match="bonded tips cannot slide .* set 'tips_bonded' to false"):
         SensorSpec.from_dict(values)
     assert SensorSpec.from_dict(values | {"tips_bonded": False}).friction.board == 0.3
 

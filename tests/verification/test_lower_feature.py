@@ -10,6 +10,7 @@ import pytest
 from softtact.geometry.meshes import read_mesh
 from softtact.materials.config import law_from_printed
 from softtact.press.sensor import load_sensor
+from softtact.sensors.library import material_file
 
 CONFIG = Path(__file__).parents[2] / "config"
 LOWER = {"object_5": (22, 16), "object_6": (33, 16)}     # row and column of the map in the middle of a lower ridge, a lower disc
@@ -18,7 +19,7 @@ LOWER = {"object_5": (22, 16), "object_6": (33, 16)}     # row and column of the
 @pytest.fixture(scope="module")
 def soft_covered():
     """The sensor with the cover's printed Ogden constants, six times as soft at small strain as its Mooney-Rivlin ones."""
-    return load_sensor(CONFIG / "sensors/coro.yaml", materials={"cover": law_from_printed(CONFIG / "materials/neoprene.yaml",
+    return load_sensor("coro", materials={"cover": law_from_printed(material_file("neoprene"),
                                                                                           "ogden2")})
 
 

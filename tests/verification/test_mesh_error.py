@@ -1,4 +1,4 @@
-"""How far the map on each mesh is from that on a much finer one: a small press here, the long comparison from its record."""
+"""Error of the map on each mesh against a much finer mesh: a small press, and the record of many."""
 
 import json
 from pathlib import Path
@@ -6,15 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from support.sensors import CORO
 
 from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.press.sensor import Sensor
-from softtact.sensors.specification import SensorSpec
 
 ROOT = Path(__file__).parents[2]
-CORO = SensorSpec.from_yaml(ROOT / "config/sensors/coro.yaml")
 SMALL = CORO.model_copy(update={"footprint_mm": (3.6, 3.6), "map_shape": (13, 13)})      # 3 x 3 frusta, a map as dense as theirs
 LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492),
         "cover": make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)}
@@ -51,6 +50,5 @@ def test_the_errors_of_the_long_comparison_are_what_is_promised(mesh, record):
     assert {row["object"] for row in rows} == {"flat punch", "sphere", "ridges"} and kept["against"] == "reference"
     worst = max(max(row["largest_error_percent"]) for row in rows)
     record(f"36 frusta, three objects, three load steps: largest error of the map on the {mesh} mesh, % of its maximum",
-           expected=0.0,
-           source="benchmarks/mesh_error.py", got=worst)
+           expected=0.0, source="benchmarks/mesh_error.py", got=worst)
     assert 0.5 < worst < LARGEST_PERCENT[mesh]

@@ -1,15 +1,15 @@
-"""The layered sensor: condensed core against a naive one, work, symmetry, quarter turn.
+"""The layered sensor: condensed against uncondensed solution, work, symmetry, rotation by 90 degrees.
 
 Small sensors of a few frusta with the default sensor's measures.
 """
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 from naive_sensor import NaiveSensor
+from support.sensors import CORO
 
 from softtact.contact.height_field import HeightField
 from softtact.geometry.meshes import place
@@ -18,12 +18,11 @@ from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic.body import LayeredBody
 from softtact.models.hyperelastic.build import build_sensor_body, build_unit_cell
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
-from softtact.models.hyperelastic.newton import NewtonSettings, press_load_steps
+from softtact.models.hyperelastic.newton import NewtonSettings
+from softtact.models.hyperelastic.path import press_load_steps
 from softtact.models.hyperelastic.slab import Slab
 from softtact.press.sensor import Sensor
-from softtact.sensors.specification import SensorSpec
 
-CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
 LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492),
         "cover": make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)}
 COARSE = MeshSettings(cover_heights=(0.0, 1.0), cover_splits=(0,), far_pitches=1, frustum_heights=(0.0, 0.35, 1.0))
@@ -78,7 +77,7 @@ def test_condensing_the_frusta_changes_nothing(case, record):
     body = build()
     naive = NaiveSensor(body, tilted_plate)
     for load_step in press_load_steps(body, tilted_plate, forces, settings=TIGHT):
-        naive.press_to(load_step.force_n)
+        naive.press_to(load_step.force_n, load_step.state.history)
         slab, support = load_step.state.slab.displacement, load_step.state.support.displacement
         # unbalanced forces of up to 1e-7 N over the softest stiffness of 0.03 N/mm
         assert max(np.abs(naive.slab - slab).max(), np.abs(naive.support - support).max()) < 4e-6

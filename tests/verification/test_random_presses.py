@@ -1,4 +1,4 @@
-"""Random presses: does one crash, hang, or return nonsense that it does not flag?"""
+"""Random presses: none may crash, hang or return unflagged nonsense"""
 
 import importlib.util
 import json
@@ -34,7 +34,7 @@ def test_no_press_of_the_long_run_went_wrong_unsaid(model, record):
     counts = models[model]
     said = ", ".join(f"{counts[name]} {name}" for name in ("reached", "outside", "flagged", "stopped", "refused"))
     wrong = sum(counts[name] for name in WRONG)
-    record(f"{model}: of {counts['presses']} random presses ({said}) those that crashed, hung or gave unflagged nonsense",
+    record(f"{model}: of {counts['presses']} random presses ({said}) number that crashed, hung or gave unflagged nonsense",
            expected=0.0, source="benchmarks/random_presses.py", got=wrong)
     assert wrong == 0, [note for note in counts["notes"] if note[1] in WRONG]
 

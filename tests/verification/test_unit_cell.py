@@ -1,4 +1,4 @@
-"""Unit cell under refinement: stiffness at small strain of one frustum of an endless lattice with its sheet.
+"""Unit cell under refinement: stiffness at small strain of one frustum with its sheet in an endless lattice.
 
 A smooth plate presses it, the tip is held on the board. The sensor's sheet meets the frustum node by node. The reference is
 another discretisation: 20-node hexahedra, a square grid for the sheet, and a much finer root that is tied to it. Where the
@@ -6,22 +6,19 @@ frustum's side meets the sheet the stress is singular, so both converge slowly, 
 direction is refined together, and the reference's limit is extrapolated.
 """
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import scipy.sparse as sp
 from fe import assemble, fine_disc, solid, solve_linear
 from naive_sensor import NaiveSensor
+from support.sensors import CORO
 
 from softtact.fem.elements import QUAD8
 from softtact.fem.extruded_mesh import extrude, grid_mesh_2d
 from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic.build import build_unit_cell
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
-from softtact.sensors.specification import SensorSpec
 
-CORO = SensorSpec.from_yaml(Path(__file__).parents[2] / "config/sensors/coro.yaml")
 LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040})
 PITCH, HEIGHT, TIP_RADIUS, ROOT_RADIUS = 1.2, 0.5, 0.3, 0.6      # mm, of the default sensor; the sheet is as thick as HEIGHT
 LAYERS, SHEET_LAYERS = 3, 2      # of the coarsest meshes

@@ -64,7 +64,8 @@ class Project:
         return [sys.executable, "-m", "snakemake", "--cores", "2", "--configfile", self.configfile, *arguments]
 
     def _environment(self, more):
-        return os.environ | {"SOFTTACT_RUNNER": STUB} | (more or {})
+        source = os.pathsep.join([str(self.folder / "src"), *filter(None, [os.environ.get("PYTHONPATH")])])     # the copy's own
+        return os.environ | {"SOFTTACT_RUNNER": STUB, "PYTHONPATH": source} | (more or {})
 
 
 def read_mesh_2d(output):

@@ -45,12 +45,12 @@ def test_more_places_of_an_object_press_it_again_with_the_fast_models_and_no_oth
 
 
 def test_a_comment_in_the_sensors_file_reruns_nothing(finished):
-    finished.edit("config/sensors/coro.yaml", "name: coro", "name: coro   # the paper's")
+    finished.edit("src/softtact/sensors/data/sensors/coro.yaml", "name: coro", "name: coro   # the paper's")
     assert finished.plan() == {}
 
 
 def test_the_covers_thickness_reruns_from_the_meshes_on_but_no_fit(finished):
-    finished.edit("config/sensors/coro.yaml", "value: 1.5", "value: 1.2")
+    finished.edit("src/softtact/sensors/data/sensors/coro.yaml", "value: 1.5", "value: 1.2")
     plan = finished.plan()
     assert {"mesh_sensor", "precompute_compliance", "simulate_press"} | LEARNING <= set(plan)
     assert len(plan["simulate_press"]) == len(finished.presses())

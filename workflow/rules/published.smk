@@ -10,7 +10,7 @@ rule import_published:
         item_list=f"{RESULTS}/published/items.json",
         inventory=f"{RESULTS}/published/inventory.json",
         counts=f"{RESULTS}/published/counts.csv",
-        odd=f"{RESULTS}/published/odd.csv",
+        outliers=f"{RESULTS}/published/outliers.csv",
     params:
         files=files,
         settings=as_settings(

@@ -31,7 +31,7 @@ def add_command(commands, name, run, summary, examples, *, json=True):
 def add_mesh(command):
     """The arguments of a mesh over a sensor."""
     command.add_argument("mesh", metavar="MESH", type=Path, help="STL, OBJ or PLY file of a closed body")
-    command.add_argument("--unit", required=True, choices=UNITS, help="the mesh's unit; the file itself does not say")
+    command.add_argument("--unit", required=True, choices=UNITS, help="the mesh's unit, which the file does not state")
     command.add_argument("--pose", metavar="x,y,z,rx,ry,rz",
                          help="the mesh's origin in the sensor's frame, mm and degrees (default: centred, touching); "
                               "write --pose=-1,... where it begins with a minus")
@@ -41,8 +41,8 @@ def add_mesh(command):
 def add_repair(command):
     """The options of how a mesh that is no clean body is taken."""
     command.add_argument("--repair", action=argparse.BooleanOptionalAction, default=True,
-                         help="mend what leaves no doubt (flat or small holes, doubled, turned or broken facets, bodies "
-                              "that overlap), and say so on stderr; with --no-repair such a mesh is refused")
+                         help="repair clear faults of the mesh (flat or small holes, doubled, turned or broken facets, "
+                              "overlapping bodies) and name each repair on stderr; --no-repair refuses such a mesh")
 
 
 def read_object(options):
@@ -54,7 +54,7 @@ def read_object(options):
         return read_mesh(options.mesh, unit=options.unit), []
     mended = read_mended(options.mesh, unit=options.unit)
     for repair in mended.repairs:
-        print(f"softtact {options.command}: {options.mesh} was mended: {repair}", file=sys.stderr)
+        print(f"softtact {options.command}: {options.mesh} was repaired: {repair}", file=sys.stderr)
     return mended.mesh, mended.repairs
 
 
@@ -92,7 +92,7 @@ def check_names(endings):
     """Refuse a file to write whose name does not end as one of those that it is written as: {path or None: endings}."""
     for path, known in endings.items():
         if path and path.suffix.lower() not in known:
-            raise InputError(f"{path}: it is written as {' or '.join(known)}; give a name that ends so.")
+            raise InputError(f"{path}: the file is written as {' or '.join(known)}; give a name with such an ending.")
 
 
 def pairs(option, texts):
@@ -118,8 +118,8 @@ def numbers(option, text, count):
 
 def sensor_spec(name):
     """The description of a sensor by its name or its YAML file, without its solvers."""
+    from softtact.sensors.library import sensor_file
     from softtact.sensors.specification import SensorSpec
-    from softtact.study.config import sensor_file
 
     return SensorSpec.from_yaml(sensor_file(name))
 

@@ -13,7 +13,7 @@ EXAMPLES = """
 def add(commands):
     """Add the command to the parser."""
     command = add_command(commands, "completion", _completion, "Print a shell's completion of this command.", EXAMPLES, json=False)
-    command.add_argument("shell", choices=SHELLS, help="the shell that is to complete")
+    command.add_argument("shell", choices=SHELLS, help="the shell to write completion for")
 
 
 def _completion(options):

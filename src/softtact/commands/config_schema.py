@@ -19,7 +19,7 @@ def add(commands):
     command = add_command(commands, "config-schema", _schema,
                           "Print the JSON schema of a study's, a sensor's or a material's YAML.", EXAMPLES, json=False)
     command.add_argument("kind", choices=KINDS, help="which file")
-    command.add_argument("--out", type=Path, metavar="FILE.json", help="write it instead")
+    command.add_argument("--out", type=Path, metavar="FILE.json", help="file to write; without it the schema is printed")
 
 
 def _schema(options):

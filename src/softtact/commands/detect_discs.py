@@ -18,8 +18,9 @@ def add(commands):
     command.add_argument("frames", metavar="FRAMES", type=Path, help="an image, a multi-page TIFF, a video, or a folder of images")
     command.add_argument("--out", type=Path, required=True, metavar="DISCS.csv", help="the table to write, one row per disc")
     command.add_argument("--pixel-mm", type=float, metavar="MM", help="side of a pixel on the glass")
-    command.add_argument("--calibration-mm", type=float, metavar="MM", help="instead: a known length in the picture, and")
-    command.add_argument("--calibration-px", type=float, metavar="PX", help="how many pixels it is long")
+    command.add_argument("--calibration-mm", type=float, metavar="MM",
+                         help="instead of --pixel-mm: a known length in the picture, with --calibration-px")
+    command.add_argument("--calibration-px", type=float, metavar="PX", help="its length in pixels")
     command.add_argument("--min-diameter-mm", type=float, default=0.0, metavar="MM", help="leave smaller discs out")
     command.add_argument("--every", type=int, default=1, metavar="N", help="take each N-th frame only (default: 1)")
     command.add_argument("--picture", type=Path, metavar="PATH",

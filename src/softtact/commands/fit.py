@@ -8,7 +8,7 @@ from softtact.errors import InputError
 EXAMPLES = """
   softtact fit uniaxial=tension.csv planar=shear.csv --law all --out card.json --plot card.png
   softtact fit uniaxial=tension.csv --law neo_hooke,yeoh --window uniaxial=0.8:1.4 --out card.json
-  softtact fit config/materials/polyurethane.yaml --out card.json
+  softtact fit polyurethane --out card.json      # a material that ships, or config/materials/NAME.yaml
 """
 LAYOUTS = ("plain", "soro_db", "stress_stretch", "literature")
 
@@ -17,7 +17,8 @@ def add(commands):
     """Add the command to the parser."""
     command = add_command(commands, "fit", _fit, "Fit hyperelastic laws to test curves and write a material card.", EXAMPLES)
     command.add_argument("curves", nargs="+", metavar="CURVES",
-                         help="CSV files, one test each, MODE=FILE to state a file's mode; or one YAML file of a material")
+                         help="CSV files, one test each, MODE=FILE to state a file's mode; or one material by its name or its "
+                              "YAML file")
     command.add_argument("--law", help="a law's name, several with commas, or all (default)")
     command.add_argument("--choose", help="the law that solvers take (default: best of the ranking)")
     command.add_argument("--material", help="the material's name in the card")
@@ -48,7 +49,7 @@ def _fit(options):
     from softtact.materials.readers import read_curves
 
     check_folders(options.out, options.plot)
-    if Path(options.curves[0]).suffix in (".yaml", ".yml"):
+    if _is_material(options.curves[0]):
         curves, settings = _yaml_curves(options)
     else:
         curves, settings = read_curves(options.curves, **_reading(options)), {}
@@ -61,6 +62,13 @@ def _fit(options):
     show(card, as_json=options.json, lines=[*_fit_lines(card), f"written: {options.out}"])
 
 
+def _is_material(text):
+    """Whether an argument means a material, by its YAML file or its name, and not a file of curves."""
+    from softtact.sensors.library import YAML, known_names
+
+    return Path(text).suffix in YAML or (text in known_names("materials") and not Path(text).exists())
+
+
 def _reading(options):
     """How the files are read, as `read_curves` takes it."""
     return {"mode": options.mode, "layout": options.layout, "columns": dict(pairs("--column", options.column)),
@@ -71,10 +79,11 @@ def _yaml_curves(options):
     """Curves and fit settings of a material's YAML."""
     from softtact.materials.config import load_material
     from softtact.materials.making import curves_of
+    from softtact.sensors.library import material_file
 
     if len(options.curves) > 1 or any(_reading(options)[key] for key in ("mode", "columns", "sort", "compression")):
-        raise InputError(f"{options.curves[0]}: a material's YAML says itself what its files are; give it alone.")
-    config = load_material(options.curves[0])
+        raise InputError(f"{options.curves[0]}: a material's YAML names its own files and options; give it without others.")
+    config = load_material(material_file(options.curves[0]))
     return curves_of(config.curve_settings), config.fit_settings
 
 

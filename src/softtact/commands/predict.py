@@ -32,7 +32,7 @@ def _predict(options):
 
     check_folders(options.out, options.plot)
     if options.out and options.out.suffix not in WRITTEN:
-        raise InputError(f"{options.out}: taxels are written as {' or '.join(WRITTEN)}; give such a name.")
+        raise InputError(f"{options.out}: taxels are written as {' or '.join(WRITTEN)}; give a name with such an ending.")
     network, facts = load_network(options.network)
     maps = read_maps(options.maps, shape=tuple(network.options["map_shape"]))
     counts = predict(network, maps.maps_mm)

@@ -16,6 +16,7 @@ from softtact.commands.common import (
     sensor_spec,
     show,
 )
+from softtact.contact.motion import Motion
 from softtact.errors import ConvergenceError, InputError
 
 EXAMPLES = """
@@ -24,6 +25,7 @@ EXAMPLES = """
   softtact press part.ply --unit m --pose=-2,1.5,0,0,0,30 --force 10 --model foundation --vtu press.vtu
   softtact press part.stl --unit mm --force 20 --sensor my_sensor.yaml --policy error --tolerance 0.02
   softtact press part.stl --unit mm --force 5 --model elastic --json > press.json
+  softtact press part.stl --unit mm --motion "z -0.5; x 1.0 in 10" --model elastic --out slide.nc
 """
 MODELS = ("auto", "elastic", "foundation", "hyperelastic")
 
@@ -33,20 +35,22 @@ def add(commands):
     command = add_command(commands, "press", _press, "Press a mesh on the sensor: deformation map and taxels.", EXAMPLES)
     add_mesh(command)
     add_repair(command)
-    command.add_argument("--force", type=float, action="append", required=True, metavar="N",
-                         help="force in N; repeat it for several load steps")
+    how = command.add_mutually_exclusive_group(required=True)
+    how.add_argument("--force", type=float, action="append", metavar="N", help="force in N; repeat it for several load steps")
+    how.add_argument("--motion", metavar="STEPS",
+                     help='steps between semicolons: ways in mm ("z -1.0" is down), "fz -20" a force in N, "x 1.0 in 10" ten steps')
     command.add_argument("--model", choices=MODELS, default="auto",
-                         help="auto takes the one that the policy asks for (default)")
+                         help="a model by its name; auto (default) lets the policy choose")
     command.add_argument("--policy", choices=("paper", "error"), default="paper",
-                         help="of auto: the mesh's complexity as in the paper (default), or the error to expect")
+                         help="how auto chooses: by the mesh's complexity as in the paper (default), or by the error to expect")
     command.add_argument("--tolerance", type=float, default=0.01, metavar="MM",
-                         help="of --policy error: root mean square over the map, in mm (default: 0.01)")
+                         help="for --policy error: root mean square error over the map, in mm (default: 0.01)")
     command.add_argument("--mesh-quality", choices=("default", "draft", "stable", "fine"), default="default",
-                         help="of the hyperelastic model: default is 1 to 4 %% off in the map's root mean square, draft 2 to 6 %% "
-                              "and several times quicker; stable presses frusta deeper than half of their height; fine is 1 %% "
-                              "off, 2 %% at single points, for 1.9 times the default's time and 3 GB")
+                         help="mesh of the hyperelastic model: default (error 1 to 2 %% of the map's maximum), draft (2 to 5 %%, "
+                              "half of the time), fine (1 %%, twice the time) or stable (for frusta pressed deeper than "
+                              "half of their height)")
     command.add_argument("--device", default="cpu", metavar="DEVICE",
-                         help="of the hyperelastic model: cpu (default), cuda, or auto, a GPU where there is one, sums up elements")
+                         help="where the hyperelastic model sums up elements: cpu (default), cuda, or auto (a GPU if there is one)")
     command.add_argument("--card", action="append", metavar="LAYER=CARD.json",
                          help="a card of `softtact fit` for the dielectric or the cover, in place of the printed constants")
     command.add_argument("--out", type=Path, metavar="FILE.nc", help="write the maps as NetCDF")
@@ -61,8 +65,8 @@ def _press(options):
 
     from softtact.geometry.meshes import check_over_sensor, place
 
-    spec, forces, pose = sensor_spec(options.sensor), sorted(set(options.force)), pose_of(options)
-    check_forces(forces, spec)
+    spec, pose = sensor_spec(options.sensor), pose_of(options)
+    how = _how(options, spec)
     check_folders(options.out, options.vtu, options.plot)
     check_names({options.out: (".nc",), options.vtu: (".vtu",), options.plot: (".png", ".svg")})
     mesh, repairs = read_object(options)
@@ -70,13 +74,22 @@ def _press(options):
     try:
         sensor = replace(softtact.load_sensor(options.sensor, materials=_cards(options)),
                          **_quality(options), device=options.device, attributes={"mesh_repairs": "; ".join(repairs)})
-        result = sensor.press(mesh, pose=pose, force_n=forces, model=options.model,
+        result = sensor.press(mesh, pose=pose, **how, model=options.model,
                               policy=options.policy, tolerance_mm=options.tolerance, keep_body=options.vtu is not None)
     except ConvergenceError as error:
         if error.result is not None:
             _show_press(error.result, options)
         raise
     _show_press(result, options)
+
+
+def _how(options, spec):
+    """Forces or a motion, by the names of `Sensor.press`."""
+    if options.motion is not None:
+        return {"motion": Motion.parse(options.motion)}
+    forces = sorted(set(options.force))
+    check_forces(forces, spec)
+    return {"force_n": forces}
 
 
 def _quality(options):
@@ -116,7 +129,7 @@ def _cards(options):
 
 def _press_summary(result):
     """What a press gave at each force, as plain JSON values."""
-    load_steps = {"force_n": result.force_n, "indentation_mm": result.indentation_mm,
+    load_steps = {"normal_force_n": result.normal_force_n, "force_n": result.force_n, "indentation_mm": result.indentation_mm,
               "contact_area_mm2": result.contact_area_mm2,
               "largest_deformation_mm": result.deformation_map_mm.max(axis=(1, 2)),
               "tactile_map": result.tactile_map}
@@ -124,6 +137,7 @@ def _press_summary(result):
              "within_validity",
              "iterations", "wall_time_s")
     load_steps |= {name: getattr(result, name) for name in names}
+    load_steps |= {"torque_nmm": result.torque_nmm}
     facts = {name: getattr(result, name) for name in ("model", "solver", "selection_reason")}
     facts["repairs"] = [repair for repair in result.attributes["mesh_repairs"].split("; ") if repair]
     return facts | {name: _or_none(values) for name, values in load_steps.items()}
@@ -131,7 +145,9 @@ def _press_summary(result):
 
 def _or_none(values):
     """Numbers as lists; what a model does not tell, nan, as null: JSON has no nan."""
-    return [None if value != value else value for value in values.tolist()] if values.ndim == 1 else values.tolist()
+    if values.ndim > 1:
+        return [_or_none(row) for row in values]
+    return [None if value != value else value for value in values.tolist()]
 
 
 def _press_lines(summary):
@@ -139,7 +155,7 @@ def _press_lines(summary):
     if summary["selection_reason"]:
         yield f"chosen because: {summary['selection_reason']}"
     yield f"{'force, N':>10}{'indentation, mm':>18}{'contact, mm2':>15}{'deepest, mm':>14}{'counts, sum':>14}"
-    names = ("force_n", "indentation_mm", "contact_area_mm2", "largest_deformation_mm", "tactile_map")
+    names = ("normal_force_n", "indentation_mm", "contact_area_mm2", "largest_deformation_mm", "tactile_map")
     for force, depth, area, deepest, counts in zip(*(summary[name] for name in names), strict=True):
         yield f"{force:10.4g}{depth:18.4f}{area:15.1f}{deepest:14.4f}{sum(map(sum, counts)):14.0f}"
     yield from _quality_lines(summary)
@@ -155,7 +171,7 @@ def _quality_lines(summary):
     if None not in summary["expected_error_mm"]:
         yield f"error to expect against the hyperelastic model: {1e3 * max(summary['expected_error_mm']):.2g} um, root mean square"
     if not all(summary["within_validity"]):
-        forces = ", ".join(f"{force:g}" for force, valid in zip(summary["force_n"], summary["within_validity"], strict=True)
+        forces = ", ".join(f"{force:g}" for force, valid in zip(summary["normal_force_n"], summary["within_validity"], strict=True)
                            if not valid)
         yield f"beyond what the model is valid for: {forces} N"
     if None not in summary["extrapolated_volume_fraction"]:

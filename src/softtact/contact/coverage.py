@@ -6,12 +6,14 @@ equilibrium exists: the force that it carries pushes it out, and without it the 
 
 import numpy as np
 
+from softtact.contact.height_field import HeightField
+
 STEEP = 1.5        # rise over run above which two places of the underside are taken for two sides of an edge
 FLAT_MM = 0.02     # ... if they differ by more than this
 _HALVINGS = 10     # the edge is found to a thousandth of the area's side
 
 
-def covered(corners, surface):
+def covered(corners: np.ndarray, surface: HeightField) -> tuple[np.ndarray, np.ndarray]:
     """Shares (p,) of rectangles with corners (p, 4, 2), in order around, that lie under the object's lowest part there.
 
     `surface(x, y)` gives heights (n,) and normals. Also returned: each rectangle's lowest corner (p, 2).
@@ -28,7 +30,7 @@ def covered(corners, surface):
     return share, foot
 
 
-def continues(height, place, base, foot):
+def continues(height: np.ndarray, place: np.ndarray, base: np.ndarray, foot: np.ndarray) -> np.ndarray:
     """Whether heights (...) in mm at places (..., 2) belong to the same part of the underside as a lower one, `base` at `foot`."""
     return height - base <= STEEP * np.linalg.norm(place - foot, axis=-1) + FLAT_MM
 

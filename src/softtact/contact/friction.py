@@ -76,7 +76,8 @@ class FrictionState:
     """How friction holds points (p,) on a rigid body during one step.
 
     anchor, start (p, d) in mm, in the rigid body's frame: where a point holds to, and where it was when the step began;
-    start_gap (p,) in mm, then; pressure (p,) in MPa, which limits the friction; touching (p,): whether the anchor is set.
+    start_gap (p,) in mm, then; pressure (p,) in MPa, which limits the friction; touching (p,): whether the anchor is set;
+    slid (p,) in mm: length of the way that a point has slid since it came to touch.
     """
 
     law: Coulomb
@@ -85,11 +86,13 @@ class FrictionState:
     start_gap: np.ndarray
     pressure: np.ndarray
     touching: np.ndarray
+    slid: np.ndarray
 
     @classmethod
     def first(cls, law, position, gap):
         """The friction state of a body at rest, which will hold every point to where it comes to touch."""
-        return cls(law, position, position, gap, np.zeros(gap.shape), np.zeros(gap.shape, dtype=bool))
+        none = np.zeros(gap.shape)
+        return cls(law, position, position, gap, none, np.zeros(gap.shape, dtype=bool), none)
 
     def friction_response(self, position, normal=None):
         """Friction on points at positions (p, d) before normals (p, d) of the rigid body; None: all d directions are tangential."""
@@ -148,13 +151,20 @@ class FrictionResponse:
             return self
         return replace(self, share=self.friction_state.law.next_share(self.slip, before._share(), before.slip))
 
+    @property
+    def slid(self):
+        """Length (p,) in mm of the way that the points have slid since they came to touch."""
+        length = np.linalg.norm(self.slip, axis=-1)
+        return self.friction_state.slid + np.maximum(length - self.friction_state.law.slip_tolerance_mm, 0.0)
+
     def next_step(self, gap):
         """The friction state of a step that starts here, with gaps (p,): anchors follow what slid further than the tolerance."""
         friction_state, length = self.friction_state, np.linalg.norm(self.slip, axis=-1, keepdims=True)
         kept = self.slip * np.minimum(1.0, friction_state.law.slip_tolerance_mm / np.maximum(length, 1e-300))
         touching = friction_state.pressure > 0
         anchor = np.where(touching[..., None], self.position - kept, self.position)
-        return replace(friction_state, anchor=anchor, start=self.position, start_gap=gap, touching=touching)
+        return replace(friction_state, anchor=anchor, start=self.position, start_gap=gap, touching=touching,
+                       slid=np.where(touching, self.slid, 0.0))
 
     def next_pass(self, gap, pressure):
         """The same step's friction state with newer pressures; a point that came to touch holds to where its path met the rigid

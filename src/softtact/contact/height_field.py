@@ -3,7 +3,11 @@
 Vertical lines through query points are cut with the triangles found in a grid of bins; no sampling of the surface takes place.
 """
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
+import trimesh
 from numba import njit
 
 NO_CONTACT_MM = 1e3   # height reported where the object is not above the point
@@ -12,7 +16,7 @@ NO_CONTACT_MM = 1e3   # height reported where the object is not above the point
 class HeightField:
     """Height z (mm) and unit normal of an object's underside over points (x, y) in the object's placed position."""
 
-    def __init__(self, mesh, *, bins=128):
+    def __init__(self, mesh: trimesh.Trimesh, *, bins: int = 128) -> None:
         triangles = np.ascontiguousarray(mesh.triangles, dtype=float)
         cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         area = np.linalg.norm(cross, axis=1)
@@ -31,7 +35,7 @@ class HeightField:
         points = self.triangles[..., :2].reshape(-1, 2)
         return points.min(axis=0) - 1e-9, points.max(axis=0) + 1e-9
 
-    def __call__(self, x, y):
+    def __call__(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Heights (n,) and normals (n, 3) pointing out of the object (downwards) for points (n,), (n,)."""
         x, y = np.ascontiguousarray(x, dtype=float), np.ascontiguousarray(y, dtype=float)
         height, index = _lowest_crossing(x, y, self.triangles, self._origin, self._size, self._bins,
@@ -42,7 +46,38 @@ class HeightField:
         return height, normal
 
 
-def lowest_crossing_naive(x, y, mesh):
+@dataclass(frozen=True)
+class MovedSurface:
+    """An object's underside after a way along x and y."""
+
+    surface: Callable
+    """Heights (n,) and normals (n, 3) of the object's underside over points, as `HeightField`."""
+    offset_mm: np.ndarray
+    """The way (2,)."""
+
+    def __call__(self, x, y):
+        """Heights (n,) and normals (n, 3) over points (n,), (n,) of the sensor."""
+        return self.surface(x - self.offset_mm[0], y - self.offset_mm[1])
+
+
+@dataclass(frozen=True)
+class SweptSurface:
+    """The lowest underside of an object over all places that a motion takes it to."""
+
+    surface: Callable
+    """Heights (n,) and normals (n, 3) of the object's underside over points, as `HeightField`."""
+    offsets_mm: np.ndarray
+    """The ways (k, 2) from its first place."""
+
+    def __call__(self, x, y):
+        """Heights (n,) and normals (n, 3) over points (n,), (n,) of the sensor."""
+        each = [self.surface(x - way[0], y - way[1]) for way in self.offsets_mm]
+        lowest = np.argmin([height for height, _ in each], axis=0)
+        every = np.arange(len(x))
+        return np.stack([height for height, _ in each])[lowest, every], np.stack([normal for _, normal in each])[lowest, every]
+
+
+def lowest_crossing_naive(x: np.ndarray, y: np.ndarray, mesh: trimesh.Trimesh) -> np.ndarray:
     """The same heights by testing every triangle: the executable specification of `HeightField`."""
     heights = np.full(len(x), NO_CONTACT_MM)
     for triangle in mesh.triangles:

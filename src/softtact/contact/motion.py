@@ -92,6 +92,20 @@ class Motion:
         straight = all(set(step.loads) == {"z"} and not step.ways for step in self.steps)
         return [-step.loads["z"] for step in self.steps] if self.steps and straight else None
 
+    @property
+    def straight(self) -> bool:
+        """Whether the object only goes up and down."""
+        return not any(step.ways.keys() - {"z"} or step.loads.keys() - {"z"} for step in self.steps)
+
+    def offsets_mm(self, *, at_most_mm: float = 0.5) -> np.ndarray:
+        """Ways (k, 2) in mm aside from where the motion begins, at every step's end and no farther apart than `at_most_mm`."""
+        ends = np.cumsum([[step.ways.get("x", 0.0), step.ways.get("y", 0.0)] for step in self.steps], axis=0)
+        places = [np.zeros(2)]
+        for end in ends:
+            count = max(1, math.ceil(np.linalg.norm(end - places[-1]) / at_most_mm))
+            places += list(places[-1] + np.linspace(0, 1, count + 1)[1:, None] * (end - places[-1]))
+        return np.array(places)
+
     @classmethod
     def parse(cls, text: str) -> "Motion":
         """A motion from one line: steps between semicolons, each of terms like `x 1.0`, `fz -20`; `in 10` divides its ways.

@@ -25,12 +25,12 @@ def feature_masks(heights_mm):
 
 def measure_press(press, heights_mm, *, frustum_height_mm):
     """One row by COLUMNS of a press (data set) at its largest force; `heights_mm` (y, x) of the object over the map's grid."""
-    final = press.isel(force=-1)
+    final = press.isel(step=-1)
     values = final.deformation_map_mm.values
     raised, lower = feature_masks(heights_mm)
     there = lower.any()
     high, low = float(values[raised].mean()), float(values[lower].mean()) if there else np.nan
-    return {"item": press.attrs["item"], "model": press.attrs["model"], "force_n": float(final.force_n),
+    return {"item": press.attrs["item"], "model": press.attrs["model"], "force_n": float(final.normal_force_n),
             "features": count_features(values), "raised_mm": high, "lower_mm": low,
             "lower_sd_mm": float(values[lower].std(ddof=1)) if lower.sum() > 1 else np.nan, "lower_points": int(lower.sum()),
             "lower_share": low / high, "frustum_share": float(final.frustum_compression_mm) / frustum_height_mm}

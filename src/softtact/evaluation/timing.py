@@ -19,7 +19,7 @@ def time_presses(presses, networks, *, predict, repeats=3):
         names = [press.attrs[name] for name in ("model", "item", "set")]
         network = networks[names[0]]
         predict(network, press.deformation_map_mm.values[:1])  # the first call allocates: it is no map's cost
-        for load_step, force in enumerate(press.force_n.values):
+        for load_step, force in enumerate(press.normal_force_n.values):
             one = press.deformation_map_mm.values[load_step:load_step + 1]
             network_s = statistics.median(seconds(predict, network, one) for _ in range(repeats))
             rows.append((*names, float(force), float(press.wall_time_s.values[load_step]), network_s))

@@ -12,7 +12,7 @@ Two terms hold them:
   locking.
 * q/4 (J - its projection)^4 is nothing for small deviations, which are an element's error, and stops large ones: an element
   that gives way settles beside where it was, where without it it would collapse.
-What both cost and save: docs/performance.md, "Frusta pressed beyond half of their height".
+What both cost and save: docs/notebook/2026-11-23-folding-frusta.md.
 
 Frusta want full quadrature (27 points): with 8 points they soften by spurious modes once they fold (13 % more compression
 at 0.4 MPa) and Newton's method stalls.

@@ -1,18 +1,21 @@
 """Closed meshes as solids: their union, and whether one that faces inwards is a cavity of them."""
 
+from collections.abc import Sequence
+
 import numpy as np
+import trimesh
 from manifold3d import Manifold, Mesh64
 
 OVERLAP = 1e-6  # of a body's volume: what is less is round-off
 
 
-def solid_of(mesh, *, inverted=False):
+def solid_of(mesh: trimesh.Trimesh, *, inverted: bool = False) -> Manifold:
     """`Manifold` of a closed mesh, of which the facets are turned if it is `inverted`; empty where it is none."""
     faces = mesh.faces[:, ::-1] if inverted else mesh.faces
     return Manifold(Mesh64(np.ascontiguousarray(mesh.vertices, dtype=float), np.ascontiguousarray(faces, dtype=np.uint64)))
 
 
-def union_of(meshes):
+def union_of(meshes: Sequence[trimesh.Trimesh]) -> Manifold | None:
     """One `Manifold` of closed meshes, or None where one of them is none, or there are none."""
     solids = [solid_of(mesh) for mesh in meshes]
     if not solids or any(solid.is_empty() for solid in solids):
@@ -23,7 +26,7 @@ def union_of(meshes):
     return union
 
 
-def is_cavity(piece, solid):
+def is_cavity(piece: trimesh.Trimesh, solid: Manifold) -> bool:
     """Whether a closed mesh that faces inwards lies within a `Manifold`."""
     if solid is None:
         return False

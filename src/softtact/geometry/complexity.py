@@ -14,7 +14,10 @@ object's lowest facet there. The default reach is the thickness of the sensor's 
 can sink: an evenly meshed sphere of 30 mm has 8.3 % of its points within it, the paper's sphere 8.7 %.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -40,24 +43,25 @@ class Complexity:
     CHo: int
 
     @property
-    def ratio_total(self):
+    def ratio_total(self) -> float:
         """NPt / CHt."""
         return _ratio(self.NPt, self.CHt)
 
     @property
-    def ratio_overlap(self):
+    def ratio_overlap(self) -> float:
         """NPo / CHo; 0 where no point of the object is in the overlap."""
         return _ratio(self.NPo, self.CHo)
 
 
-def score(triangles, *, footprint_mm, reach_mm=REACH_MM):
+def score(triangles: np.ndarray, *, footprint_mm: tuple[float, float], reach_mm: float = REACH_MM) -> Complexity:
     """`Complexity` of raw facets (n, 3, 3), in mm, in the sensor frame."""
     points = triangles.reshape(-1, 3)
     near = overlap_points(triangles, footprint_mm=footprint_mm, reach_mm=reach_mm)
     return Complexity(NPt=len(points), CHt=hull_edges(points), NPo=len(near), CHo=hull_edges(near))
 
 
-def score_file(path, *, unit, footprint_mm, pose=None, reach_mm=REACH_MM):
+def score_file(path: str | Path, *, unit: str, footprint_mm: tuple[float, float], pose: Pose | None = None,
+               reach_mm: float = REACH_MM) -> Complexity:
     """`Complexity` of a mesh file that passes `read_mesh`; without a pose it is centred over the sensor."""
     mesh = read_mesh(path, unit=unit)
     pose = pose if pose is not None else default_pose(mesh)
@@ -66,7 +70,7 @@ def score_file(path, *, unit, footprint_mm, pose=None, reach_mm=REACH_MM):
     return score(placed, footprint_mm=footprint_mm, reach_mm=reach_mm)
 
 
-def overlap_points(triangles, *, footprint_mm, reach_mm=REACH_MM):
+def overlap_points(triangles: np.ndarray, *, footprint_mm: tuple[float, float], reach_mm: float = REACH_MM) -> np.ndarray:
     """Raw points (m, 3) over the footprint and within `reach_mm` of the lowest facet there."""
     over = facets_over(triangles, footprint_mm)
     if not over.any():
@@ -76,7 +80,7 @@ def overlap_points(triangles, *, footprint_mm, reach_mm=REACH_MM):
     return points[inside & (points[:, 2] <= triangles[over, :, 2].min() + reach_mm)]
 
 
-def hull_edges(points):
+def hull_edges(points: np.ndarray) -> int:
     """Number of unique edges of the triangulated convex hull of points (n, 3).
 
     Points in one plane give a triangulated polygon (2 V - 3), points on one line 1, a single point or none 0.
@@ -94,7 +98,8 @@ def hull_edges(points):
     return 2 * len(facets) - 3 if points.shape[1] == 2 else _unique_edges(facets)
 
 
-def choose_model(NPt, CHt, NPo, CHo, *, rule="any", total=TOTAL_THRESHOLD, overlap=OVERLAP_THRESHOLD):
+def choose_model(NPt: int, CHt: int, NPo: int, CHo: int, *, rule: str = "any", total: float = TOTAL_THRESHOLD,
+                 overlap: float = OVERLAP_THRESHOLD) -> str:
     """'hyperelastic' for an object with fine details, else 'elastic'.
 
     Details show where NPt >= `total` CHt, or NPo >= `overlap` CHo. The paper's text asks for both (`rule="all"`), its
@@ -106,7 +111,8 @@ def choose_model(NPt, CHt, NPo, CHo, *, rule="any", total=TOTAL_THRESHOLD, overl
     return "hyperelastic" if detailed else "elastic"
 
 
-def score_objects(paths, objects, *, footprint_mm, rule="any", thresholds=None, reach_mm=REACH_MM):
+def score_objects(paths: Sequence[str | Path], objects: Sequence[dict[str, Any]], *, footprint_mm: tuple[float, float],
+                  rule: str = "any", thresholds: dict[str, Any] | None = None, reach_mm: float = REACH_MM) -> pd.DataFrame:
     """Table of counts and chosen model, a row for each of `paths`.
 
     objects : list of {name, unit, pose}, in the order of `paths`; pose is six numbers, or missing for centred
@@ -116,7 +122,7 @@ def score_objects(paths, objects, *, footprint_mm, rule="any", thresholds=None, 
     for path, entry in zip(paths, objects, strict=True):
         pose = Pose.from_values(entry["pose"]) if entry.get("pose") is not None else None
         counts = score_file(path, unit=entry["unit"], footprint_mm=footprint_mm, pose=pose, reach_mm=reach_mm)
-        four = {name: getattr(counts, name) for name in ("NPt", "CHt", "NPo", "CHo")}
+        four: dict[str, Any] = {name: getattr(counts, name) for name in ("NPt", "CHt", "NPo", "CHo")}
         rows.append({"object": entry["name"], **four, "model": choose_model(**four, rule=rule, **(thresholds or {})),
                      "ratio_total": counts.ratio_total, "ratio_overlap": counts.ratio_overlap})
     return pd.DataFrame(rows)

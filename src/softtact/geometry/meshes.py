@@ -5,6 +5,7 @@ sentence with its remedy.
 """
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -21,7 +22,8 @@ _MERGE_DECIMALS = 5  # of a coordinate in mm: corners closer than 10 nm are one
 _FLAT = 1e-6  # thickness over size below which a mesh is no body
 
 
-def read_triangles(path, *, unit, min_size_mm=MIN_SIZE_MM, max_size_mm=MAX_SIZE_MM):
+def read_triangles(path: str | Path, *, unit: str, min_size_mm: float = MIN_SIZE_MM,
+                   max_size_mm: float = MAX_SIZE_MM) -> np.ndarray:
     """Facets (n, 3, 3) in mm as the file stores them, corners not merged; finite and of plausible size."""
     path = Path(path)
     triangles = load_sized(path, unit=unit)
@@ -29,12 +31,13 @@ def read_triangles(path, *, unit, min_size_mm=MIN_SIZE_MM, max_size_mm=MAX_SIZE_
     return plausible_facets(path, triangles, unit=unit, min_size_mm=min_size_mm, max_size_mm=max_size_mm)
 
 
-def load_sized(path, *, unit):
+def load_sized(path: Path, *, unit: str) -> np.ndarray:
     """Facets (n, 3, 3) in mm as the file stores them, unchecked."""
     return _load_facets(path) * _unit_factor(path, unit)
 
 
-def plausible_facets(path, triangles, *, unit, min_size_mm=MIN_SIZE_MM, max_size_mm=MAX_SIZE_MM):
+def plausible_facets(path: Path, triangles: np.ndarray, *, unit: str, min_size_mm: float = MIN_SIZE_MM,
+                     max_size_mm: float = MAX_SIZE_MM) -> np.ndarray:
     """The facets (n, 3, 3) in mm, if their size is plausible; else refused with the unit that would make it so."""
     if len(triangles) == 0:
         raise InputError(f"{path}: no facet has finite coordinates; export the mesh again.")
@@ -42,12 +45,16 @@ def plausible_facets(path, triangles, *, unit, min_size_mm=MIN_SIZE_MM, max_size
     return triangles
 
 
-def read_mesh(path, *, unit, min_size_mm=MIN_SIZE_MM, max_size_mm=MAX_SIZE_MM):
+def read_mesh(path: str | Path, *, unit: str, min_size_mm: float = MIN_SIZE_MM,
+              max_size_mm: float = MAX_SIZE_MM) -> trimesh.Trimesh:
     """Closed, outward-oriented mesh of a file, as a `trimesh.Trimesh` in mm in the file's own frame.
 
     path : STL (binary or text), OBJ or PLY
     unit : 'mm', 'cm', 'm' or 'inch'; the file itself does not say
     min_size_mm, max_size_mm : range of a plausible largest side
+
+    Raises InputError that names the file, what is wrong with it (unreadable, open, inside out, flat, overlapping, of a wrong size)
+    and the remedy.
     """
     path = Path(path)
     triangles = read_triangles(path, unit=unit, min_size_mm=min_size_mm, max_size_mm=max_size_mm)
@@ -56,7 +63,7 @@ def read_mesh(path, *, unit, min_size_mm=MIN_SIZE_MM, max_size_mm=MAX_SIZE_MM):
     return mesh
 
 
-def check_body(path, mesh):
+def check_body(path: Path, mesh: trimesh.Trimesh) -> None:
     """Refuse a mesh that bounds no body: flat, open, inside out, or of pieces that overlap."""
     _refuse_flat(path, mesh)
     _refuse_open(path, mesh)
@@ -64,7 +71,7 @@ def check_body(path, mesh):
     _refuse_overlapping(path, mesh)
 
 
-def merge_facets(triangles):
+def merge_facets(triangles: np.ndarray) -> trimesh.Trimesh:
     """Mesh of facets (n, 3, 3) whose equal corners are joined; facets that collapse by it are left out."""
     mesh = trimesh.Trimesh(**trimesh.triangles.to_kwargs(triangles), process=False)
     mesh.merge_vertices(digits_vertex=_MERGE_DECIMALS)
@@ -74,7 +81,7 @@ def merge_facets(triangles):
     return mesh
 
 
-def place(mesh, *, pose=None):
+def place(mesh: trimesh.Trimesh, *, pose: Pose | None = None) -> trimesh.Trimesh:
     """The mesh in the sensor frame.
 
     pose : a `Pose`; None centres the bounding box over the origin, lowest point at z = 0 (just touching)
@@ -85,13 +92,13 @@ def place(mesh, *, pose=None):
     return placed
 
 
-def default_pose(mesh):
+def default_pose(mesh: trimesh.Trimesh) -> Pose:
     """Pose that centres the mesh's bounding box over the sensor and lets its lowest point touch."""
     (x0, y0, z0), (x1, y1, _) = mesh.bounds
     return Pose(-np.array([(x0 + x1) / 2, (y0 + y1) / 2, z0]))
 
 
-def check_over_sensor(mesh, footprint_mm, *, name="The object"):
+def check_over_sensor(mesh: trimesh.Trimesh, footprint_mm: tuple[float, float], *, name: str = "The object") -> None:
     """Refuse a placed mesh of which no facet lies over the sensor's footprint (x, y sides in mm)."""
     if np.any(facets_over(mesh.triangles, footprint_mm)):
         return
@@ -102,7 +109,7 @@ def check_over_sensor(mesh, footprint_mm, *, name="The object"):
     )
 
 
-def facets_over(triangles, footprint_mm):
+def facets_over(triangles: np.ndarray, footprint_mm: tuple[float, float]) -> np.ndarray:
     """Which facets (n, 3, 3) overlap, seen from above, a rectangle of sides `footprint_mm` about the origin, (n,) bool.
 
     Separating axes: two convex shapes are apart exactly if they are so along a side's normal of one of them.
@@ -117,7 +124,7 @@ def facets_over(triangles, footprint_mm):
     return np.all((along.min(axis=-1) <= reach) & (along.max(axis=-1) >= -reach), axis=1)
 
 
-def _load_facets(path):
+def _load_facets(path: Path) -> np.ndarray:
     """Facets (n, 3, 3) in the file's unit."""
     if not path.is_file():
         raise InputError(f"{path}: there is no such mesh file.")
@@ -127,8 +134,8 @@ def _load_facets(path):
         raise InputError(f"{path}: the file is empty; export the mesh again.")
     _refuse_cut_off(path)
     try:
-        mesh = trimesh.load(path, force="mesh", process=False)
-        triangles = np.array(mesh.triangles, dtype=float)
+        mesh: Any = trimesh.load(path, force="mesh", process=False)
+        triangles = np.array(mesh.triangles, dtype=np.float64)
     except Exception as error:  # each format's reader fails in its own way
         raise InputError(f"{path}: not readable as {path.suffix[1:].upper()} "
                          f"({' '.join(str(error).split())[:120]}); export the mesh again.") from error
@@ -139,7 +146,7 @@ def _load_facets(path):
     return triangles
 
 
-def _refuse_cut_off(path):
+def _refuse_cut_off(path: Path) -> None:
     """Refuse a text STL without its last line: what is missing might be closed as if it were a hole."""
     with path.open("rb") as file:
         start = file.read(84)
@@ -150,21 +157,21 @@ def _refuse_cut_off(path):
         raise InputError(f"{path}: its last line is not 'endsolid', so it was cut off; export the mesh again.")
 
 
-def _unit_factor(path, unit):
+def _unit_factor(path: Path, unit: str | None) -> float:
     if unit not in UNIT_MM:
         stated = "no unit is stated" if unit is None else f"the unit {unit!r} is not known"
         raise InputError(f"{path}: {stated}, and a mesh file has none of its own; state one of {', '.join(UNIT_MM)}.")
     return UNIT_MM[unit]
 
 
-def _refuse_non_finite(path, triangles):
+def _refuse_non_finite(path: Path, triangles: np.ndarray) -> None:
     bad = ~np.isfinite(triangles).all(axis=(1, 2))
     if bad.any():
         raise InputError(f"{path}: {bad.sum()} of {len(bad)} facets have coordinates that are not finite numbers "
                          f"(the first is facet {np.argmax(bad)}); export the mesh again.")
 
 
-def _refuse_implausible_size(path, triangles, unit, smallest, largest):
+def _refuse_implausible_size(path: Path, triangles: np.ndarray, unit: str, smallest: float, largest: float) -> None:
     size = float(np.ptp(triangles.reshape(-1, 3), axis=0).max())
     if smallest <= size <= largest:
         return
@@ -175,7 +182,7 @@ def _refuse_implausible_size(path, triangles, unit, smallest, largest):
                      f"{largest:g} mm; {remedy}.")
 
 
-def _refuse_flat(path, mesh):
+def _refuse_flat(path: Path, mesh: trimesh.Trimesh) -> None:
     centred = mesh.vertices - mesh.vertices.mean(axis=0) if len(mesh.faces) else np.zeros((3, 3))
     spread = np.linalg.svd(centred, compute_uv=False)
     if len(spread) < 3 or spread[2] <= _FLAT * spread[0]:
@@ -183,7 +190,7 @@ def _refuse_flat(path, mesh):
                          "body.")
 
 
-def _refuse_open(path, mesh):
+def _refuse_open(path: Path, mesh: trimesh.Trimesh) -> None:
     low, high = mesh.edges_sorted.T.astype(np.int64)
     _, uses = np.unique(low * len(mesh.vertices) + high, return_counts=True)
     boundary, odd = int(np.sum(uses == 1)), int(np.sum((uses != 2) & (uses != 1)))
@@ -196,13 +203,13 @@ def _refuse_open(path, mesh):
                          "make the normals consistent, for example with 'Recalculate outside' of Blender.")
 
 
-def _refuse_inverted(path, mesh):
+def _refuse_inverted(path: Path, mesh: trimesh.Trimesh) -> None:
     if mesh.volume <= 0:
         raise InputError(f"{path}: the facets' normals point inwards (volume {mesh.volume:.4g} mm3); flip them, for "
                          "example with trimesh's mesh.invert() or 'Flip normals' of Blender.")
 
 
-def _refuse_overlapping(path, mesh):
+def _refuse_overlapping(path: Path, mesh: trimesh.Trimesh) -> None:
     """Closed pieces that overlap or share walls have facets inside the body, which no contact search expects."""
     if mesh.body_count < 2:
         return

@@ -4,6 +4,8 @@ The object turns about z by any angle at which its pressing part fits the sensor
 room that is left. It is not tilted.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 PRESSING_MM = 1.0    # above the lowest point: the part that carries the force
@@ -11,7 +13,8 @@ RIM_MM = 1.0         # along the sensor's border, where the layers' sides are he
 _LEAST_TURN_DEG = 1.0
 
 
-def draw_poses(triangles, *, count, footprint_mm, seed):
+def draw_poses(triangles: np.ndarray, *, count: int, footprint_mm: tuple[float, float],
+               seed: Sequence[int]) -> list[list[float]]:
     """`count` poses, each [x, y, z in mm, rx, ry, rz in degrees] of the object's origin, of facets (n, 3, 3) in mm.
 
     seed: a list of whole numbers; the k-th pose depends on it and k only

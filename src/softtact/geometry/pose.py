@@ -1,5 +1,6 @@
 """Where an object stands: a translation and a rotation of its reference point in the sensor frame."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,7 +23,7 @@ class Pose:
     rotation: Rotation = field(default_factory=Rotation.identity)
 
     @classmethod
-    def from_values(cls, values):
+    def from_values(cls, values: Sequence[float | str]) -> "Pose":
         """Pose of six numbers: translation in mm; angles in degrees about the sensor's fixed x, then y, then z axis.
 
         That is scipy's `Rotation.from_euler("xyz", ...)`, and roll, pitch, yaw as robot descriptions have them.
@@ -36,10 +37,10 @@ class Pose:
         return cls(numbers[:3], Rotation.from_euler("xyz", numbers[3:], degrees=True))
 
     @classmethod
-    def parse(cls, text):
+    def parse(cls, text: str) -> "Pose":
         """Pose of a command line's `x,y,z,rx,ry,rz`; see `from_values`."""
         return cls.from_values(text.split(","))
 
-    def apply(self, points):
+    def apply(self, points: np.ndarray) -> np.ndarray:
         """Points (n, 3) in mm of the mesh, in the sensor frame."""
         return self.rotation.apply(points) + self.translation_mm

@@ -30,10 +30,11 @@ class Mended:
     repairs: list
 
 
-def read_mended(path, *, unit, min_size_mm=MIN_SIZE_MM, max_size_mm=MAX_SIZE_MM):
+def read_mended(path: str | Path, *, unit: str, min_size_mm: float = MIN_SIZE_MM, max_size_mm: float = MAX_SIZE_MM) -> Mended:
     """Read a mesh as `read_mesh` does, and mend it where that leaves no doubt; else InputError with the reason."""
     path = Path(path)
-    said, stored = [], load_sized(path, unit=unit)
+    said: list[str] = []
+    stored = load_sized(path, unit=unit)
     triangles = _finite(stored, said)
     plausible_facets(path, triangles, unit=unit, min_size_mm=min_size_mm, max_size_mm=max_size_mm)
     mesh = merge_facets(triangles)

@@ -1,11 +1,13 @@
 """Frames from files: an image, a folder of images, the pages of a TIFF, a video. One frame is in memory at a time."""
 
+import importlib.util
 from pathlib import Path
 
 import imageio.v3 as iio
 import tifffile
 
 from softtact.errors import InputError
+from softtact.extras import how_to_install
 
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp")
 STACKS = (".tif", ".tiff")
@@ -75,8 +77,14 @@ def _reader(kind):
     if kind in IMAGES:
         return lambda file: [iio.imread(file, plugin="pillow")]
     if kind in VIDEOS:
-        return lambda file: iio.imiter(file, plugin="pyav")
+        return _video
     raise ValueError(f"{kind or 'no ending'} is none of {' '.join(IMAGES + STACKS + VIDEOS)}")
+
+
+def _video(file):
+    if importlib.util.find_spec("av") is None:
+        raise InputError(f"{file}: {how_to_install('av')}")
+    return iio.imiter(file, plugin="pyav")
 
 
 def _tiff(file):

@@ -66,7 +66,7 @@ def read_tactile(paths):
 
 def check_converged(press, path):
     """Refuse a press with a load step that the solver did not finish: nothing of it may be used."""
-    failed = press.force_n.values[press.converged.values == 0]
+    failed = press.normal_force_n.values[press.converged.values == 0]
     if len(failed):
         raise ConvergenceError(f"{path}: the press of {press.attrs.get('item')} with the model "
                                f"{press.attrs.get('model')} did not converge at {failed[0]:g} N; "
@@ -95,8 +95,8 @@ def check_item(key, presses, tactile, models):
             raise InputError(f"{name}: there is no press with the model {model}; add its press file.")
         press = presses[model, *key]
         _check_finite(press.deformation_map_mm, f"the press of {name} with the model {model}")
-        if len(forces) != press.sizes["force"] or not np.allclose(forces, press.force_n.values, rtol=1e-3, atol=0):
-            raise InputError(f"{name}: the model {model} is pressed at {_list(press.force_n.values)} N and the sensor "
+        if len(forces) != press.sizes["step"] or not np.allclose(forces, press.normal_force_n.values, rtol=1e-3, atol=0):
+            raise InputError(f"{name}: the model {model} is pressed at {_list(press.normal_force_n.values)} N and the sensor "
                              f"read at {_list(forces)} N; make both at the same forces.")
 
 
@@ -106,7 +106,7 @@ def list_load_steps(items, presses, models):
     for key in sorted(items):
         of_models = [presses[model, *key] for model in models]
         usable = np.all([press.within_validity.values == 1 for press in of_models], axis=0)
-        for load_step, force in enumerate(of_models[0].force_n.values):
+        for load_step, force in enumerate(of_models[0].normal_force_n.values):
             rows.append((*key, load_step, float(force), bool(usable[load_step])))
     return pd.DataFrame(rows, columns=["set", "item", "load_step", "force_n", "usable"])
 

@@ -49,8 +49,8 @@ def read_maps(path, *, shape):
 
 def _read_press(path):
     data = read_dataset(path)
-    if "deformation_map_mm" not in data or data.deformation_map_mm.dims != ("force", "y", "x") or "force_n" not in data:
-        raise InputError(f"{path}: not a press with deformation_map_mm (force, y, x) and force_n; "
+    if "deformation_map_mm" not in data or data.deformation_map_mm.dims != ("step", "y", "x") or "normal_force_n" not in data:
+        raise InputError(f"{path}: not a press with deformation_map_mm (step, y, x) and normal_force_n; "
                          "give what `softtact press` wrote.")
     unit = data.deformation_map_mm.attrs.get("units", "mm")
     if unit != "mm":
@@ -59,7 +59,7 @@ def _read_press(path):
         raise InputError(f"{path}: a load step of the press did not converge; press it again with smaller force steps.")
     valid = data.within_validity.values == 1 if "within_validity" in data else None
     grid = {f"{side}_mm": data[side].values if side in data.coords else None for side in "xy"}
-    return Maps(data.deformation_map_mm.values, data.force_n.values, valid, data.attrs.get("model"), **grid)
+    return Maps(data.deformation_map_mm.values, data.normal_force_n.values, valid, data.attrs.get("model"), **grid)
 
 
 def _read_npy(path):

@@ -1,7 +1,7 @@
 """One small interface to sparse direct solvers for symmetric matrices: analyse once, factor often.
 
-PARDISO (MKL) where it installs (x86), SuperLU of scipy elsewhere. `solver.name` tells which one it was. A press has a solver of its
-own, which knows where the unknowns stand: `dissected_solver`.
+PARDISO (MKL) where it is installed, dense blocks of LAPACK elsewhere. `solver.name` tells which one it was. A press has a solver of
+its own, which knows where the unknowns stand: `multifrontal_solver`.
 """
 
 import ctypes
@@ -11,25 +11,27 @@ import scipy.linalg as sla
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
+from softtact.linalg.block_tridiagonal import BlockTridiagonalSolver, inverse_among
+
 
 def make_solver(*, threads=1):
     """The fastest direct solver for any matrix that this machine offers."""
     try:
         return PardisoSolver(threads=threads)
-    except (ImportError, OSError):   # no MKL for this processor
-        return SuperLUSolver()
+    except (ImportError, OSError):   # MKL is not installed, or not made for this processor
+        return BlockTridiagonalSolver()
 
 
 def condensed_inverse(upper, kept, *, threads=1):
     """Rows and columns `kept` (k,) of the inverse of a positive definite matrix, given by its upper triangle (csr, sorted).
 
-    The rest is eliminated by a factor that ends before them (Schur complement); what is left is small and dense. A sixth of the
-    work of solving for k right-hand sides, which is done where MKL is missing.
+    The rest is eliminated by a factor that ends before them (Schur complement); what is left is small and dense. Where MKL is
+    missing it takes two to three times as long.
     """
     try:
         stiffness = _schur_complement(upper, kept, threads)
     except (ImportError, OSError):
-        return _columns_of_inverse(upper, kept)
+        return _inverse_without_mkl(upper, kept)
     lower, fault = sla.lapack.dpotrf(stiffness, lower=1, overwrite_a=1)
     inverse, also = sla.lapack.dpotri(lower, lower=1, overwrite_c=1)
     if fault or also:
@@ -61,18 +63,11 @@ def _schur_complement(upper, kept, threads):
     return np.asfortranarray(out.T.ravel()[:count * count].reshape(count, count))
 
 
-def _columns_of_inverse(upper, kept, *, at_once=256):
-    solver = SuperLUSolver()
-    if not solver.factor(upper):
+def _inverse_without_mkl(upper, kept):
+    inverse = inverse_among(upper, kept)
+    if inverse is None:
         raise np.linalg.LinAlgError("The stiffness is not positive definite.")
-    out = np.empty((len(kept), len(kept)))
-    for start in range(0, len(kept), at_once):
-        part = kept[start:start + at_once]
-        right = np.zeros((upper.shape[0], len(part)))
-        right[part, np.arange(len(part))] = 1.0
-        out[:, start:start + at_once] = solver.solve(right)[kept]
-    solver.close()
-    return 0.5 * (out + out.T)
+    return inverse
 
 
 class PardisoSolver:
@@ -152,7 +147,7 @@ class PardisoSolver:
 
 
 class SuperLUSolver:
-    """scipy's SuperLU: slower and without a reusable analysis, but everywhere."""
+    """scipy's SuperLU: slow, but for any matrix and on any machine; what the other solvers are held against."""
 
     name = "superlu"
 

@@ -1,7 +1,7 @@
 """Cholesky's method for the matrix of a wide and thin body, of which it is known where each unknown stands.
 
 In single precision, and solved from 16 bits, for steps that are corrected by a residual in double precision. What it gains over a
-general solver: docs/performance.md.
+general solver: docs/notebook/2026-11-25-linear-solver.md.
 
 Some unknowns may be left for last, what nodes of the surface do along given directions: the factor ends before them, and leaves a
 small dense matrix on them. What stiffens them, like a contact, can then change without a new factor.

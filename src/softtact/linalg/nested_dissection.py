@@ -1,7 +1,8 @@
 """Nested dissection of a body that is wide and thin: it is cut along lines in plan, again and again, and the cuts come last.
 
 On a plane no order needs fewer operations, but for a factor (George, SIAM J. Numer. Anal. 10, 1973). A general ordering has to find
-the lines first: it takes five times as long for a third more operations on a sensor's lattice (docs/performance.md).
+the lines first: it takes five times as long for a third more operations on a sensor's lattice
+(docs/notebook/2026-11-25-linear-solver.md).
 """
 
 from dataclasses import dataclass

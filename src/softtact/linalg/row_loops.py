@@ -1,7 +1,8 @@
 """Loops over one row of a matrix in single precision or in 16 bits: what a triangular solve does, row by row.
 
 In functions of their own they become vector instructions and read at nearly memory's speed. Loops over several rows at once do
-not, and BLAS's triangular solves of some hundred unknowns take four times as long (docs/performance.md).
+not, and BLAS's triangular solves of some hundred unknowns take four times as long
+(docs/notebook/2026-11-25-linear-solver.md).
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""A material card made: the family of laws fitted, judged and compared (docs/materials.md)."""
+"""A material card made: the family of laws fitted, judged and compared (docs/reference/materials.md)."""
 
 from dataclasses import dataclass, field
 

@@ -1,4 +1,4 @@
-"""Material cards, and the laws made from them: what every stage after the fit reads (docs/materials.md)."""
+"""Material cards, and the laws made from them: what every stage after the fit reads (docs/reference/materials.md)."""
 
 from typing import Annotated
 

@@ -1,5 +1,6 @@
 """What a sensor's fast models start from: computed once for a sensor, and kept in the user's cache."""
 
+import importlib.util
 import os
 from pathlib import Path
 
@@ -35,7 +36,8 @@ def _cached(kind, values, cls, message, compute):
     cache = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "softtact"
     path = cache / f"{kind}-{digest([_FORMAT, *values])}.npz"
     if not path.exists():
-        announce(message)
+        announce(message if importlib.util.find_spec("pypardiso") else f"{message}; without MKL "
+                 "some minutes; pip install 'softtact[mkl]' brings it")
         with atomic_path(path) as temporary:
             compute().save(temporary)
     return cls.load(path)

@@ -6,8 +6,10 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import repeat
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import trimesh
 
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
 from softtact.contact.underside import Underside
@@ -15,14 +17,20 @@ from softtact.contact.unilateral import not_settled
 from softtact.devices import find_device
 from softtact.errors import ConvergenceError, InputError, SofttactError
 from softtact.geometry.meshes import check_over_sensor, place
+from softtact.geometry.pose import Pose
 from softtact.press.models import elastic_result
+from softtact.press.result import PressResult
 from softtact.press.validity import flag_buried
 from softtact.progress import progress
+
+if TYPE_CHECKING:
+    from softtact.press.sensor import Sensor
 
 _PREPARED = {"elastic": ("elastic",), "foundation": ("foundation",), "hyperelastic": (), "auto": ("elastic", "foundation")}
 
 
-def press_many(sensor, meshes, poses, force_n, *, model, workers, device, label, options):
+def press_many(sensor: "Sensor", meshes: list[trimesh.Trimesh], poses: list[Pose | None], force_n: np.ndarray, *, model: str,
+               workers: int, device: str, label: str, options: dict[str, Any]) -> list[Any]:
     """See `Sensor.press_many`."""
     jobs = list(zip(meshes, poses, strict=True))
     if jobs and on_gpu(device, model):
@@ -33,7 +41,7 @@ def press_many(sensor, meshes, poses, force_n, *, model, workers, device, label,
     return list(progress(_each(sensor, act, jobs, workers), label=label, total=len(jobs)))
 
 
-def on_gpu(device, model):
+def on_gpu(device: str, model: str) -> bool:
     """Whether presses of a model go to a GPU as one batch: where one is asked for, or is there; only the elastic model's can."""
     if device == "cpu" or (device == "auto" and model != "elastic"):
         return False
@@ -42,7 +50,8 @@ def on_gpu(device, model):
     return find_device(device) != "cpu"
 
 
-def press_batch(sensor, jobs, force_n, *, device, workers, label):
+def press_batch(sensor: "Sensor", jobs: list[tuple[trimesh.Trimesh, Pose | None]], force_n: np.ndarray, *, device: str,
+                workers: int, label: str) -> list[Any]:
     """Presses of the elastic model, all of them columns of one problem on a torch device; an error in the place of one that fails.
 
     jobs: (mesh, pose) of each. Their undersides are found by processes.
@@ -51,7 +60,7 @@ def press_batch(sensor, jobs, force_n, *, device, workers, label):
 
     compliance = sensor.prepared("elastic")
     undersides = list(_each(sensor, _underside, jobs, workers))
-    results = [one if isinstance(one, SofttactError) else None for one in undersides]
+    results: list[Any] = [one if isinstance(one, SofttactError) else None for one in undersides]
     good = [number for number, one in enumerate(results) if one is None]
     start = time.perf_counter()
     presses = press_layers(compliance, [undersides[number].height for number in good], force_n, device=device)
@@ -122,7 +131,7 @@ def _pressed(sensor, job, *, force_n, model, options):
         return error.with_traceback(None)     # its frames hold the press' matrices
 
 
-def raise_first(results):
+def raise_first(results: list[Any]) -> list[PressResult]:
     """The results, or the first error among them."""
     for number, result in enumerate(results):
         if isinstance(result, SofttactError):

@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from softtact.contact.height_field import HeightField
+from softtact.contact.height_field import HeightField, SweptSurface
+from softtact.contact.motion import Motion
 from softtact.contact.underside import Underside
 from softtact.errors import ConvergenceError, ExtrapolationWarning
 from softtact.models.elastic.compliance import press_layer
 from softtact.models.foundation.solve import FoundationMaps, press_foundation
-from softtact.models.hyperelastic import newton
+from softtact.models.hyperelastic import path
 from softtact.models.hyperelastic.deformed_mesh import pressed_body
 from softtact.press.result import PressResult
 from softtact.press.validity import valid_elastic, valid_foundation, valid_hyperelastic
@@ -55,7 +56,7 @@ def press_on_foundation(sensor, placed, forces, *, label, threads, keep_body=Fal
         times.clear()
         record = (load_steps.append(load_step) for load_step in press_foundation(compliance, points, forces))
         try:
-            _timed(record, forces, label, times, start=start)
+            _timed(record, len(forces), label, times, start=start)
         except ConvergenceError as error:
             error.result = _of_load_steps(sensor, compliance, points, load_steps, forces, times) if load_steps else None
             raise
@@ -99,32 +100,39 @@ def _within_reach(underside, points_within, foundation_modulus, forces, deepest,
 def press_hyperelastic(sensor, placed, forces, *, label, threads, keep_body=False):
     """Load step by load step with the hyperelastic model; a ConvergenceError holds the load steps before.
 
-    keep_body: let the result hold the whole body's displacements at each load step
+    forces (l,) in N, or a `Motion`;  keep_body: let the result hold the whole body's displacements at each load step
     """
-    surface = HeightField(placed)
-    body = sensor.body(threads=threads, surface=surface)
+    surface, lowest = HeightField(placed), _lowest_over(placed, sensor.spec.footprint_mm)
+    count = len(forces.steps) if isinstance(forces, Motion) else len(forces)
+    if isinstance(forces, Motion):
+        path.check_motion(forces)
+    body = sensor.body(threads=threads, surface=_swept(surface, forces))
     grid = np.stack(np.meshgrid(sensor.spec.map_x_mm, sensor.spec.map_y_mm), axis=-1).reshape(-1, 2)
     sampling = body.slab.sampling(grid)
-    announce(f"{label}: {body.support.count} frusta, {len(forces)} load steps of the hyperelastic model, some seconds each")
+    announce(f"{label}: {body.support.count} frusta, {count} load steps of the hyperelastic model, some seconds each")
     record, times, bodies = [], [], []
-    lowest = _lowest_over(placed, sensor.spec.footprint_mm)
 
     def read(load_step):
         _refuse_beyond_the_board(load_step, lowest, sensor.spec.thickness_mm)
-        record.append(_read_load_step(body, sampling, load_step))
+        record.append(_read_load_step(body, sampling, grid, load_step))
         if keep_body:
             bodies.append(pressed_body(body, load_step.state))
 
-    load_steps = (read(load_step)
-              for load_step in newton.press_load_steps(body, surface, forces, settings=sensor.solver))
+    load_steps = (path.press_motion(body, surface, forces, lowest, settings=sensor.solver) if isinstance(forces, Motion)
+                  else path.press_load_steps(body, surface, forces, settings=sensor.solver))
     try:
-        _timed(load_steps, forces, label, times)
+        _timed((read(load_step) for load_step in load_steps), count, label, times)
     except ConvergenceError as error:
-        error.result = _of_record(sensor, body, record, forces, times, bodies) if record else None
+        error.result = _of_record(sensor, body, record, times, bodies) if record else None
         raise
     finally:
         body.close()
-    return _of_record(sensor, body, record, forces, times, bodies)
+    return _of_record(sensor, body, record, times, bodies)
+
+
+def _swept(surface, forces):
+    """The underside at all places of the object together, where the mesh is to be fine."""
+    return SweptSurface(surface, forces.offsets_mm()) if isinstance(forces, Motion) and not forces.straight else surface
 
 
 def _lowest_over(placed, footprint_mm):
@@ -143,15 +151,17 @@ def _refuse_beyond_the_board(load_step, lowest_mm, thickness_mm):
             "forces, a finer cover (--mesh-quality fine), or use a blunter tip.")
 
 
-def _of_record(sensor, body, record, forces, times, bodies):
-    maps, load_steps = zip(*record, strict=True)
-    numbers = {name: np.array([load_step[name] for load_step in load_steps]) for name in load_steps[0]}
+def _of_record(sensor, body, record, times, bodies):
+    numbers = {name: np.array([load_step[name] for load_step in record]) for name in record[0]}
+    forces, displacement = numbers.pop("normal_force_n"), numbers["displacement_mm"]
+    numbers["displacement_mm"] = displacement.reshape(len(record), *sensor.spec.map_shape, 3)
+    numbers["slip"] = numbers["slip"].reshape(len(record), *sensor.spec.map_shape)
     _warn_extrapolation(numbers["extrapolated_volume_fraction"], forces)
     valid = valid_hyperelastic(compression_mm=numbers["frustum_compression_mm"], depth_mm=numbers["indentation_mm"],
                                contact_error_mm=numbers.pop("contact_error_mm"), points=numbers.pop("points"),
-                               frustum_mm=sensor.spec.dielectric.frusta.height_mm,
+                               frustum_mm=sensor.spec.dielectric.frusta.height_mm, forces_n=forces,
                                allowed_mm=sensor.solver.largest_penetration_mm)
-    result = make_result(sensor, "hyperelastic", body.method, np.stack(maps), forces[:len(maps)], np.array(times),
+    result = make_result(sensor, "hyperelastic", body.method, -displacement[..., 2], forces, np.array(times),
                          within_validity=valid, **numbers)
     return replace(result, bodies=tuple(bodies))
 
@@ -166,18 +176,20 @@ def _warn_extrapolation(shares, forces):
                       ExtrapolationWarning, stacklevel=5)
 
 
-def _read_load_step(body, sampling, load_step):
-    """The map (y * x,) in mm of a load step, and its numbers by their names."""
+def _read_load_step(body, sampling, grid, load_step):
+    """The numbers of a load step by their names in a result; fields over the map's points (y * x,)."""
     slab, support, top = load_step.state.slab, load_step.state.support, body.slab.top
-    return -(sampling @ slab.displacement[:, 2]), {
-        "indentation_mm": load_step.state.indentation, "contact_area_mm2": top.area_under_pressure(slab),
-        "penetration_mm": load_step.penetration_mm, "contact_error_mm": body.contact_error(load_step.state),
-        "points": np.count_nonzero(top.under_pressure(slab)),
-        "frustum_compression_mm": body.support.compression(support.displacement).max(),
-        "residual_n": load_step.residual_n,
-        "extrapolated_volume_fraction": body.share_outside_window(load_step.state), "iterations": load_step.iterations}
+    force, torque = top.resultant(slab)
+    return {"normal_force_n": load_step.force_n, "force_n": force, "torque_nmm": torque,
+            "displacement_mm": sampling @ slab.displacement, "slip": top.slip_at(slab, grid),
+            "indentation_mm": load_step.state.indentation, "contact_area_mm2": top.area_under_pressure(slab),
+            "penetration_mm": load_step.penetration_mm, "contact_error_mm": body.contact_error(load_step.state),
+            "points": np.count_nonzero(top.under_pressure(slab)),
+            "frustum_compression_mm": body.support.compression(support.displacement).max(), "residual_n": load_step.residual_n,
+            "extrapolated_volume_fraction": body.share_outside_window(load_step.state), "iterations": load_step.iterations}
 
 
+MOTIONS = {"hyperelastic": press_hyperelastic}     # those that take a `Motion` in place of forces
 PRESSES = {"elastic": press_elastic, "foundation": press_on_foundation, "hyperelastic": press_hyperelastic}
 
 
@@ -186,7 +198,7 @@ def make_result(sensor, model, solver, maps, forces, times, **numbers):
     spec, maps = sensor.spec, maps.reshape(len(forces), *sensor.spec.map_shape)
     flags = {"converged": np.ones(len(forces), dtype=np.int8),
              "within_validity": np.asarray(numbers.pop("within_validity"), dtype=np.int8)}
-    return PressResult(deformation_map_mm=maps, tactile_map=ideal_counts(spec, maps), force_n=forces, wall_time_s=times,
+    return PressResult(deformation_map_mm=maps, tactile_map=ideal_counts(spec, maps), normal_force_n=forces, wall_time_s=times,
                        x_mm=spec.map_x_mm, y_mm=spec.map_y_mm, model=model, sensor=spec.name, solver=solver,
                        largest_counts=spec.largest_counts,
                        attributes={"thickness_mm": spec.thickness_mm, **_friction(spec, model), **sensor.attributes}, **flags,
@@ -200,10 +212,10 @@ def _friction(spec, model):
     return {"friction_object": spec.friction.object, "friction_board": spec.friction.board, "tips_bonded": int(spec.tips_bonded)}
 
 
-def _timed(load_steps, forces, label, times, *, start=None):
+def _timed(load_steps, count, label, times, *, start=None):
     """The load steps as a list, and into `times` the seconds that each took; the solver's preparation counts to the first."""
     out, start = [], start or time.perf_counter()
-    for load_step in progress(load_steps, label=label, total=len(forces)):
+    for load_step in progress(load_steps, label=label, total=count):
         now = time.perf_counter()
         out.append(load_step)
         times.append(now - start)

@@ -5,53 +5,54 @@
 """
 
 import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import trimesh
 from threadpoolctl import threadpool_limits
 
+from softtact.contact.height_field import HeightField
+from softtact.contact.motion import Motion
 from softtact.devices import find_device
 from softtact.errors import ConvergenceError, InputError
 from softtact.geometry.meshes import check_over_sensor, place
+from softtact.geometry.pose import Pose
 from softtact.materials.config import law_from_printed
+from softtact.materials.laws.base import Law
 from softtact.models.hyperelastic import newton
+from softtact.models.hyperelastic.body import LayeredBody
 from softtact.models.hyperelastic.build import build_sensor_body
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.press.cache import cached_compliance, cached_foundation
 from softtact.press.choice import TOLERANCE_MM, press_auto
 from softtact.press.many import press_many, raise_first
-from softtact.press.models import PRESSES
+from softtact.press.models import MOTIONS, PRESSES
+from softtact.press.result import PressResult
 from softtact.press.validity import flag_buried
+from softtact.sensors.library import material_file, sensor_file
 from softtact.sensors.specification import SensorSpec
 
 MODELS = ("auto", *PRESSES)
-PROJECT = Path(__file__).parents[3]
 
 
-def load_sensor(name_or_yaml, *, materials=None):
-    """The `Sensor` of a name (config/sensors/NAME.yaml) or of a YAML file.
+def load_sensor(name_or_yaml: str | Path, *, materials: Mapping[str, Law] | None = None) -> "Sensor":
+    """The `Sensor` of a name or of a YAML file.
 
+    name_or_yaml: config/sensors/NAME.yaml of the working folder comes first, then what ships with the package: coro (its product's
+    name, tsf85, means the same sensor) and pad; materials that a sensor names are found in the same way
     materials: {"dielectric": Law, "cover": Law} to replace the Mooney-Rivlin constants printed for its materials
+    Raises InputError that lists the known names, or names the file and the field that is wrong.
     """
-    path = _config_file("sensors", name_or_yaml)
-    spec = SensorSpec.from_yaml(path)
+    spec = SensorSpec.from_yaml(sensor_file(name_or_yaml))
     laws = dict(materials or {})
     for layer in ("dielectric", "cover"):
         if layer not in laws:
-            laws[layer] = law_from_printed(_config_file("materials", getattr(spec, layer).material), "mooney_rivlin")
+            laws[layer] = law_from_printed(material_file(getattr(spec, layer).material), "mooney_rivlin")
     return Sensor(spec, laws)
-
-
-def _config_file(kind, name):
-    if Path(name).suffix in (".yaml", ".yml"):
-        return Path(name)
-    for folder in (Path("config"), PROJECT / "config"):
-        path = folder / kind / f"{name}.yaml"
-        if path.exists():
-            return path
-    raise InputError(f"There is no config/{kind}/{name}.yaml; give one of the names there or the path of a YAML file.")
 
 
 @dataclass
@@ -59,7 +60,8 @@ class Sensor:
     """A sensor with one law per layer; `mesh` sets the layered body's resolution, `solver` what counts as solved.
 
     device: where the hyperelastic model sums up its elements: `cpu`, `cuda`, or `auto`: a GPU where torch finds one
-    prepared_models: {"elastic": Compliance, "foundation": FoundationCompliance}, what the fast models start from; else the user's cache
+    prepared_models: {"elastic": Compliance, "foundation": FoundationCompliance}, what the fast models start from; else the
+    user's cache
     """
 
     spec: SensorSpec
@@ -71,9 +73,13 @@ class Sensor:
     attributes: dict = field(default_factory=dict)
     device: str = "cpu"
 
-    def press(self, mesh, *, pose=None, force_n, model="auto", policy="paper", tolerance_mm=TOLERANCE_MM, label="press",
-              threads=None, keep_body=False):
-        """Press a mesh (trimesh, mm) through forces (N, one or an increasing list) and return a `PressResult`.
+    def press(self, mesh: trimesh.Trimesh, *, pose: Pose | None = None, force_n: float | Sequence[float] | None = None,
+              motion: Motion | None = None, model: str = "auto", policy: str = "paper", tolerance_mm: float = TOLERANCE_MM,
+              label: str = "press", threads: int | None = None, keep_body: bool = False) -> PressResult:
+        """Press a mesh (trimesh, mm) through forces (N, one or an increasing list) or a `Motion`; return a `PressResult`.
+
+        motion: steps down by force or to a depth, and aside, with friction where the sensor's `friction.object` states it; the
+        elastic and the hyperelastic model take any, `auto` then means the hyperelastic one, the foundation model only forces.
 
         pose: `Pose` of the mesh in the sensor frame; by default its bounding box is centred over the sensor, its lowest
         side down. model: elastic, foundation, hyperelastic, or auto: chosen by a policy, `paper` (complexity of the contact)
@@ -85,6 +91,12 @@ class Sensor:
         """
         if model not in MODELS:
             raise InputError(f"Model {model!r} is unknown; use one of {', '.join(MODELS)}.")
+        if (force_n is None) == (motion is None):
+            raise InputError("A press takes either force_n or motion; give one of them.")
+        if motion is not None and motion.forces_n:
+            force_n, motion = motion.forces_n, None
+        if motion is not None:
+            return self._press_motion(mesh, pose, motion, model, label=label, threads=threads or cores(), keep_body=keep_body)
         forces = self.checked_forces(force_n)
         placed = place(mesh, pose=pose)
         check_over_sensor(placed, self.spec.footprint_mm)
@@ -99,8 +111,27 @@ class Sensor:
             error.result = error.result and flag_buried(error.result, placed.bounds[1, 2])
             raise
 
-    def press_many(self, meshes, poses=None, *, force_n, model="auto", workers=None, device="auto", failures="raise",
-                   label="presses", **options):
+    def _press_motion(self, mesh, pose, motion, model, *, label, threads, keep_body):
+        """A press that does more than go straight down by growing forces."""
+        press = MOTIONS.get("hyperelastic" if model == "auto" else model)
+        if press is None:
+            raise InputError(f"model={model!r}: the {model} model presses straight down by force only; use elastic or hyperelastic "
+                             "for this motion, or give force_n.")
+        for load in (step.loads["z"] for step in motion.steps if step.loads.get("z", 0.0) < 0):
+            self.checked_forces(-load)
+        placed = place(mesh, pose=pose)
+        check_over_sensor(placed, self.spec.footprint_mm)
+        try:
+            with threadpool_limits(limits=threads if model == "elastic" else 1):
+                return flag_buried(press(self, placed, motion, label=label, threads=threads, keep_body=keep_body),
+                                   placed.bounds[1, 2])
+        except ConvergenceError as error:
+            error.result = error.result and flag_buried(error.result, placed.bounds[1, 2])
+            raise
+
+    def press_many(self, meshes: trimesh.Trimesh | Sequence[trimesh.Trimesh], poses: Sequence[Pose | None] | None = None, *,
+                   force_n: float | Sequence[float], model: str = "auto", workers: int | None = None, device: str = "auto",
+                   failures: str = "raise", label: str = "presses", **options: Any) -> list[PressResult]:
         """Press each of `meshes` in its pose, all through the same forces; a list of `PressResult`s in their order.
 
         meshes: one for each press, or a single one for all poses;  poses: a `Pose` or None (centred) for each press
@@ -109,24 +140,25 @@ class Sensor:
         failures: `raise` the first, after all are done, or `keep` each error in its press' place
         options: policy, tolerance_mm, as for `press`
         """
-        meshes = list(meshes) if isinstance(meshes, (list, tuple)) else [meshes] * len(poses)
-        poses = list(poses) if poses is not None else [None] * len(meshes)
+        if isinstance(meshes, trimesh.Trimesh):
+            meshes = [meshes] * (1 if poses is None else len(poses))
+        poses = [None] * len(meshes) if poses is None else list(poses)
         if len(meshes) != len(poses):
             raise InputError(f"There are {len(meshes)} meshes and {len(poses)} poses; give one pose for each mesh, or one mesh.")
         if failures not in ("raise", "keep"):
             raise InputError(f"failures={failures!r} is unknown; write 'raise' or 'keep'.")
-        results = press_many(self, meshes, poses, self.checked_forces(force_n), model=model, workers=workers or cores(),
+        results = press_many(self, list(meshes), poses, self.checked_forces(force_n), model=model, workers=workers or cores(),
                              device=device, label=label, options=options)
         return raise_first(results) if failures == "raise" else results
 
-    def prepared(self, model, threads=1):
+    def prepared(self, model: str, threads: int = 1) -> Any:
         """What a fast model starts from: `Compliance` or `FoundationCompliance`, computed on first use."""
         if model not in self.prepared_models:
             self.prepared_models[model] = (cached_compliance(self.spec, threads=threads) if model == "elastic"
                                  else cached_foundation(self.spec, self.laws, threads=threads))
         return self.prepared_models[model]
 
-    def body(self, *, threads=1, surface=None):
+    def body(self, *, threads: int = 1, surface: HeightField | None = None) -> LayeredBody:
         """The `LayeredBody` that the hyperelastic model presses on."""
         device = find_device(self.device)
         body = build_sensor_body(self.spec, dielectric_law=self.laws["dielectric"], cover_law=self.laws["cover"],
@@ -137,7 +169,7 @@ class Sensor:
             body.sum_with(DeviceKernels(device))
         return body
 
-    def checked_forces(self, force_n):
+    def checked_forces(self, force_n: float | Sequence[float]) -> np.ndarray:
         """Forces (N) as an increasing array within the sensor's range; others are refused."""
         forces = np.atleast_1d(np.asarray(force_n, dtype=float))
         low, high = self.spec.force_range_n
@@ -150,6 +182,6 @@ class Sensor:
         return forces
 
 
-def cores():
+def cores() -> int:
     """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

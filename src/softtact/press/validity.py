@@ -1,11 +1,11 @@
-"""Which load steps of a press are to be relied on (`PressResult.within_validity`), and why not: docs/command_line.md lists it."""
+"""Which load steps of a press can be relied on (`PressResult.within_validity`); the rules: docs/reference/command_line.md."""
 
 from dataclasses import replace
 
 import numpy as np
 
 _DEEPEST_LINEAR = 0.5       # of the layer's thickness: a linear layer does not know that it ends
-_HARDLY_COMPRESSED = 0.33   # of a frustum's height: below, the foundation model was within 2 % and SSIM 0.98 (docs/fast_models.md)
+_HARDLY_COMPRESSED = 0.33   # of a frustum's height; the foundation model then errs by 2 % at most (docs/explanation/fast_models.md)
 _FULL_POCKET = 0.8          # of a frustum's height: above, its pocket is full and contacts begin that the models leave out
 _OVERLAP_LEFT = 2.0         # times the allowed overlap, or gap under pressure: above, pressing apart has failed
 _FEWEST_POINTS = 9          # of the cover that carry the object: fewer do not resolve where a spike touches, and how deep
@@ -23,14 +23,14 @@ def valid_foundation(compression_mm, depth_mm, *, frustum_mm, thickness_mm, law_
     return (compression_mm < min(law_limit_mm, _HARDLY_COMPRESSED * frustum_mm)) & (depth_mm < _DEEPEST_LINEAR * thickness_mm)
 
 
-def valid_hyperelastic(*, compression_mm, contact_error_mm, points, depth_mm, frustum_mm, allowed_mm):
+def valid_hyperelastic(*, compression_mm, contact_error_mm, points, depth_mm, forces_n, frustum_mm, allowed_mm):
     """Which load steps (l,) of a hyperelastic press hold, by its most compressed frustum, contacts and course.
 
     contact_error_mm (l,): deepest overlap, or widest gap under pressure, of which `allowed_mm` were asked for
-    points (l,): of the cover that carry the object
+    points (l,): of the cover that carry the object;  forces_n (l,): where they do not grow, depths need not either
     """
     return ((compression_mm < _FULL_POCKET * frustum_mm) & (contact_error_mm < _OVERLAP_LEFT * allowed_mm)
-            & (points >= _FEWEST_POINTS) & _grows(depth_mm, slack_mm=allowed_mm))
+            & (points >= _FEWEST_POINTS) & ((np.diff(forces_n) <= 0).any() | _grows(depth_mm, slack_mm=allowed_mm)))
 
 
 def _grows(depth, *, slack_mm):

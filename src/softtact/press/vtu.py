@@ -6,12 +6,18 @@ displacement is known there, and no pressure on the map's grid.
 """
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from softtact.errors import InputError
 from softtact.files import atomic_path
+
+if TYPE_CHECKING:
+    from softtact.models.hyperelastic.deformed_mesh import PressedBody
 
 LAYERS = {"frusta": 0, "sheet": 1, "cover": 2, "pressed face": 3, "wall at rest": 4}
 _DISPLACEMENT, _PRESSURE = "displacement_mm_{:g}N", "contact_pressure_mpa_{:g}N"
@@ -35,14 +41,14 @@ class PressedMesh:
     displacement_mm: np.ndarray
     pressure_mpa: np.ndarray | None = None
 
-    def points_of(self, layer):
+    def points_of(self, layer: str) -> np.ndarray:
         """Numbers of the points that the cells of a layer use, by its name in `LAYERS`. Raises InputError where it has none."""
         used = [nodes.ravel() for _, nodes, own in self.cells if own == LAYERS[layer]]
         if not used:
             raise InputError(f"The pressed sensor has no cells of the layer {layer!r}; keep the body of a hyperelastic press.")
         return np.unique(np.concatenate(used))
 
-    def write(self, path):
+    def write(self, path: str | Path) -> None:
         """Write as VTU: for each force an array of displacements and, where known, of pressures (nan off the pressed face)."""
         import meshio
 
@@ -58,7 +64,7 @@ class PressedMesh:
         with atomic_path(path) as temporary:
             mesh.write(temporary, file_format="vtu")
 
-    def surface(self):
+    def surface(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Points (n', 3) on the outside, triangles (m, 3) of them, and their numbers (n',) in `points`."""
         faces = [corners for kind, nodes, _ in self.cells for corners in _outer_faces(kind, nodes)]
         triangles = np.concatenate([quads[:, [0, k, k + 1]] for quads in faces for k in range(1, quads.shape[1] - 1)])
@@ -66,7 +72,7 @@ class PressedMesh:
         return self.points[used], triangles.reshape(-1, 3), used
 
 
-def read_vtu(path):
+def read_vtu(path: str | Path) -> PressedMesh:
     """The `PressedMesh` of a file that `PressedMesh.write` wrote; its pressures are left out."""
     from meshio import vtu
 
@@ -87,7 +93,7 @@ def read_vtu(path):
                        displacement_mm=np.stack([mesh.point_data[name] for _, name in load_steps]))
 
 
-def of_map(maps_mm, x_mm, y_mm, force_n, *, thickness_mm):
+def of_map(maps_mm: np.ndarray, x_mm: np.ndarray, y_mm: np.ndarray, force_n: np.ndarray, *, thickness_mm: float) -> PressedMesh:
     """The `PressedMesh` of deformation maps (l, ny, nx): a pressed face in walls and a bottom that are as at rest."""
     number = np.arange(len(y_mm) * len(x_mm)).reshape(len(y_mm), len(x_mm))
     top = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1).reshape(-1, 4)
@@ -103,7 +109,7 @@ def of_map(maps_mm, x_mm, y_mm, force_n, *, thickness_mm):
     return PressedMesh(points=points, cells=cells, force_n=np.asarray(force_n), displacement_mm=moved)
 
 
-def of_bodies(bodies, force_n):
+def of_bodies(bodies: "Sequence[PressedBody]", force_n: np.ndarray) -> PressedMesh:
     """The `PressedMesh` of a hyperelastic press' `PressedBody`s, one for each force."""
     first = bodies[0]
     cells = [(cells.kind, cells.nodes, LAYERS[cells.region]) for cells in first.cells]
@@ -112,7 +118,7 @@ def of_bodies(bodies, force_n):
                        pressure_mpa=np.stack([body.pressure_mpa for body in bodies]))
 
 
-def _outer_faces(kind, nodes):
+def _outer_faces(kind: str, nodes: np.ndarray) -> list[np.ndarray]:
     """Faces [(f, corners)] of cells of one kind that no other of them shares."""
     shape = kind.rstrip("0123456789")
     if shape not in _FACES:

@@ -14,7 +14,7 @@ from softtact.errors import InputError
 
 SOURCE = "published archive"
 WHERE = ("https://github.com/Lab-CORO/TactileDataset, whose README links to a share where each CSV is fetched by a click; "
-         "docs/published_archive.md tells the way")
+         "docs/how-to/published_archive.md tells the way")
 SETS = {"flat": "Flat", "curved": "Curved"}
 MODELS = {"abaqus": "hyperelastic", "isaac": "elastic"}     # the paper's solver of each model
 SPELLINGS = {"abaqus": "abaqus", "isaac": "isaac", "issac": "isaac"}

@@ -8,7 +8,7 @@ import xarray
 from softtact.errors import InputError
 from softtact.published.archive import MODELS, SETS, SOURCE
 from softtact.published.arrangement import ARRANGEMENTS, arrange, correlations
-from softtact.published.outliers import Odd
+from softtact.published.outliers import Outliers
 from softtact.published.pairing import MAP_COLUMNS, MAP_ROWS, TAXELS, object_name, pair
 from softtact.published.table import read_table
 
@@ -26,7 +26,7 @@ class Tables:
     real: dict
     simulated: dict
     tests: dict
-    odd: Odd
+    outliers: Outliers
 
     def maps_mm(self, model, set_name, test):
         """Maps (n, y, x) of a test, as the file has them."""
@@ -46,13 +46,16 @@ class Tables:
 
 def read_archive(archive):
     """The `Tables` of an `Archive`, paired and checked."""
-    odd = Odd()
-    real = {name: [read_table(file.path, columns=TAXELS, force=True, odd=odd) for file in archive.real[name]] for name in SETS}
-    simulated = {model: {name: read_table(file.path, columns=MAP_COLUMNS, force=False, odd=odd) for name, file in of_set.items()}
+    outliers = Outliers()
+    real = {name: [read_table(file.path, columns=TAXELS, force=True, outliers=outliers) for file in archive.real[name]]
+            for name in SETS}
+    simulated = {model: {name: read_table(file.path, columns=MAP_COLUMNS, force=False, outliers=outliers) for name,
+                         file in of_set.items()}
                  for model, of_set in archive.simulated.items()}
-    tests = {name: pair(real[name], {model: of_set[name] for model, of_set in simulated.items()}, odd=odd) for name in SETS}
-    tests["curved"] = _only_grasped(tests, real["curved"][0], odd)
-    tables = Tables(real, simulated, tests, odd)
+    tests = {name: pair(real[name], {model: of_set[name] for model, of_set in simulated.items()}, outliers=outliers)
+             for name in SETS}
+    tests["curved"] = _only_grasped(tests, real["curved"][0], outliers)
+    tables = Tables(real, simulated, tests, outliers)
     tell_disorder(tables)
     return tables
 
@@ -66,7 +69,8 @@ def tell_disorder(tables):
                 follows = order_correlation(sign * tables.maps_mm(model, name, test), tables.readings(name, test))
                 if follows < 0:
                     table = tables.real[name][0]
-                    tables.odd.keep(table.file, table.line[test.readings[0]], test.path, "the readings do not rise with the maps "
+                    tables.outliers.keep(table.file, table.line[test.readings[0]], test.path,
+                                         "the readings do not rise with the maps "
                                     f"of {SOLVERS[model]} (correlation {follows:.2f}); other order?")
 
 
@@ -78,12 +82,12 @@ def order_correlation(maps, counts):
     return float(np.corrcoef(depth, count)[0, 1])
 
 
-def _only_grasped(tests, table, odd):
+def _only_grasped(tests, table, outliers):
     """The grasps of objects that are not among the indenters too, which training sees."""
     indenters = {test.object for test in tests["flat"]}
     for test in tests["curved"]:
         if test.object in indenters:
-            odd.leave_out(table.file, table.line[test.readings[0]], test.path, "its object stands among the indenters too")
+            outliers.leave_out(table.file, table.line[test.readings[0]], test.path, "its object stands among the indenters too")
     return [test for test in tests["curved"] if test.object not in indenters]
 
 
@@ -148,9 +152,9 @@ def press_dataset(tables, key, tests, *, model, sensor, sign):
     maps = sign * np.concatenate([tables.maps_mm(model, *test) for test in tests])
     ones = np.ones(len(maps), dtype=np.int8)
     return xarray.Dataset(
-        {"deformation_map_mm": (("force", "y", "x"), maps.astype(np.float32), {"units": "mm"}),
-         "force_n": ("force", _forces(tables, tests), {"units": "N"}), "path": ("force", _paths(tests)),
-         "converged": ("force", ones), "within_validity": ("force", ones)},
+        {"deformation_map_mm": (("step", "y", "x"), maps.astype(np.float32), {"units": "mm"}),
+         "normal_force_n": ("step", _forces(tables, tests), {"units": "N"}), "path": ("step", _paths(tests)),
+         "converged": ("step", ones), "within_validity": ("step", ones)},
         coords={"y": sensor.map_y_mm, "x": sensor.map_x_mm},
         attrs={"model": model, "set": key[0], "item": key[1], "source": SOURCE, "solver": SOLVERS[model]})
 

@@ -1,4 +1,4 @@
-"""What is odd in the archive: each by file and row, counted, and with what was done about it."""
+"""Outliers of the archive: each by file and row, counted, and with what was done about it."""
 
 from dataclasses import asdict, dataclass, fields
 
@@ -9,7 +9,7 @@ from softtact.errors import InputError
 
 @dataclass(frozen=True)
 class Finding:
-    """One oddity. row: the line of its first occurrence, 1 being the header;  path: the test, '' for a file;  count: occurrences
+    """One outlier. row: the line of its first occurrence, 1 being the header;  path: the test, '' for a file;  count: occurrences
     done: "left out" (the test) or "kept"."""
 
     file: str
@@ -23,7 +23,7 @@ class Finding:
         return f"{self.file}, row {self.row}{f', {self.path}' if self.path else ''}: {self.what}"
 
 
-class Odd:
+class Outliers:
     """The findings, as they come up."""
 
     def __init__(self):
@@ -45,15 +45,15 @@ class Odd:
         """A row per finding."""
         return pd.DataFrame([asdict(f) for f in self.findings], columns=[field.name for field in fields(Finding)])
 
-    def refuse(self, tests, *, odd, largest_share):
+    def refuse(self, tests, *, outliers, largest_share):
         """Refuse an archive that is odder than the user allows.
 
-        tests: how many there are;  odd: leave_out or refuse;  largest_share: of tests that may be left out
+        tests: how many there are;  outliers: leave_out or refuse;  largest_share: of tests that may be left out
         """
         left = len(self.left_out())
-        if left and (odd == "refuse" or left > largest_share * tests):
+        if left and (outliers == "refuse" or left > largest_share * tests):
             first = [str(f) for f in self.findings if f.done == "left out"][:3]
-            allowed = "none may be" if odd == "refuse" else f"at most {largest_share:.0%} may be"
-            remedy = "set 'data.odd' to leave_out" if odd == "refuse" else "raise 'data.largest_odd_share'"
-            raise InputError(f"{left} of {tests} tests of the archive are odd, and {allowed} ({'; '.join(first)}); "
+            allowed = "none may be" if outliers == "refuse" else f"at most {largest_share:.0%} may be"
+            remedy = "set 'data.outliers' to leave_out" if outliers == "refuse" else "raise 'data.largest_outlier_share'"
+            raise InputError(f"{left} of {tests} tests of the archive are outliers, and {allowed} ({'; '.join(first)}); "
                              f"correct the files or {remedy}.")

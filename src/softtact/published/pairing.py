@@ -35,7 +35,7 @@ def object_name(path):
     return re.sub(r"[^a-z0-9]+", "_", words.lower()).strip("_")
 
 
-def pair(reals, simulated, *, odd):
+def pair(reals, simulated, *, outliers):
     """The usable `PairedTest`s of one set.
 
     reals: tables of readings, of which the first serves and the others must agree;  simulated: {model: table}
@@ -45,42 +45,43 @@ def pair(reals, simulated, *, odd):
     rows = {id(table): table.rows_of_tests() for table in tables}
     tests = []
     for path in dict.fromkeys(path for table in tables for path in table.paths):
-        before = len(odd.left_out())
+        before = len(outliers.left_out())
         own = {id(table): rows[id(table)].get(path) for table in tables}
-        if _in_all(path, tables, own, odd):
-            _check_readings(path, real, others, own, odd)
+        if _in_all(path, tables, own, outliers):
+            _check_readings(path, real, others, own, outliers)
             for table in simulated.values():
-                _check_maps(path, real, table, own, odd)
-        if len(odd.left_out()) == before:
+                _check_maps(path, real, table, own, outliers)
+        if len(outliers.left_out()) == before:
             tests.append(PairedTest(path, object_name(path), own[id(real)], {model: own[id(t)] for model, t in simulated.items()}))
     return tests
 
 
-def _in_all(path, tables, own, odd):
+def _in_all(path, tables, own, outliers):
     """Whether each table has the test, and it names an object."""
     here = [table for table in tables if own[id(table)] is not None]
     first = here[0].line[own[id(here[0])][0]]
     for table in tables:
         if own[id(table)] is None:
-            odd.leave_out(here[0].file, first, path, f"the test is not in {table.file}")
+            outliers.leave_out(here[0].file, first, path, f"the test is not in {table.file}")
     if not object_name(path):
-        odd.leave_out(here[0].file, first, path, "the test names no object")
+        outliers.leave_out(here[0].file, first, path, "the test names no object")
     return len(here) == len(tables)
 
 
-def _check_readings(path, real, others, own, odd):
+def _check_readings(path, real, others, own, outliers):
     rows = own[id(real)]
-    _check_common(path, real, rows, odd)
-    _check_range(path, real, rows, real.values, COUNTS, "counts", odd)
-    _check_range(path, real, rows, real.force_n[:, None], FORCES_N, "N", odd)
+    _check_common(path, real, rows, outliers)
+    _check_range(path, real, rows, real.values, COUNTS, "counts", outliers)
+    _check_range(path, real, rows, real.force_n[:, None], FORCES_N, "N", outliers)
     high = rows[(real.values[rows] > PAPERS_COUNTS).any(axis=1)]
     if len(high):
-        odd.keep(real.file, real.line[high[0]], path, f"readings above {PAPERS_COUNTS:g} counts, where the paper's figures end",
+        outliers.keep(real.file, real.line[high[0]], path,
+                      f"readings above {PAPERS_COUNTS:g} counts, where the paper's figures end",
                  count=len(high))
     for other in others:
         theirs = own[id(other)]
         if not _alike(other.force_n[theirs], real.force_n[rows]) or not _alike(other.values[theirs], real.values[rows]):
-            odd.leave_out(other.file, other.line[theirs[0]], path, f"other readings than in {real.file}")
+            outliers.leave_out(other.file, other.line[theirs[0]], path, f"other readings than in {real.file}")
 
 
 def _alike(ours, theirs):
@@ -88,34 +89,37 @@ def _alike(ours, theirs):
     return ours.shape == theirs.shape and np.allclose(ours, theirs, rtol=1e-3, atol=1e-2, equal_nan=True)
 
 
-def _check_maps(path, real, table, own, odd):
+def _check_maps(path, real, table, own, outliers):
     rows, readings = own[id(table)], len(own[id(real)])
-    _check_common(path, table, rows, odd)
-    _check_range(path, table, rows, table.values, (-LARGEST_DEFORMATION_MM, LARGEST_DEFORMATION_MM), "mm", odd)
+    _check_common(path, table, rows, outliers)
+    _check_range(path, table, rows, table.values, (-LARGEST_DEFORMATION_MM, LARGEST_DEFORMATION_MM), "mm", outliers)
     if len(rows) % MAP_ROWS:
-        odd.leave_out(table.file, table.line[rows[0]], path, f"{len(rows)} rows are no whole number of maps of {MAP_ROWS} rows")
+        outliers.leave_out(table.file, table.line[rows[0]], path,
+                           f"{len(rows)} rows are no whole number of maps of {MAP_ROWS} rows")
     elif len(rows) != readings * MAP_ROWS:
-        odd.leave_out(table.file, table.line[rows[0]], path, f"{len(rows) // MAP_ROWS} maps and {readings} readings in {real.file}")
+        outliers.leave_out(table.file, table.line[rows[0]], path,
+                           f"{len(rows) // MAP_ROWS} maps and {readings} readings in {real.file}")
 
 
-def _check_common(path, table, rows, odd):
+def _check_common(path, table, rows, outliers):
     """Numbers missing, too many fields, a test in several places."""
     bad = ~np.isfinite(table.values[rows])
     per_row = bad.any(axis=1)
     if per_row.any():
         line = table.line[rows[np.argmax(per_row)]]
         text = f"{table.texts[int(line)]!r} in place of a number" if int(line) in table.texts else "a value is missing or infinite"
-        odd.leave_out(table.file, line, path, text, count=bad.sum())
+        outliers.leave_out(table.file, line, path, text, count=bad.sum())
     surplus = rows[table.surplus[rows]]
     if len(surplus):
-        odd.leave_out(table.file, table.line[surplus[0]], path, "more fields than columns", count=len(surplus))
+        outliers.leave_out(table.file, table.line[surplus[0]], path, "more fields than columns", count=len(surplus))
     gaps = [k for k in np.flatnonzero(np.diff(rows) > 1) if (table.test[rows[k] + 1:rows[k + 1]] >= 0).any()]
     if gaps:
-        odd.keep(table.file, table.line[rows[gaps[0] + 1]], path, "the test goes on after rows of another; joined in their order",
+        outliers.keep(table.file, table.line[rows[gaps[0] + 1]], path,
+                      "the test goes on after rows of another; joined in their order",
                  count=len(gaps))
 
 
-def _check_range(path, table, rows, values, limits, unit, odd):
+def _check_range(path, table, rows, values, limits, unit, outliers):
     own = values[rows]
     outside = (own < limits[0]) | (own > limits[1])
     if unit == "N":
@@ -125,5 +129,5 @@ def _check_range(path, table, rows, values, limits, unit, odd):
         at = np.argmax(per_row)
         worst = own[at][outside[at]][0]
         raw = "; raw values of the converter?" if unit == "counts" and worst > limits[1] else ""
-        odd.leave_out(table.file, table.line[rows[at]], path,
+        outliers.leave_out(table.file, table.line[rows[at]], path,
                       f"{worst:g} {unit} is not within {limits[0]:g} to {limits[1]:g}{raw}", count=outside.sum())

@@ -50,9 +50,9 @@ class Table:
         return {path: order[start:end] for path, start, end in zip(self.paths, ends[:-1], ends[1:], strict=True)}
 
 
-def read_table(path, *, columns, force, odd):
+def read_table(path, *, columns, force, outliers):
     """The `Table` of a file with `columns` values a row, and a force column where `force`; oddities of the file go to `odd`."""
-    layout = read_layout(path, columns=columns, force=force, odd=odd)
+    layout = read_layout(path, columns=columns, force=force, outliers=outliers)
     codes, texts, pieces = {}, {}, []
     try:
         for piece in _pieces(path, layout):
@@ -63,11 +63,11 @@ def read_table(path, *, columns, force, odd):
         raise InputError(f"{path}: it holds a header and no row; fetch it again.")
     values, force_n, test, line, surplus = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
     if (test < 0).any():
-        odd.keep(path.name, line[test < 0][0], "", "the row names no test; it is not used", count=(test < 0).sum())
+        outliers.keep(path.name, line[test < 0][0], "", "the row names no test; it is not used", count=(test < 0).sum())
     return Table(path.name, values, force_n, test, line, list(codes), surplus, texts)
 
 
-def read_layout(path, *, columns, force, odd):
+def read_layout(path, *, columns, force, outliers):
     """The `Layout` that the first two lines tell; another number of columns than expected is refused."""
     with open(path, encoding="utf-8-sig", errors="replace") as lines:
         header, first = lines.readline().rstrip("\r\n"), lines.readline().rstrip("\r\n")
@@ -75,27 +75,27 @@ def read_layout(path, *, columns, force, odd):
     decimal = "," if separator != "," and "," in first else "."
     names = [name.strip().strip('"') for name in header.split(separator)]
     if (separator, decimal) != (",", "."):
-        odd.keep(path.name, 1, "", f"fields end with {separator!r} and decimals are written with {decimal!r}; read so")
+        outliers.keep(path.name, 1, "", f"fields end with {separator!r} and decimals are written with {decimal!r}; read so")
     found = [k for k, name in enumerate(names) if name.lower() == "path"]
     if len(found) != 1:
         raise InputError(f"{path}: {len(found)} columns are named 'Path' where one is needed (row 1 is {header[:60]!r}); "
                          "fetch it again.")
     numbers = [k for k in range(len(names)) if k != found[0] and not re.fullmatch(r"(Unnamed: \d+)?", names[k])]
     if len(numbers) < len(names) - 1:
-        odd.keep(path.name, 1, "", "a column without a name is passed over: row numbers of a former table")
+        outliers.keep(path.name, 1, "", "a column without a name is passed over: row numbers of a former table")
     wanted = columns + force
     if len(numbers) != wanted:
         raise InputError(f"{path}: row 1 names {len(numbers)} columns of numbers beside 'Path' where {wanted} are needed"
                          f"{' (force and the taxels)' if force else ''}; fetch it again.")
-    force_at = _force_column(path, names, numbers, odd) if force else None
+    force_at = _force_column(path, names, numbers, outliers) if force else None
     return Layout(separator, decimal, names, found[0], [k for k in numbers if k != force_at], force_at)
 
 
-def _force_column(path, names, numbers, odd):
+def _force_column(path, names, numbers, outliers):
     """Which column holds the force: the one of that name, else the first."""
     named = [k for k in numbers if "force" in names[k].lower()]
     if len(named) != 1:
-        odd.keep(path.name, 1, "", f"no column is named force; the first, {names[numbers[0]]!r}, is taken for it")
+        outliers.keep(path.name, 1, "", f"no column is named force; the first, {names[numbers[0]]!r}, is taken for it")
     return named[0] if len(named) == 1 else numbers[0]
 
 

@@ -1,11 +1,16 @@
 """The electrodes on the PCB: means over them, the field at their edges, what neighbours take from each other."""
 
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+if TYPE_CHECKING:
+    from softtact.sensors.specification import SensorSpec
 
-def taxel_means(spec, field, *, spacing_mm=0.0, shift_mm=(0.0, 0.0)):
+
+def taxel_means(spec: "SensorSpec", field: np.ndarray, *, spacing_mm: float = 0.0,
+                shift_mm: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
     """Means (..., rows, columns) over the electrodes of a field (..., y, x) on the deformation map's grid.
 
     Exact for the field's piecewise linear interpolant, which goes on unchanged beyond the map's edge.
@@ -15,7 +20,8 @@ def taxel_means(spec, field, *, spacing_mm=0.0, shift_mm=(0.0, 0.0)):
     return np.einsum("ry,...yx,cx->...rc", rows, field, columns, optimize=True)
 
 
-def electrode_weights(spec, *, spacing_mm=0.0, shift_mm=(0.0, 0.0)):
+def electrode_weights(spec: "SensorSpec", *, spacing_mm: float = 0.0,
+                      shift_mm: tuple[float, float] = (0.0, 0.0)) -> tuple[np.ndarray, np.ndarray]:
     """Weights (rows, y) and (columns, x) whose products give the means over electrodes; arguments as for `taxel_means`."""
     return (_averaging(tuple(spec.map_y_mm), spec.taxels.rows, spacing=spacing_mm, shift=shift_mm[1]),
             _averaging(tuple(spec.map_x_mm), spec.taxels.columns, spacing=spacing_mm, shift=shift_mm[0]))
@@ -42,12 +48,12 @@ def _averaging(grid, count, *, spacing=0.0, shift=0.0):
     return weights
 
 
-def electrode_sides(spec, *, spacing_mm=0.0):
+def electrode_sides(spec: "SensorSpec", *, spacing_mm: float = 0.0) -> tuple[float, float]:
     """Sides (x, y) of an electrode in mm."""
     return (spec.footprint_mm[0] / spec.taxels.columns - spacing_mm, spec.footprint_mm[1] / spec.taxels.rows - spacing_mm)
 
 
-def edge_excess(side_mm, gap_mm):
+def edge_excess(side_mm: float, gap_mm: np.ndarray) -> np.ndarray:
     """What the field at two opposite edges adds to a plate's capacitance, as a share of it; side and gap in mm, any shape.
 
     gap / (pi side) (1 + ln(2 pi side / gap)): a strip of two equal plates, side > gap; H. B. Palmer, Trans. AIEE 56 (1937) 363-366
@@ -55,7 +61,8 @@ def edge_excess(side_mm, gap_mm):
     return gap_mm / (np.pi * side_mm) * (1 + np.log(2 * np.pi * side_mm / gap_mm))
 
 
-def fringe_factor(spec, gap_mm, *, spacing_mm=0.0, outer=1.0, inner=0.0):
+def fringe_factor(spec: "SensorSpec", gap_mm: np.ndarray, *, spacing_mm: float = 0.0, outer: float = 1.0,
+                  inner: float = 0.0) -> np.ndarray:
     """Factors (..., rows, columns) of the taxels' capacitance for gaps (..., rows, columns) in mm.
 
     The two pairs of edges add up. Palmer multiplies them, which is 3 to 6 % above the field of square plates, the sum 1.5 %.
@@ -74,7 +81,7 @@ def _edge_share(count, outer, inner):
     return 0.5 * (low + high)
 
 
-def coupled(values, share):
+def coupled(values: np.ndarray, share: float) -> np.ndarray:
     """Values (..., rows, columns) after each pair of neighbours in a row or column exchanged `share` of their difference.
 
     Nothing is lost: the sum stays, a uniform map stays, and what i takes from j is what j takes from i.

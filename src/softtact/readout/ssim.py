@@ -10,22 +10,22 @@ import numpy as np
 from softtact.errors import InputError
 
 
-def map_ssim(predicted, measured, *, window, data_range):
+def map_ssim(predicted: np.ndarray, measured: np.ndarray, *, window: int, data_range: float) -> np.ndarray:
     """SSIM (n,) of predicted against measured tactile maps (n, row, column) in counts."""
     from skimage.metrics import structural_similarity
 
     check_maps(predicted, measured, window)
     return np.array([
         structural_similarity(a, b, win_size=window, data_range=data_range, gaussian_weights=False)
-        for a, b in zip(np.float64(predicted), np.float64(measured), strict=True)])
+        for a, b in zip(np.asarray(predicted, float), np.asarray(measured, float), strict=True)])
 
 
-def mean_absolute_counts(predicted, measured):
+def mean_absolute_counts(predicted: np.ndarray, measured: np.ndarray) -> np.ndarray:
     """Mean absolute difference (n,) of tactile maps (n, row, column) in counts."""
     return np.abs(np.float64(predicted) - np.float64(measured)).mean(axis=(1, 2))
 
 
-def leave_one_out_ssim(trials, *, window, data_range):
+def leave_one_out_ssim(trials: np.ndarray, *, window: int, data_range: float) -> np.ndarray:
     """SSIM (trial,) of each reading (trial, row, column) against the mean of the others.
 
     That is what a predictor could reach that knows the sensor perfectly but not the trial's noise.
@@ -35,14 +35,14 @@ def leave_one_out_ssim(trials, *, window, data_range):
     return map_ssim(others, trials, window=window, data_range=data_range)
 
 
-def check_maps(predicted, measured, window):
+def check_maps(predicted: np.ndarray, measured: np.ndarray, window: int) -> None:
     """Refuse maps of different shapes, and a window that does not fit on them."""
     if predicted.shape != measured.shape:
         raise InputError(f"SSIM: {predicted.shape} predicted and {measured.shape} measured values; give maps alike.")
     check_window(window, predicted.shape[1:])
 
 
-def check_window(window, taxels):
+def check_window(window: int, taxels: tuple[int, ...]) -> None:
     """Refuse a window that does not fit on (rows, columns) of taxels."""
     smallest = min(taxels)
     if window > smallest:

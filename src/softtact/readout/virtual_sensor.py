@@ -2,7 +2,7 @@
 
 Reference deformation, moved and scaled as trials differ -> lag over the history of force -> capacitance of each electrode with its
 edges and neighbours -> gain, zero and drift of each taxel -> the converter. One seed is one specimen; trials differ in placement,
-force, drift and noise. Each effect, its default's reason and its switch: docs/virtual_sensor.md.
+force, drift and noise. Each effect, its default's reason and its switch: docs/explanation/virtual_sensor.md.
 """
 
 import dataclasses
@@ -23,7 +23,7 @@ _MAY_BE_INFINITE = ("rate_n_per_s", "largest_counts")
 
 @dataclass(frozen=True)
 class VirtualSensorSettings:
-    """Sizes of the effects; 0, or no entry in a list, switches one off. Reasons: docs/virtual_sensor.md.
+    """Sizes of the effects; 0, or no entry in a list, switches one off. Reasons: docs/explanation/virtual_sensor.md.
 
     electrode_spacing_mm: between neighbours;  outer_fringe, inner_fringe: share of a free edge's field at the sensor's border, and
     between neighbours;  coupling: share of their difference that neighbours exchange;  sheet_scatter: standard deviation of the

@@ -121,8 +121,9 @@ def _archive_facts(settings, archive):
     items = archive["items"]
     return (f"Maps and readings are those of the published archive: {archive['tests_used']} of {archive['tests']} tests of "
             f"{len(items['indenters'])} indenters, {len(items['unseen'])} held-out ones (our choice: the paper does not name its "
-            f"own) and {len(items['grasps'])} objects; {archive['tests_left_out']} odd tests are left out (published/outliers.csv). "
-            f"{archive['sentence']} No object was pressed, so figures 2, 7 and 8 and our times are not here. "
+            f"own) and {len(items['grasps'])} objects; {archive['tests_left_out']} odd tests are left out "
+            f"(published/outliers.csv). {archive['sentence']} No object was pressed, so figures 2, 7 and 8 and our times "
+            "are not here. "
             f"Seed {settings['seed']}.")
 
 

@@ -6,7 +6,7 @@ from softtact.reporting.style import pyplot, save
 def plot_press(result, path):
     """Draw a `PressResult` to PNG or SVG: a column per force, the map in mm above, the ideal counts of the taxels below."""
     plt = pyplot()
-    forces = result.force_n
+    forces = result.normal_force_n
     half = [0.5 * (side[-1] - side[0]) for side in (result.x_mm, result.y_mm)]
     extent = (-half[0], half[0], -half[1], half[1])
     figure, axes = plt.subplots(2, len(forces), figsize=(1.2 + 2.3 * len(forces), 7.2), squeeze=False, layout="constrained")

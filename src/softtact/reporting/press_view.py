@@ -44,12 +44,12 @@ def read_view(path):
 
 def _read_map(path):
     data = read_dataset(path)
-    missing = [name for name in ("deformation_map_mm", "force_n", "x", "y") if name not in data.variables]
+    missing = [name for name in ("deformation_map_mm", "normal_force_n", "x", "y") if name not in data.variables]
     if missing:
         raise InputError(f"{path}: it holds no {missing[0]!r}, so it is no press; give the file of softtact press --out.")
-    if data["deformation_map_mm"].dims != ("force", "y", "x"):
-        raise InputError(f"{path}: the map has the dimensions {data['deformation_map_mm'].dims} and not force, y, x; press again.")
-    return of_map(data["deformation_map_mm"].values, data["x"].values, data["y"].values, data["force_n"].values,
+    if data["deformation_map_mm"].dims != ("step", "y", "x"):
+        raise InputError(f"{path}: the map has the dimensions {data['deformation_map_mm'].dims} and not step, y, x; press again.")
+    return of_map(data["deformation_map_mm"].values, data["x"].values, data["y"].values, data["normal_force_n"].values,
                   thickness_mm=float(data.attrs.get("thickness_mm", _SHEET_MM)))
 
 

@@ -1,7 +1,8 @@
 """The sensor as its YAML file describes it: sizes in mm, layers, frusta, taxels. No mechanics."""
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Generic, TypeVar
+from typing import Annotated, Any, Generic, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PositiveFloat, PositiveInt, ValidationError
@@ -15,11 +16,11 @@ ORIENTATIONS = ("default", "as_printed")
 T = TypeVar("T")
 
 
-def _at(path):
+def _at(path: Sequence[str | int]) -> str:
     return f", at {'.'.join(map(str, path))!r}" if path else ""
 
 
-def _plain_value(field):
+def _plain_value(field: Any) -> Any:
     """Accept `{value, assumed, reason}` wherever a plain value stands."""
     if isinstance(field, dict) and "value" in field:
         extra = set(field) - {"value", "assumed", "reason"}
@@ -43,13 +44,15 @@ class Stated(_Strict, Generic[T]):
     reason: str = ""
 
 
-def _or_stated(kind):
-    """A `kind` of value, which may stand as a `Stated` one in the file."""
-    return Annotated[kind, BeforeValidator(_plain_value, json_schema_input_type=kind | Stated[kind])]
+def _or_stated(kind: Any) -> BeforeValidator:
+    """What lets a `kind` of value stand as a `Stated` one in the file."""
+    return BeforeValidator(_plain_value, json_schema_input_type=kind | Stated[kind])
 
 
-Length = _or_stated(PositiveFloat)
-Coefficient = _or_stated(Annotated[float, Field(ge=0.0, allow_inf_nan=False)])
+_NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+Length = Annotated[PositiveFloat, _or_stated(PositiveFloat)]
+Coefficient = Annotated[_NotNegative, _or_stated(_NotNegative)]
+Flag = Annotated[bool, _or_stated(bool)]
 
 
 class Frusta(_Strict):
@@ -109,11 +112,11 @@ class SensorSpec(_Strict):
     taxels: Taxels
     dielectric: Dielectric
     cover: Cover
-    tips_bonded: _or_stated(bool) = True
+    tips_bonded: Flag = True
     friction: Friction = Friction()
     elastic_layer: ElasticLayer
 
-    def with_frustum_orientation(self, reading):
+    def with_frustum_orientation(self, reading: str) -> "SensorSpec":
         """The same sensor with the `default` reading of its frustum's diameters, the narrow end as tip, or `as_printed`."""
         narrow, wide = sorted((self.dielectric.frusta.tip_diameter_mm, self.dielectric.frusta.root_diameter_mm))
         tip, root = {"default": (narrow, wide), "as_printed": (wide, narrow)}[reading]
@@ -121,33 +124,33 @@ class SensorSpec(_Strict):
         return self.model_copy(update={"dielectric": self.dielectric.model_copy(update={"frusta": frusta})})
 
     @property
-    def thickness_mm(self):
+    def thickness_mm(self) -> float:
         """Height of the sensing surface over the PCB."""
         return self.dielectric_thickness_mm + self.cover.thickness_mm
 
     @property
-    def dielectric_thickness_mm(self):
+    def dielectric_thickness_mm(self) -> float:
         """Height of the electrode plane (top of the dielectric) over the PCB."""
         return self.dielectric.frusta.height_mm + self.dielectric.sheet_thickness_mm
 
     @property
-    def map_x_mm(self):
+    def map_x_mm(self) -> np.ndarray:
         """Columns of the deformation map, (33,) for the paper's sensor."""
         return np.linspace(-0.5, 0.5, self.map_shape[1]) * self.footprint_mm[0]
 
     @property
-    def map_y_mm(self):
+    def map_y_mm(self) -> np.ndarray:
         """Rows of the deformation map, (57,) for the paper's sensor."""
         return np.linspace(-0.5, 0.5, self.map_shape[0]) * self.footprint_mm[1]
 
     @property
-    def in_words(self):
+    def in_words(self) -> str:
         """Name, size and counts in one line."""
         sides, frusta = " x ".join(f"{side:g}" for side in self.footprint_mm), " x ".join(map(str, self.frusta_counts))
         return (f"{self.name}: {sides} mm, {frusta} frusta, {self.taxels.rows} x {self.taxels.columns} taxels, "
                 f"maps of {self.map_shape[0]} x {self.map_shape[1]} points")
 
-    def check_for(self, kind):
+    def check_for(self, kind: str) -> None:
         """Refuse a map or a lattice that a model of this kind (elastic, foundation, hyperelastic) cannot take by its quarters."""
         if kind in ("elastic", "foundation") and not all(count % 2 for count in self.map_shape):
             raise InputError(f"{self.name}, at 'map_shape': {list(self.map_shape)} has no middle row and column, which the fast "
@@ -157,13 +160,13 @@ class SensorSpec(_Strict):
                              "the middle; the foundation model wants even numbers; change the pitch or the footprint a little.")
 
     @property
-    def frusta_counts(self):
+    def frusta_counts(self) -> tuple[int, ...]:
         """How many frusta fit along x and y."""
         pitch = self.dielectric.frusta.pitch_mm
         return tuple(int(np.floor(side / pitch + 1e-9)) for side in self.footprint_mm)
 
     @classmethod
-    def from_dict(cls, values, *, where="sensor"):
+    def from_dict(cls, values: dict[str, Any], *, where: str = "sensor") -> "SensorSpec":
         """Validate a mapping; the first fault becomes one sentence that names `where` and the field."""
         try:
             spec = cls.model_validate(values)
@@ -181,15 +184,15 @@ class SensorSpec(_Strict):
             raise InputError(f"{where}: no frustum of pitch {spec.dielectric.frusta.pitch_mm} mm fits on the footprint "
                              f"{spec.footprint_mm} mm; enlarge the footprint or reduce the pitch.")
         if spec.tips_bonded and spec.friction.board > 0:
-            raise InputError(f"{where}: tips that are held cannot slide with a friction of {spec.friction.board:g} on the board; "
+            raise InputError(f"{where}: bonded tips cannot slide with a friction of {spec.friction.board:g} on the board; "
                              "set 'tips_bonded' to false, or 'friction.board' to 0.")
         return spec
 
     @classmethod
-    def from_yaml(cls, path):
+    def from_yaml(cls, path: str | Path) -> "SensorSpec":
         """Read a sensor file."""
         path = Path(path)
         values = read_yaml(path, missing="there is no such sensor file.")
         if not isinstance(values, dict):
-            raise InputError(f"{path}: a sensor file must hold keys and values; see config/sensors/coro.yaml.")
+            raise InputError(f"{path}: a sensor file must hold keys and values; see docs/how-to/bring_your_sensor.md.")
         return cls.from_dict(values, where=str(path))

@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 from softtact.errors import InputError, SofttactError
+from softtact.extras import missing_extra
 
 
 def main(arguments=None):
@@ -18,9 +19,18 @@ def main(arguments=None):
     try:
         run_stage(options)
     except SofttactError as error:
-        print(f"softtact {options.stage}: {error}", file=sys.stderr)
-        return 1
+        return _said(options, error)
+    except ModuleNotFoundError as error:
+        sentence = missing_extra(error)
+        if sentence is None:
+            raise
+        return _said(options, sentence)
     return 0
+
+
+def _said(options, sentence):
+    print(f"softtact {options.stage}: {sentence}", file=sys.stderr)
+    return 1
 
 
 def add_arguments(parser):

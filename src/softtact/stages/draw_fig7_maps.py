@@ -26,7 +26,7 @@ def _object(name, mesh, chosen, presses, predictions):
     models = [str(model) for model in predictions.model.values]
     first = presses[name, models[0]]
     last = predictions.sel(item=name).isel(force=-1)
-    return {"name": name, "mesh": mesh, "chosen": chosen, "force": float(first.force_n.values[-1]),
+    return {"name": name, "mesh": mesh, "chosen": chosen, "force": float(first.normal_force_n.values[-1]),
             "deformation": {model: presses[name, model].deformation_map_mm.values[-1] for model in models},
             "tactile": {model: last.tactile_map.sel(model=model).values for model in models},
             "sensor": last.sensor_map.values,

@@ -1,8 +1,8 @@
 """The published archive as press files and readings, with what was found in it.
 
 inputs: files (CSV, for the workflow's sake; `settings.folder` is what is read)
-outputs: presses, tactile (folders), item_list (JSON), inventory (JSON), counts, odd (CSV)
-settings: folder, variant, models, unseen, without, taxel_order, odd, largest_odd_share, sensor, seed
+outputs: presses, tactile (folders), item_list (JSON), inventory (JSON), counts, outliers (CSV)
+settings: folder, variant, models, unseen, without, taxel_order, outliers, largest_outlier_share, sensor, seed
 """
 
 import shutil
@@ -33,13 +33,13 @@ def run(*, inputs, outputs, settings, threads=1):
     sensor = SensorSpec.from_dict(settings["sensor"])
     check_sensor(sensor)
     tables = read_archive(find_archive(settings["folder"], models=settings["models"], variant=settings["variant"]))
-    tell(tables.odd)
+    tell(tables.outliers)
     tests = sum(map(len, tables.paths().values()))
-    tables.odd.refuse(tests, odd=settings["odd"], largest_share=settings["largest_odd_share"])
+    tables.outliers.refuse(tests, outliers=settings["outliers"], largest_share=settings["largest_outlier_share"])
     items = items_of(tables, unseen=settings["unseen"], without=settings["without"])
     facts = inventory(tables, items, tests=tests, sensor=sensor, settings=settings)
     write_items(outputs, tables, items, sensor=sensor, settings=settings, signs=facts["sign"])
-    write_csv(outputs["odd"], tables.odd.table())
+    write_csv(outputs["outliers"], tables.outliers.table())
     write_csv(outputs["counts"], counts_table(found_counts(tables, items)))
     write_json(outputs["item_list"], [{"set": name, "item": item} for name, item in items])
     write_json(outputs["inventory"], facts)
@@ -53,12 +53,12 @@ def check_sensor(sensor):
                          f"{TAXELS} taxels and maps of {MAP_ROWS} x {MAP_COLUMNS}: use the sensor 'coro'.")
 
 
-def tell(odd):
+def tell(outliers):
     """What is odd, on the screen and in the log."""
-    for finding in odd.findings[:TOLD]:
+    for finding in outliers.findings[:TOLD]:
         announce(f"{finding} ({finding.done})")
-    if len(odd.findings) > TOLD:
-        announce(f"and {len(odd.findings) - TOLD} more oddities")
+    if len(outliers.findings) > TOLD:
+        announce(f"and {len(outliers.findings) - TOLD} more outliers")
 
 
 def inventory(tables, items, *, tests, sensor, settings):
@@ -72,7 +72,7 @@ def inventory(tables, items, *, tests, sensor, settings):
         announce(f"the taxels' order is set to {chosen!r}, and readings follow the maps better as {best!r} (correlation "
                  f"{matches[best]:.2f} over {matches[chosen]:.2f}); consider 'data.taxel_order: {best}'")
     return {"files": files_table(tables), "found": found, "sentence": sentence, "tests": tests,
-            "tests_used": sum(map(len, items.values())), "tests_left_out": len(tables.odd.left_out()),
+            "tests_used": sum(map(len, items.values())), "tests_left_out": len(tables.outliers.left_out()),
             "items": {name: sorted(item for of_set, item in items if of_set == name) for name in ("indenters", "unseen", "grasps")},
             "sign": {model: sign_towards_pcb(tables, model) for model in tables.simulated},
             "taxel_order": {"read_as": chosen, "best": best, "correlation": matches}}

@@ -12,6 +12,7 @@ def run(*, inputs, outputs, settings, threads=1):
     """Press, and write the body at the force."""
     result = press_item(inputs, settings, threads=threads, keep_body=True)
     result.write_vtu(outputs["body"])
-    names = ("force_n", "indentation_mm", "contact_area_mm2", "frustum_compression_mm", "penetration_mm", "residual_n")
+    names = ("normal_force_n", "indentation_mm", "contact_area_mm2", "frustum_compression_mm", "penetration_mm", "residual_n")
     summary = {name: float(getattr(result, name)[-1]) for name in names}
+    summary["force_n"] = summary.pop("normal_force_n")
     write_json(outputs["summary"], summary | {"item": settings["item"]["name"], "model": settings["model"]})

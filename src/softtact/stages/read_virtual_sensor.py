@@ -14,12 +14,13 @@ def run(*, inputs, outputs, settings, threads=1):
     """Read `trials` presses and write their counts on the way up, and on the way down."""
     press = read_dataset(inputs["press"])
     item = f"{press.attrs['set']}/{press.attrs['item']}"
-    counts = read_branches(SensorSpec.from_dict(settings["sensor"]), press.deformation_map_mm.values, force_n=press.force_n.values,
+    counts = read_branches(SensorSpec.from_dict(settings["sensor"]), press.deformation_map_mm.values,
+                           force_n=press.normal_force_n.values,
                            trials=settings["trials"], seed=settings["seed"], item=item,
                            settings=VirtualSensorSettings.from_dict(settings["virtual_sensor"]))
     axes = ("trial", "force", "row", "column")
     data = xarray.Dataset({"tactile_map": (axes, counts.loading, {"units": "counts"}),
                            "unloading_tactile_map": (axes, counts.unloading, {"units": "counts"}),
-                           "force_n": ("force", press.force_n.values, {"units": "N"})},
+                           "force_n": ("force", press.normal_force_n.values, {"units": "N"})},
                           attrs={"source": "virtual sensor", "set": press.attrs["set"], "item": press.attrs["item"]})
     write_dataset(outputs["tactile"], data, seed=settings["seed"], settings=settings)

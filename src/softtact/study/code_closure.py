@@ -36,11 +36,17 @@ def _imported_files(path, source):
 def _imports(text, *, module_level):
     """The import statements of a source text. Parsed once, since the closures of a workflow's rules have most files in common.
 
-    A package's own functions import late and for its users only; its module level is what everyone runs.
+    A package's own functions import late and for its users only; its module level is what everyone runs. What stands under
+    `if TYPE_CHECKING:` is never run.
     """
     tree = ast.parse(text)
-    nodes = tree.body if module_level else ast.walk(tree)
-    return [node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom)]
+    nodes = tree.body if module_level else list(ast.walk(tree))
+    unrun = {id(below) for node in nodes if _for_types_only(node) for child in node.body for below in ast.walk(child)}
+    return [node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom) and id(node) not in unrun]
+
+
+def _for_types_only(node):
+    return isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
 
 
 def _file_of_name(package, name, source):

@@ -1,10 +1,12 @@
 """A study's configuration, checked before any work starts.
 
 `load_study` is the one way in. It also reads the files that the configuration names (sensor, materials, objects), so
-that rules hand their stages plain values, and a comment in a YAML file reruns nothing.
+that rules hand their stages plain values, and a comment in a YAML file reruns nothing. A sensor or a material is found by its name
+(`softtact.sensors.library`); a file below config/ that the working folder does not have is the one that ships with the package.
 """
 
 from dataclasses import asdict, dataclass
+from importlib import resources
 from itertools import groupby
 from pathlib import Path
 
@@ -16,12 +18,13 @@ from softtact.published.archive import SOURCE as PUBLISHED
 from softtact.published.archive import Archive, find_archive
 from softtact.readout.ssim import check_window
 from softtact.readout.virtual_sensor import VirtualSensorSettings, make_specimen
+from softtact.sensors.library import is_shipped, material_file, sensor_file
 from softtact.sensors.specification import SensorSpec
-from softtact.study.faults import existing, refuse_unknown, validated
+from softtact.study.faults import refuse_unknown, validated
 from softtact.study.keys import CENTRED, Values
 from softtact.study.objects import Item, check_shapes, items_of_set, make_item, read_catalogue
 
-PROJECT = Path(__file__).resolve().parents[3]
+SHIPPED = Path(str(resources.files("softtact.study"))) / "data"     # what stands in the project's config/
 SETS = ("indenters", "unseen", "grasps")
 TOGETHER = 50     # presses of a fast model in one job at most: a minute's work, and a command line within the system's limit
 
@@ -102,8 +105,17 @@ class Study:
 
 def read_values(configfile=None, *, default="config/config.yaml"):
     """The configuration mapping of a file over the default one, merged as Snakemake does it."""
-    values = _read_yaml(Path(default))
-    return values if configfile is None else _merged(values, _read_yaml(Path(configfile)))
+    values = _read_yaml(here_or_shipped(default))
+    return values if configfile is None else _merged(values, _read_yaml(here_or_shipped(configfile)))
+
+
+def here_or_shipped(path):
+    """A file as it is named or, where the working folder has no such file below config/, the one that ships with the package."""
+    path = Path(path)
+    if path.exists() or path.parts[:1] != ("config",):
+        return path
+    shipped = SHIPPED.joinpath(*path.parts[1:])
+    return shipped if shipped.exists() else path
 
 
 def _merged(base, over):
@@ -119,48 +131,43 @@ def _read_yaml(path):
     return values
 
 
-def sensor_file(name, *, folder=None):
-    """The YAML file of a sensor, given by its path or by its name in `folder`/sensors.
-
-    folder: by default config/ where the command runs, else the project's own
-    """
-    if Path(name).suffix in (".yaml", ".yml"):
-        return Path(name)
-    here = Path("config")
-    folder = folder or (here if (here / "sensors").is_dir() else PROJECT / "config")
-    return existing(Path(folder, "sensors"), name, kind="sensor")
-
-
-def load_study(values, *, folder="config"):
-    """The `Study` of a configuration mapping; the first fault becomes an `InputError` of one sentence.
-
-    folder: where sensors/ and materials/ lie
-    """
+def load_study(values):
+    """The `Study` of a configuration mapping; the first fault becomes an `InputError` of one sentence."""
     checked = validated(Values, values, where="the configuration")
-    spec = SensorSpec.from_yaml(sensor_file(checked.sensor, folder=folder))
+    spec = SensorSpec.from_yaml(_named("sensor", sensor_file, checked.sensor))
     _check_forces(checked, spec)
-    materials = _materials(checked, spec, Path(folder, "materials"))
+    materials = _materials(checked, spec)
     _check_models(checked, spec)
     _check_sensor(checked, spec)
     checked = _with_range(checked, spec)
     make_specimen(spec, seed=checked.seed, settings=VirtualSensorSettings.from_dict(checked.virtual_sensor))
-    catalogue = read_catalogue(Path(checked.objects.catalogue))
+    catalogue = read_catalogue(here_or_shipped(checked.objects.catalogue))
     items_of = {name: items_of_set(name, getattr(checked.objects, name), catalogue, spec=spec, seed=checked.seed) for name in SETS}
     check_shapes(items_of)
     study = Study(checked, spec, materials, items_of, _section_item(checked, catalogue), _archive(checked))
-    _say_outside_paths(study, folder)
+    _say_outside_paths(study)
     return study
 
 
-def _say_outside_paths(study, folder):
+def _named(key, find, name):
+    """The file of a name in the configuration, as `find` of the library gives it; a refusal says where the name stands."""
+    try:
+        return find(name)
+    except InputError as error:
+        raise InputError(f"the configuration, at {key!r}: {str(error)[0].lower()}{str(error)[1:]}") from None
+
+
+def _say_outside_paths(study):
     """Say on stderr which files of the configuration lie outside the folder that the study runs in."""
     values = study.values
     named = [("objects.catalogue", values.objects.catalogue), *((f"object {item.object}", item.file) for item in study.items()),
              *((f"material {name}", path) for name, config in study.materials.items() for path in config.measured_files),
-             ("ftir.measured", values.ftir.measured), ("sensor", sensor_file(values.sensor, folder=folder)),
+             ("ftir.measured", values.ftir.measured), ("sensor", sensor_file(values.sensor)),
              ("data.folder", values.data.folder if values.data.source == "published" else None)]
     for what, path in dict.fromkeys(named):
-        if path is not None and not Path(path).resolve().is_relative_to(Path.cwd().resolve()):
+        if path is None or is_shipped(path) or Path(path).is_relative_to(SHIPPED):
+            continue
+        if not Path(path).resolve().is_relative_to(Path.cwd().resolve()):
             announce(f"the configuration, at {what!r}: {path} lies outside this project, {Path.cwd()}; it is read from there.")
 
 
@@ -186,13 +193,13 @@ def _check_forces(values, spec):
                              f"{low:g} and up to {high:g} N; leave it out or change the sensor's force_range_n.")
 
 
-def _materials(values, spec, folder):
+def _materials(values, spec):
     """{name: MaterialConfig} of the listed materials, among which the sensor's own must be."""
     for layer in (spec.dielectric, spec.cover):
         if layer.material not in values.materials:
             raise InputError(f"the configuration, at 'materials': sensor {spec.name} is made of {layer.material!r}, "
                              "which is not in the list; add it.")
-    return {name: load_material(existing(folder, name, kind="material")) for name in values.materials}
+    return {name: load_material(_named("materials", material_file, name)) for name in values.materials}
 
 
 def _check_models(values, spec):

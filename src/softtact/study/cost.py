@@ -14,7 +14,7 @@ from statistics import mean
 
 from softtact.errors import InputError
 from softtact.files import read_yaml
-from softtact.study.config import PROJECT, SETS
+from softtact.study.config import SETS, here_or_shipped
 
 BYTES = 4          # of a number in a data set; twice that in a press
 READING_NUMBERS = 2          # branches of a reading: the way up and the way down
@@ -40,10 +40,8 @@ class Cost:
 
 
 def read_costs(path=None):
-    """The measured times of `config/costs.yaml`, of the folder that the command runs in or the project's own."""
-    here = Path("config/costs.yaml")
-    path = Path(path or (here if here.is_file() else PROJECT / here))
-    return read_yaml(path, missing="there is no file of measured times; restore it from the repository.")
+    """The measured times of `config/costs.yaml`, of the folder that the command runs in or as they ship."""
+    return read_yaml(here_or_shipped(path or "config/costs.yaml"), missing="there is no file of measured times; correct the path.")
 
 
 def study_costs(study, measured, *, results="results"):

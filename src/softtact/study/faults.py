@@ -27,12 +27,6 @@ def _fault_sentence(model, fault, *, where):
     return _sentence(f"{where}, at {at!r}{given}: {fault['msg'].removeprefix('Value error, ')}")
 
 
-def existing(folder, name, *, kind):
-    """The YAML file of `name` in a folder; an unknown name is refused with the nearest right one."""
-    refuse_unknown(name, sorted(path.stem for path in folder.glob("*.yaml")), kind=kind, where=str(folder))
-    return folder / f"{name}.yaml"
-
-
 def refuse_unknown(name, known, *, kind, where):
     """Raise an `InputError` that tells the nearest right name if `name` is not among the `known` ones."""
     if name not in known:

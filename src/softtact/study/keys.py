@@ -174,7 +174,7 @@ class Mesh(Section):
     """Resolution of a model's mesh, and the scatter of its frusta; what is not said is the model's own default."""
 
     preset: Literal["default", "draft", "stable", "fine"] | None = Field(
-        None, description="the mesh, and what counts as solved on it, that the other keys change (docs/discretisation.md)")
+        None, description="mesh and tolerances, which the other keys change (docs/explanation/discretisation.md)")
     sheet_layers: PositiveInt | None = None
     cover_heights: Annotated[list[float], AfterValidator(_rising)] | None = Field(
         None, description="heights of the cover's layers of elements, from 0 to 1")
@@ -234,13 +234,13 @@ class Data(Section):
     """Where maps and readings come from: presses and the virtual sensor, or the archive that the paper's authors published."""
 
     source: Literal["generated", "published"] = "generated"
-    folder: str = Field("dataset", description="of the archive's CSV files (docs/published_archive.md)")
+    folder: str = Field("dataset", description="of the archive's CSV files (docs/how-to/published_archive.md)")
     variant: str | None = Field(None, description="ending of the files to read, V1 say, where there are several of a kind")
     unseen: list[Name] = Field([], description="the archive's indenters that training never sees, donut_m for its DonutM")
     without: list[str] = Field([], description="tests, by their Path, and objects, by their item's name, that are not used")
     taxel_order: Arrangement = Field("rows", description="of tax1 to tax28 under the map; the import says which one fits best")
-    odd: Literal["leave_out", "refuse"] = Field("leave_out", description="tests that are odd")
-    largest_odd_share: Annotated[float, Field(ge=0.0, le=1.0)] = Field(0.1, description="of tests that may be left out")
+    outliers: Literal["leave_out", "refuse"] = Field("leave_out", description="tests that are odd")
+    largest_outlier_share: Annotated[float, Field(ge=0.0, le=1.0)] = Field(0.1, description="of tests that may be left out")
 
     @model_validator(mode="after")
     def _has_unseen_indenters(self):

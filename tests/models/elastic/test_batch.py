@@ -1,16 +1,12 @@
 """The elastic surface on a torch device: what it does to forces at all nodes is what the compliance's own matrix does."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import torch
+from support.sensors import CORO
 
 from softtact.models.elastic.batch import DeviceSurface
 from softtact.models.elastic.compliance import elastic_compliance
-from softtact.sensors.specification import SensorSpec
-
-CORO = SensorSpec.from_yaml(Path(__file__).parents[3] / "config/sensors/coro.yaml")
 
 
 @pytest.fixture(scope="module", params=[(13, 13), (9, 17)])

@@ -1,10 +1,9 @@
 """The elastic model on a small sensor: the press of its quarters against the whole layer; tests/verification has Hertz."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import trimesh
+from support.sensors import CORO
 from whole_layer import WholeLayer
 
 from softtact.contact.height_field import HeightField
@@ -15,9 +14,7 @@ from softtact.geometry.pose import Pose
 from softtact.models.elastic.compliance import Compliance, elastic_compliance, map_cells, press_layer
 from softtact.press.cache import cached_compliance
 from softtact.press.sensor import Sensor
-from softtact.sensors.specification import SensorSpec
 
-CORO = SensorSpec.from_yaml(Path(__file__).parents[3] / "config/sensors/coro.yaml")
 SMALL = CORO.model_copy(update={"footprint_mm": (9.6, 9.6), "map_shape": (13, 13)})      # elements of 0.8 mm
 FORCES = np.array([0.5, 3.0])
 OBJECTS = {
@@ -107,8 +104,8 @@ def test_the_bedding_is_the_confined_modulus_over_the_thickness(compliance):
 
 def test_the_sensors_press_is_the_layers(compliance):
     mesh, values = OBJECTS["punch off the nodes"]
-    result = Sensor(SMALL, {}, prepared_models={"elastic": compliance}).press(mesh, pose=Pose.from_values((*values[:2], 1.5, 0, 0, 0)),
-                                                                    force_n=list(FORCES), model="elastic")
+    sensor, pose = Sensor(SMALL, {}, prepared_models={"elastic": compliance}), Pose.from_values((*values[:2], 1.5, 0, 0, 0))
+    result = sensor.press(mesh, pose=pose, force_n=list(FORCES), model="elastic")
     nodes = Underside(HeightField(placed("punch off the nodes")), compliance.grid).nodes(SMALL.thickness_mm)
     expected = press_layer(compliance, nodes, FORCES)
     # the sensor asks for points as deep as the object may come; those left out never touch

@@ -1,10 +1,9 @@
 """Nodes beside an edge, neither held nor free: an edge counts where it is, wherever it lies between the nodes."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import trimesh
+from support.sensors import CORO
 
 from softtact.contact.height_field import HeightField
 from softtact.contact.underside import Underside
@@ -14,9 +13,7 @@ from softtact.models.foundation.compliance import foundation_compliance
 from softtact.models.foundation.frustum_spring import frustum_law
 from softtact.models.foundation.partial_contact import SoftEdges, beyond, own_compliance
 from softtact.models.foundation.solve import FoundationMaps, FoundationSettings, press_foundation
-from softtact.sensors.specification import SensorSpec
 
-CORO = SensorSpec.from_yaml(Path(__file__).parents[3] / "config/sensors/coro.yaml")
 SMALL = CORO.model_copy(update={"footprint_mm": (7.2, 7.2), "map_shape": (13, 13)})      # 6 x 6 frusta, nodes 0.3 mm apart
 LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492),
         "cover": make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)}

@@ -1,10 +1,10 @@
 """The dielectric between a plate and glass: how its contact area grows, and how its frusta share the force."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from support.sensors import CORO
 
 from softtact.contact.height_field import HeightField
 from softtact.errors import ConvergenceError
@@ -13,10 +13,8 @@ from softtact.models.ftir.specimen import Specimen, cell_family, press_specimen,
 from softtact.models.ftir.unit_cell import GLASS_MESH, SETTINGS, contact_area, plate_over, press_cell_on_glass
 from softtact.models.hyperelastic.build import build_patch, build_unit_cell
 from softtact.models.hyperelastic.frusta import SHEET
-from softtact.models.hyperelastic.newton import press_load_steps
-from softtact.sensors.specification import SensorSpec
+from softtact.models.hyperelastic.path import press_load_steps
 
-CORO = SensorSpec.from_yaml(Path(__file__).parents[3] / "config/sensors/coro.yaml")
 LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492)
 COARSE = replace(GLASS_MESH, frustum_heights=(0.0, 0.1, 0.2, 0.35, 1.0), frustum_rings=1)
 TIP_MM2 = np.pi * 0.3**2

@@ -1,17 +1,14 @@
 """The hyperelastic press feels a punch's edge where it is, wherever it crosses an element of the cover."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import trimesh
+from support.sensors import CORO
 
 from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.press.sensor import Sensor
-from softtact.sensors.specification import SensorSpec
 
-CORO = SensorSpec.from_yaml(Path(__file__).parents[3] / "config/sensors/coro.yaml")
 SMALL = CORO.model_copy(update={"footprint_mm": (4.8, 4.8), "map_shape": (17, 17)})      # 4 x 4 frusta
 LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492),
         "cover": make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)}

@@ -1,16 +1,13 @@
 """Contacts of the frusta at rest, for both readings of the printed diameters."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from support.sensors import CORO
 
 from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic.build import build_patch, build_unit_cell
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
-from softtact.sensors.specification import SensorSpec
 
-CORO = SensorSpec.from_yaml(Path(__file__).parents[3] / "config/sensors/coro.yaml")
 LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040})
 
 

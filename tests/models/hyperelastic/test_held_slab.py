@@ -1,19 +1,17 @@
 """What keeps elements of sheet and cover from giving way: all of them have it, it is felt late, and its slopes are right."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from support.sensors import CORO
 
 from softtact.fem.elements import HEX27, WEDGE18
 from softtact.fem.solid_block import HexBlock, WedgeBlock
 from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic.build import build_patch, build_sensor_body, build_unit_cell
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
-from softtact.sensors.specification import SensorSpec
 
-CORO = SensorSpec.from_yaml(Path(__file__).parents[3] / "config/sensors/coro.yaml")
 SMALL = CORO.model_copy(update={"footprint_mm": (6.0, 6.0), "map_shape": (11, 11)})     # 5 x 5 frusta
 DIELECTRIC = make_law("mooney_rivlin", {"c10": 0.17, "c01": 0.004}, bulk_modulus=7.0)
 COVER = make_law("neo_hooke", {"c10": 0.2}, bulk_modulus=8.0)

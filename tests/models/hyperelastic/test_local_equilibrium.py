@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 from support import six_frusta
-from support.six_frusta import CORO, LAW
+from support.sensors import CORO
+from support.six_frusta import LAW
 
 from softtact.linalg.workers import Workers
 from softtact.models.hyperelastic.body import LayeredBody

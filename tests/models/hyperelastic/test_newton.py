@@ -1,10 +1,9 @@
 """The hyperelastic press on a small sensor: first touch, refusal, mesh file; tests/verification has the rest."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import trimesh
+from support.sensors import CORO
 
 from softtact.contact.height_field import HeightField
 from softtact.errors import ConvergenceError
@@ -13,12 +12,12 @@ from softtact.geometry.pose import Pose
 from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic.build import build_sensor_body
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
-from softtact.models.hyperelastic.newton import NewtonSettings, press_load_steps
+from softtact.models.hyperelastic.newton import NewtonSettings
+from softtact.models.hyperelastic.path import press_load_steps
 from softtact.models.meshes import layered_mesh
 from softtact.press.sensor import Sensor
 from softtact.sensors.specification import SensorSpec
 
-CORO = SensorSpec.from_yaml(Path(__file__).parents[3] / "config/sensors/coro.yaml")
 SMALL = CORO.model_copy(update={"footprint_mm": (6.0, 8.4), "map_shape": (15, 11)})   # 5 x 7 frusta
 LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492),
         "cover": make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)}
@@ -90,7 +89,7 @@ def test_a_tip_deeper_than_the_sensor_is_thick_is_no_load_step_and_the_load_step
     monkeypatch.setattr(SensorSpec, "thickness_mm", tip.mean())
     with pytest.raises(ConvergenceError, match=rf"0\.02 N was not reached.* {tip[1]:.3g} mm deep") as caught:
         press_small(SPIKE, [0.01, 0.02], pose=BETWEEN_POINTS)
-    np.testing.assert_array_equal(caught.value.result.force_n, [0.01])
+    np.testing.assert_array_equal(caught.value.result.normal_force_n, [0.01])
 
 
 def test_a_cone_whose_tip_is_between_the_contact_points_goes_deeper_with_more_force():

@@ -16,7 +16,8 @@ from softtact.linalg.nodal_frames import NodeFrames
 from softtact.linalg.workers import Workers
 from softtact.models.hyperelastic import linearised_contact, preconditioner
 from softtact.models.hyperelastic.linearised_contact import StepContact
-from softtact.models.hyperelastic.newton import NewtonSettings, press_load_steps
+from softtact.models.hyperelastic.newton import NewtonSettings
+from softtact.models.hyperelastic.path import press_load_steps
 from softtact.models.hyperelastic.preconditioner import ContactFactor, DissectedContact
 
 WIDTH, LENGTH = 14, 9
@@ -43,7 +44,7 @@ class Pressed:
         share = rng.uniform(0.2, 0.8, size) * (rng.random(size) < 0.1)
         rows = sp.csr_matrix(np.eye(len(share)) + share) @ frames.movements(UNKNOWNS).T
         self.points = SimpleNamespace(rows=rows.tocsr(), indentation_increment=-rng.uniform(0.7, 1.0, len(share)))
-        self.friction_response = (0.05 * rng.normal(size=UNKNOWNS), 40.0) if friction else (0.0, 0.0)
+        self.friction_border = (0.05 * rng.normal(size=UNKNOWNS), 40.0) if friction else (0.0, 0.0)
         self.slopes = [rng.choice([0.0, 30.0, 300.0], len(share)) for _ in range(3)]
         self.free = True
 
@@ -91,7 +92,7 @@ def test_what_the_dissected_factor_solves_is_the_matrix_with_the_contact_and_its
     _, left = problem.factors(workers)
     assert left.renew(problem, slope)
     rows, indentation_increment = problem.points.rows.toarray(), problem.points.indentation_increment
-    border, corner = problem.friction_response
+    border, corner = problem.friction_border
     rubber = problem.rubber.toarray()
     matrix = rubber + np.triu(rubber, 1).T + rows.T @ (slope[:, None] * rows)
     column = rows.T @ (slope * indentation_increment) + border

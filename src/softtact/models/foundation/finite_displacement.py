@@ -14,7 +14,8 @@ Edges: the top moves sideways, and the object's edges meet other points of it (`
 meets another height.
 
 Left out: what the slab's own strain adds at second order, that pieces of it turn otherwise than its mean slope, pressures that
-differ over the height, friction. What each of these effects is worth stands in docs/fast_models.md.
+differ over the height, friction. Their effects:
+docs/notebook/2026-11-23-foundation-model.md.
 """
 
 from dataclasses import astuple, dataclass

@@ -26,7 +26,8 @@ from softtact.files import read_arrays
 from softtact.models.foundation.single_frustum import SingleFrustum
 from softtact.models.hyperelastic.build import build_unit_cell
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
-from softtact.models.hyperelastic.newton import NewtonSettings, press_load_steps
+from softtact.models.hyperelastic.newton import NewtonSettings
+from softtact.models.hyperelastic.path import press_load_steps
 
 _FIRST_N, _LEVELS_A_DECADE = 2e-3, 9
 _MORTAR_POINTS = 10      # along a side of a root's face: so dense that elements of a tenth of a pitch do not feel them singly

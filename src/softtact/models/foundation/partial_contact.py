@@ -5,7 +5,8 @@ would hold it, the contact's energy lies between by that share, which is that of
 spring of 1/r - 1 times the node's own compliance among the held ones stands for an edge there (a cut cell, in other methods).
 On a rounded edge contact ends where the surface, falling away with the root of the distance, meets it: the height up to which it
 counts as flat is a share of the depth. Two numbers are not derived: where a held middle of an element puts the edge, taken from
-finer grids of the same model; and that share, chosen by the sixteen presses of docs/fast_models.md.
+finer grids of the same model; and that share, chosen by the sixteen presses of
+docs/notebook/2026-11-23-foundation-model.md.
 """
 
 import numpy as np

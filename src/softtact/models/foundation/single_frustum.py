@@ -2,9 +2,11 @@
 
 import numpy as np
 
+from softtact.models.newton import solve
+
 _STEP_MM = 0.01        # largest movement of the root at once
 _TOLERANCE_N = 1e-7    # of the forces inside, against some 1e-2 N on the root
-_ITERATIONS, _HALVINGS = 40, 8
+_ITERATIONS = 40
 
 
 class SingleFrustum:
@@ -44,24 +46,37 @@ class SingleFrustum:
     def _settled(self, displacement):
         """Displacements (1, nodes, 3) in balance, the root's kept; None if there are none."""
         state = self.support.evaluate(displacement)
-        for _ in range(_ITERATIONS):
-            if state is None:
-                return None
-            if self._residual(state) <= _TOLERANCE_N:
-                return state.displacement
-            state = self._searched(state, self._newton_step(state, np.zeros((1, 3 * len(self._x)))))
-        return None
+        found = None if state is None else solve(self, state, max_iterations=_ITERATIONS).state
+        return None if found is None else found.displacement
 
-    def _searched(self, state, step):
-        """The state after the first of the step's shares 1, 1/2, 1/4 ... that lowers the energy or the residual."""
-        for k in range(_HALVINGS):
-            trial = self.support.evaluate(state.displacement + 0.5**k * step)
-            if trial is not None and (trial.energy < state.energy or self._residual(trial) < self._residual(state)):
-                return trial
-        return None
+    # The frustum with its root held, as a `Problem` of Newton's method.
 
-    def _residual(self, state):
+    def prepared(self, state, iteration):
+        return state
+
+    def residual(self, state):
         return np.abs(self.support.inner_residual(state)).max()
+
+    def balanced(self, state, residual):
+        return residual <= _TOLERANCE_N
+
+    def step(self, state):
+        return state, self._newton_step(state, np.zeros((1, 3 * len(self._x))))
+
+    def first_share(self, step):
+        return 1.0
+
+    def moved(self, state, step, share):
+        return self.support.evaluate(state.displacement + share * step)
+
+    def better(self, trial, state, residual):
+        return trial.energy < state.energy or self.residual(trial) < residual
+
+    def accepted(self, state, trial):
+        """Nothing is kept from one step to the next."""
+
+    def recovered(self, state):
+        return False
 
     def _forces(self):
         force = self.support.evaluate(self._displacement).force[0, self.support.root]

@@ -5,7 +5,8 @@ Unknown are the object's forces f >= 0 on patches of the cover and the frusta's 
     w    = extension(q),                      w <= 0 where q = 0          (w: how far the slab comes down on a frustum)
     u, w = G [E' f; -(q + r)]
 Active sets and Newton's method, each step solved directly. Where the contact is large, four points that the object covers whole
-share a patch and its uniform pressure, which leaves some hundred unknowns, at 0.1 to 0.4 % of the map (docs/fast_models.md).
+share a patch and its uniform pressure, which leaves some hundred unknowns, at 0.1 to 0.4 % of the map
+(docs/notebook/2026-11-23-foundation-model.md).
 Frusta rock, lean and stiffen, and slab and object move sideways: what finite displacement adds to these equations is followed from
 step to step (`finite_displacement`), e the frusta's rise and l lateral forces on their roots:
     extension(q) = w + e,       u, w = G [E' f; -(q + r)] + L' l

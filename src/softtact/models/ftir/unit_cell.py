@@ -10,12 +10,14 @@ from softtact.errors import ConvergenceError
 from softtact.fem.elements import HEX27, QUAD9
 from softtact.models.hyperelastic.build import build_unit_cell
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
-from softtact.models.hyperelastic.newton import NewtonSettings, press_load_steps
+from softtact.models.hyperelastic.newton import NewtonSettings
+from softtact.models.hyperelastic.path import press_load_steps
 
 # A gap this wide ends total reflection: the evanescent wave's intensity falls to 1/e in lambda / (4 pi sqrt(n^2 sin^2 theta - 1)),
 # for green light (0.53 um) in acrylic (n = 1.49) 0.13 um at 45 degrees and 0.05 um at 60 degrees.
 DARK_GAP_MM = 1e-4
-# Where tips are narrow their sides fold onto the glass: thin layers in the lowest third and thin rings at the rim (docs/ftir.md).
+# Where tips are narrow their sides fold onto the glass: thin layers in the lowest third and thin rings at the rim
+# (docs/notebook/2026-11-22-mesh-on-glass.md).
 GLASS_MESH = MeshSettings.converging(frustum_heights=(*np.linspace(0, 0.2, 11), 0.24, 0.28, 0.33, 0.4, 0.5, 0.7, 1.0),
                                      frustum_rings=4)
 # Where tips are wide the sides fold onto the sheet, and thin layers there turn inside out before the paper's 140 N.

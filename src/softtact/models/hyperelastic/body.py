@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from softtact.contact.history import ContactHistory
 from softtact.fem import kernels
 from softtact.linalg.multifrontal_solver import DissectedSolver
 from softtact.linalg.workers import Workers
@@ -23,6 +24,14 @@ _MOST_DOUBLINGS = 40  # ... but a tangent that is not even finite will never be
 
 
 @dataclass(frozen=True)
+class BodyHistory:
+    """The `ContactHistory` of the object on the slab's top, and of the support on the board."""
+
+    top: ContactHistory
+    support: ContactHistory
+
+
+@dataclass(frozen=True)
 class BodyState:
     """Slab and support at one displacement, and the potential energy (mJ) of both with their contacts and friction."""
 
@@ -33,6 +42,11 @@ class BodyState:
     @property
     def energy(self):
         return self.slab.energy + self.support.energy
+
+    @property
+    def history(self):
+        """What the contacts remember, `BodyHistory`."""
+        return BodyHistory(self.slab.history, self.support.history)
 
     @property
     def force(self):
@@ -94,17 +108,27 @@ class LayeredBody:
         """Displacements of slab (n, 3) and frusta (f, nodes, 3) at rest."""
         return np.zeros((self.slab.nodes, 3)), np.zeros((self.support.count, self.support.nodes, 3))
 
-    def evaluate(self, slab_displacement, bed_displacement, indentation, projection):
-        """State at given displacements; None where an element is inside out."""
-        slab = self.slab.evaluate(slab_displacement, projection, indentation, workers=self.workers)
-        support = self.support.evaluate(bed_displacement, workers=self.workers) if slab is not None else None
+    def fresh_history(self):
+        """The contacts' history before the first touch."""
+        return BodyHistory(self.slab.top.fresh_history(), self.support.fresh_history())
+
+    def begin(self):
+        """Forget all tangents and factors of an earlier press: what is kept decides the last digits of a result."""
+        self.cells.reset()
+        self.stepper.reset()
+        self.friction.reset()
+
+    def evaluate(self, slab_displacement, support_displacement, indentation, projection, history=None):
+        """State at given displacements, by default without a history of the contacts; None where an element is inside out."""
+        history = history or self.fresh_history()
+        slab = self.slab.evaluate(slab_displacement, projection, indentation, history.top, workers=self.workers)
+        support = None if slab is None else self.support.evaluate(support_displacement, history.support, workers=self.workers)
         return None if support is None else BodyState(slab=slab, support=support, indentation=indentation)
 
-    def reevaluate_contact(self, state):
-        """The same displacements after the contact's or friction's own state has changed: the rubber is not evaluated anew."""
-        return BodyState(slab=self.slab.update_normals(state.slab, state.slab.projection, state.indentation),
-                         support=self.support.reevaluate_contact(state.support),
-                         indentation=state.indentation)
+    def reevaluate_contact(self, state, history):
+        """The same displacements with another history of the contacts: the rubber is not evaluated anew."""
+        return BodyState(slab=self.slab.update_normals(state.slab, state.slab.projection, state.indentation, history.top),
+                         support=self.support.reevaluate_contact(state.support, history.support), indentation=state.indentation)
 
     def balanced(self, state, tolerance_n):
         """The state with each frustum in balance over its root, where nothing else keeps the body from it.
@@ -164,9 +188,9 @@ class LayeredBody:
 
         Not a number where that cannot be done, which fails Newton's method there.
         """
-        excess, friction_response = None if force_n is None else state.force - force_n, self.slab.friction_border(state.slab)
+        excess, border = None if force_n is None else state.force - force_n, self.slab.friction_border(state.slab)
         for shift in _shifts():
-            step = self.stepper.step(self._rubber_tangent(state, shift), residual, contact, friction_response=friction_response,
+            step = self.stepper.step(self._rubber_tangent(state, shift), residual, contact, friction_border=border,
                                      excess=excess,
                                      largest=largest_mm)
             if step is not None:
@@ -191,14 +215,16 @@ class LayeredBody:
 
     def contact_error(self, state):
         """Deepest overlap, or widest gap under pressure, in mm."""
-        return max(self.slab.top.error(state.slab), self.support.contact.error(state.support.gaps))
+        return max(self.slab.top.error(state.slab), self.support.contact_error(state.support))
 
-    def augment(self, state, *, allowed_mm):
-        """Hold the points that overlap where their surfaces just touch, on the object or in the frusta, wherever it is too much."""
+    def augmented(self, state, *, allowed_mm):
+        """The state with the points that overlap held where their surfaces just touch, wherever an overlap is more than allowed."""
+        top, support = state.slab.history, state.support.history
         if self.slab.top.error(state.slab) > allowed_mm:
-            self.slab.top.augment(state.slab)
-        if self.support.contact.error(state.support.gaps) > allowed_mm:
-            self.support.contact = self.support.contact.augmented(state.support.gaps)
+            top = self.slab.top.augmented(state.slab)
+        if self.support.contact_error(state.support) > allowed_mm:
+            support = self.support.augmented(state.support)
+        return self.reevaluate_contact(state, BodyHistory(top, support))
 
     def most_compressed(self, state):
         """Place x, y (mm) of the most compressed frustum, and its compression as a share of its height."""

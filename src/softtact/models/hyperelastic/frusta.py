@@ -16,6 +16,7 @@ from numba import njit
 
 from softtact.contact.friction import FrictionResponse, FrictionState
 from softtact.contact.height_field import NO_CONTACT_MM
+from softtact.contact.history import ContactHistory
 from softtact.fem.elements import HEX27, QUAD9
 from softtact.fem.extruded_mesh import CORE_RADIUS, disc_mesh_2d, extrude
 from softtact.fem.kernels import add_forces
@@ -49,8 +50,8 @@ class FrustumGeometry:
 class FrustaState:
     """energy (mJ), force (n, nodes, 3) on the frusta's nodes, gaps (n, p) at the contact points, displacement.
 
-    elastic: energies (n,) and force of the rubber alone;  friction_response: friction at the points on the board (n, b), None
-    without.
+    elastic: energies (n,) and force of the rubber alone;  history: of the contacts, see `ContactHistory`
+    friction_response: friction at the points on the board (n, b), None without
     """
 
     elastic: tuple
@@ -58,14 +59,12 @@ class FrustaState:
     force: np.ndarray
     gaps: np.ndarray
     displacement: np.ndarray
+    history: ContactHistory
     friction_response: FrictionResponse | None = None
 
 
 class FrustumArray:
-    """All frusta of a sensor with one law. Local node numbers are those of `self.mesh`; roots are `self.root`.
-
-    friction_state: how friction holds the points on the board during a step, None without.
-    """
+    """All frusta of a sensor with one law. Local node numbers are those of `self.mesh`; roots are `self.root`."""
 
     def __init__(self, geometry, law, *, heights, root_z_mm, pcb_z_mm, tips_bonded, contact, unprojected_penalty_ratio,
                  quartic_penalty_ratio, trilinear, refinement=0, rings=1, core=CORE_RADIUS, friction=None):
@@ -73,7 +72,7 @@ class FrustumArray:
 
         friction: `Coulomb` of the frusta on the board, or None
         """
-        self.geometry, self.contact, self.friction, self.friction_state = geometry, contact, friction, None
+        self.geometry, self.contact, self.friction = geometry, contact, friction
         mesh_2d = disc_mesh_2d(refinement, rings, core)
         self.mesh = extrude(mesh_2d, heights)
         self.outer_faces = self._outer_faces(mesh_2d)
@@ -175,10 +174,17 @@ class FrustumArray:
             planes.append(3 * self.point_nodes[moving, -1] + self.point_axis[moving])
         return LayerwiseElimination(self.count, eliminated, layers, coupled=planes)
 
-    def evaluate(self, displacement, *, workers=SERIAL):
-        """Energy, nodal forces and gaps for displacement (n, nodes, 3); None if an element is inside out."""
+    def fresh_history(self):
+        """The contacts' history before the first touch."""
+        return ContactHistory(self.contact)
+
+    def evaluate(self, displacement, history=None, *, workers=SERIAL):
+        """Energy, nodal forces and gaps for displacement (n, nodes, 3); None if an element is inside out.
+
+        history: of the contacts, by default none
+        """
         elastic = self.rubber(displacement, workers=workers)
-        return None if elastic is None else self.with_contact(displacement, elastic)
+        return None if elastic is None else self.with_contact(displacement, elastic, history or self.fresh_history())
 
     def rubber(self, displacement, frusta=slice(None), *, workers=SERIAL):
         """Energies (k,) in mJ and nodal forces (k, nodes, 3) of the rubber of the given frusta, or of all; None if inside out."""
@@ -190,27 +196,27 @@ class FrustumArray:
         add_forces(force.reshape(-1, 3), self._element_nodes[:len(elements)], body.force.reshape(-1, 27, 3))
         return body.energies.reshape(len(displacement), -1).sum(axis=1), force
 
-    def potentials(self, displacement, elastic, frusta):
+    def potentials(self, displacement, elastic, frusta, history):
         """Energies (k,) in mJ of the given frusta with their contacts, from the `rubber`'s; without friction's."""
-        energy, _, _ = self.contact.at(frusta).response(self.gap0[frusta] + self._along(displacement))
+        energy, _, _ = history.contact.at(frusta).response(self.gap0[frusta] + self._along(displacement))
         return elastic[0] + (energy * self.point_area[frusta]).sum(axis=1)
 
-    def reevaluate_contact(self, state):
-        """The same displacements after the contact's or friction's own state has changed."""
-        return self.with_contact(state.displacement, state.elastic)
+    def reevaluate_contact(self, state, history):
+        """The same displacements with another history of the contacts."""
+        return self.with_contact(state.displacement, state.elastic, history)
 
-    def with_contact(self, displacement, elastic):
+    def with_contact(self, displacement, elastic, history):
         """The state at displacement (n, nodes, 3), with the `rubber`'s energies and forces there."""
         gaps, force = self.gap0 + self._along(displacement), elastic[1].copy()
-        energy, pressure, _ = self.contact.response(gaps)
+        energy, pressure, _ = history.contact.response(gaps)
         _scatter_contact(force, -pressure * self.point_area, self.point_nodes, self.point_weights, self.point_axis)
         state = FrustaState(elastic=elastic, energy=float(elastic[0].sum() + (energy * self.point_area).sum()), force=force,
-                         gaps=gaps, displacement=displacement)
-        return state if self.friction_state is None else self._with_friction(state)
+                            gaps=gaps, displacement=displacement, history=history)
+        return state if history.friction is None else self._with_friction(state)
 
     def _with_friction(self, state):
         """The state with friction's energy and forces."""
-        response = self.friction_state.friction_response(self._on_board(state.displacement))
+        response = state.history.friction.friction_response(self._on_board(state.displacement))
         area = self.point_area[:, :self.board_points]
         force = state.force.copy()
         for axis in (0, 1):
@@ -227,31 +233,38 @@ class FrustumArray:
         position = self.coordinates + displacement
         return np.stack([_weighted_component(position, *self._board_points(axis)) for axis in (0, 1)], axis=-1)
 
-    def begin_step(self, state):
-        """Let friction hold the points as where a step starts from a `FrustaState`."""
+    def first_friction_state(self, state):
+        """The friction state in which a step starts from a `FrustaState`, None without friction."""
         if self.friction is None:
-            return
+            return None
         gaps = state.gaps[:, :self.board_points]
         if state.friction_response is None:
-            self.friction_state = FrictionState.first(self.friction, self._on_board(state.displacement), gaps)
-        else:
-            self.friction_state = state.friction_response.next_step(gaps)
+            return FrictionState.first(self.friction, self._on_board(state.displacement), gaps)
+        return state.friction_response.next_step(gaps)
 
     def renewed_friction_state(self, state):
         """The friction state with the pressures of a `FrustaState`."""
         b = self.board_points
-        return state.friction_response.next_pass(state.gaps[:, :b], self.contact.response(state.gaps)[1][:, :b])
+        return state.friction_response.next_pass(state.gaps[:, :b], state.history.contact.response(state.gaps)[1][:, :b])
 
-    def contact_slope(self, gaps):
+    def contact_slope(self, state):
         """Stiffness (n, p) of the contact points in N/mm3."""
-        return self.contact.response(gaps)[2]
+        return state.history.contact.response(state.gaps)[2]
+
+    def contact_error(self, state):
+        """Deepest overlap, or widest gap under pressure, in mm."""
+        return state.history.contact.error(state.gaps)
+
+    def augmented(self, state):
+        """The contacts' history with each point held where its surfaces just touch."""
+        return replace(state.history, contact=state.history.contact.augmented(state.gaps))
 
     def condense(self, state, frusta, damping=None, *, kept_mm=0.0):
         """Recompute the condensed tangents of the given frusta (k,).
 
         damping: stiffness (k,) in N/mm on their inner unknowns, see `Condensation.set`;  kept_mm: see `TangentCache`
         """
-        slope = self.contact.at(frusta).response(state.gaps[frusta])[2] * self.point_area[frusta]
+        slope = state.history.contact.at(frusta).response(state.gaps[frusta])[2] * self.point_area[frusta]
         displacement = state.displacement[frusta]
         friction = None if state.friction_response is None else state.friction_response.stiffness(frusta)
         layers = (([self._layer_tangents(k, displacement, frusta, kept_mm)], self._springs(k, frusta, slope, friction))

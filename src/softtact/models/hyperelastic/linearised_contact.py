@@ -21,7 +21,8 @@ class StepContact:
         self._face(state.projection)
 
     def _face(self, projection):
-        self.projection, self.points = projection, self._slab.linear_gaps(self._state.displacement, projection, self._indentation)
+        self.projection, self.points = projection, self._slab.linear_gaps(self._state.displacement, projection,
+                                                                             self._indentation, self._state.history)
 
     def frames(self, kept):
         """`NodeFrames` of the nodes whose contact with the object may change, along the normals that they face.

@@ -42,7 +42,7 @@ def _step(support, state, frusta, workers):
     step = support.own_step(state, frusta, workers=workers)
     step *= np.minimum(1.0, _FARTHEST_MM / np.maximum(np.abs(step).max(axis=(1, 2)), 1e-300))[:, None, None]
     displacement, (energies, forces) = state.displacement.copy(), tuple(part.copy() for part in state.elastic)
-    before = support.potentials(displacement[frusta], (energies[frusta], None), frusta)
+    before = support.potentials(displacement[frusta], (energies[frusta], None), frusta, state.history)
     waiting = np.arange(len(frusta))
     for halving in range(_HALVINGS):
         here = frusta[waiting]
@@ -50,9 +50,9 @@ def _step(support, state, frusta, workers):
         elastic = support.rubber(trial, here, workers=workers)
         if elastic is None:     # one of them is inside out
             continue
-        lower = support.potentials(trial, elastic, here) < before[waiting]
+        lower = support.potentials(trial, elastic, here, state.history) < before[waiting]
         displacement[here[lower]], energies[here[lower]], forces[here[lower]] = trial[lower], elastic[0][lower], elastic[1][lower]
         waiting = waiting[~lower]
         if not len(waiting):
             break
-    return support.with_contact(displacement, (energies, forces)), ~np.isin(np.arange(len(frusta)), waiting)
+    return support.with_contact(displacement, (energies, forces), state.history), ~np.isin(np.arange(len(frusta)), waiting)

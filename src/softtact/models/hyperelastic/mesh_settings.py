@@ -6,7 +6,7 @@ from softtact.contact.penalty import Contact
 from softtact.fem.extruded_mesh import CORE_RADIUS
 
 _OBJECT_SMOOTHING_MM = 1e-3
-_CORE_IN_ONE_RING = 0.6     # docs/discretisation.md
+_CORE_IN_ONE_RING = 0.6     # docs/notebook/2026-11-24-choice-of-the-meshes.md
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class MeshSettings:
         """Within 2 % of the map's maximum at every point under punch, sphere and ridges, for twice the default's time.
 
         The cover has a layer more and is finer at edges, frusta have two rings. Under a punch as wide as two frusta 3 %
-        (docs/discretisation.md).
+        (docs/explanation/discretisation.md).
         """
         return cls(cover_heights=(0.0, 0.4, 0.75, 1.0), cover_splits=(1, 2), frustum_rings=2, frustum_core=0.6,
                    frustum_heights=(0.0, 0.2, 0.7, 1.0))
@@ -100,6 +100,7 @@ class MeshSettings:
     def stable(cls):
         """For frusta pressed to more than 60 % of their height, where on the default mesh elements give way and many steps fail.
 
-        A sphere to 50 N; under a flat punch the map is within 1.4 % of its maximum of the default mesh's (docs/performance.md).
+        A sphere to 50 N; under a flat punch the map is within 1.4 % of its maximum of the default mesh's
+        (docs/notebook/2026-11-23-folding-frusta.md).
         """
         return cls(quartic_penalty_ratio=400.0, slab_quartic_penalty_ratio=10.0)

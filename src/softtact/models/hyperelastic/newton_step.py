@@ -63,22 +63,28 @@ class ContactStepper:
     """Steps of one body; keeps the last factor for the next step. factor: of `contact_factor`."""
 
     def __init__(self, factor):
-        self.factor, self._factored = factor, False
+        self.factor = factor
         self.factors, self.iterations = 0, 0     # so far, of the matrix and of conjugate gradients
+        self.reset()
 
-    def step(self, rubber, residual, contact, *, friction_response=(0.0, 0.0), excess=None, largest=np.inf):
+    def reset(self):
+        """Forget the last factor."""
+        self._factored = False
+        self.factor.reset()
+
+    def step(self, rubber, residual, contact, *, friction_border=(0.0, 0.0), excess=None, largest=np.inf):
         """Step (n,) in mm of the unknowns, and how far the object is lowered with it; None if A is not positive definite.
 
         rubber: A, upper triangle (csr), with friction;  residual (n,) in N
         contact: its `points` are `LinearGaps`, its `rubber_forces(rubber, step)` A times a step (n,), its `follow(step, indentation
         increment)` looks up what the points face where a step leads, and says whether that was done; its `frames` are for
         `contact_factor`
-        friction_response: friction's border (n,) and corner in N/mm, between the unknowns and the object's indentation increment
+        friction_border: friction's border (n,) and corner in N/mm, between the unknowns and the object's indentation increment
         excess: the object's force less the wanted one in N; None holds the object where it is. A free object that touches
         nothing finds no stiffness: it is lowered by nan.
         largest: mm, by which a free object is moved at most; farther steps end there with the contact of that depth
         """
-        problem = _Problem(rubber, contact, residual, friction_response, excess)
+        problem = _Problem(rubber, contact, residual, friction_border, excess)
         at = problem.move(problem.rest())
         if problem.free and not contact.points.slope(0.0).any():
             return problem.parts(np.append(at.x[:-1], np.nan))
@@ -154,8 +160,8 @@ class ContactStepper:
 class _Problem:
     """The convex problem of one step, in the unknowns and, where the object is free, its indentation increment behind them."""
 
-    def __init__(self, rubber, contact, residual, friction_response, excess):
-        self.rubber, self.contact, self.friction_response = rubber, contact, friction_response
+    def __init__(self, rubber, contact, residual, friction_border, excess):
+        self.rubber, self.contact, self.friction_border = rubber, contact, friction_border
         self.size, self.free, self.held = len(residual), excess is not None, False
         # What the points face may change under way: the residual less the contact's share in it stays.
         residual = np.append(residual, excess) if self.free else residual
@@ -213,7 +219,7 @@ class _Problem:
         product = self.contact.rubber_forces(self.rubber, u)
         if not self.free:
             return product
-        border, corner = self.friction_response
+        border, corner = self.friction_border
         return np.append(product + border * x[-1], np.sum(border * u) + corner * x[-1])
 
     def gradient(self, at):

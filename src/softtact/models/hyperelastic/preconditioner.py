@@ -26,10 +26,13 @@ class ContactFactor:
     def __init__(self, solver):
         self.solver = solver
 
+    def reset(self):
+        """Nothing is kept from one factor to the next."""
+
     def renew(self, problem, slope):
         """Factor with the rubber's tangent and the points' stiffness (p,) of now; False if that is not positive definite."""
-        rows, indentation_increment, (border,
-                                      corner) = problem.points.rows, problem.points.indentation_increment, problem.friction_response
+        rows, indentation_increment = problem.points.rows, problem.points.indentation_increment
+        border, corner = problem.friction_border
         upper = (problem.rubber + sp.triu(rows.T @ sp.diags_array(slope) @ rows)).tocsr()
         upper.sort_indices()
         if not self.solver.factor(upper):
@@ -56,12 +59,17 @@ class DissectedContact:
     """With a `DissectedSolver`, which leaves what the contact changes for last."""
 
     def __init__(self, solver, *, workers=SERIAL):
-        self.solver, self._workers, self._frames, self._points, self._slope = solver, workers, None, None, None
+        self.solver, self._workers = solver, workers
+        self.reset()
+
+    def reset(self):
+        """Forget the nodes' frames, which a factor otherwise takes over from the last one."""
+        self._frames, self._points, self._slope = None, None, None
 
     def renew(self, problem, slope):
         """Factor with the rubber's tangent and the points' stiffness (p,) of now; False if that is not positive definite."""
         self._frames, self._points, self._slope = problem.contact.frames(self._frames), None, None
-        border, corner = problem.friction_response
+        border, corner = problem.friction_border
         column = np.append(np.broadcast_to(border, self.solver.unknowns), corner)
         if not self.solver.factor_bordered(Bordered(upper=problem.rubber, column=column, frames=self._frames)):
             return False

@@ -1,13 +1,15 @@
 """Contact of a rigid object with the slab's top: quadrature points of the top faces, each before a plane of the object."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from softtact.contact.coverage import continues, covered
 from softtact.contact.face_edges import ROWS, contact_compliance, own_areas
 from softtact.contact.friction import FrictionResponse, FrictionState
 from softtact.contact.height_field import NO_CONTACT_MM
+from softtact.contact.history import ContactHistory
 from softtact.fem.elements import QUAD8
 from softtact.fem.quadrature import gauss
 
@@ -19,7 +21,8 @@ class ContactProjection:
     """The planes of the object's facets that points face: anchors (p, 3) in mm at no indentation, outward normals (p, 3).
 
     covered (p,): share of a point's own area that the object covers;  beside (p,): points that lie beside the object themselves
-    softness (p,): mm/MPa of a spring between point and plane, where an edge covers it in part (`contact/face_edges`)
+    contact_compliance (p,): mm/MPa of a spring between point and plane, where an edge covers it in part (`contact/face_edges`)
+    offset_mm (2,): way of the object along x and y from its place at first touch, at which the anchors are
     A point keeps its plane during a step of Newton's method, so that each step lowers one potential.
     """
 
@@ -28,6 +31,11 @@ class ContactProjection:
     covered: np.ndarray
     beside: np.ndarray
     contact_compliance: np.ndarray
+    offset_mm: np.ndarray = field(default_factory=lambda: np.zeros(2))
+
+    def moved(self, way_mm):
+        """The same planes after the object has moved by a way (2,) along x and y."""
+        return replace(self, anchors=self.anchors + [*way_mm, 0.0], offset_mm=self.offset_mm + way_mm)
 
 
 @dataclass(frozen=True)
@@ -48,7 +56,6 @@ class TopContact:
     """The points of a `CoverMesh`'s top faces, flattened (p = t * points): areas (p,) in mm2, places (p, 3) in mm at rest.
 
     faces (t, w): the free nodes that a face hangs on, values (t, points, w): their shape values at its points.
-    friction_state: how friction holds the points during a step, None without.
     """
 
     def __init__(self, mesh, contact, *, plane_modulus, friction=None):
@@ -56,7 +63,7 @@ class TopContact:
 
         plane_modulus: E / (1 - nu^2) in MPa of what the object presses on
         """
-        self.contact, self.friction, self.friction_state = contact, friction, None
+        self.contact, self.friction = contact, friction
         points, weights = gauss(ROWS, 2)
         values, slopes = QUAD8.shape(points)
         edges = np.einsum("tad,gai->tgdi", mesh.points[mesh.top][..., :2], slopes)
@@ -71,7 +78,7 @@ class TopContact:
         return np.matmul(self.values, field[self.faces]).reshape(-1, 3)
 
     def project(self, displacement, surface):
-        """The object's facets above the points (see `ContactProjection`)."""
+        """The object's facets above the points (see `ContactProjection`); a `MovedSurface` tells how far aside the object is."""
         position = self.reference + self.at_points(displacement)
         height, normals = surface(position[:, 0], position[:, 1])
         anchors = np.column_stack([position[:, :2], height])
@@ -83,11 +90,20 @@ class TopContact:
         normals[beside] = foot_normals[beside]
         share[anchors[:, 2] >= NO_CONTACT_MM] = 0.0
         return ContactProjection(anchors=anchors, normals=normals, covered=share, beside=beside,
-                                 contact_compliance=contact_compliance(share, self._give))
+                                 contact_compliance=contact_compliance(share, self._give),
+                                 offset_mm=np.asarray(getattr(surface, "offset_mm", (0.0, 0.0))))
 
-    def contact_on(self, projection):
+    def fresh_history(self):
+        """The contact's history before the first touch."""
+        return ContactHistory(self.contact)
+
+    def contact_on(self, projection, history):
         """The points' `Contact` on the planes that they face."""
-        return replace(self.contact, contact_compliance=projection.contact_compliance)
+        return replace(history.contact, contact_compliance=projection.contact_compliance)
+
+    def contact_of(self, state):
+        """The points' `Contact` in a `SlabState`."""
+        return self.contact_on(state.projection, state.history)
 
     def gaps(self, displacement, projection, indentation):
         """Normal gaps (p,) in mm between the points and the planes they face."""
@@ -96,30 +112,33 @@ class TopContact:
 
     def own_gaps(self, state):
         """Gaps (p,) of the points that lie under the object, without what edges give way; of those beside it one that says so."""
-        return np.where(state.projection.beside, NO_CONTACT_MM, self.contact_on(state.projection).own_gaps(state.gaps))
+        return np.where(state.projection.beside, NO_CONTACT_MM, self.contact_of(state).own_gaps(state.gaps))
 
     def error(self, state):
         """Deepest overlap, or widest gap under pressure, in mm of points that lie under the object."""
-        return self.contact_on(state.projection).error(np.where(state.projection.beside, NO_CONTACT_MM, state.gaps))
+        return self.contact_of(state).error(np.where(state.projection.beside, NO_CONTACT_MM, state.gaps))
 
-    def augment(self, state):
-        """From now on hold each point where it just touches the object."""
-        self.contact = self.contact_on(state.projection).augmented(state.gaps)
+    def augmented(self, state):
+        """The contact's history with each point held where it just touches the object."""
+        return replace(state.history, contact=self.contact_of(state).augmented(state.gaps))
 
-    def touch(self, displacement, projection, indentation):
+    def touch(self, displacement, projection, indentation, history):
         """The contact with the object lowered by `indentation` mm."""
         gaps, normals = self.gaps(displacement, projection, indentation), projection.normals
-        density, pressure, _ = self.contact_on(projection).response(gaps)
+        density, pressure, _ = self.contact_on(projection, history).response(gaps)
         area = self.area * projection.covered
         push = (pressure * area)[:, None] * normals      # on the slab: along the object's outward normal
         touch = Touch(energy=float(density @ area), force=-self._on_nodes(push), gaps=gaps,
                       indentation_force=float(-push[:, 2].sum()))
-        return touch if self.friction_state is None else self._with_friction(touch, displacement, projection, indentation)
+        if history.friction is None:
+            return touch
+        return self._with_friction(touch, history.friction, displacement, projection, indentation)
 
-    def _with_friction(self, touch, displacement, projection, indentation):
+    def _with_friction(self, touch, friction_state, displacement, projection, indentation):
         """The contact with friction's energy and forces, on the covered share of area as the pressure's."""
         area = self.area * projection.covered
-        friction_response = self.friction_state.friction_response(self._in_object(displacement, indentation), projection.normals)
+        place = self._in_object(displacement, projection, indentation)
+        friction_response = friction_state.friction_response(place, projection.normals)
         pull = friction_response.traction * area[:, None]
         # Raising the indentation lifts the points in the object's frame, so the slips' vertical part resists it.
         return replace(touch, energy=touch.energy + float(friction_response.energy @ area),
@@ -130,18 +149,18 @@ class TopContact:
         """Forces (p, 3) in N at the points as forces (t, w, 3) on the faces' nodes."""
         return np.matmul(self.values.transpose(0, 2, 1), forces.reshape(len(self.faces), -1, 3))
 
-    def _in_object(self, displacement, indentation):
-        """Places (p, 3) of the points in the frame of the object, which goes down by `indentation`."""
-        return self.reference + self.at_points(displacement) + [0.0, 0.0, indentation]
+    def _in_object(self, displacement, projection, indentation):
+        """Places (p, 3) of the points in the frame of the object, which goes down by `indentation` and aside with `projection`."""
+        return self.reference + self.at_points(displacement) + [*-projection.offset_mm, indentation]
 
-    def begin_step(self, state, indentation):
-        """Let friction hold the points as where a step starts from a `SlabState`."""
+    def first_friction_state(self, state, indentation):
+        """The friction state in which a step starts from a `SlabState`, None without friction."""
         if self.friction is None:
-            return
+            return None
         if state.friction_response is None:
-            self.friction_state = FrictionState.first(self.friction, self._in_object(state.displacement, indentation), state.gaps)
-        else:
-            self.friction_state = state.friction_response.next_step(state.gaps)
+            place = self._in_object(state.displacement, state.projection, indentation)
+            return FrictionState.first(self.friction, place, state.gaps)
+        return state.friction_response.next_step(state.gaps)
 
     def renewed_friction_state(self, state):
         """The friction state with the pressures of a `SlabState`."""
@@ -149,7 +168,7 @@ class TopContact:
 
     def _pressure(self, state):
         """Pressure (p,) in MPa under the contact as it is now, on what is covered of the points' areas."""
-        return self.contact_on(state.projection).response(state.gaps)[1]
+        return self.contact_of(state).response(state.gaps)[1]
 
     def balanced(self, state, indentation, force_n):
         """The indentation (mm) at which the object's force, friction aside, is `force_n` on the cover as it is.
@@ -158,7 +177,7 @@ class TopContact:
         """
         near = np.flatnonzero(state.gaps < _NEAR_MM)
         down, area = -state.projection.normals[near, 2], (self.area * state.projection.covered)[near]
-        contact, gaps, shift = self.contact_on(state.projection).at(near), state.gaps[near], 0.0
+        contact, gaps, shift = self.contact_of(state).at(near), state.gaps[near], 0.0
         for _ in range(50):
             _, pressure, slope = contact.response(gaps - shift * down)
             excess = pressure @ (down * area) - force_n
@@ -170,7 +189,7 @@ class TopContact:
 
     def stiffness(self, state):
         """Stiffness (p,) in N/mm of the points along their normals."""
-        return self.contact_on(state.projection).response(state.gaps)[2] * self.area * state.projection.covered
+        return self.contact_of(state).response(state.gaps)[2] * self.area * state.projection.covered
 
     def area_under_pressure(self, state):
         """Area in mm2 of the points that carry pressure under the contact as it is now, as far as the object covers it.
@@ -182,6 +201,28 @@ class TopContact:
     def under_pressure(self, state):
         """Which points (p,) carry pressure."""
         return self._pressure(state) * state.projection.covered > 0
+
+    def resultant(self, state):
+        """Force (3,) in N of the object on the surface, and its torque (3,) in N mm about the sensor frame's origin."""
+        area = (self.area * state.projection.covered)[:, None]
+        force = self._pressure(state)[:, None] * state.projection.normals * area
+        if state.friction_response is not None:
+            force = force - state.friction_response.traction * area
+        return force.sum(axis=0), np.cross(self.reference + self.at_points(state.displacement), force).sum(axis=0)
+
+    def slip_at(self, state, places):
+        """How far (n,) in mm the surface has slid along the object at places (n, 2); nan where it bears no pressure.
+
+        Told by the nearest contact point, as far as its own area may reach; nan everywhere without friction.
+        """
+        slip, touching = np.full(len(places), np.nan), self.under_pressure(state)
+        if state.friction_response is None or not touching.any():
+            return slip
+        points = (self.reference + self.at_points(state.displacement))[:, :2]
+        distance, nearest = cKDTree(points).query(places)
+        here = touching[nearest] & (distance <= np.sqrt(self.area[nearest]))
+        slip[here] = state.friction_response.slid[nearest[here]]
+        return slip
 
     def pressure_of_faces(self, state):
         """Mean pressure (t,) in MPa on each face, under the contact as it is now."""

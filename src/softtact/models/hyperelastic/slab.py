@@ -12,6 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from softtact.contact.friction import FrictionResponse
+from softtact.contact.history import ContactHistory
 from softtact.fem.assembly import SymmetricProduct, add_upper, upper_pattern, upper_positions
 from softtact.fem.extruded_mesh import extrude
 from softtact.fem.graded_mesh import cover_mesh
@@ -29,7 +30,7 @@ class SlabState:
     """energy (mJ), force (n, 3) in N, contact quantities at the top's points, displacement (n, 3).
 
     elastic: energy and force of the rubber alone; projection: what the points face; indentation_force: the object's, N downwards;
-    friction_response: friction at the points, None without.
+    history: of the contact, see `ContactHistory`;  friction_response: friction at the points, None without
     """
 
     elastic: tuple
@@ -39,6 +40,7 @@ class SlabState:
     projection: ContactProjection
     displacement: np.ndarray
     indentation_force: float
+    history: ContactHistory
     friction_response: FrictionResponse | None = None
 
 
@@ -180,8 +182,11 @@ class Slab:
         """The object's facets above the top's points (see `ContactProjection`)."""
         return self.top.project(displacement, surface)
 
-    def evaluate(self, displacement, projection, indentation, *, workers=SERIAL):
-        """Energy, forces and contact with the object lowered by `indentation` mm; None if an element is inside out."""
+    def evaluate(self, displacement, projection, indentation, history=None, *, workers=SERIAL):
+        """Energy, forces and contact with the object lowered by `indentation` mm; None if an element is inside out.
+
+        history: of the contact, by default none
+        """
         force = np.zeros((self.nodes, 3))
         energy = 0.0
         for nodes, block in self._joined:
@@ -190,18 +195,18 @@ class Slab:
                 return None
             energy += state.energy
             add_forces(force, nodes, state.force.reshape(*nodes.shape, 3))
-        return self._with_contact(displacement, (energy, force), projection, indentation)
+        return self._with_contact(displacement, (energy, force), projection, indentation, history or self.top.fresh_history())
 
-    def update_normals(self, state, projection, indentation):
-        """The same displacements in front of other projection."""
-        return self._with_contact(state.displacement, state.elastic, projection, indentation)
+    def update_normals(self, state, projection, indentation, history=None):
+        """The same displacements under another projection, and with another history of the contact if there is one."""
+        return self._with_contact(state.displacement, state.elastic, projection, indentation, history or state.history)
 
-    def _with_contact(self, displacement, elastic, projection, indentation):
+    def _with_contact(self, displacement, elastic, projection, indentation, history):
         energy, force = elastic[0], elastic[1].copy()
-        touch = self.top.touch(displacement, projection, indentation)
+        touch = self.top.touch(displacement, projection, indentation, history)
         add_forces(force, self.top.faces, touch.force.reshape(*self.top.faces.shape, 3))
         return SlabState(elastic=elastic, energy=energy + touch.energy, force=force, gaps=touch.gaps, projection=projection,
-                         displacement=displacement, indentation_force=touch.indentation_force,
+                         displacement=displacement, indentation_force=touch.indentation_force, history=history,
                          friction_response=touch.friction_response)
 
     def build_pattern(self, eliminated, cells, *, precision=np.float32):
@@ -241,7 +246,7 @@ class Slab:
             add_upper(matrix.data, self.top.friction_tangent(state)[0], self._top_positions)
         return matrix
 
-    def linear_gaps(self, displacement, projection, indentation):
+    def linear_gaps(self, displacement, projection, indentation, history):
         """The gaps of the object's contact points as they depend on a step of the global unknowns, a `LinearGaps`."""
         shapes, gaps = self.top.normal_shapes(projection), self.top.gaps(displacement, projection, indentation)
         free = np.broadcast_to(self._top_dofs[:, None] >= 0, shapes.shape)
@@ -249,7 +254,7 @@ class Slab:
         columns = np.broadcast_to(self._top_dofs[:, None], shapes.shape)[free]
         rows = sp.csr_matrix((shapes[free], (points, columns)), shape=(len(gaps), len(self.unknowns)))
         return LinearGaps(gaps=gaps, rows=rows, indentation_increment=projection.normals[:, 2],
-                          area=self.top.area * projection.covered, contact=self.top.contact_on(projection))
+                          area=self.top.area * projection.covered, contact=self.top.contact_on(projection, history))
 
     def unknowns_of(self, nodes):
         """The global matrix' unknowns (k, 3) of nodes (k,), -1 where a movement is none."""

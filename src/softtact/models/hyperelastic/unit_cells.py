@@ -75,6 +75,11 @@ class SheetCells:
             self._damping = np.where(self._damping > _LEAST_DAMPING, self._damping / _DAMPING_GROWTH, 0.0)
         return bool(thrown.any())
 
+    def reset(self):
+        """Forget everything of an earlier press: tangents and damping."""
+        self.forget()
+        self._damping, self._damped_with = np.zeros(self.count), np.zeros(self.count)
+
     def forget(self, cells=None):
         """Let the next `refresh` recompute the given cells, or all, then also the tangents that their elements keep."""
         if cells is None:
@@ -103,7 +108,7 @@ class SheetCells:
 
     def _slope(self, state):
         """Stiffnesses (f, q) in N/mm3 of the contact points with friction's, and by how much they may change."""
-        slope, friction_response = self.support.contact_slope(state.support.gaps), state.support.friction_response
+        slope, friction_response = self.support.contact_slope(state.support), state.support.friction_response
         if friction_response is not None:
             slope = np.hstack([slope, friction_response.stiffness().reshape(self.count, -1)])
         without = state.slab.friction_response is None and friction_response is None

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from softtact.errors import ConvergenceError
+from softtact.models.newton import lowers_potential, solve
 from softtact.models.solid.body import FreeState
 
 
@@ -114,60 +115,84 @@ class _Press:
         return _interpolated([s.indentation for s in states], [s.displacement for s in states], indentation)
 
     def _newton(self, state, force):
-        body, settings = self.body, self.settings
         if state is None:
             raise ConvergenceError("The increment turns an element inside out; take smaller ones.")
-        last, residual = self.states[-1], self._norm(state, force)
-        reuse, correction, factorisations, memory = self.factored and force is None, np.inf, 0, _Memory()
-        for iteration in range(settings.max_iterations):
-            moved = float(np.abs(state.displacement - last.displacement).max())
-            if residual <= settings.relative_residual * state.mean_force and correction <= settings.relative_correction * moved:
-                return FreeLoadStep(state, iteration, factorisations, residual)
-            if not reuse:
-                body.factor(state)
-                self.factored, factorisations, memory = True, factorisations + 1, _Memory()
-            step, indentation_increment = self._step(state, force, reuse)
-            if force is None and not body.contacts:   # a mean of steps would not fulfil the contact
-                step = memory.improved(step)
-            trial = self._line_search(state, step, indentation_increment, force, residual)
-            if trial is None and not reuse and not body.join_contact():
-                break
-            reuse = trial is not None and self._norm(trial, force) < settings.good_reduction * residual
-            if trial is not None:
-                correction, residual, state = float(np.abs(step).max()), self._norm(trial, force), trial
-        raise ConvergenceError(f"No balance at an indentation of {state.indentation:.4g} mm: {residual:.3g} N are left.")
+        problem = _Balance(self.body, self.settings, force, self.states[-1], factored=self.factored)
+        found = solve(problem, state, max_iterations=self.settings.max_iterations)
+        self.factored = problem.factored
+        if found.state is None:
+            raise ConvergenceError(f"No balance at an indentation of {problem.state.indentation:.4g} mm: "
+                                   f"{found.residual_n:.3g} N are left.")
+        return FreeLoadStep(found.state, found.iterations, problem.factorisations, found.residual_n)
 
-    def _step(self, state, force, reuse):
-        """Step (unknowns,) and indentation increment of the object (mm)."""
+
+class _Balance:
+    """The body's balance under a force (N), or at its indentation where that is None, as a `Problem`."""
+
+    def __init__(self, body, settings, force, last, *, factored):
+        self.body, self.settings, self.force, self.last, self.factored = body, settings, force, last, factored
+        self.reuse, self.correction, self.factorisations, self.memory = factored and force is None, np.inf, 0, _Memory()
+
+    def prepared(self, state, iteration):
+        self.state = state
+        return state
+
+    def residual(self, state):
+        largest = float(np.abs(self.body.residual(state)).max())
+        return largest if self.force is None else max(largest, abs(state.object_force - self.force))
+
+    def balanced(self, state, residual):
+        moved = float(np.abs(state.displacement - self.last.displacement).max())
+        return (residual <= self.settings.relative_residual * state.mean_force
+                and self.correction <= self.settings.relative_correction * moved)
+
+    def step(self, state):
+        """Step (unknowns,) and indentation increment of the object (mm), with a factor of before where it serves."""
+        if not self.reuse:
+            self.body.factor(state)
+            self.factored, self.factorisations, self.memory = True, self.factorisations + 1, _Memory()
+        step, indentation_increment = self._step(state)
+        if self.force is None and not self.body.contacts:   # a mean of steps would not fulfil the contact
+            step = self.memory.improved(step)
+        self._step_size = float(np.abs(step).max())
+        return state, (step, indentation_increment)
+
+    def _step(self, state):
         body = self.body
-        if force is None:
+        if self.force is None:
             return body.step(state), 0.0
         residual = body.residual(state)
-        if not reuse:
+        if not self.reuse:
             self._border, self._corner = body.border(state)
             step, self._along = -body.solver.solve(np.column_stack([residual, self._border])).T
         else:
             step = -body.solver.solve(residual)
         stiffness = abs(self._corner + self._border @ self._along)
-        indentation_increment = (force - state.object_force - self._border @ step) / stiffness
+        indentation_increment = (self.force - state.object_force - self._border @ step) / stiffness
         return step + indentation_increment * self._along, indentation_increment
 
-    def _norm(self, state, force):
-        largest = float(np.abs(self.body.residual(state)).max())
-        return largest if force is None else max(largest, abs(state.object_force - force))
+    def first_share(self, step):
+        return min(1.0, self.settings.largest_step_mm / max(float(np.abs(step[0]).max()), abs(step[1]), 1e-30))
 
-    def _line_search(self, state, step, indentation_increment, force, residual):
-        """The first of the shares 1, 1/2, 1/4 ... of the step that lowers the residual or the potential."""
-        share = min(1.0, self.settings.largest_step_mm / max(float(np.abs(step).max()), abs(indentation_increment), 1e-30))
-        before = state.energy - (force or 0.0) * state.indentation
-        for _ in range(10):
-            trial = self.body.moved(state, share * step, share * indentation_increment)
-            if trial is not None:
-                change = trial.energy - (force or 0.0) * trial.indentation - before
-                if self._norm(trial, force) < residual or change < -1e-11 * abs(before):
-                    return trial
-            share *= 0.5
-        return None
+    def moved(self, state, step, share):
+        return self.body.moved(state, share * step[0], share * step[1])
+
+    def better(self, trial, state, residual):
+        before = self._potential(state)
+        return self.residual(trial) < residual or bool(lowers_potential(before, self._potential(trial), abs(before)))
+
+    def _potential(self, state):
+        return state.energy - (self.force or 0.0) * state.indentation
+
+    def accepted(self, state, trial):
+        self.correction = self._step_size
+        self.reuse = self.residual(trial) < self.settings.good_reduction * self.residual(state)
+
+    def recovered(self, state):
+        """A new factor may help where an old one was used, or points that join the contact."""
+        helped = self.reuse or self.body.join_contact()
+        self.reuse = False
+        return helped
 
 
 class _Memory:

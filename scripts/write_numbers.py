@@ -1,0 +1,145 @@
+"""Write the numbers that change into the documentation: docs/reference/numbers.md and the tables of docs/performance.md.
+
+    python scripts/write_numbers.py            (`make numbers`; `make docs` runs it first)
+
+Sources: the records in benchmarks/results/, and pytest's collection for the number of tests. Other pages link to these numbers.
+"""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+from statistics import median
+
+ROOT = Path(__file__).resolve().parents[1]
+NUMBERS = ROOT / "docs" / "reference" / "numbers.md"
+PERFORMANCE = ROOT / "docs" / "performance.md"
+MESHES = {"draft": "draft", "production": "default", "fine": "fine"}     # name in the records, name of the preset
+BLOCK = r"(<!-- numbers: {} -->\n).*?(<!-- end of numbers -->)"
+HEAD = """\
+# Numbers that change
+
+`make numbers` writes this page. Do not edit it. Each table names its record in `benchmarks/results/`, which holds the machine, the
+versions and every single number. Times depend on the machine, so compare numbers of one table only. Times of single presses:
+[what a press costs](../performance.md).
+"""
+
+
+def record(name: str) -> dict:
+    """One record of benchmarks/results/."""
+    return json.loads((ROOT / "benchmarks" / "results" / f"{name}.json").read_text(encoding="utf-8"))
+
+
+def table(head: str, rows: list[list[object]]) -> str:
+    """A table in Markdown; `head` separates its columns by commas."""
+    lines = [head.split(", "), ["---"] * len(head.split(", ")), *rows]
+    return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines)
+
+
+def source(name: str) -> str:
+    """The sentence that names a record, its date and its machine."""
+    read = record(name)
+    machine = read["machine"]
+    return f"`{name}.json`, {read['date'][:10]}, {machine['cores']} cores of an {machine['processor']} processor."
+
+
+def count_tests() -> dict[str, int]:
+    """Folder of tests/ to its number of tests, as `make test` runs them."""
+    command = [sys.executable, "-m", "pytest", "--collect-only", "-qq", "-o", "addopts=-m 'not gold'"]
+    done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False)
+    if done.returncode:
+        sys.exit(f"pytest cannot collect the tests; correct this first:\n{done.stdout[-2000:]}")
+    counts: dict[str, int] = {}
+    for path, number in re.findall(r"^tests/(\S+): (\d+)$", done.stdout, flags=re.MULTILINE):
+        folder = path.partition("/")[0] if "/" in path else "(top)"
+        counts[folder] = counts.get(folder, 0) + int(number)
+    return dict(sorted(counts.items()))
+
+
+def tests(counts: dict[str, int]) -> str:
+    """The number of tests by folder."""
+    rows = [[folder, number] for folder, number in counts.items()] + [["**all**", sum(counts.values())]]
+    return "Counted by pytest, without the tests marked `gold`.\n\n" + table("folder of `tests/`, tests", rows)
+
+
+def whole_runs() -> str:
+    """Minutes of make's targets."""
+    read = record("whole_runs")
+    rows = [[f"`{row['run']}`", row["what"], row["minutes"]] for row in read["rows"]]
+    return f"{source('whole_runs')} {read['note'].capitalize()}.\n\n" + table("run, what, minutes", rows)
+
+
+def presses() -> str:
+    """Time and memory of a hyperelastic press on each mesh."""
+    rows = [[MESHES[row["mesh"]], row["levels"], row["threads"], f"{row['seconds']:.0f}", row["iterations"],
+             f"{row['memory_gb']:.1f}"] for row in record("press")["rows"]]
+    return f"{source('press')}\n\n" + table("mesh, load steps, threads, seconds, iterations, peak memory (GB)", rows)
+
+
+def fast_presses() -> str:
+    """Time of a press with the two fast models, over all indenters."""
+    read = record("fast_models")
+    rows = []
+    for model in ("elastic", "foundation"):
+        seconds = sorted(row[model] for row in read["seconds"])
+        rate = {entry["workers"]: f"{entry['per_second']:.2g}" for entry in read["many"]
+                if entry["model"] == model and entry["batch"] == 1000}
+        rows.append([model, f"{median(seconds):.2f}", f"{seconds[0]:.2f} to {seconds[-1]:.2f}", rate[1], rate[2]])
+    head = "model, median (s), range (s), presses per second with 1 process, with 2 processes"
+    return f"{source('fast_models')} One process, {read['levels']} load steps to 50 N.\n\n" + table(head, rows)
+
+
+def growth() -> str:
+    """How the cost of a hyperelastic press grows with the number of frusta, on one and two threads."""
+    by_size: dict[int, dict[int, dict]] = {}
+    for row in record("scaling")["rows"]:
+        by_size.setdefault(row["frusta"], {})[row["threads"]] = row
+    rows = []
+    for frusta, threads in by_size.items():
+        pair = [threads[1], threads[2]]
+        parts = [" / ".join(f"{row[name]:.2g}" for row in pair)
+                 for name in ("condense_s", "factor_s", "solve_s", "residual_s", "press_s")]
+        rows.append([frusta, f"{pair[0]['unknowns_all']:,}", f"{pair[0]['unknowns_global']:,}", *parts, pair[0]["iterations"],
+                     f"{pair[0]['memory_gb']:.1f}"])
+    head = ("frusta, unknowns, of the matrix, all cells condensed (s), factor (s), solve (s), residual (s), whole press (s), "
+            "iterations, memory (GB)")
+    return (f"{source('scaling')} A flat punch of 2 mm radius at 4 N, default mesh, one / two threads.\n\n" + table(head, rows))
+
+
+def mesh_errors() -> str:
+    """Error of the map on each mesh against a much finer one."""
+    rows = []
+    for mesh, name in MESHES.items():
+        cells = [max(row[key]) for key in ("rms_error_percent", "largest_error_percent")
+                 for row in record("mesh_error")["rows"] if row["mesh"] == mesh]
+        rows.append([name, f"{min(cells[:3]):.1f} to {max(cells[:3]):.1f}", f"{min(cells[3:]):.1f} to {max(cells[3:]):.1f}"])
+    head = "mesh, root mean square (% of the map's maximum), largest at a point (%)"
+    return (f"{source('mesh_error')} 36 frusta; flat punch, sphere and ridges, each at its worst force.\n\n" + table(head, rows))
+
+
+def random_presses() -> str:
+    """Outcomes of random presses."""
+    outcomes = ["presses", "reached", "outside", "flagged", "stopped", "refused", "nonsense", "hung", "crashed"]
+    models = record("random_presses")["models"]
+    rows = [[model, *(counts[outcome] for outcome in outcomes)] for model, counts in models.items()]
+    return f"{source('random_presses')}\n\n" + table("model, " + ", ".join(outcomes), rows)
+
+
+def numbers_page(counts: dict[str, int]) -> str:
+    """The text of docs/reference/numbers.md."""
+    parts = {"Tests": tests(counts), "Whole runs": whole_runs(), "Growth of a hyperelastic press with the sensor": growth(),
+             "Error of the meshes": mesh_errors(), "Random presses": random_presses()}
+    return HEAD + "".join(f"\n## {title}\n{text}\n" for title, text in parts.items())
+
+
+def performance_page(text: str) -> str:
+    """The text of docs/performance.md with its tables from the records."""
+    for name, content in (("presses", presses()), ("fast presses", fast_presses())):
+        text = re.sub(BLOCK.format(name), lambda found, new=content: f"{found[1]}{new}\n{found[2]}", text, flags=re.DOTALL)
+    return text
+
+
+if __name__ == "__main__":
+    NUMBERS.write_text(numbers_page(count_tests()), encoding="utf-8")
+    PERFORMANCE.write_text(performance_page(PERFORMANCE.read_text(encoding="utf-8")), encoding="utf-8")

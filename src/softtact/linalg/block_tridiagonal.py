@@ -1,0 +1,136 @@
+"""Cholesky's method by layers of the matrix' graph, in dense blocks of LAPACK: a direct solver where MKL is missing.
+
+Unknowns at the same distance from one end of the body form a layer. A layer couples to the next one only, so the matrix is block
+tridiagonal (A. George, J. W. Liu, Computer Solution of Large Sparse Positive Definite Systems, 1981, ch. 4):
+
+    L_i L_i^T = D_i - C_(i-1)^T C_(i-1),    C_i = L_i^-1 A_(i,i+1)
+
+Unknowns that couple to the next layer come last in their own, so that C_i has rows for them alone. It serves long bodies, whose
+layers hold some thousand unknowns, and many right-hand sides: all of it is matrix products.
+"""
+
+import numpy as np
+import scipy.linalg as sla
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components, dijkstra
+
+
+class BlockTridiagonalSolver:
+    """The interface of `softtact.linalg.direct`."""
+
+    name = "block tridiagonal Cholesky"
+
+    def factor(self, upper):
+        """Factor the matrix whose upper triangle (csr, with its diagonal) is given; False if not positive definite."""
+        self._blocks = _Blocks(upper)
+        self._factors = list(self._blocks.factors())
+        return len(self._factors) == len(self._blocks.parts)
+
+    def solve(self, right):
+        """Solve for one (n,) or several (n, k) right-hand sides."""
+        blocks = self._blocks
+        found = np.array(right, dtype=float).reshape(len(right), -1)[blocks.order]
+        for number, (factor, coupling) in enumerate(self._factors):
+            own = blocks.parts[number]
+            found[own] = _lower(factor, found[own])
+            if coupling is not None:
+                found[blocks.parts[number + 1]] -= coupling.T @ found[blocks.tail(number)]
+        for number, (factor, coupling) in reversed(list(enumerate(self._factors))):
+            own = blocks.parts[number]
+            if coupling is not None:
+                found[blocks.tail(number)] -= coupling @ found[blocks.parts[number + 1]]
+            found[own] = sla.solve_triangular(factor, found[own], lower=True, trans="T", check_finite=False)
+        out = np.empty_like(found)
+        out[blocks.order] = found
+        return out.reshape(right.shape)
+
+    def close(self):
+        """Forget the factors."""
+        self._factors = []
+
+
+def inverse_among(upper, kept):
+    """Rows and columns `kept` (k,) of the inverse of a matrix by its upper triangle (csr), (k, k); None if not positive definite.
+
+    It is Y^T Y with L Y = their columns of the unit matrix. One layer's factor and rows of Y are in memory at a time.
+    """
+    blocks = _Blocks(upper)
+    place = np.empty(len(blocks.order), dtype=int)
+    place[blocks.order] = np.arange(len(place))
+    rows, by_place = np.sort(place[kept]), np.argsort(place[kept])
+    inverse, passed_on, done = np.zeros((len(kept), len(kept))), 0.0, 0
+    for own, (factor, coupling) in zip(blocks.parts, blocks.factors(), strict=False):
+        first, begun = np.searchsorted(rows, [own.start, own.stop])     # columns beyond are still zero
+        columns = np.zeros((own.stop - own.start, begun))
+        columns[:, :first] = passed_on
+        columns[rows[first:begun] - own.start, np.arange(first, begun)] = 1.0
+        columns = _lower(factor, columns)
+        inverse[:begun, :begun] += columns.T @ columns
+        if coupling is not None:
+            passed_on = -coupling.T @ columns[len(columns) - len(coupling):]
+        done += 1
+    if done < len(blocks.parts):
+        return None
+    out = np.empty_like(inverse)
+    out[np.ix_(by_place, by_place)] = inverse
+    return out
+
+
+class _Blocks:
+    """A matrix in the order of its layers: `order` (n,), and the `parts` (slices) of the layers in it."""
+
+    def __init__(self, upper):
+        full = (upper + sp.triu(upper, 1).T).tocsr().astype(float)
+        layer, entries = layers(full), full.tocoo()
+        forward = np.zeros(len(layer), dtype=bool)
+        forward[entries.row[layer[entries.row] < layer[entries.col]]] = True
+        self.order = np.lexsort((forward, layer))
+        ends = np.cumsum(np.bincount(layer))
+        self.parts = [slice(start, end) for start, end in zip([0, *ends[:-1]], ends, strict=True)]
+        self._tails = np.bincount(layer, weights=forward).astype(int)
+        self._ordered = full[self.order][:, self.order].tocsr()
+
+    def tail(self, number):
+        """The unknowns of a layer that couple to the next one, its last ones."""
+        stop = self.parts[number].stop
+        return slice(stop - self._tails[number], stop)
+
+    def factors(self):
+        """(L_i, C_i) of the layers in turn, C_i by its rows that are not zero, None of the last; ends where it is not definite."""
+        update = 0.0
+        for number, own in enumerate(self.parts):
+            factor, fault = sla.lapack.dpotrf(np.asfortranarray(self._ordered[own, own].toarray() - update), lower=1, overwrite_a=1)
+            if fault:
+                return
+            if number + 1 == len(self.parts):
+                yield factor, None
+                return
+            size, tail = len(factor), self.tail(number)
+            last = factor[size - (tail.stop - tail.start):, size - (tail.stop - tail.start):]
+            coupling = _lower(last, self._ordered[tail, self.parts[number + 1]].toarray())
+            update = coupling.T @ coupling
+            yield factor, coupling
+
+
+def layers(matrix):
+    """Layer (n,) of each unknown of a symmetric sparse matrix: its distance from one end of its part of the matrix' graph."""
+    graph = sp.csr_matrix((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
+    _, part = connected_components(graph, directed=False)
+    out, offset = np.empty(matrix.shape[0], dtype=int), 0
+    for own in range(part.max() + 1):
+        members = np.flatnonzero(part == own)
+        own_graph = graph[members][:, members]
+        distance = _distance(own_graph, [0])
+        for _ in range(2):     # from the far end as a whole: from one point layers would bend
+            distance = _distance(own_graph, np.flatnonzero(distance == distance.max()))
+        out[members] = distance + offset
+        offset += distance.max() + 1
+    return out
+
+
+def _distance(graph, starts):
+    return dijkstra(graph, directed=False, indices=starts, unweighted=True, min_only=True).astype(int)
+
+
+def _lower(factor, right):
+    return sla.solve_triangular(factor, right, lower=True, check_finite=False)

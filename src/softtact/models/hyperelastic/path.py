@@ -1,0 +1,225 @@
+"""The way of an object on the body: load steps by force, or by a `Motion`, in increments that adapt.
+
+A stage of the way leads from one load step to the next along a coordinate: the force where a press only grows, else the share of
+the motion's step. An increment that finds no balance is halved, one that does is doubled.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from softtact.contact.height_field import MovedSurface
+from softtact.contact.motion import Motion, MotionStep
+from softtact.errors import ConvergenceError, InputError
+from softtact.models.hyperelastic.body import BodyState
+from softtact.models.hyperelastic.newton import NewtonSettings, augment, first_touch, settle, tolerance_at
+
+_DEEP = 0.55           # of a frustum's height: from here on elements of the default mesh may be unstable
+DEFAULT = NewtonSettings()
+_SMALLEST_SHARE = 1 / 64     # of a motion's step, until it is given up
+
+
+@dataclass(frozen=True)
+class LoadStep:
+    """One converged load step."""
+
+    force_n: float
+    """Normal force of the object, positive into the sensor."""
+    state: BodyState
+    """Displacements, contacts and their history."""
+    iterations: int
+    """Newton steps in all of its increments."""
+    residual_n: float
+    """Largest unbalanced nodal force."""
+    penetration_mm: float
+    """Deepest overlap left."""
+
+
+@dataclass(frozen=True)
+class Control:
+    """What holds the object: its force (N) or, where that is None, its indentation (mm); and its way (2,) aside in mm."""
+
+    force: float | None
+    indentation: float
+    offset_mm: np.ndarray
+
+
+@dataclass(frozen=True)
+class ByForce:
+    """A stage straight down to a force; its coordinate is the force (N)."""
+
+    end: float
+    smallest: float
+
+    def control(self, force):
+        return Control(force, 0.0, np.zeros(2))
+
+    def reach(self, body, start, settings):
+        """The largest force that one increment may go to: friction depends on the way, so with it forces grow by doubling."""
+        if not body.friction.active:
+            return self.end
+        growth = settings.friction_growth
+        return max(growth * start, self.end / growth**2)
+
+    def growth(self, start, coordinate):
+        return coordinate / start if start > 0 else 1.0
+
+    def pressed(self, start, state):
+        """Whether the object already presses where an increment starts; a first touch is no result."""
+        return start > 0
+
+    def failure(self, start, coordinate):
+        return (f"The load step of {self.end:g} N was not reached: from {start:.4g} N on no step towards {coordinate:.4g} N found "
+                "a balance")
+
+    remedy = "Ask for smaller forces or for load steps nearer to each other"
+
+
+@dataclass(frozen=True)
+class ByMotion:
+    """A step of a motion; its coordinate is the share of it that is done."""
+
+    before: Control
+    after: Control
+    number: int
+    """Of the step, from 1 on."""
+    end: float = 1.0
+    smallest: float = _SMALLEST_SHARE
+
+    def control(self, share):
+        force = None if self.after.force is None else self.before.force + share * (self.after.force - self.before.force)
+        return Control(force, self.before.indentation + share * (self.after.indentation - self.before.indentation),
+                       self.before.offset_mm + share * (self.after.offset_mm - self.before.offset_mm))
+
+    def reach(self, body, start, settings):
+        """The largest share that one increment may go to, by the way that the object may go at once."""
+        way = np.linalg.norm(self.after.offset_mm - self.before.offset_mm)
+        if self.after.force is None:
+            way = max(way, abs(self.after.indentation - self.before.indentation))
+        return start + min(1.0, settings.largest_way_mm / max(way, 1e-12))
+
+    def pressed(self, start, state):
+        return state.force > 0
+
+    def growth(self, start, coordinate):
+        """Of the force, where it is known: a first guess of the pressures that friction acts by."""
+        before, after = self.control(start).force, self.control(coordinate).force
+        return after / before if before and after else 1.0
+
+    def failure(self, start, coordinate):
+        return f"Step {self.number} of the motion was not reached: from {start:.0%} of it on no increment found a balance"
+
+    remedy = "Make the step's way or load smaller"
+
+
+def press_load_steps(body, surface, forces_n, *, settings=DEFAULT):
+    """Yield a `LoadStep` for each force (N, increasing). Raises ConvergenceError naming the load step that was not reached."""
+    body.begin()
+    state, reached = first_touch(body, surface, settings), 0.0
+    for force in forces_n:
+        load_step = _advance(body, surface, state, reached, ByForce(float(force), settings.smallest_increment_n), settings)
+        state, reached = load_step.state, load_step.force_n
+        yield load_step
+
+
+def press_motion(body, surface, motion, touch_mm, *, settings=DEFAULT):
+    """Yield a `LoadStep` for each step of a `Motion`. Raises ConvergenceError naming the step that was not reached.
+
+    touch_mm: the indentation at which the object just touches the surface at rest, from where depths count
+    """
+    body.begin()
+    control, state = Control(None, float(touch_mm), np.zeros(2)), None
+    for number, step in enumerate(motion.steps, start=1):
+        if state is None:
+            state, control = _start(body, surface, step, control, settings)
+        stage = ByMotion(control, _after(control, step), number)
+        load_step = _advance(body, surface, state, 0.0, stage, settings)
+        state = load_step.state
+        control = replace(stage.after, indentation=state.indentation)
+        yield replace(load_step, force_n=state.force)
+
+
+def check_motion(motion: Motion) -> None:
+    """Refuse what the hyperelastic model cannot do: turn the object, or load it sideways."""
+    for number, step in enumerate(motion.steps, start=1):
+        other = [name for name in step.ways if name not in "xyz"] + [name for name in step.loads if name != "z"]
+        if other:
+            raise InputError(f"Motion, step {number}: the hyperelastic model moves an object along x, y and z and loads it along "
+                             f"z; it cannot prescribe or load {other[0]!r} so; leave that out.")
+        if step.loads.get("z", -1.0) >= 0:
+            raise InputError(f"Motion, step {number}: the load z is {step.loads['z']:g} N, which does not press; give a negative "
+                             "one.")
+
+
+def _start(body, surface, step, control, settings):
+    """State and `Control` from which the first step begins: at rest, or in a first touch under a load."""
+    if "z" in step.loads:
+        state = first_touch(body, surface, settings)
+        return state, replace(control, force=state.force, indentation=state.indentation)
+    slab, support = body.rest()
+    state = body.evaluate(slab, support, control.indentation, body.slab.project(slab, surface))
+    return body.reevaluate_contact(state, body.friction.begin_step(state)), control
+
+
+def _after(before: Control, step: MotionStep) -> Control:
+    """The `Control` at a step's end."""
+    way = np.array([step.ways.get("x", 0.0), step.ways.get("y", 0.0)])
+    if "z" in step.loads:
+        force = -step.loads["z"]
+    else:
+        force = None if "z" in step.ways else before.force
+    return Control(force, before.indentation - step.ways.get("z", 0.0), before.offset_mm + way)
+
+
+def _advance(body, surface, state, reached, stage, settings):
+    """Reach the stage's end, halving the increment where Newton's method fails and growing it again where it succeeds.
+
+    A step starts from the last state: displacements continued along the path, whole or in part, start in worse contact and took
+    as many iterations or more, once the step itself is exact in the contact (benchmarks/mesh_error.py's bodies, ten load steps).
+    """
+    iterations, increment = 0, stage.end - reached
+    while True:
+        at = min(stage.end, reached + increment, stage.reach(body, reached, settings))
+        control = stage.control(at)
+        if settings.max_augmentations and stage.pressed(reached, state):
+            start = body.augmented(state, allowed_mm=0.0)     # what overlaps is no start: more of it comes with more force
+        else:
+            start = state
+        start, moved = _begun(body, surface, start, control, stage.growth(reached, at))
+        found = settle(body, moved, start, control.force, tolerance_at(_force(control, state), settings), settings)
+        iterations += found.iterations
+        if found.state is not None and at >= stage.end:
+            found = augment(body, moved, found, control.force, settings)
+            iterations += found.iterations
+        if found.state is not None and at >= stage.end:
+            return LoadStep(force_n=stage.control(at).force, state=found.state, iterations=iterations,
+                            residual_n=found.residual_n, penetration_mm=body.penetration(found.state))
+        increment = 2 * increment if found.state is not None else 0.5 * (at - reached)
+        if found.state is None and (increment < stage.smallest or iterations >= settings.load_step_iterations):
+            raise ConvergenceError(_failure(body, state, stage, reached, at, found.residual_n, iterations))
+        if found.state is not None:
+            reached, state = at, found.state
+
+
+def _force(control, state):
+    return state.force if control.force is None else control.force
+
+
+def _begun(body, surface, state, control, growth):
+    """The state from which an increment goes on to a `Control`, and the surface of the object there."""
+    state = body.reevaluate_contact(state, body.friction.begin_step(state, growth=growth))
+    way = control.offset_mm - state.slab.projection.offset_mm
+    if way.any():
+        state = body.update_normals(state, state.slab.projection.moved(way))
+    if control.force is None:
+        state = body.indented(state, control.indentation - state.indentation)
+    return state, MovedSurface(surface, control.offset_mm) if control.offset_mm.any() else surface
+
+
+def _failure(body, state, stage, reached, at, residual, iterations):
+    x, y, share = body.most_compressed(state)
+    remedy = stage.remedy
+    if share > _DEEP:
+        remedy += ", or press with MeshSettings.stable() (--mesh-quality stable)"
+    return (f"{stage.failure(reached, at)} (unbalanced force {residual:.2g} N, {iterations} iterations in all); the frustum at "
+            f"x {x:.1f}, y {y:.1f} mm is compressed by {share:.0%} of its height. {remedy}.")

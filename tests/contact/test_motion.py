@@ -1,0 +1,54 @@
+"""Motions: what they say, read from one line, and refuse."""
+
+import numpy as np
+import pytest
+
+from softtact.contact.motion import Motion, MotionStep
+from softtact.errors import InputError
+
+
+def test_a_line_says_what_the_calls_do():
+    by_calls = Motion().press(depth_mm=1.0).slide(x_mm=1.0, steps=2)
+    assert Motion.parse("z -1.0; x 1.0 in 2") == by_calls
+    assert Motion.parse("fz -20") == Motion().press(force_n=20)
+    assert Motion.parse("z -0.5 x 0.2; rz 5") == Motion().step(ways={"z": -0.5, "x": 0.2}).step(ways={"rz": 5.0})
+
+
+def test_depths_count_from_first_touch_and_ways_from_where_a_step_begins():
+    motion = Motion().press(depth_mm=[0.2, 0.5]).press(depth_mm=0.3)
+    assert [step.ways["z"] for step in motion.steps] == pytest.approx([-0.2, -0.3, 0.2]) and motion.depth_mm == pytest.approx(0.3)
+
+
+def test_a_motion_stays_as_it_is_when_a_longer_one_is_made_of_it():
+    start = Motion().press(force_n=5)
+    start.slide(x_mm=1.0)
+    assert start.steps == (MotionStep(loads={"z": -5.0}),)
+
+
+def test_only_straight_presses_by_force_have_forces():
+    assert Motion().press(force_n=[5, 20]).forces_n == [5, 20]
+    assert Motion().press(force_n=5).slide(x_mm=1).forces_n is None and Motion().forces_n is None
+    assert Motion().press(depth_mm=1).straight and not Motion().slide(y_mm=1).straight
+
+
+def test_the_places_of_a_motion_are_no_farther_apart_than_asked():
+    places = Motion().press(depth_mm=0.1).slide(x_mm=1.0).slide(y_mm=-0.4).offsets_mm(at_most_mm=0.3)
+    assert np.linalg.norm(np.diff(places, axis=0), axis=1).max() <= 0.3 + 1e-12
+    np.testing.assert_allclose(places[-1], [1.0, -0.4])
+
+
+@pytest.mark.parametrize(("make", "sentence"), [
+    (lambda: Motion().press(), "either force_n or depth_mm"),
+    (lambda: Motion().press(force_n=-5), "force_n=-5 does not press"),
+    (lambda: Motion().press(depth_mm=float("nan")), "depth_mm=nan is no number"),
+    (lambda: Motion().slide(x_mm=1.0, steps=0), "steps=0 is not possible"),
+    (lambda: Motion().step(ways={"w": 1.0}), "the freedom 'w' is unknown"),
+    (lambda: Motion().step(ways={"z": 1.0}, loads={"z": 1.0}), "'z' is prescribed and loaded in one step"),
+    (lambda: Motion().press(force_n=5).press(depth_mm=1.0), "a depth after a press by force is not known"),
+    (lambda: Motion.parse("z -1; aside 2"), "the step 'aside 2' is not understood"),
+    (lambda: Motion.parse("q 1"), "'q' in the step 'q 1' is no freedom"),
+    (lambda: Motion.parse(" ; "), "there is no step in")])
+def test_what_is_no_motion_is_refused_in_one_sentence(make, sentence):
+    with pytest.raises(InputError, match=sentence) as caught:
+        make()
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,134 @@
+"""An object that moves on the hyperelastic sensor: down by depth or force, aside, and back."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+from support.sensors import CORO
+
+from softtact.contact.motion import Motion
+from softtact.errors import InputError
+from softtact.materials.laws.registry import make_law
+from softtact.models.hyperelastic.build import build_sensor_body
+from softtact.models.hyperelastic.mesh_settings import MeshSettings
+from softtact.models.hyperelastic.newton import NewtonSettings
+from softtact.models.hyperelastic.path import press_load_steps, press_motion
+from softtact.press.sensor import Sensor
+
+SMALL = CORO.model_copy(update={"footprint_mm": (4.8, 4.8), "map_shape": (9, 9)})     # 4 x 4 frusta
+LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492),
+        "cover": make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)}
+COARSE = MeshSettings(cover_heights=(0.0, 1.0), cover_splits=(0,), far_pitches=1, frustum_heights=(0.0, 0.35, 1.0))
+TIGHT = NewtonSettings(relative_tolerance=1e-6, largest_penetration_mm=1e-4)
+MU = 0.3
+
+
+def sensor(mu=0.0, solver=TIGHT):
+    spec = SMALL.model_copy(update={"friction": SMALL.friction.model_copy(update={"object": mu})})
+    return Sensor(spec, LAWS, mesh=COARSE, solver=solver)
+
+
+def ball(radius=3.0):
+    return trimesh.creation.icosphere(subdivisions=4, radius=radius)
+
+
+@pytest.fixture(scope="module")
+def slid():
+    """A ball pressed 0.15 mm deep, moved aside by 0.3 mm and back."""
+    motion = Motion().press(depth_mm=[0.08, 0.15]).slide(x_mm=0.3, steps=3).slide(x_mm=-0.3, steps=3)
+    return sensor(MU).press(ball(), motion=motion, model="hyperelastic", label="")
+
+
+def test_a_ball_sinks_as_deep_by_force_as_the_depth_that_gave_that_force():
+    """One curve of force and depth, walked by either control. The light press is settled to 1e-5 of its force, so 1e-4 is ample."""
+    fine = replace(TIGHT, relative_tolerance=5e-8, first_touch_tolerance_n=1e-6)
+    by_depth = sensor(solver=fine).press(ball(), motion=Motion().press(depth_mm=[0.05, 0.1, 0.15]), model="hyperelastic", label="")
+    by_force = sensor(solver=fine).press(ball(), force_n=by_depth.normal_force_n, model="hyperelastic", label="")
+    np.testing.assert_allclose(by_depth.indentation_mm, [0.05, 0.1, 0.15], rtol=1e-12)
+    np.testing.assert_allclose(by_force.indentation_mm, by_depth.indentation_mm, rtol=1e-4)
+    np.testing.assert_allclose(by_force.deformation_map_mm, by_depth.deformation_map_mm, atol=1e-4 * 0.15)
+
+
+def test_the_vector_of_force_holds_the_normal_force_and_a_ball_in_the_middle_gives_no_torque(slid):
+    np.testing.assert_allclose(slid.force_n[:, 2], -slid.normal_force_n, rtol=1e-9)
+    assert np.abs(slid.torque_nmm[:2]).max() < 1e-3 * 0.25 * 0.3      # of the force times the contact's radius
+
+
+def test_a_plate_that_slides_is_held_by_the_coefficient_times_the_force():
+    """Coulomb: |T| = mu N once all points slide; the cover of a plate without slope has no other force along x."""
+    plate = trimesh.creation.box((2.6, 2.6, 1.0))
+    result = sensor(MU).press(plate, motion=Motion().press(force_n=1.0).slide(x_mm=0.6, steps=3), model="hyperelastic", label="")
+    np.testing.assert_allclose(result.normal_force_n, 1.0, rtol=1e-4)
+    assert result.force_n[-1, 0] == pytest.approx(MU * 1.0, rel=2e-3)   # where the trough's rim leans, pressure has a part along x
+    assert 0 < np.nanmin(result.slip[-1]) and np.isnan(result.slip[-1]).any()
+
+
+def test_a_path_that_returns_dissipates_and_one_that_sticks_does_not():
+    """Work of the object along x over a closed path: friction takes what sliding points lose, and sticking ones give all back."""
+    def loop(mu, way):
+        motion = Motion().press(depth_mm=0.1).slide(x_mm=way, steps=2).slide(x_mm=-way, steps=2)
+        result = sensor(mu).press(ball(), motion=motion, model="hyperelastic", label="")
+        force, place = result.force_n[:, 0], np.concatenate([[0.0], way * np.array([1, 2, 1, 0]) / 2])
+        pull = np.concatenate([[0.0], force[1:]])
+        return 0.5 * (pull[1:] + pull[:-1]) @ np.diff(place), np.abs(pull).max() * way
+    lost, scale = loop(MU, 0.2)
+    kept, stuck_scale = loop(3.0, 0.01)
+    assert lost > 0.5 * scale and abs(kept) < 0.05 * stuck_scale
+
+
+def test_the_end_depends_on_the_path_with_friction_and_not_without():
+    def end(mu, before):
+        motion = Motion().step(ways={"x": before}) if before else Motion()
+        motion = motion.press(depth_mm=0.1)
+        result = sensor(mu).press(ball(), motion=motion.slide(x_mm=-before) if before else motion, model="hyperelastic", label="")
+        return result.displacement_mm[-1]
+    straight = {mu: end(mu, 0.0) for mu in (0.0, MU)}
+    assert np.abs(end(MU, -0.3) - straight[MU])[..., 0].max() > 1e-3
+    assert np.abs(end(0.0, -0.3) - straight[0.0]).max() < 2e-4      # facets under other points, 0.1 um of overlap
+
+
+def test_a_mirrored_motion_gives_mirrored_maps():
+    right, left = (sensor(MU).press(ball(), motion=Motion().press(depth_mm=0.1).slide(x_mm=way, steps=2), model="hyperelastic",
+                                    label="") for way in (0.2, -0.2))
+    np.testing.assert_allclose(left.deformation_map_mm[:, :, ::-1], right.deformation_map_mm, atol=2e-5)
+    np.testing.assert_allclose(left.force_n * [-1, 1, 1], right.force_n, atol=2e-4)
+
+
+def test_a_body_pressed_twice_gives_the_same_bytes():
+    """What an earlier press left in multipliers, anchors, tangents and factors has no part in the next one."""
+    spec = SMALL.model_copy(update={"friction": SMALL.friction.model_copy(update={"object": MU})})
+    body = build_sensor_body(spec, dielectric_law=LAWS["dielectric"], cover_law=LAWS["cover"], mesh=COARSE)
+
+    def surface(x, y):      # a cone, whose edges and multipliers change with every press that remembers
+        height = 0.3 * np.hypot(x, y)
+        slope = np.stack([0.3 * x, 0.3 * y], axis=-1) / np.maximum(np.hypot(x, y), 1e-9)[:, None]
+        normal = np.column_stack([slope, -np.ones(len(x))])
+        return height, normal / np.linalg.norm(normal, axis=1, keepdims=True)
+
+    straight = [[step.state.slab.displacement.tobytes() for step in press_load_steps(body, surface, [0.3, 1.0])] for _ in range(2)]
+    motion = Motion().press(depth_mm=0.1).slide(y_mm=0.1)
+    aside = [[step.state.slab.displacement.tobytes() for step in press_motion(body, surface, motion, 0.0)] for _ in range(2)]
+    assert straight[0] == straight[1] and aside[0] == aside[1]
+
+
+@pytest.mark.parametrize(("motion", "sentence"), [
+    (Motion().press(depth_mm=0.1).step(ways={"rz": 5.0}), "Motion, step 2: .* cannot prescribe or load 'rz'"),
+    (Motion().press(depth_mm=0.1).step(loads={"x": 1.0}), "Motion, step 2: .* cannot prescribe or load 'x'"),
+    (Motion().step(ways={"x": 0.1}, loads={"z": 2.0}), "Motion, step 1: the load z is 2 N, which does not press")])
+def test_a_motion_that_the_model_cannot_do_is_refused_by_its_step(motion, sentence):
+    with pytest.raises(InputError, match=sentence):
+        sensor(MU).press(ball(), motion=motion, model="hyperelastic")
+
+
+def test_the_foundation_model_takes_forces_only_and_one_of_force_and_motion_is_wanted():
+    with pytest.raises(InputError, match="the foundation model presses straight down by force only"):
+        sensor().press(ball(), motion=Motion().press(depth_mm=0.1), model="foundation")
+    with pytest.raises(InputError, match="takes either force_n or motion"):
+        sensor().press(ball(), model="hyperelastic")
+
+
+def test_a_motion_of_forces_is_the_press_by_these_forces():
+    by_motion, by_force = (sensor().press(ball(), model="hyperelastic", label="", **how)
+                           for how in ({"motion": Motion().press(force_n=[0.1, 0.2])}, {"force_n": [0.1, 0.2]}))
+    assert by_motion.deformation_map_mm.tobytes() == by_force.deformation_map_mm.tobytes()
