@@ -82,7 +82,7 @@ class Slab:
         below these keep to the sheet's plan. None: none does, and none is split.
 
         constrained_cell_edges: everywhere (True), nowhere (False), or where a function of places (n, 2) says so (n,)
-        quartic_penalty_ratio: see `blocks`;  friction: `Coulomb` of the object on the top, or None
+        quartic_penalty_ratio: see `solid_block`;  friction: `Coulomb` of the object on the top, or None
         """
         if splits is None:
             splits = np.zeros((len(cover.heights) - 1, len(y_lines) - 1, len(x_lines) - 1), dtype=np.int64)
