@@ -10,8 +10,8 @@ from pathlib import Path
 import record
 from stand_in import SEED, SOURCE, stand_in
 
+from softtact.evaluation.learning_curve import learning_curve
 from softtact.evaluation.scoring import score_sensor
-from softtact.learning.learning_curve import learning_curve
 from softtact.learning.settings import Training
 from softtact.learning.training import prepare_torch
 from softtact.reporting.style import pyplot, save

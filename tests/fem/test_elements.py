@@ -203,3 +203,9 @@ def test_full_elements_contain_the_serendipity_ones_in_the_plane_too():
 def test_an_element_turned_inside_out_is_reported():
     block = HexBlock(HEX20.nodes[None].copy(), LAW)
     assert block.evaluate((-2.0 * HEX20.nodes * np.array([1, 0, 0]))[None]) is None
+
+
+@EVERY_ELEMENT
+def test_at_no_points_there_are_no_values(element):
+    values, slopes = element.shape(np.zeros((0, element.nodes.shape[1])))
+    assert values.shape == (0, len(element.nodes)) and slopes.shape == (0, *element.nodes.shape)

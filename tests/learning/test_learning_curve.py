@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from formula_study import make_samples
 
-from softtact.learning.learning_curve import COLUMNS, learning_curve
+from softtact.evaluation.learning_curve import COLUMNS, learning_curve
 from softtact.learning.settings import Training
 from softtact.learning.training import prepare_torch
 

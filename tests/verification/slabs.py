@@ -120,5 +120,5 @@ def _without_frusta(x, y):
 
 def interpolate(slab, field, points):
     """A nodal field (n, 3) of the top at points (p, 2)."""
-    quads, values = slab.locate(points)
+    quads, values = slab.underside.locate(points)
     return np.einsum("pa,pad->pd", values, field[slab.top.faces[quads]])

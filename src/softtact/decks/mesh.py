@@ -73,7 +73,7 @@ def body_mesh(body):
     points = np.vstack([slab.points, slab.cover_mesh.points[hanging], slab.sheet_mesh.points[followers],
                         support.coordinates.reshape(-1, 3)])
     ties = _ties(slab.nodes, hanging, *slab.cover_mesh.masters())
-    ties += _ties(slab.nodes + len(hanging), followers, *slab.sheet_nodes)
+    ties += _ties(slab.nodes + len(hanging), followers, slab.sheet_nodes.masters, slab.sheet_nodes.weights)
     number = _numbers_in_use([sheet[_hexes(slab.sheet_mesh)], sheet[_wedges(slab.sheet_mesh)], cover,
                               own[:, _hexes(support.mesh)], *(tie.masters for tie in ties)], len(points))
     ties = [Tie(int(number[tie.slave]), number[tie.masters], tie.weights) for tie in ties if number[tie.slave] >= 0]
@@ -101,7 +101,7 @@ def _sheet_numbers(slab, first_follower):
 
     A node that follows one other with weight 1 is that one.
     """
-    masters, weights = slab.sheet_nodes
+    masters, weights = slab.sheet_nodes.masters, slab.sheet_nodes.weights
     first = np.argmax(weights, axis=1)
     rows = np.arange(len(masters))
     followers = np.flatnonzero(np.abs(weights[rows, first] - 1) > _NO_WEIGHT)

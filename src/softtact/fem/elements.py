@@ -63,7 +63,7 @@ class Element:
         return np.array([face.nodes for face in (self.faces[2:] if self.nodes.shape[1] == 3 else self.faces)])
 
 
-def reference_gradients(coordinates, derivatives, weights):
+def reference_gradients(coordinates: np.ndarray, derivatives: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Gradients in the reference configuration.
 
     coordinates (e, m, 3) in mm, derivatives (g, m, 3), weights (g,).

@@ -274,7 +274,7 @@ def tangent(deformed, at_rest, stress, moduli, volume, like):
     """
     F, C, J = deformed.F, deformed.C, deformed.J
     gradients, volumes, shapes = at_rest.gradients, at_rest.volumes, at_rest.shapes
-    pressure, growing, unprojected = volume.pressure, volume.quartic, volume.unprojected
+    pressure, quartic, unprojected = volume.pressure, volume.quartic, volume.unprojected
     elements, points = J.shape
     nodes = gradients.shape[3]
     width = -(-nodes // _LANES) * _LANES
@@ -284,15 +284,15 @@ def tangent(deformed, at_rest, stress, moduli, volume, like):
     several = -(-at_rest.basis.shape[1] // _AT_ONCE) * _AT_ONCE
     basis = _padded(at_rest.basis, points, several, like)
     A, D, S = np.empty((3, 6, 3), like.dtype), np.empty((6, 6)), np.empty((3, 3))
-    grows = growing.size > 0
+    penalised = quartic.size > 0
     for e in range(elements):
         blocks[:], right[:] = 0.0, 0.0
         for g in range(points):
             n, j, w, own = e * points + g, J[e, g], volumes[shapes[e], g], G[3 * g:3 * g + 3]
             inverse = inverse_symmetric(C[n])
             local = 0.5 * unprojected * (j * j + 1.0)
-            if grows:
-                local += growing[e, g] * j * j
+            if penalised:
+                local += quartic[e, g] * j * j
             _moduli(D, S, stress[n], moduli[n], inverse, w, pressure[e, g] * j, local)
             _elasticity(A, F[e, g], S, D)
             own[:, :nodes] = gradients[shapes[e], g]

@@ -13,7 +13,7 @@ class Quadrature(NamedTuple):
     degree: int
 
 
-def gauss(points, dimension):
+def gauss(points: int, dimension: int) -> tuple[np.ndarray, np.ndarray]:
     """Gauss rule on [-1, 1]^dimension: points (n, dimension) and weights (n,)."""
     x, w = np.polynomial.legendre.leggauss(points)
     grids = np.meshgrid(*[x] * dimension, indexing="ij")
@@ -21,12 +21,12 @@ def gauss(points, dimension):
     return np.column_stack([g.ravel() for g in grids]), np.prod([g.ravel() for g in weights], axis=0)
 
 
-def gauss_rule(points, dimension):
+def gauss_rule(points: int, dimension: int) -> Quadrature:
     """The same as a `Quadrature`."""
     return Quadrature(*gauss(points, dimension), degree=2 * points - 1)
 
 
-def triangle_rule():
+def triangle_rule() -> Quadrature:
     """Six points of the triangle (0, 0), (1, 0), (0, 1), of degree 4. (Dunavant, Int. J. Numer. Meth. Engng 21 (1985) 1129.)"""
     near, far = (0.445948490915965, 0.223381589678011), (0.091576213509771, 0.109951743655322)
     plane = np.array([[c, c] for c, _ in (near, far)] + [[1 - 2 * c, c] for c, _ in (near, far)]
@@ -34,7 +34,7 @@ def triangle_rule():
     return Quadrature(plane, 0.5 * np.array([w for _, w in (near, far)] * 3), degree=4)
 
 
-def wedge_rule():
+def wedge_rule() -> Quadrature:
     """The triangle's six points times three along the height: 18 points."""
     plane, weight, degree = triangle_rule()
     z, wz = np.polynomial.legendre.leggauss(3)
@@ -42,6 +42,6 @@ def wedge_rule():
     return Quadrature(points, np.tile(weight, 3) * np.repeat(wz, 6), degree)
 
 
-def tetrahedron_rule():
+def tetrahedron_rule() -> Quadrature:
     """The one point in the middle of the tetrahedron of the origin and the unit vectors, of degree 1."""
     return Quadrature(np.full((1, 3), 0.25), np.array([1 / 6]), degree=1)

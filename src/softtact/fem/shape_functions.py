@@ -1,9 +1,11 @@
 """Shape functions in parent coordinates: each function gives values (n, m) and derivatives (n, m, d) at points (n, d)."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 
-def serendipity(points, *, nodes):
+def serendipity(points: np.ndarray, *, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Quadratic serendipity functions on [-1, 1]^d, d = 2 or 3.
 
     nodes (m, d): corners and mid-sides (a 0 marks the direction of the side). (Zienkiewicz and Taylor, vol. 1, ch. 8.)
@@ -28,7 +30,7 @@ def serendipity(points, *, nodes):
     return values, derivatives
 
 
-def quadratic(points, *, nodes):
+def quadratic(points: np.ndarray, *, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Products of the quadratic functions along each direction of [-1, 1]^d, for nodes (m, d) at -1, 0 and 1."""
     points, kind = np.asarray(points, dtype=float), np.asarray(nodes, dtype=np.int64) % 3     # of nodes at 0, 1, -1
     lines = [_along(points[:, axis]) for axis in range(kind.shape[1])]
@@ -51,17 +53,17 @@ def _along(t):
 _TRIANGLE_SIDES = np.array([[0, 1], [1, 2], [2, 0]])
 
 
-def quadratic_triangle(points):
+def quadratic_triangle(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Quadratic functions of the triangle (0, 0), (1, 0), (0, 1): three corners, then the mid-sides."""
     L, dL = linear_simplex(points)
     a, b = _TRIANGLE_SIDES.T
     values = np.hstack([L * (2 * L - 1), 4 * L[:, a] * L[:, b]])
-    slopes = np.concatenate([(4 * L - 1)[..., None] * dL[0],
-                             4 * (L[:, a, None] * dL[0, b] + L[:, b, None] * dL[0, a])], axis=1)
+    slopes = np.concatenate([(4 * L - 1)[..., None] * dL,
+                             4 * (L[:, a, None] * dL[:, b] + L[:, b, None] * dL[:, a])], axis=1)
     return values, slopes
 
 
-def linear_simplex(points):
+def linear_simplex(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Linear functions of the simplex of the origin and the unit vectors: a triangle or a tetrahedron."""
     points = np.asarray(points, dtype=float)
     d = points.shape[1]
@@ -72,7 +74,7 @@ def linear_simplex(points):
     return np.column_stack([rest, points]), np.broadcast_to(slopes, (len(points), *slopes.shape))
 
 
-def lifted(points, *, base):
+def lifted(points: np.ndarray, *, base: Callable) -> tuple[np.ndarray, np.ndarray]:
     """Products of a plane element's functions `base` with the quadratic ones in height, of its bottom, top and middle nodes."""
     points = np.asarray(points, dtype=float)
     values, slopes = base(points[:, :2])

@@ -9,7 +9,7 @@ from softtact.fem.static_condensation import packed
 
 
 class TangentCache:
-    """Of the elements (e,) of a block of `blocks`; in single precision, upper triangles as `packed` has them."""
+    """Of the elements (e,) of a `SolidBlock`; in single precision, upper triangles as `packed` has them."""
 
     def __init__(self, block):
         elements, nodes = len(block.at_rest.shapes), block.at_rest.gradients.shape[3]

@@ -5,7 +5,8 @@ x > 0, y > 0 with its own conditions on the two planes of symmetry: four systems
 compliance that hold a quarter of the numbers of the whole one.
 Parity (p, q): 0 even, 1 odd in x and y. With the blocks G_pq between places i, j of the quarter, and signs s, t of x and y:
     G(i s, j t) = 1/4 sum_pq (s_x t_x)^p (s_y t_y)^q G_pq(i, j)
-Elements: 27-node hexahedra with a discontinuous linear pressure (`blocks`), which do not lock for nearly incompressible rubber.
+Elements: 27-node hexahedra with a discontinuous linear pressure (`solid_block`), which do not lock for nearly incompressible
+rubber.
 Reference: representation of the dihedral group; Healey and Treacy, Int. J. Numer. Meth. Engng 31 (1991) 265.
 """
 

@@ -6,8 +6,8 @@ outputs: curve (CSV);  settings: learning_curve, training, network, ssim, seed, 
 
 import pandas as pd
 
+from softtact.evaluation.learning_curve import COLUMNS, learning_curve
 from softtact.files import read_json, write_csv
-from softtact.learning.learning_curve import COLUMNS, learning_curve
 from softtact.learning.samples import read_samples
 from softtact.learning.settings import LearningCurve, Network, Ssim, Training, chosen_network, chosen_training
 from softtact.learning.training import prepare_torch

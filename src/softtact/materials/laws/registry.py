@@ -4,6 +4,7 @@ import math
 
 from softtact.errors import InputError
 from softtact.materials.laws.arruda_boyce import ArrudaBoyce
+from softtact.materials.laws.base import Law
 from softtact.materials.laws.gent import Gent
 from softtact.materials.laws.mooney_rivlin import MooneyRivlin
 from softtact.materials.laws.neo_hooke import NeoHooke
@@ -24,7 +25,8 @@ def law_class(name):
     return LAWS[name]
 
 
-def make_law(name, parameters, *, bulk_modulus=None, bulk_over_shear=20.0, volumetric="quadratic"):
+def make_law(name: str, parameters: dict[str, float], *, bulk_modulus: float | None = None, bulk_over_shear: float = 20.0,
+             volumetric: str = "quadratic") -> Law:
     """A law with its constants (MPa, 1). The bulk modulus (MPa) is `bulk_modulus`, or `bulk_over_shear` * mu0.
 
     volumetric: name of its U(J) in VOLUMETRIC_FUNCTIONS

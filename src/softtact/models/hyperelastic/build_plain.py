@@ -12,8 +12,8 @@ from softtact.fem.point_location import interpolation_2d
 from softtact.models.hyperelastic.body import LayeredBody
 from softtact.models.hyperelastic.build import cover_splits
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
-from softtact.models.hyperelastic.sampling import interpolation_on_side
 from softtact.models.hyperelastic.slab import Layer, Slab
+from softtact.models.hyperelastic.slab_nodes import CoverSide
 from softtact.models.hyperelastic.support import PlainSupport
 
 _SHEET_SHARE = 0.5      # of a single layer that is meshed as the slab's sheet
@@ -28,7 +28,7 @@ class SingleLayerSlab(Slab):
     def sampling(self, points):
         """Sparse matrix (p, nodes) that interpolates a nodal field of the top at points (p, 2)."""
         mesh = self.cover_mesh
-        at = interpolation_on_side(mesh, mesh.top, mesh.top_cells, (self.x_lines, self.y_lines), points)
+        at = CoverSide(mesh, mesh.top, mesh.top_cells, self.x_lines, self.y_lines).interpolation(points)
         at.resize(len(points), self.nodes)
         return at
 

@@ -50,7 +50,7 @@ def pressed_body(body, state=None):
     """
     slab, support = (state.slab.displacement, state.support.displacement) if state else body.rest()
     sheet, cover = body.slab.sheet_mesh, body.slab.cover_mesh
-    masters, weights = body.slab.sheet_nodes
+    masters, weights = body.slab.sheet_nodes.masters, body.slab.sheet_nodes.weights
     first = np.cumsum([0, len(sheet.points), len(cover.points)])
     cells = (*_frusta(body.support, first[2]), *_on_plan(body.slab), _cells(HEX20, cover.hexes + first[1], body.slab.regions[1]))
     moved = np.vstack([np.einsum("pm,pmd->pd", weights, slab[masters]), cover.follow @ slab[:cover.free], support.reshape(-1, 3)])

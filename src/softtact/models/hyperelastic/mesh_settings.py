@@ -20,7 +20,7 @@ class MeshSettings:
     a third of it takes a quarter fewer iterations and leaves three times the overlap; sheet_layers: elements through the sheet;
     frustum_heights: heights of the frustum's element layers as shares of its height; unprojected_penalty_ratio,
     quartic_penalty_ratio: what holds volume changes in the frusta that their elements' pressure does not see, over mu (see
-    `blocks`);
+    `solid_block`);
     slab_quartic_penalty_ratio: the latter in sheet and cover, where frusta are pressed to two thirds of their height;
     trilinear_pressure: or linear, which is softer by 2 % for small movements, and fails under deep objects.
     refinement: how often all elements are split in plan. frustum_rings: rings of elements around a frustum's core, the

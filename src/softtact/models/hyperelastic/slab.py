@@ -22,7 +22,7 @@ from softtact.fem.solid_block import HexBlock, WedgeBlock, hanging_node_constrai
 from softtact.linalg.workers import SERIAL
 from softtact.models.hyperelastic.newton_step import LinearGaps
 from softtact.models.hyperelastic.rigid_contact import ContactProjection, TopContact
-from softtact.models.hyperelastic.sampling import interpolation_on_side, located, without_zeros
+from softtact.models.hyperelastic.slab_nodes import CoverSide, sheet_nodes, without_zeros
 
 
 @dataclass(frozen=True)
@@ -73,6 +73,7 @@ class Slab:
 
     sheet_mesh: the sheet (`sheet_layers`) and the cover's layers that keep to its plan;  cover_mesh: the cover's other layers
     Nodes: cover_mesh's first, then sheet_mesh's without its top. `bottom`: those under the sheet, in the plan's order.
+    sheet_nodes: `SheetNodes`, what the nodes of sheet_mesh follow;  underside: the cover's, on which the sheet's top lies
     """
 
     regions = ("sheet", "cover")     # of the deformed mesh that the two parts belong to
@@ -83,7 +84,7 @@ class Slab:
         below these keep to the sheet's plan. None: none does, and none is split.
 
         constrained_cell_edges: everywhere (True), nowhere (False), or where a function of places (n, 2) says so (n,)
-        quartic_penalty_ratio: see `blocks`;  friction: `Coulomb` of the object on the top, or None
+        quartic_penalty_ratio: see `solid_block`;  friction: `Coulomb` of the object on the top, or None
         """
         if splits is None:
             splits = np.zeros((len(cover.heights) - 1, len(y_lines) - 1, len(x_lines) - 1), dtype=np.int64)
@@ -93,8 +94,14 @@ class Slab:
         self.cover_mesh = cover_mesh(x_lines, y_lines, cover.heights[bound:], splits)
         self.sheet_mesh = extrude(sheet_mesh_2d.mesh_2d, np.append(sheet.heights, cover.heights[1:bound + 1]))
         self.sheet_layers = len(sheet.heights) - 1
-        self._constrained_cell_edges, self._quartic_penalty_ratio = constrained_cell_edges, quartic_penalty_ratio
-        self._number_nodes(sheet_mesh_2d)
+        self._quartic_penalty_ratio = quartic_penalty_ratio
+        self.underside = CoverSide(self.cover_mesh, self.cover_mesh.bottom, self.cover_mesh.bottom_cells, self.x_lines, self.y_lines)
+        above = self.underside.interpolation(sheet_mesh_2d.mesh_2d.points)
+        self.sheet_nodes = sheet_nodes(self.sheet_mesh, sheet_mesh_2d, first=self.cover_mesh.free, above=above,
+                                       constrained=constrained_cell_edges)
+        self.points = np.vstack([self.cover_mesh.points[:self.cover_mesh.free], self.sheet_mesh.points[self.sheet_nodes.own]])
+        self.nodes = len(self.points)
+        self.bottom = self.sheet_nodes.number[self.sheet_mesh.planes[0]]
         self.groups, self.cell_groups = [], []   # (nodes, block) outside of cells; a `CellGroup` for each kind of cell
         self._add_cover(cover.law)
         self._add_sheet(sheet_mesh_2d, [sheet.law] * self.sheet_layers + [cover.law] * bound)
@@ -104,40 +111,6 @@ class Slab:
         self.top = TopContact(self.cover_mesh, contact, plane_modulus=pressed.plane_modulus if pressed else np.inf,
                               friction=friction)
 
-    def _number_nodes(self, mesh_2d):
-        """Masters (p, 8) and weights (p, 8) of sheet_mesh's nodes: its top follows the cover, the rest its own unknowns.
-
-        Along the walls between cells, two elements a side, the sheet moves as one quadratic curve: the nodes at the quarters
-        follow the corner, the middle and the next corner. (Free quarters: half as many unknowns again, and 1 % softer.)
-        """
-        mesh, first = self.sheet_mesh, self.cover_mesh.free
-        top = mesh.planes[-1]
-        curve, curve_weights = mesh_2d.quarters
-        coarse = self._constrained_cell_edges
-        if callable(coarse):
-            coarse = coarse(mesh_2d.mesh_2d.points[curve[:, 0]])
-        curve = curve[np.broadcast_to(coarse, len(curve))]
-        follows = np.zeros(len(mesh.points), dtype=bool)
-        follows[top] = True
-        planes = mesh.inner_planes
-        follows[planes[:, curve[:, 0]]] = True
-        own = np.flatnonzero(~follows)
-        number = np.full(len(mesh.points), -1, dtype=np.int64)
-        number[own] = first + np.arange(len(own))
-        above = self._under_cover(mesh_2d.mesh_2d.points)
-        width = max(int(np.diff(above.indptr).max()), 3)
-        self._masters, self._weights = np.zeros((len(mesh.points), width), dtype=np.int64), np.zeros((len(mesh.points), width))
-        self._masters[own, 0], self._weights[own, 0] = number[own], 1.0
-        row = np.repeat(np.arange(len(top)), np.diff(above.indptr))
-        place = np.arange(above.nnz) - above.indptr[row]
-        self._masters[top[row], place], self._weights[top[row], place] = above.indices, above.data
-        for plane in planes:
-            self._masters[plane[curve[:, 0]], :3] = number[plane[curve[:, 1:]]]
-            self._weights[plane[curve[:, 0]], :3] = curve_weights
-        self.points = np.vstack([self.cover_mesh.points[:first], mesh.points[own]])
-        self.nodes = len(self.points)
-        self.bottom = number[mesh.planes[0]]
-
     @cached_property
     def uses(self):
         """In how many cells, groups of other elements and top faces each node occurs (n,); 1: a cell's own."""
@@ -145,11 +118,6 @@ class Slab:
                  for group in self.cell_groups for k in range(len(group.cells))]
         others = [np.unique(nodes) for nodes, _ in self.groups] + [np.unique(self.top.faces)]
         return np.bincount(np.concatenate([*cells, *others]), minlength=self.nodes)
-
-    @property
-    def sheet_nodes(self):
-        """Masters (p, 8) and weights (p, 8) of the nodes of `sheet_mesh`: numbers of the slab's nodes that each follows."""
-        return self._masters, self._weights
 
     def _add_cover(self, law):
         """Groups of the cover's elements, those among larger ones apart: they hang on more nodes than their own."""
@@ -176,24 +144,15 @@ class Slab:
             return
         pieces = [[(hexes[:in_cells].reshape(cells, -1, 27), HexBlock, law), (wedges.reshape(cells, -1, 18), WedgeBlock, law)]
                   for hexes, wedges, law in layers]
-        for same in self._like_cells(np.hstack([elements.reshape(cells, -1) for layer in pieces for elements, _, _ in layer])):
+        nodes = np.hstack([elements.reshape(cells, -1) for layer in pieces for elements, _, _ in layer])
+        for same in self.sheet_nodes.like_cells(nodes):
             self.cell_groups.append(CellGroup(same, [
                 [self._following(elements[same].reshape(-1, elements.shape[2]), make, law)
                  for elements, make, law in layer if elements.size] for layer in pieces]))
 
     def _following(self, elements, make, law):
         block = make(self.sheet_mesh.points[elements], law, quartic_penalty_ratio=self._quartic_penalty_ratio)
-        return hanging_node_constraints(self._masters, self._weights, elements, block)
-
-    def _like_cells(self, nodes):
-        """Numbers of like cells, kind by kind, of cells with nodes (c, k): those whose nodes follow others in the same way."""
-        used = np.abs(self._weights) > 1e-12
-        kinds = {}
-        for number, cell in enumerate(nodes):
-            _, local = np.unique(np.where(used[cell], self._masters[cell], -1), return_inverse=True)
-            signature = local.tobytes() + np.round(self._weights[cell] * used[cell], 9).tobytes()
-            kinds.setdefault(signature, []).append(number)
-        return [np.array(cells) for cells in kinds.values()]
+        return hanging_node_constraints(self.sheet_nodes.masters, self.sheet_nodes.weights, elements, block)
 
     @property
     def solids(self):
@@ -323,24 +282,14 @@ class Slab:
         """Add `value` (N/mm) to each diagonal entry of an upper triangle."""
         matrix.data[matrix.indptr[:-1]] += value   # sorted upper triangle: each row begins with its diagonal
 
-    def locate(self, points):
-        """Faces (p,) under the cover and shape values (p, 8) at points (p, 2); points on a line belong to the lower side."""
-        mesh = self.cover_mesh
-        return located(mesh, mesh.bottom, mesh.bottom_cells, (self.x_lines, self.y_lines), points)
-
-    def _under_cover(self, points):
-        """Sparse matrix (p, free nodes of the cover) that interpolates on the cover's lower side at points (p, 2)."""
-        mesh = self.cover_mesh
-        return interpolation_on_side(mesh, mesh.bottom, mesh.bottom_cells, (self.x_lines, self.y_lines), points)
-
     def sampling(self, points):
         """Sparse matrix (p, nodes) that interpolates a nodal field of the plane between sheet and cover at points (p, 2)."""
         if self.sheet_layers == self.sheet_mesh.layers:
-            at = self._under_cover(points)
+            at = self.underside.interpolation(points)
             at.resize(len(points), self.nodes)
             return at
         plane = self.sheet_mesh.planes[self.sheet_layers]
-        masters, weights = self._masters[plane], self._weights[plane]
+        masters, weights = self.sheet_nodes.masters[plane], self.sheet_nodes.weights[plane]
         rows = np.repeat(np.arange(len(plane)), masters.shape[1])
         own = sp.csr_matrix((weights.ravel(), (rows, masters.ravel())), shape=(len(plane), self.nodes))
         return without_zeros(interpolation_2d(self.sheet_mesh_2d.mesh_2d, points) @ own)
@@ -351,4 +300,4 @@ class Slab:
         if self.sheet_layers == self.sheet_mesh.layers:
             return self.cover_mesh.bottom_nodes
         plane = self.sheet_mesh.planes[self.sheet_layers]
-        return np.unique(self._masters[plane][np.abs(self._weights[plane]) > 1e-12])
+        return np.unique(self.sheet_nodes.masters[plane][np.abs(self.sheet_nodes.weights[plane]) > 1e-12])
