@@ -170,11 +170,11 @@ def test_a_path_can_state_its_own_mode(write_file):
     assert [curve.mode for curve in read_curves([f"planar={path}", f"uniaxial={path}"])] == ["planar", "uniaxial"]
 
 
-@pytest.mark.parametrize("text", ["engineering_strain,nominal_stress_mpa\n0.1,0.1\n0.3,0.5\n",
-                                  "stretch,nominal_stress_mpa\n0.9,0.1\n0.7,0.5\n"])
-def test_a_compression_test_without_a_minus_is_read_when_told(write_file, text):
-    curve = read_curve(write_file(text), compression=True)
-    assert curve.stretch == pytest.approx([0.9, 0.7]) and curve.nominal_stress == pytest.approx([-0.1, -0.5])
+def test_a_compression_test_without_a_minus_is_read_when_told(write_file):
+    for text in ["engineering_strain,nominal_stress_mpa\n0.1,0.1\n0.3,0.5\n",
+                 "stretch,nominal_stress_mpa\n0.9,0.1\n0.7,0.5\n"]:
+        curve = read_curve(write_file(text), compression=True)
+        assert curve.stretch == pytest.approx([0.9, 0.7]) and curve.nominal_stress == pytest.approx([-0.1, -0.5]), text
 
 
 @pytest.mark.parametrize(
@@ -219,18 +219,18 @@ def test_a_compression_test_that_looks_like_tension_is_remarked_upon(write_file)
     assert "steepens from the start" in remark and "`compression: true`" in remark
 
 
-@pytest.mark.parametrize("end", [0.5, 1.9])
-def test_a_test_with_its_signs_is_not_remarked_upon(write_file, end):
-    assert read_curve(write_file(neo_hooke_rows(np.linspace(1, end, 11)))).remarks == ()
+def test_a_test_with_its_signs_is_not_remarked_upon(write_file):
+    for end in [0.5, 1.9]:
+        assert read_curve(write_file(neo_hooke_rows(np.linspace(1, end, 11)))).remarks == (), end
 
 
-@pytest.mark.parametrize(("header", "rows", "remark"), [
-    ("engineering_strain", "1,0.01\n5,0.05\n10,0.09\n", "if the column holds percent"),
-    ("engineering_strain_percent", "0.1,0.03\n0.3,0.09\n0.5,0.14\n", "if the column holds a ratio"),
-])
-def test_strains_that_may_be_in_another_unit_are_remarked_upon(write_file, header, rows, remark):
-    (said,) = read_curve(write_file(f"{header},nominal_stress_mpa\n{rows}")).remarks
-    assert remark in said
+def test_strains_that_may_be_in_another_unit_are_remarked_upon(write_file):
+    for header, rows, remark in [
+        ("engineering_strain", "1,0.01\n5,0.05\n10,0.09\n", "if the column holds percent"),
+        ("engineering_strain_percent", "0.1,0.03\n0.3,0.09\n0.5,0.14\n", "if the column holds a ratio"),
+    ]:
+        (said,) = read_curve(write_file(f"{header},nominal_stress_mpa\n{rows}")).remarks
+        assert remark in said, header
 
 
 def test_a_remark_stays_with_the_curve_in_the_projects_own_file(write_file, tmp_path):
