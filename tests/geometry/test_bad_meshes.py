@@ -111,7 +111,7 @@ def sensor():
     """A piece of the sensor with a map of 17 x 17."""
     spec = CORO
     spec = spec.model_copy(update={"footprint_mm": (9.6, 9.6), "map_shape": (17, 17)})
-    return Sensor(spec, laws={}, files={"elastic": elastic_compliance(spec)})
+    return Sensor(spec, laws={}, prepared_models={"elastic": elastic_compliance(spec)})
 
 
 @pytest.fixture(scope="module")

@@ -1,10 +1,9 @@
 """Every mistake in a configuration gets one sentence that names the place and the remedy."""
 
-import copy
 from pathlib import Path
 
 import pytest
-import yaml
+from support.studies import DEFAULT, ROOT, changed, merged
 
 from softtact.errors import InputError
 from softtact.materials.config import load_material
@@ -14,34 +13,10 @@ from softtact.sensors.specification import SensorSpec
 from softtact.study.config import load_study
 from softtact.study.keys import Mesh
 
-ROOT = Path(__file__).resolve().parents[2]
-DEFAULT = yaml.safe_load((ROOT / "config/config.yaml").read_text())
-
 
 @pytest.fixture(autouse=True)
 def in_project(monkeypatch):
     monkeypatch.chdir(ROOT)
-
-
-def changed(path, value):
-    """The default configuration with the value at a dotted path replaced."""
-    values = copy.deepcopy(DEFAULT)
-    *parents, last = path.split(".")
-    section = values
-    for key in parents:
-        section = section[key]
-    section[last] = value
-    return values
-
-
-def merged(name):
-    """A study's configuration as Snakemake merges it over the default one."""
-
-    def merge(base, over):
-        return base | {key: merge(base[key], value) if isinstance(base.get(key), dict) and isinstance(value, dict)
-                       else value for key, value in over.items()}
-
-    return merge(DEFAULT, yaml.safe_load((ROOT / "config" / f"{name}.yaml").read_text()))
 
 
 def refusal(values):
@@ -52,9 +27,9 @@ def refusal(values):
     return sentence
 
 
-@pytest.mark.parametrize("name", ["tiny", "paper"])
-def test_the_studies_are_valid(name):
-    assert load_study(merged(name)).name == name
+def test_the_studies_are_valid():
+    for name in ["tiny", "paper"]:
+        assert load_study(merged(name)).name == name, name
 
 
 def test_the_default_study_has_sixteen_indenters_and_the_six_objects_of_fig_7():
@@ -151,20 +126,20 @@ def test_a_missing_key_is_named():
     assert refusal(values) == "the configuration: the key 'forces_n' is missing; add it."
 
 
-@pytest.mark.parametrize(("file", "right", "wrong", "said"), [
-    ("sensors/coro.yaml", "tip_diameter_mm", "tip_diametre_mm",
-     "at 'dielectric.frusta': there is no key 'tip_diametre_mm'; did you mean 'tip_diameter_mm'?"),
-    ("sensors/coro.yaml", "name:", "nam:", "there is no key 'nam'; did you mean 'name'?"),
-    ("materials/neoprene.yaml", "  points:", "  point:", "there is no key 'point'; did you mean 'points'?"),
-])
-def test_a_misspelt_key_of_a_sensor_or_a_material_is_named_with_the_right_one(file, right, wrong, said, tmp_path):
-    text = (SHIPPED / file).read_text()
-    assert right in text
-    path = tmp_path / Path(file).name
-    path.write_text(text.replace(right, wrong, 1))
-    with pytest.raises(InputError) as caught:
-        (SensorSpec.from_yaml if "sensor" in file else load_material)(path)
-    assert said in str(caught.value) and str(caught.value).startswith(str(path))
+def test_a_misspelt_key_of_a_sensor_or_a_material_is_named_with_the_right_one(tmp_path):
+    for file, right, wrong, said in [
+        ("sensors/coro.yaml", "tip_diameter_mm", "tip_diametre_mm",
+         "at 'dielectric.frusta': there is no key 'tip_diametre_mm'; did you mean 'tip_diameter_mm'?"),
+        ("sensors/coro.yaml", "name:", "nam:", "there is no key 'nam'; did you mean 'name'?"),
+        ("materials/neoprene.yaml", "  points:", "  point:", "there is no key 'point'; did you mean 'points'?"),
+    ]:
+        text = (SHIPPED / file).read_text()
+        assert right in text, file
+        path = tmp_path / Path(file).name
+        path.write_text(text.replace(right, wrong, 1))
+        with pytest.raises(InputError) as caught:
+            (SensorSpec.from_yaml if "sensor" in file else load_material)(path)
+        assert said in str(caught.value) and str(caught.value).startswith(str(path)), file
 
 
 def test_files_outside_the_project_are_said_and_those_inside_are_not(tmp_path, capsys):
