@@ -45,8 +45,8 @@ def test_each_object_has_its_own_tests_though_one_name_begins_another(archive, t
 
 def test_an_object_is_named_by_the_text_before_the_first_slash():
     for path, name in [
-    ("CircleG/a/b", "circle_g"), ("CircleXS/1", "circle_xs"), ("AForm", "a_form"), ("DiagonalInver/x", "diagonal_inver"),
-    ("EchoH/x", "echo_h"), ("Echo/x", "echo"), ("Object5/x", "object_5"), ("Bordes V\\x", "bordes_v"), ("/x", "")]:
+        ("CircleG/a/b", "circle_g"), ("CircleXS/1", "circle_xs"), ("AForm", "a_form"), ("DiagonalInver/x", "diagonal_inver"),
+        ("EchoH/x", "echo_h"), ("Echo/x", "echo"), ("Object5/x", "object_5"), ("Bordes V\\x", "bordes_v"), ("/x", "")]:
         assert object_name(path) == name, path
 
 

@@ -175,17 +175,17 @@ DETAILED = pd.DataFrame({"object": ["object_1", "object_3", "object_5", "object_
 
 def test_maps_decide_what_is_seen_and_what_is_lost():
     for shares, start, expected in [
-    ({}, "object 5: the elastic model loses", "reproduced"),
-    ({"elastic": 0.2}, "object 5: the elastic model loses", "not reproduced"),
-    ({"hyperelastic": 0.05}, "object 6: the elastic model loses", "not reproduced"),
-    ({}, "object 4: both models show", "reproduced"),
-    ({"few": 1}, "object 4: both models show", "not reproduced"),
-    ({}, "On detailed objects the elastic", "reproduced"),
-    ({"many": 3}, "On detailed objects the elastic", "not reproduced"),
-    ({}, "Objects with NPt of ten times", "reproduced"),
-    ({"many": 3}, "Objects with NPt of ten times", "not reproduced"),
-    ({}, "The dielectric is strained so much", "reproduced"),
-    ({"strain": 0.05}, "The dielectric is strained so much", "not reproduced")]:
+        ({}, "object 5: the elastic model loses", "reproduced"),
+        ({"elastic": 0.2}, "object 5: the elastic model loses", "not reproduced"),
+        ({"hyperelastic": 0.05}, "object 6: the elastic model loses", "not reproduced"),
+        ({}, "object 4: both models show", "reproduced"),
+        ({"few": 1}, "object 4: both models show", "not reproduced"),
+        ({}, "On detailed objects the elastic", "reproduced"),
+        ({"many": 3}, "On detailed objects the elastic", "not reproduced"),
+        ({}, "Objects with NPt of ten times", "reproduced"),
+        ({"many": 3}, "Objects with NPt of ten times", "not reproduced"),
+        ({}, "The dielectric is strained so much", "reproduced"),
+        ({"strain": 0.05}, "The dielectric is strained so much", "not reproduced")]:
         frame = table(features=features(**shares), complexity=DETAILED)
         assert verdict(frame, start) == expected, shares
         assert verdict(table(complexity=DETAILED), start) == "undecided", shares            # nothing was pressed
