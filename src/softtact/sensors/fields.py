@@ -22,7 +22,7 @@ def _plain_value(field: Any) -> Any:
 class Section(BaseModel):
     """A part of a sensor file: unknown keys are refused."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class Stated(Section, Generic[T]):
