@@ -95,7 +95,8 @@ class Slab:
         self.sheet_mesh = extrude(sheet_mesh_2d.mesh_2d, np.append(sheet.heights, cover.heights[1:bound + 1]))
         self.sheet_layers = len(sheet.heights) - 1
         self._quartic_penalty_ratio = quartic_penalty_ratio
-        self.underside = CoverSide(self.cover_mesh, self.cover_mesh.bottom, self.cover_mesh.bottom_cells, self.x_lines, self.y_lines)
+        self.underside = CoverSide(self.cover_mesh, self.cover_mesh.bottom, self.cover_mesh.bottom_cells,
+                                   self.x_lines, self.y_lines)
         above = self.underside.interpolation(sheet_mesh_2d.mesh_2d.points)
         self.sheet_nodes = sheet_nodes(self.sheet_mesh, sheet_mesh_2d, first=self.cover_mesh.free, above=above,
                                        constrained=constrained_cell_edges)
