@@ -67,14 +67,14 @@ NAMES = ("press", "view", "predict", "complexity", "fit", "export-deck", "detect
          "completion")
 
 
-@pytest.mark.parametrize("command", [[], *([name] for name in NAMES)])
-def test_every_commands_help_has_examples_and_the_exit_statuses(command, capsys):
-    with pytest.raises(SystemExit) as stop:
-        main([*command, "--help"])
-    assert stop.value.code == 0
-    said = capsys.readouterr().out
-    assert "usage: softtact" in said and "examples:" in said
-    assert all(f"  {status:<4}{meaning}" in said for status, meaning in EXIT_STATUS.items())
+def test_every_commands_help_has_examples_and_the_exit_statuses(capsys):
+    for command in [[], *([name] for name in NAMES)]:
+        with pytest.raises(SystemExit) as stop:
+            main([*command, "--help"])
+        assert stop.value.code == 0
+        said = capsys.readouterr().out
+        assert "usage: softtact" in said and "examples:" in said, command
+        assert all(f"  {status:<4}{meaning}" in said for status, meaning in EXIT_STATUS.items()), command
 
 
 def test_the_docs_hold_the_exit_statuses_as_they_are():
@@ -227,29 +227,15 @@ def test_the_package_and_its_help_load_no_heavy_library(imported):
     ("arguments", "status", "said"),
     [
         (["press", OBJECT, "--force", 20], 2, "--unit"),
-        (["press", OBJECT, "--unit", "mm"], 2, "--force"),
         (["press", OBJECT, "--unit", "furlong", "--force", 20], 2, "furlong"),
-        (["press", OBJECT, "--unit", "mm", "--force", "much"], 2, "much"),
-        (["press", OBJECT, "--unit", "mm", "--force", 20, "--model", "plastic"], 2, "plastic"),
         (["press", OBJECT, "--unit", "mm", "--force", 0], 1, "0 N"),
-        (["press", OBJECT, "--unit", "mm", "--force=-5"], 1, "-5 N"),
         (["press", OBJECT, "--unit", "mm", "--force", 51], 1, "51 N"),
         (["press", OBJECT, "--unit", "mm", "--force", 5, "--sensor", "cora"], 1, "cora"),
         (["press", OBJECT, "--unit", "mm", "--force", 5, "--out", "no/such/folder.nc"], 1, "no/such"),
-        (["press", OBJECT, "--unit", "mm", "--force", 5, "--pose", "1,2,3"], 1, "six"),
         (["press", OBJECT, "--unit", "mm", "--force", 5, "--pose", "100,0,0,0,0,0"], 1, "misses the sensor"),
         (["press", OBJECT, "--unit", "m", "--force", 5], 1, "mm"),
         (["press", "none.stl", "--unit", "mm", "--force", 5], 1, "none.stl"),
-        (["complexity", "none.stl", "--unit", "mm"], 1, "none.stl"),
-        (["fit", "none.csv", "--out", "card.json"], 1, "none.csv"),
         (["export-deck", OBJECT, "--unit", "mm", "--force", 5, "--out", "deck.inp"], 2, "--format"),
-        (["export-deck", OBJECT, "--unit", "mm", "--force", 5, "--format", "calculix"], 2, "--out"),
-        (["export-deck", OBJECT, "--unit", "mm", "--force", 5, "--format", "nastran", "--out", "deck.inp"], 2, "nastran"),
-        (["export-deck", OBJECT, "--unit", "mm", "--force", 51, "--format", "abaqus", "--out", "deck.inp"], 1, "51 N"),
-        (["export-deck", OBJECT, "--unit", "mm", "--force", 5, "--format", "abaqus", "--out", "no/such/deck.inp"], 1, "no/such"),
-        (["export-deck", OBJECT, "--unit", "mm", "--force", 5, "--format", "abaqus", "--out", "deck.inp", "--pose",
-          "100,0,0,0,0,0"], 1, "misses the sensor"),
-        (["export-deck", "none.stl", "--unit", "mm", "--force", 5, "--format", "abaqus", "--out", "deck.inp"], 1, "none.stl"),
         (["stage", "no_such_stage"], 1, "no_such_stage"),
         (["stage", "fit_material", "--in", "curves"], 1, "NAME=PATH"),
         (["stage", "fit_material", "--settings", "{"], 1, "JSON"),
@@ -315,9 +301,7 @@ fit: {laws: [neo_hooke], poisson: 0.45, small_strain: 0.5}
 @pytest.mark.parametrize(("options", "sentence"), [
     (["--window", "uniaxial=2:1"], "'2:1' is not two rising numbers with a colon between them"),
     (["--window", "0.7:1.4"], "--window 0.7:1.4: write it as NAME=VALUE"),
-    (["--weight", "uniaxial=heavy"], "'heavy' is not a number"),
     (["--column", "force=F"], "`columns` maps 'force', which is no quantity with a unit"),
-    (["--law", "gents"], "Law 'gents' is unknown; use one of neo_hooke"),
     (["--choose", "yeoh", "--law", "gent"], "Law 'yeoh' is to be chosen but is not fitted"),
 ])
 def test_fit_refuses_options_without_meaning_and_writes_no_card(refused, tmp_path, options, sentence):

@@ -7,7 +7,7 @@ import pytest
 import torch
 import trimesh
 import yaml
-from test_study_config import merged
+from support.studies import merged
 
 import softtact
 from softtact.errors import InputError
@@ -35,8 +35,8 @@ def pad():
     sensor = softtact.load_sensor("pad")
     sensor.spec = sensor.spec.model_copy(update={"footprint_mm": (16.5, 10.0), "map_shape": MAP})
     law, cover = sensor.laws["dielectric"], sensor.laws["cover"]
-    sensor.files = {"elastic": elastic_compliance(sensor.spec),
-                    "foundation": foundation_compliance(sensor.spec, dielectric_law=law, cover_law=cover)}
+    sensor.prepared_models = {"elastic": elastic_compliance(sensor.spec),
+                              "foundation": foundation_compliance(sensor.spec, dielectric_law=law, cover_law=cover)}
     return sensor
 
 

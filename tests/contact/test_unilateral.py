@@ -41,7 +41,7 @@ def assert_both_methods_agree(compliance, gap0, forces):
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_the_fast_method_equals_the_plain_one_on_random_decaying_flexibilities(seed):
+def test_the_fast_method_equals_the_plain_one_on_random_decaying_compliances(seed):
     """exp(-r / length) is positive definite at any places (Matern's covariance), and so is it when rows are scaled."""
     rng = np.random.default_rng(seed)
     places = rng.uniform(0, 10, (150, 2))

@@ -23,7 +23,7 @@ from softtact.models.hyperelastic.build import build_sensor_body, build_unit_cel
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.models.hyperelastic.path import press_load_steps
-from softtact.sensors.specification import Friction
+from softtact.sensors.frusta import Friction
 
 pytestmark = needs_ccx
 PATCH = CORO.model_copy(update={"footprint_mm": (4.8, 4.8)})     # 4 x 4 frusta

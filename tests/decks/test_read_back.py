@@ -19,7 +19,7 @@ from softtact.geometry.meshes import place
 from softtact.models.hyperelastic.build import build_unit_cell
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.press.sensor import Sensor
-from softtact.sensors.specification import Friction
+from softtact.sensors.frusta import Friction
 
 SMALL = CORO.model_copy(update={"footprint_mm": (2.4, 3.6), "map_shape": (7, 5)})   # 2 x 3 frusta
 SENSOR = Sensor(SMALL, {"dielectric": POLYURETHANE, "cover": NEOPRENE},

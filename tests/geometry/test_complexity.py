@@ -25,10 +25,10 @@ PRINTED = {
 }
 
 
-@pytest.mark.parametrize("row", PRINTED)
-def test_the_rule_any_gives_every_printed_choice(row):
-    *counts, chosen = PRINTED[row]
-    assert choose_model(*counts, rule="any") == chosen
+def test_the_rule_any_gives_every_printed_choice():
+    for row in PRINTED:
+        *counts, chosen = PRINTED[row]
+        assert choose_model(*counts, rule="any") == chosen, row
 
 
 def test_the_rule_all_of_the_papers_text_contradicts_its_table_at_object_5_only():

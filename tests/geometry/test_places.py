@@ -24,11 +24,11 @@ def pressing_points(mesh, pose):
     return points[points[:, 2] < 1.0, :2]
 
 
-@pytest.mark.parametrize("name", ["indenters/triangle_right", "indenters/bordes_h", "unseen/l_form", "grasped/egg", "grasped/key"])
-def test_what_presses_stays_over_the_sensor_and_off_its_rim(name):
-    mesh = read_mesh(OBJECTS / f"{name}.stl", unit="mm")
-    for pose in poses_of(mesh):
-        assert (np.abs(pressing_points(mesh, pose)) <= HALF + 0.02).all()
+def test_what_presses_stays_over_the_sensor_and_off_its_rim():
+    for name in ["indenters/triangle_right", "indenters/bordes_h", "unseen/l_form", "grasped/egg", "grasped/key"]:
+        mesh = read_mesh(OBJECTS / f"{name}.stl", unit="mm")
+        for pose in poses_of(mesh):
+            assert (np.abs(pressing_points(mesh, pose)) <= HALF + 0.02).all(), name
 
 
 def test_a_small_object_is_turned_all_around_and_moved_all_over():

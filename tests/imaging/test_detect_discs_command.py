@@ -75,19 +75,19 @@ def test_an_empty_frame_is_an_answer_and_not_an_error(folder, tmp_path, capsys):
     assert len(pd.read_csv(tmp_path / "none.csv")) == 0 and (tmp_path / "none.png").is_file()
 
 
-@pytest.mark.parametrize(("name", "how"), [
-    ("clip.mp4", {"plugin": "pyav", "codec": "libx264", "fps": 10}),
-    ("clip.mkv", {"plugin": "pyav", "codec": "libx264", "fps": 10}),
-    ("clip.avi", {"plugin": "pyav", "codec": "mpeg4", "fps": 10}),
-    ("clip.gif", {}),
-    ("clip.tif", {}),
-])
-def test_the_frames_of_a_video_and_the_pages_of_a_stack_are_measured_one_by_one(name, how, tmp_path, capsys):
-    summary = answer(capsys, video(tmp_path / name, **how), "--out", tmp_path / "d.csv", "--pixel-mm", PIXEL_MM, "--no-picture")
-    assert [row["frame"] for row in summary["frames"]] == [f"{name}:{k:05d}" for k in range(3)]
-    assert [row["discs"] for row in summary["frames"]] == [0, 2, 2]
-    assert summary["frames"][2]["mean_area_mm2"] == pytest.approx(0.4, rel=0.03)
-    assert not (tmp_path / "d").exists()
+def test_the_frames_of_a_video_and_the_pages_of_a_stack_are_measured_one_by_one(tmp_path, capsys):
+    for name, how in [
+        ("clip.mp4", {"plugin": "pyav", "codec": "libx264", "fps": 10}),
+        ("clip.mkv", {"plugin": "pyav", "codec": "libx264", "fps": 10}),
+        ("clip.avi", {"plugin": "pyav", "codec": "mpeg4", "fps": 10}),
+        ("clip.gif", {}),
+        ("clip.tif", {}),
+    ]:
+        summary = answer(capsys, video(tmp_path / name, **how), "--out", tmp_path / "d.csv", "--pixel-mm", PIXEL_MM, "--no-picture")
+        assert [row["frame"] for row in summary["frames"]] == [f"{name}:{k:05d}" for k in range(3)], name
+        assert [row["discs"] for row in summary["frames"]] == [0, 2, 2], name
+        assert summary["frames"][2]["mean_area_mm2"] == pytest.approx(0.4, rel=0.03), name
+        assert not (tmp_path / "d").exists(), name
 
 
 def test_every_second_frame_is_taken_on_demand(tmp_path, folder):
@@ -130,35 +130,35 @@ def test_sixteen_bits_and_colours_are_read_as_they_are(tmp_path):
     assert np.array_equal(read_frame(tmp_path / "planes.tif"), coloured)
 
 
-@pytest.mark.parametrize("scale", [
-    [], ["--calibration-mm", 3], ["--calibration-px", 3], ["--pixel-mm", 0.05, "--calibration-mm", 3],
-    ["--pixel-mm", 0.05, "--calibration-mm", 3, "--calibration-px", 60],
-])
-def test_the_scale_must_be_given_in_exactly_one_way(scale, folder, tmp_path, capsys):
-    assert "give either --pixel-mm, or both" in refusal(capsys, folder, "--out", tmp_path / "d.csv", *scale)
-    assert not (tmp_path / "d.csv").exists()
+def test_the_scale_must_be_given_in_exactly_one_way(folder, tmp_path, capsys):
+    for scale in [
+        [], ["--calibration-mm", 3], ["--calibration-px", 3], ["--pixel-mm", 0.05, "--calibration-mm", 3],
+        ["--pixel-mm", 0.05, "--calibration-mm", 3, "--calibration-px", 60],
+    ]:
+        assert "give either --pixel-mm, or both" in refusal(capsys, folder, "--out", tmp_path / "d.csv", *scale), scale
+        assert not (tmp_path / "d.csv").exists(), scale
 
 
-@pytest.mark.parametrize(("arguments", "message"), [
-    (["--pixel-mm", 0], "--pixel-mm 0"),
-    (["--pixel-mm", "nan"], "--pixel-mm nan"),
-    (["--calibration-mm", 3, "--calibration-px", -60], "--calibration-px -60"),
-    (["--pixel-mm", 0.05, "--every", 0], "--every 0"),
-    (["--pixel-mm", 0.05, "--min-diameter-mm", -1], "--min-diameter-mm -1"),
-    (["--pixel-mm", 0.05, "--picture", "one.png"], "give --picture a folder"),
-])
-def test_a_setting_that_makes_no_sense_is_refused(arguments, message, folder, tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert message in refusal(capsys, folder, "--out", "d.csv", *arguments)
-    assert not (tmp_path / "d.csv").exists()
+def test_a_setting_that_makes_no_sense_is_refused(folder, tmp_path, capsys, monkeypatch):
+    for arguments, message in [
+        (["--pixel-mm", 0], "--pixel-mm 0"),
+        (["--pixel-mm", "nan"], "--pixel-mm nan"),
+        (["--calibration-mm", 3, "--calibration-px", -60], "--calibration-px -60"),
+        (["--pixel-mm", 0.05, "--every", 0], "--every 0"),
+        (["--pixel-mm", 0.05, "--min-diameter-mm", -1], "--min-diameter-mm -1"),
+        (["--pixel-mm", 0.05, "--picture", "one.png"], "give --picture a folder"),
+    ]:
+        monkeypatch.chdir(tmp_path)
+        assert message in refusal(capsys, folder, "--out", "d.csv", *arguments), arguments
+        assert not (tmp_path / "d.csv").exists(), arguments
 
 
-@pytest.mark.parametrize("name", ["text.png", "text.jpg", "text.tif", "text.mp4", "text.gif", "text.doc"])
-@pytest.mark.parametrize("content", [b"", b"this is not a picture\n" * 20])
-def test_a_broken_or_empty_file_is_named_with_the_remedy(name, content, tmp_path, capsys):
-    (tmp_path / name).write_bytes(content)
-    said = refusal(capsys, tmp_path / name, "--out", tmp_path / "d.csv", "--pixel-mm", 0.05)
-    assert f"{name}: not a readable" in said and "save it again" in said
+def test_a_broken_or_empty_file_is_named_with_the_remedy(tmp_path, capsys):
+    for name in ["text.png", "text.jpg", "text.tif", "text.mp4", "text.gif", "text.doc"]:
+        for content in [b"", b"this is not a picture\n" * 20]:
+            (tmp_path / name).write_bytes(content)
+            said = refusal(capsys, tmp_path / name, "--out", tmp_path / "d.csv", "--pixel-mm", 0.05)
+            assert f"{name}: not a readable" in said and "save it again" in said, content
 
 
 def test_half_of_a_file_is_refused(folder, tmp_path, capsys):

@@ -46,35 +46,35 @@ def errors(diameter, *, frames=2, **camera):
     return off / area, off / np.concatenate([table.area_sd_mm2 for table in tables])
 
 
-@pytest.mark.parametrize("diameter", [12, 16, 24])
-def test_areas_at_signal_to_noise_five_and_a_third_less_light_are_as_good_as_noise_lets_them(diameter):
-    relative, _ = errors(diameter)
-    assert len(relative) == 96
-    assert abs(relative.mean()) < 0.01                                     # scatter of the mean: 0.0024
-    assert np.sqrt((relative**2).mean()) < 1.3 * DARKER * BOUND[diameter]   # sd of that of 96: 7 %
+def test_areas_at_signal_to_noise_five_and_a_third_less_light_are_as_good_as_noise_lets_them():
+    for diameter in [12, 16, 24]:
+        relative, _ = errors(diameter)
+        assert len(relative) == 96, diameter
+        assert abs(relative.mean()) < 0.01, diameter                                     # scatter of the mean: 0.0024
+        assert np.sqrt((relative**2).mean()) < 1.3 * DARKER * BOUND[diameter], diameter   # sd of that of 96: 7 %
 
 
 def test_a_disc_of_sixteen_pixels_is_within_two_percent_root_mean_square():
     assert np.sqrt((errors(16)[0] ** 2).mean()) < 0.02
 
 
-@pytest.mark.parametrize("diameter", [12, 20])
-def test_the_stated_uncertainty_is_the_scatter(diameter):
-    assert errors(diameter)[1].std() == pytest.approx(1.0, abs=0.25)   # sd of that of 96: 7 %
+def test_the_stated_uncertainty_is_the_scatter():
+    for diameter in [12, 20]:
+        assert errors(diameter)[1].std() == pytest.approx(1.0, abs=0.25), diameter   # sd of that of 96: 7 %
 
 
-@pytest.mark.parametrize("area", [0.15, 0.283, 0.45])
-def test_area_is_found_within_half_a_percent_in_a_good_light(area):
-    discs = detect_discs(frame(area)[0], pixel_mm=CAMERA["pixel_mm"])
-    assert len(discs) == 48
-    assert np.abs(discs.area_mm2 / area - 1).max() < 0.03
-    assert discs.area_mm2.mean() == pytest.approx(area, rel=0.005)
+def test_area_is_found_within_half_a_percent_in_a_good_light():
+    for area in [0.15, 0.283, 0.45]:
+        discs = detect_discs(frame(area)[0], pixel_mm=CAMERA["pixel_mm"])
+        assert len(discs) == 48, area
+        assert np.abs(discs.area_mm2 / area - 1).max() < 0.03, area
+        assert discs.area_mm2.mean() == pytest.approx(area, rel=0.005), area
 
 
-@pytest.mark.parametrize("blur_mm", [0.0, 0.06, 0.09])
-def test_area_does_not_depend_on_blur(blur_mm):
-    discs = detect_discs(frame(0.283, blur_mm=blur_mm)[0], pixel_mm=CAMERA["pixel_mm"])
-    assert discs.area_mm2.mean() == pytest.approx(0.283, rel=0.006)
+def test_area_does_not_depend_on_blur():
+    for blur_mm in [0.0, 0.06, 0.09]:
+        discs = detect_discs(frame(0.283, blur_mm=blur_mm)[0], pixel_mm=CAMERA["pixel_mm"])
+        assert discs.area_mm2.mean() == pytest.approx(0.283, rel=0.006), blur_mm
 
 
 def test_every_frustum_of_the_sensor_is_found():
@@ -114,20 +114,21 @@ def test_an_empty_frame_has_no_discs_whatever_its_noise_and_light(noise, falloff
     assert detect_discs(empty, pixel_mm=1.0).empty
 
 
-@pytest.mark.parametrize("quality", [75, 95])
-@pytest.mark.parametrize("noise", [0.02, 0.1])
-def test_the_blotches_of_a_compressed_empty_frame_are_no_discs(noise, quality):
-    empty = render_frame([], [], [], footprint_mm=(320, 240), pixel_mm=1.0, blur_mm=1.0, noise=noise, falloff=0.5, seed=[0, 0])
-    packed = iio.imwrite("<bytes>", empty, extension=".jpg", quality=quality)
-    assert detect_discs(iio.imread(packed, extension=".jpg"), pixel_mm=1.0).empty
+def test_the_blotches_of_a_compressed_empty_frame_are_no_discs():
+    for quality in [75, 95]:
+        for noise in [0.02, 0.1]:
+            empty = render_frame([], [], [], footprint_mm=(320, 240), pixel_mm=1.0, blur_mm=1.0, noise=noise, falloff=0.5,
+                                 seed=[0, 0])
+            packed = iio.imwrite("<bytes>", empty, extension=".jpg", quality=quality)
+            assert detect_discs(iio.imread(packed, extension=".jpg"), pixel_mm=1.0).empty, noise
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.02])
-def test_a_lamp_s_reflection_is_no_disc(noise):
-    r, c = np.mgrid[0:200, 0:260]
-    light = 0.1 + 0.7 * np.exp(-((r - 80) ** 2 + (c - 100) ** 2) / (2 * 40**2))
-    light += noise * np.random.default_rng(0).normal(size=r.shape)
-    assert detect_discs((255 * light.clip(0, 1)).astype(np.uint8), pixel_mm=1.0).empty
+def test_a_lamp_s_reflection_is_no_disc():
+    for noise in [0.0, 0.02]:
+        r, c = np.mgrid[0:200, 0:260]
+        light = 0.1 + 0.7 * np.exp(-((r - 80) ** 2 + (c - 100) ** 2) / (2 * 40**2))
+        light += noise * np.random.default_rng(0).normal(size=r.shape)
+        assert detect_discs((255 * light.clip(0, 1)).astype(np.uint8), pixel_mm=1.0).empty, noise
 
 
 def test_the_table_of_an_empty_frame_has_the_columns_and_kinds_of_a_full_one():
@@ -188,12 +189,12 @@ def test_a_sheet_of_discs_as_wide_as_their_pitch_is_found_disc_by_disc():
     assert discs.area_mm2.mean() == pytest.approx(area, rel=0.02)
 
 
-@pytest.mark.parametrize("x", [60, 64, 68])
-def test_a_disc_cut_by_the_border_is_flagged_and_has_the_area_that_is_seen(x):
-    picture, area = shapes(lambda a, b: (a - x) ** 2 + b**2 < 400, side=128, noise=0.04)
-    disc = detect_discs(picture, pixel_mm=1.0).iloc[0]
-    assert disc.clipped and disc.x_mm == pytest.approx(x, abs=2.5)   # what lies beyond the border is only guessed
-    assert disc.area_mm2 == pytest.approx(area, abs=max(4 * disc.area_sd_mm2, 0.01 * area))
+def test_a_disc_cut_by_the_border_is_flagged_and_has_the_area_that_is_seen():
+    for x in [60, 64, 68]:
+        picture, area = shapes(lambda a, b, x=x: (a - x) ** 2 + b**2 < 400, side=128, noise=0.04)
+        disc = detect_discs(picture, pixel_mm=1.0).iloc[0]
+        assert disc.clipped and disc.x_mm == pytest.approx(x, abs=2.5), x   # what lies beyond the border is only guessed
+        assert disc.area_mm2 == pytest.approx(area, abs=max(4 * disc.area_sd_mm2, 0.01 * area)), x
 
 
 def test_dim_discs_beside_bright_ones_keep_their_own_brightness():
@@ -209,22 +210,22 @@ def test_smaller_discs_are_left_out_on_demand():
     assert detect_discs(picture, pixel_mm=0.03, smallest_mm=0.5).area_mm2.tolist() == [pytest.approx(0.4, rel=0.01)]
 
 
-@pytest.mark.parametrize("change", [
-    lambda f: f.astype(np.uint16) * 16,                       # 12 bits in 16
-    lambda f: f.astype(np.uint16) * 257,
-    lambda f: f / 255.0,
-    lambda f: f.astype(np.float32),                           # 0 ... 255 in floating point
-    lambda f: np.repeat(f[..., None], 3, axis=2),
-    lambda f: np.dstack([f, f, f, np.full_like(f, 255)]),
-    lambda f: f[..., None],
-])
-def test_a_frame_s_depth_and_channels_do_not_matter(change):
-    picture, _ = frame(0.283, counts=(3, 3))
-    plain, other = (detect_discs(each, pixel_mm=0.03) for each in (picture, change(picture)))
-    assert other.area_mm2.to_numpy() == pytest.approx(plain.area_mm2.to_numpy(), rel=0.003)
+def test_a_frame_s_depth_and_channels_do_not_matter():
+    for change in [
+        lambda f: f.astype(np.uint16) * 16,                       # 12 bits in 16
+        lambda f: f.astype(np.uint16) * 257,
+        lambda f: f / 255.0,
+        lambda f: f.astype(np.float32),                           # 0 ... 255 in floating point
+        lambda f: np.repeat(f[..., None], 3, axis=2),
+        lambda f: np.dstack([f, f, f, np.full_like(f, 255)]),
+        lambda f: f[..., None],
+    ]:
+        picture, _ = frame(0.283, counts=(3, 3))
+        plain, other = (detect_discs(each, pixel_mm=0.03) for each in (picture, change(picture)))
+        assert other.area_mm2.to_numpy() == pytest.approx(plain.area_mm2.to_numpy(), rel=0.003), change
 
 
-@pytest.mark.parametrize("frame", [np.zeros(9), np.zeros((3, 100)), np.full((50, 50), np.nan)])
-def test_what_is_no_picture_is_refused(frame):
-    with pytest.raises(InputError):
-        detect_discs(frame, pixel_mm=1.0)
+def test_what_is_no_picture_is_refused():
+    for picture in (np.zeros(9), np.zeros((3, 100)), np.full((50, 50), np.nan)):
+        with pytest.raises(InputError):
+            detect_discs(picture, pixel_mm=1.0)

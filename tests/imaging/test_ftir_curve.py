@@ -17,16 +17,16 @@ def test_a_measured_curve_is_read_at_the_study_s_forces(tmp_path):
     assert source.startswith("measured")
 
 
-@pytest.mark.parametrize(("text", "message"), [
-    ("force_n,area\n0,0\n100,1\n", "needs the columns force_n and area_mm2"),
-    ("force_n,area_mm2\n0,zero\n100,1\n", "needs the columns force_n and area_mm2 in numbers"),
-    ("force_n,area_mm2\n20,0.1\n100,1\n", "measured from 20 to 100 N, but 'ftir.forces_n' asks for 10 N"),
-])
-def test_an_unusable_curve_is_refused(tmp_path, text, message):
-    path = tmp_path / "curve.csv"
-    path.write_text(text)
-    with pytest.raises(InputError, match=message):
-        _measured(path, FORCES, virtual=None)
+def test_an_unusable_curve_is_refused(tmp_path):
+    for text, message in [
+        ("force_n,area\n0,0\n100,1\n", "needs the columns force_n and area_mm2"),
+        ("force_n,area_mm2\n0,zero\n100,1\n", "needs the columns force_n and area_mm2 in numbers"),
+        ("force_n,area_mm2\n20,0.1\n100,1\n", "measured from 20 to 100 N, but 'ftir.forces_n' asks for 10 N"),
+    ]:
+        path = tmp_path / "curve.csv"
+        path.write_text(text)
+        with pytest.raises(InputError, match=message):
+            _measured(path, FORCES, virtual=None)
 
 
 def test_a_missing_curve_is_refused(tmp_path):

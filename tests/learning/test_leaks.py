@@ -27,17 +27,20 @@ def study(request):
         yield load_study(values)
 
 
-@pytest.fixture(params=["map", "press", "object"])
-def load_steps(study, request):
-    """All load steps of a study, split in each of the ways, as if every press were valid; and the way."""
+@pytest.fixture(scope="module")
+def split_ways(study):
+    """{way: all load steps of a study, split in this way} as if every press were valid."""
     items = [(item.set, item.id) for item in study.items()]
     check_items(items)
     forces = np.array(study.values.forces_n)
     press = SimpleNamespace(force_n=SimpleNamespace(values=forces), within_validity=SimpleNamespace(values=np.ones(len(forces))))
     presses = {("elastic", *key): press for key in items}
-    split = assign_splits(list_load_steps(items, presses, ["elastic"]), train_fraction=0.8, seed=study.values.seed,
-                          split_by=request.param)
-    return split.assign(object=split["item"].map(object_of)), request.param
+    ways = {}
+    for way in ("map", "press", "object"):
+        split = assign_splits(list_load_steps(items, presses, ["elastic"]), train_fraction=0.8, seed=study.values.seed,
+                              split_by=way)
+        ways[way] = split.assign(object=split["item"].map(object_of))
+    return ways
 
 
 def of(load_steps, *splits):
@@ -49,23 +52,23 @@ def shared(load_steps, column):
     return set(of(load_steps, "train")[column]) & set(of(load_steps, "validation")[column])
 
 
-def test_no_object_press_or_mesh_of_a_test_was_trained_on_or_chosen_by(study, load_steps):
-    load_steps, _ = load_steps
-    learnt, tests = of(load_steps, "train", "validation"), of(load_steps, "unseen", "grasps")
-    assert len(learnt) + len(tests) == len(load_steps) and len(tests) > 0
-    for column in ("object", "item"):
-        assert not set(learnt[column]) & set(tests[column])
+def test_no_object_press_or_mesh_of_a_test_was_trained_on_or_chosen_by(study, split_ways):
+    for way, load_steps in split_ways.items():
+        learnt, tests = of(load_steps, "train", "validation"), of(load_steps, "unseen", "grasps")
+        assert len(learnt) + len(tests) == len(load_steps) and len(tests) > 0
+        for column in ("object", "item"):
+            assert not set(learnt[column]) & set(tests[column]), way
     meshes = {name: {Path(item.file).read_bytes() for item in items.values()} for name, items in study.items_of.items()}
     assert not meshes["indenters"] & (meshes["unseen"] | meshes["grasps"]) and not meshes["unseen"] & meshes["grasps"]
 
 
-def test_training_and_validation_share_no_map_and_no_more_than_the_way_of_splitting_says(load_steps):
-    load_steps, way = load_steps
-    pairs = load_steps.assign(pair=load_steps["item"] + " " + load_steps.force_n.astype(str))
-    assert not shared(pairs, "pair") and pairs.pair.is_unique
-    assert bool(shared(load_steps, "item")) == (way == "map")
-    assert bool(shared(load_steps, "object")) == (way != "object")
-    assert abs(len(of(load_steps, "train")) / len(of(load_steps, "train", "validation")) - 0.8) < 0.05
+def test_training_and_validation_share_no_map_and_no_more_than_the_way_of_splitting_says(split_ways):
+    for way, load_steps in split_ways.items():
+        pairs = load_steps.assign(pair=load_steps["item"] + " " + load_steps.force_n.astype(str))
+        assert not shared(pairs, "pair") and pairs.pair.is_unique, way
+        assert bool(shared(load_steps, "item")) == (way == "map")
+        assert bool(shared(load_steps, "object")) == (way != "object")
+        assert abs(len(of(load_steps, "train")) / len(of(load_steps, "train", "validation")) - 0.8) < 0.05, way
 
 
 def test_no_object_is_pressed_twice_in_one_place(study):

@@ -15,12 +15,9 @@ def test_defaults_are_what_the_paper_prints():
 @pytest.mark.parametrize(("section", "values", "sentence"), [
     (Training, {"epoch": 3}, "it.epoch: there is no such key; use one of epochs, batch"),
     (Training, {"epochs": 0}, r"it.epochs: .*greater than 0 \(it is 0\)"),
-    (Training, {"learning_rate": "best"}, "it.learning_rate"),
     (Search, {"space": {"dense": [64, 8]}}, r"it.space.dense: a range is \[smallest, largest\]"),
-    (Network, {"architecture": "drawn"}, "it.architecture: .*'printed', 'searched' or 'compact'"),
     (Network, {"compact": {"filters": [16, 32]}}, "it.compact.filters.2: Field required"),
     (LearningCurve, {"shares": [0.5, 0.2]}, "it.shares: shares rise from one to the next"),
-    (LearningCurve, {"shares": [0.5, 1.2]}, "it.shares.1: .*less than or equal to 1"),
     (Ssim, {"window": 4}, "it.window: a window has a taxel at its centre"),
 ])
 def test_a_wrong_setting_is_refused_with_its_key_and_value(section, values, sentence):

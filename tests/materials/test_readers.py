@@ -28,12 +28,12 @@ def test_a_stated_mode_comes_before_the_files_own(write_file):
     assert read_curve(write_file("# mode: planar\n" + PLAIN), mode="uniaxial").mode == "uniaxial"
 
 
-@pytest.mark.parametrize("separator", [",", ";", "\t"])
-def test_percent_and_kilopascal_become_stretch_and_megapascal(write_file, separator):
+def test_percent_and_kilopascal_become_stretch_and_megapascal_with_any_separator(write_file):
     rows = [["engineering_strain_percent", "time", "nominal_stress_kpa"], ["-20", "0", "-300"], ["50", "1", "200"]]
-    curve = read_curve(write_file("\n".join(separator.join(row) for row in rows)))
-    assert curve.stretch == pytest.approx([0.8, 1.5])
-    assert curve.nominal_stress == pytest.approx([-0.3, 0.2])
+    for separator in (",", ";", "\t"):
+        curve = read_curve(write_file("\n".join(separator.join(row) for row in rows)))
+        assert curve.stretch == pytest.approx([0.8, 1.5])
+        assert curve.nominal_stress == pytest.approx([-0.3, 0.2])
 
 
 def test_a_users_own_column_names_are_mapped(write_file):
@@ -81,26 +81,22 @@ HEADER = "stretch,nominal_stress_mpa\n"
     [
         ("", "the file is empty; give a test curve"),
         (HEADER, r"0 point\(s\) make no curve; give at least two"),
-        (HEADER + "1.1,0.1\n", r"1 point\(s\) make no curve"),
         (HEADER + "1.0,0\n1.1,nan\n", "row 3: the value 'nan' is not finite; correct it or remove the row"),
         (HEADER + "1.0,0\n1.1,\n", "row 3: '' is not a number; correct it or remove the row"),
-        (HEADER + "1.0,0\nlong,0.1\n", "row 3: 'long' is not a number"),
         (
             "stretch;nominal_stress_mpa\n1,0;0,1\n1,1;0,2\n",
             "row 2: '1,0' is not a number; write it with a decimal point",
         ),
         (HEADER + "0,0\n0.1,0.1\n", "row 2: the stretch 0 is not positive; .* name it engineering_strain"),
         (HEADER + "1,0\n50,0.1\n", "row 3: the stretch 50 is above 25, .* name it engineering_strain_percent"),
-        ("engineering_strain,nominal_stress_mpa\n0,0\n85,1\n", "row 3: the stretch 86 .* engineering_strain_percent"),
         (HEADER + "1,0\n1.5,350\n", "row 3: the stress 350 MPa is beyond 200 MPa, .* nominal_stress_kpa"),
         (HEADER + "0.7,0.47\n1,0\n", "row 2: the stress 0.47 MPa has the wrong sign .* compression negative"),
         (HEADER + "1,0\n1.2,0.2\n1.1,0.1\n", "row 4: the stretch turns back to 1.1; keep one loading branch"),
         ("lambda,nominal_stress_mpa\n1,0\n", "no column holds the stretch among lambda, nominal_stress_mpa; name one"),
-        ("stretch,S11\n1,0\n", "no column holds the stress among stretch, S11; .* map it under `columns`"),
         ("stretch,engineering_strain,nominal_stress_mpa\n1,0,0\n", "several columns hold the stretch"),
     ],
 )
-def test_a_file_that_cannot_be_trusted_is_refused_by_name_row_value_and_remedy(write_file, text, sentence):
+def test_an_unreadable_or_implausible_curve_is_refused_by_file_row_value_and_remedy(write_file, text, sentence):
     path = write_file(text)
     with pytest.raises(InputError, match=sentence) as refusal:
         read_curve(path)
@@ -147,13 +143,12 @@ def test_two_bare_columns_are_stress_then_stretch(published):
     assert (curve.stretch[-1], curve.nominal_stress[-1], len(curve.stretch)) == (7.6, 6.3176, 24)
 
 
-@pytest.mark.parametrize("unit", ["mpa", "kpa", "pa"])
-def test_true_stress_and_true_strain_become_nominal_stress_and_stretch(write_file, unit):
+def test_true_stress_and_true_strain_become_nominal_stress_and_stretch(write_file):
     """Constant volume: the section shrinks by the stretch. ln 2 = 0.693147; 3 MPa over a stretch of 2 is 1.5 MPa."""
-    stress = {"mpa": "3", "kpa": "3000", "pa": "3000000"}[unit]
-    curve = read_curve(write_file(f"true_strain,true_stress_{unit}\n0,0\n{np.log(2)},{stress}\n"))
-    assert curve.stretch == pytest.approx([1, 2])
-    assert curve.nominal_stress == pytest.approx([0, 1.5])
+    for unit, stress in {"mpa": "3", "kpa": "3000", "pa": "3000000"}.items():
+        curve = read_curve(write_file(f"true_strain,true_stress_{unit}\n0,0\n{np.log(2)},{stress}\n"))
+        assert curve.stretch == pytest.approx([1, 2])
+        assert curve.nominal_stress == pytest.approx([0, 1.5])
 
 
 def test_a_volumetric_test_is_pressure_against_volume(write_file):
@@ -175,11 +170,11 @@ def test_a_path_can_state_its_own_mode(write_file):
     assert [curve.mode for curve in read_curves([f"planar={path}", f"uniaxial={path}"])] == ["planar", "uniaxial"]
 
 
-@pytest.mark.parametrize("text", ["engineering_strain,nominal_stress_mpa\n0.1,0.1\n0.3,0.5\n",
-                                  "stretch,nominal_stress_mpa\n0.9,0.1\n0.7,0.5\n"])
-def test_a_compression_test_without_a_minus_is_read_when_told(write_file, text):
-    curve = read_curve(write_file(text), compression=True)
-    assert curve.stretch == pytest.approx([0.9, 0.7]) and curve.nominal_stress == pytest.approx([-0.1, -0.5])
+def test_a_compression_test_without_a_minus_is_read_when_told(write_file):
+    for text in ["engineering_strain,nominal_stress_mpa\n0.1,0.1\n0.3,0.5\n",
+                 "stretch,nominal_stress_mpa\n0.9,0.1\n0.7,0.5\n"]:
+        curve = read_curve(write_file(text), compression=True)
+        assert curve.stretch == pytest.approx([0.9, 0.7]) and curve.nominal_stress == pytest.approx([-0.1, -0.5]), text
 
 
 @pytest.mark.parametrize(
@@ -187,16 +182,14 @@ def test_a_compression_test_without_a_minus_is_read_when_told(write_file, text):
     [
         ("volumetric", "volume_ratio,pressure_mpa\n1,0\n0.98,-0.1\n", "row 3: the pressure -0.1 MPa has the wrong sign"),
         ("volumetric", "volume_ratio,pressure_mpa\n1,0\n0.02,0.1\n", "row 3: the volume ratio 0.02 .* volumetric_strain"),
-        ("volumetric", HEADER + "1,0\n0.9,-0.1\n", "no column holds the volume among stretch, nominal_stress_mpa"),
         ("uniaxial", HEADER + "1.1,0.05\n1.2,0.09\n1.3,130\n1.4,160\n", "row 4: the stress jumps to 130 MPa.*are units mixed"),
         ("uniaxial", HEADER + "0.02,1.1\n0.1,1.3\n0.2,2\n", "row 2: the stress 1.1 MPa has the wrong sign.*are they swapped"),
-        ("uniaxial", HEADER + "-0.1,0.9\n0.2,1.2\n", "row 2: the stretch -0.1 is not positive.*are they swapped"),
         ("uniaxial", HEADER + "0.9,0.1\n0.8,0.3\n", "say `compression: true` for a compression test written without a minus"),
         ("uniaxial", HEADER + "1.2,0.1\n1.2,0.3\n", "every row has the stretch 1.2; give a curve over a range"),
         ("uniaxial", "true_strain,nominal_stress_mpa\n0,0\n900,1\n", "row 3: the true strain 900 is beyond any elastomer"),
     ],
 )
-def test_more_that_cannot_be_trusted_is_refused(write_file, name, text, sentence):
+def test_a_curve_that_no_rubber_gives_is_refused(write_file, name, text, sentence):
     with pytest.raises(InputError, match=sentence):
         read_curve(write_file(text, f"{name}.csv"))
 
@@ -226,18 +219,18 @@ def test_a_compression_test_that_looks_like_tension_is_remarked_upon(write_file)
     assert "steepens from the start" in remark and "`compression: true`" in remark
 
 
-@pytest.mark.parametrize("end", [0.5, 1.9])
-def test_a_test_with_its_signs_is_not_remarked_upon(write_file, end):
-    assert read_curve(write_file(neo_hooke_rows(np.linspace(1, end, 11)))).remarks == ()
+def test_a_test_with_its_signs_is_not_remarked_upon(write_file):
+    for end in [0.5, 1.9]:
+        assert read_curve(write_file(neo_hooke_rows(np.linspace(1, end, 11)))).remarks == (), end
 
 
-@pytest.mark.parametrize(("header", "rows", "remark"), [
-    ("engineering_strain", "1,0.01\n5,0.05\n10,0.09\n", "if the column holds percent"),
-    ("engineering_strain_percent", "0.1,0.03\n0.3,0.09\n0.5,0.14\n", "if the column holds a ratio"),
-])
-def test_strains_that_may_be_in_another_unit_are_remarked_upon(write_file, header, rows, remark):
-    (said,) = read_curve(write_file(f"{header},nominal_stress_mpa\n{rows}")).remarks
-    assert remark in said
+def test_strains_that_may_be_in_another_unit_are_remarked_upon(write_file):
+    for header, rows, remark in [
+        ("engineering_strain", "1,0.01\n5,0.05\n10,0.09\n", "if the column holds percent"),
+        ("engineering_strain_percent", "0.1,0.03\n0.3,0.09\n0.5,0.14\n", "if the column holds a ratio"),
+    ]:
+        (said,) = read_curve(write_file(f"{header},nominal_stress_mpa\n{rows}")).remarks
+        assert remark in said, header
 
 
 def test_a_remark_stays_with_the_curve_in_the_projects_own_file(write_file, tmp_path):

@@ -43,11 +43,11 @@ def test_each_object_has_its_own_tests_though_one_name_begins_another(archive, t
     assert paths == {"Echo/test_0", "Echo/test_1"}
 
 
-@pytest.mark.parametrize(("path", "name"), [
-    ("CircleG/a/b", "circle_g"), ("CircleXS/1", "circle_xs"), ("AForm", "a_form"), ("DiagonalInver/x", "diagonal_inver"),
-    ("EchoH/x", "echo_h"), ("Echo/x", "echo"), ("Object5/x", "object_5"), ("Bordes V\\x", "bordes_v"), ("/x", "")])
-def test_an_object_is_named_by_the_text_before_the_first_slash(path, name):
-    assert object_name(path) == name
+def test_an_object_is_named_by_the_text_before_the_first_slash():
+    for path, name in [
+        ("CircleG/a/b", "circle_g"), ("CircleXS/1", "circle_xs"), ("AForm", "a_form"), ("DiagonalInver/x", "diagonal_inver"),
+        ("EchoH/x", "echo_h"), ("Echo/x", "echo"), ("Object5/x", "object_5"), ("Bordes V\\x", "bordes_v"), ("/x", "")]:
+        assert object_name(path) == name, path
 
 
 @pytest.mark.parametrize(("ending", "isaac"), [("", "Issac"), ("_V1", "Isaac"), ("_V1_Noise", "issac")])
@@ -133,13 +133,10 @@ ODDITIES = [
     (lambda a: drop(a, FLAT_MAPS, range(57)), FLAT_MAPS, 0, "4 maps and 5 readings in Flat_Real_Abaqus.csv"),
     (lambda a: drop(a, FLAT_REAL, range(5)), "Flat_Simulation_Isaac.csv", 0, "the test is not in Flat_Real_Abaqus.csv"),
     (lambda a: set_value(a, FLAT_MAPS, 60, "x5", "0,12"), FLAT_MAPS, 60, "'0,12' in place of a number"),
-    (lambda a: set_value(a, FLAT_MAPS, 60, "x5", None), FLAT_MAPS, 60, "a value is missing or infinite"),
     (lambda a: set_value(a, FLAT_MAPS, 60, "x5", "inf"), FLAT_MAPS, 60, "a value is missing or infinite"),
     (lambda a: set_value(a, FLAT_MAPS, 60, "x5", 7.0), FLAT_MAPS, 60, "7 mm is not within -2.5 to 2.5"),
     (lambda a: set_value(a, FLAT_REAL, 2, "tax9", 20117.0), FLAT_REAL, 2,
      "20117 counts is not within -240 to 5000; raw values of the converter?"),
-    (lambda a: set_value(a, FLAT_REAL, 2, "force", "?"), FLAT_REAL, 2, "nan N is not within -1 to 75"),
-    (lambda a: set_value(a, FLAT_REAL, 2, "force", 400.0), FLAT_REAL, 2, "400 N is not within -1 to 75"),
 ]
 
 
@@ -256,17 +253,17 @@ def test_maps_that_are_negative_towards_the_pcb_are_turned_and_metres_refused(ar
     assert "may be in metres" in refusal(read, archive.write(tmp_path / "b"))
 
 
-@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_the_taxels_arrangement_is_told_by_maps_and_readings(arrangement):
-    rng = np.random.default_rng(1)
-    maps = np.array([dent(*rng.uniform([-12, -7, 4], [12, 7, 10])) for _ in range(40)])
-    truth = np.array([counts_of(one) for one in maps]).reshape(-1, 7, 4)
-    grids = arrange(np.tile(np.arange(28), (1, 1)), arrangement, shape=(7, 4))[0]      # taxel at each place
-    counts = np.empty((len(maps), 28))
-    counts[:, grids.ravel()] = truth.reshape(len(maps), 28)
-    found = correlations(maps, counts, shape=(7, 4))
-    assert max(found, key=found.get) == arrangement and found[arrangement] > 0.95
-    assert sorted(found.values())[-2] < 0.8
+def test_the_taxels_arrangement_is_told_by_maps_and_readings():
+    for arrangement in ARRANGEMENTS:
+        rng = np.random.default_rng(1)
+        maps = np.array([dent(*rng.uniform([-12, -7, 4], [12, 7, 10])) for _ in range(40)])
+        truth = np.array([counts_of(one) for one in maps]).reshape(-1, 7, 4)
+        grids = arrange(np.tile(np.arange(28), (1, 1)), arrangement, shape=(7, 4))[0]      # taxel at each place
+        counts = np.empty((len(maps), 28))
+        counts[:, grids.ravel()] = truth.reshape(len(maps), 28)
+        found = correlations(maps, counts, shape=(7, 4))
+        assert max(found, key=found.get) == arrangement and found[arrangement] > 0.95, arrangement
+        assert sorted(found.values())[-2] < 0.8, arrangement
 
 
 def test_what_is_found_is_counted_against_print(archive, tmp_path):

@@ -47,11 +47,12 @@ def test_without_edges_the_fringe_factor_is_one():
     assert (fringe_factor(CORO, np.ones((7, 4)), outer=0, inner=0) == 1).all()
 
 
-@pytest.mark.parametrize("gap", [0.1, 0.15, 0.2])
-def test_the_edges_of_two_pairs_of_sides_add_up_to_the_field_of_square_plates(gap):
-    field, strip = edge_factor(gap), edge_excess(1.0, gap)
-    assert 1 + 2 * strip == pytest.approx(field, rel=0.02)       # 1.4 % measured; the moments still rise by 0.5 % with their number
-    assert (1 + strip) ** 2 > 1.03 * field                       # Palmer's product: why it was not taken
+def test_the_edges_of_two_pairs_of_sides_add_up_to_the_field_of_square_plates():
+    for gap in [0.1, 0.15, 0.2]:
+        field, strip = edge_factor(gap), edge_excess(1.0, gap)
+        # 1.4 % measured; the moments still rise by 0.5 % with their number.
+        assert 1 + 2 * strip == pytest.approx(field, rel=0.02), gap
+        assert (1 + strip) ** 2 > 1.03 * field, gap                       # Palmer's product: why it was not taken
 
 
 def test_a_taxel_with_free_edges_all_around_has_two_pairs_of_them():

@@ -21,11 +21,11 @@ def test_a_step_creeps_as_its_prony_series():
     assert felt[1:] == pytest.approx(1 - late(lambda tau: np.exp(-times[1:] / tau)))
 
 
-@pytest.mark.parametrize("count", [2, 7, 300])
-def test_a_ramp_of_constant_rate_is_exact_at_any_time_step(count):
-    times, rate = np.linspace(0, 4.0, count), 3.0
-    expected = rate * (times - late(lambda tau: tau * -np.expm1(-times / tau)))
-    assert lagged(rate * times, times, **TERMS) == pytest.approx(expected)
+def test_a_ramp_of_constant_rate_is_exact_at_any_time_step():
+    for count in [2, 7, 300]:
+        times, rate = np.linspace(0, 4.0, count), 3.0
+        expected = rate * (times - late(lambda tau, times=times: tau * -np.expm1(-times / tau)))
+        assert lagged(rate * times, times, **TERMS) == pytest.approx(expected), count
 
 
 def test_in_the_end_all_has_arrived():

@@ -54,16 +54,16 @@ def test_with_every_effect_off_it_reads_the_ideal_counts_in_every_trial_up_and_d
     assert readings.unloading == pytest.approx(readings.loading)
 
 
-@pytest.mark.parametrize("effect", SPECIMEN)
-def test_an_effect_of_the_specimen_changes_readings_and_all_trials_alike(effect):
-    loading = branches(**{effect: SPECIMEN[effect]}).loading
-    assert np.abs(loading[0] - ideal_counts(CORO, PRESS)).max() > 0.1 and (loading[0] == loading[1]).all()
+def test_an_effect_of_the_specimen_changes_readings_and_all_trials_alike():
+    for effect in SPECIMEN:
+        loading = branches(**{effect: SPECIMEN[effect]}).loading
+        assert np.abs(loading[0] - ideal_counts(CORO, PRESS)).max() > 0.1 and (loading[0] == loading[1]).all(), effect
 
 
-@pytest.mark.parametrize("effect", TRIAL)
-def test_an_effect_of_the_trial_makes_repeated_trials_scatter(effect):
-    loading = branches(**{effect: TRIAL[effect]}).loading
-    assert np.abs(loading[0] - loading[1]).max() > 0.1
+def test_an_effect_of_the_trial_makes_repeated_trials_scatter():
+    for effect in TRIAL:
+        loading = branches(**{effect: TRIAL[effect]}).loading
+        assert np.abs(loading[0] - loading[1]).max() > 0.1, effect
 
 
 def test_zeros_in_a_configuration_switch_every_effect_off():
@@ -196,8 +196,6 @@ def test_a_deeper_press_never_reads_less_but_for_the_zero_of_the_converter(seed,
     [
         ({"nose_counts": 1}, "key 'nose_counts' is unknown; use one of electrode_spacing_mm"),
         ({"drift": -0.1}, "drift is -0.1; give one number of 0 or more"),
-        ({"drift": [0.1, 0.2]}, "drift is [0.1, 0.2]; give one number"),
-        ({"load_step_s": float("inf")}, "load_step_s is inf; give one number"),
         ({"rate_n_per_s": 0}, "rate_n_per_s and largest_counts must be above 0"),
         ({"coupling": 0.3}, "coupling is 0.3; four neighbours can take 0.25 each"),
         ({"sheet_scatter": 0.4}, "sheet_scatter is 0.4; from 0.4 on a sheet could vanish"),
@@ -212,15 +210,12 @@ def test_unusable_settings_are_refused_by_name(values, said):
     assert said in str(refusal.value)
 
 
-@pytest.mark.parametrize(
-    ("values", "said"),
-    [({"dead_taxels": [28]}, "dead_taxels has 28; the taxels are numbered 0 to 27"),
-     ({"electrode_spacing_mm": 5.4}, "electrode_spacing_mm is 5.4, and a taxel 5.28571 mm wide")],
-)
-def test_settings_that_the_sensor_cannot_have_are_refused(values, said):
-    with pytest.raises(InputError) as refusal:
-        make_specimen(CORO, seed=0, settings=VirtualSensorSettings.from_dict(values))
-    assert said in str(refusal.value)
+def test_settings_that_the_sensor_cannot_have_are_refused():
+    for values, said in [({"dead_taxels": [28]}, "dead_taxels has 28; the taxels are numbered 0 to 27"),
+                         ({"electrode_spacing_mm": 5.4}, "electrode_spacing_mm is 5.4, and a taxel 5.28571 mm wide")]:
+        with pytest.raises(InputError) as refusal:
+            make_specimen(CORO, seed=0, settings=VirtualSensorSettings.from_dict(values))
+        assert said in str(refusal.value), values
 
 
 def test_the_stage_writes_readings_of_the_way_up_and_the_way_down(tmp_path):

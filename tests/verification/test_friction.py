@@ -28,7 +28,7 @@ from softtact.models.hyperelastic.friction import BodyFriction
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.models.hyperelastic.path import press_load_steps
 from softtact.press.sensor import Sensor
-from softtact.sensors.specification import Friction, SensorSpec
+from softtact.sensors.frusta import Friction, SensorSpec
 
 COULOMB = "Coulomb's law"
 FINE = NewtonSettings(relative_tolerance=1e-6)

@@ -48,7 +48,7 @@ class Project:
     def plan(self, *arguments):
         """What Snakemake would run now: {rule: [wildcards of each job]}."""
         output = self.snakemake("--dry-run", *arguments).stdout
-        return read_mesh_2d(output)
+        return read_plan(output)
 
     def presses(self):
         """The press files that are there."""
@@ -68,7 +68,7 @@ class Project:
         return os.environ | {"SOFTTACT_RUNNER": STUB, "PYTHONPATH": source} | (more or {})
 
 
-def read_mesh_2d(output):
+def read_plan(output):
     """{rule: [{wildcard: value}]} of a dry run's output, without the target rule."""
     plan = defaultdict(list)
     for block in re.split(r"\n(?=(?:local)?rule )", output)[1:]:

@@ -43,7 +43,7 @@ def test_a_misspelt_key_is_answered_with_the_nearest_right_one(fresh):
 
 def test_an_unknown_material_is_refused(fresh):
     said = refusal(fresh, "--config", "materials=[polyurethane,neoprene,neopren]")
-    assert "there is no material 'neopren' (did you mean 'neoprene'?); known are neoprene, polyurethane" in said
+    assert "there is no material 'neopren' (did you mean 'neoprene'?); known are neoprene, polyurethane, silicone" in said
 
 
 def test_a_mesh_that_is_not_there_is_refused(fresh, tmp_path):

@@ -119,9 +119,9 @@ def numbers(option, text, count):
 def sensor_spec(name):
     """The description of a sensor by its name or its YAML file, without its solvers."""
     from softtact.sensors.library import sensor_file
-    from softtact.sensors.specification import SensorSpec
+    from softtact.sensors.specification import read_spec
 
-    return SensorSpec.from_yaml(sensor_file(name))
+    return read_spec(sensor_file(name))
 
 
 def short(value):

@@ -35,8 +35,8 @@ def _schema(options):
 def schema_of(kind):
     """The JSON schema of a kind of file, generated from the types that read it."""
     from softtact.materials.config import MaterialConfig
-    from softtact.sensors.specification import SensorSpec
+    from softtact.sensors.specification import sensor_schema
     from softtact.study.keys import Values
 
-    model = {"study": Values, "sensor": SensorSpec, "material": MaterialConfig}[kind]
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | model.model_json_schema()
+    schema = {"study": Values.model_json_schema, "sensor": sensor_schema, "material": MaterialConfig.model_json_schema}[kind]
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | schema()

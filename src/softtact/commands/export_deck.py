@@ -41,6 +41,7 @@ def _export_deck(options):
     from softtact.geometry.meshes import check_over_sensor, place
 
     spec, forces, pose = sensor_spec(options.sensor), sorted(set(options.force)), pose_of(options)
+    spec.need_frusta("export-deck", "name a sensor of kind frusta")
     check_forces(forces, spec)
     check_folders(options.out)
     mesh, repairs = read_object(options)

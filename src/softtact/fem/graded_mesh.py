@@ -20,7 +20,8 @@ class CoverMesh:
     """points (n, 3) in mm, of which the free ones come first; hexes (e, 20), layer by layer from below.
 
     follow (n, free): displacements of all points from those of the free ones
-    top, bottom (t, 8): faces in the order of QUAD8_NODES;  bottom_cells (ny 2^m, nx 2^m): which of the bottom ones is where
+    top, bottom (t, 8): faces in the order of QUAD8_NODES;  bottom_cells, top_cells (ny 2^m, nx 2^m): which of
+    these is where
     """
 
     points: np.ndarray
@@ -29,6 +30,7 @@ class CoverMesh:
     top: np.ndarray
     bottom: np.ndarray
     bottom_cells: np.ndarray
+    top_cells: np.ndarray
 
     @property
     def free(self):
@@ -100,15 +102,15 @@ def cover_mesh(x_lines, y_lines, heights, splits):
     layer = low[:, 2] // 2
     return CoverMesh(points=points, hexes=number[hexes], follow=follow[order].tocsr(),
                      top=number[hexes[layer == len(splits) - 1][:, HEX20.top]], bottom=number[hexes[layer == 0][:, HEX20.bottom]],
-                     bottom_cells=_owners(cells[0], splits[0].shape))
+                     bottom_cells=_owners(cells[0], splits[0].shape), top_cells=_owners(cells[-1], splits[-1].shape))
 
 
 def _faces_alone(x_lines, y_lines, height):
     mesh_2d = grid_mesh_2d(np.asarray(x_lines), np.asarray(y_lines))
     points = np.column_stack([mesh_2d.points, np.full(len(mesh_2d.points), float(height))])
+    cells = np.arange(len(mesh_2d.quads)).reshape(len(y_lines) - 1, len(x_lines) - 1)
     return CoverMesh(points=points, hexes=np.zeros((0, 20), dtype=np.int64), follow=sp.eye(len(points), format="csr"),
-                     top=mesh_2d.quads, bottom=mesh_2d.quads,
-                     bottom_cells=np.arange(len(mesh_2d.quads)).reshape(len(y_lines) - 1, len(x_lines) - 1))
+                     top=mesh_2d.quads, bottom=mesh_2d.quads, bottom_cells=cells, top_cells=cells)
 
 
 def _owners(leaves, shape):

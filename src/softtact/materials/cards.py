@@ -49,7 +49,10 @@ def law_from_card(card, law=None):
         raise InputError(
             f"The card of material {card['material']} has no hyperelastic law {name!r}; it has {', '.join(available)}."
         )
-    made = law_of_entry(name, card["laws"][name])
+    try:
+        made = law_of_entry(name, card["laws"][name])
+    except InputError as error:     # of constants, which know no card
+        raise InputError(f"The card of material {card['material']}: {error}") from None
     made.stretch_window = principal_window(card.get("strain_window", {}))
     return made
 

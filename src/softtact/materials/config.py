@@ -136,7 +136,11 @@ def load_material(path):
     path = Path(path)
     known = ", ".join(sorted(file.stem for file in path.parent.glob("*.yaml"))) or "none"
     raw = read_yaml(path, missing=f"there is no such material; known beside it: {known}.")
-    return _resolved(validated(MaterialConfig, raw, where=str(path)), path)
+    config = validated(MaterialConfig, raw, where=str(path))
+    try:
+        return _resolved(config, path)
+    except InputError as error:     # of laws and constants, which know no file
+        raise InputError(f"{path}: {error}") from None
 
 
 def validated(model, raw, *, where):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from softtact.files import atomic_path, digest
 from softtact.models.elastic.compliance import Compliance, elastic_compliance
+from softtact.models.elastic.tangential import SurfaceCompliance, surface_compliance
 from softtact.models.foundation.compliance import FoundationCompliance, foundation_compliance
 from softtact.progress import announce
 
@@ -13,8 +14,8 @@ _FORMAT = 9     # of the files; another one makes them again
 
 
 def _values(spec):
-    """What of a sensor the fast models start from; its readout is none of their business."""
-    return spec.model_dump(mode="json", exclude={"largest_counts"})
+    """What of a sensor the fast models start from: not its readout, nor the kind that a file without one is of."""
+    return spec.model_dump(mode="json", exclude={"largest_counts"} | ({"kind"} if spec.kind == "frusta" else set()))
 
 
 def cached_compliance(spec, *, threads=1):
@@ -22,6 +23,14 @@ def cached_compliance(spec, *, threads=1):
     return _cached("compliance", [_values(spec)], Compliance,
                    f"{spec.name}: computing the elastic layer's compliance, once for this sensor (some ten seconds)",
                    lambda: elastic_compliance(spec, threads=threads))
+
+
+def cached_surface_compliance(spec, *, threads=1):
+    """The elastic layer's `SurfaceCompliance`, by the values that it depends on: friction and taxels change nothing."""
+    values = [spec.footprint_mm, spec.map_shape, spec.thickness_mm, repr(spec.elastic_layer)]
+    return _cached("surface", values, SurfaceCompliance,
+                   f"{spec.name}: computing the elastic layer's compliance to forces in all directions, once for this sensor (a "
+                   "minute or two; 230 MB for the paper's)", lambda: surface_compliance(spec, threads=threads))
 
 
 def cached_foundation(spec, laws, *, threads=1):

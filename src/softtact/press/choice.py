@@ -86,6 +86,8 @@ def press_auto(sensor, placed, forces, *, label, threads, policy, tolerance_mm, 
         return _by_counts(sensor, placed, forces, label=label, threads=threads, keep_body=keep_body)
     if not tolerance_mm > 0:
         raise InputError(f"The tolerance {tolerance_mm:g} mm is not positive; give the largest error of a map in mm.")
+    if np.isnan(sensor.spec.frustum_height_mm):
+        return _without_frusta(sensor, placed, forces, label=label, threads=threads, keep_body=keep_body)
     return _by_error(sensor, placed, forces, tolerance_mm, label=label, threads=threads, keep_body=keep_body)
 
 
@@ -96,6 +98,13 @@ def _by_counts(sensor, placed, forces, **how):
     reason = (f"the paper's rule: NPt / CHt = {counts.ratio_total:.3g} ({TOTAL_THRESHOLD:g} asks for the hyperelastic model), "
               f"NPo / CHo = {counts.ratio_overlap:.3g} ({OVERLAP_THRESHOLD:g})")
     return replace(result, selection_reason=reason)
+
+
+def _without_frusta(sensor, placed, forces, **how):
+    """The hyperelastic press: what the cheap models err by was calibrated on frusta, and nothing tells it without."""
+    result = PRESSES["hyperelastic"](sensor, placed, forces, **how)
+    return replace(result, selection_reason=f"{sensor.spec.name} has no frusta, on which the expected errors were calibrated: the "
+                   "hyperelastic model", expected_error_mm=np.zeros(len(forces)))
 
 
 def _by_error(sensor, placed, forces, tolerance_mm, **how):

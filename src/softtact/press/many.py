@@ -33,10 +33,11 @@ def press_many(sensor: "Sensor", meshes: list[trimesh.Trimesh], poses: list[Pose
                workers: int, device: str, label: str, options: dict[str, Any]) -> list[Any]:
     """See `Sensor.press_many`."""
     jobs = list(zip(meshes, poses, strict=True))
-    if jobs and on_gpu(device, model):
+    if jobs and on_gpu(device, model) and sensor.spec.base_held:     # the batch does not know how a free lower side moves
         return press_batch(sensor, jobs, force_n, device="cuda" if device == "auto" else device, workers=workers, label=label)
     for name in _PREPARED.get(model, ()):
-        sensor.prepared(name)
+        if model != "auto" or name != "foundation" or not np.isnan(sensor.spec.frustum_height_mm):
+            sensor.prepared(name)
     act = partial(_pressed, force_n=force_n, model=model, options=options)
     return list(progress(_each(sensor, act, jobs, workers), label=label, total=len(jobs)))
 

@@ -13,7 +13,9 @@ from softtact.errors import ConvergenceError, ExtrapolationWarning
 from softtact.models.elastic.compliance import press_layer
 from softtact.models.foundation.solve import FoundationMaps, press_foundation
 from softtact.models.hyperelastic import path
+from softtact.models.hyperelastic.build_plain import lower_side
 from softtact.models.hyperelastic.deformed_mesh import pressed_body
+from softtact.press.elastic_motion import press_motion
 from softtact.press.result import PressResult
 from softtact.press.validity import valid_elastic, valid_foundation, valid_hyperelastic
 from softtact.progress import announce, progress
@@ -28,7 +30,7 @@ def press_elastic(sensor, placed, forces, *, label, threads, keep_body=False):
     """All load steps at once with the elastic model, which has no body to keep: the surface's compliance is all that it knows."""
     start, compliance = time.perf_counter(), sensor.prepared("elastic", threads)
     underside = Underside(HeightField(placed), compliance.grid)
-    points, press = _within_reach(underside, underside.nodes, compliance.foundation_modulus, forces, sensor.spec.thickness_mm,
+    points, press = _within_reach(underside, underside.nodes, compliance.foundation_modulus, forces, sensor.spec.deepest_mm,
                                   lambda points: press_layer(compliance, points, forces), lambda press: press.contact.depth[-1])
     seconds = np.full(len(forces), (time.perf_counter() - start) / len(forces))
     return elastic_result(sensor, compliance, press, forces, seconds, lowest_mm=underside.lowest_mm)
@@ -42,7 +44,7 @@ def elastic_result(sensor, compliance, press, forces, seconds, *, lowest_mm):
                        penetration_mm=contact.penetration,
                        within_validity=valid_elastic(contact.depth - lowest_mm, thickness_mm=thickness),
                        frustum_compression_mm=unknown, residual_n=unknown, extrapolated_volume_fraction=unknown,
-                       iterations=contact.iterations)
+                       lower_maps=press.lower_maps, iterations=contact.iterations)
 
 
 def press_on_foundation(sensor, placed, forces, *, label, threads, keep_body=False):
@@ -108,13 +110,14 @@ def press_hyperelastic(sensor, placed, forces, *, label, threads, keep_body=Fals
         path.check_motion(forces)
     body = sensor.body(threads=threads, surface=_swept(surface, forces))
     grid = np.stack(np.meshgrid(sensor.spec.map_x_mm, sensor.spec.map_y_mm), axis=-1).reshape(-1, 2)
-    sampling = body.slab.sampling(grid)
-    announce(f"{label}: {body.support.count} frusta, {count} load steps of the hyperelastic model, some seconds each")
+    sampling, lower = body.slab.sampling(grid), None if sensor.spec.base_held else lower_side(body.slab, grid)
+    announce(f"{label}: {sensor.spec.parts_in_words}, {count} load steps of the hyperelastic model, some seconds each")
     record, times, bodies = [], [], []
 
     def read(load_step):
-        _refuse_beyond_the_board(load_step, lowest, sensor.spec.thickness_mm)
-        record.append(_read_load_step(body, sampling, grid, load_step))
+        _refuse_beyond_the_board(load_step, lowest, sensor.spec.deepest_mm)
+        record.append(_read_load_step(body, (sampling, lower, grid), load_step,
+                                      from_mm=lowest if isinstance(forces, Motion) else 0.0))
         if keep_body:
             bodies.append(pressed_body(body, load_step.state))
 
@@ -159,7 +162,7 @@ def _of_record(sensor, body, record, times, bodies):
     _warn_extrapolation(numbers["extrapolated_volume_fraction"], forces)
     valid = valid_hyperelastic(compression_mm=numbers["frustum_compression_mm"], depth_mm=numbers["indentation_mm"],
                                contact_error_mm=numbers.pop("contact_error_mm"), points=numbers.pop("points"),
-                               frustum_mm=sensor.spec.dielectric.frusta.height_mm, forces_n=forces,
+                               frustum_mm=sensor.spec.frustum_height_mm, forces_n=forces,
                                allowed_mm=sensor.solver.largest_penetration_mm)
     result = make_result(sensor, "hyperelastic", body.method, -displacement[..., 2], forces, np.array(times),
                          within_validity=valid, **numbers)
@@ -176,29 +179,68 @@ def _warn_extrapolation(shares, forces):
                       ExtrapolationWarning, stacklevel=5)
 
 
-def _read_load_step(body, sampling, grid, load_step):
-    """The numbers of a load step by their names in a result; fields over the map's points (y * x,)."""
+def _read_load_step(body, maps, load_step, *, from_mm):
+    """The numbers of a load step by their names in a result; fields over the map's points (y * x,).
+
+    maps: what samples the map's plane, what samples a free lower side (or None), and the points (y * x, 2);  from_mm: the
+    indentation from which depths count
+    """
+    sampling, lower, grid = maps
     slab, support, top = load_step.state.slab, load_step.state.support, body.slab.top
     force, torque = top.resultant(slab)
-    return {"normal_force_n": load_step.force_n, "force_n": force, "torque_nmm": torque,
+    free_below = {} if lower is None else {"lower_maps": -(lower @ slab.displacement[:, 2])}
+    return free_below | {"normal_force_n": load_step.force_n, "force_n": force, "torque_nmm": torque,
             "displacement_mm": sampling @ slab.displacement, "slip": top.slip_at(slab, grid),
-            "indentation_mm": load_step.state.indentation, "contact_area_mm2": top.area_under_pressure(slab),
+            "indentation_mm": load_step.state.indentation - from_mm, "contact_area_mm2": top.area_under_pressure(slab),
             "penetration_mm": load_step.penetration_mm, "contact_error_mm": body.contact_error(load_step.state),
             "points": np.count_nonzero(top.under_pressure(slab)),
-            "frustum_compression_mm": body.support.compression(support.displacement).max(), "residual_n": load_step.residual_n,
+            "frustum_compression_mm": body.support.largest_compression(support.displacement), "residual_n": load_step.residual_n,
             "extrapolated_volume_fraction": body.share_outside_window(load_step.state), "iterations": load_step.iterations}
 
 
-MOTIONS = {"hyperelastic": press_hyperelastic}     # those that take a `Motion` in place of forces
+# What a result takes over from an `ElasticMotion`.
+_OF_MOTION = ("displacement_mm", "force_n", "torque_nmm", "slip", "iterations", "contact_area_mm2", "penetration_mm")
+
+
+def press_elastic_motion(sensor, placed, motion, *, label, threads, keep_body=False):
+    """Step by step with the elastic model, which has no body to keep; a ConvergenceError holds the steps before."""
+    seconds = []
+    try:
+        moved = press_motion(sensor, placed, motion, seconds, label=label, threads=threads)
+    except ConvergenceError as error:
+        error.result = error.result and _of_motion(sensor, error.result, seconds)
+        raise
+    return _of_motion(sensor, moved, seconds)
+
+
+def _of_motion(sensor, moved, seconds):
+    """The result of an `ElasticMotion`."""
+    unknown = np.full(len(moved.depth_mm), np.nan)
+    attributes = {"friction_object": sensor.spec.friction.object, "friction": "of the object, Coulomb's"}
+    result = make_result(sensor, "elastic", "Panagiotopoulos' turns", -moved.displacement_mm[..., 2], -moved.force_n[:, 2],
+                         np.array(seconds[:len(unknown)]), indentation_mm=moved.depth_mm,
+                         within_validity=valid_elastic(moved.depth_mm, thickness_mm=sensor.spec.thickness_mm),
+                         frustum_compression_mm=unknown, residual_n=unknown, extrapolated_volume_fraction=unknown,
+                         **{name: getattr(moved, name) for name in _OF_MOTION})
+    return replace(result, attributes=result.attributes | attributes)
+
+
+# Those that take a `Motion` in place of forces.
+MOTIONS = {"elastic": press_elastic_motion, "hyperelastic": press_hyperelastic}
 PRESSES = {"elastic": press_elastic, "foundation": press_on_foundation, "hyperelastic": press_hyperelastic}
 
 
 def make_result(sensor, model, solver, maps, forces, times, **numbers):
-    """A `PressResult` of maps (l, points) or (l, ny, nx) and numbers by the result's names."""
+    """A `PressResult` of maps (l, points) or (l, ny, nx) and numbers by the result's names.
+
+    lower_maps among these: of the lower side where it moves; capacitance follows the change of thickness
+    """
     spec, maps = sensor.spec, maps.reshape(len(forces), *sensor.spec.map_shape)
+    lower_maps = numbers.pop("lower_maps", None)
+    thinning = maps if lower_maps is None else maps - lower_maps.reshape(maps.shape)
     flags = {"converged": np.ones(len(forces), dtype=np.int8),
              "within_validity": np.asarray(numbers.pop("within_validity"), dtype=np.int8)}
-    return PressResult(deformation_map_mm=maps, tactile_map=ideal_counts(spec, maps), normal_force_n=forces, wall_time_s=times,
+    return PressResult(deformation_map_mm=maps, tactile_map=ideal_counts(spec, thinning), normal_force_n=forces, wall_time_s=times,
                        x_mm=spec.map_x_mm, y_mm=spec.map_y_mm, model=model, sensor=spec.name, solver=solver,
                        largest_counts=spec.largest_counts,
                        attributes={"thickness_mm": spec.thickness_mm, **_friction(spec, model), **sensor.attributes}, **flags,
@@ -209,7 +251,7 @@ def _friction(spec, model):
     """Attributes that state the friction of a result."""
     if model != "hyperelastic":
         return {"friction": f"none: the {model} model knows no friction"}
-    return {"friction_object": spec.friction.object, "friction_board": spec.friction.board, "tips_bonded": int(spec.tips_bonded)}
+    return spec.support_facts
 
 
 def _timed(load_steps, count, label, times, *, start=None):

@@ -26,6 +26,7 @@ from softtact.materials.laws.base import Law
 from softtact.models.hyperelastic import newton
 from softtact.models.hyperelastic.body import LayeredBody
 from softtact.models.hyperelastic.build import build_sensor_body
+from softtact.models.hyperelastic.build_plain import build_plain_body
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.press.cache import cached_compliance, cached_foundation
 from softtact.press.choice import TOLERANCE_MM, press_auto
@@ -34,9 +35,10 @@ from softtact.press.models import MOTIONS, PRESSES
 from softtact.press.result import PressResult
 from softtact.press.validity import flag_buried
 from softtact.sensors.library import material_file, sensor_file
-from softtact.sensors.specification import SensorSpec
+from softtact.sensors.specification import AnySpec, read_spec
 
 MODELS = ("auto", *PRESSES)
+BODIES = {"frusta": build_sensor_body, "layers": build_plain_body}     # by the kind of a sensor
 
 
 def load_sensor(name_or_yaml: str | Path, *, materials: Mapping[str, Law] | None = None) -> "Sensor":
@@ -47,11 +49,13 @@ def load_sensor(name_or_yaml: str | Path, *, materials: Mapping[str, Law] | None
     materials: {"dielectric": Law, "cover": Law} to replace the Mooney-Rivlin constants printed for its materials
     Raises InputError that lists the known names, or names the file and the field that is wrong.
     """
-    spec = SensorSpec.from_yaml(sensor_file(name_or_yaml))
+    spec = read_spec(sensor_file(name_or_yaml))
     laws = dict(materials or {})
-    for layer in ("dielectric", "cover"):
+    for layer in sorted(set(laws) - set(spec.materials)):
+        raise InputError(f"{spec.name} has no layer {layer!r} for the material given; its layers are {', '.join(spec.materials)}.")
+    for layer, material in spec.materials.items():
         if layer not in laws:
-            laws[layer] = law_from_printed(material_file(getattr(spec, layer).material), "mooney_rivlin")
+            laws[layer] = law_from_printed(material_file(material), "mooney_rivlin")
     return Sensor(spec, laws)
 
 
@@ -64,7 +68,7 @@ class Sensor:
     user's cache
     """
 
-    spec: SensorSpec
+    spec: AnySpec
     laws: dict
     mesh: MeshSettings = MeshSettings()
     solver: newton.NewtonSettings = newton.NewtonSettings()
@@ -121,12 +125,12 @@ class Sensor:
             self.checked_forces(-load)
         placed = place(mesh, pose=pose)
         check_over_sensor(placed, self.spec.footprint_mm)
+        height = float(np.ptp(placed.bounds[:, 2]))
         try:
             with threadpool_limits(limits=threads if model == "elastic" else 1):
-                return flag_buried(press(self, placed, motion, label=label, threads=threads, keep_body=keep_body),
-                                   placed.bounds[1, 2])
+                return flag_buried(press(self, placed, motion, label=label, threads=threads, keep_body=keep_body), height)
         except ConvergenceError as error:
-            error.result = error.result and flag_buried(error.result, placed.bounds[1, 2])
+            error.result = error.result and flag_buried(error.result, height)
             raise
 
     def press_many(self, meshes: trimesh.Trimesh | Sequence[trimesh.Trimesh], poses: Sequence[Pose | None] | None = None, *,
@@ -153,6 +157,7 @@ class Sensor:
 
     def prepared(self, model: str, threads: int = 1) -> Any:
         """What a fast model starts from: `Compliance` or `FoundationCompliance`, computed on first use."""
+        self.spec.check_for(model)
         if model not in self.prepared_models:
             self.prepared_models[model] = (cached_compliance(self.spec, threads=threads) if model == "elastic"
                                  else cached_foundation(self.spec, self.laws, threads=threads))
@@ -161,8 +166,8 @@ class Sensor:
     def body(self, *, threads: int = 1, surface: HeightField | None = None) -> LayeredBody:
         """The `LayeredBody` that the hyperelastic model presses on."""
         device = find_device(self.device)
-        body = build_sensor_body(self.spec, dielectric_law=self.laws["dielectric"], cover_law=self.laws["cover"],
-                                 mesh=self.mesh, scatter=self.scatter, threads=threads, surface=surface)
+        laws = {f"{layer}_law": self.laws[layer] for layer in self.spec.materials}
+        body = BODIES[self.spec.kind](self.spec, **laws, mesh=self.mesh, scatter=self.scatter, threads=threads, surface=surface)
         if device != "cpu":
             from softtact.fem.kernels_torch import DeviceKernels  # torch, which takes seconds to import
 

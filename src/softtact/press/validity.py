@@ -27,9 +27,10 @@ def valid_hyperelastic(*, compression_mm, contact_error_mm, points, depth_mm, fo
     """Which load steps (l,) of a hyperelastic press hold, by its most compressed frustum, contacts and course.
 
     contact_error_mm (l,): deepest overlap, or widest gap under pressure, of which `allowed_mm` were asked for
-    points (l,): of the cover that carry the object;  forces_n (l,): where they do not grow, depths need not either
+    points (l,): of the cover that carry the object;  compression_mm, frustum_mm: nan without frusta, where nothing asks for them
+    forces_n (l,): where they do not grow, depths need not either
     """
-    return ((compression_mm < _FULL_POCKET * frustum_mm) & (contact_error_mm < _OVERLAP_LEFT * allowed_mm)
+    return (~(compression_mm >= _FULL_POCKET * frustum_mm) & (contact_error_mm < _OVERLAP_LEFT * allowed_mm)
             & (points >= _FEWEST_POINTS) & ((np.diff(forces_n) <= 0).any() | _grows(depth_mm, slack_mm=allowed_mm)))
 
 

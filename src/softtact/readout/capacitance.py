@@ -41,9 +41,16 @@ def _pocket(frusta, permittivity):
 
 
 def equivalent_air_gap(spec, displacement_mm):
-    """Thickness (mm) of air with the same capacitance per area, where the electrode plane moved by `displacement_mm`."""
-    d, h = spec.dielectric, spec.dielectric.frusta.height_mm
+    """Thickness (mm) of air with the same capacitance per area, where the electrode plane moved by `displacement_mm`.
+
+    Of a plain layer the movement against its lower side, by which it is thinner. It keeps its volume and spreads; the electrodes
+    do not, so their area stays, and what lies beyond their edges is the fringe's.
+    """
+    d = spec.dielectric
     moved = np.minimum(displacement_mm, (1 - _LEAST_GAP) * spec.dielectric_thickness_mm)
+    if spec.kind == "layers":
+        return (d.thickness_mm - moved) / d.relative_permittivity
+    h = d.frusta.height_mm
     share = np.interp(1 - moved / h, *_pocket(d.frusta, d.relative_permittivity))     # 1 / eps once no air is left
     return (h - moved) * share + d.sheet_thickness_mm / d.relative_permittivity
 

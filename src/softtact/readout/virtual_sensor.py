@@ -151,6 +151,7 @@ def read_branches(spec, deformation_map_mm, *, force_n, trials, seed, item, sett
 
 def make_specimen(spec, *, seed, settings=VirtualSensorSettings()):
     """The `Specimen` of a seed. All is always drawn, so one effect switched off leaves the others as they were."""
+    spec.need_frusta("the virtual sensor", "take the ideal readout, `PressResult.tactile_map`")
     if not settings.electrode_spacing_mm < min(electrode_sides(spec)):
         raise InputError(f"virtual_sensor: electrode_spacing_mm is {settings.electrode_spacing_mm:g}, and a taxel "
                          f"{min(electrode_sides(spec)):g} mm wide; leave something of the electrode.")

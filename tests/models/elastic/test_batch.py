@@ -19,7 +19,7 @@ def forces_on(grid):
     return np.random.default_rng(1).standard_normal((grid.count, 3))
 
 
-def test_displacements_are_those_of_the_dense_flexibility(compliance):
+def test_displacements_are_those_of_the_dense_compliance(compliance):
     nodes = np.arange(compliance.grid.count)
     places, force = compliance.grid.quarter(nodes), forces_on(compliance.grid)
     expected = compliance.blocks.between(*places, *places).astype(float) @ force

@@ -97,7 +97,7 @@ def test_a_map_without_a_middle_is_refused():
         map_cells(SMALL.model_copy(update={"map_shape": (13, 12)}))
 
 
-def test_the_bedding_is_the_confined_modulus_over_the_thickness(compliance):
+def test_the_foundation_modulus_is_the_confined_modulus_over_the_thickness(compliance):
     """E (1 - nu) / ((1 + nu) (1 - 2 nu)) = 1.289 * 0.8271 / (1.1729 * 0.6542) = 1.3895 MPa, over 2.5 mm."""
     assert compliance.foundation_modulus == pytest.approx(1.3895 / 2.5, rel=1e-4)
 
@@ -122,7 +122,7 @@ def test_a_press_deeper_than_half_the_layer_is_out_of_its_validity(compliance):
     assert result.within_validity.tolist() == [1, 0]
 
 
-def test_a_flexibility_is_computed_once_and_then_read_from_the_users_cache(tmp_path, monkeypatch, capsys):
+def test_a_compliance_is_computed_once_and_then_read_from_the_users_cache(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     coarse = SMALL.model_copy(update={"map_shape": (9, 9)})
     first = cached_compliance(coarse)

@@ -322,7 +322,7 @@ def test_membrane_loads_are_the_gradient_of_their_energy():
         assert loads[place_] == pytest.approx((energy(down + step) - energy(down - step)) / 2e-4, abs=1e-9)
 
 
-def test_a_flexibility_is_read_as_it_was_written(compliance, tmp_path):
+def test_a_compliance_is_read_as_it_was_written(compliance, tmp_path):
     compliance.save(tmp_path / "foundation.npz")
     again = FoundationCompliance.load(tmp_path / "foundation.npz")
     assert (tuple(again.counts), again.foundation_modulus) == (compliance.counts, compliance.foundation_modulus)

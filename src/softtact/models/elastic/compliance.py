@@ -1,5 +1,6 @@
 """The elastic model: one linear layer, held at its base and sides; the object's contact on the known compliance of its top.
 
+Of a sensor that is free below the sides alone are held, and the compliance tells how its lower side moves, too.
 The vertical compliance of the top's nodes (mm/N) is computed once for a sensor (`elastic_compliance`), by quarters of the layer
 (`quarter_slab`). The nodes lie at half the map's spacing.
 """
@@ -23,17 +24,19 @@ class Compliance:
     """What the top does under downwards forces, in mm/N: blocks by parity among the grid's nodes of a quarter.
 
     foundation_modulus: pressure per depth in N/mm3 under a wide punch;  stencil: about the inverse
+    lower: what the lower side does, like `blocks`; None where it is held
     """
 
     grid: NodeGrid
     blocks: ParityBlocks
     foundation_modulus: float
     stencil: Stencil
+    lower: ParityBlocks | None = None
 
     def save(self, path):
         """Write as a NumPy archive, in single precision."""
         np.savez(path, x=self.grid.x, y=self.grid.y, blocks=self.blocks.blocks, foundation_modulus=self.foundation_modulus,
-                 stencil=self.stencil.values)
+                 stencil=self.stencil.values, **({} if self.lower is None else {"lower": self.lower.blocks}))
 
     @classmethod
     def load(cls, path):
@@ -41,7 +44,7 @@ class Compliance:
         with read_arrays(path) as data:
             return cls(grid=NodeGrid(data["x"], data["y"]), blocks=ParityBlocks(data["blocks"]),
                        foundation_modulus=float(data["foundation_modulus"]),
-                       stencil=Stencil(data["stencil"]))
+                       stencil=Stencil(data["stencil"]), lower=ParityBlocks(data["lower"]) if "lower" in data else None)
 
     def among(self, points):
         """Compliance (c, c) among `ObjectPoints`."""
@@ -50,8 +53,15 @@ class Compliance:
 
     def maps(self, points, force):
         """Deformation maps (l, ny, nx) in mm of forces (c, l) in N at `ObjectPoints`, with the held edges."""
+        return self._maps(self.blocks, points, force)
+
+    def lower_maps(self, points, force):
+        """The same of the lower side; None where it is held."""
+        return None if self.lower is None else self._maps(self.lower, points, force)
+
+    def _maps(self, blocks, points, force):
         coarse = self.grid.every_second
-        rows = self.blocks.between(*self.grid.quarter(_coarse_nodes(self.grid)), *self.grid.quarter(points.nodes))
+        rows = blocks.between(*self.grid.quarter(_coarse_nodes(self.grid)), *self.grid.quarter(points.nodes))
         inner = (rows @ force.astype(np.float32)).T.reshape(-1, *coarse.shape)
         return np.pad(inner.astype(float), ((0, 0), (1, 1), (1, 1)))
 
@@ -77,19 +87,25 @@ def elastic_slab(spec, *, cells=None):
     layer = spec.elastic_layer
     bulk, shear = layer.young_mpa / (3 * (1 - 2 * layer.poisson)), layer.young_mpa / (2 * (1 + layer.poisson))
     return QuarterSlab(spec.footprint_mm, [ElasticLayer(spec.thickness_mm, bulk, shear, _SHARES)], cells or map_cells(spec),
-                       base_held=True)
+                       base_held=spec.base_held)
 
 
 def elastic_compliance(spec, *, threads=1, cells=None):
     """The `Compliance` of a sensor's elastic layer; `cells`: elements along a quarter's sides, if not as the map asks for."""
     slab = elastic_slab(spec, cells=cells)
-    kept = 3 * slab.top.ravel() + 2
-    blocks = np.stack([slab.compliance(slab.stiffness, kept, parity, threads=threads) for parity in PARITIES])
-    layer = spec.elastic_layer
-    confined = layer.young_mpa * (1 - layer.poisson) / ((1 + layer.poisson) * (1 - 2 * layer.poisson))
+    planes, count = [slab.top] if spec.base_held else [slab.top, slab.plane(0)], slab.top.size
+    kept = 3 * np.concatenate([plane.ravel() for plane in planes]) + 2
+    both = np.stack([slab.compliance(slab.stiffness, kept, parity, threads=threads) for parity in PARITIES])
+    blocks = both[:, :count, :count]
     return Compliance(grid=surface_grid(slab), blocks=ParityBlocks(blocks.astype(np.float32)),
-                      foundation_modulus=confined / spec.thickness_mm,
-                      stencil=_stencil(blocks, slab.top.shape))
+                      foundation_modulus=confined_modulus(spec.elastic_layer) / spec.thickness_mm,
+                      stencil=_stencil(blocks, slab.top.shape),
+                      lower=None if spec.base_held else ParityBlocks(both[:, count:, :count].astype(np.float32)))
+
+
+def confined_modulus(layer):
+    """Modulus (MPa) of an elastic layer that is compressed and cannot move sideways."""
+    return layer.young_mpa * (1 - layer.poisson) / ((1 + layer.poisson) * (1 - 2 * layer.poisson))
 
 
 def _stencil(blocks, shape):
@@ -110,10 +126,11 @@ def _stencil(blocks, shape):
 
 @dataclass(frozen=True)
 class LayerPress:
-    """maps (l, ny, nx) in mm of all load steps, and the contact's `ContactLoadSteps`."""
+    """maps (l, ny, nx) in mm of all load steps, the contact's `ContactLoadSteps`, and maps of a lower side that is free."""
 
     maps: np.ndarray
     contact: ContactLoadSteps
+    lower_maps: np.ndarray | None = None
 
 
 def press_layer(compliance, points, forces_n):
@@ -121,4 +138,5 @@ def press_layer(compliance, points, forces_n):
     contact = press_elastic(compliance.among(points), points.gap, forces_n, area=points.covered * np.prod(compliance.grid.step),
                             foundation_modulus=compliance.foundation_modulus,
                             precondition=compliance.stencil.on(compliance.grid, points.nodes))
-    return LayerPress(maps=compliance.maps(points, contact.force), contact=contact)
+    return LayerPress(maps=compliance.maps(points, contact.force), contact=contact,
+                      lower_maps=compliance.lower_maps(points, contact.force))

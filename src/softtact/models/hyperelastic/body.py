@@ -1,4 +1,4 @@
-"""The layered sensor as one body: slab (sheet and cover) tied to the array of frusta, and one Newton step of it."""
+"""The layered sensor as one body: slab (sheet and cover) tied to its `Support`, and one Newton step of it."""
 
 from dataclasses import dataclass, replace
 
@@ -9,13 +9,13 @@ from softtact.fem import kernels
 from softtact.linalg.multifrontal_solver import DissectedSolver
 from softtact.linalg.workers import Workers
 from softtact.models.hyperelastic.friction import BodyFriction
-from softtact.models.hyperelastic.frusta import FrustaState
 from softtact.models.hyperelastic.linearised_contact import StepContact
 from softtact.models.hyperelastic.local_equilibrium import balanced
 from softtact.models.hyperelastic.newton_step import ContactStepper
 from softtact.models.hyperelastic.preconditioner import DissectedContact
 from softtact.models.hyperelastic.rigid_contact import ContactProjection
 from softtact.models.hyperelastic.slab import SlabState
+from softtact.models.hyperelastic.support import NoCells, SupportState
 from softtact.models.hyperelastic.unit_cells import SheetCells
 
 _DAMPINGS = 4         # steps that are tried with ever more damping of the cells that they throw too far
@@ -36,7 +36,7 @@ class BodyState:
     """Slab and support at one displacement, and the potential energy (mJ) of both with their contacts and friction."""
 
     slab: SlabState
-    support: FrustaState
+    support: SupportState
     indentation: float
 
     @property
@@ -56,7 +56,7 @@ class BodyState:
 
 @dataclass(frozen=True)
 class Step:
-    """A Newton step: slab (n, 3), frusta (f, nodes, 3) in mm, indentation in mm, and what the object's contact faces in it."""
+    """A Newton step: slab (n, 3), support (f, nodes, 3) in mm, indentation in mm, and what the object's contact faces in it."""
 
     slab: np.ndarray
     support: np.ndarray
@@ -64,7 +64,7 @@ class Step:
     projection: ContactProjection
 
     def largest(self):
-        return max(np.abs(self.slab).max(), np.abs(self.support).max(), abs(self.indentation))
+        return max(np.abs(self.slab).max(), np.abs(self.support).max(initial=0.0), abs(self.indentation))
 
 
 def _shifts():
@@ -76,27 +76,27 @@ def _shifts():
 
 
 class LayeredBody:
-    """Slab on frusta on a rigid PCB, pressed from above by a rigid object. Lengths in mm, z = 0 at the top at rest."""
+    """Slab on a `Support`, pressed from above by a rigid object. Lengths in mm, z = 0 at the top at rest."""
 
-    def __init__(self, slab, support, roots, *, threads=1):
-        """`roots` (f, k): the slab's nodes that are the frusta's root nodes."""
+    def __init__(self, slab, support, roots=None, *, threads=1):
+        """`roots` (f, k): the slab's nodes that are the frusta's root nodes; none for a support without bodies."""
         self.slab, self.support = slab, support
         self.workers = Workers(threads)
         self.friction = BodyFriction(slab.top, support)
-        self.cells = SheetCells(slab, support, roots)
+        self.cells = SheetCells(slab, support, roots) if support.count else NoCells()
         slab.build_pattern(self.cells.eliminated, self.cells.outer_dofs)
         self.solver = DissectedSolver(slab.points[slab.unknowns // 3, :2], workers=self.workers)
         self.stepper = ContactStepper(DissectedContact(self.solver, workers=self.workers))
 
     def sum_with(self, loops):
         """Let elements be summed by `loops`: `kernels`, as from the start, or `device_kernels`."""
-        for block in self.slab.blocks + [self.support.block]:
+        for block in self.slab.blocks + self.support.blocks:
             block.loops = loops
 
     @property
     def method(self):
         """Linear solver and device in words."""
-        loops = self.support.block.loops
+        loops = self.slab.blocks[0].loops
         return self.solver.name if loops is kernels else f"{self.solver.name}; elements on {loops.device}"
 
     def close(self):
@@ -105,7 +105,7 @@ class LayeredBody:
         self.workers.close()
 
     def rest(self):
-        """Displacements of slab (n, 3) and frusta (f, nodes, 3) at rest."""
+        """Displacements of slab (n, 3) and support (f, nodes, 3) at rest."""
         return np.zeros((self.slab.nodes, 3)), np.zeros((self.support.count, self.support.nodes, 3))
 
     def fresh_history(self):
@@ -137,7 +137,7 @@ class LayeredBody:
         friction on the board frusta wait for the steps of all: what holds them does not see one alone.
         """
         rest = max(tolerance_n, self._slab_residual(state))
-        if self.support.friction is not None or np.abs(self.support.inner_residual(state.support)).max() <= rest:
+        if self.support.friction is not None or self._support_residual(state) <= rest:
             return state
         support, moved = balanced(self.support, state.support, tolerance_n, workers=self.workers)
         self.cells.forget(moved)
@@ -207,7 +207,7 @@ class LayeredBody:
 
     def penetration(self, state):
         """Deepest penetration in mm, of the object into the cover or of frusta into the board or each other."""
-        return float(max(0.0, -self.slab.top.own_gaps(state.slab).min(), -state.support.gaps.min()))
+        return float(max(0.0, -self.slab.top.own_gaps(state.slab).min(), -state.support.gaps.min(initial=np.inf)))
 
     def descent(self, state):
         """How far the cover has come down where it did most, in mm."""
@@ -227,10 +227,12 @@ class LayeredBody:
         return self.reevaluate_contact(state, BodyHistory(top, support))
 
     def most_compressed(self, state):
-        """Place x, y (mm) of the most compressed frustum, and its compression as a share of its height."""
-        share = self.support.compression(state.support.displacement) / self.support.geometry.heights
-        worst = int(np.argmax(share))
-        return *self.support.geometry.centres[worst], float(share[worst])
+        """The largest share of its height by which a frustum, or without any the layers, are shortened; and which in words."""
+        of_support = self.support.most_compressed(state.support)
+        if of_support is not None:
+            return of_support
+        share = self.descent(state) / np.ptp(self.slab.points[:, 2])
+        return share, f"the surface has come down by {share:.0%} of the layers' thickness"
 
     def share_outside_window(self, state):
         """Share of a law's volume that is strained beyond what the law was fitted to, the largest over the laws.
@@ -240,18 +242,22 @@ class LayeredBody:
         volumes = {}
         for nodes, block in self.slab.solids:
             _add_volumes(volumes, block, state.slab.displacement[nodes])
-        _add_volumes(volumes, self.support.block, self.support.per_element(state.support.displacement))
+        for block in self.support.blocks:
+            _add_volumes(volumes, block, self.support.per_element(state.support.displacement))
         return max((outside / whole for outside, whole in volumes.values()), default=np.nan)
 
     def residual_norm(self, state, force_n):
         """Largest unbalanced nodal force in N, over slab, frusta and the object."""
-        parts = [self._slab_residual(state), np.abs(self.support.inner_residual(state.support)).max()]
+        parts = [self._slab_residual(state), self._support_residual(state)]
         if force_n is not None:
             parts.append(abs(state.force - force_n))
         return float(max(parts))
 
     def _slab_residual(self, state):
         return np.abs(self.slab_force(state).ravel()[self.slab.free]).max()
+
+    def _support_residual(self, state):
+        return np.abs(self.support.inner_residual(state.support)).max(initial=0.0)
 
     def slab_force(self, state):
         """Forces (n, 3) on the slab's nodes, those of the frusta's roots among them."""

@@ -40,7 +40,7 @@ def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), s
                         for side, count in zip(spec.footprint_mm, counts, strict=True))
     sheet = Layer(np.linspace(bottom, -spec.cover.thickness_mm, mesh.sheet_layers + 1), dielectric_law)
     cover = Layer(spec.cover.thickness_mm * (np.asarray(mesh.cover_heights) - 1), cover_law)
-    splits, zone = _cover_splits(mesh, surface, x_lines, y_lines, frusta.pitch_mm)
+    splits, zone = cover_splits(mesh, surface, x_lines, y_lines, frusta.pitch_mm)
     centres, neighbours = lattice(counts, frusta.pitch_mm)
     mesh_2d = sheet_mesh_2d(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, spec.footprint_mm,
                             refinement=mesh.refinement,
@@ -53,7 +53,7 @@ def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), s
                        threads=threads)
 
 
-def _cover_splits(mesh, surface, x_lines, y_lines, pitch):
+def cover_splits(mesh, surface, x_lines, y_lines, pitch):
     """How often the cover's uppermost layers are split, from below (layers, ny 2^m, nx 2^m), and its zones.
 
     What is below follows their lower side, which must not be finer: it would hang freely between the nodes. Where it lies on the

@@ -49,25 +49,33 @@ def pressed_body(body, state=None):
     rest.
     """
     slab, support = (state.slab.displacement, state.support.displacement) if state else body.rest()
-    sheet, cover, frusta = body.slab.sheet_mesh, body.slab.cover_mesh, body.support.mesh
+    sheet, cover = body.slab.sheet_mesh, body.slab.cover_mesh
     masters, weights = body.slab.sheet_nodes.masters, body.slab.sheet_nodes.weights
     first = np.cumsum([0, len(sheet.points), len(cover.points)])
-    hexes = (frusta.hexes[None] + first[2] + (np.arange(body.support.count) * body.support.nodes)[:, None, None]).reshape(-1, 27)
-    cells = (_cells(HEX27, hexes, "frusta"), *_on_plan(body.slab), _cells(HEX20, cover.hexes + first[1], "cover"))
+    cells = (*_frusta(body.support, first[2]), *_on_plan(body.slab), _cells(HEX20, cover.hexes + first[1], body.slab.regions[1]))
     moved = np.vstack([np.einsum("pm,pmd->pd", weights, slab[masters]), cover.follow @ slab[:cover.free], support.reshape(-1, 3)])
     pressure = body.slab.top.pressure_of_faces(state.slab) if state else np.zeros(len(cover.top))
-    return PressedBody(points_mm=np.vstack([sheet.points, cover.points, body.support.coordinates.reshape(-1, 3)]),
+    below = [body.support.coordinates.reshape(-1, 3)] if body.support.count else []
+    return PressedBody(points_mm=np.vstack([sheet.points, cover.points, *below]),
                        displacement_mm=moved.astype(np.float32), cells=cells, top=cover.top + first[1],
                        pressure_mpa=pressure.astype(np.float32))
+
+
+def _frusta(support, first):
+    """`Cells` of the frusta, whose nodes begin with number `first`; none where there are none."""
+    if support.count:
+        hexes = support.mesh.hexes[None] + first + (np.arange(support.count) * support.nodes)[:, None, None]
+        yield _cells(HEX27, hexes.reshape(-1, 27), "frusta")
 
 
 def _on_plan(slab):
     """`Cells` of the sheet, and of the cover's layers that keep to its plan."""
     mesh = slab.sheet_mesh
-    for region, layers in (("sheet", range(slab.sheet_layers)), ("cover", range(slab.sheet_layers, mesh.layers))):
+    for region, layers in zip(slab.regions, (range(slab.sheet_layers), range(slab.sheet_layers, mesh.layers)), strict=True):
         for element, of_layer in ((HEX27, mesh.layer), (WEDGE18, mesh.wedge_layer)):
-            if layers:
-                yield _cells(element, np.vstack([of_layer(k) for k in layers]), region)
+            nodes = np.vstack([of_layer(k) for k in layers]) if layers else []
+            if len(nodes):
+                yield _cells(element, nodes, region)
 
 
 def _cells(element, nodes, region):

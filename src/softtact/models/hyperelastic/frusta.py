@@ -12,9 +12,8 @@ sheet; there it is a level plane that moves with the root's outermost node.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 
-from softtact.contact.friction import FrictionResponse, FrictionState
+from softtact.contact.friction import FrictionState
 from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.contact.history import ContactHistory
 from softtact.fem.elements import HEX27, QUAD9
@@ -26,6 +25,8 @@ from softtact.fem.static_condensation import Springs
 from softtact.fem.substructuring import LayerwiseElimination
 from softtact.fem.tangent_cache import TangentCache
 from softtact.linalg.workers import SERIAL
+from softtact.models.hyperelastic.point_loops import scatter_contact, weighted_component
+from softtact.models.hyperelastic.support import SupportState
 
 BOARD, SHEET = -1, -2                                     # what a contact point faces where it is no neighbour in DIRECTIONS
 DIRECTIONS = ((0, 1.0), (1, 1.0), (0, -1.0), (1, -1.0))   # axis and sign of the four neighbours: +x, +y, -x, -y
@@ -44,23 +45,6 @@ class FrustumGeometry:
     root_diameter: float
     neighbours: np.ndarray
     wall_mm: float = 0.0
-
-
-@dataclass(frozen=True)
-class FrustaState:
-    """energy (mJ), force (n, nodes, 3) on the frusta's nodes, gaps (n, p) at the contact points, displacement.
-
-    elastic: energies (n,) and force of the rubber alone;  history: of the contacts, see `ContactHistory`
-    friction_response: friction at the points on the board (n, b), None without
-    """
-
-    elastic: tuple
-    energy: float
-    force: np.ndarray
-    gaps: np.ndarray
-    displacement: np.ndarray
-    history: ContactHistory
-    friction_response: FrictionResponse | None = None
 
 
 class FrustumArray:
@@ -101,6 +85,16 @@ class FrustumArray:
     def per_element(self, field):
         """A nodal field (n, nodes, 3) at the elements' nodes (n * elements, 27, 3)."""
         return np.ascontiguousarray(field[:, self.mesh.hexes].reshape(-1, 27, 3))
+
+    @property
+    def blocks(self):
+        """The one block of all frusta."""
+        return [self.block]
+
+    @property
+    def in_words(self):
+        """How many frusta there are, for messages."""
+        return f"{self.count} frusta"
 
     def _outer_faces(self, mesh_2d):
         """Nodes (layers * sides, 9) of the cone's faces."""
@@ -143,7 +137,7 @@ class FrustumArray:
 
     def _along(self, field):
         """Weighted component (n, p) of a nodal field along each contact point's axis."""
-        return _weighted_component(field, self.point_nodes, self.point_weights, self.point_axis)
+        return weighted_component(field, self.point_nodes, self.point_weights, self.point_axis)
 
     def _areas(self, faces, slopes, weights):
         """Reference areas (n, p) of the quadrature points of faces (f, 8)."""
@@ -209,8 +203,8 @@ class FrustumArray:
         """The state at displacement (n, nodes, 3), with the `rubber`'s energies and forces there."""
         gaps, force = self.gap0 + self._along(displacement), elastic[1].copy()
         energy, pressure, _ = history.contact.response(gaps)
-        _scatter_contact(force, -pressure * self.point_area, self.point_nodes, self.point_weights, self.point_axis)
-        state = FrustaState(elastic=elastic, energy=float(elastic[0].sum() + (energy * self.point_area).sum()), force=force,
+        scatter_contact(force, -pressure * self.point_area, self.point_nodes, self.point_weights, self.point_axis)
+        state = SupportState(elastic=elastic, energy=float(elastic[0].sum() + (energy * self.point_area).sum()), force=force,
                             gaps=gaps, displacement=displacement, history=history)
         return state if history.friction is None else self._with_friction(state)
 
@@ -220,7 +214,7 @@ class FrustumArray:
         area = self.point_area[:, :self.board_points]
         force = state.force.copy()
         for axis in (0, 1):
-            _scatter_contact(force, response.traction[..., axis] * area, *self._board_points(axis))
+            scatter_contact(force, response.traction[..., axis] * area, *self._board_points(axis))
         return replace(state, energy=state.energy + float((response.energy * area).sum()), force=force, friction_response=response)
 
     def _board_points(self, axis):
@@ -231,10 +225,10 @@ class FrustumArray:
     def _on_board(self, displacement):
         """Places (n, b, 2) of the points in the board's plane."""
         position = self.coordinates + displacement
-        return np.stack([_weighted_component(position, *self._board_points(axis)) for axis in (0, 1)], axis=-1)
+        return np.stack([weighted_component(position, *self._board_points(axis)) for axis in (0, 1)], axis=-1)
 
     def first_friction_state(self, state):
-        """The friction state in which a step starts from a `FrustaState`, None without friction."""
+        """The friction state in which a step starts from a `SupportState`, None without friction."""
         if self.friction is None:
             return None
         gaps = state.gaps[:, :self.board_points]
@@ -243,7 +237,7 @@ class FrustumArray:
         return state.friction_response.next_step(gaps)
 
     def renewed_friction_state(self, state):
-        """The friction state with the pressures of a `FrustaState`."""
+        """The friction state with the pressures of a `SupportState`."""
         b = self.board_points
         return state.friction_response.next_pass(state.gaps[:, :b], state.history.contact.response(state.gaps)[1][:, :b])
 
@@ -336,24 +330,16 @@ class FrustumArray:
         """Mean shortening (n,) of each frustum in mm: root against tip."""
         return displacement[:, self.tip, 2].mean(axis=1) - displacement[:, self.root, 2].mean(axis=1)
 
+    def largest_compression(self, displacement):
+        """By how much (mm) the most compressed frustum is shortened."""
+        return self.compression(displacement).max()
 
-@njit(cache=True, nogil=True)
-def _weighted_component(field, nodes, weights, axis):
-    out = np.zeros((field.shape[0], nodes.shape[0]))
-    for f in range(field.shape[0]):
-        for p in range(nodes.shape[0]):
-            for k in range(nodes.shape[1]):
-                out[f, p] += weights[p, k] * field[f, nodes[p, k], axis[p]]
-    return out
-
-
-@njit(cache=True, nogil=True)
-def _scatter_contact(force, magnitude, nodes, weights, axis):
-    for f in range(force.shape[0]):
-        for p in range(nodes.shape[0]):
-            if magnitude[f, p] != 0.0:
-                for k in range(nodes.shape[1]):
-                    force[f, nodes[p, k], axis[p]] += magnitude[f, p] * weights[p, k]
+    def most_compressed(self, state):
+        """Share of its height by which the most compressed frustum is shortened, and which one in words."""
+        share = self.compression(state.displacement) / self.geometry.heights
+        worst = int(np.argmax(share))
+        x, y = self.geometry.centres[worst]
+        return float(share[worst]), f"the frustum at x {x:.1f}, y {y:.1f} mm is compressed by {share[worst]:.0%} of its height"
 
 
 def _dofs(nodes):

@@ -17,7 +17,7 @@ _AT_ONCE = 8             # frusta that a thread condenses at once
 
 
 def balanced(support, state, tolerance_n, *, workers=SERIAL):
-    """The `FrustaState` after each frustum beyond the tolerance (N) went to its own balance, and which frusta did (k,).
+    """The `SupportState` after each frustum beyond the tolerance (N) went to its own balance, and which frusta did (k,).
 
     These have their condensed tangents anew, on the way and not where they came to.
     """

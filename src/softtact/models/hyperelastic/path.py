@@ -14,7 +14,7 @@ from softtact.errors import ConvergenceError, InputError
 from softtact.models.hyperelastic.body import BodyState
 from softtact.models.hyperelastic.newton import NewtonSettings, augment, first_touch, settle, tolerance_at
 
-_DEEP = 0.55           # of a frustum's height: from here on elements of the default mesh may be unstable
+_DEEP = 0.55           # of a frustum's height, or of the layers': from here on elements of the default mesh may be unstable
 DEFAULT = NewtonSettings()
 _SMALLEST_SHARE = 1 / 64     # of a motion's step, until it is given up
 
@@ -217,9 +217,9 @@ def _begun(body, surface, state, control, growth):
 
 
 def _failure(body, state, stage, reached, at, residual, iterations):
-    x, y, share = body.most_compressed(state)
+    share, most_compressed = body.most_compressed(state)
     remedy = stage.remedy
     if share > _DEEP:
         remedy += ", or press with MeshSettings.stable() (--mesh-quality stable)"
-    return (f"{stage.failure(reached, at)} (unbalanced force {residual:.2g} N, {iterations} iterations in all); the frustum at "
-            f"x {x:.1f}, y {y:.1f} mm is compressed by {share:.0%} of its height. {remedy}.")
+    return (f"{stage.failure(reached, at)} (unbalanced force {residual:.2g} N, {iterations} iterations in all); "
+            f"{most_compressed}. {remedy}.")

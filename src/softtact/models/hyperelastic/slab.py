@@ -22,7 +22,7 @@ from softtact.fem.solid_block import HexBlock, WedgeBlock, hanging_node_constrai
 from softtact.linalg.workers import SERIAL
 from softtact.models.hyperelastic.newton_step import LinearGaps
 from softtact.models.hyperelastic.rigid_contact import ContactProjection, TopContact
-from softtact.models.hyperelastic.slab_nodes import CoverUnderside, sheet_nodes, without_zeros
+from softtact.models.hyperelastic.slab_nodes import CoverSide, sheet_nodes, without_zeros
 
 
 @dataclass(frozen=True)
@@ -76,6 +76,8 @@ class Slab:
     sheet_nodes: `SheetNodes`, what the nodes of sheet_mesh follow;  underside: the cover's, on which the sheet's top lies
     """
 
+    regions = ("sheet", "cover")     # of the deformed mesh that the two parts belong to
+
     def __init__(self, sheet, cover, sheet_mesh_2d, x_lines, y_lines, *, sides, contact, constrained_cell_edges=True, splits=None,
                  quartic_penalty_ratio=0.0, friction=None):
         """splits (layers, ny 2^m, nx 2^m): how often the cover's uppermost layers are split where (see `cover_mesh`); the layers
@@ -93,7 +95,8 @@ class Slab:
         self.sheet_mesh = extrude(sheet_mesh_2d.mesh_2d, np.append(sheet.heights, cover.heights[1:bound + 1]))
         self.sheet_layers = len(sheet.heights) - 1
         self._quartic_penalty_ratio = quartic_penalty_ratio
-        self.underside = CoverUnderside(self.cover_mesh, self.x_lines, self.y_lines)
+        self.underside = CoverSide(self.cover_mesh, self.cover_mesh.bottom, self.cover_mesh.bottom_cells,
+                                   self.x_lines, self.y_lines)
         above = self.underside.interpolation(sheet_mesh_2d.mesh_2d.points)
         self.sheet_nodes = sheet_nodes(self.sheet_mesh, sheet_mesh_2d, first=self.cover_mesh.free, above=above,
                                        constrained=constrained_cell_edges)
@@ -176,6 +179,12 @@ class Slab:
             raise ValueError(f"sides must be 'held', 'symmetric' or 'free', not {sides!r}")
         self.free = np.flatnonzero(~held.ravel())
         self.number = np.full(held.size, -1, dtype=np.int64)
+        self.number[self.free] = np.arange(len(self.free))
+
+    def hold(self, nodes):
+        """Hold nodes (k,) in all directions, before `build_pattern`."""
+        self.number.reshape(-1, 3)[nodes] = -1
+        self.free = np.flatnonzero(self.number >= 0)
         self.number[self.free] = np.arange(len(self.free))
 
     def project(self, displacement, surface):

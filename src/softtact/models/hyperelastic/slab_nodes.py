@@ -66,26 +66,27 @@ def sheet_nodes(mesh, sheet_2d, *, first, above, constrained):
     return SheetNodes(masters, weights, own, number)
 
 
-class CoverUnderside:
-    """The lower side of a `CoverMesh` between grid lines (mm)."""
+class CoverSide:
+    """The lower or the upper side of a `CoverMesh` between grid lines (mm)."""
 
-    def __init__(self, mesh, x_lines, y_lines):
-        self._mesh, self._lines = mesh, (x_lines, y_lines)
+    def __init__(self, mesh, faces, cells, x_lines, y_lines):
+        """faces (t, 8): of the side;  cells (ny 2^m, nx 2^m): which of them is where"""
+        self._mesh, self._faces, self._cells, self._lines = mesh, faces, cells, (x_lines, y_lines)
 
     def locate(self, points):
-        """Faces (p,) under the cover and shape values (p, 8) at points (p, 2); points on a line belong to the lower side."""
-        cells = self._mesh.bottom_cells
+        """Faces (p,) of the side and shape values (p, 8) at points (p, 2); points on a line belong to the lower face."""
+        cells = self._cells
         fine = cells.shape[0] // (len(self._lines[1]) - 1)
         i, j = (_place(value, lines, fine) for value, lines in zip(points.T, self._lines, strict=True))
         faces = cells[j, i]
-        low, _, high, _ = self._mesh.points[self._mesh.bottom[faces, :4], :2].transpose(1, 0, 2)
+        low, _, high, _ = self._mesh.points[self._faces[faces, :4], :2].transpose(1, 0, 2)
         return faces, QUAD8.shape(2 * (points - low) / (high - low) - 1)[0]
 
     def interpolation(self, points):
-        """Sparse matrix (p, free nodes of the cover) that interpolates on the cover's lower side at points (p, 2)."""
+        """Sparse matrix (p, free nodes of the cover) that interpolates on the side at points (p, 2)."""
         mesh, (faces, values) = self._mesh, self.locate(points)
         rows = np.repeat(np.arange(len(points)), 8)
-        all_nodes = sp.csr_matrix((values.ravel(), (rows, mesh.bottom[faces].ravel())), shape=(len(points), len(mesh.points)))
+        all_nodes = sp.csr_matrix((values.ravel(), (rows, self._faces[faces].ravel())), shape=(len(points), len(mesh.points)))
         return without_zeros(all_nodes @ mesh.follow)
 
 

@@ -1,0 +1,273 @@
+"""One increment of a rigid object that presses and drags an elastic surface of known compliance, with Coulomb's exact law.
+
+Unknown are a normal force p >= 0 and a tangential force q (x, y) at each contact point, both on the surface, p downwards:
+    gap  = gap0 - depth + N p + C q >= 0,   p gap = 0            (Signorini)
+    slip = T q + C' p - carried                                  the surface's way on the object within the increment
+    |q| <= mu p,   slip = 0 where |q| < mu p,   slip = -l q with l >= 0 where |q| = mu p       (Coulomb)
+with the parts N, C, T of the surface's compliance. `carried` is the surface's tangential displacement when the increment began and
+the object's way since, so a point that sticks goes where the object goes. History is in `carried` alone.
+
+The normal problem for given q, and the tangential one for given p, are convex; they are solved in turns until both agree
+(Panagiotopoulos' process; Kalker's NORM and TANG), with Aitken's relaxation. Each is solved by active sets with conjugate gradients
+on the set (`unilateral` has more levels at once, but loads only). `solve_block_by_block` is the plain method and the specification.
+References: Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), ch. 4; Panagiotopoulos, Ing.-Arch. 44 (1975) 421;
+Jourdan, Alart and Jean, Comput. Methods Appl. Mech. Engng 155 (1998) 31 (block Gauss-Seidel).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from softtact.contact.disc_constraints import solve_in_discs
+from softtact.contact.unilateral import depth_on_springs
+from softtact.errors import ConvergenceError
+
+
+@dataclass(frozen=True)
+class CoulombSettings:
+    """When an increment counts as solved."""
+
+    tolerance_mm: float = 1e-7
+    """Of gaps under pressure, overlaps, and slips of points that stick."""
+    max_turns: int = 60
+    """Turns of the normal and the tangential problem."""
+    max_iterations: int = 100
+    """Active sets within each."""
+    inner_iterations: int = 400
+    """Conjugate gradients on one active set."""
+
+
+@dataclass(frozen=True)
+class ContactCompliance:
+    """The compliance in mm/N among contact points (c,), as operators that act on forces by `@`; directions are x, y and down."""
+
+    normal: object
+    """(c, 1) from (c, 1): `DenseBlock`, or what acts like it and has `diagonal` (c, axes) and `T`."""
+    coupling: object
+    """Down (c, 1) from x, y (c, 2)."""
+    tangential: object
+    """x, y (c, 2) from x, y (c, 2)."""
+
+    @classmethod
+    def dense(cls, matrix: np.ndarray) -> "ContactCompliance":
+        """Of a matrix (c, 3, c, 3): displacement directions at points, by force directions at points."""
+        n, t = [2], [0, 1]
+        return cls(*(DenseBlock(matrix[:, rows][:, :, :, columns]) for rows, columns in ((n, n), (n, t), (t, t))))
+
+
+class DenseBlock:
+    """A matrix (c, a, c, b) that acts on forces (c, b)."""
+
+    def __init__(self, matrix):
+        self._shape, count = (matrix.shape[0], matrix.shape[1]), matrix.shape[0]
+        self.matrix = np.ascontiguousarray(matrix.reshape(count * matrix.shape[1], -1))
+
+    def __matmul__(self, force):
+        return (self.matrix @ force.ravel()).reshape(self._shape)
+
+    @property
+    def T(self) -> "DenseBlock":
+        """The transposed operator."""
+        return DenseBlock(self.matrix.T.reshape(self._shape[0], -1, *self._shape))
+
+    @property
+    def diagonal(self) -> np.ndarray:
+        """The points' own compliance (c, a)."""
+        return np.diag(self.matrix).reshape(self._shape)
+
+
+@dataclass(frozen=True)
+class Increment:
+    """What one increment asks for at contact points (c,)."""
+
+    gap: np.ndarray
+    """The object's height (c,) in mm over the undeformed surface, at depth 0."""
+    carried: np.ndarray
+    """(c, 2) in mm: where a sticking point's tangential displacement goes."""
+    friction: float
+    """Coulomb's coefficient; infinite: whatever touches sticks."""
+    depth: float | None = None
+    """Prescribed depth in mm, or None where `load` tells."""
+    load: float | None = None
+    """Normal force in N that the surface is to carry."""
+
+    def bound(self, normal: np.ndarray) -> np.ndarray:
+        """The largest tangential forces (c,) in N at normal forces (c,)."""
+        return self.friction * normal if np.isfinite(self.friction) else np.where(normal > 0, np.inf, 0.0)
+
+
+@dataclass(frozen=True)
+class CoulombContact:
+    """The contact at an increment's end."""
+
+    normal: np.ndarray
+    """p (c,) in N."""
+    tangential: np.ndarray
+    """q (c, 2) in N, on the surface."""
+    depth: float
+    """Depth of the object in mm."""
+    gap: np.ndarray
+    """(c,) in mm; below 0 only by the tolerance."""
+    slip: np.ndarray
+    """(c, 2) in mm: the surface's way on the object within the increment; exactly 0 where a point sticks."""
+    sticks: np.ndarray
+    """(c,): whether a point touches and does not slip."""
+    turns: int
+    """Turns of the normal and the tangential problem."""
+    products: int
+    """Products with the compliance, all together."""
+
+
+def solve_increment(compliance: ContactCompliance, increment: Increment, *, normal: np.ndarray | None = None,
+                    tangential: np.ndarray | None = None, settings: CoulombSettings = CoulombSettings()) -> CoulombContact:
+    """The contact of an increment, from first guesses `normal` (c,) and `tangential` (c, 2) in N.
+
+    Raises ConvergenceError where the turns do not agree.
+    """
+    count = len(increment.gap)
+    p = _first_guess(compliance, increment) if normal is None or not normal.any() else normal.copy()
+    q = np.zeros((count, 2)) if tangential is None else tangential.copy()
+    turns, products, raised, relaxation = 0, 0, (compliance.coupling @ q)[:, 0], _Relaxation()
+    while turns < settings.max_turns:
+        turns += 1
+        p, depth, own, used = _solve_normal(compliance.normal, increment.gap + raised, p, increment, settings)
+        products += used
+        if not increment.friction:
+            q, dragged, raised = np.zeros((count, 2)), np.zeros((count, 2)), np.zeros(count)
+            break
+        by_pressure = compliance.coupling.T @ p[:, None] - increment.carried
+        bound = increment.bound(p)
+        q, dragged, used = solve_in_discs(compliance.tangential, by_pressure, bound, q, settings=settings)
+        products += used + 2
+        change = (compliance.coupling @ q)[:, 0] - raised
+        if np.abs(change)[p > 0].max(initial=0.0) <= settings.tolerance_mm:
+            raised = raised + change
+            break
+        raised = raised + relaxation.of(change) * change
+    else:
+        raise ConvergenceError(f"An increment of the elastic model did not settle pressure and friction in {settings.max_turns} "
+                               "turns; move the object in more steps.")
+    slip = compliance.coupling.T @ p[:, None] + dragged - increment.carried
+    sticks = _sticking(q - slip / compliance.tangential.diagonal.max(axis=1, keepdims=True), increment.bound(p))
+    slip[sticks] = 0.0
+    return CoulombContact(p, q, depth, increment.gap + raised + own - depth, slip, sticks, turns, products + 2)
+
+
+class _Relaxation:
+    """Aitken's share of a change that a turn takes over: with much friction whole changes swing, ever wider.
+
+    Kuettler and Wall, Comput. Mech. 43 (2008) 61.
+    """
+
+    _LEAST, _MOST = 0.02, 1.0
+
+    def __init__(self):
+        self._share, self._last = self._MOST, None
+
+    def of(self, change):
+        """The share to take of this turn's change (c,)."""
+        if self._last is not None:
+            turned = change - self._last
+            aitken = -self._share * (self._last @ turned) / max(turned @ turned, 1e-300)
+            self._share = min(max(abs(aitken), self._LEAST), self._MOST)
+        self._last = change
+        return self._share
+
+
+def _sticking(pulled, bound):
+    """Whether forces (c, 2) that the slip would still change lie within the discs: told by the slip, as |q| alone is rounded."""
+    return (bound > 0) & (np.linalg.norm(pulled, axis=1) <= bound)
+
+
+def _first_guess(compliance, increment):
+    """Forces of springs side by side, each as stiff as the points' own compliance among their likes."""
+    lowest = increment.gap.min()
+    if increment.load is None:
+        return np.clip(increment.depth - increment.gap, 0.0, None) / compliance.normal.diagonal[:, 0]
+    spring = 1 / compliance.normal.diagonal[:, 0]
+    depth = lowest + depth_on_springs(increment.gap - lowest, spring, increment.load)
+    return np.clip(depth - increment.gap, 0.0, None) * spring
+
+
+def _solve_normal(compliance, gap, p, increment, settings):
+    """Forces p (c,), depth, what the points go down under p (c,), and the number of products; gap (c,): at depth 0 without p."""
+    active, products, depth = p > 0, 0, increment.depth
+    for _ in range(settings.max_iterations):
+        if increment.load is not None and not active.any():
+            active = gap <= gap.min()
+        p = np.where(active, p, 0.0)
+        if increment.load is not None:
+            p[active] += (increment.load - p.sum()) / active.sum()
+        own = (compliance @ p[:, None])[:, 0]
+        p, own, used = _on_active_set(compliance, gap, p, own, active, increment.depth, settings)
+        products += used + 1
+        open_by = gap + own
+        if increment.load is not None:
+            depth = open_by[active].mean()
+        joining, leaving = ~active & (open_by - depth < -settings.tolerance_mm), active & (p < 0)
+        if not joining.any() and not leaving.any():
+            return p, float(depth), own, products
+        active = (active | joining) & ~leaving
+    raise ConvergenceError(f"An increment of the elastic model did not settle its contact in {settings.max_iterations} active "
+                           "sets; move the object in more steps.")
+
+
+def _on_active_set(compliance, gap, p, own, active, depth, settings):
+    """Conjugate gradients for gap + N p = depth on the set, with the sum of p kept where the depth is not prescribed."""
+    if not active.any():
+        return p, own, 0
+    scale = np.where(active, 1 / compliance.diagonal[:, 0], 0.0)
+
+    def project(residual):
+        return residual - (scale @ residual) / scale.sum() * active if depth is None else residual
+
+    def reduced(p, own):
+        lacking = np.where(active, (0.0 if depth is None else depth) - gap - own, 0.0)
+        return project(lacking)
+
+    residual = reduced(p, own)
+    direction = z = scale * residual
+    rho, products = residual @ z, 0
+    while np.abs(residual).max() > 0.1 * settings.tolerance_mm and products < settings.inner_iterations:
+        moved = (compliance @ direction[:, None])[:, 0]
+        step = rho / (direction @ moved)
+        p, own, products = p + step * direction, own + step * moved, products + 1
+        residual = project(residual - step * np.where(active, moved, 0.0))
+        z = scale * residual
+        before, rho = rho, residual @ z
+        direction = z + rho / before * direction
+    return p, own, products
+
+
+def solve_block_by_block(matrix: np.ndarray, increment: Increment, *, tolerance_mm: float = 1e-9,
+                         max_sweeps: int = 20000) -> CoulombContact:
+    """The same for a matrix (c, 3, c, 3), point by point (block Gauss-Seidel) at a prescribed depth; a few hundred points.
+
+    At each point first the normal force, others kept, then the tangential one, projected on its disc.
+    """
+    count = len(increment.gap)
+    force, moved = np.zeros((count, 3)), np.zeros((count, 3))
+    columns = matrix.reshape(3 * count, count, 3)
+    for sweep in range(1, max_sweeps + 1):
+        largest = 0.0
+        for i in range(count):
+            own, before = matrix[i, :, i], force[i].copy()
+            gap = increment.gap[i] - increment.depth + moved[i, 2]
+            force[i, 2] = max(0.0, force[i, 2] - gap / own[2, 2])
+            slip = moved[i, :2] + own[:2, 2] * (force[i, 2] - before[2]) - increment.carried[i]
+            force[i, :2] = _in_disc(force[i, :2] - slip / max(own[0, 0], own[1, 1]), increment.friction * force[i, 2])
+            change = force[i] - before
+            moved += (columns[:, i] @ change).reshape(count, 3)
+            largest = max(largest, np.abs(own @ change).max())
+        if largest <= tolerance_mm:
+            gap = increment.gap - increment.depth + moved[:, 2]
+            slip = moved[:, :2] - increment.carried
+            own = np.einsum("iaia->ia", matrix[:, :2, :, :2]).max(axis=1, keepdims=True)
+            sticks = _sticking(force[:, :2] - slip / own, increment.bound(force[:, 2]))
+            return CoulombContact(force[:, 2], force[:, :2], increment.depth, gap, slip, sticks, sweep, sweep)
+    raise ConvergenceError(f"The plain contact method did not settle in {max_sweeps} sweeps.")
+
+
+def _in_disc(force, radius):
+    length = np.linalg.norm(force)
+    return force if length <= radius else force * (radius / length)

@@ -1,0 +1,242 @@
+"""A rigid object that presses and friction responses the elastic layer with Coulomb friction, increment by increment.
+
+What a state holds is all that there is of history: the forces at the top's nodes, their tangential displacements, and each node's
+place under the object. A node that sticks keeps its place there, a sliding one loses what the object moves on, and over one that
+is free the object moves by its way less what friction friction responses the surface along. The tangential displacement that the
+pressure alone causes does not move the places, as in a press straight down (`compliance`): without friction that is what comes out
+here, too. The object's underside is evaluated at those places, exact to its triangles.
+Normal forces act along z, and torques are about the undeformed surface: the model is linear.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from softtact.contact.coulomb import ContactCompliance, CoulombSettings, Increment, solve_increment
+from softtact.contact.height_field import NO_CONTACT_MM
+from softtact.contact.unilateral import depth_on_springs
+from softtact.errors import InputError
+
+_SETTINGS = CoulombSettings()
+_MARGIN, _LEAST_MARGIN_MM = 1.3, 0.1     # of the depth, within which points are looked for at first
+_RISE = 1.15                             # of the depth: points within may touch
+_HALVINGS = 6                            # the moment of touch is found to a 64th of an increment
+# With the places under the object brought up to date between them. The first one of a way aside has only nodes that touched
+# before: the others' places follow from how far these friction response the surface along.
+_PASSES = 3
+
+
+@dataclass(frozen=True)
+class SlidingState:
+    """Object and surface at an increment's end; n nodes of the grid."""
+
+    position: np.ndarray
+    """(3,) in mm: the object's way in x and y, and its depth from first touch."""
+    place: np.ndarray
+    """(n, 2) in mm: where a node lies under the object, in the frame in which the object was placed."""
+    normal: np.ndarray
+    """(n,) in N, downwards on the surface."""
+    tangential: np.ndarray
+    """(n, 2) in N, on the surface."""
+    moved: np.ndarray
+    """(n, 2) in mm: the surface's tangential displacement."""
+    dragged: np.ndarray
+    """(n, 2) in mm: the part of it that the tangential forces cause."""
+    path: np.ndarray
+    """(n,) in mm: how far a node has slid on the object since it came to touch; 0 where it does not touch."""
+    sticks: np.ndarray
+    """(n,): which nodes touch and did not slide in the last increment."""
+    stored_mj: float = 0.0
+    """Elastic energy of the layer."""
+    work_mj: float = 0.0
+    """Work of the object's force on the surface since the start."""
+    dissipated_mj: float = 0.0
+    """Work of friction against slip since the start."""
+    penetration_mm: float = 0.0
+    """Deepest overlap."""
+    turns: int = 0
+    """Turns of the normal and the tangential problem since the start."""
+
+    @property
+    def force_n(self) -> np.ndarray:
+        """The object's force (3,) in N on the surface: x, y, z; pressing down is negative."""
+        return np.append(self.tangential.sum(axis=0), -self.normal.sum())
+
+
+class SlidingObject:
+    """An object over a layer: `start`, and `advance` from state to state. What it keeps between calls changes no result.
+
+    compliance: `SurfaceCompliance`;  underside(x, y): heights (n,) in mm and normals (n, 3), as of `HeightField`
+    first_touch_mm: height of the object's lowest point over the surface, where depth 0 is;  friction: Coulomb's coefficient
+    """
+
+    def __init__(self, compliance, underside, *, first_touch_mm: float, friction: float, deepest_mm: float,
+                 settings: CoulombSettings = _SETTINGS):
+        self.compliance, self.friction, self.settings = compliance, friction, settings
+        self._underside, self._first_touch, self._deepest = underside, first_touch_mm, deepest_mm
+        self._operators = (b"", None)
+
+    @property
+    def start(self) -> SlidingState:
+        """The object at first touch, the surface at rest."""
+        points = self.compliance.grid.points
+        zero, zeros = np.zeros(len(points)), np.zeros((len(points), 2))
+        return SlidingState(np.zeros(3), points, zero, zeros, zeros, zeros, zero, zero > 0)
+
+    def heights(self, place: np.ndarray) -> np.ndarray:
+        """Height (n,) in mm of the object over places (n, 2), counted from first touch."""
+        return self._underside(*place.T)[0] - self._first_touch
+
+    def advance(self, state: SlidingState, way: np.ndarray, *, depth: float | None = None,
+                load: float | None = None) -> SlidingState:
+        """The state where the object has moved aside by `way` (2,) in mm and is `depth` mm deep, or carries `load` N.
+
+        Raises ConvergenceError where the contact does not settle, InputError where the object has nothing below it to carry a load.
+        """
+        place = np.where(state.sticks[:, None], state.place, state.place - way)
+        expected = state.position[2] if depth is None else depth
+        touched = state.normal > 0
+        allowed = touched if self.friction > 0 and way.any() and touched.any() else np.ones_like(touched)
+        for _ in range(1 if self.friction == 0 else _PASSES):
+            found = self._solve(state, place, allowed, way, depth, load, expected=expected)
+            place, expected, allowed = self._places(state, found, place, way), found.depth, np.ones_like(touched)
+        return self._finish(state, found, place, way)
+
+    def _solve(self, state, place, allowed, way, depth, load, *, expected):
+        """The contact for given places, with as many candidate nodes as its depth asks for; expected: its depth in mm."""
+        heights = self.heights(place)
+        if (heights[allowed] < self._deepest).any():
+            heights = np.where(allowed, heights, NO_CONTACT_MM)
+        reach = _MARGIN * max(self._expected_depth(heights, load) if depth is None else depth, state.position[2]) + _LEAST_MARGIN_MM
+        while True:
+            nodes = np.flatnonzero(heights < min(reach, self._deepest))
+            if not len(nodes):
+                return self._free(state, depth)
+            among, spread = self._operators_of(nodes)
+            carried = state.moved[nodes] + self._share_in_contact(state, among, nodes, heights, place, expected)[:, None] * way
+            contact = solve_increment(among, Increment(heights[nodes], carried, self.friction, depth, load),
+                                      normal=state.normal[nodes], tangential=state.tangential[nodes], settings=self.settings)
+            if reach >= self._deepest or _RISE * contact.depth <= reach:
+                return _Found(nodes, contact, heights[nodes], *spread(contact), contact.depth)
+            reach *= _MARGIN
+
+    def _share_in_contact(self, state, among, nodes, heights, place, depth):
+        """The share (c,) of an increment in which a node touches: 1 for those that did, for others from where their gap closes."""
+        share = np.ones(len(nodes))
+        if self.friction == 0:
+            return share
+        down = (among.normal @ state.normal[nodes, None] + among.coupling @ state.tangential[nodes])[:, 0]
+        coming = np.flatnonzero((state.normal[nodes] == 0) & (heights[nodes] - depth + down < 0))
+        begin, end, down = state.place[nodes[coming]], place[nodes[coming]], down[coming]
+        low, high = np.zeros(len(coming)), np.ones(len(coming))
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            lowered = state.position[2] + middle * (depth - state.position[2])
+            closed = self.heights(begin + middle[:, None] * (end - begin)) - lowered + down < 0
+            low, high = np.where(closed, low, middle), np.where(closed, middle, high)
+        share[coming] = 1 - 0.5 * (low + high)
+        return share
+
+    def _expected_depth(self, heights, load):
+        """Depth in mm of a load on springs side by side."""
+        there = heights[heights < self._deepest]
+        if not len(there):
+            raise InputError("The object has slid off the sensor's free surface and carries no load any more; shorten the way.")
+        lowest, area = there.min(), np.full(len(there), np.prod(self.compliance.grid.step))
+        if load <= 0:
+            return lowest
+        return lowest + float(depth_on_springs(there - lowest, area, load / self.compliance.foundation_modulus))
+
+    def fractions(self, state: SlidingState, load: float, count: int) -> np.ndarray:
+        """Loads (count,) in N from the state's to `load` that lower the object about evenly, after its shape on springs."""
+        heights, begin = self.heights(state.place), state.normal.sum()
+        depths = np.array([self._expected_depth(heights, max(force, 0.0)) for force in (begin, load)])
+        on_springs = [np.clip(depth - heights, 0.0, None).sum() for depth in np.linspace(*depths, count + 1)]
+        grown = np.array(on_springs[1:]) - on_springs[0]
+        return begin + (load - begin) * (grown / grown[-1] if grown[-1] else np.linspace(0, 1, count + 1)[1:])
+
+    def depth_of(self, state: SlidingState, load: float) -> float:
+        """Depth in mm that a load is expected to have where the object is now: an estimate, to divide steps by."""
+        return self._expected_depth(self.heights(state.place), load)
+
+    def _operators_of(self, nodes):
+        """The compliance among nodes, and what spreads a contact's forces to all nodes' tangential displacements."""
+        key, found = self._operators
+        if key != nodes.tobytes():
+            between, everywhere = self.compliance.between, np.arange(self.compliance.grid.count)
+            among = ContactCompliance(between(nodes, nodes, row_axes=(2,), column_axes=(2,)),
+                                      between(nodes, nodes, row_axes=(2,), column_axes=(0, 1)),
+                                      between(nodes, nodes, row_axes=(0, 1), column_axes=(0, 1)))
+            by_normal, by_tangential = (between(everywhere, nodes, row_axes=(0, 1), column_axes=axes, dtype=np.float32)
+                                        for axes in ((2,), (0, 1)))
+
+            def spread(contact):
+                return by_normal @ contact.normal[:, None], by_tangential @ contact.tangential
+
+            found = among, spread
+            self._operators = nodes.tobytes(), found
+        return found
+
+    def _free(self, state, depth):
+        zeros = np.zeros_like(state.moved)
+        return _Found(np.zeros(0, dtype=int), None, np.zeros(0), zeros, zeros, depth)
+
+    def _places(self, state, found, used, way):
+        """Places (n, 2) of all nodes under the object after an increment that was solved with places `used`.
+
+        A node that came to touch keeps what was used where its own traction would carry it back out from under an edge.
+        """
+        position, points = state.position[:2] + way, self.compliance.grid.points
+        if self.friction == 0:
+            return points - position
+        place = points - position + found.dragged
+        touching, contact = found.touching, found.contact
+        if len(touching):
+            stayed, sliding = state.normal[touching] > 0, ~contact.sticks[found.acting]
+            along = found.dragged[touching] - state.dragged[touching] - way
+            out = ~stayed & (self.heights(place[touching]) >= self._deepest)
+            place[touching[stayed]] = (state.place[touching] + np.where(sliding[:, None], along, 0.0))[stayed]
+            place[touching[out]] = used[touching[out]]
+        return place
+
+    def _finish(self, state, found, place, way):
+        """The next state, with its energies by the trapezoidal rule."""
+        normal, tangential, moved = np.zeros_like(state.normal), np.zeros_like(state.moved), found.by_normal + found.dragged
+        slip = np.where((state.normal > 0)[:, None], moved - state.moved - way, 0.0)      # of those that lose contact, too
+        sticks, stored, overlap, turns = np.zeros(len(normal), dtype=bool), 0.0, 0.0, 0
+        if found.contact is not None:
+            contact, nodes = found.contact, found.nodes
+            normal[nodes], tangential[nodes], sticks[nodes] = contact.normal, contact.tangential, contact.sticks
+            acting = contact.normal > 0
+            slip[nodes[acting]] = contact.slip[acting]
+            turns, down = contact.turns, contact.gap - found.height + contact.depth
+            stored = 0.5 * float(contact.normal @ down + (contact.tangential * moved[nodes]).sum())
+            overlap = max(0.0, -float(contact.gap.min()))
+        after = replace(state, position=np.append(state.position[:2] + way, found.depth), place=place, normal=normal,
+                        tangential=tangential, moved=moved, dragged=found.dragged,
+                        path=np.where(normal > 0, state.path * (state.normal > 0) + np.linalg.norm(slip, axis=1), 0.0),
+                        sticks=sticks, stored_mj=stored, penetration_mm=overlap, turns=state.turns + turns)
+        mean_force = 0.5 * (state.force_n + after.force_n)
+        travelled = np.append(way, state.position[2] - found.depth)
+        rubbed = -0.5 * float(((state.tangential + tangential) * slip).sum())
+        return replace(after, work_mj=state.work_mj + float(mean_force @ travelled), dissipated_mj=state.dissipated_mj + rubbed)
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A solved contact at candidate nodes (c,), their heights (c,), and all nodes' tangential displacements (n, 2) by its parts."""
+
+    nodes: np.ndarray
+    contact: object
+    height: np.ndarray
+    by_normal: np.ndarray
+    dragged: np.ndarray
+    depth: float | None = None
+
+    @property
+    def acting(self):
+        return self.contact.normal > 0 if self.contact is not None else np.zeros(0, dtype=bool)
+
+    @property
+    def touching(self):
+        return self.nodes[self.acting]

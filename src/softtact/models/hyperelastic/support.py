@@ -1,0 +1,169 @@
+"""What is below the slab and holds it: a lattice of frusta (`FrustumArray`), the board itself, or nothing (`PlainSupport`).
+
+    frusta   each with its own unknowns, tied to the slab at its root, in contact with the board
+    base     the slab's lower side is bonded to the board: the slab holds these nodes (`Slab.hold`), no unknown is left below
+    none     the slab's lower side is free: it hangs in the sensor's shell, which holds its sides
+"""
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from softtact.contact.friction import Coulomb, FrictionResponse, FrictionState
+from softtact.contact.history import ContactHistory
+from softtact.contact.penalty import Contact
+from softtact.linalg.workers import SERIAL
+
+
+@dataclass(frozen=True)
+class SupportState:
+    """energy (mJ), force (f, nodes, 3) on the support's nodes, gaps (f, p) at its contact points, displacement (f, nodes, 3).
+
+    elastic: energies (f,) and force of the rubber alone;  history: of the contacts, see `ContactHistory`
+    friction_response: friction at the points on the board (f, b), None without
+    """
+
+    elastic: tuple
+    energy: float
+    force: np.ndarray
+    gaps: np.ndarray
+    displacement: np.ndarray
+    history: ContactHistory
+    friction_response: FrictionResponse | None = None
+
+
+class Support(Protocol):
+    """What a `LayeredBody` asks of what is below its slab: `count` bodies of `nodes` nodes each, tied to the slab at `root`.
+
+    A support with bodies also condenses them for the slab's cells (`SheetCells`) and balances them one by one
+    (`local_equilibrium`); both look at supports with a `count` above zero only.
+    """
+
+    count: int
+    nodes: int
+    root: np.ndarray
+    friction: Coulomb | None
+
+    @property
+    def blocks(self) -> list:
+        """Blocks of its elements; none where it has no rubber of its own."""
+        ...
+
+    @property
+    def in_words(self) -> str:
+        """What it is, for messages."""
+        ...
+
+    def fresh_history(self) -> ContactHistory:
+        """The contacts' history before the first touch."""
+        ...
+
+    def evaluate(self, displacement: np.ndarray, history: ContactHistory | None = None, *, workers: Any = SERIAL
+                 ) -> SupportState | None:
+        """The state at displacement (f, nodes, 3); None if an element is inside out."""
+        ...
+
+    def reevaluate_contact(self, state: SupportState, history: ContactHistory) -> SupportState:
+        """The same displacements with another history of the contacts."""
+        ...
+
+    def inner_residual(self, state: SupportState) -> np.ndarray:
+        """Unbalanced forces (f, inner) in N of the unknowns that are not the slab's."""
+        ...
+
+    def contact_error(self, state: SupportState) -> float:
+        """Deepest overlap, or widest gap under pressure, in mm."""
+        ...
+
+    def augmented(self, state: SupportState) -> ContactHistory:
+        """The contacts' history with each point held where its surfaces just touch."""
+        ...
+
+    def first_friction_state(self, state: SupportState) -> FrictionState | None:
+        """The friction state in which a step starts, None without friction."""
+        ...
+
+    def most_compressed(self, state: SupportState) -> tuple[float, str] | None:
+        """Share of its height by which the most compressed body is shortened, and which one in words; None without bodies."""
+        ...
+
+    def largest_compression(self, displacement: np.ndarray) -> float:
+        """By how much (mm) the most compressed body is shortened; nan without bodies."""
+        ...
+
+
+class PlainSupport:
+    """The board under a bonded slab, or nothing: no bodies, no energy, no contact. Fulfils `Support`."""
+
+    count, nodes, friction = 0, 1, None
+    root = np.zeros(0, dtype=np.int64)
+
+    def __init__(self, kind, contact=None):
+        """kind: base or none;  contact: a penalty for the history that every support has; no point uses it"""
+        self.kind, self._contact = kind, contact or Contact(stiffness=1.0, smoothing=1.0)
+
+    @property
+    def blocks(self):
+        return []
+
+    @property
+    def in_words(self):
+        return {"base": "bonded to the board", "none": "free below"}[self.kind]
+
+    def fresh_history(self):
+        return ContactHistory(self._contact)
+
+    def evaluate(self, displacement, history=None, *, workers=SERIAL):
+        nothing = np.zeros((0, self.nodes, 3))
+        return SupportState(elastic=(np.zeros(0), nothing), energy=0.0, force=nothing, gaps=np.zeros((0, 1)),
+                            displacement=displacement, history=history or self.fresh_history())
+
+    def reevaluate_contact(self, state, history):
+        return self.evaluate(state.displacement, history)
+
+    def inner_residual(self, state):
+        return np.zeros((0, 1))
+
+    def contact_error(self, state):
+        return 0.0
+
+    def augmented(self, state):
+        return state.history
+
+    def first_friction_state(self, state):
+        return None
+
+    def most_compressed(self, state):
+        return None
+
+    def largest_compression(self, displacement):
+        return np.nan
+
+
+class NoCells:
+    """In place of `SheetCells` for a slab without bodies below it: nothing is eliminated, every unknown is global."""
+
+    count, outer_dofs, outer = 0, [], []
+    roots, eliminated = np.zeros((0, 1), dtype=np.int64), np.zeros(0, dtype=np.int64)
+
+    def positive_outer(self):
+        return []
+
+    def refresh(self, state, *, kept_mm=0.0, workers=SERIAL):
+        return 0
+
+    def damp(self, slab_step, bed_step):
+        return False
+
+    def reset(self):
+        pass
+
+    def forget(self, cells=None):
+        pass
+
+    def condensed_residual(self, state, *, workers=SERIAL):
+        return state.slab.force.copy(), None
+
+    def recover(self, kept, slab_step, *, workers=SERIAL):
+        return slab_step, np.zeros((0, PlainSupport.nodes, 3))

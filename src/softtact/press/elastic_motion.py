@@ -1,0 +1,40 @@
+"""A `Motion` of a placed object with the elastic model, from a sensor: its surface compliance, friction and first touch."""
+
+import time
+
+import numpy as np
+from trimesh import Trimesh
+
+from softtact.contact.height_field import HeightField
+from softtact.contact.motion import Motion
+from softtact.contact.underside import Underside
+from softtact.models.elastic.motion_press import ElasticMotion, check_motion, move_on_layer
+from softtact.press.cache import cached_surface_compliance
+from softtact.progress import announce
+
+
+def press_motion(sensor, placed: Trimesh, motion: Motion, seconds: list[float], *, label: str = "press",
+                 threads: int = 1) -> ElasticMotion:
+    """The `ElasticMotion` of a mesh placed in the sensor's frame; into `seconds` goes the time that each step took.
+
+    Raises InputError for rotations, lateral loads, and an object that misses the sensor; ConvergenceError, with the steps before as
+    its `result`, where one is not reached.
+    """
+    check_motion(motion)
+    if "elastic_surface" not in sensor.prepared_models:
+        sensor.prepared_models["elastic_surface"] = cached_surface_compliance(sensor.spec, threads=threads)
+    compliance, spec = sensor.prepared_models["elastic_surface"], sensor.spec
+    field, start = HeightField(placed), time.perf_counter()
+
+    def note(state):
+        seconds.append(time.perf_counter() - start - sum(seconds))
+        announce(f"{label}: step {len(seconds)} of {len(motion.steps)}, {state.position[2]:.3f} mm deep")
+
+    return move_on_layer(compliance, field, motion, first_touch_mm=first_touch(placed, field, compliance.grid, spec.footprint_mm),
+                           friction=spec.friction.object, deepest_mm=spec.thickness_mm, on_step=note)
+
+
+def first_touch(placed: Trimesh, field: HeightField, grid, footprint_mm) -> float:
+    """Height in mm over the surface of the object's lowest point over the sensor; InputError where it misses it."""
+    over = (np.abs(placed.vertices[:, :2]) <= np.asarray(footprint_mm) / 2).all(axis=1)
+    return min(Underside(field, grid).lowest_mm, float(placed.vertices[over, 2].min(initial=np.inf)))

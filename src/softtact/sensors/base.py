@@ -1,0 +1,142 @@
+"""What every kind of sensor has: footprint, map, taxels, an elastic layer; and how its file is read."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from pydantic import Field, PositiveFloat, PositiveInt, ValidationError
+
+from softtact.errors import InputError
+from softtact.files import read_yaml
+from softtact.sensors.fields import ElasticLayer, Section, Taxels
+from softtact.unknown_names import first_fault, known_keys, unknown
+
+
+class BaseSpec(Section):
+    """The part of a specification that does not depend on its `kind`, which each class states as a literal.
+
+    Frame: origin at the centre of the sensing surface, x and y along the sides, z outwards.
+    """
+
+    name: str
+    footprint_mm: tuple[PositiveFloat, PositiveFloat]
+    map_shape: tuple[PositiveInt, PositiveInt]
+    force_range_n: tuple[float, PositiveFloat]
+    largest_counts: PositiveFloat = Field(2400.0, description="of the readout's converter; pictures end there")
+    taxels: Taxels
+    elastic_layer: ElasticLayer
+
+    @property
+    def thickness_mm(self) -> float:
+        """Height of the sensing surface over the lower side: over the PCB, where the sensor lies on it."""
+        raise NotImplementedError
+
+    @property
+    def base_held(self) -> bool:
+        """Whether the board carries the sensor from below; else its sides alone do."""
+        return True
+
+    @property
+    def deepest_mm(self) -> float:
+        """How far (mm) an object can come down at most: to the board, or without end where there is none."""
+        return self.thickness_mm if self.base_held else np.inf
+
+    @property
+    def materials(self) -> dict[str, str]:
+        """Names of the materials by layer, from below: dielectric, and cover where there is one."""
+        raise NotImplementedError
+
+    @property
+    def frustum_height_mm(self) -> float:
+        """Height of the frusta; nan without frusta."""
+        return np.nan
+
+    @property
+    def parts_in_words(self) -> str:
+        """What the sensor is made of, in some words."""
+        raise NotImplementedError
+
+    @property
+    def support_facts(self) -> dict[str, Any]:
+        """What holds the sensor, and friction in the hyperelastic model, as attributes of a result."""
+        raise NotImplementedError
+
+    @property
+    def map_x_mm(self) -> np.ndarray:
+        """Columns of the deformation map, (33,) for the paper's sensor."""
+        return np.linspace(-0.5, 0.5, self.map_shape[1]) * self.footprint_mm[0]
+
+    @property
+    def map_y_mm(self) -> np.ndarray:
+        """Rows of the deformation map, (57,) for the paper's sensor."""
+        return np.linspace(-0.5, 0.5, self.map_shape[0]) * self.footprint_mm[1]
+
+    @property
+    def in_words(self) -> str:
+        """Name, size and counts in one line."""
+        sides = " x ".join(f"{side:g}" for side in self.footprint_mm)
+        return (f"{self.name}: {sides} mm, {self.parts_in_words}, {self.taxels.rows} x {self.taxels.columns} taxels, "
+                f"maps of {self.map_shape[0]} x {self.map_shape[1]} points")
+
+    def need_frusta(self, what: str, remedy: str) -> None:
+        """Refuse `what` with one sentence that ends in the remedy, where the sensor has no frusta."""
+
+    def check_for(self, kind: str) -> None:
+        """Refuse what a model of this kind (elastic, foundation, hyperelastic) cannot take: no frusta, or no middle row."""
+        if kind == "foundation":
+            self.need_frusta("the foundation model", "press with elastic or hyperelastic")
+        if kind in ("elastic", "foundation") and not all(count % 2 for count in self.map_shape):
+            raise InputError(f"{self.name}, at 'map_shape': {list(self.map_shape)} has no middle row and column, which the fast "
+                             "models ask for; write odd numbers.")
+
+    def _check(self, where: str) -> None:
+        """Refuse values that are right each by itself and wrong together."""
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any], *, where: str = "sensor") -> Self:
+        """Validate a mapping; the first fault becomes one sentence that names `where` and the field."""
+        cls._check_kind(values, where)
+        try:
+            spec = cls.model_validate(values)
+        except ValidationError as error:
+            raise InputError(_sentence(cls, first_fault(error), where)) from None
+        spec._check(where)
+        return spec
+
+    @classmethod
+    def _check_kind(cls, values: dict[str, Any], where: str) -> None:
+        """Refuse a sensor of another kind than this class."""
+        own = cls.model_fields["kind"].annotation.__args__[0]     # type: ignore[union-attr]
+        if values.get("kind", "frusta") != own:
+            raise InputError(f"{where}, at 'kind': {values.get('kind', 'frusta')!r} is not the kind that is needed here; give a "
+                             f"sensor of kind {own}.")
+
+    @classmethod
+    def from_yaml(cls, path: str | Path) -> Self:
+        """Read a sensor file of this kind."""
+        return cls.from_dict(read_mapping(path), where=str(path))
+
+
+def read_mapping(path: str | Path) -> dict[str, Any]:
+    """The keys and values of a sensor file; one without any is refused."""
+    values = read_yaml(Path(path), missing="there is no such sensor file.")
+    if not isinstance(values, dict):
+        raise InputError(f"{path}: a sensor file must hold keys and values; see docs/how-to/bring_your_sensor.md.")
+    return values
+
+
+def _sentence(cls: type[Section], fault: Any, where: str) -> str:
+    """What is wrong with a field, and what to do."""
+    field = ".".join(str(part) for part in fault["loc"])
+    if fault["type"] == "extra_forbidden":
+        *parents, last = fault["loc"]
+        said = unknown(last, known_keys(cls, parents), kind="key")
+        return f"{where}{_at(parents)}: {said}{'' if said.endswith('?') else '.'}"
+    if fault["type"] == "missing":
+        return f"{where}: the key '{field}' is missing; add it."
+    return f"{where}: field '{field}' is not usable: {fault['msg']}; correct it."
+
+
+def _at(path: Sequence[str | int]) -> str:
+    return f", at {'.'.join(map(str, path))!r}" if path else ""

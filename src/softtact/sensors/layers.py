@@ -1,0 +1,89 @@
+"""Sensors of `kind: layers`: one or two plain layers without frusta, on the board or held at their sides alone."""
+
+from typing import Annotated, Any, Literal, NoReturn
+
+from pydantic import Field
+
+from softtact.errors import InputError
+from softtact.sensors.base import BaseSpec
+from softtact.sensors.fields import Coefficient, Length, Section
+
+_ELEMENTS = 4     # through the thickness that the default size of elements in plan is taken from
+
+
+class PlainLayer(Section):
+    """A layer as thick everywhere; `relative_permittivity` counts in the lowest, the dielectric."""
+
+    material: str
+    thickness_mm: Length
+    relative_permittivity: Length = 3.5
+
+
+class ObjectFriction(Section):
+    """Coefficient of Coulomb friction of the object on the sensing surface, in the hyperelastic model."""
+
+    object: Coefficient = 0.0
+
+
+class LayersSpec(BaseSpec):
+    """One or two plain layers, from below. The first is the dielectric: the deformation map is the movement of its top.
+
+    support: `base`, the lowest layer is bonded to the board, or `none`, it is free below; the sides are held in both.
+    element_mm: size of the hyperelastic model's elements in plan under an object; by default a quarter of the thickness: half
+    of that changes the depth of a ball by 0.7 % and takes three times as long
+    """
+
+    kind: Literal["layers"]
+    support: Literal["base", "none"]
+    layers: Annotated[tuple[PlainLayer, ...], Field(min_length=1, max_length=2)]
+    element_mm: Length | None = None
+    friction: ObjectFriction = ObjectFriction()
+
+    @property
+    def dielectric(self) -> PlainLayer:
+        """The lowest layer, between the electrodes."""
+        return self.layers[0]
+
+    @property
+    def cover(self) -> PlainLayer | None:
+        """The upper layer, or None."""
+        return self.layers[1] if len(self.layers) > 1 else None
+
+    @property
+    def thickness_mm(self) -> float:
+        """Height of the sensing surface over the lower side."""
+        return sum(layer.thickness_mm for layer in self.layers)
+
+    @property
+    def dielectric_thickness_mm(self) -> float:
+        """Height of the electrode plane (top of the dielectric) over the lower side."""
+        return self.dielectric.thickness_mm
+
+    @property
+    def base_held(self) -> bool:
+        """Whether the board carries the sensor from below; else its sides alone do."""
+        return self.support == "base"
+
+    @property
+    def materials(self) -> dict[str, str]:
+        """Names of the materials by layer: dielectric, and cover where there are two."""
+        return {name: layer.material for name, layer in zip(("dielectric", "cover"), self.layers, strict=False)}
+
+    @property
+    def element_size_mm(self) -> float:
+        """Size of the hyperelastic model's elements in plan under an object."""
+        return self.element_mm or self.thickness_mm / _ELEMENTS
+
+    @property
+    def parts_in_words(self) -> str:
+        """How many layers there are, and what holds them."""
+        return f"{len(self.layers)} plain layer{'s' * (len(self.layers) > 1)} ({self.support})"
+
+    @property
+    def support_facts(self) -> dict[str, Any]:
+        """Friction in the hyperelastic model, and the support, as attributes of a result."""
+        return {"friction_object": self.friction.object, "support": self.support}
+
+    def need_frusta(self, what: str, remedy: str) -> NoReturn:
+        """Refuse `what` with one sentence that ends in the remedy."""
+        raise InputError(f"{self.name} has no frusta, which {what} needs; {remedy}.")
