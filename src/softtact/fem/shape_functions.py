@@ -80,7 +80,8 @@ def lifted(points: np.ndarray, *, base: Callable) -> tuple[np.ndarray, np.ndarra
     values, slopes = base(points[:, :2])
     (z, dz), order = _along(points[:, 2]), [2, 1, 0]
     z, dz = z[:, order], dz[:, order]
-    product = (z[:, :, None] * values[:, None, :]).reshape(len(points), -1)
-    in_plane = (z[:, :, None, None] * slopes[:, None]).reshape(len(points), -1, 2)
-    upwards = (dz[:, :, None] * values[:, None, :]).reshape(len(points), -1, 1)
+    shape = len(points), 3 * values.shape[1]
+    product = (z[:, :, None] * values[:, None, :]).reshape(shape)
+    in_plane = (z[:, :, None, None] * slopes[:, None]).reshape(*shape, 2)
+    upwards = (dz[:, :, None] * values[:, None, :]).reshape(*shape, 1)
     return product, np.concatenate([in_plane, upwards], axis=2)
