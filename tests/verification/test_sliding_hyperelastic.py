@@ -17,26 +17,27 @@ from softtact.press.sensor import load_sensor
 pytestmark = pytest.mark.slow
 
 COARSE = MeshSettings(cover_heights=(0.0, 0.5, 1.0), cover_splits=(0, 0), far_pitches=1)
-TIGHT = NewtonSettings(relative_tolerance=1e-6, smallest_scale_n=1.0, largest_penetration_mm=1e-6)
+TIGHT = NewtonSettings(relative_tolerance=1e-6, smallest_scale_n=0.1, largest_penetration_mm=1e-6)
 
 
 def test_a_stuck_plate_shears_a_wide_bonded_layer_by_its_modulus(record):
     """tau = G delta / h far from the sides, where a layer between two planes that do not slide is sheared alone.
 
-    The plate holds each point by a slip of tau / (2 mu p) of the tolerance of 0.5 um, 0.1 % of the way here.
+    The sides are free: held ones would be felt in the middle. The law is compressible (K = 2 G), for the same reason.
+    The press before adds its stress to the modulus, 0.3 % here, and sticking takes a slip of 0.1 % of the way.
     """
-    shear, thickness, way = 0.5, 1.0, 0.02
+    shear, thickness, way = 0.5, 1.0, 0.002
     spec = load_sensor("sheet").spec
     layer = spec.layers[0].model_copy(update={"thickness_mm": thickness})
     spec = spec.model_copy(update={"footprint_mm": (10.0, 6.0), "map_shape": (13, 21), "layers": (layer,), "element_mm": 0.5,
-                                   "friction": spec.friction.model_copy(update={"object": 5.0})})
-    body = build_plain_body(spec, dielectric_law=make_law("neo_hooke", {"c10": 0.5 * shear}, bulk_modulus=20 * shear), mesh=COARSE,
-                            sides="symmetric")
+                                   "friction": spec.friction.model_copy(update={"object": 40.0})})
+    body = build_plain_body(spec, dielectric_law=make_law("neo_hooke", {"c10": 0.5 * shear}, bulk_modulus=2 * shear), mesh=COARSE,
+                            sides="free")
 
     def plate(x, y):
         return np.zeros_like(x), np.tile([0.0, 0.0, -1.0], (len(x), 1))
 
-    *_, last = press_motion(body, plate, Motion().press(depth_mm=0.02).slide(x_mm=way), 0.0, settings=TIGHT)
+    *_, last = press_motion(body, plate, Motion().press(depth_mm=0.001).slide(x_mm=way), 0.0, settings=TIGHT)
     slab, top = last.state.slab, body.slab.top
     middle = (np.abs(top.reference[:, 0]) < 1.0) & (np.abs(top.reference[:, 1]) < 1.0)
     got = -slab.friction_response.traction[middle, 0].mean()
@@ -47,7 +48,7 @@ def test_a_stuck_plate_shears_a_wide_bonded_layer_by_its_modulus(record):
 
 @pytest.mark.parametrize("support", ["base"])
 def test_both_models_slide_a_ball_alike_on_a_plain_sheet(support, record):
-    """The same E and nu, small strain: force down and aside. Pressure acts along z in the elastic model, and its mesh is its own."""
+    """The same E and nu, small strain: force down and aside. In the elastic model pressure acts along z alone."""
     sensor = load_sensor("sheet")
     friction = sensor.spec.friction.model_copy(update={"object": 0.3})
     sensor.spec = sensor.spec.model_copy(update={"friction": friction, "support": support})
