@@ -218,14 +218,11 @@ class Slab:
         elif sides != "free":
             raise ValueError(f"sides must be 'held', 'symmetric' or 'free', not {sides!r}")
         self.free = np.flatnonzero(~held.ravel())
-        self.number = np.full(held.size, -1, dtype=np.int64)
-        self.number[self.free] = np.arange(len(self.free))
 
     def hold(self, nodes):
         """Hold nodes (k,) in all directions, before `build_pattern`."""
-        self.number.reshape(-1, 3)[nodes] = -1
-        self.free = np.flatnonzero(self.number >= 0)
-        self.number[self.free] = np.arange(len(self.free))
+        dofs = (3 * np.asarray(nodes)[:, None] + np.arange(3)).ravel()
+        self.free = np.setdiff1d(self.free, dofs)
 
     def project(self, displacement, surface):
         """The object's facets above the top's points (see `ContactProjection`)."""
@@ -325,13 +322,15 @@ class Slab:
 
     def locate(self, points):
         """Faces (p,) under the cover and shape values (p, 8) at points (p, 2); points on a line belong to the lower side."""
-        mesh = self.cover_mesh
-        return located(mesh, mesh.bottom, mesh.bottom_cells, (self.x_lines, self.y_lines), points)
+        return located(self.cover_mesh, *self._lower_side, points)
 
     def _under_cover(self, points):
         """Sparse matrix (p, free nodes of the cover) that interpolates on the cover's lower side at points (p, 2)."""
-        mesh = self.cover_mesh
-        return interpolation_on_side(mesh, mesh.bottom, mesh.bottom_cells, (self.x_lines, self.y_lines), points)
+        return interpolation_on_side(self.cover_mesh, *self._lower_side, points)
+
+    @property
+    def _lower_side(self):
+        return self.cover_mesh.bottom, self.cover_mesh.bottom_cells, (self.x_lines, self.y_lines)
 
     def sampling(self, points):
         """Sparse matrix (p, nodes) that interpolates a nodal field of the plane between sheet and cover at points (p, 2)."""
