@@ -203,14 +203,6 @@ def test_the_schema_in_docs_is_that_of_the_types_and_takes_the_projects_files(ki
         jsonschema.validate(values | {"nam": 1}, schema)
 
 
-@pytest.mark.parametrize("name", ["pad", "sheet", "pad4x4"])
-def test_the_sensors_schema_takes_each_kind(name):
-    schema, values = json.loads((ROOT / "docs/schemas/sensor.schema.json").read_text()), yaml.safe_load(sensor_file(name).read_text())
-    jsonschema.validate(values, schema)
-    with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate(values | {"kind": "pillars"}, schema)
-
-
 def test_the_command_line_offers_what_the_package_has():
     """It keeps its own copies, so that --help loads no solver."""
     assert press_command.MODELS == MODELS

@@ -91,6 +91,7 @@ class Slab:
         self.layers, self.sheet_mesh_2d = (sheet, cover), sheet_mesh_2d
         bound = len(cover.heights) - 1 - len(splits)
         self.cover_mesh = cover_mesh(x_lines, y_lines, cover.heights[bound:], splits)
+        self._lower_side = self.cover_mesh.bottom, self.cover_mesh.bottom_cells, (self.x_lines, self.y_lines)
         self.sheet_mesh = extrude(sheet_mesh_2d.mesh_2d, np.append(sheet.heights, cover.heights[1:bound + 1]))
         self.sheet_layers = len(sheet.heights) - 1
         self._constrained_cell_edges, self._quartic_penalty_ratio = constrained_cell_edges, quartic_penalty_ratio
@@ -327,10 +328,6 @@ class Slab:
     def _under_cover(self, points):
         """Sparse matrix (p, free nodes of the cover) that interpolates on the cover's lower side at points (p, 2)."""
         return interpolation_on_side(self.cover_mesh, *self._lower_side, points)
-
-    @property
-    def _lower_side(self):
-        return self.cover_mesh.bottom, self.cover_mesh.bottom_cells, (self.x_lines, self.y_lines)
 
     def sampling(self, points):
         """Sparse matrix (p, nodes) that interpolates a nodal field of the plane between sheet and cover at points (p, 2)."""
