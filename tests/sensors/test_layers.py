@@ -1,5 +1,6 @@
 """Sensor files of `kind: layers`: what they say, what is refused, and a press through each model that takes them."""
 
+import jsonschema
 import numpy as np
 import pytest
 import trimesh
@@ -10,7 +11,7 @@ from softtact.errors import InputError
 from softtact.readout.capacitance import EPSILON_0_PF_PER_MM, capacitance_per_area
 from softtact.readout.virtual_sensor import make_specimen
 from softtact.sensors.library import sensor_file
-from softtact.sensors.specification import LayersSpec, SensorSpec, read_spec, spec_from_dict
+from softtact.sensors.specification import LayersSpec, SensorSpec, read_spec, sensor_schema, spec_from_dict
 
 SHIPPED = ("sheet", "pad4x4")
 
@@ -32,6 +33,14 @@ def test_a_shipped_sensor_of_plain_layers_is_described(name):
     assert isinstance(spec, LayersSpec)
     assert spec.thickness_mm == pytest.approx({"sheet": 2.0, "pad4x4": 1.8}[name])
     assert list(softtact.load_sensor(name).laws) == {"sheet": ["dielectric"], "pad4x4": ["dielectric", "cover"]}[name]
+
+
+@pytest.mark.parametrize("name", ["pad", *SHIPPED])
+def test_the_schema_takes_each_kind_and_no_other(name):
+    jsonschema.validate(values_of(name), sensor_schema())
+    for wrong in ({"kind": "pillars"}, {"nam": 1}):
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate(values_of(name) | wrong, sensor_schema())
 
 
 def test_a_file_without_a_kind_is_of_frusta():

@@ -45,8 +45,9 @@ def load_sensor(name_or_yaml: str | Path, *, materials: Mapping[str, Law] | None
     """The `Sensor` of a name or of a YAML file.
 
     name_or_yaml: config/sensors/NAME.yaml of the working folder comes first, then what ships with the package: coro (its product's
-    name, tsf85, means the same sensor) and pad; materials that a sensor names are found in the same way
-    materials: {"dielectric": Law, "cover": Law} to replace the Mooney-Rivlin constants printed for its materials
+    name, tsf85, means the same sensor), pad, and without frusta sheet and pad4x4; materials that a
+    sensor names are found in the same way
+    materials: {"dielectric": Law, "cover": Law}, or one of them, to replace the Mooney-Rivlin constants printed for its materials
     Raises InputError that lists the known names, or names the file and the field that is wrong.
     """
     spec = read_spec(sensor_file(name_or_yaml))

@@ -12,11 +12,11 @@ from pydantic import Field, TypeAdapter
 
 from softtact.errors import InputError
 from softtact.sensors.base import BaseSpec, read_mapping
-from softtact.sensors.frusta import ORIENTATIONS, SensorSpec
+from softtact.sensors.frusta import ORIENTATIONS, Friction, SensorSpec
 from softtact.sensors.layers import LayersSpec
 
-__all__ = ["KINDS", "ORIENTATIONS", "AnySpec", "BaseSpec", "LayersSpec", "SensorSpec", "read_spec", "sensor_schema",
-           "spec_from_dict"]
+__all__ = ["KINDS", "ORIENTATIONS", "AnySpec", "BaseSpec", "Friction", "LayersSpec", "SensorSpec", "read_spec",
+           "sensor_schema", "spec_from_dict"]
 
 KINDS: dict[str, type[BaseSpec]] = {"frusta": SensorSpec, "layers": LayersSpec}
 AnySpec = SensorSpec | LayersSpec

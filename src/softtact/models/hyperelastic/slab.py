@@ -178,14 +178,11 @@ class Slab:
         elif sides != "free":
             raise ValueError(f"sides must be 'held', 'symmetric' or 'free', not {sides!r}")
         self.free = np.flatnonzero(~held.ravel())
-        self.number = np.full(held.size, -1, dtype=np.int64)
-        self.number[self.free] = np.arange(len(self.free))
 
     def hold(self, nodes):
         """Hold nodes (k,) in all directions, before `build_pattern`."""
-        self.number.reshape(-1, 3)[nodes] = -1
-        self.free = np.flatnonzero(self.number >= 0)
-        self.number[self.free] = np.arange(len(self.free))
+        dofs = (3 * np.asarray(nodes)[:, None] + np.arange(3)).ravel()
+        self.free = np.setdiff1d(self.free, dofs)
 
     def project(self, displacement, surface):
         """The object's facets above the top's points (see `ContactProjection`)."""
