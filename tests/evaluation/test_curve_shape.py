@@ -49,12 +49,12 @@ def test_what_breaks_the_rule_is_said(area, said):
     assert any(said in sentence for sentence in against(area))
 
 
-def test_readings_are_judged_one_by_one_and_the_whole_follows_from_them():
+def test_orientations_are_judged_one_by_one_and_the_whole_follows_from_them():
     flat = np.full(5, 1.131)
-    table = pd.concat([pd.DataFrame({"reading": reading, "law": "ogden2", "force_n": FORCES, "area_per_frustum_mm2": area})
-                       for reading, area in (("default", GROWING), ("as_printed", flat))])
+    table = pd.concat([pd.DataFrame({"orientation": orientation, "law": "ogden2", "force_n": FORCES, "area_per_frustum_mm2": area})
+                       for orientation, area in (("default", GROWING), ("as_printed", flat))])
     records = judge(table, pitch_mm=1.2, pixel_mm=0.02)
     assert [record["allowed"] for record in records] == [True, False]
     assert summary_sentence(records) == ("The paper's words allow default with ogden2. "
-                                         "They hardly allow the reading as_printed with any law.")
+                                         "They hardly allow the orientation as_printed with any law.")
     assert summary_sentence(records[1:]).startswith("The paper's words allow none of the curves.")
