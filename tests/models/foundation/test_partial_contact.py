@@ -43,16 +43,16 @@ def map_of(compliances, times, width):
     return FoundationMaps(compliances[times], points)([load_step])[0][::times, ::times]
 
 
-@pytest.mark.parametrize("share", [0.0, 0.2, 0.4, 0.6, 0.8])
-def test_an_edge_is_felt_where_it_is_wherever_it_lies_between_two_nodes(share, compliances):
+def test_an_edge_is_felt_where_it_is_wherever_it_lies_between_two_nodes(compliances):
     """Against a grid three times as fine. Without soft edges a map is off by up to 2.4 %, and an edge by half a step, 0.16 mm."""
-    width = 2 * (4 + share) * 0.3
-    fine = map_of(compliances, FINER, width)
-    by_width = (map_of(compliances, FINER, width + 0.1) - map_of(compliances, FINER, width - 0.1)) / 0.2
-    difference = map_of(compliances, 1, width) - fine
-    edge = (difference * by_width).sum() / (by_width**2).sum() / 2
-    assert np.sqrt((difference**2).mean()) < 0.007 * fine.max()
-    assert abs(edge) < 0.05
+    for share in [0.0, 0.2, 0.4, 0.6, 0.8]:
+        width = 2 * (4 + share) * 0.3
+        fine = map_of(compliances, FINER, width)
+        by_width = (map_of(compliances, FINER, width + 0.1) - map_of(compliances, FINER, width - 0.1)) / 0.2
+        difference = map_of(compliances, 1, width) - fine
+        edge = (difference * by_width).sum() / (by_width**2).sum() / 2
+        assert np.sqrt((difference**2).mean()) < 0.007 * fine.max()
+        assert abs(edge) < 0.05
 
 
 def test_a_wider_bar_sinks_in_less_by_whichever_part_of_a_step_it_is_wider(compliances):

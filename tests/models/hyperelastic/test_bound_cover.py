@@ -114,21 +114,21 @@ def test_parts_of_body_and_deck_are_those_of_the_layers():
     assert np.count_nonzero(interface < 0) == 5 * 25      # middles of the five bricks' faces in each cell
 
 
-@pytest.mark.parametrize(("splits", "bound"), [((1, 1, 2), 0), ((1, 4), 1), ((1,), 2)])
-def test_layers_without_a_number_of_splits_are_bound(splits, bound):
-    assert MeshSettings(cover_heights=THREE, cover_splits=splits).bound_layers == bound
+def test_layers_without_a_number_of_splits_are_bound():
+    for splits, bound in [((1, 1, 2), 0), ((1, 4), 1), ((1,), 2)]:
+        assert MeshSettings(cover_heights=THREE, cover_splits=splits).bound_layers == bound
 
 
-@pytest.mark.parametrize("splits", [(), (1, 1, 1, 2)])
-def test_splits_for_no_layer_or_too_many_are_refused(splits):
-    with pytest.raises(ValueError, match="cover_splits has . entries for the 3 layers"):
-        MeshSettings(cover_heights=THREE, cover_splits=splits)
+def test_splits_for_no_layer_or_too_many_are_refused():
+    for splits in [(), (1, 1, 1, 2)]:
+        with pytest.raises(ValueError, match="cover_splits has . entries for the 3 layers"):
+            MeshSettings(cover_heights=THREE, cover_splits=splits)
 
 
-@pytest.mark.parametrize("splits", [(2, 1, 2), (3,)])
-def test_a_lowest_layer_that_would_hang_freely_is_refused(splits):
-    with pytest.raises(InputError, match=f"mesh: cover_splits begins with {splits[0]}; give 0 or 1"):
-        mesh_settings({"cover_heights": list(THREE), "cover_splits": list(splits)})
+def test_a_lowest_layer_that_would_hang_freely_is_refused():
+    for splits in [(2, 1, 2), (3,)]:
+        with pytest.raises(InputError, match=f"mesh: cover_splits begins with {splits[0]}; give 0 or 1"):
+            mesh_settings({"cover_heights": list(THREE), "cover_splits": list(splits)})
 
 
 class Overlapping:
