@@ -139,7 +139,8 @@ def test_bottom_top_and_sides_lie_where_their_names_say():
         ends = np.array([element.nodes[side, :2].mean(axis=0) for side in element.sides])
         assert ends == pytest.approx(np.array([base.nodes[side].mean(axis=0) for side in base.sides])), element
         if base.nodes.shape[0] > 6:
-            assert np.sign(np.round(ends, 9)).tolist() == [[0, -1], [1, 0], [0, 1], [-1, 0]]     # eta = -1, xi = 1, eta = 1, xi = -1
+            # eta = -1, xi = 1, eta = 1, xi = -1
+            assert np.sign(np.round(ends, 9)).tolist() == [[0, -1], [1, 0], [0, 1], [-1, 0]]
 
 
 @EVERY_ELEMENT

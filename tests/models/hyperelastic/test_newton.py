@@ -39,18 +39,19 @@ def cylinder_press():
 
 def test_a_deeper_press_needs_more_force_and_stays_out_of_the_object(cylinder_press):
     assert (np.diff(cylinder_press.indentation_mm) > 0).all()
-    assert cylinder_press.penetration_mm.max() < 0.01           # penalty: pressure / stiffness = 1 MPa / 500 N/mm3, and its edge
+    # Without augmentation pressure over stiffness, 1 MPa / 500 N/mm3, would be left, and more at the edge.
+    assert cylinder_press.penetration_mm.max() <= NewtonSettings().largest_penetration_mm
     assert (cylinder_press.converged == 1).all()
 
 
-def test_the_contact_area_does_not_depend_on_how_far_overlaps_were_pressed_apart():
-    """To a point or two of 0.1 mm2: touching points were once told by their gaps, which are of either sign when pressed apart."""
+def test_the_contact_area_does_not_depend_on_augmentation():
+    """To a point or two of 0.1 mm2: touching points were once told by their gaps, which are of either sign after augmentation."""
     cylinder, areas = trimesh.creation.cylinder(radius=1.8, height=3, sections=64), []
     for allowed in (1.0, 2e-4):
         sensor = Sensor(SMALL, LAWS, mesh=COARSE, solver=NewtonSettings(largest_penetration_mm=allowed))
         result = sensor.press(cylinder, force_n=[0.5, 1.5], model="hyperelastic")
         areas.append(result.contact_area_mm2)
-    assert result.penetration_mm.max() < 2e-4       # the second was pressed apart
+    assert result.penetration_mm.max() < 2e-4       # the second was augmented
     np.testing.assert_allclose(areas[1], areas[0], rtol=0.02)
 
 
@@ -60,7 +61,7 @@ def test_a_light_press_overlaps_by_less_in_proportion():
     assert light.penetration_mm[0] <= 1e-3 * light.indentation_mm[0] / 0.2 < 1e-4      # the cover comes down by less
 
 
-def test_overlaps_that_were_not_pressed_apart_are_outside_validity(cylinder_press):
+def test_overlaps_that_were_not_augmented_are_outside_validity(cylinder_press):
     solver = NewtonSettings(largest_penetration_mm=0.25 * cylinder_press.penetration_mm.min(), max_augmentations=0)
     cylinder = trimesh.creation.cylinder(radius=1.8, height=3, sections=64)
     left = Sensor(SMALL, LAWS, mesh=COARSE, solver=solver).press(cylinder, force_n=[0.5], model="hyperelastic")
