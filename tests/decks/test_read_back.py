@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
-from deck_study import NEOPRENE, POLYURETHANE
+from support.laws import NEOPRENE, POLYURETHANE
 from support.sensors import CORO
 
 from softtact.contact.penalty import penalty

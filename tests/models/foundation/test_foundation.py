@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
+from support.laws import LAWS
 from support.sensors import CORO
 from whole_foundation import WholeFoundation
 
@@ -13,7 +14,6 @@ from softtact.contact.underside import Underside
 from softtact.errors import ConvergenceError, InputError
 from softtact.geometry.meshes import place
 from softtact.geometry.pose import Pose
-from softtact.materials.laws.registry import make_law
 from softtact.models.foundation import solve
 from softtact.models.foundation.compliance import FoundationCompliance, foundation_compliance
 from softtact.models.foundation.dof_maps import Places, Sideways, lattice_places
@@ -27,8 +27,6 @@ from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.press.sensor import Sensor
 
 SMALL = CORO.model_copy(update={"footprint_mm": (7.2, 7.2), "map_shape": (13, 13)})      # 6 x 6 frusta
-LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492),
-        "cover": make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)}
 PUNCH = trimesh.creation.cylinder(radius=1.8, height=3.0, sections=96)
 BOX = trimesh.creation.box((3.1, 2.2, 2.0))
 TILTED = (0.3, -0.4, 0, 4.0, -3.0, 20.0)

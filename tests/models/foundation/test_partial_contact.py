@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 import trimesh
+from support.laws import LAWS
 from support.sensors import CORO
 
 from softtact.contact.height_field import HeightField
 from softtact.contact.underside import Underside
-from softtact.materials.laws.registry import make_law
 from softtact.models.elastic.compliance import map_cells
 from softtact.models.foundation.compliance import foundation_compliance
 from softtact.models.foundation.frustum_spring import frustum_law
@@ -15,8 +15,6 @@ from softtact.models.foundation.partial_contact import SoftEdges, beyond, own_co
 from softtact.models.foundation.solve import FoundationMaps, FoundationSettings, press_foundation
 
 SMALL = CORO.model_copy(update={"footprint_mm": (7.2, 7.2), "map_shape": (13, 13)})      # 6 x 6 frusta, nodes 0.3 mm apart
-LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492),
-        "cover": make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)}
 LINEAR = FoundationSettings(follow=False, rocking=False)
 FINER = 3      # an odd number: nodes of the coarse grid are corners on it where they are corners
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 from scipy.spatial import cKDTree
+from support.laws import POLYURETHANE as LAW
 from support.sensors import CORO
 
 from softtact.contact.height_field import HeightField
@@ -20,7 +21,6 @@ from softtact.models.newton import Solution
 from softtact.press.sensor import Sensor
 
 SMALL = CORO.model_copy(update={"footprint_mm": (6.0, 6.0), "map_shape": (11, 11)})     # 5 x 5 frusta
-LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492)
 THREE = (0.0, 0.45, 0.8, 1.0)
 LAYERS = {"cover_heights": (0.0, 0.4, 1.0), "far_pitches": 1, "frustum_heights": (0.0, 0.35, 1.0)}
 BOUND, TIED = MeshSettings(cover_splits=(1,), **LAYERS), MeshSettings(cover_splits=(1, 1), **LAYERS)
