@@ -139,17 +139,17 @@ def test_json_stands_alone_on_stdout_and_messages_on_stderr(capsys, tmp_path):
     assert told["written"] == [str(tmp_path / "p.nc"), str(tmp_path / "p.vtu")] and np.shape(told["tactile_map"]) == (1, 7, 4)
 
 
-@pytest.mark.parametrize(("fault", "status"), [
-    (ConvergenceError("The load step of 20 N was not reached."), 3), (InputError("no."), 1), (KeyboardInterrupt(), 130),
-    (OSError(28, "No space left on device", "press.nc"), 4),
-])
-def test_what_stops_a_command_has_its_exit_status(fault, status, refused, monkeypatch):
-    def stop(options):
-        raise fault
+def test_what_stops_a_command_has_its_exit_status(refused, monkeypatch):
+    for fault, status in [
+        (ConvergenceError("The load step of 20 N was not reached."), 3), (InputError("no."), 1), (KeyboardInterrupt(), 130),
+        (OSError(28, "No space left on device", "press.nc"), 4),
+    ]:
+        def stop(options, fault=fault):
+            raise fault
 
-    monkeypatch.setattr(complexity, "_complexity", stop)
-    got, sentence = refused("complexity", OBJECT, "--unit", "mm")
-    assert got == status and sentence.startswith("softtact complexity: ")
+        monkeypatch.setattr(complexity, "_complexity", stop)
+        got, sentence = refused("complexity", OBJECT, "--unit", "mm")
+        assert got == status and sentence.startswith("softtact complexity: "), fault
 
 
 def test_a_press_that_stops_early_writes_and_prints_the_forces_before(capsys, tmp_path, monkeypatch):
@@ -223,9 +223,8 @@ def test_the_package_and_its_help_load_no_heavy_library():
         assert done.stdout.strip() == "[]", imported
 
 
-@pytest.mark.parametrize(
-    ("arguments", "status", "said"),
-    [
+def test_a_refusal_is_one_sentence_and_a_status(refused):
+    for arguments, status, said in [
         (["press", OBJECT, "--force", 20], 2, "--unit"),
         (["press", OBJECT, "--unit", "furlong", "--force", 20], 2, "furlong"),
         (["press", OBJECT, "--unit", "mm", "--force", 0], 1, "0 N"),
@@ -240,12 +239,10 @@ def test_the_package_and_its_help_load_no_heavy_library():
         (["stage", "fit_material", "--in", "curves"], 1, "NAME=PATH"),
         (["stage", "fit_material", "--settings", "{"], 1, "JSON"),
         (["prss"], 2, "prss"),
-    ],
-)
-def test_a_refusal_is_one_sentence_and_a_status(arguments, status, said, refused):
-    got, sentence = refused(*arguments)
-    assert got == status
-    assert said in sentence
+    ]:
+        got, sentence = refused(*arguments)
+        assert got == status, arguments
+        assert said in sentence, arguments
 
 
 def test_complexity_counts_and_chooses(answer):

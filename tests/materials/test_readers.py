@@ -76,9 +76,8 @@ def test_one_synthetic_part_makes_the_whole_synthetic(write_file):
 HEADER = "stretch,nominal_stress_mpa\n"
 
 
-@pytest.mark.parametrize(
-    ("text", "sentence"),
-    [
+def test_an_unreadable_or_implausible_curve_is_refused_by_file_row_value_and_remedy(write_file):
+    for text, sentence in [
         ("", "the file is empty; give a test curve"),
         (HEADER, r"0 point\(s\) make no curve; give at least two"),
         (HEADER + "1.0,0\n1.1,nan\n", "row 3: the value 'nan' is not finite; correct it or remove the row"),
@@ -94,14 +93,12 @@ HEADER = "stretch,nominal_stress_mpa\n"
         (HEADER + "1,0\n1.2,0.2\n1.1,0.1\n", "row 4: the stretch turns back to 1.1; keep one loading branch"),
         ("lambda,nominal_stress_mpa\n1,0\n", "no column holds the stretch among lambda, nominal_stress_mpa; name one"),
         ("stretch,engineering_strain,nominal_stress_mpa\n1,0,0\n", "several columns hold the stretch"),
-    ],
-)
-def test_an_unreadable_or_implausible_curve_is_refused_by_file_row_value_and_remedy(write_file, text, sentence):
-    path = write_file(text)
-    with pytest.raises(InputError, match=sentence) as refusal:
-        read_curve(path)
-    assert str(refusal.value).startswith(str(path))
-    assert str(refusal.value).endswith(".")
+    ]:
+        path = write_file(text)
+        with pytest.raises(InputError, match=sentence) as refusal:
+            read_curve(path)
+        assert str(refusal.value).startswith(str(path)), text
+        assert str(refusal.value).endswith("."), text
 
 
 def test_a_missing_file_is_refused(tmp_path):
