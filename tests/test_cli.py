@@ -139,17 +139,17 @@ def test_json_stands_alone_on_stdout_and_messages_on_stderr(capsys, tmp_path):
     assert told["written"] == [str(tmp_path / "p.nc"), str(tmp_path / "p.vtu")] and np.shape(told["tactile_map"]) == (1, 7, 4)
 
 
-@pytest.mark.parametrize(("fault", "status"), [
-    (ConvergenceError("The load step of 20 N was not reached."), 3), (InputError("no."), 1), (KeyboardInterrupt(), 130),
-    (OSError(28, "No space left on device", "press.nc"), 4),
-])
-def test_what_stops_a_command_has_its_exit_status(fault, status, refused, monkeypatch):
-    def stop(options):
-        raise fault
+def test_what_stops_a_command_has_its_exit_status(refused, monkeypatch):
+    for fault, status in [
+        (ConvergenceError("The load step of 20 N was not reached."), 3), (InputError("no."), 1), (KeyboardInterrupt(), 130),
+        (OSError(28, "No space left on device", "press.nc"), 4),
+    ]:
+        def stop(options, fault=fault):
+            raise fault
 
-    monkeypatch.setattr(complexity, "_complexity", stop)
-    got, sentence = refused("complexity", OBJECT, "--unit", "mm")
-    assert got == status and sentence.startswith("softtact complexity: ")
+        monkeypatch.setattr(complexity, "_complexity", stop)
+        got, sentence = refused("complexity", OBJECT, "--unit", "mm")
+        assert got == status and sentence.startswith("softtact complexity: "), fault
 
 
 def test_a_press_that_stops_early_writes_and_prints_the_forces_before(capsys, tmp_path, monkeypatch):
@@ -167,13 +167,13 @@ def test_a_press_that_stops_early_writes_and_prints_the_forces_before(capsys, tm
     assert captured.err.endswith("softtact press: The load step of 20 N was not reached.\n")
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_completion_is_a_script_of_the_shell(shell, answer, tmp_path):
-    script = tmp_path / "completion"
-    script.write_text(answer("completion", shell))
-    assert "softtact" in script.read_text()
-    if shutil.which(shell):
-        subprocess.run([shell, "-n", script], check=True)
+def test_completion_is_a_script_of_the_shell(answer, tmp_path):
+    for shell in ["bash", "zsh", "fish"]:
+        script = tmp_path / "completion"
+        script.write_text(answer("completion", shell))
+        assert "softtact" in script.read_text(), shell
+        if shutil.which(shell):
+            subprocess.run([shell, "-n", script], check=True)
 
 
 def test_bash_completes_commands_and_options(tmp_path):
@@ -191,16 +191,16 @@ def test_bash_completes_commands_and_options(tmp_path):
     assert set(completed("softtact press part.stl --model ")) >= {"auto", "elastic"}
 
 
-@pytest.mark.parametrize("kind", ["study", "sensor", "material"])
-def test_the_schema_in_docs_is_that_of_the_types_and_takes_the_projects_files(kind, answer):
-    schema = json.loads((ROOT / f"docs/schemas/{kind}.schema.json").read_text())
-    again = f"softtact config-schema {kind} --out docs/schemas/{kind}.schema.json"
-    assert schema == json.loads(answer("config-schema", kind)), again
-    files = {"study": ROOT / "config/config.yaml", "sensor": sensor_file("coro"), "material": material_file("neoprene")}
-    values = yaml.safe_load(files[kind].read_text())
-    jsonschema.validate(values, schema)
-    with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate(values | {"nam": 1}, schema)
+def test_the_schema_in_docs_is_that_of_the_types_and_takes_the_projects_files(answer):
+    for kind in ["study", "sensor", "material"]:
+        schema = json.loads((ROOT / f"docs/schemas/{kind}.schema.json").read_text())
+        again = f"softtact config-schema {kind} --out docs/schemas/{kind}.schema.json"
+        assert schema == json.loads(answer("config-schema", kind)), again
+        files = {"study": ROOT / "config/config.yaml", "sensor": sensor_file("coro"), "material": material_file("neoprene")}
+        values = yaml.safe_load(files[kind].read_text())
+        jsonschema.validate(values, schema)
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate(values | {"nam": 1}, schema)
 
 
 def test_the_command_line_offers_what_the_package_has():
@@ -216,16 +216,15 @@ HEAVY = ("numpy", "torch", "scipy", "numba", "pandas", "xarray", "matplotlib", "
          "skimage")
 
 
-@pytest.mark.parametrize("imported", ["import softtact", "import softtact.cli; softtact.cli._parser().format_help()"])
-def test_the_package_and_its_help_load_no_heavy_library(imported):
-    listed = f"import sys; {imported}; print([name for name in {HEAVY} if name in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", listed], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
+def test_the_package_and_its_help_load_no_heavy_library():
+    for imported in ["import softtact", "import softtact.cli; softtact.cli._parser().format_help()"]:
+        listed = f"import sys; {imported}; print([name for name in {HEAVY} if name in sys.modules])"
+        done = subprocess.run([sys.executable, "-c", listed], capture_output=True, text=True, check=True)
+        assert done.stdout.strip() == "[]", imported
 
 
-@pytest.mark.parametrize(
-    ("arguments", "status", "said"),
-    [
+def test_a_refusal_is_one_sentence_and_a_status(refused):
+    for arguments, status, said in [
         (["press", OBJECT, "--force", 20], 2, "--unit"),
         (["press", OBJECT, "--unit", "furlong", "--force", 20], 2, "furlong"),
         (["press", OBJECT, "--unit", "mm", "--force", 0], 1, "0 N"),
@@ -240,12 +239,10 @@ def test_the_package_and_its_help_load_no_heavy_library(imported):
         (["stage", "fit_material", "--in", "curves"], 1, "NAME=PATH"),
         (["stage", "fit_material", "--settings", "{"], 1, "JSON"),
         (["prss"], 2, "prss"),
-    ],
-)
-def test_a_refusal_is_one_sentence_and_a_status(arguments, status, said, refused):
-    got, sentence = refused(*arguments)
-    assert got == status
-    assert said in sentence
+    ]:
+        got, sentence = refused(*arguments)
+        assert got == status, arguments
+        assert said in sentence, arguments
 
 
 def test_complexity_counts_and_chooses(answer):
@@ -298,17 +295,17 @@ fit: {laws: [neo_hooke], poisson: 0.45, small_strain: 0.5}
     assert said["laws"]["linear"]["parameters"]["poisson"] == 0.4
 
 
-@pytest.mark.parametrize(("options", "sentence"), [
-    (["--window", "uniaxial=2:1"], "'2:1' is not two rising numbers with a colon between them"),
-    (["--window", "0.7:1.4"], "--window 0.7:1.4: write it as NAME=VALUE"),
-    (["--column", "force=F"], "`columns` maps 'force', which is no quantity with a unit"),
-    (["--choose", "yeoh", "--law", "gent"], "Law 'yeoh' is to be chosen but is not fitted"),
-])
-def test_fit_refuses_options_without_meaning_and_writes_no_card(refused, tmp_path, options, sentence):
-    curve = neo_hooke_file(tmp_path / "uniaxial.csv", (0.8, 0.9, 1.1, 1.3))
-    status, said = refused("fit", curve, *options, "--out", tmp_path / "card.json")
-    assert status == 1 and sentence in said
-    assert not (tmp_path / "card.json").exists()
+def test_fit_refuses_options_without_meaning_and_writes_no_card(refused, tmp_path):
+    for options, sentence in [
+        (["--window", "uniaxial=2:1"], "'2:1' is not two rising numbers with a colon between them"),
+        (["--window", "0.7:1.4"], "--window 0.7:1.4: write it as NAME=VALUE"),
+        (["--column", "force=F"], "`columns` maps 'force', which is no quantity with a unit"),
+        (["--choose", "yeoh", "--law", "gent"], "Law 'yeoh' is to be chosen but is not fitted"),
+    ]:
+        curve = neo_hooke_file(tmp_path / "uniaxial.csv", (0.8, 0.9, 1.1, 1.3))
+        status, said = refused("fit", curve, *options, "--out", tmp_path / "card.json")
+        assert status == 1 and sentence in said, options
+        assert not (tmp_path / "card.json").exists(), options
 
 
 def test_a_materials_yaml_is_given_alone(refused, tmp_path):
@@ -316,11 +313,11 @@ def test_a_materials_yaml_is_given_alone(refused, tmp_path):
     assert status == 1 and "names its own files and options; give it without others" in said
 
 
-@pytest.mark.parametrize(("card", "sentence"), [("lid=card.json", "the layer is 'lid'; give dielectric or cover"),
-                                               ("cover=none.json", "none.json: there is no such file")])
-def test_press_refuses_a_card_that_it_cannot_use(refused, card, sentence):
-    status, said = refused("press", OBJECT, "--unit", "mm", "--force", 5, "--model", "hyperelastic", "--card", card)
-    assert status == 1 and sentence in said
+def test_press_refuses_a_card_that_it_cannot_use(refused):
+    for card, sentence in [("lid=card.json", "the layer is 'lid'; give dielectric or cover"),
+                          ("cover=none.json", "none.json: there is no such file")]:
+        status, said = refused("press", OBJECT, "--unit", "mm", "--force", 5, "--model", "hyperelastic", "--card", card)
+        assert status == 1 and sentence in said, card
 
 
 @pytest.mark.parametrize("dialect", ["calculix", "abaqus"])

@@ -28,19 +28,19 @@ def write_arrays(path):
     np.savez(path, x=np.arange(1000.0))
 
 
-@pytest.mark.parametrize(("name", "write", "read"), [
-    ("press.nc", lambda path: write_dataset(path, MAPS, seed=1, settings={}), read_dataset),
-    ("card.json", lambda path: write_json(path, {"laws": list(range(100))}), read_json),
-    ("compliance.npz", write_arrays, Compliance.load),
-    ("compliance.npz", write_arrays, FoundationCompliance.load),
-    ("law.npz", write_arrays, FrustumLaw.load),
-    ("body.vtu", TETRAHEDRON.write, read_vtu)])
-def test_a_truncated_file_is_refused_by_its_name_and_with_a_remedy(tmp_path, name, write, read):
-    path = tmp_path / name
-    write(path)
-    path.write_bytes(path.read_bytes()[:-len(path.read_bytes()) // 2])
-    with pytest.raises(InputError, match=f"{name}: not .*(again)"):
-        read(path)
+def test_a_truncated_file_is_refused_by_its_name_and_with_a_remedy(tmp_path):
+    for name, write, read in [
+        ("press.nc", lambda path: write_dataset(path, MAPS, seed=1, settings={}), read_dataset),
+        ("card.json", lambda path: write_json(path, {"laws": list(range(100))}), read_json),
+        ("compliance.npz", write_arrays, Compliance.load),
+        ("compliance.npz", write_arrays, FoundationCompliance.load),
+        ("law.npz", write_arrays, FrustumLaw.load),
+        ("body.vtu", TETRAHEDRON.write, read_vtu)]:
+        path = tmp_path / name
+        write(path)
+        path.write_bytes(path.read_bytes()[:-len(path.read_bytes()) // 2])
+        with pytest.raises(InputError, match=f"{name}: not .*(again)"):
+            read(path)
 
 
 def test_a_data_set_is_written_the_same_twice_and_read_as_it_was(tmp_path):

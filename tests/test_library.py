@@ -98,18 +98,18 @@ def test_a_users_own_sensor_may_be_of_an_own_and_of_a_shipped_material(tmp_path,
     assert laws["dielectric"].parameters == softtact.load_sensor("coro").laws["dielectric"].parameters
 
 
-@pytest.mark.parametrize(("find", "name", "said"), [
-    (sensor_file, "cora", "There is no sensor 'cora' (did you mean 'coro'?); known are coro, pad, pad4x4, sheet, tsf85; write "
-                          "one of them, the path of a YAML file, or put yours at config/sensors/cora.yaml."),
-    (material_file, "xyz", "There is no material 'xyz'; known are neoprene, polyurethane, silicone; write one of them, the "
-                           "path of a YAML file, or put yours at config/materials/xyz.yaml."),
-    (sensor_file, "../materials/neoprene", "There is no sensor '../materials/neoprene'"),
-])
-def test_an_unknown_name_is_refused_in_one_sentence_with_the_known_ones(find, name, said, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(InputError) as caught:
-        find(name)
-    assert str(caught.value).startswith(said)
+def test_an_unknown_name_is_refused_in_one_sentence_with_the_known_ones(tmp_path, monkeypatch):
+    for find, name, said in [
+        (sensor_file, "cora", "There is no sensor 'cora' (did you mean 'coro'?); known are coro, pad, pad4x4, sheet, tsf85; write "
+                              "one of them, the path of a YAML file, or put yours at config/sensors/cora.yaml."),
+        (material_file, "xyz", "There is no material 'xyz'; known are neoprene, polyurethane, silicone; write one of them, the "
+                               "path of a YAML file, or put yours at config/materials/xyz.yaml."),
+        (sensor_file, "../materials/neoprene", "There is no sensor '../materials/neoprene'"),
+    ]:
+        monkeypatch.chdir(tmp_path)
+        with pytest.raises(InputError) as caught:
+            find(name)
+        assert str(caught.value).startswith(said), find
 
 
 def test_the_costs_of_the_shipped_studies_are_told_in_any_folder(tmp_path, monkeypatch, capsys):

@@ -110,12 +110,12 @@ def test_without_pyvista_matplotlib_draws(press_nc, tmp_path):
     assert (tmp_path / "plain.png").stat().st_size > 10_000
 
 
-@pytest.mark.parametrize(("name", "content", "said"), [
-    ("press.csv", b"1,2", "give the .nc or .vtu file"), ("press.nc", b"x", "not a readable NetCDF"),
-    ("press.vtu", b"<", "not readable as VTU"),
-])
-def test_what_is_no_press_is_refused(name, content, said, tmp_path, capsys):
-    (tmp_path / name).write_bytes(content)
-    assert main(["view", str(tmp_path / name), "--save", str(tmp_path / "p.png")]) == 1
-    message = capsys.readouterr().err
-    assert said in message and name in message and not (tmp_path / "p.png").exists()
+def test_what_is_no_press_is_refused(tmp_path, capsys):
+    for name, content, said in [
+        ("press.csv", b"1,2", "give the .nc or .vtu file"), ("press.nc", b"x", "not a readable NetCDF"),
+        ("press.vtu", b"<", "not readable as VTU"),
+    ]:
+        (tmp_path / name).write_bytes(content)
+        assert main(["view", str(tmp_path / name), "--save", str(tmp_path / "p.png")]) == 1, name
+        message = capsys.readouterr().err
+        assert said in message and name in message and not (tmp_path / "p.png").exists(), name

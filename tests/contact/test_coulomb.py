@@ -25,26 +25,27 @@ def compliance(poisson):
     return matrix, ContactCompliance.dense(matrix)
 
 
-@pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
-@pytest.mark.parametrize(("poisson", "friction"), [(0.0, 0.3), (0.3, 0.3), (0.3, 2.0), (0.5, 1.0)])
-def test_the_fast_method_finds_what_the_plain_one_does(poisson, friction, way):
-    matrix, fast = compliance(poisson)
-    wanted = increment(friction, way, depth=DEPTH)
-    found, plain = solve_increment(fast, wanted, settings=SETTINGS), solve_block_by_block(matrix, wanted, tolerance_mm=1e-12)
-    largest = plain.normal.max()
-    # both stop at about 1e-10 mm, over a point's own compliance of 1 to 2 mm/N, and the largest force is 3e-3 N
-    np.testing.assert_allclose(found.normal, plain.normal, rtol=0, atol=1e-6 * largest)
-    np.testing.assert_allclose(found.tangential, plain.tangential, rtol=0, atol=1e-6 * largest)
-    np.testing.assert_array_equal(found.sticks, plain.sticks)
+def test_the_fast_method_finds_what_the_plain_one_does():
+    for way in WAYS.values():
+        for poisson, friction in [(0.0, 0.3), (0.3, 0.3), (0.3, 2.0), (0.5, 1.0)]:
+            matrix, fast = compliance(poisson)
+            wanted = increment(friction, way, depth=DEPTH)
+            found = solve_increment(fast, wanted, settings=SETTINGS)
+            plain = solve_block_by_block(matrix, wanted, tolerance_mm=1e-12)
+            largest = plain.normal.max()
+            # both stop at about 1e-10 mm, over a point's own compliance of 1 to 2 mm/N, and the largest force is 3e-3 N
+            np.testing.assert_allclose(found.normal, plain.normal, rtol=0, atol=1e-6 * largest)
+            np.testing.assert_allclose(found.tangential, plain.tangential, rtol=0, atol=1e-6 * largest)
+            np.testing.assert_array_equal(found.sticks, plain.sticks)
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.3, np.inf])
-def test_a_load_gives_the_depth_that_gives_the_load(friction):
-    _, fast = compliance(0.3)
-    deep = solve_increment(fast, increment(friction, 2e-3, depth=DEPTH), settings=SETTINGS)
-    loaded = solve_increment(fast, increment(friction, 2e-3, load=deep.normal.sum()), settings=SETTINGS)
-    assert loaded.depth == pytest.approx(DEPTH, rel=1e-7)      # the tolerance over the depth is 1e-8
-    np.testing.assert_allclose(loaded.tangential, deep.tangential, rtol=0, atol=1e-6 * deep.normal.max())
+def test_a_load_gives_the_depth_that_gives_the_load():
+    for friction in [0.0, 0.3, np.inf]:
+        _, fast = compliance(0.3)
+        deep = solve_increment(fast, increment(friction, 2e-3, depth=DEPTH), settings=SETTINGS)
+        loaded = solve_increment(fast, increment(friction, 2e-3, load=deep.normal.sum()), settings=SETTINGS)
+        assert loaded.depth == pytest.approx(DEPTH, rel=1e-7)      # the tolerance over the depth is 1e-8
+        np.testing.assert_allclose(loaded.tangential, deep.tangential, rtol=0, atol=1e-6 * deep.normal.max())
 
 
 def test_the_law_holds_at_every_point():

@@ -9,7 +9,8 @@ import subprocess
 import numpy as np
 import pytest
 import trimesh
-from deck_study import NEOPRENE, POLYURETHANE, Tables, gaussian_chains, needs_ccx, sharp
+from deck_study import Tables, gaussian_chains, needs_ccx, sharp
+from support.laws import NEOPRENE, POLYURETHANE
 from support.sensors import CORO
 
 from softtact.contact.height_field import HeightField

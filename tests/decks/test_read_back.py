@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
-from deck_study import NEOPRENE, POLYURETHANE
+from support.laws import NEOPRENE, POLYURETHANE
 from support.sensors import CORO
 
 from softtact.contact.penalty import penalty
@@ -33,6 +33,9 @@ BRICK_EDGES = [(1, 2), (2, 3), (3, 4), (4, 1), (5, 6), (6, 7), (7, 8), (8, 5), (
 WEDGE_EDGES = [(1, 2), (2, 3), (3, 1), (4, 5), (5, 6), (6, 4), (1, 4), (2, 5), (3, 6)]
 
 
+one_dialect = pytest.mark.parametrize("dialect", ["calculix"], indirect=True)     # for what does not depend on it
+
+
 @pytest.fixture(scope="module", params=["calculix", "abaqus"])
 def dialect(request):
     return request.param
@@ -46,6 +49,7 @@ def pair(dialect, tmp_path_factory):
     return model, read_deck(path)
 
 
+@one_dialect
 def test_the_heading_states_the_units(pair):
     assert pair[1].title == "sphere on sensor coro; units: mm, N, MPa"
 
@@ -67,6 +71,7 @@ def test_nodes_and_elements_come_back(pair, dialect):
         assert deck.node_sets[part.name] == (part.nodes + 1).tolist()
 
 
+@one_dialect
 def test_nodes_beyond_the_corners_halve_the_edges_that_abaqus_says(pair):
     """An arc of a quarter circle is 0.21 of its chord away from it; a node of another edge would be half an edge away."""
     model, _ = pair
@@ -79,6 +84,7 @@ def test_nodes_beyond_the_corners_halve_the_edges_that_abaqus_says(pair):
                 assert (off < 0.22 * length).all()
 
 
+@one_dialect
 def test_sheet_and_frusta_share_the_roots_and_no_node_is_idle(pair):
     model, _ = pair
     sheet, cover, frusta = (set(part.nodes.tolist()) for part in model.parts)
@@ -113,6 +119,7 @@ def test_constraints_come_back_and_carry_a_quadratic_field(pair):
         assert tie.weights @ field[tie.masters] == pytest.approx(field[tie.slave], abs=1e-9)
 
 
+@one_dialect
 def test_a_node_that_follows_others_is_no_master_and_is_not_held(pair):
     """Both programs eliminate it, and refuse chains and further conditions on it."""
     model, deck = pair
@@ -222,6 +229,7 @@ def test_our_faces_are_those_of_abaqus():
     assert [set((face[:4] + 1).tolist()) for face in ours] == list(ABAQUS_FACES.values())
 
 
+@one_dialect
 def test_a_unit_cell_has_walls_for_the_neighbours_it_lacks(tmp_path, dialect):
     body = build_unit_cell(CORO, dielectric_law=POLYURETHANE)
     model = deck_model(body, place(trimesh.creation.box((5.0, 5.0, 1.0))), indentations_mm=[0.02, 0.05])
@@ -238,6 +246,7 @@ def test_a_unit_cell_has_walls_for_the_neighbours_it_lacks(tmp_path, dialect):
     assert (np.einsum("fi,fi->f", normal, corners.mean(axis=1) * [1, 1, 0]) < 0).all()    # inwards
 
 
+@one_dialect
 def test_a_refined_cell_has_its_finer_sides_and_no_coarse_walls(dialect):
     body = build_unit_cell(CORO, dielectric_law=POLYURETHANE, mesh=MeshSettings(refinement=1))
     model = deck_model(body, place(trimesh.creation.box((5.0, 5.0, 1.0))), indentations_mm=[0.02])
@@ -277,6 +286,7 @@ def test_a_sliver_among_the_facets_is_left_out():
     assert len(model.rigid[0].facets) == 3        # of four that look down
 
 
+@one_dialect
 def test_the_same_press_gives_the_same_bytes(dialect):
     model = deck_model(SENSOR.body(), place(SPHERE), forces_n=[1.0])
     assert deck_text(model, dialect=dialect) == deck_text(deck_model(SENSOR.body(), place(SPHERE), forces_n=[1.0]), dialect=dialect)

@@ -73,17 +73,17 @@ def test_derivatives_agree_with_finite_differences(element):
 
 
 @EVERY_ELEMENT
-@pytest.mark.parametrize("reduced", [False, True])
-def test_quadrature_integrates_all_polynomials_of_its_degree(element, reduced):
-    rule = element.reduced if reduced else element.quadrature
-    if rule is None:
-        return
-    dimension = element.nodes.shape[1]
-    for powers in product(range(rule.degree + 1), repeat=dimension):
-        if sum(powers) <= rule.degree:
-            assert rule.weights @ np.prod(rule.points**powers, axis=1) == pytest.approx(integral(element, powers), abs=1e-14)
-    over = (2 * ((rule.degree + 2) // 2), *[0] * (dimension - 1))     # even: odd powers vanish on [-1, 1] for every rule
-    assert rule.weights @ np.prod(rule.points**over, axis=1) != pytest.approx(integral(element, over), abs=1e-6)
+def test_quadrature_integrates_all_polynomials_of_its_degree(element):
+    for reduced in [False, True]:
+        rule = element.reduced if reduced else element.quadrature
+        if rule is None:
+            return
+        dimension = element.nodes.shape[1]
+        for powers in product(range(rule.degree + 1), repeat=dimension):
+            if sum(powers) <= rule.degree:
+                assert rule.weights @ np.prod(rule.points**powers, axis=1) == pytest.approx(integral(element, powers), abs=1e-14)
+        over = (2 * ((rule.degree + 2) // 2), *[0] * (dimension - 1))     # even: odd powers vanish on [-1, 1] for every rule
+        assert rule.weights @ np.prod(rule.points**over, axis=1) != pytest.approx(integral(element, over), abs=1e-6), reduced
 
 
 def test_the_wedges_quadrature_integrates_the_square_of_its_quadratic_functions():
@@ -131,15 +131,16 @@ def test_faces_are_counter_clockwise_from_inside_at_the_bottom_and_from_outside_
     assert sum(flux[1:]) - flux[0] == pytest.approx(np.zeros(3), abs=1e-12)
 
 
-@pytest.mark.parametrize("element", [HEX20, HEX27, WEDGE18], ids=["HEX20", "HEX27", "WEDGE18"])
-def test_bottom_top_and_sides_lie_where_their_names_say(element):
-    height = element.nodes[:, 2]
-    assert (height[element.bottom] == -1).all() and (height[element.top] == 1).all()
-    base = element.faces[0].element
-    ends = np.array([element.nodes[side, :2].mean(axis=0) for side in element.sides])
-    assert ends == pytest.approx(np.array([base.nodes[side].mean(axis=0) for side in base.sides]))
-    if base.nodes.shape[0] > 6:
-        assert np.sign(np.round(ends, 9)).tolist() == [[0, -1], [1, 0], [0, 1], [-1, 0]]     # eta = -1, xi = 1, eta = 1, xi = -1
+def test_bottom_top_and_sides_lie_where_their_names_say():
+    for element in [HEX20, HEX27, WEDGE18]:
+        height = element.nodes[:, 2]
+        assert (height[element.bottom] == -1).all() and (height[element.top] == 1).all(), element
+        base = element.faces[0].element
+        ends = np.array([element.nodes[side, :2].mean(axis=0) for side in element.sides])
+        assert ends == pytest.approx(np.array([base.nodes[side].mean(axis=0) for side in base.sides])), element
+        if base.nodes.shape[0] > 6:
+            # eta = -1, xi = 1, eta = 1, xi = -1
+            assert np.sign(np.round(ends, 9)).tolist() == [[0, -1], [1, 0], [0, 1], [-1, 0]]
 
 
 @EVERY_ELEMENT

@@ -53,20 +53,20 @@ def loops(request):
     return DeviceKernels(request.param)
 
 
-@pytest.mark.parametrize("name", BLOCKS)
-def test_a_device_gives_energy_forces_and_tangents_of_the_compiled_loops(name, loops):
-    kind, nodes, law, options = BLOCKS[name]
-    coordinates, displacement = elements(7, nodes, seed=3)
-    block, there = kind(coordinates, law, **options), kind(coordinates, law, **options)
-    there.loops = loops
-    one, other = block.evaluate(displacement), there.evaluate(displacement)
-    assert one.energy > 0.1 and other.energy == pytest.approx(one.energy, rel=1e-12)     # rounding of double precision
-    np.testing.assert_allclose(other.force, one.force, rtol=0, atol=1e-12 * np.abs(one.force).max())
-    chosen = np.array([5, 0, 2])
-    for precision, rounding in ((np.float64, 1e-12), (np.float32, 3e-6)):     # 27 points' sums round 24 bits a few times
-        K, K_there = (each.tangent(displacement[chosen], chosen, precision=precision) for each in (block, there))
-        assert K_there.dtype == precision
-        np.testing.assert_allclose(K_there, K, rtol=0, atol=rounding * np.abs(K).max())
+def test_a_device_gives_energy_forces_and_tangents_of_the_compiled_loops(loops):
+    for name in BLOCKS:
+        kind, nodes, law, options = BLOCKS[name]
+        coordinates, displacement = elements(7, nodes, seed=3)
+        block, there = kind(coordinates, law, **options), kind(coordinates, law, **options)
+        there.loops = loops
+        one, other = block.evaluate(displacement), there.evaluate(displacement)
+        assert one.energy > 0.1 and other.energy == pytest.approx(one.energy, rel=1e-12)     # rounding of double precision
+        np.testing.assert_allclose(other.force, one.force, rtol=0, atol=1e-12 * np.abs(one.force).max())
+        chosen = np.array([5, 0, 2])
+        for precision, rounding in ((np.float64, 1e-12), (np.float32, 3e-6)):     # 27 points' sums round 24 bits a few times
+            K, K_there = (each.tangent(displacement[chosen], chosen, precision=precision) for each in (block, there))
+            assert K_there.dtype == precision
+            np.testing.assert_allclose(K_there, K, rtol=0, atol=rounding * np.abs(K).max())
 
 
 def test_all_that_the_sums_make_lies_on_the_device_of_their_arguments():

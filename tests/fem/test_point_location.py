@@ -23,10 +23,10 @@ def smooth(points):
     return np.sin(points[:, 0]) * np.cos(points[:, 1])
 
 
-@pytest.mark.parametrize("name", PLANS)
-def test_a_node_is_found_at_itself(name):
-    mesh = PLANS[name]
-    assert abs(interpolation_2d(mesh, mesh.points) - np.eye(len(mesh.points))).max() < 1e-6
+def test_a_node_is_found_at_itself():
+    for name in PLANS:
+        mesh = PLANS[name]
+        assert abs(interpolation_2d(mesh, mesh.points) - np.eye(len(mesh.points))).max() < 1e-6
 
 
 @given(x=st.floats(-2.0, 2.0), y=st.floats(-1.45, 1.45), name=st.sampled_from(sorted(PLANS)))

@@ -52,13 +52,13 @@ def test_joined_blocks_have_the_energy_and_the_forces_of_their_parts():
     assert again == pytest.approx(energy, rel=1e-12)
 
 
-@pytest.mark.parametrize("options", [{}, {"unprojected_penalty_ratio": 0.5}, {"quartic_penalty_ratio": 100.0, "trilinear": True}])
-def test_tangents_in_single_precision_are_those_in_double_precision_to_seven_digits(options):
-    block = HexBlock(0.5 * HEX27.nodes[None], LAWS[0], **options)
-    field = 0.02 * np.random.default_rng(1).normal(size=(1, 27, 3))
-    exact, rough = block.tangent(field), block.tangent(field, precision=np.float32)
-    assert rough.dtype == np.float32
-    assert np.abs(rough - exact).max() < 2e-6 * np.abs(exact).max()      # sums of 81 products of seven digits
+def test_tangents_in_single_precision_are_those_in_double_precision_to_seven_digits():
+    for options in [{}, {"unprojected_penalty_ratio": 0.5}, {"quartic_penalty_ratio": 100.0, "trilinear": True}]:
+        block = HexBlock(0.5 * HEX27.nodes[None], LAWS[0], **options)
+        field = 0.02 * np.random.default_rng(1).normal(size=(1, 27, 3))
+        exact, rough = block.tangent(field), block.tangent(field, precision=np.float32)
+        assert rough.dtype == np.float32
+        assert np.abs(rough - exact).max() < 2e-6 * np.abs(exact).max()      # sums of 81 products of seven digits
 
 
 def test_elements_that_hang_on_other_nodes_feel_the_displacement_that_these_give_them():
@@ -88,22 +88,23 @@ def projected(block, field):
     return np.array(rows)
 
 
-@pytest.mark.parametrize("options", [{}, {"unprojected_penalty_ratio": 0.5}, {"quartic_penalty_ratio": 100.0},
-                                     {"unprojected_penalty_ratio": 4.0, "quartic_penalty_ratio": 100.0, "trilinear": True}])
-def test_the_energy_of_volume_changes_is_that_of_the_formulas_written_down_plainly(options):
-    points = 0.5 * HEX27.nodes + 0.02 * np.random.default_rng(2).normal(size=(3, 27, 3))
-    block = HexBlock(points, LAWS[0], **options)
-    J = 1 + 0.2 * np.random.default_rng(3).normal(size=(3, 27)).clip(-2, 2)
-    K, k, q = block.law.bulk_modulus, block.unprojected_modulus, block.quartic_modulus
-    seen = projected(block, J - 1)
-    density = (K - k) / 2 * seen**2 + k / 4 * (J**2 - 1 - 2 * np.log(J)) + q / 4 * (J - 1 - seen) ** 4
-    held = q * (J - 1 - seen) ** 3
-    pressure = (K - k) * seen + k / 2 * (J - 1 / J) + held - projected(block, held)
-    found = block._volumetric(J, block.at_rest)
-    np.testing.assert_allclose(found.energies, (block.at_rest.volumes[block.at_rest.shapes] * density).sum(axis=1), rtol=1e-12)
-    np.testing.assert_allclose(found.pressure, pressure, rtol=1e-11, atol=1e-12 * np.abs(pressure).max())
-    assert found.quartic.shape == ((3, 27) if q else (0, 0))
-    np.testing.assert_allclose(found.quartic, 3 * q * (J - 1 - seen) ** 2 if q else found.quartic, rtol=1e-9, atol=1e-12 * (q + 1))
+def test_the_energy_of_volume_changes_is_that_of_the_formulas_written_down_plainly():
+    for options in [{}, {"unprojected_penalty_ratio": 0.5}, {"quartic_penalty_ratio": 100.0},
+                    {"unprojected_penalty_ratio": 4.0, "quartic_penalty_ratio": 100.0, "trilinear": True}]:
+        points = 0.5 * HEX27.nodes + 0.02 * np.random.default_rng(2).normal(size=(3, 27, 3))
+        block = HexBlock(points, LAWS[0], **options)
+        J = 1 + 0.2 * np.random.default_rng(3).normal(size=(3, 27)).clip(-2, 2)
+        K, k, q = block.law.bulk_modulus, block.unprojected_modulus, block.quartic_modulus
+        seen = projected(block, J - 1)
+        density = (K - k) / 2 * seen**2 + k / 4 * (J**2 - 1 - 2 * np.log(J)) + q / 4 * (J - 1 - seen) ** 4
+        held = q * (J - 1 - seen) ** 3
+        pressure = (K - k) * seen + k / 2 * (J - 1 / J) + held - projected(block, held)
+        found = block._volumetric(J, block.at_rest)
+        np.testing.assert_allclose(found.energies, (block.at_rest.volumes[block.at_rest.shapes] * density).sum(axis=1), rtol=1e-12)
+        np.testing.assert_allclose(found.pressure, pressure, rtol=1e-11, atol=1e-12 * np.abs(pressure).max())
+        assert found.quartic.shape == ((3, 27) if q else (0, 0))
+        if q:
+            np.testing.assert_allclose(found.quartic, 3 * q * (J - 1 - seen) ** 2, rtol=1e-9, atol=1e-12 * (q + 1))
 
 
 VOLUMES = [make_law("mooney_rivlin", {"c10": 0.17, "c01": 0.004}, bulk_modulus=7.0, volumetric=name)

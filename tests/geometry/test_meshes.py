@@ -197,7 +197,9 @@ def test_an_object_beside_the_sensor_is_refused():
 
 
 def test_an_object_that_covers_the_whole_sensor_is_over_it():
-    check_over_sensor(place(box((100, 100, 10))), FOOTPRINT)  # no corner lies over the footprint
+    mesh = place(box((100, 100, 10)))      # no corner lies over the footprint
+    assert facets_over(mesh.triangles, FOOTPRINT).any()
+    check_over_sensor(mesh, FOOTPRINT)
 
 
 def test_a_ring_around_the_sensor_is_not_over_it():

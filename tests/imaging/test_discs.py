@@ -226,6 +226,7 @@ def test_a_frame_s_depth_and_channels_do_not_matter():
 
 
 def test_what_is_no_picture_is_refused():
-    for picture in (np.zeros(9), np.zeros((3, 100)), np.full((50, 50), np.nan)):
-        with pytest.raises(InputError):
+    for picture, said in ((np.zeros(9), r"shape \(9,\) is no picture"), (np.zeros((3, 100)), r"shape \(3, 100\) is no picture"),
+                          (np.full((50, 50), np.nan), "values that are not numbers")):
+        with pytest.raises(InputError, match=said):
             detect_discs(picture, pixel_mm=1.0)

@@ -33,7 +33,8 @@ def split_ways(study):
     items = [(item.set, item.id) for item in study.items()]
     check_items(items)
     forces = np.array(study.values.forces_n)
-    press = SimpleNamespace(force_n=SimpleNamespace(values=forces), within_validity=SimpleNamespace(values=np.ones(len(forces))))
+    press = SimpleNamespace(normal_force_n=SimpleNamespace(values=forces),
+                            within_validity=SimpleNamespace(values=np.ones(len(forces))))
     presses = {("elastic", *key): press for key in items}
     ways = {}
     for way in ("map", "press", "object"):

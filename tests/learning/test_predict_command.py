@@ -87,17 +87,17 @@ def test_counts_are_written_as_netcdf_and_csv_and_drawn(capsys, network, model, 
     assert (tmp_path / "taxels.png").stat().st_size > 20_000
 
 
-@pytest.mark.parametrize(("changes", "sentence"), [
-    ({"deformation_map_mm": (("step", "y", "x"), np.stack([2 * bump(0)] * 3))},
-     "3 of 3 maps lie outside the training maps' range, 0.05 to 0.5 mm deep at most"),
-    ({"normal_force_n": ("step", [10.0, 20.0, 50.0])},
-     "1 of 3 maps lie outside the training maps' range, 5 to 40 N (the first with 50)"),
-    ({"within_validity": ("step", [1, 1, 0])}, "1 of 3 load steps are beyond what the press' model is valid for"),
-])
-def test_what_training_has_not_seen_is_predicted_with_a_warning(capsys, model, tmp_path, changes, sentence):
-    status, out, err = run(capsys, write_press(tmp_path / "far.nc", **changes), "--network", model, "--json")
-    assert status == 0 and err.count("\n") == 1 and sentence in err
-    assert sentence in json.loads(out)["warnings"][0]
+def test_what_training_has_not_seen_is_predicted_with_a_warning(capsys, model, tmp_path):
+    for changes, sentence in [
+        ({"deformation_map_mm": (("step", "y", "x"), np.stack([2 * bump(0)] * 3))},
+         "3 of 3 maps lie outside the training maps' range, 0.05 to 0.5 mm deep at most"),
+        ({"normal_force_n": ("step", [10.0, 20.0, 50.0])},
+         "1 of 3 maps lie outside the training maps' range, 5 to 40 N (the first with 50)"),
+        ({"within_validity": ("step", [1, 1, 0])}, "1 of 3 load steps are beyond what the press' model is valid for"),
+    ]:
+        status, out, err = run(capsys, write_press(tmp_path / "far.nc", **changes), "--network", model, "--json")
+        assert status == 0 and err.count("\n") == 1 and sentence in err, changes
+        assert sentence in json.loads(out)["warnings"][0], changes
 
 
 def test_maps_of_another_model_than_the_networks_are_warned_of(capsys, model, tmp_path):
@@ -117,33 +117,34 @@ def spoiled(values, kind):
     return values
 
 
-@pytest.mark.parametrize(("name", "values", "sentence"), [
-    ("a.npy", bump(0).T, "its map has 33 x 57 values and the network takes 57 x 33 (y, x); it is transposed"),
-    ("a.npy", np.stack([bump(0)] * 2), "it holds 3-dimensional float64 values; give one map"),
-    ("a.npy", spoiled(bump(0), np.nan), "it holds values that are not finite"),
-    ("a.npy", np.array([{}], dtype=object), "not an array of numbers"),
-    ("a.csv", "x,y\n1,2\n", "not a table of numbers"),
-    ("a.txt", "1,2\n", "maps are read from .nc, .npy, .csv"),
-    ("a.nc", "no NetCDF", "not a readable NetCDF file"),
-])
-def test_a_file_that_holds_no_map_is_refused(capsys, model, tmp_path, name, values, sentence):
-    if isinstance(values, str):
-        (tmp_path / name).write_text(values)
-    else:
-        np.save(tmp_path / name, values, allow_pickle=True)
-    status, out, err = run(capsys, tmp_path / name, "--network", model, "--out", tmp_path / "taxels.nc")
-    assert (status, out, err.count("\n")) == (1, "", 1)
-    assert sentence in err and not (tmp_path / "taxels.nc").exists()
+def test_a_file_that_holds_no_map_is_refused(capsys, model, tmp_path):
+    for name, values, sentence in [
+        ("a.npy", bump(0).T, "its map has 33 x 57 values and the network takes 57 x 33 (y, x); it is transposed"),
+        ("a.npy", np.stack([bump(0)] * 2), "it holds 3-dimensional float64 values; give one map"),
+        ("a.npy", spoiled(bump(0), np.nan), "it holds values that are not finite"),
+        ("a.npy", np.array([{}], dtype=object), "not an array of numbers"),
+        ("a.csv", "x,y\n1,2\n", "not a table of numbers"),
+        ("a.txt", "1,2\n", "maps are read from .nc, .npy, .csv"),
+        ("a.nc", "no NetCDF", "not a readable NetCDF file"),
+    ]:
+        if isinstance(values, str):
+            (tmp_path / name).write_text(values)
+        else:
+            np.save(tmp_path / name, values, allow_pickle=True)
+        status, out, err = run(capsys, tmp_path / name, "--network", model, "--out", tmp_path / "taxels.nc")
+        assert (status, out, err.count("\n")) == (1, "", 1), name
+        assert sentence in err and not (tmp_path / "taxels.nc").exists(), name
 
 
-@pytest.mark.parametrize(("changes", "sentence"), [
-    ({"deformation_map_mm": (("step", "y", "x"), np.zeros((3, 57, 33)), {"units": "m"})}, "its maps are in 'm'; give them in mm"),
-    ({"deformation_map_mm": (("sample", "y", "x"), np.zeros((3, 57, 33)))}, "not a press with deformation_map_mm (step, y, x)"),
-    ({"converged": ("step", [1, 1, 0])}, "a load step of the press did not converge"),
-])
-def test_a_press_that_may_not_be_used_is_refused(capsys, model, tmp_path, changes, sentence):
-    status, _, err = run(capsys, write_press(tmp_path / "p.nc", **changes), "--network", model)
-    assert status == 1 and sentence in err and err.count("\n") == 1
+def test_a_press_that_may_not_be_used_is_refused(capsys, model, tmp_path):
+    for changes, sentence in [
+        ({"deformation_map_mm": (("step", "y", "x"), np.zeros((3, 57, 33)), {"units": "m"})},
+         "its maps are in 'm'; give them in mm"),
+        ({"deformation_map_mm": (("sample", "y", "x"), np.zeros((3, 57, 33)))}, "not a press with deformation_map_mm (step, y, x)"),
+        ({"converged": ("step", [1, 1, 0])}, "a load step of the press did not converge"),
+    ]:
+        status, _, err = run(capsys, write_press(tmp_path / "p.nc", **changes), "--network", model)
+        assert status == 1 and sentence in err and err.count("\n") == 1, changes
 
 
 def test_a_wrong_path_is_refused_in_one_sentence(capsys, model, press):

@@ -59,35 +59,35 @@ def test_operations_grow_with_the_cube_of_a_plates_width_and_entries_with_its_ar
     assert 7 < large[0] / small[0] < 10 and 4 < large[1] / small[1] < 5.5
 
 
-@pytest.mark.parametrize("size", [(3, 2), (30, 17), (60, 40)])
-def test_triangles_and_rows_of_16_bits_hold_the_factor(size, workers):
-    whole, upper, places = plate(*size)
-    solver = DissectedSolver(places, workers=workers)
-    assert solver.factor(upper)
-    fronts, store, order, n = solver._fronts, solver._store, solver._order, len(places)
-    factor = np.zeros((n, n))
-    for p in range(len(fronts.own_at) - 1):
-        first, end = fronts.own_at[p], fronts.own_at[p + 1]
-        bound = fronts.bound[fronts.bound_at[p]:fronts.bound_at[p + 1]]
-        own = np.zeros((end - first, end - first))
-        own[np.triu_indices(end - first)] = store.triangles[fronts.triangle_at[p]:fronts.triangle_at[p + 1]]
-        np.fill_diagonal(own, 1.0 / own.diagonal())
-        short = store.short[fronts.short_at[p]:fronts.short_at[p + 1]].reshape(end - first, -1)
-        factor[first:end, first:end] = own
-        factor[first:end, bound] = store.scale[first:end, None] * short
-    # An entry is off by half a unit of 16 bits, 1.5e-5 of its row's largest, which is 1 here; up to 70 of them meet.
-    np.testing.assert_allclose(factor.T @ factor, whole[order][:, order].toarray(), atol=1e-4)
+def test_triangles_and_rows_of_16_bits_hold_the_factor(workers):
+    for size in [(3, 2), (30, 17), (60, 40)]:
+        whole, upper, places = plate(*size)
+        solver = DissectedSolver(places, workers=workers)
+        assert solver.factor(upper)
+        fronts, store, order, n = solver._fronts, solver._store, solver._order, len(places)
+        factor = np.zeros((n, n))
+        for p in range(len(fronts.own_at) - 1):
+            first, end = fronts.own_at[p], fronts.own_at[p + 1]
+            bound = fronts.bound[fronts.bound_at[p]:fronts.bound_at[p + 1]]
+            own = np.zeros((end - first, end - first))
+            own[np.triu_indices(end - first)] = store.triangles[fronts.triangle_at[p]:fronts.triangle_at[p + 1]]
+            np.fill_diagonal(own, 1.0 / own.diagonal())
+            short = store.short[fronts.short_at[p]:fronts.short_at[p + 1]].reshape(end - first, -1)
+            factor[first:end, first:end] = own
+            factor[first:end, bound] = store.scale[first:end, None] * short
+        # An entry is off by half a unit of 16 bits, 1.5e-5 of its row's largest, which is 1 here; up to 70 of them meet.
+        np.testing.assert_allclose(factor.T @ factor, whole[order][:, order].toarray(), atol=1e-4)
 
 
-@pytest.mark.parametrize("columns", [None, 3])
-def test_a_solution_balances_its_right_side_to_what_16_bits_leave(columns, workers):
-    whole, upper, places = plate(40, 30)
-    right = np.random.default_rng(0).normal(size=len(places) if columns is None else (len(places), columns))
-    solver = DissectedSolver(places, workers=workers)
-    assert solver.factor(upper.astype(np.float32))
-    found = solver.solve(1e5 * right)
-    assert found.shape == right.shape and found.dtype == np.float64
-    np.testing.assert_allclose(whole @ found / 1e5, right, atol=1e-3)
+def test_a_solution_balances_its_right_side_to_what_16_bits_leave(workers):
+    for columns in [None, 3]:
+        whole, upper, places = plate(40, 30)
+        right = np.random.default_rng(0).normal(size=len(places) if columns is None else (len(places), columns))
+        solver = DissectedSolver(places, workers=workers)
+        assert solver.factor(upper.astype(np.float32))
+        found = solver.solve(1e5 * right)
+        assert found.shape == right.shape and found.dtype == np.float64
+        np.testing.assert_allclose(whole @ found / 1e5, right, atol=1e-3)
 
 
 def test_a_solution_of_an_ill_conditioned_matrix_still_serves_conjugate_gradients():
@@ -111,15 +111,15 @@ def test_as_many_threads_give_the_same_to_the_last_digit():
     np.testing.assert_array_equal(found[0], found[2])
 
 
-@pytest.mark.parametrize("diagonal", [-50.0, np.nan])
-def test_a_matrix_that_is_not_positive_definite_is_told_and_the_next_one_factored(diagonal, workers):
-    whole, upper, places = plate(60, 40)
-    solver, right = DissectedSolver(places, workers=workers), np.ones(len(places))
-    for place in (0, len(places) // 2, len(places) - 1):
-        indefinite = sp.csr_matrix((upper.data.copy(), upper.indices, upper.indptr), shape=upper.shape)
-        indefinite.data[indefinite.indptr[place]] = diagonal
-        assert solver.factor(upper) and not solver.factor(indefinite) and solver.factor(upper)
-        np.testing.assert_allclose(whole @ solver.solve(right), right, atol=1e-3)
+def test_a_matrix_that_is_not_positive_definite_is_told_and_the_next_one_factored(workers):
+    for diagonal in [-50.0, np.nan]:
+        whole, upper, places = plate(60, 40)
+        solver, right = DissectedSolver(places, workers=workers), np.ones(len(places))
+        for place in (0, len(places) // 2, len(places) - 1):
+            indefinite = sp.csr_matrix((upper.data.copy(), upper.indices, upper.indptr), shape=upper.shape)
+            indefinite.data[indefinite.indptr[place]] = diagonal
+            assert solver.factor(upper) and not solver.factor(indefinite) and solver.factor(upper)
+            np.testing.assert_allclose(whole @ solver.solve(right), right, atol=1e-3)
 
 
 def test_plates_that_nothing_joins_are_solved_together():

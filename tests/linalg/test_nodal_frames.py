@@ -1,7 +1,6 @@
 """Nodes whose coordinates are turned: the same matrix and vectors as with the whole orthogonal matrix of the turns."""
 
 import numpy as np
-import pytest
 import scipy.sparse as sp
 from scipy.spatial.transform import Rotation
 
@@ -37,12 +36,12 @@ def random_matrix(seed=1):
     return whole, upper
 
 
-@pytest.mark.parametrize("nodes", [[0], [1, 2, 5], range(NODES - 1)])
-def test_a_turned_matrix_is_that_between_the_turns(nodes):
-    frames, (whole, upper) = frames_of(nodes, [1] * len(nodes)), random_matrix()
-    found = sp.csr_matrix((frames.turned_matrix(upper), upper.indices, upper.indptr), shape=upper.shape).toarray()
-    turn = whole_turn(frames)
-    np.testing.assert_allclose(found, np.triu(turn.T @ whole @ turn), atol=1e-13)
+def test_a_turned_matrix_is_that_between_the_turns():
+    for nodes in [[0], [1, 2, 5], range(NODES - 1)]:
+        frames, (whole, upper) = frames_of(nodes, [1] * len(nodes)), random_matrix()
+        found = sp.csr_matrix((frames.turned_matrix(upper), upper.indices, upper.indptr), shape=upper.shape).toarray()
+        turn = whole_turn(frames)
+        np.testing.assert_allclose(found, np.triu(turn.T @ whole @ turn), atol=1e-13)
 
 
 def test_a_vector_is_turned_by_the_same_turns_and_back():
@@ -64,10 +63,10 @@ def test_upright_frames_leave_a_matrix_as_it_is():
     assert frames.turned_matrix(upper) is upper.data
 
 
-@pytest.mark.parametrize(("nodes", "wanted", "others", "covered"), [
-    ([1, 5], [1, 2], [25], True), ([1, 3], [1, 1], [], False), ([1], [2], [], False), ([1], [1], [24], False)])
-def test_frames_cover_those_of_fewer_nodes_vectors_and_others(nodes, wanted, others, covered):
-    assert frames_of([1, 2, 5], [1, 3, 2], others=[25]).covers(frames_of(nodes, wanted, others=others)) is covered
+def test_frames_cover_those_of_fewer_nodes_vectors_and_others():
+    for nodes, wanted, others, covered in [
+        ([1, 5], [1, 2], [25], True), ([1, 3], [1, 1], [], False), ([1], [2], [], False), ([1], [1], [24], False)]:
+        assert frames_of([1, 2, 5], [1, 3, 2], others=[25]).covers(frames_of(nodes, wanted, others=others)) is covered, nodes
 
 
 def test_covering_frames_take_over_the_vectors_of_now():

@@ -1,7 +1,6 @@
 """Where fronts stand: what is needed at the same time has places of its own."""
 
 import numpy as np
-import pytest
 from support.plates import plate
 
 from softtact.linalg.multifrontal_solver import DissectedSolver
@@ -22,27 +21,27 @@ def times_of(fronts, parts, levels):
     return own, update
 
 
-@pytest.mark.parametrize("size", [(60, 40), (120, 30)])
-def test_what_is_needed_at_the_same_time_does_not_overlap(size):
-    _, upper, places = plate(*size)
-    solver = DissectedSolver(places)
-    assert solver.factor(upper)
-    fronts, levels = solver._fronts, [np.array(level) for level, _ in solver._large]
-    own, bound = np.diff(fronts.own_at), np.diff(fronts.bound_at)
-    ranges = [(fronts.panel_at, own * (own + bound)), (fronts.update_at, bound**2)]
-    needed = np.vstack(times_of(fronts, solver._parts, levels))
-    start, end = (np.concatenate([f(*r) for r in ranges]) for f in (lambda at, _: at, lambda at, size: at + size))
-    part_of = np.full(len(own), -1)
-    for k, part in enumerate(solver._parts):
-        part_of[part] = k
-    part_of = np.tile(part_of, 2)
-    assert len(solver._parts) > 2 and len(levels) > 2
-    for a in range(len(start)):
-        # Within a part pieces come one after the other and share room, so that is left to the next test.
-        others = (needed[:, 0] < needed[a, 1]) & (needed[a, 0] < needed[:, 1]) & ((part_of != part_of[a]) | (part_of < 0))
-        others[a] = False
-        overlap = others & (start < end[a]) & (start[a] < end)
-        assert not overlap.any()
+def test_what_is_needed_at_the_same_time_does_not_overlap():
+    for size in [(60, 40), (120, 30)]:
+        _, upper, places = plate(*size)
+        solver = DissectedSolver(places)
+        assert solver.factor(upper)
+        fronts, levels = solver._fronts, [np.array(level) for level, _ in solver._large]
+        own, bound = np.diff(fronts.own_at), np.diff(fronts.bound_at)
+        ranges = [(fronts.panel_at, own * (own + bound)), (fronts.update_at, bound**2)]
+        needed = np.vstack(times_of(fronts, solver._parts, levels))
+        start, end = (np.concatenate([f(*r) for r in ranges]) for f in (lambda at, _: at, lambda at, size: at + size))
+        part_of = np.full(len(own), -1)
+        for k, part in enumerate(solver._parts):
+            part_of[part] = k
+        part_of = np.tile(part_of, 2)
+        assert len(solver._parts) > 2 and len(levels) > 2
+        for a in range(len(start)):
+            # Within a part pieces come one after the other and share room, so that is left to the next test.
+            others = (needed[:, 0] < needed[a, 1]) & (needed[a, 0] < needed[:, 1]) & ((part_of != part_of[a]) | (part_of < 0))
+            others[a] = False
+            overlap = others & (start < end[a]) & (start[a] < end)
+            assert not overlap.any()
 
 
 def test_pieces_one_after_the_other_share_room_and_keep_what_is_not_yet_taken_over():

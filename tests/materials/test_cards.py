@@ -143,8 +143,9 @@ def test_linear_constants_that_a_law_shares_raise_no_sentence():
 
 
 def test_impossible_linear_constants_are_refused():
-    for young, poisson in [(-1.0, 0.3), (1.0, 0.5)]:
-        with pytest.raises(InputError, match="give"):
+    for young, poisson, said in [(-1.0, 0.3, "Young's modulus is -1 MPa; give a positive one"),
+                                 (1.0, 0.5, "Poisson's ratio is 0.5; give one between -1 and 0.5")]:
+        with pytest.raises(InputError, match=said):
             LinearConstants(young, poisson)
 
 

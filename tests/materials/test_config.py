@@ -67,9 +67,8 @@ def test_a_users_own_files_are_found_beside_the_yaml(tmp_path):
     assert config.modes == ["uniaxial"]
 
 
-@pytest.mark.parametrize(
-    ("path", "value", "sentence"),
-    [
+def test_a_wrong_key_or_value_is_refused_in_one_sentence(tmp_path, material_yaml):
+    for path, value, sentence in [
         (["curves", "nois"], 0.1, "the key curves.nois is unknown"),
         (["curves", "noise"], -1, "curves.noise is -1; input should be greater than or equal to 0"),
         (["curves", "kind"], "guessed", "curves is .*guessed"),
@@ -86,18 +85,16 @@ def test_a_users_own_files_are_found_beside_the_yaml(tmp_path):
             {"parameters": {"c10": "soft"}},
             "printed.mooney_rivlin.parameters.c10 is 'soft'",
         ),
-    ],
-)
-def test_a_wrong_key_or_value_is_refused_in_one_sentence(tmp_path, material_yaml, path, value, sentence):
-    config = yaml.safe_load(material_yaml("neoprene").read_text())
-    section = config
-    for key in path[:-1]:
-        section = section[key]
-    section[path[-1]] = value
-    (tmp_path / "wrong.yaml").write_text(yaml.safe_dump(config, sort_keys=False))
-    with pytest.raises(InputError, match=sentence) as refusal:
-        load_material(tmp_path / "wrong.yaml")
-    assert "\n" not in str(refusal.value)
+    ]:
+        config = yaml.safe_load(material_yaml("neoprene").read_text())
+        section = config
+        for key in path[:-1]:
+            section = section[key]
+        section[path[-1]] = value
+        (tmp_path / "wrong.yaml").write_text(yaml.safe_dump(config, sort_keys=False))
+        with pytest.raises(InputError, match=sentence) as refusal:
+            load_material(tmp_path / "wrong.yaml")
+        assert "\n" not in str(refusal.value), path
 
 
 def test_a_missing_key_is_named(tmp_path):

@@ -76,9 +76,8 @@ def test_one_synthetic_part_makes_the_whole_synthetic(write_file):
 HEADER = "stretch,nominal_stress_mpa\n"
 
 
-@pytest.mark.parametrize(
-    ("text", "sentence"),
-    [
+def test_an_unreadable_or_implausible_curve_is_refused_by_file_row_value_and_remedy(write_file):
+    for text, sentence in [
         ("", "the file is empty; give a test curve"),
         (HEADER, r"0 point\(s\) make no curve; give at least two"),
         (HEADER + "1.0,0\n1.1,nan\n", "row 3: the value 'nan' is not finite; correct it or remove the row"),
@@ -94,14 +93,12 @@ HEADER = "stretch,nominal_stress_mpa\n"
         (HEADER + "1,0\n1.2,0.2\n1.1,0.1\n", "row 4: the stretch turns back to 1.1; keep one loading branch"),
         ("lambda,nominal_stress_mpa\n1,0\n", "no column holds the stretch among lambda, nominal_stress_mpa; name one"),
         ("stretch,engineering_strain,nominal_stress_mpa\n1,0,0\n", "several columns hold the stretch"),
-    ],
-)
-def test_an_unreadable_or_implausible_curve_is_refused_by_file_row_value_and_remedy(write_file, text, sentence):
-    path = write_file(text)
-    with pytest.raises(InputError, match=sentence) as refusal:
-        read_curve(path)
-    assert str(refusal.value).startswith(str(path))
-    assert str(refusal.value).endswith(".")
+    ]:
+        path = write_file(text)
+        with pytest.raises(InputError, match=sentence) as refusal:
+            read_curve(path)
+        assert str(refusal.value).startswith(str(path)), text
+        assert str(refusal.value).endswith("."), text
 
 
 def test_a_missing_file_is_refused(tmp_path):
@@ -177,9 +174,8 @@ def test_a_compression_test_without_a_minus_is_read_when_told(write_file):
         assert curve.stretch == pytest.approx([0.9, 0.7]) and curve.nominal_stress == pytest.approx([-0.1, -0.5]), text
 
 
-@pytest.mark.parametrize(
-    ("name", "text", "sentence"),
-    [
+def test_a_curve_that_no_rubber_gives_is_refused(write_file):
+    for name, text, sentence in [
         ("volumetric", "volume_ratio,pressure_mpa\n1,0\n0.98,-0.1\n", "row 3: the pressure -0.1 MPa has the wrong sign"),
         ("volumetric", "volume_ratio,pressure_mpa\n1,0\n0.02,0.1\n", "row 3: the volume ratio 0.02 .* volumetric_strain"),
         ("uniaxial", HEADER + "1.1,0.05\n1.2,0.09\n1.3,130\n1.4,160\n", "row 4: the stress jumps to 130 MPa.*are units mixed"),
@@ -187,11 +183,9 @@ def test_a_compression_test_without_a_minus_is_read_when_told(write_file):
         ("uniaxial", HEADER + "0.9,0.1\n0.8,0.3\n", "say `compression: true` for a compression test written without a minus"),
         ("uniaxial", HEADER + "1.2,0.1\n1.2,0.3\n", "every row has the stretch 1.2; give a curve over a range"),
         ("uniaxial", "true_strain,nominal_stress_mpa\n0,0\n900,1\n", "row 3: the true strain 900 is beyond any elastomer"),
-    ],
-)
-def test_a_curve_that_no_rubber_gives_is_refused(write_file, name, text, sentence):
-    with pytest.raises(InputError, match=sentence):
-        read_curve(write_file(text, f"{name}.csv"))
+    ]:
+        with pytest.raises(InputError, match=sentence):
+            read_curve(write_file(text, f"{name}.csv"))
 
 
 def test_a_mapped_name_that_is_no_quantity_is_refused(write_file):

@@ -86,18 +86,18 @@ def test_the_compliance_is_symmetric_and_positive():
 # --- mechanics ---
 
 
-@pytest.mark.parametrize(("bulk", "shear"), [(4.0, 0.3), (0.66, 0.55), (0.1, 0.5)])
-def test_a_wide_thin_layer_yields_to_even_pressure_as_if_confined(bulk, shear):
+def test_a_wide_thin_layer_yields_to_even_pressure_as_if_confined():
     """Depth = p t / (K + 4 mu / 3), the oedometer modulus: stress over strain where no strain is sideways (Hooke)."""
-    thickness, pressure = 1.0, 1e-3
-    slab = QuarterSlab((24.0, 24.0), [ElasticLayer(thickness, bulk, shear, (0.5, 0.5))], (8, 8), base_held=True)
-    load = np.zeros(slab.unknowns)
-    load[dofs(slab.numbers[-1], 2)] = pressure * np.outer(*(_simpson(line) for line in (slab.y, slab.x))).ravel()
-    free = slab.free((0, 0))
-    moved = np.zeros(slab.unknowns)
-    moved[free] = spsolve(slab.stiffness[free][:, free].tocsc(), load[free])
-    middle = moved[dofs(slab.numbers[-1, :5, :5], 2)]      # 3 mm: the held sides are nine thicknesses away
-    np.testing.assert_allclose(middle, pressure * thickness / (bulk + 4 / 3 * shear), rtol=0.01)
+    for bulk, shear in [(4.0, 0.3), (0.66, 0.55), (0.1, 0.5)]:
+        thickness, pressure = 1.0, 1e-3
+        slab = QuarterSlab((24.0, 24.0), [ElasticLayer(thickness, bulk, shear, (0.5, 0.5))], (8, 8), base_held=True)
+        load = np.zeros(slab.unknowns)
+        load[dofs(slab.numbers[-1], 2)] = pressure * np.outer(*(_simpson(line) for line in (slab.y, slab.x))).ravel()
+        free = slab.free((0, 0))
+        moved = np.zeros(slab.unknowns)
+        moved[free] = spsolve(slab.stiffness[free][:, free].tocsc(), load[free])
+        middle = moved[dofs(slab.numbers[-1, :5, :5], 2)]      # 3 mm: the held sides are nine thicknesses away
+        np.testing.assert_allclose(middle, pressure * thickness / (bulk + 4 / 3 * shear), rtol=0.01)
 
 
 def _simpson(line):

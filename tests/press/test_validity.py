@@ -3,19 +3,14 @@
 import numpy as np
 import pytest
 import trimesh
-from support.sensors import CORO
+from support.bodies import COARSE, SMALL
+from support.laws import LAWS
 
 from softtact.errors import ConvergenceError
-from softtact.materials.laws.registry import make_law
-from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.press.sensor import Sensor
 from softtact.press.validity import valid_elastic, valid_foundation, valid_hyperelastic
 
-SMALL = CORO.model_copy(update={"footprint_mm": (6.0, 8.4), "map_shape": (15, 11)})   # 5 x 7 frusta
-LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492),
-        "cover": make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)}
-COARSE = MeshSettings(cover_heights=(0.0, 1.0), cover_splits=(0,), far_pitches=1, frustum_heights=(0.0, 0.35, 1.0))
 GOOD = {"compression_mm": [0.1, 0.2, 0.3], "contact_error_mm": [0.0, 0.001, 0.001], "points": [9, 40, 80],
         "depth_mm": [0.1, 0.2, 0.3]}
 

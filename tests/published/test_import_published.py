@@ -42,7 +42,7 @@ def test_every_object_has_its_maps_and_readings_with_the_forces_of_its_tests(imp
     archive, outputs = imported
     press = read_dataset(outputs["presses"] / "indenters/echo_h/hyperelastic.nc")
     reading = read_dataset(outputs["tactile"] / "indenters/echo_h.nc")
-    assert dict(press.sizes) == {"force": 10, "y": 57, "x": 33}
+    assert dict(press.sizes) == {"step": 10, "y": 57, "x": 33}
     assert list(np.unique(press.path)) == ["EchoH/test_0", "EchoH/test_1"]
     assert np.array_equal(press.normal_force_n, reading.force_n)
     assert reading.tactile_map.shape == (1, 10, 7, 4)

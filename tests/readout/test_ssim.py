@@ -49,13 +49,13 @@ def test_the_data_range_decides_how_much_a_small_difference_weighs(maps):
     assert wide > 0.99 > 0.9 > narrow
 
 
-@pytest.mark.parametrize(("window", "shape", "sentence"), [
-    (5, (2, 7, 4), "ssim.window is 5; it must fit on the 4 taxels"),
-    (3, (3, 7, 4), "give maps alike"),
-])
-def test_maps_that_cannot_be_compared_are_refused(maps, window, shape, sentence):
-    with pytest.raises(InputError, match=sentence):
-        map_ssim(np.zeros(shape), maps[:2], window=window, data_range=2400)
+def test_maps_that_cannot_be_compared_are_refused(maps):
+    for window, shape, sentence in [
+        (5, (2, 7, 4), "ssim.window is 5; it must fit on the 4 taxels"),
+        (3, (3, 7, 4), "give maps alike"),
+    ]:
+        with pytest.raises(InputError, match=sentence):
+            map_ssim(np.zeros(shape), maps[:2], window=window, data_range=2400)
 
 
 def test_mean_absolute_counts_of_a_hand_made_case():

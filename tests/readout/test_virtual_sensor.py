@@ -191,9 +191,8 @@ def test_a_deeper_press_never_reads_less_but_for_the_zero_of_the_converter(seed,
     assert (branches(maps + size * rng.random(PRESS.shape), **effects).loading >= branches(maps, **effects).loading).all()
 
 
-@pytest.mark.parametrize(
-    ("values", "said"),
-    [
+def test_unusable_settings_are_refused_by_name():
+    for values, said in [
         ({"nose_counts": 1}, "key 'nose_counts' is unknown; use one of electrode_spacing_mm"),
         ({"drift": -0.1}, "drift is -0.1; give one number of 0 or more"),
         ({"rate_n_per_s": 0}, "rate_n_per_s and largest_counts must be above 0"),
@@ -202,12 +201,10 @@ def test_a_deeper_press_never_reads_less_but_for_the_zero_of_the_converter(seed,
         ({"relaxation": 0.1}, "relaxation has 1 terms and relaxation_s 2; give as many"),
         ({"relaxation": [0.6, 0.4]}, "shares of 0 or more that sum to less than 1"),
         ({"relaxation": 0.1, "relaxation_s": 0}, "times above 0 s"),
-    ],
-)
-def test_unusable_settings_are_refused_by_name(values, said):
-    with pytest.raises(InputError) as refusal:
-        VirtualSensorSettings.from_dict(values)
-    assert said in str(refusal.value)
+    ]:
+        with pytest.raises(InputError) as refusal:
+            VirtualSensorSettings.from_dict(values)
+        assert said in str(refusal.value), values
 
 
 def test_settings_that_the_sensor_cannot_have_are_refused():

@@ -28,12 +28,13 @@ def card(*, kind="measured", laws=("ogden2", "mooney_rivlin"), rmse=0.005, warni
     return {"material": "rubber", "kind": kind, "chosen": laws[0], "laws": entries, "warnings": list(warnings)}
 
 
-SHAPES = [{"reading": reading, "law": law, "allowed": reading == "default" and law == "ogden2", "sentence": f"{reading}, {law}."}
-          for reading in ("default", "as_printed") for law in ("mooney_rivlin", "ogden2")]
+SHAPES = [{"orientation": orientation, "law": law, "allowed": orientation == "default" and law == "ogden2",
+           "sentence": f"{orientation}, {law}."}
+          for orientation in ("default", "as_printed") for law in ("mooney_rivlin", "ogden2")]
 
 
 def ftir(rmse, source):
-    return {"rmse_mm2_per_frustum": rmse, "source": source, "readings": SHAPES}
+    return {"rmse_mm2_per_frustum": rmse, "source": source, "orientations": SHAPES}
 
 
 def table(**changes):
@@ -58,7 +59,7 @@ def test_a_measured_curve_decides_the_ftir_claim_and_a_virtual_one_does_not():
     assert verdict(table(ftir=ftir(0.001, "virtual dielectric")), name) == "needs the archive"
 
 
-def test_a_reading_of_the_frustum_holds_if_one_law_grows_as_the_paper_says():
+def test_an_orientation_of_the_frustum_holds_if_one_law_grows_as_the_paper_says():
     assert verdict(table(), "Frusta read as default") == "reproduced"
     assert verdict(table(), "Frusta read as as_printed") == "not reproduced"
 

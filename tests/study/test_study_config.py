@@ -82,9 +82,8 @@ def test_assumed_values_and_their_reasons_reach_the_stages_as_plain_numbers():
     assert load_study(DEFAULT).sensor["cover"] == {"material": "neoprene", "thickness_mm": 1.5}
 
 
-@pytest.mark.parametrize(
-    ("path", "value", "said"),
-    [
+def test_a_mistake_is_named_with_its_remedy():
+    for path, value, said in [
         ("forces_nn", [5], "there is no key 'forces_nn'; did you mean 'forces_n'?"),
         ("data.sorce", "published", "at 'data': there is no key 'sorce'; did you mean 'source'?"),
         ("data", {"source": "published"}, "'unseen' is empty; name indenters of the archive that training must not see"),
@@ -111,10 +110,8 @@ def test_assumed_values_and_their_reasons_reach_the_stages_as_plain_numbers():
         ("ftir.forces_n", [0], "forces_n holds 0 N only; add a force above"),
         ("tested", ["elastic", "viscous"], "there is no model 'viscous'"),
         ("trials", "five", "at 'trials' (it is 'five')"),
-    ],
-)
-def test_a_mistake_is_named_with_its_remedy(path, value, said):
-    assert said in refusal(changed(path, value))
+    ]:
+        assert said in refusal(changed(path, value)), path
 
 
 def test_the_mesh_section_knows_the_keys_of_the_solver():

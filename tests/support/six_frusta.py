@@ -1,15 +1,13 @@
 """A sensor of 3 x 2 frusta on a coarse mesh, for tests of single cells."""
 
 import numpy as np
+from support.bodies import COARSE
+from support.laws import POLYURETHANE as LAW
 from support.sensors import CORO
 
-from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic.build import build_sensor_body
-from softtact.models.hyperelastic.mesh_settings import MeshSettings
 
 SMALL = CORO.model_copy(update={"footprint_mm": (3.6, 2.4), "map_shape": (5, 7)})
-LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492)
-COARSE = MeshSettings(cover_heights=(0.0, 1.0), cover_splits=(0,), far_pitches=1, frustum_heights=(0.0, 0.35, 1.0))
 
 
 def plate(x, y):

@@ -11,7 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from slabs import HeldSlab, flat_punch, graded, mirrored
-from test_presses import COARSE, LAWS, TIGHT, sides_touch, small_spec, sphere, tilted_plate
+from support.bodies import COARSE
+from support.laws import LAWS
+from test_presses import TIGHT, sides_touch, small_spec, sphere, tilted_plate
 
 from softtact.contact.friction import SLIP_TOLERANCE_MM, Coulomb
 from softtact.contact.height_field import HeightField

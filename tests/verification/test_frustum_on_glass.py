@@ -11,17 +11,16 @@ import subprocess
 
 import numpy as np
 import pytest
+from support.laws import POLYURETHANE as LAW
 
 from softtact.contact.penalty import Contact
 from softtact.decks import keywords
 from softtact.decks.laws import law_card
 from softtact.fem.extruded_mesh import grid_mesh_2d
-from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic.frusta import FrustumArray, FrustumGeometry
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 
 TIP, ROOT, HEIGHT = 0.3, 0.6, 0.5        # radii and height in mm
-LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492)
 HARD = Contact(stiffness=2e4, smoothing=1e-5)    # overlaps of 0.0001 mm: as good as none
 PARTS = 16
 DEPTHS = (0.02, 0.05, 0.1, 0.15, 0.2)    # mm

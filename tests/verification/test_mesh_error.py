@@ -6,17 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from support.laws import LAWS
 from support.sensors import CORO
 
-from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.press.sensor import Sensor
 
 ROOT = Path(__file__).parents[2]
 SMALL = CORO.model_copy(update={"footprint_mm": (3.6, 3.6), "map_shape": (13, 13)})      # 3 x 3 frusta, a map as dense as theirs
-LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492),
-        "cover": make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)}
 # No share with the fine mesh: elements split in plan, twice as many layers, two of the cover's bound, edges split five times.
 FINER = MeshSettings(refinement=1, frustum_heights=(0.0, 0.1, 0.3, 0.6, 1.0), cover_heights=(0.0, 0.25, 0.5, 0.75, 1.0),
                      cover_splits=(1, 4))

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 import trimesh
 from naive_sensor import NaiveSensor
+from support.bodies import COARSE
+from support.laws import LAWS
 from support.sensors import CORO
 
 from softtact.contact.height_field import HeightField
 from softtact.geometry.meshes import place
 from softtact.geometry.pose import Pose
-from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic.body import LayeredBody
 from softtact.models.hyperelastic.build import build_sensor_body, build_unit_cell
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
@@ -23,9 +24,6 @@ from softtact.models.hyperelastic.path import press_load_steps
 from softtact.models.hyperelastic.slab import Slab
 from softtact.press.sensor import Sensor
 
-LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492),
-        "cover": make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)}
-COARSE = MeshSettings(cover_heights=(0.0, 1.0), cover_splits=(0,), far_pitches=1, frustum_heights=(0.0, 0.35, 1.0))
 BOUND = MeshSettings(cover_heights=(0.0, 0.5, 1.0), cover_splits=(0,), far_pitches=1, frustum_heights=(0.0, 0.35, 1.0))
 TIGHT = NewtonSettings(relative_tolerance=1e-8)
 

@@ -114,7 +114,7 @@ def _interval(table, **where):
 def _spread(ssim, source):
     """Does the elastic model's score vary more from object to object?"""
     means = ssim[ssim.set == "grasps"].groupby(["model", "item"]).ssim.mean()
-    spread = {model: means[model] for model in ("hyperelastic", "elastic") if model in means.index.get_load_step_values(0)}
+    spread = {model: means[model] for model in ("hyperelastic", "elastic") if model in means.index.get_level_values(0)}
     claim = "The elastic model's SSIM varies more from object to object"
     rule = "at least three objects, and the standard deviations part by more than twice their standard error"
     if len(spread) < 2 or len(spread["elastic"]) < 3:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
+from support.laws import LAWS
 from support.sensors import CORO
 from whole_foundation import WholeFoundation
 
@@ -13,7 +14,6 @@ from softtact.contact.underside import Underside
 from softtact.errors import ConvergenceError, InputError
 from softtact.geometry.meshes import place
 from softtact.geometry.pose import Pose
-from softtact.materials.laws.registry import make_law
 from softtact.models.foundation import solve
 from softtact.models.foundation.compliance import FoundationCompliance, foundation_compliance
 from softtact.models.foundation.dof_maps import Places, Sideways, lattice_places
@@ -27,8 +27,6 @@ from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.press.sensor import Sensor
 
 SMALL = CORO.model_copy(update={"footprint_mm": (7.2, 7.2), "map_shape": (13, 13)})      # 6 x 6 frusta
-LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492),
-        "cover": make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)}
 PUNCH = trimesh.creation.cylinder(radius=1.8, height=3.0, sections=96)
 BOX = trimesh.creation.box((3.1, 2.2, 2.0))
 TILTED = (0.3, -0.4, 0, 4.0, -3.0, 20.0)
@@ -343,33 +341,33 @@ POSES = {"punch": (PUNCH, (0, 0, 0, 0, 0, 0)), "tilted box": (BOX, TILTED),
          "sphere": (trimesh.creation.icosphere(subdivisions=4, radius=6.0), (0.4, 0.1, 0, 0, 0, 0))}
 
 
-@pytest.mark.parametrize("name", POSES)
-@pytest.mark.parametrize("follow", [False, True])
-def test_the_conditions_of_contact_hold_for_object_and_frusta(name, follow, compliance):
-    mesh, values = POSES[name]
-    points = points_of(mesh, compliance, values)
-    for load_step in press_foundation(compliance, points, [0.3, 1.5, 4.0], settings=FoundationSettings(follow=follow)):
-        nodes = load_step.load[:-36]
-        assert nodes.min() >= 0
-        assert nodes.sum() == pytest.approx(load_step.force_n, rel=1e-6)      # weights in single precision
-        assert load_step.penetration <= 3e-5
-        assert load_step.touching.any() and load_step.iterations > 0
+def test_the_conditions_of_contact_hold_for_object_and_frusta(compliance):
+    for name in POSES:
+        for follow in [False, True]:
+            mesh, values = POSES[name]
+            points = points_of(mesh, compliance, values)
+            for load_step in press_foundation(compliance, points, [0.3, 1.5, 4.0], settings=FoundationSettings(follow=follow)):
+                nodes = load_step.load[:-36]
+                assert nodes.min() >= 0
+                assert nodes.sum() == pytest.approx(load_step.force_n, rel=1e-6)      # weights in single precision
+                assert load_step.penetration <= 3e-5
+                assert load_step.touching.any() and load_step.iterations > 0
 
 
-@pytest.mark.parametrize("name", POSES)
-def test_the_frusta_and_the_held_sides_carry_the_objects_force(name, compliance, whole):
+def test_the_frusta_and_the_held_sides_carry_the_objects_force(compliance, whole):
     """The whole slab under the press' loads comes down on the frusta as the press says, and these push back by their law."""
-    mesh, values = POSES[name]
-    points = points_of(mesh, compliance, values)
-    load_step, = press_foundation(compliance, points, [3.0], settings=FoundationSettings(follow=False))
-    forces = whole.forces(points.nodes, load_step.load)
-    moved = whole.displacement(forces)
-    pushed = -load_step.load[-36:]
-    assert_close(load_step.compression, -(whole.descents @ moved), 1e-4)
-    assert_close(pushed, force_of(compliance.law, load_step.compression), 1e-4)
-    assert pushed.min() >= 0
-    assert pushed.sum() + whole.sides_carry(moved, forces) == pytest.approx(3.0, rel=1e-4)
-    assert 0.9 * 3.0 < pushed.sum() < 1.1 * 3.0      # the held sides push or hold down only a little
+    for name in POSES:
+        mesh, values = POSES[name]
+        points = points_of(mesh, compliance, values)
+        load_step, = press_foundation(compliance, points, [3.0], settings=FoundationSettings(follow=False))
+        forces = whole.forces(points.nodes, load_step.load)
+        moved = whole.displacement(forces)
+        pushed = -load_step.load[-36:]
+        assert_close(load_step.compression, -(whole.descents @ moved), 1e-4)
+        assert_close(pushed, force_of(compliance.law, load_step.compression), 1e-4)
+        assert pushed.min() >= 0
+        assert pushed.sum() + whole.sides_carry(moved, forces) == pytest.approx(3.0, rel=1e-4)
+        assert 0.9 * 3.0 < pushed.sum() < 1.1 * 3.0      # the held sides push or hold down only a little
 
 
 def test_rocking_frusta_push_where_the_rims_of_their_tips_meet_the_board(compliance):
@@ -386,26 +384,26 @@ def test_rocking_frusta_push_where_the_rims_of_their_tips_meet_the_board(complia
     assert (short[q == 0] < 1e-5).all()
 
 
-@pytest.mark.parametrize("name", POSES)
-def test_with_all_that_finite_displacement_adds_frusta_and_whole_slab_are_in_balance(name, compliance, whole):
+def test_with_all_that_finite_displacement_adds_frusta_and_whole_slab_are_in_balance(compliance, whole):
     """The whole slab moves under the press' loads; what these should be by the movement, law and formulas is what they are."""
-    mesh, values = POSES[name]
-    points, law = points_of(mesh, compliance, values), compliance.law
-    load_step, = press_foundation(compliance, points, [3.0], settings=FoundationSettings(rocking=False, tolerance=1e-6))
-    moved = whole.displacement(whole.forces(points.nodes, load_step.load, load_step.lateral.ravel()))
-    down, roots = -(whole.descents @ moved), (whole.lateral @ moved).reshape(2, 2, -1).transpose(2, 0, 1)
-    assert_close(load_step.compression, down, 1e-4)
-    # Membrane forces are followed without those of the lateral loads, which are of second order themselves.
-    linear = whole.displacement(whole.forces(points.nodes, load_step.load))
-    q = force_of(law, down)
-    more, growth = law.stiffening(q)
-    by_slope = membrane_loads(down.reshape(6, 6), whole.membrane(linear).reshape(3, 6, 6)).ravel()
-    pushed = q + by_slope + 0.5 * np.einsum("bai,bij,baj->b", roots, growth, roots)
-    assert_close(-load_step.load[-36:], pushed, 2e-3)      # forces turn steep: a frusta's 1e-4 mm are 1e-3 of its force
-    by_movement = -np.einsum("bij,baj->aib", more, roots).reshape(4, -1)
-    by_pressure = np.stack([q * roots[:, 0, 1], q * roots[:, 0, 0], q * roots[:, 1, 1], q * roots[:, 1, 0]])
-    assert_close(load_step.lateral, by_movement + by_pressure, 2e-3)
-    assert np.abs(load_step.lateral).max() > 1e-3
+    for name in POSES:
+        mesh, values = POSES[name]
+        points, law = points_of(mesh, compliance, values), compliance.law
+        load_step, = press_foundation(compliance, points, [3.0], settings=FoundationSettings(rocking=False, tolerance=1e-6))
+        moved = whole.displacement(whole.forces(points.nodes, load_step.load, load_step.lateral.ravel()))
+        down, roots = -(whole.descents @ moved), (whole.lateral @ moved).reshape(2, 2, -1).transpose(2, 0, 1)
+        assert_close(load_step.compression, down, 1e-4)
+        # Membrane forces are followed without those of the lateral loads, which are of second order themselves.
+        linear = whole.displacement(whole.forces(points.nodes, load_step.load))
+        q = force_of(law, down)
+        more, growth = law.stiffening(q)
+        by_slope = membrane_loads(down.reshape(6, 6), whole.membrane(linear).reshape(3, 6, 6)).ravel()
+        pushed = q + by_slope + 0.5 * np.einsum("bai,bij,baj->b", roots, growth, roots)
+        assert_close(-load_step.load[-36:], pushed, 2e-3)      # forces turn steep: a frusta's 1e-4 mm are 1e-3 of its force
+        by_movement = -np.einsum("bij,baj->aib", more, roots).reshape(4, -1)
+        by_pressure = np.stack([q * roots[:, 0, 1], q * roots[:, 0, 0], q * roots[:, 1, 1], q * roots[:, 1, 0]])
+        assert_close(load_step.lateral, by_movement + by_pressure, 2e-3)
+        assert np.abs(load_step.lateral).max() > 1e-3
 
 
 def test_a_force_that_is_not_reached_at_once_is_reached_by_way_of_smaller_ones(compliance):
@@ -493,21 +491,21 @@ def test_what_follows_the_deformation_vanishes_with_the_force(compliance):
     assert 1e-4 < shares[1] < 0.1
 
 
-@pytest.mark.parametrize("name", ["punch", "sphere"])
-def test_a_centred_object_of_two_symmetries_gives_a_map_that_has_them(name, compliance):
-    points = points_of(POSES[name][0], compliance)
-    map_, = FoundationMaps(compliance, points)(list(press_foundation(compliance, points, [1.0])))
-    for mirrored in (map_[::-1], map_[:, ::-1]):
-        assert_close(map_, mirrored, 1e-3)
+def test_a_centred_object_of_two_symmetries_gives_a_map_that_has_them(compliance):
+    for name in ["punch", "sphere"]:
+        points = points_of(POSES[name][0], compliance)
+        map_, = FoundationMaps(compliance, points)(list(press_foundation(compliance, points, [1.0])))
+        for mirrored in (map_[::-1], map_[:, ::-1]):
+            assert_close(map_, mirrored, 1e-3)
 
 
-@pytest.mark.parametrize("name", ["punch", "sphere"])
-def test_without_patches_a_centred_object_of_two_symmetries_gives_a_map_that_has_them(name, compliance):
-    points = points_of(POSES[name][0], compliance)
-    load_steps = list(press_foundation(compliance, points, [1.0], settings=FoundationSettings(patches=False)))
-    map_, = FoundationMaps(compliance, points)(load_steps)
-    for mirrored in (map_[::-1], map_[:, ::-1]):
-        assert_close(map_, mirrored, 1e-3)
+def test_without_patches_a_centred_object_of_two_symmetries_gives_a_map_that_has_them(compliance):
+    for name in ["punch", "sphere"]:
+        points = points_of(POSES[name][0], compliance)
+        load_steps = list(press_foundation(compliance, points, [1.0], settings=FoundationSettings(patches=False)))
+        map_, = FoundationMaps(compliance, points)(load_steps)
+        for mirrored in (map_[::-1], map_[:, ::-1]):
+            assert_close(map_, mirrored, 1e-3)
 
 
 def test_at_a_small_force_the_foundation_gives_the_hyperelastic_models_map(compliance):

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 import trimesh
+from support.laws import LAWS
 from support.sensors import CORO
 
 from softtact.contact.height_field import HeightField
 from softtact.contact.underside import Underside
-from softtact.materials.laws.registry import make_law
 from softtact.models.elastic.compliance import map_cells
 from softtact.models.foundation.compliance import foundation_compliance
 from softtact.models.foundation.frustum_spring import frustum_law
@@ -15,8 +15,6 @@ from softtact.models.foundation.partial_contact import SoftEdges, beyond, own_co
 from softtact.models.foundation.solve import FoundationMaps, FoundationSettings, press_foundation
 
 SMALL = CORO.model_copy(update={"footprint_mm": (7.2, 7.2), "map_shape": (13, 13)})      # 6 x 6 frusta, nodes 0.3 mm apart
-LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492),
-        "cover": make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)}
 LINEAR = FoundationSettings(follow=False, rocking=False)
 FINER = 3      # an odd number: nodes of the coarse grid are corners on it where they are corners
 
@@ -43,16 +41,16 @@ def map_of(compliances, times, width):
     return FoundationMaps(compliances[times], points)([load_step])[0][::times, ::times]
 
 
-@pytest.mark.parametrize("share", [0.0, 0.2, 0.4, 0.6, 0.8])
-def test_an_edge_is_felt_where_it_is_wherever_it_lies_between_two_nodes(share, compliances):
+def test_an_edge_is_felt_where_it_is_wherever_it_lies_between_two_nodes(compliances):
     """Against a grid three times as fine. Without soft edges a map is off by up to 2.4 %, and an edge by half a step, 0.16 mm."""
-    width = 2 * (4 + share) * 0.3
-    fine = map_of(compliances, FINER, width)
-    by_width = (map_of(compliances, FINER, width + 0.1) - map_of(compliances, FINER, width - 0.1)) / 0.2
-    difference = map_of(compliances, 1, width) - fine
-    edge = (difference * by_width).sum() / (by_width**2).sum() / 2
-    assert np.sqrt((difference**2).mean()) < 0.007 * fine.max()
-    assert abs(edge) < 0.05
+    for share in [0.0, 0.2, 0.4, 0.6, 0.8]:
+        width = 2 * (4 + share) * 0.3
+        fine = map_of(compliances, FINER, width)
+        by_width = (map_of(compliances, FINER, width + 0.1) - map_of(compliances, FINER, width - 0.1)) / 0.2
+        difference = map_of(compliances, 1, width) - fine
+        edge = (difference * by_width).sum() / (by_width**2).sum() / 2
+        assert np.sqrt((difference**2).mean()) < 0.007 * fine.max()
+        assert abs(edge) < 0.05
 
 
 def test_a_wider_bar_sinks_in_less_by_whichever_part_of_a_step_it_is_wider(compliances):

@@ -4,18 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.laws import POLYURETHANE as LAW
 from support.sensors import CORO
 
 from softtact.contact.height_field import HeightField
 from softtact.errors import ConvergenceError
-from softtact.materials.laws.registry import make_law
 from softtact.models.ftir.specimen import Specimen, cell_family, press_specimen, scattered_specimen
 from softtact.models.ftir.unit_cell import GLASS_MESH, SETTINGS, contact_area, plate_over, press_cell_on_glass
 from softtact.models.hyperelastic.build import build_patch, build_unit_cell
 from softtact.models.hyperelastic.frusta import SHEET
 from softtact.models.hyperelastic.path import press_load_steps
 
-LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492)
 COARSE = replace(GLASS_MESH, frustum_heights=(0.0, 0.1, 0.2, 0.35, 1.0), frustum_rings=1)
 TIP_MM2 = np.pi * 0.3**2
 

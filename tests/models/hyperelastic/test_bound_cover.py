@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 from scipy.spatial import cKDTree
+from support.laws import POLYURETHANE as LAW
 from support.sensors import CORO
 
 from softtact.contact.height_field import HeightField
@@ -20,7 +21,6 @@ from softtact.models.newton import Solution
 from softtact.press.sensor import Sensor
 
 SMALL = CORO.model_copy(update={"footprint_mm": (6.0, 6.0), "map_shape": (11, 11)})     # 5 x 5 frusta
-LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492)
 THREE = (0.0, 0.45, 0.8, 1.0)
 LAYERS = {"cover_heights": (0.0, 0.4, 1.0), "far_pitches": 1, "frustum_heights": (0.0, 0.35, 1.0)}
 BOUND, TIED = MeshSettings(cover_splits=(1,), **LAYERS), MeshSettings(cover_splits=(1, 1), **LAYERS)
@@ -114,21 +114,21 @@ def test_parts_of_body_and_deck_are_those_of_the_layers():
     assert np.count_nonzero(interface < 0) == 5 * 25      # middles of the five bricks' faces in each cell
 
 
-@pytest.mark.parametrize(("splits", "bound"), [((1, 1, 2), 0), ((1, 4), 1), ((1,), 2)])
-def test_layers_without_a_number_of_splits_are_bound(splits, bound):
-    assert MeshSettings(cover_heights=THREE, cover_splits=splits).bound_layers == bound
+def test_layers_without_a_number_of_splits_are_bound():
+    for splits, bound in [((1, 1, 2), 0), ((1, 4), 1), ((1,), 2)]:
+        assert MeshSettings(cover_heights=THREE, cover_splits=splits).bound_layers == bound
 
 
-@pytest.mark.parametrize("splits", [(), (1, 1, 1, 2)])
-def test_splits_for_no_layer_or_too_many_are_refused(splits):
-    with pytest.raises(ValueError, match="cover_splits has . entries for the 3 layers"):
-        MeshSettings(cover_heights=THREE, cover_splits=splits)
+def test_splits_for_no_layer_or_too_many_are_refused():
+    for splits in [(), (1, 1, 1, 2)]:
+        with pytest.raises(ValueError, match="cover_splits has . entries for the 3 layers"):
+            MeshSettings(cover_heights=THREE, cover_splits=splits)
 
 
-@pytest.mark.parametrize("splits", [(2, 1, 2), (3,)])
-def test_a_lowest_layer_that_would_hang_freely_is_refused(splits):
-    with pytest.raises(InputError, match=f"mesh: cover_splits begins with {splits[0]}; give 0 or 1"):
-        mesh_settings({"cover_heights": list(THREE), "cover_splits": list(splits)})
+def test_a_lowest_layer_that_would_hang_freely_is_refused():
+    for splits in [(2, 1, 2), (3,)]:
+        with pytest.raises(InputError, match=f"mesh: cover_splits begins with {splits[0]}; give 0 or 1"):
+            mesh_settings({"cover_heights": list(THREE), "cover_splits": list(splits)})
 
 
 class Overlapping:

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 from scipy.spatial import cKDTree
-from test_newton import COARSE, LAWS, SMALL, small_body
+from support.bodies import COARSE, SMALL, small_body
+from support.laws import LAWS
 
 from softtact.errors import InputError
 from softtact.models.hyperelastic.deformed_mesh import pressed_body

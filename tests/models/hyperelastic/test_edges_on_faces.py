@@ -3,15 +3,13 @@
 import numpy as np
 import pytest
 import trimesh
+from support.laws import LAWS
 from support.sensors import CORO
 
-from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.press.sensor import Sensor
 
 SMALL = CORO.model_copy(update={"footprint_mm": (4.8, 4.8), "map_shape": (17, 17)})      # 4 x 4 frusta
-LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492),
-        "cover": make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)}
 LAYERS = {"cover_heights": (0.0, 0.45, 0.8, 1.0), "frustum_heights": (0.0, 0.35, 1.0)}
 COARSE = MeshSettings(cover_splits=(1, 1, 2), **LAYERS)      # elements of 0.3 mm at the edge
 FINE = MeshSettings(cover_splits=(1, 1, 4), **LAYERS)        # of 0.075 mm

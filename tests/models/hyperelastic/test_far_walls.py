@@ -2,7 +2,8 @@
 
 import numpy as np
 import trimesh
-from test_newton import LAWS, SMALL
+from support.bodies import SMALL
+from support.laws import LAWS
 
 from softtact.contact.height_field import HeightField
 from softtact.geometry.meshes import place

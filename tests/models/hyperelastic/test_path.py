@@ -5,21 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
+from support.bodies import COARSE
+from support.laws import LAWS
 from support.sensors import CORO
 
 from softtact.contact.motion import Motion
 from softtact.errors import InputError
-from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic.build import build_sensor_body
-from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.models.hyperelastic.path import press_load_steps, press_motion
 from softtact.press.sensor import Sensor
 
 SMALL = CORO.model_copy(update={"footprint_mm": (4.8, 4.8), "map_shape": (9, 9)})     # 4 x 4 frusta
-LAWS = {"dielectric": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=20 * 0.3492),
-        "cover": make_law("mooney_rivlin", {"c10": 0.1786, "c01": 0.0022}, bulk_modulus=20 * 0.3616)}
-COARSE = MeshSettings(cover_heights=(0.0, 1.0), cover_splits=(0,), far_pitches=1, frustum_heights=(0.0, 0.35, 1.0))
 TIGHT = NewtonSettings(relative_tolerance=1e-6, largest_penetration_mm=1e-4)
 MU = 0.3
 

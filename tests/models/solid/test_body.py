@@ -51,41 +51,41 @@ def shaken(points, size=0.1):
     return size * np.random.default_rng(1).normal(size=points.shape)
 
 
-@pytest.mark.parametrize("name", LAWS)
-def test_energy_of_tetrahedra_is_the_formulas(name):
-    points, tets = block()
-    energy, _ = LinearTetrahedra(points, tets, LAWS[name]).add_force(shaken(points), np.zeros_like(points))
-    assert energy == pytest.approx(naive(points, tets, LAWS[name], shaken(points)), rel=1e-12)
+def test_energy_of_tetrahedra_is_the_formulas():
+    for name in LAWS:
+        points, tets = block()
+        energy, _ = LinearTetrahedra(points, tets, LAWS[name]).add_force(shaken(points), np.zeros_like(points))
+        assert energy == pytest.approx(naive(points, tets, LAWS[name], shaken(points)), rel=1e-12)
 
 
-@pytest.mark.parametrize("name", LAWS)
-def test_forces_of_tetrahedra_are_differences_of_the_naive_energy(name):
-    points, tets = block((1, 1, 2))
-    force, u = np.zeros_like(points), shaken(points)
-    LinearTetrahedra(points, tets, LAWS[name]).add_force(u, force)
-    for node, axis in ((0, 0), (5, 1), (7, 2), (11, 0)):
-        move = np.zeros_like(points)
-        move[node, axis] = 1e-5
-        slope = (naive(points, tets, LAWS[name], u + move) - naive(points, tets, LAWS[name], u - move)) / 2e-5
-        assert force[node, axis] == pytest.approx(slope, abs=1e-8)   # central difference: rounding 1e-11, curvature 1e-10
+def test_forces_of_tetrahedra_are_differences_of_the_naive_energy():
+    for name in LAWS:
+        points, tets = block((1, 1, 2))
+        force, u = np.zeros_like(points), shaken(points)
+        LinearTetrahedra(points, tets, LAWS[name]).add_force(u, force)
+        for node, axis in ((0, 0), (5, 1), (7, 2), (11, 0)):
+            move = np.zeros_like(points)
+            move[node, axis] = 1e-5
+            slope = (naive(points, tets, LAWS[name], u + move) - naive(points, tets, LAWS[name], u - move)) / 2e-5
+            assert force[node, axis] == pytest.approx(slope, abs=1e-8)   # central difference: rounding 1e-11, curvature 1e-10
 
 
-@pytest.mark.parametrize("name", LAWS)
-@pytest.mark.parametrize("threads", [1, 2])
-def test_tetrahedra_agree_with_solid_blocks_of_one_point(name, threads):
-    points, tets = block()
-    fast = LinearTetrahedra(points, tets, LAWS[name], threads=threads)
-    gradients = np.concatenate([-fast.gradients.sum(axis=1, keepdims=True), fast.gradients], axis=1)
-    slow = SolidElements(tets, SolidBlock(gradients[:, None], fast.volumes[:, None], np.zeros((1, 0)), LAWS[name]))
-    held = np.zeros(points.shape, dtype=bool)
-    held[:7], held[9, 1] = True, True
-    bodies = [FreeBody(points, [part], held=held) for part in (fast, slow)]
-    states = [body.evaluate(shaken(points), 0.0) for body in bodies]
-    assert np.allclose(states[0].force, states[1].force, atol=1e-13)
-    for body, state in zip(bodies, states, strict=True):
-        body.factor(state)
-    matrices = [body._matrix.data for body in bodies]
-    assert np.abs(matrices[0] - matrices[1]).max() <= 1e-12 * np.abs(matrices[1]).max()
+def test_tetrahedra_agree_with_solid_blocks_of_one_point():
+    for name in LAWS:
+        for threads in [1, 2]:
+            points, tets = block()
+            fast = LinearTetrahedra(points, tets, LAWS[name], threads=threads)
+            gradients = np.concatenate([-fast.gradients.sum(axis=1, keepdims=True), fast.gradients], axis=1)
+            slow = SolidElements(tets, SolidBlock(gradients[:, None], fast.volumes[:, None], np.zeros((1, 0)), LAWS[name]))
+            held = np.zeros(points.shape, dtype=bool)
+            held[:7], held[9, 1] = True, True
+            bodies = [FreeBody(points, [part], held=held) for part in (fast, slow)]
+            states = [body.evaluate(shaken(points), 0.0) for body in bodies]
+            assert np.allclose(states[0].force, states[1].force, atol=1e-13)
+            for body, state in zip(bodies, states, strict=True):
+                body.factor(state)
+            matrices = [body._matrix.data for body in bodies]
+            assert np.abs(matrices[0] - matrices[1]).max() <= 1e-12 * np.abs(matrices[1]).max()
 
 
 def test_a_tangent_is_the_difference_of_the_forces():
@@ -116,18 +116,18 @@ def test_tetrahedra_turned_inside_out_are_refused_and_noticed():
     assert LinearTetrahedra(points, tets, LAWS["yeoh"]).add_force(-2.0 * points, np.zeros_like(points)) is None
 
 
-@pytest.mark.parametrize("stretch", [0.375, 0.6, 1.0, 1.7, 2.66])
-def test_tetrahedra_know_volumes_from_a_nineteenth_to_the_nineteenfold(stretch):
-    points, tets = block()
-    energy, _ = LinearTetrahedra(points, tets, LAWS["yeoh"]).add_force((stretch - 1) * points, np.zeros_like(points))
-    # The energy of a change of volume; the rounding of F's other invariants is 1e-15 of K V.
-    assert energy == pytest.approx(18 * 0.5 * 7.0 * (stretch**3 - 1) ** 2, rel=1e-12, abs=1e-12)
+def test_tetrahedra_know_volumes_from_a_nineteenth_to_the_nineteenfold():
+    for stretch in [0.375, 0.6, 1.0, 1.7, 2.66]:
+        points, tets = block()
+        energy, _ = LinearTetrahedra(points, tets, LAWS["yeoh"]).add_force((stretch - 1) * points, np.zeros_like(points))
+        # The energy of a change of volume; the rounding of F's other invariants is 1e-15 of K V.
+        assert energy == pytest.approx(18 * 0.5 * 7.0 * (stretch**3 - 1) ** 2, rel=1e-12, abs=1e-12)
 
 
-@pytest.mark.parametrize("stretch", [0.36, 2.7])
-def test_tetrahedra_beyond_that_count_as_inside_out(stretch):
-    points, tets = block()
-    assert LinearTetrahedra(points, tets, LAWS["yeoh"]).add_force((stretch - 1) * points, np.zeros_like(points)) is None
+def test_tetrahedra_beyond_that_count_as_inside_out():
+    for stretch in [0.36, 2.7]:
+        points, tets = block()
+        assert LinearTetrahedra(points, tets, LAWS["yeoh"]).add_force((stretch - 1) * points, np.zeros_like(points)) is None
 
 
 def pressed_block(*, law="mooney_rivlin", glued=False, board=False, **options):
@@ -201,9 +201,9 @@ def test_earlier_steps_are_weighed_as_by_singular_values():
     assert _least_squares(rows, target) == pytest.approx(expected, rel=1e-9)      # normal equations, condition 10: 1e-15 times 100
 
 
-@pytest.mark.parametrize("third", [0.0, 1.0])
-def test_a_step_without_change_or_made_twice_leaves_the_weighed_sum_as_it_is(third):
-    rng = np.random.default_rng(4)
-    rows, target = rng.normal(size=(2, 30)), rng.normal(size=30)
-    more = np.vstack([rows, third * rows[0]])
-    assert _least_squares(more, target) @ more == pytest.approx(_least_squares(rows, target) @ rows, abs=1e-12)
+def test_a_step_without_change_or_made_twice_leaves_the_weighed_sum_as_it_is():
+    for third in [0.0, 1.0]:
+        rng = np.random.default_rng(4)
+        rows, target = rng.normal(size=(2, 30)), rng.normal(size=30)
+        more = np.vstack([rows, third * rows[0]])
+        assert _least_squares(more, target) @ more == pytest.approx(_least_squares(rows, target) @ rows, abs=1e-12)
