@@ -96,13 +96,9 @@ class Sensor:
         """
         if model not in MODELS:
             raise InputError(f"Model {model!r} is unknown; use one of {', '.join(MODELS)}.")
-        if (force_n is None) == (motion is None):
-            raise InputError("A press takes either force_n or motion; give one of them.")
-        if motion is not None and motion.forces_n:
-            force_n, motion = motion.forces_n, None
-        if motion is not None:
+        if motion is not None and force_n is None and not motion.forces_n:
             return self._press_motion(mesh, pose, motion, model, label=label, threads=threads or cores(), keep_body=keep_body)
-        forces = self.checked_forces(force_n)
+        forces = self.checked_forces(_given(force_n, motion))
         placed = place(mesh, pose=pose)
         check_over_sensor(placed, self.spec.footprint_mm)
         threads = threads or cores()
@@ -116,7 +112,8 @@ class Sensor:
             error.result = error.result and flag_buried(error.result, placed.bounds[1, 2])
             raise
 
-    def _press_motion(self, mesh, pose, motion, model, *, label, threads, keep_body):
+    def _press_motion(self, mesh: trimesh.Trimesh, pose: Pose | None, motion: Motion, model: str, *, label: str, threads: int,
+                      keep_body: bool) -> PressResult:
         """A press that does more than go straight down by growing forces."""
         press = MOTIONS.get("hyperelastic" if model == "auto" else model)
         if press is None:
@@ -186,6 +183,14 @@ class Sensor:
         if (np.diff(forces) <= 0).any():
             raise InputError("The forces must increase; sort them and leave out doubles.")
         return forces
+
+
+def _given(force_n: float | Sequence[float] | None, motion: Motion | None) -> float | Sequence[float]:
+    """The forces (N) of a press, be they a motion's."""
+    given = motion.forces_n if motion is not None and force_n is None else force_n
+    if given is None or (motion is not None and force_n is not None):
+        raise InputError("A press takes either force_n or motion; give one of them.")
+    return given
 
 
 def cores() -> int:
