@@ -81,7 +81,7 @@ def test_a_point_is_the_softer_the_less_of_it_is_covered_and_free_where_nothing_
     assert (contact_compliance[0][plain] == 0).all()
 
 
-def test_a_nodes_compliance_among_held_ones_is_less_than_alone_and_larger_at_elements_corners(compliances):
+def test_a_nodes_compliance_among_fixed_ones_is_less_than_alone_and_larger_at_elements_corners(compliances):
     compliance = compliances[1]
     grid = compliance.grid
     alone = []
