@@ -112,7 +112,7 @@ def test_an_unknown_name_is_refused_in_one_sentence_with_the_known_ones(tmp_path
         assert str(caught.value).startswith(said), find
 
 
-def test_the_costs_of_the_shipped_studies_are_told_in_any_folder(tmp_path, monkeypatch, capsys):
+def test_the_costs_of_the_shipped_studies_are_printed_in_any_folder(tmp_path, monkeypatch, capsys):
     from softtact.cli import main
 
     told = []

@@ -63,7 +63,7 @@ def test_the_law_holds_at_every_point():
     assert not found.slip[found.sticks].any()
 
 
-def test_without_friction_nothing_is_dragged():
+def test_without_friction_nothing_moves_sideways():
     matrix, fast = compliance(0.3)
     found = solve_increment(fast, increment(0.0, 2e-2, depth=DEPTH), settings=SETTINGS)
     assert not found.tangential.any() and not found.sticks.any()
@@ -88,7 +88,7 @@ def test_an_object_above_the_surface_carries_nothing():
     assert not found.normal.any() and not found.tangential.any()
 
 
-def test_what_does_not_settle_is_told_with_a_remedy():
+def test_an_iteration_that_does_not_converge_is_refused_with_a_remedy():
     _, fast = compliance(0.0)
     with pytest.raises(ConvergenceError, match="did not settle pressure and friction in 2 turns; move the object in more steps"):
         solve_increment(fast, increment(2.0, 2e-2, depth=DEPTH), settings=CoulombSettings(tolerance_mm=1e-12, max_turns=2))

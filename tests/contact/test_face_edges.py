@@ -58,7 +58,7 @@ def test_a_points_spring_gives_way_by_its_softness_times_the_pressure():
     assert np.allclose(contact.own_gaps(gap), gap + [0.0, 0.01 * pressure[1]]) and pressure[1] < pressure[0] / 20
 
 
-def test_what_a_spring_gives_way_is_not_pressed_apart():
+def test_the_compression_of_a_spring_is_not_augmented():
     contact, gap = Contact(contact_compliance=np.array([0.01])), np.array([-4e-3])
     _, pressure, _ = contact.response(gap)
     held, there = contact.augmented(gap), -0.01 * pressure     # the surface where the spring alone gives way

@@ -37,7 +37,7 @@ def test_the_places_of_a_motion_are_no_farther_apart_than_asked():
     np.testing.assert_allclose(places[-1], [1.0, -0.4])
 
 
-def test_what_is_no_motion_is_refused_in_one_sentence():
+def test_steps_that_are_no_motion_are_refused_in_one_sentence():
     for make, sentence in [
         (lambda: Motion().press(), "either force_n or depth_mm"),
         (lambda: Motion().press(force_n=-5), "force_n=-5 does not press"),

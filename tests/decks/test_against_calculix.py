@@ -122,7 +122,7 @@ def test_a_small_sensor_gives_way_as_in_calculix(solve):
 
 
 @pytest.mark.slow
-def test_a_rough_sphere_on_frusta_that_may_slide_needs_nearly_the_force_of_calculix(solve):
+def test_a_sphere_with_friction_on_frusta_that_may_slide_needs_nearly_the_force_of_calculix(solve):
     """The same sensor with friction of 0.3 on both sides; +1.8 and +1.3 % measured.
 
     At these indentations a press without friction takes 4 and 6 % less.

@@ -120,7 +120,7 @@ def test_constraints_come_back_and_carry_a_quadratic_field(pair):
 
 
 @one_dialect
-def test_a_node_that_follows_others_is_no_master_and_is_not_held(pair):
+def test_a_hanging_node_is_no_master_and_is_not_fixed(pair):
     """Both programs eliminate it, and refuse chains and further conditions on it."""
     model, deck = pair
     slaves = {tie.slave + 1 for tie in model.ties}
@@ -205,7 +205,7 @@ def test_a_deck_has_the_friction_of_the_sensor_and_none_without(pair, dialect, t
     assert len(deck.contacts) == 3                                # neighbouring frusta glide on each other
 
 
-def test_the_objects_facets_look_at_the_rubber(pair, dialect):
+def test_the_normals_of_the_objects_facets_point_to_the_rubber(pair, dialect):
     model, deck = pair
     body, = (rigid for rigid in model.rigid if rigid.name == "OBJECT")
     (kind, elements), = deck.elements["OBJECT"].items()
@@ -230,7 +230,7 @@ def test_our_faces_are_those_of_abaqus():
 
 
 @one_dialect
-def test_a_unit_cell_has_walls_for_the_neighbours_it_lacks(tmp_path, dialect):
+def test_a_unit_cell_has_planes_of_contact_for_the_neighbours_it_lacks(tmp_path, dialect):
     body = build_unit_cell(CORO, dielectric_law=POLYURETHANE)
     model = deck_model(body, place(trimesh.creation.box((5.0, 5.0, 1.0))), indentations_mm=[0.02, 0.05])
     write_deck(tmp_path / "cell.inp", model, dialect=dialect)
@@ -247,7 +247,7 @@ def test_a_unit_cell_has_walls_for_the_neighbours_it_lacks(tmp_path, dialect):
 
 
 @one_dialect
-def test_a_refined_cell_has_its_finer_sides_and_no_coarse_walls(dialect):
+def test_a_refined_cell_has_finer_sides_and_no_constrained_edges(dialect):
     body = build_unit_cell(CORO, dielectric_law=POLYURETHANE, mesh=MeshSettings(refinement=1))
     model = deck_model(body, place(trimesh.creation.box((5.0, 5.0, 1.0))), indentations_mm=[0.02])
     sides = np.vstack(face_corners(model, "FRUSTA_SIDES")) - [0, 0, 1.5]      # no cover: 1.5 mm higher than in a sensor

@@ -38,7 +38,7 @@ def test_a_straight_line_departs_from_none():
     assert found(line)["largest_rate"] == pytest.approx(1)
 
 
-def test_what_breaks_the_rule_is_said():
+def test_a_curve_that_breaks_the_rule_is_refused_with_the_reason():
     for area, said in [
         (np.full(5, 0.3), "changes by 0.000 mm2, less than 0.04 mm2"),
         (np.linspace(0.3, 0.3 + 0.9 * LEAST_GROWTH_MM2, 5), "(five times the paper's RMSE)"),

@@ -36,7 +36,7 @@ def test_a_press_counts_with_its_worst_load_step_and_the_time_of_all(table):
     assert (cup.elastic_time_s, cup.hyperelastic_time_s) == (0.2, 200.0)
 
 
-def test_an_error_that_is_the_same_everywhere_is_told_exactly(table):
+def test_an_error_that_is_the_same_everywhere_is_found_exactly(table):
     assert told_over_true(table, "foundation")["median"] == pytest.approx(1.0, rel=1e-6)
 
 

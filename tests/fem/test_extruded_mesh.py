@@ -36,7 +36,7 @@ def test_a_frustum_has_the_volume_of_a_truncated_cone():
     assert volume(mesh) == pytest.approx(np.pi * 0.5 / 3 * (0.3**2 + 0.3 * 0.6 + 0.6**2), rel=1e-10)
 
 
-def test_the_sheets_plan_fills_its_footprint_and_holds_every_frustums_root():
+def test_the_sheets_2d_mesh_fills_its_footprint_and_holds_every_frustums_root():
     for diameter in [1.2, 0.9]:
         for refinement in [0, 1]:
             centres, _ = lattice((3, 2), 1.2)

@@ -61,7 +61,7 @@ def test_tangents_in_single_precision_are_those_in_double_precision_to_seven_dig
         assert np.abs(rough - exact).max() < 2e-6 * np.abs(exact).max()      # sums of 81 products of seven digits
 
 
-def test_elements_that_hang_on_other_nodes_feel_the_displacement_that_these_give_them():
+def test_elements_with_hanging_nodes_take_the_displacement_of_their_masters():
     """Up to three masters a node, some twice in an element, some without weight."""
     rng, points = np.random.default_rng(4), 0.5 * HEX27.nodes + np.zeros((4, 1, 1))
     masters, weights = rng.integers(0, 40, size=(60, 3)), rng.normal(size=(60, 3)) * rng.integers(0, 2, size=(60, 3))

@@ -153,7 +153,7 @@ REFUSED = [(third_wall, "1 edges with more than two facets"), (large_curved_hole
            (flat, "degenerate")]
 
 
-def test_what_would_have_to_be_guessed_is_refused(tmp_path):
+def test_a_mesh_whose_repair_would_be_a_guess_is_refused(tmp_path):
     for spoil, said in REFUSED:
         spoil(punch()).export(tmp_path / "bad.stl")
         with pytest.raises(InputError, match=said):
@@ -203,7 +203,7 @@ def test_a_mesh_of_a_million_facets_is_read_in_its_own_size(tmp_path):
 
 
 @pytest.mark.skipif(not DATA, reason="SOFTTACT_TEST_DATA is not set")
-def test_published_dirty_meshes_are_mended():
+def test_published_faulty_meshes_are_repaired():
     for file, said in [
         ("taccel_train.stl", ["closed 2 holes, 161 mm2", "united 13 bodies that overlap or touch into 1"]),
         ("taccel_flashlight.stl", ["closed 1 hole, 89.3 mm2", "united 2 bodies that overlap or touch into 1"]),

@@ -227,7 +227,7 @@ def test_published_meshes_are_read():
 
 
 @needs_data
-def test_published_dirty_meshes_are_refused():
+def test_published_faulty_meshes_are_refused_without_repair():
     for file, phrase in [("taccel_train.stl", "64 boundary edges"),
                          ("taccel_flashlight.stl", "10 boundary edges"),
                          ("tactilegym_green_cup_collision.obj", "overlap or touch")]:

@@ -123,7 +123,7 @@ def test_the_blotches_of_a_compressed_empty_frame_are_no_discs():
             assert detect_discs(iio.imread(packed, extension=".jpg"), pixel_mm=1.0).empty, noise
 
 
-def test_a_lamp_s_reflection_is_no_disc():
+def test_a_lamps_reflection_is_no_disc():
     for noise in [0.0, 0.02]:
         r, c = np.mgrid[0:200, 0:260]
         light = 0.1 + 0.7 * np.exp(-((r - 80) ** 2 + (c - 100) ** 2) / (2 * 40**2))
@@ -210,7 +210,7 @@ def test_smaller_discs_are_left_out_on_demand():
     assert detect_discs(picture, pixel_mm=0.03, smallest_mm=0.5).area_mm2.tolist() == [pytest.approx(0.4, rel=0.01)]
 
 
-def test_a_frame_s_depth_and_channels_do_not_matter():
+def test_a_frames_depth_and_channels_do_not_matter():
     for change in [
         lambda f: f.astype(np.uint16) * 16,                       # 12 bits in 16
         lambda f: f.astype(np.uint16) * 257,
@@ -225,7 +225,7 @@ def test_a_frame_s_depth_and_channels_do_not_matter():
         assert other.area_mm2.to_numpy() == pytest.approx(plain.area_mm2.to_numpy(), rel=0.003), change
 
 
-def test_what_is_no_picture_is_refused():
+def test_an_array_that_is_no_picture_is_refused():
     for picture, said in ((np.zeros(9), r"shape \(9,\) is no picture"), (np.zeros((3, 100)), r"shape \(3, 100\) is no picture"),
                           (np.full((50, 50), np.nan), "values that are not numbers")):
         with pytest.raises(InputError, match=said):

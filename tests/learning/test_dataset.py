@@ -164,7 +164,7 @@ def mix_sources(study):
     (leave_nothing, "no load step is left for unseen"),
     (mix_sources, "published archive and virtual sensor; do not mix"),
 ])
-def test_what_cannot_be_used_is_refused_in_one_sentence(study, fault, sentence):
+def test_presses_and_readings_that_cannot_be_used_are_refused_in_one_sentence(study, fault, sentence):
     fault(study)
     with pytest.raises(InputError, match=sentence):
         build(study)

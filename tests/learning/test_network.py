@@ -182,7 +182,7 @@ def test_a_missing_file_is_refused_with_the_remedy(tmp_path):
         load_network(tmp_path / "model.pt")
 
 
-def test_equal_maps_are_read_once_and_told_each_time(tiny, monkeypatch):
+def test_equal_maps_are_predicted_once_and_returned_each_time(tiny, monkeypatch):
     maps = np.random.default_rng(3).uniform(0, 0.3, (3, 57, 33))
     expected, seen, forward = predict(tiny, maps), [], type(tiny).forward
     monkeypatch.setattr(type(tiny), "forward", lambda self, part: seen.append(len(part)) or forward(self, part))

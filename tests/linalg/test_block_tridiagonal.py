@@ -54,7 +54,7 @@ def test_the_inverse_among_some_unknowns_is_that_part_of_the_dense_inverse(besid
     np.testing.assert_allclose(inverse_among(upper_of(matrix), kept), dense[np.ix_(kept, kept)], atol=1e-13)
 
 
-def test_a_matrix_that_is_not_positive_definite_is_told_and_the_next_one_factored():
+def test_a_matrix_that_is_not_positive_definite_is_reported_and_the_next_one_factored():
     matrix, solver = slab(), BlockTridiagonalSolver()
     indefinite = matrix - 3.0 * sp.eye(matrix.shape[0])
     assert inverse_among(upper_of(indefinite), np.array([0])) is None

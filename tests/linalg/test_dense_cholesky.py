@@ -50,7 +50,7 @@ def test_as_many_threads_give_the_same_to_the_last_digit():
     np.testing.assert_array_equal(np.triu(found[0]), np.triu(found[2]))
 
 
-def test_a_matrix_that_is_not_positive_definite_is_told():
+def test_a_matrix_that_is_not_positive_definite_is_reported():
     for value in [-50.0, np.nan]:
         for place in [0, BLOCK + 5, 2 * BLOCK + 99]:
             matrix = positive_matrix(2 * BLOCK + 100).astype(np.float32)

@@ -38,7 +38,7 @@ def test_a_solution_balances_its_right_side(name):
 
 
 @pytest.mark.parametrize("name", SOLVERS)
-def test_a_matrix_that_is_not_positive_definite_is_told_and_the_next_one_factored(name):
+def test_a_matrix_that_is_not_positive_definite_is_reported_and_the_next_one_factored(name):
     whole, upper = box()
     make, tolerance = SOLVERS[name]
     solver, indefinite, right = make(), upper.copy(), np.ones(whole.shape[0])

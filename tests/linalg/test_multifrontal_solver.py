@@ -111,7 +111,7 @@ def test_as_many_threads_give_the_same_to_the_last_digit():
     np.testing.assert_array_equal(found[0], found[2])
 
 
-def test_a_matrix_that_is_not_positive_definite_is_told_and_the_next_one_factored(workers):
+def test_a_matrix_that_is_not_positive_definite_is_reported_and_the_next_one_factored(workers):
     for diagonal in [-50.0, np.nan]:
         whole, upper, places = plate(60, 40)
         solver, right = DissectedSolver(places, workers=workers), np.ones(len(places))

@@ -199,7 +199,7 @@ def test_the_bulk_modulus_standard_error_is_the_scatter_of_repeated_tests():
     assert np.mean([bulk.standard_error_mpa for bulk in found]) == pytest.approx(scatter, rel=0.15)
 
 
-def test_a_volumetric_curve_that_is_not_straight_is_told(curves_of):
+def test_a_volumetric_curve_that_is_not_straight_gives_a_warning(curves_of):
     J = np.linspace(0.8, 1, 20)
     curved = VolumetricCurve(J, 10 * (1 - J) + 100 * (1 - J) ** 3)
     card = make_card([*curves_of("neo_hooke", {"c10": 0.2}), curved], laws=["neo_hooke"])

@@ -213,7 +213,7 @@ def test_gent_finds_its_limit_beyond_the_data(curves_of):
     assert fit.parameters == pytest.approx({"mu": 0.3, "jm": 3.0}, rel=1e-4)
 
 
-def test_noise_is_told_from_a_law_that_does_not_follow(curves_of):
+def test_noise_is_distinguished_from_a_law_that_does_not_follow_the_curve(curves_of):
     """Errors of neighbours: independent for noise (0 +- 1/sqrt(75) = 0.12), alike where the law bends the wrong way."""
     noisy = fit_law("yeoh", curves_of("yeoh", TRUTH["yeoh"], noise=0.01))
     wrong = fit_law("neo_hooke", curves_of("yeoh", {"c10": 0.18, "c20": 0.1, "c30": 0.05}))

@@ -208,7 +208,7 @@ def neo_hooke_rows(stretches, *, minus=True):
     return "engineering_strain,nominal_stress_mpa\n" + "".join(f"{e:.6f},{s:.6f}\n" for e, s in rows)
 
 
-def test_a_compression_test_that_looks_like_tension_is_remarked_upon(write_file):
+def test_a_compression_test_that_may_be_tension_gets_a_remark(write_file):
     (remark,) = read_curve(write_file(neo_hooke_rows(np.linspace(1, 0.5, 11), minus=False))).remarks
     assert "steepens from the start" in remark and "`compression: true`" in remark
 

@@ -75,7 +75,7 @@ def test_the_inventory_tells_how_the_archive_was_read(imported):
     assert list(pd.read_csv(imported[1]["counts"]).columns) == ["what", "where", "printed", "found", "meets"]
 
 
-def test_odd_tests_are_left_out_of_the_files_and_stand_in_the_report(tmp_path):
+def test_outliers_are_left_out_of_the_files_and_listed_in_the_report(tmp_path):
     archive = Archive()
     archive.maps["Flat", "elastic"] = archive.maps["Flat", "elastic"].iloc[1:]
     outputs = run_import(archive.write(tmp_path / "csv"), tmp_path / "results")

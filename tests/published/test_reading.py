@@ -97,7 +97,7 @@ def test_path_may_stand_anywhere_and_an_index_column_is_passed_over(archive, tmp
     assert [(f.file, f.row, f.done) for f in tables.outliers.findings] == [(FLAT_REAL, 1, "kept")]
 
 
-def test_commas_for_decimals_are_read_and_told(archive, tmp_path):
+def test_commas_for_decimals_are_read_and_reported(archive, tmp_path):
     plain, comma = read(archive.write(tmp_path / "a")), read(archive.write(tmp_path / "b", sep=";", decimal=","))
     assert np.array_equal(plain.real["flat"][0].values, comma.real["flat"][0].values)
     assert all("decimals are written with ','" in f.what for f in comma.outliers.findings) and len(comma.outliers.findings) == 6
@@ -141,7 +141,7 @@ ODDITIES = [
 
 
 @pytest.mark.parametrize(("inject", "file", "row", "said"), ODDITIES, ids=[said[:30] for *_, said in ODDITIES])
-def test_an_oddity_is_named_by_file_and_row_and_costs_its_test_only(archive, tmp_path, inject, file, row, said):
+def test_an_outlier_is_named_by_file_and_row_and_only_its_test_is_left_out(archive, tmp_path, inject, file, row, said):
     inject(archive)
     tables = read(archive.write(tmp_path))
     left_out = [f for f in tables.outliers.findings if f.done == "left out"]
@@ -179,7 +179,7 @@ def test_blank_lines_count_as_lines_and_are_no_rows(archive, tmp_path):
     assert finding.row == FIRST[FLAT_MAPS] + 60 + 2
 
 
-def test_a_test_in_two_places_is_joined_and_told(archive, tmp_path):
+def test_a_test_in_two_places_is_joined_and_reported(archive, tmp_path):
     real = archive.real["Flat"]
     archive.real["Flat"] = real.iloc[[*range(3), *range(5, len(real)), 3, 4]]
     tables = read(archive.write(tmp_path))
@@ -188,7 +188,7 @@ def test_a_test_in_two_places_is_joined_and_told(archive, tmp_path):
     assert len(tables.tests["flat"]) == 12
 
 
-def test_readings_above_the_papers_scale_are_kept_and_told(archive, tmp_path):
+def test_readings_above_the_papers_scale_are_kept_and_reported(archive, tmp_path):
     set_value(archive, FLAT_REAL, 2, "tax9", 2600.0)
     tables = read(archive.write(tmp_path))
     assert [(f.row, f.done) for f in tables.outliers.findings] == [(FIRST[FLAT_REAL] + 2, "kept")]
@@ -205,7 +205,7 @@ def test_readings_beside_isaacs_maps_must_be_the_same(archive, tmp_path, column)
     assert (finding.path, finding.done) == ("CircleG/test_1", "left out") and "other readings" in finding.what
 
 
-def test_readings_in_another_order_than_the_maps_are_told(archive, tmp_path):
+def test_readings_in_another_order_than_the_maps_are_reported(archive, tmp_path):
     rows = np.arange(len(archive.real["Flat"]))
     rows[20:25] = rows[20:25][::-1]
     archive.real["Flat"] = archive.real["Flat"].iloc[rows]
@@ -234,7 +234,7 @@ def test_a_file_with_other_columns_is_refused(archive, tmp_path, file, columns, 
 @pytest.mark.parametrize(("options", "refused"), [
     ({"outliers": "leave_out", "largest_share": 0.1}, False), ({"outliers": "leave_out", "largest_share": 0.01}, True),
     ({"outliers": "refuse", "largest_share": 1.0}, True)])
-def test_an_archive_odder_than_allowed_is_refused(archive, tmp_path, options, refused):
+def test_an_archive_with_more_outliers_than_allowed_is_refused(archive, tmp_path, options, refused):
     drop(archive, FLAT_MAPS, [3])
     outliers = read(archive.write(tmp_path)).outliers
     if refused:
@@ -253,7 +253,7 @@ def test_maps_that_are_negative_towards_the_pcb_are_turned_and_metres_refused(ar
     assert "may be in metres" in refusal(read, archive.write(tmp_path / "b"))
 
 
-def test_the_taxels_arrangement_is_told_by_maps_and_readings():
+def test_the_taxels_arrangement_is_found_from_maps_and_readings():
     for arrangement in ARRANGEMENTS:
         rng = np.random.default_rng(1)
         maps = np.array([dent(*rng.uniform([-12, -7, 4], [12, 7, 10])) for _ in range(40)])
@@ -266,7 +266,7 @@ def test_the_taxels_arrangement_is_told_by_maps_and_readings():
         assert sorted(found.values())[-2] < 0.8, arrangement
 
 
-def test_what_is_found_is_counted_against_print(archive, tmp_path):
+def test_the_counts_found_are_compared_with_those_printed(archive, tmp_path):
     tables = read(archive.write(tmp_path))
     found = found_counts(tables, items_of(tables, unseen=["donut_m"]))
     assert found == {"real maps": 80, "maps of elastic": 80, "maps of hyperelastic": 80, "real maps of indenters to train on": 50,

@@ -149,7 +149,7 @@ def test_table_3_sums_solver_and_network():
     assert frame[frame.source == "paper"].mean_s.iloc[0] == 37.4
 
 
-def test_what_the_papers_own_numbers_contradict_is_told():
+def test_a_claim_that_the_papers_own_numbers_contradict_is_marked_so():
     frame = table()
     assert verdict(frame, "Hyperelastic maps take 3.5 times") == "contradicts itself"          # table 3 gives 4.3
     assert verdict(frame, "The data set holds 53,400 maps") == "contradicts itself"            # its parts make 46,200

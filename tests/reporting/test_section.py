@@ -46,13 +46,13 @@ def test_the_layers_of_a_section_at_rest_have_their_areas(body):
     assert areas["frusta"] == pytest.approx(5 * 0.5 * 0.5 * (0.6 + 1.2), rel=0.01)     # 0.01 mm beside the axes
 
 
-def test_cells_that_cannot_be_cut_are_told_not_left_out(body):
+def test_cells_that_cannot_be_cut_are_refused_and_not_left_out(body):
     kind, nodes, layer = body.cells[0]
     with pytest.raises(InputError, match="Cells of the kind 'tetra10' are not cut"):
         section(replace(body, cells=[*body.cells[1:], ("tetra10", nodes[:, :10], layer)]), 0.0)
 
 
-def test_points_of_a_layer_that_is_not_there_are_told():
+def test_points_of_a_missing_layer_are_refused():
     flat = of_map(np.zeros((1, 3, 3)), np.arange(3.0), np.arange(3.0), [1.0], thickness_mm=2.5)
     assert len(flat.points_of("pressed face")) == 9
     with pytest.raises(InputError, match="no cells of the layer 'sheet'"):

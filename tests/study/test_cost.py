@@ -48,7 +48,7 @@ def test_the_tiny_study_costs_minutes_and_more_load_steps_cost_more():
     assert each > 3 * costs["simulate_press, hyperelastic"].each_s
 
 
-def test_what_is_done_is_not_counted_and_the_studys_own_times_come_first(tmp_path):
+def test_finished_jobs_are_not_counted_and_the_studys_own_times_come_first(tmp_path):
     folder = tmp_path / "tiny"
     for item, seconds in (("square", 30.0), ("donut_m", 50.0)):
         for path in (folder / f"presses/indenters/{item}/hyperelastic.nc",

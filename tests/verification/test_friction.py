@@ -160,7 +160,7 @@ def ball_on(body, forces):
     return press_load_steps(body, HeightField(place(ball, pose=pose)), forces, settings=FINE)
 
 
-def test_tips_with_much_friction_do_as_held_tips_do(record):
+def test_tips_with_much_friction_act_as_bonded_tips(record):
     """Where nothing slides only the slip that builds the traction up is left, less than its tolerance."""
     source, forces = "bonded tips", [0.4, 0.8]
     bodies = {"held": body_with(held=True, columns=3, rows=3), "rough": body_with(board=2.0, columns=3, rows=3),
@@ -242,7 +242,7 @@ def elastic(body, state):
     return state.energy - float(top + board)
 
 
-def test_the_more_friction_the_smaller_the_indentation_between_free_and_held_tips(record):
+def test_the_more_friction_the_smaller_the_indentation_between_free_and_bonded_tips(record):
     source, forces, coefficients = "the press with less friction", [1.0, 2.0], (0.0, 0.1, 0.2, 0.4, 0.8)
     bodies = [*(body_with(board=mu, columns=3, rows=3) for mu in coefficients), body_with(held=True, columns=3, rows=3)]
     *depths, held = (list(ball_on(body, forces))[-1].state.indentation for body in bodies)
@@ -376,7 +376,7 @@ def test_teeth_push_a_layer_aside_until_friction_holds_them(mu, record):
     assert abs(top - aside) < 2e-3 * depth
 
 
-def test_a_rough_punch_needs_more_force_than_a_smooth_one(record):
+def test_a_punch_with_friction_needs_more_force_than_one_without(record):
     """Poisson's ratio 0, where it is most: 4 G a depth ln(3 - 4 nu) / (1 - 2 nu) against 4 G a depth / (1 - nu)."""
     expected, source = np.log(3.0), "Mossakovskii 1954; Johnson, Contact Mechanics, eq. (3.104)"
     law = make_law("neo_hooke", {"c10": 0.25}, bulk_modulus=1.0 / 3)
@@ -403,7 +403,7 @@ CORNERS = {"under the plate": [1.0, 0.0, 0.0], "on the ground": [1.0, 0.0, -BLOC
 
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
-def test_a_block_under_a_rough_plate_resists_and_spreads_as_in_another_program(tmp_path, record):
+def test_a_block_under_a_plate_with_friction_resists_and_spreads_as_in_calculix(tmp_path, record):
     """A quarter of a block of 2 x 2 x 0.5 mm on smooth ground, a fifth lower under a plate with mu = 0.2, which takes 20 % more
     force than a smooth one. There C3D20R and 20 increments or more, here our elements and four load steps.
     """
@@ -470,7 +470,7 @@ def block_in_calculix(folder):
 # --- the description ---
 
 
-def test_friction_under_held_tips_is_refused():
+def test_friction_under_bonded_tips_is_refused():
     values = small_spec(2, 2, margin=0.4).model_dump(mode="json") | {"friction": {"object": 0.0, "board": 0.3}}
     with pytest.raises(InputError, match="bonded tips cannot slide .* set 'tips_bonded' to false"):
         SensorSpec.from_dict(values)

@@ -50,7 +50,7 @@ def test_presses_that_nobody_tried_before_go_well(benchmark, model, presses):
 
 
 @pytest.mark.parametrize("number", [24, 41, 86, 330])
-def test_presses_that_went_wrong_in_a_long_run_are_mended_or_flagged(benchmark, number):
+def test_presses_that_failed_in_a_long_run_are_repaired_or_flagged(benchmark, number):
     """24: contact not solved at a sharp corner; 41: lost touch on the way; 86, 330: small and deep, in two states of balance.
 
     Which of two states is found depends on the last digits of the sums: with other threads it may be the same one at all forces, or

@@ -60,7 +60,7 @@ def test_sigkill_in_every_stage_is_survived_and_ends_with_the_same_files(finishe
     assert results(project) == results(finished)
 
 
-def test_a_damaged_file_is_told_and_when_deleted_made_again_with_all_that_comes_of_it(finished, finished_once):
+def test_a_damaged_file_is_reported_and_once_deleted_made_again_with_all_that_depends_on_it(finished, finished_once):
     damaged = finished.folder / "results/tiny/presses/grasps/object_5/elastic.nc"
     damaged.write_text("half of a f")
     refused = finished.snakemake(check=False)
@@ -71,7 +71,7 @@ def test_a_damaged_file_is_told_and_when_deleted_made_again_with_all_that_comes_
     assert results(finished) == results(finished_once)
 
 
-def test_results_that_cannot_be_written_are_told_in_one_sentence(tmp_path):
+def test_results_that_cannot_be_written_are_reported_in_one_sentence(tmp_path):
     project = Project.of_sources(tmp_path)
     (project.folder / "results").write_text("a file, where a folder is wanted")
     done = project.snakemake(check=False)

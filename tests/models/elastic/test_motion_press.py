@@ -163,7 +163,7 @@ def test_what_the_model_does_not_know_is_refused(surface, motion, said):
         move(surface, standing(BALL), motion, friction=0.3)
 
 
-def test_an_object_that_slides_off_under_its_load_is_told(surface):
+def test_an_object_that_slides_off_under_its_load_is_reported(surface):
     with pytest.raises(InputError, match="has slid off the sensor's free surface"):
         move(surface, standing(PUNCH), Motion().press(force_n=1.0).slide(x_mm=8.0), friction=0.0)
 

@@ -3,26 +3,23 @@
 import numpy as np
 import pytest
 import trimesh
+from foundation_study import SMALL  # its nodes are 0.3 mm apart
 from support.laws import LAWS
-from support.sensors import CORO
 
 from softtact.contact.height_field import HeightField
 from softtact.contact.underside import Underside
 from softtact.models.elastic.compliance import map_cells
 from softtact.models.foundation.compliance import foundation_compliance
-from softtact.models.foundation.frustum_spring import frustum_law
 from softtact.models.foundation.partial_contact import SoftEdges, beyond, own_compliance
 from softtact.models.foundation.solve import FoundationMaps, FoundationSettings, press_foundation
 
-SMALL = CORO.model_copy(update={"footprint_mm": (7.2, 7.2), "map_shape": (13, 13)})      # 6 x 6 frusta, nodes 0.3 mm apart
 LINEAR = FoundationSettings(follow=False, rocking=False)
 FINER = 3      # an odd number: nodes of the coarse grid are corners on it where they are corners
 
 
 @pytest.fixture(scope="module")
-def compliances():
+def compliances(law):
     """By how many times finer than the sensor's their grid is."""
-    law = frustum_law(SMALL, LAWS["dielectric"])
     return {times: foundation_compliance(SMALL, dielectric_law=LAWS["dielectric"], cover_law=LAWS["cover"], frustum=law,
                                           cells=tuple(times * count for count in map_cells(SMALL)))
             for times in (1, FINER)}
@@ -81,7 +78,7 @@ def test_a_point_is_the_softer_the_less_of_it_is_covered_and_free_where_nothing_
     assert (contact_compliance[0][plain] == 0).all()
 
 
-def test_a_nodes_compliance_among_held_ones_is_less_than_alone_and_larger_at_elements_corners(compliances):
+def test_a_nodes_compliance_among_fixed_ones_is_less_than_alone_and_larger_at_elements_corners(compliances):
     compliance = compliances[1]
     grid = compliance.grid
     alone = []

@@ -125,7 +125,7 @@ def test_splits_for_no_layer_or_too_many_are_refused():
             MeshSettings(cover_heights=THREE, cover_splits=splits)
 
 
-def test_a_lowest_layer_that_would_hang_freely_is_refused():
+def test_a_lowest_layer_with_hanging_nodes_is_refused():
     for splits in [(2, 1, 2), (3,)]:
         with pytest.raises(InputError, match=f"mesh: cover_splits begins with {splits[0]}; give 0 or 1"):
             mesh_settings({"cover_heights": list(THREE), "cover_splits": list(splits)})
@@ -156,7 +156,7 @@ class Overlapping:
     ([5, 4.9, 4.9, 4.9, 4.9, 4.9], [1, 1, 1, 1, 1], 3),      # three passes in vain
     ([5, 6, 3, 3, 3, 2, 1], [1, 1, 1, 1, 1, 1], 6),          # one in vain is not all
     ([5, 5, 5, 5, 5, 5, 1], [0, 0, 0, 0, 0, 1], 6)])         # those that move nothing add up
-def test_overlaps_are_pressed_apart_as_long_as_it_helps(monkeypatch, overlaps, spent, passes):
+def test_overlaps_are_augmented_as_long_as_it_helps(monkeypatch, overlaps, spent, passes):
     body = Overlapping([1e-3 * depth for depth in overlaps], spent)
     monkeypatch.setattr("softtact.models.hyperelastic.newton.settle",
                         lambda body, *_: Solution("state", body.spent[body.passes - 1], 0.0))

@@ -22,7 +22,7 @@ def free_nodes(**changes):
     return body.slab.points[body.slab.cover_mesh.free:, :2]
 
 
-def test_walls_are_fine_around_the_object_and_coarse_far_from_it():
+def test_cell_edges_are_fine_around_the_object_and_constrained_far_from_it():
     mixed, coarse = free_nodes(), free_nodes(constrained_cell_edges=True)
     more = {tuple(p) for p in np.round(mixed, 6)} - {tuple(p) for p in np.round(coarse, 6)}
     assert more

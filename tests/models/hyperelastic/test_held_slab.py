@@ -22,7 +22,7 @@ BODIES = {"sensor": lambda mesh: build_sensor_body(SMALL, dielectric_law=DIELECT
 
 
 @pytest.mark.parametrize("body", BODIES)
-def test_every_element_of_sheet_and_cover_is_held_by_its_own_shear_modulus_and_the_frusta_by_another_setting(body):
+def test_the_quartic_penalty_of_each_layer_follows_its_own_shear_modulus_and_that_of_the_frusta_its_own_setting(body):
     held = BODIES[body](HELD)
     assert held.slab.solids
     for _, block in held.slab.solids:

@@ -67,7 +67,7 @@ SPIKE = trimesh.creation.cone(radius=0.8, height=2.5, sections=64).apply_transfo
 BETWEEN_POINTS = Pose.from_values([0.17, 0.11, 0, 0, 0, 0])
 
 
-def test_a_spike_that_goes_in_between_the_contact_points_is_lowered_until_they_feel_it():
+def test_a_spike_between_the_contact_points_goes_down_until_they_touch_it():
     # With more force it slips on between them, and where it stops is chance.
     result = press_small(SPIKE, [0.01, 0.02], pose=BETWEEN_POINTS)
     assert (np.diff(result.indentation_mm) > 0).all() and result.residual_n.max() < 3e-3

@@ -128,7 +128,7 @@ def test_a_point_that_would_fly_into_the_object_is_stopped_within_one_step(exact
     assert depth == pytest.approx((1 - 1e-3 + 60 / 6000) / 61, rel=1e-6)
 
 
-def test_a_free_object_that_touches_nothing_is_told_by_nan():
+def test_a_free_object_that_touches_nothing_gives_nan():
     scene = Scene(2)
     scene.points = replace(scene.points, gaps=np.full(POINTS, 0.1))
     _, indentation_increment = scene.step(dense_stepper(), excess=-1.0)

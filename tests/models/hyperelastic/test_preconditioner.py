@@ -114,7 +114,7 @@ def test_a_contact_that_hardly_changed_keeps_its_factor_and_one_that_did_does_no
 
 
 @pytest.mark.parametrize("place", ["far from the object", "on it"])
-def test_rubber_that_is_not_positive_definite_is_told(place, workers):
+def test_rubber_that_is_not_positive_definite_is_reported(place, workers):
     problem = Pressed()
     row = 0 if place == "far from the object" else problem.contact.frames(None).first[4]
     problem.rubber.data[problem.rubber.indptr[row:row + 3]] -= 1e4
