@@ -27,6 +27,7 @@ def test_press_a_mesh_prints_a_line_a_force_and_draws(tmp_path, capsys):
     assert capsys.readouterr().out.count(" N: ") == 2
 
 
+@pytest.mark.slow
 def test_higher_frusta_gain_more_per_pressure_and_every_curve_flattens(tmp_path):
     table = run("sweep_frustum_height", "--heights", 0.4, 0.6, "--out", tmp_path / "h.svg")
     low, high = (table[table.height_mm == height] for height in (0.4, 0.6))

@@ -253,6 +253,7 @@ def test_the_more_friction_the_smaller_the_indentation_between_free_and_bonded_t
     assert depths[-1] > held - SLIP_TOLERANCE_MM
 
 
+@pytest.mark.slow
 def test_a_step_that_begins_with_the_pressures_of_its_end_takes_fewer_iterations_and_errs_less(record, monkeypatch):
     """Paths of sliding are not unique: what is found is always in balance, and with the guess nearer to where small steps lead."""
     coarse, small = [1.0, 2.0, 4.0], np.linspace(0.25, 4.0, 16)

@@ -19,6 +19,7 @@ def refusal(project, *arguments):
     return done.stdout
 
 
+@pytest.mark.slow
 def test_the_papers_study_is_planned_whole(fresh):
     paper = Project(fresh.folder, configfile="config/paper.yaml")
     plan = paper.plan()

@@ -37,6 +37,7 @@ def killed(tmp_path):
     return project
 
 
+@pytest.mark.slow
 def test_a_killed_run_resumes_and_gives_the_files_of_an_undisturbed_one(killed, finished_once):
     assert 3 <= len(killed.presses()) < len(finished_once.presses())
     resumed = killed.snakemake()
@@ -44,6 +45,7 @@ def test_a_killed_run_resumes_and_gives_the_files_of_an_undisturbed_one(killed, 
     assert results(killed) == results(finished_once)
 
 
+@pytest.mark.slow
 def test_sigkill_in_every_stage_is_survived_and_ends_with_the_same_files(finished, tmp_path):
     """The first job of each stage dies after its first output; a job that is tried again is what the next run would run.
 

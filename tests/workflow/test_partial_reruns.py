@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import pytest
+
 from softtact.study.code_closure import code_closure
 
 STAGES = Path(__file__).resolve().parents[2] / "src/softtact/stages"
@@ -28,6 +30,7 @@ def test_a_new_indenter_is_the_only_one_simulated(finished):
     assert LEARNING <= set(plan)
 
 
+@pytest.mark.slow
 def test_more_places_of_an_object_press_it_again_with_the_fast_models_and_no_other(finished):
     """Three indenters in five presses: the first two get a second place. A fast model presses both places in one job."""
     finished.edit("config/tiny.yaml", "donut_m], presses: null", "donut_m], presses: 5")

@@ -37,6 +37,7 @@ def test_a_missing_archive_is_refused_with_where_to_get_it(project):
     assert "softtact: elsewhere: there is no such folder; put the archive's CSV files there" in done.stdout
 
 
+@pytest.mark.slow
 def test_a_changed_file_of_the_archive_reruns_the_import_and_all_after(project, tmp_path):
     finished = project.copy(tmp_path / "project")
     finished.configfile = project.configfile

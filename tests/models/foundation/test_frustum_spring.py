@@ -179,6 +179,7 @@ def test_a_roots_nodes_follow_any_quadratic_field_exactly_and_pass_their_forces_
     np.testing.assert_allclose(on_slab @ law.root_xy, forces @ nodes, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_frustum_sinks_hardly_deeper_into_a_slab_of_finer_elements(law):
     """Under a unit force of its own; tied to the slab at single points, frusta sank in by 6 to 8 % more each time, without end."""
     sunk = []
