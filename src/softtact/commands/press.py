@@ -16,7 +16,6 @@ from softtact.commands.common import (
     sensor_spec,
     show,
 )
-from softtact.contact.motion import Motion
 from softtact.errors import ConvergenceError, InputError
 
 EXAMPLES = """
@@ -86,6 +85,8 @@ def _press(options):
 def _how(options, spec):
     """Forces or a motion, by the names of `Sensor.press`."""
     if options.motion is not None:
+        from softtact.contact.motion import Motion  # NumPy, which the parser does without
+
         return {"motion": Motion.parse(options.motion)}
     forces = sorted(set(options.force))
     check_forces(forces, spec)
