@@ -12,7 +12,7 @@ from softtact.press.sensor import Sensor
 from softtact.press.validity import valid_elastic, valid_foundation, valid_hyperelastic
 
 GOOD = {"compression_mm": [0.1, 0.2, 0.3], "contact_error_mm": [0.0, 0.001, 0.001], "points": [9, 40, 80],
-        "depth_mm": [0.1, 0.2, 0.3]}
+        "depth_mm": [0.1, 0.2, 0.3], "forces_n": [5.0, 20.0, 50.0]}
 
 
 def valid(**changed):
@@ -67,3 +67,7 @@ def test_the_load_steps_before_a_force_that_is_not_reached_are_flagged_alike():
     with pytest.raises(ConvergenceError) as stopped:
         sensor.press(disc, force_n=[3.0, 50.0], model="hyperelastic")
     assert stopped.value.result.indentation_mm[0] > 0.1 and stopped.value.result.within_validity.tolist() == [0]
+
+
+def test_depths_may_fall_where_the_force_does_not_grow():
+    assert valid(depth_mm=[0.3, 0.2, 0.1], forces_n=[50.0, 20.0, 20.0]) == [True, True, True]
