@@ -96,8 +96,8 @@ def _advance(press, path, target):
                 return replace(load_step, iterations=spent)
             force = target
         elif _SHORTER * (force - before) < _SHORTEST * target:
-            raise ConvergenceError(f"The foundation model did not reach {target:g} N: from {before:.3g} N on its corrections for "
-                                   "finite displacement run away; ask for smaller forces, or for the hyperelastic model.")
+            raise ConvergenceError(f"The foundation model did not reach {target:g} N: from {before:.3g} N on the corrections for "
+                                   "finite displacement diverge; use smaller forces, or the hyperelastic model.")
         else:
             force = before + _SHORTER * (force - before)
 

@@ -69,7 +69,7 @@ def first_touch(body, surface, settings):
         start = body.reevaluate_contact(start, body.friction.begin_step(before))
     found = settle(body, surface, start, None, settings.first_touch_tolerance_n, settings)
     if found.state is None:
-        raise ConvergenceError("The first touch of the object did not converge.")
+        raise ConvergenceError("The first touch did not converge; check the pose, or use --mesh-quality stable.")
     return found.state
 
 
@@ -157,14 +157,16 @@ class _Press:
         return residual <= self.tolerance
 
     def step(self, state):
-        body, settings = self.body, self.settings
         surface = self.surface if self.projected else None
-        step = body.newton_step(state, self.force, surface, largest_mm=settings.largest_step_mm, kept_mm=settings.kept_tangent_mm)
+        step = self._newton_step(state, surface)
         if np.isnan(step.indentation) and not state.force > 0:     # a free object that lost its touch on the way
-            state = _indented_until_contact(body, state, settings.first_touch_mm)
-            step = body.newton_step(state, self.force, surface, largest_mm=settings.largest_step_mm,
-                                    kept_mm=settings.kept_tangent_mm)
-        return body.update_normals(state, step.projection), step if np.isfinite(step.largest()) else None
+            state = _indented_until_contact(self.body, state, self.settings.first_touch_mm)
+            step = self._newton_step(state, surface)
+        return self.body.update_normals(state, step.projection), step if np.isfinite(step.largest()) else None
+
+    def _newton_step(self, state, surface):
+        return self.body.newton_step(state, self.force, surface, largest_mm=self.settings.largest_step_mm,
+                                     kept_mm=self.settings.kept_tangent_mm)
 
     def first_share(self, step):
         return min(1.0, self.settings.largest_step_mm / max(step.largest(), 1e-30))

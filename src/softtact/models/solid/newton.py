@@ -116,7 +116,7 @@ class _Press:
 
     def _newton(self, state, force):
         if state is None:
-            raise ConvergenceError("The increment turns an element inside out; take smaller ones.")
+            raise ConvergenceError("The step inverts an element; use smaller steps.")
         problem = _Balance(self.body, self.settings, force, self.states[-1], factored=self.factored)
         found = solve(problem, state, max_iterations=self.settings.max_iterations)
         self.factored = problem.factored
