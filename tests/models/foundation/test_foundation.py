@@ -187,7 +187,7 @@ def test_a_force_that_is_not_reached_at_once_is_reached_by_way_of_smaller_ones(c
 def test_a_force_that_is_not_reached_says_from_which_one_on(compliance):
     points = points_of(BOX, compliance, TILTED)
     load_steps = press_foundation(compliance, points, [4.0], settings=FoundationSettings(max_iterations=1))
-    with pytest.raises(ConvergenceError, match="did not reach 4 N: from 0 N on .* ask for smaller forces, or for the hyperelastic"):
+    with pytest.raises(ConvergenceError, match="did not reach 4 N: from 0 N on .* use smaller forces, or the hyperelastic"):
         next(load_steps)
 
 
