@@ -2,13 +2,16 @@
 
 import importlib.util
 import os
+from collections.abc import Mapping
 from pathlib import Path
 
 from softtact.files import atomic_path, digest
+from softtact.materials.laws.base import Law
 from softtact.models.elastic.compliance import Compliance, elastic_compliance
 from softtact.models.elastic.tangential import SurfaceCompliance, surface_compliance
 from softtact.models.foundation.compliance import FoundationCompliance, foundation_compliance
 from softtact.progress import announce
+from softtact.sensors.specification import AnySpec
 
 _FORMAT = 9     # of the files; another one makes them again
 
@@ -18,14 +21,14 @@ def _values(spec):
     return spec.model_dump(mode="json", exclude={"largest_counts"} | ({"kind"} if spec.kind == "frusta" else set()))
 
 
-def cached_compliance(spec, *, threads=1):
+def cached_compliance(spec: AnySpec, *, threads: int = 1) -> Compliance:
     """The elastic layer's `Compliance`, by the sensor's values."""
     return _cached("compliance", [_values(spec)], Compliance,
                    f"{spec.name}: computing the elastic layer's compliance, once for this sensor (some ten seconds)",
                    lambda: elastic_compliance(spec, threads=threads))
 
 
-def cached_surface_compliance(spec, *, threads=1):
+def cached_surface_compliance(spec: AnySpec, *, threads: int = 1) -> SurfaceCompliance:
     """The elastic layer's `SurfaceCompliance`, by the values that it depends on: friction and taxels change nothing."""
     values = [spec.footprint_mm, spec.map_shape, spec.thickness_mm, repr(spec.elastic_layer)]
     return _cached("surface", values, SurfaceCompliance,
@@ -33,7 +36,7 @@ def cached_surface_compliance(spec, *, threads=1):
                    "minute or two; 230 MB for the paper's)", lambda: surface_compliance(spec, threads=threads))
 
 
-def cached_foundation(spec, laws, *, threads=1):
+def cached_foundation(spec: AnySpec, laws: Mapping[str, Law], *, threads: int = 1) -> FoundationCompliance:
     """The `FoundationCompliance` of a sensor with its laws {"dielectric", "cover"}, by the values of all three."""
     dielectric, cover = laws["dielectric"], laws["cover"]
     return _cached("foundation", [_values(spec), repr(dielectric), repr(cover)], FoundationCompliance,

@@ -8,12 +8,18 @@ Errors are root mean squares over the map, in mm, against the hyperelastic model
 """
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
+from trimesh import Trimesh
 
 from softtact.errors import ConvergenceError, InputError
 from softtact.geometry.complexity import OVERLAP_THRESHOLD, TOTAL_THRESHOLD, choose_model, score
 from softtact.press.models import PRESSES
+from softtact.press.result import PressResult
+
+if TYPE_CHECKING:
+    from softtact.press.sensor import Sensor
 
 POLICIES = ("paper", "error")
 TOLERANCE_MM = 0.01
@@ -34,17 +40,17 @@ class FoundationError:
     at_rest: float = 0.0128
     growth: float = 0.640
 
-    def __call__(self, maps_mm, compression_mm, height_mm):
+    def __call__(self, maps_mm: np.ndarray, compression_mm: np.ndarray, height_mm: float) -> np.ndarray:
         """Errors (l,) in mm of maps (l, y, x) with largest compressions (l,) in mm."""
         return (self.at_rest + self.growth * (np.asarray(compression_mm) / height_mm) ** _POWER) * rms(maps_mm)
 
 
-def rms(maps_mm):
+def rms(maps_mm: np.ndarray) -> np.ndarray:
     """Root mean square over the maps (..., y, x)."""
     return np.sqrt((np.asarray(maps_mm) ** 2).mean(axis=(-2, -1)))
 
 
-def calibrate(maps_mm, compression_mm, true_mm, *, height_mm):
+def calibrate(maps_mm: np.ndarray, compression_mm: np.ndarray, true_mm: np.ndarray, *, height_mm: float) -> FoundationError:
     """`FoundationError` from presses: maps (n, y, x), largest compressions (n,), true errors (n,), all in mm.
 
     Least squares of the relative error with weights that make it relative, too; neither constant is below zero.
@@ -58,7 +64,8 @@ def calibrate(maps_mm, compression_mm, true_mm, *, height_mm):
     return FoundationError(at_rest=float(at_rest), growth=float(growth))
 
 
-def expected_errors(elastic, foundation, *, height_mm, model=FoundationError()):
+def expected_errors(elastic: PressResult, foundation: PressResult, *, height_mm: float,
+                    model: FoundationError = FoundationError()) -> dict[str, np.ndarray]:
     """{model: errors (l,) in mm} of two `PressResult`s, or data sets with their names, of the same press.
 
     Infinite where frusta are compressed much further than in any press that the error was calibrated on.
@@ -70,12 +77,13 @@ def expected_errors(elastic, foundation, *, height_mm, model=FoundationError()):
     return {"elastic": np.hypot(apart, ours), "foundation": ours}
 
 
-def cheapest(errors, tolerance_mm):
+def cheapest(errors: dict[str, np.ndarray], tolerance_mm: float) -> str:
     """The first of elastic, foundation whose errors are all within the tolerance, else hyperelastic."""
     return next((name for name in ("elastic", "foundation") if errors[name].max() <= tolerance_mm), "hyperelastic")
 
 
-def press_auto(sensor, placed, forces, *, label, threads, policy, tolerance_mm, keep_body=False):
+def press_auto(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, *, label: str, threads: int, policy: str, tolerance_mm: float,
+               keep_body: bool = False) -> PressResult:
     """A press with the model that a policy takes; the result tells which, why, and with what error to expect.
 
     label, threads, keep_body: passed on to the models' presses

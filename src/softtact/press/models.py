@@ -3,14 +3,16 @@
 import time
 import warnings
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from trimesh import Trimesh
 
 from softtact.contact.height_field import HeightField, SweptSurface
 from softtact.contact.motion import Motion
 from softtact.contact.underside import Underside
 from softtact.errors import ConvergenceError, ExtrapolationWarning
-from softtact.models.elastic.compliance import press_layer
+from softtact.models.elastic.compliance import Compliance, LayerPress, press_layer
 from softtact.models.foundation.solve import FoundationMaps, press_foundation
 from softtact.models.hyperelastic import path
 from softtact.models.hyperelastic.build_plain import lower_side
@@ -21,12 +23,16 @@ from softtact.press.validity import valid_elastic, valid_foundation, valid_hyper
 from softtact.progress import announce, progress
 from softtact.readout.capacitance import ideal_counts
 
+if TYPE_CHECKING:
+    from softtact.press.sensor import Sensor
+
 _CORNER = 0.01            # share of a layer: strains at an edge of the object go beyond any data
 _MARGIN, _LEAST_MARGIN_MM = 1.3, 0.1     # of the depth on springs, within which points are looked for at first
 _RISE = 1.15              # of the object's depth: points within may touch
 
 
-def press_elastic(sensor, placed, forces, *, label, threads, keep_body=False):
+def press_elastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, *, label: str, threads: int,
+                  keep_body: bool = False) -> PressResult:
     """All load steps at once with the elastic model, which has no body to keep: the surface's compliance is all that it knows."""
     start, compliance = time.perf_counter(), sensor.prepared("elastic", threads)
     underside = Underside(HeightField(placed), compliance.grid)
@@ -36,7 +42,8 @@ def press_elastic(sensor, placed, forces, *, label, threads, keep_body=False):
     return elastic_result(sensor, compliance, press, forces, seconds, lowest_mm=underside.lowest_mm)
 
 
-def elastic_result(sensor, compliance, press, forces, seconds, *, lowest_mm):
+def elastic_result(sensor: "Sensor", compliance: Compliance, press: LayerPress, forces: np.ndarray, seconds: np.ndarray, *,
+                   lowest_mm: float) -> PressResult:
     """The result of a `LayerPress`; lowest_mm: of the object over the free surface."""
     contact, unknown, thickness = press.contact, np.full(len(forces), np.nan), sensor.spec.thickness_mm
     return make_result(sensor, "elastic", "conjugate gradients", press.maps, forces, seconds, indentation_mm=contact.depth,
@@ -47,11 +54,13 @@ def elastic_result(sensor, compliance, press, forces, seconds, *, lowest_mm):
                        lower_maps=press.lower_maps, iterations=contact.iterations)
 
 
-def press_on_foundation(sensor, placed, forces, *, label, threads, keep_body=False):
+def press_on_foundation(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, *, label: str, threads: int,
+                        keep_body: bool = False) -> PressResult:
     """Load step by load step with the foundation model, which has no body to keep."""
     start, compliance = time.perf_counter(), sensor.prepared("foundation", threads)
     underside = Underside(HeightField(placed), compliance.grid)
-    load_steps, times = [], []
+    load_steps: list[Any] = []
+    times: list[float] = []
 
     def solve(points):
         load_steps.clear()
@@ -99,7 +108,8 @@ def _within_reach(underside, points_within, foundation_modulus, forces, deepest,
         reach *= _MARGIN
 
 
-def press_hyperelastic(sensor, placed, forces, *, label, threads, keep_body=False):
+def press_hyperelastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray | Motion, *, label: str, threads: int,
+                       keep_body: bool = False) -> PressResult:
     """Load step by load step with the hyperelastic model; a ConvergenceError holds the load steps before.
 
     forces (l,) in N, or a `Motion`;  keep_body: let the result hold the whole body's displacements at each load step
@@ -112,7 +122,9 @@ def press_hyperelastic(sensor, placed, forces, *, label, threads, keep_body=Fals
     grid = np.stack(np.meshgrid(sensor.spec.map_x_mm, sensor.spec.map_y_mm), axis=-1).reshape(-1, 2)
     sampling, lower = body.slab.sampling(grid), None if sensor.spec.base_held else lower_side(body.slab, grid)
     announce(f"{label}: {sensor.spec.parts_in_words}, {count} load steps of the hyperelastic model, some seconds each")
-    record, times, bodies = [], [], []
+    record: list[dict[str, Any]] = []
+    times: list[float] = []
+    bodies: list[Any] = []
 
     def read(load_step):
         _refuse_beyond_the_board(load_step, lowest, sensor.spec.deepest_mm)
@@ -202,9 +214,10 @@ def _read_load_step(body, maps, load_step, *, from_mm):
 _OF_MOTION = ("displacement_mm", "force_n", "torque_nmm", "slip", "iterations", "contact_area_mm2", "penetration_mm")
 
 
-def press_elastic_motion(sensor, placed, motion, *, label, threads, keep_body=False):
+def press_elastic_motion(sensor: "Sensor", placed: Trimesh, motion: Motion, *, label: str, threads: int,
+                         keep_body: bool = False) -> PressResult:
     """Step by step with the elastic model, which has no body to keep; a ConvergenceError holds the steps before."""
-    seconds = []
+    seconds: list[float] = []
     try:
         moved = press_motion(sensor, placed, motion, seconds, label=label, threads=threads)
     except ConvergenceError as error:
@@ -230,7 +243,8 @@ MOTIONS = {"elastic": press_elastic_motion, "hyperelastic": press_hyperelastic}
 PRESSES = {"elastic": press_elastic, "foundation": press_on_foundation, "hyperelastic": press_hyperelastic}
 
 
-def make_result(sensor, model, solver, maps, forces, times, **numbers):
+def make_result(sensor: "Sensor", model: str, solver: str, maps: np.ndarray, forces: np.ndarray, times: np.ndarray,
+                **numbers: Any) -> PressResult:
     """A `PressResult` of maps (l, points) or (l, ny, nx) and numbers by the result's names.
 
     lower_maps among these: of the lower side where it moves; capacitance follows the change of thickness
@@ -238,13 +252,14 @@ def make_result(sensor, model, solver, maps, forces, times, **numbers):
     spec, maps = sensor.spec, maps.reshape(len(forces), *sensor.spec.map_shape)
     lower_maps = numbers.pop("lower_maps", None)
     thinning = maps if lower_maps is None else maps - lower_maps.reshape(maps.shape)
-    flags = {"converged": np.ones(len(forces), dtype=np.int8),
-             "within_validity": np.asarray(numbers.pop("within_validity"), dtype=np.int8)}
+    flags: dict[str, Any] = {"converged": np.ones(len(forces), dtype=np.int8),
+                             "within_validity": np.asarray(numbers.pop("within_validity"), dtype=np.int8)}
+    arrays: dict[str, Any] = {name: np.asarray(values) for name, values in numbers.items()}
     return PressResult(deformation_map_mm=maps, tactile_map=ideal_counts(spec, thinning), normal_force_n=forces, wall_time_s=times,
                        x_mm=spec.map_x_mm, y_mm=spec.map_y_mm, model=model, sensor=spec.name, solver=solver,
                        largest_counts=spec.largest_counts,
                        attributes={"thickness_mm": spec.thickness_mm, **_friction(spec, model), **sensor.attributes}, **flags,
-                       **{name: np.asarray(values) for name, values in numbers.items()})
+                       **arrays)
 
 
 def _friction(spec, model):

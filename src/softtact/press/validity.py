@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from softtact.press.result import PressResult
+
 _DEEPEST_LINEAR = 0.5       # of the layer's thickness: a linear layer does not know that it ends
 _HARDLY_COMPRESSED = 0.33   # of a frustum's height; the foundation model then errs by 2 % at most (docs/explanation/fast_models.md)
 _FULL_POCKET = 0.8          # of a frustum's height: above, its pocket is full and contacts begin that the models leave out
@@ -11,19 +13,21 @@ _OVERLAP_LEFT = 2.0         # times the allowed overlap, or gap under pressure: 
 _FEWEST_POINTS = 9          # of the cover that carry the object: fewer do not resolve where a spike touches, and how deep
 
 
-def valid_elastic(depth_mm, *, thickness_mm):
+def valid_elastic(depth_mm: np.ndarray, *, thickness_mm: float) -> np.ndarray:
     """Which load steps (l,) of an elastic press hold: depth_mm (l,) is how far the object's lowest point has come down."""
     return depth_mm < _DEEPEST_LINEAR * thickness_mm
 
 
-def valid_foundation(compression_mm, depth_mm, *, frustum_mm, thickness_mm, law_limit_mm):
+def valid_foundation(compression_mm: np.ndarray, depth_mm: np.ndarray, *, frustum_mm: float, thickness_mm: float,
+                     law_limit_mm: float) -> np.ndarray:
     """Which load steps (l,) of a foundation press hold, by its most compressed frustum (l,), frustum_mm high, and by how far the
     object's lowest point has come down (l,): the slab is linear, too, and a corner sinks into it without end.
     """
     return (compression_mm < min(law_limit_mm, _HARDLY_COMPRESSED * frustum_mm)) & (depth_mm < _DEEPEST_LINEAR * thickness_mm)
 
 
-def valid_hyperelastic(*, compression_mm, contact_error_mm, points, depth_mm, forces_n, frustum_mm, allowed_mm):
+def valid_hyperelastic(*, compression_mm: np.ndarray, contact_error_mm: np.ndarray, points: np.ndarray, depth_mm: np.ndarray,
+                       forces_n: np.ndarray, frustum_mm: float, allowed_mm: float) -> np.ndarray:
     """Which load steps (l,) of a hyperelastic press hold, by its most compressed frustum, contacts and course.
 
     contact_error_mm (l,): deepest overlap, or widest gap under pressure, of which `allowed_mm` were asked for
@@ -40,7 +44,7 @@ def _grows(depth, *, slack_mm):
     return (depth >= deepest_before - slack_mm) & (depth <= least_after + slack_mm)
 
 
-def flag_buried(result, top_mm):
+def flag_buried(result: PressResult, top_mm: float) -> PressResult:
     """The result with the load steps flagged at which the object's top has sunk below the surface at rest: no model feels that
     side.
     """

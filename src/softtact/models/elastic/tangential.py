@@ -17,7 +17,7 @@ from softtact.contact.node_grid import NodeGrid
 from softtact.files import read_arrays
 from softtact.models.elastic.compliance import confined_modulus, elastic_slab, surface_grid
 from softtact.models.quarter_symmetry import PARITIES
-from softtact.sensors.specification import SensorSpec
+from softtact.sensors.specification import AnySpec
 
 _SIGNS = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])                                     # of x and y
 _HADAMARD = np.array([[s[0]**p * s[1]**q for s in _SIGNS] for p, q in PARITIES], float)     # (parity, signs)
@@ -120,7 +120,7 @@ def _part(triangle, rows, columns):
     return out
 
 
-def surface_compliance(spec: SensorSpec, *, threads: int = 1, cells: tuple[int, int] | None = None) -> SurfaceCompliance:
+def surface_compliance(spec: AnySpec, *, threads: int = 1, cells: tuple[int, int] | None = None) -> SurfaceCompliance:
     """The `SurfaceCompliance` of a sensor's elastic layer.
 
     cells: elements along a quarter's sides, if not as many as the map asks for
