@@ -5,8 +5,11 @@ What belongs to a model alone (a new projection of the contact, kept tangents, a
 Reference: Nocedal and Wright, Numerical Optimization, 2nd ed., ch. 3.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
+
+import numpy as np
 
 HALVINGS = 10     # of a step, until it is given up
 
@@ -81,6 +84,20 @@ def line_search(problem: Problem, state: Any, step: Any, residual: float) -> Any
             return trial
         share *= 0.5
     return None
+
+
+def line_search_each(accept: Callable[[np.ndarray, float], np.ndarray], count: int, *, halvings: int) -> np.ndarray:
+    """The same for many small problems at once, each with a share of its own: which (count,) found a better trial.
+
+    accept(waiting, share): tries a share of the steps of the problems with these numbers (k,), keeps what is better, and says
+    which (k,) it was
+    """
+    waiting = np.arange(count)
+    for halving in range(halvings):
+        waiting = waiting[~accept(waiting, 0.5**halving)]
+        if not len(waiting):
+            break
+    return ~np.isin(np.arange(count), waiting)
 
 
 def lowers_potential(before: float, after: float, scale: float) -> bool | None:

@@ -8,6 +8,7 @@ do, and one frustum whose energy rises halves such a step for all. What each doe
 import numpy as np
 
 from softtact.linalg.workers import SERIAL, chunks
+from softtact.models.newton import line_search_each
 
 _STEPS = 6               # of Newton's method for a frustum; what is not in balance then is left to the next step of all
 _HALVINGS = 5
@@ -43,16 +44,16 @@ def _step(support, state, frusta, workers):
     step *= np.minimum(1.0, _FARTHEST_MM / np.maximum(np.abs(step).max(axis=(1, 2)), 1e-300))[:, None, None]
     displacement, (energies, forces) = state.displacement.copy(), tuple(part.copy() for part in state.elastic)
     before = support.potentials(displacement[frusta], (energies[frusta], None), frusta, state.history)
-    waiting = np.arange(len(frusta))
-    for halving in range(_HALVINGS):
+
+    def accept(waiting, share):
         here = frusta[waiting]
-        trial = state.displacement[here] + 0.5**halving * step[waiting]
+        trial = state.displacement[here] + share * step[waiting]
         elastic = support.rubber(trial, here, workers=workers)
         if elastic is None:     # one of them is inside out
-            continue
+            return np.zeros(len(waiting), dtype=bool)
         lower = support.potentials(trial, elastic, here, state.history) < before[waiting]
         displacement[here[lower]], energies[here[lower]], forces[here[lower]] = trial[lower], elastic[0][lower], elastic[1][lower]
-        waiting = waiting[~lower]
-        if not len(waiting):
-            break
-    return support.with_contact(displacement, (energies, forces), state.history), ~np.isin(np.arange(len(frusta)), waiting)
+        return lower
+
+    lowered = line_search_each(accept, len(frusta), halvings=_HALVINGS)
+    return support.with_contact(displacement, (energies, forces), state.history), lowered
