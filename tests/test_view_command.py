@@ -119,3 +119,12 @@ def test_what_is_no_press_is_refused(tmp_path, capsys):
         assert main(["view", str(tmp_path / name), "--save", str(tmp_path / "p.png")]) == 1, name
         message = capsys.readouterr().err
         assert said in message and name in message and not (tmp_path / "p.png").exists(), name
+
+
+def test_steps_of_one_force_stay_apart_and_in_their_order(tmp_path):
+    """A slide under a load has one force at every step; arrays named by the force alone would overwrite each other."""
+    of_map(np.stack([MAPS[1], MAPS[0]]), X, Y, [5, 5], thickness_mm=2.5).write(tmp_path / "slide.vtu")
+    again = read_vtu(tmp_path / "slide.vtu")
+    assert again.force_n.tolist() == [5, 5] and again.displacement_mm.shape[0] == 2
+    assert -again.displacement_mm[0].min() == pytest.approx(MAPS[1].max()) and -again.displacement_mm[1].min() == pytest.approx(
+        MAPS[0].max())

@@ -45,6 +45,16 @@ class HeightField:
         normal[hit] = self.normals[index[hit]]
         return height, normal
 
+    def first_touch_mm(self, x_mm, y_mm):
+        """Height (mm) of the underside's lowest point over a sensor whose map has columns x_mm and rows y_mm, its edges among them.
+
+        By the corners of facets over the sensor, and by the map's points where the object is wider; NO_CONTACT_MM beside it.
+        """
+        corners = self.triangles.reshape(-1, 3)
+        over = ((corners[:, 0] >= x_mm[0]) & (corners[:, 0] <= x_mm[-1]) & (corners[:, 1] >= y_mm[0]) & (corners[:, 1] <= y_mm[-1]))
+        height, _ = self(*(line.ravel() for line in np.meshgrid(x_mm, y_mm)))
+        return float(min(corners[over, 2].min(initial=NO_CONTACT_MM), height.min()))
+
 
 @dataclass(frozen=True)
 class MovedSurface:

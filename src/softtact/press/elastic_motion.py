@@ -1,16 +1,12 @@
 """A `Motion` of a placed object with the elastic model, from a sensor: its surface compliance, friction and first touch."""
 
 import time
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
 from trimesh import Trimesh
 
 from softtact.contact.height_field import HeightField
 from softtact.contact.motion import Motion
-from softtact.contact.node_grid import NodeGrid
-from softtact.contact.underside import Underside
 from softtact.models.elastic.motion_press import ElasticMotion, check_motion, move_on_layer
 from softtact.models.elastic.sliding import SlidingState
 from softtact.press.cache import cached_surface_compliance
@@ -37,11 +33,6 @@ def press_motion(sensor: "Sensor", placed: Trimesh, motion: Motion, seconds: lis
         seconds.append(time.perf_counter() - start - sum(seconds))
         announce(f"{label}: step {len(seconds)} of {len(motion.steps)}, {state.position[2]:.3f} mm deep")
 
-    return move_on_layer(compliance, field, motion, first_touch_mm=first_touch(placed, field, compliance.grid, spec.footprint_mm),
-                           friction=spec.friction.object, deepest_mm=spec.thickness_mm, on_step=note)
-
-
-def first_touch(placed: Trimesh, field: HeightField, grid: NodeGrid, footprint_mm: Sequence[float]) -> float:
-    """Height in mm over the surface of the object's lowest point over the sensor; InputError where it misses it."""
-    over = (np.abs(placed.vertices[:, :2]) <= np.asarray(footprint_mm) / 2).all(axis=1)
-    return min(Underside(field, grid).lowest_mm, float(placed.vertices[over, 2].min(initial=np.inf)))
+    lowest = field.first_touch_mm(spec.map_x_mm, spec.map_y_mm)
+    return move_on_layer(compliance, field, motion, first_touch_mm=lowest, friction=spec.friction.object,
+                         deepest_mm=spec.thickness_mm, on_step=note)

@@ -11,7 +11,7 @@ from trimesh import Trimesh
 from softtact.contact.height_field import HeightField, SweptSurface
 from softtact.contact.motion import Motion
 from softtact.contact.underside import Underside
-from softtact.errors import ConvergenceError, ExtrapolationWarning
+from softtact.errors import ConvergenceError, ExtrapolationWarning, InputError
 from softtact.models.elastic.compliance import Compliance, LayerPress, press_layer
 from softtact.models.foundation.solve import FoundationMaps, press_foundation
 from softtact.models.hyperelastic import path
@@ -114,7 +114,8 @@ def press_hyperelastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray | M
 
     forces (l,) in N, or a `Motion`;  keep_body: let the result hold the whole body's displacements at each load step
     """
-    surface, lowest = HeightField(placed), _lowest_over(placed, sensor.spec.footprint_mm)
+    surface = HeightField(placed)
+    lowest = surface.first_touch_mm(sensor.spec.map_x_mm, sensor.spec.map_y_mm)
     count = len(forces.steps) if isinstance(forces, Motion) else len(forces)
     if isinstance(forces, Motion):
         path.check_motion(forces)
@@ -148,12 +149,6 @@ def press_hyperelastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray | M
 def _swept(surface, forces):
     """The underside at all places of the object together, where the mesh is to be fine."""
     return SweptSurface(surface, forces.offsets_mm()) if isinstance(forces, Motion) and not forces.straight else surface
-
-
-def _lowest_over(placed, footprint_mm):
-    """Height (mm) of the lowest vertex over the sensor; infinite where there is none."""
-    half = np.asarray(footprint_mm) / 2
-    return placed.vertices[(np.abs(placed.vertices[:, :2]) <= half).all(axis=1), 2].min(initial=np.inf)
 
 
 def _refuse_beyond_the_board(load_step, lowest_mm, thickness_mm):
@@ -217,6 +212,9 @@ _OF_MOTION = ("displacement_mm", "force_n", "torque_nmm", "slip", "iterations", 
 def press_elastic_motion(sensor: "Sensor", placed: Trimesh, motion: Motion, *, label: str, threads: int,
                          keep_body: bool = False) -> PressResult:
     """Step by step with the elastic model, which has no body to keep; a ConvergenceError holds the steps before."""
+    if not sensor.spec.base_held:
+        raise InputError(f"{sensor.spec.name} has support 'none', which the elastic model presses straight down by force only; use "
+                         "the hyperelastic model for this motion.")
     seconds: list[float] = []
     try:
         moved = press_motion(sensor, placed, motion, seconds, label=label, threads=threads)

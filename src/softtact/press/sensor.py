@@ -123,7 +123,7 @@ class Sensor:
             self.checked_forces(-load)
         placed = place(mesh, pose=pose)
         check_over_sensor(placed, self.spec.footprint_mm)
-        height = float(np.ptp(placed.bounds[:, 2]))
+        height = placed.bounds[1, 2] - HeightField(placed).first_touch_mm(self.spec.map_x_mm, self.spec.map_y_mm)
         try:
             with threadpool_limits(limits=threads if model == "elastic" else 1):
                 return flag_buried(press(self, placed, motion, label=label, threads=threads, keep_body=keep_body), height)

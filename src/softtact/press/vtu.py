@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from softtact.models.hyperelastic.deformed_mesh import PressedBody
 
 LAYERS = {"frusta": 0, "sheet": 1, "cover": 2, "pressed face": 3, "wall at rest": 4}
-_DISPLACEMENT, _PRESSURE = "displacement_mm_{:g}N", "contact_pressure_mpa_{:g}N"
-_LEVEL = re.compile(r"displacement_mm_(.+)N")
+_DISPLACEMENT, _PRESSURE = "displacement_mm_", "contact_pressure_mpa_"     # with `PressedMesh._ends`
+_LOAD_STEP = re.compile(r"displacement_mm_(.+?)N(?:_step(\d+))?")
 # Faces of a cell of VTK's by its corners; the cells that are drawn by `surface`.
 _FACES = {"hexahedron": ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
           "wedge": ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)), "quad": ((0, 1, 2, 3),)}
@@ -54,15 +54,20 @@ class PressedMesh:
 
         kinds = [(kind, nodes) for kind, nodes, _ in self.cells]
         layers = {"layer": [np.full(len(nodes), layer, dtype=np.int32) for _, nodes, layer in self.cells]}
-        moved = {_DISPLACEMENT.format(force): values.astype(np.float32)
-                 for force, values in zip(self.force_n, self.displacement_mm, strict=True)}
+        ends = self._ends()
+        moved = {_DISPLACEMENT + end: values.astype(np.float32) for end, values in zip(ends, self.displacement_mm, strict=True)}
         pressed = {} if self.pressure_mpa is None else {
-            _PRESSURE.format(force): [values.astype(np.float32) if layer == LAYERS["pressed face"]
+            _PRESSURE + end: [values.astype(np.float32) if layer == LAYERS["pressed face"]
                                       else np.full(len(nodes), np.nan, np.float32) for _, nodes, layer in self.cells]
-            for force, values in zip(self.force_n, self.pressure_mpa, strict=True)}
+            for end, values in zip(ends, self.pressure_mpa, strict=True)}
         mesh = meshio.Mesh(self.points, kinds, point_data=moved, cell_data=layers | pressed)
         with atomic_path(path) as temporary:
             mesh.write(temporary, file_format="vtu")
+
+    def _ends(self) -> list[str]:
+        """What the arrays' names end with: the force, and the step's number where forces repeat, as in a motion."""
+        ends = [f"{force:g}N" for force in self.force_n]
+        return ends if len(set(ends)) == len(ends) else [f"{end}_step{number}" for number, end in enumerate(ends, start=1)]
 
     def surface(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Points (n', 3) on the outside, triangles (m, 3) of them, and their numbers (n',) in `points`."""
@@ -83,14 +88,15 @@ def read_vtu(path: str | Path) -> PressedMesh:
     except Exception as error:     # the reader fails in many ways
         raise InputError(f"{path}: not readable as VTU ({' '.join(str(error).split())[:120] or type(error).__name__}); "
                          "write it again.") from None
-    load_steps = sorted((float(match[1]), name) for name in mesh.point_data if (match := _LEVEL.fullmatch(name)))
+    load_steps = sorted((int(match[2] or 0), float(match[1]), name)
+                        for name in mesh.point_data if (match := _LOAD_STEP.fullmatch(name)))
     if not load_steps:
         raise InputError(f"{path}: it holds no pressed sensor (no displacements); give a file of softtact press --vtu.")
     layers = mesh.cell_data.get("layer", [np.zeros(len(block.data)) for block in mesh.cells])
     cells = [(block.type, block.data[layer == own], int(own))     # a file has one block for all neighbouring cells of a kind
              for block, layer in zip(mesh.cells, layers, strict=True) for own in np.unique(layer)]
-    return PressedMesh(points=mesh.points, cells=cells, force_n=np.array([force for force, _ in load_steps]),
-                       displacement_mm=np.stack([mesh.point_data[name] for _, name in load_steps]))
+    return PressedMesh(points=mesh.points, cells=cells, force_n=np.array([force for _, force, _ in load_steps]),
+                       displacement_mm=np.stack([mesh.point_data[name] for _, _, name in load_steps]))
 
 
 def of_map(maps_mm: np.ndarray, x_mm: np.ndarray, y_mm: np.ndarray, force_n: np.ndarray, *, thickness_mm: float) -> PressedMesh:

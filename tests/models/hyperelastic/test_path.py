@@ -11,6 +11,7 @@ from support.sensors import CORO
 
 from softtact.contact.motion import Motion
 from softtact.errors import InputError
+from softtact.geometry.pose import Pose
 from softtact.models.hyperelastic.build import build_sensor_body
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.models.hyperelastic.path import press_load_steps, press_motion
@@ -129,3 +130,36 @@ def test_a_motion_of_forces_is_the_press_by_these_forces():
     by_motion, by_force = (sensor().press(ball(), model="hyperelastic", label="", **how)
                            for how in ({"motion": Motion().press(force_n=[0.1, 0.2])}, {"force_n": [0.1, 0.2]}))
     assert by_motion.deformation_map_mm.tobytes() == by_force.deformation_map_mm.tobytes()
+
+
+def test_a_press_by_depth_goes_on_by_force_and_back():
+    """Down by depth, on by the force of a deeper press, and up until the object lets go: one curve without friction."""
+    deep = sensor().press(ball(), motion=Motion().press(depth_mm=0.1), model="hyperelastic", label="")
+    motion = Motion().press(depth_mm=0.05).press(force_n=deep.normal_force_n[0]).step(ways={"z": 0.2})
+    result = sensor().press(ball(), motion=motion, model="hyperelastic", label="")
+    assert result.indentation_mm[1] == pytest.approx(0.1, rel=1e-3)
+    # What is left: the tolerance of 1e-5 N over the softest stiffness of a frustum, 0.03 N/mm.
+    assert result.normal_force_n[2] == 0.0 and np.abs(result.deformation_map_mm[2]).max() < 3e-4
+
+
+def test_a_motion_presses_with_friction_as_forces_alone_do():
+    """The force grows in the same increments, so friction finds the same path; a slide of a nanometre makes it a motion."""
+    spec = SMALL.model_copy(update={"friction": SMALL.friction.model_copy(update={"object": MU})})
+    body = build_sensor_body(spec, dielectric_law=LAWS["dielectric"], cover_law=LAWS["cover"], mesh=COARSE)
+
+    def surface(x, y):
+        return 0.15 * (x**2 + y**2), np.column_stack([0.3 * x, 0.3 * y, -np.ones(len(x))]) / np.sqrt(
+            1 + 0.09 * (x**2 + y**2))[:, None]
+
+    *_, straight = press_load_steps(body, surface, [2.0], settings=TIGHT)
+    first, _ = press_motion(body, surface, Motion().press(force_n=2.0).slide(x_mm=1e-6), 0.0, settings=TIGHT)
+    assert first.state.indentation == pytest.approx(straight.state.indentation, rel=2e-4)
+
+
+def test_an_object_wider_than_the_pad_touches_where_it_is_over_the_pad():
+    """All corners of a plate lie beside the pad; lifted by 1 mm it touches after 1 mm, from where its depth counts."""
+    plate = trimesh.creation.box((20.0, 20.0, 1.0))
+    low, lifted = (sensor().press(plate, pose=Pose.from_values([0, 0, height, 0, 0, 0]), motion=Motion().press(depth_mm=0.01),
+                                  model="hyperelastic", label="") for height in (0.5, 1.5))
+    assert lifted.indentation_mm[0] == pytest.approx(0.01) and lifted.normal_force_n[0] > 0.1
+    np.testing.assert_allclose(lifted.deformation_map_mm, low.deformation_map_mm, atol=1e-6)

@@ -16,7 +16,7 @@ from softtact.models.hyperelastic.newton import NewtonSettings, augment, first_t
 
 _DEEP = 0.55           # of a frustum's height, or of the layers': from here on elements of the default mesh may be unstable
 DEFAULT = NewtonSettings()
-_SMALLEST_SHARE = 1 / 64     # of a motion's step, until it is given up
+_SMALLEST_SHARE = 1 / 64     # of the way that an object may go at once, until a motion's step is given up
 
 
 @dataclass(frozen=True)
@@ -81,22 +81,37 @@ class ByMotion:
 
     before: Control
     after: Control
+    pressed_n: float
+    """Normal force where the step begins."""
+    largest_way_mm: float
     number: int
     """Of the step, from 1 on."""
     end: float = 1.0
-    smallest: float = _SMALLEST_SHARE
+
+    @property
+    def at_once(self):
+        """The share of the step in which the object goes as far as it may at once."""
+        way = np.linalg.norm(self.after.offset_mm - self.before.offset_mm)
+        if self.after.force is None:
+            way = max(way, abs(self.after.indentation - self.before.indentation))
+        return min(1.0, self.largest_way_mm / max(way, 1e-12))
+
+    @property
+    def smallest(self):
+        return _SMALLEST_SHARE * self.at_once
 
     def control(self, share):
-        force = None if self.after.force is None else self.before.force + share * (self.after.force - self.before.force)
+        force = None if self.after.force is None else self.pressed_n + share * (self.after.force - self.pressed_n)
         return Control(force, self.before.indentation + share * (self.after.indentation - self.before.indentation),
                        self.before.offset_mm + share * (self.after.offset_mm - self.before.offset_mm))
 
     def reach(self, body, start, settings):
-        """The largest share that one increment may go to, by the way that the object may go at once."""
-        way = np.linalg.norm(self.after.offset_mm - self.before.offset_mm)
-        if self.after.force is None:
-            way = max(way, abs(self.after.indentation - self.before.indentation))
-        return start + min(1.0, settings.largest_way_mm / max(way, 1e-12))
+        """The largest share that one increment may go to, by the object's way and, as in a press by force, by its force."""
+        reach, more = start + self.at_once, (self.after.force or 0.0) - self.pressed_n
+        if self.after.force is None or more <= 0:
+            return reach
+        force = ByForce(self.after.force, 0.0).reach(body, self.control(start).force, settings)
+        return min(reach, (force - self.pressed_n) / more)
 
     def pressed(self, start, state):
         return state.force > 0
@@ -132,7 +147,7 @@ def press_motion(body, surface, motion, touch_mm, *, settings=DEFAULT):
     for number, step in enumerate(motion.steps, start=1):
         if state is None:
             state, control = _start(body, surface, step, control, settings)
-        stage = ByMotion(control, _after(control, step), number)
+        stage = ByMotion(control, _after(control, step), state.force, settings.largest_way_mm, number)
         load_step = _advance(body, surface, state, 0.0, stage, settings)
         state = load_step.state
         control = replace(stage.after, indentation=state.indentation)
@@ -155,7 +170,7 @@ def _start(body, surface, step, control, settings):
     """State and `Control` from which the first step begins: at rest, or in a first touch under a load."""
     if "z" in step.loads:
         state = first_touch(body, surface, settings)
-        return state, replace(control, force=state.force, indentation=state.indentation)
+        return state, replace(control, indentation=state.indentation)
     slab, support = body.rest()
     state = body.evaluate(slab, support, control.indentation, body.slab.project(slab, surface))
     return body.reevaluate_contact(state, body.friction.begin_step(state)), control
