@@ -172,8 +172,8 @@ def _quality_lines(summary):
     if None not in summary["expected_error_mm"]:
         yield f"error to expect against the hyperelastic model: {1e3 * max(summary['expected_error_mm']):.2g} um, root mean square"
     if not all(summary["within_validity"]):
-        forces = ", ".join(f"{force:g}" for force, valid in zip(summary["normal_force_n"], summary["within_validity"], strict=True)
-                           if not valid)
+        flagged = zip(summary["normal_force_n"], summary["within_validity"], strict=True)
+        forces = ", ".join(f"{force:.4g}" for force, valid in flagged if not valid)
         yield f"beyond what the model is valid for: {forces} N"
     if None not in summary["extrapolated_volume_fraction"]:
         yield f"strained beyond the data behind its law: {max(summary['extrapolated_volume_fraction']):.1%} of a layer"

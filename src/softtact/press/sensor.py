@@ -33,7 +33,7 @@ from softtact.press.choice import TOLERANCE_MM, press_auto
 from softtact.press.many import press_many, raise_first
 from softtact.press.models import MOTIONS, PRESSES
 from softtact.press.result import PressResult
-from softtact.press.validity import flag_buried
+from softtact.press.validity import flag_buried, flag_overloaded
 from softtact.sensors.library import material_file, sensor_file
 from softtact.sensors.specification import AnySpec, read_spec
 
@@ -126,10 +126,14 @@ class Sensor:
         height = placed.bounds[1, 2] - HeightField(placed).first_touch_mm(self.spec.map_x_mm, self.spec.map_y_mm)
         try:
             with threadpool_limits(limits=threads if model == "elastic" else 1):
-                return flag_buried(press(self, placed, motion, label=label, threads=threads, keep_body=keep_body), height)
+                return self._flagged(press(self, placed, motion, label=label, threads=threads, keep_body=keep_body), height)
         except ConvergenceError as error:
-            error.result = error.result and flag_buried(error.result, height)
+            error.result = error.result and self._flagged(error.result, height)
             raise
+
+    def _flagged(self, result: PressResult, height_mm: float) -> PressResult:
+        """A motion's result with the steps flagged that bury the object or overload the sensor."""
+        return flag_overloaded(flag_buried(result, height_mm), self.spec.force_range_n[1])
 
     def press_many(self, meshes: trimesh.Trimesh | Sequence[trimesh.Trimesh], poses: Sequence[Pose | None] | None = None, *,
                    force_n: float | Sequence[float], model: str = "auto", workers: int | None = None, device: str = "auto",

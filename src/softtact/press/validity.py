@@ -50,3 +50,8 @@ def flag_buried(result: PressResult, top_mm: float) -> PressResult:
     """
     above = result.indentation_mm < top_mm
     return replace(result, within_validity=result.within_validity & above.astype(np.int8))
+
+
+def flag_overloaded(result: PressResult, largest_n: float) -> PressResult:
+    """The result with the steps flagged at which a press by depth needs more force than the sensor bears."""
+    return replace(result, within_validity=result.within_validity & (result.normal_force_n <= largest_n).astype(np.int8))

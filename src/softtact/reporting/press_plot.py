@@ -15,7 +15,7 @@ def plot_press(result, path):
         image = axes[0, k].imshow(result.deformation_map_mm[k], origin="lower", extent=extent, vmin=0, vmax=top, cmap="viridis")
         counts = axes[1, k].imshow(result.tactile_map[k], origin="lower", extent=extent, vmin=0,
                                    vmax=result.largest_counts, cmap="viridis")
-        axes[0, k].set_title(f"{force:g} N, depth {result.indentation_mm[k]:.2f} mm")
+        axes[0, k].set_title(f"{force:.4g} N, depth {result.indentation_mm[k]:.3g} mm")
         for axis in axes[:, k]:
             axis.set_xlabel("x (mm)")
     for axis, name in zip(axes[:, 0], ("deformation", "taxels"), strict=True):

@@ -163,3 +163,11 @@ def test_an_object_wider_than_the_pad_touches_where_it_is_over_the_pad():
                                   model="hyperelastic", label="") for height in (0.5, 1.5))
     assert lifted.indentation_mm[0] == pytest.approx(0.01) and lifted.normal_force_n[0] > 0.1
     np.testing.assert_allclose(lifted.deformation_map_mm, low.deformation_map_mm, atol=1e-6)
+
+
+def test_a_depth_that_needs_more_force_than_the_sensor_bears_is_flagged():
+    weak = sensor()
+    weak.spec = weak.spec.model_copy(update={"force_range_n": (0.0, 0.5)})
+    result = weak.press(ball(), motion=Motion().press(depth_mm=[0.15, 0.25]), model="hyperelastic", label="")
+    bears = weak.spec.force_range_n[1]
+    assert result.normal_force_n[0] < bears < result.normal_force_n[1] and result.within_validity.tolist() == [1, 0]
