@@ -60,6 +60,8 @@ def test_a_plate_that_slides_is_held_by_the_coefficient_times_the_force():
     np.testing.assert_allclose(result.normal_force_n, 1.0, rtol=1e-4)
     assert result.force_n[-1, 0] == pytest.approx(MU * 1.0, rel=2e-3)   # where the trough's rim leans, pressure has a part along x
     assert 0 < np.nanmin(result.slip[-1]) and np.isnan(result.slip[-1]).any()
+    # Once all slide, a step of 0.2 mm is slip alone: the cover is pulled by the same force as before, here and there a bit back.
+    assert np.nanmean(np.diff(result.slip[:, 3:6, 3:6], axis=0)[-1]) == pytest.approx(0.2, rel=0.06)
 
 
 def test_a_path_that_returns_dissipates_and_one_that_sticks_does_not():
@@ -171,3 +173,12 @@ def test_a_depth_that_needs_more_force_than_the_sensor_bears_is_flagged():
     result = weak.press(ball(), motion=Motion().press(depth_mm=[0.15, 0.25]), model="hyperelastic", label="")
     bears = weak.spec.force_range_n[1]
     assert result.normal_force_n[0] < bears < result.normal_force_n[1] and result.within_validity.tolist() == [1, 0]
+
+
+def test_the_deepest_place_goes_with_the_object():
+    """Centre of the map's depths under a ball without friction, 0.4 mm aside; a node's distance is 0.6 mm."""
+    start, end = sensor().press(ball(), motion=Motion().press(depth_mm=0.1).slide(x_mm=0.4, y_mm=-0.2), model="hyperelastic",
+                                label="").deformation_map_mm
+    x, y = np.meshgrid(SMALL.map_x_mm, SMALL.map_y_mm)
+    centre = [np.array([(depth * line).sum() / depth.sum() for line in (x, y)]) for depth in (start.clip(0.0), end.clip(0.0))]
+    np.testing.assert_allclose(centre[1] - centre[0], [0.4, -0.2], atol=0.15)
