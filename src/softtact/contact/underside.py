@@ -28,7 +28,7 @@ class Underside:
 
     def __init__(self, surface, grid):
         self._surface, self._grid = surface, grid
-        self._coarse = _sampled(surface, grid.points, grid.step)
+        self._coarse = _sampled(surface, grid)
         self.lowest_mm = float(self._coarse.min())
         if self.lowest_mm >= NO_CONTACT_MM:
             raise InputError("The object misses every free point of the sensor's surface; move it over the sensor.")
@@ -132,11 +132,13 @@ class Underside:
         return sliding_window_view(raster, (size, size))[SAMPLES * j + SAMPLES // 2, SAMPLES * i + SAMPLES // 2]
 
 
-def _sampled(surface, points, step):
-    """Heights (n, 9) at three by three samples of each node's own rectangle, up to its sides."""
+def _sampled(surface, grid):
+    """Heights (n, 9) at three by three samples of each node's own rectangle, up to its sides and the sensor's."""
     side = np.linspace(-0.5, 0.5, 3)
-    where = points[:, None] + np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2) * step * (1 - 1e-9)
-    return surface(*where.reshape(-1, 2).T)[0].reshape(len(points), 9)
+    where = grid.points[:, None] + np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2) * grid.step * (1 - 1e-9)
+    if grid.sides:
+        where = np.clip(where, grid.points[0], grid.points[-1])
+    return surface(*where.reshape(-1, 2).T)[0].reshape(grid.count, 9)
 
 
 def _lowest_places(heights):

@@ -1,4 +1,5 @@
-"""Linear layers under a rectangle, held at its sides: how the top moves under forces, from one quarter of the body.
+"""Linear layers under a rectangle: how the top moves under forces, from one quarter of the body. Side faces are held, from the top
+or from a depth on, or free.
 
 The body is symmetric in x and y, so a load falls into four parts that are even or odd in x and in y. Each needs only the quarter
 x > 0, y > 0 with its own conditions on the two planes of symmetry: four systems of a quarter of the size, and four blocks of
@@ -19,10 +20,12 @@ import scipy.sparse as sp
 from numba import njit
 
 from softtact.fem.elements import HEX27
+from softtact.fem.levels import with_level
 from softtact.fem.solid_block import HexBlock
 from softtact.linalg.direct import condensed_inverse
 from softtact.materials.laws.registry import make_law
 
+_SAME_MM = 1e-9
 PARITIES = tuple(product((0, 1), repeat=2))
 
 
@@ -40,21 +43,26 @@ class QuarterSlab:
     """The quarter x > 0, y > 0 of a stack of layers, from below, on `footprint_mm`.
 
     cells (nx, ny): elements along the quarter's sides; nodes lie at their corners, mid-sides and centres. base_held: else free.
+    held_below_mm: depth below the top from which side faces are held, infinite: they are free; an element layer begins there
     """
 
-    def __init__(self, footprint_mm, layers, cells, *, base_held):
-        self.layers = [(layer, share * layer.thickness) for layer in layers for share in layer.shares]
-        self.cells, self.base_held = cells, base_held
+    def __init__(self, footprint_mm, layers, cells, *, base_held, held_below_mm=0.0):
+        self.layers = _element_layers(layers, held_below_mm)
+        self.cells, self.base_held, self.held_below_mm = cells, base_held, held_below_mm
         self.x, self.y = (np.linspace(0.0, 0.5 * side, 2 * count + 1) for side, count in zip(footprint_mm, cells, strict=True))
         self.numbers = np.arange((2 * len(self.layers) + 1) * len(self.y) * len(self.x)).reshape(-1, len(self.y), len(self.x))
         self.hexes = self._hexes()
 
     @property
+    def heights(self):
+        """z (2 layers + 1,) in mm of the planes of nodes, 0 at the top."""
+        levels = np.concatenate([[0.0], np.cumsum([thickness for _, thickness in self.layers])])
+        return np.interp(np.arange(2 * len(levels) - 1) / 2, np.arange(len(levels)), levels - levels[-1])
+
+    @property
     def points(self):
         """Nodes (n, 3) in mm, z = 0 at the top."""
-        levels = np.concatenate([[0.0], np.cumsum([thickness for _, thickness in self.layers])])
-        heights = np.interp(np.arange(2 * len(levels) - 1) / 2, np.arange(len(levels)), levels - levels[-1])
-        z, y, x = np.meshgrid(heights, self.y, self.x, indexing="ij")
+        z, y, x = np.meshgrid(self.heights, self.y, self.x, indexing="ij")
         return np.column_stack([x.ravel(), y.ravel(), z.ravel()])
 
     @property
@@ -62,14 +70,26 @@ class QuarterSlab:
         """Three for each node."""
         return 3 * self.numbers.size
 
-    def plane(self, boundary):
-        """Numbers (ny, nx) of the nodes in the plane over so many element layers, those on the held sides left out."""
-        return self.numbers[2 * boundary, :-1, :-1]
+    def below_top(self, boundary):
+        """Numbers (ny, nx) of the nodes in the plane over so many element layers that lie below those of the `top`.
+
+        Some may be on sides that are held there: `compliance` says that they do not move.
+        """
+        return self.numbers[2 * boundary] if not self.side_held[-1] else self.numbers[2 * boundary, :-1, :-1]
+
+    @property
+    def side_held(self):
+        """Whether the sides are held (2 layers + 1,) at each plane of nodes."""
+        return self.heights <= -self.held_below_mm + _SAME_MM
+
+    def boundary_over(self, layer):
+        """Number of the boundary over an `ElasticLayer` of the stack, for `below_top`."""
+        return 1 + max(number for number, (own, _) in enumerate(self.layers) if own is layer)
 
     @property
     def top(self):
-        """`plane` of the top."""
-        return self.plane(len(self.layers))
+        """Numbers (ny, nx) of the nodes on the top, those on sides that are held left out."""
+        return self.below_top(len(self.layers))
 
     def _hexes(self):
         """Nodes (layers, nx ny, 27) of the elements."""
@@ -98,7 +118,7 @@ class QuarterSlab:
     def free(self, parity):
         """Unknowns that are not held at the sides, by the base, or by the parity on the planes of symmetry."""
         free = np.ones((*self.numbers.shape, 3), dtype=bool)
-        free[:, :, -1] = free[:, -1] = False
+        free[self.side_held, :, -1] = free[self.side_held, -1] = False
         if self.base_held:
             free[0] = False
         for axis, odd in enumerate(parity):
@@ -148,6 +168,16 @@ class QuarterSlab:
         out = np.zeros((len(kept), len(kept)))
         out[np.ix_(there, there)] = condensed_inverse(upper, place[kept[there]], threads=threads)
         return out
+
+
+def _element_layers(layers, held_below_mm):
+    """Element layers from below with their thickness [(layer, mm)], one of them beginning where side faces begin to be held."""
+    out, top = [], 0.0
+    for layer in reversed(layers):
+        levels = top - layer.thickness + layer.thickness * np.concatenate([[0.0], np.cumsum(layer.shares)])
+        out = [(layer, thickness) for thickness in np.diff(with_level(levels, -held_below_mm))] + out
+        top -= layer.thickness
+    return out
 
 
 def _membrane_stress(layer, gradient):

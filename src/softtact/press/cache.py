@@ -13,7 +13,7 @@ from softtact.models.foundation.compliance import FoundationCompliance, foundati
 from softtact.progress import announce
 from softtact.sensors.specification import AnySpec
 
-_FORMAT = 9     # of the files; another one makes them again
+_FORMAT = 10    # of the files; another one makes them again
 
 
 def _values(spec):
@@ -30,7 +30,7 @@ def cached_compliance(spec: AnySpec, *, threads: int = 1) -> Compliance:
 
 def cached_surface_compliance(spec: AnySpec, *, threads: int = 1) -> SurfaceCompliance:
     """The elastic layer's `SurfaceCompliance`, by the values that it depends on: friction and taxels change nothing."""
-    values = [spec.footprint_mm, spec.map_shape, spec.thickness_mm, repr(spec.elastic_layer)]
+    values = [spec.footprint_mm, spec.map_shape, spec.thickness_mm, repr(spec.elastic_layer), spec.edge.held_below_mm]
     return _cached("surface", values, SurfaceCompliance,
                    f"{spec.name}: computing the elastic layer's compliance to forces in all directions, once for this sensor (a "
                    "minute or two; 230 MB for the paper's)", lambda: surface_compliance(spec, threads=threads))

@@ -47,7 +47,7 @@ def elastic_result(sensor: "Sensor", compliance: Compliance, press: LayerPress, 
     """The result of a `LayerPress`; lowest_mm: of the object over the free surface."""
     contact, unknown, thickness = press.contact, np.full(len(forces), np.nan), sensor.spec.thickness_mm
     return make_result(sensor, "elastic", "conjugate gradients", press.maps, forces, seconds, indentation_mm=contact.depth,
-                       contact_area_mm2=np.prod(compliance.grid.step) * np.count_nonzero(contact.force > 0, axis=0),
+                       contact_area_mm2=press.areas @ (contact.force > 0),
                        penetration_mm=contact.penetration,
                        within_validity=valid_elastic(contact.depth - lowest_mm, thickness_mm=thickness),
                        frustum_compression_mm=unknown, residual_n=unknown, extrapolated_volume_fraction=unknown,
@@ -79,7 +79,7 @@ def press_on_foundation(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, *
 
 def _of_load_steps(sensor, compliance, points, load_steps, forces, times):
     """The result of a foundation press' load steps, be it those before one that was not reached."""
-    area, count = points.covered * np.prod(compliance.grid.step), len(load_steps)
+    area, count = points.covered * compliance.grid.areas(points.nodes), len(load_steps)
     compression = np.array([load_step.compression.max() for load_step in load_steps])
     depth = np.array([load_step.depth for load_step in load_steps])
     valid = valid_foundation(compression, depth - points.gap.min(), frustum_mm=sensor.spec.dielectric.frusta.height_mm,

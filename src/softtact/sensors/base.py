@@ -9,6 +9,7 @@ from pydantic import Field, PositiveFloat, PositiveInt, ValidationError
 
 from softtact.errors import InputError
 from softtact.files import read_yaml
+from softtact.sensors.edge import Edge, EdgeField
 from softtact.sensors.fields import ElasticLayer, Section, Taxels
 from softtact.unknown_names import first_fault, known_keys, unknown
 
@@ -26,11 +27,17 @@ class BaseSpec(Section):
     largest_counts: PositiveFloat = Field(2400.0, description="of the readout's converter; pictures end there")
     taxels: Taxels
     elastic_layer: ElasticLayer
+    edge: EdgeField = Edge()
 
     @property
     def thickness_mm(self) -> float:
         """Height of the sensing surface over the lower side: over the PCB, where the sensor lies on it."""
         raise NotImplementedError
+
+    @property
+    def held_height_mm(self) -> float:
+        """Height of the part whose side faces a shell can hold: all layers, but not frusta."""
+        return self.thickness_mm
 
     @property
     def base_held(self) -> bool:
@@ -92,6 +99,13 @@ class BaseSpec(Section):
 
     def _check(self, where: str) -> None:
         """Refuse values that are right each by itself and wrong together."""
+        below = self.edge.held_below_mm
+        if np.isfinite(below) and below >= self.held_height_mm:
+            raise InputError(f"{where}, at 'edge.held.sides_below_mm': {below:g} mm is not less than the height of the layers, "
+                             f"{self.held_height_mm:g} mm, so nothing is held; make it smaller, or write 'held: free'.")
+        if not self.base_held and not np.isfinite(below):
+            raise InputError(f"{where}, at 'edge.held': with support 'none' and free sides nothing holds the sensor; hold the "
+                             "sides, or write support: base.")
 
     @classmethod
     def from_dict(cls, values: dict[str, Any], *, where: str = "sensor") -> Self:

@@ -7,7 +7,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PositiveFloa
 T = TypeVar("T")
 
 
-def _plain_value(field: Any) -> Any:
+def plain_value(field: Any) -> Any:
     """Accept `{value, assumed, reason}` wherever a plain value stands."""
     if isinstance(field, dict) and "value" in field:
         extra = set(field) - {"value", "assumed", "reason"}
@@ -35,7 +35,7 @@ class Stated(Section, Generic[T]):
 
 def _or_stated(kind: Any) -> BeforeValidator:
     """What lets a `kind` of value stand as a `Stated` one in the file."""
-    return BeforeValidator(_plain_value, json_schema_input_type=kind | Stated[kind])
+    return BeforeValidator(plain_value, json_schema_input_type=kind | Stated[kind])
 
 
 _NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]

@@ -99,12 +99,18 @@ class SensorSpec(BaseSpec):
                              "the middle; the foundation model wants even numbers; change the pitch or the footprint a little.")
 
     @property
+    def held_height_mm(self) -> float:
+        """Height of sheet and cover, whose side faces a shell can hold."""
+        return self.thickness_mm - self.frustum_height_mm
+
+    @property
     def frusta_counts(self) -> tuple[int, ...]:
         """How many frusta fit along x and y."""
         pitch = self.dielectric.frusta.pitch_mm
         return tuple(int(np.floor(side / pitch + 1e-9)) for side in self.footprint_mm)
 
     def _check(self, where: str) -> None:
+        super()._check(where)
         if min(self.frusta_counts) < 1:
             raise InputError(f"{where}: no frustum of pitch {self.dielectric.frusta.pitch_mm} mm fits on the footprint "
                              f"{self.footprint_mm} mm; enlarge the footprint or reduce the pitch.")

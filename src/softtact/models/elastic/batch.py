@@ -94,20 +94,22 @@ def press_layers(compliance, heights, forces_n, *, device, settings=None):
 
 
 def _press_some(compliance, surface, heights, forces_n, settings):
-    area = np.prod(compliance.grid.step)
+    grid = compliance.grid
+    area = grid.areas(np.arange(grid.count))
     first = np.stack([_depth_at_first(height, area, forces_n / compliance.foundation_modulus) for height in heights])
     on_device = [torch.as_tensor(values, device=surface.device)
                  for values in (np.stack(heights, axis=1), np.tile(forces_n, (len(heights), 1)), first)]
-    areas = torch.full((compliance.grid.count,), area, dtype=torch.float64, device=surface.device)
+    areas = torch.as_tensor(area, dtype=torch.float64, device=surface.device)
     load_steps = press_columns(surface, *on_device, area=areas, settings=settings)
-    every_second = surface.double(load_steps.force).reshape(*surface.shape, -1)[1::2, 1::2]
-    maps = torch.nn.functional.pad(every_second, (0, 0, 1, 1, 1, 1)).permute(2, 0, 1).cpu().numpy()
+    first_row = grid.first_of_second
+    every_second = surface.double(load_steps.force).reshape(*surface.shape, -1)[first_row::2, first_row::2]
+    maps = grid.with_held_sides(every_second.permute(2, 0, 1).cpu().numpy())
     arrays = {field.name: getattr(load_steps, field.name).cpu().numpy() for field in fields(load_steps)}
     for press in range(len(heights)):
         own = slice(press * len(forces_n), (press + 1) * len(forces_n))
-        yield LayerPress(maps=maps[own], contact=ContactLoadSteps(**{name: values[..., own] for name, values in arrays.items()}))
+        yield LayerPress(maps=maps[own], areas=area, contact=ContactLoadSteps(**{name: values[..., own] for name, values in arrays.items()}))
 
 
 def _depth_at_first(height, area, force_over_modulus):
     lowest, there = height.min(), height < NO_CONTACT_MM
-    return lowest + depth_on_springs(height[there] - lowest, np.full(there.sum(), area), force_over_modulus)
+    return lowest + depth_on_springs(height[there] - lowest, area[there], force_over_modulus)

@@ -1,4 +1,4 @@
-"""The elastic model: one linear layer, held at its base and sides; the object's contact on the known compliance of its top.
+"""The elastic model: one linear layer, held at its base and as the sensor's edge says; contact on the known compliance of its top.
 
 Of a sensor that is free below the sides alone are held, and the compliance tells how its lower side moves, too.
 The vertical compliance of the top's nodes (mm/N) is computed once for a sensor (`elastic_compliance`), by quarters of the layer
@@ -35,14 +35,14 @@ class Compliance:
 
     def save(self, path):
         """Write as a NumPy archive, in single precision."""
-        np.savez(path, x=self.grid.x, y=self.grid.y, blocks=self.blocks.blocks, foundation_modulus=self.foundation_modulus,
+        np.savez(path, **self.grid.arrays(), blocks=self.blocks.blocks, foundation_modulus=self.foundation_modulus,
                  stencil=self.stencil.values, **({} if self.lower is None else {"lower": self.lower.blocks}))
 
     @classmethod
     def load(cls, path):
         """Read what `save` wrote."""
         with read_arrays(path) as data:
-            return cls(grid=NodeGrid(data["x"], data["y"]), blocks=ParityBlocks(data["blocks"]),
+            return cls(grid=NodeGrid.of(data), blocks=ParityBlocks(data["blocks"]),
                        foundation_modulus=float(data["foundation_modulus"]),
                        stencil=Stencil(data["stencil"]), lower=ParityBlocks(data["lower"]) if "lower" in data else None)
 
@@ -52,7 +52,7 @@ class Compliance:
         return self.blocks.between(*places, *places)
 
     def maps(self, points, force):
-        """Deformation maps (l, ny, nx) in mm of forces (c, l) in N at `ObjectPoints`, with the held edges."""
+        """Deformation maps (l, ny, nx) in mm of forces (c, l) in N at `ObjectPoints`, with sides that are held."""
         return self._maps(self.blocks, points, force)
 
     def lower_maps(self, points, force):
@@ -60,15 +60,9 @@ class Compliance:
         return None if self.lower is None else self._maps(self.lower, points, force)
 
     def _maps(self, blocks, points, force):
-        coarse = self.grid.every_second
-        rows = blocks.between(*self.grid.quarter(_coarse_nodes(self.grid)), *self.grid.quarter(points.nodes))
-        inner = (rows @ force.astype(np.float32)).T.reshape(-1, *coarse.shape)
-        return np.pad(inner.astype(float), ((0, 0), (1, 1), (1, 1)))
-
-
-def _coarse_nodes(grid):
-    """Numbers of the grid's every second node."""
-    return np.arange(grid.count).reshape(grid.shape)[1::2, 1::2].ravel()
+        rows = blocks.between(*self.grid.quarter(self.grid.second_nodes), *self.grid.quarter(points.nodes))
+        inner = (rows @ force.astype(np.float32)).T.reshape(-1, *self.grid.every_second.shape)
+        return self.grid.with_held_sides(inner.astype(float))
 
 
 def map_cells(spec):
@@ -78,8 +72,10 @@ def map_cells(spec):
 
 
 def surface_grid(slab):
-    """The `NodeGrid` of a whole slab's free nodes on one plane, from its `QuarterSlab`."""
-    return NodeGrid(*(np.concatenate([-line[-2:0:-1], line[:-1]]) for line in (slab.x, slab.y)))
+    """The `NodeGrid` of the free nodes on a whole slab's top, from its `QuarterSlab`."""
+    sides = not slab.side_held[-1]
+    x, y = (line if sides else line[:-1] for line in (slab.x, slab.y))
+    return NodeGrid(*(np.concatenate([-line[:0:-1], line]) for line in (x, y)), sides)
 
 
 def elastic_slab(spec, *, cells=None):
@@ -87,13 +83,13 @@ def elastic_slab(spec, *, cells=None):
     layer = spec.elastic_layer
     bulk, shear = layer.young_mpa / (3 * (1 - 2 * layer.poisson)), layer.young_mpa / (2 * (1 + layer.poisson))
     return QuarterSlab(spec.footprint_mm, [ElasticLayer(spec.thickness_mm, bulk, shear, _SHARES)], cells or map_cells(spec),
-                       base_held=spec.base_held)
+                       base_held=spec.base_held, held_below_mm=spec.edge.held_below_mm)
 
 
 def elastic_compliance(spec, *, threads=1, cells=None):
     """The `Compliance` of a sensor's elastic layer; `cells`: elements along a quarter's sides, if not as the map asks for."""
     slab = elastic_slab(spec, cells=cells)
-    planes, count = [slab.top] if spec.base_held else [slab.top, slab.plane(0)], slab.top.size
+    planes, count = [slab.top] if spec.base_held else [slab.top, slab.below_top(0)], slab.top.size
     kept = 3 * np.concatenate([plane.ravel() for plane in planes]) + 2
     both = np.stack([slab.compliance(slab.stiffness, kept, parity, threads=threads) for parity in PARITIES])
     blocks = both[:, :count, :count]
@@ -126,17 +122,21 @@ def _stencil(blocks, shape):
 
 @dataclass(frozen=True)
 class LayerPress:
-    """maps (l, ny, nx) in mm of all load steps, the contact's `ContactLoadSteps`, and maps of a lower side that is free."""
+    """maps (l, ny, nx) in mm of all load steps, the contact's `ContactLoadSteps`, areas (c,) in mm2 of its points, and maps of a
+    lower side that is free.
+    """
 
     maps: np.ndarray
     contact: ContactLoadSteps
+    areas: np.ndarray
     lower_maps: np.ndarray | None = None
 
 
 def press_layer(compliance, points, forces_n):
     """Press `ObjectPoints` of the compliance's grid with forces (l,) in N."""
-    contact = press_elastic(compliance.among(points), points.gap, forces_n, area=points.covered * np.prod(compliance.grid.step),
+    areas = compliance.grid.areas(points.nodes)
+    contact = press_elastic(compliance.among(points), points.gap, forces_n, area=points.covered * areas,
                             foundation_modulus=compliance.foundation_modulus,
                             precondition=compliance.stencil.on(compliance.grid, points.nodes))
-    return LayerPress(maps=compliance.maps(points, contact.force), contact=contact,
+    return LayerPress(maps=compliance.maps(points, contact.force), contact=contact, areas=areas,
                       lower_maps=compliance.lower_maps(points, contact.force))

@@ -135,22 +135,21 @@ def _result(compliance, states, counts):
         displacement_mm=np.stack([_displacement(compliance, state) for state in ends]),
         force_n=forces, torque_nmm=np.stack([_torque(grid, state) for state in ends]),
         slip=np.stack([_slip_map(grid, state) for state in ends]),
-        contact_area_mm2=np.prod(grid.step) * np.array([np.count_nonzero(state.normal > 0) for state in ends]),
+        contact_area_mm2=np.array([grid.areas(np.flatnonzero(state.normal > 0)).sum() for state in ends]),
         penetration_mm=np.array([state.penetration_mm for state in ends]),
         iterations=np.diff([state.turns for state in states]), increments=np.array(counts),
         **{name: np.array([getattr(state, name) for state in ends]) for name in ("dissipated_mj", "stored_mj", "work_mj")})
 
 
 def _displacement(compliance, state):
-    """(y, x, 3) in mm on the map's grid, with the held edges."""
+    """(y, x, 3) in mm on the map's grid, with sides that are held."""
     grid, touching = compliance.grid, np.flatnonzero(state.normal > 0)
-    coarse = np.arange(grid.count).reshape(grid.shape)[1::2, 1::2]
-    out = np.zeros((*coarse.shape, 3))
+    moved = np.zeros((3, *grid.every_second.shape))
     if len(touching):
         force = np.column_stack([state.tangential, state.normal])[touching]
-        moved = compliance.between(coarse.ravel(), touching, dtype=np.float32) @ force
-        out[:] = (moved * [1.0, 1.0, -1.0]).reshape(out.shape)
-    return np.pad(out, ((1, 1), (1, 1), (0, 0)))
+        found = compliance.between(grid.second_nodes, touching, dtype=np.float32) @ force
+        moved[:] = (found * [1.0, 1.0, -1.0]).T.reshape(moved.shape)
+    return np.moveaxis(grid.with_held_sides(moved), 0, -1)
 
 
 def _torque(grid, state):
@@ -159,5 +158,5 @@ def _torque(grid, state):
 
 
 def _slip_map(grid, state):
-    path = np.where(state.normal > 0, state.path, np.nan).reshape(grid.shape)[1::2, 1::2]
-    return np.pad(path, 1, constant_values=np.nan)
+    path = np.where(state.normal > 0, state.path, np.nan)[grid.second_nodes].reshape(grid.every_second.shape)
+    return path if grid.sides else np.pad(path, 1, constant_values=np.nan)

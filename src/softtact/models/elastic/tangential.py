@@ -38,13 +38,13 @@ class SurfaceCompliance:
 
     def save(self, path) -> None:
         """Write as a NumPy archive, in single precision."""
-        np.savez(path, x=self.grid.x, y=self.grid.y, triangles=self.triangles, foundation_modulus=self.foundation_modulus)
+        np.savez(path, **self.grid.arrays(), triangles=self.triangles, foundation_modulus=self.foundation_modulus)
 
     @classmethod
     def load(cls, path) -> "SurfaceCompliance":
         """Read what `save` wrote."""
         with read_arrays(path) as data:
-            return cls(grid=NodeGrid(data["x"], data["y"]), triangles=data["triangles"],
+            return cls(grid=NodeGrid.of(data), triangles=data["triangles"],
                        foundation_modulus=float(data["foundation_modulus"]))
 
     def between(self, rows: np.ndarray, columns: np.ndarray, *, row_axes=(0, 1, 2), column_axes=(0, 1, 2),

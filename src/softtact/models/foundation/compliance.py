@@ -26,7 +26,8 @@ _TIE = 20.0     # N/mm of the springs that tie the frusta's descents to the slab
 class FoundationCompliance:
     """What the slab on its frusta does under downwards forces, by parity (see `quarter_slab`), and the law of the frusta.
 
-    surface: among the grid's nodes in the quarter (a,), the frusta (b,) and the electrode plane at the map's points (c,)
+    surface: among the grid's nodes in the quarter (a,), the frusta (b,) and the electrode plane at the map's points (c,), without
+        sides where the grid is so
     sideways: of the grid's every second node, in x and in y (2 c,), from the nodes and frusta (a + b,)
     membrane: forces N_xx, N_yy, N_xy of the frusta's cells (3 b,) in N/mm, from the same
     lateral: movement and tilt of the frusta's roots along x, then along y (4 b,), from all of these (a + b + c)
@@ -46,7 +47,7 @@ class FoundationCompliance:
 
     def save(self, path):
         """Write as a NumPy archive."""
-        arrays = {"x": self.grid.x, "y": self.grid.y, "counts": self.counts, "foundation_modulus": self.foundation_modulus}
+        arrays = self.grid.arrays() | {"counts": self.counts, "foundation_modulus": self.foundation_modulus}
         arrays |= {f"law_{name}": values for name, values in self.law.arrays().items()}
         arrays |= {name: getattr(self, name).blocks for name in _BLOCKS}
         np.savez(path, **arrays)
@@ -57,7 +58,7 @@ class FoundationCompliance:
         with read_arrays(path) as data:
             law = FrustumLaw(**{name.removeprefix("law_"): data[name] for name in data.files if name.startswith("law_")})
             blocks = {name: ParityBlocks(data[name]) for name in _BLOCKS}
-            return cls(grid=NodeGrid(data["x"], data["y"]), counts=tuple(data["counts"]),
+            return cls(grid=NodeGrid.of(data), counts=tuple(data["counts"]),
                        foundation_modulus=float(data["foundation_modulus"]), law=law, **blocks)
 
 
@@ -75,7 +76,8 @@ def foundation_compliance(spec, *, dielectric_law, cover_law, frustum=None, cell
     descents = _cleaned(sp.kron(sp.eye(len(centres)), frustum.descent[None], format="csr") @ roots)
     followed = sp.vstack([_membrane(slab, spec, centres), _lateral_movement(roots, frustum, centres)]).tocsr()
     columns = np.concatenate([3 * slab.top.ravel() + 2, slab.unknowns + np.arange(len(centres))])
-    rows = np.concatenate([columns, 3 * slab.plane(len(SHEET_SHARES))[::2, ::2].ravel() + 2,
+    electrodes = slab.below_top(slab.boundary_over(slab.layers[0][0]))
+    rows = np.concatenate([columns, 3 * electrodes[::2, ::2].ravel() + 2,
                            *(3 * slab.top[::2, ::2].ravel() + axis for axis in (0, 1))])
     parts = [_of_parity(slab, stiffness, descents, followed, rows, len(columns), parity, threads) for parity in PARITIES]
     surface, sideways, both, own = (np.stack(blocks).astype(np.float32) for blocks in zip(*parts, strict=True))
@@ -91,7 +93,8 @@ def foundation_slab(spec, dielectric_law, cover_law, *, cells=None):
     """The `QuarterSlab` of sheet and cover with two laws' linear constants."""
     layers = [ElasticLayer(spec.dielectric.sheet_thickness_mm, dielectric_law.bulk_modulus, dielectric_law.mu0, SHEET_SHARES),
               ElasticLayer(spec.cover.thickness_mm, cover_law.bulk_modulus, cover_law.mu0, COVER_SHARES)]
-    return QuarterSlab(spec.footprint_mm, layers, cells or map_cells(spec), base_held=False)
+    return QuarterSlab(spec.footprint_mm, layers, cells or map_cells(spec), base_held=False,
+                       held_below_mm=spec.edge.held_below_mm)
 
 
 def _quarter_lattice(spec):

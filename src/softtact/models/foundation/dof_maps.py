@@ -33,7 +33,7 @@ def patches_of(points, grid, shared):
 
 def _pressure_weights(points, grid):
     """Nodal forces (c,) of a uniform pressure on quadratic elements, whose corners are every second node from the middle."""
-    return np.where(grid.from_middle(points.nodes) % 2, 2.0, 1.0).prod(axis=1)
+    return np.where(grid.from_middle(points.nodes) % 2, 2.0, 1.0).prod(axis=1) * grid.share_inside(points.nodes)
 
 
 class Places:
@@ -53,13 +53,13 @@ class Places:
         return self.compliance.surface.between(self.columns, self.signs, self.columns, self.signs)
 
     def maps(self, load, lateral):
-        """Deformation maps (l, ny, nx) in mm under loads (n + b, l) and lateral ones of frusta (4 b, l), with the held edges."""
+        """Deformation maps (l, ny, nx) in mm under loads (n + b, l) and lateral ones of frusta (4 b, l), with sides that are held."""
         coarse = self.compliance.grid.every_second
         numbers, signs = coarse.quarter(np.arange(coarse.count))
         rows = self.compliance.surface.between(self._map_start + numbers, signs, self.columns, self.signs)
         by_frusta = self._lateral(self._map_start + numbers, signs).T @ lateral.astype(np.float32)
         down = rows @ load.astype(np.float32) + by_frusta
-        return np.pad(down.T.reshape(-1, *coarse.shape).astype(float), ((0, 0), (1, 1), (1, 1)))
+        return coarse.with_held_sides(down.T.reshape(-1, *coarse.shape).astype(float))
 
     def sideways(self, nodes):
         """Movement in x and y (2 k, n + b) of some nodes (k,) of the grid of every second node."""
@@ -113,7 +113,7 @@ class Sideways:
     def __init__(self, compliance, points, places):
         grid, coarse = compliance.grid, compliance.grid.every_second
         j, i = np.divmod(points.nodes, grid.shape[1])
-        at = np.column_stack([i, j]) / 2 - 0.5        # in steps of the coarse grid, whose first node is the grid's second one
+        at = (np.column_stack([i, j]) - grid.first_of_second) / 2       # in steps of the coarse grid
         low = np.floor(at).astype(int)
         share = at - low
         corner, weight = [], []

@@ -6,6 +6,7 @@ import numpy as np
 
 from softtact.contact.friction import coulomb
 from softtact.fem.extruded_mesh import sheet_mesh_2d
+from softtact.fem.levels import with_level
 from softtact.models.hyperelastic.body import LayeredBody
 from softtact.models.hyperelastic.frusta import FrustumArray, FrustumGeometry
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
@@ -38,8 +39,9 @@ def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), s
     bottom = -(spec.cover.thickness_mm + spec.dielectric.sheet_thickness_mm)
     x_lines, y_lines = (_lines(side, count, frusta.pitch_mm, mesh.far_pitches)
                         for side, count in zip(spec.footprint_mm, counts, strict=True))
-    sheet = Layer(np.linspace(bottom, -spec.cover.thickness_mm, mesh.sheet_layers + 1), dielectric_law)
-    cover = Layer(spec.cover.thickness_mm * (np.asarray(mesh.cover_heights) - 1), cover_law)
+    held_below = spec.edge.held_below_mm
+    sheet = Layer(with_level(np.linspace(bottom, -spec.cover.thickness_mm, mesh.sheet_layers + 1), -held_below), dielectric_law)
+    cover = Layer(with_level(spec.cover.thickness_mm * (np.asarray(mesh.cover_heights) - 1), -held_below), cover_law)
     splits, zone = cover_splits(mesh, surface, x_lines, y_lines, frusta.pitch_mm)
     centres, neighbours = lattice(counts, frusta.pitch_mm)
     mesh_2d = sheet_mesh_2d(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, spec.footprint_mm,
@@ -47,7 +49,8 @@ def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), s
                       rings=mesh.frustum_rings, core=mesh.core)
     slab = Slab(sheet, cover, mesh_2d, x_lines, y_lines, sides="held", contact=contact or mesh.object_contact,
                 constrained_cell_edges=mesh.constrained_cell_edges or _far(zone, x_lines, y_lines), splits=splits,
-                quartic_penalty_ratio=mesh.slab_quartic_penalty_ratio, friction=coulomb(spec.friction.object))
+                quartic_penalty_ratio=mesh.slab_quartic_penalty_ratio, friction=coulomb(spec.friction.object),
+                held_below_mm=held_below)
     return LayeredBody(slab, _frustum_array(spec, centres, neighbours, dielectric_law, mesh, scatter, contact),
                        slab.bottom[mesh_2d.roots],
                        threads=threads)

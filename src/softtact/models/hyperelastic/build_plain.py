@@ -1,4 +1,4 @@
-"""Bodies of one or two plain layers without frusta, bonded to the board or free below; their sides are held.
+"""Bodies of one or two plain layers without frusta, bonded to the board or free below; their sides as the sensor's edge says.
 
 The lowest part is the slab's sheet, 27-node hexahedra on a regular grid; above lies its cover, refined under the object. Of a
 single layer the lower half is the sheet, of two layers the dielectric is.
@@ -8,6 +8,7 @@ import numpy as np
 
 from softtact.contact.friction import coulomb
 from softtact.fem.extruded_mesh import SheetMesh2D, grid_mesh_2d, merge, with_centres
+from softtact.fem.levels import with_level
 from softtact.fem.point_location import interpolation_2d
 from softtact.models.hyperelastic.body import LayeredBody
 from softtact.models.hyperelastic.build import cover_splits
@@ -47,7 +48,8 @@ def build_plain_body(spec, *, dielectric_law, cover_law=None, mesh=MeshSettings(
     kind = Slab if spec.cover else SingleLayerSlab
     slab = kind(sheet, cover, grid_without_cells(*(_fine(lines, mesh) for lines in (x_lines, y_lines))), x_lines, y_lines,
                 sides=sides, contact=contact or mesh.object_contact, splits=splits,
-                quartic_penalty_ratio=mesh.slab_quartic_penalty_ratio, friction=coulomb(spec.friction.object))
+                quartic_penalty_ratio=mesh.slab_quartic_penalty_ratio, friction=coulomb(spec.friction.object),
+                held_below_mm=spec.edge.held_below_mm)
     if spec.base_held:
         slab.hold(slab.bottom)
     return LayeredBody(slab, PlainSupport(spec.support, contact or mesh.contact), threads=threads)
@@ -57,8 +59,9 @@ def _layers(spec, dielectric_law, cover_law, mesh):
     """The slab's sheet and cover as `Layer`s, z = 0 at the top."""
     above = spec.cover.thickness_mm if spec.cover else (1 - _SHEET_SHARE) * spec.thickness_mm
     heights = np.linspace(-spec.thickness_mm, -above, max(mesh.sheet_layers, _SHEET_LAYERS) + 1)
-    return (Layer(heights, dielectric_law),
-            Layer(above * (np.asarray(mesh.cover_heights) - 1), cover_law if spec.cover else dielectric_law))
+    held = -spec.edge.held_below_mm
+    return (Layer(with_level(heights, held), dielectric_law),
+            Layer(with_level(above * (np.asarray(mesh.cover_heights) - 1), held), cover_law if spec.cover else dielectric_law))
 
 
 def _lines(side, element_mm, mesh):

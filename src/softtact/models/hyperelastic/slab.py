@@ -79,12 +79,13 @@ class Slab:
     regions = ("sheet", "cover")     # of the deformed mesh that the two parts belong to
 
     def __init__(self, sheet, cover, sheet_mesh_2d, x_lines, y_lines, *, sides, contact, constrained_cell_edges=True, splits=None,
-                 quartic_penalty_ratio=0.0, friction=None):
+                 quartic_penalty_ratio=0.0, friction=None, held_below_mm=0.0):
         """splits (layers, ny 2^m, nx 2^m): how often the cover's uppermost layers are split where (see `cover_mesh`); the layers
         below these keep to the sheet's plan. None: none does, and none is split.
 
         constrained_cell_edges: everywhere (True), nowhere (False), or where a function of places (n, 2) says so (n,)
         quartic_penalty_ratio: see `solid_block`;  friction: `Coulomb` of the object on the top, or None
+        held_below_mm: depth below the top, one of the layers' levels, from which `held` sides are held
         """
         if splits is None:
             splits = np.zeros((len(cover.heights) - 1, len(y_lines) - 1, len(x_lines) - 1), dtype=np.int64)
@@ -107,7 +108,7 @@ class Slab:
         self._add_cover(cover.law)
         self._add_sheet(sheet_mesh_2d, [sheet.law] * self.sheet_layers + [cover.law] * bound)
         self._joined = joined(self.solids)     # to evaluate a hundred small blocks takes twice as long
-        self._number_unknowns(sides)
+        self._number_unknowns(sides, held_below_mm)
         pressed = cover.law or sheet.law     # None in bodies at rest, of which only the mesh is wanted
         self.top = TopContact(self.cover_mesh, contact, plane_modulus=pressed.plane_modulus if pressed else np.inf,
                               friction=friction)
@@ -165,14 +166,14 @@ class Slab:
         """All blocks of elements: those of `solids`, and the same joined."""
         return [block for _, block in self.solids + self._joined]
 
-    def _number_unknowns(self, sides):
+    def _number_unknowns(self, sides, held_below_mm):
         """Free unknowns: all but the sides, which are `held` (sensor shell), `symmetric` (unit cell) or also `free`."""
-        x, y, _ = self.points.T
+        x, y, z = self.points.T
         on_x = (np.abs(x - self.x_lines[0]) < 1e-9) | (np.abs(x - self.x_lines[-1]) < 1e-9)
         on_y = (np.abs(y - self.y_lines[0]) < 1e-9) | (np.abs(y - self.y_lines[-1]) < 1e-9)
         held = np.zeros((self.nodes, 3), dtype=bool)
         if sides == "held":
-            held[on_x | on_y] = True
+            held[(on_x | on_y) & (z <= 1e-9 - held_below_mm)] = True
         elif sides == "symmetric":
             held[on_x, 0] = held[on_y, 1] = True
         elif sides != "free":
