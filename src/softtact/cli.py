@@ -7,6 +7,7 @@ Heavy imports stand inside the commands' functions, so that `softtact --help` an
 import argparse
 import os
 import sys
+from collections.abc import Sequence
 
 import softtact
 from softtact.commands import (
@@ -37,7 +38,7 @@ EXAMPLES = """examples:
 """
 
 
-def main(arguments=None):
+def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return its exit status."""
     parser = _parser()
     if "_ARGCOMPLETE" in os.environ:     # a shell asks what could come next

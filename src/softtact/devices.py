@@ -10,7 +10,7 @@ from softtact.extras import how_to_install
 _DRIVERS = ("/dev/nvidiactl", "/dev/dxg", "/dev/kfd")     # NVIDIA's, that of Windows' subsystem for Linux, AMD's
 
 
-def find_device(name):
+def find_device(name: str) -> str:
     """`cpu`, or torch's name of a GPU: `auto` is one where there is one, `cuda` (or `cuda:1`) asks for it.
 
     Raises InputError where the name is unknown, or the GPU that was asked for is not there.

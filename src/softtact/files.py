@@ -8,7 +8,9 @@ import json
 import os
 import tempfile
 import zipfile
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import yaml
@@ -16,11 +18,15 @@ import yaml
 import softtact
 from softtact.errors import InputError, OutputError
 
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
 PROVENANCE = ("softtact_version", "config_digest", "seed")     # attributes of every data set that is written
 
 
 @contextlib.contextmanager
-def atomic_path(path):
+def atomic_path(path: str | Path) -> Iterator[Path]:
     """Yield a temporary path beside `path`; rename it to `path` if the block succeeds, delete it otherwise.
 
     A full disk, or a folder that cannot be written to, becomes an `OutputError`.
@@ -56,7 +62,7 @@ def _not_written(path, error):
                        "and run again.")
 
 
-def read_yaml(path, *, missing):
+def read_yaml(path: str | Path, *, missing: str) -> Any:
     """What a YAML file holds; `missing` says of a file that is not there what to do about it."""
     try:
         return yaml.safe_load(Path(path).read_text(encoding="utf-8"))
@@ -66,24 +72,24 @@ def read_yaml(path, *, missing):
         raise InputError(f"{path}: not valid YAML ({' '.join(str(error).split())}); correct it.") from None
 
 
-def files_below(paths, *, suffix):
+def files_below(paths: str | Path | list[Path], *, suffix: str) -> list[Path]:
     """The files of a list, or of a folder and all below it, sorted."""
     return paths if isinstance(paths, list) else sorted(Path(paths).rglob(f"*{suffix}"))
 
 
-def digest(obj):
+def digest(obj: Any) -> str:
     """Short, stable digest (16 hex digits) of a JSON-like object."""
     text = json.dumps(obj, sort_keys=True, separators=(",", ":"), default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def write_json(path, obj):
+def write_json(path: str | Path, obj: Any) -> None:
     """Write `obj` as indented JSON with sorted keys."""
     with atomic_path(path) as temporary:
         temporary.write_text(json.dumps(obj, indent=2, sort_keys=True) + "\n", encoding="utf-8")
 
 
-def read_json(path):
+def read_json(path: str | Path) -> Any:
     """Read a JSON file; an unreadable one raises `InputError` naming the file and the line."""
     try:
         return json.loads(Path(path).read_text(encoding="utf-8"))
@@ -93,13 +99,13 @@ def read_json(path):
         raise InputError(f"{path}: not valid JSON ({error}); write the file again.") from None
 
 
-def write_csv(path, frame, *, float_format="%.6g"):
+def write_csv(path: str | Path, frame: "pd.DataFrame", *, float_format: str = "%.6g") -> None:
     """Write a pandas data frame as CSV without its index."""
     with atomic_path(path) as temporary:
         frame.to_csv(temporary, index=False, float_format=float_format, lineterminator="\n")
 
 
-def write_dataset(path, dataset, *, seed, settings):
+def write_dataset(path: str | Path, dataset: "xr.Dataset", *, seed: int | None, settings: Any) -> None:
     """Write an xarray dataset as NetCDF with version, settings digest and seed among its attributes.
 
     The same data set gives the same bytes: no time stamp or path is stored.
@@ -111,7 +117,7 @@ def write_dataset(path, dataset, *, seed, settings):
         temporary.write_bytes(content.getbuffer())
 
 
-def read_dataset(path):
+def read_dataset(path: str | Path) -> "xr.Dataset":
     """Read a NetCDF file whole into memory."""
     import xarray
 
@@ -124,7 +130,7 @@ def read_dataset(path):
 
 
 @contextlib.contextmanager
-def read_arrays(path):
+def read_arrays(path: str | Path) -> Iterator[np.lib.npyio.NpzFile]:
     """The arrays of an .npz file, open while a block reads them; a damaged file raises `InputError`."""
     try:
         with np.load(path, allow_pickle=False) as data:

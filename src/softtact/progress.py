@@ -2,14 +2,18 @@
 
 import sys
 import time
+from collections.abc import Iterable, Iterator
+from typing import TypeVar
+
+_Item = TypeVar("_Item")
 
 
-def progress(iterable, *, label, total=None, interval_s=2.0):
+def progress(iterable: Iterable[_Item], *, label: str, total: int | None = None, interval_s: float = 2.0) -> Iterator[_Item]:
     """Yield the items of `iterable`; write `label: 3/20, 12 s` on stderr at most every `interval_s` seconds.
 
     An empty label writes nothing: the work is part of some other that tells its progress.
     """
-    total = total if total is not None else len(iterable)
+    total = total if total is not None else len(iterable)     # type: ignore[arg-type]
     start = shown = time.monotonic()
     for done, item in enumerate(iterable, start=1):
         yield item
@@ -19,6 +23,6 @@ def progress(iterable, *, label, total=None, interval_s=2.0):
             shown = now
 
 
-def announce(text):
+def announce(text: str) -> None:
     """Say on stderr what begins now and may take a while."""
     print(text, file=sys.stderr, flush=True)

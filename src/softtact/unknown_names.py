@@ -1,25 +1,27 @@
 """What is to be said of a key or a name that is not known: the nearest right one."""
 
 import difflib
-from typing import get_args
+from collections.abc import Collection, Iterable
+from typing import Any, get_args
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
 
 
-def unknown(name, known, *, kind):
+def unknown(name: object, known: Collection[object], *, kind: str) -> str:
     """What is to be said of a `kind` of thing called `name` that is not among the `known`."""
     near = difflib.get_close_matches(str(name), [str(right) for right in known], n=1)
     remedy = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(map(str, known)) or 'none'}"
     return f"there is no {kind} {name!r}; {remedy}"
 
 
-def nearest(name, known):
+def nearest(name: object, known: Iterable[str]) -> str:
     """The known name that is nearest to `name`, as an aside in a sentence; empty where none is near."""
     near = difflib.get_close_matches(str(name), known, n=1)
     return f" (did you mean {near[0]!r}?)" if near else ""
 
 
-def known_keys(model, path):
+def known_keys(model: type[BaseModel], path: Iterable[Any]) -> list[str]:
     """Keys of the section that the keys `path` lead to from a pydantic model; of all, where it may be one of several."""
     models = [model]
     for key in path:     # the index of a list, the name of an entry, the kind of a section lead no further
@@ -28,7 +30,7 @@ def known_keys(model, path):
     return [name for model in models for name in model.model_fields]
 
 
-def first_fault(error):
+def first_fault(error: ValidationError) -> ErrorDetails:
     """Of a pydantic ValidationError's faults the one to tell: a misspelt key before the right one that is missing for it."""
     return min(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
 

@@ -4,9 +4,17 @@ import argparse
 import json
 import os
 import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from softtact.errors import InputError
+
+if TYPE_CHECKING:
+    import trimesh
+
+    from softtact.geometry.pose import Pose
+    from softtact.sensors.specification import AnySpec
 
 UNITS = ("mm", "cm", "m", "inch")
 EXIT_STATUS = {0: "done",
@@ -18,7 +26,8 @@ EXIT_STATUS = {0: "done",
 EXIT_TEXT = "exit status:\n" + "\n".join(f"  {status:<4}{meaning}" for status, meaning in EXIT_STATUS.items())
 
 
-def add_command(commands, name, run, summary, examples, *, json=True):
+def add_command(commands: argparse._SubParsersAction, name: str, run: Callable[[argparse.Namespace], None], summary: str,
+                examples: str, *, json: bool = True) -> argparse.ArgumentParser:
     """A new command `name` that calls run(options), with examples in its help; one with `json` can answer so."""
     command = commands.add_parser(name, help=summary, description=summary, epilog=f"examples:{examples.rstrip()}\n\n{EXIT_TEXT}",
                                   formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -28,7 +37,7 @@ def add_command(commands, name, run, summary, examples, *, json=True):
     return command
 
 
-def add_mesh(command):
+def add_mesh(command: argparse.ArgumentParser) -> None:
     """The arguments of a mesh over a sensor."""
     command.add_argument("mesh", metavar="MESH", type=Path, help="STL, OBJ or PLY file of a closed body")
     command.add_argument("--unit", required=True, choices=UNITS, help="the mesh's unit, which the file does not state")
@@ -38,14 +47,14 @@ def add_mesh(command):
     command.add_argument("--sensor", default="coro", help="name or YAML file of a sensor (default: coro)")
 
 
-def add_repair(command):
+def add_repair(command: argparse.ArgumentParser) -> None:
     """The options of how a mesh that is no clean body is taken."""
     command.add_argument("--repair", action=argparse.BooleanOptionalAction, default=True,
                          help="repair clear faults of the mesh (flat or small holes, doubled, turned or broken facets, "
                               "overlapping bodies) and name each repair on stderr; --no-repair refuses such a mesh")
 
 
-def read_object(options):
+def read_object(options: argparse.Namespace) -> "tuple[trimesh.Trimesh, list[str]]":
     """The command line's mesh (trimesh, mm) and the list of its repairs, which are also said on stderr."""
     from softtact.geometry.meshes import read_mesh
     from softtact.geometry.repair import read_mended
@@ -58,12 +67,12 @@ def read_object(options):
     return mended.mesh, mended.repairs
 
 
-def show(result, *, as_json, lines):
+def show(result: Any, *, as_json: bool, lines: Iterable[str]) -> None:
     """`result` as JSON, or the lines for people."""
     print(json.dumps(result, indent=2) if as_json else "\n".join(lines))
 
 
-def check_forces(forces, spec):
+def check_forces(forces: Iterable[float], spec: "AnySpec") -> None:
     """Refuse a force that the sensor does not bear, before a mesh is read or a solver loaded."""
     low, high = spec.force_range_n
     for force in forces:
@@ -72,14 +81,14 @@ def check_forces(forces, spec):
                              f"give a force above {low:g} N and up to {high:g} N.")
 
 
-def pose_of(options):
+def pose_of(options: argparse.Namespace) -> "Pose | None":
     """The `Pose` given on the command line, or None."""
     from softtact.geometry.pose import Pose
 
     return Pose.parse(options.pose) if options.pose else None
 
 
-def check_folders(*paths):
+def check_folders(*paths: Path | None) -> None:
     """Refuse now what could not be written after a long press."""
     for path in paths:
         if path and not path.parent.is_dir():
@@ -88,14 +97,14 @@ def check_folders(*paths):
             raise InputError(f"{path}: the folder {path.parent} may not be written to; choose another.")
 
 
-def check_names(endings):
+def check_names(endings: Mapping[Path | None, tuple[str, ...]]) -> None:
     """Refuse a file to write whose name does not end as one of those that it is written as: {path or None: endings}."""
     for path, known in endings.items():
         if path and path.suffix.lower() not in known:
             raise InputError(f"{path}: the file is written as {' or '.join(known)}; give a name with such an ending.")
 
 
-def pairs(option, texts):
+def pairs(option: str, texts: Iterable[str] | None) -> Iterator[tuple[str, str]]:
     """(name, value) of texts NAME=VALUE."""
     for text in texts or ():
         name, equals, value = text.partition("=")
@@ -104,7 +113,7 @@ def pairs(option, texts):
         yield name, value
 
 
-def numbers(option, text, count):
+def numbers(option: str, text: str, count: int) -> list[float]:
     """`count` numbers with colons between them."""
     try:
         values = [float(part) for part in text.split(":")]
@@ -116,7 +125,7 @@ def numbers(option, text, count):
     return values
 
 
-def sensor_spec(name):
+def sensor_spec(name: str) -> "AnySpec":
     """The description of a sensor by its name or its YAML file, without its solvers."""
     from softtact.sensors.library import sensor_file
     from softtact.sensors.specification import read_spec
@@ -124,6 +133,6 @@ def sensor_spec(name):
     return read_spec(sensor_file(name))
 
 
-def short(value):
+def short(value: object) -> str:
     """A number in four digits, anything else as it is."""
     return f"{value:.4g}" if isinstance(value, float) else str(value)

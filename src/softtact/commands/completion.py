@@ -1,5 +1,7 @@
 """`softtact completion`: what makes a shell complete softtact's commands, options and files."""
 
+import argparse
+
 from softtact.commands.common import add_command
 
 SHELLS = ("bash", "zsh", "fish")
@@ -10,7 +12,7 @@ EXAMPLES = """
 """
 
 
-def add(commands):
+def add(commands: argparse._SubParsersAction) -> None:
     """Add the command to the parser."""
     command = add_command(commands, "completion", _completion, "Print a shell's completion of this command.", EXAMPLES, json=False)
     command.add_argument("shell", choices=SHELLS, help="the shell to write completion for")

@@ -1,5 +1,7 @@
 """`softtact complexity`: the counts that the paper chooses a model by."""
 
+import argparse
+
 from softtact.commands.common import add_command, add_mesh, pose_of, sensor_spec, short, show
 
 EXAMPLES = """
@@ -8,7 +10,7 @@ EXAMPLES = """
 """
 
 
-def add(commands):
+def add(commands: argparse._SubParsersAction) -> None:
     """Add the command to the parser."""
     command = add_command(commands, "complexity", _complexity, "Count a mesh's complexity and choose its model.", EXAMPLES)
     add_mesh(command)

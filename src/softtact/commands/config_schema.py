@@ -1,7 +1,9 @@
 """`softtact config-schema`: what the files that a user writes may hold, as JSON schema for an editor."""
 
+import argparse
 import json
 from pathlib import Path
+from typing import Any
 
 from softtact.commands.common import add_command, check_folders
 
@@ -14,7 +16,7 @@ An editor with YAML support checks a file whose first line is:
 """
 
 
-def add(commands):
+def add(commands: argparse._SubParsersAction) -> None:
     """Add the command to the parser."""
     command = add_command(commands, "config-schema", _schema,
                           "Print the JSON schema of a study's, a sensor's or a material's YAML.", EXAMPLES, json=False)
@@ -32,7 +34,7 @@ def _schema(options):
         print(json.dumps(schema_of(options.kind), indent=2, sort_keys=True))
 
 
-def schema_of(kind):
+def schema_of(kind: str) -> dict[str, Any]:
     """The JSON schema of a kind of file, generated from the types that read it."""
     from softtact.materials.config import MaterialConfig
     from softtact.sensors.specification import sensor_schema

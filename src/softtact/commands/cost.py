@@ -1,5 +1,6 @@
 """`softtact cost`: what a study takes before it is started."""
 
+import argparse
 import os
 from pathlib import Path
 
@@ -11,7 +12,7 @@ EXAMPLES = """
 """
 
 
-def add(commands):
+def add(commands: argparse._SubParsersAction) -> None:
     """Add the command to the parser."""
     command = add_command(commands, "cost", _cost, "Tell a study's jobs, hours and disk before it is started.", EXAMPLES)
     command.add_argument("--configfile", type=Path, metavar="FILE.yaml",

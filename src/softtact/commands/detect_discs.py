@@ -1,5 +1,6 @@
 """`softtact detect-discs`: contact discs in camera frames."""
 
+import argparse
 from pathlib import Path
 
 from softtact.commands.common import add_command, check_folders, show
@@ -11,7 +12,7 @@ EXAMPLES = """
 """
 
 
-def add(commands):
+def add(commands: argparse._SubParsersAction) -> None:
     """Add the command to the parser."""
     command = add_command(commands, "detect-discs", _detect_discs,
                            "Measure the bright contact discs in camera frames: table and annotated pictures.", EXAMPLES)

@@ -1,5 +1,6 @@
 """`softtact export-deck`: a press as another solver's input."""
 
+import argparse
 from pathlib import Path
 
 import softtact
@@ -22,7 +23,7 @@ EXAMPLES = """
 DECK_FORMATS = ("calculix", "abaqus")
 
 
-def add(commands):
+def add(commands: argparse._SubParsersAction) -> None:
     """Add the command to the parser."""
     command = add_command(commands, "export-deck", _export_deck,
                            "Write the hyperelastic press of a mesh as an input deck for another solver.", EXAMPLES)

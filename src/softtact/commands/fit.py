@@ -1,5 +1,6 @@
 """`softtact fit`: test curves to a material card."""
 
+import argparse
 from pathlib import Path
 
 from softtact.commands.common import add_command, check_folders, numbers, pairs, show
@@ -13,7 +14,7 @@ EXAMPLES = """
 LAYOUTS = ("plain", "soro_db", "stress_stretch", "literature")
 
 
-def add(commands):
+def add(commands: argparse._SubParsersAction) -> None:
     """Add the command to the parser."""
     command = add_command(commands, "fit", _fit, "Fit hyperelastic laws to test curves and write a material card.", EXAMPLES)
     command.add_argument("curves", nargs="+", metavar="CURVES",

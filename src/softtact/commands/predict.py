@@ -1,5 +1,6 @@
 """`softtact predict`: the taxels that a trained network reads off deformation maps."""
 
+import argparse
 import sys
 from pathlib import Path
 
@@ -14,7 +15,7 @@ EXAMPLES = """
 WRITTEN = (".nc", ".csv")
 
 
-def add(commands):
+def add(commands: argparse._SubParsersAction) -> None:
     """Add the command to the parser."""
     command = add_command(commands, "predict", _predict, "Predict the taxels' counts from deformation maps with a trained network.",
                           EXAMPLES)

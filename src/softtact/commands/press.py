@@ -1,5 +1,6 @@
 """`softtact press`: a mesh on the sensor, its maps and a summary."""
 
+import argparse
 from pathlib import Path
 
 import softtact
@@ -29,7 +30,7 @@ EXAMPLES = """
 MODELS = ("auto", "elastic", "foundation", "hyperelastic")
 
 
-def add(commands):
+def add(commands: argparse._SubParsersAction) -> None:
     """Add the command to the parser."""
     command = add_command(commands, "press", _press, "Press a mesh on the sensor: deformation map and taxels.", EXAMPLES)
     add_mesh(command)

@@ -1,5 +1,7 @@
 """`softtact stage`: one stage of the workflow on files."""
 
+import argparse
+
 from softtact.commands.common import add_command
 
 EXAMPLES = r"""
@@ -9,7 +11,7 @@ EXAMPLES = r"""
 """
 
 
-def add(commands):
+def add(commands: argparse._SubParsersAction) -> None:
     """Add the command to the parser."""
     from softtact.stages.__main__ import add_arguments
 

@@ -1,5 +1,6 @@
 """`softtact view`: a pressed sensor in a browser, or as a picture."""
 
+import argparse
 import os
 import sys
 import tempfile
@@ -15,7 +16,7 @@ EXAMPLES = """
 """
 
 
-def add(commands):
+def add(commands: argparse._SubParsersAction) -> None:
     """Add the command to the parser."""
     command = add_command(commands, "view", _view, "Show a pressed sensor from all sides, in a browser or as a picture.", EXAMPLES)
     command.add_argument("result", metavar="RESULT", type=Path, help="the .nc or .vtu file of softtact press")

@@ -13,6 +13,7 @@ import numpy as np
 from softtact.contact.penalty import penalty
 from softtact.decks import keywords
 from softtact.decks.laws import law_card
+from softtact.decks.model import DeckModel
 from softtact.fem.elements import HEX20, WEDGE18
 
 PROGRAM = "Abaqus"
@@ -27,7 +28,7 @@ _OUTPUT = ("*OUTPUT, FIELD, FREQUENCY=1000", "*NODE OUTPUT", "U, RF", "*ELEMENT 
            "*NODE PRINT, NSET=INTERFACE, FREQUENCY=1000", "U3")
 
 
-def deck_lines(model, *, slab_element="C3D20RH", frustum_element="C3D20H"):
+def deck_lines(model: DeckModel, *, slab_element: str = "C3D20RH", frustum_element: str = "C3D20H") -> list[str]:
     """The deck's lines."""
     kinds = {part.name: frustum_element if part.name == "FRUSTA" else slab_element for part in model.parts}
     cards = {part.name: law_card(part.law, no_term=_NO_TERM, dialect=PROGRAM) for part in model.parts}

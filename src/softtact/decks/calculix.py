@@ -19,11 +19,12 @@ import numpy as np
 
 from softtact.decks import keywords
 from softtact.decks.laws import law_card
+from softtact.decks.model import DeckModel
 from softtact.fem.elements import HEX20, TET4, WEDGE18
 
 PROGRAM = "CalculiX"
 ELEMENTS = (f"{HEX20.abaqus_name}R", HEX20.abaqus_name)     # R: 2 x 2 x 2 points
-WEDGE = WEDGE18.abaqus_name
+WEDGE: str = WEDGE18.abaqus_name     # type: ignore[assignment]
 _NO_TERM = 1e20              # a zero D_i would be replaced by a default
 _STIFF = "1000, 0.3"         # of the rigid bodies' elements, whose nodes are all prescribed
 _FIRST_INCREMENT, _LARGEST_INCREMENT, _SMALLEST_INCREMENT = 0.1, 0.25, 1e-6
@@ -37,7 +38,8 @@ _TABLES = ("*NODE PRINT, NSET=OBJECT_REFERENCE, FREQUENCY=1000", "U",
 _FIELDS = ("*NODE FILE, FREQUENCY=1000", "U, RF", "*EL FILE, FREQUENCY=1000", "S", "*CONTACT FILE, FREQUENCY=1000", "CDIS, CSTR")
 
 
-def deck_lines(model, *, slab_element="C3D20R", frustum_element="C3D20R", fields=True):
+def deck_lines(model: DeckModel, *, slab_element: str = "C3D20R", frustum_element: str = "C3D20R",
+               fields: bool = True) -> list[str]:
     """The deck's lines.
 
     `fields`: displacements, stresses and contact in the .frd file too, not only the tables of the .dat file

@@ -9,6 +9,7 @@ The Ogden constants are those of Abaqus in all three: psi = sum 2 mu_k / alpha_k
 from dataclasses import dataclass
 
 from softtact.errors import InputError
+from softtact.materials.laws.base import Law
 
 # Law: the form's parameters on the keyword line, our constants in the order of the data, number of D_i.
 _FORMS = {
@@ -31,7 +32,7 @@ class LawCard:
     constants: tuple
 
 
-def law_card(law, *, no_term, dialect):
+def law_card(law: Law | None, *, no_term: float, dialect: str) -> LawCard:
     """The `LawCard` of a law. `no_term`: the D_i (1/MPa) with which the dialect leaves a volumetric term out."""
     if law is None or law.name not in _FORMS:
         name = getattr(law, "name", None)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from softtact.fem.elements import HEX27, WEDGE18
+from softtact.models.hyperelastic.body import LayeredBody
 
 _NO_WEIGHT = 1e-10
 
@@ -24,17 +25,17 @@ class Part:
     law: object
 
     @property
-    def hex_elements(self):
+    def hex_elements(self) -> np.ndarray:
         """Numbers (h,) of the bricks."""
         return self.elements[:len(self.hexes)]
 
     @property
-    def wedge_elements(self):
+    def wedge_elements(self) -> np.ndarray:
         """Numbers (w,) of the wedges."""
         return self.elements[len(self.hexes):]
 
     @property
-    def nodes(self):
+    def nodes(self) -> np.ndarray:
         """Every node once."""
         return np.unique(np.concatenate([self.hexes.ravel(), self.wedges.ravel()]))
 
@@ -62,7 +63,7 @@ class BodyMesh:
     frusta: np.ndarray
 
 
-def body_mesh(body):
+def body_mesh(body: LayeredBody) -> BodyMesh:
     """The `BodyMesh` of a `LayeredBody`."""
     slab, support = body.slab, body.support
     cover, hanging = _cover_numbers(slab)

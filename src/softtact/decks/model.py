@@ -4,9 +4,11 @@ Nothing here is written in a program's dialect. Numbers count from 0; the writer
 in MPa.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import trimesh
 
 from softtact.contact.friction import Coulomb
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
@@ -16,6 +18,7 @@ from softtact.errors import InputError
 from softtact.fem.elements import HEX27
 from softtact.fem.extruded_mesh import Mesh2D
 from softtact.geometry.meshes import facets_over
+from softtact.models.hyperelastic.body import LayeredBody
 from softtact.models.hyperelastic.frusta import DIRECTIONS
 
 # Numbers of a brick's and a wedge's faces in Abaqus and CalculiX alike, S1 to S6: those of `Element.faces`, counted from 1.
@@ -79,7 +82,9 @@ class DeckModel:
     remarks: tuple = ()
 
 
-def deck_model(body, placed, *, forces_n=None, indentations_mm=None, title="press", touch_mm=TOUCH_MM):
+def deck_model(body: LayeredBody, placed: trimesh.Trimesh, *, forces_n: Sequence[float] | np.ndarray | None = None,
+               indentations_mm: Sequence[float] | np.ndarray | None = None, title: str = "press",
+               touch_mm: float = TOUCH_MM) -> DeckModel:
     """The press of a placed mesh (trimesh, mm) on a `LayeredBody` as a `DeckModel`.
 
     Either `forces_n` (N, increasing), after a first step that lowers the object until it overlaps by `touch_mm`, or

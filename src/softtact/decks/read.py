@@ -1,6 +1,7 @@
 """Reading a deck of either dialect back, as far as `softtact` writes one: for comparison with what was meant."""
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from softtact.errors import InputError
 
@@ -38,7 +39,7 @@ class DeckStep:
     loads: list = field(default_factory=list)
 
 
-def read_deck(path):
+def read_deck(path: Path) -> Deck:
     """The `Deck` of a file."""
     deck, behaviours, frictions, comment = Deck(), {}, {}, ""
     current = {"material": "", "interaction": ""}

@@ -1,6 +1,7 @@
 """Bright contact discs in a camera frame: found by their edges, measured by an outline fitted to their light."""
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -15,6 +16,7 @@ from softtact.imaging.outline import (
     ROW,
     A,
     B,
+    Outline,
     R,
     S,
     box,
@@ -36,7 +38,7 @@ _MISFIT, _RESIDUAL = 1.5, 0.08   # over noise and over contrast: beyond both, th
 PASSES = 3               # fits of every disc: alone, with what the others tell, and once more beside its neighbours' light
 
 
-def detect_discs(frame, *, pixel_mm, smallest_mm=0.0):
+def detect_discs(frame: np.ndarray, *, pixel_mm: float, smallest_mm: float = 0.0) -> pd.DataFrame:
     """Table of the bright discs in a frame (rows, columns) or (rows, columns, channels), one row each.
 
     disc             number, from 0, from top to bottom
@@ -53,7 +55,7 @@ def detect_discs(frame, *, pixel_mm, smallest_mm=0.0):
     return discs_and_outlines(frame, pixel_mm=pixel_mm, smallest_mm=smallest_mm)[0]
 
 
-def discs_and_outlines(frame, *, pixel_mm, smallest_mm=0.0):
+def discs_and_outlines(frame: np.ndarray, *, pixel_mm: float, smallest_mm: float = 0.0) -> tuple[pd.DataFrame, list[np.ndarray]]:
     """The table of `detect_discs`, and the outline of each disc: x_mm and y_mm of its corners (corners, 2)."""
     image = grey(frame)
     scene = Scene(image)
@@ -65,7 +67,7 @@ def discs_and_outlines(frame, *, pixel_mm, smallest_mm=0.0):
     return _table(rows, middle, pixel_mm), outlines
 
 
-def grey(frame):
+def grey(frame: np.ndarray) -> np.ndarray:
     """A frame of any depth as grey values (rows, columns) whose full scale is 1; colours count alike, alpha does not.
 
     The full scale of integers is that of the fewest bits that hold them, at least 8: cameras store 10 or 12 bits in 16.
@@ -108,13 +110,13 @@ class Scene:
     as far as these agree: discs that differ in brightness keep their own. passes: 1 fits every disc alone.
     """
 
-    def __init__(self, image, *, passes=PASSES):
+    def __init__(self, image: np.ndarray, *, passes: int = PASSES) -> None:
         self.image, self.passes, noise = image, passes, noise_of(image)
         self.regions = find_regions(image, noise=noise)
         self.props = regionprops(self.regions.labels)
         self.limits = _limits(image)
         self.noise = self._whole_noise(noise)
-        self.fits = []
+        self.fits: list[Outline] = []
         if self.props:
             self._fit()
 
@@ -193,7 +195,7 @@ class Scene:
             light[window] += contrast_light(one, window)
         return light
 
-    def measure(self, k):
+    def measure(self, k: int) -> dict[str, Any]:
         """One row of the table, in pixels."""
         fit, region = self.fits[k], self.props[k]
         row = {"label": k + 1, "touching": bool(self.regions.touching[k]), "clipped": self._clipped(k),
@@ -208,7 +210,7 @@ class Scene:
             row["pixels_sd"] = fit.sd_of(self._share) * max(1.0, fit.misfit)
         return row
 
-    def corners(self, row):
+    def corners(self, row: dict[str, Any]) -> np.ndarray:
         """Outline (corners, 2) of one disc in rows and columns."""
         k = row["label"] - 1
         if row["measured_by"] == "outline":

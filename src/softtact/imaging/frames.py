@@ -5,6 +5,8 @@
 Rows run along y, columns along x; the frame's centre is the origin. Coverage is the share of a pixel that lies in a disc.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
@@ -13,8 +15,9 @@ BRIGHTNESS = 0.85   # of full scale: a contact at the frame's centre
 _SUBROWS = 16       # lines per pixel along which a disc's chord is exact: coverage to 1e-4 of a disc of 4 pixels
 
 
-def render_frame(x_mm, y_mm, area_mm2, *, footprint_mm, pixel_mm, blur_mm, noise, falloff, seed,
-                 background=BACKGROUND, brightness=BRIGHTNESS):
+def render_frame(x_mm: np.ndarray, y_mm: np.ndarray, area_mm2: np.ndarray, *, footprint_mm: tuple[float, float], pixel_mm: float,
+                 blur_mm: float, noise: float, falloff: float, seed: int | Sequence[int], background: float = BACKGROUND,
+                 brightness: float = BRIGHTNESS) -> np.ndarray:
     """An 8-bit frame (rows along y, columns along x) of discs with given centres (n,) and areas (n,).
 
     footprint_mm: sides (along x, along y) of what the camera sees; blur_mm: standard deviation of the lens' blur;
@@ -31,19 +34,20 @@ def render_frame(x_mm, y_mm, area_mm2, *, footprint_mm, pixel_mm, blur_mm, noise
                   background=background, brightness=brightness)
 
 
-def expose(cover, *, noise, falloff, seed, background=BACKGROUND, brightness=BRIGHTNESS):
+def expose(cover: np.ndarray, *, noise: float, falloff: float, seed: int | Sequence[int], background: float = BACKGROUND,
+           brightness: float = BRIGHTNESS) -> np.ndarray:
     """The 8-bit frame of a blurred coverage (rows, columns) of contacts of any shape; the rest as in `render_frame`."""
     light = illumination(cover.shape, falloff) * (background + (brightness - background) * cover)
     light += noise * np.random.default_rng(seed).standard_normal(light.shape)
     return np.round(255 * np.clip(light, 0, 1)).astype(np.uint8)
 
 
-def signal_to_noise(*, noise, background=BACKGROUND, brightness=BRIGHTNESS):
+def signal_to_noise(*, noise: float, background: float = BACKGROUND, brightness: float = BRIGHTNESS) -> float:
     """Contrast of a disc over the background at the frame's centre, before blur, over the noise of one pixel."""
     return (brightness - background) / noise
 
 
-def coverage(x_mm, y_mm, area_mm2, *, shape, pixel_mm):
+def coverage(x_mm: np.ndarray, y_mm: np.ndarray, area_mm2: np.ndarray, *, shape: tuple[int, int], pixel_mm: float) -> np.ndarray:
     """Share (rows, columns) of each pixel that lies in a disc; touching discs share a pixel, overlapping ones count once."""
     cover = np.zeros(shape)
     middle = 0.5 * (np.array(shape) - 1)
@@ -64,7 +68,7 @@ def _add_disc(cover, row, column, radius):
     cover[top:bottom, left:right] += chord.reshape(bottom - top, _SUBROWS, right - left).mean(axis=1)
 
 
-def illumination(shape, falloff):
+def illumination(shape: tuple[int, int], falloff: float) -> np.ndarray:
     """Light (rows, columns) relative to the centre: it falls with the square of the distance."""
     r, c = np.ogrid[-1:1:shape[0] * 1j, -1:1:shape[1] * 1j]
     return 1 - 0.5 * falloff * (r**2 + c**2)

@@ -13,6 +13,7 @@ Fit              Gauss-Newton on the squared residuals over the noise, plus what
 The harmonics cost a disc's area nothing: to first order its error does not depend on theirs.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,19 +48,19 @@ class Outline:
     residual: float          # rms of the residual over the contrast
 
     @property
-    def area(self):
+    def area(self) -> float:
         """Area in pixels; the mean square that noise adds to each squared parameter is taken off."""
         squares = self.values**2 - np.diag(self.covariance)
         return np.pi * (squares[R] + 0.5 * squares[SHAPE].sum())
 
     @property
-    def area_sd(self):
+    def area_sd(self) -> float:
         """Standard deviation of the area in pixels."""
         slope = np.zeros(len(self.values))
         slope[R], slope[SHAPE] = 2 * np.pi * self.values[R], np.pi * self.values[SHAPE]
         return float(np.sqrt(max(slope @ self.covariance @ slope, 0.0)))
 
-    def sd_of(self, measure):
+    def sd_of(self, measure: Callable[[np.ndarray], float]) -> float:
         """Standard deviation of `measure` (a function of the parameters), from its slopes."""
         slope = np.zeros(len(self.values))
         for k in range(ROW, len(slope)):
@@ -70,7 +71,8 @@ class Outline:
         return float(np.sqrt(max(slope @ self.covariance @ slope, 0.0)))
 
 
-def fit_outline(rows, columns, light, *, start, prior, noise, other=0.0, limits=(-1e6, 1e6)):
+def fit_outline(rows: np.ndarray, columns: np.ndarray, light: np.ndarray, *, start: np.ndarray, prior: Prior, noise: float,
+                other: float | np.ndarray = 0.0, limits: tuple[float, float] = (-1e6, 1e6)) -> Outline:
     """The `Outline` of the disc in pixels (n,) of brightness `light` (n,); `other`: light of its neighbours (n,)."""
     weight = 1.0 / prior.sd**2
 
@@ -134,7 +136,7 @@ def _polar(values, rows, columns):
     return radius, angles, (dr, dc, rho)
 
 
-def blurred_disc(radius, rho, s):
+def blurred_disc(radius: np.ndarray, rho: np.ndarray, s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Share of light at distance rho (n,) from the centre of a disc of radius (n,), and its slopes along radius and rho."""
     share, by_radius, by_rho = (rho < radius).astype(float), np.zeros_like(rho), np.zeros_like(rho)
     near = np.abs(rho - radius) < _FAR * s
@@ -145,7 +147,7 @@ def blurred_disc(radius, rho, s):
     return share, by_radius, by_rho
 
 
-def clipped(light, *, noise, limits):
+def clipped(light: np.ndarray, *, noise: float, limits: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
     """Mean (n,) of brightness plus noise once a camera has cut it off at its limits, and its slope along the brightness."""
     low, high = ((limit - light) / noise for limit in limits)
     passed = ndtr(high) - ndtr(low)
@@ -157,27 +159,27 @@ def _excess(z):
     return z * ndtr(z) + np.exp(-0.5 * z**2) / np.sqrt(2 * np.pi)
 
 
-def box(values, *, shape, margin):
+def box(values: np.ndarray, *, shape: tuple[int, int], margin: float) -> tuple[slice, ...]:
     """Slices of the pixels around an outline, as far as they lie in the frame."""
     reach = values[R] + np.abs(values[SHAPE]).sum() + margin
     return tuple(slice(int(np.clip(np.floor(m - reach), 0, n)), int(np.clip(np.ceil(m + reach) + 1, 0, n)))
                  for m, n in zip(values[[ROW, COLUMN]], shape, strict=True))
 
 
-def contrast_light(values, window):
+def contrast_light(values: np.ndarray, window: tuple[slice, ...]) -> np.ndarray:
     """Light (rows, columns) of a disc above the glass in a window of the frame."""
     rows, columns = np.mgrid[window].astype(float)
     radius, _, (_, _, rho) = _polar(values, rows, columns)
     return values[A] * blurred_disc(radius, rho, values[S])[0]
 
 
-def inside(values, window):
+def inside(values: np.ndarray, window: tuple[slice, ...]) -> np.ndarray:
     """Share (rows, columns) of each pixel that lies in the outline, without blur."""
     radius, _, (_, _, rho) = _polar(values, *np.mgrid[window].astype(float))
     return np.clip(radius - rho + 0.5, 0.0, 1.0)
 
 
-def corners(values, *, count=72):
+def corners(values: np.ndarray, *, count: int = 72) -> np.ndarray:
     """Points (count + 1, 2) in rows and columns along an outline, closed."""
     phi = np.linspace(0, 2 * np.pi, count + 1)
     angles = np.stack([f(m * phi) for m in HARMONICS for f in (np.cos, np.sin)])

@@ -5,9 +5,11 @@ brightness of the glass and the blur as polynomials of the place, also where one
 a larger dim one. Discs that differ by more than their errors keep their own values: the prior is as wide as they scatter.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from softtact.imaging.outline import COLUMN, ROW, Prior, R
+from softtact.imaging.outline import COLUMN, ROW, Outline, Prior, R
 from softtact.imaging.regions import terms
 
 SHAPE_SD = np.repeat([0.15, 0.08, 0.08], 2)   # of the radius: harmonics 2 (an ellipse of 1.3 has 0.13), 3, 4
@@ -18,14 +20,14 @@ _TOLD = 0.2           # of the contrast: a disc that knows its own to that much 
 _CHANGE = 0.3         # of the contrast and of the blur: by how much each term of the polynomial may change them
 
 
-def first_priors(start):
+def first_priors(start: np.ndarray) -> list[Prior]:
     """`Prior` of each disc (discs, parameters) before any fit: the regions tell contrast and blur to about a half."""
     sd = np.full(start.shape, UNKNOWN)
     sd[:, 0], sd[:, 2] = 0.5 * start[:, 0], 0.3 + 0.5 * start[:, 2]
     return _with_shape(start, sd)
 
 
-def pooled_priors(fits, priors, *, shape):
+def pooled_priors(fits: Sequence[Outline], priors: Sequence[Prior], *, shape: tuple[int, int]) -> list[Prior]:
     """`Prior` of each disc from the fits of all, made under `priors`."""
     values = np.array([fit.values for fit in fits])
     if len(fits) < FEWEST:

@@ -1,9 +1,11 @@
 """Frames from files: an image, a folder of images, the pages of a TIFF, a video. One frame is in memory at a time."""
 
 import importlib.util
+from collections.abc import Iterator
 from pathlib import Path
 
 import imageio.v3 as iio
+import numpy as np
 import tifffile
 
 from softtact.errors import InputError
@@ -14,7 +16,7 @@ STACKS = (".tif", ".tiff")
 VIDEOS = (".mp4", ".avi", ".mov", ".mkv", ".gif")
 
 
-def read_frames(path, *, every=1):
+def read_frames(path: str | Path, *, every: int = 1) -> Iterator[tuple[str, np.ndarray]]:
     """Pairs (name, frame) of a file, or of the images in a folder in order of name; each `every`-th of them.
 
     A frame is (rows, columns) or (rows, columns, channels) in the file's own depth. Frames of a video and pages of a TIFF are
@@ -28,7 +30,7 @@ def read_frames(path, *, every=1):
         yield from _numbered(file, every=1)
 
 
-def image_files(path):
+def image_files(path: str | Path) -> list[Path]:
     """The file itself, or a folder's images in order of name."""
     path = Path(path)
     if not path.exists():
@@ -41,7 +43,7 @@ def image_files(path):
     return files
 
 
-def read_frame(file):
+def read_frame(file: str | Path) -> np.ndarray:
     """The first frame of a file."""
     return next(_frames(Path(file)))
 

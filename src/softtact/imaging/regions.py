@@ -6,13 +6,17 @@ halfway between glass and disc in every part of an uneven frame; close to edges 
 ones count.
 """
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.ndimage import convolve, distance_transform_edt, gaussian_filter, gaussian_gradient_magnitude, maximum
 from skimage.measure import label, regionprops
 from skimage.morphology import dilation, disk, h_maxima
 from skimage.segmentation import find_boundaries, watershed
+
+if TYPE_CHECKING:
+    from skimage.measure._regionprops import RegionProperties
 
 EDGE_SCALE = 1.5        # pixels; sd of the filter that looks for edges
 EDGE_SIGNIFICANCE = 6.5  # sd of the noise: one pixel in 1e9 of an empty frame; skewed noise at black has a longer tail
@@ -35,7 +39,7 @@ class Regions(NamedTuple):
     touching: np.ndarray    # (discs,) bool: split from a neighbour
 
 
-def noise_of(image, where=None):
+def noise_of(image: np.ndarray, where: np.ndarray | None = None) -> float:
     """Standard deviation of the noise of one pixel, from differences that are blind to slopes and few of which meet an edge.
 
     where: pixels (rows, columns) bool that count; default all. Median form of J. Immerkaer, Computer Vision and Image
@@ -45,7 +49,7 @@ def noise_of(image, where=None):
     return max(1.4826 * float(np.median(np.abs(cross if where is None else cross[where]))), _COUNT)
 
 
-def find_regions(image, *, noise):
+def find_regions(image: np.ndarray, *, noise: float) -> Regions:
     """The `Regions` of a frame (rows, columns) whose full scale is 1."""
     slope = _slope(image)
     smooth = gaussian_filter(image, _SMOOTH)
@@ -87,7 +91,8 @@ def _steepest(contrast, *, blur):
     return contrast / np.sqrt(2 * np.pi * (blur**2 + EDGE_SCALE**2))
 
 
-def smooth_surface(where, values, *, weights, shape, stiffness=1e-3):
+def smooth_surface(where: tuple[np.ndarray, np.ndarray], values: np.ndarray, *, weights: np.ndarray, shape: tuple[int, int],
+                   stiffness: float = 1e-3) -> Callable[[float | np.ndarray, float | np.ndarray], np.ndarray]:
     """A function of (rows, columns): the polynomial of second order through `values` (n,) at the places `where` ((n,), (n,)).
 
     stiffness: what keeps it flat where the values tell nothing, relative to the weights' sum
@@ -98,7 +103,7 @@ def smooth_surface(where, values, *, weights, shape, stiffness=1e-3):
     return lambda rows, columns: mean + np.tensordot(factors, terms(rows, columns, shape), axes=1)
 
 
-def terms(rows, columns, shape):
+def terms(rows: float | np.ndarray, columns: float | np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     """Polynomials of second order (6, ...) of the place in a frame of `shape`, each side of which runs from -1 to 1."""
     r, c = (2 * np.asarray(index) / max(size - 1, 1) - 1 for index, size in zip((rows, columns), shape, strict=True))
     return np.stack([np.ones_like(r), r, c, r * r, r * c, c * c])
@@ -153,7 +158,7 @@ def _seeds(region):
     return label(h_maxima(depth, 0.75 + 0.1 * np.median(_peaks(depth))))
 
 
-def is_ring(region):
+def is_ring(region: "RegionProperties") -> bool:
     """Whether a region is one contact with a dark middle, and not touching discs around a gap."""
     return region.euler_number == 0 and region.area_filled > _CONVEX * region.area_convex
 

@@ -4,10 +4,12 @@ The difference of two laws on a path is the root mean square of the difference o
 """
 
 import itertools
+from collections.abc import Collection, Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
-from softtact.materials.laws.base import TEST_PATHS
+from softtact.materials.laws.base import TEST_PATHS, Law
 from softtact.materials.windows import path_window
 
 THRESHOLD = 0.2     # laws that part by more are named
@@ -15,12 +17,12 @@ MARGIN = 0.1        # "just outside": so much farther, as a share of the window'
 _POINTS = 33
 
 
-def paths_inside(windows):
+def paths_inside(windows: Mapping[str, tuple[float, float]]) -> dict[str, np.ndarray]:
     """{mode: stretches (n,)} over the windows {mode: (min, max)} of the tests."""
     return {mode: np.geomspace(*window, _POINTS) for mode, window in windows.items() if mode in TEST_PATHS}
 
 
-def paths_outside(principal):
+def paths_outside(principal: tuple[float, float]) -> dict[str, np.ndarray]:
     """{mode: stretches (n,)} just beyond the window `principal` of principal stretches, in both directions of all three paths."""
     paths = {}
     for mode in TEST_PATHS:
@@ -30,7 +32,7 @@ def paths_outside(principal):
     return paths
 
 
-def difference(one, other, paths):
+def difference(one: Law, other: Law, paths: Mapping[str, np.ndarray]) -> tuple[float, str]:
     """(largest difference of two laws over the paths, its mode)"""
     found = [(_difference(one, other, mode, stretch), mode) for mode, stretch in paths.items()]
     return max(found)
@@ -43,9 +45,9 @@ def _difference(one, other, mode, stretch):
     return float(value) if np.isfinite(value) else np.inf
 
 
-def differences(laws, paths):
+def differences(laws: Mapping[str, Law], paths: Mapping[str, np.ndarray]) -> dict[str, dict[str, dict[str, Any]]]:
     """{law: {other: {"difference": share, or None where one does not exist, "mode": ...}}} of laws {name: Law}, each pair twice."""
-    table = {name: {} for name in laws}
+    table: dict[str, dict[str, dict[str, Any]]] = {name: {} for name in laws}
     for one, other in itertools.combinations(laws, 2):
         value, mode = difference(laws[one], laws[other], paths)
         entry = {"difference": value if np.isfinite(value) else None, "mode": mode}
@@ -53,7 +55,7 @@ def differences(laws, paths):
     return table
 
 
-def partings(chosen, agreement, *, among, threshold=THRESHOLD):
+def partings(chosen: str, agreement: Mapping[str, Any], *, among: Collection[str], threshold: float = THRESHOLD) -> Iterator[str]:
     """Sentences on the laws of the list `among` that part from the chosen one by more than `threshold`."""
     for place, where in (("inside", "within the data"), ("outside", "just outside the data")):
         named = [f"{name} by {_share(entry)} ({entry['mode']})" for name, entry in agreement[place].get(chosen, {}).items()

@@ -1,6 +1,8 @@
 """A material card made: the family of laws fitted, judged and compared (docs/reference/materials.md)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +12,7 @@ from softtact.materials.bulk import bulk_modulus, poisson_ratio, small_strain_co
 from softtact.materials.cards import law_of_entry, linear_from_card
 from softtact.materials.checks import refuse_mixed_units
 from softtact.materials.consistency import against_linear, printed_warnings
-from softtact.materials.curves import VOLUMETRIC, common_kind, join_by_mode
+from softtact.materials.curves import VOLUMETRIC, Curve, VolumetricCurve, common_kind, join_by_mode
 from softtact.materials.fitting import STARTS, FitOptions, fit_law, law_names
 from softtact.materials.linear import LinearConstants, young_modulus
 from softtact.materials.prediction import predict_left_out
@@ -51,32 +53,33 @@ class CardOptions:
     disagreement: float = THRESHOLD
 
     @property
-    def fit(self):
+    def fit(self) -> dict[str, Any]:
         """The part that `FitOptions` takes."""
         return {name: getattr(self, name) for name in FitOptions.__dataclass_fields__}
 
 
-def make_card(curves, *, material="material", printed=None, **options):
+def make_card(curves: Sequence[Curve | VolumetricCurve], *, material: str = "material", printed: dict[str, Any] | None = None,
+              **options: Any) -> dict[str, Any]:
     """Fit the laws to the curves and return the card as a dict, ready for `write_json`.
 
     curves: list of `Curve` and `VolumetricCurve`;  options: those of `CardOptions`
     printed: constants published for the material, {law: {"parameters": {...}}}, checked against each other
     """
-    options = CardOptions(**options)
+    settings = CardOptions(**options)
     refuse_mixed_units(curves)
-    curves = _windowed(join_by_mode(curves), options.window)
-    shape = [curve for curve in curves if curve.mode != VOLUMETRIC]
-    volumetric = next((curve for curve in curves if curve.mode == VOLUMETRIC), None)
-    bulk = bulk_modulus(volumetric, bulk_over_shear=options.bulk_over_shear)
+    curves = _windowed(join_by_mode(curves), settings.window)
+    shape: list[Any] = [curve for curve in curves if curve.mode != VOLUMETRIC]
+    volumetric: Any = next((curve for curve in curves if curve.mode == VOLUMETRIC), None)
+    bulk = bulk_modulus(volumetric, bulk_over_shear=settings.bulk_over_shear)
     if not shape:
         raise InputError("There is only a volumetric curve; give a uniaxial, equibiaxial or planar one for the shape.")
     fits, entries = {}, {}
-    for name in progress(law_names(options.laws), label="laws"):
-        fits[name] = fit_law(name, shape, **options.fit)
-        entries[name] = _law_entry(fits[name], shape, bulk, options)
+    for name in progress(law_names(settings.laws), label="laws"):
+        fits[name] = fit_law(name, shape, **settings.fit)
+        entries[name] = _law_entry(fits[name], shape, bulk, settings)
     ranking = sorted(entries, key=lambda name: (not entries[name]["stable_over_data"], entries[name]["aicc"]))
-    chosen = _choose(options.choose, ranking, entries)
-    linear, linear_warnings = _linear_entry(shape, bulk, options)
+    chosen = _choose(settings.choose, ranking, entries)
+    linear, linear_warnings = _linear_entry(shape, bulk, settings)
     card = {
         "material": material,
         "kind": common_kind(curves),
@@ -91,10 +94,10 @@ def make_card(curves, *, material="material", printed=None, **options):
     }
     card["warnings"] += [sentence for name, fit in fits.items() for sentence in _fit_warnings(fit, entries[name])]
     card["warnings"] += [*_systematic(fits.values())]
-    card["warnings"] += linear_warnings + _consistency_warnings(card, options.disagreement)
+    card["warnings"] += linear_warnings + _consistency_warnings(card, settings.disagreement)
     if printed:
         card["printed"] = printed
-        card["warnings"] += printed_warnings(printed, bulk_over_shear=options.bulk_over_shear)
+        card["warnings"] += printed_warnings(printed, bulk_over_shear=settings.bulk_over_shear)
     return card
 
 

@@ -1,12 +1,14 @@
 """Material cards, and the laws made from them: what every stage after the fit reads (docs/reference/materials.md)."""
 
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
 import pydantic
 
 from softtact.errors import InputError
 from softtact.files import read_json
 from softtact.materials.config import validated
+from softtact.materials.laws.base import Law
 from softtact.materials.laws.registry import make_law
 from softtact.materials.linear import LinearConstants
 from softtact.materials.windows import principal_window
@@ -31,7 +33,7 @@ class _Card(pydantic.BaseModel):
     strain_window: dict[str, Annotated[list[pydantic.PositiveFloat], pydantic.Field(min_length=2, max_length=2)]] = {}
 
 
-def load_card(path):
+def load_card(path: str | Path) -> dict[str, Any]:
     """Read a card, a mapping as `softtact fit` wrote it; a file that is none is refused."""
     card = read_json(path)
     missing = [key for key in ("material", "kind", "chosen", "laws") if not isinstance(card, dict) or key not in card]
@@ -41,7 +43,7 @@ def load_card(path):
     return card
 
 
-def law_from_card(card, law=None):
+def law_from_card(card: dict[str, Any], law: str | None = None) -> Law:
     """The `Law` of a card: the chosen one, or the one named. It warns where it is used outside the card's strain window."""
     name = law or card["chosen"]
     available = [key for key in card["laws"] if key != "linear"]
@@ -57,14 +59,14 @@ def law_from_card(card, law=None):
     return made
 
 
-def law_of_entry(name, entry):
+def law_of_entry(name: str, entry: dict[str, Any]) -> Law:
     """The `Law` of one entry of a card, without a window of its own."""
     if entry.get("bulk_modulus_mpa") is None:
         raise InputError(f"The card's law {name} has no bulk_modulus_mpa; write the card again with `softtact fit`.")
     return make_law(name, entry["parameters"], bulk_modulus=entry["bulk_modulus_mpa"])
 
 
-def linear_from_card(card):
+def linear_from_card(card: dict[str, Any]) -> LinearConstants:
     """The `LinearConstants` (E, nu) of a card."""
     if "linear" not in card["laws"]:
         raise InputError(

@@ -1,9 +1,12 @@
 """What makes a test curve unfit for a fit: refused with row and remedy, or, where it may be right, said in a remark."""
 
+from collections.abc import Sequence
+from pathlib import Path
+
 import numpy as np
 
 from softtact.errors import InputError
-from softtact.materials.curves import VOLUMETRIC
+from softtact.materials.curves import VOLUMETRIC, Curve, VolumetricCurve
 from softtact.materials.laws.base import principal_stretches
 
 # No elastomer goes beyond these; values beyond are percent or another unit.
@@ -17,7 +20,7 @@ UNIT_JUMP = (200.0, 5000.0)
 MODULI_APART = 50.0
 
 
-def checked(path, rows, x, y, *, mode, raw):
+def checked(path: str | Path, rows: np.ndarray, x: np.ndarray, y: np.ndarray, *, mode: str, raw: np.ndarray) -> tuple[str, ...]:
     """Remarks (a tuple of sentences) on a curve; what cannot be right is refused.
 
     rows: (n,) numbers of the file's rows;  x, y: (n,) stretch and nominal stress, or volume ratio and pressure, in MPa
@@ -31,7 +34,8 @@ def checked(path, rows, x, y, *, mode, raw):
     return tuple(f"{path}: {remark}" for remark in (_percent(x), _ratio_as_percent(x), _positive_compression(x, y, mode)) if remark)
 
 
-def order(path, rows, x, y, *, mode, sort):
+def order(path: str | Path, rows: np.ndarray, x: np.ndarray, y: np.ndarray, *, mode: str,
+          sort: bool) -> tuple[np.ndarray, np.ndarray]:
     """x and y in rising or falling order: as they are, or sorted."""
     if sort:
         by_x = np.argsort(x, kind="stable")
@@ -47,9 +51,9 @@ def order(path, rows, x, y, *, mode, sort):
     return x, y
 
 
-def refuse_mixed_units(curves):
+def refuse_mixed_units(curves: Sequence[Curve | VolumetricCurve]) -> None:
     """Refuse curves of one material whose stiffnesses are so far apart that one must be in another unit."""
-    moduli = [(secant_modulus(curve), curve) for curve in curves if curve.mode != VOLUMETRIC]
+    moduli = [(secant_modulus(curve), curve) for curve in curves if curve.mode != VOLUMETRIC]     # type: ignore[arg-type]
     moduli = [(modulus, curve) for modulus, curve in moduli if modulus > 0]
     if len(moduli) < 2:
         return
@@ -61,7 +65,7 @@ def refuse_mixed_units(curves):
         )
 
 
-def secant_modulus(curve):
+def secant_modulus(curve: Curve) -> float:
     """Shear modulus (MPa) of the neo-Hookean law closest to the curve."""
     unit = _neo_hooke(curve.mode, curve.stretch)
     return float(unit @ curve.nominal_stress / (unit @ unit)) if unit.any() else 0.0

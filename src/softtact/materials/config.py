@@ -7,18 +7,20 @@ printed:  constants published for it, {law: {parameters: ..., rmse_mpa: ...}}
 """
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 import pydantic
 from pydantic import Field
 
 from softtact.errors import InputError
 from softtact.files import read_yaml
+from softtact.materials.laws.base import Law
 from softtact.materials.laws.registry import law_class, make_law
 from softtact.materials.linear import LinearConstants
 from softtact.unknown_names import first_fault, known_keys, unknown
 
 Mode = Literal["uniaxial", "equibiaxial", "planar", "volumetric"]
+_Model = TypeVar("_Model", bound=pydantic.BaseModel)
 
 
 def _rising(window):
@@ -103,35 +105,35 @@ class MaterialConfig(_Section):
     material: str = Field(pattern=r"^[a-z0-9_]+$")
     description: str = ""
     curves: Annotated[SyntheticCurves | MeasuredCurves, Field(discriminator="kind")]
-    fit: FitSettings = FitSettings()
+    fit: FitSettings = FitSettings()     # type: ignore[call-arg]
     source: str = Field("", description="where the printed constants stand")
     printed: dict[str, PrintedLaw] = Field(default_factory=dict)
 
     @property
-    def modes(self):
+    def modes(self) -> list[str]:
         """Test modes of the curves: one curve file each."""
         if self.curves.kind == "synthetic":
             return list(self.curves.modes)
         return list(dict.fromkeys(file.mode for file in self.curves.files))
 
     @property
-    def measured_files(self):
+    def measured_files(self) -> list[str]:
         """Paths of the user's own files, in order; none for synthetic curves."""
         return [] if self.curves.kind == "synthetic" else [file.file for file in self.curves.files]
 
     @property
-    def curve_settings(self):
+    def curve_settings(self) -> dict[str, Any]:
         """Settings of the stage make_curves."""
         return {"material": self.material} | self.curves.model_dump(mode="json")
 
     @property
-    def fit_settings(self):
+    def fit_settings(self) -> dict[str, Any]:
         """Settings of the stage fit_material."""
         stage = FitStage(material=self.material, printed=self.printed, **self.fit.model_dump())
         return stage.model_dump(mode="json", exclude_none=True)
 
 
-def load_material(path):
+def load_material(path: str | Path) -> MaterialConfig:
     """Read a material's YAML into a `MaterialConfig`; what is wrong is told in one sentence."""
     path = Path(path)
     known = ", ".join(sorted(file.stem for file in path.parent.glob("*.yaml"))) or "none"
@@ -143,7 +145,7 @@ def load_material(path):
         raise InputError(f"{path}: {error}") from None
 
 
-def validated(model, raw, *, where):
+def validated(model: type[_Model], raw: Any, *, where: str) -> _Model:
     """`model` from plain values; the first fault becomes an `InputError` that names the field and its value."""
     try:
         return model.model_validate(raw)
@@ -165,7 +167,7 @@ def _fault(model, field, fault):
     return f"{field} is {fault['input']!r:.80}; {reason[0].lower()}{reason[1:]}."
 
 
-def law_from_printed(material_yaml, law):
+def law_from_printed(material_yaml: str | Path, law: str) -> Law:
     """The `Law` with the constants that a material's YAML prints for it."""
     config = load_material(material_yaml)
     return make_law(law, _printed_parameters(config, law), bulk_over_shear=config.fit.bulk_over_shear)

@@ -4,8 +4,12 @@ Two laws can both be stable and both fit "their" data, and still describe differ
 as large, or five times the stress in compression. Each disagreement becomes a sentence with its numbers.
 """
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
+from softtact.materials.laws.base import Law
 from softtact.materials.laws.registry import make_law
 from softtact.materials.linear import LinearConstants
 from softtact.materials.stability import is_stable
@@ -17,7 +21,7 @@ PROBES = (("uniaxial", 0.5), ("uniaxial", 1.5), ("equibiaxial", 1.3), ("planar",
 FACTOR = 1.5
 
 
-def printed_warnings(printed, *, bulk_over_shear=20.0):
+def printed_warnings(printed: Mapping[str, Any], *, bulk_over_shear: float = 20.0) -> list[str]:
     """Sentences on where published constants {law: {"parameters": {...}}} contradict each other."""
     laws = {
         name: make_law(name, entry["parameters"], bulk_over_shear=bulk_over_shear)
@@ -28,7 +32,7 @@ def printed_warnings(printed, *, bulk_over_shear=20.0):
     return [f"{PRINTED}{sentence}" for sentence in disagreements(laws, linear=linear)]
 
 
-def disagreements(laws, *, linear=None, factor=FACTOR):
+def disagreements(laws: Mapping[str, Law], *, linear: LinearConstants | None = None, factor: float = FACTOR) -> list[str]:
     """Sentences on where laws {name: Law} of one material part by more than `factor`.
 
     linear: `LinearConstants` of the same material, or None
@@ -55,7 +59,7 @@ def _parting(quantity, values, factor):
     )
 
 
-def against_linear(laws, linear, *, factor=FACTOR):
+def against_linear(laws: Mapping[str, Law], linear: LinearConstants | None, *, factor: float = FACTOR) -> list[str]:
     """A sentence on linear constants whose moduli no law has, in a list that is empty otherwise."""
     if linear is None or not laws:
         return []

@@ -1,12 +1,14 @@
 """Test curves: nominal stress against stretch, or pressure against volume, and the project's own CSV form of them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
 from softtact.files import atomic_path
-from softtact.materials.laws.base import TEST_PATHS
+from softtact.materials.laws.base import TEST_PATHS, Law
 
 VOLUMETRIC = "volumetric"
 MODES = (*TEST_PATHS, VOLUMETRIC)
@@ -32,17 +34,17 @@ class Curve:
     remarks: tuple = ()
 
     @property
-    def window(self):
+    def window(self) -> tuple[float, float]:
         """Smallest and largest stretch."""
         return float(self.stretch.min()), float(self.stretch.max())
 
-    def within(self, window):
+    def within(self, window: Sequence[float]) -> Self:
         """The part of the curve inside a window [min, max] of stretch."""
         keep = (self.stretch >= window[0]) & (self.stretch <= window[1])
         return replace(self, stretch=self.stretch[keep], nominal_stress=self.nominal_stress[keep])
 
     @property
-    def columns(self):
+    def columns(self) -> dict[str, np.ndarray]:
         """{name in a file: values (n,)}"""
         return {"stretch": self.stretch, "nominal_stress_mpa": self.nominal_stress}
 
@@ -64,22 +66,22 @@ class VolumetricCurve:
     mode = VOLUMETRIC
 
     @property
-    def window(self):
+    def window(self) -> tuple[float, float]:
         """Smallest and largest volume ratio."""
         return float(self.volume_ratio.min()), float(self.volume_ratio.max())
 
-    def within(self, window):
+    def within(self, window: Sequence[float]) -> Self:
         """The part of the curve inside a window [min, max] of the volume ratio."""
         keep = (self.volume_ratio >= window[0]) & (self.volume_ratio <= window[1])
         return replace(self, volume_ratio=self.volume_ratio[keep], pressure=self.pressure[keep])
 
     @property
-    def columns(self):
+    def columns(self) -> dict[str, np.ndarray]:
         """{name in a file: values (n,)}"""
         return {"volume_ratio": self.volume_ratio, "pressure_mpa": self.pressure}
 
 
-def join_by_mode(curves):
+def join_by_mode(curves: Sequence[Curve | VolumetricCurve]) -> list[Curve | VolumetricCurve]:
     """One curve per mode, its points sorted: say, a tension and a compression test of the same material."""
     return [_join([curve for curve in curves if curve.mode == mode]) for mode in dict.fromkeys(c.mode for c in curves)]
 
@@ -94,12 +96,13 @@ def _join(curves):
                    remarks=tuple(remark for curve in curves for remark in curve.remarks))
 
 
-def common_kind(curves):
+def common_kind(curves: Sequence[Curve | VolumetricCurve]) -> str:
     """`measured` only if every curve is."""
     return "measured" if all(curve.kind == "measured" for curve in curves) else "synthetic"
 
 
-def synthetic_curve(law, mode, window, *, points, noise, seed):
+def synthetic_curve(law: Law, mode: str, window: tuple[float, float], *, points: int, noise: float,
+                    seed: int | Sequence[int]) -> Curve | VolumetricCurve:
     """A `Curve` (or `VolumetricCurve`) of `law` at `points` even stretches (volume ratios) in `window`, with normal noise.
 
     noise: standard deviation as a share of the curve's largest stress, like a load cell's share of full scale
@@ -116,7 +119,7 @@ def synthetic_curve(law, mode, window, *, points, noise, seed):
     return Curve(mode, x, stress + error, "synthetic", making)
 
 
-def write_curve(path, curve):
+def write_curve(path: str | Path, curve: Curve | VolumetricCurve) -> None:
     """Write a curve as CSV: `# key: value` lines with mode, kind, source and remarks, then its two columns."""
     lines = [f"# mode: {curve.mode}", f"# kind: {curve.kind}", f"# source: {curve.source}"]
     lines += [f"# remark: {remark}" for remark in curve.remarks]

@@ -4,14 +4,17 @@ Every law is linear in its constants of unit MPa and nonlinear in the others (ex
 only guesses the nonlinear ones; the linear ones follow from a bounded linear fit, and both are then polished together.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares, lsq_linear
 from scipy.stats import qmc
 
 from softtact.errors import InputError
-from softtact.materials.laws.base import principal_stretches
+from softtact.materials.curves import Curve
+from softtact.materials.laws.base import Law, principal_stretches
 from softtact.materials.laws.registry import LAWS, law_class
 
 STARTS = 24
@@ -78,7 +81,7 @@ class LawFit:
     at_bound: list = field(default_factory=list)
     record: dict = field(default_factory=dict)
 
-    def make(self, *, bulk_modulus=1.0):
+    def make(self, *, bulk_modulus: float = 1.0) -> Law:
         """The `Law` itself."""
         return LAWS[self.law](self.parameters, bulk_modulus=bulk_modulus)
 
@@ -96,22 +99,22 @@ class Points:
     mode: np.ndarray
     floor: np.ndarray
 
-    def predict(self, law):
+    def predict(self, law: Law) -> np.ndarray:
         """Nominal stress (n,) of a law in MPa."""
         t = law.principal_stress(self.stretches)
         return (t[:, 0] - t[:, 2]) / self.stretches[:, 0]
 
     @property
-    def size(self):
+    def size(self) -> np.ndarray:
         """(n,) what relative errors are relative to, MPa."""
         return np.maximum(np.abs(self.stress), self.floor)
 
-    def by_mode(self, measure, values):
+    def by_mode(self, measure: Callable[[np.ndarray], float], values: np.ndarray) -> dict[str, float]:
         """{mode: measure(values of its points)}"""
         return {str(mode): measure(values[self.mode == mode]) for mode in dict.fromkeys(self.mode)}
 
 
-def collect(curves):
+def collect(curves: Sequence[Curve]) -> Points:
     """`Points` of a list of curves."""
     largest = [np.full(len(curve.stretch), np.abs(curve.nominal_stress).max()) for curve in curves]
     return Points(
@@ -122,40 +125,40 @@ def collect(curves):
     )
 
 
-def errors_of(law, curves):
+def errors_of(law: Law, curves: Sequence[Curve]) -> tuple[float, float]:
     """(RMSE in MPa, root mean square relative error) of a law on curves."""
     points = collect(curves)
     error = points.predict(law) - points.stress
     return rms(error), rms(error / points.size)
 
 
-def fit_family(curves, *, laws="all", **options):
+def fit_family(curves: Sequence[Curve], *, laws: str | Sequence[str] = "all", **options: Any) -> dict[str, LawFit]:
     """{law: LawFit} for a list of law names or "all"; options are those of `FitOptions`."""
     return {name: fit_law(name, curves, **options) for name in law_names(laws)}
 
 
-def law_names(laws):
+def law_names(laws: str | Sequence[str]) -> list[str]:
     """Names of laws from a list of them, one name, or "all"."""
     return list(LAWS) if laws in ("all", ["all"]) else [laws] if isinstance(laws, str) else list(laws)
 
 
-def fit_law(name, curves, **options):
+def fit_law(name: str, curves: Sequence[Curve], **options: Any) -> LawFit:
     """Fit one law to all curves at once; options are those of `FitOptions`."""
-    kind, points, options = law_class(name), collect(curves), FitOptions(**options)
+    kind, points, settings = law_class(name), collect(curves), FitOptions(**options)
     if len(points.stress) <= len(kind.constants):
         raise InputError(
             f"Law {name} has {len(kind.constants)} constants and the curves only {len(points.stress)} points;"
             " give more points or choose a law with fewer constants."
         )
-    problem = _Problem(kind, points, options)
-    rough = [problem.polish(problem.start(guess), _ROUGH) for guess in _guesses(problem, options)]
+    problem = _Problem(kind, points, settings)
+    rough = [problem.polish(problem.start(guess), _ROUGH) for guess in _guesses(problem, settings)]
     promising = sorted(rough, key=lambda solution: solution.cost)[:_PROMISING]
     final = [problem.polish(solution.x, _FINAL) for solution in promising]
     best = min(final, key=lambda solution: solution.cost)
     record = {
         "points": len(points.stress), "starts": len(rough), "finished": len(final),
         "finished_agreeing": int(sum(solution.cost < best.cost * 1.001 + 1e-15 for solution in final)),
-        "evaluations": int(sum(solution.nfev for solution in rough + final)), "residual": options.residual,
+        "evaluations": int(sum(solution.nfev for solution in rough + final)), "residual": settings.residual,
     }  # fmt: skip
     return _report(problem, best.x, record)
 
@@ -268,7 +271,7 @@ def _report(problem, x, record):
     )
 
 
-def rms(values):
+def rms(values: np.ndarray) -> float:
     """Root mean square."""
     return float(np.sqrt(np.mean(np.square(values))))
 

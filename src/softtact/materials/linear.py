@@ -4,11 +4,14 @@ Symbols: E Young's modulus (MPa), nu Poisson's ratio; mu = E / (2 (1 + nu)), K =
 E is the slope of the uniaxial curve at small strain. Stress curves alone hold nothing of nu: it has to be stated.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
 from softtact.errors import InputError
+from softtact.materials.curves import Curve, VolumetricCurve
 
 
 @dataclass(frozen=True)
@@ -25,24 +28,24 @@ class LinearConstants:
             raise InputError(f"Poisson's ratio is {self.poisson:g}; give one between -1 and 0.5.")
 
     @classmethod
-    def of(cls, parameters):
+    def of(cls, parameters: dict[str, float]) -> Self:
         """The constants of a mapping, which must hold these two and no others."""
         if set(parameters) != {"young_mpa", "poisson"}:
             raise InputError(f"Linear constants are young_mpa and poisson, not {', '.join(map(str, parameters)) or 'none'}.")
         return cls(**parameters)
 
     @property
-    def mu_mpa(self):
+    def mu_mpa(self) -> float:
         """Shear modulus, MPa."""
         return self.young_mpa / (2 * (1 + self.poisson))
 
     @property
-    def bulk_modulus_mpa(self):
+    def bulk_modulus_mpa(self) -> float:
         """Bulk modulus, MPa."""
         return self.young_mpa / (3 * (1 - 2 * self.poisson))
 
 
-def young_modulus(curves, *, small_strain):
+def young_modulus(curves: Sequence[Curve | VolumetricCurve], *, small_strain: float) -> tuple[float, float, float]:
     """(E, its standard error, RMSE) in MPa from the uniaxial points with strain up to `small_strain`.
 
     The stress is fitted by E e + b e^2: without the square, points on one side of zero bias the slope by some percent.

@@ -1,16 +1,19 @@
 """A material's curve files: made from a law, or gathered from the user's own files in one form."""
 
 import zlib
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from softtact.errors import InputError
 from softtact.materials.config import MeasuredCurves, SyntheticCurves, validated
-from softtact.materials.curves import join_by_mode, synthetic_curve, write_curve
+from softtact.materials.curves import Curve, VolumetricCurve, join_by_mode, synthetic_curve, write_curve
 from softtact.materials.laws.registry import make_law
 from softtact.materials.readers import read_curve
 
 
-def make_curves(measured, curves, settings):
+def make_curves(measured: str | Path | Sequence[str | Path], curves: str | Path | Sequence[str | Path],
+                settings: dict[str, Any]) -> None:
     """Write one CSV per mode to the paths `curves`, whose names are the modes.
 
     measured: paths of the user's files in the order of settings["files"], for kind "measured"
@@ -23,7 +26,7 @@ def make_curves(measured, curves, settings):
         write_curve(path, by_mode[path.stem])
 
 
-def curves_of(settings, *, measured=()):
+def curves_of(settings: dict[str, Any], *, measured: str | Path | Sequence[str | Path] = ()) -> list[Curve | VolumetricCurve]:
     """The curves, one per mode, that `MaterialConfig.curve_settings` describe; `measured`: where the user's files are now."""
     settings = dict(settings)
     material = settings.pop("material", None)

@@ -10,7 +10,9 @@ Layouts:
 """
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -39,7 +41,8 @@ _SORO = {"engineering_strain": "Engineering Strain", "nominal_stress_mpa": "Engi
 _FOLDERS = {"UT": "uniaxial", "ET": "equibiaxial", "PS": "planar"}
 
 
-def read_curve(path, *, mode=None, layout="plain", columns=None, sort=False, compression=False):
+def read_curve(path: str | Path, *, mode: str | None = None, layout: str = "plain", columns: dict[str, str] | None = None,
+               sort: bool = False, compression: bool = False) -> Curve | VolumetricCurve:
     """Read one `Curve`, or `VolumetricCurve`.
 
     mode: test mode; else taken from the file's `# mode:` line or from a file name such as uniaxial.csv
@@ -62,7 +65,8 @@ def read_curve(path, *, mode=None, layout="plain", columns=None, sort=False, com
     return VolumetricCurve(x, y, **record) if mode == VOLUMETRIC else Curve(mode, x, y, **record)
 
 
-def read_curves(paths, *, mode=None, layout="plain", **options):
+def read_curves(paths: str | Path | Sequence[str | Path], *, mode: str | None = None, layout: str = "plain",
+                **options: Any) -> list[Curve | VolumetricCurve]:
     """Read one or several files with the same options of `read_curve`; a path MODE=FILE states a file's own mode.
 
     In the layout `literature` each path is a folder with a file per mode.

@@ -145,7 +145,7 @@ def read_press(path: str | Path) -> PressResult:
         if data[_name(one)].dims != one.metadata["dimensions"]:
             raise InputError(f"{path}: {_name(one)!r} has the dimensions {data[_name(one)].dims} in place of "
                              f"{one.metadata['dimensions']}; write the press again.")
-    arrays = {one.name: data[_name(one)].values for one in _arrays()}
+    arrays: dict[str, Any] = {one.name: data[_name(one)].values for one in _arrays()}
     attributes = {name: value.item() if isinstance(value, np.generic) else value for name, value in data.attrs.items()}
     facts = {name: attributes.pop(name) for name in _facts()}
     return PressResult(**arrays, **facts, attributes={name: value for name, value in attributes.items() if name not in PROVENANCE})

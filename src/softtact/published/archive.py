@@ -7,6 +7,7 @@ The names are those that the repository's viewer opens (Lab-CORO/TactileDataset,
 """
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,7 +33,7 @@ class ArchiveFile:
     variant: str
 
     @property
-    def stands_for(self):
+    def stands_for(self) -> tuple[str, str, str]:
         """What a folder may hold only one file of."""
         return self.set, self.kind, self.solver
 
@@ -44,13 +45,13 @@ class Archive:
     real: dict
     simulated: dict
 
-    def files(self):
+    def files(self) -> list[ArchiveFile]:
         """All files, real ones first."""
         return [file for files in self.real.values() for file in files] + [
             file for of_set in self.simulated.values() for file in of_set.values()]
 
 
-def describe(path):
+def describe(path: Path) -> ArchiveFile | None:
     """The `ArchiveFile` that a path's name tells, or None."""
     found = _NAME.fullmatch(path.stem)
     if path.suffix.lower() != ".csv" or found is None:
@@ -59,7 +60,7 @@ def describe(path):
     return ArchiveFile(path, of_set.lower(), kind.lower(), SPELLINGS[solver.lower()], variant or "")
 
 
-def find_archive(folder, *, models, variant=None):
+def find_archive(folder: str | Path, *, models: Sequence[str], variant: str | None = None) -> Archive:
     """The `Archive` in a folder and those below it, with those of the `models` whose simulation files are there.
 
     variant: the ending of the files to read ("V1"); None: the only one that is there

@@ -14,13 +14,13 @@ PRINTED = [  # what is counted, where it is printed, how many
 ]
 
 
-def counts_table(found):
+def counts_table(found: dict[str, int]) -> pd.DataFrame:
     """A row per printed count: what, where, printed, found, meets.  found {what: number}; what is not found was not there."""
     rows = [(what, where, printed, found.get(what), found.get(what) == printed) for what, where, printed in PRINTED]
     return pd.DataFrame(rows, columns=["what", "where", "printed", "found", "meets"])
 
 
-def counts_sentence(table):
+def counts_sentence(table: pd.DataFrame) -> str:
     """Which of the three counts in print the archive meets."""
     verdicts = []
     for where, rows in table.groupby("where", sort=False):

@@ -1,16 +1,19 @@
 """The archive as the files that data sets are built from: per object, maps of each model and the readings that belong to them."""
 
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray
 
 from softtact.errors import InputError
-from softtact.published.archive import MODELS, SETS, SOURCE
+from softtact.published.archive import MODELS, SETS, SOURCE, Archive
 from softtact.published.arrangement import ARRANGEMENTS, arrange, correlations
 from softtact.published.outliers import Outliers
-from softtact.published.pairing import MAP_COLUMNS, MAP_ROWS, TAXELS, object_name, pair
+from softtact.published.pairing import MAP_COLUMNS, MAP_ROWS, TAXELS, PairedTest, object_name, pair
 from softtact.published.table import read_table
+from softtact.sensors.base import BaseSpec
 
 SOLVERS = {model: solver.capitalize() for solver, model in MODELS.items()}
 COUNTED_AS = {"indenters": "real maps of indenters to train on", "unseen": "real maps of unseen indenters",
@@ -28,15 +31,15 @@ class Tables:
     tests: dict
     outliers: Outliers
 
-    def maps_mm(self, model, set_name, test):
+    def maps_mm(self, model: str, set_name: str, test: PairedTest) -> np.ndarray:
         """Maps (n, y, x) of a test, as the file has them."""
         return self.simulated[model][set_name].values[test.maps[model]].reshape(-1, MAP_ROWS, MAP_COLUMNS)
 
-    def readings(self, set_name, test):
+    def readings(self, set_name: str, test: PairedTest) -> np.ndarray:
         """Counts (n, taxel) of a test."""
         return self.real[set_name][0].values[test.readings]
 
-    def paths(self):
+    def paths(self) -> dict[str, list[str]]:
         """All tests of a set, usable or not: {set: [path, ...]}."""
         return {name: list(dict.fromkeys(path for table in self._of_set(name) for path in table.paths)) for name in SETS}
 
@@ -44,7 +47,7 @@ class Tables:
         return [*self.real[name], *(of_set[name] for of_set in self.simulated.values())]
 
 
-def read_archive(archive):
+def read_archive(archive: Archive) -> Tables:
     """The `Tables` of an `Archive`, paired and checked."""
     outliers = Outliers()
     real = {name: [read_table(file.path, columns=TAXELS, force=True, outliers=outliers) for file in archive.real[name]]
@@ -60,7 +63,7 @@ def read_archive(archive):
     return tables
 
 
-def tell_disorder(tables):
+def tell_disorder(tables: Tables) -> None:
     """Tell of tests whose readings fall where their maps deepen: perhaps the two do not match by order. They are kept."""
     for model in tables.simulated:
         sign = sign_towards_pcb(tables, model)
@@ -74,7 +77,7 @@ def tell_disorder(tables):
                                     f"of {SOLVERS[model]} (correlation {follows:.2f}); other order?")
 
 
-def order_correlation(maps, counts):
+def order_correlation(maps: np.ndarray, counts: np.ndarray) -> float:
     """Correlation over a test's frames of the mean of the map (n, y, x) and of the counts (n, taxel); 1 for fewer than 3 frames."""
     depth, count = maps.mean(axis=(1, 2), dtype=float), counts.mean(axis=1, dtype=float)
     if len(maps) < 3 or depth.std() == 0 or count.std() == 0:
@@ -91,7 +94,8 @@ def _only_grasped(tests, table, outliers):
     return [test for test in tests["curved"] if test.object not in indenters]
 
 
-def items_of(tables, *, unseen, without=()):
+def items_of(tables: Tables, *, unseen: Collection[str],
+             without: Collection[str] = ()) -> dict[tuple[str, str], list[tuple[str, PairedTest]]]:
     """{(set, item): tests}: an item is an object with all its tests.
 
     unseen: indenters that training must not see;  without: paths of tests, or objects, that are not used
@@ -102,7 +106,7 @@ def items_of(tables, *, unseen, without=()):
         if name not in known:
             raise InputError(f"the configuration, at 'data.unseen': no usable test of the archive is of an indenter {name!r}; "
                              f"name some of {', '.join(known) or 'none'}.")
-    items = {}
+    items: dict[tuple[str, str], list[tuple[str, PairedTest]]] = {}
     for set_name in SETS:
         for test in tables.tests[set_name]:
             if {test.path, test.object} & set(without):
@@ -120,7 +124,7 @@ def _check_known(tables, without):
                              f"{name!r}; correct it.")
 
 
-def sign_towards_pcb(tables, model):
+def sign_towards_pcb(tables: Tables, model: str) -> int:
     """+1, or -1 where the archive's maps are mostly negative: ours are positive towards the PCB. Maps in metres are refused."""
     of_tests = [tables.maps_mm(model, name, test) for name in SETS for test in tables.tests[name]]
     deepest = max((float(np.abs(maps).max()) for maps in of_tests), default=0.0)
@@ -130,7 +134,7 @@ def sign_towards_pcb(tables, model):
     return 1 if sum(float(maps.sum(dtype=float)) for maps in of_tests) >= 0 else -1
 
 
-def judge_arrangement(tables, *, shape, seed):
+def judge_arrangement(tables: Tables, *, shape: tuple[int, int], seed: int) -> dict[str, float]:
     """{arrangement: correlation} over a sample of all usable maps of the first model."""
     model = next(iter(tables.simulated))
     pairs = [(name, test) for name in SETS for test in tables.tests[name]]
@@ -147,7 +151,8 @@ def judge_arrangement(tables, *, shape, seed):
     return correlations(sign_towards_pcb(tables, model) * np.concatenate(maps), np.concatenate(counts), shape=shape)
 
 
-def press_dataset(tables, key, tests, *, model, sensor, sign):
+def press_dataset(tables: Tables, key: tuple[str, str], tests: Sequence[tuple[str, PairedTest]], *, model: str, sensor: BaseSpec,
+                  sign: int) -> xarray.Dataset:
     """Maps of one item and model as `simulate_press` would write them; `path` tells each map's test."""
     maps = sign * np.concatenate([tables.maps_mm(model, *test) for test in tests])
     ones = np.ones(len(maps), dtype=np.int8)
@@ -159,7 +164,8 @@ def press_dataset(tables, key, tests, *, model, sensor, sign):
         attrs={"model": model, "set": key[0], "item": key[1], "source": SOURCE, "solver": SOLVERS[model]})
 
 
-def tactile_dataset(tables, key, tests, *, shape, arrangement):
+def tactile_dataset(tables: Tables, key: tuple[str, str], tests: Sequence[tuple[str, PairedTest]], *, shape: tuple[int, int],
+                    arrangement: str) -> xarray.Dataset:
     """Readings of one item, one trial each: nothing in the archive tells which readings repeat which."""
     counts = np.concatenate([tables.readings(*test) for test in tests])
     return xarray.Dataset(
@@ -176,7 +182,7 @@ def _paths(tests):
     return np.concatenate([np.full(len(test.readings), test.path, dtype=object) for _, test in tests])
 
 
-def found_counts(tables, items):
+def found_counts(tables: Tables, items: dict[tuple[str, str], list[tuple[str, PairedTest]]]) -> dict[str, int]:
     """{what: number} as `counts.PRINTED` names them: rows and maps in the files, and usable ones per set."""
     found = {"real maps": sum(len(tables.real[name][0].test) for name in SETS)}
     found |= {f"maps of {model}": sum(len(table.test) for table in of_set.values()) // MAP_ROWS
@@ -186,7 +192,7 @@ def found_counts(tables, items):
     return found
 
 
-def files_table(tables):
+def files_table(tables: Tables) -> list[dict[str, Any]]:
     """[{file, rows, tests, objects}] of all files."""
     every = [table for name in SETS for table in tables.real[name]] + [
         table for of_set in tables.simulated.values() for table in of_set.values()]

@@ -1,6 +1,7 @@
 """Outliers of the archive: each by file and row, counted, and with what was done about it."""
 
 from dataclasses import asdict, dataclass, fields
+from pathlib import Path
 
 import pandas as pd
 
@@ -26,26 +27,26 @@ class Finding:
 class Outliers:
     """The findings, as they come up."""
 
-    def __init__(self):
-        self.findings = []
+    def __init__(self) -> None:
+        self.findings: list[Finding] = []
 
-    def leave_out(self, file, row, path, what, *, count=1):
+    def leave_out(self, file: str | Path, row: int, path: str, what: str, *, count: int = 1) -> None:
         """A finding for which its test is not used."""
         self.findings.append(Finding(str(file), int(row), path, what, int(count), "left out"))
 
-    def keep(self, file, row, path, what, *, count=1):
+    def keep(self, file: str | Path, row: int, path: str, what: str, *, count: int = 1) -> None:
         """A finding that is only told."""
         self.findings.append(Finding(str(file), int(row), path, what, int(count), "kept"))
 
-    def left_out(self):
+    def left_out(self) -> list[str]:
         """The tests that are not used, in the order of their first finding."""
         return list(dict.fromkeys(f.path for f in self.findings if f.done == "left out"))
 
-    def table(self):
+    def table(self) -> pd.DataFrame:
         """A row per finding."""
         return pd.DataFrame([asdict(f) for f in self.findings], columns=[field.name for field in fields(Finding)])
 
-    def refuse(self, tests, *, outliers, largest_share):
+    def refuse(self, tests: int, *, outliers: str, largest_share: float) -> None:
         """Refuse an archive that is odder than the user allows.
 
         tests: how many there are;  outliers: leave_out or refuse;  largest_share: of tests that may be left out

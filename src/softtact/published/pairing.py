@@ -5,9 +5,14 @@ simulated ones. That is inferred (nobody states it), so it is tested: every test
 """
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+
+from softtact.published.outliers import Outliers
+from softtact.published.table import Table
 
 MAP_ROWS, MAP_COLUMNS, TAXELS = 57, 33, 28
 # Beyond these a test is left out. The layered sensor is 2.5 mm thick; counts run to 2400 in the paper's figures and the raw
@@ -28,14 +33,14 @@ class PairedTest:
     maps: dict
 
 
-def object_name(path):
+def object_name(path: str) -> str:
     """CircleG/... -> circle_g: the text before the first slash, in words that capitals and digits begin; '' if there is none."""
     text = re.split(r"[/\\]", path.strip(), maxsplit=1)[0]
     words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])|(?<=[A-Za-z])(?=[0-9])", "_", text)
     return re.sub(r"[^a-z0-9]+", "_", words.lower()).strip("_")
 
 
-def pair(reals, simulated, *, outliers):
+def pair(reals: Sequence[Table], simulated: dict[str, Table], *, outliers: Outliers) -> list[PairedTest]:
     """The usable `PairedTest`s of one set.
 
     reals: tables of readings, of which the first serves and the others must agree;  simulated: {model: table}
@@ -46,7 +51,7 @@ def pair(reals, simulated, *, outliers):
     tests = []
     for path in dict.fromkeys(path for table in tables for path in table.paths):
         before = len(outliers.left_out())
-        own = {id(table): rows[id(table)].get(path) for table in tables}
+        own: dict[int, Any] = {id(table): rows[id(table)].get(path) for table in tables}
         if _in_all(path, tables, own, outliers):
             _check_readings(path, real, others, own, outliers)
             for table in simulated.values():

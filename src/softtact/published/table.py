@@ -2,11 +2,13 @@
 
 import re
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from softtact.errors import InputError
+from softtact.published.outliers import Outliers
 
 PIECE = 57 * 200    # rows read at a time: some 4 MB
 TEXTS_KEPT = 1000   # words in place of numbers, for naming; one for each of the first rows that have them
@@ -43,17 +45,19 @@ class Table:
     surplus: np.ndarray
     texts: dict
 
-    def rows_of_tests(self):
+    def rows_of_tests(self) -> dict[str, np.ndarray]:
         """{path: rows (n,) in the file's order}."""
         order = np.argsort(self.test, kind="stable")
         ends = np.searchsorted(self.test[order], np.arange(len(self.paths) + 1))
         return {path: order[start:end] for path, start, end in zip(self.paths, ends[:-1], ends[1:], strict=True)}
 
 
-def read_table(path, *, columns, force, outliers):
+def read_table(path: Path, *, columns: int, force: bool, outliers: Outliers) -> Table:
     """The `Table` of a file with `columns` values a row, and a force column where `force`; oddities of the file go to `odd`."""
     layout = read_layout(path, columns=columns, force=force, outliers=outliers)
-    codes, texts, pieces = {}, {}, []
+    codes: dict[str, int] = {}
+    texts: dict[int, str] = {}
+    pieces = []
     try:
         for piece in _pieces(path, layout):
             pieces.append(_arrays(piece, layout, codes, texts))
@@ -67,7 +71,7 @@ def read_table(path, *, columns, force, outliers):
     return Table(path.name, values, force_n, test, line, list(codes), surplus, texts)
 
 
-def read_layout(path, *, columns, force, outliers):
+def read_layout(path: Path, *, columns: int, force: bool, outliers: Outliers) -> Layout:
     """The `Layout` that the first two lines tell; another number of columns than expected is refused."""
     with open(path, encoding="utf-8-sig", errors="replace") as lines:
         header, first = lines.readline().rstrip("\r\n"), lines.readline().rstrip("\r\n")

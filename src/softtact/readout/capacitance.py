@@ -14,17 +14,22 @@ phi = min(1, k phi at rest), until the pocket between the frusta is full; what t
 """
 
 import functools
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softtact.readout.electrodes import taxel_means
+
+if TYPE_CHECKING:
+    from softtact.sensors.frusta import Frusta
+    from softtact.sensors.specification import AnySpec
 
 EPSILON_0_PF_PER_MM = 8.8541878128e-3
 _LEAST_GAP = 0.02         # of the dielectric's thickness: the plates cannot meet
 _SLICES, _STATES = 400, 2001
 
 
-def solid_share(frusta):
+def solid_share(frusta: "Frusta") -> np.ndarray:
     """Area share phi (slices,) of the solid at the middles of equally thick slices of the frusta at rest, tip first."""
     height = (np.arange(_SLICES) + 0.5) / _SLICES
     diameter = frusta.tip_diameter_mm + height * (frusta.root_diameter_mm - frusta.tip_diameter_mm)
@@ -40,13 +45,13 @@ def _pocket(frusta, permittivity):
     return phi.mean() / spread.mean(axis=1), (1 / (1 + (permittivity - 1) * spread)).mean(axis=1)
 
 
-def equivalent_air_gap(spec, displacement_mm):
+def equivalent_air_gap(spec: "AnySpec", displacement_mm: float | np.ndarray) -> np.ndarray:
     """Thickness (mm) of air with the same capacitance per area, where the electrode plane moved by `displacement_mm`.
 
     Of a plain layer the movement against its lower side, by which it is thinner. It keeps its volume and spreads; the electrodes
     do not, so their area stays, and what lies beyond their edges is the fringe's.
     """
-    d = spec.dielectric
+    d: Any = spec.dielectric
     moved = np.minimum(displacement_mm, (1 - _LEAST_GAP) * spec.dielectric_thickness_mm)
     if spec.kind == "layers":
         return (d.thickness_mm - moved) / d.relative_permittivity
@@ -55,12 +60,12 @@ def equivalent_air_gap(spec, displacement_mm):
     return (h - moved) * share + d.sheet_thickness_mm / d.relative_permittivity
 
 
-def capacitance_per_area(spec, displacement_mm):
+def capacitance_per_area(spec: "AnySpec", displacement_mm: float | np.ndarray) -> np.ndarray:
     """Capacitance in pF/mm2 where the electrode plane moved towards the PCB by `displacement_mm` (any shape)."""
     return EPSILON_0_PF_PER_MM / equivalent_air_gap(spec, displacement_mm)
 
 
-def ideal_counts(spec, deformation_map_mm, *, counts_per_relative_change=1000.0):
+def ideal_counts(spec: "AnySpec", deformation_map_mm: np.ndarray, *, counts_per_relative_change: float = 1000.0) -> np.ndarray:
     """Counts (..., rows, columns) of a ideal readout: proportional to dC / C0, limited to the converter's range."""
     rest = capacitance_per_area(spec, 0.0)
     change = taxel_means(spec, capacitance_per_area(spec, deformation_map_mm)) / rest - 1

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from softtact.sensors.specification import SensorSpec
+    from softtact.sensors.base import BaseSpec
 
 
-def taxel_means(spec: "SensorSpec", field: np.ndarray, *, spacing_mm: float = 0.0,
+def taxel_means(spec: "BaseSpec", field: np.ndarray, *, spacing_mm: float = 0.0,
                 shift_mm: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
     """Means (..., rows, columns) over the electrodes of a field (..., y, x) on the deformation map's grid.
 
@@ -20,7 +20,7 @@ def taxel_means(spec: "SensorSpec", field: np.ndarray, *, spacing_mm: float = 0.
     return np.einsum("ry,...yx,cx->...rc", rows, field, columns, optimize=True)
 
 
-def electrode_weights(spec: "SensorSpec", *, spacing_mm: float = 0.0,
+def electrode_weights(spec: "BaseSpec", *, spacing_mm: float = 0.0,
                       shift_mm: tuple[float, float] = (0.0, 0.0)) -> tuple[np.ndarray, np.ndarray]:
     """Weights (rows, y) and (columns, x) whose products give the means over electrodes; arguments as for `taxel_means`."""
     return (_averaging(tuple(spec.map_y_mm), spec.taxels.rows, spacing=spacing_mm, shift=shift_mm[1]),
@@ -48,7 +48,7 @@ def _averaging(grid, count, *, spacing=0.0, shift=0.0):
     return weights
 
 
-def electrode_sides(spec: "SensorSpec", *, spacing_mm: float = 0.0) -> tuple[float, float]:
+def electrode_sides(spec: "BaseSpec", *, spacing_mm: float = 0.0) -> tuple[float, float]:
     """Sides (x, y) of an electrode in mm."""
     return (spec.footprint_mm[0] / spec.taxels.columns - spacing_mm, spec.footprint_mm[1] / spec.taxels.rows - spacing_mm)
 
@@ -61,7 +61,7 @@ def edge_excess(side_mm: float, gap_mm: np.ndarray) -> np.ndarray:
     return gap_mm / (np.pi * side_mm) * (1 + np.log(2 * np.pi * side_mm / gap_mm))
 
 
-def fringe_factor(spec: "SensorSpec", gap_mm: np.ndarray, *, spacing_mm: float = 0.0, outer: float = 1.0,
+def fringe_factor(spec: "BaseSpec", gap_mm: np.ndarray, *, spacing_mm: float = 0.0, outer: float = 1.0,
                   inner: float = 0.0) -> np.ndarray:
     """Factors (..., rows, columns) of the taxels' capacitance for gaps (..., rows, columns) in mm.
 

@@ -13,6 +13,7 @@ Computational Inelasticity, 1998, sec. 10.3; Taylor, Pister and Goudreau, 1970):
     q_i(t + dt) = exp(-dt / tau_i) q_i(t) + g_i (u_e(t + dt) - u_e(t)) (1 - exp(-dt / tau_i)) tau_i / dt.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,7 +33,8 @@ class LoadHistory:
     unloading: np.ndarray
 
 
-def staircase(force_n, *, rate_n_per_s, hold_s, cycles_before=0, rest_s=0.0):
+def staircase(force_n: np.ndarray, *, rate_n_per_s: float, hold_s: float, cycles_before: int = 0,
+              rest_s: float = 0.0) -> LoadHistory:
     """The `LoadHistory` of a press: up the load steps (N, rising) and down again, each held and read at the end of its hold.
 
     cycles_before: to the highest load step and back without holds, `rest_s` without force after each;  rate_n_per_s: inf for jumps
@@ -50,7 +52,7 @@ def staircase(force_n, *, rate_n_per_s, hold_s, cycles_before=0, rest_s=0.0):
     return LoadHistory(np.concatenate([[0.0], np.cumsum(duration)]), load_step, read[:count], read[count:][::-1])
 
 
-def lagged(values, times_s, *, shares, time_constants_s):
+def lagged(values: np.ndarray, times_s: np.ndarray, *, shares: Sequence[float], time_constants_s: Sequence[float]) -> np.ndarray:
     """What is felt (n, ...) at `times_s` (n,) of elastic values (n, ...), linear between; at the first all has arrived.
 
     shares, time_constants_s (terms,): g_i and tau_i in s; without terms the values themselves
@@ -71,7 +73,8 @@ def _not_yet_arrived(values, steps, share):
     return late
 
 
-def felt_branches(maps, history, *, shares, time_constants_s):
+def felt_branches(maps: np.ndarray, history: LoadHistory, *, shares: Sequence[float],
+                  time_constants_s: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
     """Maps (load steps, ...) felt on the way up and on the way down, for elastic maps (load steps, ...) of the same load steps."""
     elastic = np.concatenate([np.zeros((1, *maps.shape[1:])), maps])[history.load_step]
     felt = lagged(elastic, history.times_s, shares=shares, time_constants_s=time_constants_s)

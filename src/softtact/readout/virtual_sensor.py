@@ -6,7 +6,9 @@ force, drift and noise. Each effect, its default's reason and its switch: docs/e
 """
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -15,6 +17,9 @@ from softtact.readout.capacitance import EPSILON_0_PF_PER_MM, equivalent_air_gap
 from softtact.readout.electrodes import coupled, electrode_sides, electrode_weights, fringe_factor, taxel_means
 from softtact.readout.hysteresis import felt_branches, staircase
 from softtact.readout.readout import amplified, converted, random_walk
+
+if TYPE_CHECKING:
+    from softtact.sensors.frusta import SensorSpec
 
 _LISTS = ("relaxation", "relaxation_s", "dead_taxels")
 _LARGEST_DEVIATION = 2.5          # standard deviations of a sheet's thickness, as of the frusta's heights
@@ -63,7 +68,7 @@ class VirtualSensorSettings:
     largest_counts: float | None = None
 
     @classmethod
-    def from_dict(cls, values):
+    def from_dict(cls, values: dict[str, Any]) -> Self:
         """Settings from a mapping; an unknown key or an unusable value is refused."""
         unknown = sorted(set(values) - set(cls.__dataclass_fields__))
         if unknown:
@@ -72,7 +77,7 @@ class VirtualSensorSettings:
         return cls(**values)
 
     @classmethod
-    def ideal(cls, **changes):
+    def ideal(cls, **changes: Any) -> Self:
         """Every effect off, but for `changes`: the ideal counts, without limit above."""
         off = {field.name: () if field.name in _LISTS else 0.0 for field in dataclasses.fields(cls)}
         kept = {name: getattr(cls, name) for name in ("rate_n_per_s", "load_step_s", "counts_per_relative_change")}
@@ -131,13 +136,15 @@ class Branches:
     unloading: np.ndarray
 
 
-def read_virtual_sensor(spec, deformation_map_mm, *, force_n, trials, seed, item, settings=VirtualSensorSettings()):
+def read_virtual_sensor(spec: "SensorSpec", deformation_map_mm: np.ndarray, *, force_n: Sequence[float] | np.ndarray, trials: int,
+                        seed: int, item: str, settings: VirtualSensorSettings = VirtualSensorSettings()) -> np.ndarray:
     """Counts (trial, force, row, column) on the way up; arguments as for `read_branches`."""
     return read_branches(spec, deformation_map_mm, force_n=force_n, trials=trials, seed=seed, item=item,
                          settings=settings).loading
 
 
-def read_branches(spec, deformation_map_mm, *, force_n, trials, seed, item, settings=VirtualSensorSettings()):
+def read_branches(spec: "SensorSpec", deformation_map_mm: np.ndarray, *, force_n: Sequence[float] | np.ndarray, trials: int,
+                  seed: int, item: str, settings: VirtualSensorSettings = VirtualSensorSettings()) -> Branches:
     """`Branches` of counts for maps (force, y, x) in mm at rising forces (force,) in N; `item` tells presses apart."""
     specimen = make_specimen(spec, seed=seed, settings=settings)
     history = staircase(np.asarray(force_n, dtype=float), rate_n_per_s=settings.rate_n_per_s, hold_s=settings.load_step_s,
@@ -149,7 +156,7 @@ def read_branches(spec, deformation_map_mm, *, force_n, trials, seed, item, sett
     return Branches(*np.split(counts, 2, axis=1))
 
 
-def make_specimen(spec, *, seed, settings=VirtualSensorSettings()):
+def make_specimen(spec: "SensorSpec", *, seed: int, settings: VirtualSensorSettings = VirtualSensorSettings()) -> Specimen:
     """The `Specimen` of a seed. All is always drawn, so one effect switched off leaves the others as they were."""
     spec.need_frusta("the virtual sensor", "take the ideal readout, `PressResult.tactile_map`")
     if not settings.electrode_spacing_mm < min(electrode_sides(spec)):
@@ -166,7 +173,9 @@ def make_specimen(spec, *, seed, settings=VirtualSensorSettings()):
     return Specimen(1 + settings.gain_scatter * gain, settings.offset_counts * offset, sheet_excess, dead)
 
 
-def taxel_capacitance(spec, displacement_mm, *, sheet_excess_mm=0.0, shift_mm=(0.0, 0.0), settings=VirtualSensorSettings()):
+def taxel_capacitance(spec: "SensorSpec", displacement_mm: np.ndarray, *, sheet_excess_mm: float | np.ndarray = 0.0,
+                      shift_mm: tuple[float, float] = (0.0, 0.0),
+                      settings: VirtualSensorSettings = VirtualSensorSettings()) -> np.ndarray:
     """Capacitance (..., rows, columns) in pF of the electrodes under a displacement (..., y, x) in mm of the electrode plane.
 
     sheet_excess_mm: number or (rows, columns), by which the sheet over a taxel is thicker;  shift_mm: (x, y) of the object

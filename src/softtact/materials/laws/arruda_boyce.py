@@ -21,7 +21,7 @@ class ArrudaBoyce(InvariantLaw):
     name = "arruda_boyce"
     constants = (Parameter("mu", "MPa", 0.0, 5.0), Parameter("lambda_m", "1", 1.01, 100.0))
 
-    def derivatives(self, i1, i2):
+    def derivatives(self, i1: np.ndarray, i2: np.ndarray) -> Derivatives:
         mu, lambda_m = self.parameters["mu"], self.parameters["lambda_m"]
         polynomial = np.polynomial.Polynomial(mu * SERIES * lambda_m ** (2.0 - 2 * np.arange(6)))
         return Derivatives(

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from softtact.errors import ExtrapolationWarning, InputError
-from softtact.materials.laws.volumetric import Quadratic
+from softtact.materials.laws.volumetric import Quadratic, VolumetricFunction
 
 # Exponents (e1, e2, e3) of the incompressible test paths: l_k = stretch ** e_k. Direction 3 is always free of stress.
 TEST_PATHS = {
@@ -61,18 +61,19 @@ class Law:
     name: str
     constants: tuple[Parameter, ...]
 
-    def __init__(self, parameters, *, bulk_modulus, volumetric=Quadratic):
+    def __init__(self, parameters: dict[str, float], *, bulk_modulus: float,
+                 volumetric: type[VolumetricFunction] = Quadratic) -> None:
         """parameters {constant: MPa or 1};  bulk_modulus in MPa;  volumetric: the class of U."""
         self.parameters = {constant.name: float(parameters[constant.name]) for constant in self.constants}
         self.volumetric = volumetric(float(bulk_modulus))
 
     @classmethod
-    def in_order(cls, parameters):
+    def in_order(cls, parameters: dict[str, float]) -> dict[str, float]:
         """The same constants in their usual order, where terms can be exchanged."""
         return parameters
 
     @classmethod
-    def lowest(cls, stretches):
+    def lowest(cls, stretches: np.ndarray) -> dict[str, float]:
         """{constant: least value} for which psi exists at principal stretches (n, 3); a fit searches above it."""
         return {}
 
@@ -82,25 +83,25 @@ class Law:
         return f"{type(self).__name__}({values}, bulk_modulus={self.bulk_modulus:g}{volume})"
 
     @property
-    def bulk_modulus(self):
+    def bulk_modulus(self) -> float:
         """K = U''(1), MPa."""
         return self.volumetric.bulk_modulus
 
     @property
-    def mu0(self):
+    def mu0(self) -> float:
         """Initial shear modulus, MPa."""
         raise NotImplementedError
 
     @property
-    def plane_modulus(self):
+    def plane_modulus(self) -> float:
         """E / (1 - nu^2) for small strains, MPa: what stands against an indenter on a half-space."""
         return 4 * self.mu0 * (self.bulk_modulus + self.mu0 / 3) / (self.bulk_modulus + 4 * self.mu0 / 3)
 
-    def isochoric(self, C6, *, tangent=True):
+    def isochoric(self, C6: np.ndarray, *, tangent: bool = True) -> IsochoricResponse:
         """`IsochoricResponse` for C6 (n, 6): the components xx, yy, zz, xy, yz, zx of C, not doubled."""
         raise NotImplementedError
 
-    def principal_stress(self, stretches):
+    def principal_stress(self, stretches: np.ndarray) -> np.ndarray:
         """t_a = l_a dpsi/dl_a (..., 3) in MPa at isochoric principal stretches (..., 3).
 
         Its deviator is the Kirchhoff stress; the mean is not determined by psi. Complex stretches are allowed, so that
@@ -108,7 +109,7 @@ class Law:
         """
         raise NotImplementedError
 
-    def nominal_stress(self, mode, stretch):
+    def nominal_stress(self, mode: str, stretch: float | np.ndarray) -> np.ndarray:
         """Nominal stress (MPa) of the incompressible material in a `uniaxial`, `equibiaxial` or `planar` test.
 
         A law with a `stretch_window` warns (`ExtrapolationWarning`) of stretches outside of it.
@@ -126,7 +127,7 @@ class Law:
             warnings.warn(f"Law {self.name} is used at principal stretches {stretches.min():.3g} to {stretches.max():.3g}; its card"
                           f" rests on data from {low:.3g} to {high:.3g}.", ExtrapolationWarning, stacklevel=3)
 
-    def uniaxial_compressible(self, stretch):
+    def uniaxial_compressible(self, stretch: float | np.ndarray) -> np.ndarray:
         """Nominal stress (MPa) of the uniaxial test with U: the lateral stress is solved to zero."""
         axial = np.atleast_1d(np.asarray(stretch, float))
         stress = np.array([self._axial_stress(value) for value in axial])
@@ -143,7 +144,7 @@ class Law:
         return stress - stress.mean() + J * self.volumetric.pressure(J - 1)
 
 
-def principal_stretches(mode, stretch):
+def principal_stretches(mode: str, stretch: float | np.ndarray) -> np.ndarray:
     """Principal stretches (..., 3) of the incompressible material at the stretch (...) of a test mode."""
     if mode not in TEST_PATHS:
         raise InputError(f"Test mode {mode!r} is unknown; use one of {', '.join(TEST_PATHS)}.")

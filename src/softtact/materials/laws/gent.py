@@ -19,11 +19,11 @@ class Gent(InvariantLaw):
     constants = (Parameter("mu", "MPa", 0.0, 5.0), Parameter("jm", "1", 0.01, 1000.0))
 
     @classmethod
-    def lowest(cls, stretches):
+    def lowest(cls, stretches: np.ndarray) -> dict[str, float]:
         """The search keeps jm above the largest x of the points (n, 3), where psi exists; see `Law.lowest`."""
         return {"jm": 1.001 * float((stretches**2).sum(axis=1).max() - 3) + 1e-6}
 
-    def derivatives(self, i1, i2):
+    def derivatives(self, i1: np.ndarray, i2: np.ndarray) -> Derivatives:
         mu, jm = self.parameters["mu"], self.parameters["jm"]
         with np.errstate(divide="ignore", invalid="ignore"):
             room = 1 - (i1 - 3) / jm

@@ -28,7 +28,7 @@ class Derivatives(NamedTuple):
     """psi and its derivatives by i1 and i2 (MPa); each (n,) or a scalar."""
 
     psi: np.ndarray
-    psi1: np.ndarray
+    psi1: np.ndarray | float
     psi2: np.ndarray | float = 0.0
     psi11: np.ndarray | float = 0.0
     psi12: np.ndarray | float = 0.0
@@ -38,16 +38,16 @@ class Derivatives(NamedTuple):
 class InvariantLaw(Law):
     """A law psi(i1, i2)."""
 
-    def derivatives(self, i1, i2):
+    def derivatives(self, i1: np.ndarray, i2: np.ndarray) -> Derivatives:
         """`Derivatives` at the isochoric invariants i1, i2 (n,)."""
         raise NotImplementedError
 
     @property
-    def mu0(self):
+    def mu0(self) -> float:
         start = self.derivatives(np.array(3.0), np.array(3.0))
         return float(2 * (start.psi1 + start.psi2))
 
-    def isochoric(self, C6, *, tangent=True):
+    def isochoric(self, C6: np.ndarray, *, tangent: bool = True) -> IsochoricResponse:
         C6 = np.ascontiguousarray(C6, dtype=float)
         i1, i2 = isochoric_invariants(C6)
         table = _table(self.derivatives(i1, i2), len(C6))
@@ -56,7 +56,7 @@ class InvariantLaw(Law):
         _stress_and_tangent(C6, table, stress, moduli)
         return IsochoricResponse(table[:, 0].copy(), stress, moduli if tangent else None)
 
-    def principal_stress(self, stretches):
+    def principal_stress(self, stretches: np.ndarray) -> np.ndarray:
         square = np.asarray(stretches) ** 2
         i1 = square.sum(axis=-1)
         i2 = (i1**2 - (square**2).sum(axis=-1)) / 2
@@ -74,7 +74,7 @@ def _table(derivatives, n):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def isochoric_invariants(C6):
+def isochoric_invariants(C6: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Isochoric invariants i1, i2 (n,) of C6 (n, 6); NaN where det C <= 0."""
     n = len(C6)
     i1, i2 = np.empty(n), np.empty(n)

@@ -8,6 +8,8 @@ Small strain  mu0 = sum_k mu_k
 Reference     Ogden, Proc. R. Soc. A 326 (1972) 565-584; convention of the Abaqus Theory Guide, 4.6.1
 """
 
+from typing import Any
+
 import numpy as np
 
 from softtact.materials.laws.base import IsochoricResponse, Law, Parameter
@@ -23,30 +25,30 @@ class Ogden1(Law):
     name = "ogden1"
     constants = _constants([1])
 
-    def __init__(self, parameters, **volume):
+    def __init__(self, parameters: dict[str, float], **volume: Any) -> None:
         super().__init__(parameters, **volume)
         self._mu, self._alpha = np.array(list(self.parameters.values())).reshape(-1, 2).T.copy()
         self._alpha[self._alpha == 0] = 1e-9  # a search may touch 0, whose limit is finite; `make_law` refuses it
 
     @classmethod
-    def in_order(cls, parameters):
+    def in_order(cls, parameters: dict[str, float]) -> dict[str, float]:
         """The terms by falling exponent."""
-        values = np.array([parameters[constant.name] for constant in cls.constants]).reshape(-1, 2)
+        values: Any = np.array([parameters[constant.name] for constant in cls.constants]).reshape(-1, 2)
         values = values[np.argsort(-values[:, 1], kind="stable")].ravel().tolist()
         return {constant.name: value for constant, value in zip(cls.constants, values, strict=True)}
 
     @property
-    def mu0(self):
+    def mu0(self) -> float:
         return float(self._mu.sum())
 
-    def isochoric(self, C6, *, tangent=True):
+    def isochoric(self, C6: np.ndarray, *, tangent: bool = True) -> IsochoricResponse:
         C6 = np.ascontiguousarray(C6, dtype=float)
         energy, stress = np.empty(len(C6)), np.empty((len(C6), 6))
         moduli = np.empty((len(C6) if tangent else 0, 6, 6))
         power_sum_response(C6, self._mu, self._alpha, energy, stress, moduli)
         return IsochoricResponse(energy, stress, moduli if tangent else None)
 
-    def principal_stress(self, stretches):
+    def principal_stress(self, stretches: np.ndarray) -> np.ndarray:
         excess = np.expm1(np.log(stretches)[..., None] * self._alpha)  # lb^alpha - 1: exact near alpha = 0
         return excess @ (2 * self._mu / self._alpha)
 

@@ -13,12 +13,12 @@ from softtact.materials.laws.reduced_polynomial2 import ReducedPolynomial2
 from softtact.materials.laws.volumetric import VOLUMETRIC_FUNCTIONS
 from softtact.materials.laws.yeoh import Yeoh
 
-LAWS = {
+LAWS: dict[str, type[Law]] = {
     law.name: law for law in (NeoHooke, MooneyRivlin, Yeoh, ReducedPolynomial2, ArrudaBoyce, Gent, Ogden1, Ogden2, Ogden3)
 }
 
 
-def law_class(name):
+def law_class(name: str) -> type[Law]:
     """The class of a law; an unknown name is refused."""
     if name not in LAWS:
         raise InputError(f"Law {name!r} is unknown; use one of {', '.join(LAWS)}.")

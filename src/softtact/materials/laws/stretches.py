@@ -20,7 +20,7 @@ from softtact.materials.laws.invariants import COLUMN, ROW
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def eigen(C6, A, V):
+def eigen(C6: np.ndarray, A: np.ndarray, V: np.ndarray) -> None:
     """Eigenvalues of one symmetric C6 (6,) on the diagonal of A (3, 3), eigenvectors in V's columns: cyclic Jacobi.
 
     Jacobi rather than a closed formula: eigenvectors stay orthogonal to round-off however close the eigenvalues lie.
@@ -62,7 +62,8 @@ def _rotate(A, V, p, q):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def power_sum_response(C6, mu, alpha, energy, stress, tangent):
+def power_sum_response(C6: np.ndarray, mu: np.ndarray, alpha: np.ndarray, energy: np.ndarray, stress: np.ndarray,
+                       tangent: np.ndarray) -> None:
     """Fill energy (n,), stress (n, 6) and, unless it is empty, tangent (n, 6, 6); mu, alpha (terms,)."""
     A, V, c, cb, dev, h = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     N, W, D = np.empty((3, 6)), np.empty((3, 6)), np.empty((3, 3))
@@ -140,7 +141,7 @@ def _dyads(V, N, W):
             W[a, k] = V[i, a] * V[j, b] + V[j, a] * V[i, b]
 
 
-def stretch_range(C6):
+def stretch_range(C6: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Smallest and largest isochoric principal stretch (n,) at points given by C6 (n, 6).
 
     Eigenvalues of a symmetric 3 x 3 matrix in closed form (Smith, Comm. ACM 4 (1961) 168).

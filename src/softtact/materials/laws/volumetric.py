@@ -55,13 +55,13 @@ class Quadratic(VolumetricFunction):
     name = "quadratic"
     linear = True
 
-    def energy(self, change):
+    def energy(self, change: np.ndarray) -> np.ndarray:
         return 0.5 * self.bulk_modulus * change**2
 
-    def pressure(self, change):
+    def pressure(self, change: np.ndarray) -> np.ndarray:
         return self.bulk_modulus * change
 
-    def stiffness(self, change):
+    def stiffness(self, change: np.ndarray) -> np.ndarray:
         return np.full(np.shape(change), self.bulk_modulus)
 
 
@@ -71,13 +71,13 @@ class Logarithmic(VolumetricFunction):
     name = "logarithmic"
     least_change = -1.0
 
-    def energy(self, change):
+    def energy(self, change: np.ndarray) -> np.ndarray:
         return 0.25 * self.bulk_modulus * (change * (change + 2) - 2 * np.log1p(change))
 
-    def pressure(self, change):
+    def pressure(self, change: np.ndarray) -> np.ndarray:
         return 0.5 * self.bulk_modulus * change * (change + 2) / (1 + change)
 
-    def stiffness(self, change):
+    def stiffness(self, change: np.ndarray) -> np.ndarray:
         return 0.5 * self.bulk_modulus * (1 + (1 + change) ** -2.0)
 
 

@@ -8,6 +8,8 @@ Small strain  mu0 = 2 c10
 Reference     Yeoh, Rubber Chem. Technol. 66 (1993) 754-771
 """
 
+import numpy as np
+
 from softtact.materials.laws.base import Parameter
 from softtact.materials.laws.invariants import Derivatives, InvariantLaw
 
@@ -20,7 +22,7 @@ class Yeoh(InvariantLaw):
         Parameter("c30", "MPa", -5.0, 5.0),
     )
 
-    def derivatives(self, i1, i2):
+    def derivatives(self, i1: np.ndarray, i2: np.ndarray) -> Derivatives:
         c10, c20, c30 = self.parameters.values()
         x = i1 - 3
         return Derivatives(
