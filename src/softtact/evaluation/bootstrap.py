@@ -4,13 +4,19 @@ Maps of one object are alike, and so are maps of one trial (one loading, one dri
 then trials of each drawn object; a trial brings all its maps.
 """
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy import stats
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 LEVEL, REPEATS = 0.95, 2000
 
 
-def interval_of_mean(values, items, trials, *, seed, level=LEVEL, repeats=REPEATS):
+def interval_of_mean(values: np.ndarray, items: "np.ndarray | pd.Series", trials: "np.ndarray | pd.Series", *, seed: int,
+                     level: float = LEVEL, repeats: int = REPEATS) -> tuple[float, float]:
     """(low, high) of the mean of `values` (n,), by percentiles over `repeats` draws; items, trials (n,) say what belongs together.
 
     With a single item nothing tells how items differ: (nan, nan). With few, plain percentiles are too narrow (by a third for
@@ -31,7 +37,8 @@ def interval_of_mean(values, items, trials, *, seed, level=LEVEL, repeats=REPEAT
     return float(low), float(high)
 
 
-def by_trial(values, items, trials):
+def by_trial(values: np.ndarray, items: "np.ndarray | pd.Series",
+             trials: "np.ndarray | pd.Series") -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Sums and counts of `values` per item and trial, trials counted from 0 within an item; and each item's number of trials."""
     _, item = np.unique(np.asarray(items).astype(str), return_inverse=True)
     pairs, pair = np.unique(np.stack([item, np.asarray(trials)]), axis=1, return_inverse=True)

@@ -5,12 +5,13 @@ UNDECIDED, MEASUREMENTS = "undecided", "needs the paper's measurements"
 COLUMNS = ["claim", "where", "paper", "ours", "uncertainty", "verdict", "rule", "evidence"]
 
 
-def row(claim, where, paper, ours, verdict, rule, evidence, *, uncertainty="not told"):
+def row(claim: str, where: str, paper: str | float, ours: str | float, verdict: str, rule: str, evidence: str, *,
+        uncertainty: str = "not told") -> dict[str, str]:
     """One claim by COLUMNS; all but the verdict is text for readers."""
     values = (claim, where, str(paper), str(ours), uncertainty, verdict, rule, evidence)
     return dict(zip(COLUMNS, values, strict=True))
 
 
-def verdict_of(condition):
+def verdict_of(condition: bool) -> str:
     """Reproduced or not."""
     return REPRODUCED if condition else NOT

@@ -1,5 +1,8 @@
 """The paper's claims, each with its number, ours, and a verdict computed by the rule that stands beside it."""
 
+from collections.abc import Callable, Sequence
+from typing import Any
+
 import numpy as np
 import pandas as pd
 
@@ -19,8 +22,11 @@ from softtact.evaluation.claims_of_scores import VIRTUAL, claims_of_scores
 from softtact.materials.consistency import PRINTED
 
 
-def claims(*, cards, complexity, ftir, ssim, timing, choose, printed_counts, printed_times, source=VIRTUAL, summary=None,
-           per_item=None, ceiling=None, features=None):
+def claims(*, cards: Sequence[dict[str, Any]], complexity: pd.DataFrame, ftir: dict[str, Any], ssim: pd.DataFrame,
+           timing: pd.DataFrame, choose: Callable[..., str], printed_counts: dict[str, tuple[int, int, int, int, str]],
+           printed_times: dict[str, tuple[float, float, float, float]], source: str = VIRTUAL, summary: pd.DataFrame | None = None,
+           per_item: pd.DataFrame | None = None, ceiling: pd.DataFrame | None = None,
+           features: pd.DataFrame | None = None) -> pd.DataFrame:
     """Data frame with `claim_rows.COLUMNS`; the arguments are what the study's files hold.
 
     source: of the readings; against the virtual sensor's no verdict is given on the paper's numbers

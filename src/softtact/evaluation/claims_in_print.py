@@ -1,5 +1,7 @@
 """Claims that the paper's own numbers decide: does what the text says follow from what its tables print?"""
 
+from collections.abc import Iterator
+
 from softtact.evaluation.claim_rows import CONTRADICTION, REPRODUCED, row
 
 _CLOSE = 0.1      # relative: the text rounds
@@ -7,7 +9,8 @@ _CLOSE = 0.1      # relative: the text rounds
 SETS, KINDS, ALL_MAPS = (13_000, 400, 2_000), 3, 53_400
 
 
-def claims_in_print(*, printed_counts, printed_times):
+def claims_in_print(*, printed_counts: dict[str, tuple[int, int, int, int, str]],
+                    printed_times: dict[str, tuple[float, float, float, float]]) -> Iterator[dict[str, str]]:
     """A row for each; printed_counts {object: (NPt, CHt, NPo, CHo, model)}, printed_times {model: (mean, min, max, sd)} in s."""
     hyper, elastic = printed_times["hyperelastic"], printed_times["elastic"]
     yield _follows("Hyperelastic maps take 3.5 times as long as elastic ones", "sec. 5", 3.5, hyper[0] / elastic[0],

@@ -1,8 +1,14 @@
 """Claims that deformation maps decide by themselves: features seen and lost, and how far the rubber is strained."""
 
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from softtact.evaluation.claim_rows import UNDECIDED, row, verdict_of
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SMOOTH, RELIEF, STEPPED = ("object_1", "object_2", "object_3"), "object_4", ("object_5", "object_6")
 TENFOLD = 10.0              # NPt over CHt: from here on objects show "more detailed deformation patterns"
@@ -12,7 +18,7 @@ _FEATURES, _PRESSES = "evaluation/features.csv", "needs presses of these objects
 _COUNTED = "counts; a feature is a part of the map above half of its maximum"
 
 
-def claims_of_maps(features, complexity):
+def claims_of_maps(features: "pd.DataFrame | None", complexity: "pd.DataFrame") -> Iterator[dict[str, str]]:
     """A row for each; features as of `evaluation.features`, or None where nothing was pressed."""
     table = features.set_index(["item", "model"]) if features is not None else None
     yield from (_lower_feature(table, name) for name in STEPPED)

@@ -1,8 +1,14 @@
 """Claims on how well the networks read: SSIM by set, object and model, and how the sensor repeats itself."""
 
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from softtact.evaluation.claim_rows import ARCHIVE, UNDECIDED, row, verdict_of
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 VIRTUAL = "virtual sensor"      # the source of readings on which the paper's numbers cannot be judged
 CLOSE = 0.05                    # of mean SSIM: what trainings of one network from different seeds and searches may part by, assumed
@@ -13,7 +19,8 @@ PRINTED_SSIM = {"validation": {"hyperelastic": 0.87, "elastic": 0.86}, "unseen":
 READS = 0.5                     # mean SSIM from which a network counts as trained; assumed
 
 
-def claims_of_scores(ssim, *, source, summary, per_item, ceiling):
+def claims_of_scores(ssim: "pd.DataFrame", *, source: str, summary: "pd.DataFrame | None", per_item: "pd.DataFrame | None",
+                     ceiling: "pd.DataFrame | None") -> Iterator[dict[str, str]]:
     """A row for each; the tables as the evaluation writes them, None where they are not there."""
     yield from _agreement(ssim, source)
     yield from _scores(ssim, source, summary, per_item)

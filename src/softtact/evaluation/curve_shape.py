@@ -9,7 +9,13 @@ simulated area differed by 0.008 mm2. So, stated as a rule, a curve is compatibl
 The departure from a straight line is reported and excludes nothing.
 """
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 PAPER_RMSE_MM2 = 0.008          # section 4.1
 LEAST_GROWTH_MM2 = 5 * PAPER_RMSE_MM2
@@ -17,7 +23,7 @@ LEAST_GAP_PIXELS = 2
 LARGEST_RATE = 4.0
 
 
-def measures(force_n, area_mm2, *, pitch_mm):
+def measures(force_n: "np.ndarray | pd.Series", area_mm2: "np.ndarray | pd.Series", *, pitch_mm: float) -> dict[str, float]:
     """What the rule asks of a curve of area (f,) per frustum at forces (f,), those of 0 N left out.
 
     growth_mm2, growth_share: from the first force to the last;  disc_gap_mm: between equal circles of the last area;
@@ -37,7 +43,7 @@ def measures(force_n, area_mm2, *, pitch_mm):
             "departure_from_line": float(np.abs((area - line) / scale).max())}
 
 
-def objections(found, *, pixel_mm):
+def objections(found: dict[str, float], *, pixel_mm: float) -> list[str]:
     """What speaks against a curve of these `measures`, in words; nothing where the paper allows it."""
     least_gap = LEAST_GAP_PIXELS * pixel_mm
     said = []
@@ -55,7 +61,7 @@ def objections(found, *, pixel_mm):
     return said
 
 
-def verdict(name, found, *, pixel_mm):
+def verdict(name: str, found: dict[str, float], *, pixel_mm: float) -> str:
     """One sentence on a curve called `name`."""
     against = objections(found, pixel_mm=pixel_mm)
     span = f"{found['from_n']:g} to {found['to_n']:g} N"
@@ -67,7 +73,7 @@ def verdict(name, found, *, pixel_mm):
             "discs.")
 
 
-def judge(orientations, *, pitch_mm, pixel_mm):
+def judge(orientations: "pd.DataFrame", *, pitch_mm: float, pixel_mm: float) -> list[dict[str, Any]]:
     """Records {orientation, law, allowed, sentence, and the measures} of a long table (orientation, law, force_n,
     area_per_frustum_mm2).
     """
@@ -79,7 +85,7 @@ def judge(orientations, *, pitch_mm, pixel_mm):
     return records
 
 
-def summary_sentence(records):
+def summary_sentence(records: Sequence[dict[str, Any]]) -> str:
     """What the paper's words allow, of all orientations and laws judged."""
     allowed = [f"{r['orientation']} with {r['law']}" for r in records if r["allowed"]]
     orientations = list(dict.fromkeys(r["orientation"] for r in records))

@@ -7,6 +7,8 @@ network  the best network on the same maps (the two that the study trains, and t
 The largest above `CLEAR` is named. Nothing here is chosen by these numbers.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
 
@@ -18,7 +20,8 @@ COLUMNS = ["model", "set", "ssim", "paper", "sensor_ssim", "perfect_model_gain",
 WORDS = {"model": "the mechanical model", "data": "the number of maps", "network": "the network or its training"}
 
 
-def limits(curves, networks, *, own, tested, reference, source):
+def limits(curves: pd.DataFrame, networks: pd.DataFrame, *, own: str, tested: Sequence[str], reference: str,
+           source: str) -> pd.DataFrame:
     """Frame with COLUMNS, a row per tested model and set.
 
     curves: learning_curve.csv of all models, the reference's (where there is one) among them;  networks: networks.csv

@@ -6,7 +6,8 @@ SHARE = 0.1             # of the reading's largest count, from which on a taxel 
 FLOOR_COUNTS = 30.0     # at least: some four standard deviations of the virtual sensor's offsets and noise together
 
 
-def contact_patch_overlap(predicted, measured, *, share=SHARE, floor_counts=FLOOR_COUNTS):
+def contact_patch_overlap(predicted: np.ndarray, measured: np.ndarray, *, share: float = SHARE,
+                          floor_counts: float = FLOOR_COUNTS) -> np.ndarray:
     """Intersection over union (n,) of the contact patches of tactile maps (n, row, column) in counts.
 
     A patch is the taxels above a threshold: `share` of the *measured* map's maximum, but no less than `floor_counts`. Both

@@ -5,16 +5,23 @@ steps; its time is that of all load steps together, under the `error` policy wit
 first. The error to expect is calibrated on one set of presses (the indenters) and tested on the others.
 """
 
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 import pandas as pd
 
-from softtact.press.choice import calibrate, cheapest, expected_errors, rms
+from softtact.press.choice import FoundationError, calibrate, cheapest, expected_errors, rms
+
+if TYPE_CHECKING:
+    import xarray
 
 MODELS = ("elastic", "foundation", "hyperelastic")
 CALIBRATION_SET = "indenters"
 
 
-def press_table(presses, paper_choice, *, height_mm):
+def press_table(presses: "Sequence[dict[str, xarray.Dataset]]", paper_choice: dict[str, str], *,
+                height_mm: float) -> tuple[pd.DataFrame, FoundationError]:
     """A row per press and its worst load step: set, item, paper's model, time and error of each model, errors to expect.
 
     presses: list of {model: data set of `simulate_press`};  paper_choice: {item: model};  height_mm: of a frustum
@@ -50,7 +57,7 @@ def _row(press, paper_choice, calibrated, height_mm):
     return row | {f"{model}_expected_mm": float(values.max()) for model, values in told.items()}
 
 
-def choices(table, tolerance_mm):
+def choices(table: pd.DataFrame, tolerance_mm: float) -> dict[str, pd.Series]:
     """{policy: series of models} over a table's presses."""
     def by_error(row):
         return cheapest({model: np.array([row[f"{model}_expected_mm"]]) for model in MODELS[:2]}, tolerance_mm)
@@ -59,10 +66,10 @@ def choices(table, tolerance_mm):
             f"error, {1e3 * tolerance_mm:g} um": table.apply(by_error, axis=1)}
 
 
-def policy_table(table, tolerances_mm, *, sets):
+def policy_table(table: pd.DataFrame, tolerances_mm: Iterable[float], *, sets: Sequence[str]) -> pd.DataFrame:
     """A row per policy over the presses of some sets: shares of the models, errors accepted, time, and how well errors are told."""
     table = table[table.set.isin(sets)]
-    rows = {}
+    rows: dict[str, dict[str, Any]] = {}
     for tolerance in tolerances_mm:
         for policy, chosen in choices(table, tolerance).items():
             rows.setdefault(policy, _summary(table, policy, chosen, tolerance))
@@ -87,7 +94,7 @@ def _of_chosen(table, chosen, quantity):
                      index=table.index)
 
 
-def told_over_true(table, model):
+def told_over_true(table: pd.DataFrame, model: str) -> dict[str, float]:
     """Expected over true error of a model's presses: median, lowest and highest."""
     ratio = table[f"{model}_expected_mm"] / table[f"{model}_error_mm"]
     return {"median": ratio.median(), "lowest": ratio.min(), "highest": ratio.max()}

@@ -1,5 +1,7 @@
 """How well a network reads what it never saw, and how well the sensor repeats itself."""
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 import pandas as pd
 import xarray
@@ -7,14 +9,17 @@ import xarray
 from softtact.evaluation.bootstrap import interval_of_mean
 from softtact.evaluation.overlap import contact_patch_overlap
 from softtact.learning.network import predict
-from softtact.learning.samples import object_of
+from softtact.learning.samples import Samples, object_of
 from softtact.readout.ssim import leave_one_out_ssim, map_ssim, mean_absolute_counts
+
+if TYPE_CHECKING:
+    import torch
 
 SSIM_COLUMNS = ["model", "set", "item", "trial", "force_n", "ssim", "mae_counts", "overlap"]
 CEILING_COLUMNS = ["set", "item", "force_n", "ssim"]
 
 
-def score_samples(network, samples, *, ssim):
+def score_samples(network: "torch.nn.Module", samples: Samples, *, ssim: dict[str, Any]) -> pd.DataFrame:
     """A row per sample of `samples`: model, set, item, trial, force_n, ssim, mae_counts, overlap.
 
     The rows of the split `validation` carry set = "validation": its items are indenters that training saw at other
@@ -27,7 +32,7 @@ def score_samples(network, samples, *, ssim):
     return frame[SSIM_COLUMNS].sort_values(SSIM_COLUMNS[1:5], ignore_index=True)
 
 
-def score_sensor(samples, *, ssim):
+def score_sensor(samples: Samples, *, ssim: dict[str, Any]) -> pd.DataFrame:
     """A row per load step with at least two trials: set, item, force_n, ssim.
 
     ssim: mean over the trials of each one's SSIM against the mean of the others. A network's scores can
@@ -40,7 +45,7 @@ def score_sensor(samples, *, ssim):
     return pd.DataFrame(rows, columns=CEILING_COLUMNS)
 
 
-def predict_grasps(networks, grasps):
+def predict_grasps(networks: "dict[str, torch.nn.Module]", grasps: dict[str, Samples]) -> xarray.Dataset:
     """Predicted and measured maps of the grasped objects.
 
     networks, grasps: {model: network}, {model: samples}
@@ -61,7 +66,7 @@ def predict_grasps(networks, grasps):
         attrs={"source": some.source})
 
 
-def load_step_means(samples, maps, items, forces):
+def load_step_means(samples: Samples, maps: np.ndarray, items: list[str], forces: np.ndarray) -> np.ndarray:
     """Mean over the trials of `maps` (n, row, column) per item and force: (item, force, row, column)."""
     means = np.full((len(items), len(forces), *maps.shape[1:]), np.nan, dtype=np.float32)
     for (item, force), chosen in samples.labels.groupby(["item", "force_n"]).indices.items():
@@ -69,7 +74,7 @@ def load_step_means(samples, maps, items, forces):
     return means
 
 
-def summarise_scores(scores, ceiling, *, seed):
+def summarise_scores(scores: pd.DataFrame, ceiling: pd.DataFrame, *, seed: int) -> pd.DataFrame:
     """Frame model, set, items, maps, ssim, ssim_low, ssim_high, mae_counts, overlap, sensor_ssim of a study's scores.
 
     ssim_low, ssim_high: 95 % interval of the mean, by bootstrap over objects, then presses and trials; nan where there is one
@@ -86,13 +91,13 @@ def summarise_scores(scores, ceiling, *, seed):
     return pd.DataFrame(rows)
 
 
-def interval_over_objects(scores, *, seed):
+def interval_over_objects(scores: pd.DataFrame, *, seed: int) -> tuple[float, float]:
     """(low, high) of the mean SSIM of a set's scores: objects are drawn, then trials of each; a trial is one press read once."""
     trial = pd.factorize(scores["item"] + " " + scores.trial.astype(str))[0]
     return interval_of_mean(scores.ssim.to_numpy(), scores["item"].map(object_of), trial, seed=seed)
 
 
-def score_items(scores, *, seed):
+def score_items(scores: pd.DataFrame, *, seed: int) -> pd.DataFrame:
     """Frame model, set, item, maps, ssim, ssim_low, ssim_high, mae_counts, overlap: a row per item and model.
 
     ssim_low, ssim_high: 95 % interval of the item's mean, by bootstrap over its trials; nan with one

@@ -2,13 +2,21 @@
 
 import statistics
 import time
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING
 
 import pandas as pd
+
+if TYPE_CHECKING:
+    import numpy as np
+    import torch
+    import xarray
 
 TIMING_COLUMNS = ["model", "item", "set", "force_n", "solver_s", "network_s"]
 
 
-def time_presses(presses, networks, *, predict, repeats=3):
+def time_presses(presses: "Iterable[xarray.Dataset]", networks: "dict[str, torch.nn.Module]", *,
+                 predict: "Callable[[torch.nn.Module, np.ndarray], np.ndarray]", repeats: int = 3) -> pd.DataFrame:
     """A row per map: model, item, set, force_n, solver_s, network_s.
 
     presses: data sets of `simulate_press`;  networks {model: network};  predict(network, maps (1, y, x))
@@ -26,14 +34,14 @@ def time_presses(presses, networks, *, predict, repeats=3):
     return pd.DataFrame(rows, columns=TIMING_COLUMNS)
 
 
-def seconds(call, *arguments):
+def seconds(call: Callable[..., object], *arguments: object) -> float:
     """Wall time of one call, s."""
     start = time.perf_counter()
     call(*arguments)
     return time.perf_counter() - start
 
 
-def summarise_times(timing):
+def summarise_times(timing: pd.DataFrame) -> pd.DataFrame:
     """Time per map of solver and network together, s: model, maps, mean, min, max, sd."""
     total = timing.assign(total_s=timing.solver_s + timing.network_s)
     return total.groupby("model", sort=False).total_s.agg(

@@ -7,6 +7,10 @@ All models share the split, and a load step is used only where it is within ever
 same samples.
 """
 
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pandas as pd
 import xarray
@@ -20,9 +24,13 @@ TRAINING_SET = "indenters"
 OUT_OF_RANGE = "out_of_range"
 MEAN = -1  # in place of a trial's number: the mean over the trials
 MANIFEST = ["set", "item", "model", "force_n", "trial", "split", "converged", "within_validity"]
+_Presses = dict[tuple[str, str, str], xarray.Dataset]     # by model, set, item
+_Readings = dict[tuple[str, str], xarray.Dataset]         # by set, item
 
 
-def build_datasets(presses, tactile, *, models, items, train_fraction, seed, training_trials="each", split_by="map"):
+def build_datasets(presses: _Presses, tactile: _Readings, *, models: Sequence[str], items: list[Any], train_fraction: float,
+                   seed: int, training_trials: str = "each",
+                   split_by: str = "map") -> tuple[dict[tuple[str, str], xarray.Dataset], pd.DataFrame]:
     """Join and split presses and readings.
 
     presses {(model, set, item): dataset};  tactile {(set, item): dataset};  items: [{"set", "item"}, ...]
@@ -45,9 +53,9 @@ def build_datasets(presses, tactile, *, models, items, train_fraction, seed, tra
     return datasets, manifest(load_steps, presses, tactile, models)
 
 
-def read_presses(paths):
+def read_presses(paths: Iterable[str | Path]) -> _Presses:
     """{(model, set, item): dataset} of press files; their attributes say what they are."""
-    presses = {}
+    presses: _Presses = {}
     for path in paths:
         data = read_dataset(path)
         check_converged(data, path)
@@ -55,16 +63,16 @@ def read_presses(paths):
     return presses
 
 
-def read_tactile(paths):
+def read_tactile(paths: Iterable[str | Path]) -> _Readings:
     """{(set, item): dataset} of the sensor's readings."""
-    tactile = {}
+    tactile: _Readings = {}
     for path in paths:
         data = read_dataset(path)
         _add(tactile, tuple(_attribute(data, name, path) for name in ("set", "item")), data, path)
     return tactile
 
 
-def check_converged(press, path):
+def check_converged(press: xarray.Dataset, path: str | Path) -> None:
     """Refuse a press with a load step that the solver did not finish: nothing of it may be used."""
     failed = press.normal_force_n.values[press.converged.values == 0]
     if len(failed):
@@ -73,8 +81,9 @@ def check_converged(press, path):
                                "press it again with smaller force steps, or leave it out.")
 
 
-def check_items(items):
+def check_items(items: Iterable[tuple[str, str]]) -> None:
     """Refuse an item that stands twice, and an object in two sets: a test must not hold what training saw."""
+    sets: dict[str, str]
     sets, seen = {}, set()
     for set_name, item in items:
         own = sets.setdefault(object_of(item), set_name)
@@ -83,7 +92,7 @@ def check_items(items):
         seen.add(item)
 
 
-def check_item(key, presses, tactile, models):
+def check_item(key: tuple[str, str], presses: _Presses, tactile: _Readings, models: Sequence[str]) -> None:
     """Refuse an item whose press or reading is missing, not finite, or at other forces than the rest."""
     name = "/".join(key)
     if key not in tactile:
@@ -100,7 +109,7 @@ def check_item(key, presses, tactile, models):
                              f"read at {_list(forces)} N; make both at the same forces.")
 
 
-def list_load_steps(items, presses, models):
+def list_load_steps(items: Iterable[tuple[str, str]], presses: _Presses, models: Sequence[str]) -> pd.DataFrame:
     """Frame of all load steps, in the order of set, item and force: set, item, load step (index of the force), force_n, usable."""
     rows = []
     for key in sorted(items):
@@ -111,7 +120,7 @@ def list_load_steps(items, presses, models):
     return pd.DataFrame(rows, columns=["set", "item", "load_step", "force_n", "usable"])
 
 
-def assign_splits(load_steps, *, train_fraction, seed, split_by="map"):
+def assign_splits(load_steps: pd.DataFrame, *, train_fraction: float, seed: int, split_by: str = "map") -> pd.DataFrame:
     """`load_steps` with the column split: train or validation by lot for indenters, else the load step's set."""
     load_steps = load_steps.assign(split=load_steps["set"].where(load_steps.usable, OUT_OF_RANGE))
     candidates = load_steps[load_steps.usable & (load_steps["set"] == TRAINING_SET)]
@@ -123,7 +132,7 @@ def assign_splits(load_steps, *, train_fraction, seed, split_by="map"):
     return load_steps
 
 
-def check_splits(load_steps):
+def check_splits(load_steps: pd.DataFrame) -> None:
     """Refuse a split without a load step."""
     for split in SPLITS:
         if not (load_steps.split == split).any():
@@ -132,7 +141,7 @@ def check_splits(load_steps):
                              "model's validity); add items or smaller forces.")
 
 
-def check_no_map_leaks(load_steps, presses, models):
+def check_no_map_leaks(load_steps: pd.DataFrame, presses: _Presses, models: Sequence[str]) -> None:
     """Refuse a test whose deformation map is one of the training set: the same shape under two names.
 
     A map of zeros, before an object touches, is every object's and tells nothing.
@@ -150,7 +159,7 @@ def check_no_map_leaks(load_steps, presses, models):
                                  f"training indenter {owner}; leave one of the two out.")
 
 
-def order_samples(load_steps, tactile, split, *, seed, training_trials):
+def order_samples(load_steps: pd.DataFrame, tactile: _Readings, split: str, *, seed: int, training_trials: str) -> pd.DataFrame:
     """Samples of one split as a frame set, item, load step, force_n, trial; shuffled with the seed where a network trains."""
     chosen = load_steps[load_steps.split == split]
     mean = split == "train" and training_trials == "mean"
@@ -163,11 +172,11 @@ def order_samples(load_steps, tactile, split, *, seed, training_trials):
     return samples
 
 
-def gather(samples, presses, tactile, *, model, split):
+def gather(samples: pd.DataFrame, presses: _Presses, tactile: _Readings, *, model: str, split: str) -> xarray.Dataset:
     """The data set (sample, ...) of one model and split, in the order of the frame `samples`."""
     keys = list(zip(samples["set"], samples["item"], samples["load_step"], samples["trial"], strict=True))
-    maps = [presses[model, s, i].deformation_map_mm.values[load_step] for s, i, load_step, _ in keys]
-    counts = [_reading(tactile[s, i].tactile_map.values[:, load_step], trial) for s, i, load_step, trial in keys]
+    maps: Any = [presses[model, s, i].deformation_map_mm.values[load_step] for s, i, load_step, _ in keys]
+    counts: Any = [_reading(tactile[s, i].tactile_map.values[:, load_step], trial) for s, i, load_step, trial in keys]
     first = presses[model, *keys[0][:2]]
     return xarray.Dataset(
         {"deformation_map_mm": (("sample", "y", "x"), np.float32(maps), {"units": "mm"}),
@@ -180,7 +189,7 @@ def gather(samples, presses, tactile, *, model, split):
         attrs={"model": model, "split": split, "source": _one_source(tactile)})
 
 
-def manifest(load_steps, presses, tactile, models):
+def manifest(load_steps: pd.DataFrame, presses: _Presses, tactile: _Readings, models: Sequence[str]) -> pd.DataFrame:
     """A row per model, load step and trial with the split that it went to; also of what was left out."""
     rows = []
     for model in models:

@@ -14,6 +14,10 @@ Inside, maps and counts are divided by two constants of the training set, so tha
 are stored with the weights: a network's face is in mm and counts.
 """
 
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import torch
 from torch import nn
@@ -27,9 +31,11 @@ class TactileNetwork(nn.Module):
     """The printed network: deformation maps (n, y, x) in mm to tactile maps (n, row, column) in counts."""
 
     architecture = "printed"
+    map_scale_mm: torch.Tensor
+    count_scale: torch.Tensor
 
-    def __init__(self, *, map_shape, taxels, filters=(80, 95, 120), dense=570, activation="relu",
-                 map_scale_mm=1.0, count_scale=1.0):
+    def __init__(self, *, map_shape: Sequence[int], taxels: Sequence[int], filters: Sequence[int] = (80, 95, 120), dense: int = 570,
+                 activation: str = "relu", map_scale_mm: float = 1.0, count_scale: float = 1.0) -> None:
         super().__init__()
         self.options = {"map_shape": list(map_shape), "taxels": list(taxels), "filters": list(filters),
                         "dense": dense, "activation": activation}
@@ -43,14 +49,14 @@ class TactileNetwork(nn.Module):
         self.register_buffer("map_scale_mm", torch.tensor(float(map_scale_mm)))
         self.register_buffer("count_scale", torch.tensor(float(count_scale)))
 
-    def forward(self, maps_mm):                                      # (n, 57, 33) mm
+    def forward(self, maps_mm: torch.Tensor) -> torch.Tensor:        # (n, 57, 33) mm
         x = self.features(maps_mm[:, None] / self.map_scale_mm)      # (n, 120, 51, 27)
         x = torch.relu(self.hidden(x.flatten(1)))                    # (n, 570)
         x = self.output(x) * self.count_scale                        # (n, 28) counts
         return x.unflatten(1, self.options["taxels"])                # (n, 7, 4) counts
 
 
-def block(n_in, n_out, activation):
+def block(n_in: int, n_out: int, activation: str) -> tuple[nn.Module, nn.Module, nn.Module]:
     """Convolution, its activation, and a pool: each (n, c, h, w) loses two rows and two columns."""
     middle = {"relu": nn.ReLU, "linear": nn.Identity}[activation]
     return nn.Conv2d(n_in, n_out, kernel_size=2), middle(), nn.MaxPool2d(kernel_size=2, stride=1)
@@ -63,8 +69,13 @@ class CompactNetwork(nn.Module):
     """
 
     architecture = "compact"
+    rows: torch.Tensor
+    columns: torch.Tensor
+    map_scale_mm: torch.Tensor
+    count_scale: torch.Tensor
 
-    def __init__(self, *, map_shape, taxels, filters=(16, 32, 64), map_scale_mm=1.0, count_scale=1.0):
+    def __init__(self, *, map_shape: Sequence[int], taxels: Sequence[int], filters: Sequence[int] = (16, 32, 64),
+                 map_scale_mm: float = 1.0, count_scale: float = 1.0) -> None:
         super().__init__()
         if not all(side % 2 for side in map_shape):
             raise InputError(f"the compact network: a map of {map_shape[0]} x {map_shape[1]} points cannot be halved with both "
@@ -84,14 +95,14 @@ class CompactNetwork(nn.Module):
         self.register_buffer("map_scale_mm", torch.tensor(float(map_scale_mm)))
         self.register_buffer("count_scale", torch.tensor(float(count_scale)))
 
-    def forward(self, maps_mm):                                      # (n, 57, 33) mm
+    def forward(self, maps_mm: torch.Tensor) -> torch.Tensor:        # (n, 57, 33) mm
         x = self.features(maps_mm[:, None] / self.map_scale_mm)      # (n, 64, 29, 17)
         x = self.rows @ x @ self.columns.T                           # (n, 64, 7, 4) means over each taxel
         x = self.reading(torch.relu(self.neighbours(x)))[:, 0]       # (n, 7, 4)
         return (self.gain * x + self.offset) * self.count_scale      # (n, 7, 4) counts
 
 
-def taxel_weights(points, parts):
+def taxel_weights(points: int, parts: int) -> np.ndarray:
     """Weights (parts, points) of the mean over `parts` equal parts of a side, linear between its `points`."""
     t = np.linspace(0, points - 1, parts + 1)[:, None] - np.arange(points)   # from each point to each part's ends
     left, right = np.clip(t + 1, 0, 1), np.clip(t, 0, 1)
@@ -102,12 +113,12 @@ def taxel_weights(points, parts):
 ARCHITECTURES = {network.architecture: network for network in (TactileNetwork, CompactNetwork)}
 
 
-def summed_l1(predicted, measured):
+def summed_l1(predicted: torch.Tensor, measured: torch.Tensor) -> torch.Tensor:
     """The paper's equation 1: |difference| summed over a map's taxels, in counts; here its mean over the maps (n, 7, 4)."""
     return (predicted - measured).abs().sum(dim=(1, 2)).mean()
 
 
-def predict(network, maps_mm, *, batch=64):
+def predict(network: nn.Module, maps_mm: np.ndarray, *, batch: int = 64) -> np.ndarray:
     """Tactile maps (n, row, column) in counts, as numpy, of deformation maps (n, y, x) in mm.
 
     Equal maps, of which repeated trials have many, are given to the network once.
@@ -120,14 +131,14 @@ def predict(network, maps_mm, *, batch=64):
     return tactile[own.ravel()]
 
 
-def save_network(path, network, *, facts):
+def save_network(path: str | Path, network: nn.Module, *, facts: dict[str, Any]) -> None:
     """Write weights, options and `facts` (plain values: model, seed, epoch, ...); the same network gives the same bytes."""
     weights = {name: tensor.detach().cpu() for name, tensor in network.state_dict().items()}
     save(path, {"architecture": network.architecture, "options": network.options, "weights": weights,
                 "facts": {**facts, "softtact_version": softtact.__version__}})
 
 
-def load_network(path):
+def load_network(path: str | Path) -> tuple[nn.Module, dict[str, Any]]:
     """(network, facts) of a file that `save_network` wrote, on the CPU; only tensors and plain values are accepted."""
     stored = load(path)
     try:
@@ -139,13 +150,13 @@ def load_network(path):
                          "give a model.pt that a training wrote.") from None
 
 
-def save(path, stored):
+def save(path: str | Path, stored: dict[str, Any]) -> None:
     """Write a dictionary of tensors and plain values, whole or not at all."""
     with atomic_path(path) as temporary, open(temporary, "wb") as file:
         torch.save(stored, file)  # into an open file: given a path, torch writes the file's name into the bytes
 
 
-def load(path):
+def load(path: str | Path) -> dict[str, Any]:
     """Read what `save` wrote; a file that holds anything but tensors and plain values is refused."""
     try:
         return torch.load(path, map_location="cpu", weights_only=True)

@@ -1,7 +1,9 @@
 """Maps from a user's file for a trained network, and its counts back to a file; what does not fit is refused or warned of."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -29,7 +31,7 @@ class Maps:
     y_mm: np.ndarray | None = None
 
 
-def read_maps(path, *, shape):
+def read_maps(path: str | Path, *, shape: Sequence[int]) -> Maps:
     """The `Maps` of a press (NetCDF) or of one map (.npy, .csv); `shape` (y, x) is what the network takes."""
     readers = {".nc": _read_press, ".npy": _read_npy, ".csv": _read_csv}
     if Path(path).suffix not in readers:
@@ -85,7 +87,7 @@ def _one_map(path, values):
     return Maps(values[None].astype(float))
 
 
-def outside_training(maps, facts):
+def outside_training(maps: Maps, facts: dict[str, Any]) -> list[str]:
     """Sentences on what the network has not seen in training; a network's file from before ranges were kept tells little."""
     said = []
     if maps.model and maps.model != facts.get("model", maps.model):
@@ -103,7 +105,7 @@ def outside_training(maps, facts):
     return said
 
 
-def write_counts(path, maps, counts, *, facts):
+def write_counts(path: Path, maps: Maps, counts: np.ndarray, *, facts: dict[str, Any]) -> None:
     """Write counts (n, row, column) as NetCDF, or as CSV with a line for each taxel."""
     if path.suffix == ".csv":
         n, rows, columns = np.indices(counts.shape).reshape(3, -1)

@@ -2,6 +2,8 @@
 
 import hashlib
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -26,22 +28,22 @@ class Samples:
     split: str
     source: str
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.maps_mm)
 
-    def digest(self):
+    def digest(self) -> str:
         """Tells contents apart: 16 hex digits over model, maps and counts."""
-        content = hashlib.sha256(self.model.encode())
+        content: Any = hashlib.sha256(self.model.encode())
         content.update(np.ascontiguousarray(self.maps_mm))
         content.update(np.ascontiguousarray(self.counts))
         return content.hexdigest()[:16]
 
-    def range(self):
+    def range(self) -> dict[str, list[float]]:
         """Plain values of what the samples span: [least, greatest] of the maps' maxima in mm and of the forces in N."""
         deepest, forces = self.maps_mm.max(axis=(1, 2)), self.labels.force_n
         return {"map_max_mm": [float(deepest.min()), float(deepest.max())], "force_n": [float(forces.min()), float(forces.max())]}
 
-    def subset(self, count, *, seed):
+    def subset(self, count: int | None, *, seed: int) -> "Samples":
         """At most `count` samples (None: all), drawn with the seed, in their order."""
         if count is None or count >= len(self):
             return self
@@ -50,7 +52,7 @@ class Samples:
                        self.model, self.split, self.source)
 
 
-def object_of(item):
+def object_of(item: str) -> str:
     """The object of an item's name: `square-1` is the square in its first drawn pose."""
     return item.partition("-")[0]
 
@@ -58,7 +60,7 @@ def object_of(item):
 LABELS = ("set", "item", "trial", "force_n")
 
 
-def read_samples(path):
+def read_samples(path: str | Path) -> Samples:
     """The samples of one file of `build_dataset`."""
     data = read_dataset(path)
     if "deformation_map_mm" not in data or "sample" not in data.dims:

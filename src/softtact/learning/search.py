@@ -10,7 +10,9 @@ depends on who finishes when. A process that dies leaves its trial to the others
 import contextlib
 import fcntl
 import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 import optuna
@@ -18,16 +20,23 @@ import pandas as pd
 
 from softtact.errors import ConvergenceError, InputError
 from softtact.files import digest
-from softtact.learning.settings import Training
+from softtact.learning.settings import Search, SearchSpace, Training
 from softtact.learning.training import start_run, train_network
 from softtact.progress import announce
+
+if TYPE_CHECKING:
+    import optuna.storages.journal
+    import torch
+
+    from softtact.learning.samples import Samples
 
 WAIT_S = 1.0     # between two looks at what other processes have left to do
 
 optuna.logging.set_verbosity(optuna.logging.WARNING)
 
 
-def search_hyperparameters(train, validation, *, options, activation, ssim, seed, device, journal):
+def search_hyperparameters(train: "Samples", validation: "Samples", *, options: Search, activation: str, ssim: dict[str, Any],
+                           seed: int, device: "torch.device", journal: str | Path) -> optuna.Study:
     """Run the trials of `options` (a `Search`) that `journal` does not hold yet; returns the finished Optuna study."""
     train, journal = train.subset(options.maps, seed=seed), Path(journal)
     owner = search_digest(train, validation, options, activation, seed)
@@ -46,12 +55,12 @@ def search_hyperparameters(train, validation, *, options, activation, ssim, seed
         return study
 
 
-def unfinished(study, options):
+def unfinished(study: optuna.Study, options: Search) -> bool:
     """Whether a trial is still to be drawn or at work."""
     return len(study.trials) < options.trials or not all(trial.state.is_finished() for trial in study.trials)
 
 
-def claim_trial(study, journal, *, options, seed):
+def claim_trial(study: optuna.Study, journal: Path, *, options: Search, seed: int) -> optuna.Trial | None:
     """The next trial, drawn; None if all are drawn. One process at a time."""
     with open(journal.with_suffix(".claim"), "w") as claim:
         fcntl.flock(claim, fcntl.LOCK_EX)
@@ -63,7 +72,7 @@ def claim_trial(study, journal, *, options, seed):
         return study.ask()
 
 
-def tell_result(study, trial, run):
+def tell_result(study: optuna.Study, trial: optuna.Trial, run: Callable[[optuna.Trial], float]) -> None:
     """Run a trial and note its value, or that it was pruned."""
     try:
         study.tell(trial, run(trial))
@@ -71,7 +80,8 @@ def tell_result(study, trial, run):
         study.tell(trial, state=optuna.trial.TrialState.PRUNED)
 
 
-def run_trial(trial, train, validation, *, options, activation, ssim, seed, device):
+def run_trial(trial: optuna.Trial, train: "Samples", validation: "Samples", *, options: Search, activation: str,
+              ssim: dict[str, Any], seed: int, device: "torch.device") -> float:
     """Train the network that a trial draws; returns its smallest validation loss, or leaves when Hyperband prunes it."""
     drawn = draw(trial, options.space)
     network = {"filters": drawn["filters"], "dense": drawn["dense"], "activation": activation}
@@ -90,7 +100,7 @@ def run_trial(trial, train, validation, *, options, activation, ssim, seed, devi
     return run.best["validation_loss"]
 
 
-def draw(trial, space):
+def draw(trial: optuna.Trial, space: SearchSpace) -> dict[str, Any]:
     """Hyperparameters of a trial: filters (list), dense, learning_rate."""
     layers = trial.suggest_int("layers", *space.depth)
     filters = [trial.suggest_int(f"filters_{layer}", *bounds) for layer, bounds in enumerate(space.filters[:layers], start=1)]
@@ -98,7 +108,7 @@ def draw(trial, space):
             "learning_rate": trial.suggest_float("learning_rate", *space.learning_rate, log=True)}
 
 
-def join_study(users, journal, *, options, owner):
+def join_study(users: TextIO, journal: Path, *, options: Search, owner: str) -> optuna.Study:
     """The study, `users` then locked as by one who shares it; whoever finds nobody else there forgets unfinished trials."""
     fcntl.flock(users, fcntl.LOCK_UN)
     with contextlib.suppress(BlockingIOError):
@@ -108,14 +118,14 @@ def join_study(users, journal, *, options, owner):
     return open_study(journal, options=options, owner=owner, alone=False)
 
 
-def open_study(journal, *, options, owner, alone):
+def open_study(journal: Path, *, options: Search, owner: str, alone: bool) -> optuna.Study:
     """The Optuna study `owner` in the journal file, made if it is not there; `alone`: without an unfinished trial."""
     backend = optuna.storages.journal.JournalFileBackend(
         str(journal), lock_obj=optuna.storages.journal.JournalFileOpenLock(str(journal)))
     storage = optuna.storages.JournalStorage(backend)
     pruner = optuna.pruners.HyperbandPruner(min_resource=1, max_resource=options.max_epochs,
                                             reduction_factor=options.reduction_factor)
-    known = {"storage": storage, "study_name": owner}
+    known: dict[str, Any] = {"storage": storage, "study_name": owner}
     study = optuna.create_study(**known, pruner=pruner, load_if_exists=True)
     finished = [trial for trial in study.trials if trial.state.is_finished() and trial.state.name != "FAIL"]
     if alone and len(finished) < len(study.trials):
@@ -126,17 +136,17 @@ def open_study(journal, *, options, owner, alone):
     return study
 
 
-def make_sampler(seed):
+def make_sampler(seed: Sequence[int]) -> optuna.samplers.TPESampler:
     """Optuna's tree-structured Parzen sampler; `seed` is a list of integers."""
     return optuna.samplers.TPESampler(seed=int(np.random.SeedSequence(seed).generate_state(1)[0]))
 
 
-def search_digest(train, validation, options, activation, seed):
+def search_digest(train: "Samples", validation: "Samples", options: Search, activation: str, seed: int) -> str:
     """Name of the study: other data or settings get another one."""
     return digest([options.model_dump(exclude={"trials"}), activation, seed, train.digest(), validation.digest()])
 
 
-def search_table(study):
+def search_table(study: optuna.Study) -> pd.DataFrame:
     """A row per trial: trial, the drawn values (none for a layer that it lacks), value (validation loss, counts), state, epochs."""
     rows = [{"trial": trial.number, **trial.params, "value": smallest_loss(trial), "state": trial.state.name.lower(),
              "epochs": len(trial.intermediate_values)} for trial in study.trials]
@@ -145,7 +155,7 @@ def search_table(study):
     return table[["trial", "layers", *filters, "dense", "learning_rate", "value", "state", "epochs"]]
 
 
-def best_trial(study):
+def best_trial(study: optuna.Study) -> dict[str, Any]:
     """filters, dense, learning_rate, trial and validation_loss of the finished trial with the smallest loss."""
     candidates = [trial for trial in study.trials if np.isfinite(smallest_loss(trial))]
     if not candidates:
@@ -157,6 +167,6 @@ def best_trial(study):
             "validation_loss": smallest_loss(best)}
 
 
-def smallest_loss(trial):
+def smallest_loss(trial: optuna.trial.FrozenTrial) -> float:
     """Smallest validation loss among a trial's epochs, counts."""
     return min(trial.intermediate_values.values(), default=float("nan"))

@@ -3,7 +3,7 @@
 Defaults are what the paper prints; where it is silent the description says so.
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, Self
 
 import pydantic
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
@@ -28,7 +28,7 @@ class Section(pydantic.BaseModel):
     model_config = pydantic.ConfigDict(extra="forbid", frozen=True)
 
     @classmethod
-    def from_dict(cls, values, *, where):
+    def from_dict(cls, values: dict[str, Any], *, where: str) -> Self:
         """The section from plain values; the first fault becomes an `InputError` naming the key and its value."""
         try:
             return cls.model_validate(values)
@@ -77,7 +77,7 @@ class SearchSpace(Section):
         return self
 
     @property
-    def depth(self):
+    def depth(self) -> tuple[int, int]:
         """Fewest and most convolutions."""
         return self.layers or (min(2, len(self.filters)), len(self.filters))
 
@@ -135,17 +135,18 @@ class Ssim(Section):
         return window
 
 
-def chosen_network(network, best):
+def chosen_network(network: Network, best: dict[str, Any] | None) -> dict[str, Any]:
     """Architecture and its options: as printed, as the search found them (`best`), or the compact one's."""
     if network.architecture == "compact":
         return {"architecture": "compact", "filters": network.compact.filters}
-    searched = {name: best[name] for name in ("filters", "dense")} if network.architecture == "searched" else {}
+    searched = {name: best[name] for name in ("filters", "dense")} if network.architecture == "searched" else {}  # type: ignore[index]
     return {**network.model_dump(include={"filters", "dense", "activation"}), **searched}
 
 
-def chosen_training(options, network, best):
+def chosen_training(options: Training, network: Network, best: dict[str, Any] | None) -> Training:
     """`options` with the learning rate as a number: the search's, the stated one, or the compact network's own."""
     if network.architecture == "compact":
         own = {"learning_rate": network.compact.learning_rate, "epochs": network.compact.epochs or options.epochs}
         return options.model_copy(update=own)
-    return options.model_copy(update={"learning_rate": best["learning_rate"]} if options.learning_rate == "searched" else {})
+    return options.model_copy(
+        update={"learning_rate": best["learning_rate"]} if options.learning_rate == "searched" else {})     # type: ignore[index]

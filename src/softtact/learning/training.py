@@ -8,8 +8,10 @@ the same bytes.
 import math
 import os
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
@@ -19,6 +21,10 @@ from softtact.files import digest
 from softtact.learning.network import ARCHITECTURES, load, predict, save, summed_l1
 from softtact.progress import progress
 from softtact.readout.ssim import map_ssim
+
+if TYPE_CHECKING:
+    from softtact.learning.samples import Samples
+    from softtact.learning.settings import Training
 
 
 @dataclass
@@ -34,23 +40,23 @@ class Run:
     best: dict = field(default_factory=lambda: {"epoch": 0, "validation_loss": math.inf, "weights": {}})
 
     @property
-    def epoch(self):
+    def epoch(self) -> int:
         """Epochs done."""
         return len(self.history)
 
-    def state(self):
+    def state(self) -> dict[str, Any]:
         """Tensors and plain values of the run."""
         return {"network": self.network.state_dict(), "optimiser": self.optimiser.state_dict(),
                 "history": self.history, "best": self.best}
 
-    def load_state(self, state):
+    def load_state(self, state: dict[str, Any]) -> None:
         """Take up the run where `state` left it."""
         self.network.load_state_dict(state["network"])
         self.optimiser.load_state_dict(state["optimiser"])
         self.history, self.best = state["history"], state["best"]
 
 
-def prepare_torch(*, threads, device="cpu"):
+def prepare_torch(*, threads: int, device: str = "cpu") -> torch.device:
     """Fix the number of threads and ask for deterministic kernels; returns the torch device."""
     torch.set_num_threads(threads)
     name = device if device != "auto" else "cuda" if torch.cuda.is_available() else "cpu"
@@ -60,7 +66,7 @@ def prepare_torch(*, threads, device="cpu"):
     return torch.device(name)
 
 
-def start_run(train, *, network, learning_rate, seed, device):
+def start_run(train: "Samples", *, network: dict[str, Any], learning_rate: float, seed: int, device: torch.device | str) -> Run:
     """A `Run` with fresh weights; the training set's greatest map and count become the network's scales.
 
     network: dict of the architecture (printed, if not said) and its options: filters, and dense, activation of the printed one
@@ -74,7 +80,8 @@ def start_run(train, *, network, learning_rate, seed, device):
     return Run(model, torch.optim.Adam(model.parameters(), lr=learning_rate, fused=True))
 
 
-def train_network(run, train, validation, *, options, ssim, seed, checkpoint, label="training"):
+def train_network(run: Run, train: "Samples", validation: "Samples", *, options: "Training", ssim: dict[str, Any], seed: int,
+                  checkpoint: Path | None, label: str = "training") -> Iterator[dict[str, Any]]:
     """Train `run` to the end of `options` (a `Training`), or until patience ends; yields a record per epoch.
 
     checkpoint: file to resume from, if it belongs to this training, and to write on the way; None: neither
@@ -100,7 +107,7 @@ def train_network(run, train, validation, *, options, ssim, seed, checkpoint, la
         yield record
 
 
-def train_epoch(run, maps_mm, counts, *, rate, batch, seed, label):
+def train_epoch(run: Run, maps_mm: torch.Tensor, counts: torch.Tensor, *, rate: float, batch: int, seed: int, label: str) -> float:
     """One pass over the maps in the order of seed and epoch; returns the mean loss in counts before each step."""
     run.network.train()
     run.optimiser.param_groups[0]["lr"] = rate
@@ -117,37 +124,37 @@ def train_epoch(run, maps_mm, counts, *, rate, batch, seed, label):
     return total / len(maps_mm)
 
 
-def epoch_label(label, run, options):
+def epoch_label(label: str, run: Run, options: "Training") -> str:
     """What a line of progress says of the epoch under way."""
     so_far = f", validation loss {run.history[-1]['validation_loss']:.0f} counts" if run.history else ""
     return f"{label}, epoch {run.epoch + 1} of {options.epochs}{so_far}"
 
 
-def validate(network, samples, ssim):
+def validate(network: torch.nn.Module, samples: "Samples", ssim: dict[str, Any]) -> dict[str, float]:
     """Loss in counts and mean SSIM of a network on `samples`."""
     predicted = predict(network, samples.maps_mm)
     loss = summed_l1(torch.from_numpy(predicted), torch.from_numpy(samples.counts)).item()
     return {"validation_loss": loss, "validation_ssim": float(map_ssim(predicted, samples.counts, **ssim).mean())}
 
 
-def scheduled_rate(rate, epoch, options):
+def scheduled_rate(rate: float, epoch: int, options: "Training") -> float:
     """Learning rate of an epoch, counted from 0: constant, or half a cosine from `rate` towards 0."""
     return rate if options.schedule == "constant" else rate * 0.5 * (1 + math.cos(math.pi * epoch / options.epochs))
 
 
-def keep_best(run, record):
+def keep_best(run: Run, record: dict[str, float]) -> None:
     """Copy the weights if the epoch's validation loss is the smallest so far."""
     if record["validation_loss"] < run.best["validation_loss"]:
         weights = {name: tensor.detach().to("cpu", copy=True) for name, tensor in run.network.state_dict().items()}
         run.best = {"epoch": record["epoch"], "validation_loss": record["validation_loss"], "weights": weights}
 
 
-def out_of_patience(run, patience):
+def out_of_patience(run: Run, patience: int) -> bool:
     """Whether the last `patience` epochs brought no better validation loss."""
     return run.epoch - run.best["epoch"] >= patience
 
 
-def training_digest(run, train, validation, options, seed):
+def training_digest(run: Run, train: "Samples", validation: "Samples", options: "Training", seed: int) -> str:
     """Tells trainings apart: a checkpoint of other data or settings must not be taken up."""
     choices = options.model_dump(exclude={"checkpoint_every_s", "threads"})
     rate = run.optimiser.param_groups[0]["lr"]
@@ -155,7 +162,7 @@ def training_digest(run, train, validation, options, seed):
     return digest([choices, rate, seed, network, train.digest(), validation.digest(), torch.__version__])
 
 
-def resume(run, checkpoint, owner):
+def resume(run: Run, checkpoint: Path | None, owner: str) -> None:
     """Load `checkpoint` into `run` if it is there and is the owner's."""
     if checkpoint is not None and Path(checkpoint).exists():
         state = load(checkpoint)

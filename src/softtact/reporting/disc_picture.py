@@ -1,16 +1,24 @@
 """A camera frame with the discs found in it: outlines, numbers, scale."""
 
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from softtact.imaging.discs import grey
 from softtact.reporting.style import pyplot, save
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 COLOURS = {"whole": "#3fd0ff", "touching": "#ffb000", "clipped": "#ff4d6d"}   # apart in brightness and for the colour-blind
 MOST_NUMBERS = 200   # discs; more numbers than that hide each other
 _WIDEST = 9.0        # inches
 
 
-def draw_discs(frame, table, outlines, path, *, pixel_mm, title):
+def draw_discs(frame: np.ndarray, table: "pd.DataFrame", outlines: Sequence[np.ndarray], path: str | Path, *, pixel_mm: float,
+               title: str) -> None:
     """Write a PNG: the frame in mm, the outlines (list of (corners, 2) in mm), clipped and touching discs in their own colours."""
     light, plt = grey(frame), pyplot()
     sides = np.array(light.shape)[::-1] * pixel_mm   # x, y

@@ -6,6 +6,7 @@ import shutil
 import tempfile
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -17,7 +18,8 @@ from softtact.progress import progress
 from softtact.reporting.disc_picture import draw_discs
 
 
-def report_discs(frames, out, *, picture, pixel_mm, smallest_mm=0.0, every=1):
+def report_discs(frames: str | Path, out: str | Path, *, picture: str | Path | None, pixel_mm: float, smallest_mm: float = 0.0,
+                 every: int = 1) -> dict[str, Any]:
     """Write the table `out` (CSV) of all discs in the frames of a file or folder and their pictures; return the summary.
 
     picture: None for none; a PNG for a single frame, a folder for several; without an ending it becomes the one that fits

@@ -1,11 +1,17 @@
 """Figure 10: SSIM against the number of training maps, a panel a set."""
 
+from typing import TYPE_CHECKING
+
 from softtact.reporting.style import ARCHITECTURE_LINES, colour, pyplot
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
 
 MARKS = {"elastic": "s", "foundation": "D", "hyperelastic": "o"}      # apart in grey too
 
 
-def draw(curves, ceiling):
+def draw(curves: "pd.DataFrame", ceiling: "pd.DataFrame") -> "Figure":
     """Figure of the learning_curve.csv of all models in one frame, and of ceiling.csv."""
     plt = pyplot()
     sets = list(curves["set"].unique())

@@ -1,10 +1,19 @@
 """Figure 2: a section through the sensor at rest and pressed, whole and near the most pressed frusta."""
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from softtact.models.hyperelastic.deformed_mesh import REGIONS
 from softtact.press.vtu import LAYERS
 from softtact.reporting.style import pyplot
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from softtact.reporting.section import Section
+    from softtact.sensors.specification import SensorSpec
 
 # Light to dark from the cover down: apart in grey, too.
 _COLOURS = {"cover": "#f2d6b3", "sheet": "#6fa8c9", "frusta": "#1f4e79"}
@@ -12,7 +21,8 @@ _NAMES = {"cover": "cover and fabric", "sheet": "dielectric's sheet", "frusta": 
 _CLOSE_PITCHES = 1.9      # on either side of the deepest place, in the close-ups
 
 
-def draw(section, outline, *, spec, summary, y_mm):
+def draw(section: "Section", outline: Sequence[np.ndarray], *, spec: "SensorSpec", summary: dict[str, Any],
+         y_mm: float) -> "Figure":
     """Figure of a `Section`; outline: polygons (k, 2) of the object in its plane where the press took it."""
     plt = pyplot()
     figure = plt.figure(figsize=(11, 6.9), layout="constrained")

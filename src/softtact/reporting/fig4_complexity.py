@@ -1,12 +1,18 @@
 """Figure 4: meshes and hulls of two objects, whole and where the sensor can touch, and the ratios that choose the model."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softtact.geometry.complexity import overlap_points
 from softtact.reporting.render import Part, View, add_view, part_of, rendered, tell_fallback
 from softtact.reporting.style import colour, pyplot
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import trimesh
+    from matplotlib.figure import Figure
 
 PRINTED = ("object_3", "object_6")     # what the paper's figure shows: a flat cylinder and a detailed one
 _OUTSIDE = 1.015                       # times the hull's size
@@ -17,12 +23,12 @@ _BELOW = {"seen_from": (0.55, -0.9, -0.9), "up": (0.0, 0.0, -1.0)}     # the sid
 class Placed:
     """A mesh (trimesh) in the sensor's frame, and what of it counts as the overlap."""
 
-    mesh: object
-    footprint_mm: tuple
+    mesh: "trimesh.Trimesh"
+    footprint_mm: tuple[float, float]
     reach_mm: float
 
 
-def draw(complexity, placed, *, thresholds):
+def draw(complexity: "pd.DataFrame", placed: dict[str, Placed], *, thresholds: dict[str, float]) -> "Figure":
     """Figure from the complexity table and {object: Placed}."""
     plt = pyplot()
     shown = chosen_objects(complexity, placed)
@@ -30,7 +36,7 @@ def draw(complexity, placed, *, thresholds):
     grid = figure.add_gridspec(2, len(shown) + 1, width_ratios=[1] * len(shown) + [1.6])
     rows = complexity.set_index("object").loc[shown]
     views = [view for name in shown for view in (_whole(placed[name], rows.model[name]), _overlap(placed[name], rows.model[name]))]
-    images = rendered(views)
+    images: Any = rendered(views)
     for k, (name, row) in enumerate(rows.iterrows()):
         titles = (f"{name.replace('_', ' ')}: {row.model}\nmesh NPt {row.NPt:.0f}, hull CHt {row.CHt:.0f}",
                   f"over the sensor: NPo {row.NPo:.0f}, CHo {row.CHo:.0f}")
@@ -42,7 +48,7 @@ def draw(complexity, placed, *, thresholds):
     return figure
 
 
-def chosen_objects(complexity, placed):
+def chosen_objects(complexity: "pd.DataFrame", placed: dict[str, Placed]) -> list[str]:
     """The paper's two where both are here, else the first of each chosen model."""
     if all(name in placed and (complexity.object == name).any() for name in PRINTED):
         return list(PRINTED)

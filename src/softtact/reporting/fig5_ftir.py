@@ -1,13 +1,19 @@
 """Figure 5: contact area of the dielectric's frusta against force."""
 
+from typing import TYPE_CHECKING, Any
+
 from softtact.reporting.style import pyplot
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
 
 _MODEL, _MEASURED = "#1f4e79", "#e08214"     # apart in grey and to the colour-blind; markers tell them too
 _STROKES = (("--", 1.0), ((0, (1, 4)), 2.4), ("-", 0.7), ("-.", 1.0))     # two that coincide are both seen
 _FAR = 1.5                                   # times the largest area of the main curves: drawn in a panel of its own above
 
 
-def draw(area, summary, *, orientations=None):
+def draw(area: "pd.DataFrame", summary: dict[str, Any], *, orientations: "pd.DataFrame | None" = None) -> "Figure":
     """Figure from contact_area.csv, its summary, and orientations.csv (all orientations and laws), if there is one."""
     main = ["area_per_frustum_mm2", "area_measured_mm2", "area_image_mm2"]
     others = [] if orientations is None else _others(orientations, summary["under_test"])

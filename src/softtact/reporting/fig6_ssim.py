@@ -1,11 +1,17 @@
 """Figure 6: SSIM per grasped object for each model, with box plots over maps and trials, and the sensor's own ceiling."""
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from softtact.reporting.style import colour, pyplot, ssim_label
 
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
 
-def draw(ssim, ceiling, *, choices=None):
+
+def draw(ssim: "pd.DataFrame", ceiling: "pd.DataFrame", *, choices: dict[str, Any] | None = None) -> "Figure":
     """Figure from ssim.csv and ceiling.csv; one panel a set of test data.  choices: {window, data_range} of the SSIM"""
     plt = pyplot()
     sets = [name for name in ("validation", "unseen", "grasps") if (ssim.set == name).any()]

@@ -1,13 +1,19 @@
 """Figure 7: objects x (view, deformation maps, tactile maps of both models and of the sensor) at the largest force."""
 
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
 from softtact.reporting.render import View, add_view, part_of, rendered, tell_fallback
 from softtact.reporting.style import draw_map, pyplot
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _BELOW = {"seen_from": (0.55, -0.9, -0.9), "up": (0.0, 0.0, -1.0)}     # the side that touches
 
 
-def draw(objects, *, largest_counts):
+def draw(objects: Sequence[dict[str, Any]], *, largest_counts: float) -> "Figure":
     """Figure from a list of objects.
 
     Each {name, mesh, chosen, deformation {model: (y, x)} in mm, tactile {model: (row, column)} in counts, sensor (row, column),
@@ -20,7 +26,7 @@ def draw(objects, *, largest_counts):
     figure = plt.figure(figsize=(2.5 * len(objects) + 1.2, 1.75 * rows), layout="constrained")
     grid = figure.add_gridspec(rows, len(objects))
     views = [View([part_of(item["mesh"], colour="#aeb6c2")], **_BELOW) for item in objects]
-    images = rendered(views)
+    images: Any = rendered(views)
     for k, item in enumerate(objects):
         axes = add_view(figure, grid[0, k], views[k], images and images[k])
         axes.set_title(f"{item['name'].replace('_', ' ')}\nchosen: {item['chosen']}", fontsize=9)

@@ -1,8 +1,14 @@
 """Figure 8: error against time of the policies that choose a model, and the error that was expected against the true one."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from softtact.reporting.style import MODEL_COLOURS, pyplot
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
 
 CALIBRATION_SET = "indenters"
 _BELOW = {"xytext": (0, -8), "ha": "center", "va": "top"}
@@ -12,7 +18,7 @@ _KINDS = {"always": ("s", "0.45", "always the same model", _BELOW), "paper": ("D
           "error": ("o", "#1f7a4d", "by expected error, tolerance of", _ABOVE)}
 
 
-def draw(policies, presses):
+def draw(policies: "pd.DataFrame", presses: "pd.DataFrame") -> "Figure":
     """Figure of the tables of `compare_policies`: policies over the presses that were not calibrated on, and a row per press."""
     plt = pyplot()
     figure, (left, right) = plt.subplots(1, 2, figsize=(10.5, 4.4), layout="constrained")

@@ -1,15 +1,22 @@
 """Figure 9: the architectures on the same split, by SSIM and by what they cost, and how each was trained."""
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from softtact.reporting.style import ARCHITECTURE_LINES, colour, pyplot, ssim_label
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
 
 # An architecture is told by hatch and line, a model by its colour: apart in grey too.
 HATCHES = {"printed": "", "searched": "..", "compact": "////"}
 NO_INTERVAL = "one item:\nno interval"
 
 
-def draw(networks, histories, *, choices=None):
+def draw(networks: "pd.DataFrame", histories: "dict[tuple[str, str], pd.DataFrame]", *,
+         choices: dict[str, Any] | None = None) -> "Figure":
     """Figure of networks.csv and {(model, architecture): history.csv}; one model's printed and compact stand side by side.
 
     choices: {window, data_range} of the SSIM

@@ -1,10 +1,17 @@
 """A material card as a picture: curves with the laws through them, what the laws leave, and where they are stable."""
 
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from softtact.materials.cards import law_of_entry
-from softtact.materials.curves import VOLUMETRIC, join_by_mode
+from softtact.materials.curves import VOLUMETRIC, Curve, VolumetricCurve, join_by_mode
 from softtact.reporting.style import pyplot, save
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # The best laws get a line of their own; more would hide each other. Colours that differ in grey, and line styles beside them.
 _LINES = (("#000000", "-"), ("#1f77b4", "--"), ("#e08214", "-."), ("#3f9c6d", ":"), ("#b2abd2", (0, (3, 1, 1, 1, 1, 1))))
@@ -12,12 +19,12 @@ _BEYOND = 0.15      # of the window: so far beyond it go data and lines
 _MODE_COLOURS = {"uniaxial": "#1f4e79", "equibiaxial": "#e08214", "planar": "#3f9c6d"}
 
 
-def plot_material(card, curves, *paths):
+def plot_material(card: dict[str, Any], curves: Sequence[Curve | VolumetricCurve], *paths: str | Path) -> None:
     """Draw a card (dict) and the curves it was fitted to (list) to PNG or SVG files."""
     save(draw_material(card, curves), *paths)
 
 
-def draw_material(card, curves):
+def draw_material(card: dict[str, Any], curves: Sequence[Curve | VolumetricCurve]) -> "Figure":
     """The figure: a column per test mode with data and fits above residuals, and the stable ranges below."""
     plt = pyplot()
     curves = join_by_mode(curves)

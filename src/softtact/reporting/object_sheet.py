@@ -1,7 +1,9 @@
 """All objects of a catalogue on one sheet, as the sensor sees them: `python -m softtact.reporting.object_sheet`."""
 
 import argparse
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,6 +11,11 @@ from softtact.contact.height_field import NO_CONTACT_MM, HeightField
 from softtact.geometry.meshes import place, read_mesh
 from softtact.reporting.style import pyplot, save
 from softtact.study.objects import read_catalogue
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from softtact.study.keys import CatalogueEntry
 
 FOOTPRINT_MM = (22.0, 37.0)      # of the sensor `coro`, drawn around every object
 SHOWN_MM = 2.5                   # above the lowest point: the thickness of the soft layers
@@ -18,7 +25,7 @@ TITLES = {"indenters": "Indenters: training and validation", "unseen": "Unseen i
           "grasps": "Grasped objects: never trained on"}
 
 
-def draw(entries, *, footprint_mm=FOOTPRINT_MM):
+def draw(entries: "Iterable[CatalogueEntry]", *, footprint_mm: tuple[float, float] = FOOTPRINT_MM) -> "Figure":
     """Figure of catalogue entries: each underside, dark where it touches first, over the outline of the sensor's surface."""
     sets = {name: [entry for entry in entries if entry.set == name] for name in TITLES}
     rows = {name: -(-len(of_set) // COLUMNS) for name, of_set in sets.items()}
@@ -50,7 +57,7 @@ def _draw_object(axes, entry, footprint_mm):
     return image
 
 
-def main(arguments=None):
+def main(arguments: Sequence[str] | None = None) -> None:
     """Command line."""
     parser = argparse.ArgumentParser(description="Draw all objects of a catalogue on one sheet.")
     parser.add_argument("--catalogue", default="config/objects/catalogue.yaml", type=Path)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 
-def main(folder):
+def main(folder: str | Path) -> None:
     """Read views.json and arrays.npz, write images.npz."""
     import pyvista
 

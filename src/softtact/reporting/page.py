@@ -2,7 +2,9 @@
 
 import base64
 import os
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 from jinja2 import Environment
@@ -54,7 +56,7 @@ _FOLDERS = ("presses", "tactile", "dataset", "learning", "evaluation", "section"
 PAPERS_SENSOR = "coro: "     # how the line on it begins
 
 
-def render_page(inputs, settings, *, folder, run):
+def render_page(inputs: dict[str, Any], settings: dict[str, Any], *, folder: Path, run: pd.DataFrame) -> str:
     """The page as text; `inputs` and `settings` as in the stage, links relative to `folder`, run as of `run_record`."""
     claims = pd.read_csv(inputs["claims"], keep_default_na=False)
     ftir = read_json(inputs["ftir"])
@@ -80,14 +82,14 @@ def render_page(inputs, settings, *, folder, run):
 SOURCES_PAGE = "sources.html"
 
 
-def render_sources(paths, *, study, config, named, page):
+def render_sources(paths: Iterable[str | Path], *, study: str, config: str, named: str, page: str) -> str:
     """The page of the configuration (YAML texts) and of source files below src/, each under its own anchor."""
     files = [(_below_src(path), Path(path).read_text(encoding="utf-8")) for path in paths]
     return Environment(autoescape=True).from_string(SOURCES).render(
         study=study, style=Markup(STYLE), files=files, config=config, named=named, page=page, version=softtact.__version__)
 
 
-def code_link(name):
+def code_link(name: str) -> str:
     """Where the page of sources holds a file, given by its path below src/."""
     return f"{SOURCES_PAGE}#{name}"
 

@@ -1,11 +1,19 @@
 """A picture of a prediction: deformation maps and the taxels that a network reads off them."""
 
+from pathlib import Path
+from typing import TYPE_CHECKING
+
 from softtact.reporting.style import pyplot, save
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from softtact.learning.prediction import Maps
 
 MOST = 8     # maps in one picture; of more, evenly chosen ones
 
 
-def plot_prediction(maps, counts, path):
+def plot_prediction(maps: "Maps", counts: "np.ndarray", path: str | Path) -> None:
     """Draw `Maps` and counts (n, row, column) to PNG or SVG: a column per map, in mm above, the counts below."""
     plt = pyplot()
     shown = [round(k * (len(counts) - 1) / max(1, min(MOST, len(counts)) - 1)) for k in range(min(MOST, len(counts)))]

@@ -1,9 +1,15 @@
 """A picture of one press: deformation map and taxels at every force."""
 
+from pathlib import Path
+from typing import TYPE_CHECKING
+
 from softtact.reporting.style import pyplot, save
 
+if TYPE_CHECKING:
+    from softtact.press.result import PressResult
 
-def plot_press(result, path):
+
+def plot_press(result: "PressResult", path: str | Path) -> None:
     """Draw a `PressResult` to PNG or SVG: a column per force, the map in mm above, the ideal counts of the taxels below."""
     plt = pyplot()
     forces = result.normal_force_n

@@ -27,7 +27,7 @@ class PressView:
     title: str
 
 
-def read_view(path):
+def read_view(path: str | Path) -> PressView:
     """The `PressView` of a press' NetCDF or VTU file."""
     readers = {".nc": _read_map, ".vtu": read_vtu}
     path = Path(path)
@@ -53,7 +53,7 @@ def _read_map(path):
                   thickness_mm=float(data.attrs.get("thickness_mm", _SHEET_MM)))
 
 
-def write_page(view, path):
+def write_page(view: PressView, path: str | Path) -> None:
     """Write a page that shows the press and needs nothing else."""
     body = html_view(view.points_mm, view.triangles, view.values, title=view.title, unit=UNIT, labels=view.labels)
     with atomic_path(path) as temporary:
@@ -62,7 +62,7 @@ def write_page(view, path):
                              encoding="utf-8")
 
 
-def save_picture(view, path):
+def save_picture(view: PressView, path: str | Path) -> str:
     """Draw the press at its largest force to PNG; returns what drew it: pyvista where it is installed, else matplotlib."""
     try:
         import pyvista

@@ -8,12 +8,20 @@ import json
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softtact.progress import announce
+
+if TYPE_CHECKING:
+    import trimesh
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.gridspec import SubplotSpec
 
 FALLBACK = "3-D views drawn by matplotlib: no off-screen renderer here"
 TIMEOUT_S = 120.0
@@ -41,12 +49,12 @@ class View:
     up: tuple = (0.0, 0.0, 1.0)
 
 
-def part_of(mesh, **look):
+def part_of(mesh: "trimesh.Trimesh", **look: Any) -> Part:
     """A `Part` of a trimesh."""
     return Part(points_mm=np.asarray(mesh.vertices), triangles=np.asarray(mesh.faces), **look)
 
 
-def rendered(views, *, size=(900, 675), timeout_s=TIMEOUT_S):
+def rendered(views: Sequence[View], *, size: tuple[int, int] = (900, 675), timeout_s: float = TIMEOUT_S) -> list[np.ndarray] | None:
     """Images (h, w, 3) of the views in 0 to 255, or None where rendering failed, after a sentence in the log."""
     with tempfile.TemporaryDirectory(prefix="softtact-render-") as folder:
         _write(views, size, Path(folder))
@@ -77,7 +85,7 @@ def _write(views, size, folder):
     (folder / "views.json").write_text(json.dumps({"size": size, "views": listed}), encoding="utf-8")
 
 
-def add_view(figure, place, view, image):
+def add_view(figure: "Figure", place: "SubplotSpec", view: View, image: np.ndarray | None) -> "Axes":
     """Axes at a place of a grid with the image, or with the view drawn by matplotlib where there is no image."""
     if image is None:
         axes = figure.add_subplot(place, projection="3d")
@@ -89,7 +97,7 @@ def add_view(figure, place, view, image):
     return axes
 
 
-def tell_fallback(figure, images):
+def tell_fallback(figure: "Figure", images: list[np.ndarray] | None) -> None:
     """A line under the figure where its views were drawn by matplotlib."""
     if images is None:
         figure.text(0.005, 0.002, FALLBACK, fontsize=6, color="0.4", ha="left", va="bottom")

@@ -11,7 +11,7 @@ from softtact.reporting.tables import machine
 COLUMNS = ["stage", "jobs", "total_s", "mean_s", "longest_s", "largest_memory_mb"]
 
 
-def run_record(folder):
+def run_record(folder: str | Path) -> pd.DataFrame:
     """A row for each stage with a benchmark below `folder`, and one of all: seconds of wall time, memory in MB.
 
     Each job counts once, by its last run; a stage whose jobs are all from an earlier run is here, too. The report's own job is not.
@@ -29,7 +29,7 @@ def run_record(folder):
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def run_sentence(record):
+def run_sentence(record: pd.DataFrame) -> str:
     """The record in words, with the machine."""
     where = f"The report was made on {machine()}; {os.cpu_count()} processors."
     if not len(record):

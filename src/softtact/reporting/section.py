@@ -5,12 +5,16 @@ then cuts these. No picture is rendered here.
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softtact.errors import InputError
 from softtact.fem.elements import HEX20, HEX27, WEDGE18
-from softtact.press.vtu import LAYERS
+from softtact.press.vtu import LAYERS, PressedMesh
+
+if TYPE_CHECKING:
+    from softtact.sensors.specification import SensorSpec
 
 _FACE_TRIANGLES = np.array([[0, 4, 7], [4, 1, 5], [5, 2, 6], [6, 3, 7], [4, 5, 6], [4, 6, 7]])     # of corners, then mid-sides
 _BESIDE_MM = 0.01     # a plane exactly through the frusta's axes would run along faces of elements
@@ -25,7 +29,7 @@ class Section:
     region: np.ndarray
 
 
-def top_surface(mesh):
+def top_surface(mesh: PressedMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Points (n, 3) at rest, displacements (n, 3) in mm at the largest force and triangles (m, 3) of the cover's upper side."""
     faces = np.vstack([nodes for _, nodes, layer in mesh.cells if layer == LAYERS["pressed face"]])
     used, numbers = np.unique(faces, return_inverse=True)
@@ -33,7 +37,7 @@ def top_surface(mesh):
     return mesh.points[used], mesh.displacement_mm[-1, used], triangles
 
 
-def row_under_load(mesh, spec):
+def row_under_load(mesh: PressedMesh, spec: "SensorSpec") -> float:
     """y (mm) of the row of frusta under the place that went down most at the largest force."""
     nodes = mesh.points_of("sheet")
     deepest = mesh.points[nodes[np.argmin(mesh.displacement_mm[-1, nodes, 2])], 1]
@@ -42,7 +46,7 @@ def row_under_load(mesh, spec):
     return float(rows[np.argmin(np.abs(rows - deepest))])
 
 
-def section(mesh, y_mm, *, parts=3):
+def section(mesh: PressedMesh, y_mm: float, *, parts: int = 3) -> Section:
     """The `Section` at y_mm of a `PressedMesh` at its largest force; each element cut into `parts` along each of its directions."""
     import pyvista
 
@@ -58,7 +62,7 @@ def section(mesh, y_mm, *, parts=3):
         points, moved, linear, cell_type = _refined(kind, mesh.points[nodes], mesh.displacement_mm[-1, nodes], parts)
         grid = pyvista.UnstructuredGrid({cell_type: linear}, points)
         grid["displacement"] = moved
-        cut = grid.slice(normal="y", origin=(0.0, plane, 0.0))
+        cut: Any = grid.slice(normal="y", origin=(0.0, plane, 0.0))
         for face in cut.regular_faces if cut.is_all_triangles else cut.irregular_faces:
             at, to = cut.points[face], cut["displacement"][face]
             rest.append(at[:, [0, 2]])

@@ -1,8 +1,17 @@
 """How every figure looks and is written: legible sizes, two model colours that differ in grey too, files without dates."""
 
+from collections.abc import Sequence
 from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
 from softtact.files import atomic_path
+
+if TYPE_CHECKING:
+    import numpy as np
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.image import AxesImage
 
 # Dark blue, light orange and a green between: apart in grey as well.
 MODEL_COLOURS = {"hyperelastic": "#1f4e79", "elastic": "#e08214", "foundation": "#3f9c6d"}
@@ -10,7 +19,7 @@ MODEL_NAMES = {name: name for name in MODEL_COLOURS}
 ARCHITECTURE_LINES = {"printed": "-", "searched": "-.", "compact": "--"}
 
 
-def pyplot():
+def pyplot() -> ModuleType:
     """matplotlib's pyplot without a screen, with the project's settings."""
     import matplotlib
 
@@ -22,17 +31,17 @@ def pyplot():
     return plt
 
 
-def colour(model):
+def colour(model: str) -> str:
     """A model's colour; grey for one that has none of its own."""
     return MODEL_COLOURS.get(model, "0.4")
 
 
-def ssim_label(ssim):
+def ssim_label(ssim: dict[str, Any] | None) -> str:
     """Axis label of structural similarity with its choices {window, data_range}, if they are known."""
     return "SSIM" if ssim is None else f"SSIM (window {ssim['window']}, range {ssim['data_range']:g} counts)"
 
 
-def save(figure, *paths):
+def save(figure: "Figure", *paths: str | Path) -> None:
     """Write a figure to PNG and SVG files, whole or not at all, the same bytes for the same figure."""
     plt = pyplot()
     for path in map(Path, paths):
@@ -43,7 +52,8 @@ def save(figure, *paths):
     plt.close(figure)
 
 
-def draw_map(axes, values, *, extent, limits, cmap="jet"):
+def draw_map(axes: "Axes", values: "np.ndarray", *, extent: Sequence[float], limits: tuple[float, float],
+             cmap: str = "jet") -> "AxesImage":
     """An image of a map (y, x), turned 90 degrees counter-clockwise as the paper prints it: y runs to the left."""
     x0, x1, y0, y1 = extent
     return axes.imshow(values.T[:, ::-1], origin="lower", extent=(y1, y0, x0, x1), vmin=limits[0], vmax=limits[1], cmap=cmap,

@@ -1,6 +1,8 @@
 """Tables 1 to 3: what was fitted, what was chosen, how long it took, each beside the paper's numbers."""
 
 import platform
+from collections.abc import Callable, Iterable
+from typing import Any
 
 import pandas as pd
 
@@ -14,7 +16,7 @@ PRINTED_COUNTS = {"object_1": (1356, 231, 51, 36, "elastic"), "object_2": (13830
 PRINTED_TIMES = {"hyperelastic": (162.1, 48.0, 1863.0, 110.9), "elastic": (37.4, 2.46, 157.6, 32.44)}
 
 
-def table1_materials(cards):
+def table1_materials(cards: Iterable[dict[str, Any]]) -> pd.DataFrame:
     """A row per material and law: parameters, errors, stability, what the data leave open, the paper's constants and RMSE."""
     rows = []
     for card in cards:
@@ -31,14 +33,14 @@ def table1_materials(cards):
     return pd.DataFrame(rows)
 
 
-def contradictions(cards):
+def contradictions(cards: Iterable[dict[str, Any]]) -> pd.DataFrame:
     """A row per contradiction among the constants that a publication prints, with its numbers."""
     rows = [{"material": card["material"], "contradiction": text.removeprefix(PRINTED)}
             for card in cards for text in card["warnings"] if text.startswith(PRINTED)]
     return pd.DataFrame(rows, columns=["material", "contradiction"])
 
 
-def table2_complexity(complexity, choose):
+def table2_complexity(complexity: pd.DataFrame, choose: Callable[..., str]) -> pd.DataFrame:
     """Counts and choice per object, ours and the six printed rows; `choose(NPt, CHt, NPo, CHo)` is the rule."""
     ours = complexity.assign(source="ours")
     printed = pd.DataFrame([{"object": name, "NPt": a, "CHt": b, "NPo": c, "CHo": d, "model": choose(a, b, c, d),
@@ -47,7 +49,7 @@ def table2_complexity(complexity, choose):
     return pd.concat([ours, printed], ignore_index=True)
 
 
-def table3_timing(timing):
+def table3_timing(timing: pd.DataFrame) -> pd.DataFrame:
     """Seconds per map and model: ours with its machine, and the paper's; that alone where nothing was pressed."""
     rows = []
     timing = timing.assign(total_s=timing.solver_s + timing.network_s)
@@ -62,7 +64,7 @@ def table3_timing(timing):
     return pd.DataFrame(rows)
 
 
-def machine():
+def machine() -> str:
     """Processor and system in words."""
     try:
         with open("/proc/cpuinfo", encoding="utf-8") as lines:

@@ -7,6 +7,7 @@ and a page may hold as many views as it likes (browsers allow a page only few We
 import base64
 import html
 import json
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -16,7 +17,8 @@ from softtact.reporting.view3d_script import SCRIPT
 _DIGITS = 3      # of the numbers beside the colour bar
 
 
-def html_view(points_mm, triangles, values, *, title, unit, labels=None, limits=None, map_name="viridis"):
+def html_view(points_mm: np.ndarray, triangles: np.ndarray, values: np.ndarray, *, title: str, unit: str,
+              labels: Sequence[str] | None = None, limits: tuple[float, float] | None = None, map_name: str = "viridis") -> str:
     """A piece of HTML, a <figure> with its script: the surface turns by mouse, touch and arrow keys, and zooms.
 
     points_mm: (n, 3), z upwards, or (states, n, 3): a slider goes through the states

@@ -7,13 +7,14 @@ import argparse
 import importlib
 import json
 import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from softtact.errors import InputError, SofttactError
 from softtact.extras import missing_extra
 
 
-def main(arguments=None):
+def main(arguments: Sequence[str] | None = None) -> int:
     """Run the stage that the command line names; return its exit status."""
     options = add_arguments(argparse.ArgumentParser(prog="softtact stage", description=__doc__)).parse_args(arguments)
     try:
@@ -33,7 +34,7 @@ def _said(options, sentence):
     return 1
 
 
-def add_arguments(parser):
+def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
     """Declare a stage's command line on `parser`."""
     parser.add_argument("stage", metavar="NAME", help="a module of softtact.stages, named as the workflow's rule")
     parser.add_argument("--in", dest="inputs", action="append", default=[], metavar="NAME=PATH",
@@ -45,14 +46,14 @@ def add_arguments(parser):
     return parser
 
 
-def run_stage(options):
+def run_stage(options: argparse.Namespace) -> None:
     """Import the stage module and call its `run`."""
     run = find_stage(options.stage)
     run(inputs=_named_paths(options.inputs, option="--in"), outputs=_named_paths(options.outputs, option="--out"),
         settings=_settings(options.settings), threads=options.threads)
 
 
-def find_stage(name):
+def find_stage(name: str) -> Callable[..., None]:
     """The `run` function of stage `name`."""
     stages = sorted(path.stem for path in Path(__file__).parent.glob("[!_]*.py"))
     if name not in stages:

@@ -4,6 +4,8 @@ inputs: networks, timings (of each network, in its order), validation, unseen, g
 outputs: networks (CSV);  settings: ssim, seed
 """
 
+from typing import Any
+
 import pandas as pd
 
 from softtact.evaluation.networks import compare_networks
@@ -17,7 +19,7 @@ from softtact.learning.training import prepare_torch
 TESTS = ("validation", "unseen", "grasps")
 
 
-def run(*, inputs, outputs, settings, threads=1):
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Score and time every network; write the table."""
     prepare_torch(threads=threads)
     ssim = Ssim.from_dict(settings.get("ssim", {}), where="ssim").model_dump()

@@ -6,6 +6,7 @@ settings: sensor, tolerances_mm
 """
 
 from dataclasses import asdict
+from typing import Any
 
 import pandas as pd
 
@@ -14,7 +15,7 @@ from softtact.files import read_dataset, write_csv, write_json
 from softtact.sensors.specification import SensorSpec
 
 
-def run(*, inputs, outputs, settings, threads=1):
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Calibrate on the indenters, and compare on all other sets."""
     paths = zip(*(inputs[model] for model in MODELS), strict=True)
     presses = [dict(zip(MODELS, map(read_dataset, three), strict=True)) for three in paths]

@@ -4,6 +4,8 @@ inputs: states (virtual_dielectric.nc);  outputs: images (folder), discs (CSV)
 settings: camera {pixel_mm, blur_mm, noise, falloff}, sensor footprint is the frusta's own extent, seed
 """
 
+from typing import Any
+
 import pandas as pd
 from skimage import io
 
@@ -16,7 +18,7 @@ from softtact.progress import progress
 MARGIN_MM = 1.0   # of glass seen around the outermost frusta's centres
 
 
-def run(*, inputs, outputs, settings, threads=1):
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Render a frame per force, then detect in the written files as in a camera's."""
     state, camera = read_dataset(inputs["states"][0]), settings["camera"]
     x, y = state.x_mm.values, state.y_mm.values

@@ -3,6 +3,8 @@
 inputs: body (VTU), summary (JSON), object (mesh);  outputs: png, svg;  settings: sensor, unit, pose
 """
 
+from typing import Any
+
 import numpy as np
 
 from softtact.files import read_json
@@ -15,7 +17,7 @@ from softtact.reporting.style import save
 from softtact.sensors.specification import SensorSpec
 
 
-def run(*, inputs, outputs, settings, threads=1):
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Cut the pressed body through the row of frusta under the load, and draw."""
     spec, summary, body = SensorSpec.from_dict(settings["sensor"]), read_json(inputs["summary"]), read_vtu(inputs["body"])
     y = row_under_load(body, spec)

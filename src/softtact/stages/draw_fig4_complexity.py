@@ -4,6 +4,8 @@ inputs: complexity, objects (list of meshes);  outputs: png, svg
 settings: thresholds, objects [{name, unit, pose}, ...], footprint_mm, reach_mm
 """
 
+from typing import Any
+
 import pandas as pd
 
 from softtact.geometry.meshes import place, read_mesh
@@ -12,7 +14,7 @@ from softtact.reporting.fig4_complexity import Placed, draw
 from softtact.reporting.style import save
 
 
-def run(*, inputs, outputs, settings, threads=1):
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Draw."""
     placed = {entry["name"]: Placed(_placed(path, entry), tuple(settings["footprint_mm"]), settings["reach_mm"])
               for path, entry in zip(inputs["objects"], settings["objects"], strict=True)}

@@ -3,6 +3,8 @@
 inputs: ssim, ceiling;  outputs: png, svg;  settings: ssim {window, data_range}
 """
 
+from typing import Any
+
 import pandas as pd
 
 from softtact.learning.samples import object_of
@@ -10,7 +12,7 @@ from softtact.reporting.fig6_ssim import draw
 from softtact.reporting.style import save
 
 
-def run(*, inputs, outputs, settings, threads=1):
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Draw; an object's presses in several places stand together."""
     scores, ceiling = (pd.read_csv(inputs[name]) for name in ("ssim", "ceiling"))
     together = (table.assign(item=table["item"].map(object_of)) for table in (scores, ceiling))

@@ -4,6 +4,8 @@ inputs: predictions, complexity, objects (list of meshes), presses (list: every 
 outputs: png, svg;  settings: units [[object, unit], ...], trials, largest_counts
 """
 
+from typing import Any
+
 import pandas as pd
 
 from softtact.files import read_dataset
@@ -12,7 +14,7 @@ from softtact.reporting.fig7_maps import draw
 from softtact.reporting.style import save
 
 
-def run(*, inputs, outputs, settings, threads=1):
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Draw the grasped objects at the largest force."""
     predictions = read_dataset(inputs["predictions"])
     chosen = pd.read_csv(inputs["complexity"]).set_index("object").model

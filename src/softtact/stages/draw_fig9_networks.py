@@ -3,13 +3,15 @@
 inputs: networks (CSV), histories (of each of its networks, in its order);  outputs: png, svg;  settings: ssim {window, data_range}
 """
 
+from typing import Any
+
 import pandas as pd
 
 from softtact.reporting.fig9_networks import draw
 from softtact.reporting.style import save
 
 
-def run(*, inputs, outputs, settings, threads=1):
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Draw."""
     networks = pd.read_csv(inputs["networks"])
     kinds = list(networks.groupby(["model", "architecture"], sort=False).groups)

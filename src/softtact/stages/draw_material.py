@@ -3,11 +3,13 @@
 inputs: card, curves (CSV, one per mode);  outputs: png, svg
 """
 
+from typing import Any
+
 from softtact.materials.cards import load_card
 from softtact.materials.readers import read_curves
 from softtact.reporting.material_plot import plot_material
 
 
-def run(*, inputs, outputs, settings, threads=1):
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Draw."""
     plot_material(load_card(inputs["card"]), read_curves(inputs["curves"]), outputs["png"], outputs["svg"])

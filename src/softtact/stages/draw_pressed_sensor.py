@@ -3,6 +3,8 @@
 inputs: body (VTU), summary (JSON), object (mesh);  outputs: html;  settings: unit, pose
 """
 
+from typing import Any
+
 import numpy as np
 
 from softtact.files import atomic_path, read_json
@@ -15,7 +17,7 @@ from softtact.reporting.view3d import html_view
 _LIFTED_MM = 6.0     # of the object above the surface, so that its imprint is seen
 
 
-def run(*, inputs, outputs, settings, threads=1):
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Two states, at rest and pressed, of the surface with the object above it."""
     body, summary = read_vtu(inputs["body"]), read_json(inputs["summary"])
     pose = None if settings["pose"] is None else Pose.from_values(settings["pose"])

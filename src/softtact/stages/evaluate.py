@@ -5,6 +5,8 @@ inputs: networks (one per model), validation, unseen, grasps (one per model each
 outputs: ssim, per_item, summary, ceiling, timing (CSV), predictions (NetCDF);  settings: ssim, seed
 """
 
+from typing import Any
+
 import pandas as pd
 
 from softtact.evaluation.scoring import predict_grasps, score_items, score_samples, score_sensor, summarise_scores
@@ -18,7 +20,7 @@ from softtact.learning.training import prepare_torch
 TESTS = ("validation", "unseen", "grasps")
 
 
-def run(*, inputs, outputs, settings, threads=1):
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Score every network on its three splits, score the sensor against itself, time every map."""
     prepare_torch(threads=threads)
     ssim = Ssim.from_dict(settings.get("ssim", {}), where="ssim").model_dump()

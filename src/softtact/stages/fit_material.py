@@ -1,12 +1,14 @@
 """Fit the family of laws to a material's curves and write its card."""
 
+from typing import Any
+
 from softtact.files import write_json
 from softtact.materials.card_making import make_card
 from softtact.materials.config import FitStage, validated
 from softtact.materials.readers import read_curves
 
 
-def run(*, inputs, outputs, settings, threads=1):
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """inputs: curves (CSV, one per mode); outputs: card (JSON)."""
     options = validated(FitStage, settings, where="settings of fit_material").model_dump(exclude_none=True)
     write_json(outputs["card"], make_card(read_curves(inputs["curves"]), **options))

@@ -3,6 +3,8 @@
 inputs: card_dielectric;  outputs: law;  settings: sensor, law, mesh (of the cell, as for the hyperelastic model)
 """
 
+from typing import Any
+
 from softtact.files import atomic_path
 from softtact.materials.cards import law_from_card, load_card
 from softtact.models.foundation.frustum_spring import frustum_law
@@ -10,7 +12,7 @@ from softtact.models.hyperelastic.presets import mesh_settings
 from softtact.sensors.specification import SensorSpec
 
 
-def run(*, inputs, outputs, settings, threads=1):
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Press the cell as far as it goes, and keep force against compression."""
     spec = SensorSpec.from_dict(settings["sensor"])
     law = law_from_card(load_card(inputs["card_dielectric"]), settings["law"])

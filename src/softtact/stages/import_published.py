@@ -6,6 +6,7 @@ settings: folder, variant, models, unseen, without, taxel_order, outliers, large
 """
 
 import shutil
+from typing import TYPE_CHECKING, Any
 
 from softtact.errors import InputError
 from softtact.files import write_csv, write_dataset, write_json
@@ -13,6 +14,7 @@ from softtact.progress import announce
 from softtact.published.archive import find_archive
 from softtact.published.counts import counts_sentence, counts_table
 from softtact.published.importing import (
+    Tables,
     files_table,
     found_counts,
     items_of,
@@ -22,13 +24,16 @@ from softtact.published.importing import (
     sign_towards_pcb,
     tactile_dataset,
 )
-from softtact.published.pairing import MAP_COLUMNS, MAP_ROWS, TAXELS
+from softtact.published.pairing import MAP_COLUMNS, MAP_ROWS, TAXELS, PairedTest
 from softtact.sensors.specification import SensorSpec
+
+if TYPE_CHECKING:
+    from softtact.published.outliers import Outliers
 
 TOLD = 20   # findings in the log; all stand in the table
 
 
-def run(*, inputs, outputs, settings, threads=1):
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Read, pair and check the archive, say what is odd, and write what is usable."""
     sensor = SensorSpec.from_dict(settings["sensor"])
     check_sensor(sensor)
@@ -45,7 +50,7 @@ def run(*, inputs, outputs, settings, threads=1):
     write_json(outputs["inventory"], facts)
 
 
-def check_sensor(sensor):
+def check_sensor(sensor: SensorSpec) -> None:
     """Refuse a sensor of another grid: the archive's maps and readings are of the paper's."""
     shape = sensor.taxels.rows * sensor.taxels.columns, *sensor.map_shape
     if shape != (TAXELS, MAP_ROWS, MAP_COLUMNS):
@@ -53,7 +58,7 @@ def check_sensor(sensor):
                          f"{TAXELS} taxels and maps of {MAP_ROWS} x {MAP_COLUMNS}: use the sensor 'coro'.")
 
 
-def tell(outliers):
+def tell(outliers: "Outliers") -> None:
     """What is odd, on the screen and in the log."""
     for finding in outliers.findings[:TOLD]:
         announce(f"{finding} ({finding.done})")
@@ -61,7 +66,8 @@ def tell(outliers):
         announce(f"and {len(outliers.findings) - TOLD} more outliers")
 
 
-def inventory(tables, items, *, tests, sensor, settings):
+def inventory(tables: Tables, items: dict[tuple[str, str], list[tuple[str, PairedTest]]], *, tests: int, sensor: SensorSpec,
+              settings: dict[str, Any]) -> dict[str, Any]:
     """What the archive holds, how it is read, and how that compares with print."""
     found = found_counts(tables, items)
     matches = judge_arrangement(tables, shape=_grid(sensor), seed=settings["seed"])
@@ -78,7 +84,8 @@ def inventory(tables, items, *, tests, sensor, settings):
             "taxel_order": {"read_as": chosen, "best": best, "correlation": matches}}
 
 
-def write_items(outputs, tables, items, *, sensor, settings, signs):
+def write_items(outputs: dict[str, Any], tables: Tables, items: dict[tuple[str, str], list[tuple[str, PairedTest]]], *,
+                sensor: SensorSpec, settings: dict[str, Any], signs: dict[str, int]) -> None:
     """A file of maps per item and model, and one of readings per item; what an earlier import left is removed."""
     for name in ("presses", "tactile"):
         shutil.rmtree(outputs[name], ignore_errors=True)

@@ -4,6 +4,8 @@ inputs: train, validation, unseen, grasps, and best (of the search) where a netw
 outputs: curve (CSV);  settings: learning_curve, training, network, ssim, seed, threads
 """
 
+from typing import Any
+
 import pandas as pd
 
 from softtact.evaluation.learning_curve import COLUMNS, learning_curve
@@ -15,7 +17,7 @@ from softtact.learning.training import prepare_torch
 TESTS = ("validation", "unseen", "grasps")
 
 
-def run(*, inputs, outputs, settings, threads=1):
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Train every network at every share; write a row per network, share and set."""
     curve = LearningCurve.from_dict(settings["learning_curve"], where="learning_curve")
     options = Training.from_dict(settings["training"], where="training")

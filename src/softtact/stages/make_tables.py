@@ -5,6 +5,8 @@ outputs: table1, contradictions, table2, table3, claims
 settings: rule, thresholds {total, overlap}, source (of the readings)
 """
 
+from typing import Any
+
 import pandas as pd
 
 from softtact.evaluation.claims import claims
@@ -21,7 +23,7 @@ from softtact.reporting.tables import (
 )
 
 
-def run(*, inputs, outputs, settings, threads=1):
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Read the study's results and write its tables."""
     cards = [read_json(path) for path in inputs["cards"]]
     complexity, ssim, timing = (pd.read_csv(inputs[name]) for name in ("complexity", "ssim", "timing"))

@@ -4,6 +4,8 @@ inputs: objects (list of meshes), presses (list: every model of every object);  
 settings: objects [{name, unit, pose}, ...], frustum_height_mm
 """
 
+from typing import Any
+
 import numpy as np
 
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
@@ -13,7 +15,7 @@ from softtact.geometry.meshes import place, read_mesh
 from softtact.geometry.pose import Pose
 
 
-def run(*, inputs, outputs, settings, threads=1):
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Measure every press at its largest force."""
     presses = [read_dataset(path) for path in inputs["presses"]]
     grid = np.meshgrid(presses[0].x.values, presses[0].y.values)

@@ -3,6 +3,8 @@
 inputs: for a foundation frustum_law, card_dielectric, card_cover;  outputs: compliance;  settings: sensor, kind, laws {layer: law}
 """
 
+from typing import Any
+
 from softtact.files import atomic_path
 from softtact.materials.cards import law_from_card, load_card
 from softtact.models.elastic.compliance import elastic_compliance
@@ -11,7 +13,7 @@ from softtact.models.foundation.frustum_spring import FrustumLaw
 from softtact.sensors.specification import SensorSpec
 
 
-def run(*, inputs, outputs, settings, threads=1):
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Condense a quarter of the layers four times, and write what is left."""
     spec = SensorSpec.from_dict(settings["sensor"])
     if settings["kind"] == "elastic":

@@ -6,6 +6,8 @@ tip_scatter,
     mesh, seed
 """
 
+from typing import Any
+
 import numpy as np
 import xarray
 
@@ -19,7 +21,7 @@ from softtact.progress import progress
 from softtact.sensors.specification import SensorSpec
 
 
-def run(*, inputs, outputs, settings, threads=1):
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Solve one cell per orientation and law, then a specimen whose frusta differ in height and tip diameter."""
     spec, card = SensorSpec.from_dict(settings["sensor"]), load_card(inputs["card"])
     changes = {key: value for key, value in settings["mesh"].items() if value is not None}

@@ -4,11 +4,13 @@ inputs, settings: as for `simulate_press`, with forces_n [one force]
 outputs: body (VTU as of `softtact press --vtu`), summary (JSON: what the press says of itself)
 """
 
+from typing import Any
+
 from softtact.files import write_json
 from softtact.stages.simulate_press import press_item
 
 
-def run(*, inputs, outputs, settings, threads=1):
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Press, and write the body at the force."""
     result = press_item(inputs, settings, threads=threads, keep_body=True)
     result.write_vtu(outputs["body"])

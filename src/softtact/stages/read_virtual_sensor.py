@@ -3,6 +3,8 @@
 inputs: press;  outputs: tactile;  settings: sensor, virtual_sensor, trials, seed
 """
 
+from typing import Any
+
 import xarray
 
 from softtact.files import read_dataset, write_dataset
@@ -10,7 +12,7 @@ from softtact.readout.virtual_sensor import VirtualSensorSettings, read_branches
 from softtact.sensors.specification import SensorSpec
 
 
-def run(*, inputs, outputs, settings, threads=1):
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Read `trials` presses and write their counts on the way up, and on the way down."""
     press = read_dataset(inputs["press"])
     item = f"{press.attrs['set']}/{press.attrs['item']}"

@@ -6,6 +6,8 @@ outputs: page, sources, config, named, run
 settings: study facts, config (all values), named (what these name), benchmarks (folder), sources {figure: {data, code}}
 """
 
+from typing import Any
+
 import yaml
 
 from softtact.files import atomic_path, write_csv
@@ -13,7 +15,7 @@ from softtact.reporting.page import render_page, render_sources
 from softtact.reporting.run_record import run_record
 
 
-def run(*, inputs, outputs, settings, threads=1):
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Write the configuration, the sources, the record of the run, and the page, each whole."""
     config, named = (yaml.safe_dump(settings[name], sort_keys=False, allow_unicode=True, width=120) for name in ("config", "named"))
     record = run_record(settings["benchmarks"])

@@ -1,10 +1,12 @@
 """STL files of objects -> table of complexity counts and the model that each asks for."""
 
+from typing import Any
+
 from softtact.files import write_csv
 from softtact.geometry.complexity import score_objects
 
 
-def run(*, inputs, outputs, settings, threads=1):
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """meshes (one or more) -> table (complexity.csv).
 
     settings: objects (list of {name, unit, pose}, in the order of the meshes), footprint_mm, and optionally rule,

@@ -4,6 +4,8 @@ inputs: train, validation;  outputs: search (CSV), best (JSON); the trials' jour
 settings: search, network, ssim, device, seed
 """
 
+from typing import Any
+
 from softtact.files import write_csv, write_json
 from softtact.learning.samples import read_samples
 from softtact.learning.search import best_trial, search_hyperparameters, search_table
@@ -11,7 +13,7 @@ from softtact.learning.settings import Network, Search, Ssim
 from softtact.learning.training import prepare_torch
 
 
-def run(*, inputs, outputs, settings, threads=1):
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Run the trials that are left, write the table of all and the best one."""
     options = Search.from_dict(settings["search"], where="search")
     network = Network.from_dict(settings.get("network", {}), where="network")

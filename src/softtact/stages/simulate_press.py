@@ -4,6 +4,8 @@ inputs: object (STL), and of mesh, compliance, card_dielectric, card_cover what 
 outputs: press;  settings: item {name, set, unit, pose}, sensor, model, kind, laws {layer: law}, mesh, friction, device, forces_n
 """
 
+from typing import TYPE_CHECKING, Any
+
 from softtact.errors import ConvergenceError
 from softtact.geometry.meshes import read_mesh
 from softtact.geometry.pose import Pose
@@ -15,15 +17,18 @@ from softtact.models.hyperelastic.specimen import frustum_scatter, specimen_of
 from softtact.press.sensor import Sensor
 from softtact.sensors.specification import SensorSpec
 
-COMPLIANCES = {"elastic": Compliance, "foundation": FoundationCompliance}
+if TYPE_CHECKING:
+    from softtact.press.result import PressResult
+
+COMPLIANCES: dict[str, type[Compliance] | type[FoundationCompliance]] = {"elastic": Compliance, "foundation": FoundationCompliance}
 
 
-def run(*, inputs, outputs, settings, threads=1):
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Press, and write the maps; a press that does not converge fails with its name."""
     press_item(inputs, settings, threads=threads).write(outputs["press"], settings=settings)
 
 
-def press_item(inputs, settings, *, threads, keep_body=False):
+def press_item(inputs: dict[str, Any], settings: dict[str, Any], *, threads: int, keep_body: bool = False) -> "PressResult":
     """The `PressResult` of the item of the settings."""
     item, label = settings["item"], press_label(settings)
     sensor = make_sensor(inputs, settings)
@@ -34,7 +39,7 @@ def press_item(inputs, settings, *, threads, keep_body=False):
         raise ConvergenceError(f"{label}: {error}", result=error.result) from None
 
 
-def make_sensor(inputs, settings):
+def make_sensor(inputs: dict[str, Any], settings: dict[str, Any]) -> Sensor:
     """The `Sensor` that is pressed, with what its model prepared."""
     kind, mesh, names = settings["kind"], settings["mesh"], names_of(settings)
     spec = SensorSpec.from_dict(settings["sensor"])
@@ -47,18 +52,18 @@ def make_sensor(inputs, settings):
                   scatter=frustum_scatter(spec, mesh), attributes=names, device=settings["device"])
 
 
-def names_of(settings):
+def names_of(settings: dict[str, Any]) -> dict[str, str]:
     """What a press' file says of itself."""
     item = settings["item"]
     return {"model": settings["model"], "set": item["set"], "item": item["name"]}
 
 
-def press_label(settings):
+def press_label(settings: dict[str, Any]) -> str:
     """A press in words: where its file lies."""
     return "{set}/{item}/{model}".format_map(names_of(settings))
 
 
-def pose_of(item):
+def pose_of(item: dict[str, Any]) -> Pose | None:
     """The `Pose` of an item, or None for the centred one."""
     return None if item["pose"] is None else Pose.from_values(item["pose"])
 

@@ -4,14 +4,16 @@ inputs: object (STL), compliance
 outputs: press, a list;  settings: as for `simulate_press`, with `items`, one for each output, in place of `item`
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 from softtact.errors import InputError, SofttactError
 from softtact.geometry.meshes import read_mesh
 from softtact.stages.simulate_press import make_sensor, names_of, pose_of, press_label
 
 
-def run(*, inputs, outputs, settings, threads=1):
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Press all, and write each as `simulate_press` would; nothing is written where one fails, which is named."""
     each = [{**_shared(settings), "item": item} for item in settings["items"]]
     if len(outputs["press"]) != len(each):
@@ -22,7 +24,7 @@ def run(*, inputs, outputs, settings, threads=1):
         replace(result, attributes=result.attributes | names_of(one)).write(path, settings=one)
 
 
-def press_items(inputs, each, *, threads):
+def press_items(inputs: dict[str, Any], each: Sequence[dict[str, Any]], *, threads: int) -> list[Any]:
     """A `PressResult`, or the error in its place, of each press; `each` differs from the first by its pose and name alone."""
     first = each[0]
     mesh = read_mesh(inputs["object"], unit=first["item"]["unit"])

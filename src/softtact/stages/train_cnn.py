@@ -5,25 +5,28 @@ outputs: model (the best epoch's weights), history, and timing where asked for; 
 settings: training, network (its `architecture` says which is trained), ssim, seed, threads (by default those of the job)
 """
 
+from typing import Any
+
 import pandas as pd
 
 from softtact.files import digest, read_json, write_csv
 from softtact.learning.network import save_network
 from softtact.learning.samples import read_samples
 from softtact.learning.settings import Network, Ssim, Training, chosen_network, chosen_training
-from softtact.learning.training import prepare_torch, start_run, train_network
+from softtact.learning.training import Run, prepare_torch, start_run, train_network
 
 HISTORY = ["epoch", "train_loss", "validation_loss", "validation_ssim", "learning_rate"]
 
 
-def run(*, inputs, outputs, settings, threads=1):
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Train, or go on with a training that was cut off, and write the best weights and the history."""
     network = Network.from_dict(settings["network"], where="network")
     best, seed = read_json(inputs["best"]), settings["seed"]
     options = chosen_training(Training.from_dict(settings["training"], where="training"), network, best)
     ssim = Ssim.from_dict(settings.get("ssim", {}), where="ssim").model_dump()
     train, validation = read_samples(inputs["train"]), read_samples(inputs["validation"])
-    training = start_run(train, network=chosen_network(network, best), seed=seed, learning_rate=options.learning_rate,
+    training = start_run(train, network=chosen_network(network, best), seed=seed,
+                         learning_rate=options.learning_rate,     # type: ignore[arg-type]
                          device=prepare_torch(threads=settings.get("threads", threads), device=options.device))
     checkpoint = outputs["model"].with_name("checkpoint.pt")
     for _ in train_network(training, train, validation, options=options, ssim=ssim, seed=seed, checkpoint=checkpoint,
@@ -35,7 +38,7 @@ def run(*, inputs, outputs, settings, threads=1):
     checkpoint.unlink(missing_ok=True)
 
 
-def write_results(outputs, training, *, facts):
+def write_results(outputs: dict[str, Any], training: Run, *, facts: dict[str, Any]) -> None:
     """Write the best weights and the history; wall times, which no two runs share, go to a file of their own."""
     best = training.best
     training.network.load_state_dict(best["weights"])

@@ -5,6 +5,8 @@ inputs: state, virtual, discs (list), measured (CSV force_n, area_mm2 of the mea
 outputs: area (CSV), orientations (CSV, long: each orientation and law), summary (JSON);  settings: pixel_mm of the camera
 """
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 import pandas as pd
 
@@ -12,8 +14,11 @@ from softtact.errors import InputError
 from softtact.evaluation.curve_shape import PAPER_RMSE_MM2, judge, summary_sentence
 from softtact.files import read_dataset, write_csv, write_json
 
+if TYPE_CHECKING:
+    import xarray
 
-def run(*, inputs, outputs, settings, threads=1):
+
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Join the three curves, report their differences, and judge the orientations by the paper's words."""
     state, virtual = read_dataset(inputs["state"]), read_dataset(inputs["virtual"])
     count = virtual.sizes["frustum"]
@@ -27,7 +32,7 @@ def run(*, inputs, outputs, settings, threads=1):
         "under_test": {"orientation": state.attrs["orientation_under_test"], "law": state.attrs["law_under_test"]}})
 
 
-def long_table(state, count):
+def long_table(state: "xarray.Dataset", count: int) -> pd.DataFrame:
     """Every orientation's and law's curve, one row a force."""
     names = ["area_per_frustum_mm2", "compression_mm", "disc_gap_mm"]
     table = state[[*names, "force_n"]].to_dataframe().reset_index()

@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 
 
-def code_closure(module, *, source="src"):
+def code_closure(module: str, *, source: str | Path = "src") -> list[str]:
     """Sorted paths of `module`'s file and of everything below `source` that it imports, directly or not."""
     source = Path(source)
     found, waiting = set(), [_file(module, source)]

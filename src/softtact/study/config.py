@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from importlib import resources
 from itertools import groupby
 from pathlib import Path
+from typing import Any
 
 from softtact.errors import InputError
 from softtact.files import read_yaml
@@ -47,51 +48,51 @@ class Study:
     archive: Archive | None = None
 
     @property
-    def tested(self):
+    def tested(self) -> list[str]:
         """The models that a network is trained for: of an archive, those whose simulations are there."""
         return list(self.archive.simulated) if self.archive else self.values.tested
 
     @property
-    def learnt_from(self):
+    def learnt_from(self) -> list[str]:
         """The models whose maps data sets are made of: those under test, and the reference, as if a model were perfect."""
         return self.tested if self.archive else list(dict.fromkeys([*self.tested, self.values.reference]))
 
     @property
-    def pressed_with(self):
+    def pressed_with(self) -> list[str]:
         """The models that every item is pressed with: those learnt from, and those that policies choose between."""
         return [] if self.archive else list(dict.fromkeys([*self.learnt_from, *self.values.choice.models.values()]))
 
     @property
-    def source(self):
+    def source(self) -> str:
         """What the readings are from, in words."""
         return PUBLISHED if self.archive else "virtual sensor"
 
     @property
-    def name(self):
+    def name(self) -> str:
         """The study's name, and its folder below results/."""
         return self.values.study
 
     @property
-    def sensor(self):
+    def sensor(self) -> dict[str, Any]:
         """The sensor's description as plain JSON values; what is assumed, and why, is left out."""
         return self.spec.model_dump(mode="json")
 
-    def trials_of(self, set_name):
+    def trials_of(self, set_name: str) -> int:
         """How often the virtual sensor reads each press of a set."""
         return getattr(self.values.objects, set_name).trials or self.values.trials
 
-    def named(self):
+    def named(self) -> dict[str, Any]:
         """What the configuration names, as plain JSON values: the sensor, the materials' settings, the items of each set."""
         materials = {name: {"curves": material.curve_settings, "fit": material.fit_settings}
                      for name, material in self.materials.items()}
         items = {name: [asdict(item) for item in items.values()] for name, items in self.items_of.items()}
         return {"sensor": self.sensor, "materials": materials, "items": items, "section": asdict(self.section_item)}
 
-    def items(self):
+    def items(self) -> list[Item]:
         """The items of all sets, in order."""
         return [item for items in self.items_of.values() for item in items.values()]
 
-    def press_jobs(self, model):
+    def press_jobs(self, model: str) -> list[list[Item]]:
         """[[Item]]: what a model presses in one job each, in the order of `items`.
 
         A fast model presses an object's places together, for to start takes it longer than to press. Another object is another
@@ -103,13 +104,13 @@ class Study:
         return [same[first:first + TOGETHER] for same in places for first in range(0, len(same), TOGETHER)]
 
 
-def read_values(configfile=None, *, default="config/config.yaml"):
+def read_values(configfile: str | Path | None = None, *, default: str | Path = "config/config.yaml") -> dict[str, Any]:
     """The configuration mapping of a file over the default one, merged as Snakemake does it."""
     values = _read_yaml(here_or_shipped(default))
     return values if configfile is None else _merged(values, _read_yaml(here_or_shipped(configfile)))
 
 
-def here_or_shipped(path):
+def here_or_shipped(path: str | Path) -> Path:
     """A file as it is named or, where the working folder has no such file below config/, the one that ships with the package."""
     path = Path(path)
     if path.exists() or path.parts[:1] != ("config",):
@@ -131,7 +132,7 @@ def _read_yaml(path):
     return values
 
 
-def load_study(values):
+def load_study(values: dict[str, Any]) -> Study:
     """The `Study` of a configuration mapping; the first fault becomes an `InputError` of one sentence."""
     checked = validated(Values, values, where="the configuration")
     spec = SensorSpec.from_yaml(_named("sensor", sensor_file, checked.sensor))

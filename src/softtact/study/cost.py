@@ -8,13 +8,18 @@ training sooner, and all networks of a search cost as the printed one: so `at mo
 import itertools
 import math
 import operator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean
+from typing import TYPE_CHECKING, Any
 
 from softtact.errors import InputError
 from softtact.files import read_yaml
-from softtact.study.config import SETS, here_or_shipped
+from softtact.study.config import SETS, Study, here_or_shipped
+
+if TYPE_CHECKING:
+    from softtact.learning.settings import Search
 
 BYTES = 4          # of a number in a data set; twice that in a press
 READING_NUMBERS = 2          # branches of a reading: the way up and the way down
@@ -34,17 +39,17 @@ class Cost:
     disk_mb: float = 0.0
 
     @property
-    def hours(self):
+    def hours(self) -> float:
         """Of one core, for what is left."""
         return self.left * self.each_s / 3600
 
 
-def read_costs(path=None):
+def read_costs(path: str | Path | None = None) -> dict[str, Any]:
     """The measured times of `config/costs.yaml`, of the folder that the command runs in or as they ship."""
     return read_yaml(here_or_shipped(path or "config/costs.yaml"), missing="there is no file of measured times; correct the path.")
 
 
-def study_costs(study, measured, *, results="results"):
+def study_costs(study: Study, measured: dict[str, Any], *, results: str | Path = "results") -> list[Cost]:
     """[Cost] of a `Study`, in the order of its work. A study on the published archive presses nothing and is refused."""
     if study.archive:
         raise InputError(f"the study {study.name}: it reads the published archive, whose size is known after the import only; "
@@ -54,7 +59,7 @@ def study_costs(study, measured, *, results="results"):
     return [*costs, Cost("all else", 1, int(not (folder / "report.html").exists()), measured["all_else_s"])]
 
 
-def cost_lines(study, costs, measured, *, cores):
+def cost_lines(study: Study, costs: Sequence[Cost], measured: dict[str, Any], *, cores: int) -> Iterator[str]:
     """The costs as a table for people."""
     width = max(len(cost.stage) for cost in costs)
     yield f"{'cost of the study ' + study.name:{width}}{'jobs':>7}{'left':>7}{'s each':>9}{'core hours':>12}{'MB':>8}"
@@ -99,7 +104,7 @@ class Sizes:
     tests: int
 
     @classmethod
-    def of(cls, study):
+    def of(cls, study: Study) -> "Sizes":
         """As many as the study has where all presses are within their models' validity."""
         load_steps, dataset = len(study.values.forces_n), study.values.dataset
         maps = {name: len(items) * load_steps for name, items in study.items_of.items()}
@@ -151,7 +156,7 @@ def _epoch_s(time, train, sizes):
     return train * time["train_map_s"] + sizes.validation * time["predict_map_s"]
 
 
-def epochs_of_a_trial(search):
+def epochs_of_a_trial(search: "Search") -> float:
     """Epochs that Hyperband gives a trial in the mean: Optuna's brackets, in each of which one in `reduction_factor` goes on."""
     factor = search.reduction_factor
     rungs = [factor**k for k in range(search.max_epochs.bit_length()) if factor**k <= search.max_epochs]     # 1, 3, 9, ...

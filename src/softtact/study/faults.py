@@ -1,12 +1,17 @@
 """What is wrong with a configuration, in one sentence that names the field, the value and the remedy."""
 
-from pydantic import ValidationError
+from collections.abc import Collection
+from typing import TypeVar
+
+from pydantic import BaseModel, ValidationError
 
 from softtact.errors import InputError
 from softtact.unknown_names import first_fault, known_keys, unknown
 
+_Checked = TypeVar("_Checked", bound=BaseModel)
 
-def validated(model, values, *, where):
+
+def validated(model: type[_Checked], values: object, *, where: str) -> _Checked:
     """`model` from plain values; the first fault becomes an `InputError` naming the field and the remedy."""
     try:
         return model.model_validate(values)
@@ -27,7 +32,7 @@ def _fault_sentence(model, fault, *, where):
     return _sentence(f"{where}, at {at!r}{given}: {fault['msg'].removeprefix('Value error, ')}")
 
 
-def refuse_unknown(name, known, *, kind, where):
+def refuse_unknown(name: str, known: Collection[str], *, kind: str, where: str) -> None:
     """Raise an `InputError` that tells the nearest right name if `name` is not among the `known` ones."""
     if name not in known:
         raise InputError(_sentence(f"{where}: {unknown(name, known, kind=kind)}"))

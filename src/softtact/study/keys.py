@@ -225,7 +225,7 @@ class Model(Section):
     needs: list[Literal["mesh", "compliance", "card_dielectric", "card_cover"]] = []
 
     @property
-    def prepared_from(self):
+    def prepared_from(self) -> list[str]:
         """What its compliance is computed from."""
         return ["frustum_law", "card_dielectric", "card_cover"] if self.kind == "foundation" else []
 

@@ -3,11 +3,15 @@
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from softtact.errors import InputError
 from softtact.files import read_yaml
 from softtact.study.faults import refuse_unknown, validated
-from softtact.study.keys import CENTRED, CatalogueEntry
+from softtact.study.keys import CENTRED, CatalogueEntry, ItemSet
+
+if TYPE_CHECKING:
+    from softtact.sensors.specification import SensorSpec
 
 
 @dataclass(frozen=True)
@@ -24,7 +28,7 @@ class Item:
     first: bool
 
 
-def read_catalogue(path):
+def read_catalogue(path: Path) -> dict[str, CatalogueEntry]:
     """{name: CatalogueEntry} with the mesh files' paths as seen from here; a missing mesh is refused now."""
     lines = read_yaml(path, missing="there is no such catalogue of objects; correct 'objects.catalogue'.")
     entries = [validated(CatalogueEntry, line, where=str(path)) for line in lines or []]
@@ -32,7 +36,8 @@ def read_catalogue(path):
     return {entry.name: entry for entry in entries}
 
 
-def items_of_set(set_name, chosen, catalogue, *, spec, seed):
+def items_of_set(set_name: str, chosen: ItemSet, catalogue: dict[str, CatalogueEntry], *, spec: "SensorSpec",
+                 seed: int) -> dict[str, Item]:
     """{id: Item} of one set: each object in its poses, the listed ones and those that are drawn."""
     known = [name for name, entry in catalogue.items() if entry.set == set_name]
     names = known if chosen.names == "all" else chosen.names
@@ -40,7 +45,7 @@ def items_of_set(set_name, chosen, catalogue, *, spec, seed):
     for name in names:
         refuse_unknown(name, known, kind=f"object of set {set_name}", where=where)
     drawn = _dealt(chosen, len(names), where=where)
-    items = {}
+    items: dict[str, Item] = {}
     for entry, count in zip((catalogue[name] for name in names), drawn, strict=True):
         poses = chosen.poses | _drawn(entry, count, spec=spec, seed=seed)
         made = [make_item(entry, pose_name, pose, first=k == 0) for k, (pose_name, pose) in enumerate(poses.items())]
@@ -48,7 +53,7 @@ def items_of_set(set_name, chosen, catalogue, *, spec, seed):
     return items
 
 
-def make_item(entry, pose_name, pose, *, first):
+def make_item(entry: CatalogueEntry, pose_name: str, pose: list[float] | None, *, first: bool) -> Item:
     """The `Item` of a catalogue's entry in a named pose (6,), or None for the centred one."""
     _check_mesh(entry)
     suffix = "" if pose_name == CENTRED else f"-{pose_name}"
@@ -56,9 +61,9 @@ def make_item(entry, pose_name, pose, *, first):
                 first)
 
 
-def check_shapes(items_of):
+def check_shapes(items_of: dict[str, dict[str, Item]]) -> None:
     """Refuse a mesh that stands in two sets, be it under two names: a test must not hold a shape that training saw."""
-    seen = {}
+    seen: dict[bytes, Item] = {}
     for item in (item for items in items_of.values() for item in items.values() if item.first):
         other = seen.setdefault(Path(item.file).read_bytes(), item)
         if other.set != item.set:
