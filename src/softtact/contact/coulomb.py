@@ -15,6 +15,7 @@ Jourdan, Alart and Jean, Comput. Methods Appl. Mech. Engng 155 (1998) 31 (block 
 """
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -37,15 +38,27 @@ class CoulombSettings:
     """Conjugate gradients on one active set."""
 
 
+class Operator(Protocol):
+    """What acts on forces (c, axes) by `@`: `DenseBlock`, and whatever acts like it."""
+
+    def __matmul__(self, force: np.ndarray) -> np.ndarray: ...
+
+    @property
+    def T(self) -> "Operator": ...
+
+    @property
+    def diagonal(self) -> np.ndarray: ...
+
+
 @dataclass(frozen=True)
 class ContactCompliance:
     """The compliance in mm/N among contact points (c,), as operators that act on forces by `@`; directions are x, y and down."""
 
-    normal: object
+    normal: Operator
     """(c, 1) from (c, 1): `DenseBlock`, or what acts like it and has `diagonal` (c, axes) and `T`."""
-    coupling: object
+    coupling: Operator
     """Down (c, 1) from x, y (c, 2)."""
-    tangential: object
+    tangential: Operator
     """x, y (c, 2) from x, y (c, 2)."""
 
     @classmethod
@@ -58,11 +71,11 @@ class ContactCompliance:
 class DenseBlock:
     """A matrix (c, a, c, b) that acts on forces (c, b)."""
 
-    def __init__(self, matrix):
+    def __init__(self, matrix: np.ndarray) -> None:
         self._shape, count = (matrix.shape[0], matrix.shape[1]), matrix.shape[0]
         self.matrix = np.ascontiguousarray(matrix.reshape(count * matrix.shape[1], -1))
 
-    def __matmul__(self, force):
+    def __matmul__(self, force: np.ndarray) -> np.ndarray:
         return (self.matrix @ force.ravel()).reshape(self._shape)
 
     @property
@@ -264,7 +277,8 @@ def solve_block_by_block(matrix: np.ndarray, increment: Increment, *, tolerance_
             slip = moved[:, :2] - increment.carried
             own = np.einsum("iaia->ia", matrix[:, :2, :, :2]).max(axis=1, keepdims=True)
             sticks = _sticking(force[:, :2] - slip / own, increment.bound(force[:, 2]))
-            return CoulombContact(force[:, 2], force[:, :2], increment.depth, gap, slip, sticks, sweep, sweep)
+            return CoulombContact(force[:, 2], force[:, :2], increment.depth,     # type: ignore[arg-type]
+                                  gap, slip, sticks, sweep, sweep)
     raise ConvergenceError(f"The plain contact method did not settle in {max_sweeps} sweeps.")
 
 

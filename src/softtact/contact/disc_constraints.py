@@ -7,16 +7,22 @@ shortened, and at last a projected gradient step is taken, which always does.
 Reference: Dostal and Kozubek, Optim. Methods Softw. 27 (2012) 1099 (separable round constraints).
 """
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from softtact.errors import ConvergenceError
+
+if TYPE_CHECKING:
+    from softtact.contact.coulomb import CoulombSettings, Operator
 
 _ON_RIM = 1 - 1e-12     # share of a disc's radius from which on a force is on the rim
 _SHORTENED = (1.0, 0.5, 0.25)
 _ROUNDING = 1e-13     # of an energy
 
 
-def solve_in_discs(compliance, linear, bound, q, *, settings):
+def solve_in_discs(compliance: "Operator", linear: np.ndarray, bound: np.ndarray, q: np.ndarray, *,
+                   settings: "CoulombSettings") -> tuple[np.ndarray, np.ndarray, int]:
     """q (c, 2) in N, the displacement T q (c, 2), and the number of products; from a first guess q.
 
     compliance: T, mm/N;  linear (c, 2): b in mm;  bound (c,): radii in N, 0 where there is no contact
@@ -47,7 +53,7 @@ def solve_in_discs(compliance, linear, bound, q, *, settings):
     return q, moved, products
 
 
-def into_discs(q, bound):
+def into_discs(q: np.ndarray, bound: np.ndarray) -> np.ndarray:
     """Each of q (c, 2) moved to the nearest place of its disc of radius bound (c,)."""
     length = np.linalg.norm(q, axis=1)
     share = np.where(length > bound, bound / np.maximum(length, 1e-300), 1.0)

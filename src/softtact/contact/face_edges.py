@@ -21,14 +21,14 @@ _SOFTNESS = np.array([0.15, 0.3, 0.4])
 _NOWHERE = 1e-12                            # squared: below this no direction is more outwards than another
 
 
-def own_areas(half, points):
+def own_areas(half: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Corners (t, points, 4, 2) in mm of the points' own rectangles, from the points; half (t, 2): half the faces' sides in mm."""
     i, j = (g.ravel() for g in np.meshgrid(np.arange(ROWS), np.arange(ROWS), indexing="ij"))
     places = np.stack([np.column_stack([ENDS[i + a], ENDS[j + b]]) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))], axis=1)
     return half[:, None, None] * (places - points[:, None])
 
 
-def contact_compliance(covered, width):
+def contact_compliance(covered: np.ndarray, width: np.ndarray) -> np.ndarray:
     """Softness (t * points,) in mm of displacement per unit of pressure over the plane modulus E / (1 - nu^2).
 
     covered (t * points,): share of each point's own area under the object;  width (t,): of the faces in mm

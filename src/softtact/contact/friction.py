@@ -12,6 +12,7 @@ point at the distance e: e is elastic slip, once, and does not add up from load 
 """
 
 from dataclasses import dataclass, replace
+from types import EllipsisType
 
 import numpy as np
 
@@ -27,17 +28,17 @@ class Coulomb:
     coefficient: float
     slip_tolerance_mm: float = SLIP_TOLERANCE_MM
 
-    def energy(self, slip, pressure):
+    def energy(self, slip: np.ndarray, pressure: np.ndarray) -> np.ndarray:
         """mJ/mm2 (p,) for slips (p, d) in mm at pressures (p,) in MPa."""
         e, length = self.slip_tolerance_mm, np.linalg.norm(slip, axis=-1)
         inside = np.minimum(length, e)
         return self.coefficient * pressure * (inside**2 / e - inside**3 / (3 * e**2) + (length - inside))
 
-    def traction(self, slip, pressure):
+    def traction(self, slip: np.ndarray, pressure: np.ndarray) -> np.ndarray:
         """Slope of the energy by the slip (p, d) in MPa: at most the coefficient times the pressure."""
         return (self.coefficient * pressure * self._secant(slip))[..., None] * slip
 
-    def stiffness(self, slip, pressure, plane, share):
+    def stiffness(self, slip: np.ndarray, pressure: np.ndarray, plane: np.ndarray, share: np.ndarray) -> np.ndarray:
         """Slope of the traction (p, d, d) in N/mm3, if `share` (p, d) is the traction's part of its limit (see `FrictionResponse`).
 
         plane (d, d) or (p, d, d) projects on the tangential directions.
@@ -46,11 +47,11 @@ class Coulomb:
         slope = self._secant(slip)[..., None, None] * (plane - 0.5 * (turned + np.swapaxes(turned, -1, -2)))
         return (self.coefficient * pressure)[..., None, None] * slope
 
-    def share(self, slip):
+    def share(self, slip: np.ndarray) -> np.ndarray:
         """The traction's part of its limit (p, d): phi'(|s|) s/|s|."""
         return self._secant(slip)[..., None] * slip
 
-    def next_share(self, slip, share, before):
+    def next_share(self, slip: np.ndarray, share: np.ndarray, before: np.ndarray) -> np.ndarray:
         """`share` one Newton step on: at slips `slip` (p, d), from `before`, cut to what friction can bear."""
         along = self._growth(before) * (_direction(before) * (slip - before)).sum(axis=-1)
         ahead = self._secant(before)[..., None] * (slip - along[..., None] * share)
@@ -89,18 +90,18 @@ class FrictionState:
     slid: np.ndarray
 
     @classmethod
-    def first(cls, law, position, gap):
+    def first(cls, law: Coulomb, position: np.ndarray, gap: np.ndarray) -> "FrictionState":
         """The friction state of a body at rest, which will hold every point to where it comes to touch."""
         none = np.zeros(gap.shape)
         return cls(law, position, position, gap, none, np.zeros(gap.shape, dtype=bool), none)
 
-    def friction_response(self, position, normal=None):
+    def friction_response(self, position: np.ndarray, normal: np.ndarray | None = None) -> "FrictionResponse":
         """Friction on points at positions (p, d) before normals (p, d) of the rigid body; None: all d directions are tangential."""
         way = position - self.anchor
         slip = way if normal is None else way - (way * normal).sum(axis=-1, keepdims=True) * normal
         return FrictionResponse(self, position, slip, normal)
 
-    def halfway(self, other):
+    def halfway(self, other: "FrictionState") -> "FrictionState":
         """`other` with the pressures halfway between both."""
         return replace(other, pressure=0.5 * (self.pressure + other.pressure))
 
@@ -120,16 +121,16 @@ class FrictionResponse:
     share: np.ndarray | None = None
 
     @property
-    def energy(self):
+    def energy(self) -> np.ndarray:
         """mJ/mm2 (p,)."""
         return self.friction_state.law.energy(self.slip, self.friction_state.pressure)
 
     @property
-    def traction(self):
+    def traction(self) -> np.ndarray:
         """MPa (p, d), against which the points slide."""
         return self.friction_state.law.traction(self.slip, self.friction_state.pressure)
 
-    def stiffness(self, points=...):
+    def stiffness(self, points: np.ndarray | slice | EllipsisType = ...) -> np.ndarray:
         """N/mm3 (p, d, d) of all points or of some."""
         plane = np.eye(self.slip.shape[-1])
         if self.normal is not None:
@@ -140,7 +141,7 @@ class FrictionResponse:
     def _share(self, points=...):
         return self.friction_state.law.share(self.slip[points]) if self.share is None else self.share[points]
 
-    def after(self, before):
+    def after(self, before: "FrictionResponse | None") -> "FrictionResponse":
         """The same for the next tangent, where the last was taken at `before`.
 
         A point that slides has no stiffness along its way, so whole Newton steps throw it to and fro across the slip
@@ -152,12 +153,12 @@ class FrictionResponse:
         return replace(self, share=self.friction_state.law.next_share(self.slip, before._share(), before.slip))
 
     @property
-    def slid(self):
+    def slid(self) -> np.ndarray:
         """Length (p,) in mm of the way that the points have slid since they came to touch."""
         length = np.linalg.norm(self.slip, axis=-1)
         return self.friction_state.slid + np.maximum(length - self.friction_state.law.slip_tolerance_mm, 0.0)
 
-    def next_step(self, gap):
+    def next_step(self, gap: np.ndarray) -> FrictionState:
         """The friction state of a step that starts here, with gaps (p,): anchors follow what slid further than the tolerance."""
         friction_state, length = self.friction_state, np.linalg.norm(self.slip, axis=-1, keepdims=True)
         kept = self.slip * np.minimum(1.0, friction_state.law.slip_tolerance_mm / np.maximum(length, 1e-300))
@@ -166,7 +167,7 @@ class FrictionResponse:
         return replace(friction_state, anchor=anchor, start=self.position, start_gap=gap, touching=touching,
                        slid=np.where(touching, self.slid, 0.0))
 
-    def next_pass(self, gap, pressure):
+    def next_pass(self, gap: np.ndarray, pressure: np.ndarray) -> FrictionState:
         """The same step's friction state with newer pressures; a point that came to touch holds to where its path met the rigid
         body.
         """
@@ -178,6 +179,6 @@ class FrictionResponse:
         return replace(friction_state, anchor=anchor, pressure=pressure, touching=friction_state.touching | new)
 
 
-def coulomb(coefficient):
+def coulomb(coefficient: float) -> Coulomb | None:
     """The law of a coefficient; None, and so no friction at all, where it is 0."""
     return Coulomb(coefficient) if coefficient > 0 else None

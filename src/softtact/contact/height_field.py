@@ -45,7 +45,7 @@ class HeightField:
         normal[hit] = self.normals[index[hit]]
         return height, normal
 
-    def first_touch_mm(self, x_mm, y_mm):
+    def first_touch_mm(self, x_mm: np.ndarray, y_mm: np.ndarray) -> float:
         """Height (mm) of the underside's lowest point over a sensor whose map has columns x_mm and rows y_mm, its edges among them.
 
         By the corners of facets over the sensor, and by the map's points where the object is wider; NO_CONTACT_MM beside it.
@@ -65,7 +65,7 @@ class MovedSurface:
     offset_mm: np.ndarray
     """The way (2,)."""
 
-    def __call__(self, x, y):
+    def __call__(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Heights (n,) and normals (n, 3) over points (n,), (n,) of the sensor."""
         return self.surface(x - self.offset_mm[0], y - self.offset_mm[1])
 
@@ -79,7 +79,7 @@ class SweptSurface:
     offsets_mm: np.ndarray
     """The ways (k, 2) from its first place."""
 
-    def __call__(self, x, y):
+    def __call__(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Heights (n,) and normals (n, 3) over points (n,), (n,) of the sensor."""
         each = [self.surface(x - way[0], y - way[1]) for way in self.offsets_mm]
         lowest = np.argmin([height for height, _ in each], axis=0)

@@ -37,15 +37,15 @@ class ObjectPoints:
     beneath: "Beneath | None" = None
 
     @property
-    def count(self):
+    def count(self) -> int:
         return len(self.nodes)
 
     @property
-    def covered(self):
+    def covered(self) -> np.ndarray:
         """Share (c,) of each node's surroundings under the object, weighted by its hat function: of area step_x step_y in all."""
         return self.covered_at(np.zeros((2, self.count)), rounding_mm=LOWEST * self.step.min())
 
-    def covered_at(self, moved, *, rounding_mm):
+    def covered_at(self, moved: np.ndarray, *, rounding_mm: float) -> np.ndarray:
         """The same where the nodes have moved sideways by `moved` (2, c) in mm, up to a step.
 
         rounding_mm: by how much what counts may lie higher than the plane of a node's gap and slope
@@ -54,7 +54,7 @@ class ObjectPoints:
         share[self.edge] = hat_shares(self.window, moved[:, self.edge].T / self.step, rounding_mm)
         return share
 
-    def as_deep(self, depth):
+    def as_deep(self, depth: float) -> "ObjectPoints":
         """The points where the object has come down by `depth` (mm) since its first touch.
 
         What lies higher over a node than that is not touched; the edge of what is lower beside it may be.
@@ -70,7 +70,7 @@ class ObjectPoints:
         gap[self.edge[place]], slope[self.edge[place]], window[place] = lower.gap[here], lower.slope[here], lower.window[here]
         return replace(self, gap=gap, slope=slope, window=window, beneath=None)
 
-    def outwards(self):
+    def outwards(self) -> np.ndarray:
         """Squares (e, 2) of the x and y components of the direction in which an edge lies from the points near one."""
         places = window_places()
         weights = np.maximum(1 - np.abs(places), 0.0)
@@ -90,13 +90,13 @@ class Beneath:
     window: np.ndarray
 
 
-def window_places():
+def window_places() -> np.ndarray:
     """Samples' places (s,) along a side of a window, in steps from the node."""
     return (np.arange(2 * REACH * SAMPLES) + 0.5) / SAMPLES - REACH
 
 
 @njit(cache=True, nogil=True)
-def hat_shares(window, moved, highest):
+def hat_shares(window: np.ndarray, moved: np.ndarray, highest: float) -> np.ndarray:
     """Shares (e,), no higher than `highest`, under hats that have moved by (e, 2) steps."""
     size = window.shape[1]
     share = np.zeros(len(window))

@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 
-def penalty(normal_gap, *, stiffness, smoothing):
+def penalty(normal_gap: np.ndarray, *, stiffness: float | np.ndarray,
+            smoothing: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Energy (N/mm), contact pressure (MPa, positive in compression) and its slope (N/mm3) per unit area.
 
     normal_gap in mm (negative = penetration), stiffness in N/mm3, smoothing in mm.
@@ -38,24 +39,24 @@ class Contact:
     offset: float | np.ndarray = 0.0
     contact_compliance: float | np.ndarray = 0.0
 
-    def response(self, gaps):
+    def response(self, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """`penalty` of the points, the offset added to their overlap."""
         return penalty(gaps - self.offset, stiffness=1.0 / (1.0 / self.stiffness + self.contact_compliance),
                        smoothing=self.smoothing)
 
-    def own_gaps(self, gaps):
+    def own_gaps(self, gaps: np.ndarray) -> np.ndarray:
         """Gaps in mm without what the points' springs give way."""
         return gaps + self.contact_compliance * self.response(gaps)[1] if np.any(self.contact_compliance) else gaps
 
-    def at(self, points):
+    def at(self, points: np.ndarray | slice) -> "Contact":
         """The contact of some of the points."""
         fields = ("offset", "contact_compliance")
         return replace(self, **{name: value[points] for name in fields if np.ndim(value := getattr(self, name))})
 
-    def error(self, gaps):
+    def error(self, gaps: np.ndarray) -> float:
         """Deepest overlap, or widest gap under pressure, in mm."""
         return float(np.where(gaps < self.offset, np.abs(self.own_gaps(gaps)), 0.0).max(initial=0.0))
 
-    def augmented(self, gaps):
+    def augmented(self, gaps: np.ndarray) -> "Contact":
         """The contact with offsets that hold each point where its surfaces just touch."""
         return replace(self, offset=np.maximum(0.0, self.offset - self.own_gaps(gaps)))

@@ -3,10 +3,13 @@
 A surface's stiffness reaches hardly further than its elements, so a few neighbours make a good preconditioner.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+
+from softtact.contact.node_grid import NodeGrid
 
 
 @dataclass(frozen=True)
@@ -18,7 +21,7 @@ class Stencil:
 
     values: np.ndarray
 
-    def on(self, grid, nodes):
+    def on(self, grid: NodeGrid, nodes: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
         """The stencil's action on values (n, levels) at some of a `NodeGrid`'s nodes (n,), all others being zero."""
         reach = self.values.shape[2] // 2
         j, i = np.divmod(nodes, grid.shape[1])

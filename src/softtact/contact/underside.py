@@ -5,11 +5,14 @@ is lowest near it, whichever explains more. Beside a kink, where a node is touch
 gets both (`Beneath`).
 """
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.ndimage import binary_dilation
 
 from softtact.contact.height_field import NO_CONTACT_MM
+from softtact.contact.node_grid import NodeGrid
 from softtact.contact.object_points import LOWEST, REACH, SAMPLES, Beneath, ObjectPoints, hat_shares, window_places
 from softtact.contact.unilateral import depth_on_springs
 from softtact.errors import InputError
@@ -26,14 +29,14 @@ _TRAPEZOID = np.array([0.25, 0.5, 0.25])
 class Underside:
     """An object's underside over the nodes of a grid;  lowest_mm: over the free surface."""
 
-    def __init__(self, surface, grid):
+    def __init__(self, surface: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]], grid: NodeGrid) -> None:
         self._surface, self._grid = surface, grid
         self._coarse = _sampled(surface, grid)
         self.lowest_mm = float(self._coarse.min())
         if self.lowest_mm >= NO_CONTACT_MM:
             raise InputError("The object misses every free point of the sensor's surface; move it over the sensor.")
 
-    def depth_on_springs(self, force_n, foundation_modulus):
+    def depth_on_springs(self, force_n: float, foundation_modulus: float) -> float:
         """How far (mm) the object sinks from its first touch into a support of springs of `foundation_modulus` N/mm3: a first
         guess.
         """
@@ -41,7 +44,7 @@ class Underside:
         area = np.broadcast_to(np.outer(_TRAPEZOID, _TRAPEZOID).ravel() * np.prod(self._grid.step), there.shape)[there]
         return depth_on_springs(self._coarse[there] - self.lowest_mm, area, force_n / foundation_modulus)
 
-    def points(self, reach_mm):
+    def points(self, reach_mm: float) -> ObjectPoints:
         """The `ObjectPoints` as far as the object is lower than `reach_mm` over its lowest point."""
         near = self._near_edges()
         plain = np.setdiff1d(np.flatnonzero(self._middle < self.lowest_mm + reach_mm), near)
@@ -53,7 +56,7 @@ class Underside:
                             slope=np.vstack([slopes, slope])[order], edge=edge, window=window, step=self._grid.step,
                             beneath=beneath)
 
-    def nodes(self, reach_mm):
+    def nodes(self, reach_mm: float) -> ObjectPoints:
         """The same with each node under the object held and all others free: blunter, but no node comes down below the object."""
         height, slope = self._facets(self._grid.points)
         kept = np.flatnonzero(height < self.lowest_mm + reach_mm)

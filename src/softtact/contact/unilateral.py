@@ -10,12 +10,16 @@ References: Hintermueller, Ito and Kunisch, SIAM J. Optim. 13 (2003) 865; Gould,
 (2001) 1376 (projected conjugate gradients); Johnson, Contact Mechanics, sec. 5.9.
 """
 
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from array_api_compat import array_namespace, device
 
 from softtact.errors import ConvergenceError
+
+_Force = TypeVar("_Force", float, np.ndarray)
 
 _AS_WIDE = 0.8    # share of the last load step's points from which on a load step starts with the last load step's forces, scaled
 
@@ -41,31 +45,44 @@ class ContactLoadSteps:
     settled: np.ndarray
 
     @property
-    def penetration(self):
+    def penetration(self) -> np.ndarray:
         """Deepest overlap (l,) in mm."""
         return np.maximum(0.0, -self.gap.min(axis=0))
+
+
+class ActingCompliance(Protocol):
+    """What `DenseCompliance` does, on arrays of one kind, NumPy's or torch's."""
+
+    def double(self, force: Any) -> Any: ...
+
+    def single(self, force: Any) -> Any: ...
+
+    def precondition(self, x: Any) -> Any: ...
 
 
 class DenseCompliance:
     """What a matrix (c, c) in mm/N does to forces (c, l), in double and in single precision."""
 
-    def __init__(self, matrix):
+    def __init__(self, matrix: np.ndarray) -> None:
         self._double, self._single = matrix.astype(np.float64), matrix.astype(np.float32)
 
-    def double(self, force):
+    def double(self, force: np.ndarray) -> np.ndarray:
         """Displacements (c, l) of forces (c, l) in double precision."""
         return self._double @ force
 
-    def single(self, force):
+    def single(self, force: np.ndarray) -> np.ndarray:
         """The same in single precision."""
         return self._single @ force
 
-    def precondition(self, x):
+    def precondition(self, x: np.ndarray) -> np.ndarray:
         """About the inverse of `single`: nothing is known of a matrix."""
         return x
 
 
-def press_elastic(compliance, gap0, forces_n, *, area=None, foundation_modulus=1.0, precondition=None, settings=ContactSettings()):
+def press_elastic(compliance: np.ndarray, gap0: np.ndarray, forces_n: Sequence[float] | np.ndarray, *,
+                  area: np.ndarray | None = None, foundation_modulus: float = 1.0,
+                  precondition: Callable[[np.ndarray], np.ndarray] | None = None,
+                  settings: ContactSettings = ContactSettings()) -> ContactLoadSteps:
     """`ContactLoadSteps` of points with gaps gap0 (c,) in mm under forces (l,) in N.
 
     compliance (c, c): mm/N;  area (c,): in any unit, and foundation_modulus: force per area and depth, for a first guess
@@ -73,7 +90,7 @@ def press_elastic(compliance, gap0, forces_n, *, area=None, foundation_modulus=1
     """
     forces_n, acting = np.asarray(forces_n, dtype=float), DenseCompliance(compliance)
     if precondition is not None:
-        acting.precondition = precondition
+        acting.precondition = precondition     # type: ignore[method-assign, assignment]
     area = np.ones(len(gap0)) if area is None else area
     depth = depth_on_springs(gap0 - gap0.min(), area, forces_n / foundation_modulus) + gap0.min()
     load_steps = press_columns(acting, gap0[:, None], forces_n[None], depth[None], area=area, settings=settings)
@@ -82,12 +99,13 @@ def press_elastic(compliance, gap0, forces_n, *, area=None, foundation_modulus=1
     return load_steps
 
 
-def not_settled(force_n, settings=ContactSettings()):
+def not_settled(force_n: float, settings: ContactSettings = ContactSettings()) -> str:
     """What is said of a load step that is not reached."""
     return f"The elastic press did not settle its contact at {force_n:g} N in {settings.max_iterations} iterations."
 
 
-def press_columns(compliance, gap0, forces_n, depth, *, area, settings=ContactSettings()):
+def press_columns(compliance: ActingCompliance, gap0: Any, forces_n: Any, depth: Any, *, area: Any,
+                  settings: ContactSettings = ContactSettings()) -> ContactLoadSteps:
     """`ContactLoadSteps` of many presses on one surface, with a column for each press and load step, a press' load steps side by
     side.
 
@@ -184,7 +202,7 @@ class _Press:
         state.iterations[columns] += 1
 
 
-def depth_on_springs(gap, area, force_over_modulus):
+def depth_on_springs(gap: np.ndarray, area: np.ndarray, force_over_modulus: _Force) -> _Force:
     """Depth at which springs side by side, under gaps (c,) >= 0 that begin at 0 and of areas (c,), take a force over their
     foundation_modulus.
 
@@ -196,7 +214,8 @@ def depth_on_springs(gap, area, force_over_modulus):
     return (force_over_modulus + moment[last]) / weight[last]
 
 
-def projected_conjugate_gradients(apply, precondition, mask, right, total, settings):
+def projected_conjugate_gradients(apply: Callable[[Any], Any], precondition: Callable[[Any], Any], mask: Any, right: Any,
+                                  total: Any, settings: ContactSettings) -> Any:
     """x (c, m), zero where mask (c, m) is, with sum x = total (m,) and apply(x) - right constant where it is not."""
     xp = array_namespace(mask)
     right = xp.astype(right, xp.float32)
@@ -242,7 +261,8 @@ class ElasticLoadStep:
     penetration: float
 
 
-def active_set(compliance, gap0, forces_n, *, max_iterations=200):
+def active_set(compliance: np.ndarray, gap0: np.ndarray, forces_n: Iterable[float], *,
+               max_iterations: int = 200) -> Iterator[ElasticLoadStep]:
     """Yield an `ElasticLoadStep` for each force: the plain method, load step by load step, with direct solutions.
 
     Solve the touching points' equations, drop those that pull, add those that penetrate; the set of one force starts the next.

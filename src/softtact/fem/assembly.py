@@ -3,11 +3,13 @@
 Built by nodes, not by unknowns: nine times less to sort. An unknown is a free component of a node, numbered node by node.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 import scipy.sparse as sp
 from numba import njit
 
-from softtact.linalg.workers import SERIAL
+from softtact.linalg.workers import SERIAL, Workers
 
 
 class SymmetricPattern:
@@ -16,7 +18,7 @@ class SymmetricPattern:
     free (n, 3): which components of the nodes are unknown; elements: arrays (e, m) of node numbers, one per kind.
     """
 
-    def __init__(self, free, elements):
+    def __init__(self, free: np.ndarray, elements: Sequence[np.ndarray]) -> None:
         counts = free.sum(axis=1)
         self.number = np.where(free, np.cumsum(free.ravel()).reshape(free.shape) - 1, -1)
         self.size = int(counts.sum())
@@ -26,11 +28,11 @@ class SymmetricPattern:
         self._before = _columns_before(self._starts, self._neighbours, counts)
         self.indptr, self.indices = _expand(self.number, counts, self._starts, self._neighbours)
 
-    def matrix(self):
+    def matrix(self) -> sp.csr_matrix:
         """A csr matrix of zeros with this pattern."""
         return sp.csr_matrix((np.zeros(len(self.indices)), self.indices, self.indptr), shape=(self.size, self.size))
 
-    def positions(self, nodes):
+    def positions(self, nodes: np.ndarray) -> np.ndarray:
         """Places (e, k (k + 1) / 2) in the values of the entries (i, j >= i) of elements (e, m), k = 3 m; -1 where held."""
         return _positions(np.ascontiguousarray(nodes), self.number, self._rank, self._starts, self._neighbours, self._before,
                           self.indptr)
@@ -42,14 +44,16 @@ class SymmetricProduct:
     Values are read once, not once for each triangle, and the columns of rows that have the same ones (a node's three) once for all.
     """
 
-    def __init__(self, indptr, indices):
+    _parts: list[tuple[int, np.ndarray]]
+
+    def __init__(self, indptr: np.ndarray, indices: np.ndarray) -> None:
         self._indptr, self._indices = indptr, indices
         alike = _rows_alike(indptr, indices)
         first = np.cumsum([0, *alike])
         half = np.searchsorted(indptr[first], indptr[-1] // 2)
         self._parts = [(0, alike[:half]), (first[half], alike[half:])]     # as many values in each; sums do not depend on threads
 
-    def __call__(self, data, x, *, workers=SERIAL):
+    def __call__(self, data: np.ndarray, x: np.ndarray, *, workers: Workers = SERIAL) -> np.ndarray:
         """A x (n,) in double precision, whatever that of the values."""
         one, other = workers.map(lambda part: _symmetric_product(self._indptr, self._indices, data, *part, x), self._parts)
         return one + other
@@ -258,7 +262,7 @@ def _entries_before(row, size):
 
 
 @njit(cache=True, nogil=True)
-def add_upper(values, matrices, positions):
+def add_upper(values: np.ndarray, matrices: np.ndarray, positions: np.ndarray) -> None:
     """Add symmetric element matrices (e, k, k) at their `positions`."""
     k = matrices.shape[1]
     for e in range(len(matrices)):
@@ -271,7 +275,7 @@ def add_upper(values, matrices, positions):
                 n += 1
 
 
-def upper_pattern(members, size):
+def upper_pattern(members: Sequence[np.ndarray], size: int) -> tuple[np.ndarray, np.ndarray]:
     """indptr, indices of the upper triangle of all unknowns that meet in an element; members (e, k), -1 where held."""
     starts = np.cumsum([0, *map(len, members)])
     rows = np.concatenate([np.repeat(np.arange(first, first + len(dofs)), dofs.shape[1])
@@ -285,7 +289,7 @@ def upper_pattern(members, size):
 
 
 @njit(cache=True, nogil=True)
-def upper_positions(indptr, indices, dofs):
+def upper_positions(indptr: np.ndarray, indices: np.ndarray, dofs: np.ndarray) -> np.ndarray:
     """Places (e, k (k + 1) / 2) in the values of the upper triangle for entries (i, j >= i) of matrices of unknowns (e, k).
 
     -1 where one is held.

@@ -163,7 +163,7 @@ _HEX27_NODES = np.vstack([_at_height(_QUAD9_NODES, zeta) for zeta in (-1, 1, 0)]
 HEX27 = Element(
     _HEX27_NODES, partial(quadratic, nodes=_HEX27_NODES), gauss_rule(3, 3), "hexahedron27",
     np.array([0, 1, 2, 3, 9, 10, 11, 12, 4, 5, 6, 7, 13, 14, 15, 16, 18, 19, 20, 21, 25, 23, 22, 24, 8, 17, 26]),
-    _faces(QUAD9, [np.arange(9), np.arange(9, 18), *(_side(*face.nodes, 9) for face in _QUAD_SIDES)]),
+    _faces(QUAD9, [np.arange(9), np.arange(9, 18), *(_side(*face.nodes, 9) for face in _QUAD_SIDES)]),     # type: ignore[call-arg]
     reduced=gauss_rule(2, 3), abaqus_name="C3D20",
     abaqus_nodes=np.array([0, 1, 2, 3, 9, 10, 11, 12, 4, 5, 6, 7, 13, 14, 15, 16, 18, 19, 20, 21]))
 """Full quadratic hexahedron on [-1, 1]^3: QUAD9 at the bottom, the top and the middle; sides as those of HEX20::
@@ -181,7 +181,7 @@ WEDGE18 = Element(
     np.vstack([_at_height(TRI6.nodes, zeta) for zeta in (-1, 1, 0)]), partial(lifted, base=quadratic_triangle), wedge_rule(),
     "wedge18",
     np.array([0, 1, 2, 6, 7, 8, 3, 4, 5, 9, 10, 11, 12, 13, 14, 15, 16, 17]),
-    _faces(TRI6, [np.arange(6), np.arange(6, 12)]) + _faces(QUAD9, [_side(*face.nodes, 6) for face in TRI6.faces]),
+    _faces(TRI6, [np.arange(6), np.arange(6, 12)]) + _faces(QUAD9, [_side(*face.nodes, 6) for face in TRI6.faces]),     # type: ignore[call-arg]
     abaqus_name="C3D15", abaqus_nodes=np.array([0, 1, 2, 6, 7, 8, 3, 4, 5, 9, 10, 11, 12, 13, 14]))
 """Full quadratic wedge, zeta from -1 to 1: TRI6 at the bottom, the top and the middle; sides over those of TRI6::
 

@@ -1,6 +1,7 @@
 """Meshes made by lifting a plan of quadratic quadrilaterals and triangles through levels of height."""
 
 import itertools
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -23,7 +24,7 @@ class Mesh2D:
     corners: int
     triangles: np.ndarray = field(default_factory=lambda: np.zeros((0, 6), dtype=np.int64))
 
-    def outer_sides(self):
+    def outer_sides(self) -> tuple[np.ndarray, ...]:
         """Quads (k,) and their sides (k,), numbered as in `QUAD9.faces`, that belong to no other element."""
         sides = np.sort(self.quads[:, QUAD9.sides[:, :2]], axis=2)     # by their corners
         others = np.sort(self.triangles[:, TRI6.sides[:, :2]], axis=2)
@@ -45,33 +46,33 @@ class HexMesh:
     wedges: np.ndarray
 
     @property
-    def layers(self):
+    def layers(self) -> int:
         """Number of element layers."""
         return len(self.planes) - 1
 
     @property
-    def inner_planes(self):
+    def inner_planes(self) -> np.ndarray:
         """Node numbers (2 layers, plan points) of the planes below the top, those in the middle of layers among them.
 
         Only of a mesh whose layers have all the plan's points in their middle.
         """
         return np.vstack([self.planes[:-1], *(self.middle(k) for k in range(self.layers))])
 
-    def middle(self, index):
+    def middle(self, index: int) -> np.ndarray:
         """Node numbers (plan points,) in the middle of one layer, of a mesh that has them all."""
         count = self.planes.shape[1]
         return self.planes.size + index * count + np.arange(count)
 
-    def layer(self, index):
+    def layer(self, index: int) -> np.ndarray:
         """Hexes of one layer (q, 20 or 27)."""
         return self.hexes.reshape(self.layers, -1, self.hexes.shape[1])[index]
 
-    def wedge_layer(self, index):
+    def wedge_layer(self, index: int) -> np.ndarray:
         """Wedges of one layer (t, 18)."""
         return self.wedges.reshape(self.layers, -1, 18)[index]
 
 
-def extrude(mesh_2d, heights, *, scale=None):
+def extrude(mesh_2d: Mesh2D, heights: Sequence[float] | np.ndarray, *, scale: Callable[[float], float] | None = None) -> HexMesh:
     """Lift a plan mesh through `levels` (increasing z in mm); `scale(z)` multiplies the plan's coordinates.
 
     8-node quads become 20-node hexahedra, 9-node quads 27-node ones, triangles 18-node wedges.
@@ -106,7 +107,7 @@ def _serendipity(low, high, middle, quads):
     return np.hstack([low[corner], high[corner], low[mid], high[mid], middle[corner]])
 
 
-def grid_mesh_2d(x_lines, y_lines):
+def grid_mesh_2d(x_lines: np.ndarray, y_lines: np.ndarray) -> Mesh2D:
     """Rectangles between grid lines (increasing, mm), numbered x fastest."""
     nx, ny = len(x_lines), len(y_lines)
     corner = np.arange(nx * ny).reshape(ny, nx)
@@ -123,7 +124,7 @@ def grid_mesh_2d(x_lines, y_lines):
     return Mesh2D(np.vstack([points(x_lines, y_lines), points(xm, y_lines), points(x_lines, ym)]), quads, nx * ny)
 
 
-def merge(quads, triangles=NO_TRIANGLES):
+def merge(quads: np.ndarray, triangles: np.ndarray = NO_TRIANGLES) -> Mesh2D:
     """Plan mesh of elements given by their nodes' coordinates, quads (q, 9, 2) and triangles (t, 6, 2) in mm."""
     corners = np.vstack([quads[:, :4].reshape(-1, 2), triangles[:, :3].reshape(-1, 2)])
     others = np.vstack([quads[:, 4:].reshape(-1, 2), triangles[:, 3:].reshape(-1, 2)])
@@ -136,7 +137,7 @@ def merge(quads, triangles=NO_TRIANGLES):
     return Mesh2D(np.vstack([corner_points, other_points]), quad, len(corner_points), triangle)
 
 
-def with_centres(quads):
+def with_centres(quads: np.ndarray) -> np.ndarray:
     """8-node quads (q, 8, 2) with their centres as ninth nodes (the 8-node map's centre, so that the shape is the same)."""
     centre = QUAD8.shape(np.zeros((1, 2)))[0] @ quads
     return np.concatenate([quads, centre], axis=1)
@@ -147,7 +148,7 @@ def _unique(points):
     return points[first], where.ravel()
 
 
-def refine(mesh_2d, times=1):
+def refine(mesh_2d: Mesh2D, times: int = 1) -> Mesh2D:
     """Split every element of a plan mesh into four, on the same curves."""
     for _ in range(times):
         mesh_2d = merge(_split(mesh_2d.points[mesh_2d.quads], QUAD9.shape, QUAD9.nodes, _QUAD_CHILDREN),
@@ -188,7 +189,7 @@ def _ring_quads(inner, inner_mid, outer, outer_mid):
     return np.array(quads)
 
 
-def disc_quads(rings=1, core=CORE_RADIUS):
+def disc_quads(rings: int = 1, core: float = CORE_RADIUS) -> np.ndarray:
     """Unit disc as an O-grid of a square core and `rings` rings of four quads (1 + 4 rings, 9, 2), the thinner the farther out.
 
     Corners of the outer sides lie at 0, 90, 180 and 270 degrees.
@@ -202,12 +203,12 @@ def disc_quads(rings=1, core=CORE_RADIUS):
     return with_centres(np.vstack([[[*inner, *inner_mid]], *between]))
 
 
-def disc_mesh_2d(refinement=0, rings=1, core=CORE_RADIUS):
+def disc_mesh_2d(refinement: int = 0, rings: int = 1, core: float = CORE_RADIUS) -> Mesh2D:
     """Unit disc as an O-grid of `disc_quads`, each split into four `refinement` times."""
     return refine(merge(disc_quads(rings, core)), refinement)
 
 
-def cell_mesh_2d(pitch, diameter, rings=1, core=CORE_RADIUS):
+def cell_mesh_2d(pitch: float, diameter: float, rings: int = 1, core: float = CORE_RADIUS) -> tuple[np.ndarray, np.ndarray]:
     """One cell of a lattice of discs: quads (q, 9, 2) and triangles (4, 6, 2) in mm, the first quads being `disc_quads`.
 
     Along each side of the cell lie two elements. Where the discs of neighbours do not touch a ring of quads surrounds the disc.
@@ -241,7 +242,8 @@ class SheetMesh2D:
     quarters: tuple
 
 
-def sheet_mesh_2d(centres, counts, pitch, diameter, footprint, *, refinement=0, rings=1, core=CORE_RADIUS):
+def sheet_mesh_2d(centres: np.ndarray, counts: Sequence[int], pitch: float, diameter: float, footprint: Sequence[float], *,
+                  refinement: int = 0, rings: int = 1, core: float = CORE_RADIUS) -> SheetMesh2D:
     """Cells at `centres` (f, 2) of a lattice `counts`, and strips of quads to the edges of the footprint (mm)."""
     quads, triangles = cell_mesh_2d(pitch, diameter, rings, core)
     strips = _strips(counts, pitch, footprint)

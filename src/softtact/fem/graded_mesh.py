@@ -4,6 +4,7 @@ Where a small element meets a larger one its nodes follow the larger one's face.
 its own functions on each part; so the displacement is continuous, and nodes that follow are no unknowns.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,23 +34,23 @@ class CoverMesh:
     top_cells: np.ndarray
 
     @property
-    def free(self):
+    def free(self) -> int:
         """Number of points that follow no others; they are the first ones."""
         return self.follow.shape[1]
 
     @property
-    def top_nodes(self):
+    def top_nodes(self) -> np.ndarray:
         """Free points on the top."""
         nodes = np.unique(self.top)
         return nodes[nodes < self.free]
 
     @property
-    def bottom_nodes(self):
+    def bottom_nodes(self) -> np.ndarray:
         """Free points on the lower side."""
         nodes = np.unique(self.bottom)
         return nodes[nodes < self.free]
 
-    def masters(self):
+    def masters(self) -> tuple[np.ndarray, np.ndarray]:
         """Free points (n, w) that each point follows, and with which weights (n, w); unused places have weight 0."""
         width = int(np.diff(self.follow.indptr).max())
         nodes, weights = np.zeros((len(self.points), width), dtype=np.int64), np.zeros((len(self.points), width))
@@ -59,7 +60,7 @@ class CoverMesh:
         return nodes, weights
 
 
-def split_depths(shape, wanted, most):
+def split_depths(shape: tuple[int, int], wanted: Callable[[np.ndarray, float, int], np.ndarray], most: int) -> np.ndarray:
     """How often each place of a grid is split (ny 2^most, nx 2^most), for a grid of `shape` (nx, ny).
 
     `wanted(low, size, level)` tells of cells, by their lower corners (c, 2) and size in units of the grid, whether to split them.
@@ -75,7 +76,7 @@ def split_depths(shape, wanted, most):
     return depth
 
 
-def cover_mesh(x_lines, y_lines, heights, splits):
+def cover_mesh(x_lines: np.ndarray, y_lines: np.ndarray, heights: np.ndarray, splits: np.ndarray) -> CoverMesh:
     """Hexahedra between `heights` (k + 1,) in mm over a grid.
 
     levels (k, ny 2^m, nx 2^m): how often the cells are split where, layer by layer from below.

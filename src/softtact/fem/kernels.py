@@ -6,7 +6,7 @@ Symmetric tensors are stored as xx, yy, zz, xy, yz, zx. All kernels run on one c
 import numpy as np
 from numba import njit
 
-from softtact.fem.kernel_records import Deformation
+from softtact.fem.kernel_records import Deformation, ElementArrays, VolumeResponse
 
 _ROW = np.array([0, 1, 2, 0, 1, 2])
 _COL = np.array([0, 1, 2, 1, 2, 0])
@@ -28,7 +28,7 @@ def _gradient(along, slopes):
 
 
 @njit(cache=True, nogil=True)
-def deformation(displacement, at_rest):
+def deformation(displacement: np.ndarray, at_rest: ElementArrays) -> Deformation:
     """`Deformation` of elements, given by their `ElementArrays`, from nodal displacement (e, m, 3) in mm."""
     gradients, shapes = at_rest.gradients, at_rest.shapes
     elements, nodes, _ = displacement.shape
@@ -59,7 +59,7 @@ def deformation(displacement, at_rest):
 
 
 @njit(cache=True, nogil=True)
-def add_forces(total, nodes, forces):
+def add_forces(total: np.ndarray, nodes: np.ndarray, forces: np.ndarray) -> None:
     """Add elements' forces (e, m, 3) to those of all nodes (n, 3); nodes (e, m)."""
     for e in range(len(nodes)):
         for a in range(nodes.shape[1]):
@@ -68,7 +68,7 @@ def add_forces(total, nodes, forces):
 
 
 @njit(cache=True, nogil=True)
-def inverse_symmetric(c):
+def inverse_symmetric(c: np.ndarray) -> np.ndarray:
     """Inverse (6,) of a symmetric 3 x 3 tensor (6,)."""
     xx, yy, zz, xy, yz, zx = c[0], c[1], c[2], c[3], c[4], c[5]
     out = np.empty(6)
@@ -83,7 +83,7 @@ def inverse_symmetric(c):
 
 
 @njit(cache=True, nogil=True)
-def internal_force(deformed, at_rest, stress, pressure):
+def internal_force(deformed: Deformation, at_rest: ElementArrays, stress: np.ndarray, pressure: np.ndarray) -> np.ndarray:
     """Nodal forces (e, 3 m) in N: isochoric second Piola-Kirchhoff stress (e*g, 6) plus pressure (e, g) J C^-1, both in MPa."""
     F, C, J = deformed.F, deformed.C, deformed.J
     gradients, volumes, shapes = at_rest.gradients, at_rest.volumes, at_rest.shapes
@@ -261,7 +261,8 @@ def _padded(values, rows, columns, like):
 
 
 @njit(cache=True, nogil=True)
-def tangent(deformed, at_rest, stress, moduli, volume, like):
+def tangent(deformed: Deformation, at_rest: ElementArrays, stress: np.ndarray, moduli: np.ndarray, volume: VolumeResponse,
+            like: np.ndarray) -> np.ndarray:
     """Tangent (e, 3 m, 3 m) in N/mm of `internal_force` with the pressure of a `VolumeResponse`.
 
     stress (e*g, 6), moduli (e*g, 6, 6) in MPa: of the law without its volume

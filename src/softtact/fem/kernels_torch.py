@@ -4,9 +4,10 @@ A law sees C of all points (6 numbers each) and gives stress and moduli (6 and 3
 run in double precision but for the products of a tangent in single precision, as in `kernels`; both agree to rounding.
 """
 
+import numpy as np
 import torch
 
-from softtact.fem.kernel_records import Deformation
+from softtact.fem.kernel_records import Deformation, ElementArrays, VolumeResponse
 
 _ROW, _COL = [0, 1, 2, 0, 1, 2], [0, 1, 2, 1, 2, 0]     # of xx, yy, zz, xy, yz, zx
 _VOIGT = [[0, 3, 5], [3, 1, 4], [5, 4, 2]]
@@ -15,23 +16,24 @@ _VOIGT = [[0, 3, 5], [3, 1, 4], [5, 4, 2]]
 class DeviceKernels:
     """`deformation`, `internal_force` and `tangent` with the arguments of `kernels`: arrays, but for F, which stays there."""
 
-    def __init__(self, device):
+    def __init__(self, device: str | torch.device) -> None:
         self.device = torch.device(device)
-        self._kept = {}
+        self._kept: dict[int, tuple[np.ndarray, torch.Tensor]] = {}
 
-    def deformation(self, displacement, at_rest):
+    def deformation(self, displacement: np.ndarray, at_rest: ElementArrays) -> Deformation:
         """See `kernels.deformation`."""
         F, C, J = _kinematics(self._constant(at_rest.gradients)[self._there(at_rest.shapes)], self._there(displacement))
         return Deformation(F, _back(C), _back(J))
 
-    def internal_force(self, deformed, at_rest, stress, pressure):
+    def internal_force(self, deformed: Deformation, at_rest: ElementArrays, stress: np.ndarray, pressure: np.ndarray) -> np.ndarray:
         """See `kernels.internal_force`."""
         (F, _, J), which = deformed, self._there(at_rest.shapes)
         force = _forces(F, self._there(J), self._constant(at_rest.gradients)[which], self._constant(at_rest.volumes)[which],
                         self._per_point(stress, J), self._there(pressure))
         return _back(force)
 
-    def tangent(self, deformed, at_rest, stress, moduli, volume, like):
+    def tangent(self, deformed: Deformation, at_rest: ElementArrays, stress: np.ndarray, moduli: np.ndarray, volume: VolumeResponse,
+                like: np.ndarray) -> np.ndarray:
         """See `kernels.tangent`."""
         (F, _, J), which, precision = deformed, self._there(at_rest.shapes), torch.from_numpy(like).dtype
         G, w, J_there = self._constant(at_rest.gradients)[which], self._constant(at_rest.volumes)[which], self._there(J)
@@ -42,7 +44,7 @@ class DeviceKernels:
         A, inverse = _moduli(F, w, self._per_point(stress, J), self._per_point(moduli, J), pj, local)
         change = torch.einsum("egij,egjm->egmi", (w * J_there)[..., None, None] * (F @ inverse), G).flatten(2)
         modes = [values.to(precision) for values in (self._constant(at_rest.basis), self._constant(at_rest.gram_inverse)[which], w)]
-        volumetric = _volumetric(change.to(precision), *modes, volume.modulus if stiffness is None else stiffness.to(precision),
+        volumetric = _volumetric(change.to(precision), *modes, volume.modulus if stiffness is None else stiffness.to(precision),     # type: ignore[call-arg]
                                  None if quartic is None else quartic.to(precision))
         return _back(volumetric + _products(A.to(precision), G.to(precision)))
 

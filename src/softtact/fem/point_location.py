@@ -5,6 +5,7 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from softtact.fem.elements import QUAD9, TRI6
+from softtact.fem.extruded_mesh import Mesh2D
 
 _NEAREST = 16        # elements, by their middles, in which a point is looked for
 _NEWTON_STEPS = 30
@@ -13,7 +14,7 @@ _SAME = 1e-9         # mm
 _STARTS = np.linspace(0.0, 1.0, 9)
 
 
-def interpolation_2d(mesh_2d, points):
+def interpolation_2d(mesh_2d: Mesh2D, points: np.ndarray) -> sp.csr_matrix:
     """Sparse matrix (p, plan points) that interpolates a nodal field of a full quadratic `Mesh2D` at points (p, 2) in mm.
 
     Raises ValueError for a point outside the plan.

@@ -19,8 +19,10 @@ at 0.4 MPa) and Newton's method stalls.
 """
 
 import copy
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -28,7 +30,8 @@ from softtact.fem import kernels
 from softtact.fem.elements import HEX20, HEX27, WEDGE18, reference_gradients
 from softtact.fem.kernel_records import ElementArrays, VolumePenalties, VolumeResponse
 from softtact.fem.volume_kernels import add_penalties, project
-from softtact.linalg.workers import SERIAL, slices, unique_rows
+from softtact.linalg.workers import SERIAL, Workers, slices, unique_rows
+from softtact.materials.laws.base import Law
 from softtact.materials.laws.stretches import stretch_range
 
 _NONE = np.zeros((0, 0))
@@ -44,7 +47,7 @@ class BlockState:
     displacement: np.ndarray
 
     @property
-    def energy(self):
+    def energy(self) -> float:
         """Energy of all elements in mJ."""
         return float(self.energies.sum())
 
@@ -60,8 +63,9 @@ class SolidBlock:
 
     loops = kernels
 
-    def __init__(self, gradients, volumes, points, law, *, shapes=None, unprojected_penalty_ratio=0.0, quartic_penalty_ratio=0.0,
-                 trilinear=False):
+    def __init__(self, gradients: np.ndarray, volumes: np.ndarray, points: np.ndarray, law: Law, *,
+                 shapes: np.ndarray | None = None, unprojected_penalty_ratio: float = 0.0, quartic_penalty_ratio: float = 0.0,
+                 trilinear: bool = False) -> None:
         self.law = law
         self._unprojected_penalty_ratio, self._quartic_penalty_ratio = unprojected_penalty_ratio, quartic_penalty_ratio
         volumes, basis = np.ascontiguousarray(volumes), _pressure_modes(points, trilinear)
@@ -70,12 +74,12 @@ class SolidBlock:
                                      np.arange(len(gradients)) if shapes is None else shapes, basis, np.linalg.inv(gram))
 
     @property
-    def unprojected_modulus(self):
+    def unprojected_modulus(self) -> float:
         """k in MPa."""
         return min(self._unprojected_penalty_ratio * self.law.mu0, self.law.bulk_modulus)
 
     @property
-    def quartic_modulus(self):
+    def quartic_modulus(self) -> float:
         """q in MPa."""
         return self._quartic_penalty_ratio * self.law.mu0
 
@@ -85,7 +89,8 @@ class SolidBlock:
         penalties = VolumePenalties(self.unprojected_modulus, self.quartic_modulus)
         return self.law.volumetric.with_modulus(self.law.bulk_modulus - penalties.unprojected), penalties
 
-    def evaluate(self, displacement, elements=slice(None), *, workers=SERIAL):
+    def evaluate(self, displacement: np.ndarray, elements: np.ndarray | slice = slice(None), *,
+                 workers: Workers = SERIAL) -> BlockState | None:
         """Energies and internal forces of the chosen elements; None if one is turned inside out (J <= 0 at a quadrature point)."""
         shapes = self.at_rest.shapes[elements]
         parts = workers.map(lambda part: self._evaluate(displacement[part], self.at_rest._replace(shapes=shapes[part])),
@@ -105,7 +110,8 @@ class SolidBlock:
         energies = (at_rest.volumes[at_rest.shapes] * response.energy.reshape(deformed.J.shape)).sum(axis=1) + volume.energies
         return energies, self.loops.internal_force(deformed, at_rest, response.stress, volume.pressure)
 
-    def tangent(self, displacement, elements=slice(None), *, precision=np.float64):
+    def tangent(self, displacement: np.ndarray, elements: np.ndarray | slice = slice(None), *,
+                precision: type[np.floating] = np.float64) -> np.ndarray:
         """Tangent (e, 3 m, 3 m) in N/mm of the chosen elements, whose displacement (e, m, 3) is given.
 
         precision: float32 takes two thirds of the time, for steps that are corrected by a residual in double precision
@@ -116,11 +122,11 @@ class SolidBlock:
         return self.loops.tangent(deformed, at_rest, response.stress, response.tangent, volume, np.empty(0, precision))
 
     @property
-    def volume(self):
+    def volume(self) -> float:
         """Volume of all elements in mm3."""
         return float(self.at_rest.volumes.sum(axis=1)[self.at_rest.shapes].sum())
 
-    def volume_outside(self, displacement, window):
+    def volume_outside(self, displacement: np.ndarray, window: tuple[float, float]) -> float:
         """Volume (mm3) in which an isochoric principal stretch lies outside of `window` (lowest, highest)."""
         low, high = stretch_range(kernels.deformation(displacement, self.at_rest).C)
         return float(self.at_rest.volumes[self.at_rest.shapes].ravel() @ ((low < window[0]) | (high > window[1])))
@@ -138,12 +144,12 @@ class SolidBlock:
         return VolumeResponse(energies, pressure, projected.bulk_modulus, stiffness, penalties.unprojected, quartic)
 
 
-def joined(parts):
+def joined(parts: Iterable[tuple[np.ndarray, SolidBlock]]) -> list[tuple[np.ndarray, SolidBlock]]:
     """The same elements in as few blocks as there are kinds of them; parts and result: [(nodes (e, m), block)].
 
     The kind is the law, the numbers of nodes and of points; the parts' blocks come to use their share of the new ones' arrays.
     """
-    kinds = {}
+    kinds: dict[tuple, list[tuple[np.ndarray, SolidBlock]]] = {}
     for nodes, block in parts:
         kinds.setdefault((id(block.law), type(block), *block.at_rest.gradients.shape[1:]), []).append((nodes, block))
     return [(np.vstack([nodes for nodes, _ in alike]), _joined_block([block for _, block in alike])) for alike in kinds.values()]
@@ -206,23 +212,24 @@ class HexBlock(_ElementBlock):
     reduced: 2 x 2 x 2 points instead of 3 x 3 x 3
     """
 
-    def __init__(self, coordinates, law, **options):
+    def __init__(self, coordinates: np.ndarray, law: Law, **options: Any) -> None:
         super().__init__({20: HEX20, 27: HEX27}[coordinates.shape[1]], coordinates, law, **options)
 
 
 class WedgeBlock(_ElementBlock):
     """Wedges WEDGE18 given by coordinates (e, 18, 3) in mm; options as `SolidBlock` has them."""
 
-    def __init__(self, coordinates, law, **options):
+    def __init__(self, coordinates: np.ndarray, law: Law, **options: Any) -> None:
         super().__init__(WEDGE18, coordinates, law, **options)
 
 
-def hanging_node_constraints(masters, weights, elements, block):
+def hanging_node_constraints(masters: np.ndarray, weights: np.ndarray, elements: np.ndarray,
+                             block: SolidBlock) -> tuple[np.ndarray, SolidBlock]:
     """Nodes (e, w) that elements (e, m) hang on, and the block in terms of these."""
     masters, weights = masters[elements], weights[elements]
     nodes, column = _distinct(np.where(np.abs(weights) > 1e-12, masters, -1).reshape(len(elements), -1))
     follow = np.zeros((*elements.shape, nodes.shape[1]))
-    element, node, _ = np.indices(masters.shape, sparse=True)
+    element, node, _ = np.indices(masters.shape, sparse=True)     # type: ignore[misc]
     column, used = column.reshape(masters.shape), column.reshape(masters.shape) >= 0
     np.add.at(follow, tuple(np.broadcast_to(index, masters.shape)[used] for index in (element, node, column)), weights[used])
     at_rest = block.at_rest

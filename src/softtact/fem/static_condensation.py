@@ -4,6 +4,7 @@ The matrix (n + m, n + m) of a body lists n inner unknowns first, then m outer o
 filled, row by row; to Fortran that is a lower triangle column by column.
 """
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from numba import njit
 
 from softtact.linalg.lapack import ROUTINES, address, call, keep_alive
 from softtact.linalg.row_loops import add_row, row_product
-from softtact.linalg.workers import SERIAL, slices
+from softtact.linalg.workers import SERIAL, Workers, slices
 
 _AT_ONCE = 60                # bodies that one thread reduces or recovers at once
 _SMALLEST_STIFFNESS = 0.02   # N/mm of a mode of a folding body; the softest mode of a frustum at rest has 0.03
@@ -25,7 +26,7 @@ class Springs(NamedTuple):
     places: np.ndarray
     weights: np.ndarray
 
-    def with_others(self, others):
+    def with_others(self, others: "Springs") -> "Springs":
         """These springs and the others, which act on as many unknowns or more."""
         more = ((0, 0), (0, others.places.shape[1] - self.places.shape[1]))
         return Springs(np.hstack([self.stiffness, others.stiffness]),
@@ -50,17 +51,18 @@ class Condensation:
     All in single precision: it serves steps that are corrected by a residual in double precision.
     """
 
-    def __init__(self, bodies, inner, outer, element_dofs):
+    def __init__(self, bodies: int, inner: int, outer: int, element_dofs: Iterable[np.ndarray]) -> None:
         self._dofs = tuple(np.ascontiguousarray(dofs) for dofs in element_dofs)
         self._store = _Store(rows=np.zeros((bodies, inner, inner + outer), dtype=np.float32),
                              outer=np.zeros((bodies, outer, outer), dtype=np.float32), modified=np.zeros(bodies, dtype=bool))
 
     @property
-    def outer(self):
+    def outer(self) -> np.ndarray:
         """The condensed matrices (bodies, m, m) in N/mm."""
         return self._store.outer
 
-    def set(self, bodies, tangents, springs=None, *, damping=None):
+    def set(self, bodies: np.ndarray, tangents: Iterable[np.ndarray], springs: Springs | None = None, *,
+            damping: np.ndarray | None = None) -> None:
         """Assemble, factor and condense the matrices of the given bodies (b,).
 
         tangents: for each group of elements (b, k, w (w + 1) / 2) in N/mm, as `packed` has them;  springs: `Springs` of these
@@ -75,7 +77,8 @@ class Condensation:
         damping = np.zeros(len(bodies)) if damping is None else damping
         _set(bodies, damping, tuple(tangents), self._dofs, springs, self._store, ROUTINES)
 
-    def residual(self, inner, *, bodies=None, workers=SERIAL):
+    def residual(self, inner: np.ndarray, *, bodies: np.ndarray | None = None,
+                 workers: Workers = SERIAL) -> tuple[np.ndarray, np.ndarray]:
         """What inner residuals (b, n) of some bodies (b,), or of all, leave on their outer unknowns (b, m), and the part to keep
         for `recover`."""
         half, bodies = np.array(inner, dtype=np.float32, order="C"), self._chosen(bodies)
@@ -83,7 +86,8 @@ class Condensation:
         workers.map(lambda part: _reduce(self._store.rows, bodies[part], half[part], passed_on[part]), slices(len(half), _AT_ONCE))
         return passed_on, half
 
-    def recover(self, half, outer_step, *, bodies=None, workers=SERIAL):
+    def recover(self, half: np.ndarray, outer_step: np.ndarray, *, bodies: np.ndarray | None = None,
+                workers: Workers = SERIAL) -> np.ndarray:
         """Newton step (b, n) of the inner unknowns of some bodies (b,), or of all, for that of their outer ones (b, m)."""
         step, bodies = half.astype(np.float32), self._chosen(bodies)     # a copy; a half that was cut is in double precision
         outer = np.ascontiguousarray(outer_step, dtype=np.float32)
@@ -93,18 +97,18 @@ class Condensation:
     def _chosen(self, bodies):
         return np.arange(len(self._store.rows)) if bodies is None else bodies
 
-    def positive_outer(self):
+    def positive_outer(self) -> np.ndarray:
         """The condensed matrices without their modes of negative stiffness."""
         values, vectors = np.linalg.eigh(self.outer)
         return np.matmul(vectors * np.maximum(values, 0.0)[:, None, :], vectors.transpose(0, 2, 1))
 
     @property
-    def modified(self):
+    def modified(self) -> int:
         """How many bodies had modes of negative stiffness."""
         return int(self._store.modified.sum())
 
 
-def packed(matrices):
+def packed(matrices: np.ndarray) -> np.ndarray:
     """Upper triangles (..., w (w + 1) / 2) of symmetric matrices (..., w, w), row after row, in single precision."""
     *like, width, _ = matrices.shape
     out = np.empty((int(np.prod(like)), width * (width + 1) // 2), dtype=np.float32)

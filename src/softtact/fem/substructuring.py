@@ -3,12 +3,13 @@
 Layers meet in their common planes only, so this takes half the operations and memory of one dense matrix for each body.
 """
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from softtact.fem.static_condensation import Condensation, packed
-from softtact.linalg.workers import SERIAL
+from softtact.fem.static_condensation import Condensation, Springs, packed
+from softtact.linalg.workers import SERIAL, Workers
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,8 @@ class Stage:
 class LayerwiseElimination:
     """Bodies with unknowns numbered from 0 to n - 1 in each; `outer` are those that are left in the end, in rising order."""
 
-    def __init__(self, bodies, inner, layers, *, coupled=None):
+    def __init__(self, bodies: int, inner: np.ndarray, layers: Sequence[Sequence[np.ndarray]], *,
+                 coupled: Sequence[np.ndarray] | None = None) -> None:
         """inner (n,): whether an unknown is eliminated
 
         layers: layer by layer the unknowns (k, w) of each group of like elements, -1 where held
@@ -48,26 +50,27 @@ class LayerwiseElimination:
         self.outer = left
 
     @property
-    def matrices(self):
+    def matrices(self) -> np.ndarray:
         """What is left of each body: (bodies, m, m), m as in `outer`."""
         return self.stages[-1].condensed.outer
 
-    def positive_matrices(self):
+    def positive_matrices(self) -> np.ndarray:
         """The same without their modes of negative stiffness."""
         return self.stages[-1].condensed.positive_outer()
 
-    def set(self, bodies, layers, *, damping=None):
+    def set(self, bodies: np.ndarray, layers: Iterable[tuple[Sequence[np.ndarray], Springs | None]], *,
+            damping: np.ndarray | None = None) -> None:
         """Eliminate anew in the given bodies (b,).
 
         layers: for each layer the tangents of its groups and its `Springs` or None; one layer is asked for after the other
         For these and the damping see `Condensation.set`.
         """
-        carried = []
+        carried: list[np.ndarray] = []
         for stage, (tangents, springs) in zip(self.stages, layers, strict=True):
             stage.condensed.set(bodies, [*tangents, *carried], springs, damping=damping)
             carried = [packed(stage.condensed.outer[bodies][:, None])]
 
-    def residual(self, force, *, bodies=None, workers=SERIAL):
+    def residual(self, force: np.ndarray, *, bodies: np.ndarray | None = None, workers: Workers = SERIAL) -> list[np.ndarray]:
         """Pass the inner forces (b, n) of some bodies (b,), or of all, on to the outer unknowns, in place; returns what `recover`
         needs."""
         forward_solved = []
@@ -77,7 +80,8 @@ class LayerwiseElimination:
             forward_solved.append(half)
         return forward_solved
 
-    def recover(self, forward_solved, step, *, bodies=None, workers=SERIAL):
+    def recover(self, forward_solved: Sequence[np.ndarray], step: np.ndarray, *, bodies: np.ndarray | None = None,
+                workers: Workers = SERIAL) -> None:
         """Fill in the inner unknowns of a Newton step (b, n) of some bodies, or of all, whose outer ones are given, in place."""
         for stage, half in zip(self.stages[::-1], forward_solved[::-1], strict=True):
             step[:, stage.inner] = stage.condensed.recover(half, step[:, stage.outer], bodies=bodies, workers=workers)

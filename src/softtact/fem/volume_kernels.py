@@ -3,9 +3,11 @@
 import numpy as np
 from numba import njit
 
+from softtact.fem.kernel_records import ElementArrays, VolumePenalties
+
 
 @njit(cache=True, nogil=True)
-def project(field, at_rest):
+def project(field: np.ndarray, at_rest: ElementArrays) -> np.ndarray:
     """Fields (e, g) of elements, projected on the functions of the pressure (e, g)."""
     out = np.empty(field.shape)
     for e in range(len(field)):
@@ -14,7 +16,8 @@ def project(field, at_rest):
 
 
 @njit(cache=True, nogil=True)
-def add_penalties(J, at_rest, seen, density, pressure, penalties):
+def add_penalties(J: np.ndarray, at_rest: ElementArrays, seen: np.ndarray, density: np.ndarray, pressure: np.ndarray,
+                  penalties: VolumePenalties) -> tuple[np.ndarray, np.ndarray]:
     """Energies (e,) in mJ of changes of volume; second derivative (e, g) in MPa of the quartic penalty, or (0, 0).
 
     seen, density, pressure (e, g): the projected J - 1, and the law's U and U' there, in MPa; the penalties are added to `pressure`

@@ -7,10 +7,12 @@ the sensor's full 50 N.
 """
 
 import argparse
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 import trimesh
+from manifold3d import Manifold
 
 from softtact.files import atomic_path
 from softtact.geometry.solids import (
@@ -36,68 +38,68 @@ OVERLAP = 0.5  # mm that a part reaches into its plate, so that the union is one
 LOW_FEATURE = 0.5  # mm by which the low features of objects 5 and 6 stay behind the others (paper, sec. 4.2)
 
 
-def bar(*points, width=BAR_WIDTH):
+def bar(*points: Sequence[float], width: float = BAR_WIDTH) -> Manifold:
     """Bar of an indenter along the line through `points`."""
     return path(points, width=width, height=FACE_HEIGHT + OVERLAP)
 
 
-def disc(diameter, centre=(0.0, 0.0)):
+def disc(diameter: float, centre: tuple[float, float] = (0.0, 0.0)) -> Manifold:
     """Round pad of an indenter."""
     return pad(centre, radius=diameter / 2, height=FACE_HEIGHT + OVERLAP)
 
 
-def hoop(outer, inner, centre=(0.0, 0.0)):
+def hoop(outer: float, inner: float, centre: tuple[float, float] = (0.0, 0.0)) -> Manifold:
     """Ring of an indenter."""
     return ring(outer=outer, inner=inner, height=FACE_HEIGHT + OVERLAP, centre=centre)
 
 
-def face(*corners):
+def face(*corners: Sequence[float] | np.ndarray) -> Manifold:
     """Convex polygonal pad of an indenter; corners counter-clockwise."""
     return polygon(corners, height=FACE_HEIGHT + OVERLAP)
 
 
-def corner_points(count, radius, *, start_deg=90.0):
+def corner_points(count: int, radius: float, *, start_deg: float = 90.0) -> np.ndarray:
     """Corners (count, 2) of a regular polygon."""
     angle = np.radians(start_deg + 360.0 * np.arange(count) / count)
     return radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
-def star(*, points=5, outer=10.0, inner=5.0):
+def star(*, points: int = 5, outer: float = 10.0, inner: float = 5.0) -> Manifold:
     """Star as overlapping kites, each from a tip across the centre: the rounded edges meet on the outline only."""
     tips = corner_points(points, outer)
     valleys = corner_points(points, inner, start_deg=90.0 + 180.0 / points)
     return union(face(tips[k], valleys[k], valleys[(k + 2) % points], valleys[k - 1]) for k in range(points))
 
 
-def corner_brackets(x=8.0, y=15.0, leg=5.0):
+def corner_brackets(x: float = 8.0, y: float = 15.0, leg: float = 5.0) -> Manifold:
     """An L in each of the four corners."""
     return union(bar((sx * (x - leg), sy * y), (sx * x, sy * y), (sx * x, sy * (y - leg)))
                  for sx in (-1, 1) for sy in (-1, 1))
 
 
-def blob(*discs):
+def blob(*discs: tuple[float, float, float]) -> Manifold:
     """Pad of overlapping discs (x, y, diameter)."""
     return union(disc(diameter, (x, y)) for x, y, diameter in discs)
 
 
-def half_disc(radius):
+def half_disc(radius: float) -> Manifold:
     """Half of a disc, its straight side along x."""
     angle = np.radians(np.linspace(0.0, 180.0, 25))
     return face(*np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
 
 
-def cap(radius, base_diameter):
+def cap(radius: float, base_diameter: float) -> Manifold:
     """Spherical cap of an indenter."""
     return dome(radius=radius, base_diameter=base_diameter, height=FACE_HEIGHT + OVERLAP)
 
 
-def ellipse(length=24.0, width=13.0):
+def ellipse(length: float = 24.0, width: float = 13.0) -> Manifold:
     """Elliptic pad with its long side along y."""
     angle = 2 * np.pi * np.arange(48) / 48
     return face(*np.column_stack([width / 2 * np.cos(angle), length / 2 * np.sin(angle)]))
 
 
-INDENTERS = {
+INDENTERS: dict[str, Callable[[], Manifold]] = {
     "A Form": lambda: union([bar((-7, -12), (0, 12), (7, -12)), bar((-4, -3), (4, -3))]),
     "Bordes H": lambda: union([bar((-8, 14), (8, 14)), bar((-8, -14), (8, -14))]),
     "Bordes V": lambda: union([bar((-8, -14), (-8, 14)), bar((8, -14), (8, 14))]),
@@ -151,7 +153,7 @@ INDENTERS = {
     "Irregular C": lambda: union([bar((-6, -12), (1, -6), (-3, 3), (6, 12)), bar((1, -6), (7, -9)), disc(6, (6, 4))]),
 }
 
-UNSEEN = {
+UNSEEN: dict[str, Callable[[], Manifold]] = {
     "Hexagon": lambda: face(*corner_points(6, 8.5)),
     "Ellipse": ellipse,
     "L Form": lambda: bar((-6, 12), (-6, -12), (7, -12)),
@@ -165,7 +167,7 @@ UNSEEN = {
 }
 
 
-def on_plate(pressing):
+def on_plate(pressing: Manifold) -> Manifold:
     """Indenter: the pressing part under a plate a little larger than its bounding box."""
     x0, y0, _, x1, y1, _ = pressing.bounding_box()
     plate = block(x1 - x0 + 2 * PLATE_MARGIN, y1 - y0 + 2 * PLATE_MARGIN, PLATE_HEIGHT)
@@ -173,29 +175,29 @@ def on_plate(pressing):
     return union([pressing, plate])
 
 
-def object_1():
+def object_1() -> Manifold:
     """Smooth rectangular prism."""
     return block(14, 34, 18, corner_radius=2.0, edge=2.0, round_top=True)
 
 
-def object_2():
+def object_2() -> Manifold:
     """Smooth sphere."""
     return ball(radius=25.0)
 
 
-def object_3():
+def object_3() -> Manifold:
     """Smooth circular prism on its flat end."""
     return pad((0, 0), radius=10.0, height=30.0, edge=0.5, round_top=True)
 
 
-def object_4():
+def object_4() -> Manifold:
     """Circular prism whose end carries a rim and a boss of one height."""
     body = raised(pad((0, 0), radius=10.5, height=16.0, edge=0.5, round_top=True), 2.0)
     reliefs = [ring(outer=20, inner=13, height=2.5), pad((0, 0), radius=3.5, height=2.5)]
     return union([body, *reliefs])
 
 
-def object_5():
+def object_5() -> Manifold:
     """Rectangular prism with four ridges, the second one 0.5 mm lower, and blind holes in the far side."""
     floor, holes_floor, top = 3.0, 10.0, 18.0
     body = raised(block(24, 42, top - floor, corner_radius=2.0), floor)
@@ -205,13 +207,13 @@ def object_5():
     return union([body, *ridges]) - union(holes)
 
 
-def ridge(y, *, lowered, floor=3.0):
+def ridge(y: float, *, lowered: float, floor: float = 3.0) -> Manifold:
     """Ridge of object 5, along x; `lowered` is how far it stays behind the contact plane."""
     bar_ = path([(-6.5, y), (6.5, y)], width=3.5, height=floor + OVERLAP - lowered)
     return raised(bar_, lowered)
 
 
-def object_6():
+def object_6() -> Manifold:
     """Cylinder with 19 small bosses on its flat end, six of which are 0.5 mm lower."""
     floor, pitch, boss_radius = 3.0, 5.0, 1.9
     body = raised(pad((0, 0), radius=14.0, height=20.0, edge=0.5, round_top=True), floor)
@@ -224,7 +226,7 @@ def object_6():
     return union([body, *bosses, *low])
 
 
-def key():
+def key() -> Manifold:
     """Key lying flat: a bow with its hole, a blade, and four bits of different lengths."""
     thickness = 2.3
     bits = [path([(0, y), (reach, y)], width=1.8, height=thickness)
@@ -233,7 +235,7 @@ def key():
                   path([(0, 0), (0, -15)], width=5.0, height=thickness), *bits])
 
 
-def bolt_head():
+def bolt_head() -> Manifold:
     """Head of a socket bolt: a hexagon with chamfered corners and a hexagonal hole, its shank behind."""
     head = polygon(corner_points(6, 9.6), height=7.0, edge=0.6)
     shank = raised(pad((0, 0), radius=5.0, height=20.5), 6.5)
@@ -241,7 +243,7 @@ def bolt_head():
     return union([head, shank]) - socket
 
 
-def coin():
+def coin() -> Manifold:
     """Coin: a raised rim, and a star in relief that stays 0.05 mm behind it."""
     body = raised(pad((0, 0), radius=9.8, height=1.6, edge=0.2, round_top=True), 0.3)
     relief = [raised(polygon([(0, 0), *tips], height=0.6, edge=0.15), 0.05) for tips in _rays(points=8, outer=7.0, half_deg=12.0)]
@@ -254,14 +256,14 @@ def _rays(*, points, outer, half_deg):
         yield [outer * np.array([np.cos(angle), np.sin(angle)]) for angle in np.radians([start - half_deg, start + half_deg])]
 
 
-def spanner():
+def spanner() -> Manifold:
     """Open-ended spanner lying flat: jaws, and a handle that ends in a round."""
     thickness = 4.0
     jaws = raised(arc(radius=6.2, width=4.5, start_deg=130, end_deg=410, height=thickness), 0.0).translate((0.0, 8.0, 0.0))
     return union([jaws, path([(0, 1), (0, -15)], width=6.0, height=thickness)])
 
 
-def bottle_cap():
+def bottle_cap() -> Manifold:
     """Screw cap, open side down: a wall with 24 friction states around it, closed behind."""
     height = 11.0
     wall = ring(outer=19.0, inner=14.5, height=height)
@@ -269,7 +271,7 @@ def bottle_cap():
     return union([wall, raised(pad((0, 0), radius=9.0, height=1.5), height - 1.5), *friction_states])
 
 
-def egg():
+def egg() -> Manifold:
     """Egg on its side: a ball, stretched along y and narrower towards one end."""
     points = trimesh.creation.icosphere(subdivisions=4).vertices
     narrow = 1.0 - 0.16 * points[:, 1]
@@ -282,25 +284,25 @@ GRASPED = {f"Object {number}": shape for number, shape in
            enumerate([object_1, object_2, object_3, object_4, object_5, object_6], start=1)} | EVERYDAY
 
 # set -> (folder, shapes, what every shape of the set gets)
-SETS = {
+SETS: dict[str, tuple[str, dict[str, Callable[[], Manifold]], Callable[[Manifold], Manifold]]] = {
     "indenters": ("indenters", INDENTERS, on_plate),
     "unseen": ("unseen", UNSEEN, on_plate),
     "grasps": ("grasped", GRASPED, lambda solid: solid),
 }
 
 
-def file_name(label):
+def file_name(label: str) -> str:
     """Name of an item as it stands in paths: `Circle G` -> `circle_g`."""
     return label.lower().replace(" ", "_")
 
 
-def make_mesh(set_name, label):
+def make_mesh(set_name: str, label: str) -> trimesh.Trimesh:
     """Mesh of one object of the study in mm, as a `trimesh.Trimesh`."""
     _, shapes, finish = SETS[set_name]
     return to_mesh(finish(shapes[label]()))
 
 
-def write_objects(out):
+def write_objects(out: Path | str) -> Path:
     """Write every STL file and `catalogue.yaml` below the folder `out`; return the catalogue's path."""
     out = Path(out)
     lines = ["# Objects of the study, one a line: name in paths, file beside this one, unit of the mesh, set, label.",
@@ -321,7 +323,7 @@ def _write_stl(file, mesh):
         temporary.write_bytes(mesh.export(file_type="stl"))
 
 
-def main(arguments=None):
+def main(arguments: Sequence[str] | None = None) -> None:
     """Command line."""
     parser = argparse.ArgumentParser(description="Write the study's objects as STL files with their catalogue.")
     parser.add_argument("--out", default="config/objects", type=Path, help="folder to write to")

@@ -4,9 +4,13 @@ Every solid stands on z = 0 with the face that presses, and grows upwards. Its l
 sharp edge puts an infinite pressure on a soft layer, which no mesh resolves.
 """
 
+from collections.abc import Iterable, Sequence
+from typing import Any
+
 import numpy as np
 import trimesh
 from manifold3d import CrossSection, Manifold, OpType
+from numpy.typing import ArrayLike
 
 EDGE_MM = 0.25  # radius of the rounded lower edge
 CHORD_ERROR_MM = 0.02  # how far a polygon may leave its circle
@@ -14,13 +18,13 @@ _EDGE_STEPS = 3  # straight pieces of the rounded edge, seen from the side
 _DECIMALS = 4  # of a coordinate in mm; unions leave corners that differ by round-off
 
 
-def circle_segments(radius):
+def circle_segments(radius: float) -> int:
     """Number of sides, a multiple of 4, that keeps a polygon within `CHORD_ERROR_MM` of its circle."""
     half_angle = np.arccos(max(1.0 - CHORD_ERROR_MM / radius, 0.0))
     return max(12, 4 * int(np.ceil(np.pi / half_angle / 4)))
 
 
-def edge_profile(radius, height, *, edge=EDGE_MM, round_top=False):
+def edge_profile(radius: float, height: float, *, edge: float = EDGE_MM, round_top: bool = False) -> np.ndarray:
     """Outline (points, 2) of a disc seen from the side as (distance from the axis, z), from the bottom upwards."""
     angle = np.linspace(0.0, np.pi / 2, _EDGE_STEPS + 1)
     lower = np.column_stack([radius - edge + edge * np.sin(angle), edge - edge * np.cos(angle)])
@@ -28,7 +32,7 @@ def edge_profile(radius, height, *, edge=EDGE_MM, round_top=False):
     return np.vstack([lower, upper])
 
 
-def disc_points(centre, radius, height, **profile):
+def disc_points(centre: ArrayLike, radius: float, height: float, **profile: Any) -> np.ndarray:
     """Points (n, 3) of a disc with a rounded edge, whose convex hull is the disc."""
     outline = edge_profile(radius, height, **profile)
     count = circle_segments(radius)
@@ -39,31 +43,32 @@ def disc_points(centre, radius, height, **profile):
     return np.concatenate([xy, z], axis=-1).reshape(-1, 3)
 
 
-def pad(centres, *, radius, height, **profile):
+def pad(centres: ArrayLike, *, radius: float, height: float, **profile: Any) -> Manifold:
     """Convex solid: the hull of discs of `radius` about each of `centres` (n, 2); one centre gives a disc."""
     points = [disc_points(centre, radius, height, **profile) for centre in np.atleast_2d(centres)]
     return Manifold.hull_points(np.concatenate(points))
 
 
-def polygon(corners, *, height, corner_radius=0.5, **profile):
+def polygon(corners: Sequence[Sequence[float] | np.ndarray] | np.ndarray, *, height: float, corner_radius: float = 0.5,
+            **profile: Any) -> Manifold:
     """Convex polygon through `corners` (n, 2), with rounded corners."""
     return pad(_inset(np.asarray(corners, float), corner_radius), radius=corner_radius, height=height, **profile)
 
 
-def path(points, *, width, height):
+def path(points: Sequence[Sequence[float] | np.ndarray] | np.ndarray, *, width: float, height: float) -> Manifold:
     """Bar of `width` with round ends along the line through `points` (n, 2)."""
     points = np.asarray(points, float)
     return union([pad(ends, radius=width / 2, height=height) for ends in zip(points[:-1], points[1:], strict=True)])
 
 
-def arc(*, radius, width, start_deg, end_deg, height):
+def arc(*, radius: float, width: float, start_deg: float, end_deg: float, height: float) -> Manifold:
     """Bar along an arc about the origin."""
     count = int(np.ceil(circle_segments(radius) * abs(end_deg - start_deg) / 360)) + 1
     angle = np.radians(np.linspace(start_deg, end_deg, count))
     return path(radius * np.column_stack([np.cos(angle), np.sin(angle)]), width=width, height=height)
 
 
-def ring(*, outer, inner, height, centre=(0.0, 0.0)):
+def ring(*, outer: float, inner: float, height: float, centre: tuple[float, float] = (0.0, 0.0)) -> Manifold:
     """Ring between two diameters; both lower edges are rounded."""
     outside = edge_profile(outer / 2, height)
     width = (outer - inner) / 2
@@ -72,7 +77,7 @@ def ring(*, outer, inner, height, centre=(0.0, 0.0)):
     return section.revolve(circle_segments(outer / 2)).translate((*centre, 0.0))
 
 
-def dome(*, radius, base_diameter, height):
+def dome(*, radius: float, base_diameter: float, height: float) -> Manifold:
     """Spherical cap of `radius` under a cylinder of `base_diameter`; `height` counts from the lowest point."""
     polar = np.linspace(0.0, np.arcsin(base_diameter / 2 / radius), 16)[1:]
     outline = np.column_stack([radius * np.sin(polar), radius - radius * np.cos(polar)])
@@ -80,34 +85,34 @@ def dome(*, radius, base_diameter, height):
     return CrossSection([outline]).revolve(circle_segments(base_diameter / 2))
 
 
-def block(size_x, size_y, height, *, corner_radius=0.5, **profile):
+def block(size_x: float, size_y: float, height: float, *, corner_radius: float = 0.5, **profile: Any) -> Manifold:
     """Rectangular block about the z axis."""
     x, y = size_x / 2, size_y / 2
     return polygon([(-x, -y), (x, -y), (x, y), (-x, y)], height=height, corner_radius=corner_radius, **profile)
 
 
-def ball(*, radius, subdivisions=4):
+def ball(*, radius: float, subdivisions: int = 4) -> Manifold:
     """Sphere that rests on z = 0."""
     sphere = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
     return Manifold.hull_points(sphere.vertices + [0, 0, radius])
 
 
-def hull(points):
+def hull(points: np.ndarray) -> Manifold:
     """Convex solid around points (n, 3)."""
     return Manifold.hull_points(points)
 
 
-def union(solids):
+def union(solids: Iterable[Manifold]) -> Manifold:
     """One solid of several."""
     return Manifold.batch_boolean(list(solids), OpType.Add)
 
 
-def raised(solid, z):
+def raised(solid: Manifold, z: float) -> Manifold:
     """The solid, moved up by `z`."""
     return solid.translate((0.0, 0.0, z))
 
 
-def to_mesh(solid):
+def to_mesh(solid: Manifold) -> trimesh.Trimesh:
     """Triangle mesh in single precision, as an STL holds it, with its facets in one fixed order.
 
     The order that the boolean operations leave depends on threads; sorted facets give the same file every time.

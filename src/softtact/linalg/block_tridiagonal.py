@@ -20,13 +20,13 @@ class BlockTridiagonalSolver:
 
     name = "block tridiagonal Cholesky"
 
-    def factor(self, upper):
+    def factor(self, upper: sp.csr_matrix) -> bool:
         """Factor the matrix whose upper triangle (csr, with its diagonal) is given; False if not positive definite."""
         self._blocks = _Blocks(upper)
         self._factors = list(self._blocks.factors())
         return len(self._factors) == len(self._blocks.parts)
 
-    def solve(self, right):
+    def solve(self, right: np.ndarray) -> np.ndarray:
         """Solve for one (n,) or several (n, k) right-hand sides."""
         blocks = self._blocks
         found = np.array(right, dtype=float).reshape(len(right), -1)[blocks.order]
@@ -44,12 +44,12 @@ class BlockTridiagonalSolver:
         out[blocks.order] = found
         return out.reshape(right.shape)
 
-    def close(self):
+    def close(self) -> None:
         """Forget the factors."""
         self._factors = []
 
 
-def inverse_among(upper, kept):
+def inverse_among(upper: sp.csr_matrix, kept: np.ndarray) -> np.ndarray | None:
     """Rows and columns `kept` (k,) of the inverse of a matrix by its upper triangle (csr), (k, k); None if not positive definite.
 
     It is Y^T Y with L Y = their columns of the unit matrix. One layer's factor and rows of Y are in memory at a time.
@@ -112,7 +112,7 @@ class _Blocks:
             yield factor, coupling
 
 
-def layers(matrix):
+def layers(matrix: sp.csr_matrix) -> np.ndarray:
     """Layer (n,) of each unknown of a symmetric sparse matrix: its distance from one end of its part of the matrix' graph."""
     graph = sp.csr_matrix((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
     _, part = connected_components(graph, directed=False)

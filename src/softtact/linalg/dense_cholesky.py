@@ -7,20 +7,20 @@ import numpy as np
 from numba import njit
 
 from softtact.linalg.lapack import ROUTINES, address, call, keep_alive
-from softtact.linalg.workers import SERIAL, slices
+from softtact.linalg.workers import SERIAL, Workers, slices
 
 _BLOCK = 384
 
 
-def factor_in_place(matrix, *, workers=SERIAL):
+def factor_in_place(matrix: np.ndarray, *, workers: Workers = SERIAL) -> bool:
     """Overwrite the upper triangle of a matrix A (n, n), row by row, by R of A = R'.R; False if A is not positive definite."""
     size = len(matrix)
     for block in slices(size, _BLOCK):
         if not _begin(matrix, block.start, block.stop, ROUTINES):
             return False
         rest = [(block.stop + part.start, block.stop + part.stop) for part in slices(size - block.stop, _BLOCK)]
-        workers.map(lambda part, b=block: _couple(matrix, b.start, b.stop, *part, ROUTINES), rest)
-        workers.map(lambda part, b=block: _update(matrix, b.start, b.stop, *part, ROUTINES), rest)
+        workers.map(lambda part, b=block: _couple(matrix, b.start, b.stop, *part, ROUTINES), rest)     # type: ignore[misc, call-arg]
+        workers.map(lambda part, b=block: _update(matrix, b.start, b.stop, *part, ROUTINES), rest)     # type: ignore[misc, call-arg]
     return True
 
 

@@ -14,7 +14,7 @@ import scipy.sparse.linalg as spla
 from softtact.linalg.block_tridiagonal import BlockTridiagonalSolver, inverse_among
 
 
-def make_solver(*, threads=1):
+def make_solver(*, threads: int = 1) -> "PardisoSolver | BlockTridiagonalSolver":
     """The fastest direct solver for any matrix that this machine offers."""
     try:
         return PardisoSolver(threads=threads)
@@ -22,7 +22,7 @@ def make_solver(*, threads=1):
         return BlockTridiagonalSolver()
 
 
-def condensed_inverse(upper, kept, *, threads=1):
+def condensed_inverse(upper: sp.csr_matrix, kept: np.ndarray, *, threads: int = 1) -> np.ndarray:
     """Rows and columns `kept` (k,) of the inverse of a positive definite matrix, given by its upper triangle (csr, sorted).
 
     The rest is eliminated by a factor that ends before them (Schur complement); what is left is small and dense. Where MKL is
@@ -74,14 +74,15 @@ class PardisoSolver:
     """MKL PARDISO's Cholesky; the analysis is reused while the pattern stays."""
 
     name = "pardiso"
-    precision = np.float64
+    precision: type[np.floating] = np.float64
     _POSITIVE, _FACTOR, _SOLVE, _ANALYSE_AND_FACTOR, _NO_MEMORY = 2, 22, 33, 12, -2
     # Entries of iparm, counted from 0: own values, METIS on one thread (the same order whatever the number of threads), and no
     # iterative refinement, which makes a solve four times as long for digits that Newton's method does not need.
     _PARAMETERS = {0: 1, 1: 2, 7: 0, 17: -1, 18: -1}
     _FROM_ZERO = 34     # the entry of iparm that lets rows and columns be counted from 0
+    _pattern: tuple[np.ndarray, np.ndarray] | None
 
-    def __init__(self, *, threads=1):
+    def __init__(self, *, threads: int = 1) -> None:
         from pypardiso import PyPardisoSolver
 
         self._solver, self._pattern, self._upper, self._converted = PyPardisoSolver(mtype=self._POSITIVE), None, None, None
@@ -90,7 +91,7 @@ class PardisoSolver:
             self._solver.set_iparm(entry + 1, value)
         self._solver.set_iparm(self._FROM_ZERO + 1, 1)
 
-    def factor(self, upper):
+    def factor(self, upper: sp.csr_matrix) -> bool:
         """Factor the matrix whose upper triangle (csr, sorted, with its diagonal) is given; False if not positive definite."""
         pattern = (upper.indptr, upper.indices)
         if any(array.dtype != np.int32 for array in pattern):
@@ -114,7 +115,7 @@ class PardisoSolver:
         self._converted.data[:] = upper.data
         return self._converted
 
-    def solve(self, right):
+    def solve(self, right: np.ndarray) -> np.ndarray:
         """Solve for one (n,) or several (n, k) right-hand sides."""
         found, fault = self._call(self._SOLVE, np.asfortranarray(right.reshape(len(right), -1), dtype=self.precision))
         if fault:
@@ -140,7 +141,7 @@ class PardisoSolver:
         solver.libmkl.MKL_Set_Num_Threads_Local(before)
         return found, fault.value
 
-    def close(self):
+    def close(self) -> None:
         """Free the factors, which live outside Python's memory."""
         self._solver.free_memory(everything=True)
         self._pattern, self._upper = None, None
@@ -151,7 +152,7 @@ class SuperLUSolver:
 
     name = "superlu"
 
-    def factor(self, upper):
+    def factor(self, upper: sp.csr_matrix) -> bool:
         """Factor the matrix whose upper triangle (csr) is given; False if not positive definite."""
         full = (upper + sp.triu(upper, 1).T).astype(float)
         self._lu = spla.splu(full.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
@@ -159,10 +160,10 @@ class SuperLUSolver:
         # Pivots from the diagonal, whose signs are those of the eigenvalues (Sylvester's law of inertia).
         return bool((self._lu.U.diagonal() > 0).all())
 
-    def solve(self, right):
+    def solve(self, right: np.ndarray) -> np.ndarray:
         """Solve for one (n,) or several (n, k) right-hand sides."""
         return self._lu.solve(right)
 
-    def close(self):
+    def close(self) -> None:
         """Forget the factors."""
         self._lu = None

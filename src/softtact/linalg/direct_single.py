@@ -20,7 +20,7 @@ class PardisoSingle(PardisoSolver):
     name = "pardiso, single precision"
     precision = np.float32
 
-    def __init__(self, *, threads=1, quick_analysis=False):
+    def __init__(self, *, threads: int = 1, quick_analysis: bool = False) -> None:
         """quick_analysis: order by minimum degree: on a layer of small elements as little fill as dissection, in two thirds of
         the time; on cells of many unknowns half as many operations again."""
         point_at_mkl()
@@ -29,13 +29,13 @@ class PardisoSingle(PardisoSolver):
         if quick_analysis:
             self._solver.set_iparm(_ORDERING, _MINIMUM_DEGREE)
 
-    def solve(self, right):
+    def solve(self, right: np.ndarray) -> np.ndarray:
         """Solve for one (n,) or several (n, k) right-hand sides, scaled to the range of single precision."""
         size = float(np.abs(right).max()) or 1.0
         return size * super().solve((right / size).astype(np.float32)).astype(float)
 
 
-def point_at_mkl():
+def point_at_mkl() -> None:
     """Tell pypardiso where MKL is: its own search through the installation takes half a second for every solver."""
     if "PYPARDISO_MKL_RT" not in os.environ:
         files = importlib.metadata.files("mkl") or []

@@ -5,7 +5,8 @@ A compiled function takes the addresses of the routines that it needs as argumen
 address in it. (Numba's own type for functions as arguments takes 20 us to recognise at every call; a number takes none.)
 """
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
@@ -36,7 +37,7 @@ ROUTINES = Routines(letters=np.array([ord(letter) for letter in "LNRT"], dtype=n
 
 
 @intrinsic
-def call(typing_context, routine, arguments):
+def call(typing_context: Any, routine: types.Type, arguments: types.BaseTuple) -> tuple[Any, Callable[..., Any]]:
     """Call a routine by its address with a tuple of arguments, each an address itself, as in Fortran."""
     def generate(context, builder, signature, values):
         word = ir.IntType(64)
@@ -49,12 +50,12 @@ def call(typing_context, routine, arguments):
 
 
 @njit(cache=True, nogil=True)
-def address(array, place):
+def address(array: np.ndarray, place: int) -> np.uintp:
     """Where an entry of a flat array stands in memory."""
     return np.uintp(array.ctypes.data) + np.uintp(place * array.itemsize)
 
 
 @njit(cache=True, nogil=True, inline="never")
-def keep_alive(array):
+def keep_alive(array: np.ndarray) -> np.number:
     """Use an array that a routine was pointed at: until here it must not be freed."""
     return array[0]

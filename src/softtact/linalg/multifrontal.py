@@ -15,7 +15,7 @@ from collections import namedtuple
 import numpy as np
 from numba import njit
 
-from softtact.linalg.lapack import address, call, keep_alive
+from softtact.linalg.lapack import Routines, address, call, keep_alive
 from softtact.linalg.row_loops import add_row, row_product
 
 # Of all pieces one behind the other: piece p has those from at[p] to at[p + 1]. Unknowns are numbered as they are eliminated.
@@ -35,7 +35,7 @@ _LONGEST = 32767                     # of a number in 16 bits
 
 
 @njit(cache=True, nogil=True)
-def factor_pieces(pieces, fronts, store, values, blas):
+def factor_pieces(pieces: np.ndarray, fronts: Fronts, store: Store, values: np.ndarray, blas: Routines) -> bool:
     """Factor pieces of a matrix, whose values are given, one after the other; False where one is not positive definite.
 
     blas: `lapack.Routines`
@@ -51,7 +51,7 @@ def factor_pieces(pieces, fronts, store, values, blas):
 
 
 @njit(cache=True, nogil=True)
-def sum_up(p, fronts, store, values):
+def sum_up(p: int, fronts: Fronts, store: Store, values: np.ndarray) -> None:
     """Sum up a piece's panel (k, k + b): the matrix' values, and what earlier pieces have left."""
     own, width = _shape(p, fronts)
     panel = _panel_of(p, fronts, store)
@@ -63,7 +63,7 @@ def sum_up(p, fronts, store, values):
 
 
 @njit(cache=True, nogil=True)
-def begin(p, fronts, store, values, blas):
+def begin(p: int, fronts: Fronts, store: Store, values: np.ndarray, blas: Routines) -> bool:
     """`sum_up` a piece's panel, and factor its own unknowns; False if they are not positive definite."""
     sum_up(p, fronts, store, values)
     own, width = _shape(p, fronts)
@@ -71,13 +71,13 @@ def begin(p, fronts, store, values, blas):
         return True
     panel = _panel_of(p, fronts, store)
     size = np.array([own, width, 0], dtype=np.int32)
-    call(blas.potrf, (address(blas.letters, 0), address(size, 0), address(panel, 0), address(size, 1), address(size, 2)))
+    call(blas.potrf, (address(blas.letters, 0), address(size, 0), address(panel, 0), address(size, 1), address(size, 2)))     # type: ignore[call-arg, arg-type]
     # BLAS libraries differ in whether they tell of what is not a number; it goes through to the last pivot.
     return size[2] == 0 and np.isfinite(panel[(own - 1) * (width + 1)])
 
 
 @njit(cache=True, nogil=True)
-def couple(p, start, end, fronts, store, blas):
+def couple(p: int, start: int, end: int, fronts: Fronts, store: Store, blas: Routines) -> None:
     """The panel's columns from `start` to `end` of the bound unknowns."""
     own, width = _shape(p, fronts)
     if own == 0 or start == end:
@@ -86,13 +86,13 @@ def couple(p, start, end, fronts, store, blas):
     size = np.array([own, width, end - start], dtype=np.int32)
     letters, factors = blas.letters, blas.factors
     L, N, R, T = address(letters, 0), address(letters, 1), address(letters, 2), address(letters, 3)
-    call(blas.trsm, (R, L, T, N, address(size, 2), address(size, 0), address(factors, 0), address(panel, 0), address(size, 1),
+    call(blas.trsm, (R, L, T, N, address(size, 2), address(size, 0), address(factors, 0), address(panel, 0), address(size, 1),     # type: ignore[call-arg, arg-type]
                 address(panel, own + start), address(size, 1)))
     keep_alive(size)
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def keep(p, fronts, store):
+def keep(p: int, fronts: Fronts, store: Store) -> None:
     """Keep what a solve needs of a panel: the own triangle, the bound columns in 16 bits, and the size of a unit in each row."""
     own, width = _shape(p, fronts)
     bound, panel = width - own, _panel_of(p, fronts, store)
@@ -114,7 +114,7 @@ def keep(p, fronts, store):
 
 
 @njit(cache=True, nogil=True)
-def update(p, start, end, fronts, store, blas):
+def update(p: int, start: int, end: int, fronts: Fronts, store: Store, blas: Routines) -> None:
     """The update's rows from `start` to `end`."""
     if start == end:
         return
@@ -124,7 +124,7 @@ def update(p, start, end, fronts, store, blas):
     letters, factors = blas.letters, blas.factors
     L, N, T = address(letters, 0), address(letters, 1), address(letters, 3)
     minus_one, zero, rows = address(factors, 1), address(factors, 2), address(panel, own + start)
-    call(blas.syrk, (L, N, address(size, 2), address(size, 0), minus_one, rows, address(size, 1), zero,
+    call(blas.syrk, (L, N, address(size, 2), address(size, 0), minus_one, rows, address(size, 1), zero,     # type: ignore[call-arg, arg-type]
                 address(out, start * bound + start), address(size, 3)))
     if bound > end:
         call(blas.gemm, (N, T, address(size, 4), address(size, 2), address(size, 0), minus_one, address(panel, own + end),
@@ -165,7 +165,7 @@ def _runs(places):
 
 
 @njit(cache=True, nogil=True)
-def forward(pieces, fronts, store, right, beyond, first):
+def forward(pieces: np.ndarray, fronts: Fronts, store: Store, right: np.ndarray, beyond: np.ndarray, first: int) -> None:
     """Eliminate the pieces' unknowns from a right-hand side (n,), in place.
 
     What is left on unknowns from `first` on, which other pieces may change at the same time, goes to `beyond`.
@@ -184,7 +184,7 @@ def forward(pieces, fronts, store, right, beyond, first):
 
 
 @njit(cache=True, nogil=True)
-def backward(pieces, fronts, store, right):
+def backward(pieces: np.ndarray, fronts: Fronts, store: Store, right: np.ndarray) -> None:
     """The pieces' unknowns, from the last on, in place; later ones are known."""
     for p in pieces[::-1]:
         x, known, rows = _own_of(p, fronts, right), right[_bound_of(p, fronts, fronts.bound)], _short_of(p, fronts, store)

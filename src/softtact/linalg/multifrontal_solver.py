@@ -7,7 +7,9 @@ Some unknowns may be left for last, what nodes of the surface do along given dir
 small dense matrix on them. What stiffens them, like a contact, can then change without a new factor.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,7 +20,7 @@ from softtact.linalg.multifrontal import Store
 from softtact.linalg.nested_dissection import Piece, dissect
 from softtact.linalg.nodal_frames import NodeFrames
 from softtact.linalg.symbolic import lay_out, with_room
-from softtact.linalg.workers import SERIAL, slices
+from softtact.linalg.workers import SERIAL, Workers, slices
 
 _PARTS = 32              # of all operations: what takes less than such a share is one thread's, from its first piece to its last
 _SOLVED_APART = 4        # parts that are solved on threads of their own
@@ -43,22 +45,24 @@ class DissectedSolver:
 
     name = "dissected Cholesky, single precision"
     precision = np.float32
+    _frames: Any     # `NodeFrames` while a bordered matrix is factored, else None
+    _store: Any      # `Store`, None before the first factor
 
-    def __init__(self, places, *, workers=SERIAL):
+    def __init__(self, places: np.ndarray, *, workers: Workers = SERIAL) -> None:
         """places (n, 2): where each unknown stands in plan, in mm"""
         self._places, self._workers, self._pattern, self._frames = places, workers, None, None
         self._store = None
 
     @property
-    def unknowns(self):
+    def unknowns(self) -> int:
         return len(self._places)
 
-    def factor(self, upper):
+    def factor(self, upper: sp.csr_matrix) -> bool:
         """Factor the matrix whose upper triangle (csr, sorted, with its diagonal) is given; False if not positive definite."""
         self._frames = None
         return self._factor((upper.indptr, upper.indices), upper.data, None)
 
-    def factor_bordered(self, matrix):
+    def factor_bordered(self, matrix: Bordered) -> bool:
         """Factor a `Bordered` matrix but for its last unknowns; False if what comes before them is not positive definite."""
         upper, self._frames = matrix.upper, matrix.frames
         column = self._frames.turned(matrix.column).astype(np.float32)
@@ -90,13 +94,13 @@ class DissectedSolver:
         return True
 
     @property
-    def left(self):
+    def left(self) -> np.ndarray:
         """What the factor leaves on the k nodes' movements and the bordering unknown: (k + 1, k + 1), its upper triangle."""
         size = len(self._frames.last) + 1
         start = self._fronts.panel_at[-1]
         return self._store.work[start:start + size * size].reshape(size, size)
 
-    def solve(self, right):
+    def solve(self, right: np.ndarray) -> np.ndarray:
         """Solve for one (n,) or several (n, k) right-hand sides, scaled to the range of single precision: see the class.
 
         All operations come in the same order, whatever the number of threads.
@@ -105,7 +109,7 @@ class DissectedSolver:
             return np.column_stack([self.solve(column) for column in right.T])
         return self._solved(right, lambda rest: rest)
 
-    def solve_bordered(self, right, finish):
+    def solve_bordered(self, right: np.ndarray, finish: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
         """Solve for a right-hand side (n + 1,), if `finish` solves for what is left of it on the last unknowns (k + 1,)."""
         return self._frames.turned_back(self._solved(self._frames.turned(right), finish))
 
@@ -153,7 +157,7 @@ class DissectedSolver:
                 old[name] = np.empty(int(_SLACK * size), dtype=np.int16 if name == "short" else np.float32)
         return Store(**old)
 
-    def close(self):
+    def close(self) -> None:
         """Forget the factors."""
         self._pattern = self._fronts = self._store = None
 

@@ -25,7 +25,7 @@ class Piece:
     before: tuple
 
 
-def dissect(indptr, indices, places, *, without=None):
+def dissect(indptr: np.ndarray, indices: np.ndarray, places: np.ndarray, *, without: np.ndarray | None = None) -> list[Piece]:
     """`Piece`s of a symmetric matrix, each behind those before it; the first cut is the last piece.
 
     indptr, indices: pattern of its upper triangle (csr);  places (n, 2): where each unknown stands in plan, in mm
@@ -38,7 +38,7 @@ def dissect(indptr, indices, places, *, without=None):
     members = np.argsort(column_of, kind="stable")[np.count_nonzero(column_of < 0):]
     weight = np.bincount(column_of[members], minlength=len(columns))
     member_at = np.cumsum([0, *weight])
-    pieces = []
+    pieces: list[Piece] = []
     _cut(_graph_of_columns(indptr, indices, column_of, members, member_at), columns, weight, np.flatnonzero(weight), pieces)
     return [Piece(own=_members_of(piece.own, members, member_at), before=piece.before) for piece in pieces]
 

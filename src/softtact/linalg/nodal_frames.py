@@ -26,25 +26,25 @@ class NodeFrames:
         return np.nonzero(np.arange(3) >= 3 - self.wanted[:, None])
 
     @cached_property
-    def last(self):
+    def last(self) -> np.ndarray:
         """The unknowns (m + o,) that are movements along the vectors meant, once the nodes are turned, and the others."""
         node, vector = self._meant
         return np.append(self.first[node] + vector, self.others)
 
-    def movements(self, unknowns):
+    def movements(self, unknowns: int) -> sp.csr_matrix:
         """Sparse matrix (unknowns, m + o): a unit of each of the movements meant."""
         (node, vector), along, (m, o) = self._meant, np.arange(3), (len(self._meant[0]), len(self.others))
         rows = np.append(self.first[node, None] + along, self.others)
         values = np.append(self.turns[node[:, None], along, vector[:, None]], np.ones(o))
         return sp.csr_matrix((values, (rows, np.append(np.repeat(np.arange(m), 3), m + np.arange(o)))), shape=(unknowns, m + o))
 
-    def covers(self, others):
+    def covers(self, others: "NodeFrames") -> bool:
         """Whether all that other frames mean is meant here, too, but for the vectors' directions."""
         if not (np.isin(others.first, self.first).all() and np.isin(others.others, self.others).all()):
             return False
         return bool((others.wanted <= self.wanted[np.searchsorted(self.first, others.first)]).all())
 
-    def turned_as(self, others):
+    def turned_as(self, others: "NodeFrames") -> "NodeFrames":
         """These with the vectors of others that they cover."""
         turns = self.turns.copy()
         turns[np.searchsorted(self.first, others.first)] = others.turns
@@ -54,11 +54,11 @@ class NodeFrames:
     def _upright(self):
         return bool((self.turns == np.eye(3)).all())
 
-    def turned(self, vector):
+    def turned(self, vector: np.ndarray) -> np.ndarray:
         """Components of a vector (unknowns,) in the turned coordinates."""
         return self._changed(vector, "kji,kj->ki")
 
-    def turned_back(self, vector):
+    def turned_back(self, vector: np.ndarray) -> np.ndarray:
         """The inverse of `turned`."""
         return self._changed(vector, "kij,kj->ki")
 
@@ -69,7 +69,7 @@ class NodeFrames:
         out[places] = np.einsum(how, self.turns, vector[places])
         return out
 
-    def turned_matrix(self, upper):
+    def turned_matrix(self, upper: sp.csr_matrix) -> np.ndarray:
         """Values of an upper triangle (csr, sorted) in the turned coordinates; what a node couples with, all its three do."""
         if self._upright:
             return upper.data

@@ -10,14 +10,14 @@ from numba import njit
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def add_row(row, share, out):
+def add_row(row: np.ndarray, share: float, out: np.ndarray) -> None:
     """Add a share of a row (k,) to `out` (k,)."""
     for j in range(len(row)):
         out[j] += share * np.float32(row[j])
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def row_product(row, x):
+def row_product(row: np.ndarray, x: np.ndarray) -> np.float32:
     """The product of a row (k,) with x (k,)."""
     total = np.float32(0.0)
     for j in range(len(row)):

@@ -1,12 +1,16 @@
 """Where everything of a sparse matrix' fronts stands: found once for a pattern."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numba import njit
 
 from softtact.linalg.multifrontal import Fronts
+from softtact.linalg.nested_dissection import Piece
 
 
-def lay_out(indptr, indices, pieces, *, bordered=False):
+def lay_out(indptr: np.ndarray, indices: np.ndarray, pieces: Sequence[Piece], *,
+            bordered: bool = False) -> tuple[Fronts, np.ndarray]:
     """`Fronts` of a matrix whose upper triangle (csr) has this pattern, for `Piece`s of a dissection in the order of elimination.
 
     bordered: one more unknown, coupled with all and in the last piece; its column's entries come behind those of the pattern
@@ -31,7 +35,7 @@ def lay_out(indptr, indices, pieces, *, bordered=False):
     return fronts, order
 
 
-def with_room(fronts, parts, levels):
+def with_room(fronts: Fronts, parts: Sequence[np.ndarray], levels: Sequence[np.ndarray]) -> tuple[Fronts, int]:
     """Fronts with places for their panels and updates, and how much room these take together.
 
     parts: pieces (k,) that are worked on one after the other, the parts at the same time;  levels: pieces (k,), behind all parts
@@ -52,7 +56,7 @@ def with_room(fronts, parts, levels):
             for child in fronts.child[fronts.child_at[p]:fronts.child_at[p + 1]]:
                 room.give_back(update_at[child], updates[child])
 
-    ended = []
+    ended: list[tuple[int, int]] = []
     for part in parts:
         own_room = _Room(room.most)
         for p in part:

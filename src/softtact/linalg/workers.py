@@ -1,22 +1,27 @@
 """Work on slices of many like things, on as many threads as were asked for. The kernels release Python's lock."""
 
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
 
 import numpy as np
+
+_Item = TypeVar("_Item")
+_Result = TypeVar("_Result")
 
 
 class Workers:
     """Runs a function over items in order; with one thread in the caller's own."""
 
-    def __init__(self, threads=1):
+    def __init__(self, threads: int = 1) -> None:
         self.threads = threads
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
 
-    def map(self, function, items):
+    def map(self, function: Callable[[_Item], _Result], items: Iterable[_Item]) -> list[_Result]:
         """The function's results, in the items' order."""
         return [function(item) for item in items] if self._pool is None else list(self._pool.map(function, items))
 
-    def close(self):
+    def close(self) -> None:
         """End the threads."""
         if self._pool is not None:
             self._pool.shutdown()
@@ -25,17 +30,17 @@ class Workers:
 SERIAL = Workers()
 
 
-def slices(count, size):
+def slices(count: int, size: int) -> list[slice]:
     """Slices of at most `size` that cover `count` things."""
     return [slice(start, min(start + size, count)) for start in range(0, count, size)]
 
 
-def chunks(numbers, size):
+def chunks(numbers: np.ndarray, size: int) -> list[np.ndarray]:
     """Arrays of at most `size` of the given numbers (n,)."""
     return [numbers[part] for part in slices(len(numbers), size)]
 
 
-def unique_rows(table):
+def unique_rows(table: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Numbers (u,) of rows of a table (n, k) that stand for all, and for each row (n,) which of these it equals.
 
     Equal to 1e-9 of the largest entry; told apart by two random projections, which like rows share.
