@@ -10,6 +10,7 @@ rubber.
 Reference: representation of the dihedral group; Healey and Treacy, Int. J. Numer. Meth. Engng 31 (1991) 265.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -42,7 +43,8 @@ class QuarterSlab:
     cells (nx, ny): elements along the quarter's sides; nodes lie at their corners, mid-sides and centres. base_held: else free.
     """
 
-    def __init__(self, footprint_mm, layers, cells, *, base_held):
+    def __init__(self, footprint_mm: Sequence[float], layers: Sequence[ElasticLayer], cells: Sequence[int], *,
+                 base_held: bool) -> None:
         self.layers = [(layer, share * layer.thickness) for layer in layers for share in layer.shares]
         self.cells, self.base_held = cells, base_held
         self.x, self.y = (np.linspace(0.0, 0.5 * side, 2 * count + 1) for side, count in zip(footprint_mm, cells, strict=True))
@@ -50,7 +52,7 @@ class QuarterSlab:
         self.hexes = self._hexes()
 
     @property
-    def points(self):
+    def points(self) -> np.ndarray:
         """Nodes (n, 3) in mm, z = 0 at the top."""
         levels = np.concatenate([[0.0], np.cumsum([thickness for _, thickness in self.layers])])
         heights = np.interp(np.arange(2 * len(levels) - 1) / 2, np.arange(len(levels)), levels - levels[-1])
@@ -58,16 +60,16 @@ class QuarterSlab:
         return np.column_stack([x.ravel(), y.ravel(), z.ravel()])
 
     @property
-    def unknowns(self):
+    def unknowns(self) -> int:
         """Three for each node."""
         return 3 * self.numbers.size
 
-    def plane(self, boundary):
+    def plane(self, boundary: int) -> np.ndarray:
         """Numbers (ny, nx) of the nodes in the plane over so many element layers, those on the held sides left out."""
         return self.numbers[2 * boundary, :-1, :-1]
 
     @property
-    def top(self):
+    def top(self) -> np.ndarray:
         """`plane` of the top."""
         return self.plane(len(self.layers))
 
@@ -81,7 +83,7 @@ class QuarterSlab:
         return np.array([self.x[2], self.y[2], thickness])
 
     @cached_property
-    def stiffness(self):
+    def stiffness(self) -> sp.csr_matrix:
         """The stiffness (unknowns, unknowns) in N/mm; elements of a layer are all alike."""
         rows, columns, values = [], [], []
         for (layer, thickness), hexes in zip(self.layers, self.hexes, strict=True):
@@ -95,7 +97,7 @@ class QuarterSlab:
         return sp.csr_matrix(tuple([np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))]),
                              shape=(self.unknowns, self.unknowns))
 
-    def free(self, parity):
+    def free(self, parity: tuple[int, ...]) -> np.ndarray:
         """Unknowns that are not held at the sides, by the base, or by the parity on the planes of symmetry."""
         free = np.ones((*self.numbers.shape, 3), dtype=bool)
         free[:, :, -1] = free[:, -1] = False
@@ -106,7 +108,7 @@ class QuarterSlab:
             plane[..., [k for k in range(3) if k != axis] if odd else axis] = False
         return np.flatnonzero(free.ravel())
 
-    def interpolation(self, points):
+    def interpolation(self, points: np.ndarray) -> sp.csr_matrix:
         """Matrix (p, nodes of a plane) that interpolates at points (p, 2) of the quarter, quadratic in each element."""
         (i, wx), (j, wy) = (_quadratic(line, values) for line, values in zip((self.x, self.y), points.T, strict=True))
         nodes = (j[:, :, None] * len(self.x) + i[:, None, :]).reshape(len(points), 9)
@@ -114,7 +116,7 @@ class QuarterSlab:
         return sp.csr_matrix((weights.ravel(), (np.repeat(np.arange(len(points)), 9), nodes.ravel())),
                              shape=(len(points), len(self.x) * len(self.y)))
 
-    def mean_forces(self, cells_of, count):
+    def mean_forces(self, cells_of: Callable[[np.ndarray, np.ndarray], np.ndarray], count: int) -> list[sp.csr_matrix]:
         """Membrane forces in N/mm, over cells of the plan, as functionals of the displacement: three matrices (count, unknowns).
 
         cells_of(x, y): number of the cell at points of the quarter, -1 where there is none. The forces are the integrals over the
@@ -122,7 +124,7 @@ class QuarterSlab:
         """
         points, weights, _ = HEX27.quadrature
         j, i = (grid.ravel() for grid in np.meshgrid(np.arange(self.cells[1]), np.arange(self.cells[0]), indexing="ij"))
-        entries = [([], [], []) for _ in range(3)]
+        entries: list[tuple[list, list, list]] = [([], [], []) for _ in range(3)]
         for (layer, thickness), hexes in zip(self.layers, self.hexes, strict=True):
             size = self._sizes(thickness)
             gradients, dofs = HEX27.shape(points)[1] * (2 / size), _dofs(hexes)
@@ -137,7 +139,7 @@ class QuarterSlab:
                     for r, c, v in entries]
         return matrices
 
-    def compliance(self, stiffness, kept, parity, *, threads=1):
+    def compliance(self, stiffness: sp.csr_matrix, kept: np.ndarray, parity: tuple[int, ...], *, threads: int = 1) -> np.ndarray:
         """Compliance (k, k) among the unknowns `kept` of a stiffness, in one parity; zero for those that it holds."""
         free = np.concatenate([self.free(parity), np.arange(self.unknowns, stiffness.shape[0])])
         place = np.full(stiffness.shape[0], -1)
@@ -178,7 +180,7 @@ class ParityBlocks:
 
     blocks: np.ndarray
 
-    def between(self, rows, row_signs, columns, column_signs):
+    def between(self, rows: np.ndarray, row_signs: np.ndarray, columns: np.ndarray, column_signs: np.ndarray) -> np.ndarray:
         """Compliance (r, c) of places given by their quarter's number (r,), (c,) and their signs of x and y (r, 2), (c, 2)."""
         args = [np.ascontiguousarray(values) for values in (rows, row_signs < 0, columns, column_signs < 0)]
         return _between(self.blocks, *args)
