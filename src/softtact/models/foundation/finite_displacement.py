@@ -19,7 +19,7 @@ docs/notebook/2026-11-23-foundation-model.md.
 """
 
 from dataclasses import astuple, dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -90,12 +90,12 @@ class FiniteDisplacement:
         missing, as the largest change of a frustum's force in N.
         """
         found, missing, load = effects, 0.0, load.astype(np.float32)
-        roots = self._roots(effects, load) if self.settings.follow or self.settings.rocking else None
+        roots: Any = self._roots(effects, load) if self.settings.follow or self.settings.rocking else None
         if self.settings.follow:
             found = self._found(effects, load, down.reshape(self.lattice), q, roots)
             missing = max(np.abs(found.loads - effects.loads).max(), np.abs(found.lateral - effects.lateral).max())
         if self.settings.rocking:
-            rise = self.law.rise(np.hypot(*roots[:, :, 0].T), q)     # type: ignore[index]
+            rise = self.law.rise(np.hypot(*roots[:, :, 0].T), q)
             found = Effects(found.loads, found.lateral, found.moved, rise)
             missing = max(missing, _SLOWLY * (np.abs(rise - effects.rise) / self.law.slope(q)).max())
         return effects.towards(found, share, loads=share * self._pace(q, roots), rise=0.5), float(missing)
