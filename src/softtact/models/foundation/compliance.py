@@ -60,10 +60,10 @@ class FoundationCompliance:
     def load(cls, path: Path) -> "FoundationCompliance":
         """Read what `save` wrote."""
         with read_arrays(path) as data:
-            law = FrustumLaw(**{name.removeprefix("law_"): data[name] for name in data.files if name.startswith("law_")})
+            of_law: dict[str, Any] = {name.removeprefix("law_"): data[name] for name in data.files if name.startswith("law_")}
             blocks = {name: ParityBlocks(data[name]) for name in _BLOCKS}
             return cls(grid=NodeGrid(data["x"], data["y"]), counts=tuple(data["counts"]),
-                       foundation_modulus=float(data["foundation_modulus"]), law=law, **blocks)
+                       foundation_modulus=float(data["foundation_modulus"]), law=FrustumLaw(**of_law), **blocks)
 
 
 def foundation_compliance(spec: SensorSpec, *, dielectric_law: Law, cover_law: Law, frustum: FrustumLaw | None = None,

@@ -123,7 +123,8 @@ class FrustumLaw:
     def load(cls, path: Path) -> "FrustumLaw":
         """Read what `save` wrote."""
         with read_arrays(path) as data:
-            return cls(**dict(data))
+            values: dict[str, Any] = dict(data)
+            return cls(**values)
 
     def arrays(self) -> dict[str, Any]:
         """All fields by name, to be saved."""

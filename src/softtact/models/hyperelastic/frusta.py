@@ -52,7 +52,7 @@ class FrustumGeometry:
 class FrustumArray:
     """All frusta of a sensor with one law. Local node numbers are those of `self.mesh`; roots are `self.root`."""
 
-    def __init__(self, geometry: FrustumGeometry, law: Law | None, *, heights: np.ndarray, root_z_mm: float, pcb_z_mm: float,
+    def __init__(self, geometry: FrustumGeometry, law: Law, *, heights: np.ndarray, root_z_mm: float, pcb_z_mm: float,
                  tips_bonded: bool, contact: Contact, unprojected_penalty_ratio: float, quartic_penalty_ratio: float,
                  trilinear: bool, refinement: int = 0, rings: int = 1, core: float = CORE_RADIUS, friction: Coulomb | None = None):
         """unprojected_penalty_ratio, quartic_penalty_ratio, trilinear: see `blocks`

@@ -14,6 +14,7 @@ import scipy.linalg
 import scipy.sparse as sp
 from numba import njit
 
+from softtact.linalg.block_tridiagonal import BlockTridiagonalSolver
 from softtact.linalg.dense_cholesky import factor_in_place
 from softtact.linalg.direct import PardisoSolver, SuperLUSolver
 from softtact.linalg.multifrontal_solver import Bordered, DissectedSolver
@@ -30,7 +31,7 @@ _LEAST_CORNER = 1e-9         # N/mm: rounding must not turn the object's own sti
 class ContactFactor:
     """With any solver of `linear_solvers`: a new factor for each contact."""
 
-    def __init__(self, solver: PardisoSolver | SuperLUSolver | DissectedSolver) -> None:
+    def __init__(self, solver: PardisoSolver | BlockTridiagonalSolver | SuperLUSolver | DissectedSolver) -> None:
         self.solver = solver
 
     def reset(self) -> None:

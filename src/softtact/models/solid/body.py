@@ -13,6 +13,7 @@ import numpy as np
 from softtact.contact.penalty import penalty
 from softtact.fem.assembly import SymmetricPattern, add_upper
 from softtact.fem.solid_block import SolidBlock
+from softtact.linalg.block_tridiagonal import BlockTridiagonalSolver
 from softtact.linalg.direct import PardisoSolver, SuperLUSolver, make_solver
 from softtact.linalg.direct_single import point_at_mkl
 from softtact.linalg.workers import SERIAL, Workers
@@ -154,7 +155,8 @@ class FreeBody:
 
     def __init__(self, points: np.ndarray, parts: Sequence[SolidElements | LinearTetrahedra], *, held: np.ndarray,
                  contacts: Sequence[RigidContact] = (), follows: np.ndarray | None = None,
-                 solver: PardisoSolver | SuperLUSolver | None = None, apart: bool = False, workers: Workers = SERIAL) -> None:
+                 solver: PardisoSolver | BlockTridiagonalSolver | SuperLUSolver | None = None, apart: bool = False,
+                 workers: Workers = SERIAL) -> None:
         self.points, self.parts, self.contacts = points, parts, contacts
         self._follows = np.zeros(points.shape) if follows is None else -np.where(held, follows, 0.0)
         used = np.zeros(len(points), dtype=bool)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from softtact.linalg.block_tridiagonal import BlockTridiagonalSolver
 from softtact.linalg.direct import PardisoSolver, SuperLUSolver
 
 if TYPE_CHECKING:
@@ -26,8 +27,8 @@ class ContactCorrection:
     number (n, 3): unknowns of the nodes, -1 where held; contact: the moving `RigidContact`; normals (n, 3): N's directions.
     """
 
-    def __init__(self, solver: PardisoSolver | SuperLUSolver, number: np.ndarray, contact: "RigidContact",
-                 normals: np.ndarray) -> None:
+    def __init__(self, solver: PardisoSolver | BlockTridiagonalSolver | SuperLUSolver, number: np.ndarray,
+                 contact: "RigidContact", normals: np.ndarray) -> None:
         self._solver, self._contact = solver, contact
         self._size = int(number.max()) + 1
         # Of the whole body only the contact's own nodes matter inside a step; `row` is a node's place among those touched.
