@@ -1,5 +1,8 @@
 """The models' meshes of a sensor as meshio meshes."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import meshio
 import numpy as np
 
@@ -11,9 +14,10 @@ from softtact.models.hyperelastic.build import build_sensor_body
 from softtact.models.hyperelastic.deformed_mesh import pressed_body
 from softtact.models.hyperelastic.presets import mesh_settings
 from softtact.models.hyperelastic.specimen import frustum_scatter, specimen_of
+from softtact.sensors.frusta import SensorSpec
 
 
-def layered_mesh(spec, values):
+def layered_mesh(spec: SensorSpec, values: Mapping[str, Any]) -> meshio.Mesh:
     """Sheet, cover and frusta as one meshio mesh; cell data `layer`: 0 frusta, 1 sheet, 2 cover."""
     settings = mesh_settings(values)
     spec = specimen_of(spec, values)
@@ -22,7 +26,7 @@ def layered_mesh(spec, values):
     return pressed_body(body).to_meshio()
 
 
-def slab_mesh(spec, kind):
+def slab_mesh(spec: SensorSpec, kind: str) -> meshio.Mesh:
     """Layer of the elastic model, or sheet and cover of the foundation model, as meshio meshes; `layer` counts from below."""
     double = spec.model_copy(update={"footprint_mm": tuple(2 * side for side in spec.footprint_mm)})     # its quarter is the whole
     cells = tuple(2 * count for count in map_cells(spec))

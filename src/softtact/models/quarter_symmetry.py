@@ -11,6 +11,7 @@ rubber.
 Reference: representation of the dihedral group; Healey and Treacy, Int. J. Numer. Meth. Engng 31 (1991) 265.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -46,7 +47,8 @@ class QuarterSlab:
     held_below_mm: depth below the top from which side faces are held, infinite: they are free; an element layer begins there
     """
 
-    def __init__(self, footprint_mm, layers, cells, *, base_held, held_below_mm=0.0):
+    def __init__(self, footprint_mm: Sequence[float], layers: Sequence[ElasticLayer], cells: Sequence[int], *,
+                 base_held: bool, held_below_mm: float = 0.0) -> None:
         self.layers = _element_layers(layers, held_below_mm)
         self.cells, self.base_held, self.held_below_mm = cells, base_held, held_below_mm
         self.x, self.y = (np.linspace(0.0, 0.5 * side, 2 * count + 1) for side, count in zip(footprint_mm, cells, strict=True))
@@ -54,23 +56,23 @@ class QuarterSlab:
         self.hexes = self._hexes()
 
     @property
-    def heights(self):
+    def heights(self) -> np.ndarray:
         """z (2 layers + 1,) in mm of the planes of nodes, 0 at the top."""
         levels = np.concatenate([[0.0], np.cumsum([thickness for _, thickness in self.layers])])
         return np.interp(np.arange(2 * len(levels) - 1) / 2, np.arange(len(levels)), levels - levels[-1])
 
     @property
-    def points(self):
+    def points(self) -> np.ndarray:
         """Nodes (n, 3) in mm, z = 0 at the top."""
         z, y, x = np.meshgrid(self.heights, self.y, self.x, indexing="ij")
         return np.column_stack([x.ravel(), y.ravel(), z.ravel()])
 
     @property
-    def unknowns(self):
+    def unknowns(self) -> int:
         """Three for each node."""
         return 3 * self.numbers.size
 
-    def below_top(self, boundary):
+    def below_top(self, boundary: int) -> np.ndarray:
         """Numbers (ny, nx) of the nodes in the plane over so many element layers that lie below those of the `top`.
 
         Some may be on sides that are held there: `compliance` says that they do not move.
@@ -78,16 +80,16 @@ class QuarterSlab:
         return self.numbers[2 * boundary] if not self.side_held[-1] else self.numbers[2 * boundary, :-1, :-1]
 
     @property
-    def side_held(self):
+    def side_held(self) -> np.ndarray:
         """Whether the sides are held (2 layers + 1,) at each plane of nodes."""
         return self.heights <= -self.held_below_mm + _SAME_MM
 
-    def boundary_over(self, layer):
+    def boundary_over(self, layer: ElasticLayer) -> int:
         """Number of the boundary over an `ElasticLayer` of the stack, for `below_top`."""
         return 1 + max(number for number, (own, _) in enumerate(self.layers) if own is layer)
 
     @property
-    def top(self):
+    def top(self) -> np.ndarray:
         """Numbers (ny, nx) of the nodes on the top, those on sides that are held left out."""
         return self.below_top(len(self.layers))
 
@@ -101,7 +103,7 @@ class QuarterSlab:
         return np.array([self.x[2], self.y[2], thickness])
 
     @cached_property
-    def stiffness(self):
+    def stiffness(self) -> sp.csr_matrix:
         """The stiffness (unknowns, unknowns) in N/mm; elements of a layer are all alike."""
         rows, columns, values = [], [], []
         for (layer, thickness), hexes in zip(self.layers, self.hexes, strict=True):
@@ -115,7 +117,7 @@ class QuarterSlab:
         return sp.csr_matrix(tuple([np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))]),
                              shape=(self.unknowns, self.unknowns))
 
-    def free(self, parity):
+    def free(self, parity: tuple[int, ...]) -> np.ndarray:
         """Unknowns that are not held at the sides, by the base, or by the parity on the planes of symmetry."""
         free = np.ones((*self.numbers.shape, 3), dtype=bool)
         free[self.side_held, :, -1] = free[self.side_held, -1] = False
@@ -126,7 +128,7 @@ class QuarterSlab:
             plane[..., [k for k in range(3) if k != axis] if odd else axis] = False
         return np.flatnonzero(free.ravel())
 
-    def interpolation(self, points):
+    def interpolation(self, points: np.ndarray) -> sp.csr_matrix:
         """Matrix (p, nodes of a plane) that interpolates at points (p, 2) of the quarter, quadratic in each element."""
         (i, wx), (j, wy) = (_quadratic(line, values) for line, values in zip((self.x, self.y), points.T, strict=True))
         nodes = (j[:, :, None] * len(self.x) + i[:, None, :]).reshape(len(points), 9)
@@ -134,7 +136,7 @@ class QuarterSlab:
         return sp.csr_matrix((weights.ravel(), (np.repeat(np.arange(len(points)), 9), nodes.ravel())),
                              shape=(len(points), len(self.x) * len(self.y)))
 
-    def mean_forces(self, cells_of, count):
+    def mean_forces(self, cells_of: Callable[[np.ndarray, np.ndarray], np.ndarray], count: int) -> list[sp.csr_matrix]:
         """Membrane forces in N/mm, over cells of the plan, as functionals of the displacement: three matrices (count, unknowns).
 
         cells_of(x, y): number of the cell at points of the quarter, -1 where there is none. The forces are the integrals over the
@@ -142,7 +144,7 @@ class QuarterSlab:
         """
         points, weights, _ = HEX27.quadrature
         j, i = (grid.ravel() for grid in np.meshgrid(np.arange(self.cells[1]), np.arange(self.cells[0]), indexing="ij"))
-        entries = [([], [], []) for _ in range(3)]
+        entries: list[tuple[list, list, list]] = [([], [], []) for _ in range(3)]
         for (layer, thickness), hexes in zip(self.layers, self.hexes, strict=True):
             size = self._sizes(thickness)
             gradients, dofs = HEX27.shape(points)[1] * (2 / size), _dofs(hexes)
@@ -157,7 +159,7 @@ class QuarterSlab:
                     for r, c, v in entries]
         return matrices
 
-    def compliance(self, stiffness, kept, parity, *, threads=1):
+    def compliance(self, stiffness: sp.csr_matrix, kept: np.ndarray, parity: tuple[int, ...], *, threads: int = 1) -> np.ndarray:
         """Compliance (k, k) among the unknowns `kept` of a stiffness, in one parity; zero for those that it holds."""
         free = np.concatenate([self.free(parity), np.arange(self.unknowns, stiffness.shape[0])])
         place = np.full(stiffness.shape[0], -1)
@@ -208,7 +210,7 @@ class ParityBlocks:
 
     blocks: np.ndarray
 
-    def between(self, rows, row_signs, columns, column_signs):
+    def between(self, rows: np.ndarray, row_signs: np.ndarray, columns: np.ndarray, column_signs: np.ndarray) -> np.ndarray:
         """Compliance (r, c) of places given by their quarter's number (r,), (c,) and their signs of x and y (r, 2), (c, 2)."""
         args = [np.ascontiguousarray(values) for values in (rows, row_signs < 0, columns, column_signs < 0)]
         return _between(self.blocks, *args)

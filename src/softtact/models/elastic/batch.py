@@ -5,6 +5,7 @@ matrices, one for each parity, of a quarter of the surface's nodes, with as many
 operations, and is what a GPU is made for. The method is `contact.unilateral`'s own, on torch's arrays.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import fields
 
 import numpy as np
@@ -12,7 +13,7 @@ import torch
 
 from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.contact.unilateral import ContactLoadSteps, ContactSettings, depth_on_springs, press_columns
-from softtact.models.elastic.compliance import LayerPress
+from softtact.models.elastic.compliance import Compliance, LayerPress
 
 COLUMNS_AT_ONCE = 4000      # 1 MB each on the coro's grid, most of it in single precision
 
@@ -20,18 +21,18 @@ COLUMNS_AT_ONCE = 4000      # 1 MB each on the coro's grid, most of it in single
 class DeviceSurface:
     """A `Compliance` on a torch device: `double`, `single`, `precondition`, of values (nodes, columns) at all its grid's nodes."""
 
-    def __init__(self, compliance, device):
+    def __init__(self, compliance: Compliance, device: str | torch.device) -> None:
         self.device, self.shape = torch.device(device), compliance.grid.shape
         self._single = torch.as_tensor(compliance.blocks.blocks, dtype=torch.float32, device=self.device)
         self._double = self._single.double()
         self._offsets = list(_offsets(compliance.stencil))
         self._weights = torch.as_tensor(_stencil_weights(compliance), dtype=torch.float32, device=self.device)
 
-    def double(self, force):
+    def double(self, force: torch.Tensor) -> torch.Tensor:
         """Displacements in mm of forces in N, in double precision."""
         return self._displacement(self._double, force)
 
-    def single(self, force):
+    def single(self, force: torch.Tensor) -> torch.Tensor:
         """The same in single precision."""
         return self._displacement(self._single, force)
 
@@ -43,7 +44,7 @@ class DeviceSurface:
         even_y, odd_y = (_unfolded(moved[y], moved[2 + y], axis=1) for y in (0, 1))     # PARITIES' order: x outside, y inside
         return 0.25 * _unfolded(even_y, odd_y, axis=0).reshape(rows * columns, -1)
 
-    def precondition(self, x):
+    def precondition(self, x: torch.Tensor) -> torch.Tensor:
         """About the inverse of `single`: the compliance's stencil."""
         rows, columns = self.shape
         reach = max(offset for offset, _ in self._offsets)
@@ -81,7 +82,8 @@ def _stencil_weights(compliance):
     return np.stack([values[j, i, dj + reach, di + reach] for dj, di in _offsets(compliance.stencil)])
 
 
-def press_layers(compliance, heights, forces_n, *, device, settings=None):
+def press_layers(compliance: Compliance, heights: Sequence[np.ndarray] | np.ndarray, forces_n: Sequence[float] | np.ndarray, *,
+                 device: str | torch.device, settings: ContactSettings | None = None) -> Iterator[LayerPress]:
     """Yield the `LayerPress` of each object with `heights` (p, n) in mm over the grid's nodes, in their order.
 
     forces_n (l,): in N, rising;  device: of torch. A load step that does not settle is marked by the contact's `settled`.

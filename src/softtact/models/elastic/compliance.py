@@ -5,15 +5,21 @@ The vertical compliance of the top's nodes (mm/N) is computed once for a sensor 
 (`quarter_slab`). The nodes lie at half the map's spacing.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from softtact.contact.node_grid import NodeGrid
+from softtact.contact.object_points import ObjectPoints
 from softtact.contact.stencil import Stencil
 from softtact.contact.unilateral import ContactLoadSteps, press_elastic
 from softtact.files import read_arrays
 from softtact.models.quarter_symmetry import PARITIES, ElasticLayer, ParityBlocks, QuarterSlab
+from softtact.sensors import fields
+from softtact.sensors.base import BaseSpec
 
 _SHARES = (0.34, 0.3, 0.22, 0.14)     # of the layer's thickness, from below, that its element layers have
 _REACH = 1                            # nodes that the preconditioner looks around; 2 and 3 cost as much as they save
@@ -33,29 +39,31 @@ class Compliance:
     stencil: Stencil
     lower: ParityBlocks | None = None
 
-    def save(self, path):
+    def save(self, path: Path) -> None:
         """Write as a NumPy archive, in single precision."""
-        np.savez(path, **self.grid.arrays(), blocks=self.blocks.blocks, foundation_modulus=self.foundation_modulus,
-                 stencil=self.stencil.values, **({} if self.lower is None else {"lower": self.lower.blocks}))
+        lower: dict[str, Any] = {} if self.lower is None else {"lower": self.lower.blocks}
+        arrays: dict[str, Any] = self.grid.arrays()
+        np.savez(path, **arrays, blocks=self.blocks.blocks, foundation_modulus=self.foundation_modulus,
+                 stencil=self.stencil.values, **lower)
 
     @classmethod
-    def load(cls, path):
+    def load(cls, path: Path) -> "Compliance":
         """Read what `save` wrote."""
         with read_arrays(path) as data:
             return cls(grid=NodeGrid.of(data), blocks=ParityBlocks(data["blocks"]),
                        foundation_modulus=float(data["foundation_modulus"]),
                        stencil=Stencil(data["stencil"]), lower=ParityBlocks(data["lower"]) if "lower" in data else None)
 
-    def among(self, points):
+    def among(self, points: ObjectPoints) -> np.ndarray:
         """Compliance (c, c) among `ObjectPoints`."""
         places = self.grid.quarter(points.nodes)
         return self.blocks.between(*places, *places)
 
-    def maps(self, points, force):
+    def maps(self, points: ObjectPoints, force: np.ndarray) -> np.ndarray:
         """Deformation maps (l, ny, nx) in mm of forces (c, l) in N at `ObjectPoints`, with sides that are held."""
         return self._maps(self.blocks, points, force)
 
-    def lower_maps(self, points, force):
+    def lower_maps(self, points: ObjectPoints, force: np.ndarray) -> np.ndarray | None:
         """The same of the lower side; None where it is held."""
         return None if self.lower is None else self._maps(self.lower, points, force)
 
@@ -65,20 +73,20 @@ class Compliance:
         return self.grid.with_held_sides(inner.astype(float))
 
 
-def map_cells(spec):
+def map_cells(spec: BaseSpec) -> tuple[int, ...]:
     """Elements (nx, ny) along a quarter's sides: as many as the map has steps there; nodes lie at half the map's spacing."""
     spec.check_for("elastic")
     return tuple((count - 1) // 2 for count in spec.map_shape[::-1])
 
 
-def surface_grid(slab):
+def surface_grid(slab: QuarterSlab) -> NodeGrid:
     """The `NodeGrid` of the free nodes on a whole slab's top, from its `QuarterSlab`."""
     sides = not slab.side_held[-1]
     x, y = (line if sides else line[:-1] for line in (slab.x, slab.y))
     return NodeGrid(*(np.concatenate([-line[:0:-1], line]) for line in (x, y)), sides)
 
 
-def elastic_slab(spec, *, cells=None):
+def elastic_slab(spec: BaseSpec, *, cells: tuple[int, ...] | None = None) -> QuarterSlab:
     """The `QuarterSlab` of a sensor's single elastic layer."""
     layer = spec.elastic_layer
     bulk, shear = layer.young_mpa / (3 * (1 - 2 * layer.poisson)), layer.young_mpa / (2 * (1 + layer.poisson))
@@ -86,7 +94,7 @@ def elastic_slab(spec, *, cells=None):
                        base_held=spec.base_held, held_below_mm=spec.edge.held_below_mm)
 
 
-def elastic_compliance(spec, *, threads=1, cells=None):
+def elastic_compliance(spec: BaseSpec, *, threads: int = 1, cells: tuple[int, ...] | None = None) -> Compliance:
     """The `Compliance` of a sensor's elastic layer; `cells`: elements along a quarter's sides, if not as the map asks for."""
     slab = elastic_slab(spec, cells=cells)
     planes, count = [slab.top] if spec.base_held else [slab.top, slab.below_top(0)], slab.top.size
@@ -99,7 +107,7 @@ def elastic_compliance(spec, *, threads=1, cells=None):
                       lower=None if spec.base_held else ParityBlocks(both[:, count:, :count].astype(np.float32)))
 
 
-def confined_modulus(layer):
+def confined_modulus(layer: fields.ElasticLayer) -> float:
     """Modulus (MPa) of an elastic layer that is compressed and cannot move sideways."""
     return layer.young_mpa * (1 - layer.poisson) / ((1 + layer.poisson) * (1 - 2 * layer.poisson))
 
@@ -132,7 +140,7 @@ class LayerPress:
     lower_maps: np.ndarray | None = None
 
 
-def press_layer(compliance, points, forces_n):
+def press_layer(compliance: Compliance, points: ObjectPoints, forces_n: Sequence[float] | np.ndarray) -> LayerPress:
     """Press `ObjectPoints` of the compliance's grid with forces (l,) in N."""
     areas = compliance.grid.areas(points.nodes)
     contact = press_elastic(compliance.among(points), points.gap, forces_n, area=points.covered * areas,

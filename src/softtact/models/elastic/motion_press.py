@@ -5,6 +5,7 @@ nodes' spacing in an increment (no node is passed over, and each takes hold wher
 Without friction there is no history, and each step is one increment.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,8 +52,9 @@ class ElasticMotion:
     """(step,): work of the object's force since the motion began; stored and dissipated energy, to the increments' order."""
 
 
-def move_on_layer(compliance: SurfaceCompliance, underside, motion: Motion, *, first_touch_mm: float, friction: float,
-                  deepest_mm: float, settings: CoulombSettings = _SETTINGS, on_step=None) -> ElasticMotion:
+def move_on_layer(compliance: SurfaceCompliance, underside: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]],
+                  motion: Motion, *, first_touch_mm: float, friction: float, deepest_mm: float,
+                  settings: CoulombSettings = _SETTINGS, on_step: Callable[[SlidingState], None] | None = None) -> ElasticMotion:
     """The `ElasticMotion` of an object with an `underside(x, y)` (heights (n,) in mm and normals) over a layer.
 
     first_touch_mm: height of its lowest point over the surface;  friction: Coulomb's coefficient

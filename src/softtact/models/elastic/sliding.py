@@ -8,6 +8,7 @@ here, too. The object's underside is evaluated at those places, exact to its tri
 Normal forces act along z, and torques are about the undeformed surface: the model is linear.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +17,7 @@ from softtact.contact.coulomb import ContactCompliance, CoulombSettings, Increme
 from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.contact.unilateral import depth_on_springs
 from softtact.errors import InputError
+from softtact.models.elastic.tangential import SurfaceCompliance
 
 _SETTINGS = CoulombSettings()
 _MARGIN, _LEAST_MARGIN_MM = 1.3, 0.1     # of the depth, within which points are looked for at first
@@ -70,8 +72,8 @@ class SlidingObject:
     first_touch_mm: height of the object's lowest point over the surface, where depth 0 is;  friction: Coulomb's coefficient
     """
 
-    def __init__(self, compliance, underside, *, first_touch_mm: float, friction: float, deepest_mm: float,
-                 settings: CoulombSettings = _SETTINGS):
+    def __init__(self, compliance: SurfaceCompliance, underside: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]],
+                 *, first_touch_mm: float, friction: float, deepest_mm: float, settings: CoulombSettings = _SETTINGS) -> None:
         self.compliance, self.friction, self.settings = compliance, friction, settings
         self._underside, self._first_touch, self._deepest = underside, first_touch_mm, deepest_mm
         self._operators = (b"", None)
@@ -151,7 +153,7 @@ class SlidingObject:
         """Loads (count,) in N from the state's to `load` that lower the object about evenly, after its shape on springs."""
         heights, begin = self.heights(state.place), state.normal.sum()
         depths = np.array([self._expected_depth(heights, max(force, 0.0)) for force in (begin, load)])
-        on_springs = [np.clip(depth - heights, 0.0, None).sum() for depth in np.linspace(*depths, count + 1)]
+        on_springs = [np.clip(depth - heights, 0.0, None).sum() for depth in np.linspace(depths[0], depths[1], count + 1)]
         grown = np.array(on_springs[1:]) - on_springs[0]
         return begin + (load - begin) * (grown / grown[-1] if grown[-1] else np.linspace(0, 1, count + 1)[1:])
 

@@ -9,6 +9,7 @@ Directions here are x, y and down: a force or displacement into the sensor is po
 """
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numba import njit
@@ -36,19 +37,19 @@ class SurfaceCompliance:
     foundation_modulus: float
     """Pressure per depth in N/mm3 under a wide punch."""
 
-    def save(self, path) -> None:
+    def save(self, path: Path) -> None:
         """Write as a NumPy archive, in single precision."""
         np.savez(path, **self.grid.arrays(), triangles=self.triangles, foundation_modulus=self.foundation_modulus)
 
     @classmethod
-    def load(cls, path) -> "SurfaceCompliance":
+    def load(cls, path: Path) -> "SurfaceCompliance":
         """Read what `save` wrote."""
         with read_arrays(path) as data:
             return cls(grid=NodeGrid.of(data), triangles=data["triangles"],
                        foundation_modulus=float(data["foundation_modulus"]))
 
-    def between(self, rows: np.ndarray, columns: np.ndarray, *, row_axes=(0, 1, 2), column_axes=(0, 1, 2),
-                dtype=np.float64) -> "FoldedBlock":
+    def between(self, rows: np.ndarray, columns: np.ndarray, *, row_axes: tuple[int, ...] = (0, 1, 2),
+                column_axes: tuple[int, ...] = (0, 1, 2), dtype: type[np.floating] = np.float64) -> "FoldedBlock":
         """Displacements at the grid's nodes `rows` (r,) from forces at nodes `columns` (c,), of some of the directions 0, 1, 2."""
         return FoldedBlock(self, _Folding(self.grid, rows, row_axes), _Folding(self.grid, columns, column_axes), dtype)
 
@@ -83,7 +84,7 @@ class FoldedBlock:
     a dense matrix among its nodes would, and never more than four times as many.
     """
 
-    def __init__(self, compliance, rows, columns, dtype):
+    def __init__(self, compliance: SurfaceCompliance, rows: _Folding, columns: _Folding, dtype: type[np.floating]) -> None:
         self._rows, self._columns = rows, columns
         parts = [_part(triangle, rows.unknowns, columns.unknowns) for triangle in compliance.triangles]
         self._blocks = np.stack(parts).astype(dtype)

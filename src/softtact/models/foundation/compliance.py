@@ -6,6 +6,8 @@ which the press sets the law (`foundation_press`).
 """
 
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,9 +15,11 @@ import scipy.sparse as sp
 from softtact.contact.node_grid import NodeGrid
 from softtact.files import read_arrays
 from softtact.linalg.direct import make_solver
+from softtact.materials.laws.base import Law
 from softtact.models.elastic.compliance import map_cells, surface_grid
 from softtact.models.foundation.frustum_spring import FrustumLaw, frustum_law
 from softtact.models.quarter_symmetry import PARITIES, ElasticLayer, ParityBlocks, QuarterSlab
+from softtact.sensors.frusta import SensorSpec
 
 SHEET_SHARES, COVER_SHARES = (1.0,), (0.45, 0.35, 0.2)
 _BLOCKS = ("surface", "sideways", "membrane", "lateral", "lateral_self")
@@ -45,24 +49,25 @@ class FoundationCompliance:
     lateral: ParityBlocks
     lateral_self: ParityBlocks
 
-    def save(self, path):
+    def save(self, path: Path) -> None:
         """Write as a NumPy archive."""
-        arrays = self.grid.arrays() | {"counts": self.counts, "foundation_modulus": self.foundation_modulus}
+        arrays: dict[str, Any] = self.grid.arrays() | {"counts": self.counts, "foundation_modulus": self.foundation_modulus}
         arrays |= {f"law_{name}": values for name, values in self.law.arrays().items()}
         arrays |= {name: getattr(self, name).blocks for name in _BLOCKS}
         np.savez(path, **arrays)
 
     @classmethod
-    def load(cls, path):
+    def load(cls, path: Path) -> "FoundationCompliance":
         """Read what `save` wrote."""
         with read_arrays(path) as data:
-            law = FrustumLaw(**{name.removeprefix("law_"): data[name] for name in data.files if name.startswith("law_")})
+            of_law: dict[str, Any] = {name.removeprefix("law_"): data[name] for name in data.files if name.startswith("law_")}
             blocks = {name: ParityBlocks(data[name]) for name in _BLOCKS}
             return cls(grid=NodeGrid.of(data), counts=tuple(data["counts"]),
-                       foundation_modulus=float(data["foundation_modulus"]), law=law, **blocks)
+                       foundation_modulus=float(data["foundation_modulus"]), law=FrustumLaw(**of_law), **blocks)
 
 
-def foundation_compliance(spec, *, dielectric_law, cover_law, frustum=None, cells=None, threads=1):
+def foundation_compliance(spec: SensorSpec, *, dielectric_law: Law, cover_law: Law, frustum: FrustumLaw | None = None,
+                          cells: tuple[int, ...] | None = None, threads: int = 1) -> FoundationCompliance:
     """The `FoundationCompliance` of a sensor with its two laws.
 
     frustum: its `FrustumLaw`, or None to compute it;  cells: elements along the quarter's sides, by default the map's steps there
@@ -89,7 +94,7 @@ def foundation_compliance(spec, *, dielectric_law, cover_law, frustum=None, cell
         lateral=ParityBlocks(lateral), lateral_self=ParityBlocks(own))
 
 
-def foundation_slab(spec, dielectric_law, cover_law, *, cells=None):
+def foundation_slab(spec: SensorSpec, dielectric_law: Law, cover_law: Law, *, cells: tuple[int, ...] | None = None) -> QuarterSlab:
     """The `QuarterSlab` of sheet and cover with two laws' linear constants."""
     layers = [ElasticLayer(spec.dielectric.sheet_thickness_mm, dielectric_law.bulk_modulus, dielectric_law.mu0, SHEET_SHARES),
               ElasticLayer(spec.cover.thickness_mm, cover_law.bulk_modulus, cover_law.mu0, COVER_SHARES)]

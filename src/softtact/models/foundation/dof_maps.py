@@ -1,14 +1,20 @@
 """Where a press of the foundation model acts: its nodes and frusta among the compliance of a quarter, and patches of points."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import scipy.sparse as sp
+
+from softtact.contact.node_grid import NodeGrid
+from softtact.contact.object_points import ObjectPoints
+from softtact.models.foundation.compliance import FoundationCompliance
 
 _LEVEL_MM = 0.02     # range of heights among the points of a patch
 _WHOLE = 0.999        # covered share from which on a point may share a patch
 _MANY_POINTS = 800   # from which on patches save time; a small contact wants all of its points
 
 
-def patches_of(points, grid, shared):
+def patches_of(points: ObjectPoints, grid: NodeGrid, shared: bool) -> sp.csr_matrix:
     """Matrix (patches, c) of the points' shares in patches: four whole points of a square, level with each other, or one alone.
 
     Squares are counted from the middle, where a row's and a column's points go in pairs, so that a symmetric contact stays so.
@@ -39,7 +45,7 @@ def _pressure_weights(points, grid):
 class Places:
     """A press' nodes and frusta in the quarter's numbers and signs, and the matrices between them and what a press asks for."""
 
-    def __init__(self, compliance, points):
+    def __init__(self, compliance: FoundationCompliance, points: ObjectPoints) -> None:
         self.compliance, grid = compliance, compliance.grid
         nodes, signs = grid.quarter(points.nodes)
         self.frusta, self.frustum_signs = lattice_places(compliance.counts)
@@ -48,11 +54,11 @@ class Places:
         self.signs = np.vstack([signs, self.frustum_signs])
         self._map_start = quarter + len(self.frusta) // 4
 
-    def surface(self):
+    def surface(self) -> np.ndarray:
         """Compliance (n + b, n + b) of nodes and frusta."""
         return self.compliance.surface.between(self.columns, self.signs, self.columns, self.signs)
 
-    def maps(self, load, lateral):
+    def maps(self, load: np.ndarray, lateral: np.ndarray) -> np.ndarray:
         """Deformation maps (l, ny, nx) in mm under loads (n + b, l) and lateral ones of frusta (4 b, l), with sides that are held."""
         coarse = self.compliance.grid.every_second
         numbers, signs = coarse.quarter(np.arange(coarse.count))
@@ -61,7 +67,7 @@ class Places:
         down = rows @ load.astype(np.float32) + by_frusta
         return coarse.with_held_sides(down.T.reshape(-1, *coarse.shape).astype(float))
 
-    def sideways(self, nodes):
+    def sideways(self, nodes: np.ndarray) -> np.ndarray:
         """Movement in x and y (2 k, n + b) of some nodes (k,) of the grid of every second node."""
         numbers, signs = self.compliance.grid.every_second.quarter(nodes)
         block = self.compliance.sideways
@@ -69,7 +75,7 @@ class Places:
         return np.vstack([block.between(axis * quarter + numbers, signs, self.columns, self.signs)
                           * signs[:, axis:axis + 1].astype(np.float32) for axis in (0, 1)])
 
-    def lateral(self):
+    def lateral(self) -> np.ndarray:
         """Movement and tilt along x, then along y (4 b, n + b), of all frusta's roots."""
         return self._lateral(self.columns, self.signs)
 
@@ -78,7 +84,7 @@ class Places:
         return np.vstack([self.compliance.lateral.between(rows, self.frustum_signs, columns, signs) * sign[:, None]
                           for rows, sign in self._lateral_rows()])
 
-    def lateral_self(self):
+    def lateral_self(self) -> np.ndarray:
         """The same (4 b, 4 b) from unit forces and moments of the frusta along x, then along y."""
         block, kinds = self.compliance.lateral_self, list(self._lateral_rows())
         return np.block([[block.between(rows, self.frustum_signs, columns, self.frustum_signs) * np.outer(sign, other)
@@ -90,7 +96,7 @@ class Places:
         for kind in range(4):
             yield kind * quarter + self.frusta, self.frustum_signs[:, kind // 2].astype(np.float32)
 
-    def membrane(self):
+    def membrane(self) -> np.ndarray:
         """Membrane forces (3 b, n + b) of all cells."""
         block = self.compliance.membrane
         quarter = block.blocks.shape[1] // 3
@@ -99,7 +105,7 @@ class Places:
         return np.vstack(rows)
 
 
-def lattice_places(counts):
+def lattice_places(counts: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
     """Of all frusta, x fastest: their numbers in the quarter (b,), from the middle, and signs (b, 2)."""
     i, j = (grid.ravel() for grid in np.meshgrid(*(np.arange(count) for count in counts)))
     half = [count // 2 for count in counts]
@@ -110,7 +116,7 @@ def lattice_places(counts):
 class Sideways:
     """Movement of the points in x and y, interpolated between the nodes around them of the grid of every second node."""
 
-    def __init__(self, compliance, points, places):
+    def __init__(self, compliance: FoundationCompliance, points: ObjectPoints, places: Places) -> None:
         grid, coarse = compliance.grid, compliance.grid.every_second
         j, i = np.divmod(points.nodes, grid.shape[1])
         at = (np.column_stack([i, j]) - grid.first_of_second) / 2       # in steps of the coarse grid
@@ -128,6 +134,6 @@ class Sideways:
         self._between = sp.csr_matrix((np.stack(weight, axis=1).ravel(), (rows, place.ravel())), shape=(points.count, len(used)))
         self._nodes = places.sideways(used)
 
-    def __call__(self, load):
+    def __call__(self, load: np.ndarray) -> np.ndarray:
         """Movement (2, c) in mm under a load (n + b,)."""
         return np.stack([self._between @ part for part in (self._nodes @ load).reshape(2, -1)])

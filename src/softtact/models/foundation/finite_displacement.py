@@ -19,10 +19,16 @@ docs/notebook/2026-11-23-foundation-model.md.
 """
 
 from dataclasses import astuple, dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softtact.models.foundation.dof_maps import Sideways
+from softtact.contact.object_points import ObjectPoints
+from softtact.models.foundation.compliance import FoundationCompliance
+from softtact.models.foundation.dof_maps import Places, Sideways
+
+if TYPE_CHECKING:
+    from softtact.models.foundation.solve import FoundationSettings
 
 _STEP = 0.01         # of a force, for a difference quotient
 _SLOWLY = 5.0        # times as exact must what is followed half of the way only have settled
@@ -40,12 +46,12 @@ class Effects:
     moved: np.ndarray
     rise: np.ndarray
 
-    def towards(self, other, share, *, loads, rise):
+    def towards(self, other: "Effects", share: float, *, loads: np.ndarray | float, rise: float) -> "Effects":
         """These with a share of the way to others gone, and other shares of the way to their loads and rise."""
         shares = (loads, share, 1.0, rise)
         return Effects(*(a + part * (b - a) for a, b, part in zip(astuple(self), astuple(other), shares, strict=True)))
 
-    def continued(self, before, share):
+    def continued(self, before: "Effects", share: float) -> "Effects":
         """These continued by a share of how they differ from those before."""
         loads, lateral, moved, rise = (b + share * (b - a) for a, b in zip(astuple(before), astuple(self), strict=True))
         return Effects(loads, lateral, moved, np.maximum(rise, 0.0))
@@ -54,7 +60,8 @@ class Effects:
 class FiniteDisplacement:
     """The effects of one press, of loads (n + b,) on its nodes and frusta."""
 
-    def __init__(self, compliance, points, places, settings):
+    def __init__(self, compliance: FoundationCompliance, points: ObjectPoints, places: Places,
+                 settings: "FoundationSettings") -> None:
         """settings: `FoundationSettings`, of which `follow` and `rocking` count"""
         self.law, self.settings, self.lattice = compliance.law, settings, compliance.counts[::-1]
         self.frusta, self.points = len(places.frusta), points
@@ -64,25 +71,26 @@ class FiniteDisplacement:
             self.lateral_self, self.membrane = places.lateral_self(), places.membrane()
             self.sideways, self._own = Sideways(compliance, points, places), self._own_compliance()
 
-    def none(self):
+    def none(self) -> Effects:
         """Those of the unloaded sensor."""
         b = self.frusta
         return Effects(np.zeros(b), np.zeros((4, b)), np.zeros((2, self.points.count)), np.zeros(b))
 
-    def down(self, effects):
+    def down(self, effects: Effects) -> np.ndarray:
         """How far nodes and frusta (n + b,) come down under lateral loads of the frusta, in mm."""
         if not self.settings.follow:
             return np.zeros(self.points.count + self.frusta, dtype=np.float32)
         return effects.lateral.ravel().astype(np.float32) @ self.lateral
 
-    def renewed(self, effects, load, down, q, *, share):
+    def renewed(self, effects: Effects, load: np.ndarray, down: np.ndarray, q: np.ndarray, *,
+                share: float) -> tuple[Effects, float]:
         """The effects under a load, frusta down by `down` (b,) under their law's forces q (b,), or a share of the way there.
 
         The rise goes half of the way, for all of it would swing: a force ends what lifts it. Returns the effects, and what was
         missing, as the largest change of a frustum's force in N.
         """
         found, missing, load = effects, 0.0, load.astype(np.float32)
-        roots = self._roots(effects, load) if self.settings.follow or self.settings.rocking else None
+        roots: Any = self._roots(effects, load) if self.settings.follow or self.settings.rocking else None
         if self.settings.follow:
             found = self._found(effects, load, down.reshape(self.lattice), q, roots)
             missing = max(np.abs(found.loads - effects.loads).max(), np.abs(found.lateral - effects.lateral).max())
@@ -137,7 +145,7 @@ class FiniteDisplacement:
         return self.lateral_self[np.ix_(both, both)].astype(float)
 
 
-def membrane_loads(down, forces):
+def membrane_loads(down: np.ndarray, forces: np.ndarray) -> np.ndarray:
     """Loads on the frusta (ny, nx), upwards in N, of membrane forces (3, ny, nx) in N/mm in a slab that has come down by `down`
     (ny, nx) in mm: the gradient of 1/2 sum N_ab w_a w_b over the cells; beyond the lattice the slab is held.
 

@@ -13,6 +13,8 @@ slab at single points instead, they were point loads, under which a slab gives w
 
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -23,11 +25,13 @@ from softtact.errors import ConvergenceError
 from softtact.fem.elements import HEX27, QUAD9
 from softtact.fem.quadrature import gauss
 from softtact.files import read_arrays
+from softtact.materials.laws.base import Law
 from softtact.models.foundation.single_frustum import SingleFrustum
 from softtact.models.hyperelastic.build import build_unit_cell
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.models.hyperelastic.path import press_load_steps
+from softtact.sensors.frusta import SensorSpec
 
 _FIRST_N, _LEVELS_A_DECADE = 2e-3, 9
 _MORTAR_POINTS = 10      # along a side of a root's face: so dense that elements of a tenth of a pitch do not feel them singly
@@ -69,20 +73,20 @@ class FrustumLaw:
         return self._curve.derivative()
 
     @property
-    def limit_mm(self):
+    def limit_mm(self) -> float:
         """Largest compression that the cell reached."""
         return float(self.compression_mm[-1])
 
-    def extension(self, force):
+    def extension(self, force: np.ndarray) -> np.ndarray:
         """Compression in mm under forces >= 0 in N, of any shape."""
         inside = np.minimum(force, self.force_n[-1])
         return self._curve(inside) + self._last_slope * (force - inside)
 
-    def slope(self, force):
+    def slope(self, force: np.ndarray) -> np.ndarray:
         """Derivative of `extension` in mm/N."""
         return np.where(force < self.force_n[-1], self._curve_slope(np.minimum(force, self.force_n[-1])), self._last_slope)
 
-    def rise(self, sideways, force):
+    def rise(self, sideways: np.ndarray, force: np.ndarray) -> np.ndarray:
         """How far roots that have moved `sideways` (mm) are lifted by frusta that rock under forces >= 0 (N), in mm.
 
         A rigid tip of radius e on a board without tension: its moment is at most e times the force, and what it leans beyond
@@ -90,7 +94,7 @@ class FrustumLaw:
         """
         return self.tip_radius_mm * np.maximum(self.lean * sideways - self.tip_radius_mm * force / self.upright, 0.0)
 
-    def stiffening(self, force):
+    def stiffening(self, force: np.ndarray) -> tuple[np.ndarray, ...]:
         """By how much frusta under forces (b,) in N are stiffer than at rest against (movement, tilt), (b, 2, 2), and that matrix'
         derivative by their compression, per mm.
         """
@@ -111,22 +115,23 @@ class FrustumLaw:
     def _last_slope(self):
         return float(self._curve_slope(self.force_n[-1]))
 
-    def save(self, path):
+    def save(self, path: Path) -> None:
         """Write as a NumPy archive."""
         np.savez(path, **self.arrays())
 
     @classmethod
-    def load(cls, path):
+    def load(cls, path: Path) -> "FrustumLaw":
         """Read what `save` wrote."""
         with read_arrays(path) as data:
-            return cls(**dict(data))
+            values: dict[str, Any] = dict(data)
+            return cls(**values)
 
-    def arrays(self):
+    def arrays(self) -> dict[str, Any]:
         """All fields by name, to be saved."""
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
 
-def frustum_law(spec, law, *, mesh=None, pressure_mpa=_PRESSURE_MPA):
+def frustum_law(spec: SensorSpec, law: Law, *, mesh: MeshSettings | None = None, pressure_mpa: float = _PRESSURE_MPA) -> FrustumLaw:
     """The `FrustumLaw` of a sensor's frusta of a hyperelastic law, from its unit cell up to a pressure, or as far as it goes.
 
     mesh: `MeshSettings` of the cell; by default frusta of two rings, which one cell can afford (of one: 2 % too stiff)
@@ -135,7 +140,7 @@ def frustum_law(spec, law, *, mesh=None, pressure_mpa=_PRESSURE_MPA):
     support = body.support
     root_xy, spread, mass = _root_mortar(support)
     stiffness = _root_stiffness(support)
-    straight = np.zeros((len(spread), 3))
+    straight: np.ndarray = np.zeros((len(spread), 3))
     straight[:, 2] = 1.0
     straight = straight.ravel()
     along = stiffness @ straight

@@ -11,6 +11,9 @@ docs/notebook/2026-11-23-foundation-model.md.
 
 import numpy as np
 
+from softtact.contact.object_points import ObjectPoints
+from softtact.models.foundation.compliance import FoundationCompliance
+
 _AROUND, _DEEP = 6, 6     # nodes along an edge, and held behind it, among which a node's own compliance is found
 _ROUNDED = 0.12           # of the depth: height on a rounded edge up to which the object acts as if it had no rounding
 _EVEN_MM = 1e-3           # that lies in a plane: heights over it are in single precision
@@ -20,12 +23,12 @@ _MIDDLE_BEYOND = 0.26     # of a step, that an edge must be beyond an element's 
 class SoftEdges:
     """How soft points on a `FoundationCompliance`'s grid are beside edges."""
 
-    def __init__(self, compliance):
+    def __init__(self, compliance: FoundationCompliance) -> None:
         self._grid = compliance.grid
         self._by_axis = np.stack([own_compliance(compliance, axis) for axis in (0, 1)])
         self._last = None
 
-    def __call__(self, points, moved, depth):
+    def __call__(self, points: ObjectPoints, moved: np.ndarray, depth: float) -> np.ndarray:
         """Softness (c,) in mm/N of `ObjectPoints` that have moved sideways by `moved` (2, c) in mm; infinite where not covered.
 
         depth: how far the object has come down since its first touch, in mm
@@ -47,13 +50,13 @@ class SoftEdges:
         return self._last[1:]
 
 
-def beyond(covered):
+def beyond(covered: np.ndarray) -> np.ndarray:
     """How many steps, up to 2, a straight edge lies beyond the node before those of which it covers a share (c,) of the hat."""
     inner = np.sqrt(2 * np.minimum(covered, 0.5))
     return np.where(covered < 0.5, inner, 2 - np.sqrt(2 * np.clip(1 - covered, 0.0, 0.5)))
 
 
-def own_compliance(compliance, axis):
+def own_compliance(compliance: FoundationCompliance, axis: int) -> np.ndarray:
     """Compliance (2,) in mm/N of a row of nodes across an axis (0: x), pushed alike beside rows that are held, in the sensor's
     middle: of rows of elements' corners, and of their middles.
     """

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from softtact.models.hyperelastic.frusta import FrustumArray
+from softtact.models.hyperelastic.support import SupportState
 from softtact.models.newton import solve
 
 _STEP_MM = 0.01        # largest movement of the root at once
@@ -12,11 +14,11 @@ _ITERATIONS = 40
 class SingleFrustum:
     """The only frustum of a `FrustumArray`, from its state at rest on; each `move` goes on from the last."""
 
-    def __init__(self, support):
+    def __init__(self, support: FrustumArray) -> None:
         self.support, self._displacement, self._place = support, np.zeros((1, support.nodes, 3)), np.zeros(3)
         self._x = support.coordinates[0][support.root, 0] - support.geometry.centres[0][0]
 
-    def move(self, movement, tilt, descent):
+    def move(self, movement: float, tilt: float, descent: float) -> np.ndarray | None:
         """Force and moment (2,) in N and N mm, along x, that hold the root at a movement and descent in mm and a tilt along x.
 
         None where a step on the way finds no balance, and from then on.
@@ -51,31 +53,31 @@ class SingleFrustum:
 
     # The frustum with its root held, as a `Problem` of Newton's method.
 
-    def prepared(self, state, iteration):
+    def prepared(self, state: SupportState, iteration: int) -> SupportState:
         return state
 
-    def residual(self, state):
+    def residual(self, state: SupportState) -> float:
         return np.abs(self.support.inner_residual(state)).max()
 
-    def balanced(self, state, residual):
+    def balanced(self, state: SupportState, residual: float) -> bool:
         return residual <= _TOLERANCE_N
 
-    def step(self, state):
+    def step(self, state: SupportState) -> tuple[SupportState, np.ndarray]:
         return state, self._newton_step(state, np.zeros((1, 3 * len(self._x))))
 
-    def first_share(self, step):
+    def first_share(self, step: np.ndarray) -> float:
         return 1.0
 
-    def moved(self, state, step, share):
+    def moved(self, state: SupportState, step: np.ndarray, share: float) -> SupportState | None:
         return self.support.evaluate(state.displacement + share * step)
 
-    def better(self, trial, state, residual):
+    def better(self, trial: SupportState, state: SupportState, residual: float) -> bool:
         return trial.energy < state.energy or self.residual(trial) < residual
 
-    def accepted(self, state, trial):
+    def accepted(self, state: SupportState, trial: SupportState) -> None:
         """Nothing is kept from one step to the next."""
 
-    def recovered(self, state):
+    def recovered(self, state: SupportState) -> bool:
         return False
 
     def _forces(self):

@@ -12,12 +12,15 @@ step to step (`finite_displacement`), e the frusta's rise and l lateral forces o
     extension(q) = w + e,       u, w = G [E' f; -(q + r)] + L' l
 """
 
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg as sla
 
+from softtact.contact.object_points import ObjectPoints
 from softtact.errors import ConvergenceError
+from softtact.models.foundation.compliance import FoundationCompliance
 from softtact.models.foundation.dof_maps import Places, patches_of
 from softtact.models.foundation.finite_displacement import Effects, FiniteDisplacement
 from softtact.models.foundation.partial_contact import SoftEdges
@@ -70,7 +73,8 @@ class FoundationLoadStep:
     iterations: int
 
 
-def press_foundation(compliance, points, forces_n, *, settings=FoundationSettings()):
+def press_foundation(compliance: FoundationCompliance, points: ObjectPoints, forces_n: Iterable[float], *,
+                     settings: FoundationSettings = FoundationSettings()) -> Iterator[FoundationLoadStep]:
     """Yield a `FoundationLoadStep` for each force (N, increasing). Raises ConvergenceError naming the load step that was not
     reached.
     """
@@ -105,10 +109,10 @@ def _advance(press, path, target):
 class FoundationMaps:
     """Deformation maps in mm of the load steps of one press."""
 
-    def __init__(self, compliance, points):
+    def __init__(self, compliance: FoundationCompliance, points: ObjectPoints) -> None:
         self._places = Places(compliance, points)
 
-    def __call__(self, load_steps):
+    def __call__(self, load_steps: Sequence[FoundationLoadStep]) -> np.ndarray:
         """Maps (l, ny, nx) of some `FoundationLoadStep`s, with the held edges."""
         return self._places.maps(np.stack([load_step.load for load_step in load_steps], axis=1),
                                  np.stack([load_step.lateral.ravel() for load_step in load_steps], axis=1))

@@ -6,6 +6,7 @@ c_i = max(0, d - (h_max - h_i)) when the plate has gone down by d from its first
 is one equation for d. The cell's force F and area A come from `press_cell_on_glass` at a few heights and tip diameters.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,8 +15,11 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
 from softtact.errors import ConvergenceError
+from softtact.materials.laws.base import Law
 from softtact.models.ftir.unit_cell import GlassCurve, press_cell_on_glass
 from softtact.models.hyperelastic.build import lattice
+from softtact.models.hyperelastic.mesh_settings import MeshSettings
+from softtact.sensors.frusta import SensorSpec
 
 _SPARE = 1.25            # cells are pressed so much farther than the mean frustum: the tallest carries more
 _LEVELS = 14            # of force, at which a cell is solved
@@ -39,7 +43,7 @@ class PressedSpecimen:
     area_mm2: np.ndarray
 
 
-def scattered_specimen(spec, *, height_scatter, tip_scatter, seed):
+def scattered_specimen(spec: SensorSpec, *, height_scatter: float, tip_scatter: float, seed: int) -> Specimen:
     """A `Specimen` whose factors are normally distributed about 1 with these standard deviations."""
     centres, _ = lattice(spec.frusta_counts, spec.dielectric.frusta.pitch_mm)
     rng = np.random.default_rng([seed, 2])
@@ -54,7 +58,8 @@ class CellFamily:
     parabola in the height factor and one in the tip factor, at equal compression per height; their product term is left out.
     """
 
-    def __init__(self, spec, law, *, largest_n, height_spread, tip_spread, mesh=None):
+    def __init__(self, spec: SensorSpec, law: Law, *, largest_n: float, height_spread: float, tip_spread: float,
+                 mesh: MeshSettings | None = None) -> None:
         """largest_n: mean force per frustum that will be asked for;  spreads: farthest factors from 1 on either side."""
         self.height_mm, self.spreads = spec.dielectric.frusta.height_mm, (height_spread, tip_spread)
 
@@ -68,15 +73,15 @@ class CellFamily:
                       for name, spread in zip(("height_factor", "tip_factor"), self.spreads, strict=True)]
 
     @cached_property
-    def limit(self):
+    def limit(self) -> float:
         """Compression per height up to which all cells were solved."""
         return min(cell.limit for cell in [self.nominal, *(cell for pair in self.pairs if pair for cell in pair)])
 
-    def force(self, compression_mm, height_factor, tip_factor):
+    def force(self, compression_mm: np.ndarray, height_factor: np.ndarray, tip_factor: np.ndarray) -> np.ndarray:
         """Forces (n,) in N of frusta at compressions (n,) >= 0."""
         return self._at("force", compression_mm, height_factor, tip_factor)
 
-    def area(self, compression_mm, height_factor, tip_factor):
+    def area(self, compression_mm: np.ndarray, height_factor: np.ndarray, tip_factor: np.ndarray) -> np.ndarray:
         """Contact areas (n,) in mm2; none where there is no compression."""
         return np.where(compression_mm > 0, self._at("area", compression_mm, height_factor, tip_factor), 0.0)
 
@@ -101,14 +106,15 @@ class _Cell:
         self.area = PchipInterpolator(share[1:], curve.area_mm2[1:])     # at the first touch the area jumps from 0 to the tip's
 
 
-def cell_family(spec, law, specimen, *, largest_n, mesh=None):
+def cell_family(spec: SensorSpec, law: Law, specimen: Specimen, *, largest_n: float,
+                mesh: MeshSettings | None = None) -> CellFamily:
     """The `CellFamily` that spans a specimen's frusta; largest_n: largest total force that will be asked for."""
     spreads = [float(np.abs(factor - 1).max()) for factor in (specimen.height_factor, specimen.tip_factor)]
     return CellFamily(spec, law, largest_n=largest_n / len(specimen.centres), height_spread=spreads[0], tip_spread=spreads[1],
                       mesh=mesh)
 
 
-def press_specimen(family, specimen, forces_n):
+def press_specimen(family: CellFamily, specimen: Specimen, forces_n: Sequence[float] | np.ndarray) -> PressedSpecimen:
     """The `PressedSpecimen` under total forces (f,) in N, from 0 on."""
     lag = family.height_mm * (specimen.height_factor.max() - specimen.height_factor)       # mm until the plate meets a frustum
     shape = specimen.height_factor, specimen.tip_factor

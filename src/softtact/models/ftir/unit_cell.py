@@ -1,6 +1,8 @@
 """The dielectric between a plate and glass: one cell of its lattice, force per frustum against contact area (FTIR)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -8,10 +10,13 @@ import trimesh
 from softtact.contact.height_field import HeightField
 from softtact.errors import ConvergenceError
 from softtact.fem.elements import HEX27, QUAD9
+from softtact.materials.laws.base import Law
 from softtact.models.hyperelastic.build import build_unit_cell
+from softtact.models.hyperelastic.frusta import FrustumArray
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.models.hyperelastic.path import press_load_steps
+from softtact.sensors.frusta import SensorSpec
 
 # A gap this wide ends total reflection: the evanescent wave's intensity falls to 1/e in lambda / (4 pi sqrt(n^2 sin^2 theta - 1)),
 # for green light (0.53 um) in acrylic (n = 1.49) 0.13 um at 45 degrees and 0.05 um at 60 degrees.
@@ -37,7 +42,8 @@ class GlassCurve:
     compression_mm: np.ndarray
 
 
-def press_cell_on_glass(spec, law, forces_n, *, mesh=None, height_factor=1.0, tip_factor=1.0, as_far_as_it_goes=False):
+def press_cell_on_glass(spec: SensorSpec, law: Law, forces_n: Sequence[float] | np.ndarray, *, mesh: MeshSettings | None = None,
+                        height_factor: float = 1.0, tip_factor: float = 1.0, as_far_as_it_goes: bool = False) -> GlassCurve:
     """Contact area of one frustum under forces (N per frustum, increasing, from 0 on).
 
     mesh: `MeshSettings`, by default the one for the frustum's shape
@@ -50,7 +56,7 @@ def press_cell_on_glass(spec, law, forces_n, *, mesh=None, height_factor=1.0, ti
     settings = replace(SETTINGS, smallest_increment_n=_GIVE_UP_N) if as_far_as_it_goes else SETTINGS
     try:
         for load_step in press_load_steps(body, HeightField(plate_over(spec)), forces[forces > 0], settings=settings):
-            area = contact_area(body.support, load_step.state.support.displacement)
+            area = contact_area(body.support, load_step.state.support.displacement)     # type: ignore[arg-type]
             reached.append((load_step.force_n, area, load_step.state.indentation))
     except ConvergenceError:
         if not as_far_as_it_goes or len(reached) < 2:
@@ -60,20 +66,20 @@ def press_cell_on_glass(spec, law, forces_n, *, mesh=None, height_factor=1.0, ti
     return GlassCurve(*np.array(reached).T)
 
 
-def glass_mesh(spec, **changes):
+def glass_mesh(spec: SensorSpec, **changes: Any) -> MeshSettings:
     """The `MeshSettings` that a frustum of this shape needs; changes are made where its sides fold onto the glass."""
     frusta = spec.dielectric.frusta
     return replace(GLASS_MESH, **changes) if frusta.tip_diameter_mm < frusta.root_diameter_mm else WIDE_TIP_MESH
 
 
-def plate_over(spec):
+def plate_over(spec: SensorSpec) -> trimesh.Trimesh:
     """A rigid plate over the cell, its underside at z = 0."""
     plate = trimesh.creation.box((4 * spec.dielectric.frusta.pitch_mm,) * 2 + (1.0,))
     plate.apply_translation([0, 0, 0.5])
     return plate
 
 
-def contact_area(support, displacement, *, frustum=0, gap_mm=DARK_GAP_MM):
+def contact_area(support: FrustumArray, displacement: np.ndarray, *, frustum: int = 0, gap_mm: float = DARK_GAP_MM) -> float:
     """Projected area (mm2) of one frustum's surface that is nearer to the glass than `gap_mm`."""
     position = support.coordinates[frustum] + displacement[frustum]
     faces = np.vstack([support.mesh.layer(0)[:, HEX27.bottom], support.outer_faces])

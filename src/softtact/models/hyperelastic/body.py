@@ -1,6 +1,8 @@
 """The layered sensor as one body: slab (sheet and cover) tied to its `Support`, and one Newton step of it."""
 
 from dataclasses import dataclass, replace
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,10 +15,13 @@ from softtact.models.hyperelastic.linearised_contact import StepContact
 from softtact.models.hyperelastic.local_equilibrium import balanced
 from softtact.models.hyperelastic.newton_step import ContactStepper
 from softtact.models.hyperelastic.preconditioner import DissectedContact
-from softtact.models.hyperelastic.rigid_contact import ContactProjection
-from softtact.models.hyperelastic.slab import SlabState
-from softtact.models.hyperelastic.support import NoCells, SupportState
+from softtact.models.hyperelastic.rigid_contact import ContactProjection, Surface
+from softtact.models.hyperelastic.slab import Slab, SlabState
+from softtact.models.hyperelastic.support import NoCells, Support, SupportState
 from softtact.models.hyperelastic.unit_cells import SheetCells
+
+if TYPE_CHECKING:
+    from softtact.fem.kernels_torch import DeviceKernels
 
 _DAMPINGS = 4         # steps that are tried with ever more damping of the cells that they throw too far
 _FIRST_SHIFT = 0.01   # N/mm on every free unknown of the slab, doubled until the tangent is positive definite ...
@@ -40,16 +45,16 @@ class BodyState:
     indentation: float
 
     @property
-    def energy(self):
+    def energy(self) -> float:
         return self.slab.energy + self.support.energy
 
     @property
-    def history(self):
+    def history(self) -> BodyHistory:
         """What the contacts remember, `BodyHistory`."""
         return BodyHistory(self.slab.history, self.support.history)
 
     @property
-    def force(self):
+    def force(self) -> float:
         """Force (N) that the object exerts downwards."""
         return self.slab.indentation_force
 
@@ -63,7 +68,7 @@ class Step:
     indentation: float
     projection: ContactProjection
 
-    def largest(self):
+    def largest(self) -> float:
         return max(np.abs(self.slab).max(), np.abs(self.support).max(initial=0.0), abs(self.indentation))
 
 
@@ -78,59 +83,60 @@ def _shifts():
 class LayeredBody:
     """Slab on a `Support`, pressed from above by a rigid object. Lengths in mm, z = 0 at the top at rest."""
 
-    def __init__(self, slab, support, roots=None, *, threads=1):
+    def __init__(self, slab: Slab, support: Support, roots: np.ndarray | None = None, *, threads: int = 1) -> None:
         """`roots` (f, k): the slab's nodes that are the frusta's root nodes; none for a support without bodies."""
         self.slab, self.support = slab, support
         self.workers = Workers(threads)
         self.friction = BodyFriction(slab.top, support)
-        self.cells = SheetCells(slab, support, roots) if support.count else NoCells()
+        self.cells = SheetCells(slab, support, roots) if support.count else NoCells()     # type: ignore[arg-type]
         slab.build_pattern(self.cells.eliminated, self.cells.outer_dofs)
         self.solver = DissectedSolver(slab.points[slab.unknowns // 3, :2], workers=self.workers)
         self.stepper = ContactStepper(DissectedContact(self.solver, workers=self.workers))
 
-    def sum_with(self, loops):
+    def sum_with(self, loops: "ModuleType | DeviceKernels") -> None:
         """Let elements be summed by `loops`: `kernels`, as from the start, or `device_kernels`."""
         for block in self.slab.blocks + self.support.blocks:
             block.loops = loops
 
     @property
-    def method(self):
+    def method(self) -> str:
         """Linear solver and device in words."""
         loops = self.slab.blocks[0].loops
         return self.solver.name if loops is kernels else f"{self.solver.name}; elements on {loops.device}"
 
-    def close(self):
+    def close(self) -> None:
         """Free the factors, and end the threads."""
         self.solver.close()
         self.workers.close()
 
-    def rest(self):
+    def rest(self) -> tuple[np.ndarray, np.ndarray]:
         """Displacements of slab (n, 3) and support (f, nodes, 3) at rest."""
         return np.zeros((self.slab.nodes, 3)), np.zeros((self.support.count, self.support.nodes, 3))
 
-    def fresh_history(self):
+    def fresh_history(self) -> BodyHistory:
         """The contacts' history before the first touch."""
         return BodyHistory(self.slab.top.fresh_history(), self.support.fresh_history())
 
-    def begin(self):
+    def begin(self) -> None:
         """Forget all tangents and factors of an earlier press: what is kept decides the last digits of a result."""
         self.cells.reset()
         self.stepper.reset()
         self.friction.reset()
 
-    def evaluate(self, slab_displacement, support_displacement, indentation, projection, history=None):
+    def evaluate(self, slab_displacement: np.ndarray, support_displacement: np.ndarray, indentation: float,
+                 projection: ContactProjection, history: BodyHistory | None = None) -> BodyState | None:
         """State at given displacements, by default without a history of the contacts; None where an element is inside out."""
         history = history or self.fresh_history()
         slab = self.slab.evaluate(slab_displacement, projection, indentation, history.top, workers=self.workers)
         support = None if slab is None else self.support.evaluate(support_displacement, history.support, workers=self.workers)
-        return None if support is None else BodyState(slab=slab, support=support, indentation=indentation)
+        return None if slab is None or support is None else BodyState(slab=slab, support=support, indentation=indentation)
 
-    def reevaluate_contact(self, state, history):
+    def reevaluate_contact(self, state: BodyState, history: BodyHistory) -> BodyState:
         """The same displacements with another history of the contacts: the rubber is not evaluated anew."""
         return BodyState(slab=self.slab.update_normals(state.slab, state.slab.projection, state.indentation, history.top),
                          support=self.support.reevaluate_contact(state.support, history.support), indentation=state.indentation)
 
-    def balanced(self, state, tolerance_n):
+    def balanced(self, state: BodyState, tolerance_n: float) -> BodyState:
         """The state with each frustum in balance over its root, where nothing else keeps the body from it.
 
         A frustum that rocks or folds needs steps of its own; as long as sheet or cover do, too, it takes them with these. With
@@ -143,20 +149,21 @@ class LayeredBody:
         self.cells.forget(moved)
         return replace(state, support=support)
 
-    def update_normals(self, state, projection):
+    def update_normals(self, state: BodyState, projection: ContactProjection) -> BodyState:
         """The same state with the object's contact on other planes."""
         return replace(state, slab=self.slab.update_normals(state.slab, projection, state.indentation))
 
-    def indented_to(self, state, force_n):
+    def indented_to(self, state: BodyState, force_n: float) -> BodyState:
         """The state with the object at the depth where its force is `force_n`: the least energy over the indentation."""
         return self.indented(state, self.slab.top.balanced(state.slab, state.indentation, force_n) - state.indentation)
 
-    def indented(self, state, by_mm):
+    def indented(self, state: BodyState, by_mm: float) -> BodyState:
         """The state with the object lower by so much."""
         depth = state.indentation + by_mm
         return replace(state, slab=self.slab.update_normals(state.slab, state.slab.projection, depth), indentation=depth)
 
-    def newton_step(self, state, force_n, surface=None, *, largest_mm=np.inf, kept_mm=0.0):
+    def newton_step(self, state: BodyState, force_n: float | None, surface: Surface | None = None, *, largest_mm: float = np.inf,
+                    kept_mm: float = 0.0) -> Step:
         """The Newton step under a given force (N), or with the indentation kept where `force_n` is None.
 
         largest_mm: by which the object goes down at most;  kept_mm: cells that moved less since their last tangent keep it
@@ -205,19 +212,19 @@ class LayeredBody:
         self.slab.add_to_diagonal(rubber, shift)
         return rubber
 
-    def penetration(self, state):
+    def penetration(self, state: BodyState) -> float:
         """Deepest penetration in mm, of the object into the cover or of frusta into the board or each other."""
         return float(max(0.0, -self.slab.top.own_gaps(state.slab).min(), -state.support.gaps.min(initial=np.inf)))
 
-    def descent(self, state):
+    def descent(self, state: BodyState) -> float:
         """How far the cover has come down where it did most, in mm."""
         return float(-state.slab.displacement[:, 2].min())
 
-    def contact_error(self, state):
+    def contact_error(self, state: BodyState) -> float:
         """Deepest overlap, or widest gap under pressure, in mm."""
         return max(self.slab.top.error(state.slab), self.support.contact_error(state.support))
 
-    def augmented(self, state, *, allowed_mm):
+    def augmented(self, state: BodyState, *, allowed_mm: float) -> BodyState:
         """The state with the points that overlap held where their surfaces just touch, wherever an overlap is more than allowed."""
         top, support = state.slab.history, state.support.history
         if self.slab.top.error(state.slab) > allowed_mm:
@@ -226,7 +233,7 @@ class LayeredBody:
             support = self.support.augmented(state.support)
         return self.reevaluate_contact(state, BodyHistory(top, support))
 
-    def most_compressed(self, state):
+    def most_compressed(self, state: BodyState) -> tuple[float, str]:
         """The largest share of its height by which a frustum, or without any the layers, are shortened; and which in words."""
         of_support = self.support.most_compressed(state.support)
         if of_support is not None:
@@ -234,19 +241,19 @@ class LayeredBody:
         share = self.descent(state) / np.ptp(self.slab.points[:, 2])
         return share, f"the surface has come down by {share:.0%} of the layers' thickness"
 
-    def share_outside_window(self, state):
+    def share_outside_window(self, state: BodyState) -> float:
         """Share of a law's volume that is strained beyond what the law was fitted to, the largest over the laws.
 
         nan where no law knows what it was fitted to.
         """
-        volumes = {}
+        volumes: dict[int, tuple[float, float]] = {}
         for nodes, block in self.slab.solids:
             _add_volumes(volumes, block, state.slab.displacement[nodes])
         for block in self.support.blocks:
-            _add_volumes(volumes, block, self.support.per_element(state.support.displacement))
+            _add_volumes(volumes, block, self.support.per_element(state.support.displacement))     # type: ignore[attr-defined]
         return max((outside / whole for outside, whole in volumes.values()), default=np.nan)
 
-    def residual_norm(self, state, force_n):
+    def residual_norm(self, state: BodyState, force_n: float | None) -> float:
         """Largest unbalanced nodal force in N, over slab, frusta and the object."""
         parts = [self._slab_residual(state), self._support_residual(state)]
         if force_n is not None:
@@ -259,7 +266,7 @@ class LayeredBody:
     def _support_residual(self, state):
         return np.abs(self.support.inner_residual(state.support)).max(initial=0.0)
 
-    def slab_force(self, state):
+    def slab_force(self, state: BodyState) -> np.ndarray:
         """Forces (n, 3) on the slab's nodes, those of the frusta's roots among them."""
         total = state.slab.force.copy()
         np.add.at(total, self.cells.roots.ravel(), state.support.force[:, self.support.root].reshape(-1, 3))

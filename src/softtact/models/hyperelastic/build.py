@@ -1,17 +1,22 @@
 """Layered bodies of a sensor: the whole of it, one cell of an endless lattice, a piece of the dielectric."""
 
 import itertools
+from collections.abc import Sequence
 
 import numpy as np
 
 from softtact.contact.friction import coulomb
+from softtact.contact.penalty import Contact
 from softtact.fem.extruded_mesh import sheet_mesh_2d
 from softtact.fem.levels import with_level
+from softtact.materials.laws.base import Law
 from softtact.models.hyperelastic.body import LayeredBody
 from softtact.models.hyperelastic.frusta import FrustumArray, FrustumGeometry
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.models.hyperelastic.refinement import FAR, NEAR, split_depths_of, zones
+from softtact.models.hyperelastic.rigid_contact import Surface
 from softtact.models.hyperelastic.slab import Layer, Slab
+from softtact.sensors.frusta import SensorSpec
 
 
 def _lines(side, count, pitch, pitches):
@@ -22,7 +27,7 @@ def _lines(side, count, pitch, pitches):
     return np.concatenate([[-0.5 * side], inner, [0.5 * side]]) if margin > 1e-6 else inner
 
 
-def lattice(counts, pitch):
+def lattice(counts: Sequence[int], pitch: float) -> tuple[np.ndarray, np.ndarray]:
     """Centres (n, 2) of a frustum lattice around the origin and who has a neighbour in +x, +y, -x, -y (n, 4)."""
     nx, ny = counts
     i, j = (grid.ravel() for grid in np.meshgrid(np.arange(nx), np.arange(ny)))
@@ -30,7 +35,9 @@ def lattice(counts, pitch):
     return centres, np.column_stack([i < nx - 1, j < ny - 1, i > 0, j > 0])
 
 
-def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), scatter=None, contact=None, threads=1, surface=None):
+def build_sensor_body(spec: SensorSpec, *, dielectric_law: Law | None, cover_law: Law | None, mesh: MeshSettings = MeshSettings(),
+                      scatter: tuple[np.ndarray, np.ndarray] | None = None, contact: Contact | None = None, threads: int = 1,
+                      surface: Surface | None = None) -> LayeredBody:
     """The whole sensor. `scatter`: None or (heights factor (n,), tip diameter factor (n,)) of its frusta.
 
     surface: the underside of the object that is to be pressed, where the cover's mesh is to be fine; without it a pitch everywhere
@@ -56,7 +63,8 @@ def build_sensor_body(spec, *, dielectric_law, cover_law, mesh=MeshSettings(), s
                        threads=threads)
 
 
-def cover_splits(mesh, surface, x_lines, y_lines, pitch):
+def cover_splits(mesh: MeshSettings, surface: Surface | None, x_lines: np.ndarray, y_lines: np.ndarray,
+                 pitch: float) -> tuple[np.ndarray, np.ndarray]:
     """How often the cover's uppermost layers are split, from below (layers, ny 2^m, nx 2^m), and its zones.
 
     What is below follows their lower side, which must not be finer: it would hang freely between the nodes. Where it lies on the
@@ -91,7 +99,8 @@ def _far(zone, x_lines, y_lines):
     return far
 
 
-def build_unit_cell(spec, *, dielectric_law, cover_law=None, mesh=MeshSettings(), height_factor=1.0, tip_factor=1.0):
+def build_unit_cell(spec: SensorSpec, *, dielectric_law: Law | None, cover_law: Law | None = None,
+                    mesh: MeshSettings = MeshSettings(), height_factor: float = 1.0, tip_factor: float = 1.0) -> LayeredBody:
     """One frustum of an endless lattice with its share of the sheet, and of the cover where a law for it is given."""
     frusta = spec.dielectric.frusta
     lines = 0.5 * frusta.pitch_mm * np.linspace(-1, 1, 2**mesh.refinement + 1)
@@ -112,7 +121,8 @@ def build_unit_cell(spec, *, dielectric_law, cover_law=None, mesh=MeshSettings()
     return LayeredBody(slab, support, slab.bottom[mesh_2d.roots])
 
 
-def build_patch(spec, counts, *, dielectric_law, mesh=MeshSettings()):
+def build_patch(spec: SensorSpec, counts: Sequence[int], *, dielectric_law: Law | None,
+                mesh: MeshSettings = MeshSettings()) -> LayeredBody:
     """A piece of the dielectric alone, `counts` frusta along x and y with free borders half a pitch from the outer ones' axes."""
     frusta, thickness = spec.dielectric.frusta, spec.dielectric.sheet_thickness_mm
     centres, neighbours = lattice(counts, frusta.pitch_mm)

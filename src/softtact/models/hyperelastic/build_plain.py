@@ -5,17 +5,22 @@ single layer the lower half is the sheet, of two layers the dielectric is.
 """
 
 import numpy as np
+import scipy.sparse as sp
 
 from softtact.contact.friction import coulomb
+from softtact.contact.penalty import Contact
 from softtact.fem.extruded_mesh import SheetMesh2D, grid_mesh_2d, merge, with_centres
 from softtact.fem.levels import with_level
 from softtact.fem.point_location import interpolation_2d
+from softtact.materials.laws.base import Law
 from softtact.models.hyperelastic.body import LayeredBody
 from softtact.models.hyperelastic.build import cover_splits
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
+from softtact.models.hyperelastic.rigid_contact import Surface
 from softtact.models.hyperelastic.slab import Layer, Slab
 from softtact.models.hyperelastic.slab_nodes import CoverSide
 from softtact.models.hyperelastic.support import PlainSupport
+from softtact.sensors.layers import LayersSpec
 
 _SHEET_SHARE = 0.5      # of a single layer that is meshed as the slab's sheet
 _SHEET_LAYERS = 2       # at least: a bonded layer's shear changes over its height
@@ -26,7 +31,7 @@ class SingleLayerSlab(Slab):
 
     regions = ("sheet", "sheet")
 
-    def sampling(self, points):
+    def sampling(self, points: np.ndarray) -> sp.csr_matrix:
         """Sparse matrix (p, nodes) that interpolates a nodal field of the top at points (p, 2)."""
         mesh = self.cover_mesh
         at = CoverSide(mesh, mesh.top, mesh.top_cells, self.x_lines, self.y_lines).interpolation(points)
@@ -34,8 +39,9 @@ class SingleLayerSlab(Slab):
         return at
 
 
-def build_plain_body(spec, *, dielectric_law, cover_law=None, mesh=MeshSettings(), scatter=None, contact=None, threads=1,
-                     surface=None, sides="held"):
+def build_plain_body(spec: LayersSpec, *, dielectric_law: Law | None, cover_law: Law | None = None,
+                     mesh: MeshSettings = MeshSettings(), scatter: tuple | None = None, contact: Contact | None = None,
+                     threads: int = 1, surface: Surface | None = None, sides: str = "held") -> LayeredBody:
     """The body of a `LayersSpec`; arguments as for `build_sensor_body`.
 
     scatter: must be None, there are no frusta that could differ;  sides: see `Slab`, for pieces of a wider layer
@@ -76,13 +82,13 @@ def _fine(lines, mesh):
     return np.interp(np.arange(parts * (len(lines) - 1) + 1), parts * np.arange(len(lines)), lines)
 
 
-def grid_without_cells(x_lines, y_lines):
+def grid_without_cells(x_lines: np.ndarray, y_lines: np.ndarray) -> SheetMesh2D:
     """The `SheetMesh2D` of a grid without frusta: no roots, no cells."""
     grid, none = grid_mesh_2d(x_lines, y_lines), np.zeros((0, 4), dtype=np.int64)
     return SheetMesh2D(merge(with_centres(grid.points[grid.quads])), np.zeros((0, 25), dtype=np.int64), 0, (none, np.zeros(3)))
 
 
-def lower_side(slab, points):
+def lower_side(slab: Slab, points: np.ndarray) -> sp.csr_matrix:
     """Sparse matrix (p, nodes) that interpolates a nodal field of the lower side at points (p, 2)."""
     on_plan = interpolation_2d(slab.sheet_mesh_2d.mesh_2d, points).tocoo()
     nodes = slab.bottom[on_plan.col]

@@ -4,11 +4,15 @@ The cells are eliminated during a press, but every state of it holds the displac
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import meshio
 import numpy as np
 
 from softtact.fem.elements import HEX20, HEX27, WEDGE18
+
+if TYPE_CHECKING:
+    from softtact.models.hyperelastic.body import BodyState, LayeredBody
 
 REGIONS = ("frusta", "sheet", "cover")     # from below; their numbers are the cell data `layer`
 
@@ -38,13 +42,13 @@ class PressedBody:
     top: np.ndarray
     pressure_mpa: np.ndarray
 
-    def to_meshio(self):
+    def to_meshio(self) -> meshio.Mesh:
         """As a meshio mesh at rest; cell data `layer`: 0 frusta, 1 sheet, 2 cover."""
         layers = [np.full(len(cells.nodes), REGIONS.index(cells.region)) for cells in self.cells]
         return meshio.Mesh(self.points_mm, [(cells.kind, cells.nodes) for cells in self.cells], cell_data={"layer": layers})
 
 
-def pressed_body(body, state=None):
+def pressed_body(body: "LayeredBody", state: "BodyState | None" = None) -> PressedBody:
     """The `PressedBody` of a `LayeredBody` in a `BodyState`, to be taken before the next load step changes the contact; or at
     rest.
     """
@@ -55,7 +59,7 @@ def pressed_body(body, state=None):
     cells = (*_frusta(body.support, first[2]), *_on_plan(body.slab), _cells(HEX20, cover.hexes + first[1], body.slab.regions[1]))
     moved = np.vstack([np.einsum("pm,pmd->pd", weights, slab[masters]), cover.follow @ slab[:cover.free], support.reshape(-1, 3)])
     pressure = body.slab.top.pressure_of_faces(state.slab) if state else np.zeros(len(cover.top))
-    below = [body.support.coordinates.reshape(-1, 3)] if body.support.count else []
+    below = [body.support.coordinates.reshape(-1, 3)] if body.support.count else []     # type: ignore[attr-defined]
     return PressedBody(points_mm=np.vstack([sheet.points, cover.points, *below]),
                        displacement_mm=moved.astype(np.float32), cells=cells, top=cover.top + first[1],
                        pressure_mpa=pressure.astype(np.float32))

@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from softtact.contact.friction import FrictionState
+from softtact.contact.friction import Coulomb, FrictionState
 from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.contact.history import ContactHistory
+from softtact.contact.penalty import Contact
 from softtact.fem.elements import HEX27, QUAD9
 from softtact.fem.extruded_mesh import CORE_RADIUS, disc_mesh_2d, extrude
 from softtact.fem.kernels import add_forces
@@ -24,7 +25,8 @@ from softtact.fem.solid_block import HexBlock
 from softtact.fem.static_condensation import Springs
 from softtact.fem.substructuring import LayerwiseElimination
 from softtact.fem.tangent_cache import TangentCache
-from softtact.linalg.workers import SERIAL
+from softtact.linalg.workers import SERIAL, Workers
+from softtact.materials.laws.base import Law
 from softtact.models.hyperelastic.point_loops import scatter_contact, weighted_component
 from softtact.models.hyperelastic.support import SupportState
 
@@ -50,8 +52,9 @@ class FrustumGeometry:
 class FrustumArray:
     """All frusta of a sensor with one law. Local node numbers are those of `self.mesh`; roots are `self.root`."""
 
-    def __init__(self, geometry, law, *, heights, root_z_mm, pcb_z_mm, tips_bonded, contact, unprojected_penalty_ratio,
-                 quartic_penalty_ratio, trilinear, refinement=0, rings=1, core=CORE_RADIUS, friction=None):
+    def __init__(self, geometry: FrustumGeometry, law: Law, *, heights: np.ndarray, root_z_mm: float, pcb_z_mm: float,
+                 tips_bonded: bool, contact: Contact, unprojected_penalty_ratio: float, quartic_penalty_ratio: float,
+                 trilinear: bool, refinement: int = 0, rings: int = 1, core: float = CORE_RADIUS, friction: Coulomb | None = None):
         """unprojected_penalty_ratio, quartic_penalty_ratio, trilinear: see `blocks`
 
         friction: `Coulomb` of the frusta on the board, or None
@@ -66,8 +69,7 @@ class FrustumArray:
         self.coordinates = self._place(heights, root_z_mm)
         self._element_nodes = (self.nodes * np.arange(self.count)[:, None, None] + self.mesh.hexes).reshape(-1, 27)
         self.block = HexBlock(self.per_element(self.coordinates), law, trilinear=trilinear,
-                              unprojected_penalty_ratio=unprojected_penalty_ratio,
-                              quartic_penalty_ratio=quartic_penalty_ratio)
+                              unprojected_penalty_ratio=unprojected_penalty_ratio, quartic_penalty_ratio=quartic_penalty_ratio)
         self._tangents = TangentCache(self.block)
         self._contact_points(pcb_z_mm)
         self._number_unknowns(tips_bonded)
@@ -82,17 +84,17 @@ class FrustumArray:
         z = root_z - g.heights[:, None] * (1 - fraction)
         return np.concatenate([mesh_2d, z[..., None]], axis=2)
 
-    def per_element(self, field):
+    def per_element(self, field: np.ndarray) -> np.ndarray:
         """A nodal field (n, nodes, 3) at the elements' nodes (n * elements, 27, 3)."""
         return np.ascontiguousarray(field[:, self.mesh.hexes].reshape(-1, 27, 3))
 
     @property
-    def blocks(self):
+    def blocks(self) -> list[HexBlock]:
         """The one block of all frusta."""
         return [self.block]
 
     @property
-    def in_words(self):
+    def in_words(self) -> str:
         """How many frusta there are, for messages."""
         return f"{self.count} frusta"
 
@@ -168,11 +170,12 @@ class FrustumArray:
             planes.append(3 * self.point_nodes[moving, -1] + self.point_axis[moving])
         return LayerwiseElimination(self.count, eliminated, layers, coupled=planes)
 
-    def fresh_history(self):
+    def fresh_history(self) -> ContactHistory:
         """The contacts' history before the first touch."""
         return ContactHistory(self.contact)
 
-    def evaluate(self, displacement, history=None, *, workers=SERIAL):
+    def evaluate(self, displacement: np.ndarray, history: ContactHistory | None = None, *,
+                 workers: Workers = SERIAL) -> SupportState | None:
         """Energy, nodal forces and gaps for displacement (n, nodes, 3); None if an element is inside out.
 
         history: of the contacts, by default none
@@ -180,7 +183,8 @@ class FrustumArray:
         elastic = self.rubber(displacement, workers=workers)
         return None if elastic is None else self.with_contact(displacement, elastic, history or self.fresh_history())
 
-    def rubber(self, displacement, frusta=slice(None), *, workers=SERIAL):
+    def rubber(self, displacement: np.ndarray, frusta: np.ndarray | slice = slice(None), *,
+               workers: Workers = SERIAL) -> tuple | None:
         """Energies (k,) in mJ and nodal forces (k, nodes, 3) of the rubber of the given frusta, or of all; None if inside out."""
         elements = np.arange(len(self._element_nodes)).reshape(self.count, -1)[frusta].ravel()
         body = self.block.evaluate(self.per_element(displacement), elements, workers=workers)
@@ -190,16 +194,16 @@ class FrustumArray:
         add_forces(force.reshape(-1, 3), self._element_nodes[:len(elements)], body.force.reshape(-1, 27, 3))
         return body.energies.reshape(len(displacement), -1).sum(axis=1), force
 
-    def potentials(self, displacement, elastic, frusta, history):
+    def potentials(self, displacement: np.ndarray, elastic: tuple, frusta: np.ndarray, history: ContactHistory) -> np.ndarray:
         """Energies (k,) in mJ of the given frusta with their contacts, from the `rubber`'s; without friction's."""
         energy, _, _ = history.contact.at(frusta).response(self.gap0[frusta] + self._along(displacement))
         return elastic[0] + (energy * self.point_area[frusta]).sum(axis=1)
 
-    def reevaluate_contact(self, state, history):
+    def reevaluate_contact(self, state: SupportState, history: ContactHistory) -> SupportState:
         """The same displacements with another history of the contacts."""
         return self.with_contact(state.displacement, state.elastic, history)
 
-    def with_contact(self, displacement, elastic, history):
+    def with_contact(self, displacement: np.ndarray, elastic: tuple, history: ContactHistory) -> SupportState:
         """The state at displacement (n, nodes, 3), with the `rubber`'s energies and forces there."""
         gaps, force = self.gap0 + self._along(displacement), elastic[1].copy()
         energy, pressure, _ = history.contact.response(gaps)
@@ -227,7 +231,7 @@ class FrustumArray:
         position = self.coordinates + displacement
         return np.stack([weighted_component(position, *self._board_points(axis)) for axis in (0, 1)], axis=-1)
 
-    def first_friction_state(self, state):
+    def first_friction_state(self, state: SupportState) -> FrictionState | None:
         """The friction state in which a step starts from a `SupportState`, None without friction."""
         if self.friction is None:
             return None
@@ -236,24 +240,24 @@ class FrustumArray:
             return FrictionState.first(self.friction, self._on_board(state.displacement), gaps)
         return state.friction_response.next_step(gaps)
 
-    def renewed_friction_state(self, state):
+    def renewed_friction_state(self, state: SupportState) -> FrictionState:
         """The friction state with the pressures of a `SupportState`."""
-        b = self.board_points
-        return state.friction_response.next_pass(state.gaps[:, :b], state.history.contact.response(state.gaps)[1][:, :b])
+        b, pressure = self.board_points, state.history.contact.response(state.gaps)[1]
+        return state.friction_response.next_pass(state.gaps[:, :b], pressure[:, :b])     # type: ignore[union-attr]
 
-    def contact_slope(self, state):
+    def contact_slope(self, state: SupportState) -> np.ndarray:
         """Stiffness (n, p) of the contact points in N/mm3."""
         return state.history.contact.response(state.gaps)[2]
 
-    def contact_error(self, state):
+    def contact_error(self, state: SupportState) -> float:
         """Deepest overlap, or widest gap under pressure, in mm."""
         return state.history.contact.error(state.gaps)
 
-    def augmented(self, state):
+    def augmented(self, state: SupportState) -> ContactHistory:
         """The contacts' history with each point held where its surfaces just touch."""
         return replace(state.history, contact=state.history.contact.augmented(state.gaps))
 
-    def condense(self, state, frusta, damping=None, *, kept_mm=0.0):
+    def condense(self, state: SupportState, frusta: np.ndarray, damping: np.ndarray | None = None, *, kept_mm: float = 0.0) -> None:
         """Recompute the condensed tangents of the given frusta (k,).
 
         damping: stiffness (k,) in N/mm on their inner unknowns, see `Condensation.set`;  kept_mm: see `TangentCache`
@@ -265,12 +269,12 @@ class FrustumArray:
                   for k in range(self.mesh.layers))
         self.elimination.set(frusta, layers, damping=damping)
 
-    def forget(self):
+    def forget(self) -> None:
         """Let the next `condense` find the tangents of all elements anew."""
         self._tangents.forget()
 
     @property
-    def root_stiffness(self):
+    def root_stiffness(self) -> np.ndarray:
         """What the condensed frusta leave on their roots (n, 3 r, 3 r) in N/mm, r nodes each."""
         return self.elimination.matrices
 
@@ -292,8 +296,7 @@ class FrustumArray:
         x, y = (place[3 * self.point_nodes[at] + axis] for axis in (0, 1))
         weights, held = self.point_weights[at], np.full(x.shape, -1)
         return Springs(np.hstack([K[..., 0, 0] - both, K[..., 1, 1] - both, both]),
-                       np.vstack([np.hstack([x, held]), np.hstack([held, y]), np.hstack([x, y])]),
-                       np.tile(weights, (3, 2)))
+                       np.vstack([np.hstack([x, held]), np.hstack([held, y]), np.hstack([x, y])]), np.tile(weights, (3, 2)))
 
     def _layer_tangents(self, k, displacement, frusta, kept_mm):
         """Packed tangents (b, h, w) of the k-th layer's h elements in frusta (b,)."""
@@ -302,39 +305,39 @@ class FrustumArray:
         tangents = self._tangents.at(displacement[:, hexes].reshape(-1, 27, 3), elements.ravel(), kept_mm=kept_mm)
         return tangents.reshape(*elements.shape, -1)
 
-    def condensed_residual(self, state, *, workers=SERIAL):
+    def condensed_residual(self, state: SupportState, *, workers: Workers = SERIAL) -> tuple[np.ndarray, list[np.ndarray]]:
         """Root forces (n, 75) after the inner residual has been eliminated, and what `inner_step` needs again."""
         force = state.force.reshape(self.count, -1).copy()
         forward_solved = self.elimination.residual(force, workers=workers)
         return force[:, self.root_dofs], forward_solved
 
-    def inner_step(self, forward_solved, root_step, *, workers=SERIAL):
+    def inner_step(self, forward_solved: list[np.ndarray], root_step: np.ndarray, *, workers: Workers = SERIAL) -> np.ndarray:
         """Newton step (n, nodes, 3) of the frusta for the roots' step (n, 75)."""
         step = np.zeros((self.count, 3 * self.nodes))
         step[:, self.root_dofs] = root_step
         self.elimination.recover(forward_solved, step, workers=workers)
         return step.reshape(self.count, self.nodes, 3)
 
-    def own_step(self, state, frusta, *, workers=SERIAL):
+    def own_step(self, state: SupportState, frusta: np.ndarray, *, workers: Workers = SERIAL) -> np.ndarray:
         """Newton step (k, nodes, 3) of the given frusta by their last condensed tangents, with their roots held."""
         force, step = state.force[frusta].reshape(len(frusta), -1), np.zeros((len(frusta), 3 * self.nodes))
         forward_solved = self.elimination.residual(force, bodies=frusta, workers=workers)
         self.elimination.recover(forward_solved, step, bodies=frusta, workers=workers)
         return step.reshape(len(frusta), self.nodes, 3)
 
-    def inner_residual(self, state):
+    def inner_residual(self, state: SupportState) -> np.ndarray:
         """Unbalanced forces (n, inner) of the inner unknowns."""
         return state.force.reshape(self.count, -1)[:, self.inner]
 
-    def compression(self, displacement):
+    def compression(self, displacement: np.ndarray) -> np.ndarray:
         """Mean shortening (n,) of each frustum in mm: root against tip."""
         return displacement[:, self.tip, 2].mean(axis=1) - displacement[:, self.root, 2].mean(axis=1)
 
-    def largest_compression(self, displacement):
+    def largest_compression(self, displacement: np.ndarray) -> float:
         """By how much (mm) the most compressed frustum is shortened."""
         return self.compression(displacement).max()
 
-    def most_compressed(self, state):
+    def most_compressed(self, state: SupportState) -> tuple[float, str]:
         """Share of its height by which the most compressed frustum is shortened, and which one in words."""
         share = self.compression(state.displacement) / self.geometry.heights
         worst = int(np.argmax(share))

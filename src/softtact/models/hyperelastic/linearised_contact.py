@@ -1,9 +1,12 @@
 """The object's contact with a slab as a step of Newton's method sees it."""
 
 import numpy as np
+import scipy.sparse as sp
 
 from softtact.linalg.nodal_frames import NodeFrames
-from softtact.linalg.workers import SERIAL
+from softtact.linalg.workers import SERIAL, Workers
+from softtact.models.hyperelastic.rigid_contact import Surface
+from softtact.models.hyperelastic.slab import Slab, SlabState
 
 _SOON_MM, _NEAR_MM = 0.01, 0.1     # gaps of points that may touch within a step or two, and within some load steps
 # Share of the squared normals that a node's own directions may leave out, when asked whether they are enough and when chosen.
@@ -16,7 +19,8 @@ class StepContact:
     surface: looked up anew where the step leads; None: the points keep the planes that they face
     """
 
-    def __init__(self, slab, state, indentation, surface=None, *, workers=SERIAL):
+    def __init__(self, slab: Slab, state: SlabState, indentation: float, surface: Surface | None = None, *,
+                 workers: Workers = SERIAL) -> None:
         self._slab, self._state, self._indentation, self._surface, self._workers = slab, state, indentation, surface, workers
         self._face(state.projection)
 
@@ -24,7 +28,7 @@ class StepContact:
         self.projection, self.points = projection, self._slab.linear_gaps(self._state.displacement, projection,
                                                                              self._indentation, self._state.history)
 
-    def frames(self, kept):
+    def frames(self, kept: NodeFrames | None) -> NodeFrames:
         """`NodeFrames` of the nodes whose contact with the object may change, along the normals that they face.
 
         kept: frames of before, whose nodes and numbers of vectors stay if they are enough for the nodes that may touch soon
@@ -45,11 +49,11 @@ class StepContact:
         return NodeFrames(first=unknowns[free, 0], turns=turns, wanted=(size > bent * size[:, 2:]).sum(axis=1),
                           others=unknowns[~free][unknowns[~free] >= 0])
 
-    def rubber_forces(self, rubber, step):
+    def rubber_forces(self, rubber: sp.csr_matrix, step: np.ndarray) -> np.ndarray:
         """Forces (unknowns,) of the rubber's tangent against a step (unknowns,) in mm."""
         return self._slab.product(rubber.data, step, workers=self._workers)
 
-    def follow(self, step, indentation_increment):
+    def follow(self, step: np.ndarray, indentation_increment: float) -> bool:
         """Look up what the points face after a step (unknowns,) in mm of the slab; True if there is a surface to ask."""
         if self._surface is None:
             return False

@@ -7,7 +7,8 @@ do, and one frustum whose energy rises halves such a step for all. What each doe
 
 import numpy as np
 
-from softtact.linalg.workers import SERIAL, chunks
+from softtact.linalg.workers import SERIAL, Workers, chunks
+from softtact.models.hyperelastic.support import Support, SupportState
 from softtact.models.newton import line_search_each
 
 _STEPS = 6               # of Newton's method for a frustum; what is not in balance then is left to the next step of all
@@ -17,7 +18,8 @@ _SHARE = 0.3             # of the tolerance that a frustum keeps at most: what m
 _AT_ONCE = 8             # frusta that a thread condenses at once
 
 
-def balanced(support, state, tolerance_n, *, workers=SERIAL):
+def balanced(support: Support, state: SupportState, tolerance_n: float, *,
+             workers: Workers = SERIAL) -> tuple[SupportState, np.ndarray]:
     """The `SupportState` after each frustum beyond the tolerance (N) went to its own balance, and which frusta did (k,).
 
     These have their condensed tangents anew, on the way and not where they came to.

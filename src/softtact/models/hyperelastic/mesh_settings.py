@@ -1,6 +1,7 @@
 """Resolution of the layered body, and what holds its elements."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from softtact.contact.penalty import Contact
 from softtact.fem.extruded_mesh import CORE_RADIUS
@@ -54,34 +55,34 @@ class MeshSettings:
                              "hangs freely there, and the map is wrong by up to a third")
 
     @property
-    def core(self):
+    def core(self) -> float:
         """The core's corners over the radius of a frustum's disc."""
         if self.frustum_core is not None:
             return self.frustum_core
         return _CORE_IN_ONE_RING if self.frustum_rings == 1 else CORE_RADIUS
 
     @property
-    def bound_layers(self):
+    def bound_layers(self) -> int:
         """How many of the cover's layers, the lowest ones, keep to the sheet's plan."""
         return len(self.cover_heights) - 1 - len(self.cover_splits)
 
     @property
-    def contact(self):
+    def contact(self) -> Contact:
         """The frusta's penalty, linear above half of a pressure of 1 MPa."""
         return Contact(stiffness=self.contact_stiffness, smoothing=1.0 / self.contact_stiffness)
 
     @property
-    def object_contact(self):
+    def object_contact(self) -> Contact:
         """The object's penalty: softer where it is lightly pressed, a third fewer factors under a wide punch and 0.3 um deeper."""
         return Contact(stiffness=self.contact_stiffness, smoothing=_OBJECT_SMOOTHING_MM)
 
     @classmethod
-    def draft(cls):
+    def draft(cls) -> "MeshSettings":
         """For quick studies: a layer less in frusta, a cover tied to the sheet, walls as one curve; see `NewtonSettings.draft`."""
         return cls(frustum_heights=(0.0, 0.35, 1.0), constrained_cell_edges=True, cover_splits=(0, 1), contact_stiffness=1000.0)
 
     @classmethod
-    def fine(cls):
+    def fine(cls) -> "MeshSettings":
         """Within 2 % of the map's maximum at every point under punch, sphere and ridges, for twice the default's time.
 
         The cover has a layer more and is finer at edges, frusta have two rings. Under a punch as wide as two frusta 3 %
@@ -91,13 +92,13 @@ class MeshSettings:
                    frustum_heights=(0.0, 0.2, 0.7, 1.0))
 
     @classmethod
-    def converging(cls, *, unprojected_penalty_ratio=0.1, **changes):
+    def converging(cls, *, unprojected_penalty_ratio: float = 0.1, **changes: Any) -> "MeshSettings":
         """To be refined: linear pressure, which does not lock, and little else; single frusta and cells, but no whole sensor."""
         return cls(unprojected_penalty_ratio=unprojected_penalty_ratio, quartic_penalty_ratio=0.0, trilinear_pressure=False,
                    **changes)
 
     @classmethod
-    def stable(cls):
+    def stable(cls) -> "MeshSettings":
         """For frusta pressed to more than 60 % of their height, where on the default mesh elements give way and many steps fail.
 
         A sphere to 50 N; under a flat punch the map is within 1.4 % of its maximum of the default mesh's

@@ -1,10 +1,13 @@
 """Balance of the body under an object that is held by a force or at an indentation: Newton's method and augmentations."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from softtact.errors import ConvergenceError
+from softtact.models.hyperelastic.body import BodyState, LayeredBody
+from softtact.models.hyperelastic.rigid_contact import Surface
 from softtact.models.newton import Solution, lowers_potential, solve
 
 _STILL_MM = 1e-3       # after a step of less no point faces another facet but those that slide to and fro past an edge
@@ -53,19 +56,19 @@ class NewtonSettings:
     whole_passes: int = 3
 
     @classmethod
-    def draft(cls):
+    def draft(cls) -> "NewtonSettings":
         """For `MeshSettings.draft()`, whose map is off by a tenth at edges: half the time, and the map changes by 0.1 % (rms)."""
         return cls(relative_tolerance=1e-3, largest_penetration_mm=4e-3, kept_tangent_mm=0.03)
 
 
-def first_touch(body, surface, settings):
+def first_touch(body: LayeredBody, surface: Surface, settings: NewtonSettings) -> BodyState:
     """Equilibrium at a small given indentation: under force control alone the free object has no stiffness."""
     slab, support = body.rest()
     projection = body.slab.project(slab, surface)
     start = _indented_until_contact(body, body.evaluate(slab, support, projection.anchors[:, 2].min(), projection),
                                     settings.first_touch_mm)
     if body.friction.active:
-        before = body.evaluate(slab, support, start.indentation - settings.first_touch_mm, projection)
+        before: Any = body.evaluate(slab, support, start.indentation - settings.first_touch_mm, projection)
         start = body.reevaluate_contact(start, body.friction.begin_step(before))
     found = settle(body, surface, start, None, settings.first_touch_tolerance_n, settings)
     if found.state is None:
@@ -83,7 +86,7 @@ def _indented_until_contact(body, state, step_mm):
                            f"{_MOST_INCREMENTS * step_mm:g} mm; press with a finer cover (cover_splits) or with a larger object.")
 
 
-def augment(body, surface, found, force, settings):
+def augment(body: LayeredBody, surface: Surface, found: Solution, force: float | None, settings: NewtonSettings) -> Solution:
     """The load step once more with its overlaps augmented, as long as they are deeper than allowed and become less."""
     iterations, spent, least, in_vain = 0, 0, np.inf, 0
     for _ in range(settings.max_augmentations):
@@ -103,11 +106,12 @@ def augment(body, surface, found, force, settings):
     return replace(found, iterations=iterations)
 
 
-def tolerance_at(force, settings):
+def tolerance_at(force: float | None, settings: NewtonSettings) -> float:
     return settings.relative_tolerance * max(force or 0.0, settings.smallest_scale_n)
 
 
-def settle(body, surface, state, force, tolerance, settings):
+def settle(body: LayeredBody, surface: Surface, state: BodyState, force: float | None, tolerance: float,
+           settings: NewtonSettings) -> Solution:
     """The `Solution` under a force (N) or at the state's indentation; with friction until friction and pressures agree."""
     if not body.friction.active:
         return _newton(body, surface, state, force, tolerance, settings)

@@ -7,9 +7,16 @@ preconditioned by the rubber of an earlier step with the contact of now (`contac
 """
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
+
+from softtact.contact.penalty import Contact
+from softtact.models.hyperelastic.preconditioner import ContactFactor, DissectedContact
+
+if TYPE_CHECKING:
+    from softtact.models.hyperelastic.linearised_contact import StepContact
 
 _INNER_STEPS = 12
 _FACINGS = 4                 # lookups of what the points face; an edge that slides over them moves forces from point to point
@@ -31,13 +38,13 @@ class LinearGaps:
     rows: sp.csr_matrix
     indentation_increment: np.ndarray
     area: np.ndarray
-    contact: object
+    contact: Contact
 
-    def pressure(self, change):
+    def pressure(self, change: np.ndarray | float) -> np.ndarray:
         """Forces (p,) in N that the points carry after their gaps have changed, positive in compression."""
         return self.area * self.contact.response(self.gaps + change)[1]
 
-    def slope(self, change):
+    def slope(self, change: np.ndarray | float) -> np.ndarray:
         """Stiffness (p,) in N/mm of the points after their gaps have changed."""
         return self.area * self.contact.response(self.gaps + change)[2]
 
@@ -62,17 +69,19 @@ class _Move:
 class ContactStepper:
     """Steps of one body; keeps the last factor for the next step. factor: of `contact_factor`."""
 
-    def __init__(self, factor):
+    def __init__(self, factor: ContactFactor | DissectedContact) -> None:
         self.factor = factor
         self.factors, self.iterations = 0, 0     # so far, of the matrix and of conjugate gradients
         self.reset()
 
-    def reset(self):
+    def reset(self) -> None:
         """Forget the last factor."""
         self._factored = False
         self.factor.reset()
 
-    def step(self, rubber, residual, contact, *, friction_border=(0.0, 0.0), excess=None, largest=np.inf):
+    def step(self, rubber: sp.csr_matrix, residual: np.ndarray, contact: "StepContact", *,
+             friction_border: tuple[np.ndarray | float, float] = (0.0, 0.0), excess: float | None = None,
+             largest: float = np.inf) -> tuple[np.ndarray, float] | None:
         """Step (n,) in mm of the unknowns, and how far the object is lowered with it; None if A is not positive definite.
 
         rubber: A, upper triangle (csr), with friction;  residual (n,) in N

@@ -4,15 +4,18 @@ A stage of the way leads from one load step to the next along a coordinate: the 
 the motion's step. An increment that finds no balance is halved, one that does is doubled.
 """
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from softtact.contact.height_field import MovedSurface
 from softtact.contact.motion import Motion, MotionStep
 from softtact.errors import ConvergenceError, InputError
-from softtact.models.hyperelastic.body import BodyState
+from softtact.models.hyperelastic.body import BodyState, LayeredBody
 from softtact.models.hyperelastic.newton import NewtonSettings, augment, first_touch, settle, tolerance_at
+from softtact.models.hyperelastic.rigid_contact import Surface
 
 _DEEP = 0.55           # of a frustum's height, or of the layers': from here on elements of the default mesh may be unstable
 DEFAULT = NewtonSettings()
@@ -51,24 +54,24 @@ class ByForce:
     end: float
     smallest: float
 
-    def control(self, force):
+    def control(self, force: float) -> Control:
         return Control(force, 0.0, np.zeros(2))
 
-    def reach(self, body, start, settings):
+    def reach(self, body: LayeredBody, start: float, settings: NewtonSettings) -> float:
         """The largest force that one increment may go to: friction depends on the way, so with it forces grow by doubling."""
         if not body.friction.active:
             return self.end
         growth = settings.friction_growth
         return max(growth * start, self.end / growth**2)
 
-    def growth(self, start, coordinate):
+    def growth(self, start: float, coordinate: float) -> float:
         return coordinate / start if start > 0 else 1.0
 
-    def pressed(self, start, state):
+    def pressed(self, start: float, state: BodyState) -> bool:
         """Whether the object already presses where an increment starts; a first touch is no result."""
         return start > 0
 
-    def failure(self, start, coordinate):
+    def failure(self, start: float, coordinate: float) -> str:
         return (f"The load step of {self.end:g} N was not reached: from {start:.4g} N on no step towards {coordinate:.4g} N found "
                 "a balance")
 
@@ -89,45 +92,47 @@ class ByMotion:
     end: float = 1.0
 
     @property
-    def at_once(self):
+    def at_once(self) -> float:
         """The share of the step in which the object goes as far as it may at once."""
-        way = np.linalg.norm(self.after.offset_mm - self.before.offset_mm)
+        way = float(np.linalg.norm(self.after.offset_mm - self.before.offset_mm))
         if self.after.force is None:
             way = max(way, abs(self.after.indentation - self.before.indentation))
         return min(1.0, self.largest_way_mm / max(way, 1e-12))
 
     @property
-    def smallest(self):
+    def smallest(self) -> float:
         return _SMALLEST_SHARE * self.at_once
 
-    def control(self, share):
+    def control(self, share: float) -> Control:
         force = None if self.after.force is None else self.pressed_n + share * (self.after.force - self.pressed_n)
         return Control(force, self.before.indentation + share * (self.after.indentation - self.before.indentation),
                        self.before.offset_mm + share * (self.after.offset_mm - self.before.offset_mm))
 
-    def reach(self, body, start, settings):
+    def reach(self, body: LayeredBody, start: float, settings: NewtonSettings) -> float:
         """The largest share that one increment may go to, by the object's way and, as in a press by force, by its force."""
         reach, more = start + self.at_once, (self.after.force or 0.0) - self.pressed_n
         if self.after.force is None or more <= 0:
             return reach
-        force = ByForce(self.after.force, 0.0).reach(body, self.control(start).force, settings)
+        now: Any = self.control(start).force
+        force = ByForce(self.after.force, 0.0).reach(body, now, settings)
         return min(reach, (force - self.pressed_n) / more)
 
-    def pressed(self, start, state):
+    def pressed(self, start: float, state: BodyState) -> bool:
         return state.force > 0
 
-    def growth(self, start, coordinate):
+    def growth(self, start: float, coordinate: float) -> float:
         """Of the force, where it is known: a first guess of the pressures that friction acts by."""
         before, after = self.control(start).force, self.control(coordinate).force
         return after / before if before and after else 1.0
 
-    def failure(self, start, coordinate):
+    def failure(self, start: float, coordinate: float) -> str:
         return f"Step {self.number} of the motion was not reached: from {start:.0%} of it on no increment found a balance"
 
     remedy = "Make the step's way or load smaller"
 
 
-def press_load_steps(body, surface, forces_n, *, settings=DEFAULT):
+def press_load_steps(body: LayeredBody, surface: Surface, forces_n: Iterable[float], *,
+                     settings: NewtonSettings = DEFAULT) -> Iterator[LoadStep]:
     """Yield a `LoadStep` for each force (N, increasing). Raises ConvergenceError naming the load step that was not reached."""
     body.begin()
     state, reached = first_touch(body, surface, settings), 0.0
@@ -137,7 +142,8 @@ def press_load_steps(body, surface, forces_n, *, settings=DEFAULT):
         yield load_step
 
 
-def press_motion(body, surface, motion, touch_mm, *, settings=DEFAULT):
+def press_motion(body: LayeredBody, surface: Surface, motion: Motion, touch_mm: float, *,
+                 settings: NewtonSettings = DEFAULT) -> Iterator[LoadStep]:
     """Yield a `LoadStep` for each step of a `Motion`. Raises ConvergenceError naming the step that was not reached.
 
     touch_mm: the indentation at which the object just touches the surface at rest, from where depths count
@@ -180,7 +186,7 @@ def _after(before: Control, step: MotionStep) -> Control:
     """The `Control` at a step's end."""
     way = np.array([step.ways.get("x", 0.0), step.ways.get("y", 0.0)])
     if "z" in step.loads:
-        force = -step.loads["z"]
+        force: float | None = -step.loads["z"]
     else:
         force = None if "z" in step.ways else before.force
     return Control(force, before.indentation - step.ways.get("z", 0.0), before.offset_mm + way)

@@ -5,7 +5,7 @@ from numba import njit
 
 
 @njit(cache=True, nogil=True)
-def weighted_component(field, nodes, weights, axis):
+def weighted_component(field: np.ndarray, nodes: np.ndarray, weights: np.ndarray, axis: np.ndarray) -> np.ndarray:
     """Weighted components (f, p) of nodal fields (f, nodes, 3) at points of nodes (p, k), weights (p, k), axis (p,)."""
     out = np.zeros((field.shape[0], nodes.shape[0]))
     for f in range(field.shape[0]):
@@ -16,7 +16,7 @@ def weighted_component(field, nodes, weights, axis):
 
 
 @njit(cache=True, nogil=True)
-def scatter_contact(force, magnitude, nodes, weights, axis):
+def scatter_contact(force: np.ndarray, magnitude: np.ndarray, nodes: np.ndarray, weights: np.ndarray, axis: np.ndarray) -> None:
     """Add to nodal forces (f, nodes, 3) those of magnitudes (f, p) at the same points."""
     for f in range(force.shape[0]):
         for p in range(nodes.shape[0]):

@@ -7,14 +7,22 @@ surface nodes' movements along the object's normals and the indentation incremen
 is a dense matrix, small beside the whole; the contact changes that matrix alone, as far as its normals are the nodes' own.
 """
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 from numba import njit
 
+from softtact.linalg.block_tridiagonal import BlockTridiagonalSolver
 from softtact.linalg.dense_cholesky import factor_in_place
-from softtact.linalg.multifrontal_solver import Bordered
-from softtact.linalg.workers import SERIAL
+from softtact.linalg.direct import PardisoSolver, SuperLUSolver
+from softtact.linalg.multifrontal_solver import Bordered, DissectedSolver
+from softtact.linalg.nodal_frames import NodeFrames
+from softtact.linalg.workers import SERIAL, Workers
+
+if TYPE_CHECKING:
+    from softtact.models.hyperelastic.newton_step import LinearGaps, _Problem
 
 _ALIKE = 0.002               # of all points' stiffness together: contacts that differ by less are taken for one
 _LEAST_CORNER = 1e-9         # N/mm: rounding must not turn the object's own stiffness negative
@@ -23,13 +31,13 @@ _LEAST_CORNER = 1e-9         # N/mm: rounding must not turn the object's own sti
 class ContactFactor:
     """With any solver of `linear_solvers`: a new factor for each contact."""
 
-    def __init__(self, solver):
+    def __init__(self, solver: PardisoSolver | BlockTridiagonalSolver | SuperLUSolver | DissectedSolver) -> None:
         self.solver = solver
 
-    def reset(self):
+    def reset(self) -> None:
         """Nothing is kept from one factor to the next."""
 
-    def renew(self, problem, slope):
+    def renew(self, problem: "_Problem", slope: np.ndarray) -> bool:
         """Factor with the rubber's tangent and the points' stiffness (p,) of now; False if that is not positive definite."""
         rows, indentation_increment = problem.points.rows, problem.points.indentation_increment
         border, corner = problem.friction_border
@@ -42,11 +50,11 @@ class ContactFactor:
         self._corner = max(slope @ indentation_increment**2 + corner - self._border @ self._along, _LEAST_CORNER)
         return True
 
-    def follow(self, problem, slope):
+    def follow(self, problem: "_Problem", slope: np.ndarray) -> bool:
         """Take over the points' stiffness alone; False if that cannot be done."""
         return self.renew(problem, slope)
 
-    def solve(self, right, *, held):
+    def solve(self, right: np.ndarray, *, held: bool) -> np.ndarray:
         """Solution for forces on the unknowns (n,), or on them and a free object (n + 1,); held: the object stays where it is."""
         inner = self.solver.solve(right[:len(self._border)])
         if len(right) == len(inner):
@@ -58,15 +66,19 @@ class ContactFactor:
 class DissectedContact:
     """With a `DissectedSolver`, which leaves what the contact changes for last."""
 
-    def __init__(self, solver, *, workers=SERIAL):
+    _frames: NodeFrames | None
+    _points: "LinearGaps | None"
+    _slope: np.ndarray | None
+
+    def __init__(self, solver: DissectedSolver, *, workers: Workers = SERIAL) -> None:
         self.solver, self._workers = solver, workers
         self.reset()
 
-    def reset(self):
+    def reset(self) -> None:
         """Forget the nodes' frames, which a factor otherwise takes over from the last one."""
         self._frames, self._points, self._slope = None, None, None
 
-    def renew(self, problem, slope):
+    def renew(self, problem: "_Problem", slope: np.ndarray) -> bool:
         """Factor with the rubber's tangent and the points' stiffness (p,) of now; False if that is not positive definite."""
         self._frames, self._points, self._slope = problem.contact.frames(self._frames), None, None
         border, corner = problem.friction_border
@@ -75,7 +87,7 @@ class DissectedContact:
             return False
         return self.follow(problem, slope)
 
-    def follow(self, problem, slope):
+    def follow(self, problem: "_Problem", slope: np.ndarray) -> bool:
         """Take over the points' stiffness (p,) alone, as far as it acts on what was left; False if not positive definite."""
         if self._slope is not None and np.abs(slope - self._slope).sum() <= _ALIKE * slope.sum():
             return True
@@ -88,7 +100,7 @@ class DissectedContact:
         self._corner = max(corner - float(self._border @ self._border), _LEAST_CORNER)
         return True
 
-    def solve(self, right, *, held):
+    def solve(self, right: np.ndarray, *, held: bool) -> np.ndarray:
         """Solution for forces on the unknowns (n,), or on them and a free object (n + 1,); held: the object stays where it is."""
         free = len(right) > self.solver.unknowns
         whole, held = right if free else np.append(right, 0.0), held or not free

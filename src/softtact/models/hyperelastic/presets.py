@@ -1,6 +1,8 @@
 """The layered body's meshes by name, with what counts as solved on them, from plain values."""
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 from softtact.errors import InputError
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
@@ -14,7 +16,7 @@ PRESETS = {"default": (MeshSettings, NewtonSettings), "draft": (MeshSettings.dra
            "stable": (MeshSettings.stable, NewtonSettings), "fine": (MeshSettings.fine, NewtonSettings)}
 
 
-def mesh_settings(values):
+def mesh_settings(values: Mapping[str, Any]) -> MeshSettings:
     """`MeshSettings` from a mapping: those of its `preset`, changed by what else it says.
 
     The scatter's and the solver's keys are passed over, an unknown key is refused.
@@ -30,7 +32,7 @@ def mesh_settings(values):
         raise InputError(f"mesh: {problem}.") from None
 
 
-def newton_settings(values):
+def newton_settings(values: Mapping[str, Any]) -> NewtonSettings:
     """`NewtonSettings` from the same mapping."""
     return replace(_preset(values)[1](), **{key: values[key] for key in _SOLVER_KEYS if key in values})
 

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from softtact.fem.graded_mesh import split_depths
+from softtact.models.hyperelastic.rigid_contact import Surface
 
 REACH_MM = 1.0        # what stands higher above the object's lowest point is taken to stay off the cover
 AROUND_MM = 0.3       # the zone under the object ends so far from it
@@ -19,7 +20,7 @@ _SAMPLES = 4          # heights along each side of the smallest element
 FAR, NEAR, FLAT, CURVED, EDGE = range(5)
 
 
-def zones(surface, x_lines, y_lines, most):
+def zones(surface: Surface, x_lines: np.ndarray, y_lines: np.ndarray, most: int) -> np.ndarray:
     """FAR, NEAR, FLAT, CURVED or EDGE for each place of a grid (ny 2^most, nx 2^most) whose cells are split `most` times."""
     height = _heights(surface, x_lines, y_lines, _SAMPLES << most)
     side = min(np.diff(lines).max() for lines in (x_lines, y_lines)) / (1 << most)
@@ -54,7 +55,7 @@ def _sampled(lines, parts):
     return fine[1::2]
 
 
-def split_depths_of(zone, shape, most):
+def split_depths_of(zone: np.ndarray, shape: tuple[int, int], most: int) -> np.ndarray:
     """How often each place is split for wanted levels (ny 2^most, nx 2^most), in a grid of `shape` (nx, ny)."""
 
     def wanted(low, size, depth):

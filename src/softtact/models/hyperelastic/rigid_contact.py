@@ -1,18 +1,27 @@
 """Contact of a rigid object with the slab's top: quadrature points of the top faces, each before a plane of the object."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from softtact.contact.coverage import continues, covered
 from softtact.contact.face_edges import ROWS, contact_compliance, own_areas
-from softtact.contact.friction import FrictionResponse, FrictionState
+from softtact.contact.friction import Coulomb, FrictionResponse, FrictionState
 from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.contact.history import ContactHistory
+from softtact.contact.penalty import Contact
 from softtact.fem.elements import QUAD8
+from softtact.fem.graded_mesh import CoverMesh
 from softtact.fem.quadrature import gauss
 
+if TYPE_CHECKING:
+    from softtact.models.hyperelastic.slab import SlabState
+
+# Heights (n,) and outward normals (n, 3) of an object's underside over places x (n,), y (n,).
+Surface = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 _NEAR_MM, _LARGEST_SHIFT_MM = 0.2, 0.02   # points that may touch when the object is let down on the cover, and how far at once
 
 
@@ -33,7 +42,7 @@ class ContactProjection:
     contact_compliance: np.ndarray
     offset_mm: np.ndarray = field(default_factory=lambda: np.zeros(2))
 
-    def moved(self, way_mm):
+    def moved(self, way_mm: np.ndarray) -> "ContactProjection":
         """The same planes after the object has moved by a way (2,) along x and y."""
         return replace(self, anchors=self.anchors + [*way_mm, 0.0], offset_mm=self.offset_mm + way_mm)
 
@@ -58,7 +67,7 @@ class TopContact:
     faces (t, w): the free nodes that a face hangs on, values (t, points, w): their shape values at its points.
     """
 
-    def __init__(self, mesh, contact, *, plane_modulus, friction=None):
+    def __init__(self, mesh: CoverMesh, contact: Contact, *, plane_modulus: float, friction: Coulomb | None = None) -> None:
         """contact: `Contact`, the law of the points;  friction: `Coulomb` of the object on them, or None.
 
         plane_modulus: E / (1 - nu^2) in MPa of what the object presses on
@@ -73,16 +82,16 @@ class TopContact:
         half = 0.5 * np.ptp(mesh.points[mesh.top[:, :4]][..., :2], axis=1)
         self._own_area, self._give = own_areas(half, points).reshape(-1, 4, 2), 2.0 * np.sqrt(half.prod(axis=1)) / plane_modulus
 
-    def at_points(self, field):
+    def at_points(self, field: np.ndarray) -> np.ndarray:
         """A nodal field (n, 3) at the points (p, 3)."""
         return np.matmul(self.values, field[self.faces]).reshape(-1, 3)
 
-    def project(self, displacement, surface):
+    def project(self, displacement: np.ndarray, surface: Surface) -> ContactProjection:
         """The object's facets above the points (see `ContactProjection`); a `MovedSurface` tells how far aside the object is."""
         position = self.reference + self.at_points(displacement)
         height, normals = surface(position[:, 0], position[:, 1])
         anchors = np.column_stack([position[:, :2], height])
-        share, foot = covered(position[:, None, :2] + self._own_area, surface)
+        share, foot = covered(position[:, None, :2] + self._own_area, surface)     # type: ignore[arg-type]
         # A point beside the object whose area reaches under it faces the plane there.
         base, foot_normals = surface(*foot.T)
         beside = ~continues(height, position[:, :2], base, foot)
@@ -93,36 +102,36 @@ class TopContact:
                                  contact_compliance=contact_compliance(share, self._give),
                                  offset_mm=np.asarray(getattr(surface, "offset_mm", (0.0, 0.0))))
 
-    def fresh_history(self):
+    def fresh_history(self) -> ContactHistory:
         """The contact's history before the first touch."""
         return ContactHistory(self.contact)
 
-    def contact_on(self, projection, history):
+    def contact_on(self, projection: ContactProjection, history: ContactHistory) -> Contact:
         """The points' `Contact` on the planes that they face."""
         return replace(history.contact, contact_compliance=projection.contact_compliance)
 
-    def contact_of(self, state):
+    def contact_of(self, state: "SlabState") -> Contact:
         """The points' `Contact` in a `SlabState`."""
         return self.contact_on(state.projection, state.history)
 
-    def gaps(self, displacement, projection, indentation):
+    def gaps(self, displacement: np.ndarray, projection: ContactProjection, indentation: float) -> np.ndarray:
         """Normal gaps (p,) in mm between the points and the planes they face."""
         offset = self.reference + self.at_points(displacement) - projection.anchors
         return np.einsum("pd,pd->p", projection.normals, offset) + indentation * projection.normals[:, 2]
 
-    def own_gaps(self, state):
+    def own_gaps(self, state: "SlabState") -> np.ndarray:
         """Gaps (p,) of the points that lie under the object, without what edges give way; of those beside it one that says so."""
         return np.where(state.projection.beside, NO_CONTACT_MM, self.contact_of(state).own_gaps(state.gaps))
 
-    def error(self, state):
+    def error(self, state: "SlabState") -> float:
         """Deepest overlap, or widest gap under pressure, in mm of points that lie under the object."""
         return self.contact_of(state).error(np.where(state.projection.beside, NO_CONTACT_MM, state.gaps))
 
-    def augmented(self, state):
+    def augmented(self, state: "SlabState") -> ContactHistory:
         """The contact's history with each point held where it just touches the object."""
         return replace(state.history, contact=self.contact_of(state).augmented(state.gaps))
 
-    def touch(self, displacement, projection, indentation, history):
+    def touch(self, displacement: np.ndarray, projection: ContactProjection, indentation: float, history: ContactHistory) -> Touch:
         """The contact with the object lowered by `indentation` mm."""
         gaps, normals = self.gaps(displacement, projection, indentation), projection.normals
         density, pressure, _ = self.contact_on(projection, history).response(gaps)
@@ -153,7 +162,7 @@ class TopContact:
         """Places (p, 3) of the points in the frame of the object, which goes down by `indentation` and aside with `projection`."""
         return self.reference + self.at_points(displacement) + [*-projection.offset_mm, indentation]
 
-    def first_friction_state(self, state, indentation):
+    def first_friction_state(self, state: "SlabState", indentation: float) -> FrictionState | None:
         """The friction state in which a step starts from a `SlabState`, None without friction."""
         if self.friction is None:
             return None
@@ -162,15 +171,16 @@ class TopContact:
             return FrictionState.first(self.friction, place, state.gaps)
         return state.friction_response.next_step(state.gaps)
 
-    def renewed_friction_state(self, state):
+    def renewed_friction_state(self, state: "SlabState") -> FrictionState:
         """The friction state with the pressures of a `SlabState`."""
-        return state.friction_response.next_pass(state.gaps, self._pressure(state))
+        response: Any = state.friction_response
+        return response.next_pass(state.gaps, self._pressure(state))
 
     def _pressure(self, state):
         """Pressure (p,) in MPa under the contact as it is now, on what is covered of the points' areas."""
         return self.contact_of(state).response(state.gaps)[1]
 
-    def balanced(self, state, indentation, force_n):
+    def balanced(self, state: "SlabState", indentation: float, force_n: float) -> float:
         """The indentation (mm) at which the object's force, friction aside, is `force_n` on the cover as it is.
 
         The force grows with the depth, from a square root's slope on: Newton's method with bounded steps.
@@ -187,22 +197,22 @@ class TopContact:
             shift -= np.clip(excess / max(stiffness, 1e-12), -_LARGEST_SHIFT_MM, _LARGEST_SHIFT_MM)
         return indentation + shift
 
-    def stiffness(self, state):
+    def stiffness(self, state: "SlabState") -> np.ndarray:
         """Stiffness (p,) in N/mm of the points along their normals."""
         return self.contact_of(state).response(state.gaps)[2] * self.area * state.projection.covered
 
-    def area_under_pressure(self, state):
+    def area_under_pressure(self, state: "SlabState") -> float:
         """Area in mm2 of the points that carry pressure under the contact as it is now, as far as the object covers it.
 
         By the pressure, not by the gap: where overlaps were pressed apart, touching points have gaps near zero of either sign.
         """
         return float((self.area * state.projection.covered)[self.under_pressure(state)].sum())
 
-    def under_pressure(self, state):
+    def under_pressure(self, state: "SlabState") -> np.ndarray:
         """Which points (p,) carry pressure."""
         return self._pressure(state) * state.projection.covered > 0
 
-    def resultant(self, state):
+    def resultant(self, state: "SlabState") -> tuple[np.ndarray, np.ndarray]:
         """Force (3,) in N of the object on the surface, and its torque (3,) in N mm about the sensor frame's origin."""
         area = (self.area * state.projection.covered)[:, None]
         force = self._pressure(state)[:, None] * state.projection.normals * area
@@ -210,7 +220,7 @@ class TopContact:
             force = force - state.friction_response.traction * area
         return force.sum(axis=0), np.cross(self.reference + self.at_points(state.displacement), force).sum(axis=0)
 
-    def slip_at(self, state, places):
+    def slip_at(self, state: "SlabState", places: np.ndarray) -> np.ndarray:
         """How far (n,) in mm the surface has slid along the object at places (n, 2); nan where it bears no pressure.
 
         Told by the nearest contact point, as far as its own area may reach; nan everywhere without friction.
@@ -224,18 +234,18 @@ class TopContact:
         slip[here] = state.friction_response.slid[nearest[here]]
         return slip
 
-    def pressure_of_faces(self, state):
+    def pressure_of_faces(self, state: "SlabState") -> np.ndarray:
         """Mean pressure (t,) in MPa on each face, under the contact as it is now."""
         area = self.area.reshape(len(self.faces), -1)
         force = self._pressure(state) * self.area * state.projection.covered
         return force.reshape(area.shape).sum(axis=1) / area.sum(axis=1)
 
-    def normal_shapes(self, projection):
+    def normal_shapes(self, projection: ContactProjection) -> np.ndarray:
         """Change (t, points, 3 w) of the points' gaps by the faces' unknowns."""
         normal = projection.normals.reshape(*self.values.shape[:2], 3)
         return np.einsum("tga,tgd->tgad", self.values, normal).reshape(*normal.shape[:2], -1)
 
-    def projected_nodes(self, gaps, projection, within_mm):
+    def projected_nodes(self, gaps: np.ndarray, projection: ContactProjection, within_mm: float) -> tuple[np.ndarray, np.ndarray]:
         """Free nodes (k,) of faces with points under the object whose gaps are less, and how the planes before each lie.
 
         That is the sum (k, 3, 3) of n n' over the normals, in mm2 of the points' areas.
@@ -249,13 +259,14 @@ class TopContact:
         nodes = np.flatnonzero(np.trace(total, axis1=1, axis2=2) > 0)
         return nodes, total[nodes]
 
-    def friction_tangent(self, state):
+    def friction_tangent(self, state: "SlabState") -> tuple[np.ndarray, np.ndarray, float]:
         """Friction's blocks (t, 3 w, 3 w) of the faces, border (t, 3 w) and corner.
 
         The border is the derivative of the forces by the indentation, the corner the energy's second derivative by it.
         """
         area = (self.area * state.projection.covered)[:, None, None]
-        slope = (state.friction_response.stiffness() * area).reshape(*self.values.shape[:2], 3, 3)
+        response: Any = state.friction_response
+        slope = (response.stiffness() * area).reshape(*self.values.shape[:2], 3, 3)
         along = np.einsum("tga,tgij->tgaij", self.values, slope)
         blocks = np.einsum("tgaij,tgb->taibj", along, self.values, optimize=True)
         size = 3 * self.values.shape[2]

@@ -5,23 +5,26 @@ coarser in plan: the nodes of what is below follow its lower side. Where sheet a
 frustum to frustum, and such a tie costs several per cent of the map; so the cover's lowest layers may keep to the sheet's plan.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 
-from softtact.contact.friction import FrictionResponse
+from softtact.contact.friction import Coulomb, FrictionResponse
 from softtact.contact.history import ContactHistory
+from softtact.contact.penalty import Contact
 from softtact.fem.assembly import SymmetricProduct, add_upper, upper_pattern, upper_positions
-from softtact.fem.extruded_mesh import extrude
+from softtact.fem.extruded_mesh import SheetMesh2D, extrude
 from softtact.fem.graded_mesh import cover_mesh
 from softtact.fem.kernels import add_forces
 from softtact.fem.point_location import interpolation_2d
-from softtact.fem.solid_block import HexBlock, WedgeBlock, hanging_node_constraints, joined
-from softtact.linalg.workers import SERIAL
+from softtact.fem.solid_block import HexBlock, SolidBlock, WedgeBlock, hanging_node_constraints, joined
+from softtact.linalg.workers import SERIAL, Workers
+from softtact.materials.laws.base import Law
 from softtact.models.hyperelastic.newton_step import LinearGaps
-from softtact.models.hyperelastic.rigid_contact import ContactProjection, TopContact
+from softtact.models.hyperelastic.rigid_contact import ContactProjection, Surface, TopContact
 from softtact.models.hyperelastic.slab_nodes import CoverSide, sheet_nodes, without_zeros
 
 
@@ -49,7 +52,7 @@ class Layer:
     """One material's layer: increasing heights z of its element layers (mm), and its law."""
 
     heights: np.ndarray
-    law: object
+    law: Law | None
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,7 @@ class CellGroup:
     layers: list
 
     @property
-    def parts(self):
+    def parts(self) -> list[tuple[np.ndarray, SolidBlock]]:
         """Those of all layers."""
         return [part for layer in self.layers for part in layer]
 
@@ -77,9 +80,13 @@ class Slab:
     """
 
     regions = ("sheet", "cover")     # of the deformed mesh that the two parts belong to
+    groups: list[tuple[np.ndarray, SolidBlock]]
+    cell_groups: list[CellGroup]
 
-    def __init__(self, sheet, cover, sheet_mesh_2d, x_lines, y_lines, *, sides, contact, constrained_cell_edges=True, splits=None,
-                 quartic_penalty_ratio=0.0, friction=None, held_below_mm=0.0):
+    def __init__(self, sheet: Layer, cover: Layer, sheet_mesh_2d: SheetMesh2D, x_lines: np.ndarray, y_lines: np.ndarray, *,
+                 sides: str, contact: Contact, constrained_cell_edges: bool | Callable[[np.ndarray], np.ndarray] = True,
+                 splits: np.ndarray | None = None, quartic_penalty_ratio: float = 0.0, friction: Coulomb | None = None,
+                 held_below_mm: float = 0.0) -> None:
         """splits (layers, ny 2^m, nx 2^m): how often the cover's uppermost layers are split where (see `cover_mesh`); the layers
         below these keep to the sheet's plan. None: none does, and none is split.
 
@@ -114,7 +121,7 @@ class Slab:
                               friction=friction)
 
     @cached_property
-    def uses(self):
+    def uses(self) -> np.ndarray:
         """In how many cells, groups of other elements and top faces each node occurs (n,); 1: a cell's own."""
         cells = [np.unique(np.hstack([nodes.reshape(len(group.cells), -1) for nodes, _ in group.parts])[k])
                  for group in self.cell_groups for k in range(len(group.cells))]
@@ -157,12 +164,12 @@ class Slab:
         return hanging_node_constraints(self.sheet_nodes.masters, self.sheet_nodes.weights, elements, block)
 
     @property
-    def solids(self):
+    def solids(self) -> list[tuple[np.ndarray, SolidBlock]]:
         """All elements with their nodes: [(nodes (e, w), block)]."""
         return self.groups + [part for group in self.cell_groups for part in group.parts]
 
     @property
-    def blocks(self):
+    def blocks(self) -> list[SolidBlock]:
         """All blocks of elements: those of `solids`, and the same joined."""
         return [block for _, block in self.solids + self._joined]
 
@@ -180,16 +187,17 @@ class Slab:
             raise ValueError(f"sides must be 'held', 'symmetric' or 'free', not {sides!r}")
         self.free = np.flatnonzero(~held.ravel())
 
-    def hold(self, nodes):
+    def hold(self, nodes: np.ndarray) -> None:
         """Hold nodes (k,) in all directions, before `build_pattern`."""
         dofs = (3 * np.asarray(nodes)[:, None] + np.arange(3)).ravel()
         self.free = np.setdiff1d(self.free, dofs)
 
-    def project(self, displacement, surface):
+    def project(self, displacement: np.ndarray, surface: Surface) -> ContactProjection:
         """The object's facets above the top's points (see `ContactProjection`)."""
         return self.top.project(displacement, surface)
 
-    def evaluate(self, displacement, projection, indentation, history=None, *, workers=SERIAL):
+    def evaluate(self, displacement: np.ndarray, projection: ContactProjection, indentation: float,
+                 history: ContactHistory | None = None, *, workers: Workers = SERIAL) -> SlabState | None:
         """Energy, forces and contact with the object lowered by `indentation` mm; None if an element is inside out.
 
         history: of the contact, by default none
@@ -204,7 +212,8 @@ class Slab:
             add_forces(force, nodes, state.force.reshape(*nodes.shape, 3))
         return self._with_contact(displacement, (energy, force), projection, indentation, history or self.top.fresh_history())
 
-    def update_normals(self, state, projection, indentation, history=None):
+    def update_normals(self, state: SlabState, projection: ContactProjection, indentation: float,
+                       history: ContactHistory | None = None) -> SlabState:
         """The same displacements under another projection, and with another history of the contact if there is one."""
         return self._with_contact(state.displacement, state.elastic, projection, indentation, history or state.history)
 
@@ -216,7 +225,7 @@ class Slab:
                          displacement=displacement, indentation_force=touch.indentation_force, history=history,
                          friction_response=touch.friction_response)
 
-    def build_pattern(self, eliminated, cells, *, precision=np.float32):
+    def build_pattern(self, eliminated: np.ndarray, cells: list[np.ndarray], *, precision: type[np.floating] = np.float32) -> None:
         """Fix the global matrix: its unknowns are the free but the `eliminated` ones; `cells` [(c, k)]: what cells leave.
 
         precision: of its values; single is enough for steps that a residual in double precision corrects
@@ -235,14 +244,14 @@ class Slab:
         self._matrix = sp.csr_matrix((np.zeros(len(indices), dtype=precision), indices, indptr), shape=(len(keep),) * 2)
         self.product = SymmetricProduct(indptr, indices)
 
-    def tangent(self, state, condensed, *, workers=SERIAL):
+    def tangent(self, state: SlabState, condensed: list[np.ndarray], *, workers: Workers = SERIAL) -> sp.csr_matrix:
         """Upper triangle (csr) of the tangent with the cells' condensed blocks [(f, k, k)] and the object's contact."""
         whole, shapes = self.rubber_tangent(state, condensed, workers=workers).copy(), self.top.normal_shapes(state.projection)
         weighted = shapes * self.top.stiffness(state).reshape(len(shapes), -1, 1)
         add_upper(whole.data, np.matmul(weighted.transpose(0, 2, 1), shapes), self._top_positions)
         return whole
 
-    def rubber_tangent(self, state, condensed, *, workers=SERIAL):
+    def rubber_tangent(self, state: SlabState, condensed: list[np.ndarray], *, workers: Workers = SERIAL) -> sp.csr_matrix:
         """Upper triangle (csr) of the tangent with friction, but without the object's pressure; valid until the next call."""
         matrix = self._matrix
         matrix.data[:] = 0.0
@@ -253,7 +262,8 @@ class Slab:
             add_upper(matrix.data, self.top.friction_tangent(state)[0], self._top_positions)
         return matrix
 
-    def linear_gaps(self, displacement, projection, indentation, history):
+    def linear_gaps(self, displacement: np.ndarray, projection: ContactProjection, indentation: float,
+                    history: ContactHistory) -> LinearGaps:
         """The gaps of the object's contact points as they depend on a step of the global unknowns, a `LinearGaps`."""
         shapes, gaps = self.top.normal_shapes(projection), self.top.gaps(displacement, projection, indentation)
         free = np.broadcast_to(self._top_dofs[:, None] >= 0, shapes.shape)
@@ -263,11 +273,11 @@ class Slab:
         return LinearGaps(gaps=gaps, rows=rows, indentation_increment=projection.normals[:, 2],
                           area=self.top.area * projection.covered, contact=self.top.contact_on(projection, history))
 
-    def unknowns_of(self, nodes):
+    def unknowns_of(self, nodes: np.ndarray) -> np.ndarray:
         """The global matrix' unknowns (k, 3) of nodes (k,), -1 where a movement is none."""
         return self._number[nodes]
 
-    def friction_border(self, state):
+    def friction_border(self, state: SlabState) -> tuple[np.ndarray, float]:
         """How friction ties the unknowns to the indentation: derivative (unknowns,) of their residual by it, and its own."""
         if state.friction_response is None:
             return np.zeros(len(self.unknowns)), 0.0
@@ -277,11 +287,11 @@ class Slab:
         return border, corner
 
     @staticmethod
-    def add_to_diagonal(matrix, value):
+    def add_to_diagonal(matrix: sp.csr_matrix, value: float) -> None:
         """Add `value` (N/mm) to each diagonal entry of an upper triangle."""
         matrix.data[matrix.indptr[:-1]] += value   # sorted upper triangle: each row begins with its diagonal
 
-    def sampling(self, points):
+    def sampling(self, points: np.ndarray) -> sp.csr_matrix:
         """Sparse matrix (p, nodes) that interpolates a nodal field of the plane between sheet and cover at points (p, 2)."""
         if self.sheet_layers == self.sheet_mesh.layers:
             at = self.underside.interpolation(points)
@@ -294,7 +304,7 @@ class Slab:
         return without_zeros(interpolation_2d(self.sheet_mesh_2d.mesh_2d, points) @ own)
 
     @property
-    def interface_nodes(self):
+    def interface_nodes(self) -> np.ndarray:
         """Free nodes (n,) of the plane between sheet and cover."""
         if self.sheet_layers == self.sheet_mesh.layers:
             return self.cover_mesh.bottom_nodes

@@ -1,11 +1,14 @@
 """The numbers of a slab's nodes: which of them the sheet's nodes are or follow, and the cover's underside that its top lies on."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 
 from softtact.fem.elements import QUAD8
+from softtact.fem.extruded_mesh import HexMesh, SheetMesh2D
+from softtact.fem.graded_mesh import CoverMesh
 
 _NO_WEIGHT = 1e-12
 
@@ -23,10 +26,10 @@ class SheetNodes:
     own: np.ndarray
     number: np.ndarray
 
-    def like_cells(self, cells):
+    def like_cells(self, cells: np.ndarray) -> list[np.ndarray]:
         """Numbers of like cells, kind by kind, of cells with nodes (c, k): those whose nodes follow others in the same way."""
         used = np.abs(self.weights) > _NO_WEIGHT
-        kinds = {}
+        kinds: dict[bytes, list[int]] = {}
         for number, cell in enumerate(cells):
             _, local = np.unique(np.where(used[cell], self.masters[cell], -1), return_inverse=True)
             signature = local.tobytes() + np.round(self.weights[cell] * used[cell], 9).tobytes()
@@ -34,7 +37,8 @@ class SheetNodes:
         return [np.array(numbers) for numbers in kinds.values()]
 
 
-def sheet_nodes(mesh, sheet_2d, *, first, above, constrained):
+def sheet_nodes(mesh: HexMesh, sheet_2d: SheetMesh2D, *, first: int, above: sp.csr_matrix,
+                constrained: bool | np.ndarray | Callable[[np.ndarray], np.ndarray]) -> SheetNodes:
     """`SheetNodes` of the sheet's mesh, lifted from a `SheetMesh2D`.
 
     first: number of the first node of its own;  above (plane's points, cover's nodes): how its top follows the cover
@@ -69,11 +73,11 @@ def sheet_nodes(mesh, sheet_2d, *, first, above, constrained):
 class CoverSide:
     """The lower or the upper side of a `CoverMesh` between grid lines (mm)."""
 
-    def __init__(self, mesh, faces, cells, x_lines, y_lines):
+    def __init__(self, mesh: CoverMesh, faces: np.ndarray, cells: np.ndarray, x_lines: np.ndarray, y_lines: np.ndarray) -> None:
         """faces (t, 8): of the side;  cells (ny 2^m, nx 2^m): which of them is where"""
         self._mesh, self._faces, self._cells, self._lines = mesh, faces, cells, (x_lines, y_lines)
 
-    def locate(self, points):
+    def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Faces (p,) of the side and shape values (p, 8) at points (p, 2); points on a line belong to the lower face."""
         cells = self._cells
         fine = cells.shape[0] // (len(self._lines[1]) - 1)
@@ -82,7 +86,7 @@ class CoverSide:
         low, _, high, _ = self._mesh.points[self._faces[faces, :4], :2].transpose(1, 0, 2)
         return faces, QUAD8.shape(2 * (points - low) / (high - low) - 1)[0]
 
-    def interpolation(self, points):
+    def interpolation(self, points: np.ndarray) -> sp.csr_matrix:
         """Sparse matrix (p, free nodes of the cover) that interpolates on the side at points (p, 2)."""
         mesh, (faces, values) = self._mesh, self.locate(points)
         rows = np.repeat(np.arange(len(points)), 8)
@@ -96,7 +100,7 @@ def _place(value, lines, fine):
     return np.clip(np.searchsorted(grid, value - 1e-9) - 1, 0, len(grid) - 2)
 
 
-def without_zeros(matrix):
+def without_zeros(matrix: sp.spmatrix) -> sp.csr_matrix:
     """A sparse matrix without what is round-off of 0, as csr."""
     matrix.data[np.abs(matrix.data) < _NO_WEIGHT] = 0.0
     matrix.eliminate_zeros()

@@ -1,12 +1,17 @@
 """One specimen of a sensor: frusta, sheet and cover whose sizes scatter about the drawing's."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
+
+from softtact.sensors.frusta import SensorSpec
 
 SCATTER_KEYS = ("height_scatter", "tip_scatter", "thickness_scatter", "specimen")
 _LARGEST_DEVIATION = 2.5     # standard deviations: a specimen beyond would not have passed inspection
 
 
-def frustum_scatter(spec, values):
+def frustum_scatter(spec: SensorSpec, values: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray] | None:
     """Factors (heights, tip diameters) of a specimen's frusta, each near 1; None where no scatter is asked for."""
     if not any(key in values for key in SCATTER_KEYS):
         return None
@@ -16,7 +21,7 @@ def frustum_scatter(spec, values):
     return 1 + values.get("height_scatter", 0.0) * heights, 1 + values.get("tip_scatter", 0.0) * tips
 
 
-def specimen_of(spec, values):
+def specimen_of(spec: SensorSpec, values: Mapping[str, Any]) -> SensorSpec:
     """The sensor with the thickness of sheet and cover of one specimen; the frusta's scatter is `frustum_scatter`'s."""
     scatter = values.get("thickness_scatter", 0.0)
     if not scatter:

@@ -6,14 +6,17 @@
 """
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from softtact.contact.friction import Coulomb, FrictionResponse, FrictionState
 from softtact.contact.history import ContactHistory
 from softtact.contact.penalty import Contact
-from softtact.linalg.workers import SERIAL
+from softtact.linalg.workers import SERIAL, Workers
+
+if TYPE_CHECKING:
+    from softtact.models.hyperelastic.body import BodyState
 
 
 @dataclass(frozen=True)
@@ -96,74 +99,78 @@ class Support(Protocol):
 class PlainSupport:
     """The board under a bonded slab, or nothing: no bodies, no energy, no contact. Fulfils `Support`."""
 
+    friction: Coulomb | None
     count, nodes, friction = 0, 1, None
     root = np.zeros(0, dtype=np.int64)
 
-    def __init__(self, kind, contact=None):
+    def __init__(self, kind: str, contact: Contact | None = None) -> None:
         """kind: base or none;  contact: a penalty for the history that every support has; no point uses it"""
         self.kind, self._contact = kind, contact or Contact(stiffness=1.0, smoothing=1.0)
 
     @property
-    def blocks(self):
+    def blocks(self) -> list:
         return []
 
     @property
-    def in_words(self):
+    def in_words(self) -> str:
         return {"base": "bonded to the board", "none": "free below"}[self.kind]
 
-    def fresh_history(self):
+    def fresh_history(self) -> ContactHistory:
         return ContactHistory(self._contact)
 
-    def evaluate(self, displacement, history=None, *, workers=SERIAL):
+    def evaluate(self, displacement: np.ndarray, history: ContactHistory | None = None, *,
+                 workers: Workers = SERIAL) -> SupportState:
         nothing = np.zeros((0, self.nodes, 3))
         return SupportState(elastic=(np.zeros(0), nothing), energy=0.0, force=nothing, gaps=np.zeros((0, 1)),
                             displacement=displacement, history=history or self.fresh_history())
 
-    def reevaluate_contact(self, state, history):
+    def reevaluate_contact(self, state: SupportState, history: ContactHistory) -> SupportState:
         return self.evaluate(state.displacement, history)
 
-    def inner_residual(self, state):
+    def inner_residual(self, state: SupportState) -> np.ndarray:
         return np.zeros((0, 1))
 
-    def contact_error(self, state):
+    def contact_error(self, state: SupportState) -> float:
         return 0.0
 
-    def augmented(self, state):
+    def augmented(self, state: SupportState) -> ContactHistory:
         return state.history
 
-    def first_friction_state(self, state):
+    def first_friction_state(self, state: SupportState) -> None:
         return None
 
-    def most_compressed(self, state):
+    def most_compressed(self, state: SupportState) -> None:
         return None
 
-    def largest_compression(self, displacement):
+    def largest_compression(self, displacement: np.ndarray) -> float:
         return np.nan
 
 
 class NoCells:
     """In place of `SheetCells` for a slab without bodies below it: nothing is eliminated, every unknown is global."""
 
+    outer_dofs: list[np.ndarray]
+    outer: list[np.ndarray]
     count, outer_dofs, outer = 0, [], []
     roots, eliminated = np.zeros((0, 1), dtype=np.int64), np.zeros(0, dtype=np.int64)
 
-    def positive_outer(self):
+    def positive_outer(self) -> list[np.ndarray]:
         return []
 
-    def refresh(self, state, *, kept_mm=0.0, workers=SERIAL):
+    def refresh(self, state: "BodyState", *, kept_mm: float = 0.0, workers: Workers = SERIAL) -> int:
         return 0
 
-    def damp(self, slab_step, bed_step):
+    def damp(self, slab_step: np.ndarray, bed_step: np.ndarray) -> bool:
         return False
 
-    def reset(self):
+    def reset(self) -> None:
         pass
 
-    def forget(self, cells=None):
+    def forget(self, cells: np.ndarray | None = None) -> None:
         pass
 
-    def condensed_residual(self, state, *, workers=SERIAL):
+    def condensed_residual(self, state: "BodyState", *, workers: Workers = SERIAL) -> tuple[np.ndarray, None]:
         return state.slab.force.copy(), None
 
-    def recover(self, kept, slab_step, *, workers=SERIAL):
+    def recover(self, kept: None, slab_step: np.ndarray, *, workers: Workers = SERIAL) -> tuple[np.ndarray, np.ndarray]:
         return slab_step, np.zeros((0, PlainSupport.nodes, 3))

@@ -4,12 +4,19 @@ Cells repeat, so their inner unknowns are eliminated cell by cell, after the fru
 matrix are the cells' walls and the cover. Cells under parts of the cover that are split differently are of different kinds.
 """
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from softtact.fem.static_condensation import packed
 from softtact.fem.substructuring import LayerwiseElimination
 from softtact.fem.tangent_cache import TangentCache
-from softtact.linalg.workers import SERIAL, chunks
+from softtact.linalg.workers import SERIAL, Workers, chunks
+from softtact.models.hyperelastic.frusta import FrustumArray
+from softtact.models.hyperelastic.slab import CellGroup, Slab
+
+if TYPE_CHECKING:
+    from softtact.models.hyperelastic.body import BodyState
 
 _CHUNK = 8                          # cells that one thread condenses at once
 _ELEMENTS_KEEP_MM = 0.004           # by which an element's nodes may move against each other before its tangent is found anew
@@ -23,32 +30,32 @@ _LEAST_DAMPING, _DAMPING_GROWTH = 0.05, 4.0     # N/mm on each unknown; a frustu
 class SheetCells:
     """Cells of a `Slab` with their frusta; `roots` (f, k) are the slab's nodes of each frustum's root."""
 
-    def __init__(self, slab, support, roots):
+    def __init__(self, slab: Slab, support: FrustumArray, roots: np.ndarray) -> None:
         self.slab, self.support, self.roots, self.count = slab, support, roots, support.count
         self.kinds = [CellKind(slab, group, roots[group.cells]) for group in slab.cell_groups]
         self._tangent_at = None
         self._damping, self._damped_with = np.zeros(self.count), np.zeros(self.count)
 
     @property
-    def eliminated(self):
+    def eliminated(self) -> np.ndarray:
         """All unknowns that the cells eliminate."""
         return np.concatenate([kind.inner_dofs.ravel() for kind in self.kinds])
 
     @property
-    def outer_dofs(self):
+    def outer_dofs(self) -> list[np.ndarray]:
         """Unknowns that the cells leave, kind by kind (c, k)."""
         return [kind.outer_dofs for kind in self.kinds]
 
     @property
-    def outer(self):
+    def outer(self) -> list[np.ndarray]:
         """Condensed matrices, kind by kind (c, k, k)."""
         return [kind.elimination.matrices for kind in self.kinds]
 
-    def positive_outer(self):
+    def positive_outer(self) -> list[np.ndarray]:
         """The condensed matrices without their modes of negative stiffness."""
         return [kind.elimination.positive_matrices() for kind in self.kinds]
 
-    def refresh(self, state, *, kept_mm=0.0, workers=SERIAL):
+    def refresh(self, state: "BodyState", *, kept_mm: float = 0.0, workers: Workers = SERIAL) -> int:
         """Recompute the condensed tangents of the cells that moved by more than `kept_mm` or changed contact since their last one.
 
         Keeping the others is a quasi-Newton step: forces are always exact. Returns how many were recomputed.
@@ -62,7 +69,7 @@ class SheetCells:
         self._damped_with = self._damping.copy()
         return int(stale.sum())
 
-    def damp(self, slab_step, bed_step):
+    def damp(self, slab_step: np.ndarray, bed_step: np.ndarray) -> bool:
         """Damp the cells that a step throws too far, for which it is to be found again: whether there are any; free the others.
 
         A frustum about to snap into a new fold has a soft mode: its step would be of no use, and shorten that of all others.
@@ -75,12 +82,12 @@ class SheetCells:
             self._damping = np.where(self._damping > _LEAST_DAMPING, self._damping / _DAMPING_GROWTH, 0.0)
         return bool(thrown.any())
 
-    def reset(self):
+    def reset(self) -> None:
         """Forget everything of an earlier press: tangents and damping."""
         self.forget()
         self._damping, self._damped_with = np.zeros(self.count), np.zeros(self.count)
 
-    def forget(self, cells=None):
+    def forget(self, cells: np.ndarray | None = None) -> None:
         """Let the next `refresh` recompute the given cells, or all, then also the tangents that their elements keep."""
         if cells is None:
             self._tangent_at = None
@@ -114,7 +121,7 @@ class SheetCells:
         without = state.slab.friction_response is None and friction_response is None
         return slope, _REFRESH_SLOPE * self.support.contact.stiffness if without else _REFRESH_WITH_FRICTION
 
-    def condensed_residual(self, state, *, workers=SERIAL):
+    def condensed_residual(self, state: "BodyState", *, workers: Workers = SERIAL) -> tuple[np.ndarray, tuple[list, list]]:
         """Residual (n, 3) of the slab with all inner unknowns eliminated, and what `recover` needs again."""
         root_force, in_frusta = self.support.condensed_residual(state.support, workers=workers)
         residual = state.slab.force.copy()
@@ -125,7 +132,8 @@ class SheetCells:
             np.add.at(flat, kind.outer_dofs.ravel(), passed_on.ravel())
         return residual, (in_frusta, [forward_solved for _, forward_solved in reduced])
 
-    def recover(self, kept, slab_step, *, workers=SERIAL):
+    def recover(self, kept: tuple[list, list], slab_step: np.ndarray, *,
+                workers: Workers = SERIAL) -> tuple[np.ndarray, np.ndarray]:
         """Newton steps of the slab (n, 3), its inner nodes filled in, and of the frusta (f, nodes, 3).
 
         A cell's step is its answer to its walls' movement and its own way to balance. The latter is cut where it goes farther
@@ -166,7 +174,7 @@ class SheetCells:
 class CellKind:
     """Cells (c,) that are translations of each other, with the sheet's elements in them; nodes (c, n) of each."""
 
-    def __init__(self, slab, group, roots):
+    def __init__(self, slab: Slab, group: CellGroup, roots: np.ndarray) -> None:
         self.cells = group.cells
         self._layers = [[(nodes, TangentCache(block)) for nodes, block in layer] for layer in group.layers]
         members = [nodes.reshape(len(self.cells), -1) for nodes, _ in group.parts]
@@ -186,21 +194,22 @@ class CellKind:
         free[slab.free] = True
         return (np.repeat(slab.uses[self.nodes] == 1, 3, axis=1) & free[_dofs(self.nodes)]).all(axis=0)
 
-    def residual(self, flat):
+    def residual(self, flat: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
         """What the slab's forces (all unknowns,) on inner unknowns leave on the outer ones (c, k), and what `inner_step` needs."""
         force = np.zeros((len(self.cells), 3 * self.nodes.shape[1]))
         force[:, self._inner_places] = flat[self.inner_dofs]
         forward_solved = self.elimination.residual(force)
         return force[:, self.elimination.outer], forward_solved
 
-    def inner_step(self, forward_solved, flat):
+    def inner_step(self, forward_solved: list[np.ndarray], flat: np.ndarray) -> np.ndarray:
         """The Newton step (c, inner) of the inner unknowns for a step (all unknowns,) of the slab's outer ones."""
         step = np.zeros((len(self.cells), 3 * self.nodes.shape[1]))
         step[:, self.elimination.outer] = flat[self.outer_dofs]
         self.elimination.recover(forward_solved, step)
         return step[:, self._inner_places]
 
-    def condense(self, state, support, chosen, damping, *, kept_mm=0.0):
+    def condense(self, state: "BodyState", support: FrustumArray, chosen: np.ndarray, damping: np.ndarray, *,
+                 kept_mm: float = 0.0) -> None:
         """Recompute the condensed tangents of some of these cells (k,), counted among them, from those of their frusta.
 
         damping: of all cells, in N/mm;  kept_mm: see `TangentCache`
@@ -210,7 +219,7 @@ class CellKind:
                   for k, layer in enumerate(self._layers))
         self.elimination.set(chosen, layers, damping=damping[self.cells[chosen]])
 
-    def forget(self):
+    def forget(self) -> None:
         """Let the next `condense` find the tangents of all elements anew."""
         for layer in self._layers:
             for _, kept in layer:

@@ -4,17 +4,24 @@ The control is the indentation d in mm: it lowers the object's planes, and carri
 derivative by the free displacements is the residual, that by d the object's force. Lengths in mm, forces in N.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from softtact.contact.penalty import penalty
 from softtact.fem.assembly import SymmetricPattern, add_upper
-from softtact.linalg.direct import make_solver
+from softtact.fem.solid_block import SolidBlock
+from softtact.linalg.block_tridiagonal import BlockTridiagonalSolver
+from softtact.linalg.direct import PardisoSolver, SuperLUSolver, make_solver
 from softtact.linalg.direct_single import point_at_mkl
-from softtact.linalg.workers import SERIAL
+from softtact.linalg.workers import SERIAL, Workers
 from softtact.models.solid.contact_correction import ContactCorrection
+from softtact.models.solid.tetrahedra import LinearTetrahedra
 
+# Heights (n,) and outward normals (n, 3) of a rigid surface over places x (n,), y (n,).
+Surface = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 _CHUNK = 400      # elements whose dense tangents are in memory at once
 _PROBE_MM = 1e-7  # of the indentation, for the residual's derivative by it
 
@@ -22,10 +29,10 @@ _PROBE_MM = 1e-7  # of the indentation, for the residual's derivative by it
 class SolidElements:
     """Elements (e, m) given by a `blocks.SolidBlock`."""
 
-    def __init__(self, nodes, block):
+    def __init__(self, nodes: np.ndarray, block: SolidBlock) -> None:
         self.nodes, self.block = np.ascontiguousarray(nodes), block
 
-    def add_force(self, displacement, force):
+    def add_force(self, displacement: np.ndarray, force: np.ndarray) -> tuple[float, float] | None:
         """Add nodal forces (n, 3); returns energy (mJ) and the sum of all force components' magnitudes (N), None where J <= 0."""
         state = self.block.evaluate(displacement[self.nodes])
         if state is None:
@@ -33,7 +40,7 @@ class SolidElements:
         np.add.at(force, self.nodes.ravel(), state.force.reshape(-1, 3))
         return state.energy, float(np.abs(state.force).sum())
 
-    def add_tangent(self, displacement, values, positions):
+    def add_tangent(self, displacement: np.ndarray, values: np.ndarray, positions: np.ndarray) -> None:
         """Add the tangent's entries (i, j >= i) to the matrix's values at `positions`."""
         for start in range(0, len(self.nodes), _CHUNK):
             part = slice(start, start + _CHUNK)
@@ -47,7 +54,8 @@ class RigidContact:
     point keeps its plane until `face` looks anew. What is "near" is numbered by `near_nodes`, the faces' own nodes.
     """
 
-    def __init__(self, points, faces, values, areas, surface, *, moves, stiffness, smoothing):
+    def __init__(self, points: np.ndarray, faces: np.ndarray, values: np.ndarray, areas: np.ndarray, surface: Surface, *,
+                 moves: bool, stiffness: float, smoothing: float) -> None:
         self.nodes, self.values, self.areas = np.ascontiguousarray(faces), values, areas
         self.near_nodes, faces = np.unique(self.nodes, return_inverse=True)
         self._faces = faces.reshape(self.nodes.shape)
@@ -58,7 +66,7 @@ class RigidContact:
     def _at(self, field):
         return np.matmul(self.values, field[self._faces])
 
-    def face(self, displacement):
+    def face(self, displacement: np.ndarray) -> None:
         """Take the planes of the object that the points (f, g) face now."""
         place = self._reference + self._at(displacement[self.near_nodes])
         height, normals = self.surface(place[..., 0].ravel(), place[..., 1].ravel())
@@ -70,7 +78,7 @@ class RigidContact:
         gaps = self._gap0 + (self._normals * self._at(near)).sum(axis=2)
         return gaps + indentation * self._normals[..., 2] if self.moves else gaps
 
-    def add_force(self, displacement, indentation, force):
+    def add_force(self, displacement: np.ndarray, indentation: float, force: np.ndarray) -> tuple[float, float]:
         """Add nodal forces (n, 3); returns the contact's energy (mJ) and the downward force (N) of a moving object."""
         near = displacement[self.near_nodes]
         density, _, _ = penalty(self._gaps(near, indentation), **self._law)
@@ -78,7 +86,7 @@ class RigidContact:
         force[self.near_nodes] += nodal
         return float((density * self.areas).sum()), float(nodal[:, 2].sum()) if self.moves else 0.0
 
-    def near_force(self, near, indentation):
+    def near_force(self, near: np.ndarray, indentation: float) -> np.ndarray:
         """Nodal forces (c, 3) of the near nodes' displacement (c, 3): those of the residual, against what the object exerts."""
         _, pressure, _ = penalty(self._gaps(near, indentation), **self._law)
         active = pressure.any(axis=1)
@@ -87,7 +95,7 @@ class RigidContact:
         np.add.at(force, self._faces[active].ravel(), -np.matmul(self.values.T, push).reshape(-1, 3))
         return force
 
-    def add_tangent(self, displacement, indentation, values, positions):
+    def add_tangent(self, displacement: np.ndarray, indentation: float, values: np.ndarray, positions: np.ndarray) -> None:
         """Add the entries of faces in contact."""
         near = displacement[self.near_nodes]
         active = penalty(self._gaps(near, indentation), **self._law)[2].any(axis=1)
@@ -95,18 +103,18 @@ class RigidContact:
         shape = shape.reshape(*slope.shape, 3 * self.nodes.shape[1])
         add_upper(values, np.matmul((shape * slope[..., None]).transpose(0, 2, 1), shape), positions[active])
 
-    def near_touching(self, near, indentation):
+    def near_touching(self, near: np.ndarray, indentation: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The faces that touch, in near nodes (t, m); the gaps' derivatives (t, g, m, 3); the points' stiffness (t, g) in N/mm."""
         slope = penalty(self._gaps(near, indentation), **self._law)[2] * self.areas
         active = slope.any(axis=1)
         return self._faces[active], self.values[..., None] * self._normals[active][:, :, None], slope[active]
 
-    def node_normals(self, points):
+    def node_normals(self, points: np.ndarray) -> np.ndarray:
         """The object's normals over nodes at rest (n, 3)."""
         return self.surface(points[:, 0], points[:, 1])[1]
 
 
-def flat_surface(height, radius=np.inf):
+def flat_surface(height: float, radius: float = np.inf) -> Surface:
     """The underside of a flat punch of this radius (mm), as `RigidContact` asks for it."""
     from softtact.contact.height_field import NO_CONTACT_MM
 
@@ -116,7 +124,7 @@ def flat_surface(height, radius=np.inf):
     return surface
 
 
-def ground(height):
+def ground(height: float) -> Surface:
     """A plane below the body, as `RigidContact` asks for it."""
     return lambda x, y: (np.full(len(x), height), np.tile([0.0, 0.0, 1.0], (len(x), 1)))
 
@@ -145,7 +153,10 @@ class FreeBody:
     workers: for the places of the elements' entries in the matrix
     """
 
-    def __init__(self, points, parts, *, held, contacts=(), follows=None, solver=None, apart=False, workers=SERIAL):
+    def __init__(self, points: np.ndarray, parts: Sequence[SolidElements | LinearTetrahedra], *, held: np.ndarray,
+                 contacts: Sequence[RigidContact] = (), follows: np.ndarray | None = None,
+                 solver: PardisoSolver | BlockTridiagonalSolver | SuperLUSolver | None = None, apart: bool = False,
+                 workers: Workers = SERIAL) -> None:
         self.points, self.parts, self.contacts = points, parts, contacts
         self._follows = np.zeros(points.shape) if follows is None else -np.where(held, follows, 0.0)
         used = np.zeros(len(points), dtype=bool)
@@ -163,20 +174,20 @@ class FreeBody:
         if self._apart:
             self._correction = ContactCorrection(self.solver, pattern.number, self._apart, self._apart.node_normals(points))
 
-    def rest(self):
+    def rest(self) -> FreeState:
         """The state without displacement."""
-        return self.evaluate(np.zeros_like(self.points), 0.0)
+        return self.evaluate(np.zeros_like(self.points), 0.0)     # type: ignore[return-value]
 
-    def carried(self, displacement, indentation):
+    def carried(self, displacement: np.ndarray, indentation: float) -> np.ndarray:
         """The displacement with the nodes that follow the object where the indentation puts them."""
         return np.where(self._follows != 0, indentation * self._follows, displacement)
 
-    def face(self, displacement):
+    def face(self, displacement: np.ndarray) -> None:
         """Let every contact point take the plane that it faces now."""
         for contact in self.contacts:
             contact.face(displacement)
 
-    def evaluate(self, displacement, indentation):
+    def evaluate(self, displacement: np.ndarray, indentation: float) -> FreeState | None:
         """`FreeState`; None where an element is inside out."""
         force = np.zeros_like(displacement)
         energy, size, pressed = 0.0, 0.0, 0.0
@@ -191,11 +202,11 @@ class FreeBody:
             energy, pressed = energy + stored, pressed + push
         return FreeState(displacement, indentation, energy, force, followed + pressed, size / self._components)
 
-    def residual(self, state):
+    def residual(self, state: FreeState) -> np.ndarray:
         """Unbalanced forces (unknowns,) in N."""
         return state.force.ravel()[self.free]
 
-    def factor(self, state):
+    def factor(self, state: FreeState) -> None:
         """Factor the tangent; where it is not positive definite, with as large a diagonal added as makes it so."""
         matrix = self._matrix
         matrix.data[:] = 0.0
@@ -211,23 +222,23 @@ class FreeBody:
             matrix.data[diagonal] += more
             shift += more
 
-    def join_contact(self):
+    def join_contact(self) -> bool:
         """Take a contact kept apart back into the factor, where the rubber alone hardly stands; False if there is none."""
         apart, self._apart = self._apart, None
         return apart is not None
 
-    def step(self, state):
+    def step(self, state: FreeState) -> np.ndarray:
         """Newton's step (unknowns,) in mm with the last factor, at the state's indentation."""
         residual = self.residual(state)
         return self._correction.step(state, residual) if self._apart else -self.solver.solve(residual)
 
-    def border(self, state):
+    def border(self, state: FreeState) -> tuple[np.ndarray, float]:
         """Derivative (unknowns,) of the residual by the indentation, and that of the object's force (N/mm), by a difference."""
         lowered = state.indentation + _PROBE_MM
-        moved = self.evaluate(self.carried(state.displacement, lowered), lowered)
+        moved: Any = self.evaluate(self.carried(state.displacement, lowered), lowered)
         return ((self.residual(moved) - self.residual(state)) / _PROBE_MM, (moved.object_force - state.object_force) / _PROBE_MM)
 
-    def moved(self, state, step, indentation_increment):
+    def moved(self, state: FreeState, step: np.ndarray, indentation_increment: float) -> FreeState | None:
         """The state after a step (unknowns,) in mm and an indentation increment of the object in mm; None where an element is
         inside out.
         """

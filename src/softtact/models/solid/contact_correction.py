@@ -7,7 +7,15 @@ system: as many unknowns as nodes touch. Columns of W are solved for when a node
 factor is renewed: they cost more than a factor, and what they miss is a residual like any other.
 """
 
+from typing import TYPE_CHECKING
+
 import numpy as np
+
+from softtact.linalg.block_tridiagonal import BlockTridiagonalSolver
+from softtact.linalg.direct import PardisoSolver, SuperLUSolver
+
+if TYPE_CHECKING:
+    from softtact.models.solid.body import FreeState, RigidContact
 
 _INNER_ITERATIONS = 15
 _INNER_TOLERANCE = 0.02   # of the residual that the step is to cut
@@ -19,7 +27,8 @@ class ContactCorrection:
     number (n, 3): unknowns of the nodes, -1 where held; contact: the moving `RigidContact`; normals (n, 3): N's directions.
     """
 
-    def __init__(self, solver, number, contact, normals):
+    def __init__(self, solver: PardisoSolver | BlockTridiagonalSolver | SuperLUSolver, number: np.ndarray,
+                 contact: "RigidContact", normals: np.ndarray) -> None:
         self._solver, self._contact = solver, contact
         self._size = int(number.max()) + 1
         # Of the whole body only the contact's own nodes matter inside a step; `row` is a node's place among those touched.
@@ -30,7 +39,7 @@ class ContactCorrection:
         self._columns, self._near_columns = np.zeros((0, self._size)), np.zeros((0, len(self._near), 3))
         self._compliance = np.zeros((0, 0))     # S = N^T W
 
-    def step(self, state, residual):
+    def step(self, state: "FreeState", residual: np.ndarray) -> np.ndarray:
         """s (unknowns,) in mm from a `FreeState` and its residual (unknowns,) in N."""
         free = -self._solver.solve(residual)
         now, depth = state.displacement[self._near], state.indentation

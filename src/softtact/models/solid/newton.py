@@ -1,12 +1,13 @@
 """Presses of a `FreeBody` to given indentations or forces: Newton's method with line search, one factor for several steps."""
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from softtact.errors import ConvergenceError
 from softtact.models.newton import lowers_potential, solve
-from softtact.models.solid.body import FreeState
+from softtact.models.solid.body import FreeBody, FreeState
 
 
 @dataclass(frozen=True)
@@ -36,14 +37,16 @@ class FreeLoadStep:
     residual_n: float
 
 
-def press_to_indentations(body, indentations_mm, *, settings=FreeSettings()):
+def press_to_indentations(body: FreeBody, indentations_mm: Iterable[float], *,
+                          settings: FreeSettings = FreeSettings()) -> Iterator[FreeLoadStep]:
     """Yield a `FreeLoadStep` for each indentation (mm, increasing)."""
     press = _Press(body, settings)
     for indentation in indentations_mm:
         yield press.advance(float(indentation), None)
 
 
-def press_to_forces(body, forces_n, *, settings=FreeSettings()):
+def press_to_forces(body: FreeBody, forces_n: Iterable[float], *,
+                    settings: FreeSettings = FreeSettings()) -> Iterator[FreeLoadStep]:
     """Yield a `FreeLoadStep` for each force (N, increasing); the first touch is made by a small indentation."""
     press = _Press(body, settings)
     press.advance(settings.first_touch_mm, None)

@@ -16,6 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numba import njit
 
+from softtact.materials.laws.invariants import InvariantLaw
 from softtact.models.solid.small_tensors import cofactor, combined, cross, dot, left_cauchy_green, symmetric_times, times
 from softtact.models.solid.tetrahedra_forces import add_forces
 
@@ -25,7 +26,7 @@ _PLACE = ((0, 3, 5), (3, 1, 4), (5, 4, 2))     # of a symmetric matrix's entries
 class LinearTetrahedra:
     """Linear tetrahedra (e, 4) at points (n, 3) in mm, of a law psi(i1, i2) of the invariants; `threads` share the elements."""
 
-    def __init__(self, points, tetrahedra, law, *, threads=1):
+    def __init__(self, points: np.ndarray, tetrahedra: np.ndarray, law: InvariantLaw, *, threads: int = 1) -> None:
         if not law.volumetric.linear:
             raise ValueError(f"the volumetric function {law.volumetric.name!r} is not that of linear tetrahedra; use 'quadratic'")
         self.law, self.nodes = law, np.ascontiguousarray(tetrahedra, dtype=np.int32)
@@ -37,7 +38,7 @@ class LinearTetrahedra:
         self._shares = [slice(a, b) for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
 
-    def add_force(self, displacement, force):
+    def add_force(self, displacement: np.ndarray, force: np.ndarray) -> tuple[float, float] | None:
         """Add nodal forces (n, 3) in N for displacement (n, 3) in mm.
 
         Returns the energy (mJ) and the sum of the magnitudes of all elements' force components (N); None where a
@@ -56,7 +57,7 @@ class LinearTetrahedra:
             force += own
         return energy, sum(size for _, _, size in results)
 
-    def add_tangent(self, displacement, values, positions):
+    def add_tangent(self, displacement: np.ndarray, values: np.ndarray, positions: np.ndarray) -> None:
         """Add the tangent's entries (i, j >= i) to the matrix's values at `positions` (e, 78)."""
         def share(part):
             own = values if part.start == 0 else np.zeros_like(values)

@@ -18,7 +18,8 @@ _MOST_J = 19.0       # up to this, and down to its inverse, `_cube_root` is exac
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def add_forces(displacement, nodes, gradients, volumes, table, bulk_modulus, force):
+def add_forces(displacement: np.ndarray, nodes: np.ndarray, gradients: np.ndarray, volumes: np.ndarray, table: np.ndarray,
+               bulk_modulus: float, force: np.ndarray) -> tuple[float, float]:
     """Add nodal forces (n, 3) in N for displacement (n, 3) in mm; returns the energy (mJ) and the forces' summed magnitudes (N).
 
     table (e, 6) or (1, 6): psi and its derivatives, see `LinearTetrahedra`;  energy: NaN where a J <= 0, or is beyond _MOST_J
