@@ -16,7 +16,7 @@ from softtact.materials.curves import VolumetricCurve, synthetic_curve
 from softtact.materials.laws.registry import make_law
 from softtact.materials.linear import LinearConstants, young_modulus
 from softtact.materials.readers import read_curve, read_curves
-from softtact.press.models import _warn_extrapolation
+from softtact.press.hyperelastic import _warn_extrapolation
 
 TRUTH = {"c10": 0.1706, "c01": 0.0040}
 

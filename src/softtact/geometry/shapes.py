@@ -264,11 +264,11 @@ def spanner() -> Manifold:
 
 
 def bottle_cap() -> Manifold:
-    """Screw cap, open side down: a wall with 24 friction states around it, closed behind."""
+    """Screw cap, open side down: a wall with 24 ridges around it, closed behind."""
     height = 11.0
     wall = ring(outer=19.0, inner=14.5, height=height)
-    friction_states = [pad(centre, radius=0.6, height=height - 0.5).translate((0.0, 0.0, 0.5)) for centre in corner_points(24, 9.3)]
-    return union([wall, raised(pad((0, 0), radius=9.0, height=1.5), height - 1.5), *friction_states])
+    ridges = [pad(centre, radius=0.6, height=height - 0.5).translate((0.0, 0.0, 0.5)) for centre in corner_points(24, 9.3)]
+    return union([wall, raised(pad((0, 0), radius=9.0, height=1.5), height - 1.5), *ridges])
 
 
 def egg() -> Manifold:

@@ -18,7 +18,7 @@ from softtact.devices import find_device
 from softtact.errors import ConvergenceError, InputError, SofttactError
 from softtact.geometry.meshes import check_over_sensor, place
 from softtact.geometry.pose import Pose
-from softtact.press.models import elastic_result
+from softtact.press.fast import elastic_result
 from softtact.press.result import PressResult
 from softtact.press.validity import flag_buried
 from softtact.progress import progress

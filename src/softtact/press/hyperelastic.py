@@ -1,0 +1,121 @@
+"""A press of a placed object with the hyperelastic model: from its mesh and forces, or a `Motion`, to a `PressResult`."""
+
+import warnings
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from trimesh import Trimesh
+
+from softtact.contact.height_field import HeightField, SweptSurface
+from softtact.contact.motion import Motion
+from softtact.errors import ConvergenceError, ExtrapolationWarning
+from softtact.models.hyperelastic import path
+from softtact.models.hyperelastic.build_plain import lower_side
+from softtact.models.hyperelastic.deformed_mesh import pressed_body
+from softtact.press.making import make_result, timed
+from softtact.press.result import PressResult
+from softtact.press.validity import valid_hyperelastic
+from softtact.progress import announce
+
+if TYPE_CHECKING:
+    from softtact.press.sensor import Sensor
+
+_CORNER = 0.01            # share of a layer: strains at an edge of the object go beyond any data
+
+
+def press_hyperelastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray | Motion, *, label: str, threads: int,
+                       keep_body: bool = False) -> PressResult:
+    """Load step by load step with the hyperelastic model; a ConvergenceError holds the load steps before.
+
+    forces (l,) in N, or a `Motion`;  keep_body: let the result hold the whole body's displacements at each load step
+    """
+    surface = HeightField(placed)
+    lowest = surface.first_touch_mm(sensor.spec.map_x_mm, sensor.spec.map_y_mm)
+    count = len(forces.steps) if isinstance(forces, Motion) else len(forces)
+    if isinstance(forces, Motion):
+        path.check_motion(forces)
+    body = sensor.body(threads=threads, surface=_swept(surface, forces))
+    grid = np.stack(np.meshgrid(sensor.spec.map_x_mm, sensor.spec.map_y_mm), axis=-1).reshape(-1, 2)
+    sampling, lower = body.slab.sampling(grid), None if sensor.spec.base_held else lower_side(body.slab, grid)
+    announce(f"{label}: {sensor.spec.parts_in_words}, {count} load steps of the hyperelastic model, some seconds each")
+    record: list[dict[str, Any]] = []
+    times: list[float] = []
+    bodies: list[Any] = []
+
+    def read(load_step):
+        _refuse_beyond_the_board(load_step, lowest, sensor.spec.deepest_mm)
+        record.append(_read_load_step(body, (sampling, lower, grid), load_step,
+                                      from_mm=lowest if isinstance(forces, Motion) else 0.0))
+        if keep_body:
+            bodies.append(pressed_body(body, load_step.state))
+
+    load_steps = (path.press_motion(body, surface, forces, lowest, settings=sensor.solver) if isinstance(forces, Motion)
+                  else path.press_load_steps(body, surface, forces, settings=sensor.solver))
+    try:
+        timed((read(load_step) for load_step in load_steps), count, label, times)
+    except ConvergenceError as error:
+        error.result = _of_record(sensor, body, record, times, bodies) if record else None
+        raise
+    finally:
+        body.close()
+    return _of_record(sensor, body, record, times, bodies)
+
+
+def _swept(surface, forces):
+    """The underside at all places of the object together, where the mesh is to be fine."""
+    return SweptSurface(surface, forces.offsets_mm()) if isinstance(forces, Motion) and not forces.straight else surface
+
+
+def _refuse_beyond_the_board(load_step, lowest_mm, thickness_mm):
+    """Raise ConvergenceError where a tip that no contact point feels has gone farther down than the sensor is thick."""
+    depth = load_step.state.indentation - lowest_mm
+    if depth > thickness_mm:
+        raise ConvergenceError(
+            f"The load step of {load_step.force_n:g} N was not reached: the object's tip would be {depth:.3g} mm deep in a sensor "
+            f"{thickness_mm:g} mm thick, for it slips in between the points of the cover that feel contact. Ask for smaller "
+            "forces, a finer cover (--mesh-quality fine), or use a blunter tip.")
+
+
+def _of_record(sensor, body, record, times, bodies):
+    numbers = {name: np.array([load_step[name] for load_step in record]) for name in record[0]}
+    forces, displacement = numbers.pop("normal_force_n"), numbers["displacement_mm"]
+    numbers["displacement_mm"] = displacement.reshape(len(record), *sensor.spec.map_shape, 3)
+    numbers["slip"] = numbers["slip"].reshape(len(record), *sensor.spec.map_shape)
+    _warn_extrapolation(numbers["extrapolated_volume_fraction"], forces)
+    valid = valid_hyperelastic(compression_mm=numbers["frustum_compression_mm"], depth_mm=numbers["indentation_mm"],
+                               contact_error_mm=numbers.pop("contact_error_mm"), points=numbers.pop("points"),
+                               frustum_mm=sensor.spec.frustum_height_mm, forces_n=forces,
+                               allowed_mm=sensor.solver.largest_penetration_mm)
+    result = make_result(sensor, "hyperelastic", body.method, -displacement[..., 2], forces, np.array(times),
+                         within_validity=valid, **numbers)
+    return replace(result, bodies=tuple(bodies))
+
+
+def _warn_extrapolation(shares, forces):
+    """Warn of the first load step at which a layer is strained beyond the data behind its card in more than a corner."""
+    outside = [(force, share) for force, share in zip(forces, shares, strict=False) if share > _CORNER]
+    if outside:
+        force, share = outside[0]
+        warnings.warn(f"At {force:g} N {share:.1%} of a layer is strained beyond the data behind its material card"
+                      " (`result.extrapolated_volume_fraction`): what its law says there is extrapolated.",
+                      ExtrapolationWarning, stacklevel=5)
+
+
+def _read_load_step(body, maps, load_step, *, from_mm):
+    """The numbers of a load step by their names in a result; fields over the map's points (y * x,).
+
+    maps: what samples the map's plane, what samples a free lower side (or None), and the points (y * x, 2);  from_mm: the
+    indentation from which depths count
+    """
+    sampling, lower, grid = maps
+    slab, support, top = load_step.state.slab, load_step.state.support, body.slab.top
+    force, torque = top.resultant(slab)
+    free_below = {} if lower is None else {"lower_maps": -(lower @ slab.displacement[:, 2])}
+    return free_below | {"normal_force_n": load_step.force_n, "force_n": force, "torque_nmm": torque,
+            "displacement_mm": sampling @ slab.displacement, "slip": top.slip_at(slab, grid),
+            "indentation_mm": load_step.state.indentation - from_mm, "contact_area_mm2": top.area_under_pressure(slab),
+            "penetration_mm": load_step.penetration_mm, "contact_error_mm": body.contact_error(load_step.state),
+            "points": np.count_nonzero(top.under_pressure(slab)),
+            "frustum_compression_mm": body.support.largest_compression(support.displacement), "residual_n": load_step.residual_n,
+            "extrapolated_volume_fraction": body.share_outside_window(load_step.state), "iterations": load_step.iterations}

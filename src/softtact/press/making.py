@@ -1,0 +1,50 @@
+"""How the models' presses make a `PressResult`: what all of them share."""
+
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from softtact.press.result import PressResult
+from softtact.progress import progress
+from softtact.readout.capacitance import ideal_counts
+
+if TYPE_CHECKING:
+    from softtact.press.sensor import Sensor
+
+
+def make_result(sensor: "Sensor", model: str, solver: str, maps: np.ndarray, forces: np.ndarray, times: np.ndarray,
+                **numbers: Any) -> PressResult:
+    """A `PressResult` of maps (l, points) or (l, ny, nx) and numbers by the result's names.
+
+    lower_maps among these: of the lower side where it moves; capacitance follows the change of thickness
+    """
+    spec, maps = sensor.spec, maps.reshape(len(forces), *sensor.spec.map_shape)
+    lower_maps = numbers.pop("lower_maps", None)
+    thinning = maps if lower_maps is None else maps - lower_maps.reshape(maps.shape)
+    flags: dict[str, Any] = {"converged": np.ones(len(forces), dtype=np.int8),
+                             "within_validity": np.asarray(numbers.pop("within_validity"), dtype=np.int8)}
+    arrays: dict[str, Any] = {name: np.asarray(values) for name, values in numbers.items()}
+    return PressResult(deformation_map_mm=maps, tactile_map=ideal_counts(spec, thinning), normal_force_n=forces, wall_time_s=times,
+                       x_mm=spec.map_x_mm, y_mm=spec.map_y_mm, model=model, sensor=spec.name, solver=solver,
+                       largest_counts=spec.largest_counts,
+                       attributes={"thickness_mm": spec.thickness_mm, **_friction(spec, model), **sensor.attributes}, **flags,
+                       **arrays)
+
+
+def _friction(spec, model):
+    """Attributes that state the friction of a result."""
+    if model != "hyperelastic":
+        return {"friction": f"none: the {model} model knows no friction"}
+    return spec.support_facts
+
+
+def timed(load_steps, count, label, times, *, start=None):
+    """The load steps as a list, and into `times` the seconds that each took; the solver's preparation counts to the first."""
+    out, start = [], start or time.perf_counter()
+    for load_step in progress(load_steps, label=label, total=count):
+        now = time.perf_counter()
+        out.append(load_step)
+        times.append(now - start)
+        start = now
+    return out
