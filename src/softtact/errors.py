@@ -29,3 +29,7 @@ class ConvergenceError(SofttactError):
 
 class ExtrapolationWarning(UserWarning):
     """A law is used where the data behind its material card do not reach."""
+
+
+class ShellWarning(UserWarning):
+    """An object rests on the shell around a pad, which carries what is added to its force."""

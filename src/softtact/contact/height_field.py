@@ -55,6 +55,20 @@ class HeightField:
         height, _ = self(*(line.ravel() for line in np.meshgrid(x_mm, y_mm)))
         return float(min(corners[over, 2].min(initial=NO_CONTACT_MM), height.min()))
 
+    def lowest_over(self, low: np.ndarray, high: np.ndarray) -> float:
+        """Height (mm) of the underside's lowest point over a rectangle with corners low (2,) and high (2,), exact to the triangles;
+        NO_CONTACT_MM where it is beside it.
+        """
+        xy = self.triangles[..., :2]
+        near = ((xy.max(axis=1) >= low) & (xy.min(axis=1) <= high)).all(axis=1)
+        vertices, faces = self.triangles[near].reshape(-1, 3), np.arange(3 * near.sum()).reshape(-1, 3)
+        for axis, sign, bound in ((0, 1.0, low[0]), (1, 1.0, low[1]), (0, -1.0, high[0]), (1, -1.0, high[1])):
+            if not len(faces):
+                break
+            normal, origin = sign * np.eye(3)[axis], bound * np.eye(3)[axis]
+            vertices, faces, _ = trimesh.intersections.slice_faces_plane(vertices, faces, normal, origin)
+        return float(vertices[faces, 2].min(initial=NO_CONTACT_MM))
+
 
 @dataclass(frozen=True)
 class MovedSurface:

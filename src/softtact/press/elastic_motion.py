@@ -7,6 +7,7 @@ from trimesh import Trimesh
 
 from softtact.contact.height_field import HeightField
 from softtact.contact.motion import Motion
+from softtact.contact.shell import Shell
 from softtact.models.elastic.motion_press import ElasticMotion, check_motion, move_on_layer
 from softtact.models.elastic.sliding import SlidingState
 from softtact.press.cache import cached_surface_compliance
@@ -27,9 +28,10 @@ def press_motion(sensor: "Sensor", placed: Trimesh, motion: Motion, seconds: lis
     if "elastic_surface" not in sensor.prepared_models:
         sensor.prepared_models["elastic_surface"] = cached_surface_compliance(sensor.spec, threads=threads)
     compliance, spec = sensor.prepared_models["elastic_surface"], sensor.spec
-    field, start = HeightField(placed), time.perf_counter()
+    shell, field, start = Shell.of(spec), HeightField(placed), time.perf_counter()
 
     def note(state: SlidingState) -> None:
+        shell.refuse_motion(field, state.position[:2], state.position[2] + lowest, lowest, step=len(seconds) + 1)
         seconds.append(time.perf_counter() - start - sum(seconds))
         announce(f"{label}: step {len(seconds)} of {len(motion.steps)}, {state.position[2]:.3f} mm deep")
 

@@ -1,6 +1,7 @@
 """Presses of a placed object with the elastic and the foundation model: from its underside and forces to a `PressResult`."""
 
 import time
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -9,10 +10,11 @@ from trimesh import Trimesh
 
 from softtact.contact.height_field import HeightField
 from softtact.contact.motion import Motion
+from softtact.contact.shell import Shell, pad_forces
 from softtact.contact.underside import Underside
 from softtact.errors import ConvergenceError, InputError
-from softtact.models.elastic.compliance import Compliance, LayerPress, press_layer
-from softtact.models.foundation.solve import FoundationMaps, press_foundation
+from softtact.models.elastic.compliance import LayerPress, press_layer, rest_on_shell
+from softtact.models.foundation.solve import FoundationMaps, lifted, press_foundation
 from softtact.press.elastic_motion import press_motion
 from softtact.press.making import make_result, timed
 from softtact.press.result import PressResult
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
 
 _MARGIN, _LEAST_MARGIN_MM = 1.3, 0.1     # of the depth on springs, within which points are looked for at first
+_ROUND_OFF = 1e-6         # of a force
 _RISE = 1.15              # of the object's depth: points within may touch
 
 
@@ -29,21 +32,39 @@ def press_elastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, *, labe
                   keep_body: bool = False) -> PressResult:
     """All load steps at once with the elastic model, which has no body to keep: the surface's compliance is all that it knows."""
     start, compliance = time.perf_counter(), sensor.prepared("elastic", threads)
-    underside = Underside(HeightField(placed), compliance.grid)
-    points, press = _within_reach(underside, underside.nodes, compliance.foundation_modulus, forces, sensor.spec.deepest_mm,
-                                  lambda points: press_layer(compliance, points, forces), lambda press: press.contact.depth[-1])
+    surface = HeightField(placed)
+    underside, touch, stop = Underside(surface, compliance.grid), first_touch_mm(sensor, surface), shell_stop_mm(sensor, surface)
+
+    def solve(points):
+        on_pad = pad_forces(forces, stop_mm=stop, touch_mm=touch,
+                            depth_of=lambda force: press_layer(compliance, points, [force]).contact.depth[0])
+        return press_layer(compliance, points, on_pad) if on_pad.any() else rest_on_shell(compliance, points, len(forces), stop)
+
+    _, press = _within_reach(underside, underside.nodes, compliance.foundation_modulus, forces, sensor.spec.deepest_mm, solve,
+                             lambda press: press.contact.depth[-1])
     seconds = np.full(len(forces), (time.perf_counter() - start) / len(forces))
-    return elastic_result(sensor, compliance, press, forces, seconds, lowest_mm=underside.lowest_mm)
+    return elastic_result(sensor, press, forces, seconds, touch_mm=touch)
 
 
-def elastic_result(sensor: "Sensor", compliance: Compliance, press: LayerPress, forces: np.ndarray, seconds: np.ndarray, *,
-                   lowest_mm: float) -> PressResult:
-    """The result of a `LayerPress`; lowest_mm: of the object over the free surface."""
+def first_touch_mm(sensor: "Sensor", surface: HeightField) -> float:
+    """Height (mm) of an object's underside over the sensing surface, from where its indentation counts."""
+    return surface.first_touch_mm(sensor.spec.map_x_mm, sensor.spec.map_y_mm)
+
+
+def shell_stop_mm(sensor: "Sensor", surface: HeightField) -> float:
+    """How far (mm) an object comes down from its pose until it rests on the sensor's shell; infinite where it never does."""
+    return Shell.of(sensor.spec).stop_mm(surface)
+
+
+def elastic_result(sensor: "Sensor", press: LayerPress, forces: np.ndarray, seconds: np.ndarray, *, touch_mm: float) -> PressResult:
+    """The result of a `LayerPress`; touch_mm: how far the object comes down until it touches."""
     contact, unknown, thickness = press.contact, np.full(len(forces), np.nan), sensor.spec.thickness_mm
-    return make_result(sensor, "elastic", "conjugate gradients", press.maps, forces, seconds, indentation_mm=contact.depth,
+    depth = contact.depth - touch_mm
+    return make_result(sensor, "elastic", "conjugate gradients", press.maps, forces, seconds, indentation_mm=depth,
+                       pad_force_n=_exactly(forces, contact.force.sum(axis=0)),
                        contact_area_mm2=press.areas @ (contact.force > 0),
                        penetration_mm=contact.penetration,
-                       within_validity=valid_elastic(contact.depth - lowest_mm, thickness_mm=thickness),
+                       within_validity=valid_elastic(depth, thickness_mm=thickness),
                        frustum_compression_mm=unknown, residual_n=unknown, extrapolated_volume_fraction=unknown,
                        lower_maps=press.lower_maps, iterations=contact.iterations)
 
@@ -52,34 +73,54 @@ def press_on_foundation(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, *
                         keep_body: bool = False) -> PressResult:
     """Load step by load step with the foundation model, which has no body to keep."""
     start, compliance = time.perf_counter(), sensor.prepared("foundation", threads)
-    underside = Underside(HeightField(placed), compliance.grid)
+    surface = HeightField(placed)
+    underside, touch, stop = Underside(surface, compliance.grid), first_touch_mm(sensor, surface), shell_stop_mm(sensor, surface)
     load_steps: list[Any] = []
     times: list[float] = []
 
     def solve(points):
         load_steps.clear()
         times.clear()
-        record = (load_steps.append(load_step) for load_step in press_foundation(compliance, points, forces))
         try:
-            timed(record, len(forces), label, times, start=start)
+            on_pad = pad_forces(forces, stop_mm=stop, touch_mm=touch,
+                                depth_of=lambda force: next(press_foundation(compliance, points, [force])).depth)
+            steps = repeated(press_foundation(compliance, points, np.unique(on_pad)), on_pad) if on_pad.any() else \
+                [lifted(compliance, points, stop)] * len(forces)
+            timed((load_steps.append(load_step) for load_step in steps), len(forces), label, times, start=start)
         except ConvergenceError as error:
-            error.result = _of_load_steps(sensor, compliance, points, load_steps, forces, times) if load_steps else None
+            error.result = _of_load_steps(sensor, compliance, points, load_steps, forces, times, touch) if load_steps else None
             raise
 
     points, _ = _within_reach(underside, underside.points, compliance.foundation_modulus, forces, sensor.spec.thickness_mm, solve,
                               lambda _: load_steps[-1].depth)
-    return _of_load_steps(sensor, compliance, points, load_steps, forces, times)
+    return _of_load_steps(sensor, compliance, points, load_steps, forces, times, touch)
 
 
-def _of_load_steps(sensor, compliance, points, load_steps, forces, times):
+def repeated(load_steps: Iterable[Any], forces: np.ndarray) -> Iterator[Any]:
+    """Load steps of different forces, in their order, once for each of forces (l,) among which are equal ones."""
+    one, before = None, None
+    steps = iter(load_steps)
+    for force in forces:
+        one = one if force == before else next(steps)
+        before = force
+        yield one
+
+
+def _exactly(forces, found):
+    """Forces (l,) that a solution agrees with up to its round-off, and what was found (l,) where they are others."""
+    return np.where(np.abs(found - forces) <= _ROUND_OFF * forces, forces, found)
+
+
+def _of_load_steps(sensor, compliance, points, load_steps, forces, times, touch_mm):
     """The result of a foundation press' load steps, be it those before one that was not reached."""
     area, count = points.covered * compliance.grid.areas(points.nodes), len(load_steps)
     compression = np.array([load_step.compression.max() for load_step in load_steps])
-    depth = np.array([load_step.depth for load_step in load_steps])
-    valid = valid_foundation(compression, depth - points.gap.min(), frustum_mm=sensor.spec.dielectric.frusta.height_mm,
+    depth = np.array([load_step.depth for load_step in load_steps]) - touch_mm
+    valid = valid_foundation(compression, depth, frustum_mm=sensor.spec.dielectric.frusta.height_mm,
                              thickness_mm=sensor.spec.thickness_mm, law_limit_mm=compliance.law.limit_mm)
     unknown = np.full(count, np.nan)
-    numbers = {"indentation_mm": depth, "penetration_mm": [load_step.penetration for load_step in load_steps],
+    numbers = {"indentation_mm": depth, "pad_force_n": [load_step.force_n for load_step in load_steps],
+               "penetration_mm": [load_step.penetration for load_step in load_steps],
                "contact_area_mm2": [area[load_step.touching].sum() for load_step in load_steps],
                "iterations": [load_step.iterations for load_step in load_steps], "frustum_compression_mm": compression}
     return make_result(sensor, "foundation", "dense", FoundationMaps(compliance, points)(load_steps), forces[:count],

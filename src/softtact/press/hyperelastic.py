@@ -9,6 +9,7 @@ from trimesh import Trimesh
 
 from softtact.contact.height_field import HeightField, SweptSurface
 from softtact.contact.motion import Motion
+from softtact.contact.shell import Shell
 from softtact.errors import ConvergenceError, ExtrapolationWarning
 from softtact.models.hyperelastic import path
 from softtact.models.hyperelastic.build_plain import lower_side
@@ -21,6 +22,7 @@ from softtact.progress import announce
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
 
+_BALANCED = 1e-3          # of a force: farther apart than any load step's tolerance leaves object and body
 _CORNER = 0.01            # share of a layer: strains at an edge of the object go beyond any data
 
 
@@ -30,7 +32,7 @@ def press_hyperelastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray | M
 
     forces (l,) in N, or a `Motion`;  keep_body: let the result hold the whole body's displacements at each load step
     """
-    surface = HeightField(placed)
+    surface, shell = HeightField(placed), Shell.of(sensor.spec)
     lowest = surface.first_touch_mm(sensor.spec.map_x_mm, sensor.spec.map_y_mm)
     count = len(forces.steps) if isinstance(forces, Motion) else len(forces)
     if isinstance(forces, Motion):
@@ -45,13 +47,16 @@ def press_hyperelastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray | M
 
     def read(load_step):
         _refuse_beyond_the_board(load_step, lowest, sensor.spec.deepest_mm)
-        record.append(_read_load_step(body, (sampling, lower, grid), load_step,
-                                      from_mm=lowest if isinstance(forces, Motion) else 0.0))
+        if isinstance(forces, Motion):
+            shell.refuse_motion(surface, load_step.state.slab.projection.offset_mm, load_step.state.indentation, lowest,
+                                step=len(record) + 1)
+        record.append(_read_load_step(body, (sampling, lower, grid), load_step, from_mm=lowest))
         if keep_body:
             bodies.append(pressed_body(body, load_step.state))
 
     load_steps = (path.press_motion(body, surface, forces, lowest, settings=sensor.solver) if isinstance(forces, Motion)
-                  else path.press_load_steps(body, surface, forces, settings=sensor.solver))
+                  else path.press_load_steps(body, surface, forces, settings=sensor.solver, touch_mm=lowest,
+                                             stop_mm=shell.stop_mm(surface)))
     try:
         timed((read(load_step) for load_step in load_steps), count, label, times)
     except ConvergenceError as error:
@@ -84,7 +89,8 @@ def _of_record(sensor, body, record, times, bodies):
     numbers["slip"] = numbers["slip"].reshape(len(record), *sensor.spec.map_shape)
     _warn_extrapolation(numbers["extrapolated_volume_fraction"], forces)
     valid = valid_hyperelastic(compression_mm=numbers["frustum_compression_mm"], depth_mm=numbers["indentation_mm"],
-                               contact_error_mm=numbers.pop("contact_error_mm"), points=numbers.pop("points"),
+                               contact_error_mm=numbers.pop("contact_error_mm"),
+                               points=np.where(numbers["pad_force_n"] > 0, numbers.pop("points"), np.inf),
                                frustum_mm=sensor.spec.frustum_height_mm, forces_n=forces,
                                allowed_mm=sensor.solver.largest_penetration_mm)
     result = make_result(sensor, "hyperelastic", body.method, -displacement[..., 2], forces, np.array(times),
@@ -102,6 +108,12 @@ def _warn_extrapolation(shares, forces):
                       ExtrapolationWarning, stacklevel=5)
 
 
+def _on_shell(load_step):
+    """Force (N) that something else than the body carries; none where the body's own is that of the load step by its tolerance."""
+    missing = load_step.force_n - load_step.state.force
+    return missing if missing > _BALANCED * load_step.force_n else 0.0
+
+
 def _read_load_step(body, maps, load_step, *, from_mm):
     """The numbers of a load step by their names in a result; fields over the map's points (y * x,).
 
@@ -111,8 +123,10 @@ def _read_load_step(body, maps, load_step, *, from_mm):
     sampling, lower, grid = maps
     slab, support, top = load_step.state.slab, load_step.state.support, body.slab.top
     force, torque = top.resultant(slab)
+    on_shell = _on_shell(load_step)
     free_below = {} if lower is None else {"lower_maps": -(lower @ slab.displacement[:, 2])}
-    return free_below | {"normal_force_n": load_step.force_n, "force_n": force, "torque_nmm": torque,
+    return free_below | {"normal_force_n": load_step.force_n, "pad_force_n": load_step.force_n - on_shell,
+            "force_n": force - [0.0, 0.0, on_shell], "torque_nmm": np.full(3, np.nan) if on_shell else torque,
             "displacement_mm": sampling @ slab.displacement, "slip": top.slip_at(slab, grid),
             "indentation_mm": load_step.state.indentation - from_mm, "contact_area_mm2": top.area_under_pressure(slab),
             "penetration_mm": load_step.penetration_mm, "contact_error_mm": body.contact_error(load_step.state),

@@ -1,16 +1,20 @@
 """How the models' presses make a `PressResult`: what all of them share."""
 
 import time
+import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softtact.errors import ShellWarning
 from softtact.press.result import PressResult
 from softtact.progress import progress
 from softtact.readout.capacitance import ideal_counts
 
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
+
+_HARDLY = 1e-6     # of a force: a share of the shell that is not worth a warning
 
 
 def make_result(sensor: "Sensor", model: str, solver: str, maps: np.ndarray, forces: np.ndarray, times: np.ndarray,
@@ -25,11 +29,22 @@ def make_result(sensor: "Sensor", model: str, solver: str, maps: np.ndarray, for
     flags: dict[str, Any] = {"converged": np.ones(len(forces), dtype=np.int8),
                              "within_validity": np.asarray(numbers.pop("within_validity"), dtype=np.int8)}
     arrays: dict[str, Any] = {name: np.asarray(values) for name, values in numbers.items()}
+    _warn_of_shell(spec, forces, arrays.get("pad_force_n", forces))
     return PressResult(deformation_map_mm=maps, tactile_map=ideal_counts(spec, thinning), normal_force_n=forces, wall_time_s=times,
                        x_mm=spec.map_x_mm, y_mm=spec.map_y_mm, model=model, sensor=spec.name, solver=solver,
                        largest_counts=spec.largest_counts,
-                       attributes={"thickness_mm": spec.thickness_mm, **_friction(spec, model), **sensor.attributes}, **flags,
-                       **arrays)
+                       attributes={"thickness_mm": spec.thickness_mm, "edge": spec.edge.in_words, **_friction(spec, model),
+                                   **sensor.attributes}, **flags, **arrays)
+
+
+def _warn_of_shell(spec, forces, on_pad):
+    """Warn of the first load step at which the shell carries a part."""
+    resting = np.flatnonzero(forces - on_pad > _HARDLY * forces)
+    if len(resting):
+        first = resting[0]
+        warnings.warn(f"At {forces[first]:g} N the object rests on the shell beside the pad, which feels {on_pad[first]:.3g} N of it "
+                      f"(`result.pad_force_n`; {spec.edge.in_words}): if your sensor's shell ends lower, say so by 'edge' in its "
+                      "file.", ShellWarning, stacklevel=5)
 
 
 def _friction(spec, model):

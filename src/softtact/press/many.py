@@ -18,7 +18,7 @@ from softtact.devices import find_device
 from softtact.errors import ConvergenceError, InputError, SofttactError
 from softtact.geometry.meshes import check_over_sensor, place
 from softtact.geometry.pose import Pose
-from softtact.press.fast import elastic_result
+from softtact.press.fast import elastic_result, first_touch_mm, shell_stop_mm
 from softtact.press.result import PressResult
 from softtact.press.validity import flag_buried
 from softtact.progress import progress
@@ -66,18 +66,23 @@ def press_batch(sensor: "Sensor", jobs: list[tuple[trimesh.Trimesh, Pose | None]
     start = time.perf_counter()
     presses = press_layers(compliance, [undersides[number].height for number in good], force_n, device=device)
     for number, press in zip(good, progress(presses, label=label, total=len(good)), strict=True):
-        results[number] = _read(sensor, compliance, press, undersides[number], force_n)
+        results[number] = _read(sensor, press, undersides[number], force_n, jobs[number])
     seconds = np.full(len(force_n), (time.perf_counter() - start) / max(1, len(good) * len(force_n)))
     return [one if isinstance(one, SofttactError) else replace(one, wall_time_s=seconds) for one in results]
 
 
 @dataclass(frozen=True)
 class _Underside:
-    """An object's height (n,) in mm over the grid's nodes, lowest height of all, and the height of its top."""
+    """An object over the sensor."""
 
     height: np.ndarray
-    lowest_mm: float
+    """(n,) in mm: over the grid's nodes."""
+    touch_mm: float
+    """How far it comes down until it touches."""
+    stop_mm: float
+    """How far it comes down until it rests on the shell."""
     top_mm: float
+    """Height of its top over first touch."""
 
 
 def _underside(sensor, job):
@@ -86,19 +91,22 @@ def _underside(sensor, job):
         placed = place(mesh, pose=pose)
         check_over_sensor(placed, sensor.spec.footprint_mm)
         grid = sensor.prepared_models["elastic"].grid
-        underside, height = Underside(HeightField(placed), grid), np.full(grid.count, NO_CONTACT_MM)
-        points = underside.nodes(sensor.spec.thickness_mm)
+        surface, height = HeightField(placed), np.full(grid.count, NO_CONTACT_MM)
+        points, touch = Underside(surface, grid).nodes(sensor.spec.thickness_mm), first_touch_mm(sensor, surface)
         height[points.nodes] = points.gap
-        return _Underside(height=height, lowest_mm=underside.lowest_mm, top_mm=placed.bounds[1, 2])
+        return _Underside(height=height, touch_mm=touch, stop_mm=shell_stop_mm(sensor, surface),
+                          top_mm=placed.bounds[1, 2] - touch)
     except InputError as error:
         return error.with_traceback(None)
 
 
-def _read(sensor, compliance, press, underside, force_n):
+def _read(sensor, press, underside, force_n, job):
+    if press.contact.depth[-1] > underside.stop_mm:     # rare: one that rests on the shell is pressed by itself
+        return _pressed(sensor, job, force_n=force_n, model="elastic", options={})
     settled = press.contact.settled
     if not settled.all():
         return ConvergenceError(not_settled(force_n[~settled][0]))
-    result = elastic_result(sensor, compliance, press, force_n, np.zeros(len(force_n)), lowest_mm=underside.lowest_mm)
+    result = elastic_result(sensor, press, force_n, np.zeros(len(force_n)), touch_mm=underside.touch_mm)
     return flag_buried(result, underside.top_mm)
 
 

@@ -33,9 +33,9 @@ class PressResult:
     tactile_map: np.ndarray = field(metadata=_array("counts", "step", "row", "column"))
     """(step, row, column) in counts: the taxels' ideal reading."""
     normal_force_n: np.ndarray = field(metadata=_array("N", "step"))
-    """(step,) in N: how hard the object was pressed, positive into the sensor."""
+    """(step,) in N: how hard the object was pressed, positive into the sensor; pad and shell together."""
     indentation_mm: np.ndarray = field(metadata=_array("mm", "step"))
-    """(step,) in mm: how far the object came down from where it just touches."""
+    """(step,) in mm: how far the object came down from where it just touches the sensing surface, whatever its pose's height."""
     contact_area_mm2: np.ndarray = field(metadata=_array("mm2", "step"))
     """(step,) in mm2: area of the sensing surface that bears pressure."""
     penetration_mm: np.ndarray = field(metadata=_array("mm", "step"))
@@ -64,10 +64,15 @@ class PressResult:
     """The sensor's name."""
     solver: str = field(metadata=_FACT)
     """The linear solver's name."""
+    pad_force_n: np.ndarray | None = field(default=None, metadata=_array("N", "step"))
+    """(step,) in N: what of `normal_force_n` the pad carries."""
+    shell_force_n: np.ndarray | None = field(default=None, metadata=_array("N", "step"))
+    """(step,) in N: what the rigid shell around the pad carries, where an object wider than the pad rests on it; else 0."""
     force_n: np.ndarray | None = field(default=None, metadata=_array("N", "step", "axis"))
-    """(step, 3) in N: the object's force on the sensor's surface along x, y, z; z is negative where it presses."""
+    """(step, 3) in N: the object's force on the sensor, pad and shell, along x, y, z; z is negative where it presses."""
     torque_nmm: np.ndarray | None = field(default=None, metadata=_array("N mm", "step", "axis"))
-    """(step, 3) in N mm: the torque of that force about the origin of the sensor frame; nan where the model does not tell."""
+    """(step, 3) in N mm: the torque of that force about the origin of the sensor frame; nan where the model does not
+    tell, and where the shell carries a part, whose place is not known."""
     displacement_mm: np.ndarray | None = field(default=None, metadata=_array("mm", "step", "y", "x", "axis"))
     """(step, y, x, 3) in mm: how the map's plane moved along x, y, z; nan in x and y where the model tells the map alone."""
     slip: np.ndarray | None = field(default=None, metadata=_array("mm", "step", "y", "x"))
@@ -88,7 +93,8 @@ class PressResult:
     def __post_init__(self) -> None:
         steps, vertical = len(self.normal_force_n), np.array([0.0, 0.0, 1.0])
         unknown = np.where(vertical == 0, np.nan, 1.0)
-        defaults = {"force_n": lambda: -self.normal_force_n[:, None] * vertical, "torque_nmm": lambda: np.full((steps, 3), np.nan),
+        defaults = {"pad_force_n": lambda: self.normal_force_n, "shell_force_n": lambda: self.normal_force_n - self.pad_force_n,
+                    "force_n": lambda: -self.normal_force_n[:, None] * vertical, "torque_nmm": lambda: np.full((steps, 3), np.nan),
                     "displacement_mm": lambda: -self.deformation_map_mm[..., None] * unknown,
                     "slip": lambda: np.full(self.deformation_map_mm.shape, np.nan),
                     "expected_error_mm": lambda: np.full(steps, np.nan)}

@@ -101,15 +101,15 @@ class Sensor:
         forces = self.checked_forces(_given(force_n, motion))
         placed = place(mesh, pose=pose)
         check_over_sensor(placed, self.spec.footprint_mm)
-        threads = threads or cores()
+        threads, height = threads or cores(), self._height_mm(placed)
         # Dense products of some hundred rows would wait for each other on more threads, up to five times as long.
         press = PRESSES[model] if model != "auto" else partial(press_auto, policy=policy, tolerance_mm=tolerance_mm)
         try:
             with threadpool_limits(limits=threads if model == "elastic" else 1):
                 result = press(self, placed, forces, label=label, threads=threads, keep_body=keep_body)
-                return flag_buried(result, placed.bounds[1, 2])
+                return flag_buried(result, height)
         except ConvergenceError as error:
-            error.result = error.result and flag_buried(error.result, placed.bounds[1, 2])
+            error.result = error.result and flag_buried(error.result, height)
             raise
 
     def _press_motion(self, mesh: trimesh.Trimesh, pose: Pose | None, motion: Motion, model: str, *, label: str, threads: int,
@@ -123,13 +123,17 @@ class Sensor:
             self.checked_forces(-load)
         placed = place(mesh, pose=pose)
         check_over_sensor(placed, self.spec.footprint_mm)
-        height = placed.bounds[1, 2] - HeightField(placed).first_touch_mm(self.spec.map_x_mm, self.spec.map_y_mm)
+        height = self._height_mm(placed)
         try:
             with threadpool_limits(limits=threads if model == "elastic" else 1):
                 return self._flagged(press(self, placed, motion, label=label, threads=threads, keep_body=keep_body), height)
         except ConvergenceError as error:
             error.result = error.result and self._flagged(error.result, height)
             raise
+
+    def _height_mm(self, placed: trimesh.Trimesh) -> float:
+        """Height (mm) of an object's top over where it first touches."""
+        return float(placed.bounds[1, 2]) - HeightField(placed).first_touch_mm(self.spec.map_x_mm, self.spec.map_y_mm)
 
     def _flagged(self, result: PressResult, height_mm: float) -> PressResult:
         """A motion's result with the steps flagged that bury the object or overload the sensor."""

@@ -109,7 +109,8 @@ def _press_some(compliance, surface, heights, forces_n, settings):
     arrays = {field.name: getattr(load_steps, field.name).cpu().numpy() for field in fields(load_steps)}
     for press in range(len(heights)):
         own = slice(press * len(forces_n), (press + 1) * len(forces_n))
-        yield LayerPress(maps=maps[own], areas=area, contact=ContactLoadSteps(**{name: values[..., own] for name, values in arrays.items()}))
+        contact = ContactLoadSteps(**{name: values[..., own] for name, values in arrays.items()})
+        yield LayerPress(maps=maps[own], areas=area, contact=contact)
 
 
 def _depth_at_first(height, area, force_over_modulus):

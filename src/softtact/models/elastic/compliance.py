@@ -148,3 +148,12 @@ def press_layer(compliance: Compliance, points: ObjectPoints, forces_n: Sequence
                             precondition=compliance.stencil.on(compliance.grid, points.nodes))
     return LayerPress(maps=compliance.maps(points, contact.force), contact=contact, areas=areas,
                       lower_maps=compliance.lower_maps(points, contact.force))
+
+
+def rest_on_shell(compliance: Compliance, points: ObjectPoints, count: int, depth_mm: float) -> LayerPress:
+    """The `LayerPress` of so many load steps of an object that something else carries: the layer is at rest."""
+    gap = np.tile((points.gap - depth_mm)[:, None], count)
+    contact = ContactLoadSteps(force=np.zeros_like(gap), depth=np.full(count, depth_mm), gap=gap,
+                               iterations=np.zeros(count, dtype=int), settled=np.ones(count, dtype=bool))
+    return LayerPress(maps=compliance.maps(points, contact.force), contact=contact, areas=compliance.grid.areas(points.nodes),
+                      lower_maps=compliance.lower_maps(points, contact.force))

@@ -58,7 +58,7 @@ def move_on_layer(compliance: SurfaceCompliance, underside: Callable[[np.ndarray
     """The `ElasticMotion` of an object with an `underside(x, y)` (heights (n,) in mm and normals) over a layer.
 
     first_touch_mm: height of its lowest point over the surface;  friction: Coulomb's coefficient
-    deepest_mm: the layer's thickness;  on_step: called with each step's `SlidingState`
+    deepest_mm: the layer's thickness;  on_step: called with each step's `SlidingState`, which it may refuse
     Raises InputError for freedoms that the model does not know, and ConvergenceError with `result`, the `ElasticMotion` of the
     steps before (or None), where a step is not reached.
     """
@@ -73,10 +73,10 @@ def move_on_layer(compliance: SurfaceCompliance, underside: Callable[[np.ndarray
             if state.position[2] > deepest_mm:
                 raise ConvergenceError(f"Step {number} was not reached: the object would be {state.position[2]:.3g} mm deep in a "
                                        f"layer {deepest_mm:g} mm thick; press less deep or with less force.")
-            states.append(state)
-            counts.append(count)
             if on_step:
                 on_step(state)
+            states.append(state)
+            counts.append(count)
     except ConvergenceError as error:
         error.result = _result(compliance, states, counts) if counts else None
         raise

@@ -59,7 +59,7 @@ class Places:
         return self.compliance.surface.between(self.columns, self.signs, self.columns, self.signs)
 
     def maps(self, load: np.ndarray, lateral: np.ndarray) -> np.ndarray:
-        """Deformation maps (l, ny, nx) in mm under loads (n + b, l) and lateral ones of frusta (4 b, l), with sides that are held."""
+        """Deformation maps (l, ny, nx) in mm under loads (n + b, l) and lateral ones of frusta (4 b, l), with held sides."""
         coarse = self.compliance.grid.every_second
         numbers, signs = coarse.quarter(np.arange(coarse.count))
         rows = self.compliance.surface.between(self._map_start + numbers, signs, self.columns, self.signs)

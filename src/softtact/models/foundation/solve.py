@@ -84,6 +84,14 @@ def press_foundation(compliance: FoundationCompliance, points: ObjectPoints, for
         yield _advance(press, path, float(force))
 
 
+def lifted(compliance: FoundationCompliance, points: ObjectPoints, depth_mm: float) -> FoundationLoadStep:
+    """The `FoundationLoadStep` of an object that something else carries so deep: the sensor is at rest."""
+    frusta = int(np.prod(compliance.counts))
+    return FoundationLoadStep(force_n=0.0, depth=depth_mm, load=np.zeros(points.count + frusta), lateral=np.zeros((4, frusta)),
+                              touching=np.zeros(points.count, dtype=bool), compression=np.zeros(frusta), penetration=0.0,
+                              iterations=0)
+
+
 def _advance(press, path, target):
     """Reach a force (N) from the end of a path of forces and states, by way of smaller ones where no step leads there at once.
 

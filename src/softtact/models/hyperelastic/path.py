@@ -19,6 +19,7 @@ from softtact.models.hyperelastic.rigid_contact import Surface
 
 _DEEP = 0.55           # of a frustum's height, or of the layers': from here on elements of the default mesh may be unstable
 DEFAULT = NewtonSettings()
+_CLEAR_MM = 0.1        # over the surface, from where on no contact law acts
 _SMALLEST_SHARE = 1 / 64     # of the way that an object may go at once, until a motion's step is given up
 
 
@@ -131,15 +132,49 @@ class ByMotion:
     remedy = "Make the step's way or load smaller"
 
 
-def press_load_steps(body: LayeredBody, surface: Surface, forces_n: Iterable[float], *,
-                     settings: NewtonSettings = DEFAULT) -> Iterator[LoadStep]:
-    """Yield a `LoadStep` for each force (N, increasing). Raises ConvergenceError naming the load step that was not reached."""
+def press_load_steps(body: LayeredBody, surface: Surface, forces_n: Iterable[float], *, settings: NewtonSettings = DEFAULT,
+                     touch_mm: float = 0.0, stop_mm: float = np.inf) -> Iterator[LoadStep]:
+    """Yield a `LoadStep` for each force (N, increasing). Raises ConvergenceError naming the load step that was not reached.
+
+    touch_mm: indentation at first touch;  stop_mm: that at which something else carries the object, whose load steps from there on
+    have one state, and with it the body's own force
+    """
     body.begin()
-    state, reached = first_touch(body, surface, settings), 0.0
-    for force in forces_n:
-        load_step = _advance(body, surface, state, reached, ByForce(float(force), settings.smallest_increment_n), settings)
-        state, reached = load_step.state, load_step.force_n
-        yield load_step
+    if stop_mm <= touch_mm:
+        rest = LoadStep(0.0, _untouched(body, surface, stop_mm), iterations=0, residual_n=0.0, penetration_mm=0.0)
+        yield from (replace(rest, force_n=float(force)) for force in forces_n)
+        return
+    state, reached, stopped = first_touch(body, surface, settings), 0.0, None
+    for force in map(float, forces_n):
+        if stopped is None:
+            load_step, stopped = _up_to(body, surface, state, reached, force, stop_mm, settings)
+            state, reached = load_step.state, load_step.force_n
+        yield replace(stopped or load_step, force_n=force)
+
+
+def _up_to(body, surface, state, reached, force, stop_mm, settings):
+    """The `LoadStep` of a force, and the same again where it is the one at which the object is stopped, else None."""
+    failed = None
+    try:
+        load_step = _advance(body, surface, state, reached, ByForce(force, settings.smallest_increment_n), settings)
+        if load_step.state.indentation <= stop_mm:
+            return load_step, None
+    except ConvergenceError as error:      # of a force that the body would not bear alone
+        if np.isinf(stop_mm):
+            raise
+        failed = error
+    begin, end = (Control(None, depth, np.zeros(2)) for depth in (state.indentation, stop_mm))
+    stopped = _advance(body, surface, state, 0.0, ByMotion(begin, end, state.force, settings.largest_way_mm, 1), settings)
+    if failed is not None and stopped.state.force >= force:
+        raise failed
+    return stopped, stopped
+
+
+def _untouched(body, surface, indentation):
+    """The body at rest under an object that does not press it, at an indentation."""
+    slab, support = body.rest()
+    state = body.evaluate(slab, support, indentation - _CLEAR_MM, body.slab.project(slab, surface))
+    return replace(state, indentation=indentation)
 
 
 def press_motion(body: LayeredBody, surface: Surface, motion: Motion, touch_mm: float, *,

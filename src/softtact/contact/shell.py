@@ -1,0 +1,76 @@
+"""Where an object that is wider than a sensor comes to rest: on the rigid shell around it (`sensors/edge`).
+
+The object moves straight down and does not turn, so a single number tells all: how far it can come down until its underside meets
+the shell's top. From there on the pad keeps the force that it has, and the shell carries what is added.
+Left out: that a cover which bulges over the shell's top may touch it.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from softtact.contact.height_field import NO_CONTACT_MM, HeightField
+from softtact.errors import ConvergenceError
+from softtact.sensors.base import BaseSpec
+
+_BESIDE_MM = 1e-3      # an object that ends at the pad's own side does not lie on the shell
+_EXACT = 1e-8          # of the largest force, to which that at rest is found
+
+
+@dataclass(frozen=True)
+class Shell:
+    """A rigid frame around a pad."""
+
+    footprint_mm: tuple[float, float]
+    """Sides of the pad along x and y, which the shell surrounds."""
+    below_mm: float
+    """Depth of its top below the pad's free surface; infinite where there is no shell."""
+    width_mm: float
+    """How wide it is."""
+
+    @classmethod
+    def of(cls, spec: BaseSpec) -> "Shell":
+        """The shell that a sensor's `edge` states."""
+        return cls(spec.footprint_mm, spec.edge.held_below_mm, spec.edge.shell_width_mm)
+
+    def stop_mm(self, surface: HeightField, offset_mm: Sequence[float] | np.ndarray = (0.0, 0.0)) -> float:
+        """How far (mm) an object can come down from where its `surface` is; infinite where it does not reach over the shell.
+
+        offset_mm: its way aside along x and y from there
+        """
+        if not np.isfinite(self.below_mm):
+            return np.inf
+        inner = 0.5 * np.asarray(self.footprint_mm) + _BESIDE_MM
+        outer, way = inner + self.width_mm, np.asarray(offset_mm)
+        boxes = [(-outer, [-inner[0], outer[1]]), ([inner[0], -outer[1]], outer),
+                 ([-inner[0], -outer[1]], [inner[0], -inner[1]]), ([-inner[0], inner[1]], [inner[0], outer[1]])]
+        lowest = min(surface.lowest_over(low - way, high - way) for low, high in boxes)
+        return lowest + self.below_mm if lowest < NO_CONTACT_MM else np.inf
+
+    def refuse_motion(self, surface: HeightField, offset_mm: np.ndarray, indentation_mm: float, touch_mm: float, *,
+                      step: int) -> None:
+        """Raise ConvergenceError where an object is lower than the shell lets it, after a motion's step of that number.
+
+        offset_mm (2,): its way aside;  indentation_mm: how far it has come down from its pose, touch_mm: did at first touch
+        """
+        stop = self.stop_mm(surface, offset_mm)
+        if indentation_mm > stop + _BESIDE_MM:
+            raise ConvergenceError(f"Step {step} of the motion was not reached: the object would be {indentation_mm - touch_mm:.3g} "
+                                   f"mm deep, but rests on the shell beside the pad after {stop - touch_mm:.3g} mm; press less deep "
+                                   "or with less force, or give the sensor's 'edge' a lower shell.")
+
+
+def pad_forces(forces_n: np.ndarray, *, stop_mm: float, touch_mm: float, depth_of: Callable[[float], float]) -> np.ndarray:
+    """Forces (l,) in N that the pad carries of rising ones (l,): all of them, or as much as it does where the object rests.
+
+    stop_mm, touch_mm: how far the object can come down, and does until first touch;  depth_of: how far it does under a force (N)
+    """
+    if stop_mm <= touch_mm:
+        return np.zeros(len(forces_n))
+    largest = float(forces_n[-1])
+    if depth_of(largest) <= stop_mm:
+        return forces_n
+    at_rest = brentq(lambda force: depth_of(force) - stop_mm, _EXACT * largest, largest, xtol=_EXACT * largest)
+    return np.minimum(forces_n, at_rest)
