@@ -55,11 +55,11 @@ class Shell:
 
         offset_mm (2,): its way aside;  indentation_mm: how far it has come down from its pose, touch_mm: did at first touch
         """
-        stop = self.stop_mm(surface, offset_mm)
-        if indentation_mm > stop + _BESIDE_MM:
-            raise ConvergenceError(f"Step {step} of the motion was not reached: the object would be {indentation_mm - touch_mm:.3g} "
-                                   f"mm deep, but rests on the shell beside the pad after {stop - touch_mm:.3g} mm; press less deep "
-                                   "or with less force, or give the sensor's 'edge' a lower shell.")
+        depth, stop = indentation_mm - touch_mm, self.stop_mm(surface, offset_mm) - touch_mm
+        if depth > stop + _BESIDE_MM:
+            raise ConvergenceError(f"Step {step} of the motion was not reached: the object would be {depth:.3g} mm deep, but rests "
+                                   f"on the shell beside the pad after {stop:.3g} mm; press less deep or with less force, or give "
+                                   "the sensor's 'edge' a lower shell.")
 
 
 def pad_forces(forces_n: np.ndarray, *, stop_mm: float, touch_mm: float, depth_of: Callable[[float], float]) -> np.ndarray:
@@ -67,9 +67,9 @@ def pad_forces(forces_n: np.ndarray, *, stop_mm: float, touch_mm: float, depth_o
 
     stop_mm, touch_mm: how far the object can come down, and does until first touch;  depth_of: how far it does under a force (N)
     """
-    if stop_mm <= touch_mm:
-        return np.zeros(len(forces_n))
     largest = float(forces_n[-1])
+    if stop_mm <= touch_mm or depth_of(_EXACT * largest) >= stop_mm:
+        return np.zeros(len(forces_n))
     if depth_of(largest) <= stop_mm:
         return forces_n
     at_rest = brentq(lambda force: depth_of(force) - stop_mm, _EXACT * largest, largest, xtol=_EXACT * largest)

@@ -13,7 +13,7 @@ from softtact.models.foundation.compliance import FoundationCompliance, foundati
 from softtact.progress import announce
 from softtact.sensors.specification import AnySpec
 
-_FORMAT = 10    # of the files; another one makes them again
+_FORMAT = 11    # of the files; another one makes them again
 
 
 def _values(spec):

@@ -42,9 +42,9 @@ def _warn_of_shell(spec, forces, on_pad):
     resting = np.flatnonzero(forces - on_pad > _HARDLY * forces)
     if len(resting):
         first = resting[0]
-        warnings.warn(f"At {forces[first]:g} N the object rests on the shell beside the pad, which feels {on_pad[first]:.3g} N of it "
-                      f"(`result.pad_force_n`; {spec.edge.in_words}): if your sensor's shell ends lower, say so by 'edge' in its "
-                      "file.", ShellWarning, stacklevel=5)
+        warnings.warn(f"At {forces[first]:g} N the object rests on the shell beside the pad, which feels {on_pad[first]:.3g} N of "
+                      f"it (`result.pad_force_n`; {spec.edge.in_words}): if your sensor's shell ends lower, say so by 'edge' in "
+                      "its file.", ShellWarning, stacklevel=5)
 
 
 def _friction(spec, model):

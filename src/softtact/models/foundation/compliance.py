@@ -5,7 +5,7 @@ frusta's linear stiffness against all but compression is part of the slab; their
 which the press sets the law (`foundation_press`).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from softtact.sensors.frusta import SensorSpec
 
 SHEET_SHARES, COVER_SHARES = (1.0,), (0.45, 0.35, 0.2)
 _BLOCKS = ("surface", "sideways", "membrane", "lateral", "lateral_self")
+_GROUND = 2e-3  # of a frustum's stiffness at rest: a lifted one pulls by so much of it, single precision still tells 1e-5 mm
 _TIE = 20.0     # N/mm of the springs that tie the frusta's descents to the slab while it is condensed, and are taken off again
 
 
@@ -77,8 +78,11 @@ def foundation_compliance(spec: SensorSpec, *, dielectric_law: Law, cover_law: L
     slab = foundation_slab(spec, dielectric_law, cover_law, cells=cells)
     centres = _quarter_lattice(spec)
     roots = _roots(slab, centres, frustum)
-    stiffness = slab.stiffness + roots.T @ sp.block_diag([frustum.rest] * len(centres), format="csr") @ roots
     descents = _cleaned(sp.kron(sp.eye(len(centres)), frustum.descent[None], format="csr") @ roots)
+    stiffness = slab.stiffness + roots.T @ sp.block_diag([frustum.rest] * len(centres), format="csr") @ roots
+    if np.isinf(spec.edge.held_below_mm):
+        frustum, ground = _with_ground(frustum)
+        stiffness = stiffness + ground * descents.T @ descents
     followed = sp.vstack([_membrane(slab, spec, centres), _lateral_movement(roots, frustum, centres)]).tocsr()
     columns = np.concatenate([3 * slab.top.ravel() + 2, slab.unknowns + np.arange(len(centres))])
     electrodes = slab.below_top(slab.boundary_over(slab.layers[0][0]))
@@ -92,6 +96,12 @@ def foundation_compliance(spec: SensorSpec, *, dielectric_law: Law, cover_law: L
         grid=surface_grid(slab), counts=spec.frusta_counts, foundation_modulus=_foundation_modulus(spec, frustum, cover_law),
         law=frustum, surface=ParityBlocks(surface), sideways=ParityBlocks(sideways), membrane=ParityBlocks(membrane),
         lateral=ParityBlocks(lateral), lateral_self=ParityBlocks(own))
+
+
+def _with_ground(frustum):
+    """A frustum's law without a linear part, and that part's stiffness in N/mm: with free sides nothing else carries the slab."""
+    ground = _GROUND * frustum.force_n[1] / frustum.compression_mm[1]
+    return replace(frustum, force_n=frustum.force_n - ground * frustum.compression_mm), ground
 
 
 def foundation_slab(spec: SensorSpec, dielectric_law: Law, cover_law: Law, *, cells: tuple[int, ...] | None = None) -> QuarterSlab:
