@@ -63,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         place = error.filename or "a file"
         return _said(options, f"{place}: {error.strerror or error}; make room or choose another place.", status=4)
     except KeyboardInterrupt:
-        return _said(options, "interrupted; no half-written file is left.", status=130)
+        return _said(options, "interrupted; what was reached is written and shown, no half-written file is left.", status=130)
     return 0
 
 

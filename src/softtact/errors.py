@@ -27,6 +27,10 @@ class ConvergenceError(SofttactError):
         self.result = result
 
 
+class TimeLimitError(ConvergenceError):
+    """The time that was given for a press is over; `result` holds the steps that were reached."""
+
+
 class ExtrapolationWarning(UserWarning):
     """A law is used where the data behind its material card do not reach."""
 

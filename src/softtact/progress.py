@@ -5,10 +5,13 @@ import time
 from collections.abc import Iterable, Iterator
 from typing import TypeVar
 
+from softtact.errors import TimeLimitError
+
 _Item = TypeVar("_Item")
+_ON_SCREEN_S, _IN_A_LOG_S = 0.5, 10.0     # between two lines: on a screen one takes the place of the other
 
 
-def progress(iterable: Iterable[_Item], *, label: str, total: int | None = None, interval_s: float = 2.0) -> Iterator[_Item]:
+def progress(iterable: Iterable[_Item], *, label: str, total: int | str | None = None, interval_s: float = 2.0) -> Iterator[_Item]:
     """Yield the items of `iterable`; write `label: 3/20, 12 s` on stderr at most every `interval_s` seconds.
 
     An empty label writes nothing: the work is part of some other that tells its progress.
@@ -26,3 +29,34 @@ def progress(iterable: Iterable[_Item], *, label: str, total: int | None = None,
 def announce(text: str) -> None:
     """Say on stderr what begins now and may take a while."""
     print(text, file=sys.stderr, flush=True)
+
+
+class Watch:
+    """How far one long computation is, on one line of stderr, and when its time is over.
+
+    label: what is told first, an empty one tells nothing;  limit_s: wall-clock seconds from now on, or None
+    """
+
+    def __init__(self, label: str = "", *, limit_s: float | None = None) -> None:
+        self._label, self._limit_s, self._start = label, limit_s, time.monotonic()
+        self._screen = sys.stderr.isatty()
+        self._shown, self._open = self._start, False
+
+    def beat(self, where: str) -> None:
+        """Tell `where` the computation is, now and then; raise TimeLimitError where its time is over."""
+        now = time.monotonic()
+        spent = now - self._start
+        if self._limit_s is not None and spent > self._limit_s:
+            self.end()
+            raise TimeLimitError(f"The time limit of {self._limit_s:g} s was reached at {where}; the steps before are kept: give "
+                                 "more time (--time-limit, time_limit_s), or ask for smaller forces.")
+        if self._label and now - self._shown >= (_ON_SCREEN_S if self._screen else _IN_A_LOG_S):
+            print(f"{chr(13) if self._screen else ''}{self._label}: {where}, {spent:.0f} s", file=sys.stderr, flush=True,
+                  end="\x1b[K" if self._screen else "\n")
+            self._shown, self._open = now, self._screen
+
+    def end(self) -> None:
+        """End the line, where one is written."""
+        if self._open:
+            print(file=sys.stderr, flush=True)
+            self._open = False

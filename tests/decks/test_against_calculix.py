@@ -24,11 +24,14 @@ from softtact.models.hyperelastic.build import build_sensor_body, build_unit_cel
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.models.hyperelastic.path import press_load_steps
+from softtact.sensors.edge import Edge, SidesBelow
 from softtact.sensors.frusta import Friction
 
 pytestmark = needs_ccx
 PATCH = CORO.model_copy(update={"footprint_mm": (4.8, 4.8)})     # 4 x 4 frusta
 PLATE = place(trimesh.creation.box((5.0, 5.0, 1.0)))
+BAR = place(trimesh.creation.cylinder(radius=8.0, height=7.0, sections=400,
+                                      transform=trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0])))
 SPHERE = place(trimesh.creation.icosphere(subdivisions=4, radius=3.0))
 
 
@@ -116,6 +119,22 @@ def test_a_small_sensor_gives_way_as_in_calculix(solve):
     load_steps = press(body, SPHERE, forces)
     tables = solve(deck_model(body, SPHERE, forces_n=forces))
     assert tables.force[1:] == pytest.approx(forces, rel=1e-4)
+    assert tables.indentation[1:] == pytest.approx([load_step.state.indentation for load_step in load_steps], rel=0.02)
+    largest, rms = interface_error(body, load_steps, tables.of("INTERFACE")[1:]).T
+    assert largest.max() < 0.07 and rms.max() < 0.02
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("edge", [Edge(held=SidesBelow(sides_below_mm=1.5)), Edge(held="free")], ids=["cover-free", "all-free"])
+def test_a_round_bar_across_the_whole_sensor_gives_way_as_in_calculix(edge, solve):
+    """It overhangs the pad on both sides and presses the free rim of the cover, which bulges beyond the footprint."""
+    forces = [2.0, 4.0]
+    body = sharp(build_sensor_body(PATCH.model_copy(update={"edge": edge}), dielectric_law=POLYURETHANE, cover_law=NEOPRENE,
+                                   surface=HeightField(BAR),
+                                   mesh=MeshSettings(cover_heights=(0.0, 0.45, 0.8, 1.0), cover_splits=(0, 1, 2))))
+    load_steps = press(body, BAR, forces)
+    tables = solve(deck_model(body, BAR, forces_n=forces))
+    print(tables.indentation, [load_step.state.indentation for load_step in load_steps], interface_error(body, load_steps, tables.of("INTERFACE")[1:]))
     assert tables.indentation[1:] == pytest.approx([load_step.state.indentation for load_step in load_steps], rel=0.02)
     largest, rms = interface_error(body, load_steps, tables.of("INTERFACE")[1:]).T
     assert largest.max() < 0.07 and rms.max() < 0.02

@@ -53,7 +53,10 @@ def add(commands: argparse._SubParsersAction) -> None:
                          help="where the hyperelastic model sums up elements: cpu (default), cuda, or auto (a GPU if there is one)")
     command.add_argument("--card", action="append", metavar="LAYER=CARD.json",
                          help="a card of `softtact fit` for the dielectric or the cover, in place of the printed constants")
-    command.add_argument("--out", type=Path, metavar="FILE.nc", help="write the maps as NetCDF")
+    command.add_argument("--time-limit", type=float, metavar="S",
+                         help="end after so many seconds; the load steps that were reached are written and shown")
+    command.add_argument("--out", type=Path, metavar="FILE.nc",
+                         help="write the maps as NetCDF, anew with each load step that is reached")
     command.add_argument("--vtu", type=Path, metavar="FILE.vtu",
                          help="write the pressed sensor for ParaView and softtact view: the hyperelastic model's whole mesh, the "
                               "others' surface")
@@ -75,12 +78,18 @@ def _press(options):
         sensor = replace(softtact.load_sensor(options.sensor, materials=_cards(options)),
                          **_quality(options), device=options.device, attributes={"mesh_repairs": "; ".join(repairs)})
         result = sensor.press(mesh, pose=pose, **how, model=options.model,
-                              policy=options.policy, tolerance_mm=options.tolerance, keep_body=options.vtu is not None)
-    except ConvergenceError as error:
-        if error.result is not None:
+                              policy=options.policy, tolerance_mm=options.tolerance, keep_body=options.vtu is not None,
+                              time_limit_s=options.time_limit, on_step=_writer(options))
+    except (ConvergenceError, KeyboardInterrupt) as error:
+        if getattr(error, "result", None) is not None:
             _show_press(error.result, options)
         raise
     _show_press(result, options)
+
+
+def _writer(options):
+    """What writes the load steps so far to --out; None without it."""
+    return None if options.out is None else lambda result: result.write(options.out)
 
 
 def _how(options, spec):

@@ -5,6 +5,7 @@ shape, for its sides are curves through three nodes and its faces are spanned by
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -65,7 +66,8 @@ class BodyMesh:
 
 def body_mesh(body: LayeredBody) -> BodyMesh:
     """The `BodyMesh` of a `LayeredBody`."""
-    slab, support = body.slab, body.support
+    slab = body.slab
+    support: Any = body.support     # a `FrustumArray`: decks are of sensors with frusta
     cover, hanging = _cover_numbers(slab)
     sheet, followers = _sheet_numbers(slab, slab.nodes + len(hanging))
     first = slab.nodes + len(hanging) + len(followers)
@@ -126,7 +128,8 @@ def _numbers_in_use(members, count):
 
 
 def _parts(body, sheet, cover, frusta):
-    slab, support = body.slab, body.support
+    slab = body.slab
+    support: Any = body.support     # a `FrustumArray`: decks are of sensors with frusta
     none, mesh = np.zeros((0, 15), dtype=np.int64), slab.sheet_mesh
     (hexes, more_hexes), (wedges, more_wedges) = (np.split(sheet[kind], [len(kind) // mesh.layers * slab.sheet_layers])
                                                   for kind in (_hexes(mesh), _wedges(mesh)))     # the cover's are above

@@ -6,6 +6,7 @@ in MPa.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -91,14 +92,15 @@ def deck_model(body: LayeredBody, placed: trimesh.Trimesh, *, forces_n: Sequence
     `indentations_mm` (increasing), which the object follows.
     """
     surface, mesh = HeightField(placed), body_mesh(body)
+    support: Any = body.support     # a `FrustumArray`: decks are of sensors with frusta
     surfaces = _surfaces(body, mesh)
     rigid, contacts = [_object(body, surface), _board(body)], _contacts(body)
     if "FRUSTA_SIDES_ODD" in surfaces:
-        contacts.append(ContactPair("NEIGHBOURS", "FRUSTA_SIDES_EVEN", "FRUSTA_SIDES_ODD", body.support.contact))
+        contacts.append(ContactPair("NEIGHBOURS", "FRUSTA_SIDES_EVEN", "FRUSTA_SIDES_ODD", support.contact))
     walls = _walls(body)
     if walls is not None:
         rigid.append(walls)
-        contacts.append(ContactPair("WALLS", "FRUSTA_SIDES", "WALLS", body.support.contact))
+        contacts.append(ContactPair("WALLS", "FRUSTA_SIDES", "WALLS", support.contact))
     held = _held(body, mesh)
     return DeckModel(title=title, points=mesh.points, parts=mesh.parts, ties=mesh.ties, held=held,
                      node_sets=_node_sets(body, mesh, held), surfaces=surfaces, rigid=rigid, contacts=contacts,

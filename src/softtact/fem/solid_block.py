@@ -119,7 +119,8 @@ class SolidBlock:
         at_rest = self.at_rest._replace(shapes=self.at_rest.shapes[elements])
         deformed = self.loops.deformation(displacement, at_rest)
         response, volume = self.law.isochoric(deformed.C, tangent=True), self._volumetric(deformed.J, at_rest)
-        return self.loops.tangent(deformed, at_rest, response.stress, response.tangent, volume, np.empty(0, precision))
+        return self.loops.tangent(deformed, at_rest, response.stress, response.tangent, volume,     # type: ignore[arg-type]
+                                  np.empty(0, precision))
 
     @property
     def volume(self) -> float:

@@ -105,7 +105,7 @@ class MaterialConfig(_Section):
     material: str = Field(pattern=r"^[a-z0-9_]+$")
     description: str = ""
     curves: Annotated[SyntheticCurves | MeasuredCurves, Field(discriminator="kind")]
-    fit: FitSettings = FitSettings()     # type: ignore[call-arg]
+    fit: FitSettings = FitSettings()
     source: str = Field("", description="where the printed constants stand")
     printed: dict[str, PrintedLaw] = Field(default_factory=dict)
 

@@ -11,6 +11,7 @@ from softtact.models.elastic.compliance import Compliance, elastic_compliance
 from softtact.models.elastic.tangential import SurfaceCompliance, surface_compliance
 from softtact.models.foundation.compliance import FoundationCompliance, foundation_compliance
 from softtact.progress import announce
+from softtact.sensors.frusta import SensorSpec
 from softtact.sensors.specification import AnySpec
 
 _FORMAT = 11    # of the files; another one makes them again
@@ -36,7 +37,7 @@ def cached_surface_compliance(spec: AnySpec, *, threads: int = 1) -> SurfaceComp
                    "minute or two; 230 MB for the paper's)", lambda: surface_compliance(spec, threads=threads))
 
 
-def cached_foundation(spec: AnySpec, laws: Mapping[str, Law], *, threads: int = 1) -> FoundationCompliance:
+def cached_foundation(spec: SensorSpec, laws: Mapping[str, Law], *, threads: int = 1) -> FoundationCompliance:
     """The `FoundationCompliance` of a sensor with its laws {"dielectric", "cover"}, by the values of all three."""
     dielectric, cover = laws["dielectric"], laws["cover"]
     return _cached("foundation", [_values(spec), repr(dielectric), repr(cover)], FoundationCompliance,

@@ -15,6 +15,7 @@ from trimesh import Trimesh
 
 from softtact.errors import ConvergenceError, InputError
 from softtact.geometry.complexity import OVERLAP_THRESHOLD, TOTAL_THRESHOLD, choose_model, score
+from softtact.press.making import Course
 from softtact.press.models import PRESSES
 from softtact.press.result import PressResult
 
@@ -82,45 +83,42 @@ def cheapest(errors: dict[str, np.ndarray], tolerance_mm: float) -> str:
     return next((name for name in ("elastic", "foundation") if errors[name].max() <= tolerance_mm), "hyperelastic")
 
 
-def press_auto(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, *, label: str, threads: int, policy: str, tolerance_mm: float,
-               keep_body: bool = False) -> PressResult:
-    """A press with the model that a policy takes; the result tells which, why, and with what error to expect.
-
-    label, threads, keep_body: passed on to the models' presses
-    """
+def press_auto(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, course: Course, *, policy: str,
+               tolerance_mm: float) -> PressResult:
+    """A press with the model that a policy takes; the result tells which, why, and with what error to expect."""
     if policy not in POLICIES:
         raise InputError(f"The policy {policy!r} is unknown; use one of {', '.join(POLICIES)}.")
     if policy == "paper":
-        return _by_counts(sensor, placed, forces, label=label, threads=threads, keep_body=keep_body)
+        return _by_counts(sensor, placed, forces, course)
     if not tolerance_mm > 0:
         raise InputError(f"The tolerance {tolerance_mm:g} mm is not positive; give the largest error of a map in mm.")
     if np.isnan(sensor.spec.frustum_height_mm):
-        return _without_frusta(sensor, placed, forces, label=label, threads=threads, keep_body=keep_body)
-    return _by_error(sensor, placed, forces, tolerance_mm, label=label, threads=threads, keep_body=keep_body)
+        return _without_frusta(sensor, placed, forces, course)
+    return _by_error(sensor, placed, forces, tolerance_mm, course)
 
 
-def _by_counts(sensor, placed, forces, **how):
+def _by_counts(sensor, placed, forces, course):
     counts = score(placed.triangles, footprint_mm=sensor.spec.footprint_mm, reach_mm=sensor.spec.thickness_mm)
     model = choose_model(counts.NPt, counts.CHt, counts.NPo, counts.CHo)
-    result = PRESSES[model](sensor, placed, forces, **how)
+    result = PRESSES[model](sensor, placed, forces, course)
     reason = (f"the paper's rule: NPt / CHt = {counts.ratio_total:.3g} ({TOTAL_THRESHOLD:g} asks for the hyperelastic model), "
               f"NPo / CHo = {counts.ratio_overlap:.3g} ({OVERLAP_THRESHOLD:g})")
     return replace(result, selection_reason=reason)
 
 
-def _without_frusta(sensor, placed, forces, **how):
+def _without_frusta(sensor, placed, forces, course):
     """The hyperelastic press: what the cheap models err by was calibrated on frusta, and nothing tells it without."""
-    result = PRESSES["hyperelastic"](sensor, placed, forces, **how)
+    result = PRESSES["hyperelastic"](sensor, placed, forces, course)
     return replace(result, selection_reason=f"{sensor.spec.name} has no frusta, on which the expected errors were calibrated: the "
                    "hyperelastic model", expected_error_mm=np.zeros(len(forces)))
 
 
-def _by_error(sensor, placed, forces, tolerance_mm, **how):
-    elastic = PRESSES["elastic"](sensor, placed, forces, **how)
+def _by_error(sensor, placed, forces, tolerance_mm, course):
+    elastic = PRESSES["elastic"](sensor, placed, forces, course)
     try:
-        foundation = PRESSES["foundation"](sensor, placed, forces, **how)
+        foundation = PRESSES["foundation"](sensor, placed, forces, course)
     except ConvergenceError as error:
-        result = PRESSES["hyperelastic"](sensor, placed, forces, **how)
+        result = PRESSES["hyperelastic"](sensor, placed, forces, course)
         return replace(result, selection_reason=f"the foundation model tells no error: {error}",
                        expected_error_mm=np.zeros(len(forces)))
     errors = expected_errors(elastic, foundation, height_mm=sensor.spec.dielectric.frusta.height_mm)
@@ -130,7 +128,7 @@ def _by_error(sensor, placed, forces, tolerance_mm, **how):
     if sensor.spec.name != CALIBRATED_ON:
         reason += f" (calibrated on presses of the sensor {CALIBRATED_ON}, not of {sensor.spec.name})"
     if model == "hyperelastic":
-        result = PRESSES[model](sensor, placed, forces, **how)
+        result = PRESSES[model](sensor, placed, forces, course)
         spent = result.wall_time_s + elastic.wall_time_s + foundation.wall_time_s
         return replace(result, selection_reason=reason, expected_error_mm=np.zeros(len(forces)), wall_time_s=spent)
     result = {"elastic": elastic, "foundation": foundation}[model]

@@ -11,14 +11,14 @@ from softtact.contact.shell import Shell
 from softtact.models.elastic.motion_press import ElasticMotion, check_motion, move_on_layer
 from softtact.models.elastic.sliding import SlidingState
 from softtact.press.cache import cached_surface_compliance
-from softtact.progress import announce
+from softtact.progress import Watch
 
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
 
 
 def press_motion(sensor: "Sensor", placed: Trimesh, motion: Motion, seconds: list[float], *, label: str = "press",
-                 threads: int = 1) -> ElasticMotion:
+                 threads: int = 1, limit_s: float | None = None) -> ElasticMotion:
     """The `ElasticMotion` of a mesh placed in the sensor's frame; into `seconds` goes the time that each step took.
 
     Raises InputError for rotations, lateral loads, and an object that misses the sensor; ConvergenceError, with the steps before as
@@ -29,11 +29,12 @@ def press_motion(sensor: "Sensor", placed: Trimesh, motion: Motion, seconds: lis
         sensor.prepared_models["elastic_surface"] = cached_surface_compliance(sensor.spec, threads=threads)
     compliance, spec = sensor.prepared_models["elastic_surface"], sensor.spec
     shell, field, start = Shell.of(spec), HeightField(placed), time.perf_counter()
+    watch = Watch(label, limit_s=limit_s)
 
     def note(state: SlidingState) -> None:
         shell.refuse_motion(field, state.position[:2], state.position[2] + lowest, lowest, step=len(seconds) + 1)
+        watch.beat(f"step {len(seconds) + 1} of {len(motion.steps)}, {state.position[2]:.3f} mm deep")
         seconds.append(time.perf_counter() - start - sum(seconds))
-        announce(f"{label}: step {len(seconds)} of {len(motion.steps)}, {state.position[2]:.3f} mm deep")
 
     lowest = field.first_touch_mm(spec.map_x_mm, spec.map_y_mm)
     return move_on_layer(compliance, field, motion, first_touch_mm=lowest, friction=spec.friction.object,

@@ -16,9 +16,10 @@ from softtact.errors import ConvergenceError, InputError
 from softtact.models.elastic.compliance import LayerPress, press_layer, rest_on_shell
 from softtact.models.foundation.solve import FoundationMaps, lifted, press_foundation
 from softtact.press.elastic_motion import press_motion
-from softtact.press.making import make_result, timed
+from softtact.press.making import Course, make_result, timed
 from softtact.press.result import PressResult
 from softtact.press.validity import valid_elastic, valid_foundation
+from softtact.progress import Watch
 
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
@@ -28,10 +29,9 @@ _ROUND_OFF = 1e-6         # of a force
 _RISE = 1.15              # of the object's depth: points within may touch
 
 
-def press_elastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, *, label: str, threads: int,
-                  keep_body: bool = False) -> PressResult:
+def press_elastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, course: Course) -> PressResult:
     """All load steps at once with the elastic model, which has no body to keep: the surface's compliance is all that it knows."""
-    start, compliance = time.perf_counter(), sensor.prepared("elastic", threads)
+    start, compliance = time.perf_counter(), sensor.prepared("elastic", course.threads)
     surface = HeightField(placed)
     underside, touch, stop = Underside(surface, compliance.grid), first_touch_mm(sensor, surface), shell_stop_mm(sensor, surface)
 
@@ -69,27 +69,28 @@ def elastic_result(sensor: "Sensor", press: LayerPress, forces: np.ndarray, seco
                        lower_maps=press.lower_maps, iterations=contact.iterations)
 
 
-def press_on_foundation(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, *, label: str, threads: int,
-                        keep_body: bool = False) -> PressResult:
+def press_on_foundation(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, course: Course) -> PressResult:
     """Load step by load step with the foundation model, which has no body to keep."""
-    start, compliance = time.perf_counter(), sensor.prepared("foundation", threads)
+    start, compliance = time.perf_counter(), sensor.prepared("foundation", course.threads)
     surface = HeightField(placed)
     underside, touch, stop = Underside(surface, compliance.grid), first_touch_mm(sensor, surface), shell_stop_mm(sensor, surface)
     load_steps: list[Any] = []
     times: list[float] = []
+    watch = Watch(limit_s=course.time_limit_s)
+
+    def record(load_step):
+        watch.beat(f"{load_step.force_n:.4g} N")
+        load_steps.append(load_step)
 
     def solve(points):
         load_steps.clear()
         times.clear()
-        try:
-            on_pad = pad_forces(forces, stop_mm=stop, touch_mm=touch,
-                                depth_of=lambda force: next(press_foundation(compliance, points, [force])).depth)
-            steps = repeated(press_foundation(compliance, points, np.unique(on_pad)), on_pad) if on_pad.any() else \
-                [lifted(compliance, points, stop)] * len(forces)
-            timed((load_steps.append(load_step) for load_step in steps), len(forces), label, times, start=start)
-        except ConvergenceError as error:
-            error.result = _of_load_steps(sensor, compliance, points, load_steps, forces, times, touch) if load_steps else None
-            raise
+        on_pad = pad_forces(forces, stop_mm=stop, touch_mm=touch,
+                            depth_of=lambda force: next(press_foundation(compliance, points, [force])).depth)
+        steps = repeated(press_foundation(compliance, points, np.unique(on_pad)), on_pad) if on_pad.any() else \
+            [lifted(compliance, points, stop)] * len(forces)
+        timed(map(record, steps), len(forces), course, times,
+              lambda: _of_load_steps(sensor, compliance, points, load_steps, forces, times, touch), start=start)
 
     points, _ = _within_reach(underside, underside.points, compliance.foundation_modulus, forces, sensor.spec.thickness_mm, solve,
                               lambda _: load_steps[-1].depth)
@@ -147,15 +148,15 @@ def _within_reach(underside, points_within, foundation_modulus, forces, deepest,
 _OF_MOTION = ("displacement_mm", "force_n", "torque_nmm", "slip", "iterations", "contact_area_mm2", "penetration_mm")
 
 
-def press_elastic_motion(sensor: "Sensor", placed: Trimesh, motion: Motion, *, label: str, threads: int,
-                         keep_body: bool = False) -> PressResult:
+def press_elastic_motion(sensor: "Sensor", placed: Trimesh, motion: Motion, course: Course) -> PressResult:
     """Step by step with the elastic model, which has no body to keep; a ConvergenceError holds the steps before."""
     if not sensor.spec.base_held:
         raise InputError(f"{sensor.spec.name} has support 'none', which the elastic model presses straight down by force only; use "
                          "the hyperelastic model for this motion.")
     seconds: list[float] = []
     try:
-        moved = press_motion(sensor, placed, motion, seconds, label=label, threads=threads)
+        moved = press_motion(sensor, placed, motion, seconds, label=course.label, threads=course.threads,
+                             limit_s=course.time_limit_s)
     except ConvergenceError as error:
         error.result = error.result and _of_motion(sensor, error.result, seconds)
         raise

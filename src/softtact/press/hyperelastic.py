@@ -14,10 +14,10 @@ from softtact.errors import ConvergenceError, ExtrapolationWarning
 from softtact.models.hyperelastic import path
 from softtact.models.hyperelastic.build_plain import lower_side
 from softtact.models.hyperelastic.deformed_mesh import pressed_body
-from softtact.press.making import make_result, timed
+from softtact.press.making import Course, make_result, timed
 from softtact.press.result import PressResult
 from softtact.press.validity import valid_hyperelastic
-from softtact.progress import announce
+from softtact.progress import Watch, announce
 
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
@@ -26,21 +26,22 @@ _BALANCED = 1e-3          # of a force: farther apart than any load step's toler
 _CORNER = 0.01            # share of a layer: strains at an edge of the object go beyond any data
 
 
-def press_hyperelastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray | Motion, *, label: str, threads: int,
-                       keep_body: bool = False) -> PressResult:
-    """Load step by load step with the hyperelastic model; a ConvergenceError holds the load steps before.
+def press_hyperelastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray | Motion, course: Course) -> PressResult:
+    """Load step by load step with the hyperelastic model, of forces (l,) in N or a `Motion`.
 
-    forces (l,) in N, or a `Motion`;  keep_body: let the result hold the whole body's displacements at each load step
+    A ConvergenceError, of which a time limit is one, and an interruption of the keyboard hold the load steps before.
     """
     surface, shell = HeightField(placed), Shell.of(sensor.spec)
     lowest = surface.first_touch_mm(sensor.spec.map_x_mm, sensor.spec.map_y_mm)
     count = len(forces.steps) if isinstance(forces, Motion) else len(forces)
     if isinstance(forces, Motion):
         path.check_motion(forces)
-    body = sensor.body(threads=threads, surface=_swept(surface, forces))
+    body = sensor.body(threads=course.threads, surface=_swept(surface, forces))
     grid = np.stack(np.meshgrid(sensor.spec.map_x_mm, sensor.spec.map_y_mm), axis=-1).reshape(-1, 2)
     sampling, lower = body.slab.sampling(grid), None if sensor.spec.base_held else lower_side(body.slab, grid)
-    announce(f"{label}: {sensor.spec.parts_in_words}, {count} load steps of the hyperelastic model, some seconds each")
+    if course.label:
+        announce(f"{course.label}: {sensor.spec.parts_in_words}, {count} load steps of the hyperelastic model")
+    body.watch = Watch(course.label, limit_s=course.time_limit_s)
     record: list[dict[str, Any]] = []
     times: list[float] = []
     bodies: list[Any] = []
@@ -51,20 +52,21 @@ def press_hyperelastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray | M
             shell.refuse_motion(surface, load_step.state.slab.projection.offset_mm, load_step.state.indentation, lowest,
                                 step=len(record) + 1)
         record.append(_read_load_step(body, (sampling, lower, grid), load_step, from_mm=lowest))
-        if keep_body:
+        if course.keep_body:
             bodies.append(pressed_body(body, load_step.state))
 
     load_steps = (path.press_motion(body, surface, forces, lowest, settings=sensor.solver) if isinstance(forces, Motion)
                   else path.press_load_steps(body, surface, forces, settings=sensor.solver, touch_mm=lowest,
                                              stop_mm=shell.stop_mm(surface)))
+    def so_far():
+        return _of_record(sensor, body, record, times, bodies)
+
     try:
-        timed((read(load_step) for load_step in load_steps), count, label, times)
-    except ConvergenceError as error:
-        error.result = _of_record(sensor, body, record, times, bodies) if record else None
-        raise
+        timed(map(read, load_steps), count, replace(course, label=""), times, so_far)
+        return so_far()
     finally:
+        body.watch.end()
         body.close()
-    return _of_record(sensor, body, record, times, bodies)
 
 
 def _swept(surface, forces):

@@ -2,17 +2,35 @@
 
 import time
 import warnings
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softtact.errors import ShellWarning
+from softtact.errors import ConvergenceError, ShellWarning
 from softtact.press.result import PressResult
 from softtact.progress import progress
 from softtact.readout.capacitance import ideal_counts
 
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
+
+@dataclass(frozen=True)
+class Course:
+    """How a press goes about its work, apart from what it computes."""
+
+    label: str = "press"
+    """What its progress begins with; nothing is told where it is empty."""
+    threads: int = 1
+    """Of the linear algebra."""
+    keep_body: bool = False
+    """Whether the result holds the whole body's displacements at each load step, where the model has one."""
+    time_limit_s: float | None = None
+    """Wall-clock seconds, after which a press ends with what it has reached."""
+    on_step: Callable[[PressResult], None] | None = None
+    """Called with the result so far whenever a load step is reached."""
+
 
 _HARDLY = 1e-6     # of a force: a share of the shell that is not worth a warning
 
@@ -54,12 +72,28 @@ def _friction(spec, model):
     return spec.support_facts
 
 
-def timed(load_steps, count, label, times, *, start=None):
-    """The load steps as a list, and into `times` the seconds that each took; the solver's preparation counts to the first."""
-    out, start = [], start or time.perf_counter()
-    for load_step in progress(load_steps, label=label, total=count):
-        now = time.perf_counter()
-        out.append(load_step)
-        times.append(now - start)
-        start = now
-    return out
+def timed(load_steps: Iterable[Any], count: int, course: Course, times: list[float], so_far: Callable[[], PressResult], *,
+          start: float | None = None) -> None:
+    """Go through load steps; into `times` go the seconds that each took, the solver's preparation counting to the first.
+
+    so_far: makes the result of those that were reached. A ConvergenceError and an interruption of the keyboard take it with them
+    as their `result`; it is None where none was reached.
+    """
+    last = start or time.perf_counter()
+    try:
+        for _ in progress(load_steps, label=course.label, total=count):
+            now = time.perf_counter()
+            times.append(now - last)
+            last = now
+            if course.on_step and len(times) < count:
+                course.on_step(_quietly(so_far))
+    except (ConvergenceError, KeyboardInterrupt) as error:
+        error.result = so_far() if times else None     # type: ignore[union-attr]
+        raise
+
+
+def _quietly(make):
+    """A result whose warnings are left to the last one."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return make()

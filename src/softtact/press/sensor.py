@@ -5,7 +5,7 @@
 """
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -30,6 +30,7 @@ from softtact.models.hyperelastic.build_plain import build_plain_body
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.press.cache import cached_compliance, cached_foundation
 from softtact.press.choice import TOLERANCE_MM, press_auto
+from softtact.press.making import Course
 from softtact.press.many import press_many, raise_first
 from softtact.press.models import MOTIONS, PRESSES
 from softtact.press.result import PressResult
@@ -38,7 +39,7 @@ from softtact.sensors.library import material_file, sensor_file
 from softtact.sensors.specification import AnySpec, read_spec
 
 MODELS = ("auto", *PRESSES)
-BODIES = {"frusta": build_sensor_body, "layers": build_plain_body}     # by the kind of a sensor
+BODIES: dict[str, Callable[..., LayeredBody]] = {"frusta": build_sensor_body, "layers": build_plain_body}    # by kind
 
 
 def load_sensor(name_or_yaml: str | Path, *, materials: Mapping[str, Law] | None = None) -> "Sensor":
@@ -80,7 +81,8 @@ class Sensor:
 
     def press(self, mesh: trimesh.Trimesh, *, pose: Pose | None = None, force_n: float | Sequence[float] | None = None,
               motion: Motion | None = None, model: str = "auto", policy: str = "paper", tolerance_mm: float = TOLERANCE_MM,
-              label: str = "press", threads: int | None = None, keep_body: bool = False) -> PressResult:
+              label: str = "press", threads: int | None = None, keep_body: bool = False, time_limit_s: float | None = None,
+              on_step: Callable[[PressResult], None] | None = None) -> PressResult:
         """Press a mesh (trimesh, mm) through forces (N, one or an increasing list) or a `Motion`; return a `PressResult`.
 
         motion: steps down by force or to a depth, and aside, with friction where the sensor's `friction.object` states it; the
@@ -92,28 +94,30 @@ class Sensor:
         threads: by default one for each core.
         keep_body: let the result hold the deformed body at each force (`PressResult.pressed_body`), some 20 MB each; of the
         hyperelastic model, for the others have displacements of the map's plane alone.
-        Raises ConvergenceError at a force that is not reached; its `result` holds the forces before.
+        time_limit_s: seconds after which the press ends in a TimeLimitError;  on_step: called with the result so far at each
+        load step that is reached but the last.
+        Raises ConvergenceError at a force that is not reached; its `result` holds the forces before, as those of a
+        KeyboardInterrupt and of a TimeLimitError do.
         """
         if model not in MODELS:
             raise InputError(f"Model {model!r} is unknown; use one of {', '.join(MODELS)}.")
+        course = Course(label, threads or cores(), keep_body, time_limit_s, on_step)
         if motion is not None and force_n is None and not motion.forces_n:
-            return self._press_motion(mesh, pose, motion, model, label=label, threads=threads or cores(), keep_body=keep_body)
+            return self._press_motion(mesh, pose, motion, model, course)
         forces = self.checked_forces(_given(force_n, motion))
         placed = place(mesh, pose=pose)
         check_over_sensor(placed, self.spec.footprint_mm)
-        threads, height = threads or cores(), self._height_mm(placed)
+        height = self._height_mm(placed)
         # Dense products of some hundred rows would wait for each other on more threads, up to five times as long.
         press = PRESSES[model] if model != "auto" else partial(press_auto, policy=policy, tolerance_mm=tolerance_mm)
         try:
-            with threadpool_limits(limits=threads if model == "elastic" else 1):
-                result = press(self, placed, forces, label=label, threads=threads, keep_body=keep_body)
-                return flag_buried(result, height)
-        except ConvergenceError as error:
-            error.result = error.result and flag_buried(error.result, height)
+            with threadpool_limits(limits=course.threads if model == "elastic" else 1):
+                return flag_buried(press(self, placed, forces, course), height)
+        except (ConvergenceError, KeyboardInterrupt) as error:
+            error.result = _flagged_if_any(error, lambda result: flag_buried(result, height))     # type: ignore[union-attr]
             raise
 
-    def _press_motion(self, mesh: trimesh.Trimesh, pose: Pose | None, motion: Motion, model: str, *, label: str, threads: int,
-                      keep_body: bool) -> PressResult:
+    def _press_motion(self, mesh: trimesh.Trimesh, pose: Pose | None, motion: Motion, model: str, course: Course) -> PressResult:
         """A press that does more than go straight down by growing forces."""
         press = MOTIONS.get("hyperelastic" if model == "auto" else model)
         if press is None:
@@ -125,10 +129,10 @@ class Sensor:
         check_over_sensor(placed, self.spec.footprint_mm)
         height = self._height_mm(placed)
         try:
-            with threadpool_limits(limits=threads if model == "elastic" else 1):
-                return self._flagged(press(self, placed, motion, label=label, threads=threads, keep_body=keep_body), height)
-        except ConvergenceError as error:
-            error.result = error.result and self._flagged(error.result, height)
+            with threadpool_limits(limits=course.threads if model == "elastic" else 1):
+                return self._flagged(press(self, placed, motion, course), height)
+        except (ConvergenceError, KeyboardInterrupt) as error:
+            error.result = _flagged_if_any(error, lambda result: self._flagged(result, height))     # type: ignore[union-attr]
             raise
 
     def _height_mm(self, placed: trimesh.Trimesh) -> float:
@@ -166,7 +170,7 @@ class Sensor:
         self.spec.check_for(model)
         if model not in self.prepared_models:
             self.prepared_models[model] = (cached_compliance(self.spec, threads=threads) if model == "elastic"
-                                 else cached_foundation(self.spec, self.laws, threads=threads))
+                                 else cached_foundation(self.spec, self.laws, threads=threads))     # type: ignore[arg-type]
         return self.prepared_models[model]
 
     def body(self, *, threads: int = 1, surface: HeightField | None = None) -> LayeredBody:
@@ -191,6 +195,12 @@ class Sensor:
         if (np.diff(forces) <= 0).any():
             raise InputError("The forces must increase; sort them and leave out doubles.")
         return forces
+
+
+def _flagged_if_any(error: BaseException, flag: Callable[[PressResult], PressResult]) -> PressResult | None:
+    """The result that an error holds of the steps before it, flagged; None where it holds none."""
+    result = getattr(error, "result", None)
+    return None if result is None else flag(result)
 
 
 def _given(force_n: float | Sequence[float] | None, motion: Motion | None) -> float | Sequence[float]:

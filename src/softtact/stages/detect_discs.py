@@ -22,7 +22,7 @@ def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, 
     """Render a frame per force, then detect in the written files as in a camera's."""
     state, camera = read_dataset(inputs["states"][0]), settings["camera"]
     x, y = state.x_mm.values, state.y_mm.values
-    footprint = [2 * (abs(x).max() + MARGIN_MM), 2 * (abs(y).max() + MARGIN_MM)]
+    footprint = 2 * (abs(x).max() + MARGIN_MM), 2 * (abs(y).max() + MARGIN_MM)
     outputs["images"].mkdir(parents=True, exist_ok=True)
     tables = []
     for k, force in enumerate(progress(state.force_n.values, label="FTIR frames")):

@@ -71,7 +71,7 @@ def inventory(tables: Tables, items: dict[tuple[str, str], list[tuple[str, Paire
     """What the archive holds, how it is read, and how that compares with print."""
     found = found_counts(tables, items)
     matches = judge_arrangement(tables, shape=_grid(sensor), seed=settings["seed"])
-    best, chosen = max(matches, key=matches.get), settings["taxel_order"]
+    best, chosen = max(matches, key=matches.__getitem__), settings["taxel_order"]
     sentence = counts_sentence(counts_table(found))
     announce(sentence)
     if best != chosen:

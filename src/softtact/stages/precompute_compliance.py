@@ -7,8 +7,8 @@ from typing import Any
 
 from softtact.files import atomic_path
 from softtact.materials.cards import law_from_card, load_card
-from softtact.models.elastic.compliance import elastic_compliance
-from softtact.models.foundation.compliance import foundation_compliance
+from softtact.models.elastic.compliance import Compliance, elastic_compliance
+from softtact.models.foundation.compliance import FoundationCompliance, foundation_compliance
 from softtact.models.foundation.frustum_spring import FrustumLaw
 from softtact.sensors.specification import SensorSpec
 
@@ -16,6 +16,7 @@ from softtact.sensors.specification import SensorSpec
 def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Condense a quarter of the layers four times, and write what is left."""
     spec = SensorSpec.from_dict(settings["sensor"])
+    compliance: Compliance | FoundationCompliance
     if settings["kind"] == "elastic":
         compliance = elastic_compliance(spec, threads=threads)
     else:

@@ -83,7 +83,7 @@ def surface_grid(slab: QuarterSlab) -> NodeGrid:
     """The `NodeGrid` of the free nodes on a whole slab's top, from its `QuarterSlab`."""
     sides = not slab.side_held[-1]
     x, y = (line if sides else line[:-1] for line in (slab.x, slab.y))
-    return NodeGrid(*(np.concatenate([-line[:0:-1], line]) for line in (x, y)), sides)
+    return NodeGrid(np.concatenate([-x[:0:-1], x]), np.concatenate([-y[:0:-1], y]), sides)
 
 
 def elastic_slab(spec: BaseSpec, *, cells: tuple[int, ...] | None = None) -> QuarterSlab:

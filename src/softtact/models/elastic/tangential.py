@@ -10,6 +10,7 @@ Directions here are x, y and down: a force or displacement into the sensor is po
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -39,7 +40,8 @@ class SurfaceCompliance:
 
     def save(self, path: Path) -> None:
         """Write as a NumPy archive, in single precision."""
-        np.savez(path, **self.grid.arrays(), triangles=self.triangles, foundation_modulus=self.foundation_modulus)
+        grid: dict[str, Any] = self.grid.arrays()
+        np.savez(path, **grid, triangles=self.triangles, foundation_modulus=self.foundation_modulus)
 
     @classmethod
     def load(cls, path: Path) -> "SurfaceCompliance":

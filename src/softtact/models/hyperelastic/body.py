@@ -19,6 +19,7 @@ from softtact.models.hyperelastic.rigid_contact import ContactProjection, Surfac
 from softtact.models.hyperelastic.slab import Slab, SlabState
 from softtact.models.hyperelastic.support import NoCells, Support, SupportState
 from softtact.models.hyperelastic.unit_cells import SheetCells
+from softtact.progress import Watch
 
 if TYPE_CHECKING:
     from softtact.fem.kernels_torch import DeviceKernels
@@ -86,7 +87,7 @@ class LayeredBody:
     def __init__(self, slab: Slab, support: Support, roots: np.ndarray | None = None, *, threads: int = 1) -> None:
         """`roots` (f, k): the slab's nodes that are the frusta's root nodes; none for a support without bodies."""
         self.slab, self.support = slab, support
-        self.workers = Workers(threads)
+        self.workers, self.watch = Workers(threads), Watch()
         self.friction = BodyFriction(slab.top, support)
         self.cells = SheetCells(slab, support, roots) if support.count else NoCells()     # type: ignore[arg-type]
         slab.build_pattern(self.cells.eliminated, self.cells.outer_dofs)

@@ -146,7 +146,7 @@ class _Press:
 
     def __init__(self, body, surface, force, tolerance, settings):
         self.body, self.surface, self.force, self.tolerance, self.settings = body, surface, force, tolerance, settings
-        self.projecting, self.fresh, self.projected = True, False, False
+        self.projecting, self.fresh, self.projected, self.iterations = True, False, False, 0
 
     def prepared(self, state, iteration):
         self.projected = self.projecting and iteration < self.settings.projection_iterations
@@ -190,6 +190,10 @@ class _Press:
         return state.energy - (self.force or 0.0) * state.indentation
 
     def accepted(self, state, trial):
+        self.iterations += 1
+        target = f"on the way to {self.force:.4g} N" if self.force is not None else f"{trial.indentation:.3f} mm down"
+        self.body.watch.beat(f"{target}, now {trial.force:.4g} N, iteration {self.iterations}, largest unbalanced force "
+                             f"{self.residual(trial):.2g} N")
         if np.abs(trial.slab.displacement - state.slab.displacement).max() < _STILL_MM:
             self.projecting = False
         self.fresh = False

@@ -12,7 +12,7 @@ import numpy as np
 
 from softtact.contact.height_field import MovedSurface
 from softtact.contact.motion import Motion, MotionStep
-from softtact.errors import ConvergenceError, InputError
+from softtact.errors import ConvergenceError, InputError, TimeLimitError
 from softtact.models.hyperelastic.body import BodyState, LayeredBody
 from softtact.models.hyperelastic.newton import NewtonSettings, augment, first_touch, settle, tolerance_at
 from softtact.models.hyperelastic.rigid_contact import Surface
@@ -159,6 +159,8 @@ def _up_to(body, surface, state, reached, force, stop_mm, settings):
         load_step = _advance(body, surface, state, reached, ByForce(force, settings.smallest_increment_n), settings)
         if load_step.state.indentation <= stop_mm:
             return load_step, None
+    except TimeLimitError:
+        raise
     except ConvergenceError as error:      # of a force that the body would not bear alone
         if np.isinf(stop_mm):
             raise
