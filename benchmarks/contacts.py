@@ -21,7 +21,6 @@ import record
 import trimesh
 
 import softtact
-from softtact.contact.coverage import overhang
 from softtact.errors import SofttactError
 from softtact.geometry.pose import Pose
 

@@ -54,9 +54,9 @@ class LayerwiseElimination:
         """What is left of each body: (bodies, m, m), m as in `outer`."""
         return self.stages[-1].condensed.outer
 
-    def positive_matrices(self) -> np.ndarray:
+    def positive_matrices(self, *, workers: Workers = SERIAL) -> np.ndarray:
         """The same without their modes of negative stiffness."""
-        return self.stages[-1].condensed.positive_outer()
+        return self.stages[-1].condensed.positive_outer(workers=workers)
 
     def set(self, bodies: np.ndarray, layers: Iterable[tuple[Sequence[np.ndarray], Springs | None]], *,
             damping: np.ndarray | None = None) -> None:

@@ -9,7 +9,7 @@ from softtact.press.result import PressResult
 _DEEPEST_LINEAR = 0.5       # of the layer's thickness: a linear layer does not know that it ends
 _HARDLY_COMPRESSED = 0.33   # of a frustum's height; the foundation model then errs by 2 % at most (docs/explanation/fast_models.md)
 _FULL_POCKET = 0.8          # of a frustum's height: above, its pocket is full and contacts begin that the models leave out
-_OVERLAP_LEFT = 2.0         # times the allowed overlap, or gap under pressure: above, pressing apart has failed
+_OVERLAP_LEFT = 3.0         # times the allowed overlap, or gap under pressure: above, pressing apart has failed
 _FEWEST_POINTS = 9          # of the cover that carry the object: fewer do not resolve where a spike touches, and how deep
 
 

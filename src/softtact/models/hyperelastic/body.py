@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 _DAMPINGS = 4         # steps that are tried with ever more damping of the cells that they throw too far
 _FIRST_SHIFT = 0.01   # N/mm on every free unknown of the slab, doubled until the tangent is positive definite ...
+_LESS = 0.25          # of the shift before, from which the next one's search begins
 _MOST_DOUBLINGS = 40  # ... but a tangent that is not even finite will never be
 
 
@@ -73,12 +74,16 @@ class Step:
         return max(np.abs(self.slab).max(), np.abs(self.support).max(initial=0.0), abs(self.indentation))
 
 
-def _shifts():
-    """What is tried, one after the other, until a tangent is positive definite, so that every step lowers the energy."""
+def _shifts(last):
+    """What is tried, one after the other, until a tangent is positive definite, so that every step lowers the energy.
+
+    last: what was enough for the tangent before
+    """
     yield None
     yield 0.0
+    first = max(_FIRST_SHIFT, _LESS * last)
     for doubling in range(_MOST_DOUBLINGS):
-        yield _FIRST_SHIFT * 2**doubling
+        yield first * 2**doubling
 
 
 class LayeredBody:
@@ -93,6 +98,7 @@ class LayeredBody:
         slab.build_pattern(self.cells.eliminated, self.cells.outer_dofs)
         self.solver = DissectedSolver(slab.points[slab.unknowns // 3, :2], workers=self.workers)
         self.stepper = ContactStepper(DissectedContact(self.solver, workers=self.workers))
+        self._shift = 0.0     # that made the last tangent positive definite
 
     def sum_with(self, loops: "ModuleType | DeviceKernels") -> None:
         """Let elements be summed by `loops`: `kernels`, as from the start, or `device_kernels`."""
@@ -122,6 +128,7 @@ class LayeredBody:
         """Forget all tangents and factors of an earlier press: what is kept decides the last digits of a result."""
         self.cells.reset()
         self.stepper.reset()
+        self._shift = 0.0
         self.friction.reset()
 
     def evaluate(self, slab_displacement: np.ndarray, support_displacement: np.ndarray, indentation: float,
@@ -197,19 +204,25 @@ class LayeredBody:
         Not a number where that cannot be done, which fails Newton's method there.
         """
         excess, border = None if force_n is None else state.force - force_n, self.slab.friction_border(state.slab)
-        for shift in _shifts():
-            step = self.stepper.step(self._rubber_tangent(state, shift), residual, contact, friction_border=border,
-                                     excess=excess,
-                                     largest=largest_mm)
+        positive = None
+        for shift in _shifts(self._shift):
+            if shift is not None and positive is None:
+                positive = self.cells.positive_outer(workers=self.workers)
+            step = self.stepper.step(self._rubber_tangent(state, shift, positive), residual, contact, friction_border=border,
+                                     excess=excess, largest=largest_mm)
             if step is not None:
+                self._shift = shift or 0.0
                 return step
         return np.full(len(residual), np.nan), np.nan
 
-    def _rubber_tangent(self, state, shift):
-        """The rubber's tangent as it is (None), or without the cells' modes of negative stiffness and stiffened by a shift."""
+    def _rubber_tangent(self, state, shift, positive):
+        """The rubber's tangent as it is (None), or without the cells' modes of negative stiffness and stiffened by a shift.
+
+        positive: what the cells leave without these modes
+        """
         if shift is None:
             return self.slab.rubber_tangent(state.slab, self.cells.outer, workers=self.workers)
-        rubber = self.slab.rubber_tangent(state.slab, self.cells.positive_outer(), workers=self.workers)
+        rubber = self.slab.rubber_tangent(state.slab, positive, workers=self.workers)
         self.slab.add_to_diagonal(rubber, shift)
         return rubber
 

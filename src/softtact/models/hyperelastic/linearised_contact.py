@@ -59,5 +59,5 @@ class StepContact:
             return False
         displacement = self._state.displacement.copy()
         displacement.ravel()[self._slab.unknowns] += step
-        self._face(self._slab.project(displacement, self._surface))
+        self._face(self._slab.project(displacement, self._surface, self._indentation + indentation_increment))
         return True

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from softtact.contact.walls import OVERRUN_MM
 from softtact.errors import ConvergenceError
 from softtact.models.hyperelastic.body import BodyState, LayeredBody
 from softtact.models.hyperelastic.rigid_contact import Surface
@@ -15,6 +16,8 @@ _MOST_INCREMENTS = 100  # of the first touch's depth, until a point of the cover
 # Pressing apart is in vain where so many passes that moved anything have not brought the overlap below this share of the least
 # before. Passes that move nothing add up: the force of a single point at an edge is below the tolerance.
 _WORTH_A_PASS, _PASSES_IN_VAIN = 0.8, 3
+# An overlap of so many times what is allowed is left where a pass takes more iterations than so many: the contact is at an edge.
+_NEARLY, _COSTLY = 3.0, 6
 
 
 @dataclass(frozen=True)
@@ -88,14 +91,15 @@ def _indented_until_contact(body, state, step_mm):
 
 def augment(body: LayeredBody, surface: Surface, found: Solution, force: float | None, settings: NewtonSettings) -> Solution:
     """The load step once more with its overlaps augmented, as long as they are deeper than allowed and become less."""
-    iterations, spent, least, in_vain = 0, 0, np.inf, 0
+    iterations, spent, least, in_vain = 0, found.iterations, np.inf, 0
     for _ in range(settings.max_augmentations):
         overlap = body.contact_error(found.state) if found.state is not None else 0.0
-        in_vain = in_vain + (spent > 0) if overlap > _WORTH_A_PASS * least else 0
+        in_vain = in_vain + (iterations > 0) if overlap > _WORTH_A_PASS * least else 0
         least = min(least, overlap)
         depth = body.descent(found.state) if found.state is not None else 0.0
         allowed = settings.largest_penetration_mm * min(1.0, depth / settings.full_depth_mm)
-        if overlap <= allowed or in_vain == _PASSES_IN_VAIN:
+        nearly = overlap <= _NEARLY * allowed and spent > _COSTLY
+        if overlap <= allowed or nearly or in_vain == _PASSES_IN_VAIN:
             break
         start = body.augmented(found.state, allowed_mm=allowed)
         if force is not None:
@@ -150,9 +154,16 @@ class _Press:
 
     def prepared(self, state, iteration):
         self.projected = self.projecting and iteration < self.settings.projection_iterations
-        if not self.projected:
-            return state
-        return self.body.update_normals(state, self.body.slab.project(state.slab.displacement, self.surface))
+        anew = self.body.slab.project(state.slab.displacement, self.surface, state.indentation)
+        if self.projected:
+            return self.body.update_normals(state, anew)
+        return self._turned_back(state, anew)
+
+    def _turned_back(self, state, anew):
+        """The state with the points that have run far under an edge, while they kept the planes beside it, facing it."""
+        gaps = self.body.slab.top.gaps(state.slab.displacement, anew, state.indentation)
+        far = anew.overrun & (np.abs(gaps - state.slab.gaps) > OVERRUN_MM)
+        return self.body.update_normals(state, state.slab.projection.taking(anew, far)) if far.any() else state
 
     def residual(self, state):
         return self.body.residual_norm(state, self.force)

@@ -13,6 +13,7 @@ from softtact.contact.friction import Coulomb, FrictionResponse, FrictionState
 from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.contact.history import ContactHistory
 from softtact.contact.penalty import Contact
+from softtact.contact.walls import OVERRUN_MM, face_walls
 from softtact.fem.elements import QUAD8
 from softtact.fem.graded_mesh import CoverMesh
 from softtact.fem.quadrature import gauss
@@ -31,6 +32,7 @@ class ContactProjection:
 
     covered (p,): share of a point's own area that the object covers;  beside (p,): points that lie beside the object themselves
     contact_compliance (p,): mm/MPa of a spring between point and plane, where an edge covers it in part (`contact/face_edges`)
+    overrun (p,): points that lay far under an edge where the planes were found
     offset_mm (2,): way of the object along x and y from its place at first touch, at which the anchors are
     A point keeps its plane during a step of Newton's method, so that each step lowers one potential.
     """
@@ -41,6 +43,14 @@ class ContactProjection:
     beside: np.ndarray
     contact_compliance: np.ndarray
     offset_mm: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    overrun: np.ndarray | None = None
+
+    def taking(self, other: "ContactProjection", points: np.ndarray) -> "ContactProjection":
+        """These planes, and those of another projection for some of the points (p,)."""
+        kept = {name: getattr(self, name).copy() for name in ("anchors", "normals", "covered", "beside", "contact_compliance")}
+        for name, values in kept.items():
+            values[points] = getattr(other, name)[points]
+        return replace(self, **kept)
 
     def moved(self, way_mm: np.ndarray) -> "ContactProjection":
         """The same planes after the object has moved by a way (2,) along x and y."""
@@ -86,8 +96,11 @@ class TopContact:
         """A nodal field (n, 3) at the points (p, 3)."""
         return np.matmul(self.values, field[self.faces]).reshape(-1, 3)
 
-    def project(self, displacement: np.ndarray, surface: Surface) -> ContactProjection:
-        """The object's facets above the points (see `ContactProjection`); a `MovedSurface` tells how far aside the object is."""
+    def project(self, displacement: np.ndarray, surface: Surface, indentation: float | None = None) -> ContactProjection:
+        """The object's facets above the points (see `ContactProjection`); a `MovedSurface` tells how far aside the object is.
+
+        indentation: of the object in mm, if points that have run far under an edge are to face the wall beside them
+        """
         position = self.reference + self.at_points(displacement)
         height, normals = surface(position[:, 0], position[:, 1])
         anchors = np.column_stack([position[:, :2], height])
@@ -98,9 +111,14 @@ class TopContact:
         anchors[beside] = np.column_stack([foot, base])[beside]
         normals[beside] = foot_normals[beside]
         share[anchors[:, 2] >= NO_CONTACT_MM] = 0.0
+        overrun = np.zeros(len(share), dtype=bool)
+        if indentation is not None:
+            overlap = -normals[:, 2] * (position[:, 2] + indentation - height)
+            overrun = ~beside & (overlap > OVERRUN_MM)
+            face_walls(anchors, normals, np.flatnonzero(overrun), position + [0.0, 0.0, indentation], overlap, surface)
         return ContactProjection(anchors=anchors, normals=normals, covered=share, beside=beside,
                                  contact_compliance=contact_compliance(share, self._give),
-                                 offset_mm=np.asarray(getattr(surface, "offset_mm", (0.0, 0.0))))
+                                 offset_mm=np.asarray(getattr(surface, "offset_mm", (0.0, 0.0))), overrun=overrun)
 
     def fresh_history(self) -> ContactHistory:
         """The contact's history before the first touch."""

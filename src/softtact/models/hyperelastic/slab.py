@@ -192,9 +192,9 @@ class Slab:
         dofs = (3 * np.asarray(nodes)[:, None] + np.arange(3)).ravel()
         self.free = np.setdiff1d(self.free, dofs)
 
-    def project(self, displacement: np.ndarray, surface: Surface) -> ContactProjection:
+    def project(self, displacement: np.ndarray, surface: Surface, indentation: float | None = None) -> ContactProjection:
         """The object's facets above the top's points (see `ContactProjection`)."""
-        return self.top.project(displacement, surface)
+        return self.top.project(displacement, surface, indentation)
 
     def evaluate(self, displacement: np.ndarray, projection: ContactProjection, indentation: float,
                  history: ContactHistory | None = None, *, workers: Workers = SERIAL) -> SlabState | None:

@@ -154,7 +154,7 @@ class NoCells:
     count, outer_dofs, outer = 0, [], []
     roots, eliminated = np.zeros((0, 1), dtype=np.int64), np.zeros(0, dtype=np.int64)
 
-    def positive_outer(self) -> list[np.ndarray]:
+    def positive_outer(self, *, workers: Workers = SERIAL) -> list[np.ndarray]:
         return []
 
     def refresh(self, state: "BodyState", *, kept_mm: float = 0.0, workers: Workers = SERIAL) -> int:

@@ -51,9 +51,9 @@ class SheetCells:
         """Condensed matrices, kind by kind (c, k, k)."""
         return [kind.elimination.matrices for kind in self.kinds]
 
-    def positive_outer(self) -> list[np.ndarray]:
+    def positive_outer(self, *, workers: Workers = SERIAL) -> list[np.ndarray]:
         """The condensed matrices without their modes of negative stiffness."""
-        return [kind.elimination.positive_matrices() for kind in self.kinds]
+        return [kind.elimination.positive_matrices(workers=workers) for kind in self.kinds]
 
     def refresh(self, state: "BodyState", *, kept_mm: float = 0.0, workers: Workers = SERIAL) -> int:
         """Recompute the condensed tangents of the cells that moved by more than `kept_mm` or changed contact since their last one.
