@@ -134,7 +134,6 @@ def test_a_round_bar_across_the_whole_sensor_gives_way_as_in_calculix(edge, solv
                                    mesh=MeshSettings(cover_heights=(0.0, 0.45, 0.8, 1.0), cover_splits=(0, 1, 2))))
     load_steps = press(body, BAR, forces)
     tables = solve(deck_model(body, BAR, forces_n=forces))
-    print(tables.indentation, [load_step.state.indentation for load_step in load_steps], interface_error(body, load_steps, tables.of("INTERFACE")[1:]))
     assert tables.indentation[1:] == pytest.approx([load_step.state.indentation for load_step in load_steps], rel=0.02)
     largest, rms = interface_error(body, load_steps, tables.of("INTERFACE")[1:]).T
     assert largest.max() < 0.07 and rms.max() < 0.02

@@ -26,14 +26,19 @@ def blocks_of(slab, kept):
 class WholeSlab:
     """The same slab without symmetry: of one twice as large the quarter is the whole. Held at four sides, and the base or not."""
 
-    def __init__(self, footprint_mm, layers, cells, *, base_held):
-        slab = QuarterSlab([2 * side for side in footprint_mm], layers, [2 * count for count in cells], base_held=base_held)
+    def __init__(self, footprint_mm, layers, cells, *, base_held, held_below_mm=0.0):
+        slab = QuarterSlab([2 * side for side in footprint_mm], layers, [2 * count for count in cells], base_held=base_held,
+                           held_below_mm=held_below_mm)
         free = np.ones((*slab.numbers.shape, 3), dtype=bool)
-        free[:, [0, -1]] = free[:, :, [0, -1]] = False
+        below = slab.points[:, 2].reshape(slab.numbers.shape) <= 1e-9 - held_below_mm
+        sides = np.zeros(slab.numbers.shape, dtype=bool)
+        sides[:, [0, -1]] = sides[:, :, [0, -1]] = True
+        free[below & sides] = False
         if base_held:
             free[0] = False
         self.free, self.stiffness, self.unknowns = np.flatnonzero(free), slab.stiffness, slab.unknowns
-        self.top = slab.numbers[-1, 1:-1, 1:-1].ravel()      # in the order of `surface_grid`'s nodes
+        inner = slice(1, -1) if held_below_mm == 0 else slice(None)
+        self.top = slab.numbers[-1, inner, inner].ravel()      # in the order of `surface_grid`'s nodes
 
     def displacement(self, force):
         """Displacement (unknowns,) under forces (unknowns,) at the nodes."""
@@ -45,10 +50,11 @@ class WholeSlab:
 # --- symmetry ---
 
 
-@pytest.mark.parametrize("base_held", [True, False])
-def test_the_parities_give_the_displacements_of_the_whole_slab(base_held):
-    slab = QuarterSlab(FOOTPRINT, [SOFT, STIFF], CELLS, base_held=base_held)
-    whole, grid = WholeSlab(FOOTPRINT, [SOFT, STIFF], CELLS, base_held=base_held), surface_grid(slab)
+@pytest.mark.parametrize(("base_held", "held_below_mm"), [(True, 0.0), (False, 0.0), (False, 1.5), (True, 0.7), (True, np.inf)])
+def test_the_parities_give_the_displacements_of_the_whole_slab(base_held, held_below_mm):
+    how = {"base_held": base_held, "held_below_mm": held_below_mm}
+    slab = QuarterSlab(FOOTPRINT, [SOFT, STIFF], CELLS, **how)
+    whole, grid = WholeSlab(FOOTPRINT, [SOFT, STIFF], CELLS, **how), surface_grid(slab)
     compliance, nodes = blocks_of(slab, dofs(slab.top, 2)), np.arange(grid.count)
     middle = grid.count // 2                                 # where both lines of symmetry cross
     for loaded in (middle, middle + 2, middle - 2 * grid.shape[1], 0, grid.shape[1] + 3, grid.count - 2):
@@ -118,9 +124,18 @@ def test_an_even_strain_leaves_the_inner_nodes_of_one_material_in_balance():
 def test_the_layers_lie_at_their_heights_below_the_top():
     slab = QuarterSlab(FOOTPRINT, [SOFT, STIFF], CELLS, base_held=True)
     np.testing.assert_allclose(np.unique(slab.points[:, 2].round(12)), [-2.5, -2.0, -1.5, -1.05, -0.6, -0.3, 0.0], atol=1e-12)
-    assert (slab.points[slab.plane(1).ravel(), 2] == -1.5).all()      # the border of the two materials
+    assert (slab.points[slab.below_top(slab.boundary_over(SOFT)).ravel(), 2] == -1.5).all()      # the border of the two materials
     assert (slab.points[slab.top.ravel(), 2] == 0.0).all()
     assert slab.points[:, :2].max(axis=0) == pytest.approx([3.0, 2.0])
+
+
+@pytest.mark.parametrize(("held_below_mm", "levels"), [
+    (1.4, [-2.5, -1.5, -1.4, -0.6, 0.0]), (0.5, [-2.5, -1.5, -0.5, 0.0]), (2.0, [-2.5, -2.0, -1.5, -0.6, 0.0])])
+def test_a_boundary_between_elements_lies_where_sides_begin_to_be_held(held_below_mm, levels):
+    """The nearest inner one, or a new one where none is near, or none may move."""
+    slab = QuarterSlab(FOOTPRINT, [SOFT, STIFF], CELLS, base_held=True, held_below_mm=held_below_mm)
+    np.testing.assert_allclose(slab.heights[::2], levels, atol=1e-12)
+    np.testing.assert_array_equal(slab.side_held, slab.heights <= -held_below_mm + 1e-9)
 
 
 def test_the_mean_forces_of_an_even_strain_are_hookes():

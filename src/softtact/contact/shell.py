@@ -13,7 +13,6 @@ from scipy.optimize import brentq
 
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
 from softtact.errors import ConvergenceError
-from softtact.sensors.base import BaseSpec
 
 _BESIDE_MM = 1e-3      # an object that ends at the pad's own side does not lie on the shell
 _EXACT = 1e-8          # of the largest force, to which that at rest is found
@@ -29,11 +28,6 @@ class Shell:
     """Depth of its top below the pad's free surface; infinite where there is no shell."""
     width_mm: float
     """How wide it is."""
-
-    @classmethod
-    def of(cls, spec: BaseSpec) -> "Shell":
-        """The shell that a sensor's `edge` states."""
-        return cls(spec.footprint_mm, spec.edge.held_below_mm, spec.edge.shell_width_mm)
 
     def stop_mm(self, surface: HeightField, offset_mm: Sequence[float] | np.ndarray = (0.0, 0.0)) -> float:
         """How far (mm) an object can come down from where its `surface` is; infinite where it does not reach over the shell.

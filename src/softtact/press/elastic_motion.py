@@ -7,10 +7,10 @@ from trimesh import Trimesh
 
 from softtact.contact.height_field import HeightField
 from softtact.contact.motion import Motion
-from softtact.contact.shell import Shell
 from softtact.models.elastic.motion_press import ElasticMotion, check_motion, move_on_layer
 from softtact.models.elastic.sliding import SlidingState
 from softtact.press.cache import cached_surface_compliance
+from softtact.press.making import shell_of
 from softtact.progress import Watch
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def press_motion(sensor: "Sensor", placed: Trimesh, motion: Motion, seconds: lis
     if "elastic_surface" not in sensor.prepared_models:
         sensor.prepared_models["elastic_surface"] = cached_surface_compliance(sensor.spec, threads=threads)
     compliance, spec = sensor.prepared_models["elastic_surface"], sensor.spec
-    shell, field, start = Shell.of(spec), HeightField(placed), time.perf_counter()
+    shell, field, start = shell_of(sensor), HeightField(placed), time.perf_counter()
     watch = Watch(label, limit_s=limit_s)
 
     def note(state: SlidingState) -> None:

@@ -10,13 +10,13 @@ from trimesh import Trimesh
 
 from softtact.contact.height_field import HeightField
 from softtact.contact.motion import Motion
-from softtact.contact.shell import Shell, pad_forces
+from softtact.contact.shell import pad_forces
 from softtact.contact.underside import Underside
 from softtact.errors import ConvergenceError, InputError
 from softtact.models.elastic.compliance import LayerPress, press_layer, rest_on_shell
 from softtact.models.foundation.solve import FoundationMaps, lifted, press_foundation
 from softtact.press.elastic_motion import press_motion
-from softtact.press.making import Course, make_result, timed
+from softtact.press.making import Course, make_result, shell_of, timed
 from softtact.press.result import PressResult
 from softtact.press.validity import valid_elastic, valid_foundation
 from softtact.progress import Watch
@@ -53,7 +53,7 @@ def first_touch_mm(sensor: "Sensor", surface: HeightField) -> float:
 
 def shell_stop_mm(sensor: "Sensor", surface: HeightField) -> float:
     """How far (mm) an object comes down from its pose until it rests on the sensor's shell; infinite where it never does."""
-    return Shell.of(sensor.spec).stop_mm(surface)
+    return shell_of(sensor).stop_mm(surface)
 
 
 def elastic_result(sensor: "Sensor", press: LayerPress, forces: np.ndarray, seconds: np.ndarray, *, touch_mm: float) -> PressResult:

@@ -9,12 +9,11 @@ from trimesh import Trimesh
 
 from softtact.contact.height_field import HeightField, SweptSurface
 from softtact.contact.motion import Motion
-from softtact.contact.shell import Shell
 from softtact.errors import ConvergenceError, ExtrapolationWarning
 from softtact.models.hyperelastic import path
 from softtact.models.hyperelastic.build_plain import lower_side
 from softtact.models.hyperelastic.deformed_mesh import pressed_body
-from softtact.press.making import Course, make_result, timed
+from softtact.press.making import Course, make_result, shell_of, timed
 from softtact.press.result import PressResult
 from softtact.press.validity import valid_hyperelastic
 from softtact.progress import Watch, announce
@@ -22,7 +21,6 @@ from softtact.progress import Watch, announce
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
 
-_BALANCED = 1e-3          # of a force: farther apart than any load step's tolerance leaves object and body
 _CORNER = 0.01            # share of a layer: strains at an edge of the object go beyond any data
 
 
@@ -31,7 +29,7 @@ def press_hyperelastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray | M
 
     A ConvergenceError, of which a time limit is one, and an interruption of the keyboard hold the load steps before.
     """
-    surface, shell = HeightField(placed), Shell.of(sensor.spec)
+    surface, shell = HeightField(placed), shell_of(sensor)
     lowest = surface.first_touch_mm(sensor.spec.map_x_mm, sensor.spec.map_y_mm)
     count = len(forces.steps) if isinstance(forces, Motion) else len(forces)
     if isinstance(forces, Motion):
@@ -110,12 +108,6 @@ def _warn_extrapolation(shares, forces):
                       ExtrapolationWarning, stacklevel=5)
 
 
-def _on_shell(load_step):
-    """Force (N) that something else than the body carries; none where the body's own is that of the load step by its tolerance."""
-    missing = load_step.force_n - load_step.state.force
-    return missing if missing > _BALANCED * load_step.force_n else 0.0
-
-
 def _read_load_step(body, maps, load_step, *, from_mm):
     """The numbers of a load step by their names in a result; fields over the map's points (y * x,).
 
@@ -125,7 +117,7 @@ def _read_load_step(body, maps, load_step, *, from_mm):
     sampling, lower, grid = maps
     slab, support, top = load_step.state.slab, load_step.state.support, body.slab.top
     force, torque = top.resultant(slab)
-    on_shell = _on_shell(load_step)
+    on_shell = load_step.elsewhere_n
     free_below = {} if lower is None else {"lower_maps": -(lower @ slab.displacement[:, 2])}
     return free_below | {"normal_force_n": load_step.force_n, "pad_force_n": load_step.force_n - on_shell,
             "force_n": force - [0.0, 0.0, on_shell], "torque_nmm": np.full(3, np.nan) if on_shell else torque,

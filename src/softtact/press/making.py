@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softtact.contact.shell import Shell
 from softtact.errors import ConvergenceError, ShellWarning
 from softtact.press.result import PressResult
 from softtact.progress import progress
@@ -33,6 +34,12 @@ class Course:
 
 
 _HARDLY = 1e-6     # of a force: a share of the shell that is not worth a warning
+
+
+def shell_of(sensor: "Sensor") -> Shell:
+    """The shell that a sensor's `edge` states."""
+    edge = sensor.spec.edge
+    return Shell(sensor.spec.footprint_mm, edge.held_below_mm, edge.shell_width_mm)
 
 
 def make_result(sensor: "Sensor", model: str, solver: str, maps: np.ndarray, forces: np.ndarray, times: np.ndarray,

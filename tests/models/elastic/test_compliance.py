@@ -14,6 +14,7 @@ from softtact.geometry.pose import Pose
 from softtact.models.elastic.compliance import Compliance, elastic_compliance, map_cells, press_layer
 from softtact.press.cache import cached_compliance
 from softtact.press.sensor import Sensor
+from softtact.sensors.edge import Edge
 
 SMALL = CORO.model_copy(update={"footprint_mm": (9.6, 9.6), "map_shape": (13, 13)})      # elements of 0.8 mm
 FORCES = np.array([0.5, 3.0])
@@ -65,11 +66,13 @@ def test_no_place_is_deeper_than_a_flat_punch(compliance):
     assert (press.maps.max(axis=(1, 2)) < (1 + 1e-5) * press.contact.depth).all()      # maps are in single precision
 
 
-def test_the_map_is_held_at_its_edges_and_has_the_sensors_shape(compliance):
-    maps = press_layer(compliance, points_of("tilted box", compliance), FORCES).maps
-    assert maps.shape == (2, *SMALL.map_shape)
-    for edge in (maps[:, 0], maps[:, -1], maps[:, :, 0], maps[:, :, -1]):
-        np.testing.assert_array_equal(edge, 0.0)
+def test_the_map_has_the_sensors_shape_and_rests_where_its_sides_are_held_up_to_the_surface(compliance):
+    held = elastic_compliance(SMALL.model_copy(update={"edge": Edge(held="sides")}))
+    for layer, still in ((compliance, False), (held, True)):
+        maps = press_layer(layer, points_of("tilted box", layer), FORCES).maps
+        assert maps.shape == (2, *SMALL.map_shape)
+        for edge in (maps[:, 0], maps[:, -1], maps[:, :, 0], maps[:, :, -1]):
+            assert (edge == 0.0).all() == still
 
 
 def test_turning_the_object_by_half_a_turn_turns_the_map(compliance):

@@ -14,11 +14,13 @@ class WholeLayer:
         double = spec.model_copy(update={"footprint_mm": tuple(2 * side for side in spec.footprint_mm)})
         slab = elastic_slab(double, cells=tuple(2 * count for count in map_cells(spec)))
         free = np.ones((*slab.numbers.shape, 3), dtype=bool)
-        free[0] = free[:, [0, -1]] = free[:, :, [0, -1]] = False
+        for held in (slab.numbers[slab.side_held][:, [0, -1]], slab.numbers[slab.side_held][:, :, [0, -1]], slab.numbers[0]):
+            free.reshape(-1, 3)[held.ravel()] = False
         free = np.flatnonzero(free)
         self.stiffness = slab.stiffness[free][:, free]
-        self.top = np.searchsorted(free, 3 * slab.numbers[-1, 1:-1, 1:-1].ravel() + 2)      # in the order of the model's grid
-        self.shape = tuple(count - 2 for count in slab.numbers[-1].shape)
+        top = slab.numbers[-1, 1:-1, 1:-1] if slab.side_held[-1] else slab.numbers[-1]
+        self.top, self.shape = np.searchsorted(free, 3 * top.ravel() + 2), top.shape      # in the order of the model's grid
+        self.sides_held = slab.side_held[-1]
 
     def press(self, points, force, *, stiffness=1e5, iterations=40):
         """Depth in mm, and descent (n,) of the top's nodes, under `ObjectPoints`; stiffness: N/mm of each point's penalty.
@@ -45,5 +47,6 @@ class WholeLayer:
         raise ArithmeticError(f"no contact after {iterations} iterations")
 
     def map_of(self, descent):
-        """Map (ny, nx) of a descent, with the held edges."""
-        return np.pad(descent.reshape(self.shape)[1::2, 1::2], 1)
+        """Map (ny, nx) of a descent, with sides that are held."""
+        first = int(self.sides_held)
+        return np.pad(descent.reshape(self.shape)[first::2, first::2], first)

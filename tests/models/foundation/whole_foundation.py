@@ -22,10 +22,14 @@ class WholeFoundation:
         self.descents = sp.kron(sp.eye(count), frustum.descent[None], format="csr") @ roots
         self.lateral = sp.vstack([sp.kron(sp.eye(count), row[None], format="csr") @ roots for row in frustum.lateral]).tocsr()
         free = np.ones((*self.slab.numbers.shape, 3), dtype=bool)
-        free[:, [0, -1]] = free[:, :, [0, -1]] = False
+        for held in (self.slab.numbers[self.slab.side_held][:, [0, -1]], self.slab.numbers[self.slab.side_held][:, :, [0, -1]]):
+            free.reshape(-1, 3)[held.ravel()] = False
         self.free, self.held = np.flatnonzero(free), np.flatnonzero(~free)
-        self.top = self.slab.numbers[-1, 1:-1, 1:-1].ravel()                   # in the order of the model's grid
-        self.electrode = self.slab.plane(1)[2::2, 2::2]                        # the sheet's top at the map's inner points
+        first = int(self.slab.side_held[-1])
+        last = -first or None
+        self.top = self.slab.numbers[-1, first:last, first:last].ravel()       # in the order of the model's grid
+        self.top_at_map = self.slab.numbers[-1, 2 * first:-2 * first or None:2, 2 * first:-2 * first or None:2]
+        self.electrode = self.slab.numbers[2, 2:-2:2, 2:-2:2]                  # the sheet's top at the map's inner points
 
     def centres(self):
         """Axes (b, 2) of the frusta, x fastest."""

@@ -134,14 +134,17 @@ def test_a_lowest_layer_with_hanging_nodes_is_refused():
 class Overlapping:
     """A body whose overlaps follow a list, one for each pass; `spent` iterations are made in each."""
 
-    def __init__(self, overlaps, spent):
-        self.overlaps, self.spent, self.passes = overlaps, spent, 0
+    def __init__(self, overlaps, spent, *, edged=False):
+        self.overlaps, self.spent, self.passes, self.edged = overlaps, spent, 0, edged
 
     def descent(self, state):
         return 1.0
 
     def contact_error(self, state):
         return self.overlaps[self.passes]
+
+    def at_edge(self, state):
+        return self.edged
 
     def augmented(self, state, *, allowed_mm):
         self.passes += 1
@@ -162,3 +165,10 @@ def test_overlaps_are_augmented_as_long_as_it_helps(monkeypatch, overlaps, spent
                         lambda body, *_: Solution("state", body.spent[body.passes - 1], 0.0))
     found = augment(body, None, Solution("state", 0, 0.0), 1.0, NewtonSettings())
     assert (found.state, body.passes, found.iterations) == ("state", passes, sum(spent[:passes]))
+
+
+def test_three_times_the_overlap_is_left_where_points_have_run_under_an_edge(monkeypatch):
+    body = Overlapping([5e-3, 2.9e-3, 0.5e-3], [1, 1], edged=True)
+    monkeypatch.setattr("softtact.models.hyperelastic.newton.settle", lambda body, *_: Solution("state", 1, 0.0))
+    augment(body, None, Solution("state", 0, 0.0), 1.0, NewtonSettings())
+    assert body.passes == 1

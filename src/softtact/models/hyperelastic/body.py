@@ -238,6 +238,10 @@ class LayeredBody:
         """Deepest overlap, or widest gap under pressure, in mm."""
         return max(self.slab.top.error(state.slab), self.support.contact_error(state.support))
 
+    def at_edge(self, state: BodyState) -> bool:
+        """Whether points of the cover have run far under an edge of the object."""
+        return bool(state.slab.projection.overrun.any())
+
     def augmented(self, state: BodyState, *, allowed_mm: float) -> BodyState:
         """The state with the points that overlap held where their surfaces just touch, wherever an overlap is more than allowed."""
         top, support = state.slab.history, state.support.history

@@ -16,8 +16,7 @@ _MOST_INCREMENTS = 100  # of the first touch's depth, until a point of the cover
 # Pressing apart is in vain where so many passes that moved anything have not brought the overlap below this share of the least
 # before. Passes that move nothing add up: the force of a single point at an edge is below the tolerance.
 _WORTH_A_PASS, _PASSES_IN_VAIN = 0.8, 3
-# An overlap of so many times what is allowed is left where a pass takes more iterations than so many: the contact is at an edge.
-_NEARLY, _COSTLY = 3.0, 6
+_NEARLY = 3.0      # times what is allowed may be left where points have run under an edge: to press these apart takes tens of steps
 
 
 @dataclass(frozen=True)
@@ -91,14 +90,14 @@ def _indented_until_contact(body, state, step_mm):
 
 def augment(body: LayeredBody, surface: Surface, found: Solution, force: float | None, settings: NewtonSettings) -> Solution:
     """The load step once more with its overlaps augmented, as long as they are deeper than allowed and become less."""
-    iterations, spent, least, in_vain = 0, found.iterations, np.inf, 0
+    iterations, spent, least, in_vain = 0, 0, np.inf, 0
     for _ in range(settings.max_augmentations):
         overlap = body.contact_error(found.state) if found.state is not None else 0.0
-        in_vain = in_vain + (iterations > 0) if overlap > _WORTH_A_PASS * least else 0
+        in_vain = in_vain + (spent > 0) if overlap > _WORTH_A_PASS * least else 0
         least = min(least, overlap)
         depth = body.descent(found.state) if found.state is not None else 0.0
         allowed = settings.largest_penetration_mm * min(1.0, depth / settings.full_depth_mm)
-        nearly = overlap <= _NEARLY * allowed and spent > _COSTLY
+        nearly = found.state is not None and overlap <= _NEARLY * allowed and body.at_edge(found.state)
         if overlap <= allowed or nearly or in_vain == _PASSES_IN_VAIN:
             break
         start = body.augmented(found.state, allowed_mm=allowed)

@@ -37,6 +37,8 @@ class LoadStep:
     """Largest unbalanced nodal force."""
     penetration_mm: float
     """Deepest overlap left."""
+    elsewhere_n: float = 0.0
+    """What of the force something else than the body carries."""
 
 
 @dataclass(frozen=True)
@@ -142,14 +144,19 @@ def press_load_steps(body: LayeredBody, surface: Surface, forces_n: Iterable[flo
     body.begin()
     if stop_mm <= touch_mm:
         rest = LoadStep(0.0, _untouched(body, surface, stop_mm), iterations=0, residual_n=0.0, penetration_mm=0.0)
-        yield from (replace(rest, force_n=float(force)) for force in forces_n)
+        yield from (_stopped_at(rest, float(force)) for force in forces_n)
         return
     state, reached, stopped = first_touch(body, surface, settings), 0.0, None
     for force in map(float, forces_n):
         if stopped is None:
             load_step, stopped = _up_to(body, surface, state, reached, force, stop_mm, settings)
             state, reached = load_step.state, load_step.force_n
-        yield replace(stopped or load_step, force_n=force)
+        yield load_step if stopped is None else _stopped_at(stopped, force)
+
+
+def _stopped_at(load_step, force):
+    """The load step of a force of which the body carries no more than it does there."""
+    return replace(load_step, force_n=force, elsewhere_n=force - load_step.state.force)
 
 
 def _up_to(body, surface, state, reached, force, stop_mm, settings):

@@ -43,14 +43,14 @@ class ContactProjection:
     beside: np.ndarray
     contact_compliance: np.ndarray
     offset_mm: np.ndarray = field(default_factory=lambda: np.zeros(2))
-    overrun: np.ndarray | None = None
+    overrun: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     def taking(self, other: "ContactProjection", points: np.ndarray) -> "ContactProjection":
         """These planes, and those of another projection for some of the points (p,)."""
         kept = {name: getattr(self, name).copy() for name in ("anchors", "normals", "covered", "beside", "contact_compliance")}
         for name, values in kept.items():
             values[points] = getattr(other, name)[points]
-        return replace(self, **kept)
+        return replace(self, **kept, overrun=self.overrun | points)
 
     def moved(self, way_mm: np.ndarray) -> "ContactProjection":
         """The same planes after the object has moved by a way (2,) along x and y."""
