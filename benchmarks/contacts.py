@@ -154,7 +154,10 @@ def press_one(job):
 def press(arguments):
     """Press the contacts of some sets over processes."""
     arguments.out.mkdir(parents=True, exist_ok=True)
-    jobs = [(contact, arguments.out, arguments.limit, arguments.mesh_quality) for which in arguments.set for contact in contacts(which)]
+    jobs = [(contact, arguments.out, arguments.limit, arguments.mesh_quality)
+            for which in arguments.set for contact in contacts(which)]
+    first = softtact.load_sensor("coro")     # compiles, once for all processes
+    first.press(trimesh.creation.icosphere(subdivisions=3, radius=4.0), force_n=1.0, model="hyperelastic", threads=1, label="")
     with multiprocessing.get_context("fork").Pool(arguments.workers) as pool:
         for name, said in pool.imap_unordered(press_one, jobs, chunksize=1):
             print(name, said, flush=True)

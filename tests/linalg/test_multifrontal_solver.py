@@ -164,6 +164,6 @@ def test_a_press_ends_where_it_does_with_a_general_solver_in_double_precision():
         assert (body.method == DissectedSolver.name) is not general
         body.close()
     for one, other in zip(*ends, strict=True):
-        # Forces of 1e-7 N are left, on modes of 0.02 N/mm and more, at the free rim.
+        # Forces of 1e-7 N are left, on modes of 0.03 N/mm and more.
         assert one.indentation == pytest.approx(other.indentation, abs=1e-6)
-        np.testing.assert_allclose(one.slab.displacement, other.slab.displacement, atol=5e-6)
+        np.testing.assert_allclose(one.slab.displacement, other.slab.displacement, atol=3e-6)

@@ -157,9 +157,9 @@ def test_a_sinking_ball_finds_nodes_of_its_own_and_ends_where_a_general_solver_d
         body.close()
     assert len(frames[-1].first) > len(frames[0].first) > 0
     for one, other in zip(*ends, strict=True):
-        # Forces of 1e-8 of 2 N are left, on modes of 0.02 N/mm and more, at the free rim.
+        # Forces of 1e-8 of 2 N are left, on modes of 0.03 N/mm and more.
         assert one.indentation == pytest.approx(other.indentation, abs=1e-6)
-        np.testing.assert_allclose(one.slab.displacement, other.slab.displacement, atol=5e-6)
+        np.testing.assert_allclose(one.slab.displacement, other.slab.displacement, atol=3e-6)
 
 
 def test_nodes_that_are_enough_stay_and_are_turned_to_the_normals_of_now():
