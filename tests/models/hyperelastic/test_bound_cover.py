@@ -1,5 +1,7 @@
 """A cover whose lowest layer keeps to the sheet's plan: balance across the interface, the map's plane, parts, mesh settings."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import trimesh
@@ -133,6 +135,8 @@ def test_a_lowest_layer_with_hanging_nodes_is_refused():
 
 class Overlapping:
     """A body whose overlaps follow a list, one for each pass; `spent` iterations are made in each."""
+
+    friction = SimpleNamespace(active=False)
 
     def __init__(self, overlaps, spent, *, edged=False):
         self.overlaps, self.spent, self.passes, self.edged = overlaps, spent, 0, edged

@@ -77,11 +77,12 @@ class Step:
 def _shifts(last):
     """What is tried, one after the other, until a tangent is positive definite, so that every step lowers the energy.
 
-    last: what was enough for the tangent before
+    last: what was enough for the tangent before; where that was much, less of it is tried at once
     """
-    yield None
-    yield 0.0
     first = max(_FIRST_SHIFT, _LESS * last)
+    if first == _FIRST_SHIFT:
+        yield None
+        yield 0.0
     for doubling in range(_MOST_DOUBLINGS):
         yield first * 2**doubling
 

@@ -28,7 +28,8 @@ class NewtonSettings:
     often
     full_depth_mm: where the cover has come down by less, so much less may overlap: a micrometre is 4 % of a light press
     largest_step_mm: largest movement of a node in one iteration;  smallest_increment_n: force steps are halved down to this
-    load_step_iterations: a load step ends where it took so many in all its steps: one that crawls would go on for hours
+    load_step_iterations: a load step ends where it took so many in all its increments, friction_iterations: with friction, and
+    augmentations where they took so many: one that crawls would go on for hours
     first_touch_mm, first_touch_tolerance_n: overlap at which the press begins, and the residual that is good enough there
     largest_way_mm: way of an object at once where a `Motion` moves it down or aside
     projection_iterations: iterations that look anew which facet each point faces
@@ -43,7 +44,7 @@ class NewtonSettings:
     full_depth_mm: float = 0.2
     max_augmentations: int = 20
     max_iterations: int = 40
-    load_step_iterations: int = 300
+    load_step_iterations: int = 40
     largest_step_mm: float = 0.12
     smallest_increment_n: float = 0.02
     smallest_scale_n: float = 10.0
@@ -54,6 +55,7 @@ class NewtonSettings:
     kept_tangent_mm: float = 0.016     # as many iterations as with 4 um, since frusta far from balance take steps of their own
     friction_tolerance: float = 0.3    # sliding is soft: with 1 the indentation is 0.4 % off at 1 N on 20 frusta, with this 0.01 %
     friction_growth: float = 2.0       # a single step to 4 N is 1.8 % off, two are less than 0.1 %
+    friction_iterations: int = 300
     friction_passes: int = 30
     whole_passes: int = 3
 
@@ -98,7 +100,7 @@ def augment(body: LayeredBody, surface: Surface, found: Solution, force: float |
         depth = body.descent(found.state) if found.state is not None else 0.0
         allowed = settings.largest_penetration_mm * min(1.0, depth / settings.full_depth_mm)
         nearly = found.state is not None and overlap <= _NEARLY * allowed and body.at_edge(found.state)
-        if overlap <= allowed or nearly or in_vain == _PASSES_IN_VAIN:
+        if overlap <= allowed or nearly or in_vain == _PASSES_IN_VAIN or iterations >= most_iterations(body, settings):
             break
         start = body.augmented(found.state, allowed_mm=allowed)
         if force is not None:
@@ -107,6 +109,11 @@ def augment(body: LayeredBody, surface: Surface, found: Solution, force: float |
         spent = found.iterations
         iterations += spent
     return replace(found, iterations=iterations)
+
+
+def most_iterations(body: LayeredBody, settings: NewtonSettings) -> int:
+    """How many iterations a load step may take."""
+    return settings.friction_iterations if body.friction.active else settings.load_step_iterations
 
 
 def tolerance_at(force: float | None, settings: NewtonSettings) -> float:

@@ -14,7 +14,7 @@ from softtact.contact.height_field import MovedSurface
 from softtact.contact.motion import Motion, MotionStep
 from softtact.errors import ConvergenceError, InputError, TimeLimitError
 from softtact.models.hyperelastic.body import BodyState, LayeredBody
-from softtact.models.hyperelastic.newton import NewtonSettings, augment, first_touch, settle, tolerance_at
+from softtact.models.hyperelastic.newton import NewtonSettings, augment, first_touch, most_iterations, settle, tolerance_at
 from softtact.models.hyperelastic.rigid_contact import Surface
 
 _DEEP = 0.55           # of a frustum's height, or of the layers': from here on elements of the default mesh may be unstable
@@ -260,7 +260,7 @@ def _advance(body, surface, state, reached, stage, settings):
             return LoadStep(force_n=stage.control(at).force, state=found.state, iterations=iterations,
                             residual_n=found.residual_n, penetration_mm=body.penetration(found.state))
         increment = 2 * increment if found.state is not None else 0.5 * (at - reached)
-        if found.state is None and (increment < stage.smallest or iterations >= settings.load_step_iterations):
+        if found.state is None and (increment < stage.smallest or iterations >= most_iterations(body, settings)):
             raise ConvergenceError(_failure(body, state, stage, reached, at, found.residual_n, iterations))
         if found.state is not None:
             reached, state = at, found.state
