@@ -114,7 +114,8 @@ def contacts(which):
             tilt, reach = rng.uniform(-4, 4, 2), 0.9
         at, turn = rng.uniform(-reach, reach, 2) * half, rng.uniform(0, 180)
         pose = tuple(round(float(value), 3) for value in (*at, 0.0, *tilt, turn))
-        out.append(Contact(f"{which}_{number:03d}_{kind}", sensor, kind, sizes, pose, tuple(FORCES[which])))
+        forces = tuple(force for force in FORCES[which] if force <= spec.force_range_n[1])
+        out.append(Contact(f"{which}_{number:03d}_{kind}", sensor, kind, sizes, pose, forces))
     return out
 
 

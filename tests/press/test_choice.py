@@ -17,25 +17,27 @@ def maps(*amplitudes):
 
 
 def press(amplitudes, compression):
-    return SimpleNamespace(deformation_map_mm=maps(*amplitudes), frustum_compression_mm=np.array(compression))
+    return SimpleNamespace(deformation_map_mm=maps(*amplitudes), frustum_compression_mm=np.array(compression),
+                           indentation_mm=np.array(amplitudes))
 
 
 def test_calibration_finds_the_constants_that_errors_were_made_with():
-    true = FoundationError(at_rest=0.02, growth=0.1)
-    amplitudes, compression = np.linspace(0.05, 0.3, 12), np.linspace(0.02, 0.2, 12)
-    found = calibrate(maps(*amplitudes), compression, true(maps(*amplitudes), compression, 0.5), height_mm=0.5)
-    assert found.at_rest == pytest.approx(0.02, rel=1e-9) and found.growth == pytest.approx(0.1, rel=1e-9)
+    true = FoundationError(at_rest=0.02, growth=0.1, deep=0.3)
+    compression, depth = np.linspace(0.04, 0.4, 12), np.tile([0.1, 0.2, 0.4], 4)
+    relative = true(maps(*np.ones(12)), compression, depth) / rms(maps(1.0))
+    found = calibrate(relative, compression, depth)
+    assert (found.at_rest, found.growth, found.deep) == pytest.approx((0.02, 0.1, 0.3), rel=1e-9)
 
 
 def test_constants_never_promise_less_than_no_error():
-    amplitudes, compression = np.linspace(0.05, 0.3, 12), np.linspace(0.02, 0.2, 12)
-    falling = rms(maps(*amplitudes)) * (0.05 - 0.1 * compression / 0.5)
-    found = calibrate(maps(*amplitudes), compression, falling, height_mm=0.5)
+    compression = np.linspace(0.04, 0.4, 12)
+    found = calibrate(0.05 - 0.1 * compression, compression)
     assert found.growth == 0.0 and found.at_rest > 0
 
 
 def test_the_elastic_models_error_is_what_the_cheap_models_disagree_by():
-    errors = expected_errors(press([0.3], [0.1]), press([0.2], [0.1]), height_mm=0.5, model=FoundationError(0.0, 0.0))
+    errors = expected_errors(press([0.3], [0.1]), press([0.2], [0.1]), height_mm=0.5, thickness_mm=2.5,
+                             model=FoundationError(0.0, 0.0))
     assert errors["foundation"] == pytest.approx([0.0])
     assert errors["elastic"] == pytest.approx(rms(maps(0.1)))
 
@@ -47,7 +49,7 @@ def test_the_cheapest_model_within_the_tolerance_is_taken(tolerance, model):
 
 
 def test_beyond_the_presses_it_is_known_of_no_error_is_promised():
-    errors = expected_errors(press([0.3], [0.3]), press([0.3], [0.3]), height_mm=0.5)
+    errors = expected_errors(press([0.3], [0.3]), press([0.3], [0.3]), height_mm=0.5, thickness_mm=2.5)
     assert np.isinf(errors["foundation"]).all() and cheapest(errors, 10.0) == "hyperelastic"
 
 

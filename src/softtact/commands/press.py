@@ -41,10 +41,10 @@ def add(commands: argparse._SubParsersAction) -> None:
                      help='steps between semicolons: ways in mm ("z -1.0" is down), "fz -20" a force in N, "x 1.0 in 10" ten steps')
     command.add_argument("--model", choices=MODELS, default="auto",
                          help="a model by its name; auto (default) lets the policy choose")
-    command.add_argument("--policy", choices=("paper", "error"), default="paper",
-                         help="how auto chooses: by the mesh's complexity as in the paper (default), or by the error to expect")
+    command.add_argument("--policy", choices=("error", "paper"), default="error",
+                         help="how auto chooses: by the error to expect (default), or by the mesh's complexity as in the paper")
     command.add_argument("--tolerance", type=float, default=0.01, metavar="MM",
-                         help="for --policy error: root mean square error over the map, in mm (default: 0.01)")
+                         help="for the policy error: root mean square error over the map, in mm (default: 0.01)")
     command.add_argument("--mesh-quality", choices=("default", "draft", "stable", "fine"), default="default",
                          help="mesh of the hyperelastic model: default (error 1 to 2 %% of the map's maximum), draft (2 to 5 %%, "
                               "half of the time), fine (1 %%, twice the time) or stable (for frusta pressed deeper than "

@@ -35,7 +35,7 @@ def _calibrated(presses, height_mm):
     maps = np.concatenate([press["foundation"].deformation_map_mm.values for press in presses])
     compression = np.concatenate([press["foundation"].frustum_compression_mm.values for press in presses])
     errors = np.concatenate([_errors(press)["foundation"] for press in presses])
-    return calibrate(maps, compression, errors, height_mm=height_mm)
+    return calibrate(errors / rms(maps), compression / height_mm)
 
 
 def _errors(press):
@@ -46,7 +46,8 @@ def _errors(press):
 
 def _row(press, paper_choice, calibrated, height_mm):
     errors = _errors(press)
-    told = expected_errors(press["elastic"], press["foundation"], height_mm=height_mm, model=calibrated)
+    told = expected_errors(press["elastic"], press["foundation"], height_mm=height_mm,
+                           thickness_mm=press["foundation"].attrs["thickness_mm"], model=calibrated)
     name = press["elastic"].attrs["item"]
     row = {"set": press["elastic"].attrs["set"], "item": name, "paper_model": paper_choice[name],
            "largest_mm": float(press["hyperelastic"].deformation_map_mm.max()),

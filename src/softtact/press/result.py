@@ -79,8 +79,8 @@ class PressResult:
     """(step, y, x) in mm: how far the surface slid along the object since it came to touch; nan where it does not touch, and where
     the model knows no friction."""
     expected_error_mm: np.ndarray | None = field(default=None, metadata=_array("mm", "step"))
-    """(step,) in mm: error to expect against the hyperelastic model, root mean square over the map, where the model was chosen by
-    it; else nan."""
+    """(step,) in mm: error to expect against the hyperelastic model, root mean square over the map, of a fast model on frusta and
+    where the model was chosen by it; else nan. How well it is told: docs/explanation/fast_models.md."""
     selection_reason: str = field(default="", metadata=_FACT)
     """What made the choice of the model, where it was not the user's."""
     largest_counts: float = field(default=2400.0, metadata=_FACT)

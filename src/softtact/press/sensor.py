@@ -29,7 +29,7 @@ from softtact.models.hyperelastic.build import build_sensor_body
 from softtact.models.hyperelastic.build_plain import build_plain_body
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.press.cache import cached_compliance, cached_foundation
-from softtact.press.choice import TOLERANCE_MM, press_auto
+from softtact.press.choice import TOLERANCE_MM, press_auto, with_expected_error
 from softtact.press.making import Course
 from softtact.press.many import press_many, raise_first
 from softtact.press.models import MOTIONS, PRESSES
@@ -80,7 +80,7 @@ class Sensor:
     device: str = "cpu"
 
     def press(self, mesh: trimesh.Trimesh, *, pose: Pose | None = None, force_n: float | Sequence[float] | None = None,
-              motion: Motion | None = None, model: str = "auto", policy: str = "paper", tolerance_mm: float = TOLERANCE_MM,
+              motion: Motion | None = None, model: str = "auto", policy: str = "error", tolerance_mm: float = TOLERANCE_MM,
               label: str = "press", threads: int | None = None, keep_body: bool = False, time_limit_s: float | None = None,
               on_step: Callable[[PressResult], None] | None = None) -> PressResult:
         """Press a mesh (trimesh, mm) through forces (N, one or an increasing list) or a `Motion`; return a `PressResult`.
@@ -89,8 +89,8 @@ class Sensor:
         elastic and the hyperelastic model take any, `auto` then means the hyperelastic one, the foundation model only forces.
 
         pose: `Pose` of the mesh in the sensor frame; by default its bounding box is centred over the sensor, its lowest
-        side down. model: elastic, foundation, hyperelastic, or auto: chosen by a policy, `paper` (complexity of the contact)
-        or `error` (the cheapest model that is expected to be within `tolerance_mm` of the hyperelastic one; see `choice`).
+        side down. model: elastic, foundation, hyperelastic, or auto: chosen by a policy, `error` (the cheapest model that is
+        expected to be within `tolerance_mm` of the hyperelastic one; see `choice`) or `paper` (complexity of the contact).
         threads: by default one for each core.
         keep_body: let the result hold the deformed body at each force (`PressResult.pressed_body`), some 20 MB each; of the
         hyperelastic model, for the others have displacements of the map's plane alone.
@@ -112,7 +112,7 @@ class Sensor:
         press = PRESSES[model] if model != "auto" else partial(press_auto, policy=policy, tolerance_mm=tolerance_mm)
         try:
             with threadpool_limits(limits=course.threads if model == "elastic" else 1):
-                return flag_buried(press(self, placed, forces, course), height)
+                return flag_buried(with_expected_error(self, press(self, placed, forces, course)), height)
         except (ConvergenceError, KeyboardInterrupt) as error:
             error.result = _flagged_if_any(error, lambda result: flag_buried(result, height))     # type: ignore[union-attr]
             raise

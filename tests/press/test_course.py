@@ -1,0 +1,114 @@
+"""How a press goes about its work: time limits, interruptions, steps as they are reached, and what auto falls back on."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+from support.bodies import COARSE, SMALL
+from support.laws import LAWS
+
+from softtact.errors import ConvergenceError, TimeLimitError
+from softtact.models.hyperelastic.newton import _Press
+from softtact.press import choice
+from softtact.press.sensor import Sensor, load_sensor
+
+BALL = trimesh.creation.icosphere(subdivisions=3, radius=3.0)
+
+
+@pytest.fixture(scope="module")
+def sensor():
+    return Sensor(SMALL, LAWS, mesh=COARSE)
+
+
+def test_each_step_is_told_as_it_is_reached_with_those_before(sensor):
+    seen = []
+    whole = sensor.press(BALL, force_n=[0.5, 1.0, 2.0], model="hyperelastic", label="", on_step=seen.append)
+    assert [result.normal_force_n.tolist() for result in seen] == [[0.5], [0.5, 1.0]]
+    np.testing.assert_array_equal(seen[1].deformation_map_mm, whole.deformation_map_mm[:2])
+
+
+def stop_after(monkeypatch, error, newtons):
+    """Let an error come up in the iteration of that number."""
+    accepted, count = _Press.accepted, iter(range(1, 10_000))
+
+    def counted(self, state, trial):
+        accepted(self, state, trial)
+        if next(count) == newtons:
+            raise error
+
+    monkeypatch.setattr(_Press, "accepted", counted)
+
+
+def test_an_interruption_of_the_keyboard_takes_the_steps_before_with_it(sensor, monkeypatch):
+    iterations = int(sensor.press(BALL, force_n=[0.5], model="hyperelastic", label="").iterations.sum())
+    stop_after(monkeypatch, KeyboardInterrupt(), iterations + 6)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        sensor.press(BALL, force_n=[0.5, 5.0], model="hyperelastic", label="")
+    assert caught.value.result.normal_force_n.tolist() == [0.5]
+
+
+def test_a_press_ends_at_its_time_limit_and_says_how_far_it_was(sensor):
+    with pytest.raises(TimeLimitError, match=r"The time limit of 1e-06 s was reached at .*; the steps before are kept") as caught:
+        sensor.press(BALL, force_n=[0.5], model="hyperelastic", label="", time_limit_s=1e-6)
+    assert caught.value.result is None
+
+
+def test_a_heartbeat_tells_force_iteration_residual_and_time_on_one_line(sensor, capsys, monkeypatch):
+    monkeypatch.setattr("softtact.progress._IN_A_LOG_S", 0.0)
+    sensor.press(BALL, force_n=[0.5], model="hyperelastic", label="ball")
+    line = next(line for line in capsys.readouterr().err.splitlines() if "iteration" in line)
+    assert line.startswith("ball: ") and "N, iteration" in line and "largest unbalanced force" in line and line.endswith(" s")
+
+
+# --- auto ---
+
+
+@pytest.fixture
+def fakes(monkeypatch):
+    """Models that answer at once: what they are set to, and which were asked."""
+    base = Sensor(SMALL, LAWS, mesh=COARSE).press(BALL, force_n=[0.5], model="elastic", label="")
+    base = replace(base, frustum_compression_mm=np.array([0.01]))
+    state = {name: replace(base, model=name) for name in ("elastic", "foundation", "hyperelastic")}
+
+    def press(name):
+        def made(*_):
+            if isinstance(state[name], Exception):
+                raise state[name]
+            return state[name]
+        return made
+
+    monkeypatch.setattr(choice, "PRESSES", {name: press(name) for name in state})
+    return state
+
+
+def chosen(**options):
+    return load_sensor("coro").press(BALL, force_n=[0.5], label="", **options)
+
+
+def test_auto_takes_the_cheapest_model_within_the_tolerance_by_default(fakes):
+    result = chosen()
+    assert result.model == "elastic" and result.expected_error_mm[0] < 0.01
+
+
+def test_a_model_that_does_not_hold_is_not_taken_whatever_error_it_tells(fakes):
+    fakes["elastic"] = replace(fakes["elastic"], within_validity=np.zeros(1, dtype=np.int8))
+    result = chosen()
+    assert result.model == "foundation" and "the elastic model does not hold from 0.5 N on" in result.selection_reason
+
+
+def test_a_model_that_fails_falls_through_to_the_next(fakes):
+    fakes["foundation"] = ConvergenceError("the corrections diverge")
+    result = chosen()
+    assert result.model == "hyperelastic" and "the foundation model fails: the corrections diverge" in result.selection_reason
+
+
+def test_where_no_model_holds_the_answer_says_so(fakes):
+    for name, result in fakes.items():
+        fakes[name] = replace(result, within_validity=np.zeros(1, dtype=np.int8))
+    result = chosen()
+    assert result.model == "hyperelastic" and "none serves" in result.selection_reason
+
+
+def test_the_papers_rule_is_taken_where_it_is_asked_for(fakes):
+    assert "the paper's rule" in chosen(policy="paper").selection_reason
