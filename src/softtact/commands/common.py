@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from softtact.geometry.pose import Pose
     from softtact.sensors.specification import AnySpec
 
-UNITS = ("mm", "cm", "m", "inch")
+UNITS = ("mm", "cm", "m", "inch", "in")
 EXIT_STATUS = {0: "done",
                1: "refused: a file, a value or a combination of options is not usable; one sentence says why and what to do",
                2: "wrong command line: an option or an argument is missing, unknown or not of its kind",

@@ -68,6 +68,7 @@ def _press(options):
 
     from softtact.geometry.meshes import check_over_sensor, place
 
+    _refuse_idle(options)
     spec, pose = sensor_spec(options.sensor), pose_of(options)
     how = _how(options, spec)
     check_folders(options.out, options.vtu, options.plot)
@@ -75,8 +76,9 @@ def _press(options):
     mesh, repairs = read_object(options)
     check_over_sensor(place(mesh, pose=pose), spec.footprint_mm, name=str(options.mesh))
     try:
+        attributes = {"mesh_repairs": "; ".join(repairs), **_origin(options)}
         sensor = replace(softtact.load_sensor(options.sensor, materials=_cards(options)),
-                         **_quality(options), device=options.device, attributes={"mesh_repairs": "; ".join(repairs)})
+                         **_quality(options), device=options.device, attributes=attributes)
         result = sensor.press(mesh, pose=pose, **how, model=options.model,
                               policy=options.policy, tolerance_mm=options.tolerance, keep_body=options.vtu is not None,
                               time_limit_s=options.time_limit, on_step=_writer(options))
@@ -85,6 +87,29 @@ def _press(options):
             _show_press(error.result, options)
         raise
     _show_press(result, options)
+
+
+# Options that have an effect on the hyperelastic model alone, or on the laws that the elastic model has none of.
+_IDLE = {"card": ("elastic",), "mesh_quality": ("elastic", "foundation"), "device": ("elastic", "foundation")}
+
+
+def _refuse_idle(options):
+    """Refuse an option that would change nothing in the model that is asked for by its name."""
+    defaults = {"card": None, "mesh_quality": "default", "device": "cpu"}
+    for name, models in _IDLE.items():
+        if options.model in models and getattr(options, name) != defaults[name]:
+            given = " ".join(options.card) if name == "card" else getattr(options, name)
+            raise InputError(f"--{name.replace('_', '-')} {given}: it has no effect on the {options.model} model; "
+                             "leave it out, or choose another model.")
+
+
+def _origin(options):
+    """What a press came from, as attributes of its file."""
+    import hashlib
+    import sys
+
+    return {"mesh": options.mesh.name, "mesh_sha256": hashlib.sha256(options.mesh.read_bytes()).hexdigest(), "unit": options.unit,
+            "pose": options.pose or "centred, touching", "command": " ".join(["softtact", *map(str, sys.argv[1:])])}
 
 
 def _writer(options):

@@ -15,6 +15,8 @@ from softtact.contact.height_field import NO_CONTACT_MM, HeightField
 from softtact.errors import ConvergenceError
 
 _BESIDE_MM = 1e-3      # an object that ends at the pad's own side does not lie on the shell
+_TOUCHING_MM = 1e-6    # from where it first touches: an object that rests so near to it presses nothing
+_FAR_MM = 10.0         # stands for a depth that is not found
 _EXACT = 1e-8          # of the largest force, to which that at rest is found
 
 
@@ -61,10 +63,19 @@ def pad_forces(forces_n: np.ndarray, *, stop_mm: float, touch_mm: float, depth_o
 
     stop_mm, touch_mm: how far the object can come down, and does until first touch;  depth_of: how far it does under a force (N)
     """
-    largest = float(forces_n[-1])
-    if stop_mm <= touch_mm or depth_of(_EXACT * largest) >= stop_mm:
-        return np.zeros(len(forces_n))
-    if depth_of(largest) <= stop_mm:
+    if np.isinf(stop_mm):
         return forces_n
-    at_rest = brentq(lambda force: depth_of(force) - stop_mm, _EXACT * largest, largest, xtol=_EXACT * largest)
-    return np.minimum(forces_n, at_rest)
+    largest = float(forces_n[-1])
+    if stop_mm - touch_mm < _TOUCHING_MM:
+        return np.zeros(len(forces_n))
+
+    def below(force):
+        """How far (mm) the object would be below where it rests; without force it just touches."""
+        try:
+            return (depth_of(force) if force > _EXACT * largest else touch_mm) - stop_mm
+        except ConvergenceError:      # of a force that the pad would not bear alone
+            return _FAR_MM
+
+    if below(largest) <= 0:
+        return forces_n
+    return np.minimum(forces_n, brentq(below, 0.0, largest, xtol=_EXACT * largest))

@@ -14,7 +14,7 @@ from softtact.errors import InputError
 from softtact.geometry.bodies import OVERLAP, is_cavity, union_of
 from softtact.geometry.pose import Pose
 
-UNIT_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "inch": 25.4}
+UNIT_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "inch": 25.4, "in": 25.4}
 FORMATS = (".stl", ".obj", ".ply")
 MIN_SIZE_MM = 1.0  # smaller than a taxel's resolution by far
 MAX_SIZE_MM = 500.0  # larger than any gripper holds
@@ -50,7 +50,7 @@ def read_mesh(path: str | Path, *, unit: str, min_size_mm: float = MIN_SIZE_MM,
     """Closed, outward-oriented mesh of a file, as a `trimesh.Trimesh` in mm in the file's own frame.
 
     path : STL (binary or text), OBJ or PLY
-    unit : 'mm', 'cm', 'm' or 'inch'; the file itself does not say
+    unit : 'mm', 'cm', 'm', 'inch' or 'in'; the file itself does not say
     min_size_mm, max_size_mm : range of a plausible largest side
 
     Raises InputError that names the file, what is wrong with it (unreadable, open, inside out, flat, overlapping, of a wrong size)
