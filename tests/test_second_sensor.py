@@ -16,7 +16,6 @@ from softtact.models.elastic.compliance import elastic_compliance
 from softtact.models.foundation.compliance import foundation_compliance
 from softtact.readout.capacitance import ideal_counts
 from softtact.readout.virtual_sensor import read_virtual_sensor
-from softtact.reporting.press_plot import plot_press
 from softtact.sensors.library import sensor_file
 from softtact.study.config import load_study
 
@@ -103,11 +102,13 @@ def test_the_virtual_sensor_reads_its_taxels_up_to_its_own_largest_count(pad, pr
     assert deep.max() == 3000 == ideal_counts(pad.spec, 0 * maps + 1.1).max()
 
 
-def test_its_press_is_drawn_to_its_own_range(pressed, tmp_path, monkeypatch):
-    drawn = []
-    monkeypatch.setattr("softtact.reporting.press_plot.save", lambda figure, path: drawn.append(figure))
-    plot_press(pressed["elastic"], tmp_path / "press.png")
-    assert [axes.get_images()[0].get_clim()[1] for axes in drawn[0].axes[2:4]] == [3000, 3000]
+def test_its_press_is_drawn_to_the_range_of_its_data_or_of_its_own_readout(pressed):
+    result = pressed["elastic"]
+    for full_scale, highest in ((True, 3000), (False, result.tactile_map.max())):
+        figure = result.plot(full_scale=full_scale)
+        assert [axes.get_images()[0].get_clim()[1] for axes in figure.axes[2:4]] == [highest, highest]
+        written = [text.get_text() for text in figure.axes[2].texts]
+        assert written == [f"{value:.0f}" for value in result.tactile_map[0].ravel()]
 
 
 @pytest.mark.parametrize(("values", "said"), [

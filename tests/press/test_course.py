@@ -8,7 +8,7 @@ import trimesh
 from support.bodies import COARSE, SMALL
 from support.laws import LAWS
 
-from softtact.errors import ConvergenceError, TimeLimitError
+from softtact.errors import ConvergenceError, InputError, TimeLimitError
 from softtact.models.hyperelastic.newton import _Press
 from softtact.press import choice
 from softtact.press.sensor import Sensor, load_sensor
@@ -112,3 +112,24 @@ def test_where_no_model_holds_the_answer_says_so(fakes):
 
 def test_the_papers_rule_is_taken_where_it_is_asked_for(fakes):
     assert "the paper's rule" in chosen(policy="paper").selection_reason
+
+
+# --- what a press takes ---
+
+
+def test_a_file_and_a_matrix_press_as_a_mesh_and_a_pose_do(sensor, tmp_path):
+    BALL.export(tmp_path / "ball.stl")
+    matrix = trimesh.transformations.euler_matrix(0.1, 0.2, 0.3)
+    matrix[:3, 3] = [0.4, -0.2, 3.0]
+    from_file = sensor.press(tmp_path / "ball.stl", unit="mm", pose=matrix, force_n=0.5, model="elastic", label="")
+    six = [0.4, -0.2, 3.0, *np.degrees([0.1, 0.2, 0.3])]
+    given = sensor.press(BALL, pose=six, force_n=0.5, model="elastic", label="")
+    np.testing.assert_allclose(from_file.deformation_map_mm, given.deformation_map_mm, atol=1e-6)     # a file's single precision
+
+
+def test_a_file_without_its_unit_and_a_matrix_that_scales_are_refused(sensor, tmp_path):
+    BALL.export(tmp_path / "ball.stl")
+    with pytest.raises(InputError, match="a mesh file does not state its unit; give unit='mm'"):
+        sensor.press(tmp_path / "ball.stl", force_n=0.5)
+    with pytest.raises(InputError, match="is no rigid motion"):
+        sensor.press(BALL, pose=np.diag([2.0, 2.0, 2.0, 1.0]), force_n=0.5)

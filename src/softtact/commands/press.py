@@ -61,6 +61,8 @@ def add(commands: argparse._SubParsersAction) -> None:
                          help="write the pressed sensor for ParaView and softtact view: the hyperelastic model's whole mesh, the "
                               "others' surface")
     command.add_argument("--plot", type=Path, metavar="FILE.png", help="draw deformation map and taxels (PNG or SVG)")
+    command.add_argument("--full-scale", action="store_true",
+                         help="let the taxels' colours in --plot end at the readout's largest count, not at the data's")
 
 
 def _press(options):
@@ -143,9 +145,7 @@ def _show_press(result, options):
     if options.vtu:
         result.write_vtu(options.vtu)
     if options.plot:
-        from softtact.reporting.press_plot import plot_press
-
-        plot_press(result, options.plot)
+        result.plot(options.plot, full_scale=options.full_scale)
     summary = _press_summary(result)
     summary["written"] = [str(path) for path in (options.out, options.vtu, options.plot) if path]
     show(summary, as_json=options.json, lines=_press_lines(summary))

@@ -37,6 +37,20 @@ class Pose:
         return cls(numbers[:3], Rotation.from_euler("xyz", numbers[3:], degrees=True))
 
     @classmethod
+    def of(cls, value: "Pose | np.ndarray | Sequence[float] | None") -> "Pose | None":
+        """The pose of a `Pose`, a 4 x 4 homogeneous matrix or six numbers (`from_values`); None stays None."""
+        if value is None or isinstance(value, Pose):
+            return value
+        array = np.asarray(value, dtype=float)
+        if array.shape != (4, 4):
+            return cls.from_values(array.ravel().tolist())
+        turn, last = array[:3, :3], array[3]
+        if not (np.allclose(last, [0, 0, 0, 1]) and np.allclose(turn @ turn.T, np.eye(3), atol=1e-6) and np.linalg.det(turn) > 0):
+            raise InputError(f"The pose {array.tolist()} is no rigid motion: its upper left 3 x 3 must be a rotation and its last "
+                             "row 0, 0, 0, 1; correct it, and scale the mesh by its unit.")
+        return cls(array[:3, 3], Rotation.from_matrix(turn))
+
+    @classmethod
     def parse(cls, text: str) -> "Pose":
         """Pose of a command line's `x,y,z,rx,ry,rz`; see `from_values`."""
         return cls.from_values(text.split(","))

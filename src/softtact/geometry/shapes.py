@@ -279,9 +279,19 @@ def egg() -> Manifold:
     return hull(shaped - [0.0, 0.0, shaped[:, 2].min()])
 
 
+def tube() -> Manifold:
+    """Tube lying across the sensor's short side and beyond it on both."""
+    angle = 2 * np.pi * np.arange(360) / 360
+    ring_points = np.column_stack([14.0 * np.cos(angle), 14.0 + 14.0 * np.sin(angle)])
+    return hull(np.vstack([np.column_stack([np.full(360, x), ring_points]) for x in (-18.0, 18.0)]))
+
+
 EVERYDAY = {"Key": key, "Bolt Head": bolt_head, "Coin": coin, "Spanner": spanner, "Bottle Cap": bottle_cap, "Egg": egg}
+# Wider than the sensor, as most of what a gripper takes hold of: across its short side, and over all of it.
+WIDE: dict[str, Callable[[], Manifold]] = {"Ruler": lambda: block(34.0, 12.0, 3.0), "Tube": tube,
+                                           "Carton": lambda: block(30.0, 44.0, 8.0)}
 GRASPED = {f"Object {number}": shape for number, shape in
-           enumerate([object_1, object_2, object_3, object_4, object_5, object_6], start=1)} | EVERYDAY
+           enumerate([object_1, object_2, object_3, object_4, object_5, object_6], start=1)} | EVERYDAY | WIDE
 
 # set -> (folder, shapes, what every shape of the set gets)
 SETS: dict[str, tuple[str, dict[str, Callable[[], Manifold]], Callable[[Manifold], Manifold]]] = {

@@ -12,6 +12,7 @@ from softtact.press.vtu import of_bodies, of_map
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.figure import Figure
 
     from softtact.models.hyperelastic.deformed_mesh import PressedBody
 
@@ -108,6 +109,27 @@ class PressResult:
             raise InputError(f"This result of the {self.model} model keeps no body; press with model='hyperelastic' and "
                              "keep_body=True.")
         return self.bodies[load_step]
+
+    def plot(self, path: str | Path | None = None, *, full_scale: bool = False) -> "Figure":
+        """A matplotlib figure of maps and taxels at each load step; written to `path` (PNG or SVG) where one is given.
+
+        full_scale: let the taxels' colours end at the readout's largest count; else at the largest one that is there
+        """
+        from softtact.press import plot
+
+        figure = plot.draw(self, full_scale=full_scale)
+        if path is not None:
+            plot.save(figure, path)
+        return figure
+
+    def show(self, *, full_scale: bool = False) -> None:
+        """Show `plot` in a window, or below a notebook's cell."""
+        import matplotlib.pyplot as plt
+
+        from softtact.press import plot
+
+        plot.draw(self, full_scale=full_scale, figure=plt.figure())
+        plt.show()
 
     def to_dataset(self) -> "xarray.Dataset":
         """The result as an xarray dataset with dimensions step, y, x, axis, row, column and the units of each array."""

@@ -19,7 +19,7 @@ from softtact.contact.height_field import HeightField
 from softtact.contact.motion import Motion
 from softtact.devices import find_device
 from softtact.errors import ConvergenceError, InputError
-from softtact.geometry.meshes import check_over_sensor, place
+from softtact.geometry.meshes import check_over_sensor, place, read_mesh
 from softtact.geometry.pose import Pose
 from softtact.materials.config import law_from_printed
 from softtact.materials.laws.base import Law
@@ -79,18 +79,22 @@ class Sensor:
     attributes: dict = field(default_factory=dict)
     device: str = "cpu"
 
-    def press(self, mesh: trimesh.Trimesh, *, pose: Pose | None = None, force_n: float | Sequence[float] | None = None,
+    def press(self, mesh: trimesh.Trimesh | str | Path, *, unit: str | None = None,
+              pose: Pose | np.ndarray | Sequence[float] | None = None, force_n: float | Sequence[float] | None = None,
               motion: Motion | None = None, model: str = "auto", policy: str = "error", tolerance_mm: float = TOLERANCE_MM,
               label: str = "press", threads: int | None = None, keep_body: bool = False, time_limit_s: float | None = None,
               on_step: Callable[[PressResult], None] | None = None) -> PressResult:
-        """Press a mesh (trimesh, mm) through forces (N, one or an increasing list) or a `Motion`; return a `PressResult`.
+        """Press a mesh (trimesh in mm, or a file with its `unit`) through forces (N) or a `Motion`; return a `PressResult`.
+
+        force_n: one force, or an increasing list
 
         motion: steps down by force or to a depth, and aside, with friction where the sensor's `friction.object` states it; the
         elastic and the hyperelastic model take any, `auto` then means the hyperelastic one, the foundation model only forces.
 
-        pose: `Pose` of the mesh in the sensor frame; by default its bounding box is centred over the sensor, its lowest
-        side down. model: elastic, foundation, hyperelastic, or auto: chosen by a policy, `error` (the cheapest model that is
-        expected to be within `tolerance_mm` of the hyperelastic one; see `choice`) or `paper` (complexity of the contact).
+        pose: `Pose`, 4 x 4 matrix or six numbers (mm, degrees) of the mesh in the sensor frame; by default its bounding box is
+        centred over the sensor, its lowest side down.
+        model: elastic, foundation, hyperelastic, or auto: chosen by a policy, `error` (the cheapest model that is expected to be
+        within `tolerance_mm` of the hyperelastic one; see `choice`) or `paper` (complexity of the contact).
         threads: by default one for each core.
         keep_body: let the result hold the deformed body at each force (`PressResult.pressed_body`), some 20 MB each; of the
         hyperelastic model, for the others have displacements of the map's plane alone.
@@ -99,6 +103,7 @@ class Sensor:
         Raises ConvergenceError at a force that is not reached; its `result` holds the forces before, as those of a
         KeyboardInterrupt and of a TimeLimitError do.
         """
+        mesh, pose = _mesh_of(mesh, unit), Pose.of(pose)
         if model not in MODELS:
             raise InputError(f"Model {model!r} is unknown; use one of {', '.join(MODELS)}.")
         course = Course(label, threads or cores(), keep_body, time_limit_s, on_step)
@@ -195,6 +200,15 @@ class Sensor:
         if (np.diff(forces) <= 0).any():
             raise InputError("The forces must increase; sort them and leave out doubles.")
         return forces
+
+
+def _mesh_of(mesh: trimesh.Trimesh | str | Path, unit: str | None) -> trimesh.Trimesh:
+    """A mesh in mm, read where it is the path of a file."""
+    if isinstance(mesh, trimesh.Trimesh):
+        return mesh
+    if unit is None:
+        raise InputError(f"{mesh}: a mesh file does not state its unit; give unit='mm', or another one.")
+    return read_mesh(mesh, unit=unit)
 
 
 def _flagged_if_any(error: BaseException, flag: Callable[[PressResult], PressResult]) -> PressResult | None:
