@@ -1,6 +1,7 @@
 """The command line: what it answers, and how it refuses."""
 
 import argparse
+import hashlib
 import json
 import os
 import shlex
@@ -24,6 +25,7 @@ from softtact.commands.fit import LAYOUTS as LAYOUTS_OFFERED
 from softtact.errors import ConvergenceError, InputError
 from softtact.materials.readers import LAYOUTS
 from softtact.press.choice import TOLERANCE_MM
+from softtact.press.result import read_press
 from softtact.press.sensor import MODELS, Sensor
 from softtact.sensors.library import material_file, sensor_file
 
@@ -342,3 +344,29 @@ def test_the_draft_mesh_comes_with_what_counts_as_solved_on_it():
     draft, fine = (_quality(SimpleNamespace(mesh_quality=name)) for name in ("draft", "fine"))
     assert draft == {"mesh": MeshSettings.draft(), "solver": NewtonSettings.draft()}
     assert fine == {"mesh": MeshSettings.fine(), "solver": NewtonSettings()}
+
+
+@pytest.mark.parametrize(("options", "said"), [
+    (["--model", "elastic", "--card", "cover=card.json"], "--card cover=card.json: it has no effect on the elastic model"),
+    (["--model", "foundation", "--mesh-quality", "draft"], "--mesh-quality draft: it has no effect on the foundation model"),
+    (["--model", "elastic", "--device", "cuda"], "--device cuda: it has no effect on the elastic model")])
+def test_an_option_without_effect_on_the_chosen_model_is_refused(options, said, capsys):
+    assert main(["press", str(OBJECT), "--unit", "mm", "--force", "5", *options]) == 1
+    assert said in capsys.readouterr().err
+
+
+def test_a_press_file_tells_what_was_pressed_how_and_by_which_command(tmp_path, capsys):
+    file = tmp_path / "press.nc"
+    assert main(["press", str(OBJECT), "--unit", "mm", "--force", "5", "--model", "elastic", "--sensor", "pad4x4",
+                 "--out", str(file)]) == 0
+    facts = read_press(file).attributes
+    assert facts["mesh"] == OBJECT.name and facts["mesh_sha256"] == hashlib.sha256(OBJECT.read_bytes()).hexdigest()
+    assert facts["unit"] == "mm" and facts["pose"] == "centred, touching" and facts["command"].startswith("softtact ")
+
+
+def test_a_time_limit_ends_a_press_with_status_3_and_one_sentence(tmp_path, capsys):
+    ball = tmp_path / "ball.stl"
+    trimesh.creation.icosphere(subdivisions=3, radius=6.0).export(ball)
+    assert main(["press", str(ball), "--unit", "mm", "--force", "5", "--model", "hyperelastic", "--sensor", "pad4x4",
+                 "--time-limit", "0.001"]) == 3
+    assert "The time limit of 0.001 s was reached" in capsys.readouterr().err

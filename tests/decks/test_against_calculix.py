@@ -28,7 +28,7 @@ from softtact.sensors.edge import Edge, SidesBelow
 from softtact.sensors.frusta import Friction
 
 pytestmark = needs_ccx
-PATCH = CORO.model_copy(update={"footprint_mm": (4.8, 4.8)})     # 4 x 4 frusta
+PATCH = CORO.model_copy(update={"footprint_mm": (4.8, 4.8), "edge": Edge(held="sides")})     # 4 x 4 frusta
 PLATE = place(trimesh.creation.box((5.0, 5.0, 1.0)))
 BAR = place(trimesh.creation.cylinder(radius=8.0, height=7.0, sections=400,
                                       transform=trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0])))

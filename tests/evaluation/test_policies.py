@@ -14,7 +14,8 @@ SIZE = np.sqrt((BUMP**2).mean())
 def data_set(item, of_set, amplitude, *, time, compression=0.1):
     return xarray.Dataset({"deformation_map_mm": (("step", "y", "x"), amplitude * (FORCES / 20)[:, None, None] * BUMP),
                            "frustum_compression_mm": ("step", compression * FORCES / 20), "wall_time_s": ("step", [time, time]),
-                           "within_validity": ("step", [1, 1])}, attrs={"item": item, "set": of_set})
+                           "within_validity": ("step", [1, 1]), "indentation_mm": ("step", [0.1, 0.2])},
+                          attrs={"item": item, "set": of_set, "thickness_mm": 2.5})
 
 
 def press(item, of_set, *, apart):

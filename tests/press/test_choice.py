@@ -37,7 +37,7 @@ def test_constants_never_promise_less_than_no_error():
 
 def test_the_elastic_models_error_is_what_the_cheap_models_disagree_by():
     errors = expected_errors(press([0.3], [0.1]), press([0.2], [0.1]), height_mm=0.5, thickness_mm=2.5,
-                             model=FoundationError(0.0, 0.0))
+                             model=FoundationError(0.0, 0.0, 0.0))
     assert errors["foundation"] == pytest.approx([0.0])
     assert errors["elastic"] == pytest.approx(rms(maps(0.1)))
 

@@ -133,3 +133,10 @@ def test_a_file_without_its_unit_and_a_matrix_that_scales_are_refused(sensor, tm
         sensor.press(tmp_path / "ball.stl", force_n=0.5)
     with pytest.raises(InputError, match="is no rigid motion"):
         sensor.press(BALL, pose=np.diag([2.0, 2.0, 2.0, 1.0]), force_n=0.5)
+
+
+@pytest.mark.parametrize("model", ["elastic", "hyperelastic"])
+def test_the_indentation_counts_from_first_touch_however_high_the_pose_is(sensor, model):
+    low, high = (sensor.press(BALL, pose=[0, 0, z, 0, 0, 0], force_n=0.5, model=model, label="") for z in (3.0, -4.0))
+    assert low.indentation_mm[0] == pytest.approx(high.indentation_mm[0], rel=1e-6) and 0 < low.indentation_mm[0] < 1
+    assert high.within_validity.all()

@@ -489,4 +489,5 @@ def test_a_result_states_its_friction():
     ball, pose = sphere(2.5)
     spec = small_spec(2, 2, margin=0.4).model_copy(update={"friction": Friction(object=0.3)})
     result = Sensor(spec, LAWS, mesh=COARSE).press(ball, pose=pose, force_n=1.0, model="hyperelastic")
-    assert result.attributes == {"friction_object": 0.3, "friction_board": 0.0, "tips_bonded": 1, "thickness_mm": 2.5}
+    assert result.attributes == {"friction_object": 0.3, "friction_board": 0.0, "tips_bonded": 1, "thickness_mm": 2.5,
+                                 "edge": "sides held up to the surface"}

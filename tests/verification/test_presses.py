@@ -23,15 +23,17 @@ from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.models.hyperelastic.path import press_load_steps
 from softtact.models.hyperelastic.slab import Slab
 from softtact.press.sensor import Sensor
+from softtact.sensors.edge import Edge
 
 BOUND = MeshSettings(cover_heights=(0.0, 0.5, 1.0), cover_splits=(0,), far_pitches=1, frustum_heights=(0.0, 0.35, 1.0))
 TIGHT = NewtonSettings(relative_tolerance=1e-8)
 
 
 def small_spec(columns, rows, *, margin=0.6):
-    """A sensor of columns x rows frusta with a strip of `margin` mm around them."""
+    """A sensor of columns x rows frusta with a strip of `margin` mm around them, its sides held up to the surface."""
     side = (1.2 * columns + 2 * margin, 1.2 * rows + 2 * margin)
-    return CORO.model_copy(update={"footprint_mm": side, "map_shape": (4 * rows + 5, 4 * columns + 5)})
+    return CORO.model_copy(update={"footprint_mm": side, "map_shape": (4 * rows + 5, 4 * columns + 5),
+                                    "edge": Edge(held="sides")})
 
 
 def small_body(columns, rows, *, mesh=COARSE):

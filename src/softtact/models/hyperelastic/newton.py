@@ -43,8 +43,8 @@ class NewtonSettings:
     largest_penetration_mm: float = 1e-3
     full_depth_mm: float = 0.2
     max_augmentations: int = 20
-    max_iterations: int = 40
-    load_step_iterations: int = 40
+    max_iterations: int = 30
+    load_step_iterations: int = 100
     largest_step_mm: float = 0.12
     smallest_increment_n: float = 0.02
     smallest_scale_n: float = 10.0
