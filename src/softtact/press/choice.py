@@ -68,7 +68,7 @@ def calibrate(relative: np.ndarray, compression: np.ndarray, depth: np.ndarray |
     columns = [np.ones(len(relative)), np.asarray(compression) ** _POWER]
     columns += [] if depth is None else [np.asarray(depth) ** _DEPTH_POWER]
     found, _ = nnls(np.column_stack(columns) / np.asarray(relative)[:, None], np.ones(len(relative)))
-    return FoundationError(*map(float, found))
+    return FoundationError(at_rest=float(found[0]), growth=float(found[1]), deep=0.0 if depth is None else float(found[2]))
 
 
 def foundation_error(foundation: PressResult, *, height_mm: float, thickness_mm: float,
