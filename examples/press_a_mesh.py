@@ -13,7 +13,6 @@ from pathlib import Path
 import softtact
 from softtact.geometry.meshes import read_mesh
 from softtact.geometry.pose import Pose
-from softtact.reporting.press_plot import plot_press
 
 
 def main(arguments=None):
@@ -26,7 +25,7 @@ def main(arguments=None):
     load_steps = zip(result.normal_force_n, result.indentation_mm, result.contact_area_mm2, result.tactile_map, strict=True)
     for force, depth, area, counts in load_steps:
         print(f"{force:5.1f} N: {depth:.3f} mm deep, {area:.0f} mm2 in contact, up to {counts.max():.0f} counts")
-    plot_press(result, options.out)
+    result.plot(options.out)
     print(f"Drawn: {options.out}")
     return result
 

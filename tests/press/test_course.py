@@ -138,5 +138,5 @@ def test_a_file_without_its_unit_and_a_matrix_that_scales_are_refused(sensor, tm
 @pytest.mark.parametrize("model", ["elastic", "hyperelastic"])
 def test_the_indentation_counts_from_first_touch_however_high_the_pose_is(sensor, model):
     low, high = (sensor.press(BALL, pose=[0, 0, z, 0, 0, 0], force_n=0.5, model=model, label="") for z in (3.0, -4.0))
-    assert low.indentation_mm[0] == pytest.approx(high.indentation_mm[0], rel=1e-6) and 0 < low.indentation_mm[0] < 1
+    assert low.indentation_mm[0] == pytest.approx(high.indentation_mm[0], rel=1e-4) and 0 < low.indentation_mm[0] < 1
     assert high.within_validity.all()

@@ -108,10 +108,9 @@ def _refuse_idle(options):
 def _origin(options):
     """What a press came from, as attributes of its file."""
     import hashlib
-    import sys
 
     return {"mesh": options.mesh.name, "mesh_sha256": hashlib.sha256(options.mesh.read_bytes()).hexdigest(), "unit": options.unit,
-            "pose": options.pose or "centred, touching", "command": " ".join(["softtact", *map(str, sys.argv[1:])])}
+            "pose": options.pose or "centred, touching", "command": " ".join(["softtact", *options.given])}
 
 
 def _writer(options):
