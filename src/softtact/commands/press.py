@@ -71,6 +71,8 @@ def _press(options):
     from softtact.geometry.meshes import check_over_sensor, place
 
     _refuse_idle(options)
+    if options.time_limit is not None and not options.time_limit > 0:
+        raise InputError(f"--time-limit {options.time_limit:g}: a press needs some time; give seconds above 0.")
     spec, pose = sensor_spec(options.sensor), pose_of(options)
     how = _how(options, spec)
     check_folders(options.out, options.vtu, options.plot)
@@ -175,6 +177,8 @@ def _press_summary(result):
     load_steps |= {"torque_nmm": result.torque_nmm}
     facts = {name: getattr(result, name) for name in ("model", "solver", "selection_reason")}
     facts["repairs"] = [repair for repair in result.attributes["mesh_repairs"].split("; ") if repair]
+    facts["expected_error_interval"] = ([result.attributes[f"expected_error_times_{end}"] for end in ("low", "high")]
+                                        if "expected_error_times_low" in result.attributes else None)
     return facts | {name: _or_none(values) for name, values in load_steps.items()}
 
 
@@ -196,6 +200,14 @@ def _press_lines(summary):
     yield from _quality_lines(summary)
 
 
+def _error_line(expected_um, interval):
+    """The error to expect of a fast model, with the interval that the true one lies in; the hyperelastic model is the measure."""
+    if interval is not None:
+        low, high = (factor * expected_um for factor in interval)
+        yield (f"error to expect against the hyperelastic model: {expected_um:.2g} um ({low:.2g} to {high:.2g}), root mean square "
+               "over the map")
+
+
 def _quality_lines(summary):
     """How well the load steps were solved, by the worst of them."""
     yield f"iterations: {sum(summary['iterations'])}; deepest overlap in a contact: {1e3 * max(summary['penetration_mm']):.2g} um"
@@ -204,7 +216,7 @@ def _quality_lines(summary):
     if None not in summary["frustum_compression_mm"]:
         yield f"most compressed frustum: {max(summary['frustum_compression_mm']):.3f} mm"
     if None not in summary["expected_error_mm"]:
-        yield f"error to expect against the hyperelastic model: {1e3 * max(summary['expected_error_mm']):.2g} um, root mean square"
+        yield from _error_line(1e3 * max(summary["expected_error_mm"]), summary["expected_error_interval"])
     if not all(summary["within_validity"]):
         flagged = zip(summary["normal_force_n"], summary["within_validity"], strict=True)
         forces = ", ".join(f"{force:.4g}" for force, valid in flagged if not valid)

@@ -249,8 +249,8 @@ def _remarks(body):
             "their quarters follow the curve through the corner, the middle and the next corner; small elements of the "
             "cover follow larger ones' faces.",
             "Contacts: object on the top, frusta (tip and sides) on the board, frusta on their neighbours. Left out, as in "
-            "softtact: the sheet's underside on the frusta's sides, friction of frusta on each other, the object's steep walls and "
-            "upper sides.",
+            "softtact: the sheet's underside on the frusta's sides, friction of frusta on each other, the object's upper sides. "
+            "Left out here alone: the object's steep walls, and the shell that an object wider than the sensor may rest on.",
             f"Facets of the object narrower than {SLIVER_MM} mm are left out.",
             f"softtact lets the share {share} of the frusta's bulk modulus act at every point and projects the rest on "
             f"{functions} functions; these elements have one volumetric energy. Its bricks and "

@@ -208,3 +208,8 @@ TET4 = Element(np.vstack([np.zeros(3), np.eye(3)]), linear_simplex, tetrahedron_
     |/     `.        | /
     0 ------- 1      +---- xi
 """
+
+
+def dofs_of(nodes: np.ndarray) -> np.ndarray:
+    """Unknowns (..., 3 k) of nodes (..., k): x, y and z of one node side by side."""
+    return (3 * nodes[..., None] + np.arange(3)).reshape(*nodes.shape[:-1], -1)

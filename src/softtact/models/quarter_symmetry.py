@@ -20,7 +20,7 @@ import numpy as np
 import scipy.sparse as sp
 from numba import njit
 
-from softtact.fem.elements import HEX27
+from softtact.fem.elements import HEX27, dofs_of
 from softtact.fem.levels import with_level
 from softtact.fem.solid_block import HexBlock
 from softtact.linalg.direct import condensed_inverse
@@ -110,7 +110,7 @@ class QuarterSlab:
             law = make_law("neo_hooke", {"c10": 0.5 * layer.shear_modulus}, bulk_modulus=layer.bulk_modulus)
             block = HexBlock(0.5 * HEX27.nodes[None] * self._sizes(thickness), law)
             element = block.tangent(np.zeros((1, 27, 3)))[0]
-            dofs = _dofs(hexes)
+            dofs = dofs_of(hexes)
             rows.append(np.repeat(dofs, 81, axis=1).ravel())
             columns.append(np.tile(dofs, (1, 81)).ravel())
             values.append(np.tile(element.ravel(), len(dofs)))
@@ -147,7 +147,7 @@ class QuarterSlab:
         entries: list[tuple[list, list, list]] = [([], [], []) for _ in range(3)]
         for (layer, thickness), hexes in zip(self.layers, self.hexes, strict=True):
             size = self._sizes(thickness)
-            gradients, dofs = HEX27.shape(points)[1] * (2 / size), _dofs(hexes)
+            gradients, dofs = HEX27.shape(points)[1] * (2 / size), dofs_of(hexes)
             for point, weight, gradient in zip(points, weights * np.prod(size) / 8, gradients, strict=True):
                 owner = cells_of((i + 0.5 + 0.5 * point[0]) * size[0], (j + 0.5 + 0.5 * point[1]) * size[1])
                 inside = owner >= 0
@@ -190,10 +190,6 @@ def _membrane_stress(layer, gradient):
         row[:, axis] += 2 * mu * gradient[:, axis]
     shear[:, 0], shear[:, 1] = mu * gradient[:, 1], mu * gradient[:, 0]
     return first.ravel(), second.ravel(), shear.ravel()
-
-
-def _dofs(hexes):
-    return (3 * hexes[..., None] + np.arange(3)).reshape(len(hexes), -1)
 
 
 def _quadratic(line, values):

@@ -18,6 +18,7 @@ from softtact.devices import find_device
 from softtact.errors import ConvergenceError, InputError, SofttactError
 from softtact.geometry.meshes import check_over_sensor, place
 from softtact.geometry.pose import Pose
+from softtact.press.choice import with_expected_error
 from softtact.press.fast import elastic_result, first_touch_mm, shell_stop_mm
 from softtact.press.result import PressResult
 from softtact.press.validity import flag_buried
@@ -107,7 +108,7 @@ def _read(sensor, press, underside, force_n, job):
     if not settled.all():
         return ConvergenceError(not_settled(force_n[~settled][0]))
     result = elastic_result(sensor, press, force_n, np.zeros(len(force_n)), touch_mm=underside.touch_mm)
-    return flag_buried(result, underside.top_mm)
+    return with_expected_error(sensor, flag_buried(result, underside.top_mm))
 
 
 def _each(sensor, act, jobs, workers):

@@ -36,7 +36,8 @@ class PressResult:
     normal_force_n: np.ndarray = field(metadata=_array("N", "step"))
     """(step,) in N: how hard the object was pressed, positive into the sensor; pad and shell together."""
     indentation_mm: np.ndarray = field(metadata=_array("mm", "step"))
-    """(step,) in mm: how far the object came down from where it just touches the sensing surface, whatever its pose's height."""
+    """(step,) in mm: how far the object came down from where it just touches the sensing surface, whatever its pose's height;
+    negative where the shell beside the pad keeps it from touching."""
     contact_area_mm2: np.ndarray = field(metadata=_array("mm2", "step"))
     """(step,) in mm2: area of the sensing surface that bears pressure."""
     penetration_mm: np.ndarray = field(metadata=_array("mm", "step"))

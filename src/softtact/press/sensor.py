@@ -148,7 +148,8 @@ class Sensor:
         """A motion's result with the steps flagged that bury the object or overload the sensor."""
         return flag_overloaded(flag_buried(result, height_mm), self.spec.force_range_n[1])
 
-    def press_many(self, meshes: trimesh.Trimesh | Sequence[trimesh.Trimesh], poses: Sequence[Pose | None] | None = None, *,
+    def press_many(self, meshes: trimesh.Trimesh | Sequence[trimesh.Trimesh],
+                   poses: Sequence[Pose | np.ndarray | Sequence[float] | None] | None = None, *,
                    force_n: float | Sequence[float], model: str = "auto", workers: int | None = None, device: str = "auto",
                    failures: str = "raise", label: str = "presses", **options: Any) -> list[PressResult]:
         """Press each of `meshes` in its pose, all through the same forces; a list of `PressResult`s in their order.
@@ -161,12 +162,12 @@ class Sensor:
         """
         if isinstance(meshes, trimesh.Trimesh):
             meshes = [meshes] * (1 if poses is None else len(poses))
-        poses = [None] * len(meshes) if poses is None else list(poses)
-        if len(meshes) != len(poses):
-            raise InputError(f"There are {len(meshes)} meshes and {len(poses)} poses; give one pose for each mesh, or one mesh.")
+        places = [Pose.of(pose) for pose in ([None] * len(meshes) if poses is None else poses)]
+        if len(meshes) != len(places):
+            raise InputError(f"There are {len(meshes)} meshes and {len(places)} poses; give one pose for each mesh, or one mesh.")
         if failures not in ("raise", "keep"):
             raise InputError(f"failures={failures!r} is unknown; write 'raise' or 'keep'.")
-        results = press_many(self, list(meshes), poses, self.checked_forces(force_n), model=model, workers=workers or cores(),
+        results = press_many(self, list(meshes), places, self.checked_forces(force_n), model=model, workers=workers or cores(),
                              device=device, label=label, options=options)
         return raise_first(results) if failures == "raise" else results
 

@@ -17,7 +17,7 @@ from softtact.contact.friction import Coulomb, FrictionState
 from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.contact.history import ContactHistory
 from softtact.contact.penalty import Contact
-from softtact.fem.elements import HEX27, QUAD9
+from softtact.fem.elements import HEX27, QUAD9, dofs_of
 from softtact.fem.extruded_mesh import CORE_RADIUS, disc_mesh_2d, extrude
 from softtact.fem.kernels import add_forces
 from softtact.fem.quadrature import gauss
@@ -164,7 +164,7 @@ class FrustumArray:
         moves[self.root_dofs] = True
         layers, planes = [], []
         for k in range(self.mesh.layers):
-            unknowns = _dofs(self.mesh.layer(k))
+            unknowns = dofs_of(self.mesh.layer(k))
             layers.append([np.where(moves[unknowns], unknowns, -1)])
             moving = (self.point_layer == k) & (self.point_neighbour != BOARD)
             planes.append(3 * self.point_nodes[moving, -1] + self.point_axis[moving])
@@ -343,8 +343,3 @@ class FrustumArray:
         worst = int(np.argmax(share))
         x, y = self.geometry.centres[worst]
         return float(share[worst]), f"the frustum at x {x:.1f}, y {y:.1f} mm is compressed by {share[worst]:.0%} of its height"
-
-
-def _dofs(nodes):
-    """Unknowns (..., 3 k) of nodes (..., k)."""
-    return (3 * nodes[..., None] + np.arange(3)).reshape(*nodes.shape[:-1], -1)

@@ -134,6 +134,16 @@ class ByMotion:
     remedy = "Make the step's way or load smaller"
 
 
+class ToStop(ByMotion):
+    """The way down to where something else carries the object."""
+
+    remedy = "Ask for smaller forces"
+
+    def failure(self, start: float, coordinate: float) -> str:
+        return (f"The object was not brought down to where it rests on the shell, {self.after.indentation:.3g} mm below its pose: "
+                f"from {start:.0%} of the way on no increment found a balance")
+
+
 def press_load_steps(body: LayeredBody, surface: Surface, forces_n: Iterable[float], *, settings: NewtonSettings = DEFAULT,
                      touch_mm: float = 0.0, stop_mm: float = np.inf) -> Iterator[LoadStep]:
     """Yield a `LoadStep` for each force (N, increasing). Raises ConvergenceError naming the load step that was not reached.
@@ -173,7 +183,7 @@ def _up_to(body, surface, state, reached, force, stop_mm, settings):
             raise
         failed = error
     begin, end = (Control(None, depth, np.zeros(2)) for depth in (state.indentation, stop_mm))
-    stopped = _advance(body, surface, state, 0.0, ByMotion(begin, end, state.force, settings.largest_way_mm, 1), settings)
+    stopped = _advance(body, surface, state, 0.0, ToStop(begin, end, state.force, settings.largest_way_mm, 1), settings)
     if failed is not None and stopped.state.force >= force:
         raise failed
     return stopped, stopped

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from softtact.fem.elements import dofs_of
 from softtact.fem.static_condensation import packed
 from softtact.fem.substructuring import LayerwiseElimination
 from softtact.fem.tangent_cache import TangentCache
@@ -180,19 +181,19 @@ class CellKind:
         members = [nodes.reshape(len(self.cells), -1) for nodes, _ in group.parts]
         self.nodes, local = _same_in_all(np.hstack([*members, roots]))
         *groups, root = np.split(local, np.cumsum([m.shape[1] for m in members]))
-        elements = iter(_dofs(group.reshape(-1, nodes.shape[1])) for group, (nodes, _) in zip(groups, group.parts, strict=True))
+        elements = iter(dofs_of(group.reshape(-1, nodes.shape[1])) for group, (nodes, _) in zip(groups, group.parts, strict=True))
         layers = [[next(elements) for _ in layer] for layer in self._layers]
-        layers[0].insert(0, _dofs(root[None]))
+        layers[0].insert(0, dofs_of(root[None]))
         inner = self._inner(slab)
         self.elimination = LayerwiseElimination(len(self.cells), inner, layers)
-        self.inner_dofs, self.outer_dofs = _dofs(self.nodes)[:, inner], _dofs(self.nodes)[:, self.elimination.outer]
+        self.inner_dofs, self.outer_dofs = dofs_of(self.nodes)[:, inner], dofs_of(self.nodes)[:, self.elimination.outer]
         self._inner_places = np.flatnonzero(inner)
 
     def _inner(self, slab):
         """Which unknowns (n,) are of nodes in one cell only, in every cell; the others stay global."""
         free = np.zeros(3 * slab.nodes, dtype=bool)
         free[slab.free] = True
-        return (np.repeat(slab.uses[self.nodes] == 1, 3, axis=1) & free[_dofs(self.nodes)]).all(axis=0)
+        return (np.repeat(slab.uses[self.nodes] == 1, 3, axis=1) & free[dofs_of(self.nodes)]).all(axis=0)
 
     def residual(self, flat: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
         """What the slab's forces (all unknowns,) on inner unknowns leave on the outer ones (c, k), and what `inner_step` needs."""
@@ -232,11 +233,6 @@ class CellKind:
         elements = (chosen[:, None] * per_cell + np.arange(per_cell)).ravel()
         each = kept.at(state.slab.displacement[nodes[elements]], elements, kept_mm=kept_mm)
         return each.reshape(len(chosen), per_cell, -1)
-
-
-def _dofs(nodes):
-    """Unknowns (..., 3 k) of nodes (..., k)."""
-    return (3 * nodes[..., None] + np.arange(3)).reshape(*nodes.shape[:-1], -1)
 
 
 def _same_in_all(members):
