@@ -370,3 +370,8 @@ def test_a_time_limit_ends_a_press_with_status_3_and_one_sentence(tmp_path, caps
     assert main(["press", str(ball), "--unit", "mm", "--force", "5", "--model", "hyperelastic", "--sensor", "pad4x4",
                  "--time-limit", "0.001"]) == 3
     assert "The time limit of 0.001 s was reached" in capsys.readouterr().err
+
+
+def test_a_time_limit_of_no_time_is_refused(capsys):
+    assert main(["press", str(OBJECT), "--unit", "mm", "--force", "5", "--time-limit", "0"]) == 1
+    assert "--time-limit 0: a press needs some time; give seconds above 0" in capsys.readouterr().err

@@ -1,5 +1,6 @@
 """How a press goes about its work: time limits, interruptions, steps as they are reached, and what auto falls back on."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -68,7 +69,7 @@ def test_a_heartbeat_tells_force_iteration_residual_and_time_on_one_line(sensor,
 def fakes(monkeypatch):
     """Models that answer at once: what they are set to, and which were asked."""
     base = Sensor(SMALL, LAWS, mesh=COARSE).press(BALL, force_n=[0.5], model="elastic", label="")
-    base = replace(base, frustum_compression_mm=np.array([0.01]))
+    base = replace(base, frustum_compression_mm=np.array([0.01]), expected_error_mm=np.array([np.nan]), attributes={})
     state = {name: replace(base, model=name) for name in ("elastic", "foundation", "hyperelastic")}
 
     def press(name):
@@ -114,6 +115,23 @@ def test_the_papers_rule_is_taken_where_it_is_asked_for(fakes):
     assert "the paper's rule" in chosen(policy="paper").selection_reason
 
 
+def test_a_fast_model_states_the_interval_of_its_error_and_the_hyperelastic_one_none(fakes):
+    told = {name for name in chosen().attributes if "expected_error" in name}
+    assert told == {"expected_error_times_low", "expected_error_times_high"}
+    fakes["elastic"] = fakes["foundation"] = ConvergenceError("not reached")
+    assert not any("expected_error" in name for name in chosen().attributes)
+
+
+def test_what_the_fast_models_took_is_off_the_time_limit(fakes, monkeypatch):
+    left = []
+    slow = {name: lambda *_, name=name: (time.sleep(0.05), fakes[name])[1] for name in ("elastic", "foundation")}
+    fakes["elastic"] = fakes["foundation"] = replace(fakes["elastic"], within_validity=np.zeros(1, dtype=np.int8))
+    monkeypatch.setattr(choice, "PRESSES", slow | {
+        "hyperelastic": lambda sensor, placed, forces, course: (left.append(course.time_limit_s), fakes["hyperelastic"])[1]})
+    chosen(time_limit_s=5.0)
+    assert 4.0 < left[0] < 4.9 + 1e-3
+
+
 # --- what a press takes ---
 
 
@@ -140,3 +158,12 @@ def test_the_indentation_counts_from_first_touch_however_high_the_pose_is(sensor
     low, high = (sensor.press(BALL, pose=[0, 0, z, 0, 0, 0], force_n=0.5, model=model, label="") for z in (3.0, -4.0))
     assert low.indentation_mm[0] == pytest.approx(high.indentation_mm[0], rel=1e-4) and 0 < low.indentation_mm[0] < 1
     assert high.within_validity.all()
+
+
+def test_many_presses_take_matrices_as_single_ones_do(sensor):
+    matrix = np.eye(4)
+    matrix[:3, 3] = [0.3, 0.2, 3.0]
+    one, = sensor.press_many(BALL, [matrix], force_n=0.5, model="elastic", workers=1, device="cpu")
+    single = sensor.press(BALL, pose=matrix, force_n=0.5, model="elastic", label="")
+    np.testing.assert_array_equal(one.deformation_map_mm, single.deformation_map_mm)
+    assert one.expected_error_mm[0] == single.expected_error_mm[0] > 0
