@@ -28,7 +28,7 @@ def draw(result: "PressResult", *, full_scale: bool = False, figure: "Figure | N
     half = [0.5 * (side[-1] - side[0]) for side in (result.x_mm, result.y_mm)]
     extent = (-half[0], half[0], -half[1], half[1])
     figure = figure or Figure()
-    figure.set_size_inches(1.2 + 2.3 * steps, 7.2)
+    figure.set_size_inches(1.2 + 2.3 * steps, 2.4 + 3.2 * half[1] / half[0])
     figure.set_layout_engine("constrained")
     axes = figure.subplots(2, steps, squeeze=False)
     deepest = float(result.deformation_map_mm.max()) or 1.0
