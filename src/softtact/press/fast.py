@@ -113,7 +113,8 @@ def _exactly(forces, found):
 
 
 def _of_load_steps(sensor, compliance, points, load_steps, forces, times, touch_mm):
-    """The result of a foundation press' load steps, be it those before one that was not reached."""
+    """The result of a foundation press' load steps whose times are noted, be it those before one that was not reached."""
+    load_steps = load_steps[:len(times)]
     area, count = points.covered * compliance.grid.areas(points.nodes), len(load_steps)
     compression = np.array([load_step.compression.max() for load_step in load_steps])
     depth = np.array([load_step.depth for load_step in load_steps]) - touch_mm
@@ -125,7 +126,7 @@ def _of_load_steps(sensor, compliance, points, load_steps, forces, times, touch_
                "contact_area_mm2": [area[load_step.touching].sum() for load_step in load_steps],
                "iterations": [load_step.iterations for load_step in load_steps], "frustum_compression_mm": compression}
     return make_result(sensor, "foundation", "dense", FoundationMaps(compliance, points)(load_steps), forces[:count],
-                       np.array(times[:count]), within_validity=valid, residual_n=unknown, extrapolated_volume_fraction=unknown,
+                       np.array(times), within_validity=valid, residual_n=unknown, extrapolated_volume_fraction=unknown,
                        **numbers)
 
 

@@ -29,42 +29,42 @@ def press_hyperelastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray | M
 
     A ConvergenceError, of which a time limit is one, and an interruption of the keyboard hold the load steps before.
     """
-    surface, shell = HeightField(placed), shell_of(sensor)
-    lowest = surface.first_touch_mm(sensor.spec.map_x_mm, sensor.spec.map_y_mm)
+    surface = HeightField(placed)
+    touch = surface.first_touch_mm(sensor.spec.map_x_mm, sensor.spec.map_y_mm)
     count = len(forces.steps) if isinstance(forces, Motion) else len(forces)
     if isinstance(forces, Motion):
         path.check_motion(forces)
     body = sensor.body(threads=course.threads, surface=_swept(surface, forces))
-    grid = np.stack(np.meshgrid(sensor.spec.map_x_mm, sensor.spec.map_y_mm), axis=-1).reshape(-1, 2)
-    sampling, lower = body.slab.sampling(grid), None if sensor.spec.base_held else lower_side(body.slab, grid)
     if course.label:
         announce(f"{course.label}: {sensor.spec.parts_in_words}, {count} load steps of the hyperelastic model")
     body.watch = Watch(course.label, limit_s=course.time_limit_s)
-    record: list[dict[str, Any]] = []
-    times: list[float] = []
-    bodies: list[Any] = []
-
-    def read(load_step):
-        _refuse_beyond_the_board(load_step, lowest, sensor.spec.deepest_mm)
-        if isinstance(forces, Motion):
-            shell.refuse_motion(surface, load_step.state.slab.projection.offset_mm, load_step.state.indentation, lowest,
-                                step=len(record) + 1)
-        record.append(_read_load_step(body, (sampling, lower, grid), load_step, from_mm=lowest))
-        if course.keep_body:
-            bodies.append(pressed_body(body, load_step.state))
-
-    load_steps = (path.press_motion(body, surface, forces, lowest, settings=sensor.solver) if isinstance(forces, Motion)
-                  else path.press_load_steps(body, surface, forces, settings=sensor.solver, touch_mm=lowest,
-                                             stop_mm=shell.stop_mm(surface)))
-    def so_far():
-        return _of_record(sensor, body, record, times, bodies)
-
+    record = _Record(sensor, body, touch, keep_body=course.keep_body)
+    load_steps = map(record.take, _allowed(_load_steps(sensor, body, surface, forces, touch), sensor, surface, forces, touch))
     try:
-        timed(map(read, load_steps), count, replace(course, label=""), times, so_far)
-        return so_far()
+        timed(load_steps, count, replace(course, label=""), record.times, record.result)
+        return record.result()
     finally:
         body.watch.end()
         body.close()
+
+
+def _load_steps(sensor, body, surface, forces, touch_mm):
+    """The path's `LoadStep`s, one after the other."""
+    if isinstance(forces, Motion):
+        return path.press_motion(body, surface, forces, touch_mm, settings=sensor.solver)
+    return path.press_load_steps(body, surface, forces, settings=sensor.solver, touch_mm=touch_mm,
+                                 stop_mm=shell_of(sensor).stop_mm(surface))
+
+
+def _allowed(load_steps, sensor, surface, forces, touch_mm):
+    """The same, with a ConvergenceError at the first one that goes beyond the board or, in a motion, into the shell."""
+    shell = shell_of(sensor)
+    for number, load_step in enumerate(load_steps, start=1):
+        _refuse_beyond_the_board(load_step, touch_mm, sensor.spec.deepest_mm)
+        if isinstance(forces, Motion):
+            state = load_step.state
+            shell.refuse_motion(surface, state.slab.projection.offset_mm, state.indentation, touch_mm, step=number)
+        yield load_step
 
 
 def _swept(surface, forces):
@@ -82,20 +82,41 @@ def _refuse_beyond_the_board(load_step, lowest_mm, thickness_mm):
             "forces, a finer cover (--mesh-quality fine), or use a blunter tip.")
 
 
-def _of_record(sensor, body, record, times, bodies):
-    numbers = {name: np.array([load_step[name] for load_step in record]) for name in record[0]}
-    forces, displacement = numbers.pop("normal_force_n"), numbers["displacement_mm"]
-    numbers["displacement_mm"] = displacement.reshape(len(record), *sensor.spec.map_shape, 3)
-    numbers["slip"] = numbers["slip"].reshape(len(record), *sensor.spec.map_shape)
-    _warn_extrapolation(numbers["extrapolated_volume_fraction"], forces)
-    valid = valid_hyperelastic(compression_mm=numbers["frustum_compression_mm"], depth_mm=numbers["indentation_mm"],
-                               contact_error_mm=numbers.pop("contact_error_mm"),
-                               points=np.where(numbers["pad_force_n"] > 0, numbers.pop("points"), np.inf),
-                               frustum_mm=sensor.spec.frustum_height_mm, forces_n=forces,
-                               allowed_mm=sensor.solver.largest_penetration_mm)
-    result = make_result(sensor, "hyperelastic", body.method, -displacement[..., 2], forces, np.array(times),
-                         within_validity=valid, **numbers)
-    return replace(result, bodies=tuple(bodies))
+class _Record:
+    """What a press has reached: the numbers of its load steps, the seconds that each took, and bodies where they are kept."""
+
+    def __init__(self, sensor, body, touch_mm, *, keep_body):
+        self._sensor, self._body, self._touch_mm, self._keep_body = sensor, body, touch_mm, keep_body
+        self._grid = np.stack(np.meshgrid(sensor.spec.map_x_mm, sensor.spec.map_y_mm), axis=-1).reshape(-1, 2)
+        self._sampling = body.slab.sampling(self._grid)
+        self._lower = None if sensor.spec.base_held else lower_side(body.slab, self._grid)
+        self._steps: list[dict[str, Any]] = []
+        self._bodies: list[Any] = []
+        self.times: list[float] = []
+
+    def take(self, load_step):
+        """Read a load step; its time is noted by who asked for it."""
+        maps = self._sampling, self._lower, self._grid
+        self._steps.append(_read_load_step(self._body, maps, load_step, from_mm=self._touch_mm))
+        if self._keep_body:
+            self._bodies.append(pressed_body(self._body, load_step.state))
+
+    def result(self):
+        """The `PressResult` of the load steps whose time is noted: an interruption may come just before it is."""
+        sensor, steps = self._sensor, self._steps[:len(self.times)]
+        numbers = {name: np.array([load_step[name] for load_step in steps]) for name in steps[0]}
+        forces, displacement = numbers.pop("normal_force_n"), numbers["displacement_mm"]
+        numbers["displacement_mm"] = displacement.reshape(len(steps), *sensor.spec.map_shape, 3)
+        numbers["slip"] = numbers["slip"].reshape(len(steps), *sensor.spec.map_shape)
+        _warn_extrapolation(numbers["extrapolated_volume_fraction"], forces)
+        points = np.where(numbers["pad_force_n"] > 0, numbers.pop("points"), np.inf)
+        valid = valid_hyperelastic(compression_mm=numbers["frustum_compression_mm"], depth_mm=numbers["indentation_mm"],
+                                   contact_error_mm=numbers.pop("contact_error_mm"), points=points,
+                                   frustum_mm=sensor.spec.frustum_height_mm, forces_n=forces,
+                                   allowed_mm=sensor.solver.largest_penetration_mm)
+        made = make_result(sensor, "hyperelastic", self._body.method, -displacement[..., 2], forces, np.array(self.times),
+                           within_validity=valid, **numbers)
+        return replace(made, bodies=tuple(self._bodies[:len(steps)]))
 
 
 def _warn_extrapolation(shares, forces):
