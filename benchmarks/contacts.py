@@ -127,8 +127,8 @@ def placed_pose(contact):
 
 
 def press_one(job):
-    """Press a contact with the hyperelastic model, one thread; write what was reached, and the reason where not all was."""
-    contact, out, limit_s, quality = job
+    """Press a contact with the hyperelastic model; write what was reached, and the reason where not all was."""
+    contact, out, limit_s, quality, threads = job
     file = out / f"{contact.name}.npz"
     if file.exists():
         return contact.name, "there"
@@ -140,7 +140,7 @@ def press_one(job):
     start, reason, result = time.perf_counter(), "", None
     try:
         result = sensor.press(contact.mesh, pose=placed_pose(contact), force_n=list(contact.forces_n), model="hyperelastic",
-                              threads=1, label="", time_limit_s=limit_s)
+                              threads=threads, label="", time_limit_s=limit_s)
     except SofttactError as error:
         reason, result = str(error), getattr(error, "result", None)
     seconds = time.perf_counter() - start
@@ -155,8 +155,10 @@ def press_one(job):
 def press(arguments):
     """Press the contacts of some sets over processes."""
     arguments.out.mkdir(parents=True, exist_ok=True)
-    jobs = [(contact, arguments.out, arguments.limit, arguments.mesh_quality)
+    jobs = [(contact, arguments.out, arguments.limit, arguments.mesh_quality, arguments.threads)
             for which in arguments.set for contact in contacts(which)]
+    first_ones = set(arguments.first.read_text().split()) if arguments.first else set()
+    jobs.sort(key=lambda job: job[0].name not in first_ones)
     first = softtact.load_sensor("coro")     # compiles, once for all processes
     first.press(trimesh.creation.icosphere(subdivisions=3, radius=4.0), force_n=1.0, model="hyperelastic", threads=1, label="")
     with multiprocessing.get_context("fork").Pool(arguments.workers) as pool:
@@ -195,6 +197,8 @@ def main():
     one = commands.add_parser("press")
     one.add_argument("--set", nargs="+", choices=COUNTS, required=True)
     one.add_argument("--workers", type=int, default=2)
+    one.add_argument("--threads", type=int, default=1, help="of each press")
+    one.add_argument("--first", type=Path, help="file with names of contacts that are pressed before the others")
     one.add_argument("--limit", type=float, default=IN_TIME_S, help="seconds of one press")
     one.add_argument("--mesh-quality", default="default")
     one.set_defaults(act=press)

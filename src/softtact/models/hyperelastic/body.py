@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from softtact.fem.kernels_torch import DeviceKernels
 
 _DAMPINGS = 4         # steps that are tried with ever more damping of the cells that they throw too far
-_FIRST_SHIFT = 0.01   # N/mm on every free unknown of the slab, doubled until the tangent is positive definite ...
-_LESS = 0.25          # of the shift before, from which the next one's search begins
-_MOST_DOUBLINGS = 40  # ... but a tangent that is not even finite will never be
+_FIRST_SHIFT = 0.01   # N/mm on every free unknown of the slab, then more until the tangent is positive definite ...
+_MORE, _LESS = 4.0, 0.25   # of the shift before: the next that is tried, and from where a later search begins
+_MOST_SHIFTS = 20     # ... but a tangent that is not even finite will never be
 
 
 @dataclass(frozen=True)
@@ -83,8 +83,8 @@ def _shifts(last):
     if first == _FIRST_SHIFT:
         yield None
         yield 0.0
-    for doubling in range(_MOST_DOUBLINGS):
-        yield first * 2**doubling
+    for number in range(_MOST_SHIFTS):
+        yield first * _MORE**number
 
 
 class LayeredBody:
@@ -191,7 +191,7 @@ class LayeredBody:
         """The step with the cells as they are damped now."""
         self.cells.refresh(state, kept_mm=kept_mm, workers=self.workers)
         residual, kept = self.cells.condensed_residual(state, workers=self.workers)
-        contact = StepContact(self.slab, state.slab, state.indentation, surface, workers=self.workers)
+        contact = StepContact(self.slab, state.slab, state.indentation, surface, largest_mm=largest_mm, workers=self.workers)
         step, indentation_increment = self._step_of_unknowns(state, residual.ravel()[self.slab.unknowns], contact, force_n,
                                                  largest_mm)
         full = np.zeros(3 * self.slab.nodes)

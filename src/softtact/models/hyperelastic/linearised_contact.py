@@ -17,11 +17,13 @@ class StepContact:
     """The object's contact in the course of a step from a `SlabState`; `planes` and `points` are what it is at present.
 
     surface: looked up anew where the step leads; None: the points keep the planes that they face
+    largest_mm: to which a step is cut: what a longer one would face at its end may lie far from where it stops
     """
 
     def __init__(self, slab: Slab, state: SlabState, indentation: float, surface: Surface | None = None, *,
-                 workers: Workers = SERIAL) -> None:
+                 largest_mm: float = np.inf, workers: Workers = SERIAL) -> None:
         self._slab, self._state, self._indentation, self._surface, self._workers = slab, state, indentation, surface, workers
+        self._largest_mm = largest_mm
         self._face(state.projection)
 
     def _face(self, projection):
@@ -57,7 +59,8 @@ class StepContact:
         """Look up what the points face after a step (unknowns,) in mm of the slab; True if there is a surface to ask."""
         if self._surface is None:
             return False
+        share = min(1.0, self._largest_mm / max(np.abs(step).max(), abs(indentation_increment), 1e-30))
         displacement = self._state.displacement.copy()
-        displacement.ravel()[self._slab.unknowns] += step
-        self._face(self._slab.project(displacement, self._surface, self._indentation + indentation_increment))
+        displacement.ravel()[self._slab.unknowns] += share * step
+        self._face(self._slab.project(displacement, self._surface, self._indentation + share * indentation_increment))
         return True
