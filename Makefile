@@ -1,10 +1,11 @@
-# `make`: the default study.  `make tiny`: the smallest study.  `make test`: the tests.  `make docs`: the documentation.
+# `make`: the default study.  `make tiny`: the smallest study.  `make docs`: the documentation.
+# `make test`: the tests, in minutes.  `make test-slow`: those that take longer, CalculiX's and whole runs of the workflow among them.
 # `make numbers`: the measured numbers in docs/, from benchmarks/results/ and a count of the tests.
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 BIN := .venv/bin
 SNAKEMAKE = $(BIN)/snakemake --cores all
 
-.PHONY: study tiny test lint advice bench docs numbers clean
+.PHONY: study tiny test test-slow lint advice bench docs numbers clean
 
 study: .venv/installed
 	$(SNAKEMAKE)
@@ -15,11 +16,15 @@ tiny: .venv/installed
 	@echo "Open results/tiny/report.html"
 
 # Two processes with one thread each: two threads in one process take nearly as long as one.
-test: export OMP_NUM_THREADS = 1
-test: export MKL_NUM_THREADS = 1
-test: export OPENBLAS_NUM_THREADS = 1
+test test-slow: export OMP_NUM_THREADS = 1
+test test-slow: export MKL_NUM_THREADS = 1
+test test-slow: export OPENBLAS_NUM_THREADS = 1
+PYTEST = $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 test: .venv/tested
-	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
+	$(PYTEST) -m 'not gold and not slow'
+
+test-slow: .venv/tested
+	$(PYTEST) -m 'slow and not gold'
 
 bench: .venv/installed
 	for benchmark in fast_models press scaling mesh_error edges against_calculix discretisation unknowns materials discs glass_mesh glass_edge \

@@ -84,6 +84,7 @@ def desk(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", python_blocks(run=True))
 def test_python_on_a_page_runs_and_prints_or_leaves_a_press(text, desk, monkeypatch, capsys):
     monkeypatch.chdir(desk)
@@ -92,6 +93,7 @@ def test_python_on_a_page_runs_and_prints_or_leaves_a_press(text, desk, monkeypa
     assert capsys.readouterr().out or np.isfinite(names["result"].deformation_map_mm).all()
 
 
+@pytest.mark.slow
 def test_every_softtact_line_on_a_page_succeeds(desk, monkeypatch, capsys):
     monkeypatch.chdir(desk)
     for line in shell_lines(run=True):

@@ -69,6 +69,7 @@ CASES = {"sides held": (lambda: small_body(2, 2), [0.5, 1.0, 2.0, 4.0, 8.0]),
          "sides gliding, frusta folded": (folding_body, [0.2, 0.4, 0.8, 1.4, 2.0, 2.6, 3.2, 4.0])}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_condensing_the_frusta_changes_nothing(case, record):
     """All unknowns in one matrix, plain Newton steps, own contact sums: the states have to agree at every load step."""

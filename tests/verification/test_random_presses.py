@@ -39,6 +39,7 @@ def test_no_press_of_the_long_run_went_wrong_unsaid(model, record):
     assert wrong == 0, [note for note in counts["notes"] if note[1] in WRONG]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("model", "presses"), [("elastic", 20), ("foundation", 5)])
 def test_presses_that_nobody_tried_before_go_well(benchmark, model, presses):
     first = 10**6      # beyond those of the long run

@@ -18,6 +18,8 @@ from softtact.models.elastic.motion_press import move_on_layer
 from softtact.models.elastic.sliding import SlidingObject
 from softtact.models.elastic.tangential import surface_compliance
 
+pytestmark = pytest.mark.slow     # the compliance of two thick layers
+
 SHEAR, POISSON, A, RADIUS, FRICTION = 1.0, 0.4999, 1.0, 100.0, 0.3
 FORCE = 4 * 2 * SHEAR * (1 + POISSON) / (1 - POISSON**2) * A**3 / (3 * RADIUS)      # Hertz's for the radius A
 LIMIT = FRICTION * FORCE

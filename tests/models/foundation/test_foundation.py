@@ -48,6 +48,7 @@ def loaded(compliance, whole):
 # Blocks are kept in single precision, and the springs that tie the frusta's descents, 20 N/mm, are taken off again.
 
 
+@pytest.mark.slow
 def test_maps_and_compressions_are_those_of_the_whole_slab(loaded, whole):
     places, load, lateral, moved, _ = loaded
     assert_close(places.maps(load[:, None], lateral[:, None])[0, 1:-1, 1:-1], -moved[3 * whole.electrode + 2], 1e-5)
@@ -124,6 +125,7 @@ def test_the_conditions_of_contact_hold_for_object_and_frusta(compliance):
                 assert load_step.touching.any() and load_step.iterations > 0
 
 
+@pytest.mark.slow
 def test_the_frusta_and_the_held_sides_carry_the_objects_force(compliance, whole):
     """The whole slab under the press' loads comes down on the frusta as the press says, and these push back by their law."""
     for name in POSES:
@@ -154,6 +156,7 @@ def test_rocking_frusta_push_where_the_rims_of_their_tips_meet_the_board(complia
     assert (short[q == 0] < 1e-5).all()
 
 
+@pytest.mark.slow
 def test_with_all_that_finite_displacement_adds_frusta_and_whole_slab_are_in_balance(compliance, whole):
     """The whole slab moves under the press' loads; what these should be by the movement, law and formulas is what they are."""
     for name in POSES:

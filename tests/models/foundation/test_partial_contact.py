@@ -13,6 +13,8 @@ from softtact.models.foundation.compliance import foundation_compliance
 from softtact.models.foundation.partial_contact import SoftEdges, beyond, own_compliance
 from softtact.models.foundation.solve import FoundationMaps, FoundationSettings, press_foundation
 
+pytestmark = pytest.mark.slow     # the compliance of two grids
+
 LINEAR = FoundationSettings(follow=False, rocking=False)
 FINER = 3      # an odd number: nodes of the coarse grid are corners on it where they are corners
 

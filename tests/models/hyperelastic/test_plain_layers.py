@@ -86,6 +86,7 @@ def test_the_elastic_and_the_hyperelastic_model_agree_under_a_light_ball():
     assert hyper.tactile_map == pytest.approx(elastic.tactile_map, abs=0.03 * elastic.tactile_map.max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("support", ["base", "none"])
 def test_what_holds_the_layers_carries_the_object(support):
     """Balance of the whole body: reactions of sides and board against the object. The solver leaves up to 3e-3 N at a node."""
