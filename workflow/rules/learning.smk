@@ -27,9 +27,19 @@ def curve_networks(model):
 
 
 def curve_files(wildcards):
-    """The search's result, where a network of the learning curve takes its learning rate from it."""
-    needed = set(curve_networks(wildcards.model)) != {"compact"}
-    return {"best": f"{RESULTS}/learning/{wildcards.model}/best.json"} if needed else {}
+    """What the search and the trial of rates found, where a network of the learning curve needs it."""
+    networks = curve_networks(wildcards.model)
+    searched = {"best": f"{RESULTS}/learning/{wildcards.model}/best.json"} if "searched" in networks else {}
+    return searched | (rate_file("printed") if "printed" in networks else {})
+
+
+def rate_file(architecture):
+    """The learning rate that was found for a network itself, as an input of its training; the searched one has the search's."""
+    found = architecture == "printed" and STUDY.values.training.learning_rate == "found"
+    return {"rate": f"{RESULTS}/learning/{{model}}/rate.json"} if found else {}
+
+
+OWN = STUDY.values.network.architecture
 
 
 rule build_dataset:
@@ -82,8 +92,35 @@ rule search_hyperparameters:
         run_stage("search_hyperparameters")
 
 
+rule find_learning_rate:
+    input:
+        code=code("find_learning_rate"),
+        train=f"{RESULTS}/dataset/{{model}}/train.nc",
+        validation=f"{RESULTS}/dataset/{{model}}/validation.nc",
+    output:
+        rates=f"{RESULTS}/learning/{{model}}/rates.csv",
+        rate=f"{RESULTS}/learning/{{model}}/rate.json",
+    params:
+        files=files,
+        settings=as_settings(
+            training=STUDY.values.training.model_dump(mode="json", exclude={"threads", "epochs", "patience", "learning_rate"}),
+            network=plain(STUDY.values.network),
+            ssim=plain(STUDY.values.ssim),
+            seed=STUDY.values.seed,
+            threads=STUDY.values.training.threads,
+        ),
+    threads: STUDY.values.training.threads
+    log:
+        log_of("find_learning_rate", "{model}"),
+    benchmark:
+        benchmark_of("find_learning_rate", "{model}")
+    shell:
+        run_stage("find_learning_rate")
+
+
 rule train_cnn:
     input:
+        **rate_file(OWN),
         code=code("train_cnn"),
         train=f"{RESULTS}/dataset/{{model}}/train.nc",
         validation=f"{RESULTS}/dataset/{{model}}/validation.nc",
@@ -112,6 +149,7 @@ rule train_cnn:
 
 rule train_beside:
     input:
+        **rate_file(BESIDE),
         code=code("train_cnn"),
         train=f"{RESULTS}/dataset/{{model}}/train.nc",
         validation=f"{RESULTS}/dataset/{{model}}/validation.nc",
@@ -164,19 +202,47 @@ rule evaluate:
         run_stage("evaluate")
 
 
+rule score_baselines:
+    input:
+        code=code("score_baselines"),
+        **{split: dataset(split) for split in SPLITS},
+    output:
+        baselines=f"{RESULTS}/evaluation/baselines.csv",
+        taxels=f"{RESULTS}/evaluation/taxels.csv",
+    params:
+        files=files,
+        settings=as_settings(
+            sensor=STUDY.sensor,
+            counts_per_relative_change=STUDY.counts_per_relative_change,
+            ssim=plain(STUDY.values.ssim),
+        ),
+    log:
+        log_of("score_baselines"),
+    benchmark:
+        benchmark_of("score_baselines")
+    shell:
+        run_stage("score_baselines")
+
+
 rule compare_networks:
     input:
         code=code("compare_networks"),
         networks=learned("model.pt"),
         timings=learned("timing.csv"),
+        histories=learned("history.csv"),
+        baselines=rules.score_baselines.output.baselines,
+        ceiling=rules.evaluate.output.ceiling,
         validation=dataset("validation"),
         unseen=dataset("unseen"),
         grasps=dataset("grasps"),
     output:
         networks=f"{RESULTS}/tables/networks.csv",
+        scores=f"{RESULTS}/tables/scores.csv",
+        levels=f"{RESULTS}/tables/levels.csv",
+        verdicts=f"{RESULTS}/evaluation/verdicts.json",
     params:
         files=files,
-        settings=as_settings(ssim=plain(STUDY.values.ssim), seed=STUDY.values.seed),
+        settings=as_settings(own=OWN, ssim=plain(STUDY.values.ssim), seed=STUDY.values.seed),
     log:
         log_of("compare_networks"),
     benchmark:
@@ -229,3 +295,28 @@ rule find_limits:
         benchmark_of("find_limits")
     shell:
         run_stage("find_limits")
+
+
+if not STUDY.archive:
+
+    rule compare_gains:
+        input:
+            code=code("compare_gains"),
+            references=[f"{RESULTS}/presses/grasps/{item}/{STUDY.values.reference}.nc" for item in STUDY.items_of["grasps"]],
+            presses=[f"{RESULTS}/presses/grasps/{item}/{model}.nc" for model in STUDY.tested for item in STUDY.items_of["grasps"]],
+        output:
+            gains=f"{RESULTS}/tables/gains.csv",
+        params:
+            files=files,
+            settings=as_settings(
+                sensor=STUDY.sensor,
+                virtual_sensor=STUDY.values.virtual_sensor,
+                ssim=plain(STUDY.values.ssim),
+                seed=STUDY.values.seed,
+            ),
+        log:
+            log_of("compare_gains"),
+        benchmark:
+            benchmark_of("compare_gains")
+        shell:
+            run_stage("compare_gains")

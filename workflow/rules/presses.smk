@@ -51,6 +51,29 @@ for _model in STUDY.pressed_with:
                 f'{run_stage("simulate_presses")} && {TOLD}'
 
 
+# The first grasped object once more with each tested model: are maps deterministic?
+FIRST = next(iter(STUDY.items_of["grasps"].values()))
+
+
+rule repeat_press:
+    input:
+        unpack(model_files),
+        code=code("simulate_press"),
+        object=FIRST.file,
+    output:
+        press=f"{RESULTS}/repeated/{{model}}.nc",
+    params:
+        files=files,
+        settings=lambda w: pressed_with(w.model, [FIRST], STUDY.values.forces_n),
+    log:
+        log_of("repeat_press", "{model}"),
+    benchmark:
+        benchmark_of("repeat_press", "{model}")
+    threads: 1
+    shell:
+        run_stage("simulate_press")
+
+
 rule read_virtual_sensor:
     input:
         code=code("read_virtual_sensor"),

@@ -50,7 +50,18 @@ rule make_tables:
         per_item=rules.evaluate.output.per_item,
         ceiling=rules.evaluate.output.ceiling,
         timing=rules.evaluate.output.timing,
-        **({} if STUDY.archive else {"features": rules.measure_features.output.features}),
+        scores=rules.compare_networks.output.scores,
+        taxels=rules.score_baselines.output.taxels,
+        searches=[f"{RESULTS}/learning/{model}/best.json" for model in STUDY.tested],
+        **(
+            {}
+            if STUDY.archive
+            else {
+                "features": rules.measure_features.output.features,
+                "pressed": [f"{RESULTS}/presses/grasps/{GRASPS[0].id}/{model}.nc" for model in STUDY.tested],
+                "repeated": [f"{RESULTS}/repeated/{model}.nc" for model in STUDY.tested],
+            }
+        ),
     output:
         table1=f"{RESULTS}/tables/table1_materials.csv",
         contradictions=f"{RESULTS}/tables/table1_contradictions.csv",
@@ -59,7 +70,7 @@ rule make_tables:
         claims=f"{RESULTS}/tables/claims.csv",
     params:
         files=files,
-        settings=as_settings(**plain(STUDY.values.complexity), source=STUDY.source),
+        settings=as_settings(**plain(STUDY.values.complexity), source=STUDY.source, models=STUDY.tested, sensor=STUDY.spec.name),
     log:
         log_of("make_tables"),
     benchmark:
@@ -175,6 +186,7 @@ rule draw_fig6_ssim:
         code=code("draw_fig6_ssim"),
         ssim=rules.evaluate.output.ssim,
         ceiling=rules.evaluate.output.ceiling,
+        baselines=rules.score_baselines.output.baselines,
     output:
         **figure_files("fig6_ssim"),
     params:
@@ -305,12 +317,15 @@ rule report:
         claims=rules.make_tables.output.claims,
         summary=rules.evaluate.output.summary,
         networks=rules.compare_networks.output.networks,
+        scores=rules.compare_networks.output.scores,
+        levels=rules.compare_networks.output.levels,
+        verdicts=rules.compare_networks.output.verdicts,
         **({"limits": rules.find_limits.output.limits} if CURVES else {}),
         ftir=rules.validate_ftir.output.summary,
         **(
             {"inventory": rules.import_published.output.inventory, "counts": rules.import_published.output.counts}
             if STUDY.archive
-            else {"policies": rules.compare_policies.output.policies}
+            else {"policies": rules.compare_policies.output.policies, "gains": rules.compare_gains.output.gains}
         ),
         figures=[
             *(f"{RESULTS}/figures/material_{name}.png" for name in STUDY.values.materials),

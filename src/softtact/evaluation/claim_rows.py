@@ -2,6 +2,8 @@
 
 REPRODUCED, NOT, CONTRADICTION, ARCHIVE = "reproduced", "not reproduced", "contradicts itself", "needs the archive"
 UNDECIDED, MEASUREMENTS = "undecided", "needs the paper's measurements"
+CONSISTENT = "consistent in print"      # the paper's numbers agree with each other; nothing of ours was compared
+FACTOR = 2.0                            # of times of two machines and solvers that count as the same, on both sides; assumed
 COLUMNS = ["claim", "where", "paper", "ours", "uncertainty", "verdict", "rule", "evidence"]
 
 
@@ -15,3 +17,8 @@ def row(claim: str, where: str, paper: str | float, ours: str | float, verdict: 
 def verdict_of(condition: bool) -> str:
     """Reproduced or not."""
     return REPRODUCED if condition else NOT
+
+
+def within(ours: float, printed: float, *, factor: float = FACTOR) -> bool:
+    """Whether a positive number is the printed one within a factor, on both sides."""
+    return bool(printed / factor <= ours <= printed * factor)

@@ -4,7 +4,8 @@ Three differences of mean SSIM, each with all else equal:
 model    the same network on the reference's own maps, which the sensor felt, less that on the model's (at all maps, equal steps)
 data     all maps less the next smaller share of them (the same network, equal steps)
 network  the best network on the same maps (the two that the study trains, and the curve's) less the study's own
-The largest above `CLEAR` is named. Nothing here is chosen by these numbers.
+The largest above `CLEAR` is named. A network that reads worse than the mean training reading at that force is not trained, and
+that is named before all else. Nothing here is chosen by these numbers.
 """
 
 from collections.abc import Sequence
@@ -44,10 +45,11 @@ def _row(model, set_name, scored, curve, perfect, *, own, source):
              "data": curve.ssim.iloc[-1] - curve.ssim.iloc[-2] if len(curve) > 1 else np.nan,
              "network": max(scored.ssim.max(), curve.ssim.iloc[-1]) - score}
     paper = PRINTED_SSIM.get(set_name, {}).get(model, np.nan)
-    limit = _largest(gains)
+    mean = scored.mean_reading_ssim[own]
+    limit = "training" if score < mean else _largest(gains)
     return {"model": model, "set": set_name, "ssim": score, "paper": paper, "sensor_ssim": scored.sensor_ssim.iloc[0],
             "perfect_model_gain": gains["model"], "more_maps_gain": gains["data"], "other_network_gain": gains["network"],
-            "limit": limit, "sentence": _sentence(score, paper, curve, gains, limit, source)}
+            "limit": limit, "sentence": _sentence(score, paper, curve, gains, limit, source, mean)}
 
 
 def _largest(gains):
@@ -56,11 +58,13 @@ def _largest(gains):
     return max(clear, key=clear.get, default="none")
 
 
-def _sentence(score, paper, curve, gains, limit, source):
+def _sentence(score, paper, curve, gains, limit, source, mean):
     against = "" if np.isnan(paper) else (f" ({'at least' if score >= paper else 'below'} the paper's {paper:g}, which is of other "
                                           "readings)" if source != "published archive" else f" (paper: {paper:g})")
     told = [f"a perfect model would bring {gains['model']:+.3f}" if not np.isnan(gains["model"]) else "",
             f"going from {curve.maps.iloc[-2]} to {curve.maps.iloc[-1]} maps brought {gains['data']:+.3f}"
             if not np.isnan(gains["data"]) else "", f"the best network trained here {gains['network']:+.3f}"]
+    if limit == "training":
+        return f"SSIM {score:.3f}{against}: not trained, for the mean training reading at that force has {mean:.3f}."
     end = f"what limits first is {WORDS[limit]}" if limit in WORDS else f"none of the three stands out by more than {CLEAR:g}"
     return f"SSIM {score:.3f}{against}: {', '.join(filter(None, told))}; {end}."

@@ -10,38 +10,49 @@ from softtact.evaluation.bootstrap import interval_of_mean
 from softtact.evaluation.overlap import contact_patch_overlap
 from softtact.learning.network import predict
 from softtact.learning.samples import Samples, object_of
-from softtact.readout.ssim import leave_one_out_ssim, map_ssim, mean_absolute_counts
+from softtact.readout.ssim import map_ssim, mean_absolute_counts, others_mean, own_range_ssim
 
 if TYPE_CHECKING:
     import torch
 
-SSIM_COLUMNS = ["model", "set", "item", "trial", "force_n", "ssim", "mae_counts", "overlap"]
-CEILING_COLUMNS = ["set", "item", "force_n", "ssim"]
+SSIM_COLUMNS = ["model", "set", "item", "trial", "force_n", "ssim", "ssim_own_range", "mae_counts", "mean_counts", "overlap"]
+CEILING_COLUMNS = ["set", "item", "force_n", "ssim", "ssim_own_range", "mae_counts", "mean_counts"]
 
 
 def score_samples(network: "torch.nn.Module", samples: Samples, *, ssim: dict[str, Any]) -> pd.DataFrame:
-    """A row per sample of `samples`: model, set, item, trial, force_n, ssim, mae_counts, overlap.
+    """`score_predictions` of what a network gives for the samples' deformation maps."""
+    return score_predictions(predict(network, samples.maps_mm), samples, ssim=ssim)
 
+
+def score_predictions(predicted: np.ndarray, samples: Samples, *, ssim: dict[str, Any]) -> pd.DataFrame:
+    """A row with SSIM_COLUMNS for each sample, of predicted counts (n, row, column) against the samples' own.
+
+    ssim_own_range: SSIM whose data range is the measured map's largest count;  mean_counts: of the measured map
     The rows of the split `validation` carry set = "validation": its items are indenters that training saw at other
     forces.
     """
-    predicted = predict(network, samples.maps_mm)
-    frame = samples.labels.assign(model=samples.model, ssim=map_ssim(predicted, samples.counts, **ssim),
-                                  mae_counts=mean_absolute_counts(predicted, samples.counts),
-                                  overlap=contact_patch_overlap(predicted, samples.counts), set=samples.split)
+    measured = samples.counts
+    frame = samples.labels.assign(model=samples.model, ssim=map_ssim(predicted, measured, **ssim),
+                                  ssim_own_range=own_range_ssim(predicted, measured, window=ssim["window"]),
+                                  mae_counts=mean_absolute_counts(predicted, measured), mean_counts=measured.mean(axis=(1, 2)),
+                                  overlap=contact_patch_overlap(predicted, measured), set=samples.split)
     return frame[SSIM_COLUMNS].sort_values(SSIM_COLUMNS[1:5], ignore_index=True)
 
 
 def score_sensor(samples: Samples, *, ssim: dict[str, Any]) -> pd.DataFrame:
-    """A row per load step with at least two trials: set, item, force_n, ssim.
+    """A row with CEILING_COLUMNS per load step with at least two trials.
 
-    ssim: mean over the trials of each one's SSIM against the mean of the others. A network's scores can
+    Means over the trials of each one's scores against the mean of the others. A network's scores can
     lie above it by chance, and by the noise that is left in the mean of few trials.
     """
     rows = []
     for (item, force), chosen in samples.labels.groupby(["item", "force_n"]).indices.items():
         if samples.labels.trial.iloc[chosen].nunique() > 1:     # one trial at the same force twice is no repetition
-            rows.append((samples.split, item, force, leave_one_out_ssim(samples.counts[chosen], **ssim).mean()))
+            trials = samples.counts[chosen].astype(float)
+            others = others_mean(trials)
+            rows.append((samples.split, item, force, map_ssim(others, trials, **ssim).mean(),
+                         own_range_ssim(others, trials, window=ssim["window"]).mean(),
+                         mean_absolute_counts(others, trials).mean(), trials.mean()))
     return pd.DataFrame(rows, columns=CEILING_COLUMNS)
 
 

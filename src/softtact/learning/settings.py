@@ -99,7 +99,11 @@ class Training(Section):
     epochs: PositiveInt = 60
     batch: PositiveInt = Field(16, description="maps per step")
     patience: PositiveInt = Field(10, description="epochs without a better validation loss before training ends")
-    learning_rate: PositiveFloat | Literal["searched"] = Field("searched", description="of the first epoch")
+    learning_rate: PositiveFloat | Literal["found"] = Field(
+        "found", description="of the first epoch; found: for the printed network among `rates`, for the searched one by its search")
+    rates: tuple[PositiveFloat, ...] = Field((3e-5, 1e-4, 3e-4, 1e-3), min_length=1,
+                                             description="tried on the printed network itself")
+    rate_epochs: PositiveInt = Field(4, description="of each of these trials")
     schedule: Literal["cosine", "constant"] = Field("cosine", description="of the learning rate over the epochs")
     checkpoint_every_s: NonNegativeFloat = Field(120.0, description="least time between two checkpoints")
     device: Literal["auto", "cpu", "cuda"] = Field("auto", description="auto: a GPU where there is one")
@@ -139,14 +143,26 @@ def chosen_network(network: Network, best: dict[str, Any] | None) -> dict[str, A
     """Architecture and its options: as printed, as the search found them (`best`), or the compact one's."""
     if network.architecture == "compact":
         return {"architecture": "compact", "filters": network.compact.filters}
-    searched = {name: best[name] for name in ("filters", "dense")} if network.architecture == "searched" else {}  # type: ignore[index]
+    searched = {name: best[name] for name in ("filters", "dense")} if network.architecture == "searched" and best else {}
     return {**network.model_dump(include={"filters", "dense", "activation"}), **searched}
 
 
-def chosen_training(options: Training, network: Network, best: dict[str, Any] | None) -> Training:
-    """`options` with the learning rate as a number: the search's, the stated one, or the compact network's own."""
+def chosen_training(options: Training, network: Network, found: dict[str, Any] | None) -> Training:
+    """`options` with the learning rate as a number: the one found for this network, the stated one, or the compact network's own.
+
+    found: what the search, or for the printed network the trial of rates, wrote
+    """
     if network.architecture == "compact":
         own = {"learning_rate": network.compact.learning_rate, "epochs": network.compact.epochs or options.epochs}
         return options.model_copy(update=own)
-    return options.model_copy(
-        update={"learning_rate": best["learning_rate"]} if options.learning_rate == "searched" else {})     # type: ignore[index]
+    if options.learning_rate != "found":
+        return options
+    if found is None:
+        raise InputError(f"training.learning_rate is 'found', and for the {network.architecture} network nothing has been found; "
+                         "give what find_learning_rate or the search wrote, or state a number.")
+    return options.model_copy(update={"learning_rate": found["learning_rate"]})
+
+
+def found_for(network: Network, *, search: dict[str, Any] | None, trial: dict[str, Any] | None) -> dict[str, Any] | None:
+    """Of the search's best and the trial of rates, what holds for this network: a rate of another architecture does not."""
+    return {"printed": trial, "searched": search, "compact": None}[network.architecture]

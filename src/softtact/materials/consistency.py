@@ -17,6 +17,8 @@ from softtact.materials.stability import is_stable
 PRINTED = "Printed constants: "    # begins a card's sentences on what a publication prints
 # Where the laws are compared: states that the sensor's layers reach under a fingertip's load.
 PROBES = (("uniaxial", 0.5), ("uniaxial", 1.5), ("equibiaxial", 1.3), ("planar", 1.5))
+# What a tensile specimen (ISO 3167) shows; laws that part elsewhere can be fits of one such test.
+TENSION = np.linspace(1.05, 2.0, 20)
 # Laws fitted to the same curves differ by tens of percent outside them; beyond this factor they are two materials.
 FACTOR = 1.5
 
@@ -45,6 +47,17 @@ def disagreements(laws: Mapping[str, Law], *, linear: LinearConstants | None = N
     return [sentence for sentence in found if sentence] + against_linear(laws, linear, factor=factor)
 
 
+def largest_parting_in_tension(laws: Mapping[str, Law]) -> tuple[float, str]:
+    """(ratio, sentence): how far laws {name: Law} of one material part at most, in mu0 and in uniaxial tension to stretch 2."""
+    moduli = {name: law.mu0 for name, law in laws.items()}
+    stress = np.array([law.nominal_stress("uniaxial", TENSION) for law in laws.values()])
+    ratios = stress.max(axis=0) / stress.min(axis=0)
+    told = " against ".join(f"{value:.3g} MPa ({name})" for name, value in moduli.items())
+    return (max(float(ratios.max()), max(moduli.values()) / min(moduli.values())),
+            f"mu0 {told}; stresses in tension part by a factor of {ratios.max():.2f} at most, at stretch "
+            f"{TENSION[ratios.argmax()]:.2f}")
+
+
 def _parting(quantity, values, factor):
     """The sentence on the two laws farthest apart, or None."""
     if len(values) < 2:
@@ -63,15 +76,13 @@ def against_linear(laws: Mapping[str, Law], linear: LinearConstants | None, *, f
     """A sentence on linear constants whose moduli no law has, in a list that is empty otherwise."""
     if linear is None or not laws:
         return []
-    own = linear.mu_mpa, linear.bulk_modulus_mpa
-    moduli = np.array([(law.mu0, law.bulk_modulus) for law in laws.values()])
-    if any(max(_ratio(a, b) for a, b in zip(pair, own, strict=True)) <= factor for pair in moduli):
+    moduli = [law.mu0 for law in laws.values()]
+    if any(_ratio(modulus, linear.mu_mpa) <= factor for modulus in moduli):
         return []
-    low, high = moduli.min(axis=0), moduli.max(axis=0)
     return [
-        f"E {linear.young_mpa:.4g} MPa and nu {linear.poisson:.4g} mean the shear and bulk moduli {own[0]:.3g} and"
-        f" {own[1]:.3g} MPa, which none of {', '.join(laws)} has:"
-        f" theirs are {low[0]:.3g} to {high[0]:.3g} and {low[1]:.3g} to {high[1]:.3g} MPa."
+        f"E {linear.young_mpa:.4g} MPa and nu {linear.poisson:.4g} mean the shear modulus {linear.mu_mpa:.3g} MPa, which none of"
+        f" {', '.join(laws)} has: theirs are {min(moduli):.3g} to {max(moduli):.3g} MPa. They also mean the bulk modulus"
+        f" {linear.bulk_modulus_mpa:.3g} MPa; the other laws' own ones come from an assumed K/mu0 and prove nothing."
     ]
 
 

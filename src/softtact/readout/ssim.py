@@ -9,6 +9,8 @@ import numpy as np
 
 from softtact.errors import InputError
 
+LEAST_RANGE = 30.0     # counts: four standard deviations of the virtual sensor's offsets and noise together
+
 
 def map_ssim(predicted: np.ndarray, measured: np.ndarray, *, window: int, data_range: float) -> np.ndarray:
     """SSIM (n,) of predicted against measured tactile maps (n, row, column) in counts."""
@@ -25,14 +27,29 @@ def mean_absolute_counts(predicted: np.ndarray, measured: np.ndarray) -> np.ndar
     return np.abs(np.float64(predicted) - np.float64(measured)).mean(axis=(1, 2))
 
 
-def leave_one_out_ssim(trials: np.ndarray, *, window: int, data_range: float) -> np.ndarray:
-    """SSIM (trial,) of each reading (trial, row, column) against the mean of the others.
+def own_range_ssim(predicted: np.ndarray, measured: np.ndarray, *, window: int) -> np.ndarray:
+    """SSIM (n,) as of `map_ssim`, each with the largest count of its measured map as data range.
+
+    SSIM's two constants grow with the range: with a readout's whole range they forgive what is wrong with a faint map. The range is
+    at least LEAST_RANGE counts, so that noise on an empty map is not taken for a shape.
+    """
+    check_maps(predicted, measured, window)
+    ranges = np.maximum(np.abs(measured).max(axis=(1, 2)), LEAST_RANGE)
+    return np.array([map_ssim(a[None], b[None], window=window, data_range=float(top))[0]
+                     for a, b, top in zip(predicted, measured, ranges, strict=True)])
+
+
+def others_mean(trials: np.ndarray) -> np.ndarray:
+    """For each reading (trial, row, column) the mean of the others.
 
     That is what a predictor could reach that knows the sensor perfectly but not the trial's noise.
     """
-    count = len(trials)
-    others = (trials.sum(axis=0, keepdims=True) - trials) / (count - 1)
-    return map_ssim(others, trials, window=window, data_range=data_range)
+    return (trials.sum(axis=0, keepdims=True) - trials) / (len(trials) - 1)
+
+
+def leave_one_out_ssim(trials: np.ndarray, *, window: int, data_range: float) -> np.ndarray:
+    """SSIM (trial,) of each reading (trial, row, column) against the mean of the others."""
+    return map_ssim(others_mean(trials), trials, window=window, data_range=data_range)
 
 
 def check_maps(predicted: np.ndarray, measured: np.ndarray, window: int) -> None:

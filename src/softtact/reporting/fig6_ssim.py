@@ -1,28 +1,52 @@
-"""Figure 6: SSIM per grasped object for each model, with box plots over maps and trials, and the sensor's own ceiling."""
+"""Figure 6: SSIM per grasped object for each model, with box plots over maps and trials, the sensor's own ceiling, and the
+predictors without a network.
+"""
 
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softtact.reporting.style import colour, pyplot, ssim_label
+from softtact.reporting.words import PREDICTORS
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+# Marks of the predictors without a network: the same for both models where they do not look at the map, else of the model shown.
+BASELINES = {"zeros": "x", "mean_reading": "_", "nearest_map": "1", "ridge": "+", "quadratic": "^", "gap_formula": "D"}
+SHOWN_MODEL = "hyperelastic"     # whose maps the baselines take, where the study has them
 
-def draw(ssim: "pd.DataFrame", ceiling: "pd.DataFrame", *, choices: dict[str, Any] | None = None) -> "Figure":
-    """Figure from ssim.csv and ceiling.csv; one panel a set of test data.  choices: {window, data_range} of the SSIM"""
+
+def draw(ssim: "pd.DataFrame", ceiling: "pd.DataFrame", baselines: "pd.DataFrame | None" = None, *,
+         choices: dict[str, Any] | None = None) -> "Figure":
+    """Figure from ssim.csv, ceiling.csv and baselines.csv; one panel a set of test data.
+
+    choices: {window, data_range} of the SSIM
+    """
     plt = pyplot()
     sets = [name for name in ("validation", "unseen", "grasps") if (ssim.set == name).any()]
     counts = [max(3, ssim[ssim.set == name].item.nunique()) for name in sets]
-    figure, axes = plt.subplots(1, len(sets), figsize=(2.5 + 0.5 * sum(counts), 4.4), sharey=True, squeeze=False,
+    figure, axes = plt.subplots(1, len(sets), figsize=(2.5 + 0.5 * sum(counts), 5.0), sharey=True, squeeze=False,
                                 gridspec_kw={"width_ratios": counts}, layout="constrained")
     for axis, name in zip(axes[0], sets, strict=True):
         _draw_set(axis, ssim[ssim.set == name], ceiling[ceiling.set == name], name)
+        if baselines is not None:
+            _draw_baselines(axis, baselines[baselines.set == name], sorted(ssim[ssim.set == name].item.unique()))
     axes[0, 0].set_ylabel(ssim_label(choices))
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), frameon=False, ncols=3, loc="outside lower center")
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), frameon=False, ncols=5, loc="outside lower center", fontsize=8)
     return figure
+
+
+def _draw_baselines(axis, rows, items):
+    """A mark for each predictor and item."""
+    models = sorted(rows.model.unique())
+    own = rows[rows.model == (SHOWN_MODEL if SHOWN_MODEL in models else models[0])]
+    means = own.groupby(["predictor", "item"]).ssim.mean()
+    for name, mark in BASELINES.items():
+        if name in means.index.get_level_values("predictor"):
+            axis.plot(np.arange(len(items)), means[name].reindex(items), mark, color="#b03060", ms=6 if mark != "_" else 16,
+                      mfc="none", label=PREDICTORS[name])
 
 
 def _draw_set(axis, rows, ceiling, name):
@@ -43,4 +67,4 @@ def _draw_set(axis, rows, ceiling, name):
     means = ", ".join(f"{rows[rows.model == model].ssim.mean():.2f}" for model in models)
     axis.set_title(f"{name}\nn = {len(rows) // len(models)}, means {means}", fontsize=9)
     axis.set_xlim(-0.6, len(items) - 0.4)
-    axis.set_ylim(min(0.0, rows.ssim.min()), 1.02)
+    axis.set_ylim(min(0.0, rows.ssim.min()) - 0.02, 1.02)

@@ -11,10 +11,13 @@ from jinja2 import Environment
 from markupsafe import Markup
 
 import softtact
+from softtact.evaluation.score_tables import ALL_FORCES, forces_of
 from softtact.files import read_json
+from softtact.reporting.gaps import missing, missing_beside_archive
 from softtact.reporting.page_template import PAGE, SOURCES, STYLE
 from softtact.reporting.run_record import run_sentence
 from softtact.reporting.tables import machine
+from softtact.reporting.words import KINDS, PREDICTORS, SETS, force_in_words, header
 
 CAPTIONS = {
     "fig2_section": "Figure 2. Section through the sensor at rest and pressed: how the frusta fold. Curved elements are cut by "
@@ -27,7 +30,8 @@ CAPTIONS = {
     "fig5_ftir": "Figure 5. Contact area of the dielectric pressed on glass.",
     "fig6_ssim": "Figure 6. SSIM of the networks' readings per item: bars are means, boxes quartiles over forces and trials; "
                  "black dashes, where trials are repeated: the sensor's own trials against each other, which no model passes by "
-                 "more than the noise left in a mean of few trials.",
+                 "more than the noise left in a mean of few trials. Red marks: predictors without a network, on the hyperelastic "
+                 "maps where they look at a map. A bar below the red dash is a network that is not trained.",
     "fig7_maps": "Figure 7. Objects seen from the side that touches, deformation maps of both models in mm (one scale for both), "
                  "tactile maps predicted from them, and the virtual sensor's (mean of its trials). Jet colours and turned 90 "
                  "degrees as printed; tactile maps from 0 to the readout's largest count; red: the model chosen by the complexity "
@@ -40,16 +44,21 @@ CAPTIONS = {
                             "objects, then trials): equal steps of the optimiser for each. The reference's maps are those that the "
                             "virtual sensor itself felt, so that line is what the same network reads from a perfect model.",
 }
-TITLES = {"table1": "Table 1. Material laws (stress in MPa)",
+TITLES = {"summary": "Scores with their 95 % interval, by set",
+          "levels": "Scores at each force",
+          "networks": "Architectures on the same split: scores with their 95 % interval beside predictors without a network, how "
+                      "the training ended, and times",
+          "limits": "What limits the scores: model, data or network",
+          "gains": "How SSIM depends on the gain of the readings, at the largest force on grasped objects, without any network",
+          "policies": "Policies that choose a model, on the presses that the expected error was not calibrated on",
+          "table1": "Table 1. Material laws",
           "contradictions": "Where the paper's table 1 contradicts itself",
           "table2": "Table 2. Complexity and choice of model",
-          "table3": "Table 3. Time per tactile map (s)",
           "counts": "The archive's counts against those in print",
-          "policies": "Policies that choose a model, on the presses that the expected error was not calibrated on",
-          "networks": "Architectures on the same split: scores with their 95 % interval, and times in s (epoch_s an epoch, "
-                      "map_s one map alone)",
-          "limits": "What limits the scores: model, data or network"}
-_STAGE_OF = {"policies": "compare_policies", "networks": "compare_networks", "counts": "import_published"}   # others: make_tables
+          "table3": "Table 3. Time per tactile map"}
+_STAGE_OF = {"policies": "compare_policies", "networks": "compare_networks", "levels": "compare_networks",
+             "counts": "import_published",
+             "summary": "evaluate", "gains": "compare_gains", "limits": "find_limits"}   # others: make_tables
 _DRAWN_BY_MATPLOTLIB = "Views are rendered off screen by VTK; a figure says so where matplotlib drew them instead."
 _WITH_VIEWS = ("fig4_complexity", "fig7_maps")
 _FOLDERS = ("presses", "tactile", "dataset", "learning", "evaluation", "section", "tables", "figures", "logs")
@@ -67,13 +76,16 @@ def render_page(inputs: dict[str, Any], settings: dict[str, Any], *, folder: Pat
     rows = [row | {"link": row.get("evidence", "") if (folder / row.get("evidence", "")).is_file() else ""}
             for row in claims.to_dict("records")]
     counts = ", ".join(f"{number} {verdict}" for verdict, number in claims.verdict.value_counts().items())
+    scores = pd.read_csv(inputs["scores"], dtype={"force": str})
     return Environment(autoescape=True).from_string(PAGE).render(
         study=settings["study"], style=Markup(STYLE), facts=_archive_facts(settings, archive) if archive else _facts(settings),
         synthetic=_synthetic_but_for_the_archive(ftir) if archive else _synthetic(ftir, settings["config"]),
-        tables=_tables(inputs, folder),
-        summary=Markup(_html(_summary(pd.read_csv(inputs["summary"])))), run=Markup(_html(run)), run_said=run_sentence(run),
+        missing=missing_beside_archive(settings) if archive else missing(settings),
+        tables=_tables(inputs, folder), verdicts_on_networks=read_json(inputs["verdicts"])["sentences"],
+        result=Markup(_html(result_table(scores))), result_link=_link(inputs["scores"], folder),
+        run=Markup(_html(run)), run_said=run_sentence(run),
         run_link="tables/run.csv", figures=figures, claims=rows, verdicts=f"{len(claims)} claims, {counts}",
-        claim_columns=list(claims.columns), claims_link=_link(inputs["claims"], folder),
+        claim_columns=list(claims.columns), header=header, claims_link=_link(inputs["claims"], folder),
         claims_code=("evaluation/claims.py", code_link("softtact/evaluation/claims.py")), config=f"{SOURCES_PAGE}#config",
         sources=SOURCES_PAGE, version=softtact.__version__, machine=machine(),
         folders=[name for name in _FOLDERS if (folder / name).is_dir()])
@@ -103,7 +115,8 @@ def _tables(inputs, folder):
     for name, title in TITLES.items():
         if name in inputs:
             stage = f"softtact/stages/{_STAGE_OF.get(name, 'make_tables')}.py"
-            tables.append({"title": title, "html": Markup(_html(pd.read_csv(inputs[name]))), "link": _link(inputs[name], folder),
+            tables.append({"title": title, "html": Markup(_html(_in_words(pd.read_csv(inputs[name])))), "link": _link(inputs[name],
+                                                                                                                      folder),
                            "code": (stage.removeprefix("softtact/"), code_link(stage))})
     return tables
 
@@ -144,17 +157,34 @@ def _synthetic(ftir, config):
             "against that virtual sensor and are not the paper's.")
 
 
+def result_table(scores: pd.DataFrame) -> pd.DataFrame:
+    """Of a `score_table` the grasped objects at the largest force, the paper's test 2, and over all forces, in words."""
+    forces = forces_of(scores)
+    rows = scores[(scores["set"] == "grasps") & scores.force.isin([forces[-1], ALL_FORCES])]
+    shown = rows.assign(predictor=rows.predictor.map(PREDICTORS), kind=rows.kind.map(KINDS), force=rows.force.map(force_in_words))
+    return shown.sort_values(["force", "model"], kind="stable").drop(columns=["set", "overlap", "maps"])
+
+
 def _summary(summary):
-    """The summary with headings for readers, and the interval in words."""
+    """The summary with the interval in words."""
     interval = ["one item: none" if low != low else f"{low:.3f} to {high:.3f}"
                 for low, high in zip(summary.ssim_low, summary.ssim_high, strict=True)]
-    shown = summary.assign(ssim_low=interval).drop(columns="ssim_high")
-    return shown.rename(columns={"ssim": "SSIM", "ssim_low": "95 % interval of the mean", "mae_counts": "mean error, counts",
-                                 "overlap": "overlap of the contact patches", "sensor_ssim": "SSIM, sensor against itself"})
+    place = list(summary.columns).index("ssim_low")
+    shown = summary.drop(columns=["ssim_low", "ssim_high"])
+    shown.insert(place, "95 % interval of the mean", interval)
+    return shown
+
+
+def _in_words(frame):
+    """A table with what stands in files by name, in words."""
+    frame = _summary(frame) if {"ssim_low", "ssim_high"} <= set(frame) else frame
+    words = {"predictor": PREDICTORS, "kind": KINDS, "set": SETS}
+    return frame.assign(**{name: frame[name].map(lambda value, known=known: known.get(value, value))
+                           for name, known in words.items() if name in frame})
 
 
 def _html(frame):
-    return frame.to_html(index=False, na_rep="", float_format=lambda value: f"{value:.4g}", border=0)
+    return frame.rename(columns=header).to_html(index=False, na_rep="", float_format=lambda value: f"{value:.4g}", border=0)
 
 
 def _link(path, folder):

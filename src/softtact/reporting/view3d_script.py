@@ -10,13 +10,19 @@ function (figure, data) {
   const view = Object.assign({}, FIRST);
   let state = data.labels.length - 1, waiting = false;
 
-  // The middle and the size of all states, so that a change of state does not move the picture.
+  // The middle of all states and their sides, so that a change of state does not move the picture.
   const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
   for (let i = 0; i < allPoints.length; i++) {
     low[i % 3] = Math.min(low[i % 3], allPoints[i]);
     high[i % 3] = Math.max(high[i % 3], allPoints[i]);
   }
-  const middle = low.map((value, k) => (value + high[k]) / 2), size = Math.hypot(...low.map((value, k) => high[k] - value)) || 1;
+  const middle = low.map((value, k) => (value + high[k]) / 2), sides = low.map((value, k) => high[k] - value);
+  const plan = Math.hypot(sides[0], sides[1]);     // how wide the body gets when it turns
+
+  function fitted(width, height) {   // pixels per mm at which nothing is cut off, however the body is turned at this tilt
+    const tall = plan * Math.abs(Math.sin(view.tilt)) + sides[2] * Math.cos(view.tilt);
+    return 0.95 * Math.min(width / (plan || 1), height / (tall || 1));
+  }
 
   const canvas = document.createElement("canvas"), context = canvas.getContext("2d");
   canvas.style.cssText = "width:100%;height:420px;touch-action:none;cursor:grab;display:block;background:#fff";
@@ -43,7 +49,7 @@ function (figure, data) {
     const image = context.createImageData(width, height), pixels = new Uint32Array(image.data.buffer);
     const depth = new Float32Array(width * height).fill(-Infinity);
     pixels.fill(BACKGROUND);
-    const [right, up, eye] = axes(), scale = view.zoom * 0.95 * Math.min(width, 1.6 * height) / size;
+    const [right, up, eye] = axes(), scale = view.zoom * fitted(width, height);
     const points = allPoints.subarray(3 * count * (state % data.pointStates));
     const values = allValues.subarray(count * (state % data.valueStates));
     const seen = new Float32Array(3 * count);

@@ -1,16 +1,18 @@
-"""The study's networks and those trained beside them, on the same split.
+"""The study's networks and those trained beside them, on the same split, beside the predictors without a network.
 
-inputs: networks, timings (of each network, in its order), validation, unseen, grasps (one per model each)
-outputs: networks (CSV);  settings: ssim, seed
+inputs: networks, timings, histories (of each network, in its order), validation, unseen, grasps (one per model each), baselines,
+    ceiling
+outputs: networks, scores, levels (CSV), verdicts (JSON: sentences on what the study's networks are worth)
+settings: own (architecture), ssim, seed
 """
 
 from typing import Any
 
 import pandas as pd
 
-from softtact.evaluation.networks import compare_networks
-from softtact.evaluation.scoring import score_sensor
-from softtact.files import write_csv
+from softtact.evaluation.networks import Trained, compare_networks, score_networks
+from softtact.evaluation.score_tables import level_table, score_table, verdicts
+from softtact.files import write_csv, write_json
 from softtact.learning.network import load_network
 from softtact.learning.samples import read_samples
 from softtact.learning.settings import Ssim
@@ -20,11 +22,17 @@ TESTS = ("validation", "unseen", "grasps")
 
 
 def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Score and time every network; write the table."""
+    """Score and time every network; write the tables."""
     prepare_torch(threads=threads)
     ssim = Ssim.from_dict(settings.get("ssim", {}), where="ssim").model_dump()
     splits = {name: {samples.model: samples for samples in map(read_samples, inputs[name])} for name in TESTS}
-    ceiling = pd.concat([score_sensor(next(iter(splits[name].values())), ssim=ssim) for name in TESTS])
-    networks = [(*load_network(path), pd.read_csv(timing))
-                for path, timing in zip(inputs["networks"], inputs["timings"], strict=True)]
-    write_csv(outputs["networks"], compare_networks(networks, splits, ceiling, ssim=ssim, seed=settings["seed"]))
+    files = zip(*(inputs[name] for name in ("networks", "timings", "histories")), strict=True)
+    networks = [Trained(*load_network(path), pd.read_csv(timing), pd.read_csv(history)) for path, timing, history in files]
+    scores, ceiling = score_networks(networks, splits, ssim=ssim), pd.read_csv(inputs["ceiling"])
+    table = score_table(scores, pd.read_csv(inputs["baselines"]), ceiling)
+    some = next(iter(splits["validation"].values()))
+    write_csv(outputs["networks"], compare_networks(networks, scores, ceiling, table, maps_mm=some.maps_mm,
+                                                    taxels=some.counts[0].size, seed=settings["seed"]))
+    write_csv(outputs["scores"], table)
+    write_csv(outputs["levels"], level_table(table))
+    write_json(outputs["verdicts"], {"sentences": verdicts(table, own=settings["own"])})

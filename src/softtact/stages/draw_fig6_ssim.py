@@ -1,6 +1,6 @@
 """Figure 6.
 
-inputs: ssim, ceiling;  outputs: png, svg;  settings: ssim {window, data_range}
+inputs: ssim, ceiling, baselines;  outputs: png, svg;  settings: ssim {window, data_range}
 """
 
 from typing import Any
@@ -14,6 +14,6 @@ from softtact.reporting.style import save
 
 def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Draw; an object's presses in several places stand together."""
-    scores, ceiling = (pd.read_csv(inputs[name]) for name in ("ssim", "ceiling"))
-    together = (table.assign(item=table["item"].map(object_of)) for table in (scores, ceiling))
+    tables = (pd.read_csv(inputs[name]) for name in ("ssim", "ceiling", "baselines"))
+    together = (table.assign(item=table["item"].map(object_of)) for table in tables)
     save(draw(*together, choices=settings["ssim"]), outputs["png"], outputs["svg"])

@@ -1,6 +1,6 @@
 """SSIM against the number of training maps of one model.
 
-inputs: train, validation, unseen, grasps, and best (of the search) where a network takes its rate from it
+inputs: train, validation, unseen, grasps, and best (of the search) and rate (of its trial) where a network needs them
 outputs: curve (CSV);  settings: learning_curve, training, network, ssim, seed, threads
 """
 
@@ -11,7 +11,7 @@ import pandas as pd
 from softtact.evaluation.learning_curve import COLUMNS, learning_curve
 from softtact.files import read_json, write_csv
 from softtact.learning.samples import read_samples
-from softtact.learning.settings import LearningCurve, Network, Ssim, Training, chosen_network, chosen_training
+from softtact.learning.settings import LearningCurve, Network, Ssim, Training, chosen_network, chosen_training, found_for
 from softtact.learning.training import prepare_torch
 
 TESTS = ("validation", "unseen", "grasps")
@@ -21,7 +21,7 @@ def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, 
     """Train every network at every share; write a row per network, share and set."""
     curve = LearningCurve.from_dict(settings["learning_curve"], where="learning_curve")
     options = Training.from_dict(settings["training"], where="training")
-    best = read_json(inputs["best"]) if "best" in inputs else None
+    best, trial = (read_json(inputs[name]) if name in inputs else None for name in ("best", "rate"))
     train, tests = read_samples(inputs["train"]), {name: read_samples(inputs[name]) for name in TESTS}
     sizes = sorted({max(1, round(share * len(train))) for share in curve.shares})
     shared = {"sizes": sizes, "steps": curve.steps, "ssim": Ssim.from_dict(settings["ssim"], where="ssim").model_dump(),
@@ -30,6 +30,7 @@ def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, 
     for kind in curve.networks:
         network = Network.from_dict(settings["network"] | {"architecture": kind}, where="network")
         table = learning_curve(train, tests["validation"], tests, network=chosen_network(network, best),
-                               options=chosen_training(options, network, best), **shared)
+                               options=chosen_training(options, network, found_for(network, search=best, trial=trial)),
+                               **shared)
         tables.append(table.assign(model=train.model, architecture=kind))
     write_csv(outputs["curve"], pd.concat(tables)[["model", "architecture", *COLUMNS]])

@@ -1,7 +1,7 @@
 """The report page, and beside it the configuration and the code that it was made with.
 
-inputs: table1, contradictions, table2, table3, networks, claims, summary, ftir, figures (list of PNG and HTML), sources (list of
-    source files), and policies, or inventory and counts of the published archive
+inputs: table1, contradictions, table2, table3, networks, scores, levels, verdicts, claims, summary, ftir, figures (list of PNG and
+    HTML), sources (list of source files), and policies and gains, or inventory and counts of the published archive
 outputs: page, sources, config, named, run
 settings: study facts, config (all values), named (what these name), benchmarks (folder), sources {figure: {data, code}}
 """

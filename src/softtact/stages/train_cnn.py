@@ -1,6 +1,6 @@
 """A network of one model, trained.
 
-inputs: train, validation, best (of the search)
+inputs: train, validation, best (of the search), and rate where the printed network's is found by a trial
 outputs: model (the best epoch's weights), history, and timing where asked for; a checkpoint lies beside them meanwhile
 settings: training, network (its `architecture` says which is trained), ssim, seed, threads (by default those of the job)
 """
@@ -12,7 +12,7 @@ import pandas as pd
 from softtact.files import digest, read_json, write_csv
 from softtact.learning.network import save_network
 from softtact.learning.samples import read_samples
-from softtact.learning.settings import Network, Ssim, Training, chosen_network, chosen_training
+from softtact.learning.settings import Network, Ssim, Training, chosen_network, chosen_training, found_for
 from softtact.learning.training import Run, prepare_torch, start_run, train_network
 
 HISTORY = ["epoch", "train_loss", "validation_loss", "validation_ssim", "learning_rate"]
@@ -22,7 +22,9 @@ def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, 
     """Train, or go on with a training that was cut off, and write the best weights and the history."""
     network = Network.from_dict(settings["network"], where="network")
     best, seed = read_json(inputs["best"]), settings["seed"]
-    options = chosen_training(Training.from_dict(settings["training"], where="training"), network, best)
+    trial = read_json(inputs["rate"]) if "rate" in inputs else None
+    options = chosen_training(Training.from_dict(settings["training"], where="training"), network,
+                              found_for(network, search=best, trial=trial))
     ssim = Ssim.from_dict(settings.get("ssim", {}), where="ssim").model_dump()
     train, validation = read_samples(inputs["train"]), read_samples(inputs["validation"])
     training = start_run(train, network=chosen_network(network, best), seed=seed,

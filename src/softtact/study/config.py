@@ -68,6 +68,11 @@ class Study:
         return PUBLISHED if self.archive else "virtual sensor"
 
     @property
+    def counts_per_relative_change(self) -> float | None:
+        """Gain of the virtual sensor's readings; None where they are an archive's, whose gain is not known."""
+        return None if self.archive else VirtualSensorSettings.from_dict(self.values.virtual_sensor).counts_per_relative_change
+
+    @property
     def name(self) -> str:
         """The study's name, and its folder below results/."""
         return self.values.study

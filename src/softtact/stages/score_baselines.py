@@ -1,0 +1,31 @@
+"""Scores of the predictors without a network, which every score stands beside.
+
+inputs: train, validation, unseen, grasps (one per model each)
+outputs: baselines (CSV, a row for each sample and predictor), taxels (CSV, how far each taxel is excited by the indenters)
+settings: sensor, counts_per_relative_change (of the readings; null where it is not known), ssim
+"""
+
+from typing import Any
+
+import pandas as pd
+
+from softtact.evaluation.baselines import score_baselines, taxel_table
+from softtact.files import write_csv
+from softtact.learning.samples import read_samples
+from softtact.learning.settings import Ssim
+from softtact.sensors.specification import SensorSpec
+
+TESTS = ("validation", "unseen", "grasps")
+
+
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
+    """Fit the predictors to each model's training samples and score them on its tests."""
+    ssim = Ssim.from_dict(settings.get("ssim", {}), where="ssim").model_dump()
+    spec = SensorSpec.from_dict(settings["sensor"])
+    frames = []
+    for k, path in enumerate(inputs["train"]):
+        tests = {name: read_samples(inputs[name][k]) for name in TESTS}
+        frames.append(score_baselines(read_samples(path), tests, spec=spec, ssim=ssim,
+                                      counts_per_relative_change=settings["counts_per_relative_change"]))
+    write_csv(outputs["baselines"], pd.concat(frames))
+    write_csv(outputs["taxels"], taxel_table([read_samples(inputs[name][0]) for name in ("train", "validation")]))
