@@ -10,9 +10,9 @@ def curve(model, half, full, *, set_name="unseen"):
     return pd.DataFrame({"model": model, "architecture": "compact", "maps": [50, 100], "set": set_name, "ssim": [half, full]})
 
 
-def scored(model, printed, compact, *, set_name="unseen"):
+def scored(model, printed, compact, *, set_name="unseen", mean=0.5):
     return pd.DataFrame({"model": model, "architecture": ["printed", "compact"], "set": set_name, "ssim": [printed, compact],
-                         "sensor_ssim": 0.99})
+                         "sensor_ssim": 0.99, "mean_reading_ssim": mean})
 
 
 def row(*, half, full, perfect, printed, compact, **changes):
@@ -43,3 +43,8 @@ def test_each_gain_is_the_difference_with_all_else_equal():
 def test_without_a_reference_nothing_is_said_of_a_perfect_model():
     found = row(half=0.7, full=0.8, perfect=0.95, printed=0.75, compact=0.79, reference="another")
     assert pd.isna(found.perfect_model_gain) and "perfect" not in found.sentence and found.limit == "data"
+
+
+def test_a_network_below_the_mean_reading_is_not_trained_whatever_else_would_gain():
+    found = row(half=0.6, full=0.8, perfect=0.95, printed=0.45, compact=0.79)
+    assert found.limit == "training" and "not trained, for the mean training reading at that force has 0.500" in found.sentence

@@ -6,7 +6,8 @@ import pytest
 import torch
 from test_scoring import SSIM, Echo, make_samples
 
-from softtact.evaluation.networks import COLUMNS, compare_networks, count_weights
+from softtact.evaluation.networks import COLUMNS, Trained, compare_networks, count_weights, score_networks
+from softtact.evaluation.score_tables import score_table
 from softtact.evaluation.scoring import score_sensor
 from softtact.learning.network import CompactNetwork, TactileNetwork
 
@@ -23,8 +24,16 @@ def test_a_row_per_network_and_set_with_scores_weights_and_times():
     splits = {name: {"elastic": make_samples(split=name, noise=20)} for name in ("unseen", "grasps")}
     ceiling = pd.concat([score_sensor(split["elastic"], ssim=SSIM) for split in splits.values()])
     timing = pd.DataFrame({"epoch": [1, 2, 3], "wall_time_s": [9.0, 2.0, 4.0]})
-    networks = [(NamedEcho(name, factor), {"model": "elastic"}, timing) for name, factor in (("printed", 0.5), ("compact", 1.0))]
-    table = compare_networks(networks, splits, ceiling, ssim=SSIM, seed=1)
+    history = pd.DataFrame({"epoch": [1, 2, 3], "train_loss": 90.0, "validation_loss": [9.0, 2.0, 4.0], "learning_rate": 1e-4})
+    networks = [Trained(NamedEcho(name, factor), {"model": "elastic"}, timing, history)
+                for name, factor in (("printed", 0.5), ("compact", 1.0))]
+    scores = score_networks(networks, splits, ssim=SSIM)
+    baseline = scores[scores.predictor == "printed"].assign(predictor="mean_reading", ssim=0.25)
+    beside = score_table(scores, baseline, ceiling)
+    maps = splits["unseen"]["elastic"].maps_mm
+    table = compare_networks(networks, scores, ceiling, beside, maps_mm=maps, taxels=28, seed=1)
+    assert (table.mean_reading_ssim == 0.25).all() and table.gap_formula_ssim.isna().all() and (table.skill > 0).all()
+    assert (table.best_epoch == 2).all() and (table.learning_rate == 1e-4).all()
     assert table.columns.tolist() == COLUMNS and len(table) == 4
     assert (table.weights == 1).all() and (table.epochs == 3).all() and (table.epoch_s == 4.0).all() and (table.map_s > 0).all()
     means = table.groupby("architecture").ssim.mean()

@@ -38,7 +38,9 @@ def make_samples(*, split="grasps", model="elastic", items=("object_1", "object_
 
 def test_a_perfect_network_scores_one_with_no_error():
     scores = score_samples(Echo(), make_samples(), ssim=SSIM)
-    assert scores.columns.tolist() == ["model", "set", "item", "trial", "force_n", "ssim", "mae_counts", "overlap"]
+    assert scores.columns.tolist() == ["model", "set", "item", "trial", "force_n", "ssim", "ssim_own_range", "mae_counts",
+                                       "mean_counts",
+                                       "overlap"]
     assert scores.ssim.values == pytest.approx(np.ones(12)) and scores.mae_counts.values == pytest.approx(0, abs=1e-3)
 
 
@@ -64,7 +66,8 @@ def test_validation_rows_are_named_so_though_their_items_are_indenters():
 
 def test_the_sensors_ceiling_falls_with_its_noise():
     quiet, noisy = (score_sensor(make_samples(noise=noise), ssim=SSIM) for noise in (0, 100))
-    assert quiet.columns.tolist() == ["set", "item", "force_n", "ssim"] and len(quiet) == 4
+    assert quiet.columns.tolist() == ["set", "item", "force_n", "ssim", "ssim_own_range", "mae_counts", "mean_counts"]
+    assert len(quiet) == 4 and quiet.mae_counts.values == pytest.approx(np.zeros(4), abs=1e-3)
     assert quiet.ssim.values == pytest.approx(np.ones(4)) and (noisy.ssim < 0.99).all()
 
 

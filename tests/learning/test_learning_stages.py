@@ -6,8 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from formula_study import MODELS, Study
+from support.sensors import CORO
 
 from softtact.errors import InputError
+from softtact.evaluation.scoring import SSIM_COLUMNS
 from softtact.files import read_dataset, read_json
 from softtact.learning.dataset import SPLITS
 from softtact.learning.network import load_network, predict
@@ -17,14 +19,16 @@ from softtact.stages import (
     compare_networks,
     draw_fig9_networks,
     evaluate,
+    find_learning_rate,
     learning_curve,
+    score_baselines,
     search_hyperparameters,
     train_cnn,
 )
 
 SPACE = {"filters": [[2, 4], [2, 4], [2, 4]], "dense": [8, 24], "learning_rate": [1e-3, 1e-2]}
 SETTINGS = {"search": {"trials": 2, "max_epochs": 2, "batch": 8, "space": SPACE},
-            "training": {"epochs": 3, "patience": 3, "batch": 8, "device": "cpu"},
+            "training": {"epochs": 3, "patience": 3, "batch": 8, "device": "cpu", "rates": [1e-3, 4e-3], "rate_epochs": 1},
             "network": {"architecture": "printed", "filters": [3, 4, 5], "dense": 16},
             "ssim": {"window": 3, "data_range": 2400}, "device": "cpu", "seed": 3}
 
@@ -41,8 +45,15 @@ def run_search(folder, model):
     return outputs
 
 
+def run_rates(folder, model):
+    outputs = {"rates": folder / f"learning/{model}/rates.csv", "rate": folder / f"learning/{model}/rate.json"}
+    find_learning_rate.run(inputs=training_inputs(folder, model), outputs=outputs,
+                           settings=settings_of("training", "network", "ssim", "seed"))
+    return outputs
+
+
 def run_training(folder, model, *, into="learning", **changes):
-    inputs = {**training_inputs(folder, model), "best": folder / f"learning/{model}/best.json"}
+    inputs = {**training_inputs(folder, model), **{name: folder / f"learning/{model}/{name}.json" for name in ("best", "rate")}}
     outputs = {name: folder / into / model / file for name, file in
                {"model": "model.pt", "history": "history.csv", "timing": "timing.csv"}.items()}
     train_cnn.run(inputs=inputs, outputs=outputs, settings=settings_of("training", "network", "ssim", "seed", **changes))
@@ -72,6 +83,7 @@ def finished(tmp_path_factory):
     networks = []
     for model in MODELS:
         run_search(folder, model)
+        run_rates(folder, model)
         networks.append(run_training(folder, model)["model"])
     tests = {split: datasets[split] for split in ("validation", "unseen", "grasps")}
     inputs = {"networks": networks, "presses": inputs["presses"], **tests}
@@ -85,7 +97,7 @@ def test_the_history_has_a_row_per_epoch_and_no_wall_time(finished):
     assert pd.read_csv(finished[0] / "learning/elastic/timing.csv").columns.tolist() == ["epoch", "wall_time_s"]
 
 
-def test_the_model_file_holds_the_best_epochs_weights_and_the_learning_rate_is_the_searchs(finished):
+def test_the_model_file_holds_the_best_epochs_weights_and_the_printed_networks_own_learning_rate(finished):
     folder = finished[0]
     network, facts = load_network(folder / "learning/elastic/model.pt")
     history = pd.read_csv(folder / "learning/elastic/history.csv")
@@ -93,8 +105,9 @@ def test_the_model_file_holds_the_best_epochs_weights_and_the_learning_rate_is_t
     validation = read_samples(folder / "dataset/elastic/validation.nc")
     loss = np.abs(predict(network, validation.maps_mm) - validation.counts).sum(axis=(1, 2)).mean()
     assert loss == pytest.approx(facts["validation_loss"], rel=1e-5)
-    best = read_json(folder / "learning/elastic/best.json")
-    assert history.learning_rate[0] == pytest.approx(best["learning_rate"], rel=1e-5)
+    rates = pd.read_csv(folder / "learning/elastic/rates.csv").set_index("learning_rate").validation_loss
+    found = read_json(folder / "learning/elastic/rate.json")
+    assert history.learning_rate[0] == found["learning_rate"] == rates.idxmin() and found["architecture"] == "printed"
 
 
 def test_no_checkpoint_stays_behind(finished):
@@ -136,11 +149,21 @@ def test_both_architectures_stand_in_one_table_and_one_figure(finished):
     folder, inputs, _ = finished
     runs = [run_training(folder, model, into=f"beside/{kind}", network={**SETTINGS["network"], "architecture": kind})
             for kind in ("printed", "compact") for model in MODELS]
-    files = {"networks": [run["model"] for run in runs], "timings": [run["timing"] for run in runs]}
+    files = {name: [run[one] for run in runs]
+             for name, one in (("networks", "model"), ("timings", "timing"), ("histories", "history"))}
+    tests = {name: inputs[name] for name in ("validation", "unseen", "grasps")}
+    score_baselines.run(inputs={**tests, "train": [folder / f"dataset/{model}/train.nc" for model in MODELS]},
+                        outputs={name: folder / f"evaluation/{name}.csv" for name in ("baselines", "taxels")},
+                        settings=settings_of("ssim", sensor=CORO.model_dump(mode="json"), counts_per_relative_change=1000.0))
+    files |= {"baselines": folder / "evaluation/baselines.csv", "ceiling": finished[2]["ceiling"]}
     table = folder / "tables/networks.csv"
-    compare_networks.run(inputs={**files, **{name: inputs[name] for name in ("validation", "unseen", "grasps")}},
-                         outputs={"networks": table}, settings=settings_of("ssim", "seed"))
-    rows = pd.read_csv(table)
+    outputs = {"networks": table, "verdicts": folder / "evaluation/verdicts.json",
+               **{name: folder / f"tables/{name}.csv" for name in ("scores", "levels")}}
+    compare_networks.run(inputs={**files, **tests}, outputs=outputs, settings=settings_of("ssim", "seed", own="printed"))
+    rows, scores = pd.read_csv(table), pd.read_csv(outputs["scores"])
+    assert scores.groupby(["model", "set", "force"]).size().unique().tolist() == [2 + 8 + 1]     # networks, baselines, the sensor
+    assert rows.mean_reading_ssim.notna().all() and set(rows.remains) <= {"noise", "optimiser", "data", "network"}
+    assert len(pd.read_csv(outputs["levels"])) == len(scores) / 4 and read_json(outputs["verdicts"])["sentences"]
     assert len(rows) == 2 * 2 * 3 and rows.architecture.unique().tolist() == ["printed", "compact"]
     summary = pd.read_csv(finished[2]["summary"])
     own = rows[rows.architecture == "printed"]
@@ -154,7 +177,7 @@ def test_both_architectures_stand_in_one_table_and_one_figure(finished):
 def test_the_learning_curve_has_a_row_per_network_share_and_set_with_intervals_where_there_are_objects(finished):
     folder, inputs, _ = finished
     curve = {"shares": [0.5, 1.0], "steps": 4, "networks": ["printed", "compact"]}
-    files = {split: folder / f"dataset/elastic/{split}.nc" for split in SPLITS} | {"best": folder / "learning/elastic/best.json"}
+    files = {split: folder / f"dataset/elastic/{split}.nc" for split in SPLITS} | {"rate": folder / "learning/elastic/rate.json"}
     outputs = {"curve": folder / "learning/elastic/learning_curve.csv"}
     learning_curve.run(inputs=files, outputs=outputs,
                        settings=settings_of("training", "network", "ssim", "seed", learning_curve=curve))
@@ -176,7 +199,7 @@ def test_a_given_learning_rate_is_used_instead_of_the_searchs(finished):
 def test_every_map_of_the_three_tests_is_scored_for_each_model(finished):
     folder, inputs, outputs = finished
     scores = pd.read_csv(outputs["ssim"])
-    assert scores.columns.tolist() == ["model", "set", "item", "trial", "force_n", "ssim", "mae_counts", "overlap"]
+    assert scores.columns.tolist() == SSIM_COLUMNS
     for k, model in enumerate(MODELS):
         for split in ("validation", "unseen", "grasps"):
             rows = scores[(scores.model == model) & (scores["set"] == split)]

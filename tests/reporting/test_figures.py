@@ -1,5 +1,6 @@
 """Figures draw what they are given and are written whole, twice the same; the page holds them and links its data."""
 
+import itertools
 import sys
 
 import numpy as np
@@ -26,6 +27,14 @@ COMPLEXITY = pd.DataFrame({"object": ["object_1", "object_2"], "NPt": [100, 900]
 SUMMARY = pd.DataFrame([{"model": "elastic", "set": name, "items": items, "maps": 8, "ssim": 0.6, "ssim_low": low,
                          "ssim_high": high, "mae_counts": 30.0, "overlap": 0.8, "sensor_ssim": 0.99}
                         for name, items, low, high in (("unseen", 4, 0.5, 0.7), ("grasps", 1, np.nan, np.nan))])
+BASELINES = pd.concat([SSIM.assign(predictor=name, ssim=score) for name, score in (("zeros", 0.1), ("mean_reading", 0.3),
+                                                                                  ("gap_formula", 0.9))])
+SCORES = pd.DataFrame([{"model": "elastic", "set": "grasps", "force": force, "predictor": name, "kind": kind, "maps": 4,
+                        "ssim": score,
+                        "ssim_own_range": score, "mae_counts": 9.0, "mae_share": 0.2, "overlap": 0.8, "skill": skill,
+                        "skill_simple": skill} for force in ("all", "10")
+                       for name, kind, score, skill in (("printed", "network", 0.2, -0.1), ("mean_reading", "trivial", 0.3, 0.0),
+                                                        ("sensor_repeated", "sensor", 0.99, 1.0))])
 NETWORKS = pd.concat([SUMMARY.assign(architecture=name, weights=weights, ssim=SUMMARY.ssim + gain,
                                      ssim_high=SUMMARY.ssim_high + gain, epochs=3, epoch_s=time, map_s=0.01)
                       for name, weights, gain, time in (("printed", 94_279_973, 0.0, 90.0), ("compact", 60_345, 0.1, 2.0))])
@@ -57,12 +66,15 @@ def test_a_map_is_printed_with_y_running_to_the_left():
 
 
 def test_figure_6_shows_the_mean_of_every_item_and_model():
-    figure = fig6_ssim.draw(SSIM, CEILING, choices={"window": 3, "data_range": 3000.0})
+    figure = fig6_ssim.draw(SSIM, CEILING, BASELINES, choices={"window": 3, "data_range": 3000.0})
     assert len(figure.axes) == 3
     assert figure.axes[0].get_ylabel() == "SSIM (window 3, range 3000 counts)"
     heights = [bar.get_height() for bar in figure.axes[0].patches]
     assert heights == pytest.approx([0.55] * 4)
     assert "n = 4" in figure.axes[2].get_title()
+    marks = {line.get_label(): line.get_ydata() for line in figure.axes[0].lines}
+    assert marks["mean training reading at that force"] == pytest.approx([0.3, 0.3])
+    assert marks["gap formula, untrained"] == pytest.approx([0.9, 0.9])
 
 
 @pytest.fixture
@@ -147,6 +159,14 @@ def test_a_figure_is_written_the_same_twice(tmp_path):
         assert (tmp_path / f"a.{kind}").read_bytes() == (tmp_path / f"b.{kind}").read_bytes()
 
 
+def scored(folder):
+    """The scores that a page begins with, written below a folder: a network that is not trained."""
+    inputs = {"scores": folder / "tables/scores.csv", "verdicts": folder / "evaluation/verdicts.json"}
+    write_csv(inputs["scores"], SCORES)
+    write_json(inputs["verdicts"], {"sentences": ["Not trained: the printed network."]})
+    return inputs
+
+
 def test_the_page_holds_its_figures_and_links_its_data(tmp_path):
     folder = tmp_path / "results"
     names = ("table1", "contradictions", "table2", "table3", "policies", "networks", "claims", "summary")
@@ -154,6 +174,7 @@ def test_the_page_holds_its_figures_and_links_its_data(tmp_path):
     for name in ("table1", "contradictions", "table2", "table3", "policies", "networks"):
         write_csv(inputs[name], COMPLEXITY)
     write_csv(inputs["summary"], SUMMARY)
+    inputs |= scored(folder)
     write_csv(inputs["claims"], pd.DataFrame({"claim": ["a < b"], "verdict": ["reproduced"]}))
     inputs["ftir"] = folder / "summary.json"
     write_json(inputs["ftir"], {"source": "virtual dielectric", "verdict": "The words allow this."})
@@ -163,7 +184,9 @@ def test_the_page_holds_its_figures_and_links_its_data(tmp_path):
     source = {"data": [folder / "evaluation/ssim.csv"], "code": ["src/softtact/stages/draw_fig6_ssim.py"]}
     facts = {"study": "mine", "sensor": "pad: 30 x 20 mm", "indenters": 3, "unseen": 1, "grasps": 2, "forces_n": [10.0], "seed": 1,
              "presses": {"indenters": 4, "unseen": 1, "grasps": 2}, "trials": {"indenters": 2, "unseen": 2, "grasps": 50},
-             "sources": {"fig6_ssim": source}, "config": {"reference": "felt", "models": {"felt": {"friction": {"object": 0.3}}}}}
+             "sources": {"fig6_ssim": source}, "config": {"reference": "felt", "tested": ["hyper"],
+                                                    "models": {"felt": {"friction": {"object": 0.3}},
+                                                               "hyper": {"mesh": {"preset": "draft"}}}}}
     page = render_page(inputs, facts, folder=folder, run=NO_RUN)
     assert page.count("data:image/png;base64,") == 3
     assert page.count("The words allow this.") == 1 and "Material foam: test curves" in page
@@ -171,6 +194,12 @@ def test_the_page_holds_its_figures_and_links_its_data(tmp_path):
     assert 'href="evaluation/ssim.csv"' in page and 'href="sources.html#softtact/stages/draw_fig6_ssim.py"' in page
     assert 'href="sources.html#config"' in page
     assert "pad: 30 x 20 mm. It is not the paper" in page
+    for first, then in itertools.pairwise([
+            "Not trained: the printed network.", "What is not here", "No robot and no gripper", "the draft one of the hyper model",
+            'id="figures"', 'id="result"', 'id="tables"', "Table 3. Time", 'id="claims"', 'id="run"']):
+        assert 0 <= page.index(first) < page.index(then), then
+    assert "mean training reading at that force" in page and "skill over the best trivial predictor" in page
+    assert "mae_counts" not in page
     assert "0.500 to 0.700" in page and "one item: none" in page
     assert "3 indenters in 4 places, each read 2 times" in page and "2 objects in 2 places, each read 50 times" in page
     assert "a &lt; b" in page and "What is synthetic here" in page
@@ -185,6 +214,7 @@ def test_the_page_of_an_archives_study_tells_of_the_archive_and_of_no_virtual_se
     for name in ("table1", "contradictions", "table2", "table3", "counts", "networks"):
         write_csv(inputs[name], COMPLEXITY)
     write_csv(inputs["summary"], SUMMARY)
+    inputs |= scored(tmp_path)
     write_csv(inputs["claims"], pd.DataFrame({"claim": ["a"], "verdict": ["reproduced"]}))
     inputs |= {"ftir": tmp_path / "ftir.json", "inventory": tmp_path / "inventory.json", "figures": [tmp_path / "fig6_ssim.png"]}
     write_json(inputs["ftir"], {"source": "virtual dielectric", "verdict": ""})

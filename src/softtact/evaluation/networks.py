@@ -63,7 +63,7 @@ def compare_networks(networks: Sequence[Trained], scores: pd.DataFrame, ceiling:
         summary = summarise_scores(own, ceiling, seed=seed).assign(
             architecture=one.architecture, weights=count_weights(one.network), epochs=len(one.timing),
             epoch_s=one.timing.wall_time_s.median(), map_s=time_of_a_map(one.network, maps_mm),
-            **convergence(one.history, noise_loss=noise))
+            **convergence(one.history, noise_loss=noise, unseen_loss=own[own["set"] == "unseen"].mae_counts.mean() * taxels))
         rows.append(summary.join(_beside(table, one), on="set"))
     return pd.concat(rows)[COLUMNS]
 

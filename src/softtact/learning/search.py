@@ -156,14 +156,14 @@ def search_table(study: optuna.Study) -> pd.DataFrame:
 
 
 def best_trial(study: optuna.Study) -> dict[str, Any]:
-    """filters, dense, learning_rate, trial and validation_loss of the finished trial with the smallest loss."""
+    """filters, dense, learning_rate, trial and validation_loss of the best finished trial; trials: how many the search had."""
     candidates = [trial for trial in study.trials if np.isfinite(smallest_loss(trial))]
     if not candidates:
         raise InputError("the search: no trial reached a finite validation loss; lower search.space.learning_rate.")
     best = min(candidates, key=lambda trial: (trial.state.name != "COMPLETE", smallest_loss(trial)))
     layers = sorted((name for name in best.params if name.startswith("filters_")), key=lambda name: int(name[8:]))
     return {"filters": [best.params[name] for name in layers], "dense": best.params["dense"],
-            "learning_rate": best.params["learning_rate"], "trial": best.number,
+            "learning_rate": best.params["learning_rate"], "trial": best.number, "trials": len(study.trials),
             "validation_loss": smallest_loss(best)}
 
 

@@ -54,7 +54,7 @@ def largest_parting_in_tension(laws: Mapping[str, Law]) -> tuple[float, str]:
     ratios = stress.max(axis=0) / stress.min(axis=0)
     told = " against ".join(f"{value:.3g} MPa ({name})" for name, value in moduli.items())
     return (max(float(ratios.max()), max(moduli.values()) / min(moduli.values())),
-            f"mu0 {told}; stresses in tension part by a factor of {ratios.max():.2f} at most, at stretch "
+            f"mu0 {told}; stresses in tension part by {1 - 1 / ratios.max():.0%} of the larger one at most, at stretch "
             f"{TENSION[ratios.argmax()]:.2f}")
 
 

@@ -136,6 +136,8 @@ def _learning(study, measured, folder):
     return [
         stage("build_dataset", ["dataset/manifest.csv"], disk / measured["write_mb_per_s"], "build_dataset/*.tsv", disk),
         stage("search_hyperparameters", learnt("search.csv"), search_s, "search_hyperparameters/*.tsv"),
+        *([stage("find_learning_rate", learnt("rate.json"), _rates_s(times["printed"], values, sizes), "find_learning_rate/*.tsv")]
+          if "printed" in (own, beside) and values.training.learning_rate == "found" else []),
         stage(f"train_cnn, {own}", learnt("model.pt"), _training_s(times[_form(own)], own, values, sizes), "train_cnn/*.tsv"),
         stage(f"train_beside, {beside}", learnt(f"{beside}/model.pt"), _training_s(times[beside], beside, values, sizes),
               "train_beside/*.tsv"),
@@ -172,6 +174,10 @@ def epochs_of_a_trial(search: "Search") -> float:
 def _training_s(time, architecture, values, sizes):
     epochs = (architecture == "compact" and values.network.compact.epochs) or values.training.epochs
     return epochs * _epoch_s(time, sizes.train, sizes)
+
+
+def _rates_s(time, values, sizes):
+    return len(values.training.rates) * values.training.rate_epochs * _epoch_s(time, sizes.train, sizes)
 
 
 def _curve_s(times, values, sizes):
