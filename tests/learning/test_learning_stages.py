@@ -20,7 +20,9 @@ from softtact.stages import (
     draw_fig9_networks,
     evaluate,
     find_learning_rate,
+    gather_seeds,
     learning_curve,
+    repeat_learning,
     score_baselines,
     search_hyperparameters,
     train_cnn,
@@ -231,3 +233,19 @@ def test_scores_and_predictions_are_the_same_bytes_again(finished):
 def test_a_file_that_is_no_data_set_is_refused(finished):
     with pytest.raises(InputError, match="not a split of a data set"):
         read_samples(finished[0] / "presses/unseen/hexagon/elastic.nc")
+
+
+def test_the_same_training_from_several_seeds_shows_how_much_of_a_score_is_chance(finished):
+    folder, inputs, _ = finished
+    files = {split: folder / f"dataset/elastic/{split}.nc" for split in SPLITS} | {"rate": folder / "learning/elastic/rate.json"}
+    repeat_learning.run(inputs=files, outputs={"seeds": folder / "seeds.csv"},
+                        settings=settings_of("training", "network", "ssim", "seed", repeats={"seeds": 3, "networks": ["printed"]}))
+    rows = pd.read_csv(folder / "seeds.csv")
+    assert sorted(rows.seed.unique()) == [3, 4, 5] and len(rows) == 3 * 3 and rows[rows["set"] == "grasps"].ssim.nunique() == 3
+    own = pd.read_csv(finished[2]["summary"]).query("model == 'elastic'").set_index("set").ssim
+    first = rows[rows.seed == 3].set_index("set").ssim
+    assert first.to_dict() == pytest.approx(own[first.index].to_dict(), rel=1e-4)     # the study's own training is the first
+    gather_seeds.run(inputs={"seeds": [folder / "seeds.csv"]}, outputs={"table": folder / "spread.csv"}, settings={})
+    spread = pd.read_csv(folder / "spread.csv").set_index("set")
+    assert spread.ssim_sd["grasps"] == pytest.approx(rows[rows["set"] == "grasps"].ssim.std(), rel=1e-3)
+    assert (spread.seeds == 3).all()

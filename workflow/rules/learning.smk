@@ -21,6 +21,9 @@ CURVE = STUDY.values.learning_curve
 CURVES = [f"{RESULTS}/learning/{model}/learning_curve.csv" for model in STUDY.learnt_from] if CURVE.shares else []
 
 
+SEEDS = [f"{RESULTS}/learning/{model}/seeds.csv" for model in STUDY.tested] if STUDY.values.learning.seeds > 1 else []
+
+
 def curve_networks(model):
     """The networks of a model's learning curve; the reference has no search, so its maps meet the compact one only."""
     return CURVE.networks if model in STUDY.tested else ("compact",)
@@ -28,7 +31,11 @@ def curve_networks(model):
 
 def curve_files(wildcards):
     """What the search and the trial of rates found, where a network of the learning curve needs it."""
-    networks = curve_networks(wildcards.model)
+    return found_files(wildcards, curve_networks(wildcards.model))
+
+
+def found_files(wildcards, networks):
+    """The same for any networks."""
     searched = {"best": f"{RESULTS}/learning/{wildcards.model}/best.json"} if "searched" in networks else {}
     return searched | (rate_file("printed") if "printed" in networks else {})
 
@@ -275,6 +282,49 @@ rule learning_curve:
         benchmark_of("learning_curve", "{model}")
     shell:
         run_stage("learning_curve")
+
+
+rule repeat_learning:
+    input:
+        unpack(lambda wildcards: found_files(wildcards, STUDY.values.learning.networks)),
+        code=code("repeat_learning"),
+        **{split: f"{RESULTS}/dataset/{{model}}/{split}.nc" for split in SPLITS},
+    output:
+        seeds=f"{RESULTS}/learning/{{model}}/seeds.csv",
+    params:
+        files=files,
+        settings=as_settings(
+            repeats=plain(STUDY.values.learning),
+            training=STUDY.values.training.model_dump(mode="json", exclude={"threads"}),
+            network=plain(STUDY.values.network),
+            ssim=plain(STUDY.values.ssim),
+            seed=STUDY.values.seed,
+            threads=STUDY.values.training.threads,
+        ),
+    threads: STUDY.values.training.threads
+    log:
+        log_of("repeat_learning", "{model}"),
+    benchmark:
+        benchmark_of("repeat_learning", "{model}")
+    shell:
+        run_stage("repeat_learning")
+
+
+rule gather_seeds:
+    input:
+        code=code("gather_seeds"),
+        seeds=SEEDS,
+    output:
+        table=f"{RESULTS}/tables/seeds.csv",
+    params:
+        files=files,
+        settings=as_settings(),
+    log:
+        log_of("gather_seeds"),
+    benchmark:
+        benchmark_of("gather_seeds")
+    shell:
+        run_stage("gather_seeds")
 
 
 rule find_limits:

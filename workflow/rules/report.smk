@@ -321,6 +321,7 @@ rule report:
         levels=rules.compare_networks.output.levels,
         verdicts=rules.compare_networks.output.verdicts,
         **({"limits": rules.find_limits.output.limits} if CURVES else {}),
+        **({"seeds": rules.gather_seeds.output.table} if SEEDS else {}),
         ftir=rules.validate_ftir.output.summary,
         **(
             {"inventory": rules.import_published.output.inventory, "counts": rules.import_published.output.counts}

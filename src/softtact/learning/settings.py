@@ -125,6 +125,14 @@ class LearningCurve(Section):
         return shares
 
 
+class Repeats(Section):
+    """The same training from several seeds, on kept presses and one split: how much of a score is chance."""
+
+    seeds: PositiveInt = Field(1,
+                               description="trainings of each network, from the study's seed and those after it; 1: no repetition")
+    networks: tuple[Literal["printed", "searched", "compact"], ...] = Field(("compact",), min_length=1)
+
+
 class Ssim(Section):
     """Structural similarity of tactile maps."""
 

@@ -46,5 +46,10 @@ def _mesh(config):
 
 
 def _seeds(settings):
+    repeats = settings.get("config", {}).get("learning", {})
+    if repeats.get("seeds", 1) > 1:
+        return (f"One virtual specimen and one split, of seed {settings['seed']}. Intervals are over objects and trials. Of "
+                f"learning {repeats['seeds']} seeds were tried, for the network {' and '.join(repeats['networks'])}: see their "
+                "spread.")
     return (f"One seed, {settings['seed']}: one virtual specimen, one split, one training of each network. Intervals are over "
             "objects and trials and hold nothing of what another seed would give.")

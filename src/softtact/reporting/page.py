@@ -48,6 +48,7 @@ TITLES = {"summary": "Scores with their 95 % interval, by set",
           "levels": "Scores at each force",
           "networks": "Architectures on the same split: scores with their 95 % interval beside predictors without a network, how "
                       "the training ended, and times",
+          "seeds": "The same training from several seeds, on the same presses and split",
           "limits": "What limits the scores: model, data or network",
           "gains": "How SSIM depends on the gain of the readings, at the largest force on grasped objects, without any network",
           "policies": "Policies that choose a model, on the presses that the expected error was not calibrated on",
@@ -58,7 +59,8 @@ TITLES = {"summary": "Scores with their 95 % interval, by set",
           "table3": "Table 3. Time per tactile map"}
 _STAGE_OF = {"policies": "compare_policies", "networks": "compare_networks", "levels": "compare_networks",
              "counts": "import_published",
-             "summary": "evaluate", "gains": "compare_gains", "limits": "find_limits"}   # others: make_tables
+             "summary": "evaluate", "gains": "compare_gains", "limits": "find_limits",
+             "seeds": "gather_seeds"}   # others: make_tables
 _DRAWN_BY_MATPLOTLIB = "Views are rendered off screen by VTK; a figure says so where matplotlib drew them instead."
 _WITH_VIEWS = ("fig4_complexity", "fig7_maps")
 _FOLDERS = ("presses", "tactile", "dataset", "learning", "evaluation", "section", "tables", "figures", "logs")

@@ -40,7 +40,9 @@ HEADERS = {
     "other_network_gain": "gain by another network",
     "limit": "limit", "sentence": "in words", "stage": "stage", "jobs": "jobs", "total_s": "in all, s", "longest_s": "longest, s",
     "largest_memory_mb": "largest memory, MB", "claim": "claim", "where": "where", "ours": "ours", "uncertainty": "uncertainty",
-    "verdict": "verdict", "rule": "rule", "evidence": "evidence"}
+    "verdict": "verdict", "seeds": "seeds", "ssim_sd": "SSIM, standard deviation",
+    "ssim_least": "SSIM, least", "ssim_most": "SSIM, most", "mae_sd": "standard deviation of the mean error, counts",
+    "rule": "rule", "evidence": "evidence"}
 
 
 def header(column: str) -> str:

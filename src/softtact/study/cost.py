@@ -143,6 +143,8 @@ def _learning(study, measured, folder):
               "train_beside/*.tsv"),
         stage("evaluate", ["evaluation/summary.csv"], len(models) * score[_form(own)], "evaluate/*.tsv"),
         stage("compare_networks", ["tables/networks.csv"], len(models) * sum(score.values()), "compare_networks/*.tsv"),
+        *([stage("repeat_learning", learnt("seeds.csv"), _repeats_s(times, values, sizes), "repeat_learning/*.tsv")]
+          if values.learning.seeds > 1 else []),
         *([stage("learning_curve", learnt("learning_curve.csv", study.learnt_from), _curve_s(times, values, sizes),
                  "learning_curve/*.tsv")] if values.learning_curve.shares else []),
     ]
@@ -174,6 +176,11 @@ def epochs_of_a_trial(search: "Search") -> float:
 def _training_s(time, architecture, values, sizes):
     epochs = (architecture == "compact" and values.network.compact.epochs) or values.training.epochs
     return epochs * _epoch_s(time, sizes.train, sizes)
+
+
+def _repeats_s(times, values, sizes):
+    each = (_training_s(times[_form(kind)], kind, values, sizes) for kind in values.learning.networks)
+    return values.learning.seeds * sum(each)
 
 
 def _rates_s(time, values, sizes):

@@ -15,7 +15,7 @@ from pydantic import (
     model_validator,
 )
 
-from softtact.learning.settings import LearningCurve, Network, Search, Ssim, Training
+from softtact.learning.settings import LearningCurve, Network, Repeats, Search, Ssim, Training
 from softtact.materials.laws.registry import LAWS
 from softtact.published.arrangement import ARRANGEMENTS
 from softtact.readout.virtual_sensor import VirtualSensorSettings
@@ -280,5 +280,6 @@ class Values(Section):
     search: Search
     training: Training
     network: Network
+    learning: Repeats = Repeats()
     learning_curve: LearningCurve = LearningCurve()
     ssim: Ssim
