@@ -1,11 +1,12 @@
 # `make`: the default study.  `make tiny`: the smallest study.  `make docs`: the documentation.
 # `make test`: the tests, in minutes.  `make test-slow`: those that take longer, CalculiX's and whole runs of the workflow among them.
+# `make results`: the results page in docs/, from a finished run of the default study.
 # `make numbers`: the measured numbers in docs/, from benchmarks/results/ and a count of the tests.
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 BIN := .venv/bin
 SNAKEMAKE = $(BIN)/snakemake --cores all
 
-.PHONY: study tiny test test-slow lint advice bench docs numbers clean
+.PHONY: study tiny test test-slow lint advice bench docs numbers results clean
 
 study: .venv/installed
 	$(SNAKEMAKE)
@@ -48,13 +49,18 @@ advice: .venv/tested
 	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[all,test,docs]'
 	touch $@
 
-# The documentation as a site, from docs/ into site/; a warning is an error.
+# The documentation as a site, from docs/ into site/; a warning of Sphinx is an error.
 docs: numbers
+	$(BIN)/python scripts/write_results.py --check
 	$(BIN)/python -m sphinx -W --keep-going -q -b html -d site/.doctrees docs site
 	@echo "Open site/index.html"
 
 numbers: .venv/tested
 	$(BIN)/python scripts/write_numbers.py
+
+# The page docs/results.md from a finished run of the default study.
+results: .venv/installed
+	$(BIN)/python scripts/write_results.py results/default
 
 clean:
 	rm -rf results/*/ .snakemake

@@ -340,6 +340,7 @@ rule report:
         config=f"{RESULTS}/config.yaml",
         named=f"{RESULTS}/config_named.yaml",
         run=f"{RESULTS}/tables/run.csv",
+        gaps=f"{RESULTS}/tables/gaps.csv",
     params:
         files=files,
         settings=as_settings(

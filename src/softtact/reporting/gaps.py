@@ -10,14 +10,17 @@ MESH_ERRORS = {"draft": "2 to 5 % of its largest value in the root mean square a
                "default": "up to 2 % of its largest value in the root mean square and up to 5 % at single points"}
 
 
-def missing(settings: dict[str, Any]) -> list[str]:
-    """Sentences on a study whose presses are its own; settings as of the stage `report`."""
+def missing(settings: dict[str, Any], *, archive: bool) -> list[str]:
+    """Sentences on a study, of its own presses or of the published archive; settings as of the stage `report`."""
+    return _beside_archive(settings) if archive else _of_presses(settings)
+
+
+def _of_presses(settings):
     return ["No robot and no gripper: a grasp is a rigid object pressed on one sensor along its normal with a stated force.",
             _places(settings), _sizes(settings), *_mesh(settings["config"]), _seeds(settings)]
 
 
-def missing_beside_archive(settings: dict[str, Any]) -> list[str]:
-    """The same of a study on the published archive."""
+def _beside_archive(settings):
     return ["Nothing was pressed here: maps are the archive's.", _seeds(settings)]
 
 

@@ -13,7 +13,7 @@ from markupsafe import Markup
 import softtact
 from softtact.evaluation.score_tables import ALL_FORCES, forces_of
 from softtact.files import read_json
-from softtact.reporting.gaps import missing, missing_beside_archive
+from softtact.reporting.gaps import missing
 from softtact.reporting.page_template import PAGE, SOURCES, STYLE
 from softtact.reporting.run_record import run_sentence
 from softtact.reporting.tables import machine
@@ -82,7 +82,7 @@ def render_page(inputs: dict[str, Any], settings: dict[str, Any], *, folder: Pat
     return Environment(autoescape=True).from_string(PAGE).render(
         study=settings["study"], style=Markup(STYLE), facts=_archive_facts(settings, archive) if archive else _facts(settings),
         synthetic=_synthetic_but_for_the_archive(ftir) if archive else _synthetic(ftir, settings["config"]),
-        missing=missing_beside_archive(settings) if archive else missing(settings),
+        missing=missing(settings, archive=archive is not None),
         tables=_tables(inputs, folder), verdicts_on_networks=read_json(inputs["verdicts"])["sentences"],
         result=Markup(_html(result_table(scores))), result_link=_link(inputs["scores"], folder),
         run=Markup(_html(run)), run_said=run_sentence(run),

@@ -2,24 +2,27 @@
 
 inputs: table1, contradictions, table2, table3, networks, scores, levels, verdicts, claims, summary, ftir, figures (list of PNG and
     HTML), sources (list of source files), and policies and gains, or inventory and counts of the published archive
-outputs: page, sources, config, named, run
+outputs: page, sources, config, named, run, gaps
 settings: study facts, config (all values), named (what these name), benchmarks (folder), sources {figure: {data, code}}
 """
 
 from typing import Any
 
+import pandas as pd
 import yaml
 
 from softtact.files import atomic_path, write_csv
+from softtact.reporting.gaps import missing
 from softtact.reporting.page import render_page, render_sources
 from softtact.reporting.run_record import run_record
 
 
 def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Write the configuration, the sources, the record of the run, and the page, each whole."""
+    """Write the configuration, the sources, the record of the run, what it lacks, and the page, each whole."""
     config, named = (yaml.safe_dump(settings[name], sort_keys=False, allow_unicode=True, width=120) for name in ("config", "named"))
     record = run_record(settings["benchmarks"])
     write_csv(outputs["run"], record)
+    write_csv(outputs["gaps"], pd.DataFrame({"sentence": missing(settings, archive="inventory" in inputs)}))
     _write(outputs["config"], config)
     _write(outputs["named"], named)
     _write(outputs["sources"], render_sources(inputs["sources"], study=settings["study"], config=config, named=named,

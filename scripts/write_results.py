@@ -1,0 +1,182 @@
+"""Write the page of results from a finished run of a study: docs/results.md, its tables and small pictures in docs/results/.
+
+    python scripts/write_results.py [results/default]      (`make results`)
+    python scripts/write_results.py --check                warns where the code has changed since; `make docs` asks
+
+The page names its run: study, digest of its settings, commit, machine, seeds, and a digest of every source file that made it.
+"""
+
+import argparse
+import hashlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+from datetime import date
+from pathlib import Path
+
+import pandas as pd
+import yaml
+from PIL import Image
+
+from softtact.errors import InputError
+from softtact.reporting.run_record import run_record, run_sentence
+from softtact.reporting.tables import machine
+from softtact.reporting.words import KINDS, PREDICTORS, SETS, header
+from softtact.study.code_closure import code_closure
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE, FOLDER = ROOT / "docs" / "results.md", ROOT / "docs" / "results"
+WIDTH_PX, COLOURS = 900, 64
+FIGURES = {
+    "fig2_section": "Figure 2. Section through the sensor, at rest and pressed.",
+    "fig4_complexity": "Figure 4. Complexity of the objects, and the model that the rule chooses.",
+    "fig5_ftir": "Figure 5. Contact area of the dielectric on glass.",
+    "fig6_ssim": "Figure 6. SSIM of each item, with the marks of predictors that need no network.",
+    "fig7_maps": "Figure 7. Deformation maps of both models, and tactile maps predicted and felt by the virtual sensor.",
+    "fig8_policies": "Figure 8. What each policy of choosing a model costs, and which error it accepts.",
+    "fig9_networks": "Figure 9. The printed network beside another, on the same split.",
+    "fig10_learning_curve": "Figure 10. SSIM against the number of training maps."}
+# Title, file below the run's folder, and the columns that the page shows; all columns stand in the CSV beside it.
+TABLES = {
+    "Scores of the networks": ("evaluation/summary.csv", None),
+    "Scores beside predictors without a network": ("tables/levels.csv", None),
+    "Networks": ("tables/networks.csv", ["model", "architecture", "weights", "set", "ssim", "mae_counts", "mean_reading_ssim",
+                                         "quadratic_ssim", "skill", "learning_rate", "remains"]),
+    "Seeds": ("tables/seeds.csv", None),
+    "SSIM against the gain of the readings": ("tables/gains.csv", None),
+    "Policies": ("tables/policies.csv", None),
+    "Time per tactile map": ("tables/table3_timing.csv", None)}
+CLAIMS, GAPS = "tables/claims.csv", "tables/gaps.csv"
+
+
+def sources() -> dict[str, str]:
+    """Source file to the first 16 digits of its SHA-256, for all files that any stage of a study runs."""
+    stages = sorted(path.stem for path in (ROOT / "src" / "softtact" / "stages").glob("[!_]*.py"))
+    files = sorted({file for stage in stages for file in code_closure(f"softtact.stages.{stage}", source=ROOT / "src")})
+    return {str(Path(file).relative_to(ROOT)): digest(Path(file))[:16] for file in files}
+
+
+def digest(path: Path) -> str:
+    """SHA-256 of a file."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def changed(recorded: dict[str, str]) -> list[str]:
+    """Source files that are new, gone or other than recorded."""
+    now = sources()
+    return sorted(file for file in recorded.keys() | now.keys() if recorded.get(file) != now.get(file))
+
+
+def provenance(run: Path) -> dict[str, object]:
+    """What the run is and where it was made; refused where it is not finished or older than the code."""
+    config = run / "config.yaml"
+    for needed in (config, run / "report.html", run / CLAIMS, run / GAPS):
+        if not needed.is_file():
+            raise InputError(f"{needed}: is missing, so this is no finished run of a study; run `make` first.")
+    newest = max((ROOT / file).stat().st_mtime for file in sources())
+    if (run / "report.html").stat().st_mtime < newest:
+        raise InputError(f"{run / 'report.html'}: is older than the code; run `make` first, which makes again what depends on it.")
+    values = yaml.safe_load(config.read_text(encoding="utf-8"))
+    return {"study": values["study"], "settings_sha256": digest(config), "seed": values["seed"], "date": date.today().isoformat(),
+            "commit": git("rev-parse", "HEAD"), "edited": bool(git("status", "--porcelain", "--untracked-files=no")),
+            "machine": machine(), "processors": os.cpu_count(), "sources": sources()}
+
+
+def git(*arguments: str) -> str:
+    """What git says."""
+    return subprocess.run(["git", *arguments], cwd=ROOT, check=True, capture_output=True, text=True).stdout.strip()
+
+
+def small(picture: Path, to: Path) -> None:
+    """A picture as a PNG of few colours, at most `WIDTH_PX` wide."""
+    image = Image.open(picture).convert("RGB")
+    if image.width > WIDTH_PX:
+        image = image.resize((WIDTH_PX, round(image.height * WIDTH_PX / image.width)), Image.Resampling.LANCZOS)
+    image.quantize(COLOURS, dither=Image.Dither.NONE).save(to, optimize=True)
+
+
+def cell(value: object) -> str:
+    """A value in a table of Markdown."""
+    text = f"{value:.3g}" if isinstance(value, float) and abs(value) < 1000 else str(value)
+    text = {**PREDICTORS, **KINDS, **SETS}.get(text, text)
+    return "" if text == "nan" else text.replace("|", "\\|").replace("\n", " ")
+
+
+def markdown(frame: pd.DataFrame) -> str:
+    """A frame as a table with headings in words."""
+    lines = [[header(name) for name in frame.columns], ["---"] * frame.shape[1],
+             *([cell(value) for value in row] for row in frame.itertuples(index=False))]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def claims_in_words(claims: pd.DataFrame) -> str:
+    """How many claims have which verdict, and all of them by verdict."""
+    counts = ", ".join(f"{number} {verdict}" for verdict, number in claims.verdict.value_counts().items())
+    shown = claims.sort_values("verdict", kind="stable")[["claim", "where", "paper", "ours", "verdict"]]
+    return (f"{len(claims)} claims: {counts}. Rule, uncertainty and evidence of each: [claims.csv](results/claims.csv).\n\n"
+            f"{markdown(shown)}")
+
+
+def page(run: Path, made: dict[str, object]) -> str:
+    """The page's text; pictures and tables lie in docs/results/."""
+    edited = ", with edited files" if made["edited"] else ""
+    parts = ["# Results of the default study\n" if made["study"] == "default" else f"# Results of the study {made['study']}\n",
+             "`make results` writes this page from a finished run. Do not edit it.\n",
+             f"Made on {made['date']} at commit `{str(made['commit'])[:12]}`{edited}, on {made['machine']} with "
+             f"{made['processors']} processors; seed {made['seed']}; SHA-256 of the run's [settings](results/config.yaml) "
+             f"`{made['settings_sha256'][:16]}`. {run_sentence(run_record(run / 'benchmarks'))}\n",
+             "## What is synthetic, and what is missing\n",
+             "All readings are those of a virtual sensor, and the stress-strain curves are made from the paper's printed constants "
+             "with stated noise. No number here was measured on a real sensor.\n"]
+    parts += [f"* {sentence}" for sentence in pd.read_csv(run / GAPS).sentence] + [""]
+    for name, caption in FIGURES.items():
+        if (FOLDER / f"{name}.png").is_file():
+            parts.append(f"## {caption.partition('.')[0]}\n\n![{caption}](results/{name}.png)\n\n{caption}\n")
+    parts += ["## Claims of the paper\n", claims_in_words(pd.read_csv(run / CLAIMS, keep_default_na=False)) + "\n"]
+    for title, (file, columns) in TABLES.items():
+        if (run / file).is_file():
+            frame = pd.read_csv(run / file)
+            shown = frame[[name for name in columns if name in frame]] if columns else frame
+            parts.append(f"## {title}\n\n[{Path(file).name}](results/{Path(file).name})\n\n{markdown(shown)}\n")
+    return "\n".join(parts)
+
+
+def write(run: Path) -> None:
+    """Write page, tables and pictures of a run."""
+    made = provenance(run)
+    shutil.rmtree(FOLDER, ignore_errors=True)
+    FOLDER.mkdir(parents=True)
+    for name in FIGURES:
+        if (run / "figures" / f"{name}.png").is_file():
+            small(run / "figures" / f"{name}.png", FOLDER / f"{name}.png")
+    for file in ["config.yaml", CLAIMS, *(file for file, _ in TABLES.values())]:
+        if (run / file).is_file():
+            shutil.copy(run / file, FOLDER / Path(file).name)
+    (FOLDER / "run.json").write_text(json.dumps(made, indent=1) + "\n", encoding="utf-8")
+    PAGE.write_text(page(run, made), encoding="utf-8")
+
+
+def check() -> None:
+    """Say on stderr where the page is older than the code that made it; that is a warning and no error."""
+    if not (FOLDER / "run.json").is_file():
+        print("warning: docs/results.md was not made yet. Run `make` and `make results`.", file=sys.stderr)
+        return
+    made = json.loads((FOLDER / "run.json").read_text(encoding="utf-8"))
+    files = changed(made["sources"])
+    if files:
+        print(f"warning: docs/results.md was made at commit {made['commit'][:12]}; {len(files)} source files have changed since "
+              f"({', '.join(files[:3])}{', ...' if len(files) > 3 else ''}). Run `make` and `make results` to make it again.",
+              file=sys.stderr)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("run", nargs="?", type=Path, default=ROOT / "results" / "default")
+    parser.add_argument("--check", action="store_true", help="warn where the code has changed since the page was made")
+    arguments = parser.parse_args()
+    try:
+        check() if arguments.check else write(arguments.run)
+    except InputError as error:
+        sys.exit(str(error))

@@ -1,0 +1,78 @@
+"""The page of results: what run it is of, what it shows of it, and when it is older than the code."""
+
+import importlib.util
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from PIL import Image
+
+from softtact.errors import InputError
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture
+def script(tmp_path):
+    """The script, which writes below a folder of the test."""
+    spec = importlib.util.spec_from_file_location("write_results", ROOT / "scripts" / "write_results.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    module.PAGE, module.FOLDER = tmp_path / "docs" / "results.md", tmp_path / "docs" / "results"
+    return module
+
+
+@pytest.fixture
+def run(tmp_path):
+    """A finished run with one figure, two claims and one sentence on what it lacks."""
+    folder = tmp_path / "results" / "small"
+    for name in ("figures", "tables"):
+        (folder / name).mkdir(parents=True)
+    (folder / "config.yaml").write_text(yaml.safe_dump({"study": "small", "seed": 17}))
+    Image.fromarray(np.zeros((600, 1800, 3), dtype=np.uint8)).save(folder / "figures" / "fig7_maps.png")
+    claims = [{"claim": f"claim {k}", "where": "sec. 4", "paper": "1", "ours": "2", "verdict": verdict, "rule": "", "evidence": ""}
+              for k, verdict in enumerate(["reproduced", "undecided"])]
+    pd.DataFrame(claims).to_csv(folder / "tables" / "claims.csv", index=False)
+    pd.DataFrame({"sentence": ["No robot."]}).to_csv(folder / "tables" / "gaps.csv", index=False)
+    (folder / "report.html").write_text("a page")
+    return folder
+
+
+def test_the_page_names_its_run_and_shows_its_claims_figures_and_gaps(script, run):
+    script.write(run)
+    text, made = script.PAGE.read_text(), json.loads((script.FOLDER / "run.json").read_text())
+    assert made["seed"] == 17 and made["settings_sha256"] == script.digest(run / "config.yaml")
+    for said in ("seed 17", made["commit"][:12], made["settings_sha256"][:16], "1 reproduced, 1 undecided", "claim 1", "* No robot.",
+                 "results/fig7_maps.png"):
+        assert said in text, said
+    assert Image.open(script.FOLDER / "fig7_maps.png").size == (900, 300)
+
+
+def test_a_run_that_is_not_finished_or_older_than_the_code_gives_no_page(script, run):
+    os.utime(run / "report.html", (0, 0))
+    with pytest.raises(InputError, match="is older than the code; run `make` first"):
+        script.write(run)
+    (run / "tables" / "claims.csv").unlink()
+    with pytest.raises(InputError, match="claims.csv: is missing"):
+        script.write(run)
+    assert not script.PAGE.exists() and not script.FOLDER.exists()
+
+
+def test_a_source_file_that_has_changed_since_is_named_by_a_warning(script, run, capsys):
+    script.write(run)
+    script.check()
+    assert capsys.readouterr().err == ""
+    made = json.loads((script.FOLDER / "run.json").read_text())
+    made["sources"]["src/softtact/press/sensor.py"] = "other"
+    (script.FOLDER / "run.json").write_text(json.dumps(made))
+    script.check()
+    assert "1 source files have changed since (src/softtact/press/sensor.py)" in capsys.readouterr().err
+
+
+def test_a_page_that_was_never_made_is_said_to_be_missing(script, capsys):
+    script.check()
+    assert "docs/results.md was not made yet" in capsys.readouterr().err
