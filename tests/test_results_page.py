@@ -46,8 +46,8 @@ def test_the_page_names_its_run_and_shows_its_claims_figures_and_gaps(script, ru
     script.write(run)
     text, made = script.PAGE.read_text(), json.loads((script.FOLDER / "run.json").read_text())
     assert made["seed"] == 17 and made["settings_sha256"] == script.digest(run / "config.yaml")
-    for said in ("seed 17", made["commit"][:12], made["settings_sha256"][:16], "1 reproduced, 1 undecided", "claim 1", "* No robot.",
-                 "results/fig7_maps.png"):
+    for said in ("seed 17", made["commit"][:12], made["settings_sha256"][:16], "1 reproduced, 1 undecided", "claim 1",
+                 "* No robot.", "results/fig7_maps.png"):
         assert said in text, said
     assert Image.open(script.FOLDER / "fig7_maps.png").size == (900, 300)
 
