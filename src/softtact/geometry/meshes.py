@@ -5,21 +5,25 @@ sentence with its remedy.
 """
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import trimesh
 
 from softtact.errors import InputError
 from softtact.geometry.bodies import OVERLAP, is_cavity, union_of
+from softtact.geometry.obj import read_obj
+from softtact.geometry.ply import read_ply
 from softtact.geometry.pose import Pose
+from softtact.geometry.stl import read_stl
 
 UNIT_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "inch": 25.4, "in": 25.4}
-FORMATS = (".stl", ".obj", ".ply")
+_READERS = {".stl": read_stl, ".obj": read_obj, ".ply": read_ply}
 MIN_SIZE_MM = 1.0  # smaller than a taxel's resolution by far
 MAX_SIZE_MM = 500.0  # larger than any gripper holds
 _MERGE_DECIMALS = 5  # of a coordinate in mm: corners closer than 10 nm are one
 _FLAT = 1e-6  # thickness over size below which a mesh is no body
+_FOLD = 5e-7  # one minus the cosine of the angle, 1e-3, below which two facets on one side of an edge lie on each other
+_SLIVER = 1e-3  # of the size: facets lower than this have no certain normal
 
 
 def read_triangles(path: str | Path, *, unit: str, min_size_mm: float = MIN_SIZE_MM,
@@ -53,13 +57,14 @@ def read_mesh(path: str | Path, *, unit: str, min_size_mm: float = MIN_SIZE_MM,
     unit : 'mm', 'cm', 'm', 'inch' or 'in'; the file itself does not say
     min_size_mm, max_size_mm : range of a plausible largest side
 
-    Raises InputError that names the file, what is wrong with it (unreadable, open, inside out, flat, overlapping, of a wrong size)
-    and the remedy.
+    Raises InputError that names the file, what is wrong with it (unreadable, open, inside out, flat, folded, overlapping, of a
+    wrong size) and the remedy.
     """
     path = Path(path)
     triangles = read_triangles(path, unit=unit, min_size_mm=min_size_mm, max_size_mm=max_size_mm)
     mesh = merge_facets(triangles)
     check_body(path, mesh)
+    refuse_folded(path, mesh)
     return mesh
 
 
@@ -69,6 +74,21 @@ def check_body(path: Path, mesh: trimesh.Trimesh) -> None:
     _refuse_open(path, mesh)
     _refuse_inverted(path, mesh)
     _refuse_overlapping(path, mesh)
+
+
+def refuse_folded(path: Path, mesh: trimesh.Trimesh) -> None:
+    """Refuse facets that lie on their neighbour, as those of a concave polygon that was cut from one corner."""
+    edges = mesh.vertices[mesh.face_adjacency_edges]                                   # (k, 2, 3)
+    spokes = mesh.vertices[mesh.face_adjacency_unshared] - edges[:, :1]                # (k, 2, 3), to the corner of either side
+    along = _unit(edges[:, 1] - edges[:, 0])[:, None]
+    heights = spokes - np.sum(spokes * along, axis=2, keepdims=True) * along
+    cosine = np.prod(_unit(heights), axis=1).sum(axis=1)
+    high = np.linalg.norm(heights, axis=2).min(axis=1) > _SLIVER * np.ptp(mesh.vertices, axis=0).max()
+    folded = high & (cosine > 1 - _FOLD)
+    if folded.any():
+        x, y, z = edges[folded.argmax()].mean(axis=0)
+        raise InputError(f"{path}: {folded.sum()} facets lie on a neighbour (the first at {x:.4g}, {y:.4g}, {z:.4g} mm), as where "
+                         "concave polygons were cut into triangles from one corner; triangulate the mesh anew where it was made.")
 
 
 def merge_facets(triangles: np.ndarray) -> trimesh.Trimesh:
@@ -128,33 +148,20 @@ def _load_facets(path: Path) -> np.ndarray:
     """Facets (n, 3, 3) in the file's unit."""
     if not path.is_file():
         raise InputError(f"{path}: there is no such mesh file.")
-    if path.suffix.lower() not in FORMATS:
+    if path.suffix.lower() not in _READERS:
         raise InputError(f"{path}: the format '{path.suffix}' is not read; save the mesh as STL, OBJ or PLY.")
     if path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty; export the mesh again.")
-    _refuse_cut_off(path)
-    try:
-        mesh: Any = trimesh.load(path, force="mesh", process=False)
-        triangles = np.array(mesh.triangles, dtype=np.float64)
-    except Exception as error:  # each format's reader fails in its own way
-        raise InputError(f"{path}: not readable as {path.suffix[1:].upper()} "
-                         f"({' '.join(str(error).split())[:120]}); export the mesh again.") from error
+    triangles = _READERS[path.suffix.lower()](path)
     if triangles.size == 0:
         raise InputError(f"{path}: the file holds no triangles; export a surface mesh, not points or curves.")
-    if triangles.shape[1:] != (3, 3):
-        raise InputError(f"{path}: some corners do not have three coordinates; export the mesh again.")
     return triangles
 
 
-def _refuse_cut_off(path: Path) -> None:
-    """Refuse a text STL without its last line: what is missing might be closed as if it were a hole."""
-    with path.open("rb") as file:
-        start = file.read(84)
-        file.seek(max(0, path.stat().st_size - 2000))
-        end = file.read()
-    binary = path.stat().st_size == 84 + 50 * int.from_bytes(start[80:84], "little")
-    if path.suffix.lower() == ".stl" and start.startswith(b"solid") and not binary and b"endsolid" not in end:
-        raise InputError(f"{path}: its last line is not 'endsolid', so it was cut off; export the mesh again.")
+def _unit(vectors):
+    """Unit vectors (..., 3), 0 where a vector has no length."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
 
 
 def _unit_factor(path: Path, unit: str | None) -> float:

@@ -1,0 +1,165 @@
+"""Polygons of mesh files as triangles that cover each polygon once, whatever its shape.
+
+A quadrilateral is split along the diagonal that divides it the more evenly; both halves must face the polygon's side, so that
+concave ones are split inside. Polygons of more corners are triangulated in the plane of their vector area by manifold3d
+(ear clipping). The result does not depend on the corner a polygon begins with, unless several splits are equally good.
+Refused: polygons that cross themselves, and those whose corners leave one plane so far that their surface is a guess.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from manifold3d import CrossSection, FillRule, triangulate
+
+from softtact.errors import InputError
+
+_ROUND_OFF = 1e-6      # of a polygon's area: what is less comes from coordinates in single precision
+_BENT_QUAD = 0.1       # of the size: how far four corners may leave their mean plane
+_BENT_POLYGON = 0.01   # the same of more corners
+_SPLITS = np.array([[[0, 1, 2], [0, 2, 3]], [[1, 2, 3], [1, 3, 0]]])     # of a quadrilateral
+
+
+@dataclass(frozen=True)
+class Polygons:
+    """Polygons as a file declares them.
+
+    points : coordinates (n, 3) in the file's unit
+    corners : numbers (m,) of points from 0, of one polygon after the other
+    counts : corners (k,) of each polygon
+    places : where each polygon stands (k,), as a number of `place`
+    place : 'line' of a text, 'face' of a binary file
+    first : the number that the file gives its first point
+    """
+
+    points: np.ndarray
+    corners: np.ndarray
+    counts: np.ndarray
+    places: np.ndarray
+    place: str = "line"
+    first: int = 0
+
+
+def facets_of(path: Path, polygons: Polygons) -> np.ndarray:
+    """Triangles (n, 3, 3) of the polygons of a file; InputError names the polygon that has none."""
+    _refuse_out_of_range(path, polygons)
+    polygons = _without_repeated(polygons)
+    starts = np.cumsum(polygons.counts) - polygons.counts
+    facets = [np.empty((0, 3, 3))]
+    for count in np.unique(polygons.counts):
+        which = np.flatnonzero(polygons.counts == count)
+        corners = polygons.corners[starts[which][:, None] + np.arange(count)]
+        facets.append(_triangles(path, polygons, which, corners).reshape(-1, 3, 3))
+    return np.concatenate(facets)
+
+
+def ear_clipped(points: np.ndarray) -> np.ndarray:
+    """Numbers (count - 2, 3) of the corners of the triangles of one nearly flat polygon (count, 3).
+
+    A polygon that covers some part twice or the wrong way round has no triangulation; its triangles then look to the other side.
+    """
+    side = _sides(points[None])[0]
+    fan = np.array([[0, k, k + 1] for k in range(1, len(points) - 1)])
+    if not side.any():
+        return fan     # all corners lie on one line, or the polygon crosses itself, which its folds will tell
+    spokes = points - points[0]
+    x = spokes[np.linalg.norm(spokes, axis=1).argmax()]
+    x = x - (x @ side) * side
+    x = x / np.linalg.norm(x)
+    plane = spokes @ np.column_stack([x, np.cross(side, x)]) / np.abs(spokes).max()
+    own = 0.5 * np.sum(plane[:, 0] * np.roll(plane[:, 1], -1) - plane[:, 1] * np.roll(plane[:, 0], -1))
+    covered = CrossSection([plane], FillRule.NonZero).area()
+    if abs(covered - own) > _ROUND_OFF:
+        return fan[:, ::-1]
+    triangles = np.asarray(triangulate([plane]))
+    return triangles if len(triangles) == len(fan) else fan[:, ::-1]
+
+
+def _triangles(path, polygons, which, corners):
+    """Triangles (k, count - 2, 3, 3) of polygons that have as many corners (k, count)."""
+    points = polygons.points[corners]
+    if points.shape[1] == 3:
+        return points
+    sides = _sides(points)
+    _refuse(path, polygons, which, _bend(points, sides) > (_BENT_QUAD if points.shape[1] == 4 else _BENT_POLYGON),
+            "leaves one plane so far that its surface is a guess; triangulate the mesh before its export")
+    if points.shape[1] == 4:
+        triangles = _halves(points, sides, corners)
+    else:
+        triangles = np.stack([polygon[ear_clipped(polygon)] for polygon in points])
+    _refuse(path, polygons, which, _folded(triangles, sides), "crosses itself; mend it where the mesh was made")
+    return triangles
+
+
+def _without_repeated(polygons):
+    """The polygons without corners that repeat the one before; what is left of less than three corners bounds no area."""
+    owner = np.repeat(np.arange(len(polygons.counts)), polygons.counts)
+    ends = np.cumsum(polygons.counts)
+    following = np.arange(1, len(owner) + 1)
+    following[ends - 1] = ends - polygons.counts
+    points = polygons.points[polygons.corners]
+    keep = (points != points[following]).any(axis=1)
+    if keep.all():
+        return polygons
+    counts = np.bincount(owner[keep], minlength=len(ends))
+    keep &= (counts >= 3)[owner]
+    return Polygons(polygons.points, polygons.corners[keep], counts[counts >= 3], polygons.places[counts >= 3], polygons.place)
+
+
+def _areas(triangles):
+    """Vector areas (..., 3) of triangles (..., 3, 3)."""
+    return 0.5 * np.cross(triangles[..., 1, :] - triangles[..., 0, :], triangles[..., 2, :] - triangles[..., 0, :])
+
+
+def _sides(points):
+    """Unit vectors (k, 3) along the vector areas of polygons (k, count, 3), to which their side looks; 0 where there is none."""
+    spokes = points - points[:, :1]
+    area = 0.5 * np.cross(spokes[:, 1:-1], spokes[:, 2:]).sum(axis=1)
+    length = np.linalg.norm(area, axis=1, keepdims=True)
+    whole = length > 1e-12 * (spokes**2).sum(axis=2).max(axis=1, keepdims=True)
+    return np.divide(area, length, out=np.zeros_like(area), where=whole)
+
+
+def _bend(points, sides):
+    """How far (k,) corners leave the polygons' mean planes, of the polygons' sizes."""
+    centred = points - points.mean(axis=1, keepdims=True)
+    size = 2 * np.linalg.norm(centred, axis=2).max(axis=1)
+    return np.abs(np.einsum("knd,kd->kn", centred, sides)).max(axis=1) / np.where(size > 0, size, 1.0)
+
+
+def _halves(points, sides, corners):
+    """Quadrilaterals (k, 4, 3) as two triangles each (k, 2, 3, 3)."""
+    options = points[:, _SPLITS]                                                       # (k, split, half, 3, 3)
+    smaller = np.einsum("kshd,kd->ksh", _areas(options), sides).min(axis=2)            # (k, split)
+    alike = np.abs(smaller[:, 0] - smaller[:, 1]) <= _ROUND_OFF * np.abs(smaller).max(axis=1)
+    at_lowest = corners.argmin(axis=1) % 2      # equally good: from the corner with the lowest number, wherever the polygon begins
+    return options[np.arange(len(points)), np.where(alike, at_lowest, smaller.argmax(axis=1))]
+
+
+def _folded(triangles, sides):
+    """Whether the triangles (k, t, 3, 3) of polygons lie on each other (k,)."""
+    areas = _areas(triangles)
+    along = np.einsum("ktd,kd->kt", areas, sides)
+    whole = np.linalg.norm(areas, axis=2).sum(axis=1)
+    flat = whole <= 1e-12 * np.ptp(triangles, axis=(1, 2)).max(axis=1) ** 2
+    return ~flat & ((along.min(axis=1) < -_ROUND_OFF * whole) | (along.sum(axis=1) < 0.5 * whole))
+
+
+def _refuse(path, polygons, which, wrong, why):
+    """Refuse the first of the polygons `which` that is wrong."""
+    if wrong.any():
+        number = which[wrong.argmax()]
+        raise InputError(f"{path}: {polygons.place} {polygons.places[number]}: the polygon of {polygons.counts[number]} corners "
+                         f"{why}.")
+
+
+def _refuse_out_of_range(path, polygons):
+    """Refuse a corner that is none of the file's points."""
+    known = len(polygons.points)
+    wrong = (polygons.corners < 0) | (polygons.corners >= known)
+    if wrong.any():
+        at = wrong.argmax()
+        number = np.searchsorted(np.cumsum(polygons.counts), at, side="right")
+        first = polygons.first
+        raise InputError(f"{path}: {polygons.place} {polygons.places[number]}: a corner is vertex {polygons.corners[at] + first}, "
+                         f"but the file's {known} vertices are {first} to {known - 1 + first}; export the mesh again.")
