@@ -103,17 +103,18 @@ class _Statements:
         return end + 1
 
     def _vertex(self, words):
-        for word in words:
-            if not is_finite(word):
-                raise no_number(self.path, self.line, word)
-        values = [float(word) for word in words]
-        if len(values) not in (3, 4, 6):
+        if len(words) not in (3, 4, 6):
             raise self._refusal(f"a vertex has three coordinates, alone or with a weight or a colour of three, not {len(words)} "
                                 f"numbers; {_AGAIN}")
-        if len(values) == 4 and values[3] != 1:
-            raise self._refusal(f"the vertex has the weight {values[3]:g}, which only free-form surfaces have; export the mesh as "
+        numbers = words[:3] if len(words) == 6 else words
+        for word in numbers:
+            if not is_finite(word):
+                raise no_number(self.path, self.line, word)
+        x, y, z, *weight = map(float, numbers)
+        if weight and weight[0] != 1:
+            raise self._refusal(f"the vertex has the weight {weight[0]:g}, which only free-form surfaces have; export the mesh as "
                                 "polygons.")
-        self.points.extend(values[:3])
+        self.points.extend((x, y, z))
         self.point_lines.append(self.line)
 
     def _face(self, words):

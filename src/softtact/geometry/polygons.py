@@ -15,7 +15,7 @@ from manifold3d import CrossSection, FillRule, triangulate
 from softtact.errors import InputError
 
 _ROUND_OFF = 1e-6      # of a polygon's area: what is less comes from coordinates in single precision
-_BENT_QUAD = 0.1       # of the size: how far four corners may leave their mean plane
+_BENT_QUAD = 0.2       # of the size: how far four corners may leave their mean plane; a square folded by 90 degrees
 _BENT_POLYGON = 0.01   # the same of more corners
 _SPLITS = np.array([[[0, 1, 2], [0, 2, 3]], [[1, 2, 3], [1, 3, 0]]])     # of a quadrilateral
 

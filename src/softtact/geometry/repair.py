@@ -160,11 +160,16 @@ def _close_holes(mesh, said):
     if len(patches) < len(loops) or not patches:
         return mesh
     curved = sum(area for _, area, flat in patches if not flat)
-    if curved > _SMALL_HOLES * mesh.area:
+    if curved > _SMALL_HOLES * mesh.area or any(not flat and _has_loose_corner(mesh, faces) for faces, _, flat in patches):
         return mesh
     area = sum(area for _, area, _ in patches)
     said.append(f"closed {_number(len(patches), 'hole')}, {area:.3g} mm2 or {area / (mesh.area + area):.2g} of the surface")
     return _of_faces(mesh.vertices, np.vstack([mesh.faces, *(faces for faces, _, _ in patches)]))
+
+
+def _has_loose_corner(mesh, faces):
+    """Whether a corner of a hole belongs to one facet only: that facet's corner seems to be misplaced, not its neighbours lost."""
+    return bool((np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices))[faces] < 2).any())
 
 
 def _rims(mesh):

@@ -87,11 +87,13 @@ def _fault(path, data, at):
     """The refusal of the first word of the facets from a byte on that is not the one that is due."""
     for number, word in enumerate(re.compile(rb"\S+").finditer(data, at)):
         due = _WORDS[number % len(_WORDS)]
+        if word.end() == len(data):
+            break
         if due is float and not is_finite(word.group()):
             return no_number(path, line_at(data, word.start()), word.group())
         if isinstance(due, bytes) and word.group() != due:
             return _unexpected(path, data, word.start(), "facet' or 'endsolid" if due == b"facet" else due.decode())
-    return InputError(f"{path}: it ends within a facet and without 'endsolid', so it was cut off; {_AGAIN}")
+    return InputError(f"{path}: it ends without 'endsolid', so it was cut off; {_AGAIN}")
 
 
 def _unexpected(path, data, at, due):
