@@ -43,13 +43,15 @@ WRITERS = {
         indent=["", "  ", "\t"], end=["\n", "\r\n", "\r"], number=["%.9g", "%.12e", "%+.8f"], upper=[False, True],
         continued=[False, True], comments=[False, True], extras=[False, True], tail=["", " 1", " 0.2 0.5 1", " nan nan nan"])),
     "ply": (ply_file, options(
-        form=["ascii", "binary_little_endian", "binary_big_endian"], coordinate=["float", "double"], length=["uchar", "ushort", "int"],
-        index=["int", "uint", "uchar"], extras=[False, True], edges=["none", "before", "after"], end=["\n", "\r\n", "\r"])),
+        form=["ascii", "binary_little_endian", "binary_big_endian"], coordinate=["float", "double"],
+        length=["uchar", "ushort", "int"], index=["int", "uint", "uchar"],
+        extras=[False, True], edges=["none", "before", "after"], end=["\n", "\r\n", "\r"])),
     "text STL": (text_stl, options(
-        name=["", "part", "two words", "vertex_cover", "facet normal 0 0 1", "endsolid"], normal=["0 0 0", "nan nan nan", "-1.#IND 1.#QNAN 0"],
+        name=["", "part", "two words", "vertex_cover", "facet normal 0 0 1", "endsolid"],
+        normal=["0 0 0", "nan nan nan", "-1.#IND 1.#QNAN 0"],
         indent=["", "  ", "\t"], gap=[" ", "\t", "  "], end=["\n", "\r\n", "\r"], number=["%.9g", "%.9e", "%+.8f"],
         case=[str, str.upper, str.title], tail=["", "\n\n", "  \n \n"])),
-    "binary STL": (binary_stl, options(header=[b"", b"solid part", b"\0" * 80], tail=[b"", b"\n", b"\0\0", b"\r\n"])),
+    "binary STL": (binary_stl, options(header=[b"", b"solid part", b"\0" * 80], tail=[b"", b"\n", b"\r\n", b" \n"])),
 }
 
 
@@ -113,42 +115,49 @@ def test_a_mutated_file_is_read_to_the_same_body_or_refused(name, tmp_path):
     mutate()
 
 
-PLAIN_OBJ = obj_file([BOX]).decode()
-PLAIN_PLY = ply_file([BOX]).decode()
-PLAIN_STL = text_stl([BOX]).decode()
+OBJ, PLY, STL = obj_file([BOX]).decode(), ply_file([BOX]).decode(), text_stl([BOX]).decode()
+BINARY = binary_stl([BOX])
 REFUSED = [
-    ("zero.obj", PLAIN_OBJ.replace("f 4 3 2 1", "f 3 2 1 0"), "line 11: a corner is vertex 0, but the file's 8 vertices are 1 to 8"),
-    ("relative_zero.obj", PLAIN_OBJ.replace("f 4 3 2 1", "f -1 -2 -3 0"), "line 11: a corner is vertex 0, but vertices are counted from"),
-    ("large.obj", PLAIN_OBJ.replace("f 4 3 2 1", "f 4 3 2 9"), "line 11: a corner is vertex 9, but the file's 8 vertices are 1 to 8"),
-    ("before.obj", PLAIN_OBJ.replace("f 4 3 2 1", "f 4 3 2 -9"), "line 11: a corner is vertex -9, but only 8 vertices stand before it"),
-    ("two.obj", PLAIN_OBJ.replace("f 4 3 2 1", "f 4 3"), "line 11: the face has 2 corners"),
-    ("comma.obj", PLAIN_OBJ.replace("v 20 20 8", "v 20,0 20 8"), "line 9: '20,0' is no finite number; write decimals with points"),
-    ("nan.obj", PLAIN_OBJ.replace("v 20 20 8", "v nan 20 8"), "line 9: 'nan' is no finite number"),
-    ("weight.obj", PLAIN_OBJ.replace("v 20 20 8", "v 20 20 8 2"), "line 9: the vertex has the weight 2"),
-    ("curve.obj", PLAIN_OBJ + "cstype bspline\n", "line 17: 'cstype' belongs to free-form"),
-    ("call.obj", PLAIN_OBJ + "call other.obj\n", "line 17: 'call' calls another file"),
-    ("word.obj", PLAIN_OBJ + "facet 1 2 3\n", "line 17: 'facet' is no statement"),
-    ("anew.obj", PLAIN_OBJ + obj_file([SMALL_BOX]).decode(), "6 faces stand there twice, and no face uses 8 of the vertices"),
-    ("cut.obj", PLAIN_OBJ + "v 1 1 1\nv 2 2 2\n", "line 17: no face uses the 2 vertices from here on, so the file was cut off"),
-    ("continued.obj", PLAIN_OBJ.replace("f 4 3 2 1", "f 4 3 \\\n2 9"), "line 11: .*vertex 9"),
-    ("utf16.obj", PLAIN_OBJ.encode("utf-16"), "UTF-16"),
-    ("more.ply", PLAIN_PLY.replace("face 6", "face 5"), "line 25: '4 3 0 4 7' follows the last row that the header declares"),
-    ("fewer.ply", PLAIN_PLY.replace("face 6", "face 7"), "declares 7 rows of 'face', and the file ends or is damaged after 6"),
-    ("range.ply", PLAIN_PLY.replace("4 3 2 1 0", "4 3 2 1 8"), "line 20: a corner is vertex 8, but the file's 8 vertices are 0 to 7"),
-    ("nan.ply", PLAIN_PLY.replace("20 20 8", "20 nan 8"), "line 18: the vertex has a coordinate that is no finite number"),
-    ("comma.ply", PLAIN_PLY.replace("20 20 8", "20 20,5 8"), "line 18: '20 20,5 8' is no row of 'vertex'"),
-    ("strips.ply", PLAIN_PLY.replace("element face", "element tristrips"), "strips of triangles"),
-    ("type.ply", PLAIN_PLY.replace("property float y", "property float3 y"), "line 7: 'property float3 y' is no line of a PLY header"),
-    ("comma.stl", PLAIN_STL.replace("20 20 8", "20 20 8,5"), "is no finite number; write decimals with points"),
-    ("nan.stl", PLAIN_STL.replace("20 20 8", "20 nan 8"), r"line \d+: 'nan' is no finite number"),
+    ("zero.obj", OBJ.replace("f 4 3 2 1", "f 3 2 1 0"), "line 11: a corner is vertex 0, but the file's 8 vertices are 1 to 8"),
+    ("relative_zero.obj", OBJ.replace("f 4 3 2 1", "f -1 -2 -3 0"), "line 11: a corner is vertex 0, but vertices are counted"),
+    ("large.obj", OBJ.replace("f 4 3 2 1", "f 4 3 2 9"), "line 11: a corner is vertex 9, but the file's 8 vertices are 1 to 8"),
+    ("digits.obj", OBJ.replace("f 4 3 2 1", "f 4 3 2 " + 30 * "9"), "line 11: '9{30}' is no number of a vertex"),
+    ("before.obj", OBJ.replace("f 4 3 2 1", "f 4 3 2 -9"), "line 11: a corner is vertex -9, but only 8 vertices stand before it"),
+    ("two.obj", OBJ.replace("f 4 3 2 1", "f 4 3"), "line 11: the face has 2 corners"),
+    ("point.obj", OBJ.replace("f 4 3 2 1", "f 4 3 2.0"), "line 11: '2.0' is no number of a vertex"),
+    ("comma.obj", OBJ.replace("v 20 20 8", "v 20,0 20 8"), "line 9: '20,0' is no finite number; write decimals with points"),
+    ("nan.obj", OBJ.replace("v 20 20 8", "v nan 20 8"), "line 9: 'nan' is no finite number"),
+    ("infinite.obj", OBJ.replace("v 20 20 8", "v 1e999 20 8"), "line 9: the vertex has a coordinate that is no finite number"),
+    ("flat.obj", OBJ.replace("v 20 20 8", "v 20 20"), "line 9: a vertex has three coordinates"),
+    ("weight.obj", OBJ.replace("v 20 20 8", "v 20 20 8 2"), "line 9: the vertex has the weight 2"),
+    ("curve.obj", OBJ + "cstype bspline\n", "line 17: 'cstype' belongs to free-form"),
+    ("call.obj", OBJ + "call other.obj\n", "line 17: 'call' calls another file"),
+    ("word.obj", OBJ + "facet 1 2 3\n", "line 17: 'facet' is no statement"),
+    ("anew.obj", OBJ + obj_file([SMALL_BOX]).decode(), "6 faces stand there twice, and no face uses 8 of the vertices"),
+    ("cut.obj", OBJ + "v 1 1 1\nv 2 2 2\n", "line 17: no face uses the 2 vertices from here on, so the file was cut off"),
+    ("continued.obj", OBJ.replace("f 4 3 2 1", "f 4 3 \\\n2 9"), "line 11: .*vertex 9"),
+    ("utf16.obj", OBJ.encode("utf-16"), "UTF-16"),
+    ("utf16.stl", STL.encode("utf-16"), "UTF-16"),
+    ("more.ply", PLY.replace("face 6", "face 5"), "line 25: '4 3 0 4 7' follows the last row that the header declares"),
+    ("fewer.ply", PLY.replace("face 6", "face 7"), "declares 7 rows of 'face', and the file ends or is damaged after 6"),
+    ("range.ply", PLY.replace("4 3 2 1 0", "4 3 2 1 8"), "line 20: a corner is vertex 8, but the file's 8 vertices are 0 to 7"),
+    ("two.ply", PLY.replace("4 3 2 1 0", "2 3 2"), "line 20: the face has 2 corners"),
+    ("nan.ply", PLY.replace("20 20 8", "20 nan 8"), "line 18: the vertex has a coordinate that is no finite number"),
+    ("comma.ply", PLY.replace("20 20 8", "20 20,5 8"), "line 18: '20 20,5 8' is no row of 'vertex'"),
+    ("strips.ply", PLY.replace("element face", "element tristrips"), "strips of triangles"),
+    ("type.ply", PLY.replace("float y", "float3 y"), "line 7: 'property float3 y' is no line of a PLY header"),
+    ("longer.ply", ply_file([BOX], form="binary_big_endian") + b"\0", "end at byte 418, but the file has 419"),
+    ("comma.stl", STL.replace("20 20 8", "20 20 8,5"), r"line \d+: '8,5' is no finite number; write decimals with points"),
+    ("nan.stl", STL.replace("20 20 8", "20 nan 8"), r"line \d+: 'nan' is no finite number"),
     ("second.stl", text_stl([BOX, SMALL_BOX])[:-200], "ends without 'endsolid', so it was cut off"),
-    ("open.stl", PLAIN_STL.replace("endsolid part\n", "", 1) + PLAIN_STL, "line 86: 'solid' stands where 'facet' or 'endsolid' is due"),
-    ("word.stl", PLAIN_STL.replace("outer loop", "outer", 1), "line 4: 'vertex' stands where 'loop' is due"),
-    ("behind.stl", PLAIN_STL + "facet normal 0 0 1\n", "line 87: 'facet' stands where 'solid' is due"),
-    ("zero.stl", binary_stl([BOX], count=0), "declares 0 facets, but 600 bytes follow these"),
-    ("fewer.stl", binary_stl([BOX], count=11), "declares 11 facets, but 50 bytes follow these"),
-    ("more.stl", binary_stl([BOX], header=b"solid", count=13), "declares 13 facets and holds 12, so it was cut off"),
-    ("bytes.stl", binary_stl([BOX], tail=b"xyz"), "declares 12 facets, but 3 bytes follow these"),
+    ("open.stl", STL.replace("endsolid part\n", "") + STL, "line 86: 'solid' stands where 'facet' or 'endsolid' is due"),
+    ("word.stl", STL.replace("outer loop", "outer", 1), "line 4: 'vertex' stands where 'loop' is due"),
+    ("behind.stl", STL + "facet normal 0 0 1\n", "line 87: 'facet' stands where 'solid' is due"),
+    ("zero.stl", binary_stl([BOX], count=0), "declares 0 facets, which take 84 bytes, but has 684"),
+    ("fewer.stl", binary_stl([BOX], count=11), "declares 11 facets, which take 634 bytes, but has 684, so it holds more"),
+    ("more.stl", binary_stl([BOX], header=b"solid", count=13), "13 facets, which take 734 bytes, but has 684, so it was cut"),
+    ("bytes.stl", binary_stl([BOX], tail=b"xyz"), "declares 12 facets, which take 684 bytes, but has 687"),
+    ("inserted.stl", BINARY[:300] + b"\0" + BINARY[300:], "declares 12 facets, which take 684 bytes, but has 685"),
 ]
 
 
@@ -168,7 +177,7 @@ def test_normals_that_are_no_numbers_leave_no_word_on_the_terminal(tmp_path, cap
 def test_a_binary_ply_that_promises_more_than_it_holds_asks_for_no_memory(tmp_path):
     content = ply_file([BOX], form="binary_little_endian", length="uint")
     (tmp_path / "rows.ply").write_bytes(content.replace(b"vertex 8", b"vertex 9999999999"))
-    (tmp_path / "list.ply").write_bytes(content.replace(struct.pack("<5I", 4, 3, 2, 1, 0), struct.pack("<5I", 2**32 - 1, 3, 2, 1, 0)))
+    (tmp_path / "list.ply").write_bytes(content.replace(struct.pack("<2I", 4, 3), struct.pack("<2I", 2**32 - 1, 3)))
     for name in ("rows.ply", "list.ply"):
         with pytest.raises(InputError, match=f"{name}: its header declares .* and the file ends or is damaged after"):
             read_mesh(tmp_path / name, unit="mm")

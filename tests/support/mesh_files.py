@@ -80,7 +80,8 @@ def _ply_row(items, row, form, end):
         return (" ".join(f"{len(values)} " * bool(n) + " ".join(f"{value:.9g}" for value in values)
                          for (_, _, n), values in zip(items, row, strict=True)) + end).encode()
     order = "<" if "little" in form else ">"
-    parts = [(struct.pack(order + _CODES[n], len(values)) if n else b"") + struct.pack(f"{order}{len(values)}{_CODES[kind]}", *values)
+    parts = [(struct.pack(order + _CODES[n], len(values)) if n else b"") +
+             struct.pack(f"{order}{len(values)}{_CODES[kind]}", *values)
              for (_, kind, n), values in zip(items, row, strict=True)]
     return b"".join(parts)
 

@@ -8,6 +8,11 @@ from softtact.errors import InputError
 _UTF8_MARK, _UTF16_MARKS = b"\xef\xbb\xbf", (b"\xff\xfe", b"\xfe\xff")
 
 
+def is_text(data: bytes) -> bool:
+    """Whether a file begins as text does: with a mark of UTF-16, or without bytes 0, which numbers of binary files have."""
+    return data.startswith(_UTF16_MARKS) or b"\0" not in data[:512]
+
+
 def plain_text(path: Path, data: bytes) -> bytes:
     """The text without a mark of its encoding, its lines parted by line feeds; UTF-16 raises InputError."""
     if data.startswith(_UTF16_MARKS):

@@ -10,7 +10,7 @@ import numpy as np
 import trimesh
 
 from softtact.errors import InputError
-from softtact.geometry.bodies import OVERLAP, is_cavity, union_of
+from softtact.geometry.bodies import OVERLAP, is_cavity, union_of, volume_of
 from softtact.geometry.obj import read_obj
 from softtact.geometry.ply import read_ply
 from softtact.geometry.pose import Pose
@@ -211,8 +211,8 @@ def _refuse_open(path: Path, mesh: trimesh.Trimesh) -> None:
 
 
 def _refuse_inverted(path: Path, mesh: trimesh.Trimesh) -> None:
-    if mesh.volume <= 0:
-        raise InputError(f"{path}: the facets' normals point inwards (volume {mesh.volume:.4g} mm3); flip them, for "
+    if volume_of(mesh) <= 0:
+        raise InputError(f"{path}: the facets' normals point inwards (volume {volume_of(mesh):.4g} mm3); flip them, for "
                          "example with trimesh's mesh.invert() or 'Flip normals' of Blender.")
 
 
@@ -221,13 +221,13 @@ def _refuse_overlapping(path: Path, mesh: trimesh.Trimesh) -> None:
     if mesh.body_count < 2:
         return
     pieces = mesh.split(only_watertight=False)
-    bodies = [piece for piece in pieces if piece.volume > 0]
+    bodies = [piece for piece in pieces if volume_of(piece) > 0]
     united = union_of(bodies)
-    total = sum(body.volume for body in bodies)
+    total = sum(volume_of(body) for body in bodies)
     if united is None or len(united.decompose()) != len(bodies) or total - united.volume() > OVERLAP * total:
         raise InputError(f"{path}: its {len(bodies)} closed pieces overlap or touch; unite them into one body, for "
                          "example with trimesh.boolean.union or Blender's Boolean modifier.")
-    outside = sum(piece.volume <= 0 and not is_cavity(piece, united) for piece in pieces)
+    outside = sum(volume_of(piece) <= 0 and not is_cavity(piece, united) for piece in pieces)
     if outside:
         raise InputError(f"{path}: {outside} of its {len(pieces)} closed pieces face inwards and are no cavities of the others; "
                          "flip them, for example with 'Recalculate outside' of Blender.")

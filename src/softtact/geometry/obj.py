@@ -22,7 +22,7 @@ _CALLS = frozenset((b"call", b"csh"))
 _AGAIN = "export the mesh again."
 # Lines of plain vertices or faces in a row, which a large file mostly consists of, are taken at once: ten times as fast.
 _VERTICES = re.compile(rb"(?:[ \t]*+v(?:[ \t]++[-+.\deE]++){3}[ \t]*+\n){1,20000}+")
-_FACES = re.compile(rb"(?:[ \t]*+f(?:[ \t]++\d++(?:/\d*+){0,2}+){3,}+[ \t]*+\n){1,20000}+")
+_FACES = re.compile(rb"(?:[ \t]*+f(?:[ \t]++\d{1,18}+(?:/\d*+){0,2}+){3,}+[ \t]*+\n){1,20000}+")
 
 
 def read_obj(path: Path) -> np.ndarray:

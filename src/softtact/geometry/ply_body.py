@@ -107,8 +107,9 @@ def binary_rows(path: Path, data: bytes, *, start: int, order: str, elements: li
     for element in elements:
         read = _table if element.is_table else _lists
         rows[element.name], at = read(path, data, at, order, element, wanted.get(element.name, ()))
-    if data[at:].strip(b"\0 \t\r\n"):
-        raise InputError(f"{path}: {len(data) - at} bytes follow the last row that the header declares; export the mesh again.")
+    if data[at:].strip(b" \t\r\n"):
+        raise InputError(f"{path}: the rows that its header declares end at byte {at}, but the file has {len(data)}; export the "
+                         "mesh again.")
     return rows
 
 

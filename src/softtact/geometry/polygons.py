@@ -71,7 +71,7 @@ def ear_clipped(points: np.ndarray) -> np.ndarray:
     covered = CrossSection([plane], FillRule.NonZero).area()
     if abs(covered - own) > _ROUND_OFF:
         return fan[:, ::-1]
-    triangles = np.asarray(triangulate([plane]))
+    triangles = np.asarray(triangulate([plane], allow_convex=False))     # its short cut makes triangles without area
     return triangles if len(triangles) == len(fan) else fan[:, ::-1]
 
 

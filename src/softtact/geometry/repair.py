@@ -15,7 +15,7 @@ import trimesh
 from manifold3d import triangulate
 
 from softtact.errors import InputError
-from softtact.geometry.bodies import OVERLAP, is_cavity, solid_of, union_of
+from softtact.geometry.bodies import OVERLAP, is_cavity, solid_of, union_of, volume_of
 from softtact.geometry.meshes import MAX_SIZE_MM, MIN_SIZE_MM, check_body, load_sized, merge_facets, plausible_facets, refuse_folded
 from softtact.geometry.t_junctions import split_at_corners
 
@@ -120,9 +120,9 @@ def _refuse_double_sided(path, mesh):
     rest = _of_faces(mesh.vertices, mesh.faces[keep])
     for body in bodies:
         trimesh.repair.fix_winding(body)
-        if body.volume > 0:
+        if volume_of(body) > 0:
             body.invert()
-        if not is_cavity(body, union_of([piece for piece in rest.split(only_watertight=False) if piece.volume > 0])):
+        if not is_cavity(body, union_of([piece for piece in rest.split(only_watertight=False) if volume_of(piece) > 0])):
             raise InputError(f"{path}: {_number(len(body.faces), 'facet')} of a closed surface are there front and back, so it has "
                              "no inside; export the mesh with single-sided facets.")
 
@@ -155,21 +155,23 @@ def _is_even(faces):
 
 def _close_holes(mesh, said):
     """Flat holes, and small curved ones, are closed by a plane piece; of others the mesh stays open."""
+    if _hangs_by_an_edge(mesh):
+        return mesh
     loops = _rims(mesh)
     patches = [patch for loop in loops if (patch := _patch(mesh, loop)) is not None]
     if len(patches) < len(loops) or not patches:
         return mesh
     curved = sum(area for _, area, flat in patches if not flat)
-    if curved > _SMALL_HOLES * mesh.area or any(not flat and _has_loose_corner(mesh, faces) for faces, _, flat in patches):
+    if curved > _SMALL_HOLES * mesh.area:
         return mesh
     area = sum(area for _, area, _ in patches)
     said.append(f"closed {_number(len(patches), 'hole')}, {area:.3g} mm2 or {area / (mesh.area + area):.2g} of the surface")
     return _of_faces(mesh.vertices, np.vstack([mesh.faces, *(faces for faces, _, _ in patches)]))
 
 
-def _has_loose_corner(mesh, faces):
-    """Whether a corner of a hole belongs to one facet only: that facet's corner seems to be misplaced, not its neighbours lost."""
-    return bool((np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices))[faces] < 2).any())
+def _hangs_by_an_edge(mesh):
+    """Whether a facet has two open edges: the corner between them seems to be a wrong one, rather than its neighbours lost."""
+    return bool((np.bincount(mesh.edges_face[_open_rows(mesh)], minlength=1) > 1).any())
 
 
 def _rims(mesh):
@@ -231,8 +233,8 @@ def _turn_bodies(mesh, said):
     if not mesh.is_watertight or not mesh.is_winding_consistent:
         return mesh
     pieces = list(mesh.split(only_watertight=False))
-    inward = [piece for piece in pieces if piece.volume < 0]
-    solid = union_of([piece for piece in pieces if piece.volume > 0])
+    inward = [piece for piece in pieces if volume_of(piece) < 0]
+    solid = union_of([piece for piece in pieces if volume_of(piece) > 0])
     wrong = [piece for piece in inward if not is_cavity(piece, solid)]
     if not wrong:
         return mesh
@@ -247,16 +249,16 @@ def _unite(mesh, said):
     if not mesh.is_watertight or not mesh.is_winding_consistent or mesh.body_count < 2:
         return mesh
     pieces = list(mesh.split(only_watertight=False))
-    bodies = [piece for piece in pieces if piece.volume > 0]
+    bodies = [piece for piece in pieces if volume_of(piece) > 0]
     united = union_of(bodies)
     if united is None:
         return mesh
-    total = sum(body.volume for body in bodies)
+    total = sum(volume_of(body) for body in bodies)
     count = len(united.decompose())
     if count == len(bodies) and total - united.volume() <= OVERLAP * total:
         return mesh
     for piece in pieces:
-        if piece.volume < 0:
+        if volume_of(piece) < 0:
             united = united - solid_of(piece, inverted=True)
     said.append(f"united {_number(len(bodies), 'body')} that overlap or touch into {count}")
     raw = united.to_mesh64()
@@ -265,8 +267,13 @@ def _unite(mesh, said):
 
 def _open_edges(mesh):
     """Edges (n, 2), as their facets go along them, that only one facet has."""
+    return mesh.edges[_open_rows(mesh)]
+
+
+def _open_rows(mesh):
+    """Rows (n,) of the mesh's `edges` that only one facet has."""
     _, first, uses = np.unique(mesh.edges_sorted, axis=0, return_index=True, return_counts=True)
-    return mesh.edges[first[uses == 1]]
+    return first[uses == 1]
 
 
 def _of_faces(vertices, faces):

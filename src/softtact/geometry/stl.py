@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from softtact.errors import InputError
-from softtact.geometry.mesh_text import is_finite, line_at, no_number, plain_text, shown
+from softtact.geometry.mesh_text import is_finite, is_text, line_at, no_number, plain_text, shown
 
 _HEADER = 84     # bytes: 80 of any text, 4 of the number of facets
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-_BLANK = b"\0 \t\r\n"     # bytes after the last facet that mean nothing
+_BLANK = b" \t\r\n"     # may follow the last facet; bytes 0 there tell that something was put in before
 _WORDS = [b"facet", b"normal", None, None, None, b"outer", b"loop", *3 * [b"vertex", float, float, float], b"endloop", b"endfacet"]
 _NUMBERS = [k for k, due in enumerate(_WORDS) if due is float]
 _PIECE = 1_000_000     # bytes of a text that are split into words at once
@@ -26,19 +26,17 @@ def read_stl(path: Path) -> np.ndarray:
     """Facets (n, 3, 3) of an STL file in its own unit; InputError where the file does not hold what it declares."""
     data = path.read_bytes()
     declared = int.from_bytes(data[80:_HEADER], "little")
-    if len(data) != _HEADER + _FACET.itemsize * declared and b"\0" not in data[:512]:
+    if len(data) != _HEADER + _FACET.itemsize * declared and is_text(data):
         return _read_text(path, plain_text(path, data).lower().rstrip())
     return _read_binary(path, data, declared)
 
 
 def _read_binary(path, data, declared):
-    held = max(len(data) - _HEADER, 0) // _FACET.itemsize
-    if declared > held or len(data) < _HEADER:
-        raise InputError(f"{path}: as a binary STL it declares {declared} facets and holds {held}, so it was cut off or damaged; "
-                         f"{_AGAIN}")
-    more = data[_HEADER + _FACET.itemsize * declared:]
-    if more.strip(_BLANK):
-        raise InputError(f"{path}: as a binary STL it declares {declared} facets, but {len(more)} bytes follow these; {_AGAIN}")
+    end = _HEADER + _FACET.itemsize * declared
+    if len(data) < end or data[end:].strip(_BLANK):
+        why = "was cut off" if len(data) < end else "holds more than it declares"
+        raise InputError(f"{path}: as a binary STL it declares {declared} facets, which take {end} bytes, but has {len(data)}, "
+                         f"so it {why}; {_AGAIN}")
     return np.frombuffer(data, _FACET, count=declared, offset=_HEADER)["corners"].astype(float)
 
 
