@@ -77,14 +77,16 @@ def check_body(path: Path, mesh: trimesh.Trimesh) -> None:
 
 
 def refuse_folded(path: Path, mesh: trimesh.Trimesh) -> None:
-    """Refuse facets that lie on their neighbour, as those of a concave polygon that was cut from one corner."""
-    edges = mesh.vertices[mesh.face_adjacency_edges]                                   # (k, 2, 3)
-    spokes = mesh.vertices[mesh.face_adjacency_unshared] - edges[:, :1]                # (k, 2, 3), to the corner of either side
-    along = _unit(edges[:, 1] - edges[:, 0])[:, None]
-    heights = spokes - np.sum(spokes * along, axis=2, keepdims=True) * along
-    cosine = np.prod(_unit(heights), axis=1).sum(axis=1)
-    high = np.linalg.norm(heights, axis=2).min(axis=1) > _SLIVER * np.ptp(mesh.vertices, axis=0).max()
-    folded = high & (cosine > 1 - _FOLD)
+    """Refuse facets that lie on their neighbour, as those of a concave polygon that was cut from one corner.
+
+    mesh : neighbours look to the same side, so that the normals of two that lie on each other are opposite
+    """
+    normals = mesh.face_normals[mesh.face_adjacency]                                   # (k, 2, 3)
+    opposite = np.flatnonzero(np.einsum("kd,kd->k", normals[:, 0], normals[:, 1]) < _FOLD - 1)
+    edges = mesh.vertices[mesh.face_adjacency_edges[opposite]]                         # (n, 2, 3)
+    areas = mesh.area_faces[mesh.face_adjacency[opposite]].min(axis=1)
+    heights = 2 * areas / np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
+    folded = heights > _SLIVER * np.ptp(mesh.vertices, axis=0).max()
     if folded.any():
         x, y, z = edges[folded.argmax()].mean(axis=0)
         raise InputError(f"{path}: {folded.sum()} facets lie on a neighbour (the first at {x:.4g}, {y:.4g}, {z:.4g} mm), as where "
@@ -156,12 +158,6 @@ def _load_facets(path: Path) -> np.ndarray:
     if triangles.size == 0:
         raise InputError(f"{path}: the file holds no triangles; export a surface mesh, not points or curves.")
     return triangles
-
-
-def _unit(vectors):
-    """Unit vectors (..., 3), 0 where a vector has no length."""
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
 
 
 def _unit_factor(path: Path, unit: str | None) -> float:
