@@ -210,6 +210,15 @@ def test_corners_on_edges_of_facets_that_lack_them_become_theirs(edges, places, 
     assert (mended.mesh.volume, mended.mesh.area) == pytest.approx((3200, 1440))
 
 
+def test_corners_on_an_edge_that_differ_on_its_two_sides_become_both_facets(tmp_path):
+    points = [[-10, -10, 0], [10, -10, 0], [10, 10, 0], [-10, 10, 0], [0, 0, 9], [2, -10, 0], [-7, -10, 0]]
+    below, walls = [[0, 3, 5], [5, 3, 2], [5, 2, 1]], [[0, 6, 4], [6, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]
+    of(np.array(points, float), below + walls).export(tmp_path / "pyramid.stl")
+    mended = read_mended(tmp_path / "pyramid.stl", unit="mm")
+    assert mended.repairs == ["split 2 facets at corners of others that lie on the edges"]
+    assert mended.mesh.volume == pytest.approx(1200)
+
+
 def test_a_concave_polygon_cut_from_one_corner_is_refused_without_repair_too(tmp_path):
     cut_from_one_corner(None).export(tmp_path / "u.stl")
     with pytest.raises(InputError, match=r"u.stl: 3 facets lie on a neighbour \(the first at .* mm\).*triangulate the mesh anew"):

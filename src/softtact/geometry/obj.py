@@ -30,6 +30,8 @@ def read_obj(path: Path) -> np.ndarray:
     data = plain_text(path, path.read_bytes()) + b"\n"
     if b"#" in data:
         data = re.sub(rb"#[^\n]*", b"", data)
+    if data.rstrip().endswith(b"\\"):
+        raise InputError(f"{path}: its last line is to go on in a next one, so the file was cut off; {_AGAIN}")
     if b"\\" in data:
         data = re.sub(rb"(?:[^\n]*\\\n)+[^\n]*", _joined, data)
     statements = _Statements(path)

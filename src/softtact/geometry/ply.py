@@ -19,6 +19,7 @@ from softtact.geometry.polygons import Polygons, facets_of
 _CODES = {"char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I", "float": "f", "double": "d",
           "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I", "float32": "f", "float64": "d"}
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}     # of the bytes; none in a text
+_COUNT = re.compile(r"[0-9]{1,18}")
 _INDICES = ("vertex_indices", "vertex_index")
 
 
@@ -69,7 +70,7 @@ def _take(header, words):
     match words:
         case ["format", form, "1.0"] if form in _ORDERS and header.order is None:
             header.order = _ORDERS[form]
-        case ["element", name, count] if count.isascii() and count.isdigit() and name not in (e.name for e in header.elements):
+        case ["element", name, count] if _COUNT.fullmatch(count) and name not in (e.name for e in header.elements):
             header.elements.append(Element(name, int(count), ()))
         case ["property", "list", length, kind, name] if _CODES.get(length, "f") not in "fd" and kind in _CODES and header.elements:
             return _add(header, Property(name, _CODES[kind], _CODES[length]))
