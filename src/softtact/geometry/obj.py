@@ -58,17 +58,19 @@ class _Statements:
     def take(self, data, at):
         """Take the statements at a byte of the text; the byte behind them."""
         if run := _VERTICES.match(data, at):
-            return self._plain_vertices(run) or self._statement(data, at)
+            return self._plain_vertices(run)
         if run := _FACES.match(data, at):
             return self._plain_faces(run)
         return self._statement(data, at)
 
     def _plain_vertices(self, run):
-        """Take lines `v x y z`; 0 where a word is no number after all."""
+        """Take lines `v x y z`."""
+        words = run.group().replace(b"v", b" ").split()
         try:
-            values = list(map(float, run.group().replace(b"v", b" ").split()))
+            values = list(map(float, words))
         except ValueError:
-            return 0
+            number = next(k for k, word in enumerate(words) if not is_finite(word))
+            raise no_number(self.path, self.line + number // 3, words[number]) from None
         self.points.extend(values)
         self.point_lines.extend(range(self.line, self.line + len(values) // 3))
         self.line += len(values) // 3

@@ -62,6 +62,7 @@ def _read_header(path, lines):
                 raise InputError(f"{path}: line {number}: {shown(line)} is no line of a PLY header; export the mesh again.")
     if header.order is None:
         raise InputError(f"{path}: its header declares no format; export the mesh again.")
+    header.elements = [element for element in header.elements if element.properties]     # others have no rows
     return header
 
 

@@ -6,7 +6,7 @@ concave ones are split inside. Polygons of more corners are triangulated in the 
 Refused: polygons that cross themselves, and those whose corners leave one plane so far that their surface is a guess.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -61,7 +61,7 @@ def ear_clipped(points: np.ndarray) -> np.ndarray:
     side = _sides(points[None])[0]
     fan = np.array([[0, k, k + 1] for k in range(1, len(points) - 1)])
     if not side.any():
-        return fan     # all corners lie on one line, or the polygon crosses itself, which its folds will tell
+        return fan     # all corners lie on one line, or the polygon crosses itself, so that its triangles look to both sides
     spokes = points - points[0]
     x = spokes[np.linalg.norm(spokes, axis=1).argmax()]
     x = x - (x @ side) * side
@@ -103,7 +103,7 @@ def _without_repeated(polygons):
         return polygons
     counts = np.bincount(owner[keep], minlength=len(ends))
     keep &= (counts >= 3)[owner]
-    return Polygons(polygons.points, polygons.corners[keep], counts[counts >= 3], polygons.places[counts >= 3], polygons.place)
+    return replace(polygons, corners=polygons.corners[keep], counts=counts[counts >= 3], places=polygons.places[counts >= 3])
 
 
 def _areas(triangles):

@@ -85,7 +85,7 @@ def _fault(path, data, at):
     """The refusal of the first word of the facets from a byte on that is not the one that is due."""
     for number, word in enumerate(re.compile(rb"\S+").finditer(data, at)):
         due = _WORDS[number % len(_WORDS)]
-        if word.end() == len(data):
+        if word.end() == len(data) and word.group() != b"endsolid":
             break
         if due is float and not is_finite(word.group()):
             return no_number(path, line_at(data, word.start()), word.group())
