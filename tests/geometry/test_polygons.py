@@ -86,6 +86,16 @@ def test_a_polygon_that_crosses_itself_or_is_bent_is_refused_with_its_line(corne
         triangles(corners)
 
 
+def test_what_few_digits_make_of_small_polygons_is_read():
+    """Of a mesh of 20 mm: a hexagon of 0.05 mm, bent by 1 um, and a strip of 10 mm by 1 um whose sides cross."""
+    angle = np.pi / 3 * np.arange(6)
+    hexagon = np.column_stack([0.025 * np.cos(angle), 0.025 * np.sin(angle), 5e-4 * (-1) ** np.arange(6)])
+    strip = [(0, 0, 0), (10, 0, 0), (10, -0.001, 0), (0, 0.001, 0)]
+    points = np.array([*hexagon, *strip, (20, 20, 20)])
+    facets = facets_of("mesh.obj", Polygons(points, np.arange(10), np.array([6, 4]), np.array([7, 8])))
+    assert len(facets) == 6 and np.isfinite(facets).all()
+
+
 def test_a_polygon_without_area_keeps_its_rim():
     """It may close a slit between facets."""
     line = np.array([(0, 0, 0), (1, 0, 0), (2, 0, 0), (4, 0, 0), (3, 0, 0)], float)

@@ -17,6 +17,7 @@ from softtact.errors import InputError
 _ROUND_OFF = 1e-6      # of a polygon's area: what is less comes from coordinates in single precision
 _BENT_QUAD = 0.2       # of the size: how far four corners may leave their mean plane; a square folded by 90 degrees
 _BENT_POLYGON = 0.01   # the same of more corners
+_ROUNDED = 1e-4        # of the mesh's size: lower heights and widths come from coordinates with few digits
 _SPLITS = np.array([[[0, 1, 2], [0, 2, 3]], [[1, 2, 3], [1, 3, 0]]])     # of a quadrilateral
 
 
@@ -45,16 +46,19 @@ def facets_of(path: Path, polygons: Polygons) -> np.ndarray:
     _refuse_out_of_range(path, polygons)
     polygons = _without_repeated(polygons)
     starts = np.cumsum(polygons.counts) - polygons.counts
+    rounded = _ROUNDED * float(np.ptp(polygons.points, axis=0).max()) if len(polygons.points) else 0.0
     facets = [np.empty((0, 3, 3))]
     for count in np.unique(polygons.counts):
         which = np.flatnonzero(polygons.counts == count)
         corners = polygons.corners[starts[which][:, None] + np.arange(count)]
-        facets.append(_triangles(path, polygons, which, corners).reshape(-1, 3, 3))
+        facets.append(_triangles(path, polygons, which, corners, rounded).reshape(-1, 3, 3))
     return np.concatenate(facets)
 
 
-def ear_clipped(points: np.ndarray) -> np.ndarray:
+def ear_clipped(points: np.ndarray, *, width: float = 0.0) -> np.ndarray:
     """Numbers (count - 2, 3) of the corners of the triangles of one nearly flat polygon (count, 3).
+
+    width : of strips, in the unit of the points, that may be covered twice or the wrong way round
 
     A polygon that covers some part twice or the wrong way round has no triangulation; its triangles then look to the other side.
     """
@@ -66,28 +70,31 @@ def ear_clipped(points: np.ndarray) -> np.ndarray:
     x = spokes[np.linalg.norm(spokes, axis=1).argmax()]
     x = x - (x @ side) * side
     x = x / np.linalg.norm(x)
-    plane = spokes @ np.column_stack([x, np.cross(side, x)]) / np.abs(spokes).max()
+    size = np.abs(spokes).max()
+    plane = spokes @ np.column_stack([x, np.cross(side, x)]) / size
     own = 0.5 * np.sum(plane[:, 0] * np.roll(plane[:, 1], -1) - plane[:, 1] * np.roll(plane[:, 0], -1))
     covered = CrossSection([plane], FillRule.NonZero).area()
-    if abs(covered - own) > _ROUND_OFF:
+    if abs(covered - own) > max(_ROUND_OFF, width / size):
         return fan[:, ::-1]
     triangles = np.asarray(triangulate([plane], allow_convex=False))     # its short cut makes triangles without area
     return triangles if len(triangles) == len(fan) else fan[:, ::-1]
 
 
-def _triangles(path, polygons, which, corners):
-    """Triangles (k, count - 2, 3, 3) of polygons that have as many corners (k, count)."""
+def _triangles(path, polygons, which, corners, rounded):
+    """Triangles (k, count - 2, 3, 3) of polygons of as many corners (k, count); heights below `rounded` are passed over."""
     points = polygons.points[corners]
     if points.shape[1] == 3:
         return points
     sides = _sides(points)
-    _refuse(path, polygons, which, _bend(points, sides) > (_BENT_QUAD if points.shape[1] == 4 else _BENT_POLYGON),
+    sizes = 2 * np.linalg.norm(points - points.mean(axis=1, keepdims=True), axis=2).max(axis=1)
+    bend = _BENT_QUAD if points.shape[1] == 4 else _BENT_POLYGON
+    _refuse(path, polygons, which, _heights(points, sides) > np.maximum(bend * sizes, rounded),
             "leaves one plane so far that its surface is a guess; triangulate the mesh before its export")
     if points.shape[1] == 4:
         triangles = _halves(points, sides, corners)
     else:
-        triangles = np.stack([polygon[ear_clipped(polygon)] for polygon in points])
-    _refuse(path, polygons, which, _folded(triangles, sides), "crosses itself; mend it where the mesh was made")
+        triangles = np.stack([polygon[ear_clipped(polygon, width=rounded)] for polygon in points])
+    _refuse(path, polygons, which, _folded(triangles, sides, rounded * sizes), "crosses itself; mend it where the mesh was made")
     return triangles
 
 
@@ -120,11 +127,9 @@ def _sides(points):
     return np.divide(area, length, out=np.zeros_like(area), where=whole)
 
 
-def _bend(points, sides):
-    """How far (k,) corners leave the polygons' mean planes, of the polygons' sizes."""
-    centred = points - points.mean(axis=1, keepdims=True)
-    size = 2 * np.linalg.norm(centred, axis=2).max(axis=1)
-    return np.abs(np.einsum("knd,kd->kn", centred, sides)).max(axis=1) / np.where(size > 0, size, 1.0)
+def _heights(points, sides):
+    """How far (k,) corners leave the polygons' mean planes."""
+    return np.abs(np.einsum("knd,kd->kn", points - points.mean(axis=1, keepdims=True), sides)).max(axis=1)
 
 
 def _halves(points, sides, corners):
@@ -136,13 +141,12 @@ def _halves(points, sides, corners):
     return options[np.arange(len(points)), np.where(alike, at_lowest, smaller.argmax(axis=1))]
 
 
-def _folded(triangles, sides):
-    """Whether the triangles (k, t, 3, 3) of polygons lie on each other (k,)."""
+def _folded(triangles, sides, negligible):
+    """Whether the triangles (k, t, 3, 3) of polygons lie on each other (k,) by more than areas (k,) that are negligible."""
     areas = _areas(triangles)
     along = np.einsum("ktd,kd->kt", areas, sides)
     whole = np.linalg.norm(areas, axis=2).sum(axis=1)
-    flat = whole <= 1e-12 * np.ptp(triangles, axis=(1, 2)).max(axis=1) ** 2
-    return ~flat & ((along.min(axis=1) < -_ROUND_OFF * whole) | (along.sum(axis=1) < 0.5 * whole))
+    return (-along.min(axis=1) > _ROUND_OFF * whole + negligible) | (0.5 * whole - along.sum(axis=1) > negligible)
 
 
 def _refuse(path, polygons, which, wrong, why):
