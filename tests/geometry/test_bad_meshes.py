@@ -13,7 +13,7 @@ from softtact.cli import main
 from softtact.errors import InputError
 from softtact.files import read_dataset
 from softtact.geometry.meshes import read_mesh
-from softtact.geometry.polygons import ear_clipped
+from softtact.geometry.polygons import triangulated
 from softtact.geometry.repair import read_mended
 from softtact.models.elastic.compliance import elastic_compliance
 from softtact.press.sensor import Sensor
@@ -198,7 +198,8 @@ def with_corners_on_edges(edges, places):
         polygon = faces[facet]
         at = next(k for k in range(len(polygon)) if {polygon[k], polygon[(k + 1) % len(polygon)]} == {a, b})
         polygon[at + 1:at + 1] = on if polygon[at] == a else on[::-1]
-    return of(points, [[polygon[i] for i in triangle] for polygon in faces for triangle in ear_clipped(np.array(points)[polygon])])
+    split = [np.array(polygon)[triangulated(np.array(points)[polygon][None])[0]] for polygon in faces]
+    return of(points, np.concatenate(split))
 
 
 @pytest.mark.parametrize("edges", [[0], [0, 1], [0, 4, 9], range(18)], ids=["one", "two", "three", "all"])

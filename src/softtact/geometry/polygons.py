@@ -1,8 +1,8 @@
 """Polygons of mesh files as triangles that cover each polygon once, whatever its shape.
 
 A quadrilateral is split along the diagonal that divides it the more evenly; both halves must face the polygon's side, so that
-concave ones are split inside. Polygons of more corners are triangulated in the plane of their vector area by manifold3d
-(ear clipping). The result does not depend on the corner a polygon begins with, unless several splits are equally good.
+concave ones are split inside. Polygons of more corners are triangulated in the plane of their vector area: convex ones from one
+corner, others by manifold3d (ear clipping). The result does not depend on the corner a polygon begins with, unless several splits are equally good.
 Refused: polygons that cross themselves, and those whose corners leave one plane so far that their surface is a guess.
 """
 
@@ -55,29 +55,53 @@ def facets_of(path: Path, polygons: Polygons) -> np.ndarray:
     return np.concatenate(facets)
 
 
-def ear_clipped(points: np.ndarray, *, width: float = 0.0) -> np.ndarray:
-    """Numbers (count - 2, 3) of the corners of the triangles of one nearly flat polygon (count, 3).
+def triangulated(points: np.ndarray, *, width: float = 0.0) -> np.ndarray:
+    """Numbers (k, count - 2, 3) of the corners of the triangles of nearly flat polygons (k, count, 3).
 
     width : of strips, in the unit of the points, that may be covered twice or the wrong way round
 
-    A polygon that covers some part twice or the wrong way round has no triangulation; its triangles then look to the other side.
+    A polygon that covers more in this way has no triangulation; its triangles then look to the other side.
     """
-    side = _sides(points[None])[0]
-    fan = np.array([[0, k, k + 1] for k in range(1, len(points) - 1)])
-    if not side.any():
-        return fan     # all corners lie on one line, or the polygon crosses itself, so that its triangles look to both sides
-    spokes = points - points[0]
-    x = spokes[np.linalg.norm(spokes, axis=1).argmax()]
-    x = x - (x @ side) * side
-    x = x / np.linalg.norm(x)
-    size = np.abs(spokes).max()
-    plane = spokes @ np.column_stack([x, np.cross(side, x)]) / size
-    own = 0.5 * np.sum(plane[:, 0] * np.roll(plane[:, 1], -1) - plane[:, 1] * np.roll(plane[:, 0], -1))
-    covered = CrossSection([plane], FillRule.NonZero).area()
-    if abs(covered - own) > max(_ROUND_OFF, width / size):
-        return fan[:, ::-1]
+    sides = _sides(points)
+    sizes = np.abs(points - points[:, :1]).max(axis=(1, 2))
+    plane = _in_plane(points, sides) / np.where(sizes > 0, sizes, 1.0)[:, None, None]
+    fan = np.array([[0, k, k + 1] for k in range(1, points.shape[1] - 1)])
+    triangles = np.repeat(fan[None], len(points), axis=0)
+    # Those without a side lie on one line, or cross themselves so that the fan's triangles look to both sides.
+    for number in np.flatnonzero(~_is_convex(plane) & sides.any(axis=1)):
+        clipped = _ear_clipped(plane[number], max(_ROUND_OFF, width / sizes[number]))
+        triangles[number] = fan[:, ::-1] if clipped is None else clipped
+    return triangles
+
+
+def _in_plane(points, sides):
+    """Points (k, count, 2) in the planes across `sides` (k, 3), seen from there."""
+    spokes = points - points[:, :1]
+    longest = np.linalg.norm(spokes, axis=2).argmax(axis=1)
+    x = spokes[np.arange(len(points)), longest]
+    x = x - np.sum(x * sides, axis=1, keepdims=True) * sides
+    length = np.linalg.norm(x, axis=1, keepdims=True)
+    x = np.divide(x, length, out=np.zeros_like(x), where=length > 0)
+    return spokes @ np.stack([x, np.cross(sides, x)], axis=2)
+
+
+def _is_convex(plane):
+    """Whether polygons (k, count, 2) turn left at each corner, and once around in all (k,)."""
+    along = np.roll(plane, -1, axis=1) - plane
+    x, y = np.moveaxis(along, 2, 0)
+    following_x, following_y = np.roll(x, -1, axis=1), np.roll(y, -1, axis=1)
+    turn = np.arctan2(x * following_y - y * following_x, x * following_x + y * following_y)
+    return (turn.min(axis=1) > _ROUND_OFF) & (turn.sum(axis=1) < 3 * np.pi)
+
+
+def _ear_clipped(plane, tolerance):
+    """Triangles (count - 2, 3) of one polygon (count, 2), or None where it covers more than a small area twice or turned over."""
+    x, y = plane.T
+    own = 0.5 * np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))
+    if abs(CrossSection([plane], FillRule.NonZero).area() - own) > tolerance:
+        return None
     triangles = np.asarray(triangulate([plane], allow_convex=False))     # its short cut makes triangles without area
-    return triangles if len(triangles) == len(fan) else fan[:, ::-1]
+    return triangles if len(triangles) == len(plane) - 2 else None
 
 
 def _triangles(path, polygons, which, corners, rounded):
@@ -93,7 +117,7 @@ def _triangles(path, polygons, which, corners, rounded):
     if points.shape[1] == 4:
         triangles = _halves(points, sides, corners)
     else:
-        triangles = np.stack([polygon[ear_clipped(polygon, width=rounded)] for polygon in points])
+        triangles = points[np.arange(len(points))[:, None, None], triangulated(points, width=rounded)]
     _refuse(path, polygons, which, _folded(triangles, sides, rounded * sizes), "crosses itself; mend it where the mesh was made")
     return triangles
 

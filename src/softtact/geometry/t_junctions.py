@@ -3,7 +3,7 @@
 import numpy as np
 import trimesh
 
-from softtact.geometry.polygons import ear_clipped
+from softtact.geometry.polygons import triangulated
 
 
 def split_at_corners(mesh: trimesh.Trimesh, open_edges: np.ndarray, *, tolerance: float) -> tuple[np.ndarray, int]:
@@ -20,7 +20,7 @@ def split_at_corners(mesh: trimesh.Trimesh, open_edges: np.ndarray, *, tolerance
         polygon = _with_corners(mesh.faces[number], inserted)
         if len(polygon) > 3:
             split.append(number)
-            pieces.append(polygon[ear_clipped(mesh.vertices[polygon])])
+            pieces.append(polygon[triangulated(mesh.vertices[polygon][None])[0]])
     return np.vstack([np.delete(mesh.faces, split, axis=0), *pieces]), len(split)
 
 
