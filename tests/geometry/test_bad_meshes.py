@@ -6,11 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from support.mesh_files import U_SHAPE, prism
 from support.sensors import CORO
 
 from softtact.cli import main
 from softtact.errors import InputError
 from softtact.files import read_dataset
+from softtact.geometry.meshes import read_mesh
+from softtact.geometry.polygons import triangulated
 from softtact.geometry.repair import read_mended
 from softtact.models.elastic.compliance import elastic_compliance
 from softtact.press.sensor import Sensor
@@ -149,7 +152,31 @@ def flat(mesh):
     return of(mesh.vertices * [1, 1, 0], mesh.faces)
 
 
-REFUSED = [(third_wall, "1 edges with more than two facets"), (large_curved_hole, "the surface is not closed"),
+def double_sided(mesh):
+    return of(mesh.vertices, np.vstack([mesh.faces, mesh.faces[:, ::-1]]))
+
+
+def beside_a_double_sided_body(mesh):
+    return trimesh.util.concatenate([mesh, double_sided(mesh.copy().apply_translation([9, 0, 0]))])
+
+
+def cut_from_one_corner(mesh):
+    """A U whose bottom and top are cut into triangles that all begin at one corner, so that some lie on others."""
+    body = prism(U_SHAPE, 8)
+    return of(body.points, [[face[0], *face[k:k + 2]] for face in body.polygons for k in range(1, len(face) - 1)])
+
+
+def with_a_corner_moved(mesh):
+    """One facet's corner lies elsewhere than its neighbours'; the file keeps the facets' corners apart."""
+    points = mesh.triangles.reshape(-1, 3).copy()
+    points[0] += [0.1, 0.2, 0.3]
+    return of(points, np.arange(len(points)).reshape(-1, 3))
+
+
+REFUSED = [(double_sided, "96 facets of a closed surface are there front and back"),
+           (beside_a_double_sided_body, "96 facets of a closed surface are there front and back"),
+           (cut_from_one_corner, "3 facets lie on a neighbour"), (with_a_corner_moved, "the surface is not closed"),
+           (third_wall, "1 edges with more than two facets"), (large_curved_hole, "the surface is not closed"),
            (flat, "degenerate")]
 
 
@@ -158,6 +185,55 @@ def test_a_mesh_whose_repair_would_be_a_guess_is_refused(tmp_path):
         spoil(punch()).export(tmp_path / "bad.stl")
         with pytest.raises(InputError, match=said):
             read_mended(tmp_path / "bad.stl", unit="mm")
+
+
+def with_corners_on_edges(edges, places):
+    """A box in which one of the two facets at each of these edges has corners along it that the other has not."""
+    box = trimesh.creation.box((20, 20, 8))
+    points, faces = list(box.vertices), [list(face) for face in box.faces]
+    for edge in edges:
+        (facet, _), (a, b) = box.face_adjacency[edge], box.face_adjacency_edges[edge]
+        on = [len(points) + k for k in range(len(places))]
+        points += [box.vertices[a] + place * (box.vertices[b] - box.vertices[a]) for place in places]
+        polygon = faces[facet]
+        at = next(k for k in range(len(polygon)) if {polygon[k], polygon[(k + 1) % len(polygon)]} == {a, b})
+        polygon[at + 1:at + 1] = on if polygon[at] == a else on[::-1]
+    split = [np.array(polygon)[triangulated(np.array(points)[polygon][None])[0]] for polygon in faces]
+    return of(points, np.concatenate(split))
+
+
+@pytest.mark.parametrize("edges", [[0], [0, 1], [0, 4, 9], range(18)], ids=["one", "two", "three", "all"])
+@pytest.mark.parametrize("places", [[0.5], [0.2, 0.3, 0.9]], ids=["a corner", "three corners"])
+def test_corners_on_edges_of_facets_that_lack_them_become_theirs(edges, places, tmp_path):
+    with_corners_on_edges(edges, places).export(tmp_path / "box.stl")
+    mended = read_mended(tmp_path / "box.stl", unit="mm")
+    assert len(mended.repairs) == 1 and mended.repairs[0].startswith("split ") and "at corners of others" in mended.repairs[0]
+    assert (mended.mesh.volume, mended.mesh.area) == pytest.approx((3200, 1440))
+
+
+def test_corners_on_an_edge_that_differ_on_its_two_sides_become_both_facets(tmp_path):
+    points = [[-10, -10, 0], [10, -10, 0], [10, 10, 0], [-10, 10, 0], [0, 0, 9], [2, -10, 0], [-7, -10, 0]]
+    below, walls = [[0, 3, 5], [5, 3, 2], [5, 2, 1]], [[0, 6, 4], [6, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]
+    of(np.array(points, float), below + walls).export(tmp_path / "pyramid.stl")
+    mended = read_mended(tmp_path / "pyramid.stl", unit="mm")
+    assert mended.repairs == ["split 2 facets at corners of others that lie on the edges"]
+    assert mended.mesh.volume == pytest.approx(1200)
+
+
+def test_a_concave_polygon_cut_from_one_corner_is_refused_without_repair_too(tmp_path):
+    cut_from_one_corner(None).export(tmp_path / "u.stl")
+    with pytest.raises(InputError, match=r"u.stl: 3 facets lie on a neighbour \(the first at .* mm\).*triangulate the mesh anew"):
+        read_mesh(tmp_path / "u.stl", unit="mm")
+
+
+def test_a_body_that_fills_a_cavity_of_another_makes_it_whole(tmp_path):
+    inner = trimesh.creation.box((4, 4, 4))
+    cavity = inner.copy()
+    cavity.invert()
+    trimesh.util.concatenate([trimesh.creation.box((9, 9, 9)), cavity, inner]).export(tmp_path / "filled.stl")
+    mended = read_mended(tmp_path / "filled.stl", unit="mm")
+    assert mended.repairs == ["left out 24 facets of those that were there twice"]
+    assert mended.mesh.volume == pytest.approx(9**3)
 
 
 def test_a_cavity_stays_and_a_body_inside_out_is_turned(tmp_path):

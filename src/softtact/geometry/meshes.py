@@ -5,21 +5,25 @@ sentence with its remedy.
 """
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import trimesh
 
 from softtact.errors import InputError
-from softtact.geometry.bodies import OVERLAP, is_cavity, union_of
+from softtact.geometry.bodies import OVERLAP, is_cavity, union_of, volume_of
+from softtact.geometry.obj import read_obj
+from softtact.geometry.ply import read_ply
 from softtact.geometry.pose import Pose
+from softtact.geometry.stl import read_stl
 
 UNIT_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "inch": 25.4, "in": 25.4}
-FORMATS = (".stl", ".obj", ".ply")
+_READERS = {".stl": read_stl, ".obj": read_obj, ".ply": read_ply}
 MIN_SIZE_MM = 1.0  # smaller than a taxel's resolution by far
 MAX_SIZE_MM = 500.0  # larger than any gripper holds
 _MERGE_DECIMALS = 5  # of a coordinate in mm: corners closer than 10 nm are one
 _FLAT = 1e-6  # thickness over size below which a mesh is no body
+_FOLD = 5e-7  # one minus the cosine of the angle, 1e-3, below which two facets on one side of an edge lie on each other
+_SLIVER = 1e-3  # of the size: facets lower than this have no certain normal
 
 
 def read_triangles(path: str | Path, *, unit: str, min_size_mm: float = MIN_SIZE_MM,
@@ -53,13 +57,14 @@ def read_mesh(path: str | Path, *, unit: str, min_size_mm: float = MIN_SIZE_MM,
     unit : 'mm', 'cm', 'm', 'inch' or 'in'; the file itself does not say
     min_size_mm, max_size_mm : range of a plausible largest side
 
-    Raises InputError that names the file, what is wrong with it (unreadable, open, inside out, flat, overlapping, of a wrong size)
-    and the remedy.
+    Raises InputError that names the file, what is wrong with it (unreadable, open, inside out, flat, folded, overlapping, of a
+    wrong size) and the remedy.
     """
     path = Path(path)
     triangles = read_triangles(path, unit=unit, min_size_mm=min_size_mm, max_size_mm=max_size_mm)
     mesh = merge_facets(triangles)
     check_body(path, mesh)
+    refuse_folded(path, mesh)
     return mesh
 
 
@@ -69,6 +74,23 @@ def check_body(path: Path, mesh: trimesh.Trimesh) -> None:
     _refuse_open(path, mesh)
     _refuse_inverted(path, mesh)
     _refuse_overlapping(path, mesh)
+
+
+def refuse_folded(path: Path, mesh: trimesh.Trimesh) -> None:
+    """Refuse facets that lie on their neighbour, as those of a concave polygon that was cut from one corner.
+
+    mesh : neighbours look to the same side, so that the normals of two that lie on each other are opposite
+    """
+    normals = mesh.face_normals[mesh.face_adjacency]                                   # (k, 2, 3)
+    opposite = np.flatnonzero(np.einsum("kd,kd->k", normals[:, 0], normals[:, 1]) < _FOLD - 1)
+    edges = mesh.vertices[mesh.face_adjacency_edges[opposite]]                         # (n, 2, 3)
+    areas = mesh.area_faces[mesh.face_adjacency[opposite]].min(axis=1)
+    heights = 2 * areas / np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
+    folded = heights > _SLIVER * np.ptp(mesh.vertices, axis=0).max()
+    if folded.any():
+        x, y, z = edges[folded.argmax()].mean(axis=0)
+        raise InputError(f"{path}: {folded.sum()} facets lie on a neighbour (the first at {x:.4g}, {y:.4g}, {z:.4g} mm), as where "
+                         "concave polygons were cut into triangles from one corner; triangulate the mesh anew where it was made.")
 
 
 def merge_facets(triangles: np.ndarray) -> trimesh.Trimesh:
@@ -128,33 +150,14 @@ def _load_facets(path: Path) -> np.ndarray:
     """Facets (n, 3, 3) in the file's unit."""
     if not path.is_file():
         raise InputError(f"{path}: there is no such mesh file.")
-    if path.suffix.lower() not in FORMATS:
+    if path.suffix.lower() not in _READERS:
         raise InputError(f"{path}: the format '{path.suffix}' is not read; save the mesh as STL, OBJ or PLY.")
     if path.stat().st_size == 0:
         raise InputError(f"{path}: the file is empty; export the mesh again.")
-    _refuse_cut_off(path)
-    try:
-        mesh: Any = trimesh.load(path, force="mesh", process=False)
-        triangles = np.array(mesh.triangles, dtype=np.float64)
-    except Exception as error:  # each format's reader fails in its own way
-        raise InputError(f"{path}: not readable as {path.suffix[1:].upper()} "
-                         f"({' '.join(str(error).split())[:120]}); export the mesh again.") from error
+    triangles = _READERS[path.suffix.lower()](path)
     if triangles.size == 0:
         raise InputError(f"{path}: the file holds no triangles; export a surface mesh, not points or curves.")
-    if triangles.shape[1:] != (3, 3):
-        raise InputError(f"{path}: some corners do not have three coordinates; export the mesh again.")
     return triangles
-
-
-def _refuse_cut_off(path: Path) -> None:
-    """Refuse a text STL without its last line: what is missing might be closed as if it were a hole."""
-    with path.open("rb") as file:
-        start = file.read(84)
-        file.seek(max(0, path.stat().st_size - 2000))
-        end = file.read()
-    binary = path.stat().st_size == 84 + 50 * int.from_bytes(start[80:84], "little")
-    if path.suffix.lower() == ".stl" and start.startswith(b"solid") and not binary and b"endsolid" not in end:
-        raise InputError(f"{path}: its last line is not 'endsolid', so it was cut off; export the mesh again.")
 
 
 def _unit_factor(path: Path, unit: str | None) -> float:
@@ -204,8 +207,8 @@ def _refuse_open(path: Path, mesh: trimesh.Trimesh) -> None:
 
 
 def _refuse_inverted(path: Path, mesh: trimesh.Trimesh) -> None:
-    if mesh.volume <= 0:
-        raise InputError(f"{path}: the facets' normals point inwards (volume {mesh.volume:.4g} mm3); flip them, for "
+    if volume_of(mesh) <= 0:
+        raise InputError(f"{path}: the facets' normals point inwards (volume {volume_of(mesh):.4g} mm3); flip them, for "
                          "example with trimesh's mesh.invert() or 'Flip normals' of Blender.")
 
 
@@ -214,13 +217,13 @@ def _refuse_overlapping(path: Path, mesh: trimesh.Trimesh) -> None:
     if mesh.body_count < 2:
         return
     pieces = mesh.split(only_watertight=False)
-    bodies = [piece for piece in pieces if piece.volume > 0]
+    bodies = [piece for piece in pieces if volume_of(piece) > 0]
     united = union_of(bodies)
-    total = sum(body.volume for body in bodies)
+    total = sum(volume_of(body) for body in bodies)
     if united is None or len(united.decompose()) != len(bodies) or total - united.volume() > OVERLAP * total:
         raise InputError(f"{path}: its {len(bodies)} closed pieces overlap or touch; unite them into one body, for "
                          "example with trimesh.boolean.union or Blender's Boolean modifier.")
-    outside = sum(piece.volume <= 0 and not is_cavity(piece, united) for piece in pieces)
+    outside = sum(volume_of(piece) <= 0 and not is_cavity(piece, united) for piece in pieces)
     if outside:
         raise InputError(f"{path}: {outside} of its {len(pieces)} closed pieces face inwards and are no cavities of the others; "
                          "flip them, for example with 'Recalculate outside' of Blender.")

@@ -1,8 +1,9 @@
 """Mending of meshes whose body is beyond doubt; each step says what it did, and what would have to be guessed is refused.
 
-Mended: facets without finite corners or without area, facets that are there twice, corners that lie apart by round-off, holes that
-are flat or small, facets that face the wrong way, bodies inside out, bodies that overlap. Not mended: large curved holes, edges
-where more than two walls meet, flat or empty meshes, sizes that no body on a sensor has.
+Mended: facets without finite corners or without area, facets that are there twice, corners that lie apart by round-off or on an
+edge of a facet that lacks them, holes that are flat or small, facets that face the wrong way, bodies inside out, bodies that
+overlap. Not mended: large curved holes, edges where more than two walls meet, facets that lie on their neighbours, double-sided
+bodies, flat or empty meshes, sizes that no body on a sensor has.
 `meshes.read_mesh` then checks the result as it checks any mesh.
 """
 
@@ -14,8 +15,9 @@ import trimesh
 from manifold3d import triangulate
 
 from softtact.errors import InputError
-from softtact.geometry.bodies import OVERLAP, is_cavity, solid_of, union_of
-from softtact.geometry.meshes import MAX_SIZE_MM, MIN_SIZE_MM, check_body, load_sized, merge_facets, plausible_facets
+from softtact.geometry.bodies import OVERLAP, is_cavity, solid_of, union_of, volume_of
+from softtact.geometry.meshes import MAX_SIZE_MM, MIN_SIZE_MM, check_body, load_sized, merge_facets, plausible_facets, refuse_folded
+from softtact.geometry.t_junctions import split_at_corners
 
 _APART = 1e-5        # of the size: corners nearer to each other are one point that was rounded twice
 _FLAT_HOLE = 1e-3    # of the size: how far a hole's rim may leave its plane
@@ -42,16 +44,20 @@ def read_mended(path: str | Path, *, unit: str, min_size_mm: float = MIN_SIZE_MM
         check_body(path, mesh)     # it is degenerate, which no step mends
     try:
         check_body(path, mesh)
-        return Mended(mesh, said)
     except InputError:
         return Mended(_mended(path, mesh, said), said)
+    refuse_folded(path, mesh)
+    return Mended(mesh, said)
 
 
 def _mended(path, mesh, said):
     """The mesh after all steps, of which what was done is appended to `said`."""
-    for step in (_join_corners, _without_doubles, _close_holes, _turn_facets, _turn_bodies, _unite):
+    _refuse_double_sided(path, mesh)
+    for step in (_join_corners, _split_at_corners, _without_doubles, _close_holes, _turn_facets, _turn_bodies):
         mesh = step(mesh, said)
     try:
+        refuse_folded(path, mesh)     # of the file's own facets: a union may leave slits that are thinner than round-off
+        mesh = _unite(mesh, said)
         check_body(path, mesh)
     except InputError as error:
         done = f" (after: {'; '.join(said)})" if said else ""
@@ -91,20 +97,54 @@ def _join_corners(mesh, said):
     return _of_faces(mesh.vertices, number[mesh.faces])
 
 
+def _split_at_corners(mesh, said):
+    """Facets get the corners of their neighbours that lie on their open edges."""
+    edges = _open_edges(mesh)
+    if not len(edges):
+        return mesh
+    faces, split = split_at_corners(mesh, edges, tolerance=_APART * _size(mesh))
+    if not split:
+        return mesh
+    said.append(f"split {_number(split, 'facet')} at corners of others that lie on the edges")
+    return _of_faces(mesh.vertices, faces)
+
+
+def _refuse_double_sided(path, mesh):
+    """Refuse a body of which each facet is there front and back: with both sides left out, it would be left out itself.
+
+    One that fills a cavity of another has the cavity's facets on its back, and makes the other whole.
+    """
+    keep, back_to_back = _doubles(mesh.faces)
+    walls = trimesh.Trimesh(mesh.vertices, back_to_back, process=False)
+    bodies = [piece for piece in walls.split(only_watertight=False) if piece.is_watertight] if len(back_to_back) else []
+    rest = _of_faces(mesh.vertices, mesh.faces[keep])
+    for body in bodies:
+        trimesh.repair.fix_winding(body)
+        if volume_of(body) > 0:
+            body.invert()
+        if not is_cavity(body, union_of([piece for piece in rest.split(only_watertight=False) if volume_of(piece) > 0])):
+            raise InputError(f"{path}: {_number(len(body.faces), 'facet')} of a closed surface are there front and back, so it has "
+                             "no inside; export the mesh with single-sided facets.")
+
+
 def _without_doubles(mesh, said):
     """Of facets with the same corners one is kept; two that face each other hold nothing between them, and both go."""
     mesh = _of_faces(mesh.vertices, mesh.faces)
-    corners, which, uses = np.unique(np.sort(mesh.faces, axis=1), axis=0, return_inverse=True, return_counts=True)
-    if len(corners) == len(mesh.faces):
+    keep, _ = _doubles(mesh.faces)
+    if len(keep) == len(mesh.faces):
         return mesh
-    which = which.ravel()
-    ahead = np.zeros(len(corners), dtype=int)
-    np.add.at(ahead, which, np.where(_is_even(mesh.faces), 1, -1))
-    _, first = np.unique(which, return_index=True)
-    # Facets that are all turned alike: one of them stays; as many of either side: a wall without thickness.
-    keep = first[(uses == 1) | (ahead != 0)]
     said.append(f"left out {_number(len(mesh.faces) - len(keep), 'facet')} of those that were there twice")
-    return _of_faces(mesh.vertices, mesh.faces[np.sort(keep)])
+    return _of_faces(mesh.vertices, mesh.faces[keep])
+
+
+def _doubles(faces):
+    """Numbers of the facets (k,) to keep, each once, and facets (n, 3) that are there as often front as back."""
+    _, first, which, uses = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True)
+    ahead = np.zeros(len(first), dtype=int)
+    np.add.at(ahead, which.ravel(), np.where(_is_even(faces), 1, -1))
+    # Facets that are all turned alike: one of them stays; as many of either side: a wall without thickness.
+    walls = (uses > 1) & (ahead == 0)
+    return np.sort(first[~walls]), faces[first[walls]]
 
 
 def _is_even(faces):
@@ -115,6 +155,8 @@ def _is_even(faces):
 
 def _close_holes(mesh, said):
     """Flat holes, and small curved ones, are closed by a plane piece; of others the mesh stays open."""
+    if _hangs_by_an_edge(mesh):
+        return mesh
     loops = _rims(mesh)
     patches = [patch for loop in loops if (patch := _patch(mesh, loop)) is not None]
     if len(patches) < len(loops) or not patches:
@@ -125,6 +167,11 @@ def _close_holes(mesh, said):
     area = sum(area for _, area, _ in patches)
     said.append(f"closed {_number(len(patches), 'hole')}, {area:.3g} mm2 or {area / (mesh.area + area):.2g} of the surface")
     return _of_faces(mesh.vertices, np.vstack([mesh.faces, *(faces for faces, _, _ in patches)]))
+
+
+def _hangs_by_an_edge(mesh):
+    """Whether a facet has two open edges: the corner between them seems to be a wrong one, rather than its neighbours lost."""
+    return bool((np.bincount(mesh.edges_face[_open_rows(mesh)], minlength=1) > 1).any())
 
 
 def _rims(mesh):
@@ -186,8 +233,8 @@ def _turn_bodies(mesh, said):
     if not mesh.is_watertight or not mesh.is_winding_consistent:
         return mesh
     pieces = list(mesh.split(only_watertight=False))
-    inward = [piece for piece in pieces if piece.volume < 0]
-    solid = union_of([piece for piece in pieces if piece.volume > 0])
+    inward = [piece for piece in pieces if volume_of(piece) < 0]
+    solid = union_of([piece for piece in pieces if volume_of(piece) > 0])
     wrong = [piece for piece in inward if not is_cavity(piece, solid)]
     if not wrong:
         return mesh
@@ -202,16 +249,16 @@ def _unite(mesh, said):
     if not mesh.is_watertight or not mesh.is_winding_consistent or mesh.body_count < 2:
         return mesh
     pieces = list(mesh.split(only_watertight=False))
-    bodies = [piece for piece in pieces if piece.volume > 0]
+    bodies = [piece for piece in pieces if volume_of(piece) > 0]
     united = union_of(bodies)
     if united is None:
         return mesh
-    total = sum(body.volume for body in bodies)
+    total = sum(volume_of(body) for body in bodies)
     count = len(united.decompose())
     if count == len(bodies) and total - united.volume() <= OVERLAP * total:
         return mesh
     for piece in pieces:
-        if piece.volume < 0:
+        if volume_of(piece) < 0:
             united = united - solid_of(piece, inverted=True)
     said.append(f"united {_number(len(bodies), 'body')} that overlap or touch into {count}")
     raw = united.to_mesh64()
@@ -220,8 +267,13 @@ def _unite(mesh, said):
 
 def _open_edges(mesh):
     """Edges (n, 2), as their facets go along them, that only one facet has."""
+    return mesh.edges[_open_rows(mesh)]
+
+
+def _open_rows(mesh):
+    """Rows (n,) of the mesh's `edges` that only one facet has."""
     _, first, uses = np.unique(mesh.edges_sorted, axis=0, return_index=True, return_counts=True)
-    return mesh.edges[first[uses == 1]]
+    return first[uses == 1]
 
 
 def _of_faces(vertices, faces):

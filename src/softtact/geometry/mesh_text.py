@@ -1,0 +1,46 @@
+"""The text of mesh files: in one encoding, with one line end."""
+
+import math
+from pathlib import Path
+
+from softtact.errors import InputError
+
+_UTF8_MARK, _UTF16_MARKS = b"\xef\xbb\xbf", (b"\xff\xfe", b"\xfe\xff")
+
+
+def is_text(data: bytes) -> bool:
+    """Whether a file begins as text does: with a mark of UTF-16, or without bytes 0, which numbers of binary files have."""
+    return data.startswith(_UTF16_MARKS) or b"\0" not in data[:512]
+
+
+def plain_text(path: Path, data: bytes) -> bytes:
+    """The text without a mark of its encoding, its lines parted by line feeds; UTF-16 raises InputError."""
+    if data.startswith(_UTF16_MARKS):
+        raise InputError(f"{path}: it is text of 16 bits a letter (UTF-16); save it as UTF-8.")
+    data = data.removeprefix(_UTF8_MARK)
+    return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in data else data
+
+
+def line_at(data: bytes, offset: int) -> int:
+    """Number of the line, from 1, in which a byte of a text stands."""
+    return data.count(b"\n", 0, offset) + 1
+
+
+def shown(word: bytes) -> str:
+    """A word of a file as a message shows it."""
+    text = word.decode("utf-8", errors="replace")
+    return repr(text if len(text) <= 40 else f"{text[:37]}...")
+
+
+def is_finite(word: bytes) -> bool:
+    """Whether a word is a finite number, written as text files write it."""
+    try:
+        return b"_" not in word and math.isfinite(float(word))     # Python would take 1_0 for a number
+    except ValueError:
+        return False
+
+
+def no_number(path: Path, line: int, word: bytes) -> InputError:
+    """The refusal of a word that stands where a finite number is due."""
+    remedy = "write decimals with points" if b"," in word else "export the mesh again"
+    return InputError(f"{path}: line {line}: {shown(word)} is no finite number; {remedy}.")
