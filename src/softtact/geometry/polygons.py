@@ -2,7 +2,8 @@
 
 A quadrilateral is split along the diagonal that divides it the more evenly; both halves must face the polygon's side, so that
 concave ones are split inside. Polygons of more corners are triangulated in the plane of their vector area: convex ones from one
-corner, others by manifold3d (ear clipping). The result does not depend on the corner a polygon begins with, unless several splits are equally good.
+corner, others by manifold3d (ear clipping). The result does not depend on the corner a polygon begins with, unless several
+splits are equally good.
 Refused: polygons that cross themselves, and those whose corners leave one plane so far that their surface is a guess.
 """
 
