@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from softtact.evaluation.score_tables import forces_of, level_table, score_table, untrained, verdicts
+from softtact.evaluation.score_tables import force_labels, forces_of, level_table, score_table, untrained, verdicts
 
 
 def rows(**scores):
@@ -50,6 +50,12 @@ def test_every_force_stands_alone_beside_all_of_them():
     assert levels.columns.tolist() == ["set", "model", "predictor", "kind", "ssim_5_n", "ssim_50_n", "mae_counts_5_n",
                                        "mae_counts_50_n"]
     assert levels[levels.predictor == "printed"].ssim_50_n.iloc[0] == pytest.approx(0.7)
+
+
+def test_forces_that_are_all_different_are_gathered_in_ranges():
+    labels = force_labels(pd.Series(np.linspace(0.5, 50, 100)))
+    assert sorted(set(labels), key=float) == ["2.5", "7.5", "12.5", "17.5", "22.5", "27.5", "32.5", "37.5", "42.5", "47.5"]
+    assert (labels.value_counts() == 10).all() and force_labels(pd.Series([5.0, 12.5])).tolist() == ["5", "12.5"]
 
 
 @pytest.mark.parametrize(("network", "begins"), [(0.4, "Not trained: the printed network of the elastic model"),

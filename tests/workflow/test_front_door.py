@@ -37,6 +37,12 @@ def test_a_tested_foundation_model_asks_for_its_frustum_law_first(fresh):
         assert "foundation" in {job["model"] for job in plan[rule]}
 
 
+def test_a_study_without_a_learning_curve_and_repeated_seeds_plans_neither(fresh):
+    plan = Project(fresh.folder).plan("--config", "learning={seeds: 1}", "learning_curve={shares: []}")
+    assert not {"learning_curve", "find_limits", "draw_fig10_learning_curve", "repeat_learning", "gather_seeds"} & set(plan)
+    assert {"compare_networks", "report"} <= set(plan)
+
+
 def test_a_misspelt_key_is_answered_with_the_nearest_right_one(fresh):
     said = refusal(fresh, "--config", "forces_nn=[5]")
     assert "softtact: the configuration: there is no key 'forces_nn'; did you mean 'forces_n'?" in said

@@ -310,41 +310,45 @@ rule repeat_learning:
         run_stage("repeat_learning")
 
 
-rule gather_seeds:
-    input:
-        code=code("gather_seeds"),
-        seeds=SEEDS,
-    output:
-        table=f"{RESULTS}/tables/seeds.csv",
-    params:
-        files=files,
-        settings=as_settings(),
-    log:
-        log_of("gather_seeds"),
-    benchmark:
-        benchmark_of("gather_seeds")
-    shell:
-        run_stage("gather_seeds")
+if SEEDS:
+
+    rule gather_seeds:
+        input:
+            code=code("gather_seeds"),
+            seeds=SEEDS,
+        output:
+            table=f"{RESULTS}/tables/seeds.csv",
+        params:
+            files=files,
+            settings=as_settings(),
+        log:
+            log_of("gather_seeds"),
+        benchmark:
+            benchmark_of("gather_seeds")
+        shell:
+            run_stage("gather_seeds")
 
 
-rule find_limits:
-    input:
-        code=code("find_limits"),
-        curves=CURVES,
-        networks=rules.compare_networks.output.networks,
-    output:
-        limits=f"{RESULTS}/tables/limits.csv",
-    params:
-        files=files,
-        settings=as_settings(
-            own=STUDY.values.network.architecture, tested=STUDY.tested, reference=STUDY.values.reference, source=STUDY.source
-        ),
-    log:
-        log_of("find_limits"),
-    benchmark:
-        benchmark_of("find_limits")
-    shell:
-        run_stage("find_limits")
+if CURVES:
+
+    rule find_limits:
+        input:
+            code=code("find_limits"),
+            curves=CURVES,
+            networks=rules.compare_networks.output.networks,
+        output:
+            limits=f"{RESULTS}/tables/limits.csv",
+        params:
+            files=files,
+            settings=as_settings(
+                own=STUDY.values.network.architecture, tested=STUDY.tested, reference=STUDY.values.reference, source=STUDY.source
+            ),
+        log:
+            log_of("find_limits"),
+        benchmark:
+            benchmark_of("find_limits")
+        shell:
+            run_stage("find_limits")
 
 
 if not STUDY.archive:

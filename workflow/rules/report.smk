@@ -260,22 +260,24 @@ rule draw_fig9_networks:
         run_stage("draw_fig9_networks")
 
 
-rule draw_fig10_learning_curve:
-    input:
-        code=code("draw_fig10_learning_curve"),
-        curves=CURVES,
-        ceiling=rules.evaluate.output.ceiling,
-    output:
-        **figure_files("fig10_learning_curve"),
-    params:
-        files=files,
-        settings=as_settings(),
-    log:
-        log_of("draw_fig10_learning_curve"),
-    benchmark:
-        benchmark_of("draw_fig10_learning_curve")
-    shell:
-        run_stage("draw_fig10_learning_curve")
+if CURVES:
+
+    rule draw_fig10_learning_curve:
+        input:
+            code=code("draw_fig10_learning_curve"),
+            curves=CURVES,
+            ceiling=rules.evaluate.output.ceiling,
+        output:
+            **figure_files("fig10_learning_curve"),
+        params:
+            files=files,
+            settings=as_settings(),
+        log:
+            log_of("draw_fig10_learning_curve"),
+        benchmark:
+            benchmark_of("draw_fig10_learning_curve")
+        shell:
+            run_stage("draw_fig10_learning_curve")
 
 
 def drawn_by(stage):

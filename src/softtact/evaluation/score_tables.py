@@ -15,6 +15,7 @@ from softtact.evaluation.baselines import KINDS
 
 NETWORK, CEILING = "network", "sensor"
 ALL_FORCES = "all"
+FORCES, BINS = 25, 10     # an archive's forces are all different
 COLUMNS = ["model", "set", "force", "predictor", "kind", "maps", "ssim", "ssim_own_range", "mae_counts", "mae_share", "overlap",
            "skill",
            "skill_simple"]
@@ -32,12 +33,21 @@ def score_table(networks: pd.DataFrame, baselines: pd.DataFrame, ceiling: pd.Dat
     models = networks.model.unique()
     sensor = [ceiling.assign(predictor="sensor_repeated", kind=CEILING, model=model) for model in models]
     rows = pd.concat([rows[rows.model.isin(models)], *sensor], ignore_index=True)
-    both = pd.concat([rows.assign(force=ALL_FORCES), rows.assign(force=rows.force_n.map("{:g}".format))], ignore_index=True)
+    both = pd.concat([rows.assign(force=ALL_FORCES), rows.assign(force=force_labels(rows.force_n))], ignore_index=True)
     table = both.groupby(["model", "set", "force", "predictor", "kind"], sort=False, dropna=False).agg(
         maps=("ssim", "size"), ssim=("ssim", "mean"), ssim_own_range=("ssim_own_range", "mean"), mae_counts=("mae_counts", "mean"),
         mean_counts=("mean_counts", "mean"), overlap=("overlap", "mean")).reset_index()
     table["mae_share"] = table.mae_counts / table.mean_counts.where(table.mean_counts > 0)
     return _with_skill(table)[COLUMNS]
+
+
+def force_labels(force_n: pd.Series) -> pd.Series:
+    """What the forces are called: their values or, where there are more than FORCES, the middle of one of BINS equal ranges."""
+    if force_n.nunique() <= FORCES:
+        return force_n.map("{:g}".format)
+    width = force_n.max() / BINS
+    middle = (np.ceil(force_n / width).clip(lower=1) - 0.5) * width
+    return middle.map("{:.3g}".format)
 
 
 def _with_skill(table):
