@@ -26,6 +26,7 @@ _SEP_LINE = re.compile(r'"?sep=(\\t|[^\w\s".]|\t)"?\s*', flags=re.IGNORECASE)   
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", flags=re.ASCII)
 _NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)", flags=re.IGNORECASE)
 _NAMES = {",": "commas", ";": "semicolons", "\t": "tabs"}
+_STATE = "state the decimal comma (--decimal ,)"
 _ROWS_TO_COMPARE = 5    # of fewer rows nothing can be told from how long their numbers are
 
 
@@ -34,14 +35,14 @@ class Table:
     """A header and the rows below it.
 
     header: the columns' names;  rows: [(number in the file, from 1, cells)], text or, of Excel, numbers
-    notes: texts of the lines that begin with `#`;  decimal: `.` or `,`
+    notes: texts of the lines that begin with `#`;  decimal: `.` or `,`, or None: the point, and no way to state another
     """
 
     path: Path
     header: list[str]
     rows: list[tuple[int, list[Cell]]]
     notes: list[str]
-    decimal: str = "."
+    decimal: str | None = None
 
     def column(self, name: str) -> int:
         """Position of the one column of this name."""
@@ -56,18 +57,19 @@ class Table:
         return [[number(self.path, row, cells[k], decimal=self.decimal) for row, cells in self.rows] for k in at]
 
 
-def read_table(path: str | Path, *, what: str = "table", marker: str | None = None, layout: str = "another", decimal: str = ".",
-               skip_rows: int = 0, sheet: str | None = None) -> Table:
+def read_table(path: str | Path, *, what: str = "table", marker: str | None = None, layout: str = "another",
+               decimal: str | None = None, skip_rows: int = 0, sheet: str | None = None) -> Table:
     """The `Table` of a CSV file or of a sheet of Excel.
 
     what: what the table is, for a refusal
     marker: a text in the header, which then may stand below other lines, as in the `layout` of that name; without it the header is
     the first line
-    decimal: `.` or `,`;  skip_rows: lines above that are passed over;  sheet: the name of a workbook's sheet, where it has several
+    decimal: `.` or `,` as the user stated it, or None: the point, and no way to state another
+    skip_rows: lines above that are passed over;  sheet: the name of a workbook's sheet, where it has several
     Raises InputError that names file, row and remedy.
     """
     path = Path(path)
-    if decimal not in DECIMALS:
+    if decimal not in (None, *DECIMALS):
         raise InputError(f"{path}: the decimal sign is {decimal!r}; state '.' or ','.")
     if path.suffix.lower() in WORKBOOKS:
         records = [(row, cells) for row, cells in read_sheet(path, sheet=sheet) if row > skip_rows]
@@ -87,7 +89,8 @@ def read_table(path: str | Path, *, what: str = "table", marker: str | None = No
     return _whole(table, text, _NAMES.get(separator, repr(separator)))
 
 
-def read_bare(path: str | Path, *, header: Sequence[str], what: str = "table", decimal: str = ".", skip_rows: int = 0) -> Table:
+def read_bare(path: str | Path, *, header: Sequence[str], what: str = "table", decimal: str | None = None,
+              skip_rows: int = 0) -> Table:
     """The `Table` of a file of numbers with blanks between them and no header; `header` names its columns."""
     text = read_text(path, what=what)
     notes, lines = _parted([(row, line) for row, line in _numbered(text) if row > skip_rows])
@@ -126,7 +129,7 @@ def encoding_of(path: str | Path) -> str:
     return "utf-8-sig"
 
 
-def number(path: Path, row: int, cell: Cell, *, decimal: str = ".") -> float:
+def number(path: Path, row: int, cell: Cell, *, decimal: str | None = None) -> float:
     """The finite number in a cell; another content is refused with its row and a remedy."""
     if isinstance(cell, float):
         value, text = cell, f"{cell:g}"
@@ -137,24 +140,25 @@ def number(path: Path, row: int, cell: Cell, *, decimal: str = ".") -> float:
         elif not is_number(cell, decimal=decimal):
             raise InputError(f"{path}, row {row}: {cell!r} is not a number; {_remedy(text, decimal)}.")
         else:
-            value = float(text.replace(decimal, "."))
+            value = float(text.replace(decimal or ".", "."))
     if not math.isfinite(value):
         raise InputError(f"{path}, row {row}: the value {text!r} is not finite; correct it or remove the row.")
     return value
 
 
-def is_number(cell: Cell, *, decimal: str = ".") -> bool:
+def is_number(cell: Cell, *, decimal: str | None = None) -> bool:
     """Whether a cell holds a number and nothing else."""
     if isinstance(cell, float):
         return True
     text = cell.strip().replace("\N{MINUS SIGN}", "-")
-    other = DECIMALS[1 - DECIMALS.index(decimal)]
-    return other not in text and _NUMBER.fullmatch(text.replace(decimal, ".")) is not None
+    if decimal == ",":
+        text = text.replace(".", "?").replace(",", ".")
+    return _NUMBER.fullmatch(text) is not None
 
 
 def _remedy(text, decimal):
-    if decimal == "." and "," in text:
-        return "write it with a decimal point and no separator of thousands, or state the decimal comma (--decimal ,)"
+    if decimal != "," and "," in text:
+        return "write it with a decimal point and no separator of thousands" + f", or {_STATE}" * (decimal is not None)
     if decimal == "," and "." in text:
         return "its decimal sign was stated to be the comma: write it so, without separators of thousands, or leave --decimal out"
     return "correct it or remove the row"
@@ -234,7 +238,8 @@ def _check_widths(table, separator):
         remedy = ("are the first the rows' own names, as R writes them? Give these a name in the header, or write the file without "
                   "(row.names = FALSE)")
     elif separator == "commas" and fields > width:
-        remedy = "are decimals written with commas? Write points, or put semicolons between the fields and state --decimal ,"
+        remedy = "are decimals written with commas? Write points" + f", or put semicolons between the fields and {_STATE}" * (
+            table.decimal is not None)
     raise InputError(f"{table.path}, row {row}: it has {fields} field{'s' * (fields != 1)} where {width} are named, with "
                      f"{separator} between them; {remedy}.")
 

@@ -29,7 +29,7 @@ def checked(path: str | Path, rows: np.ndarray, x: np.ndarray, y: np.ndarray, *,
     raw: (2, n) the same two columns as the file has them;  compression: the test was said to be written without a minus
     """
     _check_magnitude(path, rows, x, y, mode, raw)
-    _check_sign(path, rows, x, y, mode, raw)
+    _check_sign(path, rows, x, y, mode, raw, compression)
     _check_units_within(path, rows, x, y)
     if mode == VOLUMETRIC:
         return tuple(f"{path}: {remark}" for remark in _of_volume(x))
@@ -91,15 +91,17 @@ def _check_magnitude(path, rows, x, y, mode, raw):
     )  # fmt: skip
 
 
-def _check_sign(path, rows, x, y, mode, raw):
+def _check_sign(path, rows, x, y, mode, raw, compression):
     wrong = y * np.sign(x - 1) * (-1 if mode == VOLUMETRIC else 1) < -SIGN_TOLERANCE * np.abs(y).max()
     if mode == VOLUMETRIC:
         refuse_first(path, rows, y, wrong, "the pressure {value} MPa has the wrong sign for its volume ratio;"
                                             " a pressure that compresses is positive, with a volume ratio below 1.")
+    remedy = ("leave `compression` out, for it is no compression test written without a minus" if compression
+              else "say `compression: true` for a compression test written without a minus")
     refuse_first(
         path, rows, y, wrong,
         "the stress {value} MPa has the wrong sign for its stretch; tension is positive and compression negative, in strain"
-        f" and in stress; say `compression: true` for a compression test written without a minus{_swapped(raw, mode)}.",
+        f" and in stress; {remedy}{_swapped(raw, mode)}.",
     )  # fmt: skip
 
 

@@ -58,6 +58,9 @@ class MeasuredFile(_Section):
     columns: dict[str, str] = Field(default_factory=dict, description="declared name -> the file's own header")
     sort: bool = Field(False, description="order the rows by stretch")
     compression: bool = Field(False, description="a compression test written without a minus")
+    decimal: Literal[".", ","] = Field(".", description="the decimal sign")
+    skip_rows: int = Field(0, ge=0, description="lines above the header that are passed over")
+    sheet: str | None = Field(None, description="of an Excel workbook that has several")
 
 
 class MeasuredCurves(_Section):
