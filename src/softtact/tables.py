@@ -25,6 +25,7 @@ DECIMALS = (".", ",")
 _SEP_LINE = re.compile(r'"?sep=(\\t|[^\w\s".]|\t)"?\s*', flags=re.IGNORECASE)      # what Excel reads in a first line
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", flags=re.ASCII)
 _NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)", flags=re.IGNORECASE)
+_NOT_CP1252 = set(b"\0\x81\x8d\x8f\x90\x9d")     # bytes that are no letter there
 _NAMES = {",": "commas", ";": "semicolons", "\t": "tabs"}
 _STATE = "state the decimal comma (--decimal ,)"
 _ROWS_TO_COMPARE = 5    # of fewer rows nothing can be told from how long their numbers are
@@ -124,7 +125,10 @@ def encoding_of(path: str | Path) -> str:
             while piece := file.read(1 << 20):
                 decoder.decode(piece)
             decoder.decode(b"", final=True)
-        except UnicodeDecodeError:
+        except UnicodeDecodeError as error:
+            file.seek(0)
+            if any(set(piece) & _NOT_CP1252 for piece in iter(lambda: file.read(1 << 20), b"")):
+                raise InputError(f"{path}: its letters are neither UTF-8 ({error.reason}) nor cp1252; save it as UTF-8.") from None
             return "cp1252"
     return "utf-8-sig"
 
