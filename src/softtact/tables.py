@@ -183,9 +183,18 @@ def _numbered(text):
 
 
 def _parted(lines):
-    """The notes, and the other lines that are not blank; a line of separators alone is blank."""
-    notes = [line.strip() for _, line in lines if line.lstrip().startswith("#")]
-    return notes, [(row, line) for row, line in lines if line.strip("\t;, ") and not line.lstrip().startswith("#")]
+    """The notes, and the other lines that are not blank; a line of separators alone is blank.
+
+    Below the header a note is `#` and a blank: a row may begin with an error of Excel's, such as #N/A.
+    """
+    notes: list[str] = []
+    others: list[tuple[int, str]] = []
+    for row, line in lines:
+        if line.lstrip().startswith("# " if others else "#"):
+            notes.append(line.strip())
+        elif line.strip("\t;, "):
+            others.append((row, line))
+    return notes, others
 
 
 def _header_at(path, lines, marker, layout):
@@ -249,21 +258,29 @@ def _check_widths(table, separator):
 
 
 def _check_end(table):
-    """Refuse a last number that is shorter than most above it where no line end follows: the file may be cut off within it."""
-    *above, (row, last) = table.rows or [(0, [""])]
-    digits = [sum(map(str.isdigit, cells[-1])) for _, cells in above]
-    if len(digits) >= _ROWS_TO_COMPARE and sum(map(str.isdigit, last[-1])) < median(digits):
-        raise InputError(f"{table.path}, row {row}: the file ends with {last[-1]!r}, without a line end and shorter than above, so "
-                         "it may be cut off; write it again, or end its last line if it is whole.")
+    """Refuse a last number that is shorter than those above it where no line end follows: the file may be cut off within it."""
+    if len(table.rows) < 2:
+        return
+    *above, last = [_lengths(cells[-1]) for _, cells in table.rows]
+    digits, decimals = (list(values) for values in zip(*above, strict=True))
+    even = len(set(decimals)) == 1 and last[1] < decimals[0]
+    if even or (len(above) >= _ROWS_TO_COMPARE and (last[0] < median(digits) or last[1] < median(decimals))):
+        row, cells = table.rows[-1]
+        raise InputError(f"{table.path}, row {row}: the file ends with {cells[-1]!r}, without a line end and shorter than above, "
+                         "so it may be cut off; write it again, or end its last line if it is whole.")
+
+
+def _lengths(cell):
+    """Numbers of digits, and of digits behind the decimal sign, in a text."""
+    return sum(map(str.isdigit, cell)), sum(map(str.isdigit, "".join(re.split("[.,]", cell)[1:])))
 
 
 def _of_sheet(path, records, *, what, marker, layout, decimal):
     """The `Table` of the records [(row, cells)] of a sheet."""
-    def begins(cells):
-        return next((str(cell) for cell in cells if cell != ""), "")
-
-    notes = [begins(cells) for _, cells in records if begins(cells).startswith("#")]
-    records = [(row, cells) for row, cells in records if begins(cells) and not begins(cells).startswith("#")]
+    begins = {row: next((str(cell) for cell in cells if cell != ""), "") for row, cells in records}
+    notes, others = _parted(list(begins.items()))
+    kept = {row for row, _ in others}
+    records = [(row, cells) for row, cells in records if row in kept]
     if not records:
         raise InputError(f"{path}: the sheet is empty; give a {what} with its columns.")
     first = _header_at(path, ["\t".join(map(str, cells)) for _, cells in records], marker, layout)

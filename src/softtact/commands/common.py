@@ -130,7 +130,7 @@ def numbers(option: str, text: str, count: int) -> list[float]:
         values = [float(part) for part in text.split(":")]
     except ValueError:
         values = []
-    if len(values) != count or sorted(values) != values:
+    if len(values) != count or sorted(values) != values or not all(abs(value) < float("inf") for value in values):
         wanted = "a number" if count == 1 else "two rising numbers with a colon between them"
         raise InputError(f"{option} MODE={text}: {text!r} is not {wanted}; correct it.")
     return values

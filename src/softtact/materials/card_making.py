@@ -27,6 +27,9 @@ _NOTABLE = 0.01     # relative error from which that is worth saying
 # 25 to 46 % only where few constants follow a large range, or a coarse load cell a small one.
 LARGEST_ERROR = 0.25
 
+_BOUNDS = {"bulk_over_shear": (2 / 3, np.inf), "poisson": (-1.0, 0.5), "small_strain": (0.0, 1.0)}
+
+
 @dataclass(frozen=True)
 class CardOptions:
     """What a card is made with.
@@ -55,6 +58,12 @@ class CardOptions:
     seed: int = 0
     predict_left_out: bool = True
     disagreement: float = THRESHOLD
+
+    def __post_init__(self):
+        for name, (low, high) in _BOUNDS.items():
+            value = getattr(self, name)
+            if value is not None and not low < value < high:
+                raise InputError(f"{name} is {value:g}; give a value above {low:.3g} and below {high:g}.")
 
     @property
     def fit(self) -> dict[str, Any]:

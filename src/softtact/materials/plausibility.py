@@ -49,7 +49,8 @@ def _neo_hooke(mode, stretch):
 def _unit_of_strain(stretch, stress, mode):
     """Percent that were called a ratio, or a ratio that was called percent."""
     strain, largest = np.abs(stretch - 1), np.abs(stretch - 1).max()
-    as_percent = largest > 0.5 and _better(stretch, stress, 1 + (stretch - 1) / 100, mode)
+    as_percent = largest > 0.5 and any(_better(stretch, stress, other, mode)
+                                       for other in (1 + (stretch - 1) / 100, stretch**0.01))     # of engineering or true strain
     coarse = stretch.max() > 3 and strain[strain > 1e-9].min() >= 0.5 and np.median(np.abs(np.diff(stretch))) >= 0.3
     if as_percent or coarse:
         return (f"the stretch goes to {stretch.max():.3g}, and the curve is that of a strain in percent; if the column holds "
@@ -100,14 +101,17 @@ def _negative_tension(stretch, stress, mode):
 
 
 def _preload(stretch, stress, mode):
-    """Stress at no strain: where the straight line of the first strains meets it."""
-    strain = np.abs(stretch - 1)
-    start = strain <= _START
+    """Stress at no strain: of the rows without strain, else where the straight line of the first strains meets it."""
+    strain, unit = np.abs(stretch - 1), _neo_hooke(mode, stretch)
+    start, none = strain <= _START, strain <= _NEAR_ZERO
     if start.sum() < 3 or strain.min() > 0.05:
         return None
-    slope, at_zero = np.polyfit(_neo_hooke(mode, stretch[start]), stress[start], 1)
-    share = at_zero * _loading(stretch) / max(slope * np.abs(_neo_hooke(mode, np.array([1 + _START]))[0]), 1e-300)
-    if share > _PRELOAD[0 if strain.min() <= _NEAR_ZERO else 1]:
+    slope, at_zero = np.polyfit(unit[start], stress[start], 1)
+    scale = max(slope, secant_modulus(mode, stretch, stress)) * np.abs(_neo_hooke(mode, np.array([1 + _START]))[0])
+    if none.any():
+        at_zero = float(np.mean(stress[none] - slope * unit[none]))
+    share = abs(at_zero) if none.any() else at_zero * _loading(stretch)
+    if share > _PRELOAD[0 if none.any() else 1] * scale > 0:
         return (f"it has a stress of {at_zero:.3g} MPa at no strain, as a preload or an offset of the load cell gives; take it off "
                 "the column")
     return None

@@ -68,7 +68,7 @@ def read_table(path: Path, *, columns: int, force: bool, outliers: Outliers) -> 
     if (test < 0).any():
         outliers.keep(path.name, line[test < 0][0], "", "the row names no test; it is not used", count=(test < 0).sum())
     if layout.path < len(layout.columns) - 1 and test[-1] >= 0 and not _ends_with_a_line(path):
-        outliers.leave_out(path.name, line[-1], list(codes)[test[-1]], "the file ends within this row, without a line end; cut off?")
+        outliers.leave_out(path.name, line[-1], list(codes)[test[-1]], "the file ends in this row, without a line end; cut off?")
     return Table(path.name, values, force_n, test, line, list(codes), surplus, texts)
 
 
