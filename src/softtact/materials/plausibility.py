@@ -108,10 +108,11 @@ def _preload(stretch, stress, mode):
         return None
     slope, at_zero = np.polyfit(unit[start], stress[start], 1)
     scale = max(slope, secant_modulus(mode, stretch, stress)) * np.abs(_neo_hooke(mode, np.array([1 + _START]))[0])
+    noise = np.sqrt(np.mean((stress[start] - at_zero - slope * unit[start]) ** 2))
     if none.any():
         at_zero = float(np.mean(stress[none] - slope * unit[none]))
-    share = abs(at_zero) if none.any() else at_zero * _loading(stretch)
-    if share > _PRELOAD[0 if none.any() else 1] * scale > 0:
+    offset = abs(at_zero) if none.any() else at_zero * _loading(stretch)
+    if offset > max(_PRELOAD[0 if none.any() else 1] * scale, 3 * noise) > 0:
         return (f"it has a stress of {at_zero:.3g} MPa at no strain, as a preload or an offset of the load cell gives; take it off "
                 "the column")
     return None
