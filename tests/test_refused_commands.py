@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -114,6 +115,13 @@ def test_an_output_that_is_an_input_is_refused_by_whatever_path(folder, capsys, 
     status, out, said = said_by(capsys, line.format(here=folder.name))
     assert (status, out) == (1, "") and sentence in said
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_a_card_that_the_chosen_model_does_not_use_is_told(folder, capsys):
+    assert said_by(capsys, FIT)[0] == 0
+    trimesh.creation.box((8, 8, 4)).export(folder / "part.stl")
+    status, _, said = said_by(capsys, f"{PRESS} --sensor pad4x4 --policy paper --card cover=card.json")
+    assert status == 0 and "WARNING: --card cover=card.json has no effect on the elastic model, which was chosen" in said
 
 
 def test_pictures_of_discs_do_not_take_the_place_of_frames(folder, capsys):

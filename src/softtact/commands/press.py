@@ -1,6 +1,7 @@
 """`softtact press`: a mesh on the sensor, its maps and a summary."""
 
 import argparse
+import sys
 from pathlib import Path
 
 import softtact
@@ -162,6 +163,9 @@ def _show_press(result, options):
         result.write_vtu(options.vtu)
     if options.plot:
         result.plot(options.plot, full_scale=options.full_scale)
+    if options.card and result.model == "elastic":
+        print(f"softtact press: WARNING: --card {' '.join(options.card)} has no effect on the elastic model, which was chosen; "
+              "name another model to use it.", file=sys.stderr)
     summary = _press_summary(result)
     summary["written"] = [str(path) for path in (options.out, options.vtu, options.plot) if path]
     show(summary, as_json=options.json, lines=_press_lines(summary))

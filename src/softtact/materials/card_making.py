@@ -12,14 +12,13 @@ from softtact.materials.bulk import bulk_modulus, poisson_ratio, small_strain_co
 from softtact.materials.cards import law_of_entry, linear_from_card
 from softtact.materials.checks import refuse_mixed_units
 from softtact.materials.consistency import against_linear, printed_warnings
-from softtact.materials.curves import MODES, VOLUMETRIC, Curve, VolumetricCurve, common_kind, join_by_mode
+from softtact.materials.curves import VOLUMETRIC, Curve, VolumetricCurve, common_kind, join_by_mode
 from softtact.materials.fitting import STARTS, FitOptions, fit_law, law_names
 from softtact.materials.linear import LinearConstants, young_modulus
 from softtact.materials.prediction import predict_left_out
 from softtact.materials.stability import SCAN, covers, stable_ranges
-from softtact.materials.windows import principal_window
+from softtact.materials.windows import principal_window, refuse_idle
 from softtact.progress import progress
-from softtact.unknown_names import unknown
 
 _SYSTEMATIC = 0.7   # neighbouring residuals so alike are the law's misfit; noise gives 0 +- 1/sqrt(points)
 _NOTABLE = 0.01     # relative error from which that is worth saying
@@ -80,7 +79,7 @@ def make_card(curves: Sequence[Curve | VolumetricCurve], *, material: str = "mat
     """
     settings = CardOptions(**options)
     refuse_mixed_units(curves)
-    _refuse_idle(settings, [curve.mode for curve in curves])
+    refuse_idle(settings.window, settings.weights, modes=[curve.mode for curve in curves])
     curves = _windowed(join_by_mode(curves), settings.window)
     shape: list[Any] = [curve for curve in curves if curve.mode != VOLUMETRIC]
     volumetric: Any = next((curve for curve in curves if curve.mode == VOLUMETRIC), None)
@@ -123,20 +122,6 @@ def misfit_warnings(card: dict[str, Any]) -> list[str]:
     return [f"The chosen law, {card['chosen']}, misses these curves by {error:.0%} of the stress (root mean square), and above "
             f"{LARGEST_ERROR:.0%} a card does not describe them: check units, signs, preload and slack, narrow the window, or fit "
             "relative errors."]
-
-
-def _refuse_idle(settings, modes):
-    """Refuse a window or a weight that would change nothing."""
-    for name, what in (("window", settings.window), ("weight", settings.weights)):
-        for mode in what:
-            if mode not in MODES:
-                raise InputError(f"The {name} of {mode!r}: {unknown(mode, MODES, kind='test mode')}.".replace("?.", "?"))
-            if mode not in modes:
-                raise InputError(f"The {name} of {mode} has no effect, for there is no {mode} curve; leave it out.")
-    if VOLUMETRIC in settings.weights:
-        raise InputError("The weight of volumetric has no effect, for K is fitted to that curve alone; leave it out.")
-    if settings.weights and len(set(modes) - {VOLUMETRIC}) == 1:
-        raise InputError("The weight of the only mode has no effect; leave it out, or give a second test.")
 
 
 def _windowed(curves, window):

@@ -17,6 +17,7 @@ from softtact.files import read_yaml
 from softtact.materials.laws.base import Law
 from softtact.materials.laws.registry import law_class, make_law
 from softtact.materials.linear import LinearConstants
+from softtact.materials.windows import refuse_idle
 from softtact.unknown_names import first_fault, known_keys, unknown
 
 Mode = Literal["uniaxial", "equibiaxial", "planar", "volumetric"]
@@ -188,6 +189,7 @@ def _printed_parameters(config, law):
 def _resolved(config, path):
     """The config with its curves' constants filled in, and file paths as seen from here."""
     _check_laws(config)
+    refuse_idle(config.fit.window, config.fit.weights, modes=config.modes)
     curves = config.curves
     if curves.kind == "measured":
         files = [file.model_copy(update={"file": str(path.parent / file.file)}) for file in curves.files]
