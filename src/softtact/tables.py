@@ -105,6 +105,8 @@ def read_text(path: str | Path, *, what: str = "table") -> str:
         raw = Path(path).read_bytes()
     except (FileNotFoundError, IsADirectoryError):
         raise InputError(f"{path}: there is no such file; give the path of a {what}.") from None
+    if raw.startswith(b"PK\x03\x04"):
+        raise InputError(f"{path}: it is a zip archive, as workbooks of Excel are, and no text; name it .xlsx if it is one.")
     try:
         text = raw.decode(encoding_of(path))
     except UnicodeDecodeError as error:
@@ -242,15 +244,18 @@ def _whole(table, text, separator):
 def _check_widths(table, separator):
     """Refuse a row of more or fewer fields than the header: whatever the reason, its columns may be shifted."""
     width = len(table.header)
-    wrong = [(row, len(cells)) for row, cells in table.rows if len(cells) != width]
+    wrong = [(row, cells) for row, cells in table.rows if len(cells) != width]
     if not wrong:
         return
-    row, fields = wrong[0]
+    row, fields, last = wrong[0][0], len(wrong[0][1]), wrong[0][1][-1]
     remedy = "write as many in each row, and none at its end that the header does not name"
-    if len(wrong) == len(table.rows) and fields == width + 1:
+    if width == 1:
+        remedy = "is this the header, or a line above it? Pass over lines above the header" + " (--skip-rows N)" * (
+            table.decimal is not None)
+    elif len(wrong) == len(table.rows) and fields == width + 1 and any(cells[-1] for _, cells in wrong):
         remedy = ("are the first the rows' own names, as R writes them? Give these a name in the header, or write the file without "
                   "(row.names = FALSE)")
-    elif separator == "commas" and fields > width:
+    elif separator == "commas" and fields > width and last:
         remedy = "are decimals written with commas? Write points" + f", or put semicolons between the fields and {_STATE}" * (
             table.decimal is not None)
     raise InputError(f"{table.path}, row {row}: it has {fields} field{'s' * (fields != 1)} where {width} are named, with "

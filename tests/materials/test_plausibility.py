@@ -6,6 +6,7 @@ import pytest
 from softtact.errors import InputError
 from softtact.materials.branches import order
 from softtact.materials.plausibility import remarks
+from softtact.materials.readers import read_curves
 
 MU = 0.35
 EXPONENT = {"uniaxial": -2, "planar": -3, "equibiaxial": -5}
@@ -29,6 +30,19 @@ def test_percent_that_was_called_a_ratio_is_told_in_steps_of_any_size(mode, larg
         percent = np.linspace(0, largest, steps)
         assert "if the column holds percent" in told(percent, rubber(1 + percent / 100, mode), mode), steps
     assert "if the column holds percent" in told(np.exp(np.linspace(0, 3, 50)) - 1, rubber(np.exp(np.linspace(0, 0.03, 50))))
+
+
+def test_noise_hides_no_percent():
+    percent = np.linspace(0, 24, 200)
+    stress = rubber(1 + percent / 100)
+    noise = 0.01 * stress.max() * np.random.default_rng(1).standard_normal(200)
+    assert "if the column holds percent" in told(percent, stress + noise)
+
+
+def test_a_ratio_of_a_rubber_that_stiffens_is_told_where_it_was_called_percent():
+    for ratio in (np.linspace(0, 7, 60), np.linspace(0, 10, 60)):
+        for stiffening, remark in ((0.0, "holds a ratio"), (0.01, "holds a ratio"), (0.05, "check the units of strain")):
+            assert remark in told(ratio / 100, rubber(1 + ratio) * (1 + stiffening * ratio**2)), stiffening
 
 
 @pytest.mark.parametrize("mode", EXPONENT)
@@ -74,6 +88,19 @@ def test_a_rubbers_curve_with_noise_raises_no_remark(mode, ends):
     stress = rubber(1 + strain, mode)
     noise = 0.01 * np.abs(stress).max() * np.random.default_rng(3).standard_normal(41)
     assert told(strain, stress + noise, mode) == ""
+
+
+def test_published_rubbers_raise_no_remark_over_any_range_and_one_where_a_ratio_is_called_percent(published):
+    """But for the softest silicone over its first strains, which a load cell of 1 kN measured."""
+    curves = read_curves(sorted((published / "soro_db").glob("*.csv")), layout="soro_db")
+    for name in ("Treloar_1944", "Kawabata_1981"):
+        curves += read_curves(published / "literature" / name, layout="literature")
+    for curve in curves:
+        assert told((curve.stretch - 1) / 100, curve.nominal_stress, curve.mode) != "", curve.source
+        for end in np.arange(1.4, 10, 0.2):
+            own = curve.within((1, end))
+            if len(own.stretch) > 3:
+                assert told(own.stretch - 1, own.nominal_stress, curve.mode) == "", (curve.source, end)
 
 
 CYCLE = np.concatenate([STRAIN, STRAIN[-2::-1]])

@@ -83,6 +83,9 @@ def _find(table, known, columns, quantity):
         return found[0]
     unmet = next((f"; none is called {columns[name]!r}, to which {name} is mapped" for name in accepted if name in columns
                   and columns[name] not in table.header), "")
+    if len(table.header) == 1:
+        raise InputError(f"{table.path}: the header names one column, {table.header[0]!r}; put commas, semicolons or tabs between "
+                         "the columns, or pass over the lines above the header (--skip-rows N).")
     problem = "several columns hold" if found else "no column holds"
     raise InputError(f"{table.path}: {problem} the {quantity} among {', '.join(table.header)}{unmet}; name one of them "
                      f"{' or '.join(known)}, map it under `columns`, or pass over the lines above the header (--skip-rows N).")

@@ -11,13 +11,16 @@ straight line through zero (nothing else is isotropic and incompressible), and i
 from collections.abc import Iterator
 
 import numpy as np
+from scipy.optimize import nnls
 
 from softtact.materials.laws.base import principal_stretches
 
 _MODULI_MPA = (0.001, 30.0)     # initial shear moduli of gels, and of hard polyurethane
+_COMMON_MPA = 10.0              # a silicone's curve is so straight up to a stretch of 2 that in percent it would be one of 20 MPa
 # Another reading of a curve is told of where it leaves less than this share of the error: real rubbers leave half or more of it.
 _MUCH_BETTER = 0.2
 _LARGEST_STRETCH = 25.0         # see `checks`
+_FAR = 4.0                      # stretch beyond which no rubber stays as straight as one does over some percent
 _NEAR_ZERO = 0.005              # strain of a row that counts as one without strain
 _START = 0.2                    # strain up to which a curve is a straight line over the neo-Hookean law's
 _PRELOAD = (0.05, 0.3)          # of the stress at `_START`, where there is a row without strain, and where the line is lengthened
@@ -30,7 +33,7 @@ def remarks(stretch: np.ndarray, stress: np.ndarray, *, mode: str, compression: 
     unit = _unit_of_strain(stretch, stress, mode) or _modulus(stretch, stress, mode)
     found = [unit, _positive_compression(stretch, stress, mode), _negative_tension(stretch, stress, mode) if compression else None]
     if not any(found):      # of a curve in another unit or of another sign, zero says nothing
-        found = [_preload(stretch, stress, mode) or _slack(stretch, stress, mode)]
+        found = [_preload(stretch, stress, mode) or _slack(stretch, stress, mode) or _bent(stretch, stress, mode)]
     yield from (remark for remark in found if remark)
 
 
@@ -49,8 +52,9 @@ def _neo_hooke(mode, stretch):
 def _unit_of_strain(stretch, stress, mode):
     """Percent that were called a ratio, or a ratio that was called percent."""
     strain, largest = np.abs(stretch - 1), np.abs(stretch - 1).max()
-    as_percent = largest > 0.5 and any(_better(stretch, stress, other, mode)
-                                       for other in (1 + (stretch - 1) / 100, stretch**0.01))     # of engineering or true strain
+    percent = (1 + (stretch - 1) / 100, stretch**0.01)      # of engineering or true strain
+    as_percent = largest > 0.5 and any(_better(stretch, stress, other, mode) or _all_but_noise(stretch, stress, other, mode)
+                                       for other in percent)
     coarse = stretch.max() > 3 and strain[strain > 1e-9].min() >= 0.5 and np.median(np.abs(np.diff(stretch))) >= 0.3
     if as_percent or coarse:
         return (f"the stretch goes to {stretch.max():.3g}, and the curve is that of a strain in percent; if the column holds "
@@ -64,8 +68,41 @@ def _unit_of_strain(stretch, stress, mode):
 
 
 def _better(stretch, stress, other, mode):
-    """Whether the curve follows the law much better over other stretches than over those that it has."""
-    return _misfit(_neo_hooke(mode, other), stress) < _MUCH_BETTER * _misfit(_neo_hooke(mode, stretch), stress)
+    """Whether the curve follows the law much better over other stretches, and is a rubber's there."""
+    better = _misfit(_neo_hooke(mode, other), stress) < _MUCH_BETTER * _misfit(_neo_hooke(mode, stretch), stress)
+    return better and _as_stiff_as_rubber(mode, other, stress)
+
+
+def _as_stiff_as_rubber(mode, stretch, stress):
+    return _MODULI_MPA[0] < secant_modulus(mode, stretch, stress) < _COMMON_MPA
+
+
+def _all_but_noise(stretch, stress, other, mode):
+    """Whether a far curve follows Mooney's and Rivlin's law over other stretches but for its noise, and not over its own."""
+    if stretch.max() < _FAR or not _as_stiff_as_rubber(mode, other, stress):
+        return False
+    own, there = (_mooney_misfit(mode, x, stress) for x in (stretch, other))
+    noise = _left(np.vander(other - 1, 5), stress)
+    largest = np.abs(stress).max()
+    return there <= 1.2 * noise + 0.003 * largest and own**2 - there**2 > (0.006 * largest) ** 2
+
+
+def _mooney_misfit(mode, stretch, stress):
+    """Root mean square (MPa) of what the law with its two constants, neither of them negative, leaves."""
+    unit = _neo_hooke(mode, stretch)
+    columns = np.column_stack([unit, unit * _second(mode, stretch)])
+    return nnls(columns, stress)[1] / np.sqrt(len(stress))
+
+
+def _second(mode, stretch):
+    """What the constant c01 is multiplied by beside c10: the square of the middle principal stretch."""
+    return principal_stretches(mode, stretch)[:, 1] ** 2
+
+
+def _left(columns, stress):
+    """Root mean square (MPa) of what a least squares fit leaves."""
+    found = np.linalg.lstsq(columns, stress, rcond=None)[0]
+    return float(np.sqrt(np.mean((stress - columns @ found) ** 2)))
 
 
 def _modulus(stretch, stress, mode):
@@ -129,6 +166,18 @@ def _slack(stretch, stress, mode):
     if None not in moduli and (moduli[0] < _SLACK * moduli[1] or moduli[1] < 0.05 * secant_modulus(mode, stretch, stress)):
         return ("its stress hardly rises over the first strains, as that of a slack specimen or of a plate without contact; take "
                 "the strain without stress off the column")
+    return None
+
+
+def _bent(stretch, stress, mode):
+    """A curve that bends over small strains, where a rubber's is straight over the neo-Hookean law's."""
+    unit, largest = _neo_hooke(mode, stretch), np.abs(stretch - 1).max()
+    if largest > 0.25 or len(stretch) < 8:
+        return None
+    line, noise = _left(np.vander(unit, 2), stress), _left(np.vander(unit, 5), stress)
+    if line > max(0.015 * np.abs(stress).max(), 3 * noise):
+        return (f"it bends over strains up to {largest:.2g} as a rubber's curve does over larger ones; if the column holds a ratio "
+                "and not percent, name it engineering_strain")
     return None
 
 
