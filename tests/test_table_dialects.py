@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from support.table_files import dialects, faults
 
 from softtact.errors import InputError
+from softtact.learning.prediction import read_maps
 from softtact.materials.readers import read_curve
 from softtact.stages.validate_ftir import _measured_curve
 
@@ -86,6 +87,21 @@ def test_a_measured_area_with_a_fault_is_refused_or_reads_back(tmp_path, data):
     text = f"force_n{separator}area_mm2\n" + "".join(f"{f:.5f}{separator}{a:.5f}\n" for f, a in zip(force, area, strict=True))
     faulty = data.draw(faults(text, separator, "\n"))
     same_or_refused(_measured_curve, tmp_path / "area.csv", faulty, (force, area))
+
+
+@settings(quick, max_examples=100)
+@given(st.data())
+def test_a_map_with_a_fault_is_refused_or_reads_back(tmp_path, data):
+    values = np.arange(12.0).reshape(4, 3) / 7
+    text = "".join(",".join(f"{value:.5f}" for value in row) + "\n" for row in values)
+    path = tmp_path / "map.csv"
+    path.write_text(data.draw(faults(text, ",", "\n")))
+    try:
+        maps = read_maps(path, shape=(4, 3)).maps_mm
+    except InputError as error:
+        assert str(path) in str(error) and "\n" not in str(error)
+    else:
+        assert np.allclose(maps, values, atol=1e-5)
 
 
 @quick

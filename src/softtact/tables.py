@@ -99,6 +99,20 @@ def read_bare(path: str | Path, *, header: Sequence[str], what: str = "table", d
     return _whole(table, text, "blanks")
 
 
+def read_matrix(path: str | Path, *, what: str = "table") -> list[list[float]]:
+    """The numbers (rows, columns) of a CSV file without a header; each row has as many as the first."""
+    path, text = Path(path), read_text(path, what=what)
+    separator, lines = _stated_separator(text)
+    _, lines = _parted(lines)
+    if not lines:
+        raise InputError(f"{path}: the file is empty; give a {what}.")
+    separator = separator or _separator(lines[0][1])
+    rows = _records(path, lines, separator)
+    table = Table(path, [f"column {k}" for k in range(len(rows[0][1]))], rows, [])
+    table = _whole(table, text, _NAMES.get(separator, repr(separator)))
+    return [[number(path, row, cell) for cell in cells] for row, cells in table.rows]
+
+
 def read_text(path: str | Path, *, what: str = "table") -> str:
     """The text of a file whose encoding is UTF-8, UTF-16 or cp1252; what is no text is refused."""
     try:
