@@ -48,10 +48,11 @@ def workbook(tmp_path):
     (HEADER + '1.0,"1,234.5"\n', {}, "row 2: '1,234.5' is not a number; .* no separator of thousands"),
     ('"stretch","nominal_stress_mpa"\n"1",1.0,0.0\n"2",1.1,0.1\n', {}, "row 2: it has 3 fields .* rows' own names, as R"),
     ("stretch,nominal_stress_mpa,stretch,nominal_stress_mpa\n1,0,1,0\n1.1,1,1.1,2\n", {}, "several columns hold the stretch"),
+    ("stretch,nominal_stress_mpa,stretch.1,nominal_stress_mpa.1\n1,0,1,0\n1.1,1,1.1,2\n", {}, "several columns hold the stretch"),
     (HEADER + "1.0,0,\n1.1,0.1,\n", {}, "row 2: it has 3 fields .* none at its end that the header does not name"),
     ("Test of 3 May\n" + HEADER + "1.0,0\n1.1,0.1\n", {}, "Pass over lines above the header .--skip-rows N"),
     ("stretch nominal_stress_mpa\n1.0 0\n1.1 0.1\n", {}, "names one column, .*put commas, semicolons or tabs between"),
-    (b"PK\x03\x04" + bytes(20), {}, "it is a zip archive, as workbooks of Excel are"),
+    (b"PK\x03\x04" + bytes(20), {}, "it is no text, but a workbook of Excel"),
     (HEADER + "1.0,0\n1.1\n", {}, "row 3: it has 1 field where 2 are named"),
     (HEADER + '1.0,"0\n1.1,0.1\n', {}, "row 2: its quotes are not right"),
     (HEADER + "1.0,0\n#N/A,0.1\n", {}, "row 3: '#N/A' is not a number"),
@@ -144,6 +145,8 @@ def test_a_file_that_is_no_workbook_is_refused(written):
     assert "pip install 'softtact[excel]'" in missing_extra(ModuleNotFoundError(name="openpyxl"))
 
 
-def test_a_column_of_a_table_is_found_by_its_one_name(written):
+@pytest.mark.parametrize("header", ["a,a", "a,a.1", "a,a_2", "a,a (2)"])
+def test_a_column_of_a_table_is_found_by_its_one_name(written, header):
     with pytest.raises(InputError, match="several columns are named 'a' among a, a"):
-        read_table(written("a,a\n1,2\n")).numbers(["a"])
+        read_table(written(f"{header}\n1,2\n")).numbers(["a"])
+    assert read_table(written("a,area\n1,2\n")).numbers(["a"]) == [[1.0]]

@@ -45,16 +45,20 @@ class Table:
     notes: list[str]
     decimal: str | None = None
 
-    def column(self, name: str) -> int:
-        """Position of the one column of this name."""
-        if self.header.count(name) != 1:
-            found = "several columns are" if name in self.header else "no column is"
-            raise InputError(f"{self.path}: {found} named {name!r} among {', '.join(self.header)}; name one so.")
-        return self.header.index(name)
+    def positions(self, name: str) -> list[int]:
+        """Positions of the columns of this name, and of those that are called as programs call a name that stands twice."""
+        again = re.compile(re.escape(name) + r"([._]\d+| \(\d+\))")
+        return [at for at, own in enumerate(self.header) if own == name or (name in self.header and again.fullmatch(own))]
 
     def numbers(self, names: Sequence[str]) -> list[list[float]]:
-        """[[values (n,)], ...] of the columns of these names; a cell that holds no finite number is refused by its row."""
-        at = [self.column(name) for name in names]
+        """[[values (n,)], ...] of the one column of each name; a cell that holds no finite number is refused by its row."""
+        at = []
+        for name in names:
+            found = self.positions(name)
+            if len(found) != 1:
+                problem = "several columns are" if found else "no column is"
+                raise InputError(f"{self.path}: {problem} named {name!r} among {', '.join(self.header)}; name one so.")
+            at += found
         return [[number(self.path, row, cells[k], decimal=self.decimal) for row, cells in self.rows] for k in at]
 
 
@@ -119,8 +123,8 @@ def read_text(path: str | Path, *, what: str = "table") -> str:
         raw = Path(path).read_bytes()
     except (FileNotFoundError, IsADirectoryError):
         raise InputError(f"{path}: there is no such file; give the path of a {what}.") from None
-    if raw.startswith(b"PK\x03\x04"):
-        raise InputError(f"{path}: it is a zip archive, as workbooks of Excel are, and no text; name it .xlsx if it is one.")
+    if raw.startswith((b"PK\x03\x04", b"\xd0\xcf\x11\xe0")):
+        raise InputError(f"{path}: it is no text, but a workbook of Excel or another archive; save it as .xlsx, or as CSV.")
     try:
         text = raw.decode(encoding_of(path))
     except UnicodeDecodeError as error:

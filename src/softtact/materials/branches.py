@@ -9,7 +9,8 @@ from softtact.materials.checks import refuse_first
 from softtact.materials.curves import VOLUMETRIC
 
 _JITTER = 0.05      # share of the range by which a branch may turn back, as noise of the strain does
-_ROWS = 4           # of a branch; rows in disorder rise or fall over two or three
+_ROWS = 3           # of a branch, at least and on average; rows in disorder rise or fall over one or two
+_BACK = 2           # rows of the next branch within the range of the one before
 
 
 def order(path: str | Path, rows: np.ndarray, x: np.ndarray, y: np.ndarray, *, mode: str,
@@ -48,7 +49,7 @@ def _unloading(x):
     for start, turn, end in zip(turns, turns[1:], turns[2:], strict=False):
         before, after = x[start:turn + 1], x[turn + 1:end + 1]
         back = (after > before.min()) & (after < before.max())
-        if len(before) >= _ROWS and back.sum() >= _ROWS:
+        if len(before) >= _ROWS and back.sum() >= _BACK:
             return turn
     return None
 

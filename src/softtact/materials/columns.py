@@ -42,7 +42,6 @@ _UNITS = {"MPa": "mpa", "MPA": "mpa", "mpa": "mpa", "N/mm2": "mpa", "N/mm^2": "m
           "Pa": "pa", "pa": "pa", "N/m2": "pa", "N/m^2": "pa", "N/m\N{SUPERSCRIPT TWO}": "pa",
           "%": "percent", "percent": "percent", "": "1", "-": "1", "\N{EN DASH}": "1", "mm/mm": "1", "m/m": "1", "in/in": "1"}
 
-
 @dataclass(frozen=True)
 class Declared:
     """A column: its position, and the name, a key of `NAMES`, that declares its quantity and unit."""
@@ -77,8 +76,7 @@ def find_columns(table: Table, *, mode: str, columns: Mapping[str, str]) -> tupl
 def _find(table, known, columns, quantity):
     """The one column that holds the quantity."""
     accepted = [*known, *(base for base in _BASES if any(name.startswith(base) for name in known))]
-    found = [Declared(name, at) for name in accepted for at, header in enumerate(table.header)
-             if header == columns.get(name, name)]
+    found = [Declared(name, at) for name in accepted for at in table.positions(columns.get(name, name))]
     if len(found) == 1:
         return found[0]
     unmet = next((f"; none is called {columns[name]!r}, to which {name} is mapped" for name in accepted if name in columns
