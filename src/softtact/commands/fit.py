@@ -11,7 +11,7 @@ from softtact.errors import InputError
 EXAMPLES = """
   softtact fit uniaxial=tension.csv planar=shear.csv --law all --out card.json --plot card.png
   softtact fit uniaxial=tension.csv --law neo_hooke,yeoh --window uniaxial=0.8:1.4 --out card.json
-  softtact fit uniaxial=machine.csv --decimal , --skip-rows 2 --column nominal_stress_kpa=Spannung --out card.json
+  softtact fit uniaxial=machine.csv --decimal , --skip-rows 2 --column nominal_stress_kpa=Spannung --law yeoh --out card.json
   softtact fit polyurethane --out card.json      # a material that ships, or config/materials/NAME.yaml
 """
 LAYOUTS = ("plain", "soro_db", "stress_stretch", "literature")
