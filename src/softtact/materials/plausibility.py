@@ -25,7 +25,7 @@ _NEAR_ZERO = 0.005              # strain of a row that counts as one without str
 _START = 0.2                    # strain up to which a curve is a straight line over the neo-Hookean law's
 _PRELOAD = (0.05, 0.3)          # of the stress at `_START`, where there is a row without strain, and where the line is lengthened
 _SLACK_STRAINS = (0.05, 0.1, 0.2, 0.4)      # the modulus over the first two of these against that over the last two
-_SLACK = 0.5                    # their ratio; of ten published rubbers it is 0.7 and more, with a coarse load cell too
+_SLACK = 0.5                    # their ratio; of twelve published curves it is 0.7 and more
 
 
 def remarks(stretch: np.ndarray, stress: np.ndarray, *, mode: str, compression: bool) -> Iterator[str]:
