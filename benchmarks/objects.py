@@ -16,10 +16,10 @@ from pathlib import Path
 
 import numpy as np
 import record
-import yaml
 
 import softtact
 from softtact.errors import ConvergenceError
+from softtact.files import read_yaml
 from softtact.geometry.meshes import read_mesh
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.models.hyperelastic.newton import NewtonSettings
@@ -32,7 +32,7 @@ MAPS = record.RESULTS / "maps"
 
 def default_objects():
     """Names of the default study's indenters, trained on or not, and of the paper's six objects."""
-    objects = yaml.safe_load((CONFIG / "config.yaml").read_text(encoding="utf-8"))["objects"]
+    objects = read_yaml(CONFIG / "config.yaml", missing="there is no such study.")["objects"]
     return [*objects["indenters"]["names"], *objects["unseen"]["names"], *(f"object_{k}" for k in range(1, 7))]
 
 

@@ -8,10 +8,9 @@ import itertools
 
 import numpy as np
 import xarray
-import yaml
 
 import softtact
-from softtact.files import write_dataset
+from softtact.files import read_yaml, write_dataset
 from softtact.geometry.meshes import read_mesh
 from softtact.geometry.pose import Pose
 from softtact.learning.dataset import SPLITS, build_datasets
@@ -54,8 +53,7 @@ def make(paths, items):
 
 def list_presses(items):
     """(set, item, mesh, pose) of the catalogue's objects in all poses of their set."""
-    with open("config/objects/catalogue.yaml", encoding="utf-8") as lines:
-        catalogue = yaml.safe_load(lines)
+    catalogue = read_yaml("config/objects/catalogue.yaml", missing="there is no such catalogue.")
     for set_name, poses in POSES.items():
         entries = [entry for entry in catalogue if entry["set"] == set_name][:OBJECTS[set_name]]
         for entry, (k, place) in itertools.islice(itertools.product(entries, enumerate(poses)), items):

@@ -102,6 +102,8 @@ def example_files(tmp_path, monkeypatch):
         mesh.copy().apply_scale(scale).export(tmp_path / name)
     neo_hooke_file(tmp_path / "tension.csv", (0.8, 0.9, 1.1, 1.3, 1.4))
     neo_hooke_file(tmp_path / "shear.csv", (1.1, 1.3, 1.5), exponents=(1, -3))
+    rows = [f"{x:.2f};{400 * (x - x**-2):.3f}\n" for x in np.linspace(1, 1.8, 9)]
+    (tmp_path / "machine.csv").write_text("Test 7\nOperator: X\nstretch;Spannung\n" + "".join(rows).replace(".", ","))
     (tmp_path / "my_sensor.yaml").write_text(sensor_file("coro").read_text())
     (tmp_path / "config").symlink_to(ROOT / "config")
     monkeypatch.chdir(tmp_path)

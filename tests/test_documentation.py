@@ -13,6 +13,7 @@ from pathlib import Path
 
 import imageio.v3 as iio
 import numpy as np
+import pandas as pd
 import pytest
 import torch
 import trimesh
@@ -70,6 +71,13 @@ def desk(tmp_path_factory):
     for name, shape in (("a", "tension"), ("b", "shear")):
         table = np.column_stack([100 * (stretch - 1), 350 * curves[shape]])
         np.savetxt(folder / f"{name}.csv", table, delimiter=",", header="Strain [%],Stress", comments="")
+    rows = [f"{x:.4f};{350 * y:.3f}" for x, y in zip(stretch, curves["tension"], strict=True)]
+    machine = ["Test 7", "Operator: X", "Streckung;Spannung", "-;kPa", *(row.replace(".", ",") for row in rows)]
+    (folder / "machine.csv").write_text("\n".join([*machine, ""]))
+    table.T[:] = stretch, 0.35 * curves["tension"]
+    with pd.ExcelWriter(folder / "machine.xlsx") as book:
+        pd.DataFrame(table, columns=["stretch", "nominal_stress_mpa"]).to_excel(book, sheet_name="Test", index=False)
+        pd.DataFrame({"operator": ["X"]}).to_excel(book, sheet_name="Notes")
     frames = [render_frame([-0.8, 0.8], [0.2, -0.2], [area] * 2, footprint_mm=(4.2, 3.0), pixel_mm=0.03, blur_mm=0.05, noise=0.02,
                            falloff=0.2, seed=0) for area in (0.2, 0.4)]
     iio.imwrite(folder / "press.mp4", np.repeat(np.stack(frames)[..., None], 3, axis=3), plugin="pyav", codec="libx264", fps=2)

@@ -13,7 +13,8 @@ MOST_LINES = 350
 ORDER = (
     ("errors", "extras"),
     ("unknown_names", "progress", "devices"),
-    ("files",),
+    ("files", "workbooks"),
+    ("tables",),
     ("linalg", "geometry", "materials"),
     ("sensors", "contact", "fem"),
     ("models.quarter_symmetry", "models.newton"),

@@ -8,7 +8,7 @@ import json
 import os
 import tempfile
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -54,6 +54,27 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def refuse_overwriting(inputs: Iterable[Path | str | None], outputs: Mapping[str, Path | None]) -> None:
+    """Refuse an output {option: file or None} that is one of the inputs, or another output, by whatever path, link or name."""
+    read = [Path(path) for path in inputs if path]
+    written: dict[str, Path] = {}
+    for option, path in ((option, path) for option, path in outputs.items() if path):
+        for other in read:
+            if _same_file(path, other):
+                raise InputError(f"{option} {path}: it is the input {other}, which would be lost; choose another name.")
+        for name, other in written.items():
+            if _same_file(path, other):
+                raise InputError(f"{option} {path}: {name} writes the same file; choose another name for one of them.")
+        written[option] = path
+
+
+def _same_file(one, other):
+    """Whether two paths lead to one file, be it there or not."""
+    if one.exists() and other.exists():
+        return one.samefile(other)
+    return one.resolve() == other.resolve()
+
+
 _NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EROFS)
 
 
@@ -62,13 +83,36 @@ def _not_written(path, error):
                        "and run again.")
 
 
+class _OnceLoader(yaml.SafeLoader):
+    """PyYAML's safe loader, which refuses a key that stands twice in a mapping; PyYAML itself keeps the last in silence."""
+
+    def compose_mapping_node(self, anchor: Any) -> yaml.MappingNode:
+        """The node of a mapping, before merges (`<<`) add keys that it may well override."""
+        node = super().compose_mapping_node(anchor)
+        lines: dict[Any, int] = {}
+        for key, _ in node.value:
+            if not isinstance(key, yaml.ScalarNode) or key.tag == "tag:yaml.org,2002:merge":
+                continue
+            name = self.construct_object(key)
+            if name in lines:
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"the key {key.value!r} stands in line {lines[name]} and again in line {key.start_mark.line + 1}; "
+                    "keep one")
+            lines[name] = key.start_mark.line + 1
+        return node
+
+
 def read_yaml(path: str | Path, *, missing: str) -> Any:
-    """What a YAML file holds; `missing` says of a file that is not there what to do about it."""
+    """What a YAML file holds; `missing` says of a file that is not there what to do about it.
+
+    A key that stands twice in one mapping is refused.
+    """
     try:
-        return yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+        loader = _OnceLoader(Path(path).read_text(encoding="utf-8"))
+        return loader.get_single_data()
     except FileNotFoundError:
         raise InputError(f"{path}: {missing}") from None
-    except (UnicodeDecodeError, yaml.YAMLError) as error:
+    except (UnicodeDecodeError, yaml.YAMLError, ValueError, RecursionError) as error:     # ValueError: 2001-99-99 is no date
         raise InputError(f"{path}: not valid YAML ({' '.join(str(error).split())}); correct it.") from None
 
 
@@ -89,13 +133,25 @@ def write_json(path: str | Path, obj: Any) -> None:
         temporary.write_text(json.dumps(obj, indent=2, sort_keys=True) + "\n", encoding="utf-8")
 
 
+def parse_json(text: str) -> Any:
+    """The object of a JSON text; a key that stands twice, of which Python would keep the last, raises ValueError, as faults do."""
+    def once(pairs):
+        names = [name for name, _ in pairs]
+        twice = next((name for name in names if names.count(name) > 1), None) if len(set(names)) < len(names) else None
+        if twice is not None:
+            raise ValueError(f"the key {twice!r} stands twice in one object")
+        return dict(pairs)
+
+    return json.loads(text, object_pairs_hook=once)
+
+
 def read_json(path: str | Path) -> Any:
     """Read a JSON file; an unreadable one raises `InputError` naming the file and the line."""
     try:
-        return json.loads(Path(path).read_text(encoding="utf-8"))
+        return parse_json(Path(path).read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file.") from None
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: not valid JSON ({error}); write the file again.") from None
 
 

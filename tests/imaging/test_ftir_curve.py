@@ -21,6 +21,14 @@ def test_an_unusable_curve_is_refused(tmp_path):
     for text, message in [
         ("force_n,area\n0,0\n100,1\n", "needs the columns force_n and area_mm2"),
         ("force_n,area_mm2\n0,zero\n100,1\n", "needs the columns force_n and area_mm2 in numbers"),
+        ("force_n,area_mm2\n0,0,0,0\n20,0,0,1\n100,0,0,5\n", "row 2: it has 4 fields where 2 are named"),
+        ("force_n;area_mm2\n0;0\n20;0,1\n100;0,5\n", "row 3: '0,1' is not a number; write it with a decimal point"),
+        ("force_n,area_mm2\n0,0\n20,\n100,0.5\n", "row 3: '' is not a number"),
+        ("force_n,area_mm2\n0,0\n20,inf\n100,0.5\n", "row 3: the value 'inf' is not finite"),
+        ("force_n,area_mm2\n0,0\n100,0.5\n20,0.2\n", "row 4: force_n goes back to 20; keep one loading branch"),
+        ("force_n,area_mm2\n0,0\n20,0.1\n20,0.2\n100,0.5\n", "row 4: force_n goes back to 20"),
+        ("force_n,area_mm2\n0,0\n20,-0.1\n100,0.5\n", "row 3: area_mm2 is -0.1; an area is no less than 0"),
+        ("force_n,area_mm2\n0,0\n", r"1 point\(s\) make no curve"),
         ("force_n,area_mm2\n20,0.1\n100,1\n", "measured from 20 to 100 N, but 'ftir.forces_n' asks for 10 N"),
     ]:
         path = tmp_path / "curve.csv"

@@ -11,8 +11,11 @@ from softtact.study.code_closure import code_closure
 from softtact.study.config import load_study
 from softtact.study.cost import cost_lines, read_costs, study_costs
 from softtact.errors import InputError
+from softtact.files import read_yaml
 
 try:
+    for _file in workflow.configfiles:     # Snakemake's own reader keeps the last of two equal keys
+        read_yaml(_file, missing="there is no such configuration.")
     STUDY = load_study(config)
 except InputError as error:
     sys.exit(f"softtact: {error}")

@@ -81,6 +81,13 @@ def check_forces(forces: Iterable[float], spec: "AnySpec") -> None:
                              f"give a force above {low:g} N and up to {high:g} N.")
 
 
+def sensor_path(name: str) -> Path:
+    """The YAML file of a sensor, given by its name or by that file."""
+    from softtact.sensors.library import sensor_file
+
+    return sensor_file(name)
+
+
 def pose_of(options: argparse.Namespace) -> "Pose | None":
     """The `Pose` given on the command line, or None."""
     from softtact.geometry.pose import Pose
@@ -105,11 +112,15 @@ def check_names(endings: Mapping[Path | None, tuple[str, ...]]) -> None:
 
 
 def pairs(option: str, texts: Iterable[str] | None) -> Iterator[tuple[str, str]]:
-    """(name, value) of texts NAME=VALUE."""
+    """(name, value) of texts NAME=VALUE, each name once."""
+    seen: dict[str, str] = {}
     for text in texts or ():
         name, equals, value = text.partition("=")
         if not (name and equals and value):
             raise InputError(f"{option} {text}: write it as NAME=VALUE.")
+        if name in seen:
+            raise InputError(f"{option} {text}: {name} was given before, as {seen[name]}; give it once.")
+        seen[name] = value
         yield name, value
 
 
@@ -119,7 +130,7 @@ def numbers(option: str, text: str, count: int) -> list[float]:
         values = [float(part) for part in text.split(":")]
     except ValueError:
         values = []
-    if len(values) != count or sorted(values) != values:
+    if len(values) != count or sorted(values) != values or not all(abs(value) < float("inf") for value in values):
         wanted = "a number" if count == 1 else "two rising numbers with a colon between them"
         raise InputError(f"{option} MODE={text}: {text!r} is not {wanted}; correct it.")
     return values
@@ -127,10 +138,9 @@ def numbers(option: str, text: str, count: int) -> list[float]:
 
 def sensor_spec(name: str) -> "AnySpec":
     """The description of a sensor by its name or its YAML file, without its solvers."""
-    from softtact.sensors.library import sensor_file
     from softtact.sensors.specification import read_spec
 
-    return read_spec(sensor_file(name))
+    return read_spec(sensor_path(name))
 
 
 def short(value: object) -> str:

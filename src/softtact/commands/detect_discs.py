@@ -55,6 +55,8 @@ def _pixel_mm(options):
 
 
 def _check_detect_discs(options):
+    if options.no_picture and options.picture:
+        raise InputError(f"--picture {options.picture}: it has no effect with --no-picture; leave one of the two out.")
     if options.every < 1:
         raise InputError(f"--every {options.every}: give 1 for all frames, 2 for each second one, and so on.")
     if not 0 <= options.min_diameter_mm < float("inf"):

@@ -12,6 +12,7 @@ from softtact.commands.common import (
     check_forces,
     pose_of,
     read_object,
+    sensor_path,
     sensor_spec,
     show,
 )
@@ -39,12 +40,14 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def _export_deck(options):
+    from softtact.files import refuse_overwriting
     from softtact.geometry.meshes import check_over_sensor, place
 
     spec, forces, pose = sensor_spec(options.sensor), sorted(set(options.force)), pose_of(options)
     spec.need_frusta("export-deck", "name a sensor of kind frusta")
     check_forces(forces, spec)
     check_folders(options.out)
+    refuse_overwriting([options.mesh, sensor_path(options.sensor)], {"--out": options.out})
     mesh, repairs = read_object(options)
     check_over_sensor(place(mesh, pose=pose), spec.footprint_mm, name=str(options.mesh))
     from softtact.decks.export import export_press

@@ -1,7 +1,9 @@
 """`softtact fit`: test curves to a material card."""
 
 import argparse
+import sys
 from pathlib import Path
+from typing import Any
 
 from softtact.commands.common import add_command, check_folders, numbers, pairs, show
 from softtact.errors import InputError
@@ -9,6 +11,7 @@ from softtact.errors import InputError
 EXAMPLES = """
   softtact fit uniaxial=tension.csv planar=shear.csv --law all --out card.json --plot card.png
   softtact fit uniaxial=tension.csv --law neo_hooke,yeoh --window uniaxial=0.8:1.4 --out card.json
+  softtact fit uniaxial=machine.csv --decimal , --skip-rows 2 --column nominal_stress_kpa=Spannung --law yeoh --out card.json
   softtact fit polyurethane --out card.json      # a material that ships, or config/materials/NAME.yaml
 """
 LAYOUTS = ("plain", "soro_db", "stress_stretch", "literature")
@@ -18,8 +21,8 @@ def add(commands: argparse._SubParsersAction) -> None:
     """Add the command to the parser."""
     command = add_command(commands, "fit", _fit, "Fit hyperelastic laws to test curves and write a material card.", EXAMPLES)
     command.add_argument("curves", nargs="+", metavar="CURVES",
-                         help="CSV files, one test each, MODE=FILE to state a file's mode; or one material by its name or its "
-                              "YAML file")
+                         help="CSV or Excel files, one test each, MODE=FILE to state a file's mode; or one material by its name or "
+                              "its YAML file")
     command.add_argument("--law", help="a law's name, several with commas, or all (default)")
     command.add_argument("--choose", help="the law that solvers take (default: best of the ranking)")
     command.add_argument("--material", help="the material's name in the card")
@@ -38,6 +41,9 @@ def add(commands: argparse._SubParsersAction) -> None:
                          help="how the files are laid out (default: plain, columns named in a header; literature: a folder)")
     reading.add_argument("--column", action="append", metavar="NAME=HEADER",
                          help="a column's quantity and unit, and the file's own name of it; repeat it")
+    reading.add_argument("--decimal", choices=(".", ","), default=".", help="decimal sign (default: the point)")
+    reading.add_argument("--skip-rows", type=int, default=0, metavar="N", help="pass over N lines above the header")
+    reading.add_argument("--sheet", metavar="NAME", help="sheet of an Excel workbook (.xlsx) that has several")
     reading.add_argument("--sort", action="store_true", help="order the rows by stretch")
     reading.add_argument("--compression", action="store_true", help="a compression test written without a minus")
     command.add_argument("--plot", type=Path, metavar="FILE.png", help="draw data, fits, residuals and stable ranges")
@@ -45,15 +51,19 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def _fit(options):
-    from softtact.files import write_json
-    from softtact.materials.card_making import make_card
+    from softtact.files import refuse_overwriting, write_json
+    from softtact.materials.card_making import make_card, misfit_warnings
+    from softtact.materials.making import curves_of
     from softtact.materials.readers import read_curves
 
     check_folders(options.out, options.plot)
-    if _is_material(options.curves[0]):
-        curves, settings = _yaml_curves(options)
+    config = _material(options)
+    refuse_overwriting(_inputs(options, config), {"--out": options.out, "--plot": options.plot})
+    if config is not None:
+        curves, settings = curves_of(config.curve_settings), config.fit_settings
     else:
         curves, settings = read_curves(options.curves, **_reading(options)), {}
+    _refuse_idle(options, curves, settings)
     card = make_card(curves, **settings | _fit_settings(options))
     write_json(options.out, card)
     if options.plot:
@@ -61,31 +71,52 @@ def _fit(options):
 
         plot_material(card, curves, options.plot)
     show(card, as_json=options.json, lines=[*_fit_lines(card), f"written: {options.out}"])
+    for warning in [*misfit_warnings(card), *(remark for curve in curves for remark in curve.remarks)]:
+        print(f"softtact fit: WARNING: {warning}", file=sys.stderr)
 
 
-def _is_material(text):
-    """Whether an argument means a material, by its YAML file or its name, and not a file of curves."""
-    from softtact.sensors.library import YAML, known_names
+def _material(options):
+    """The `MaterialConfig` of a material's YAML, if the argument means one; None for files of curves."""
+    from softtact.materials.config import load_material
+    from softtact.sensors.library import YAML, known_names, material_file
 
-    return Path(text).suffix in YAML or (text in known_names("materials") and not Path(text).exists())
+    name = options.curves[0]
+    if Path(name).suffix not in YAML and (name not in known_names("materials") or Path(name).exists()):
+        return None
+    if len(options.curves) > 1 or _reading(options) != _READING:
+        raise InputError(f"{name}: a material's YAML names its own files and options; give it without others.")
+    return load_material(material_file(name))
+
+
+def _inputs(options, config):
+    """The files that are read."""
+    from softtact.materials.readers import stated_files
+    from softtact.sensors.library import material_file
+
+    if config is not None:
+        return [material_file(options.curves[0]), *config.measured_files]
+    return [path for path, _ in stated_files(options.curves, mode=options.mode, layout=options.layout)]
+
+
+_READING: dict[str, Any] = {"mode": None, "layout": "plain", "columns": {}, "sort": False, "compression": False, "decimal": ".",
+                            "skip_rows": 0, "sheet": None}
 
 
 def _reading(options):
     """How the files are read, as `read_curves` takes it."""
-    return {"mode": options.mode, "layout": options.layout, "columns": dict(pairs("--column", options.column)),
-            "sort": options.sort, "compression": options.compression}
+    return {name: getattr(options, name) for name in _READING if name != "columns"} | {
+        "columns": dict(pairs("--column", options.column))}
 
 
-def _yaml_curves(options):
-    """Curves and fit settings of a material's YAML."""
-    from softtact.materials.config import load_material
-    from softtact.materials.making import curves_of
-    from softtact.sensors.library import material_file
-
-    if len(options.curves) > 1 or any(_reading(options)[key] for key in ("mode", "columns", "sort", "compression")):
-        raise InputError(f"{options.curves[0]}: a material's YAML names its own files and options; give it without others.")
-    config = load_material(material_file(options.curves[0]))
-    return curves_of(config.curve_settings), config.fit_settings
+def _refuse_idle(options, curves, settings):
+    """Refuse an option that would change nothing, for want of the curve or of the constant that it acts on."""
+    volumetric = any(curve.mode == "volumetric" for curve in curves)
+    if options.bulk_over_shear is not None and volumetric:
+        raise InputError(f"--bulk-over-shear {options.bulk_over_shear:g}: it has no effect beside a volumetric curve, which gives "
+                         "K; leave one of the two out.")
+    if options.small_strain is not None and options.poisson is None and "poisson" not in settings and not volumetric:
+        raise InputError(f"--small-strain {options.small_strain:g}: it has no effect without --poisson or a volumetric curve, for "
+                         "then there are no linear constants; give one, or leave it out.")
 
 
 def _fit_settings(options):

@@ -28,12 +28,15 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def _predict(options):
+    from softtact.files import refuse_overwriting
+
+    check_folders(options.out, options.plot)
+    refuse_overwriting([options.maps, options.network], {"--out": options.out, "--plot": options.plot})
+    if options.out and options.out.suffix not in WRITTEN:
+        raise InputError(f"{options.out}: taxels are written as {' or '.join(WRITTEN)}; give a name with such an ending.")
     from softtact.learning.network import load_network, predict
     from softtact.learning.prediction import outside_training, read_maps
 
-    check_folders(options.out, options.plot)
-    if options.out and options.out.suffix not in WRITTEN:
-        raise InputError(f"{options.out}: taxels are written as {' or '.join(WRITTEN)}; give a name with such an ending.")
     network, facts = load_network(options.network)
     maps = read_maps(options.maps, shape=tuple(network.options["map_shape"]))
     counts = predict(network, maps.maps_mm)

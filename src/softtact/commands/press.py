@@ -1,6 +1,7 @@
 """`softtact press`: a mesh on the sensor, its maps and a summary."""
 
 import argparse
+import sys
 from pathlib import Path
 
 import softtact
@@ -14,6 +15,7 @@ from softtact.commands.common import (
     pairs,
     pose_of,
     read_object,
+    sensor_path,
     sensor_spec,
     show,
 )
@@ -68,6 +70,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 def _press(options):
     from dataclasses import replace
 
+    from softtact.files import refuse_overwriting
     from softtact.geometry.meshes import check_over_sensor, place
 
     _refuse_idle(options)
@@ -76,6 +79,9 @@ def _press(options):
     spec, pose = sensor_spec(options.sensor), pose_of(options)
     how = _how(options, spec)
     check_folders(options.out, options.vtu, options.plot)
+    cards = [path for _, path in pairs("--card", options.card)]
+    refuse_overwriting([options.mesh, sensor_path(options.sensor), *cards],
+                       {"--out": options.out, "--vtu": options.vtu, "--plot": options.plot})
     check_names({options.out: (".nc",), options.vtu: (".vtu",), options.plot: (".png", ".svg")})
     mesh, repairs = read_object(options)
     check_over_sensor(place(mesh, pose=pose), spec.footprint_mm, name=str(options.mesh))
@@ -93,18 +99,23 @@ def _press(options):
     _show_press(result, options)
 
 
-# Options that have an effect on the hyperelastic model alone, or on the laws that the elastic model has none of.
-_IDLE = {"card": ("elastic",), "mesh_quality": ("elastic", "foundation"), "device": ("elastic", "foundation")}
+# Options that have an effect on the hyperelastic model alone, on the laws that the elastic model has none of, or on the choice.
+_IDLE = {"card": ("elastic",), "mesh_quality": ("elastic", "foundation"), "device": ("elastic", "foundation"),
+         "policy": MODELS[1:], "tolerance": MODELS[1:]}
+_DEFAULTS = {"card": None, "mesh_quality": "default", "device": "cpu", "policy": "error", "tolerance": 0.01}
 
 
 def _refuse_idle(options):
-    """Refuse an option that would change nothing in the model that is asked for by its name."""
-    defaults = {"card": None, "mesh_quality": "default", "device": "cpu"}
+    """Refuse an option that would change nothing: in the model that is asked for by its name, or for want of another option."""
     for name, models in _IDLE.items():
-        if options.model in models and getattr(options, name) != defaults[name]:
+        if options.model in models and getattr(options, name) != _DEFAULTS[name]:
             given = " ".join(options.card) if name == "card" else getattr(options, name)
             raise InputError(f"--{name.replace('_', '-')} {given}: it has no effect on the {options.model} model; "
                              "leave it out, or choose another model.")
+    if options.policy == "paper" and options.tolerance != _DEFAULTS["tolerance"]:
+        raise InputError(f"--tolerance {options.tolerance:g}: it has no effect on the policy paper; leave one of the two out.")
+    if options.full_scale and not options.plot:
+        raise InputError("--full-scale: it has no effect without --plot; give --plot FILE.png, or leave it out.")
 
 
 def _origin(options):
@@ -125,7 +136,12 @@ def _how(options, spec):
     if options.motion is not None:
         from softtact.contact.motion import Motion  # NumPy, which the parser does without
 
-        return {"motion": Motion.parse(options.motion)}
+        motion = Motion.parse(options.motion)
+        for name in ("policy", "tolerance"):
+            if not motion.forces_n and getattr(options, name) != _DEFAULTS[name]:
+                raise InputError(f"--{name} {getattr(options, name)}: it has no effect on a motion other than straight down by "
+                                 "forces, for which auto is the hyperelastic model; leave it out.")
+        return {"motion": motion}
     forces = sorted(set(options.force))
     check_forces(forces, spec)
     return {"force_n": forces}
@@ -147,6 +163,9 @@ def _show_press(result, options):
         result.write_vtu(options.vtu)
     if options.plot:
         result.plot(options.plot, full_scale=options.full_scale)
+    if options.card and result.model == "elastic":
+        print(f"softtact press: WARNING: --card {' '.join(options.card)} has no effect on the elastic model, which was chosen; "
+              "name another model to use it.", file=sys.stderr)
     summary = _press_summary(result)
     summary["written"] = [str(path) for path in (options.out, options.vtu, options.plot) if path]
     show(summary, as_json=options.json, lines=_press_lines(summary))

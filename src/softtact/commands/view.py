@@ -25,9 +25,11 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def _view(options):
+    from softtact.files import refuse_overwriting
     from softtact.reporting.press_view import read_view, save_picture, write_page
 
     check_folders(options.save, options.page)
+    refuse_overwriting([options.result], {"--save": options.save, "--page": options.page})
     check_names({options.save: (".png",), options.page: (".html",)})
     view = read_view(options.result)
     result = {"page": None, "picture": None, "opened": False, "drawn_with": None, "triangles": len(view.triangles)}

@@ -11,6 +11,7 @@ import xarray
 
 from softtact.errors import InputError
 from softtact.files import read_dataset, write_csv, write_dataset
+from softtact.tables import read_matrix
 
 MARGIN = 1e-3     # share by which a value may pass the training's range unsaid: files round
 
@@ -75,10 +76,9 @@ def _read_npy(path):
 
 def _read_csv(path):
     try:
-        values = np.loadtxt(path, delimiter=",", ndmin=2)
-    except (ValueError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not a table of numbers with commas and no header ({error}).") from None
-    return _one_map(path, values)
+        return _one_map(path, np.array(read_matrix(path, what="map")))
+    except InputError as error:
+        raise InputError(f"{str(error).removesuffix('.')}; it is not a table of numbers with commas and no header.") from None
 
 
 def _one_map(path, values):

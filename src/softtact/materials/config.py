@@ -17,6 +17,7 @@ from softtact.files import read_yaml
 from softtact.materials.laws.base import Law
 from softtact.materials.laws.registry import law_class, make_law
 from softtact.materials.linear import LinearConstants
+from softtact.materials.windows import refuse_idle
 from softtact.unknown_names import first_fault, known_keys, unknown
 
 Mode = Literal["uniaxial", "equibiaxial", "planar", "volumetric"]
@@ -58,6 +59,9 @@ class MeasuredFile(_Section):
     columns: dict[str, str] = Field(default_factory=dict, description="declared name -> the file's own header")
     sort: bool = Field(False, description="order the rows by stretch")
     compression: bool = Field(False, description="a compression test written without a minus")
+    decimal: Literal[".", ","] = Field(".", description="the decimal sign")
+    skip_rows: int = Field(0, ge=0, description="lines above the header that are passed over")
+    sheet: str | None = Field(None, description="of an Excel workbook that has several")
 
 
 class MeasuredCurves(_Section):
@@ -185,6 +189,7 @@ def _printed_parameters(config, law):
 def _resolved(config, path):
     """The config with its curves' constants filled in, and file paths as seen from here."""
     _check_laws(config)
+    refuse_idle(config.fit.window, config.fit.weights, modes=config.modes)
     curves = config.curves
     if curves.kind == "measured":
         files = [file.model_copy(update={"file": str(path.parent / file.file)}) for file in curves.files]

@@ -1,80 +1,119 @@
 """Readers of test curves. Each refuses what it cannot trust with a sentence naming file, row, value and remedy.
 
 Layouts:
-  plain          CSV (, ; or tab) with a header. The names of the columns declare quantity and unit: one of `STRETCHES` and one
-                 of `STRESSES`, or of `VOLUMES` and `PRESSURES`; `columns` maps these names to the file's own.
-                 `# key: value` lines may stand above (mode, kind, source, remark).
+  plain          CSV (, ; or tab) or a sheet of Excel, with a header. The names of the columns declare quantity and unit: one of
+                 `STRETCHES` and one of `STRESSES`, or of `VOLUMES` and `PRESSURES` (`softtact.materials.columns`); `columns` maps
+                 these names to the file's own. `# key: value` lines may stand above (mode, kind, source, remark).
   soro_db        the Soft Robotics Materials Database: metadata lines, then `;`-separated columns. Uniaxial.
   stress_stretch two bare columns, nominal stress in MPa first, then stretch (digitised literature data)
   literature     a folder with UT, ET and PS (uniaxial, equibiaxial, planar), each with a stress_stretch.txt
 """
 
-import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from softtact.errors import InputError
-from softtact.materials.checks import checked, order
+from softtact.materials.branches import order
+from softtact.materials.checks import checked
+from softtact.materials.columns import PRESSURES, STRESSES, STRETCHES, VOLUMES, find_columns
 from softtact.materials.curves import MODES, VOLUMETRIC, Curve, VolumetricCurve
-
-# Name of a column -> its value as stretch, nominal stress in MPa at a stretch, volume ratio, pressure in MPa.
-STRETCHES = {
-    "stretch": lambda value: value,
-    "engineering_strain": lambda value: 1 + value,
-    "engineering_strain_percent": lambda value: 1 + value / 100,
-    "true_strain": math.exp,
-}
-_PER_MPA = {"mpa": 1.0, "kpa": 1e-3, "pa": 1e-6}
-STRESSES = {f"nominal_stress_{unit}": lambda value, stretch, factor=factor: factor * value for unit, factor in _PER_MPA.items()}
-# Constant volume: the loaded section of a bar, a strip or a sheet has shrunk by the stretch, in each of the three tests.
-STRESSES |= {f"true_stress_{unit}": lambda value, stretch, factor=factor: factor * value / stretch
-             for unit, factor in _PER_MPA.items()}
-VOLUMES = {"volume_ratio": lambda value: value, "volumetric_strain": lambda value: 1 + value,
-           "volumetric_strain_percent": lambda value: 1 + value / 100}
-PRESSURES = {f"pressure_{unit}": lambda value, ratio, factor=factor: factor * value for unit, factor in _PER_MPA.items()}
+from softtact.tables import number, read_bare, read_table
 
 LAYOUTS = ("plain", "soro_db", "stress_stretch", "literature")
-_SORO = {"engineering_strain": "Engineering Strain", "nominal_stress_mpa": "Engineering Stress (MPa)"}
+_MARKER = "Engineering Strain"      # in the header of the layout soro_db
+_SORO = {"engineering_strain": _MARKER, "nominal_stress_mpa": "Engineering Stress (MPa)"}
+_WHAT = "test curve"
+_BARE = ("nominal_stress_mpa", "stretch")
 _FOLDERS = {"UT": "uniaxial", "ET": "equibiaxial", "PS": "planar"}
 
 
-def read_curve(path: str | Path, *, mode: str | None = None, layout: str = "plain", columns: dict[str, str] | None = None,
-               sort: bool = False, compression: bool = False) -> Curve | VolumetricCurve:
-    """Read one `Curve`, or `VolumetricCurve`.
+@dataclass(frozen=True)
+class Reading:
+    """How a file of a test curve is read.
 
     mode: test mode; else taken from the file's `# mode:` line or from a file name such as uniaxial.csv
     columns: {"engineering_strain_percent": "Dehnung [%]", ...} for a plain file with other names in its header
-    sort: order the rows, for a file with several loading branches
-    compression: a compression test whose strains and stresses are written without a minus
+    sort: order the rows, for a file whose rows are in disorder
+    compression: a compression test whose strains and stresses are written without a minus; a volumetric test keeps its pressure
+    decimal: `.` or `,`;  skip_rows: lines above the header that are passed over;  sheet: of a workbook that has several
     """
-    if layout not in LAYOUTS[:-1]:
-        raise InputError(f"{path}: layout {layout!r} is unknown; use one of {', '.join(LAYOUTS[:-1])} for a file.")
-    rows = _read_rows(path)
-    notes = _notes(rows)
-    table = [row for row in rows if not row[1].startswith("#")]
-    mode = _mode(path, mode or ("uniaxial" if layout == "soro_db" else None), notes)
-    numbers, values, raw = _columns(path, table, layout, mode, columns or {}, compression=compression)
-    remarks = checked(path, numbers, *values, mode=mode, raw=raw)
-    x, y = order(path, numbers, *values, mode=mode, sort=sort)
-    # A file that names its source is one of the project's own: what was odd in its origin is noted in it.
-    record = {"kind": notes.get("kind", "measured"), "source": notes.get("source", Path(path).name),
-              "remarks": _remarks(rows) if "source" in notes else remarks}
-    return VolumetricCurve(x, y, **record) if mode == VOLUMETRIC else Curve(mode, x, y, **record)
+
+    mode: str | None = None
+    layout: str = "plain"
+    columns: Mapping[str, str] = field(default_factory=dict)
+    sort: bool = False
+    compression: bool = False
+    decimal: str = "."
+    skip_rows: int = 0
+    sheet: str | None = None
+
+    def __post_init__(self):
+        if self.skip_rows < 0:
+            raise InputError(f"skip_rows is {self.skip_rows}; give the number of lines above the header, 0 or more.")
+        if self.columns and self.layout != "plain":
+            raise InputError(f"`columns` has no effect on the layout {self.layout}, whose columns are known; leave it out.")
+
+
+def read_curve(path: str | Path, **options: Any) -> Curve | VolumetricCurve:
+    """Read one `Curve`, or `VolumetricCurve`; options are the fields of `Reading`."""
+    reading = Reading(**options)
+    if reading.layout not in LAYOUTS[:-1]:
+        raise InputError(f"{path}: layout {reading.layout!r} is unknown; use one of {', '.join(LAYOUTS[:-1])} for a file.")
+    curve, header = _read(path, reading)
+    _refuse_unused(reading.columns, [header])
+    return curve
 
 
 def read_curves(paths: str | Path | Sequence[str | Path], *, mode: str | None = None, layout: str = "plain",
                 **options: Any) -> list[Curve | VolumetricCurve]:
-    """Read one or several files with the same options of `read_curve`; a path MODE=FILE states a file's own mode.
+    """Read one or several files with the same options, fields of `Reading`; a path MODE=FILE states a file's own mode.
 
     In the layout `literature` each path is a folder with a file per mode.
     """
+    found = stated_files(paths, mode=mode, layout=layout)
+    bare = "stress_stretch" if layout == "literature" else layout
+    read = [_read(path, Reading(mode=own, layout=bare, **options)) for path, own in found]
+    _refuse_unused(options.get("columns") or {}, [header for _, header in read])
+    return [curve for curve, _ in read]
+
+
+def stated_files(paths: str | Path | Sequence[str | Path], *, mode: str | None = None,
+                 layout: str = "plain") -> list[tuple[Path, str | None]]:
+    """[(file, its mode or None)] of what `read_curves` is given; a mode that would change nothing is refused."""
     paths = [paths] if isinstance(paths, (str, Path)) else paths
     found = [pair for path in paths for pair in (_in_folder(path) if layout == "literature" else [_stated_mode(path, mode)])]
-    layout = "stress_stretch" if layout == "literature" else layout
-    return [read_curve(path, mode=own, layout=layout, **options) for path, own in found]
+    own = layout == "literature" or not any(path == Path(given) for given, (path, _) in zip(paths, found, strict=False))
+    if mode is not None and own:
+        raise InputError(f"the mode {mode} for all files has no effect, for each states its own; leave it out.")
+    return found
+
+
+def _read(path, reading):
+    """The curve of a file, and its header."""
+    table = _table(path, reading)
+    notes = _notes(table)
+    mode = _mode(path, reading.mode or ("uniaxial" if reading.layout == "soro_db" else None), notes)
+    rows, values, raw = _values(table, reading, mode)
+    remarks = checked(path, rows, *values, mode=mode, raw=raw, compression=reading.compression)
+    x, y = order(path, rows, *values, mode=mode, sort=reading.sort)
+    # A file that names its source is one of the project's own: what was odd in its origin is noted in it.
+    record = {"kind": notes.get("kind", "measured"), "source": notes.get("source", Path(path).name),
+              "remarks": _remarks(table) if "source" in notes else remarks}
+    return VolumetricCurve(x, y, **record) if mode == VOLUMETRIC else Curve(mode, x, y, **record), table.header
+
+
+def _table(path, reading):
+    """The file's `Table`."""
+    if reading.layout == "stress_stretch":
+        if reading.sheet is not None:
+            raise InputError(f"{path}: it has no sheet {reading.sheet!r}, for it is a text; leave `sheet` out.")
+        return read_bare(path, what=_WHAT, header=_BARE, decimal=reading.decimal, skip_rows=reading.skip_rows)
+    marked = {"marker": _MARKER, "layout": "soro_db"} if reading.layout == "soro_db" else {}
+    return read_table(path, what=_WHAT, decimal=reading.decimal, skip_rows=reading.skip_rows, sheet=reading.sheet, **marked)
 
 
 def _stated_mode(path, mode):
@@ -92,29 +131,22 @@ def _in_folder(folder):
     return found
 
 
-def _read_rows(path):
-    """(row number from 1, text) of each line that is not blank."""
-    try:
-        raw = Path(path).read_bytes()
-    except (FileNotFoundError, IsADirectoryError):
-        raise InputError(f"{path}: there is no such file; give the path of a test curve.") from None
-    text = raw.decode("utf-8-sig", errors="replace")
-    rows = [(number, line.strip()) for number, line in enumerate(text.splitlines(), 1)]
-    rows = [(number, line) for number, line in rows if line.strip(";,")]
-    if not rows:
-        raise InputError(f"{path}: the file is empty; give a test curve with its columns.")
-    return rows
+def _notes(table):
+    """The `# key: value` lines as a dict; only remarks may come more than once."""
+    notes = {}
+    for text in table.notes:
+        key, colon, value = text[1:].partition(":")
+        key, value = key.strip(), value.strip()
+        if colon and key in ("mode", "kind", "source") and notes.get(key, value) != value:
+            raise InputError(f"{table.path}: the notes state the {key} twice, {notes[key]!r} and {value!r}; keep one.")
+        if colon:
+            notes[key] = value
+    return notes
 
 
-def _notes(rows):
-    """The `# key: value` lines as a dict."""
-    pairs = [text[1:].split(":", 1) for _, text in rows if text.startswith("#") and ":" in text]
-    return {key.strip(): value.strip() for key, value in pairs}
-
-
-def _remarks(rows):
+def _remarks(table):
     """The texts of the `# remark: ` lines."""
-    return tuple(text.removeprefix("# remark: ") for _, text in rows if text.startswith("# remark: "))
+    return tuple(text.removeprefix("# remark: ") for text in table.notes if text.startswith("# remark: "))
 
 
 def _mode(path, mode, notes):
@@ -128,21 +160,20 @@ def _mode(path, mode, notes):
     return mode
 
 
-def _columns(path, table, layout, mode, columns, *, compression):
+def _values(table, reading, mode):
     """Rows' numbers (n,); stretch and stress, or volume ratio and pressure (2, n); and the file's own numbers (2, n)."""
-    if layout == "stress_stretch":
-        raw = [(row, *_numbers(path, row, text.split(), (1, 0))) for row, text in table]
-        declared = ("stretch", "nominal_stress_mpa")
-    else:
-        header, below = _after_header(path, table, "Engineering Strain" if layout == "soro_db" else None)
-        declared, raw = _named(path, header, below, _SORO if layout == "soro_db" else columns, mode)
+    columns = _SORO if reading.layout == "soro_db" else reading.columns
+    found, units = find_columns(table, mode=mode, columns=columns)
+    raw = [(row, *(number(table.path, row, cells[column.at], decimal=table.decimal) for column in found))
+           for row, cells in table.rows[units:]]
     if len(raw) < 2:
-        raise InputError(f"{path}: {len(raw)} point(s) make no curve; give at least two.")
+        raise InputError(f"{table.path}: {len(raw)} point(s) make no curve; give at least two.")
     rows, x, y = (np.array(column) for column in zip(*raw, strict=True))
-    if compression:
-        x, y = _with_minus(x, y, declared[0])
-    to_x, to_y = (STRETCHES | VOLUMES)[declared[0]], (STRESSES | PRESSURES)[declared[1]]
-    ratio = np.array([_value(path, row, value, to_x) for row, value in zip(rows, x, strict=True)])
+    names = [column.name for column in found]
+    if reading.compression:
+        x, y = _with_minus(table.path, rows, x, y, names[0])
+    to_x, to_y = (STRETCHES | VOLUMES)[names[0]], (STRESSES | PRESSURES)[names[1]]
+    ratio = np.array([_value(table.path, row, value, to_x) for row, value in zip(rows, x, strict=True)])
     with np.errstate(divide="ignore"):
         return rows, np.stack([ratio, to_y(y, ratio)]), np.stack([x, y])
 
@@ -155,67 +186,18 @@ def _value(path, row, value, convert):
                          " name it engineering_strain_percent.") from None
 
 
-def _with_minus(x, y, name):
-    """A compression test written with positive numbers, with its signs."""
-    return (x if name == "stretch" else -np.abs(x)), -np.abs(y)
+def _with_minus(path, rows, x, y, name):
+    """A compression test written with positive numbers, with its signs. A pressure that compresses is positive anyway."""
+    strain = name not in ("stretch", "volume_ratio")
+    if strain and x.min() < 0 < x.max():
+        row = rows[np.argmax(x < 0)]
+        raise InputError(f"{path}, row {row}: it has strains of both signs, so its signs are written; leave `compression` out.")
+    return (-np.abs(x) if strain else x), (y if name in VOLUMES else -np.abs(y))
 
 
-def _separator(header):
-    """The header decides: below it a comma may be a decimal comma, which is then refused as such."""
-    return max(";\t,", key=header.count)
-
-
-def _cells(text, separator):
-    return [cell.strip().strip('"') for cell in text.split(separator)]
-
-
-def _after_header(path, table, marker):
-    """The header, and the (row, text) below it. The header is the first line, or the one that has `marker`."""
-    for index, (_, text) in enumerate(table):
-        if marker is None or marker in text:
-            return text, table[index + 1 :]
-    raise InputError(f"{path}: no header with {marker!r} was found; is its layout soro_db?")
-
-
-def _named(path, header, table, columns, mode):
-    """The two declared names, and [(row, x, y)] as the file has them."""
-    separator = _separator(header)
-    header = _cells(header, separator)
-    wanted = ((VOLUMES, "volume"), (PRESSURES, "pressure")) if mode == VOLUMETRIC else (
-        (STRETCHES, "stretch"), (STRESSES, "stress"))
-    found = [_find_column(path, header, known, columns, quantity) for known, quantity in wanted]
-    places = [place for _, place in found]
-    raw = [(row, *_numbers(path, row, _cells(text, separator), places)) for row, text in table]
-    return [name for name, _ in found], raw
-
-
-def _find_column(path, header, known, columns, quantity):
-    """Name (a key of `known`) and position of the one column that holds the quantity."""
-    unknown = sorted(set(columns) - set(STRETCHES | STRESSES | VOLUMES | PRESSURES))
-    if unknown:
-        raise InputError(f"{path}: `columns` maps {unknown[0]!r}, which is no quantity with a unit; map one of"
-                         f" {', '.join(known)}.")
-    found = [name for name in known if columns.get(name, name) in header]
-    if len(found) != 1:
-        problem = "several columns hold" if found else "no column holds"
-        raise InputError(
-            f"{path}: {problem} the {quantity} among {', '.join(header)};"
-            f" name one of them {' or '.join(known)}, or map it under `columns`."
-        )
-    return found[0], header.index(columns.get(found[0], found[0]))
-
-
-def _numbers(path, row, cells, positions):
-    """The finite numbers at two positions of a row."""
-    values = []
-    for position in positions:
-        cell = cells[position] if position < len(cells) else ""
-        try:
-            value = float(cell)
-        except ValueError:
-            remedy = "write it with a decimal point" if "," in cell else "correct it or remove the row"
-            raise InputError(f"{path}, row {row}: {cell!r} is not a number; {remedy}.") from None
-        if not math.isfinite(value):
-            raise InputError(f"{path}, row {row}: the value {cell!r} is not finite; correct it or remove the row.")
-        values.append(value)
-    return values
+def _refuse_unused(columns, headers):
+    """Refuse a name that `columns` maps to and that stands in no file's header."""
+    for name, own in columns.items():
+        if not any(own in header for header in headers):
+            raise InputError(f"`columns` maps {name} to {own!r}, which no file has in its header ({', '.join(headers[0])}); "
+                             "correct it, or leave it out.")

@@ -1,8 +1,26 @@
-"""Windows of stretch: of the tests behind a law, and along a test's path."""
+"""Windows of stretch: of the tests behind a law, and along a test's path; and which windows and weights have an effect."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
+from softtact.errors import InputError
+from softtact.materials.curves import MODES, VOLUMETRIC
 from softtact.materials.laws.base import TEST_PATHS
+from softtact.unknown_names import unknown
+
+
+def refuse_idle(window: Mapping[str, Sequence[float]], weights: Mapping[str, float], *, modes: Collection[str]) -> None:
+    """Refuse a window or a weight {mode: ...} that would change nothing in a fit to curves of these modes."""
+    for name, what in (("window", window), ("weight", weights)):
+        for mode in what:
+            if mode not in MODES:
+                said = unknown(mode, MODES, kind="test mode")
+                raise InputError(f"The {name} of {mode!r}: {said}{'' if said.endswith('?') else '.'}")
+            if mode not in modes:
+                raise InputError(f"The {name} of {mode} has no effect, for there is no {mode} curve; leave it out.")
+    if VOLUMETRIC in weights:
+        raise InputError("The weight of volumetric has no effect, for K is fitted to that curve alone; leave it out.")
+    if weights and len(set(modes) - {VOLUMETRIC}) == 1:
+        raise InputError("The weight of the only mode has no effect; leave it out, or give a second test.")
 
 
 def principal_window(windows: Mapping[str, Sequence[float]]) -> tuple[float, float] | None:

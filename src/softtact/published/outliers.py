@@ -1,5 +1,6 @@
 """Outliers of the archive: each by file and row, counted, and with what was done about it."""
 
+from collections.abc import Collection
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
@@ -41,6 +42,10 @@ class Outliers:
     def left_out(self) -> list[str]:
         """The tests that are not used, in the order of their first finding."""
         return list(dict.fromkeys(f.path for f in self.findings if f.done == "left out"))
+
+    def leaves_out(self, path: str, *, files: Collection[str]) -> bool:
+        """Whether a test is not used for a finding in one of the files."""
+        return any(f.path == path and f.file in files and f.done == "left out" for f in self.findings)
 
     def table(self) -> pd.DataFrame:
         """A row per finding."""

@@ -50,13 +50,12 @@ def pair(reals: Sequence[Table], simulated: dict[str, Table], *, outliers: Outli
     rows = {id(table): table.rows_of_tests() for table in tables}
     tests = []
     for path in dict.fromkeys(path for table in tables for path in table.paths):
-        before = len(outliers.left_out())
         own: dict[int, Any] = {id(table): rows[id(table)].get(path) for table in tables}
         if _in_all(path, tables, own, outliers):
             _check_readings(path, real, others, own, outliers)
             for table in simulated.values():
                 _check_maps(path, real, table, own, outliers)
-        if len(outliers.left_out()) == before:
+        if not outliers.leaves_out(path, files={table.file for table in tables}):
             tests.append(PairedTest(path, object_name(path), own[id(real)], {model: own[id(t)] for model, t in simulated.items()}))
     return tests
 

@@ -1,6 +1,8 @@
 """One CSV of the archive as arrays: read in pieces, numbers as float32, a code for each test, never an object per cell."""
 
-import re
+import csv
+import os
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,22 +10,12 @@ import numpy as np
 import pandas as pd
 
 from softtact.errors import InputError
+from softtact.published.layout import read_layout
 from softtact.published.outliers import Outliers
 
 PIECE = 57 * 200    # rows read at a time: some 4 MB
+MOST_SURPLUS = 0.5      # share of rows with too many fields from which the file is not written as its header says
 TEXTS_KEPT = 1000   # words in place of numbers, for naming; one for each of the first rows that have them
-
-
-@dataclass(frozen=True)
-class Layout:
-    """How a CSV is written. columns: names;  path, force: which is `Path`, and the force (or None);  numbers: which are values."""
-
-    separator: str
-    decimal: str
-    columns: list
-    path: int
-    numbers: list
-    force: int | None
 
 
 @dataclass(frozen=True)
@@ -54,61 +46,45 @@ class Table:
 
 def read_table(path: Path, *, columns: int, force: bool, outliers: Outliers) -> Table:
     """The `Table` of a file with `columns` values a row, and a force column where `force`; oddities of the file go to `odd`."""
-    layout = read_layout(path, columns=columns, force=force, outliers=outliers)
     codes: dict[str, int] = {}
     texts: dict[int, str] = {}
     pieces = []
     try:
-        for piece in _pieces(path, layout):
-            pieces.append(_arrays(piece, layout, codes, texts))
+        layout = read_layout(path, columns=columns, force=force, outliers=outliers)
+        with warnings.catch_warnings(action="ignore", category=pd.errors.ParserWarning):     # of fields beyond a surplus one
+            for piece in _pieces(path, layout):
+                pieces.append(_arrays(piece, layout, codes, texts))
     except pd.errors.ParserError as error:
         raise InputError(f"{path}: not readable as a table ({_where_it_breaks(error)}); correct that line.") from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path}: not readable as a table ({error}); fetch it again.") from None
     if not pieces:
         raise InputError(f"{path}: it holds a header and no row; fetch it again.")
     values, force_n, test, line, surplus = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
+    if surplus.mean() > MOST_SURPLUS:
+        raise InputError(f"{path}, row {line[surplus][0]}: it has more fields than row 1 has columns, as {surplus.sum()} of "
+                         f"{len(line)} rows have; write decimals with points, if they are written with {layout.separator!r}, or "
+                         "fetch it again.")
     if (test < 0).any():
         outliers.keep(path.name, line[test < 0][0], "", "the row names no test; it is not used", count=(test < 0).sum())
+    if layout.path < len(layout.columns) - 1 and test[-1] >= 0 and not _ends_with_a_line(path):
+        outliers.leave_out(path.name, line[-1], list(codes)[test[-1]], "the file ends in this row, without a line end; cut off?")
     return Table(path.name, values, force_n, test, line, list(codes), surplus, texts)
 
 
-def read_layout(path: Path, *, columns: int, force: bool, outliers: Outliers) -> Layout:
-    """The `Layout` that the first two lines tell; another number of columns than expected is refused."""
-    with open(path, encoding="utf-8-sig", errors="replace") as lines:
-        header, first = lines.readline().rstrip("\r\n"), lines.readline().rstrip("\r\n")
-    separator = max(",;\t", key=header.count)
-    decimal = "," if separator != "," and "," in first else "."
-    names = [name.strip().strip('"') for name in header.split(separator)]
-    if (separator, decimal) != (",", "."):
-        outliers.keep(path.name, 1, "", f"fields end with {separator!r} and decimals are written with {decimal!r}; read so")
-    found = [k for k, name in enumerate(names) if name.lower() == "path"]
-    if len(found) != 1:
-        raise InputError(f"{path}: {len(found)} columns are named 'Path' where one is needed (row 1 is {header[:60]!r}); "
-                         "fetch it again.")
-    numbers = [k for k in range(len(names)) if k != found[0] and not re.fullmatch(r"(Unnamed: \d+)?", names[k])]
-    if len(numbers) < len(names) - 1:
-        outliers.keep(path.name, 1, "", "a column without a name is passed over: row numbers of a former table")
-    wanted = columns + force
-    if len(numbers) != wanted:
-        raise InputError(f"{path}: row 1 names {len(numbers)} columns of numbers beside 'Path' where {wanted} are needed"
-                         f"{' (force and the taxels)' if force else ''}; fetch it again.")
-    force_at = _force_column(path, names, numbers, outliers) if force else None
-    return Layout(separator, decimal, names, found[0], [k for k in numbers if k != force_at], force_at)
-
-
-def _force_column(path, names, numbers, outliers):
-    """Which column holds the force: the one of that name, else the first."""
-    named = [k for k in numbers if "force" in names[k].lower()]
-    if len(named) != 1:
-        outliers.keep(path.name, 1, "", f"no column is named force; the first, {names[numbers[0]]!r}, is taken for it")
-    return named[0] if len(named) == 1 else numbers[0]
+def _ends_with_a_line(path):
+    """Whether a file's last line has an end, so that its last number is whole."""
+    with open(path, "rb") as file:
+        file.seek(-min(4, path.stat().st_size), os.SEEK_END)
+        return b"\n" in (end := file.read()) or b"\r" in end
 
 
 def _pieces(path, layout):
     # One column more than the header has: a surplus field is then seen, and shifts nothing. Blank lines count as lines.
     width = len(layout.columns)
     return pd.read_csv(path, sep=layout.separator, decimal=layout.decimal, header=None, skiprows=1, names=range(width + 1),
-                       dtype={layout.path: str}, chunksize=PIECE, skip_blank_lines=False, low_memory=False,
-                       encoding="utf-8-sig", encoding_errors="replace")
+                       index_col=False, dtype={layout.path: str}, chunksize=PIECE, skip_blank_lines=False, low_memory=False,
+                       encoding=layout.encoding)
 
 
 def _arrays(piece, layout, codes, texts):

@@ -11,9 +11,9 @@ from typing import Any
 import pandas as pd
 
 from softtact.errors import InputError
-from softtact.files import write_csv
+from softtact.files import refuse_overwriting, write_csv
 from softtact.imaging.discs import discs_and_outlines
-from softtact.imaging.reading import read_frames
+from softtact.imaging.reading import image_files, read_frames
 from softtact.progress import progress
 from softtact.reporting.disc_picture import draw_discs
 
@@ -27,6 +27,7 @@ def report_discs(frames: str | Path, out: str | Path, *, picture: str | Path | N
     stream = read_frames(frames, every=every)
     first = list(itertools.islice(stream, 2))   # tells one frame from several without reading them all
     target = _picture_path(picture, single=len(first) == 1)
+    _refuse_overwriting(frames, out, target)
     tables, rows = [], []
     with _pictures(target) as drawn:
         for name, frame in progress(itertools.chain(first, stream), label="discs in frames", total="?"):
@@ -67,6 +68,15 @@ def _picture_path(picture, *, single):
     if picture.is_file():
         raise InputError(f"{picture}: is a file where the folder of the pictures goes; give --picture another name.")
     return picture
+
+
+def _refuse_overwriting(frames, out, target):
+    """Refuse a table or pictures that would take the place of frames."""
+    files = image_files(frames)
+    folder = target is not None and target.is_dir()
+    refuse_overwriting(files, {"--out": Path(out), "--picture": None if folder else target})
+    if folder and len(files) > 1 and target.samefile(files[0].parent):
+        raise InputError(f"--picture {target}: it is the folder of the frames, which would be lost; choose another.")
 
 
 def _file_name(name):

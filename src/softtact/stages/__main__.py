@@ -5,7 +5,6 @@ Example: python -m softtact.stages fit_material --in curves=a.csv --in curves=b.
 
 import argparse
 import importlib
-import json
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -48,9 +47,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
 
 def run_stage(options: argparse.Namespace) -> None:
     """Import the stage module and call its `run`."""
+    from softtact.files import refuse_overwriting
+
     run = find_stage(options.stage)
-    run(inputs=_named_paths(options.inputs, option="--in"), outputs=_named_paths(options.outputs, option="--out"),
-        settings=_settings(options.settings), threads=options.threads)
+    inputs, outputs = _named_paths(options.inputs, option="--in"), _named_paths(options.outputs, option="--out")
+    refuse_overwriting((path for _, path in _flat(inputs)), dict(_flat(outputs)))
+    run(inputs=inputs, outputs=outputs, settings=_settings(options.settings), threads=options.threads)
 
 
 def find_stage(name: str) -> Callable[..., None]:
@@ -59,6 +61,17 @@ def find_stage(name: str) -> Callable[..., None]:
     if name not in stages:
         raise InputError(f"there is no stage {name!r}; the stages are {', '.join(stages)}.")
     return importlib.import_module(f"softtact.stages.{name}").run
+
+
+class _Named(dict):
+    """{name: path or list of paths}; a stage that asks for one that was not given is answered with what to give."""
+
+    def __init__(self, option, paths):
+        super().__init__(paths)
+        self.option = option
+
+    def __missing__(self, name):
+        raise InputError(f"{self.option} {name}=PATH is missing, which this stage needs; give it.")
 
 
 def _named_paths(pairs, *, option):
@@ -72,13 +85,22 @@ def _named_paths(pairs, *, option):
         if key != name or name in paths:
             lists.add(name)
         paths.setdefault(name, []).append(Path(path))
-    return {name: found if name in lists else found[0] for name, found in paths.items()}
+    return _Named(option, {name: found if name in lists else found[0] for name, found in paths.items()})
+
+
+def _flat(named):
+    """(--out NAME, path) of each path, the lists' paths numbered."""
+    for name, paths in named.items():
+        for k, path in enumerate(paths if isinstance(paths, list) else [paths]):
+            yield f"--out {name}{f'[{k}]' * isinstance(paths, list)}", path
 
 
 def _settings(text):
+    from softtact.files import parse_json  # NumPy, which the parser does without
+
     try:
-        return json.loads(text)
-    except json.JSONDecodeError as error:
+        return parse_json(text)
+    except (ValueError, RecursionError) as error:
         raise InputError(f"--settings is not valid JSON ({error}).") from None
 
 

@@ -13,6 +13,7 @@ import pandas as pd
 from softtact.errors import InputError
 from softtact.evaluation.curve_shape import PAPER_RMSE_MM2, judge, summary_sentence
 from softtact.files import read_dataset, write_csv, write_json
+from softtact.tables import read_table
 
 if TYPE_CHECKING:
     import xarray
@@ -65,18 +66,35 @@ def _measured(path, forces, virtual):
     """The measured area at the forces, and what it comes from."""
     if path is None:
         return virtual.area_per_frustum_mm2.values, "virtual dielectric (no measured curve was given)"
-    try:
-        curve = pd.read_csv(path, usecols=["force_n", "area_mm2"], dtype=float).sort_values("force_n")
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file; correct 'ftir.measured'.") from None
-    except ValueError as error:
-        raise InputError(f"{path}: {error}; the file needs the columns force_n and area_mm2 in numbers.") from None
-    low, high = curve.force_n.min(), curve.force_n.max()
+    force_n, area_mm2 = _measured_curve(path)
+    low, high = force_n[0], force_n[-1]
     outside = [force for force in forces if not low <= force <= high]
     if outside:
         raise InputError(f"{path}: measured from {low:g} to {high:g} N, but 'ftir.forces_n' asks for {outside[0]:g} N; "
                          "leave that force out.")
-    return np.interp(forces, curve.force_n, curve.area_mm2), f"measured: {path}"
+    return np.interp(forces, force_n, area_mm2), f"measured: {path}"
+
+
+def _measured_curve(path):
+    """Forces (n,) in N, rising, and areas (n,) in mm2 of the file 'ftir.measured'."""
+    table = read_table(path, what="curve for 'ftir.measured'")
+    try:
+        force_n, area_mm2 = np.array(table.numbers(["force_n", "area_mm2"]))
+    except InputError as error:
+        raise InputError(f"{str(error).removesuffix('.')}; the file needs the columns force_n and area_mm2 in numbers.") from None
+    rows = [row for row, _ in table.rows]
+    if len(rows) < 2:
+        raise InputError(f"{path}: {len(rows)} point(s) make no curve; give at least two.")
+    if force_n[0] > force_n[-1]:
+        force_n, area_mm2, rows = force_n[::-1], area_mm2[::-1], rows[::-1]
+    for name, values, bad, remedy in (
+            ("force_n", force_n[1:], np.diff(force_n) <= 0, "goes back to {}; keep one loading branch, in order of the force"),
+            ("force_n", force_n, force_n < 0, "is {}; a force that presses is positive, correct the column"),
+            ("area_mm2", area_mm2, area_mm2 < 0, "is {}; an area is no less than 0, correct it")):
+        if bad.any():
+            row = rows[int(np.argmax(bad)) + len(rows) - len(values)]
+            raise InputError(f"{path}, row {row}: {name} {remedy.format(f'{values[bad][0]:g}')}.")
+    return force_n, area_mm2
 
 
 def _rmse(a, b):

@@ -33,7 +33,12 @@ def read_catalogue(path: Path) -> dict[str, CatalogueEntry]:
     lines = read_yaml(path, missing="there is no such catalogue of objects; correct 'objects.catalogue'.")
     entries = [validated(CatalogueEntry, line, where=str(path)) for line in lines or []]
     entries = [entry.model_copy(update={"file": str(path.parent / entry.file)}) for entry in entries]
-    return {entry.name: entry for entry in entries}
+    catalogue = {entry.name: entry for entry in entries}
+    if len(catalogue) < len(entries):
+        names = [entry.name for entry in entries]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise InputError(f"{path}: the object {twice!r} stands in it twice; give one of the two another name, or take it away.")
+    return catalogue
 
 
 def items_of_set(set_name: str, chosen: ItemSet, catalogue: dict[str, CatalogueEntry], *, spec: "SensorSpec",
