@@ -159,7 +159,8 @@ class QuarterSlab:
                     for r, c, v in entries]
         return matrices
 
-    def compliance(self, stiffness: sp.csr_matrix, kept: np.ndarray, parity: tuple[int, ...], *, threads: int = 1) -> np.ndarray:
+    def compliance(self, stiffness: sp.csr_matrix, kept: np.ndarray, parity: tuple[int, ...], *, threads: int = 1,
+                   dtype: type = np.float64) -> np.ndarray:
         """Compliance (k, k) among the unknowns `kept` of a stiffness, in one parity; zero for those that it holds."""
         free = np.concatenate([self.free(parity), np.arange(self.unknowns, stiffness.shape[0])])
         place = np.full(stiffness.shape[0], -1)
@@ -167,8 +168,11 @@ class QuarterSlab:
         there = place[kept] >= 0
         upper = sp.triu(stiffness[free][:, free], format="csr")
         upper.sort_indices()
-        out = np.zeros((len(kept), len(kept)))
-        out[np.ix_(there, there)] = condensed_inverse(upper, place[kept[there]], threads=threads)
+        among = condensed_inverse(upper, place[kept[there]], threads=threads, dtype=dtype)
+        if there.all():
+            return among
+        out = np.zeros((len(kept), len(kept)), dtype=dtype)
+        out[np.ix_(there, there)] = among
         return out
 
 
