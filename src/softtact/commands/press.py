@@ -84,7 +84,7 @@ def _press(options):
         sensor = replace(softtact.load_sensor(options.sensor, materials=_cards(options)),
                          **_quality(options), device=options.device, attributes=attributes)
         result = sensor.press(mesh, pose=pose, **how, model=options.model,
-                              policy=options.policy, tolerance_mm=options.tolerance, keep_body=options.vtu is not None,
+                              policy=options.policy, tolerance_mm=options.tolerance, keep_body=options.vtu is not None, keep_object=True,
                               time_limit_s=options.time_limit, on_step=_writer(options))
     except (ConvergenceError, KeyboardInterrupt) as error:
         if getattr(error, "result", None) is not None:
