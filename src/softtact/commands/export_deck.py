@@ -45,7 +45,7 @@ def _export_deck(options):
     spec.need_frusta("export-deck", "name a sensor of kind frusta")
     check_forces(forces, spec)
     check_folders(options.out)
-    mesh, repairs = read_object(options)
+    mesh, repairs = read_object(options, options.mesh)
     check_over_sensor(place(mesh, pose=pose), spec.footprint_mm, name=str(options.mesh))
     from softtact.decks.export import export_press
 
