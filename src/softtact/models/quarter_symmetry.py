@@ -104,18 +104,16 @@ class QuarterSlab:
 
     @cached_property
     def stiffness(self) -> sp.csr_matrix:
-        """The stiffness (unknowns, unknowns) in N/mm; elements of a layer are all alike."""
-        rows, columns, values = [], [], []
+        """The stiffness (unknowns, unknowns) in N/mm; elements of a layer are all alike, and entries of one are listed at a time."""
+        whole = sp.csr_matrix((self.unknowns, self.unknowns))
         for (layer, thickness), hexes in zip(self.layers, self.hexes, strict=True):
             law = make_law("neo_hooke", {"c10": 0.5 * layer.shear_modulus}, bulk_modulus=layer.bulk_modulus)
             block = HexBlock(0.5 * HEX27.nodes[None] * self._sizes(thickness), law)
             element = block.tangent(np.zeros((1, 27, 3)))[0]
-            dofs = dofs_of(hexes)
-            rows.append(np.repeat(dofs, 81, axis=1).ravel())
-            columns.append(np.tile(dofs, (1, 81)).ravel())
-            values.append(np.tile(element.ravel(), len(dofs)))
-        return sp.csr_matrix(tuple([np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))]),
-                             shape=(self.unknowns, self.unknowns))
+            dofs = dofs_of(hexes).astype(np.int32)
+            places = np.repeat(dofs, 81, axis=1).ravel(), np.tile(dofs, (1, 81)).ravel()
+            whole = whole + sp.csr_matrix((np.tile(element.ravel(), len(dofs)), places), shape=whole.shape)
+        return whole
 
     def free(self, parity: tuple[int, ...]) -> np.ndarray:
         """Unknowns that are not held at the sides, by the base, or by the parity on the planes of symmetry."""
