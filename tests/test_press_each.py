@@ -44,7 +44,8 @@ def test_results_of_an_earlier_run_do_not_stand_for_an_object_that_fails_now(par
     line = ["press", str(parts / "broken.ply"), str(parts / "block.stl"), *HOW, "--out", str(tmp_path)]
     assert main(line) == 1 and not old.exists() and (tmp_path / "block/press.nc").exists()
     table = capsys.readouterr().out.splitlines()
-    assert table[0].startswith("object") and table[1].split() == ["broken", "failed"] and table[2].split()[:3] == ["block", "done", "elastic"]
+    assert table[0].startswith("object") and table[1].split() == ["broken", "failed"]
+    assert table[2].split()[:3] == ["block", "done", "elastic"]
 
 
 def test_objects_of_one_name_are_told_apart_by_their_endings_or_refused(parts, tmp_path, capsys):
@@ -72,7 +73,7 @@ def test_a_folder_without_meshes_is_refused(tmp_path, capsys):
     assert "the folder holds no STL, OBJ or PLY file" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("words", [["--pose", "-1,0,0,0,0,0"], ["--motion", "-.5z"], ["--force", "-5e0"], ["--pos", "-1,0,0,0,0,0"]])
+@pytest.mark.parametrize("words", [["--pose", "-1,0,0,0,0,0"], ["--motion", "-.5z"], ["--force", "-5e0"], ["--pos", "-1,0"]])
 def test_a_value_that_begins_with_a_minus_and_reads_as_an_option_gets_a_hint(words, capsys):
     with pytest.raises(SystemExit) as stopped:
         main(["press", "part.stl", "--unit", "mm", *words])

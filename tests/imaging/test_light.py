@@ -44,6 +44,7 @@ def areas(frame, **how):
     pytest.param(whole(30, np.uint32), id="32 bits"),
     pytest.param(with_faulty(whole(10), 65535), id="a hot pixel of full scale"),
     pytest.param(with_faulty(whole(10), 65535, count=20), id="hot pixels"),
+    pytest.param(np.where(np.arange(64) == 45, 65535, whole(10)), id="a hot column through a disc"),
     pytest.param(with_faulty(whole(10) + 2000, 0), id="a dead pixel below the offset"),
     pytest.param(with_faulty(SHARE, 1e6), id="a hot pixel in floating point"),
     pytest.param((0.01 * SHARE).astype(np.float32), id="floating point to 0.01"),
@@ -53,6 +54,14 @@ def areas(frame, **how):
 ])
 def test_the_numbers_that_a_frame_is_stored_in_do_not_matter(frame):
     assert areas(frame) == pytest.approx(areas(FRAME), rel=0.01) and areas(frame) == pytest.approx(AREAS, rel=0.03)
+
+
+@pytest.mark.parametrize("place", [np.s_[2:5, 30:33], np.s_[44:47, 4:40]])
+def test_a_blot_or_a_bar_laid_over_a_frame_is_left_out_and_said(place):
+    frame = whole(10)
+    frame[place] = 65535
+    with pytest.warns(FrameWarning, match="times as bright as all others"):
+        assert areas(frame) == pytest.approx(areas(FRAME), rel=0.02)
 
 
 @pytest.mark.parametrize("frame", [MASK.astype(np.uint8), MASK, MASK.astype(np.int32) * 3 + 2, MASK.astype(float) * 1e-4])

@@ -113,8 +113,8 @@ def _tell(rows, folder, options):
 
 def _lines(table, folder):
     width = max(len(row["object"]) for row in table) + 2
-    yield (f"{'object':{width}}{'status':15}{'model':14}{'force, N':>9}{'indentation, mm':>17}{'contact, mm2':>14}{'deepest, mm':>13}"
-           f"{'counts, sum':>13}")
+    yield (f"{'object':{width}}{'status':15}{'model':14}{'force, N':>9}{'indentation, mm':>17}{'contact, mm2':>14}"
+           f"{'deepest, mm':>13}{'counts, sum':>13}")
     for row in table:
         numbers = "" if row["model"] is None else (
             f"{row['model']:14}{row['force_n']:9.4g}{row['indentation_mm']:17.4f}{row['contact_area_mm2']:14.1f}"

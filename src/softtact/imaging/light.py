@@ -16,6 +16,8 @@ SMALLEST_SIDE = 16       # pixels of a frame
 TRANSFERS = ("linear", "srgb")
 _CHANNELS = {1: (1, False), 2: (1, True), 3: (3, False), 4: (3, True)}   # stored: (of colour, whether the last is alpha)
 _SHARED = 3              # pixels; side of the square in which a value must be reached to count
+_FEW, _APART = 0.05, 4.0   # share of the pixels, and how many times brighter than all others, of what is laid over a frame
+_CONTRAST = 3.0          # standard deviations of the noise that a frame with more than noise spans; noise alone has 1.2
 _BEYOND = 2.0            # spans above and below the shared values; what is further off is a hot or dead pixel
 _SURE = 12.0             # standard deviations of the noise that a pixel may lie off in any frame
 _FRAYED = 0.2            # share of the pixels along the borders of a mask that stand alone
@@ -44,6 +46,8 @@ def grey(frame: np.ndarray, *, transfer: str = "linear", lossy: bool = False) ->
     elif transfer != "linear":
         raise InputError(f"transfer={transfer!r}: give one of {', '.join(TRANSFERS)}.")
     light = colours.mean(axis=2) * opacity
+    if frame.dtype not in (np.uint8, np.bool_):
+        light = _without_overlay(light)
     bottom, span, noise = _shared_range(light)
     light = _without_outliers(light, bottom, span, noise)
     on_a_scale = lossy or (frame.dtype == np.uint8 and not _is_mask(light, span))
@@ -96,6 +100,27 @@ def _shared_range(light):
     """(lowest, highest less lowest) value that 3 x 3 pixels reach together, and the noise of a pixel; 0 where noise is all."""
     top, bottom = float(minimum_filter(light, _SHARED).max()), float(maximum_filter(light, _SHARED).min())
     return min(bottom, top), max(top - bottom, 0.0), pixel_noise(light)
+
+
+def _without_overlay(light):
+    """The light without what is far above all of it, and not joined to it by any value between, as blurred edges would."""
+    few = int(_FEW * light.size)
+    top = np.sort(np.partition(light, light.size - few, axis=None)[light.size - few:]) - light.min()
+    gaps = np.flatnonzero((top[1:] > _APART * top[:-1]) & (top[:-1] > 0))
+    if not len(gaps):
+        return light
+    highest = light.min() + top[gaps[0]]
+    above = light > highest
+    rest = np.where(above, median_filter(light, _SHARED), light)     # lines of a pixel are gone now, blots are not
+    wide = rest > highest
+    rest[wide] = np.median(light)
+    _, span, noise = _shared_range(rest)
+    if span <= _CONTRAST * noise or span == 0:
+        return light
+    if wide.any():
+        warnings.warn(f"{np.count_nonzero(above)} pixels are more than {_APART:g} times as bright as all others and are left out, "
+                      "as faulty ones or a text laid over the frame.", FrameWarning, stacklevel=3)
+    return rest
 
 
 def _without_outliers(light, bottom, span, noise):

@@ -104,7 +104,7 @@ class QuarterSlab:
 
     @cached_property
     def stiffness(self) -> sp.csr_matrix:
-        """The stiffness (unknowns, unknowns) in N/mm; elements of a layer are all alike, and entries of one are listed at a time."""
+        """The stiffness (unknowns, unknowns) in N/mm; elements of a layer are all alike, and summed up layer by layer."""
         whole = sp.csr_matrix((self.unknowns, self.unknowns))
         for (layer, thickness), hexes in zip(self.layers, self.hexes, strict=True):
             law = make_law("neo_hooke", {"c10": 0.5 * layer.shear_modulus}, bulk_modulus=layer.bulk_modulus)
@@ -142,19 +142,16 @@ class QuarterSlab:
         """
         points, weights, _ = HEX27.quadrature
         j, i = (grid.ravel() for grid in np.meshgrid(np.arange(self.cells[1]), np.arange(self.cells[0]), indexing="ij"))
-        entries: list[tuple[list, list, list]] = [([], [], []) for _ in range(3)]
+        matrices = [sp.csr_matrix((count, self.unknowns)) for _ in range(3)]
         for (layer, thickness), hexes in zip(self.layers, self.hexes, strict=True):
             size = self._sizes(thickness)
             gradients, dofs = HEX27.shape(points)[1] * (2 / size), dofs_of(hexes)
             for point, weight, gradient in zip(points, weights * np.prod(size) / 8, gradients, strict=True):
                 owner = cells_of((i + 0.5 + 0.5 * point[0]) * size[0], (j + 0.5 + 0.5 * point[1]) * size[1])
                 inside = owner >= 0
-                for (rows, columns, values), row in zip(entries, _membrane_stress(layer, gradient), strict=True):
-                    rows.append(np.repeat(owner[inside], 81))
-                    columns.append(dofs[inside].ravel())
-                    values.append(np.tile(weight * row, inside.sum()))
-        matrices = [sp.csr_matrix((np.concatenate(v), (np.concatenate(r), np.concatenate(c))), shape=(count, self.unknowns))
-                    for r, c, v in entries]
+                places = np.repeat(owner[inside], 81), dofs[inside].ravel()
+                for axis, row in enumerate(_membrane_stress(layer, gradient)):
+                    matrices[axis] += sp.csr_matrix((np.tile(weight * row, inside.sum()), places), shape=matrices[axis].shape)
         return matrices
 
     def compliance(self, stiffness: sp.csr_matrix, kept: np.ndarray, parity: tuple[int, ...], *, threads: int = 1,
@@ -169,7 +166,7 @@ class QuarterSlab:
         among = condensed_inverse(upper, place[kept[there]], threads=threads, dtype=dtype)
         if there.all():
             return among
-        out = np.zeros((len(kept), len(kept)), dtype=dtype)
+        out: np.ndarray = np.zeros((len(kept), len(kept)), dtype=dtype)
         out[np.ix_(there, there)] = among
         return out
 

@@ -1,6 +1,7 @@
 """What a sensor's fast models start from: computed once for a sensor, and kept in the user's cache."""
 
 import importlib.util
+import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,6 +15,7 @@ from softtact.progress import announce
 from softtact.sensors.frusta import SensorSpec
 from softtact.sensors.specification import AnySpec
 
+_POINTS = 1881  # of the paper's map
 _FORMAT = 12    # of the files; another one makes them again
 
 
@@ -31,7 +33,7 @@ def _of_frusta(spec):
 def cached_compliance(spec: AnySpec, *, threads: int = 1) -> Compliance:
     """The elastic layer's `Compliance`, by the values that it depends on."""
     return _cached("compliance", _of_layer(spec), Compliance,
-                   f"{spec.name}: computing the elastic layer's compliance, once for this sensor (some ten seconds)",
+                   f"{spec.name}: computing the elastic layer's compliance, once for this sensor ({_about(spec, 15, 2.0)})",
                    lambda: elastic_compliance(spec, threads=threads))
 
 
@@ -46,8 +48,15 @@ def cached_foundation(spec: SensorSpec, laws: Mapping[str, Law], *, threads: int
     """The `FoundationCompliance` of a sensor with its laws {"dielectric", "cover"}, by the values that it depends on."""
     dielectric, cover = laws["dielectric"], laws["cover"]
     return _cached("foundation", [*_of_frusta(spec), repr(dielectric), repr(cover)], FoundationCompliance,
-                   f"{spec.name}: computing a frustum's law and the slab's compliance, once for this sensor and these laws (about "
-                   "a minute)", lambda: foundation_compliance(spec, dielectric_law=dielectric, cover_law=cover, threads=threads))
+                   f"{spec.name}: computing a frustum's law and the slab's compliance, once for this sensor and these laws "
+                   f"({_about(spec, 60, 2.5)})",
+                   lambda: foundation_compliance(spec, dielectric_law=dielectric, cover_law=cover, threads=threads))
+
+
+def _about(spec, seconds, power):
+    """How long it takes, in words: seconds for the paper's sensor, which grow with a power of the map's points."""
+    took = seconds * (math.prod(spec.map_shape) / _POINTS) ** power
+    return f"about {took / 60:.0f} minutes" if took > 90 else "about a minute" if took > 40 else "some ten seconds"
 
 
 def _cached(kind, values, cls, message, compute):

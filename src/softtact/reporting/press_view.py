@@ -14,6 +14,12 @@ from softtact.reporting.view3d import html_view
 
 UNIT = "displacement towards the PCB (mm)"
 _EYE = (-0.9, -1.35, 1.0)     # from where a picture looks
+_PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
+<title>{title}</title><style>
+body {{font: 16px system-ui, sans-serif; max-width: 1400px; margin: 1em auto; padding: 0 1em}}
+figure {{margin: 0}}
+</style><body>{body}</body></html>
+"""
 _SEEN_THROUGH = 0.3           # opacity of the object
 _SHEET_MM = 1.0               # height of the walls where a file does not tell the sensor's thickness
 
@@ -66,13 +72,11 @@ def _read_map(path):
 
 def write_page(view: PressView, path: str | Path) -> None:
     """Write a page that shows the press and needs nothing else."""
-    body = html_view(view.points_mm, np.vstack([view.triangles, view.object_triangles]), view.values, title=view.title, unit=UNIT,
-                     labels=view.labels, see_through=len(view.object_triangles))
+    triangles = np.vstack([view.triangles, view.object_triangles])
+    body = html_view(view.points_mm, triangles, view.values, title=view.title, unit=UNIT, labels=view.labels,
+                     see_through=len(view.object_triangles))
     with atomic_path(path) as temporary:
-        temporary.write_text(f'<!doctype html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
-                             f'<title>{html.escape(view.title)}</title><style>figure{{margin:0}}</style>'
-                             f'<body style="font:16px system-ui,sans-serif;max-width:1400px;margin:1em auto;padding:0 1em">{body}</html>\n',
-                             encoding="utf-8")
+        temporary.write_text(_PAGE.format(title=html.escape(view.title), body=body), encoding="utf-8")
 
 
 def save_picture(view: PressView, path: str | Path) -> str:

@@ -25,7 +25,8 @@ function (figure, data) {
   }
 
   const canvas = document.createElement("canvas"), context = canvas.getContext("2d");
-  canvas.style.cssText = "width:100%;height:min(75vw,75vh);min-height:240px;max-height:900px;touch-action:none;cursor:grab;display:block;background:#fff";
+  canvas.style.cssText = "width:100%;height:min(75vw,75vh);min-height:240px;max-height:900px;touch-action:none;cursor:grab;"
+    + "display:block;background:#fff";
   canvas.tabIndex = 0;
   canvas.setAttribute("role", "img");
   canvas.setAttribute("aria-label", figure.dataset.title + "; arrow keys turn it, plus and minus zoom, 0 puts it back");
