@@ -13,12 +13,12 @@ import softtact
 
 project, author, copyright = "softtact", "the authors of softtact", "2025, the authors of softtact; Apache-2.0"
 version = release = softtact.__version__
-extensions = ["myst_parser", "sphinx.ext.autodoc"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_copybutton"]
 exclude_patterns = ["conf.py"]
 root_doc = "index"
-html_theme = "alabaster"
-html_theme_options = {"description": "a soft capacitive tactile sensor, simulated", "fixed_sidebar": True, "page_width": "1100px",
-                      "show_powered_by": False}
+html_theme = "furo"     # its columns fold away on a narrow screen, its blocks of code scroll, and it loads nothing from elsewhere
+html_title = "softtact"
+copybutton_selector = "div:not(.highlight-none) > div.highlight pre"     # not on docstrings
 html_math_renderer = "mathml"
 html_show_sourcelink = False
 html_copy_source = False

@@ -61,6 +61,7 @@ def desk(tmp_path_factory):
     (folder / "config").symlink_to(ROOT / "config")
     part = trimesh.creation.box((8, 8, 4))
     part.export(folder / "part.stl")
+    part.export(folder / "block.stl")
     softtact.load_sensor("coro").press(part, force_n=[5], model="elastic", threads=1).write(folder / "press.nc")
     stretch = np.linspace(1.02, 1.6, 12)
     curves = {"uniaxial": stretch - stretch**-2, "equibiaxial": stretch - stretch**-5, "planar": stretch - stretch**-3}

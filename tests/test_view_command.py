@@ -13,9 +13,10 @@ from support.sensors import CORO
 import softtact
 from softtact.cli import main
 from softtact.commands import view as view_command
+from softtact.models.elastic.tangential import surface_compliance
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.press.vtu import LAYERS, of_bodies, of_map, read_vtu
-from softtact.reporting.press_view import _draw_with_matplotlib, read_view
+from softtact.reporting.press_view import _draw_with_matplotlib, read_view, write_page
 
 ROOT = Path(__file__).resolve().parents[1]
 X, Y = np.linspace(-2, 2, 5), np.linspace(-3, 3, 7)
@@ -84,6 +85,42 @@ def test_a_map_becomes_a_closed_block_whose_top_is_pressed():
     block = trimesh.Trimesh(points + mesh.displacement_mm[1][used], triangles)
     below = MAPS[1][1:-1, 1:-1].sum() * (X[1] - X[0]) * (Y[1] - Y[0])
     assert block.is_watertight and block.volume == pytest.approx(4 * 6 * 2.5 - below, rel=0.01)
+
+
+@pytest.fixture(scope="module")
+def beside(tmp_path_factory):
+    """A ball that slides while it is pressed, kept with its result; and the folder of its files."""
+    spec = CORO.model_copy(update={"footprint_mm": (7.2, 7.2), "map_shape": (13, 13)})
+    sensor = softtact.Sensor(spec, {}, prepared_models={"elastic_surface": surface_compliance(spec)})
+    result = sensor.press(trimesh.creation.icosphere(subdivisions=2, radius=3.0), pose=[0.5, 0, 7, 0, 0, 0], model="elastic",
+                          motion=softtact.Motion().press(depth_mm=0.2).slide(x_mm=0.4), label="", keep_object=True)
+    folder = tmp_path_factory.mktemp("beside")
+    result.write(folder / "press.nc")
+    result.write_vtu(folder / "press.vtu")
+    return result, folder
+
+
+def test_the_object_is_shown_where_it_stands_at_each_step(beside):
+    for name in ("press.nc", "press.vtu"):
+        view = read_view(beside[1] / name)
+        at = view.points_mm[:, np.unique(view.object_triangles)]
+        assert at[..., 2].min(axis=1) == pytest.approx([-0.2, -0.2], abs=1e-6), name
+        assert at[..., 0].mean(axis=1) == pytest.approx([0.5, 0.9], abs=1e-5), name
+        assert np.isnan(view.values[:, np.unique(view.object_triangles)]).all()
+        assert np.isfinite(view.values[:, view.triangles]).all()
+
+
+def test_the_object_comes_back_from_the_file_and_is_drawn_see_through(beside, tmp_path):
+    result, folder = beside
+    again = softtact.read_press(folder / "press.nc").placed_object
+    assert np.array_equal(again.points_mm, result.placed_object.points_mm)
+    assert np.array_equal(again.way_mm, result.placed_object.way_mm)
+    view = read_view(folder / "press.nc")
+    write_page(view, tmp_path / "p.html")
+    assert f'"seeThrough": {len(again.triangles)}' in (tmp_path / "p.html").read_text()
+    _draw_with_matplotlib(view, tmp_path / "with.png")
+    _draw_with_matplotlib(replace(view, object_triangles=view.object_triangles[:0]), tmp_path / "without.png")
+    assert (tmp_path / "with.png").read_bytes() != (tmp_path / "without.png").read_bytes()
 
 
 def test_view_writes_a_page_and_a_picture_and_says_so_in_json(press_nc, tmp_path, capsys):

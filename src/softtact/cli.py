@@ -6,6 +6,7 @@ Heavy imports stand inside the commands' functions, so that `softtact --help` an
 
 import argparse
 import os
+import re
 import sys
 from collections.abc import Sequence
 
@@ -76,8 +77,22 @@ def _said(options, sentence, *, status):
 class _Parser(argparse.ArgumentParser):
     """An argument parser whose complaint is one sentence."""
 
+    _words: Sequence[str] = ()
+
+    def parse_known_args(self, args=None, namespace=None):
+        self._words = sys.argv[1:] if args is None else list(args)
+        return super().parse_known_args(args, namespace)
+
     def error(self, message):
-        self.exit(2, f"{self.prog}: {message}; see {self.prog} --help.\n")
+        self.exit(2, f"{self.prog}: {self._with_minus(message) or message}; see {self.prog} --help.\n")
+
+    def _with_minus(self, message):
+        """A better sentence where an option lacks a value because that begins with a minus and reads as another option."""
+        option = re.match(r"argument (?:\S+/)?(--[\w-]+):? .*expected ", message)
+        for word, value in zip(self._words, self._words[1:], strict=False):
+            if option and option[1].startswith(word) and re.match(r"-[\d.]", value):
+                return f"{option[1]} {value}: a value that begins with a minus reads as an option; write {option[1]}={value}"
+        return None
 
 
 def _parser():

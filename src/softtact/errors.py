@@ -37,3 +37,7 @@ class ExtrapolationWarning(UserWarning):
 
 class ShellWarning(UserWarning):
     """An object rests on the shell around a pad, which carries what is added to its force."""
+
+
+class FrameWarning(UserWarning):
+    """A camera frame may not be what the detection of discs takes it for."""

@@ -106,6 +106,7 @@ def test_light_over_all_the_frame_and_the_seed_of_the_noise_do_not_matter_but_th
     assert detect_discs(picture, pixel_mm=0.06).area_mm2.to_numpy() == pytest.approx(4 * discs.area_mm2.to_numpy())
 
 
+@pytest.mark.filterwarnings("error")     # such as that of contrast without a disc
 @settings(max_examples=25, deadline=None)
 @given(noise=st.floats(0, 0.5), falloff=st.floats(0, 0.95), background=st.floats(0, 1), seed=st.integers(0, 10**6))
 def test_an_empty_frame_has_no_discs_whatever_its_noise_and_light(noise, falloff, background, seed):
@@ -227,6 +228,7 @@ def test_a_frames_depth_and_channels_do_not_matter():
 
 def test_an_array_that_is_no_picture_is_refused():
     for picture, said in ((np.zeros(9), r"shape \(9,\) is no picture"), (np.zeros((3, 100)), r"shape \(3, 100\) is no picture"),
-                          (np.full((50, 50), np.nan), "values that are not numbers")):
+                          (np.full((50, 50), np.nan), r"2500 values that are not finite numbers, the first at .* \(0, 0\)"),
+                          (np.zeros((50, 50, 5)), "5 channels"), (np.zeros((50, 50), dtype=complex), "complex128")):
         with pytest.raises(InputError, match=said):
             detect_discs(picture, pixel_mm=1.0)

@@ -56,7 +56,7 @@ def test_a_press_of_the_elastic_model_is_read_back_and_written_again_with_the_sa
 def test_every_field_is_written_but_the_bodies_and_every_array_has_units(tmp_path):
     made_up_press().write(tmp_path / "press.nc")
     with xarray.open_dataset(tmp_path / "press.nc", engine="h5netcdf") as data:
-        names = {one.name for one in fields(PressResult)} - {"bodies", "attributes", "x_mm", "y_mm"}
+        names = {one.name for one in fields(PressResult)} - {"bodies", "placed_object", "attributes", "x_mm", "y_mm"}
         assert names | {"x", "y"} <= {*data.variables, *data.attrs}
         assert all(variable.attrs.get("units") for variable in data.variables.values())
         assert data.force_n.attrs["units"] == "N" and data.tactile_map.dims == ("step", "row", "column")

@@ -37,9 +37,13 @@ def add_command(commands: argparse._SubParsersAction, name: str, run: Callable[[
     return command
 
 
-def add_mesh(command: argparse.ArgumentParser) -> None:
-    """The arguments of a mesh over a sensor."""
-    command.add_argument("mesh", metavar="MESH", type=Path, help="STL, OBJ or PLY file of a closed body")
+def add_mesh(command: argparse.ArgumentParser, *, several: bool = False) -> None:
+    """The arguments of a mesh over a sensor, or of `several`."""
+    if several:
+        command.add_argument("mesh", metavar="MESH", type=Path, nargs="+",
+                             help="STL, OBJ or PLY file of a closed body; several, or a folder of them, are pressed one by one")
+    else:
+        command.add_argument("mesh", metavar="MESH", type=Path, help="STL, OBJ or PLY file of a closed body")
     command.add_argument("--unit", required=True, choices=UNITS, help="the mesh's unit, which the file does not state")
     command.add_argument("--pose", metavar="x,y,z,rx,ry,rz",
                          help="the mesh's origin in the sensor's frame, mm and degrees (default: centred, touching); "
@@ -54,16 +58,16 @@ def add_repair(command: argparse.ArgumentParser) -> None:
                               "overlapping bodies) and name each repair on stderr; --no-repair refuses such a mesh")
 
 
-def read_object(options: argparse.Namespace) -> "tuple[trimesh.Trimesh, list[str]]":
-    """The command line's mesh (trimesh, mm) and the list of its repairs, which are also said on stderr."""
+def read_object(options: argparse.Namespace, path: Path) -> "tuple[trimesh.Trimesh, list[str]]":
+    """A mesh of the command line (trimesh, mm) and the list of its repairs, which are also said on stderr."""
     from softtact.geometry.meshes import read_mesh
     from softtact.geometry.repair import read_mended
 
     if not options.repair:
-        return read_mesh(options.mesh, unit=options.unit), []
-    mended = read_mended(options.mesh, unit=options.unit)
+        return read_mesh(path, unit=options.unit), []
+    mended = read_mended(path, unit=options.unit)
     for repair in mended.repairs:
-        print(f"softtact {options.command}: {options.mesh} was repaired: {repair}", file=sys.stderr)
+        print(f"softtact {options.command}: {path} was repaired: {repair}", file=sys.stderr)
     return mended.mesh, mended.repairs
 
 

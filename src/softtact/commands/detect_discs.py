@@ -1,6 +1,7 @@
 """`softtact detect-discs`: contact discs in camera frames."""
 
 import argparse
+import sys
 from pathlib import Path
 
 from softtact.commands.common import add_command, check_folders, show
@@ -24,6 +25,8 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.add_argument("--calibration-px", type=float, metavar="PX", help="its length in pixels")
     command.add_argument("--min-diameter-mm", type=float, default=0.0, metavar="MM", help="leave smaller discs out")
     command.add_argument("--every", type=int, default=1, metavar="N", help="take each N-th frame only (default: 1)")
+    command.add_argument("--transfer", choices=("linear", "srgb"),
+                         help="values are proportional to light (linear, default), or encoded for a screen (srgb)")
     command.add_argument("--picture", type=Path, metavar="PATH",
                          help="the annotated picture (PNG), or for several frames the folder of theirs "
                               "(default: named after the table, beside it)")
@@ -38,7 +41,10 @@ def _detect_discs(options):
 
     picture = None if options.no_picture else options.picture or options.out.with_suffix("")
     summary = report_discs(options.frames, options.out, picture=picture, pixel_mm=pixel_mm,
-                           smallest_mm=options.min_diameter_mm, every=options.every)
+                           smallest_mm=options.min_diameter_mm, every=options.every, transfer=options.transfer)
+    for sentence, names in summary["warnings"].items():
+        more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+        print(f"softtact detect-discs: warning: {names[0]}{more}: {sentence}", file=sys.stderr)
     show(summary, as_json=options.json, lines=_detect_discs_lines(summary))
 
 

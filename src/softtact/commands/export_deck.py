@@ -48,7 +48,7 @@ def _export_deck(options):
     check_forces(forces, spec)
     check_folders(options.out)
     refuse_overwriting([options.mesh, sensor_path(options.sensor)], {"--out": options.out})
-    mesh, repairs = read_object(options)
+    mesh, repairs = read_object(options, options.mesh)
     check_over_sensor(place(mesh, pose=pose), spec.footprint_mm, name=str(options.mesh))
     from softtact.decks.export import export_press
 

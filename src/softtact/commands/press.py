@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from functools import partial
 from pathlib import Path
 
 import softtact
@@ -19,6 +20,7 @@ from softtact.commands.common import (
     sensor_spec,
     show,
 )
+from softtact.commands.press_each import Files, is_several, press_each
 from softtact.errors import ConvergenceError, InputError
 
 EXAMPLES = """
@@ -27,6 +29,7 @@ EXAMPLES = """
   softtact press part.ply --unit m --pose=-2,1.5,0,0,0,30 --force 10 --model foundation --vtu press.vtu
   softtact press part.stl --unit mm --force 20 --sensor my_sensor.yaml --policy error --tolerance 0.02
   softtact press part.stl --unit mm --force 5 --model elastic --json > press.json
+  softtact press parts/ --unit mm --force 20 --model elastic --out results/ --plot press.png
   softtact press part.stl --unit mm --motion "z -0.5; x 1.0 in 10" --model elastic --out slide.nc
 """
 MODELS = ("auto", "elastic", "foundation", "hyperelastic")
@@ -35,7 +38,7 @@ MODELS = ("auto", "elastic", "foundation", "hyperelastic")
 def add(commands: argparse._SubParsersAction) -> None:
     """Add the command to the parser."""
     command = add_command(commands, "press", _press, "Press a mesh on the sensor: deformation map and taxels.", EXAMPLES)
-    add_mesh(command)
+    add_mesh(command, several=True)
     add_repair(command)
     how = command.add_mutually_exclusive_group(required=True)
     how.add_argument("--force", type=float, action="append", metavar="N", help="force in N; repeat it for several load steps")
@@ -58,7 +61,8 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.add_argument("--time-limit", type=float, metavar="S",
                          help="end after so many seconds; the load steps that were reached are written and shown")
     command.add_argument("--out", type=Path, metavar="FILE.nc",
-                         help="write the maps as NetCDF, anew with each load step that is reached")
+                         help="write the maps as NetCDF, anew with each load step that is reached; of several meshes: the folder "
+                              "in which each gets a folder of its own with press.nc, --vtu and --plot")
     command.add_argument("--vtu", type=Path, metavar="FILE.vtu",
                          help="write the pressed sensor for ParaView and softtact view: the hyperelastic model's whole mesh, the "
                               "others' surface")
@@ -68,35 +72,55 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def _press(options):
-    from dataclasses import replace
-
     from softtact.files import refuse_overwriting
-    from softtact.geometry.meshes import check_over_sensor, place
 
     _refuse_idle(options)
     if options.time_limit is not None and not options.time_limit > 0:
         raise InputError(f"--time-limit {options.time_limit:g}: a press needs some time; give seconds above 0.")
     spec, pose = sensor_spec(options.sensor), pose_of(options)
     how = _how(options, spec)
-    check_folders(options.out, options.vtu, options.plot)
+    check_names({options.vtu: (".vtu",), options.plot: (".png", ".svg")})
+    several = is_several(options.mesh)
+    if not several:
+        check_folders(options.out, options.vtu, options.plot)
+        check_names({options.out: (".nc",)})
     cards = [path for _, path in pairs("--card", options.card)]
-    refuse_overwriting([options.mesh, sensor_path(options.sensor), *cards],
+    refuse_overwriting([*options.mesh, sensor_path(options.sensor), *cards],
                        {"--out": options.out, "--vtu": options.vtu, "--plot": options.plot})
-    check_names({options.out: (".nc",), options.vtu: (".vtu",), options.plot: (".png", ".svg")})
-    mesh, repairs = read_object(options)
-    check_over_sensor(place(mesh, pose=pose), spec.footprint_mm, name=str(options.mesh))
+    press = partial(_press_one, options=options, spec=spec, pose=pose, how=how, sensors={})
+    if several:
+        return press_each(options, press)
+    summary, error = press(options.mesh[0], Files(options.out, options.vtu, options.plot))
+    show(summary, as_json=options.json, lines=_press_lines(summary))
+    if error:
+        raise error
+
+
+def _press_one(path, files, label="press", *, options, spec, pose, how, sensors):
+    """Summary of a mesh's press, whose files are written, and the error that ended it before its last load step or None.
+
+    sensors: holds the sensor from the first press on, with what its models prepared
+    """
+    from dataclasses import replace
+
+    from softtact.geometry.meshes import check_over_sensor, place
+
+    mesh, repairs = read_object(options, path)
+    check_over_sensor(place(mesh, pose=pose), spec.footprint_mm, name=str(path))
+    if not sensors:
+        sensors["own"] = replace(softtact.load_sensor(options.sensor, materials=_cards(options)), **_quality(options),
+                                 device=options.device)
+    sensor = replace(sensors["own"], attributes={"mesh_repairs": "; ".join(repairs), **_origin(options, path)})
+    on_step = None if files.out is None else lambda result: result.write(files.out)
     try:
-        attributes = {"mesh_repairs": "; ".join(repairs), **_origin(options)}
-        sensor = replace(softtact.load_sensor(options.sensor, materials=_cards(options)),
-                         **_quality(options), device=options.device, attributes=attributes)
-        result = sensor.press(mesh, pose=pose, **how, model=options.model,
-                              policy=options.policy, tolerance_mm=options.tolerance, keep_body=options.vtu is not None,
-                              time_limit_s=options.time_limit, on_step=_writer(options))
-    except (ConvergenceError, KeyboardInterrupt) as error:
-        if getattr(error, "result", None) is not None:
-            _show_press(error.result, options)
-        raise
-    _show_press(result, options)
+        result, error = sensor.press(mesh, pose=pose, **how, model=options.model, policy=options.policy, label=label,
+                                     tolerance_mm=options.tolerance, keep_body=files.vtu is not None, keep_object=True,
+                                     time_limit_s=options.time_limit, on_step=on_step), None
+    except (ConvergenceError, KeyboardInterrupt) as stop:
+        if getattr(stop, "result", None) is None:
+            raise
+        result, error = stop.result, stop
+    return _written(result, files, options), error
 
 
 # Options that have an effect on the hyperelastic model alone, on the laws that the elastic model has none of, or on the choice.
@@ -118,17 +142,12 @@ def _refuse_idle(options):
         raise InputError("--full-scale: it has no effect without --plot; give --plot FILE.png, or leave it out.")
 
 
-def _origin(options):
+def _origin(options, path):
     """What a press came from, as attributes of its file."""
     import hashlib
 
-    return {"mesh": options.mesh.name, "mesh_sha256": hashlib.sha256(options.mesh.read_bytes()).hexdigest(), "unit": options.unit,
+    return {"mesh": path.name, "mesh_sha256": hashlib.sha256(path.read_bytes()).hexdigest(), "unit": options.unit,
             "pose": options.pose or "centred, touching", "command": " ".join(["softtact", *options.given])}
-
-
-def _writer(options):
-    """What writes the load steps so far to --out; None without it."""
-    return None if options.out is None else lambda result: result.write(options.out)
 
 
 def _how(options, spec):
@@ -155,20 +174,18 @@ def _quality(options):
     return {"mesh": mesh(), "solver": solver()}
 
 
-def _show_press(result, options):
-    """Write and print what a press gave, be it the load steps before one that was not reached."""
-    if options.out:
-        result.write(options.out)
-    if options.vtu:
-        result.write_vtu(options.vtu)
-    if options.plot:
-        result.plot(options.plot, full_scale=options.full_scale)
+def _written(result, files, options):
+    """The summary of what a press gave, be it the load steps before one that was not reached; its files are written."""
+    if files.out:
+        result.write(files.out)
+    if files.vtu:
+        result.write_vtu(files.vtu)
+    if files.plot:
+        result.plot(files.plot, full_scale=options.full_scale)
     if options.card and result.model == "elastic":
         print(f"softtact press: WARNING: --card {' '.join(options.card)} has no effect on the elastic model, which was chosen; "
               "name another model to use it.", file=sys.stderr)
-    summary = _press_summary(result)
-    summary["written"] = [str(path) for path in (options.out, options.vtu, options.plot) if path]
-    show(summary, as_json=options.json, lines=_press_lines(summary))
+    return _press_summary(result) | {"written": [str(path) for path in (files.out, files.vtu, files.plot) if path]}
 
 
 def _cards(options):

@@ -97,11 +97,15 @@ class Motion:
         """Whether the object only goes up and down."""
         return not any(step.ways.keys() - {"z"} or step.loads.keys() - {"z"} for step in self.steps)
 
+    @property
+    def aside_mm(self) -> np.ndarray:
+        """Ways (step, 2) in mm along x and y from where the motion begins to each step's end."""
+        return np.cumsum([[step.ways.get("x", 0.0), step.ways.get("y", 0.0)] for step in self.steps], axis=0)
+
     def offsets_mm(self, *, at_most_mm: float = 0.5) -> np.ndarray:
         """Ways (k, 2) in mm aside from where the motion begins, at every step's end and no farther apart than `at_most_mm`."""
-        ends = np.cumsum([[step.ways.get("x", 0.0), step.ways.get("y", 0.0)] for step in self.steps], axis=0)
         places = [np.zeros(2)]
-        for end in ends:
+        for end in self.aside_mm:
             count = max(1, math.ceil(np.linalg.norm(end - places[-1]) / at_most_mm))
             places += list(places[-1] + np.linspace(0, 1, count + 1)[1:, None] * (end - places[-1]))
         return np.array(places)

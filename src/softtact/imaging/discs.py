@@ -1,5 +1,6 @@
 """Bright contact discs in a camera frame: found by their edges, measured by an outline fitted to their light."""
 
+import warnings
 from functools import cached_property
 from typing import Any
 
@@ -9,7 +10,8 @@ from scipy.ndimage import binary_erosion, distance_transform_edt, gaussian_gradi
 from skimage.measure import find_contours, regionprops
 from skimage.segmentation import expand_labels
 
-from softtact.errors import InputError
+from softtact.errors import FrameWarning
+from softtact.imaging.light import grey, warn_of_unseen_contrast
 from softtact.imaging.outline import (
     COLUMN,
     NAMES,
@@ -31,14 +33,15 @@ from softtact.imaging.regions import EDGE_SCALE, FAINTEST, find_regions, is_ring
 DTYPES = {"disc": int, "x_mm": float, "y_mm": float, "area_mm2": float, "area_sd_mm2": float, "diameter_mm": float,
           "signal_to_noise": float, "clipped": bool, "touching": bool, "measured_by": str}
 COLUMNS = list(DTYPES)
-SMALLEST_SIDE = 16       # pixels of a frame
 SMALLEST_PIXELS = 6      # area; what is smaller is noise or a hot pixel
 SURE = 3.0               # standard deviations of its area; what has less is not told from noise
 _MISFIT, _RESIDUAL = 1.5, 0.08   # over noise and over contrast: beyond both, the contact has no such outline
+_GROUND = 0.4            # of the frame; what has no outline and fills that much is rather the ground
 PASSES = 3               # fits of every disc: alone, with what the others tell, and once more beside its neighbours' light
 
 
-def detect_discs(frame: np.ndarray, *, pixel_mm: float, smallest_mm: float = 0.0) -> pd.DataFrame:
+def detect_discs(frame: np.ndarray, *, pixel_mm: float, smallest_mm: float = 0.0, transfer: str = "linear",
+                 lossy: bool = False) -> pd.DataFrame:
     """Table of the bright discs in a frame (rows, columns) or (rows, columns, channels), one row each.
 
     disc             number, from 0, from top to bottom
@@ -51,45 +54,33 @@ def detect_discs(frame: np.ndarray, *, pixel_mm: float, smallest_mm: float = 0.0
     measured_by      outline, or light (summed) where the contact has no simple outline
 
     smallest_mm: discs of a smaller diameter are left out. A frame without discs gives an empty table.
+    transfer, lossy: how values tell light, see `softtact.imaging.light.grey`
+    Warns (`FrameWarning`) of what may be wrong with the frame.
     """
-    return discs_and_outlines(frame, pixel_mm=pixel_mm, smallest_mm=smallest_mm)[0]
+    return discs_and_outlines(frame, pixel_mm=pixel_mm, smallest_mm=smallest_mm, transfer=transfer, lossy=lossy)[0]
 
 
-def discs_and_outlines(frame: np.ndarray, *, pixel_mm: float, smallest_mm: float = 0.0) -> tuple[pd.DataFrame, list[np.ndarray]]:
+def discs_and_outlines(frame: np.ndarray, *, pixel_mm: float, smallest_mm: float = 0.0, transfer: str = "linear",
+                       lossy: bool = False) -> tuple[pd.DataFrame, list[np.ndarray]]:
     """The table of `detect_discs`, and the outline of each disc: x_mm and y_mm of its corners (corners, 2)."""
-    image = grey(frame)
+    image = grey(frame, transfer=transfer, lossy=lossy)
     scene = Scene(image)
     least = max(SMALLEST_PIXELS, np.pi * (0.5 * smallest_mm / pixel_mm) ** 2)
     rows = [row for row in map(scene.measure, range(len(scene.fits)))
             if row["pixels"] >= least and row["contrast"] >= FAINTEST and row["pixels"] > SURE * row["pixels_sd"]]
+    _warn(rows, image, lossy=lossy)
     middle = 0.5 * (np.array(image.shape) - 1)
     outlines = [(scene.corners(row) - middle)[:, ::-1] * pixel_mm for row in rows]
     return _table(rows, middle, pixel_mm), outlines
 
 
-def grey(frame: np.ndarray) -> np.ndarray:
-    """A frame of any depth as grey values (rows, columns) whose full scale is 1; colours count alike, alpha does not.
-
-    The full scale of integers is that of the fewest bits that hold them, at least 8: cameras store 10 or 12 bits in 16.
-    That of floating-point numbers is 1, or their largest where it is above.
-    """
-    frame = np.asarray(frame)
-    if frame.ndim not in (2, 3) or min(frame.shape[:2]) < SMALLEST_SIDE:
-        raise InputError(f"a frame of shape {frame.shape} is no picture of at least {SMALLEST_SIDE} x {SMALLEST_SIDE} pixels; "
-                         "give (rows, columns) or (rows, columns, channels).")
-    whole = frame.dtype.kind in "ui"
-    if frame.ndim == 3:
-        frame = frame[..., :3].mean(axis=2, dtype=float) if frame.shape[2] > 2 else frame[..., 0]
-    light = np.asarray(frame, dtype=float)
-    if not np.isfinite(light).all():
-        raise InputError("a frame holds values that are not numbers; save it without them.")
-    return light / _full_scale(light, whole=whole)
-
-
-def _full_scale(light, *, whole):
-    if whole:
-        return 2.0 ** max(int(np.ceil(light.max())).bit_length(), 8) - 1
-    return max(float(light.max()), 1.0)
+def _warn(rows, image, *, lossy):
+    """Warn where what was found hardly is what was to be found."""
+    if not rows:
+        warn_of_unseen_contrast(image, lossy=lossy)
+    if sum(row["pixels"] for row in rows if row["measured_by"] == "light") > _GROUND * image.size:
+        warnings.warn("much of the frame is bright and has no outline of a disc; contacts must be bright on dark: invert the frame "
+                      "if they are dark.", FrameWarning, stacklevel=3)
 
 
 def _table(rows, middle, pixel_mm):

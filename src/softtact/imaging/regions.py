@@ -40,18 +40,23 @@ class Regions(NamedTuple):
 
 
 def noise_of(image: np.ndarray, where: np.ndarray | None = None) -> float:
+    """Noise of one pixel as in `pixel_noise`, in an image whose full scale is 1; at least that of rounding to 8 bits."""
+    return max(pixel_noise(image, where), _COUNT)
+
+
+def pixel_noise(image: np.ndarray, where: np.ndarray | None = None) -> float:
     """Standard deviation of the noise of one pixel, from differences that are blind to slopes and few of which meet an edge.
 
     where: pixels (rows, columns) bool that count; default all. Median form of J. Immerkaer, Computer Vision and Image
     Understanding 64 (1996) 300.
     """
     cross = convolve(image, np.outer([1, -2, 1], [1, -2, 1]) / 6.0)
-    return max(1.4826 * float(np.median(np.abs(cross if where is None else cross[where]))), _COUNT)
+    return 1.4826 * float(np.median(np.abs(cross if where is None else cross[where])))
 
 
 def find_regions(image: np.ndarray, *, noise: float) -> Regions:
     """The `Regions` of a frame (rows, columns) whose full scale is 1."""
-    slope = _slope(image)
+    slope = slope_of(image)
     smooth = gaussian_filter(image, _SMOOTH)
     edges = slope > _least_slope(smooth, noise)
     if not edges.any():
@@ -70,7 +75,7 @@ def _threshold(smooth, weights):
     return surface + near / (gaussian_filter(weights, _NEARBY) + 1e-3 * weights[where].mean())
 
 
-def _slope(image):
+def slope_of(image: np.ndarray) -> np.ndarray:
     """Change of brightness per pixel (rows, columns). At the border, where the filter sees only half, less of it counts."""
     slope = gaussian_gradient_magnitude(image, EDGE_SCALE)
     reach = int(2 * EDGE_SCALE)
@@ -83,10 +88,10 @@ def _least_slope(smooth, noise):
     """Change of brightness per pixel that neither noise reaches, nor the steps of 8 bits, nor light that changes over a wide
     distance."""
     of_noise = EDGE_SIGNIFICANCE * noise / (np.sqrt(8 * np.pi) * EDGE_SCALE**2)
-    return max(of_noise, _steepest(FAINTEST, blur=0.0), _steepest(float(np.ptp(smooth)), blur=WIDEST_EDGE))
+    return max(of_noise, steepest(FAINTEST, blur=0.0), steepest(float(np.ptp(smooth)), blur=WIDEST_EDGE))
 
 
-def _steepest(contrast, *, blur):
+def steepest(contrast: float, *, blur: float) -> float:
     """Slope in the middle of a blurred edge, seen by the filter that looks for it."""
     return contrast / np.sqrt(2 * np.pi * (blur**2 + EDGE_SCALE**2))
 

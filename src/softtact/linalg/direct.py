@@ -10,6 +10,7 @@ import numpy as np
 import scipy.linalg as sla
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
+from numba import njit
 
 from softtact.linalg.block_tridiagonal import BlockTridiagonalSolver, inverse_among
 
@@ -22,24 +23,31 @@ def make_solver(*, threads: int = 1) -> "PardisoSolver | BlockTridiagonalSolver"
         return BlockTridiagonalSolver()
 
 
-def condensed_inverse(upper: sp.csr_matrix, kept: np.ndarray, *, threads: int = 1) -> np.ndarray:
+def condensed_inverse(upper: sp.csr_matrix, kept: np.ndarray, *, threads: int = 1, dtype: type = np.float64) -> np.ndarray:
     """Rows and columns `kept` (k,) of the inverse of a positive definite matrix, given by its upper triangle (csr, sorted).
 
-    The rest is eliminated by a factor that ends before them (Schur complement); what is left is small and dense. Where MKL is
-    missing it takes two to three times as long.
+    The rest is eliminated by a factor that ends before them (Schur complement); what is left is dense, and inverted in its place.
+    dtype: of the result, all is computed in double precision. Where MKL is missing it takes two to three times as long.
     """
     try:
         stiffness = _schur_complement(upper, kept, threads)
     except (ImportError, OSError):
-        return _inverse_without_mkl(upper, kept)
+        return _inverse_without_mkl(upper, kept).astype(dtype, copy=False)
     lower, fault = sla.lapack.dpotrf(stiffness, lower=1, overwrite_a=1)
     inverse, also = sla.lapack.dpotri(lower, lower=1, overwrite_c=1)
     if fault or also:
         raise np.linalg.LinAlgError("The condensed stiffness is not positive definite.")
-    inverse = np.tril(inverse)
-    inverse += np.tril(inverse, -1).T
-    rank = np.argsort(np.argsort(kept))   # PARDISO keeps the matrix' own order
-    return inverse[np.ix_(rank, rank)]
+    out = np.empty(inverse.shape, dtype=dtype)
+    _fill_from_lower(inverse.T, np.argsort(kept), out)   # PARDISO keeps the matrix' own order
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _fill_from_lower(triangle, place, out):
+    """Rows and columns `place` (k,) of `out` (k, k) become a symmetric matrix, of which triangle[j, i] is given for j <= i."""
+    for j in range(len(place)):
+        for i in range(j, len(place)):
+            out[place[i], place[j]] = out[place[j], place[i]] = triangle[j, i]
 
 
 def _schur_complement(upper, kept, threads):
@@ -60,7 +68,7 @@ def _schur_complement(upper, kept, threads):
     finally:
         solver.libmkl.MKL_Set_Num_Threads_Local(before)
         solver.free_memory(everything=True)
-    return np.asfortranarray(out.T.ravel()[:count * count].reshape(count, count))
+    return out.T.ravel()[:count * count].reshape(count, count).T     # symmetric, and in LAPACK's order without a copy
 
 
 def _inverse_without_mkl(upper, kept):

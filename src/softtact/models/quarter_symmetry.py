@@ -104,18 +104,16 @@ class QuarterSlab:
 
     @cached_property
     def stiffness(self) -> sp.csr_matrix:
-        """The stiffness (unknowns, unknowns) in N/mm; elements of a layer are all alike."""
-        rows, columns, values = [], [], []
+        """The stiffness (unknowns, unknowns) in N/mm; elements of a layer are all alike, and summed up layer by layer."""
+        whole = sp.csr_matrix((self.unknowns, self.unknowns))
         for (layer, thickness), hexes in zip(self.layers, self.hexes, strict=True):
             law = make_law("neo_hooke", {"c10": 0.5 * layer.shear_modulus}, bulk_modulus=layer.bulk_modulus)
             block = HexBlock(0.5 * HEX27.nodes[None] * self._sizes(thickness), law)
             element = block.tangent(np.zeros((1, 27, 3)))[0]
-            dofs = dofs_of(hexes)
-            rows.append(np.repeat(dofs, 81, axis=1).ravel())
-            columns.append(np.tile(dofs, (1, 81)).ravel())
-            values.append(np.tile(element.ravel(), len(dofs)))
-        return sp.csr_matrix(tuple([np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))]),
-                             shape=(self.unknowns, self.unknowns))
+            dofs = dofs_of(hexes).astype(np.int32)
+            places = np.repeat(dofs, 81, axis=1).ravel(), np.tile(dofs, (1, 81)).ravel()
+            whole = whole + sp.csr_matrix((np.tile(element.ravel(), len(dofs)), places), shape=whole.shape)
+        return whole
 
     def free(self, parity: tuple[int, ...]) -> np.ndarray:
         """Unknowns that are not held at the sides, by the base, or by the parity on the planes of symmetry."""
@@ -144,22 +142,20 @@ class QuarterSlab:
         """
         points, weights, _ = HEX27.quadrature
         j, i = (grid.ravel() for grid in np.meshgrid(np.arange(self.cells[1]), np.arange(self.cells[0]), indexing="ij"))
-        entries: list[tuple[list, list, list]] = [([], [], []) for _ in range(3)]
+        matrices = [sp.csr_matrix((count, self.unknowns)) for _ in range(3)]
         for (layer, thickness), hexes in zip(self.layers, self.hexes, strict=True):
             size = self._sizes(thickness)
             gradients, dofs = HEX27.shape(points)[1] * (2 / size), dofs_of(hexes)
             for point, weight, gradient in zip(points, weights * np.prod(size) / 8, gradients, strict=True):
                 owner = cells_of((i + 0.5 + 0.5 * point[0]) * size[0], (j + 0.5 + 0.5 * point[1]) * size[1])
                 inside = owner >= 0
-                for (rows, columns, values), row in zip(entries, _membrane_stress(layer, gradient), strict=True):
-                    rows.append(np.repeat(owner[inside], 81))
-                    columns.append(dofs[inside].ravel())
-                    values.append(np.tile(weight * row, inside.sum()))
-        matrices = [sp.csr_matrix((np.concatenate(v), (np.concatenate(r), np.concatenate(c))), shape=(count, self.unknowns))
-                    for r, c, v in entries]
+                places = np.repeat(owner[inside], 81), dofs[inside].ravel()
+                for axis, row in enumerate(_membrane_stress(layer, gradient)):
+                    matrices[axis] += sp.csr_matrix((np.tile(weight * row, inside.sum()), places), shape=matrices[axis].shape)
         return matrices
 
-    def compliance(self, stiffness: sp.csr_matrix, kept: np.ndarray, parity: tuple[int, ...], *, threads: int = 1) -> np.ndarray:
+    def compliance(self, stiffness: sp.csr_matrix, kept: np.ndarray, parity: tuple[int, ...], *, threads: int = 1,
+                   dtype: type = np.float64) -> np.ndarray:
         """Compliance (k, k) among the unknowns `kept` of a stiffness, in one parity; zero for those that it holds."""
         free = np.concatenate([self.free(parity), np.arange(self.unknowns, stiffness.shape[0])])
         place = np.full(stiffness.shape[0], -1)
@@ -167,8 +163,11 @@ class QuarterSlab:
         there = place[kept] >= 0
         upper = sp.triu(stiffness[free][:, free], format="csr")
         upper.sort_indices()
-        out = np.zeros((len(kept), len(kept)))
-        out[np.ix_(there, there)] = condensed_inverse(upper, place[kept[there]], threads=threads)
+        among = condensed_inverse(upper, place[kept[there]], threads=threads, dtype=dtype)
+        if there.all():
+            return among
+        out: np.ndarray = np.zeros((len(kept), len(kept)), dtype=dtype)
+        out[np.ix_(there, there)] = among
         return out
 
 

@@ -1,6 +1,7 @@
 """What a sensor's fast models start from: computed once for a sensor, and kept in the user's cache."""
 
 import importlib.util
+import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,35 +15,48 @@ from softtact.progress import announce
 from softtact.sensors.frusta import SensorSpec
 from softtact.sensors.specification import AnySpec
 
-_FORMAT = 11    # of the files; another one makes them again
+_POINTS = 1881  # of the paper's map
+_FORMAT = 12    # of the files; another one makes them again
 
 
-def _values(spec):
-    """What of a sensor the fast models start from: not its readout, nor the kind that a file without one is of."""
-    return spec.model_dump(mode="json", exclude={"largest_counts"} | ({"kind"} if spec.kind == "frusta" else set()))
+def _of_layer(spec):
+    """What of a sensor its elastic layer depends on, and nothing else: not its name, frusta, taxels or friction."""
+    return [spec.footprint_mm, spec.map_shape, spec.thickness_mm, repr(spec.elastic_layer), spec.edge.held_below_mm, spec.base_held]
+
+
+def _of_frusta(spec):
+    """What of a sensor its slab on frusta depends on, beside the laws."""
+    return [spec.footprint_mm, spec.map_shape, repr(spec.dielectric.frusta), spec.dielectric.sheet_thickness_mm,
+            spec.cover.thickness_mm, spec.edge.held_below_mm, spec.tips_bonded, repr(spec.friction)]
 
 
 def cached_compliance(spec: AnySpec, *, threads: int = 1) -> Compliance:
-    """The elastic layer's `Compliance`, by the sensor's values."""
-    return _cached("compliance", [_values(spec)], Compliance,
-                   f"{spec.name}: computing the elastic layer's compliance, once for this sensor (some ten seconds)",
+    """The elastic layer's `Compliance`, by the values that it depends on."""
+    return _cached("compliance", _of_layer(spec), Compliance,
+                   f"{spec.name}: computing the elastic layer's compliance, once for this sensor ({_about(spec, 15, 2.0)})",
                    lambda: elastic_compliance(spec, threads=threads))
 
 
 def cached_surface_compliance(spec: AnySpec, *, threads: int = 1) -> SurfaceCompliance:
-    """The elastic layer's `SurfaceCompliance`, by the values that it depends on: friction and taxels change nothing."""
-    values = [spec.footprint_mm, spec.map_shape, spec.thickness_mm, repr(spec.elastic_layer), spec.edge.held_below_mm]
-    return _cached("surface", values, SurfaceCompliance,
+    """The elastic layer's `SurfaceCompliance`, by the values that it depends on."""
+    return _cached("surface", _of_layer(spec), SurfaceCompliance,
                    f"{spec.name}: computing the elastic layer's compliance to forces in all directions, once for this sensor (a "
                    "minute or two; 230 MB for the paper's)", lambda: surface_compliance(spec, threads=threads))
 
 
 def cached_foundation(spec: SensorSpec, laws: Mapping[str, Law], *, threads: int = 1) -> FoundationCompliance:
-    """The `FoundationCompliance` of a sensor with its laws {"dielectric", "cover"}, by the values of all three."""
+    """The `FoundationCompliance` of a sensor with its laws {"dielectric", "cover"}, by the values that it depends on."""
     dielectric, cover = laws["dielectric"], laws["cover"]
-    return _cached("foundation", [_values(spec), repr(dielectric), repr(cover)], FoundationCompliance,
-                   f"{spec.name}: computing a frustum's law and the slab's compliance, once for this sensor and these laws (about "
-                   "a minute)", lambda: foundation_compliance(spec, dielectric_law=dielectric, cover_law=cover, threads=threads))
+    return _cached("foundation", [*_of_frusta(spec), repr(dielectric), repr(cover)], FoundationCompliance,
+                   f"{spec.name}: computing a frustum's law and the slab's compliance, once for this sensor and these laws "
+                   f"({_about(spec, 60, 2.5)})",
+                   lambda: foundation_compliance(spec, dielectric_law=dielectric, cover_law=cover, threads=threads))
+
+
+def _about(spec, seconds, power):
+    """How long it takes, in words: seconds for the paper's sensor, which grow with a power of the map's points."""
+    took = seconds * (math.prod(spec.map_shape) / _POINTS) ** power
+    return f"about {took / 60:.0f} minutes" if took > 90 else "about a minute" if took > 40 else "some ten seconds"
 
 
 def _cached(kind, values, cls, message, compute):

@@ -8,6 +8,7 @@ import numpy as np
 
 from softtact.errors import InputError
 from softtact.files import PROVENANCE, read_dataset, write_dataset
+from softtact.press.placed_object import PlacedObject
 from softtact.press.vtu import of_bodies, of_map
 
 if TYPE_CHECKING:
@@ -92,6 +93,9 @@ class PressResult:
     bodies: "tuple[PressedBody, ...]" = ()
     """A `PressedBody` for each force where `Sensor.press` was asked to keep them, else none; not written with the maps."""
 
+    placed_object: PlacedObject | None = None
+    """The object where it stands at each load step, where `Sensor.press` was asked to keep it; it is written with the maps."""
+
     def __post_init__(self) -> None:
         steps, vertical = len(self.normal_force_n), np.array([0.0, 0.0, 1.0])
         unknown = np.where(vertical == 0, np.nan, 1.0)
@@ -141,6 +145,8 @@ class PressResult:
         for one in _arrays():
             kept = coordinates if one.metadata["coordinate"] else arrays
             kept[_name(one)] = (one.metadata["dimensions"], getattr(self, one.name), {"units": one.metadata["units"]})
+        if self.placed_object is not None:
+            arrays |= self.placed_object.variables()
         return xarray.Dataset(arrays, coords=coordinates, attrs={name: getattr(self, name) for name in _facts()} | self.attributes)
 
     def write(self, path: str | Path, *, settings: dict[str, Any] | None = None, seed: int | None = None) -> None:
@@ -157,6 +163,8 @@ class PressResult:
         else:
             mesh = of_map(self.deformation_map_mm, self.x_mm, self.y_mm, self.normal_force_n,
                           thickness_mm=self.attributes["thickness_mm"])
+        if self.placed_object is not None:
+            mesh = mesh.with_object(self.placed_object)
         mesh.write(path)
 
 
@@ -177,7 +185,8 @@ def read_press(path: str | Path) -> PressResult:
     arrays: dict[str, Any] = {one.name: data[_name(one)].values for one in _arrays()}
     attributes = {name: value.item() if isinstance(value, np.generic) else value for name, value in data.attrs.items()}
     facts = {name: attributes.pop(name) for name in _facts()}
-    return PressResult(**arrays, **facts, attributes={name: value for name, value in attributes.items() if name not in PROVENANCE})
+    attributes = {name: value for name, value in attributes.items() if name not in PROVENANCE}
+    return PressResult(**arrays, **facts, attributes=attributes, placed_object=PlacedObject.of(data))
 
 
 def _arrays() -> list[Field[Any]]:

@@ -6,7 +6,7 @@
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -33,6 +33,7 @@ from softtact.press.choice import TOLERANCE_MM, press_auto, with_expected_error
 from softtact.press.making import Course
 from softtact.press.many import press_many, raise_first
 from softtact.press.models import MOTIONS, PRESSES
+from softtact.press.placed_object import placed_object
 from softtact.press.result import PressResult
 from softtact.press.validity import flag_buried, flag_overloaded
 from softtact.sensors.library import material_file, sensor_file
@@ -82,8 +83,8 @@ class Sensor:
     def press(self, mesh: trimesh.Trimesh | str | Path, *, unit: str | None = None,
               pose: Pose | np.ndarray | Sequence[float] | None = None, force_n: float | Sequence[float] | None = None,
               motion: Motion | None = None, model: str = "auto", policy: str = "error", tolerance_mm: float = TOLERANCE_MM,
-              label: str = "press", threads: int | None = None, keep_body: bool = False, time_limit_s: float | None = None,
-              on_step: Callable[[PressResult], None] | None = None) -> PressResult:
+              label: str = "press", threads: int | None = None, keep_body: bool = False, keep_object: bool = False,
+              time_limit_s: float | None = None, on_step: Callable[[PressResult], None] | None = None) -> PressResult:
         """Press a mesh (trimesh in mm, or a file with its `unit`) through forces (N) or a `Motion`; return a `PressResult`.
 
         force_n: one force, or an increasing list
@@ -98,6 +99,7 @@ class Sensor:
         threads: by default one for each core.
         keep_body: let the result hold the deformed body at each force (`PressResult.pressed_body`), some 20 MB each; of the
         hyperelastic model, for the others have displacements of the map's plane alone.
+        keep_object: let the result hold the object where it stands at each step (`PressResult.placed_object`).
         time_limit_s: seconds after which the press ends in a TimeLimitError;  on_step: called with the result so far at each
         load step that is reached but the last.
         Raises ConvergenceError at a force that is not reached; its `result` holds the forces before, as those of a
@@ -106,23 +108,25 @@ class Sensor:
         mesh, pose = _mesh_of(mesh, unit), Pose.of(pose)
         if model not in MODELS:
             raise InputError(f"Model {model!r} is unknown; use one of {', '.join(MODELS)}.")
-        course = Course(label, threads or cores(), keep_body, time_limit_s, on_step)
-        if motion is not None and force_n is None and not motion.forces_n:
-            return self._press_motion(mesh, pose, motion, model, course)
-        forces = self.checked_forces(_given(force_n, motion))
         placed = place(mesh, pose=pose)
+        stand = self._standing(placed, motion) if keep_object else lambda result: result
+        course = Course(label, threads or cores(), keep_body, time_limit_s, on_step and (lambda result: on_step(stand(result))))
+        if motion is not None and force_n is None and not motion.forces_n:
+            return self._press_motion(placed, motion, model, course, stand)
+        forces = self.checked_forces(_given(force_n, motion))
         check_over_sensor(placed, self.spec.footprint_mm)
         height = self._height_mm(placed)
         # Dense products of some hundred rows would wait for each other on more threads, up to five times as long.
         press = PRESSES[model] if model != "auto" else partial(press_auto, policy=policy, tolerance_mm=tolerance_mm)
         try:
             with threadpool_limits(limits=course.threads if model == "elastic" else 1):
-                return flag_buried(with_expected_error(self, press(self, placed, forces, course)), height)
+                return stand(flag_buried(with_expected_error(self, press(self, placed, forces, course)), height))
         except (ConvergenceError, KeyboardInterrupt) as error:
-            error.result = _flagged_if_any(error, lambda result: flag_buried(result, height))     # type: ignore[union-attr]
+            error.result = _flagged_if_any(error, lambda result: stand(flag_buried(result, height)))     # type: ignore[union-attr]
             raise
 
-    def _press_motion(self, mesh: trimesh.Trimesh, pose: Pose | None, motion: Motion, model: str, course: Course) -> PressResult:
+    def _press_motion(self, placed: trimesh.Trimesh, motion: Motion, model: str, course: Course,
+                      stand: Callable[[PressResult], PressResult]) -> PressResult:
         """A press that does more than go straight down by growing forces."""
         press = MOTIONS.get("hyperelastic" if model == "auto" else model)
         if press is None:
@@ -130,15 +134,23 @@ class Sensor:
                              "for this motion, or give force_n.")
         for load in (step.loads["z"] for step in motion.steps if step.loads.get("z", 0.0) < 0):
             self.checked_forces(-load)
-        placed = place(mesh, pose=pose)
         check_over_sensor(placed, self.spec.footprint_mm)
         height = self._height_mm(placed)
         try:
             with threadpool_limits(limits=course.threads if model == "elastic" else 1):
-                return self._flagged(press(self, placed, motion, course), height)
+                return stand(self._flagged(press(self, placed, motion, course), height))
         except (ConvergenceError, KeyboardInterrupt) as error:
-            error.result = _flagged_if_any(error, lambda result: self._flagged(result, height))     # type: ignore[union-attr]
+            error.result = _flagged_if_any(error, lambda result: stand(self._flagged(result, height)))  # type: ignore[union-attr]
             raise
+
+    def _standing(self, placed: trimesh.Trimesh, motion: Motion | None) -> Callable[[PressResult], PressResult]:
+        """What adds to a result the object where it stands."""
+        def stand(result: PressResult) -> PressResult:
+            touch = HeightField(placed).first_touch_mm(self.spec.map_x_mm, self.spec.map_y_mm)
+            aside = np.zeros((len(result.indentation_mm), 2)) if motion is None else motion.aside_mm
+            return replace(result, placed_object=placed_object(placed, touch_mm=touch, indentation_mm=result.indentation_mm,
+                                                               aside_mm=aside))
+        return stand
 
     def _height_mm(self, placed: trimesh.Trimesh) -> float:
         """Height (mm) of an object's top over where it first touches."""

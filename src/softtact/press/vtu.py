@@ -3,11 +3,12 @@
 hyperelastic: the solver's own mesh, all of it (`Sensor.press(keep_body=True)`), and the object's pressure on the cover's faces.
 elastic, foundation: the deformation map as a surface in the sensor's walls and bottom at rest; only the map's vertical
 displacement is known there, and no pressure on the map's grid.
+The object stands beside it where it was kept (`Sensor.press(keep_object=True)`).
 """
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,16 +16,18 @@ import numpy as np
 
 from softtact.errors import InputError
 from softtact.files import atomic_path
+from softtact.press.placed_object import PlacedObject
 
 if TYPE_CHECKING:
     from softtact.models.hyperelastic.deformed_mesh import PressedBody
 
-LAYERS = {"frusta": 0, "sheet": 1, "cover": 2, "pressed face": 3, "wall at rest": 4}
+LAYERS = {"frusta": 0, "sheet": 1, "cover": 2, "pressed face": 3, "wall at rest": 4, "object": 5}
 _DISPLACEMENT, _PRESSURE = "displacement_mm_", "contact_pressure_mpa_"     # with `PressedMesh._ends`
 _LOAD_STEP = re.compile(r"displacement_mm_(.+?)N(?:_step(\d+))?")
 # Faces of a cell of VTK's by its corners; the cells that are drawn by `surface`.
 _FACES = {"hexahedron": ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
-          "wedge": ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)), "quad": ((0, 1, 2, 3),)}
+          "wedge": ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)), "quad": ((0, 1, 2, 3),),
+          "triangle": ((0, 1, 2),)}
 
 
 @dataclass(frozen=True)
@@ -69,9 +72,23 @@ class PressedMesh:
         ends = [f"{force:g}N" for force in self.force_n]
         return ends if len(set(ends)) == len(ends) else [f"{end}_step{number}" for number, end in enumerate(ends, start=1)]
 
-    def surface(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Points (n', 3) on the outside, triangles (m, 3) of them, and their numbers (n',) in `points`."""
-        faces = [corners for kind, nodes, _ in self.cells for corners in _outer_faces(kind, nodes)]
+    def with_object(self, placed: PlacedObject) -> "PressedMesh":
+        """The same with the object, as triangles of the layer `object` that move as one."""
+        count, steps = len(placed.points_mm), len(self.force_n)
+        moved = np.broadcast_to(placed.way_mm[:, None], (steps, count, 3))
+        return replace(self, points=np.vstack([self.points, placed.points_mm]),
+                       cells=[*self.cells, ("triangle", placed.triangles + len(self.points), LAYERS["object"])],
+                       displacement_mm=np.concatenate([self.displacement_mm, moved], axis=1))
+
+    def surface(self, *, of_object: bool = False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Points (n', 3) on the sensor's outside, triangles (m, 3) of them, and their numbers (n',) in `points`.
+
+        of_object: of the object in place of the sensor; no points where the mesh has none
+        """
+        faces = [corners for kind, nodes, layer in self.cells if (layer == LAYERS["object"]) == of_object
+                 for corners in _outer_faces(kind, nodes)]
+        if not faces:
+            return np.zeros((0, 3)), np.zeros((0, 3), dtype=int), np.zeros(0, dtype=int)
         triangles = np.concatenate([quads[:, [0, k, k + 1]] for quads in faces for k in range(1, quads.shape[1] - 1)])
         used, triangles = np.unique(triangles, return_inverse=True)
         return self.points[used], triangles.reshape(-1, 3), used
@@ -129,8 +146,8 @@ def _outer_faces(kind: str, nodes: np.ndarray) -> list[np.ndarray]:
     shape = kind.rstrip("0123456789")
     if shape not in _FACES:
         raise InputError(f"Cells of the kind {kind!r} are not drawn; give a file of softtact press --vtu.")
-    if shape == "quad":
-        return [nodes[:, :4]]
+    if shape in ("quad", "triangle"):
+        return [nodes[:, :len(_FACES[shape][0])]]
     out = []
     for size in {len(face) for face in _FACES[shape]}:
         faces = np.concatenate([nodes[:, face] for face in _FACES[shape] if len(face) == size])

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from softtact.imaging.discs import grey
+from softtact.imaging.light import grey
 from softtact.reporting.style import pyplot, save
 
 if TYPE_CHECKING:

@@ -8,23 +8,34 @@ import numpy as np
 
 from softtact.errors import InputError
 from softtact.files import atomic_path, read_dataset
+from softtact.press.placed_object import PlacedObject
 from softtact.press.vtu import of_map, read_vtu
 from softtact.reporting.view3d import html_view
 
 UNIT = "displacement towards the PCB (mm)"
 _EYE = (-0.9, -1.35, 1.0)     # from where a picture looks
+_PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
+<title>{title}</title><style>
+body {{font: 16px system-ui, sans-serif; max-width: 1400px; margin: 1em auto; padding: 0 1em}}
+figure {{margin: 0}}
+</style><body>{body}</body></html>
+"""
+_SEEN_THROUGH = 0.3           # opacity of the object
 _SHEET_MM = 1.0               # height of the walls where a file does not tell the sensor's thickness
 
 
 @dataclass(frozen=True)
 class PressView:
-    """points_mm (l, n, 3) as pressed, triangles (m, 3), values (l, n): displacement towards the PCB in mm;  labels: forces."""
+    """points_mm (l, n, 3) as pressed, triangles (m, 3) of the sensor, values (l, n): displacement towards the PCB in mm, nan at the
+    object's points;  labels: forces;  object_triangles (k, 3): none where the file does not hold the object
+    """
 
     points_mm: np.ndarray
     triangles: np.ndarray
     values: np.ndarray
     labels: list
     title: str
+    object_triangles: np.ndarray
 
 
 def read_view(path: str | Path) -> PressView:
@@ -35,11 +46,15 @@ def read_view(path: str | Path) -> PressView:
         raise InputError(f"{path}: not a press that can be shown; give the .nc or .vtu file of softtact press.")
     mesh = readers[path.suffix.lower()](path)
     _, triangles, used = mesh.surface()
-    moved = mesh.displacement_mm[:, used]
+    _, object_triangles, of_object = mesh.surface(of_object=True)
+    both = np.concatenate([used, of_object])
+    moved = mesh.displacement_mm[:, both]
     if not np.isfinite(moved).all():
         raise InputError(f"{path}: some displacements are not finite numbers; press again.")
-    return PressView(points_mm=mesh.points[used] + moved, triangles=triangles, values=-moved[..., 2],
-                     labels=[f"{force:g} N" for force in mesh.force_n], title=path.name)
+    values = -moved[..., 2]
+    values[:, len(used):] = np.nan
+    return PressView(points_mm=mesh.points[both] + moved, triangles=triangles, values=values, title=path.name,
+                     labels=[f"{force:g} N" for force in mesh.force_n], object_triangles=object_triangles + len(used))
 
 
 def _read_map(path):
@@ -49,17 +64,19 @@ def _read_map(path):
         raise InputError(f"{path}: it holds no {missing[0]!r}, so it is no press; give the file of softtact press --out.")
     if data["deformation_map_mm"].dims != ("step", "y", "x"):
         raise InputError(f"{path}: the map has the dimensions {data['deformation_map_mm'].dims} and not step, y, x; press again.")
-    return of_map(data["deformation_map_mm"].values, data["x"].values, data["y"].values, data["normal_force_n"].values,
+    mesh = of_map(data["deformation_map_mm"].values, data["x"].values, data["y"].values, data["normal_force_n"].values,
                   thickness_mm=float(data.attrs.get("thickness_mm", _SHEET_MM)))
+    placed = PlacedObject.of(data)
+    return mesh if placed is None else mesh.with_object(placed)
 
 
 def write_page(view: PressView, path: str | Path) -> None:
     """Write a page that shows the press and needs nothing else."""
-    body = html_view(view.points_mm, view.triangles, view.values, title=view.title, unit=UNIT, labels=view.labels)
+    triangles = np.vstack([view.triangles, view.object_triangles])
+    body = html_view(view.points_mm, triangles, view.values, title=view.title, unit=UNIT, labels=view.labels,
+                     see_through=len(view.object_triangles))
     with atomic_path(path) as temporary:
-        temporary.write_text(f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{html.escape(view.title)}</title>'
-                             f'<body style="font:16px system-ui,sans-serif;max-width:1000px;margin:1em auto">{body}</html>\n',
-                             encoding="utf-8")
+        temporary.write_text(_PAGE.format(title=html.escape(view.title), body=body), encoding="utf-8")
 
 
 def save_picture(view: PressView, path: str | Path) -> str:
@@ -77,19 +94,22 @@ def _draw_with_pyvista(pyvista, view, path):
     from vtkmodules.vtkCommonCore import vtkLogger
 
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)     # it warns where there is no screen, and draws all the same
-    faces = np.column_stack([np.full(len(view.triangles), 3), view.triangles]).ravel()
-    surface = pyvista.PolyData(view.points_mm[-1], faces)
+    surface, solid = (pyvista.PolyData(view.points_mm[-1], np.column_stack([np.full(len(triangles), 3), triangles]).ravel())
+                      for triangles in (view.triangles, view.object_triangles))
     plotter = pyvista.Plotter(off_screen=True, window_size=(1200, 900))
     bar = {"title": f"{UNIT}\n", "color": "black", "vertical": False, "position_x": 0.25, "position_y": 0.04, "width": 0.5,
            "fmt": "%.3g", "title_font_size": 22, "label_font_size": 20, "n_labels": 3}
     plotter.add_mesh(surface, scalars=view.values[-1], cmap="viridis", scalar_bar_args=bar)
+    if len(view.object_triangles):
+        plotter.add_mesh(solid, color="#999999", opacity=_SEEN_THROUGH)
     size = " x ".join(f"{side:.3g}" for side in np.ptp(view.points_mm[-1], axis=0))
     plotter.add_text(f"{view.title}, {view.labels[-1]}; {size} mm", color="black", font_size=12)
     plotter.add_axes(color="black")
     plotter.set_background("white")
     plotter.enable_parallel_projection()
     plotter.view_vector(_EYE)
-    plotter.camera.zoom(1.15)
+    plotter.camera.zoom(0.9)
+    plotter.camera.SetWindowCenter(0.0, -0.2)     # the colour bar stands below
     with atomic_path(path) as temporary:
         plotter.screenshot(temporary)
     plotter.close()
@@ -112,5 +132,7 @@ def _draw_with_matplotlib(view, path):
     axes.set(xlabel="x (mm)", ylabel="y (mm)", zlabel="z (mm)", zticks=[-2, 0], title=f"{view.title}, {view.labels[-1]}")
     axes.set_box_aspect(np.ptp(points, axis=0))
     axes.view_init(elev=32, azim=-123)
+    if len(view.object_triangles):
+        axes.plot_trisurf(*points.T, triangles=view.object_triangles, color="#999999", alpha=_SEEN_THROUGH, linewidth=0)
     figure.colorbar(plt.cm.ScalarMappable(limits, "viridis"), ax=axes, label=UNIT, shrink=0.6)
     save(figure, path)

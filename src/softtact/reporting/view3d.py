@@ -18,12 +18,14 @@ _DIGITS = 3      # of the numbers beside the colour bar
 
 
 def html_view(points_mm: np.ndarray, triangles: np.ndarray, values: np.ndarray, *, title: str, unit: str,
-              labels: Sequence[str] | None = None, limits: tuple[float, float] | None = None, map_name: str = "viridis") -> str:
+              labels: Sequence[str] | None = None, limits: tuple[float, float] | None = None, map_name: str = "viridis",
+              see_through: int = 0) -> str:
     """A piece of HTML, a <figure> with its script: the surface turns by mouse, touch and arrow keys, and zooms.
 
     points_mm: (n, 3), z upwards, or (states, n, 3): a slider goes through the states
     triangles: (m, 3) indices of points, seen from both sides
     values: (n,) or (states, n) in `unit`, coloured over `limits` (low, high; by default all of them); nan is grey
+    see_through: so many of the last triangles are the object, drawn see-through, and can be hidden
     title: what is shown;  unit: stands at the colour bar;  labels: what each state is, at its slider
     Several views may stand on a page. Nothing is loaded: it works from a file.
     """
@@ -34,7 +36,7 @@ def html_view(points_mm: np.ndarray, triangles: np.ndarray, values: np.ndarray, 
     low, high = limits or _limits(values)
     data = {"points": _packed(points, "<f4"), "triangles": _packed(triangles, "<u4"), "values": _packed(values, "<f4"),
             "count": points.shape[1], "pointStates": len(points), "valueStates": len(values), "labels": labels,
-            "low": low, "high": high, "colours": _packed(_colours(map_name), "u1")}
+            "seeThrough": see_through, "low": low, "high": high, "colours": _packed(_colours(map_name), "u1")}
     return (f'<figure class="view3d" data-title="{html.escape(title)}"><figcaption>{html.escape(title)}</figcaption>'
             f"{_bar(low, high, unit, map_name)}"
             f"<script>\n({SCRIPT.strip()})(document.currentScript.parentElement, {_json(data)});\n</script></figure>")

@@ -8,7 +8,7 @@ function (figure, data) {
   const triangles = new Uint32Array(bytes(data.triangles).buffer), colours = bytes(data.colours), count = data.count;
   const BACKGROUND = 0xffffffff, UNKNOWN = [170, 170, 170], LIGHT = [-0.3, 0.45, 0.84], FIRST = {turn: -0.6, tilt: 0.55, zoom: 1};
   const view = Object.assign({}, FIRST);
-  let state = data.labels.length - 1, waiting = false;
+  let state = data.labels.length - 1, waiting = false, shown = true;
 
   // The middle of all states and their sides, so that a change of state does not move the picture.
   const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
@@ -25,7 +25,8 @@ function (figure, data) {
   }
 
   const canvas = document.createElement("canvas"), context = canvas.getContext("2d");
-  canvas.style.cssText = "width:100%;height:420px;touch-action:none;cursor:grab;display:block;background:#fff";
+  canvas.style.cssText = "width:100%;height:min(75vw,75vh);min-height:240px;max-height:900px;touch-action:none;cursor:grab;"
+    + "display:block;background:#fff";
   canvas.tabIndex = 0;
   canvas.setAttribute("role", "img");
   canvas.setAttribute("aria-label", figure.dataset.title + "; arrow keys turn it, plus and minus zoom, 0 puts it back");
@@ -60,12 +61,13 @@ function (figure, data) {
       seen[3 * i + 2] = scale * (eye[0] * x + eye[1] * y + eye[2] * z);
     }
     const target = {pixels, depth, width, height};
-    for (let t = 0; t < triangles.length; t += 3) fill(seen, values, triangles[t], triangles[t + 1], triangles[t + 2], target);
+    const solid = triangles.length - 3 * data.seeThrough, end = shown ? triangles.length : solid;
+    for (let t = 0; t < end; t += 3) fill(seen, values, triangles[t], triangles[t + 1], triangles[t + 2], target, t >= solid);
     context.putImageData(image, 0, 0);
     drawAxes(right, up, ratio, height);
   }
 
-  function fill(seen, values, a, b, c, {pixels, depth, width, height}) {
+  function fill(seen, values, a, b, c, {pixels, depth, width, height}, everySecond) {   // every second pixel lets one see through
     const ax = seen[3 * a], ay = seen[3 * a + 1], az = seen[3 * a + 2];
     const ux = seen[3 * b] - ax, uy = seen[3 * b + 1] - ay, uz = seen[3 * b + 2] - az;
     const vx = seen[3 * c] - ax, vy = seen[3 * c + 1] - ay, vz = seen[3 * c + 2] - az;
@@ -78,7 +80,7 @@ function (figure, data) {
     const y0 = Math.max(0, Math.ceil(Math.min(ay, ay + uy, ay + vy))), y1 = Math.min(height - 1, Math.max(ay, ay + uy, ay + vy));
     const valueA = values[a], valueU = values[b] - valueA, valueV = values[c] - valueA;
     for (let y = y0; y <= y1; y++) {
-      for (let x = x0; x <= x1; x++) {
+      for (let x = everySecond ? x0 + (x0 + y & 1) : x0; x <= x1; x += everySecond ? 2 : 1) {
         const u = ((x - ax) * vy - (y - ay) * vx) / area, v = ((y - ay) * ux - (x - ax) * uy) / area;
         if (u < -1e-6 || v < -1e-6 || u + v > 1.000001) continue;
         const z = az + u * uz + v * vz, pixel = y * width + x;
@@ -149,6 +151,14 @@ function (figure, data) {
     canvas.after(label);
     slider.addEventListener("input", () => { state = Number(slider.value); name.textContent = data.labels[state]; show(); });
     name.textContent = data.labels[state];
+  }
+  if (data.seeThrough) {
+    const label = document.createElement("label"), box = document.createElement("input");
+    Object.assign(box, {type: "checkbox", checked: true});
+    label.style.cssText = "font:14px system-ui,sans-serif;display:block;margin:.4em 0";
+    label.append(box, " object");
+    canvas.after(label);
+    box.addEventListener("change", () => { shown = box.checked; show(); });
   }
   show();
 }

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.linalg import cho_factor, cho_solve
 
 from softtact.contact.node_grid import NodeGrid
 from softtact.contact.object_points import ObjectPoints
@@ -18,6 +19,7 @@ from softtact.contact.stencil import Stencil
 from softtact.contact.unilateral import ContactLoadSteps, press_elastic
 from softtact.files import read_arrays
 from softtact.models.quarter_symmetry import PARITIES, ElasticLayer, ParityBlocks, QuarterSlab
+from softtact.progress import progress
 from softtact.sensors import fields
 from softtact.sensors.base import BaseSpec
 
@@ -99,12 +101,14 @@ def elastic_compliance(spec: BaseSpec, *, threads: int = 1, cells: tuple[int, ..
     slab = elastic_slab(spec, cells=cells)
     planes, count = [slab.top] if spec.base_held else [slab.top, slab.below_top(0)], slab.top.size
     kept = 3 * np.concatenate([plane.ravel() for plane in planes]) + 2
-    both = np.stack([slab.compliance(slab.stiffness, kept, parity, threads=threads) for parity in PARITIES])
-    blocks = both[:, :count, :count]
-    return Compliance(grid=surface_grid(slab), blocks=ParityBlocks(blocks.astype(np.float32)),
+    both = np.empty((len(PARITIES), len(kept), count), dtype=np.float32)
+    for number, parity in enumerate(progress(PARITIES, label=f"{spec.name}: compliance, a quarter's parities")):
+        both[number] = slab.compliance(slab.stiffness, kept, parity, threads=threads, dtype=np.float32)[:, :count]
+    blocks = both[:, :count]
+    return Compliance(grid=surface_grid(slab), blocks=ParityBlocks(blocks),
                       foundation_modulus=confined_modulus(spec.elastic_layer) / spec.thickness_mm,
                       stencil=_stencil(blocks, slab.top.shape),
-                      lower=None if spec.base_held else ParityBlocks(both[:, count:, :count].astype(np.float32)))
+                      lower=None if spec.base_held else ParityBlocks(both[:, count:]))
 
 
 def confined_modulus(layer: fields.ElasticLayer) -> float:
@@ -114,18 +118,29 @@ def confined_modulus(layer: fields.ElasticLayer) -> float:
 
 def _stencil(blocks, shape):
     """The whole top's stiffness about its middle, cut off `_REACH` nodes away."""
-    inverse = np.zeros_like(blocks)
-    for block, out in zip(blocks, inverse, strict=True):
-        there = np.flatnonzero(np.diag(block) > 0)
-        out[np.ix_(there, there)] = np.linalg.inv(block[np.ix_(there, there)])
-    stiffness, offset = ParityBlocks(inverse), np.arange(-_REACH, _REACH + 1)
+    offset = np.arange(-_REACH, _REACH + 1)
+    first = [2 * (side // 4) for side in shape]     # the quarter's middle, far from all sides; nodes of four kinds follow it
+    patch = (np.arange(first[0] - _REACH, first[0] + _REACH + 2)[:, None] * shape[1]
+             + np.arange(first[1] - _REACH, first[1] + _REACH + 2))
+    stiffness = ParityBlocks(np.stack([_inverse_among(block, patch.ravel()) for block in blocks]))
+    place = np.arange(patch.size).reshape(patch.shape)
     values = np.zeros((2, 2, len(offset), len(offset)))
     for j, i in ((0, 0), (0, 1), (1, 0), (1, 1)):
-        row, column = 2 * (shape[0] // 4) + j, 2 * (shape[1] // 4) + i     # in the quarter's middle, far from all sides
-        around = ((row + offset)[:, None] * shape[1] + column + offset).ravel()
+        around = place[j:j + len(offset), i:i + len(offset)].ravel()
         ones = np.ones((len(around), 2), dtype=int)
-        values[j, i] = stiffness.between(np.array([row * shape[1] + column]), ones[:1], around, ones).reshape(values.shape[2:])
+        own = place[j + _REACH, i + _REACH].reshape(1)
+        values[j, i] = stiffness.between(own, ones[:1], around, ones).reshape(values.shape[2:])
     return Stencil(values)
+
+
+def _inverse_among(block, nodes):
+    """Rows and columns `nodes` of the inverse of a parity's compliance, of the nodes that it does not hold."""
+    there = np.diag(block) > 0
+    place = np.cumsum(there) - 1
+    factor = cho_factor(block if there.all() else block[np.ix_(there, there)], lower=True, check_finite=False)
+    ones = np.zeros((len(factor[0]), len(nodes)), dtype=block.dtype)
+    ones[place[nodes], np.arange(len(nodes))] = 1.0
+    return cho_solve(factor, ones, check_finite=False)[place[nodes]]
 
 
 @dataclass(frozen=True)

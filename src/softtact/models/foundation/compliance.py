@@ -19,11 +19,13 @@ from softtact.materials.laws.base import Law
 from softtact.models.elastic.compliance import map_cells, surface_grid
 from softtact.models.foundation.frustum_spring import FrustumLaw, frustum_law
 from softtact.models.quarter_symmetry import PARITIES, ElasticLayer, ParityBlocks, QuarterSlab
+from softtact.progress import progress
 from softtact.sensors.frusta import SensorSpec
 
 SHEET_SHARES, COVER_SHARES = (1.0,), (0.45, 0.35, 0.2)
 _BLOCKS = ("surface", "sideways", "membrane", "lateral", "lateral_self")
 _GROUND = 2e-3  # of a frustum's stiffness at rest: a lifted one pulls by so much of it, single precision still tells 1e-5 mm
+_AT_ONCE = 256  # loads for which the slab is solved together
 _TIE = 20.0     # N/mm of the springs that tie the frusta's descents to the slab while it is condensed, and are taken off again
 
 
@@ -88,8 +90,9 @@ def foundation_compliance(spec: SensorSpec, *, dielectric_law: Law, cover_law: L
     electrodes = slab.below_top(slab.boundary_over(slab.layers[0][0]))
     rows = np.concatenate([columns, 3 * electrodes[::2, ::2].ravel() + 2,
                            *(3 * slab.top[::2, ::2].ravel() + axis for axis in (0, 1))])
-    parts = [_of_parity(slab, stiffness, descents, followed, rows, len(columns), parity, threads) for parity in PARITIES]
-    surface, sideways, both, own = (np.stack(blocks).astype(np.float32) for blocks in zip(*parts, strict=True))
+    parts = (_of_parity(slab, stiffness, descents, followed, rows, len(columns), parity, threads)
+             for parity in progress(PARITIES, label=f"{spec.name}: compliance, a quarter's parities"))
+    surface, sideways, both, own = _stacked(parts, len(PARITIES))
     membrane, lateral = both[:, :3 * len(centres), :len(columns)], both[:, 3 * len(centres):]
     own = own[:, 3 * len(centres):, 3 * len(centres):]
     return FoundationCompliance(
@@ -158,21 +161,44 @@ def _of_parity(slab, stiffness, descents, followed, rows, loaded, parity, thread
     count = descents.shape[0]
     tied = sp.bmat([[stiffness + _TIE * descents.T @ descents, -_TIE * descents.T], [-_TIE * descents, _TIE * sp.eye(count)]],
                    format="csr")
-    whole = slab.compliance(tied, rows, parity, threads=threads)
+    whole = slab.compliance(tied, rows, parity, threads=threads, dtype=np.float32)
     own = np.arange(loaded - count, loaded)
     whole[own, own] -= 1 / _TIE
     place = (len(rows) - loaded) // 3
     free = slab.free(parity)
     upper = sp.triu(stiffness[free][:, free], format="csr")
     upper.sort_indices()
+    top, plane = (_picked(some, slab.unknowns) for some in (rows[:loaded - count], rows[loaded:loaded + place]))
+    responding = sp.vstack([top, descents, plane, followed], format="csr")
+    both = _response(upper, responding[:, free], followed[:, free], threads)
+    return whole[:loaded + place, :loaded], -whole[loaded + place:, :loaded], -both[:loaded + place].T, both[loaded + place:]
+
+
+def _picked(rows, count):
+    """The matrix that picks some unknowns, by their numbers, of so many."""
+    return sp.csr_matrix((np.ones(len(rows)), rows, np.arange(len(rows) + 1)), shape=(len(rows), count))
+
+
+def _response(upper, rows, loads, threads):
+    """`rows` (r, n) of the displacements under `loads` (m, n), (r, m); some loads at a time, for displacements are many."""
     solver = make_solver(threads=threads)
     solver.factor(upper)
-    response = np.zeros((slab.unknowns, followed.shape[0]))
-    response[free] = solver.solve(np.asfortranarray(followed[:, free].toarray().T))
+    out = np.empty((rows.shape[0], loads.shape[0]))
+    for first in range(0, loads.shape[0], _AT_ONCE):
+        some = slice(first, first + _AT_ONCE)
+        out[:, some] = rows @ solver.solve(np.asfortranarray(loads[some].toarray().T))
     solver.close()
-    top, plane = response[rows[:loaded - count]], response[rows[loaded:loaded + place]]
-    forces = np.vstack([top, descents @ response, plane]).T
-    return whole[:loaded + place, :loaded], -whole[loaded + place:, :loaded], -forces, followed @ response
+    return out
+
+
+def _stacked(parts, count):
+    """Arrays (count, ...) in single precision of tuples of arrays that come one after the other: none is kept twice."""
+    out: list[np.ndarray] = []
+    for number, blocks in enumerate(parts):
+        out = out or [np.empty((count, *block.shape), dtype=np.float32) for block in blocks]
+        for kept, block in zip(out, blocks, strict=True):
+            kept[number] = block
+    return out
 
 
 def _foundation_modulus(spec, frustum, cover_law):

@@ -1,0 +1,123 @@
+"""`softtact press` of several meshes: one folder of results for each, a table at the end, and none lost to one that fails."""
+
+import argparse
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from softtact.commands.common import check_folders, show
+from softtact.errors import ConvergenceError, InputError, SofttactError
+from softtact.progress import announce
+
+MESHES = (".stl", ".obj", ".ply")
+_COLUMNS = ("object", "status", "model", "force_n", "indentation_mm", "contact_area_mm2", "largest_deformation_mm", "counts",
+            "message")
+
+
+@dataclass(frozen=True)
+class Files:
+    """What a press writes."""
+
+    out: Path | None
+    vtu: Path | None
+    plot: Path | None
+
+
+def is_several(meshes: Sequence[Path]) -> bool:
+    """Whether a command line names several meshes, or a folder of them."""
+    return len(meshes) > 1 or meshes[0].is_dir()
+
+
+def press_each(options: argparse.Namespace, press: Callable[..., tuple[dict[str, Any], BaseException | None]]) -> None:
+    """Press each object with press(path, files, label), which gives a summary and the error that ended it early or None.
+
+    Raises the kind of error that the first failed one had, after all are done and the table is shown.
+    """
+    objects, rows, folder = _named(options.mesh), [], _folder(options)
+    try:
+        for number, (name, path) in enumerate(objects.items(), start=1):
+            announce(f"softtact press: {number} of {len(objects)}: {path}")
+            row, error = _row(name, path, folder / name, options, press)
+            rows.append((row, error))
+            if error:
+                announce(f"softtact press: {name}: {error}")
+            if isinstance(error, KeyboardInterrupt):
+                raise error
+    finally:
+        if rows:
+            _tell(rows, folder, options)
+    failed = [(row, error) for row, error in rows if error]
+    if failed:
+        kind = ConvergenceError if all(isinstance(error, ConvergenceError) for _, error in failed) else InputError
+        raise kind(f"{len(failed)} of {len(rows)} objects failed, {', '.join(row['object'] for row, _ in failed)}; what is wrong "
+                   "with each stands above and in the table; press these again.")
+
+
+def _named(meshes):
+    """{name of its folder: path} of all meshes, those of a folder in order of name."""
+    paths: list[Path] = []
+    for path in meshes:
+        found = sorted(file for file in path.iterdir() if file.suffix.lower() in MESHES) if path.is_dir() else [path]
+        if not found:
+            raise InputError(f"{path}: the folder holds no STL, OBJ or PLY file; name the folder with the meshes.")
+        paths += found
+    stems = [path.stem for path in paths]
+    names = [path.name if stems.count(path.stem) > 1 else path.stem for path in paths]
+    for name, path in zip(names, paths, strict=True):
+        if names.count(name) > 1:
+            raise InputError(f"{path}: two objects have the file name {name}; rename one, for each gets a folder of that name.")
+    return dict(zip(names, paths, strict=True))
+
+
+def _folder(options):
+    """The folder that all is written to."""
+    if options.out is None:
+        raise InputError("--out is missing: each of several objects gets a folder of results; give --out a folder for them.")
+    if options.out.suffix.lower() == ".nc" or options.out.is_file():
+        raise InputError(f"--out {options.out}: each of several objects gets a folder of results; give --out a folder for them.")
+    check_folders(options.out)
+    for name in ("vtu", "plot"):
+        path = getattr(options, name)
+        if path and path.parent != Path("."):
+            raise InputError(f"--{name} {path}: each of several objects gets its own in its folder; give a name without a folder.")
+    return options.out
+
+
+def _row(name, path, folder, options, press):
+    """A row of the table, and the error of an object that failed or None; its files are written."""
+    files = Files(folder / "press.nc", *(given and folder / given for given in (options.vtu, options.plot)))
+    for old in (files.out, files.vtu, files.plot):
+        if old:
+            old.unlink(missing_ok=True)     # of an earlier run: they must not be taken for this one's
+    try:
+        summary, error = press(path, files, label=name)
+    except (SofttactError, KeyboardInterrupt) as stop:
+        return dict.fromkeys(_COLUMNS) | {"object": name, "status": "failed", "message": str(stop)}, stop
+    return {"object": name, "status": "stopped early" if error else "done", "model": summary["model"],
+            "force_n": summary["normal_force_n"][-1], "counts": sum(map(sum, summary["tactile_map"][-1])),
+            "message": str(error or ""),
+            **{key: summary[key][-1] for key in ("indentation_mm", "contact_area_mm2", "largest_deformation_mm")}}, error
+
+
+def _tell(rows, folder, options):
+    """Write the table of all objects and show it."""
+    import pandas as pd
+
+    from softtact.files import write_csv
+
+    table = [row for row, _ in rows]
+    write_csv(folder / "summary.csv", pd.DataFrame(table, columns=list(_COLUMNS)))
+    show({"objects": table, "written": str(folder)}, as_json=options.json, lines=_lines(table, folder))
+
+
+def _lines(table, folder):
+    width = max(len(row["object"]) for row in table) + 2
+    yield (f"{'object':{width}}{'status':15}{'model':14}{'force, N':>9}{'indentation, mm':>17}{'contact, mm2':>14}"
+           f"{'deepest, mm':>13}{'counts, sum':>13}")
+    for row in table:
+        numbers = "" if row["model"] is None else (
+            f"{row['model']:14}{row['force_n']:9.4g}{row['indentation_mm']:17.4f}{row['contact_area_mm2']:14.1f}"
+            f"{row['largest_deformation_mm']:13.4f}{row['counts']:13.0f}")
+        yield f"{row['object']:{width}}{row['status']:15}{numbers}".rstrip()
+    yield f"written: {folder}"
