@@ -1,5 +1,6 @@
 """Claims on the choice of a model: the rule and its table, objects of rising detail, and what the hybrid is worth."""
 
+import functools
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
@@ -62,6 +63,7 @@ def _rising_detail(footprint_mm):
                uncertainty="none: counts")
 
 
+@functools.cache
 def detail_family(*, footprint_mm: tuple[float, float]) -> pd.DataFrame:
     """Rows pits, NPt, CHt, NPo, CHo of plates of 16 x 16 mm with FAMILY pits, 0.5 mm deep, along each side of their underside."""
     counts = [score(_pitted_plate(pits), footprint_mm=footprint_mm) for pits in FAMILY]
