@@ -79,14 +79,15 @@ def _press(options):
         raise InputError(f"--time-limit {options.time_limit:g}: a press needs some time; give seconds above 0.")
     spec, pose = sensor_spec(options.sensor), pose_of(options)
     how = _how(options, spec)
-    check_names({options.vtu: (".vtu",), options.plot: (".png", ".svg")})
     several = is_several(options.mesh)
     if not several:
         check_folders(options.out, options.vtu, options.plot)
-        check_names({options.out: (".nc",)})
     cards = [path for _, path in pairs("--card", options.card)]
     refuse_overwriting([*options.mesh, sensor_path(options.sensor), *cards],
                        {"--out": options.out, "--vtu": options.vtu, "--plot": options.plot})
+    check_names({options.vtu: (".vtu",), options.plot: (".png", ".svg")})
+    if not several:
+        check_names({options.out: (".nc",)})
     press = partial(_press_one, options=options, spec=spec, pose=pose, how=how, sensors={})
     if several:
         return press_each(options, press)

@@ -17,7 +17,7 @@ class StepContact:
     """The object's contact in the course of a step from a `SlabState`; `planes` and `points` are what it is at present.
 
     surface: looked up anew where the step leads; None: the points keep the planes that they face
-    largest_mm: to which a step is cut: what a longer one would face at its end may lie far from where it stops
+    largest_mm: to which a step is cut: where a longer one leads far under an edge, points face what they do where it is cut
     """
 
     def __init__(self, slab: Slab, state: SlabState, indentation: float, surface: Surface | None = None, *,
@@ -60,7 +60,14 @@ class StepContact:
         if self._surface is None:
             return False
         share = min(1.0, self._largest_mm / max(np.abs(step).max(), abs(indentation_increment), 1e-30))
-        displacement = self._state.displacement.copy()
-        displacement.ravel()[self._slab.unknowns] += share * step
-        self._face(self._slab.project(displacement, self._surface, self._indentation + share * indentation_increment))
+        projection = self._projected(step, indentation_increment)
+        if share < 1.0 and projection.overrun.any():
+            projection = self._projected(share * step, share * indentation_increment)
+        self._face(projection)
         return True
+
+    def _projected(self, step, indentation_increment):
+        """What the points face after a step."""
+        displacement = self._state.displacement.copy()
+        displacement.ravel()[self._slab.unknowns] += step
+        return self._slab.project(displacement, self._surface, self._indentation + indentation_increment)
