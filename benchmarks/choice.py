@@ -7,7 +7,7 @@ docs/policies.png, writes benchmarks/results/choice.json.
 """
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,10 +20,11 @@ from softtact.geometry.complexity import choose_model, score
 from softtact.geometry.meshes import place, read_mesh
 from softtact.reporting.fig8_policies import draw
 from softtact.reporting.style import save
+from softtact.sensors.edge import Edge
 
 MESH, FAST = "fine", MODELS[:2]
 TOLERANCES_MM = [0.003, 0.006, 0.008, 0.02, 0.04, 0.08]
-SETS = {"indenters": "indenters", "grasped": "grasps"}     # of folders
+SETS = {"indenters": "indenters", "grasped": "grasps", "unseen": "unseen"}     # of folders; the last is in neither fit nor test
 FIGURE = Path(__file__).resolve().parents[1] / "docs/policies.png"
 
 
@@ -49,7 +50,8 @@ def paper_choice(sensor, name):
 
 def main():
     """Press, calibrate, compare, and write."""
-    sensor = softtact.load_sensor("coro")
+    coro = softtact.load_sensor("coro")      # with the sides that the kept maps were pressed with
+    sensor = replace(coro, spec=coro.spec.model_copy(update={"edge": Edge(held="sides")}))
     rows = record.read("objects")["rows"]
     seconds = {row["object"]: row["processor_s"] for row in rows if row["mesh"] == MESH}
     names = sorted(path.stem for path in (MAPS / MESH).glob("*.npz"))

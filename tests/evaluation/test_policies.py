@@ -41,6 +41,14 @@ def test_an_error_that_is_the_same_everywhere_is_found_exactly(table):
     assert told_over_true(table, "foundation")["median"] == pytest.approx(1.0, rel=1e-6)
 
 
+def test_the_error_to_expect_is_found_from_indenters_alone():
+    indenters = [press("ring", "indenters", apart=0.03), press("star", "indenters", apart=0.03)]
+    others = [press("cup", "grasps", apart=0.3), press("disc", "unseen", apart=0.6)]
+    alone, beside = (press_table(presses, {"ring": "elastic", "star": "elastic", "cup": "elastic", "disc": "elastic"},
+                                 height_mm=0.5)[1] for presses in (indenters, indenters + others))
+    assert beside == alone and alone.at_rest == pytest.approx(0.03 / 1.03)
+
+
 def test_the_expected_error_sends_a_press_to_the_cheapest_model_that_will_do(table):
     of_cup = table.index[table.item == "cup"][0]
     taken = [choices(table, tolerance)[f"error, {1e3 * tolerance:g} um"][of_cup] for tolerance in (0.5, 0.01, 1e-5)]

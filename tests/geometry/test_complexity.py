@@ -77,6 +77,14 @@ def test_the_overlap_is_bounded_by_footprint_and_reach():
     assert len(overlap_points(box + [30, 0, 0], footprint_mm=FOOTPRINT)) == 0
 
 
+def test_the_overlap_reaches_up_from_the_lowest_facet_over_the_footprint_not_from_a_lower_one_beside_it():
+    box, pin = trimesh.creation.box(extents=(10, 10, 2)).triangles, trimesh.creation.box(extents=(2, 2, 2)).triangles
+    both = np.concatenate([box, pin + [30, 0, -50]])
+    np.testing.assert_array_equal(overlap_points(both, footprint_mm=FOOTPRINT, reach_mm=2.5),
+                                  overlap_points(box, footprint_mm=FOOTPRINT, reach_mm=2.5))
+    assert len(overlap_points(box, footprint_mm=FOOTPRINT, reach_mm=2.5)) == 36
+
+
 def test_points_are_counted_as_stored_not_merged(tmp_path):
     file = tmp_path / "box.stl"
     trimesh.creation.box(extents=(10, 10, 10)).export(file)

@@ -1,5 +1,8 @@
 """The choice of a model: the paper's rule, the error to expect, and what a result tells of it."""
 
+import json
+from dataclasses import asdict
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -27,6 +30,18 @@ def test_calibration_finds_the_constants_that_errors_were_made_with():
     relative = true(maps(*np.ones(12)), compression, depth) / rms(maps(1.0))
     found = calibrate(relative, compression, depth)
     assert (found.at_rest, found.growth, found.deep) == pytest.approx((0.02, 0.1, 0.3), rel=1e-9)
+
+
+def test_the_constants_that_presses_state_their_errors_by_are_those_of_the_record():
+    record = json.loads((Path(__file__).parents[2] / "benchmarks" / "results" / "expected_error.json").read_text())
+    assert asdict(FoundationError()) == pytest.approx(record["coefficients"], rel=2e-3)      # given with three digits
+
+
+def test_an_error_grows_with_the_cube_of_the_compression_and_the_square_of_the_depth():
+    grown = FoundationError(at_rest=0.0, growth=1.0, deep=0.0)(maps(1.0, 1.0), np.array([0.1, 0.3]))
+    assert grown[1] / grown[0] == pytest.approx(27.0)
+    deeper = FoundationError(at_rest=0.0, growth=0.0, deep=1.0)(maps(1.0, 1.0), np.zeros(2), np.array([0.1, 0.3]))
+    assert deeper[1] / deeper[0] == pytest.approx(9.0)
 
 
 def test_constants_never_promise_less_than_no_error():

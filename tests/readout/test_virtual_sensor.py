@@ -15,6 +15,7 @@ from softtact.readout.capacitance import EPSILON_0_PF_PER_MM, equivalent_air_gap
 from softtact.readout.electrodes import coupled, edge_excess
 from softtact.readout.virtual_sensor import (
     VirtualSensorSettings,
+    _at_force,
     make_specimen,
     read_branches,
     read_virtual_sensor,
@@ -236,3 +237,10 @@ def test_the_guide_names_every_setting_with_its_default():
         shown = f"[{', '.join(f'{v:g}' for v in value)}]" if isinstance(value, tuple) else str(value)
         shown = f"{value:g}" if isinstance(value, float) else shown
         assert f"`{name}: {shown}`" in guide, name
+
+
+@pytest.mark.parametrize(("factor", "expected"), [(0.9, [0.9, 3.4, 4.8]), (1.1, [1.3, 4.1, 5.2]), (0.4, [0.4, 0.8, 2.8])])
+def test_a_trial_at_other_forces_lies_between_the_load_steps_around_each_force(factor, expected):
+    # 1, 4, 5 mm at 10, 20, 40 N, and none at rest; beyond the last load step on along the last line
+    maps = np.array([1.0, 4.0, 5.0])[:, None, None] * np.ones((1, 2, 2))
+    np.testing.assert_allclose(_at_force(maps, FORCES, factor)[:, 0, 0], expected, rtol=1e-12)

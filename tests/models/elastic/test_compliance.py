@@ -11,7 +11,7 @@ from softtact.contact.underside import Underside
 from softtact.errors import InputError
 from softtact.geometry.meshes import place
 from softtact.geometry.pose import Pose
-from softtact.models.elastic.compliance import Compliance, elastic_compliance, map_cells, press_layer
+from softtact.models.elastic.compliance import Compliance, elastic_compliance, elastic_slab, map_cells, press_layer
 from softtact.press.cache import cached_compliance
 from softtact.press.sensor import Sensor
 from softtact.sensors.edge import Edge
@@ -58,6 +58,13 @@ def test_a_press_is_that_of_the_whole_layer_on_the_same_mesh(compliance, whole):
         # single precision, and the penalty: 0.1 N at a point over 1e5 N/mm is 1e-6 mm
         assert np.abs(press.maps[-1] - expected).max() < 2e-5 * expected.max()
         assert press.contact.depth[-1] == pytest.approx(depth, rel=2e-5)
+
+
+def test_the_layers_bulk_and_shear_moduli_are_those_of_its_youngs_modulus_and_poissons_ratio():
+    layer = elastic_slab(SMALL).layers[0][0]
+    bulk, shear = layer.bulk_modulus, layer.shear_modulus
+    assert 9 * bulk * shear / (3 * bulk + shear) == pytest.approx(SMALL.elastic_layer.young_mpa, rel=1e-12)
+    assert (3 * bulk - 2 * shear) / (2 * (3 * bulk + shear)) == pytest.approx(SMALL.elastic_layer.poisson, rel=1e-12)
 
 
 def test_no_place_is_deeper_than_a_flat_punch(compliance):
