@@ -16,6 +16,7 @@ import pytest
 import trimesh
 import yaml
 
+import softtact
 from softtact import cli
 from softtact.cli import COMMANDS, main
 from softtact.commands import complexity
@@ -377,3 +378,8 @@ def test_a_time_limit_ends_a_press_with_status_3_and_one_sentence(tmp_path, caps
 def test_a_time_limit_of_no_time_is_refused(capsys):
     assert main(["press", str(OBJECT), "--unit", "mm", "--force", "5", "--time-limit", "0"]) == 1
     assert "--time-limit 0: a press needs some time; give seconds above 0" in capsys.readouterr().err
+
+
+def test_the_module_is_the_command():
+    said = subprocess.run([sys.executable, "-m", "softtact", "--version"], capture_output=True, text=True, check=True).stdout
+    assert said.strip() == f"softtact {softtact.__version__}"

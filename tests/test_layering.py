@@ -30,6 +30,7 @@ ORDER = (
     ("stages",),
     ("commands",),
     ("cli",),
+    ("__main__",),
 )
 LEVEL = {package: level for level, packages in enumerate(ORDER) for package in packages}
 

@@ -41,6 +41,12 @@ def test_trials_of_one_load_step_stay_on_one_side(study):
     assert not maps["validation"] & (maps["unseen"] | maps["grasps"])
 
 
+def test_the_same_seed_gives_the_same_bytes_and_another_one_another_split(study, tmp_path):
+    first, again, other = (run_stage(study, tmp_path / name, seed=seed)["train"][0].read_bytes()
+                           for name, seed in (("first", 1), ("again", 1), ("other", 2)))
+    assert first == again != other
+
+
 def test_no_item_of_a_test_is_trained_on(study):
     datasets, _ = build(study)
     trained = set(datasets["elastic", "train"]["item"].values) | set(datasets["elastic", "validation"]["item"].values)
