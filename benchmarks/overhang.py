@@ -1,6 +1,6 @@
 """Objects wider than the sensor, on all models and edges: `python benchmarks/overhang.py`, some ten minutes of a core.
 
-Prints the tables of docs/explanation/edge.md and of "The edge" in docs/explanation/unknowns.md, and writes
+Prints the table of "The edge" in docs/explanation/unknowns.md, and writes, for that of docs/explanation/edge.md (`make numbers`),
 benchmarks/results/overhang.json: for each object, edge and mesh of the hyperelastic model sums of counts, depths, and how far maps
 are apart (root mean square over the hyperelastic map's maximum).
 """

@@ -1,4 +1,4 @@
-"""Write the numbers that change into the documentation: docs/reference/numbers.md and the tables of docs/performance.md.
+"""Write the numbers that change into the documentation: docs/reference/numbers.md, and tables of docs/performance.md and edge.md.
 
     python scripts/write_numbers.py            (`make numbers`; `make docs` runs it first)
 
@@ -14,7 +14,7 @@ from statistics import median
 
 ROOT = Path(__file__).resolve().parents[1]
 NUMBERS = ROOT / "docs" / "reference" / "numbers.md"
-PERFORMANCE = ROOT / "docs" / "performance.md"
+PERFORMANCE, EDGE = ROOT / "docs" / "performance.md", ROOT / "docs" / "explanation" / "edge.md"
 MESHES = {"draft": "draft", "production": "default", "fine": "fine"}     # name in the records, name of the preset
 BLOCK = r"(<!-- numbers: {} -->\n).*?(<!-- end of numbers -->)"
 HEAD = """\
@@ -118,6 +118,24 @@ def mesh_errors() -> str:
     return (f"{source('mesh_error')} 36 frusta; flat punch, sphere and ridges, each at its worst force.\n\n" + table(head, rows))
 
 
+def overhang() -> str:
+    """Counts of objects over the rim by edge and mesh, and how far the models are apart."""
+    by_case: dict[tuple[str, str], dict[str, dict]] = {}
+    for row in record("overhang")["rows"]:
+        if len(row["force_n"]) == 1:
+            by_case.setdefault((row["object"], row["edge"]), {})[row["mesh"]] = row
+    rows = []
+    for (name, edge), meshes in by_case.items():
+        cells = [f"{meshes['default']['foundation_counts'][0]:.0f}"]
+        for mesh in ("default", "fine"):
+            own = meshes.get(mesh)
+            cells += ["", ""] if own is None else [f"{own['hyperelastic_counts'][0]:.0f}", f"{100 * own['apart'][0]:.1f}"]
+        rows.append([name, f"`{edge}`", *cells])
+    head = ("object, edge, counts of the foundation model, of the hyperelastic on the default mesh, error (%), on the fine mesh, "
+            "error (%)")
+    return f"{source('overhang')}\n\n" + table(head, rows)
+
+
 def random_presses() -> str:
     """Outcomes of random presses."""
     outcomes = ["presses", "reached", "outside", "flagged", "stopped", "refused", "nonsense", "hung", "crashed"]
@@ -133,13 +151,19 @@ def numbers_page(counts: dict[str, int]) -> str:
     return HEAD + "".join(f"\n## {title}\n{text}\n" for title, text in parts.items())
 
 
-def performance_page(text: str) -> str:
-    """The text of docs/performance.md with its tables from the records."""
-    for name, content in (("presses", presses()), ("fast presses", fast_presses())):
+def pages() -> dict[Path, str]:
+    """Texts of the pages whose named tables come from the records."""
+    tables = {PERFORMANCE: {"presses": presses(), "fast presses": fast_presses()}, EDGE: {"overhang": overhang()}}
+    return {page: _with_tables(page.read_text(encoding="utf-8"), own) for page, own in tables.items()}
+
+
+def _with_tables(text, tables):
+    for name, content in tables.items():
         text = re.sub(BLOCK.format(name), lambda found, new=content: f"{found[1]}{new}\n{found[2]}", text, flags=re.DOTALL)
     return text
 
 
 if __name__ == "__main__":
     NUMBERS.write_text(numbers_page(count_tests()), encoding="utf-8")
-    PERFORMANCE.write_text(performance_page(PERFORMANCE.read_text(encoding="utf-8")), encoding="utf-8")
+    for page, text in pages().items():
+        page.write_text(text, encoding="utf-8")
