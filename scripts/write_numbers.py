@@ -1,4 +1,4 @@
-"""Write the numbers that change into the documentation: docs/reference/numbers.md, and tables of docs/performance.md and edge.md.
+"""Write the numbers that change into the documentation: docs/reference/numbers.md, and tables of other pages (`pages`).
 
     python scripts/write_numbers.py            (`make numbers`; `make docs` runs it first)
 
@@ -14,7 +14,8 @@ from statistics import median
 
 ROOT = Path(__file__).resolve().parents[1]
 NUMBERS = ROOT / "docs" / "reference" / "numbers.md"
-PERFORMANCE, EDGE = ROOT / "docs" / "performance.md", ROOT / "docs" / "explanation" / "edge.md"
+PERFORMANCE = ROOT / "docs" / "performance.md"
+EDGE, FAST = (ROOT / "docs" / "explanation" / f"{name}.md" for name in ("edge", "fast_models"))
 MESHES = {"draft": "draft", "production": "default", "fine": "fine"}     # name in the records, name of the preset
 BLOCK = r"(<!-- numbers: {} -->\n).*?(<!-- end of numbers -->)"
 HEAD = """\
@@ -136,6 +137,25 @@ def overhang() -> str:
     return f"{source('overhang')}\n\n" + table(head, rows)
 
 
+def choice() -> str:
+    """What each policy of choosing a model takes, costs and errs by."""
+    read, rows = record("choice"), []
+    for row in read["policies"]:
+        counts = [round(row["presses"] * row[f"share_{model}"]) or "" for model in ("elastic", "foundation", "hyperelastic")]
+        rows.append([row["policy"], *counts, f"{1e3 * row['mean_error_mm']:.1f}", f"{1e3 * row['largest_error_mm']:.1f}",
+                     f"{row['time_per_press_s']:.2g}" if row["time_per_press_s"] < 10 else f"{row['time_per_press_s']:.0f}"])
+    by_name = {row["policy"]: row for row in read["policies"]}
+    paper, error = by_name["paper"], by_name["error, 20 um"]
+    told = read["told_over_true"]
+    words = ", ".join(f"{model} {told[model]['lowest']:.2f} to {told[model]['highest']:.2f} (median {told[model]['median']:.2f})"
+                      for model in ("elastic", "foundation"))
+    return (f"{source('choice')}\n\n"
+            + table("policy, elastic, foundation, hyperelastic, mean error (um), worst (um), time a press (s)", rows)
+            + f"\n\nThe paper's rule takes {paper['time_per_press_s'] / error['time_per_press_s']:.0f} times the time of the error "
+              f"policy at 20 um, for {paper['mean_error_mm'] / error['mean_error_mm']:.0f} times its error. Expected over true "
+              f"errors on these objects: {words}.")
+
+
 def random_presses() -> str:
     """Outcomes of random presses."""
     outcomes = ["presses", "reached", "outside", "flagged", "stopped", "refused", "nonsense", "hung", "crashed"]
@@ -153,7 +173,8 @@ def numbers_page(counts: dict[str, int]) -> str:
 
 def pages() -> dict[Path, str]:
     """Texts of the pages whose named tables come from the records."""
-    tables = {PERFORMANCE: {"presses": presses(), "fast presses": fast_presses()}, EDGE: {"overhang": overhang()}}
+    tables = {PERFORMANCE: {"presses": presses(), "fast presses": fast_presses()}, EDGE: {"overhang": overhang()},
+              FAST: {"choice": choice()}}
     return {page: _with_tables(page.read_text(encoding="utf-8"), own) for page, own in tables.items()}
 
 
