@@ -8,6 +8,7 @@ import trimesh
 
 import softtact
 from softtact.cli import main
+from softtact.commands.press_each import _lines
 
 HOW = ["--unit", "mm", "--force", "5", "--model", "elastic"]
 
@@ -44,7 +45,7 @@ def test_results_of_an_earlier_run_do_not_stand_for_an_object_that_fails_now(par
     line = ["press", str(parts / "broken.ply"), str(parts / "block.stl"), *HOW, "--out", str(tmp_path)]
     assert main(line) == 1 and not old.exists() and (tmp_path / "block/press.nc").exists()
     table = capsys.readouterr().out.splitlines()
-    assert table[0].startswith("object") and table[1].split() == ["broken", "failed"]
+    assert table[0].split()[:3] == ["object", "status", "model"] and table[1].split() == ["broken", "failed"]
     assert table[2].split()[:3] == ["block", "done", "elastic"]
 
 
@@ -79,3 +80,8 @@ def test_a_value_that_begins_with_a_minus_and_reads_as_an_option_gets_a_hint(wor
         main(["press", "part.stl", "--unit", "mm", *words])
     assert stopped.value.code == 2
     assert f"{words[1]}: a value that begins with a minus reads as an option; write --" in capsys.readouterr().err
+
+
+def test_the_tables_headings_stand_apart_over_short_names_too():
+    row = {"object": "a", "status": "failed", "model": None}
+    assert next(_lines([row], "results")).split()[:2] == ["object", "status"]

@@ -112,7 +112,7 @@ def _tell(rows, folder, options):
 
 
 def _lines(table, folder):
-    width = max(len(row["object"]) for row in table) + 2
+    width = max(len("object"), *(len(row["object"]) for row in table)) + 2
     yield (f"{'object':{width}}{'status':15}{'model':14}{'force, N':>9}{'indentation, mm':>17}{'contact, mm2':>14}"
            f"{'deepest, mm':>13}{'counts, sum':>13}")
     for row in table:

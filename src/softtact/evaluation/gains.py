@@ -32,16 +32,15 @@ def gain_table(references: "Sequence[xarray.Dataset]", tested: "Mapping[str, Seq
     for gain in (share * settings.counts_per_relative_change for share in SHARES):
         at_gain = replace(settings, counts_per_relative_change=gain)
         counts = np.stack([_last_reading(press, spec, at_gain, seed) for press in references])
-        row = {"gain": gain, "percentile_counts": np.percentile(counts, PERCENTILE), "peak_counts": np.median(counts.max(axis=(1,
-                                                                                                                               2))),
+        row = {"gain": gain, "percentile_counts": np.percentile(counts, PERCENTILE),
+               "peak_counts": np.median(counts.max(axis=(1, 2))),
                "full_share": float((counts >= spec.largest_counts).mean()), "mean_counts": counts.mean()}
         predicted = {"mean": others_mean(counts)} if len(counts) > 1 else {}
         predicted |= {f"gap_{model}": np.stack([ideal_counts(spec, press.deformation_map_mm.values[-1],
                                                              counts_per_relative_change=gain) for press in presses])
                       for model, presses in tested.items()}
         row |= {f"ssim_{name}": map_ssim(maps, counts, **ssim).mean() for name, maps in predicted.items()}
-        row |= {f"mae_share_{name}": (mean_absolute_counts(maps, counts).mean() / counts.mean()) for name,
-                maps in predicted.items()}
+        row |= {f"mae_share_{name}": mean_absolute_counts(maps, counts).mean() / counts.mean() for name, maps in predicted.items()}
         rows.append(row)
     return pd.DataFrame(rows)
 

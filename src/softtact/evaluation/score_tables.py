@@ -17,8 +17,7 @@ NETWORK, CEILING = "network", "sensor"
 ALL_FORCES = "all"
 FORCES, BINS = 25, 10     # an archive's forces are all different
 COLUMNS = ["model", "set", "force", "predictor", "kind", "maps", "ssim", "ssim_own_range", "mae_counts", "mae_share", "overlap",
-           "skill",
-           "skill_simple"]
+           "skill", "skill_simple"]
 _OF_KIND = {"skill": "trivial", "skill_simple": "simple"}
 
 

@@ -19,8 +19,7 @@ COLUMNS = ["learning_rate", "epochs", "train_loss", "validation_loss"]
 
 
 def try_rates(train: "Samples", validation: "Samples", *, network: dict[str, Any], options: "Training", ssim: dict[str, Any],
-              seed: int,
-              device: "torch.device | str") -> pd.DataFrame:
+              seed: int, device: "torch.device | str") -> pd.DataFrame:
     """A row with COLUMNS for each of the options' `rates`: the same first weights, `rate_epochs` along the options' schedule.
 
     The losses, in counts, are those of the last epoch: nan where the training ran away.
@@ -35,8 +34,8 @@ def try_rates(train: "Samples", validation: "Samples", *, network: dict[str, Any
                                       label=f"rate {rate:g}"))[-1]
         except ConvergenceError:     # too high a rate is a finding, not a failure of the trial
             last = {"train_loss": np.nan, "validation_loss": np.nan}
-        rows.append({"learning_rate": rate, "epochs": run.epoch, **{name: last[name] for name in ("train_loss",
-                                                                                                  "validation_loss")}})
+        rows.append({"learning_rate": rate, "epochs": run.epoch, "train_loss": last["train_loss"],
+                     "validation_loss": last["validation_loss"]})
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
