@@ -33,8 +33,8 @@ from softtact.fem.elements import TET4
 from softtact.linalg.direct_single import PardisoSingle
 from softtact.linalg.workers import Workers
 from softtact.materials.laws.registry import make_law
-from softtact.models.solid.body import FreeBody, RigidContact
-from softtact.models.solid.newton import FreeSettings, press_to_indentations
+from softtact.models.solid.free_body import FreeBody, RigidContact
+from softtact.models.solid.free_press import FreeSettings, press_to_indentations
 from softtact.models.solid.tetrahedra import LinearTetrahedra
 from softtact.sensors.library import sensor_file
 from softtact.sensors.specification import SensorSpec

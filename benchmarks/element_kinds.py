@@ -12,7 +12,7 @@ from sensor_meshes import compressed, tetrahedra_of, wedges_of
 from softtact.fem.elements import HEX20, HEX27, QUAD8, QUAD9, TRI6, WEDGE18, reference_gradients
 from softtact.fem.quadrature import gauss, wedge_rule
 from softtact.fem.solid_block import SolidBlock
-from softtact.models.solid.body import SolidElements
+from softtact.models.solid.free_body import SolidElements
 from softtact.models.solid.tetrahedra import LinearTetrahedra
 
 _TET_EDGES = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])

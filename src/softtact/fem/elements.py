@@ -11,8 +11,23 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from softtact.fem.quadrature import Quadrature, gauss_rule, tetrahedron_rule, triangle_rule, wedge_rule
-from softtact.fem.shape_functions import lifted, linear_simplex, quadratic, quadratic_triangle, serendipity
+from softtact.fem.quadrature import (
+    Quadrature,
+    gauss_rule,
+    tetrahedron_rule,
+    tetrahedron_rule4,
+    tetrahedron_rule15,
+    triangle_rule,
+    wedge_rule,
+)
+from softtact.fem.shape_functions import (
+    lifted,
+    linear_simplex,
+    quadratic,
+    quadratic_tetrahedron,
+    quadratic_triangle,
+    serendipity,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +81,8 @@ class Element:
 def reference_gradients(coordinates: np.ndarray, derivatives: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Gradients in the reference configuration.
 
-    coordinates (e, m, 3) in mm, derivatives (g, m, 3), weights (g,).
-    Returns gradients (e, g, m, 3) in 1/mm and volumes (e, g) in mm3. Raises ValueError on an inverted element.
+    coordinates (e, m, d) in mm, derivatives (g, m, d), weights (g,); d = 3, or 2 of plane elements.
+    Returns gradients (e, g, m, d) in 1/mm and volumes (e, g) in mm3 (mm2). Raises ValueError on an inverted element.
     """
     jacobian = np.einsum("emi,gmj->egij", coordinates, derivatives, optimize=True)
     determinant = np.linalg.det(jacobian)
@@ -98,7 +113,8 @@ LINE3 = Element(_LINE3_NODES, partial(quadratic, nodes=_LINE3_NODES), gauss_rule
 
 _QUAD8_NODES = np.vstack([_CORNERS, _MIDS])
 _QUAD_SIDES = _faces(LINE3, [[0, 1, 4], [1, 2, 5], [2, 3, 6], [3, 0, 7]])
-QUAD8 = Element(_QUAD8_NODES, partial(serendipity, nodes=_QUAD8_NODES), gauss_rule(3, 2), "quad8", np.arange(8), _QUAD_SIDES)
+QUAD8 = Element(_QUAD8_NODES, partial(serendipity, nodes=_QUAD8_NODES), gauss_rule(3, 2), "quad8", np.arange(8), _QUAD_SIDES,
+                abaqus_name="8", abaqus_nodes=np.arange(8))
 """Serendipity quadrilateral on [-1, 1]^2; sides eta = -1, xi = 1, eta = 1, xi = -1::
 
     3 --- 6 --- 2     eta
@@ -109,7 +125,8 @@ QUAD8 = Element(_QUAD8_NODES, partial(serendipity, nodes=_QUAD8_NODES), gauss_ru
 """
 
 _QUAD9_NODES = np.vstack([_QUAD8_NODES, [[0.0, 0.0]]])
-QUAD9 = Element(_QUAD9_NODES, partial(quadratic, nodes=_QUAD9_NODES), gauss_rule(3, 2), "quad9", np.arange(9), _QUAD_SIDES)
+QUAD9 = Element(_QUAD9_NODES, partial(quadratic, nodes=_QUAD9_NODES), gauss_rule(3, 2), "quad9", np.arange(9), _QUAD_SIDES,
+                abaqus_name="8", abaqus_nodes=np.arange(8))
 """Full quadratic quadrilateral on [-1, 1]^2; sides as those of QUAD8::
 
     3 --- 6 --- 2     eta
@@ -120,7 +137,7 @@ QUAD9 = Element(_QUAD9_NODES, partial(quadratic, nodes=_QUAD9_NODES), gauss_rule
 """
 
 TRI6 = Element(np.array([[0, 0], [1, 0], [0, 1], [0.5, 0], [0.5, 0.5], [0, 0.5]]), quadratic_triangle, triangle_rule(), "triangle6",
-               np.arange(6), _faces(LINE3, [[0, 1, 3], [1, 2, 4], [2, 0, 5]]))
+               np.arange(6), _faces(LINE3, [[0, 1, 3], [1, 2, 4], [2, 0, 5]]), abaqus_name="6", abaqus_nodes=np.arange(6))
 """Quadratic triangle with corners (0, 0), (1, 0), (0, 1); its sides begin at nodes 0, 1 and 2::
 
     2
@@ -208,6 +225,14 @@ TET4 = Element(np.vstack([np.zeros(3), np.eye(3)]), linear_simplex, tetrahedron_
     |/     `.        | /
     0 ------- 1      +---- xi
 """
+
+
+TET10 = Element(np.vstack([TET4.nodes, 0.5 * (TET4.nodes[[0, 1, 2, 0, 1, 2]] + TET4.nodes[[1, 2, 0, 3, 3, 3]])]),
+                quadratic_tetrahedron, tetrahedron_rule15(), "tetra10", np.arange(10),
+                _faces(TRI6, [[0, 1, 2, 4, 5, 6], [0, 1, 3, 4, 8, 7], [1, 2, 3, 5, 9, 8], [2, 0, 3, 6, 7, 9]]),
+                reduced=tetrahedron_rule4(), abaqus_name="C3D10", abaqus_nodes=np.arange(10))
+"""Quadratic tetrahedron: TET4 and the middles of its edges 01, 12, 20, 03, 13, 23. Its reduced rule of four points integrates
+the energy of straight elements at small strain exactly, and is the usual one."""
 
 
 def dofs_of(nodes: np.ndarray) -> np.ndarray:

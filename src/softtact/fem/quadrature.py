@@ -45,3 +45,23 @@ def wedge_rule() -> Quadrature:
 def tetrahedron_rule() -> Quadrature:
     """The one point in the middle of the tetrahedron of the origin and the unit vectors, of degree 1."""
     return Quadrature(np.full((1, 3), 0.25), np.array([1 / 6]), degree=1)
+
+
+def tetrahedron_rule4() -> Quadrature:
+    """Four points of the same tetrahedron, of degree 2."""
+    near, far = (5 - np.sqrt(5)) / 20, (5 + 3 * np.sqrt(5)) / 20
+    return Quadrature(np.vstack([[near] * 3, near + (far - near) * np.eye(3)]), np.full(4, 1 / 24), degree=2)
+
+
+def tetrahedron_rule15() -> Quadrature:
+    """Fifteen points of the same tetrahedron, of degree 5. (Keast, Comput. Methods Appl. Mech. Engng 55 (1986) 339, rule 6.)"""
+    groups = (((0.25,), 0.030283678097089), ((1 / 3,), 0.006026785714286), ((1 / 11,), 0.011645249086029))
+    points, weights = [[0.25] * 3], [groups[0][1]]
+    for (near,), weight in groups[1:]:
+        far = 1 - 3 * near
+        points += [[near] * 3, [far, near, near], [near, far, near], [near, near, far]]
+        weights += [weight] * 4
+    a, b = 0.066550153573664, 0.433449846426336
+    points += [[a, b, b], [b, a, b], [b, b, a], [a, a, b], [a, b, a], [b, a, a]]
+    weights += [0.010949141561386] * 6
+    return Quadrature(np.array(points), np.array(weights), degree=5)

@@ -63,6 +63,19 @@ def quadratic_triangle(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return values, slopes
 
 
+_TETRAHEDRON_EDGES = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
+
+
+def quadratic_tetrahedron(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Quadratic functions of the tetrahedron of the origin and the unit vectors: four corners, then the mid-edges."""
+    L, dL = linear_simplex(points)
+    a, b = _TETRAHEDRON_EDGES.T
+    values = np.hstack([L * (2 * L - 1), 4 * L[:, a] * L[:, b]])
+    slopes = np.concatenate([(4 * L - 1)[..., None] * dL,
+                             4 * (L[:, a, None] * dL[:, b] + L[:, b, None] * dL[:, a])], axis=1)
+    return values, slopes
+
+
 def linear_simplex(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Linear functions of the simplex of the origin and the unit vectors: a triangle or a tetrahedron."""
     points = np.asarray(points, dtype=float)

@@ -57,18 +57,19 @@ class SolidBlock:
 
     gradients (u, g, m, 3) in 1/mm and volumes (u, g) in mm3 of the shapes that occur; shapes (e,): which is an element's, by
     default each its own; points (g, 3) of the quadrature in parent coordinates; unprojected_penalty_ratio: k / mu;
-    quartic_penalty_ratio: q / mu; trilinear: project on trilinear instead of linear functions. Displacements come per element
-    (e, m, 3) in mm. at_rest: all this as `ElementArrays`. loops: what sums over points and nodes, `kernels` or a `DeviceKernels`.
+    quartic_penalty_ratio: q / mu; trilinear: project on trilinear instead of linear functions; basis (g, p): on these instead.
+    Displacements come per element (e, m, 3) in mm. at_rest: all this as `ElementArrays`. loops: what sums over points and nodes, `kernels` or a `DeviceKernels`.
     """
 
     loops = kernels
 
     def __init__(self, gradients: np.ndarray, volumes: np.ndarray, points: np.ndarray, law: Law, *,
                  shapes: np.ndarray | None = None, unprojected_penalty_ratio: float = 0.0, quartic_penalty_ratio: float = 0.0,
-                 trilinear: bool = False) -> None:
+                 trilinear: bool = False, basis: np.ndarray | None = None) -> None:
         self.law = law
         self._unprojected_penalty_ratio, self._quartic_penalty_ratio = unprojected_penalty_ratio, quartic_penalty_ratio
-        volumes, basis = np.ascontiguousarray(volumes), _pressure_modes(points, trilinear)
+        volumes = np.ascontiguousarray(volumes)
+        basis = _pressure_modes(points, trilinear) if basis is None else np.ascontiguousarray(basis)
         gram = np.einsum("eg,gp,gq->epq", volumes, basis, basis, optimize=True)
         self.at_rest = ElementArrays(np.ascontiguousarray(gradients.transpose(0, 1, 3, 2)), volumes,
                                      np.arange(len(gradients)) if shapes is None else shapes, basis, np.linalg.inv(gram))
@@ -76,7 +77,7 @@ class SolidBlock:
     @property
     def unprojected_modulus(self) -> float:
         """k in MPa."""
-        return min(self._unprojected_penalty_ratio * self.law.mu0, self.law.bulk_modulus)
+        return min(self._unprojected_penalty_ratio * self.law.mu0, self.law.projected_modulus)
 
     @property
     def quartic_modulus(self) -> float:
@@ -87,7 +88,7 @@ class SolidBlock:
     def _volume_law(self):
         """The law's U with the modulus K - k, and the penalties."""
         penalties = VolumePenalties(self.unprojected_modulus, self.quartic_modulus)
-        return self.law.volumetric.with_modulus(self.law.bulk_modulus - penalties.unprojected), penalties
+        return self.law.volumetric.with_modulus(self.law.projected_modulus - penalties.unprojected), penalties
 
     def evaluate(self, displacement: np.ndarray, elements: np.ndarray | slice = slice(None), *,
                  workers: Workers = SERIAL) -> BlockState | None:
@@ -129,7 +130,7 @@ class SolidBlock:
 
     def volume_outside(self, displacement: np.ndarray, window: tuple[float, float]) -> float:
         """Volume (mm3) in which an isochoric principal stretch lies outside of `window` (lowest, highest)."""
-        low, high = stretch_range(kernels.deformation(displacement, self.at_rest).C)
+        low, high = stretch_range(self.loops.deformation(displacement, self.at_rest).C)
         return float(self.at_rest.volumes[self.at_rest.shapes].ravel() @ ((low < window[0]) | (high > window[1])))
 
     def _volumetric(self, J, at_rest):

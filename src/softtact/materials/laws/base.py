@@ -88,6 +88,11 @@ class Law:
         return self.volumetric.bulk_modulus
 
     @property
+    def projected_modulus(self) -> float:
+        """Modulus (MPa) of U(J): K, or 0 of a law whose energy does not divide into shape and volume."""
+        return self.bulk_modulus
+
+    @property
     def mu0(self) -> float:
         """Initial shear modulus, MPa."""
         raise NotImplementedError

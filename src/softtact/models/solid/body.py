@@ -1,248 +1,267 @@
-"""A rubber body on any mesh: elements of several kinds and laws on one set of nodes, pressed by a rigid object from above.
+"""Soft and rigid bodies on one set of nodes: their potential, what is out of balance, and the tangent.
 
-The control is the indentation d in mm: it lowers the object's planes, and carries nodes that follow it. Potential Pi(u, d): its
-derivative by the free displacements is the residual, that by d the object's force. Lengths in mm, forces in N.
+Unknown are the free displacements u and the loaded freedoms q of the frames. The residual is the derivative of the potential
+Pi(u, q) = energy of the regions + penalties of the contacts - work of pressures and loads; the tangent is its second derivative.
+Frames' freedoms border the matrix: their columns are directional derivatives of the residual, taken by a difference. Lengths in mm,
+forces in N, pressures in MPa.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 
-from softtact.contact.penalty import penalty
+from softtact.contact.pair import ContactPair, PairHistory, PairState
+from softtact.errors import InputError
 from softtact.fem.assembly import SymmetricPattern, add_upper
-from softtact.fem.solid_block import SolidBlock
-from softtact.linalg.block_tridiagonal import BlockTridiagonalSolver
-from softtact.linalg.direct import PardisoSolver, SuperLUSolver, make_solver
+from softtact.fem.kernels import add_forces
+from softtact.fem.solid_mesh import SolidMesh
+from softtact.linalg.direct import make_solver
 from softtact.linalg.direct_single import point_at_mkl
-from softtact.linalg.workers import SERIAL, Workers
-from softtact.models.solid.contact_correction import ContactCorrection
-from softtact.models.solid.tetrahedra import LinearTetrahedra
+from softtact.linalg.workers import Workers, slices
+from softtact.materials.laws.base import Law
+from softtact.models.solid.blocks import region_blocks
+from softtact.models.solid.frames import Frame, FramePose
+from softtact.models.solid.loads import FacePressure
 
-# Heights (n,) and outward normals (n, 3) of a rigid surface over places x (n,), y (n,).
-Surface = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
-_CHUNK = 400      # elements whose dense tangents are in memory at once
-_PROBE_MM = 1e-7  # of the indentation, for the residual's derivative by it
-
-
-class SolidElements:
-    """Elements (e, m) given by a `blocks.SolidBlock`."""
-
-    def __init__(self, nodes: np.ndarray, block: SolidBlock) -> None:
-        self.nodes, self.block = np.ascontiguousarray(nodes), block
-
-    def add_force(self, displacement: np.ndarray, force: np.ndarray) -> tuple[float, float] | None:
-        """Add nodal forces (n, 3); returns energy (mJ) and the sum of all force components' magnitudes (N), None where J <= 0."""
-        state = self.block.evaluate(displacement[self.nodes])
-        if state is None:
-            return None
-        np.add.at(force, self.nodes.ravel(), state.force.reshape(-1, 3))
-        return state.energy, float(np.abs(state.force).sum())
-
-    def add_tangent(self, displacement: np.ndarray, values: np.ndarray, positions: np.ndarray) -> None:
-        """Add the tangent's entries (i, j >= i) to the matrix's values at `positions`."""
-        for start in range(0, len(self.nodes), _CHUNK):
-            part = slice(start, start + _CHUNK)
-            add_upper(values, self.block.tangent(displacement[self.nodes[part]], part), positions[part])
-
-
-class RigidContact:
-    """Frictionless penalty contact of faces (f, m) with a rigid surface, at points given by shape values (g, m) and areas (f, g).
-
-    surface(x, y) gives heights and normals out of the object over points, in the object's place at d = 0; `moves`: down with d. A
-    point keeps its plane until `face` looks anew. What is "near" is numbered by `near_nodes`, the faces' own nodes.
-    """
-
-    def __init__(self, points: np.ndarray, faces: np.ndarray, values: np.ndarray, areas: np.ndarray, surface: Surface, *,
-                 moves: bool, stiffness: float, smoothing: float) -> None:
-        self.nodes, self.values, self.areas = np.ascontiguousarray(faces), values, areas
-        self.near_nodes, faces = np.unique(self.nodes, return_inverse=True)
-        self._faces = faces.reshape(self.nodes.shape)
-        self.surface, self.moves, self._law = surface, moves, {"stiffness": stiffness, "smoothing": smoothing}
-        self._reference = self._at(points[self.near_nodes])
-        self.face(np.zeros_like(points))
-
-    def _at(self, field):
-        return np.matmul(self.values, field[self._faces])
-
-    def face(self, displacement: np.ndarray) -> None:
-        """Take the planes of the object that the points (f, g) face now."""
-        place = self._reference + self._at(displacement[self.near_nodes])
-        height, normals = self.surface(place[..., 0].ravel(), place[..., 1].ravel())
-        anchors = np.concatenate([place[..., :2], height.reshape(*place.shape[:2], 1)], axis=2)
-        self._normals = normals.reshape(place.shape)
-        self._gap0 = ((self._reference - anchors) * self._normals).sum(axis=2)
-
-    def _gaps(self, near, indentation):
-        gaps = self._gap0 + (self._normals * self._at(near)).sum(axis=2)
-        return gaps + indentation * self._normals[..., 2] if self.moves else gaps
-
-    def add_force(self, displacement: np.ndarray, indentation: float, force: np.ndarray) -> tuple[float, float]:
-        """Add nodal forces (n, 3); returns the contact's energy (mJ) and the downward force (N) of a moving object."""
-        near = displacement[self.near_nodes]
-        density, _, _ = penalty(self._gaps(near, indentation), **self._law)
-        nodal = self.near_force(near, indentation)
-        force[self.near_nodes] += nodal
-        return float((density * self.areas).sum()), float(nodal[:, 2].sum()) if self.moves else 0.0
-
-    def near_force(self, near: np.ndarray, indentation: float) -> np.ndarray:
-        """Nodal forces (c, 3) of the near nodes' displacement (c, 3): those of the residual, against what the object exerts."""
-        _, pressure, _ = penalty(self._gaps(near, indentation), **self._law)
-        active = pressure.any(axis=1)
-        push = (pressure[active] * self.areas[active])[..., None] * self._normals[active]
-        force = np.zeros_like(near)
-        np.add.at(force, self._faces[active].ravel(), -np.matmul(self.values.T, push).reshape(-1, 3))
-        return force
-
-    def add_tangent(self, displacement: np.ndarray, indentation: float, values: np.ndarray, positions: np.ndarray) -> None:
-        """Add the entries of faces in contact."""
-        near = displacement[self.near_nodes]
-        active = penalty(self._gaps(near, indentation), **self._law)[2].any(axis=1)
-        _, shape, slope = self.near_touching(near, indentation)
-        shape = shape.reshape(*slope.shape, 3 * self.nodes.shape[1])
-        add_upper(values, np.matmul((shape * slope[..., None]).transpose(0, 2, 1), shape), positions[active])
-
-    def near_touching(self, near: np.ndarray, indentation: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The faces that touch, in near nodes (t, m); the gaps' derivatives (t, g, m, 3); the points' stiffness (t, g) in N/mm."""
-        slope = penalty(self._gaps(near, indentation), **self._law)[2] * self.areas
-        active = slope.any(axis=1)
-        return self._faces[active], self.values[..., None] * self._normals[active][:, :, None], slope[active]
-
-    def node_normals(self, points: np.ndarray) -> np.ndarray:
-        """The object's normals over nodes at rest (n, 3)."""
-        return self.surface(points[:, 0], points[:, 1])[1]
-
-
-def flat_surface(height: float, radius: float = np.inf) -> Surface:
-    """The underside of a flat punch of this radius (mm), as `RigidContact` asks for it."""
-    from softtact.contact.height_field import NO_CONTACT_MM
-
-    def surface(x, y):
-        return np.where(x * x + y * y <= radius * radius, height, NO_CONTACT_MM), np.tile([0.0, 0.0, -1.0], (len(x), 1))
-
-    return surface
-
-
-def ground(height: float) -> Surface:
-    """A plane below the body, as `RigidContact` asks for it."""
-    return lambda x, y: (np.full(len(x), height), np.tile([0.0, 0.0, 1.0], (len(x), 1)))
+_CHUNK = 256         # elements whose dense tangents are in memory at once, for each thread
+_PROBE = 1e-7        # mm or radians, for derivatives by a frame's freedom
+AXES = "xyz"
 
 
 @dataclass(frozen=True)
-class FreeState:
-    """Displacement (n, 3) in mm at an indentation (mm), energy (mJ), nodal forces (n, 3) and the object's downward force in N.
-
-    mean_force: mean magnitude of all elements' nodal force components (N), the scale of the residual.
-    """
+class SolidState:
+    """All bodies at given places."""
 
     displacement: np.ndarray
-    indentation: float
-    energy: float
+    """(n, 3) of the nodes in mm, the frames' among them."""
+    poses: tuple[FramePose, ...]
+    """Of the frames."""
+    pressures: np.ndarray
+    """(f,) in MPa on the faces under pressure."""
+    histories: tuple[PairHistory, ...]
+    """What the pairs in contact remember."""
+    contacts: tuple[PairState, ...]
+    """The pairs' contact."""
     force: np.ndarray
-    object_force: float
-    mean_force: float
+    """(n, 3) in N: derivative of the potential by the nodes' places; at held nodes what holds them."""
+    energy: float
+    """In mJ: of the regions and the penalties."""
+    strain_energy: float
+    """In mJ: of the regions."""
+    size: float
+    """In N: sum of what presses and holds, the scale of the residual."""
 
 
-class FreeBody:
-    """Elements and contacts on one set of nodes.
+class SolidBody:
+    """Meshed bodies with laws, held faces, frames, contacts and pressures.
 
-    parts: `SolidElements` or `LinearTetrahedra`; held (n, 3): components that are given: zero, or -d times `follows` (n, 3).
-    apart: keep the moving contact out of the factor (see `contact_correction`): worth it for some hundred touching nodes, as long
-    as the rubber alone, under the pressure it has, is stable.
-    workers: for the places of the elements' entries in the matrix
+    mesh: all soft bodies;  laws: by region;  held {face: axes such as "xyz"};  carried {frame: (reference point, faces[, axes])}:
+    faces that a rigid frame moves, along axes such as "z" alone;  rigid {frame: (reference point, triangles' corners (t, 3, 3))}: rigid objects on further nodes
     """
 
-    def __init__(self, points: np.ndarray, parts: Sequence[SolidElements | LinearTetrahedra], *, held: np.ndarray,
-                 contacts: Sequence[RigidContact] = (), follows: np.ndarray | None = None,
-                 solver: PardisoSolver | BlockTridiagonalSolver | SuperLUSolver | None = None, apart: bool = False,
-                 workers: Workers = SERIAL) -> None:
-        self.points, self.parts, self.contacts = points, parts, contacts
-        self._follows = np.zeros(points.shape) if follows is None else -np.where(held, follows, 0.0)
-        used = np.zeros(len(points), dtype=bool)
-        for part in parts:
-            used[part.nodes] = True
-        free = ~held & used[:, None]
-        self.free = np.flatnonzero(free.ravel())
-        pattern = SymmetricPattern(free, [part.nodes for part in parts])
-        self._matrix = pattern.matrix()
-        self._positions = workers.map(lambda part: pattern.positions(part.nodes), (*parts, *contacts))
-        self._components = sum(3 * part.nodes.size for part in parts)
+    def __init__(self, mesh: SolidMesh, laws: Mapping[str, Law], *, held: Mapping[str, str] | None = None,
+                 carried: Mapping[str, tuple] | None = None,
+                 rigid: Mapping[str, tuple[Sequence[float], np.ndarray]] | None = None, threads: int = 1) -> None:
+        self.mesh, self.laws = mesh, dict(laws)
+        self.blocks = region_blocks(mesh, laws)
+        self.workers = Workers(threads)
+        # What rounding hides of the energy is in proportion to modulus times volume, however small the strain.
+        self.energy_noise = 3e-4 * sum(block.law.mu0 * block.volume for _, _, block in self.blocks)
+        self.points, self.frames, self._surfaces = _with_rigid(mesh, carried or {}, rigid or {})
+        self.free_components = self._free(held or {})
+        self.free = np.flatnonzero(self.free_components.ravel())
+        self.pairs: list[ContactPair] = []
+        self.pressures: list[FacePressure] = []
+        self._refuse_loose(held or {})
         point_at_mkl()
-        self.solver = solver or make_solver()
-        self._apart = next((c for c in contacts if c.moves), None) if apart else None
-        if self._apart:
-            self._correction = ContactCorrection(self.solver, pattern.number, self._apart, self._apart.node_normals(points))
+        self.solver = make_solver(threads=threads)
+        self._pattern: SymmetricPattern | None = None
+        self._known_pairs: set[tuple[int, int]] = set()
 
-    def rest(self) -> FreeState:
+    def _free(self, held):
+        free, n = np.zeros(self.points.shape, dtype=bool), len(self.mesh.points)
+        for _, nodes, _ in self.blocks:
+            free[nodes.ravel()] = True
+        if self.mesh.geometry != "solid":
+            free[:, 2] = False
+        for face, axes in held.items():
+            if not axes or set(axes) - set(AXES):
+                raise InputError(f"The face {face!r} is held along {axes!r}; name one or more of x, y and z.")
+            free[np.ix_(self.mesh.face_nodes(face), [AXES.index(axis) for axis in axes])] = False
+        for frame in self.frames:
+            free[frame.carried] = False
+        free[n:] = False
+        return free
+
+    def _refuse_loose(self, held):
+        """A body that nothing holds has no balance."""
+        edges = [np.column_stack([nodes[:, :1].repeat(nodes.shape[1] - 1, axis=1).ravel(), nodes[:, 1:].ravel()])
+                 for _, nodes, _ in self.blocks]
+        pairs, n = np.concatenate(edges), len(self.mesh.points)
+        count, label = connected_components(sp.coo_matrix((np.ones(len(pairs)), pairs.T), shape=(n, n)), directed=False)
+        dimensions = 3 if self.mesh.geometry == "solid" else 2
+        used = np.zeros(n, bool)
+        for _, nodes, _ in self.blocks:
+            used[nodes.ravel()] = True
+        held_somewhere = np.zeros(count, bool)
+        np.logical_or.at(held_somewhere, label, used & ~self.free_components[:n, :dimensions].all(axis=1))
+        for k in np.flatnonzero(~held_somewhere):
+            own = (label == k) & used
+            if own.any():
+                x, y, z = self.mesh.points[own].mean(axis=0)
+                raise InputError(f"Nothing holds the body around {x:.4g}, {y:.4g}, {z:.4g} mm; hold one of its faces or let a frame "
+                                 f"carry it (held are {', '.join(held) or 'none'}).")
+
+    def surface_nodes(self, frame: str) -> np.ndarray:
+        """Facets (t, 3) of a rigid object, in nodes of this body."""
+        return self._surfaces[frame]
+
+    def add_pair(self, pair: ContactPair) -> None:
+        """Let two surfaces meet; before the first state is made."""
+        self.pairs.append(pair)
+
+    def rest(self) -> SolidState:
         """The state without displacement."""
-        return self.evaluate(np.zeros_like(self.points), 0.0)     # type: ignore[return-value]
+        histories = tuple(pair.first(self.points) for pair in self.pairs)
+        state = self.evaluate(np.zeros_like(self.points), tuple(FramePose() for _ in self.frames), histories,
+                              np.zeros(len(self.pressures)))
+        assert state is not None
+        return state
 
-    def carried(self, displacement: np.ndarray, indentation: float) -> np.ndarray:
-        """The displacement with the nodes that follow the object where the indentation puts them."""
-        return np.where(self._follows != 0, indentation * self._follows, displacement)
+    def evaluate(self, displacement: np.ndarray, poses: tuple[FramePose, ...], histories: tuple[PairHistory, ...],
+                 pressures: np.ndarray, before: SolidState | None = None, *, bounded: bool = False) -> SolidState | None:
+        """`SolidState` with the frames' nodes where the poses (one a frame) put them; None where an element is inside out.
 
-    def face(self, displacement: np.ndarray) -> None:
-        """Let every contact point take the plane that it faces now."""
-        for contact in self.contacts:
-            contact.face(displacement)
-
-    def evaluate(self, displacement: np.ndarray, indentation: float) -> FreeState | None:
-        """`FreeState`; None where an element is inside out."""
-        force = np.zeros_like(displacement)
-        energy, size, pressed = 0.0, 0.0, 0.0
-        for part in self.parts:
-            result = part.add_force(displacement, force)
-            if result is None:
+        before: the state that this one follows on, with the same histories;  bounded: its pressures bound friction, not the state's own
+        """
+        displacement = displacement.copy()
+        for frame, pose in zip(self.frames, poses, strict=True):
+            axes = ["xyz".index(axis) for axis in frame.axes]
+            displacement[frame.carried] = pose.displacement(frame, self.points)[:, axes]
+        force, energy = np.zeros_like(displacement), 0.0
+        for _, nodes, block in self.blocks:
+            state = block.evaluate(displacement[nodes], workers=self.workers)
+            if state is None:
                 return None
-            energy, size = energy + result[0], size + result[1]
-        followed = float((force * self._follows).sum())   # d(energy)/dd through the nodes that follow
-        for contact in self.contacts:
-            stored, push = contact.add_force(displacement, indentation, force)
-            energy, pressed = energy + stored, pressed + push
-        return FreeState(displacement, indentation, energy, force, followed + pressed, size / self._components)
+            energy += state.energy
+            add_forces(force, nodes, state.force.reshape(*nodes.shape, 3))
+        size = float(np.abs(force[~self.free_components]).sum())
+        x, contacts, penalties = self.points + displacement, [], 0.0
+        for k, (pair, history) in enumerate(zip(self.pairs, histories, strict=True)):
+            contact = pair.evaluate(history, x, None if before is None else before.contacts[k], bounded=bounded)
+            pair.add_forces(history, contact, force)
+            penalties += contact.energy
+            size += float(history.points.weight @ contact.pressure)
+            contacts.append(contact)
+        for face, pressure in zip(self.pressures, pressures, strict=True):
+            size += face.add_force(x, float(pressure), force)
+        return SolidState(displacement, poses, pressures, histories, tuple(contacts), force, energy + penalties, energy, size)
 
-    def residual(self, state: FreeState) -> np.ndarray:
-        """Unbalanced forces (unknowns,) in N."""
-        return state.force.ravel()[self.free]
+    def again(self, state: SolidState, histories: tuple[PairHistory, ...] | None = None) -> SolidState:
+        """The same places with friction bounded by the pressure that is there; with other histories, every point also looks anew which
+        facet it meets.
+        """
+        found = self.evaluate(state.displacement, state.poses, state.histories if histories is None else histories, state.pressures,
+                              state if histories is None else None)
+        assert found is not None
+        return found
 
-    def factor(self, state: FreeState) -> None:
-        """Factor the tangent; where it is not positive definite, with as large a diagonal added as makes it so."""
-        matrix = self._matrix
-        matrix.data[:] = 0.0
-        for part, positions in zip(self.parts, self._positions, strict=False):
-            part.add_tangent(state.displacement, matrix.data, positions)
-        for contact, positions in zip(self.contacts, self._positions[len(self.parts):], strict=True):
-            if contact is self._apart:
-                continue
-            contact.add_tangent(state.displacement, state.indentation, matrix.data, positions)
-        shift, diagonal = 0.0, matrix.indptr[:-1]
-        while not self.solver.factor(matrix):
-            more = max(shift, 1e-3 * float(np.abs(matrix.data[diagonal]).mean()))
-            matrix.data[diagonal] += more
-            shift += more
+    def moved(self, state: SolidState, step: np.ndarray, ways: Sequence[np.ndarray], *, pressures: np.ndarray | None = None,
+              bounded: bool = True) -> SolidState | None:
+        """The state after a step (unknowns,) of the free displacements and ways (6,) of each frame.
 
-    def join_contact(self) -> bool:
-        """Take a contact kept apart back into the factor, where the rubber alone hardly stands; False if there is none."""
-        apart, self._apart = self._apart, None
-        return apart is not None
-
-    def step(self, state: FreeState) -> np.ndarray:
-        """Newton's step (unknowns,) in mm with the last factor, at the state's indentation."""
-        residual = self.residual(state)
-        return self._correction.step(state, residual) if self._apart else -self.solver.solve(residual)
-
-    def border(self, state: FreeState) -> tuple[np.ndarray, float]:
-        """Derivative (unknowns,) of the residual by the indentation, and that of the object's force (N/mm), by a difference."""
-        lowered = state.indentation + _PROBE_MM
-        moved: Any = self.evaluate(self.carried(state.displacement, lowered), lowered)
-        return ((self.residual(moved) - self.residual(state)) / _PROBE_MM, (moved.object_force - state.object_force) / _PROBE_MM)
-
-    def moved(self, state: FreeState, step: np.ndarray, indentation_increment: float) -> FreeState | None:
-        """The state after a step (unknowns,) in mm and an indentation increment of the object in mm; None where an element is
-        inside out.
+        bounded: friction keeps the bound of the state that the step leaves
         """
         displacement = state.displacement.copy()
         displacement.ravel()[self.free] += step
-        indentation = state.indentation + indentation_increment
-        return self.evaluate(self.carried(displacement, indentation), indentation)
+        poses = tuple(pose.moved(way) for pose, way in zip(state.poses, ways, strict=True))
+        return self.evaluate(displacement, poses, state.histories, state.pressures if pressures is None else pressures, state,
+                             bounded=bounded)
+
+    def residual(self, state: SolidState) -> np.ndarray:
+        """Unbalanced forces (unknowns,) in N."""
+        return state.force.ravel()[self.free]
+
+    def frame_loads(self, state: SolidState) -> np.ndarray:
+        """(frames, 6) in N and N mm: the loads under which the frames are in balance, about their reference points.
+
+        Of a rigid object that is its force on the bodies that it touches.
+        """
+        return np.array([pose.loads(frame, self.points, state.force) for frame, pose in zip(self.frames, state.poses, strict=True)]
+                        ).reshape(-1, 6)
+
+    def border(self, state: SolidState, frame: int, freedom: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of the residual (unknowns,) and of all frames' loads (frames, 6) along a way (6,) of a frame."""
+        size = float(np.abs(freedom).max())
+        ways = [np.zeros(6) for _ in self.frames]
+        ways[frame] = freedom * (_PROBE / size)
+        moved = self.moved(state, np.zeros(len(self.free)), ways)
+        assert moved is not None
+        return ((self.residual(moved) - self.residual(state)) * (size / _PROBE),
+                (self.frame_loads(moved) - self.frame_loads(state)) * (size / _PROBE))
+
+    def factor(self, state: SolidState) -> float:
+        """Factor the tangent; returns the diagonal (N/mm) that had to be added to make it positive definite, mostly 0."""
+        matrix = self.tangent(state)
+        shift, diagonal = 0.0, matrix.indptr[:-1]
+        while not self.solver.factor(matrix):
+            more = max(3.0 * shift, 1e-4 * float(np.abs(matrix.data[diagonal]).mean()))
+            matrix.data[diagonal] += more
+            shift += more
+        return shift
+
+    def tangent(self, state: SolidState) -> sp.csr_matrix:
+        """Upper triangle of the residual's derivative by the free displacements in N/mm; the next call fills the same matrix."""
+        x = self.points + state.displacement
+        coupled = [pair.tangents(history, contact, x)
+                   for pair, history, contact in zip(self.pairs, state.histories, state.contacts, strict=True)]
+        coupled.append([face.tangents(x, float(p)) for face, p in zip(self.pressures, state.pressures, strict=True) if p])
+        matrix = self._matrix_for([part for parts in coupled for part in parts])
+        self._add_blocks(matrix.data, state.displacement)
+        for nodes, matrices in (part for parts in coupled for part in parts):
+            add_upper(matrix.data, matrices, self._pattern.positions(nodes))     # type: ignore[union-attr]
+        return matrix
+
+    def _add_blocks(self, values, displacement):
+        def tangents(part):
+            return block.tangent(displacement[nodes[part]], part)
+
+        for (_, nodes, block), positions in zip(self.blocks, self._positions, strict=True):
+            parts = slices(len(nodes), _CHUNK)
+            for start in range(0, len(parts), self.workers.threads):      # in turns, so that few are in memory at once
+                several = parts[start:start + self.workers.threads]
+                for part, matrices in zip(several, self.workers.map(tangents, several), strict=True):
+                    add_upper(values, matrices, positions[part])
+
+    def _matrix_for(self, coupled):
+        """A matrix of zeros with room for the elements, and for the pairs of facets that ever met."""
+        wanted = {(a, b) for nodes, _ in coupled for a, b in zip(nodes[:, 0].tolist(), nodes[:, -1].tolist(), strict=True)}
+        if self._pattern is None or not wanted <= self._known_pairs:
+            self._known_pairs |= wanted
+            self._members = getattr(self, "_members", []) + [nodes for nodes, _ in coupled if len(nodes)]
+            self._pattern = SymmetricPattern(self.free_components, [*(nodes for _, nodes, _ in self.blocks), *self._members])
+            self._positions = [self._pattern.positions(nodes) for _, nodes, _ in self.blocks]
+            self._matrix = self._pattern.matrix()
+        self._matrix.data[:] = 0.0
+        return self._matrix
+
+
+def _with_rigid(mesh, carried, rigid):
+    """All nodes (n, 3), the frames, and the facets (t, 3) of each rigid object."""
+    points, frames, surfaces = [mesh.points], [], {}
+    for name, (point, faces, *axes) in carried.items():
+        nodes = np.unique(np.concatenate([mesh.face_nodes(face) for face in faces]))
+        frames.append(Frame(name, np.asarray(point, float), nodes, *axes))
+    start = len(mesh.points)
+    for name, (point, triangles) in rigid.items():
+        corners, inverse = np.unique(np.asarray(triangles, float).reshape(-1, 3), axis=0, return_inverse=True)
+        surfaces[name] = start + inverse.reshape(-1, 3)
+        frames.append(Frame(name, np.asarray(point, float), np.arange(start, start + len(corners))))
+        points.append(corners)
+        start += len(corners)
+    return np.ascontiguousarray(np.vstack(points)), frames, surfaces
+
+

@@ -1,241 +1,189 @@
-"""Presses of a `FreeBody` to given indentations or forces: Newton's method with line search, one factor for several steps."""
+"""Balance of a `SolidBody` at a load step: Newton's method of `models.newton`, with the frames' loaded freedoms as unknowns."""
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from softtact.errors import ConvergenceError
-from softtact.models.newton import lowers_potential, solve
-from softtact.models.solid.body import FreeBody, FreeState
+from softtact.models.newton import Solution, lowers_potential, solve
+from softtact.models.solid.body import SolidBody, SolidState
 
 
 @dataclass(frozen=True)
-class FreeSettings:
-    """When a step is good enough, and when a tangent is used again.
+class SolidSettings:
+    """When a step is good enough."""
 
-    relative_residual: largest unbalanced force over the mean force component of the elements; relative_correction: last
-    correction over the largest displacement of the increment (CalculiX asks for 0.005 and 0.01); good_reduction: a step that
-    cuts the residual to less than this share is followed by one with the same tangent.
-    """
-
-    relative_residual: float = 1e-5
-    relative_correction: float = 1e-2
-    good_reduction: float = 0.4
-    max_iterations: int = 40
-    largest_step_mm: float = 0.2
-    first_touch_mm: float = 0.01
+    relative_residual: float = 1e-6
+    """Largest unbalanced force over the sum of what presses and holds."""
+    penetration_mm: float = 1e-3
+    """Largest overlap of surfaces in contact, and widest gap across which pressure acts."""
+    max_iterations: int = 30
+    """Newton steps of a load step, or of an augmentation."""
+    max_augmentations: int = 12
+    """Changes of the contacts' offsets."""
+    largest_step_mm: float = 1.0
+    """Longest way of a node in one Newton step."""
+    smallest_increment: float = 1 / 256
+    """Smallest share of a step into which it is divided before it is given up."""
 
 
 @dataclass(frozen=True)
-class FreeLoadStep:
-    """A converged load step: its state, iterations, factorisations, and the largest unbalanced force in N."""
+class Target:
+    """Where an increment leads."""
 
-    state: FreeState
-    iterations: int
-    factorisations: int
-    residual_n: float
+    ways: list[np.ndarray]
+    """(6,) of each frame, mm and radians: what is prescribed within the increment; 0 where a freedom is loaded or stays."""
+    loads: list[dict[int, float]]
+    """Of each frame {freedom: load at the increment's end in N or N mm}."""
+    pressures: np.ndarray
+    """(f,) in MPa at the increment's end."""
 
-
-def press_to_indentations(body: FreeBody, indentations_mm: Iterable[float], *,
-                          settings: FreeSettings = FreeSettings()) -> Iterator[FreeLoadStep]:
-    """Yield a `FreeLoadStep` for each indentation (mm, increasing)."""
-    press = _Press(body, settings)
-    for indentation in indentations_mm:
-        yield press.advance(float(indentation), None)
-
-
-def press_to_forces(body: FreeBody, forces_n: Iterable[float], *,
-                    settings: FreeSettings = FreeSettings()) -> Iterator[FreeLoadStep]:
-    """Yield a `FreeLoadStep` for each force (N, increasing); the first touch is made by a small indentation."""
-    press = _Press(body, settings)
-    press.advance(settings.first_touch_mm, None)
-    for force in forces_n:
-        yield press.advance(press.states[-1].indentation, float(force))
+    @property
+    def unknown(self) -> list[tuple[int, int]]:
+        """(frame, freedom) of the loaded freedoms."""
+        return [(frame, freedom) for frame, own in enumerate(self.loads) for freedom in sorted(own)]
 
 
-class _Press:
-    """The states reached so far and whether the solver holds a factor."""
-
-    def __init__(self, body, settings):
-        self.body, self.settings = body, settings
-        self.states, self.factored, self._slope = [body.rest()], False, None
-
-    def advance(self, indentation, force, *, halvings=5):
-        """Equilibrium at an indentation or, if given, at a force; where Newton's method fails, in two halves of the increment."""
-        try:
-            return self._increment(indentation, force)
-        except ConvergenceError:
-            if not halvings:
-                raise
-        last = self.states[-1]
-        self.factored = False
-        if force is None:
-            first = self.advance(0.5 * (last.indentation + indentation), None, halvings=halvings - 1)
-        else:
-            first = self.advance(last.indentation, 0.5 * (last.object_force + force), halvings=halvings - 1)
-        second = self.advance(indentation, force, halvings=halvings - 1)
-        return replace(second, iterations=first.iterations + second.iterations,
-                       factorisations=first.factorisations + second.factorisations)
-
-    def _increment(self, indentation, force):
-        body, last = self.body, self.states[-1]
-        body.face(last.displacement)
-        start = self._start(indentation) if force is None else body.evaluate(last.displacement, last.indentation)
-        load_step = self._newton(start, force)
-        self.states = [*self.states[-3:], load_step.state]
-        return load_step
-
-    def _start(self, indentation):
-        """Displacements continued to the next indentation: along the tangent at first, then by a curve through the last states."""
-        body, states = self.body, self.states
-        if len(states) == 1:
-            return self._along_the_tangent(states[-1], indentation)
-        guess = self._continued(indentation)
-        return (body.evaluate(body.carried(guess, indentation), indentation)
-                or body.evaluate(body.carried(states[-1].displacement, indentation), indentation))
-
-    def _along_the_tangent(self, state, indentation):
-        """The first guess, from the state at rest; a first touch has no slope to follow."""
-        body = self.body
-        if any(contact.moves for contact in body.contacts):
-            return body.evaluate(state.displacement, indentation)
-        border, _ = body.border(state)
-        body.factor(state)
-        self.factored = True
-        start = body.moved(state, -indentation * body.solver.solve(border), indentation)
-        self._slope = start.displacement / indentation if start is not None else None
-        return start
-
-    def _continued(self, indentation):
-        """u(d) through the last states; as long as they begin at rest, with the slope there: u = d u'(0) + d^2 w(d)."""
-        states = self.states
-        if self._slope is not None and states[0].indentation == 0:
-            d = [s.indentation for s in states[1:]]
-            w = [(s.displacement - s.indentation * self._slope) / s.indentation**2 for s in states[1:]]
-            return indentation * self._slope + indentation**2 * _interpolated(d, w, indentation)
-        states = states[-3:]
-        return _interpolated([s.indentation for s in states], [s.displacement for s in states], indentation)
-
-    def _newton(self, state, force):
-        if state is None:
-            raise ConvergenceError("The step inverts an element; use smaller steps.")
-        problem = _Balance(self.body, self.settings, force, self.states[-1], factored=self.factored)
-        found = solve(problem, state, max_iterations=self.settings.max_iterations)
-        self.factored = problem.factored
-        if found.state is None:
-            raise ConvergenceError(f"No balance at an indentation of {problem.state.indentation:.4g} mm: "
-                                   f"{found.residual_n:.3g} N are left.")
-        return FreeLoadStep(found.state, found.iterations, problem.factorisations, found.residual_n)
-
-
+@dataclass
 class _Balance:
-    """The body's balance under a force (N), or at its indentation where that is None, as a `Problem`."""
+    """The balance under a `Target`, as a `Problem`; the first step takes the prescribed ways along."""
 
-    def __init__(self, body, settings, force, last, *, factored):
-        self.body, self.settings, self.force, self.last, self.factored = body, settings, force, last, factored
-        self.reuse, self.correction, self.factorisations, self.memory = factored and force is None, np.inf, 0, _Memory()
+    body: SolidBody
+    settings: SolidSettings
+    target: Target
+    pending: bool
+    shift: float = 0.0
+    factorisations: int = 0
 
-    def prepared(self, state, iteration):
-        self.state = state
+    def prepared(self, state: SolidState, iteration: int) -> SolidState:
+        if iteration and self.body.pairs and any(pair.friction for pair in self.body.pairs):
+            return self.body.again(state)      # friction's bound is that of the pressure now
         return state
 
-    def residual(self, state):
-        largest = float(np.abs(self.body.residual(state)).max())
-        return largest if self.force is None else max(largest, abs(state.object_force - self.force))
+    def _loads_off(self, state: SolidState) -> np.ndarray:
+        loads = self.body.frame_loads(state)
+        return np.array([loads[frame, freedom] - self.target.loads[frame][freedom] for frame, freedom in self.target.unknown])
 
-    def balanced(self, state, residual):
-        moved = float(np.abs(state.displacement - self.last.displacement).max())
-        return (residual <= self.settings.relative_residual * state.mean_force
-                and self.correction <= self.settings.relative_correction * moved)
+    def residual(self, state: SolidState) -> float:
+        off = self._loads_off(state)
+        return float(max(np.abs(self.body.residual(state)).max(initial=0.0), np.abs(off).max(initial=0.0)))
 
-    def step(self, state):
-        """Step (unknowns,) and indentation increment of the object (mm), with a factor of before where it serves."""
-        if not self.reuse:
-            self.body.factor(state)
-            self.factored, self.factorisations, self.memory = True, self.factorisations + 1, _Memory()
-        step, indentation_increment = self._step(state)
-        if self.force is None and not self.body.contacts:   # a mean of steps would not fulfil the contact
-            step = self.memory.improved(step)
-        self._step_size = float(np.abs(step).max())
-        return state, (step, indentation_increment)
+    def balanced(self, state: SolidState, residual: float) -> bool:
+        return not self.pending and residual <= self.settings.relative_residual * max(state.size, 1e-9)
 
-    def _step(self, state):
+    def step(self, state: SolidState) -> tuple[SolidState, Any]:
+        body, unknown = self.body, self.target.unknown
+        self.shift = body.factor(state)
+        self.factorisations += 1
+        residual, off = body.residual(state).copy(), self._loads_off(state)
+        ways = [np.zeros(6) for _ in body.frames]
+        pressures = state.pressures
+        if self.pending:
+            pressures = self.target.pressures
+            residual, off = self._predicted(state, residual, off, ways)
+        columns, corner = [], np.zeros((len(unknown), len(unknown)))
+        for k, (frame, freedom) in enumerate(unknown):
+            column, loads = body.border(state, frame, np.eye(6)[freedom])
+            columns.append(column)
+            corner[:, k] = [loads[other] for other in unknown]
+        found = body.solver.solve(np.column_stack([residual, *columns]))
+        step = -found[:, 0]
+        if unknown:
+            B = np.column_stack(columns)
+            schur = 0.5 * (corner + corner.T) - B.T @ found[:, 1:]
+            amount = np.linalg.solve(_definite(schur), -off - B.T @ step)
+            step = step - found[:, 1:] @ amount
+            for (frame, freedom), value in zip(unknown, amount, strict=True):
+                ways[frame][freedom] += value
+        return state, (step, ways, pressures)
+
+    def _predicted(self, state, residual, off, ways):
+        """What is out of balance after the prescribed ways and pressures, to first order; the ways are added to `ways`."""
         body = self.body
-        if self.force is None:
-            return body.step(state), 0.0
-        residual = body.residual(state)
-        if not self.reuse:
-            self._border, self._corner = body.border(state)
-            step, self._along = -body.solver.solve(np.column_stack([residual, self._border])).T
-        else:
-            step = -body.solver.solve(residual)
-        stiffness = abs(self._corner + self._border @ self._along)
-        indentation_increment = (self.force - state.object_force - self._border @ step) / stiffness
-        return step + indentation_increment * self._along, indentation_increment
+        for frame, way in enumerate(self.target.ways):
+            if np.any(way):
+                column, loads = body.border(state, frame, way)
+                residual = residual + column
+                off = off + np.array([loads[other] for other in self.target.unknown])
+                ways[frame] += way
+        if np.any(self.target.pressures != state.pressures):
+            x = body.points + state.displacement
+            force = np.zeros_like(x)
+            for face, now, then in zip(body.pressures, state.pressures, self.target.pressures, strict=True):
+                face.add_force(x, float(then - now), force)
+            residual = residual + force.ravel()[body.free]
+        return residual, off
 
-    def first_share(self, step):
-        return min(1.0, self.settings.largest_step_mm / max(float(np.abs(step[0]).max()), abs(step[1]), 1e-30))
+    def first_share(self, step: Any) -> float:
+        if self.pending:
+            return 1.0
+        largest = max(np.abs(step[0]).max(initial=0.0), max((np.abs(way[:3]).max() for way in step[1]), default=0.0))
+        return min(1.0, self.settings.largest_step_mm / max(largest, 1e-30))
 
-    def moved(self, state, step, share):
-        return self.body.moved(state, share * step[0], share * step[1])
+    def moved(self, state: SolidState, step: Any, share: float) -> SolidState | None:
+        if self.pending and share < 1.0:
+            # The prescribed ways are taken whole, or the increment is too large.
+            return self.body.moved(state, share * step[0], step[1], pressures=step[2]) if share == 0.5 else None
+        return self.body.moved(state, share * step[0], [share * way for way in step[1]], pressures=step[2])
 
-    def better(self, trial, state, residual):
-        before = self._potential(state)
-        return self.residual(trial) < residual or bool(lowers_potential(before, self._potential(trial), abs(before)))
+    def better(self, trial: SolidState, state: SolidState, residual: float) -> bool:
+        if self.pending:
+            return True
+        smaller = self.residual(trial) < residual
+        if np.any(state.pressures):     # their work is no function of the places where the surface is open
+            return smaller
+        lower = lowers_potential(state.energy, trial.energy - self._work(state, trial), abs(state.energy) + self.body.energy_noise)
+        if any(pair.friction for pair in self.body.pairs):
+            return smaller or bool(lower)
+        return smaller if lower is None else lower     # a residual alone may fall and rise in turns where points touch and leave
 
-    def _potential(self, state):
-        return state.energy - (self.force or 0.0) * state.indentation
+    def _work(self, before: SolidState, after: SolidState) -> float:
+        """Work in mJ of the loads of the frames' loaded freedoms on a step's way; rotations by their small angles."""
+        work = 0.0
+        for frame, freedom in self.target.unknown:
+            old, new = before.poses[frame], after.poses[frame]
+            if freedom < 3:
+                way = new.translation[freedom] - old.translation[freedom]
+            else:
+                i, j = (freedom - 1) % 3, (freedom - 2) % 3
+                turn = new.rotation @ old.rotation.T
+                way = 0.5 * (turn[j, i] - turn[i, j])
+            work += self.target.loads[frame][freedom] * way
+        return work
 
-    def accepted(self, state, trial):
-        self.correction = self._step_size
-        self.reuse = self.residual(trial) < self.settings.good_reduction * self.residual(state)
+    def accepted(self, state: SolidState, trial: SolidState) -> None:
+        self.pending = False
 
-    def recovered(self, state):
-        """A new factor may help where an old one was used, or points that join the contact."""
-        helped = self.reuse or self.body.join_contact()
-        self.reuse = False
-        return helped
+    def recovered(self, state: SolidState) -> bool:
+        return False
 
 
-class _Memory:
-    """Anderson's acceleration of steps with one tangent: earlier steps and what they changed correct the next one.
+def _definite(schur: np.ndarray) -> np.ndarray:
+    """A symmetric matrix with its eigenvalues' magnitudes, none next to zero: a step uphill would lead away."""
+    values, vectors = np.linalg.eigh(schur)
+    least = 1e-8 * max(np.abs(values).max(), 1e-12)
+    return (vectors * np.maximum(np.abs(values), least)) @ vectors.T
 
-    Reference: Walker and Ni, SIAM J. Numer. Anal. 49 (2011) 1715.
+
+def balance(body: SolidBody, start: SolidState, target: Target, settings: SolidSettings) -> tuple[SolidState, int, float]:
+    """The balanced state of a target, its iterations and the largest unbalanced force (N), contact settled to the penetration.
+
+    Raises ConvergenceError where Newton's method or the augmentations do not end.
     """
+    state, iterations, pending = start, 0, True
+    for _ in range(settings.max_augmentations + 1):
+        problem = _Balance(body, settings, target, pending)
+        found: Solution = solve(problem, state, max_iterations=settings.max_iterations)
+        iterations += found.iterations
+        if found.state is None:
+            raise ConvergenceError(f"{found.residual_n:.3g} N are left unbalanced after {found.iterations} iterations.")
+        state, pending = found.state, False
+        if all(pair.settled(contact, settings.penetration_mm)
+               for pair, contact in zip(body.pairs, state.contacts, strict=True)):
+            return state, iterations, found.residual_n
+        state = body.again(state, tuple(pair.augmented(history, contact) for pair, history, contact
+                                        in zip(body.pairs, state.histories, state.contacts, strict=True)))
+    worst = max(contact.penetration_mm() for contact in state.contacts)
+    raise ConvergenceError(f"The surfaces still overlap by {worst * 1000:.3g} um after {settings.max_augmentations} augmentations.")
 
-    _DEPTH = 5
-
-    def __init__(self):
-        self._raw, self._moves, self._changes = None, [], []
-
-    def improved(self, step):
-        """The step to take in place of the tangent's `step` (unknowns,); the whole of it is assumed to be taken."""
-        if self._raw is not None:
-            self._changes = [*self._changes, step - self._raw][-self._DEPTH:]
-            weights = _least_squares(np.array(self._changes), step)
-            better = step - weights @ (np.array(self._moves[-self._DEPTH:]) + np.array(self._changes))
-        else:
-            better = step
-        self._raw, self._moves = step, [*self._moves, better][-self._DEPTH:]
-        return better
-
-
-def _least_squares(rows, target):
-    """Weights of the rows (k, n) whose sum is nearest to a target (n,), by normal equations of rows scaled to one length.
-
-    Rows that are alike within 1e-5 count as one, and rows of zeros for nothing.
-    """
-    lengths = np.linalg.norm(rows, axis=1)
-    lengths[lengths == 0] = 1.0
-    products = (rows @ rows.T) / np.outer(lengths, lengths)
-    return np.linalg.lstsq(products, (rows @ target) / lengths, rcond=1e-10)[0] / lengths
-
-
-def _interpolated(places, values, place):
-    """Lagrange's polynomial through values at places, continued to `place`."""
-    total = 0.0
-    for x, value in zip(places, values, strict=True):
-        others = [(place - y) / (x - y) for y in places if y != x]
-        total = total + np.prod(others) * value
-    return total

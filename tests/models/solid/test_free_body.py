@@ -6,8 +6,8 @@ import pytest
 from softtact.fem.solid_block import SolidBlock
 from softtact.linalg.direct_single import PardisoSingle
 from softtact.materials.laws.registry import make_law
-from softtact.models.solid.body import FreeBody, RigidContact, SolidElements, flat_surface, ground
-from softtact.models.solid.newton import FreeSettings, _least_squares, press_to_forces, press_to_indentations
+from softtact.models.solid.free_body import FreeBody, RigidContact, SolidElements, flat_surface, ground
+from softtact.models.solid.free_press import FreeSettings, _least_squares, press_to_forces, press_to_indentations
 from softtact.models.solid.tetrahedra import LinearTetrahedra
 
 LAWS = {

@@ -1,0 +1,287 @@
+"""Compiled loops over the points of a surface that meets another one: gaps, forces, tangents, with every second derivative.
+
+With the closest point x_m(xi) on the other surface, its tangents a_k, normal n and curvature kappa_kl = n . d2x/dxi_k dxi_l:
+    gap g = n . (x - x_m),   dg = n . (dx - dx_m),   D = M^-1 (a . (dx - dx_m) + g n . d(a)),   M_kl = a_k . a_l - g kappa_kl
+    d2g = -(n.da_k D_k + D_k n.da_k + kappa_kl D_k D_l) + g a^kl (n.da_k + kappa_km D_m) (n.da_l + kappa_ln D_n)
+Reference: Wriggers, Computational Contact Mechanics, 2nd ed. (2006), section 4.1.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from softtact.contact.facet_shapes import (
+    LINE2,
+    MARGIN,
+    NODES_OF,
+    QUAD8,
+    closest_on,
+    evaluate_shapes,
+    place_on,
+    room_for_shapes,
+    unit_normal,
+)
+from softtact.contact.facet_tree import FacetTree, nearest
+from softtact.contact.surfaces import SurfacePoints
+
+_AT_EDGE = 1e-9
+_LEAVES = 8.0     # a point leaves a rim that it met so much farther out than where it would meet it: else it would come and go
+
+
+class Projection(NamedTuple):
+    """The points' closest places on the other surface."""
+
+    facet: np.ndarray
+    """(p,) facet, -1 where none is within reach."""
+    coordinates: np.ndarray
+    """(p, 2) on that facet."""
+    gap: np.ndarray
+    """(p,) in mm, negative where the point is inside; infinite without a facet."""
+    normal: np.ndarray
+    """(p, 3) outwards from the other surface."""
+    inner: np.ndarray
+    """(p,) whether the place is inside its facet or the margin around it: at the margin's end the normal does not turn with it."""
+
+
+@njit(cache=True, nogil=True)
+def project(points: SurfacePoints, nodes: np.ndarray, kinds: np.ndarray, rims: np.ndarray, tree: FacetTree, x: np.ndarray,
+            reach: float, rim: float, least_cosine: float, itself: bool, before: np.ndarray, near: np.ndarray) -> Projection:
+    """`Projection` of points on the surface of facets nodes (f, 9) and kinds (f,), all nodes at x (n, 3) in mm.
+
+    rims (f, 4): which edges end the surface;  rim: how far (mm) beside such an edge a point still meets the plane of its facet
+    reach: farthest distance in mm;  least_cosine: of the angle between the surfaces' opposite normals;  itself: leave out the facets
+    that share a node with the point's own
+    before (p,), near (p, 2): facets and coordinates of before, which a point keeps as long as it stands over them: a point on the
+    edge between two facets would else change between them from iteration to iteration
+    """
+    count = len(points.facet)
+    out = Projection(np.full(count, -1), np.zeros((count, 2)), np.full(count, np.inf), np.zeros((count, 3)), np.zeros(count, np.bool_))
+    room, nobody, own, tangents, normal = room_for_shapes(), np.full(1, -1), np.empty(3), np.empty((2, 3)), np.empty(3)
+    for p in range(count):
+        _place_of_point(points, p, x, own, tangents)
+        unit_normal(tangents, normal)
+        if before[p] >= 0 and _meets(out, p, before[p], near[p, 0], near[p, 1], own, nodes, kinds, rims, x, _LEAVES * rim, room) and (
+                out.inner[p] and abs(out.gap[p]) < reach and -(out.normal[p] * normal).sum() >= least_cosine):
+            continue
+        out.facet[p], out.gap[p] = -1, np.inf
+        facet, xi, eta = nearest(tree, x, own, normal, least_cosine, reach, points.nodes[p] if itself else nobody)
+        if facet >= 0 and not _meets(out, p, facet, xi, eta, own, nodes, kinds, rims, x, rim, room):
+            out.facet[p], out.gap[p] = -1, np.inf
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _meets(out, p, facet, xi, eta, own, nodes, kinds, rims, x, rim, room):
+    """Fill the projection of point p, at `own` (3,), on a facet; whether it stands over it and not beside the surface's rim."""
+    corners, tangents, normal, place, kind = np.zeros((9, 3)), np.empty((2, 3)), np.empty(3), np.empty(3), kinds[facet]
+    for a in range(NODES_OF[kind]):
+        corners[a] = x[nodes[facet, a]]
+    xi, eta = closest_on(kind, corners, own, xi, eta, room)
+    evaluate_shapes(kind, xi, eta, room)
+    place_on(kind, corners, room, place, tangents)
+    unit_normal(tangents, normal)
+    out.facet[p], out.coordinates[p, 0], out.coordinates[p, 1], out.normal[p] = facet, xi, eta, normal
+    out.gap[p], out.inner[p] = (normal * (own - place)).sum(), _inside(kind, xi, eta)
+    return not _beyond_rim(kind, xi, eta, rims[facet], tangents, rim)
+
+
+@njit(cache=True, nogil=True)
+def _place_of_point(points, p, x, place, tangents):
+    place[:], tangents[:] = 0.0, 0.0
+    for a in range(9):
+        node = points.nodes[p, a]
+        if node < 0:
+            break
+        for i in range(3):
+            place[i] += points.values[p, a] * x[node, i]
+            tangents[0, i] += points.slopes[p, 0, a] * x[node, i]
+            tangents[1, i] += points.slopes[p, 1, a] * x[node, i]
+    if points.kind[p] >= LINE2:
+        tangents[1, 2] = 1.0
+
+
+@njit(cache=True, nogil=True)
+def _inside(kind, xi, eta):
+    limit = 1 + 2 * MARGIN - _AT_EDGE
+    if kind >= LINE2:
+        return abs(xi) < limit
+    if kind >= QUAD8:
+        return abs(xi) < limit and abs(eta) < limit
+    return xi > -MARGIN + _AT_EDGE and eta > -MARGIN + _AT_EDGE and xi + eta < 1 + MARGIN - _AT_EDGE
+
+
+@njit(cache=True, nogil=True)
+def _beyond_rim(kind, xi, eta, rims, tangents, rim):
+    """Whether coordinates lie farther than `rim` (mm) beyond an edge that ends the surface."""
+    a, b = np.sqrt((tangents[0] ** 2).sum()), np.sqrt((tangents[1] ** 2).sum())
+    if kind >= LINE2:
+        return (rims[0] and (-1 - xi) * a > rim) or (rims[1] and (xi - 1) * a > rim)
+    if kind >= QUAD8:
+        return ((rims[0] and (-1 - eta) * b > rim) or (rims[1] and (xi - 1) * a > rim) or (rims[2] and (eta - 1) * b > rim)
+                or (rims[3] and (-1 - xi) * a > rim))
+    return (rims[0] and -eta * b > rim) or (rims[1] and (xi + eta - 1) * min(a, b) > rim) or (rims[2] and -xi * a > rim)
+
+
+@njit(cache=True, nogil=True)
+def places(points: SurfacePoints, x: np.ndarray) -> np.ndarray:
+    """Places (p, 3) in mm of the points, nodes at x (n, 3); of displacements, those of the points."""
+    out, tangents = np.zeros((len(points.facet), 3)), np.empty((2, 3))
+    for p in range(len(points.facet)):
+        _place_of_point(points, p, x, out[p], tangents)
+    return out
+
+
+@njit(cache=True, nogil=True)
+def places_on(facet: np.ndarray, coordinates: np.ndarray, nodes: np.ndarray, kinds: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Places (p, 3) of coordinates (p, 2) on facets (p,) of a surface; zeros where the facet is -1."""
+    out, room = np.zeros((len(facet), 3)), room_for_shapes()
+    for p in range(len(facet)):
+        if facet[p] >= 0:
+            evaluate_shapes(kinds[facet[p]], coordinates[p, 0], coordinates[p, 1], room)
+            for a in range(NODES_OF[kinds[facet[p]]]):
+                for i in range(3):
+                    out[p, i] += room.values[a] * x[nodes[facet[p], a], i]
+    return out
+
+
+@njit(cache=True, nogil=True)
+def add_forces_of(force: np.ndarray, points: SurfacePoints, facet: np.ndarray, coordinates: np.ndarray, nodes: np.ndarray,
+                  kinds: np.ndarray, traction: np.ndarray) -> None:
+    """Take tractions (p, 3) in MPa that act on the points' surface from nodal forces (n, 3), and add them on the other one.
+
+    So that `force` holds what stands against them: the residual of a potential.
+    """
+    room = room_for_shapes()
+    for p in range(len(facet)):
+        if facet[p] < 0 or not (traction[p, 0] != 0 or traction[p, 1] != 0 or traction[p, 2] != 0):
+            continue
+        w = points.weight[p]
+        for a in range(9):
+            node = points.nodes[p, a]
+            if node < 0:
+                break
+            for i in range(3):
+                force[node, i] -= w * points.values[p, a] * traction[p, i]
+        evaluate_shapes(kinds[facet[p]], coordinates[p, 0], coordinates[p, 1], room)
+        for a in range(NODES_OF[kinds[facet[p]]]):
+            for i in range(3):
+                force[nodes[facet[p], a], i] += w * room.values[a] * traction[p, i]
+
+
+@njit(cache=True, nogil=True)
+def _forms(points, p, corners, kind, room, width, coupled, rows):
+    """Shape values of both sides into rows (1, k) and the other side's slopes (2, k), nodes of the other side behind `width`."""
+    rows[:] = 0.0
+    for a in range(NODES_OF[points.kind[p]]):
+        rows[0, a] = points.values[p, a]
+    if coupled:
+        for a in range(NODES_OF[kind]):
+            rows[0, width + a] = -room.values[a]
+            rows[1, width + a], rows[2, width + a] = room.slopes[0, a], room.slopes[1, a]
+
+
+@njit(cache=True, nogil=True)
+def add_pair_tangents(out: np.ndarray, pair: np.ndarray, points: SurfacePoints, projection: Projection, nodes: np.ndarray,
+                      kinds: np.ndarray, x: np.ndarray, pressure: np.ndarray, slope: np.ndarray, width: int, coupled: bool) -> None:
+    """Add the second derivative of the contact's energy to the matrices (pairs, k, k) of pairs of facets.
+
+    pair (p,): the points' pairs, -1 for none;  pressure (p,) in MPa and its slope (p,) in N/mm3;  width: nodes of a facet of the
+    points' side, behind which those of the other side stand where `coupled`
+    """
+    room, corners, columns = room_for_shapes(), np.zeros((9, 3)), out.shape[1]
+    k = columns // 3
+    rows, G, N, D, T = np.empty((3, k)), np.empty(columns), np.empty((2, columns)), np.empty((2, columns)), np.empty((2, columns))
+    place, tangents, normal = np.empty(3), np.empty((2, 3)), np.empty(3)
+    M, kappa, metric = np.empty((2, 2)), np.empty((2, 2)), np.empty((2, 2))
+    for p in range(len(pair)):
+        if pair[p] < 0:
+            continue
+        facet = projection.facet[p]
+        kind, n = kinds[facet], projection.normal[p]
+        for a in range(NODES_OF[kind]):
+            corners[a] = x[nodes[facet, a]]
+        evaluate_shapes(kind, projection.coordinates[p, 0], projection.coordinates[p, 1], room)
+        place_on(kind, corners, room, place, tangents)
+        _forms(points, p, corners, kind, room, width, coupled, rows)
+        for a in range(k):
+            for i in range(3):
+                G[3 * a + i] = rows[0, a] * n[i]
+        _add_square(out[pair[p]], points.weight[p] * slope[p], G)
+        if pressure[p] == 0 or not projection.inner[p]:
+            continue
+        _curvature(kind, corners, room, n, kappa)
+        gap = projection.gap[p]
+        for i in range(2):
+            for j in range(2):
+                metric[i, j] = (tangents[i] * tangents[j]).sum()
+                M[i, j] = metric[i, j] - gap * kappa[i, j]
+        _invert(M)
+        _invert(metric)
+        for d in range(2):
+            for a in range(k):
+                for i in range(3):
+                    N[d, 3 * a + i] = rows[1 + d, a] * n[i]
+                    T[d, 3 * a + i] = rows[0, a] * tangents[d, i] + gap * N[d, 3 * a + i]
+        for d in range(2):
+            D[d] = M[d, 0] * T[0] + M[d, 1] * T[1]
+        for d in range(2):
+            T[d] = N[d] + kappa[d, 0] * D[0] + kappa[d, 1] * D[1]
+        w = -points.weight[p] * pressure[p]
+        for r in range(columns):
+            for c in range(r, columns):
+                value = 0.0
+                for i in range(2):
+                    value -= N[i, r] * D[i, c] + D[i, r] * N[i, c]
+                    for j in range(2):
+                        value += gap * metric[i, j] * T[i, r] * T[j, c] - kappa[i, j] * D[i, r] * D[j, c]
+                out[pair[p], r, c] += w * value
+
+
+@njit(cache=True, nogil=True)
+def _add_square(matrix, factor, form):
+    """The upper triangle of factor times form form^T."""
+    for r in range(len(form)):
+        if form[r] != 0.0:
+            own = factor * form[r]
+            for c in range(r, len(form)):
+                matrix[r, c] += own * form[c]
+
+
+@njit(cache=True, nogil=True)
+def _curvature(kind, corners, room, n, kappa):
+    kappa[:] = 0.0
+    for a in range(NODES_OF[kind]):
+        along = n[0] * corners[a, 0] + n[1] * corners[a, 1] + n[2] * corners[a, 2]
+        kappa[0, 0] += room.curvatures[0, a] * along
+        kappa[1, 1] += room.curvatures[1, a] * along
+        kappa[0, 1] += room.curvatures[2, a] * along
+    kappa[1, 0] = kappa[0, 1]
+
+
+@njit(cache=True, nogil=True)
+def _invert(m):
+    determinant = m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0]
+    m[0, 0], m[1, 1], m[0, 1], m[1, 0] = m[1, 1] / determinant, m[0, 0] / determinant, -m[0, 1] / determinant, -m[1, 0] / determinant
+
+
+@njit(cache=True, nogil=True)
+def add_friction_tangents(out: np.ndarray, pair: np.ndarray, points: SurfacePoints, facet: np.ndarray, coordinates: np.ndarray,
+                          kinds: np.ndarray, stiffness: np.ndarray, width: int, coupled: bool) -> None:
+    """Add w F^T (3 x 3 stiffness of a point, (p, 3, 3) in N/mm3) F of F = (shape values, minus those of the other side)."""
+    room, columns = room_for_shapes(), out.shape[1]
+    k = columns // 3
+    rows, corners = np.empty((3, k)), np.zeros((9, 3))
+    for p in range(len(pair)):
+        if pair[p] < 0:
+            continue
+        kind = kinds[facet[p]]
+        evaluate_shapes(kind, coordinates[p, 0], coordinates[p, 1], room)
+        _forms(points, p, corners, kind, room, width, coupled, rows)
+        for a in range(k):
+            for b in range(a, k):
+                factor = points.weight[p] * rows[0, a] * rows[0, b]
+                if factor != 0.0:
+                    for i in range(3):
+                        for j in range(i if a == b else 0, 3):
+                            out[pair[p], 3 * a + i, 3 * b + j] += factor * stiffness[p, i, j]

@@ -1,0 +1,165 @@
+"""A mesh of any body: nodes, elements by region, faces by name; spatial, in plane strain or axisymmetric.
+
+Plane meshes lie in z = 0. Of an axisymmetric body x is the radius and y the axis.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from softtact.errors import InputError
+from softtact.fem.elements import HEX20, HEX27, QUAD8, QUAD9, TET10, TRI6, WEDGE18, Element
+
+GEOMETRIES = ("solid", "plane_strain", "axisymmetric")
+ELEMENTS = {element.meshio_name: element for element in (TET10, HEX20, HEX27, WEDGE18, TRI6, QUAD8, QUAD9)}
+_FLIPPED = {6: [0, 2, 1, 5, 4, 3], 8: [0, 3, 2, 1, 7, 6, 5, 4], 9: [0, 3, 2, 1, 7, 6, 5, 4, 8]}    # a facet seen from its other side
+_CORNERS = {3: 2, 6: 3, 8: 4, 9: 4}     # of a facet of so many nodes
+
+Facets = dict[str, np.ndarray]
+"""{meshio's name of a facet: nodes (f, k)}, seen counter-clockwise from outside."""
+
+
+@dataclass(frozen=True)
+class SolidMesh:
+    """A mesh of one or several bodies."""
+
+    points: np.ndarray
+    """(n, 3) nodes in mm."""
+    cells: tuple[tuple[str, str, np.ndarray], ...]
+    """Elements by region: (region, meshio's name of the element, nodes (e, m))."""
+    faces: dict[str, Facets] = field(default_factory=dict)
+    """Faces by name."""
+    geometry: str = "solid"
+    """solid, plane_strain or axisymmetric."""
+    thickness_mm: float = 1.0
+    """Thickness of a body in plane strain."""
+
+    def __post_init__(self) -> None:
+        if self.geometry not in GEOMETRIES:
+            raise InputError(f"The geometry {self.geometry!r} is unknown; use one of {', '.join(GEOMETRIES)}.")
+        plane = self.geometry != "solid"
+        for region, kind, nodes in self.cells:
+            if kind not in ELEMENTS:
+                raise InputError(f"The region {region!r} has cells {kind!r}; use one of {', '.join(ELEMENTS)}.")
+            if (ELEMENTS[kind].nodes.shape[1] == 2) != plane:
+                raise InputError(f"The region {region!r} has cells {kind!r}, which do not fit the geometry {self.geometry!r}.")
+            if len(nodes) and (nodes.min() < 0 or nodes.max() >= len(self.points)):
+                raise InputError(f"The region {region!r} has cells with nodes beyond the mesh's {len(self.points)}.")
+
+    @property
+    def regions(self) -> list[str]:
+        """Names of the regions, each once."""
+        return list(dict.fromkeys(region for region, _, _ in self.cells))
+
+    @property
+    def axisymmetric(self) -> bool:
+        """Whether x is a radius."""
+        return self.geometry == "axisymmetric"
+
+    def parts(self) -> Iterator[tuple[str, Element, np.ndarray]]:
+        """(region, element, nodes (e, m)) one after the other."""
+        return ((region, ELEMENTS[kind], nodes) for region, kind, nodes in self.cells)
+
+    @cached_property
+    def boundary(self) -> Facets:
+        """All facets that belong to one element only."""
+        return _boundary([(ELEMENTS[kind], nodes) for _, kind, nodes in self.cells])
+
+    def face(self, name: str) -> Facets:
+        """The face of a name; `boundary` is the whole surface. InputError lists the names where there is none of it."""
+        if name == "boundary" and name not in self.faces:
+            return self.boundary
+        if name not in self.faces:
+            raise InputError(f"The mesh has no face {name!r}; its faces are {', '.join(['boundary', *self.faces])}.")
+        return self.faces[name]
+
+    def face_nodes(self, name: str) -> np.ndarray:
+        """Nodes (k,) of a face, each once."""
+        return np.unique(np.concatenate([nodes.ravel() for nodes in self.face(name).values()]))
+
+    def with_faces(self, **where: Callable[[np.ndarray], np.ndarray]) -> "SolidMesh":
+        """The mesh with faces by name: those facets of the boundary whose middles (f, 3) in mm `where` says are (f,) of it.
+
+        InputError where a face is empty.
+        """
+        named = {name: self._facets_where(name, rule) for name, rule in where.items()}
+        return replace(self, faces=self.faces | named)
+
+    def _facets_where(self, name, rule):
+        found = {}
+        for kind, nodes in self.boundary.items():
+            middles = self.points[nodes[:, :_CORNERS[nodes.shape[1]]]].mean(axis=1)
+            if (here := np.asarray(rule(middles), dtype=bool)).any():
+                found[kind] = nodes[here]
+        if not found:
+            raise InputError(f"The face {name!r} would be empty: no facet of the boundary is where it was asked for.")
+        return found
+
+    def with_regions(self, rule: Callable[[np.ndarray], np.ndarray]) -> "SolidMesh":
+        """The mesh with the regions (e,) (names) that `rule` gives for the middles (e, 3) in mm of its elements."""
+        cells = []
+        for _, kind, nodes in self.cells:
+            names = np.asarray(rule(self.points[nodes].mean(axis=1)))
+            cells += [(str(name), kind, nodes[names == name]) for name in np.unique(names)]
+        return replace(self, cells=tuple(cells))
+
+    def moved(self, transform: Callable[[np.ndarray], np.ndarray]) -> "SolidMesh":
+        """The mesh with its nodes at transform(points (n, 3))."""
+        return replace(self, points=np.ascontiguousarray(transform(self.points), dtype=float))
+
+    def joined(self, other: "SolidMesh", *, prefix: str = "") -> "SolidMesh":
+        """Both meshes as one, their nodes apart; `prefix` before the other's names of regions and faces."""
+        if other.geometry != self.geometry:
+            raise InputError(f"A mesh of the geometry {other.geometry!r} cannot join one of {self.geometry!r}.")
+        shift = len(self.points)
+        faces = {prefix + name: {kind: nodes + shift for kind, nodes in facets.items()} for name, facets in other.faces.items()}
+        faces[prefix + "boundary"] = {kind: nodes + shift for kind, nodes in other.boundary.items()}
+        cells = tuple((prefix + region, kind, nodes + shift) for region, kind, nodes in other.cells)
+        return replace(self, points=np.vstack([self.points, other.points]), cells=self.cells + cells,
+                       faces=self.faces | {name: face for name, face in faces.items() if name not in self.faces})
+
+    def volume_mm3(self) -> float:
+        """Volume of all elements in mm3."""
+        return float(sum(volumes.sum() for volumes in map(self._volumes, self.cells)))
+
+    def _volumes(self, cell):
+        element, nodes = ELEMENTS[cell[1]], cell[2]
+        d, rule = element.nodes.shape[1], element.quadrature
+        jacobian = np.einsum("emi,gmj->egij", self.points[nodes][..., :d], element.shape(rule.points)[1], optimize=True)
+        volumes = np.linalg.det(jacobian) * rule.weights
+        if d == 3:
+            return volumes
+        radius = np.einsum("gm,em->eg", element.shape(rule.points)[0], self.points[nodes][..., 0])
+        return volumes * (2 * np.pi * radius if self.axisymmetric else self.thickness_mm)
+
+    def write(self, path: str | Path, point_data: Mapping[str, np.ndarray] | None = None) -> None:
+        """Write the mesh as VTU, its regions as the cells' `region` with their names in `field_data`-like order of the file's name."""
+        from softtact.fem.mesh_files import write_mesh
+
+        write_mesh(self, Path(path), point_data or {})
+
+
+def _boundary(cells):
+    """Facets of elements [(element, nodes (e, m))] that occur once, outwards."""
+    kinds: dict[str, list[np.ndarray]] = {}
+    for element, nodes in cells:
+        for number, face in enumerate(element.faces):
+            own = nodes[:, face.nodes]
+            if number == 0 and element.nodes.shape[1] == 3:     # a bottom is seen from inside
+                own = own[:, _FLIPPED[own.shape[1]]]
+            kinds.setdefault(face.element.meshio_name, []).append(own)
+    facets = {kind: np.concatenate(own) for kind, own in kinds.items()}
+    width = max(_CORNERS[own.shape[1]] for own in facets.values())
+    keys = [np.pad(np.sort(own[:, :_CORNERS[own.shape[1]]], axis=1), ((0, 0), (0, width - _CORNERS[own.shape[1]])), constant_values=-1)
+            for own in facets.values()]
+    _, inverse, counts = np.unique(np.concatenate(keys), axis=0, return_inverse=True, return_counts=True)
+    once, found, start = counts[inverse.ravel()] == 1, {}, 0
+    for kind, own in facets.items():
+        single = once[start:start + len(own)]
+        start += len(own)
+        if single.any():
+            found[kind] = own[single]
+    return found

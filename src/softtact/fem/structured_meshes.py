@@ -1,0 +1,70 @@
+"""Structured meshes of simple bodies: boxes, plates, rings, cylinders and spheres of full quadratic elements."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from softtact.fem.elements import HEX27, QUAD9
+from softtact.fem.solid_mesh import SolidMesh
+
+
+
+def box(low: Sequence[float], high: Sequence[float], divisions: Sequence[int], *, region: str = "body", grading: Sequence | None = None,
+        geometry: str = "plane_strain", thickness_mm: float = 1.0) -> SolidMesh:
+    """A box (three numbers each) of HEX27, or a rectangle (two numbers each) of QUAD9, with faces x0, x1, y0, y1 (, z0, z1).
+
+    low, high: opposite corners in mm;  divisions: elements along each side;  grading: for each side None, or the elements' ends as
+    rising shares from 0 to 1;  geometry, thickness_mm: of a rectangle, plane_strain or axisymmetric
+    """
+    d = len(low)
+    lines = [_line(low[i], high[i], divisions[i], grading[i] if grading else None) for i in range(d)]
+    grid = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, d)
+    sizes = [len(line) for line in lines]
+    numbers = np.arange(len(grid)).reshape(sizes)
+    element = HEX27 if d == 3 else QUAD9
+    offsets = (element.nodes + 1).round().astype(int)      # 0, 1, 2 along each side
+    first = np.stack(np.meshgrid(*[2 * np.arange(n) for n in divisions], indexing="ij"), axis=-1).reshape(-1, 1, d)
+    cells = numbers[tuple(np.moveaxis(first + offsets, -1, 0))]
+    points = np.column_stack([grid, np.zeros((len(grid), 3 - d))])
+    mesh = SolidMesh(points, ((region, element.meshio_name, cells),), geometry="solid" if d == 3 else geometry,
+                     thickness_mm=thickness_mm)
+    tolerance = 1e-9 * max(h - l for l, h in zip(low, high, strict=True))
+    rules = {}
+    for i, axis in enumerate("xyz"[:d]):
+        for end, value in enumerate((low[i], high[i])):
+            rules[f"{axis}{end}"] = lambda x, i=i, value=value: np.abs(x[:, i] - value) < tolerance
+    return mesh.with_faces(**rules)
+
+
+def _line(low, high, count, shares):
+    """Nodes of `count` quadratic elements between two places."""
+    ends = low + (high - low) * (np.linspace(0, 1, count + 1) if shares is None else np.asarray(shares, float))
+    out = np.empty(2 * count + 1)
+    out[::2], out[1::2] = ends, 0.5 * (ends[1:] + ends[:-1])
+    return out
+
+
+def square_to_disc(xy: np.ndarray) -> np.ndarray:
+    """Places (n, 2) of a square [-1, 1]^2 moved onto the unit disc, its sides onto the circle.
+
+    Elliptical grid mapping: smooth, and the four corners come to the circle's diagonals. (Nowell; Fong, arXiv:1509.06344.)
+    """
+    x, y = xy.T
+    return np.column_stack([x * np.sqrt(1 - 0.5 * y * y), y * np.sqrt(1 - 0.5 * x * x)])
+
+
+def cylinder(radius_mm: float, height_mm: float, divisions: tuple[int, int], *, region: str = "body",
+             grading: Sequence | None = None) -> SolidMesh:
+    """A cylinder around z from z = 0 up, of HEX27, with the faces side, z0 and z1.
+
+    divisions: elements across the diameter and along the height;  grading: of the height, see `box`
+    """
+    mesh = box((-1, -1, 0), (1, 1, height_mm), (divisions[0], divisions[0], divisions[1]), region=region,
+               grading=(None, None, grading))
+
+    def transform(points):
+        return np.column_stack([radius_mm * square_to_disc(points[:, :2]), points[:, 2]])
+
+    side = {kind: np.concatenate([mesh.faces[name][kind] for name in ("x0", "x1", "y0", "y1")]) for kind in mesh.faces["x0"]}
+    whole = mesh.moved(transform)
+    return SolidMesh(whole.points, whole.cells, {"side": side, "z0": mesh.faces["z0"], "z1": mesh.faces["z1"]})

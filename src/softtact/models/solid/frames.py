@@ -1,0 +1,58 @@
+"""Rigid frames: what carries an object, or the held side of a soft one, through its six freedoms."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from softtact.contact.motion import FREEDOMS
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A rigid frame and the nodes that it carries.
+
+    name: by which steps drive it;  point (3,): its reference point at rest in mm, about which it turns;  nodes (k,): what it carries
+    axes: along which it carries them: with "z" alone they slide on a smooth plate
+    """
+
+    name: str
+    point: np.ndarray
+    nodes: np.ndarray
+    axes: str = "xyz"
+
+    @property
+    def carried(self) -> tuple[np.ndarray, ...]:
+        """Index of the carried components in an array (n, 3)."""
+        return np.ix_(self.nodes, ["xyz".index(axis) for axis in self.axes])
+
+
+@dataclass(frozen=True)
+class FramePose:
+    """Where a frame is."""
+
+    translation: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    """(3,) in mm, of its reference point."""
+    rotation: np.ndarray = field(default_factory=lambda: np.eye(3))
+    """(3, 3), from rest."""
+
+    def moved(self, step: np.ndarray) -> "FramePose":
+        """The pose after a step (6,): a way in mm and a rotation vector in radians, both in the fixed frame."""
+        return FramePose(self.translation + step[:3], Rotation.from_rotvec(step[3:]).as_matrix() @ self.rotation)
+
+    def displacement(self, frame: Frame, points: np.ndarray) -> np.ndarray:
+        """Displacements (k, 3) in mm of the frame's nodes, all nodes at rest at points (n, 3)."""
+        arm = points[frame.nodes] - frame.point
+        return self.translation + arm @ (self.rotation - np.eye(3)).T
+
+    def loads(self, frame: Frame, points: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """Force (N) and torque (N mm) about the reference point (6,) of nodal forces (n, 3) on the frame's nodes."""
+        own, arm = force[frame.nodes] * [axis in frame.axes for axis in "xyz"], (points[frame.nodes] - frame.point) @ self.rotation.T
+        return np.concatenate([own.sum(axis=0), np.cross(arm, own).sum(axis=0)])
+
+
+def step_vector(ways: dict[str, float]) -> np.ndarray:
+    """Ways of a step {freedom: mm or degrees} as (6,): mm and radians."""
+    out = np.array([ways.get(name, 0.0) for name in FREEDOMS])
+    out[3:] = np.radians(out[3:])
+    return out

@@ -1,0 +1,195 @@
+"""Load steps of a `SolidBody`: frames moved or loaded, pressures raised, increments divided where Newton's method does not end."""
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from softtact.contact.motion import FREEDOMS, Motion, MotionStep
+from softtact.errors import ConvergenceError, InputError
+from softtact.materials.laws.stretches import stretch_range
+from softtact.models.solid.body import SolidBody, SolidState
+from softtact.models.solid.frames import step_vector
+from softtact.models.solid.newton import SolidSettings, Target, balance
+
+_CLOSER_MM = 1e-4      # how near a loaded object is brought before its load acts
+_FAST = 8              # iterations of an increment up to which the next one may be larger
+
+
+@dataclass(frozen=True)
+class SolidLoadStep:
+    """A balanced load step."""
+
+    state: SolidState
+    """All bodies, with what the next step starts from."""
+    loads: np.ndarray
+    """(frames, 6) in N and N mm: each frame's force and torque on the bodies, about its reference point."""
+    iterations: int
+    """Newton steps."""
+    increments: int
+    """Parts that the step was divided into."""
+    residual_n: float
+    """Largest unbalanced force in N."""
+    penetration_mm: float
+    """Deepest overlap of surfaces in contact."""
+    volume_ratio: tuple[float, float]
+    """Least and largest J."""
+    stretch: tuple[float, float]
+    """Least and largest isochoric principal stretch."""
+    extrapolated_volume_fraction: float
+    """Share of a region's volume strained beyond the data of its law, the largest of the regions'; nan where no law tells."""
+    dissipated_mj: float
+    """Energy in mJ that friction took up to this step's end."""
+    work_mj: float
+    """Work in mJ of frames and pressures up to this step's end, by the trapezoidal rule over the increments."""
+    wall_time_s: float
+    """Time in s that the step took."""
+
+
+@dataclass
+class SolidPath:
+    """Steps of frames {name: `Motion`} and pressures {name: MPa at each step's end}, all of as many steps.
+
+    A loaded freedom is first moved along its load until surfaces touch.
+    """
+
+    body: SolidBody
+    motions: Mapping[str, Motion] = field(default_factory=dict)
+    pressures: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    settings: SolidSettings = SolidSettings()
+    tell: Callable[[str], None] = lambda text: None
+
+    def __post_init__(self) -> None:
+        names, faces = [frame.name for frame in self.body.frames], [face.name for face in self.body.pressures]
+        for kind, given, known in (("frame", self.motions, names), ("pressure", self.pressures, faces)):
+            if unknown := [name for name in given if name not in known]:
+                raise InputError(f"There is no {kind} {unknown[0]!r}; there are {', '.join(known) or 'none'}.")
+        counts = {len(motion.steps) for motion in self.motions.values()} | {len(values) for values in self.pressures.values()}
+        if len(counts) != 1:
+            raise InputError(f"Motions and pressures have {' and '.join(map(str, sorted(counts))) or 'no'} steps; give all as many.")
+        self.steps = counts.pop()
+
+    def run(self, start: SolidState | None = None) -> Iterator[SolidLoadStep]:
+        """Yield a `SolidLoadStep` for each step.
+
+        Raises ConvergenceError that names the step that was not reached; the steps before were yielded.
+        """
+        state = self.body.rest() if start is None else start
+        touched, work, dissipated = start is not None, 0.0, 0.0
+        for number in range(self.steps):
+            began = time.perf_counter()
+            steps = {name: motion.steps[number] for name, motion in self.motions.items()}
+            if not touched and any(step.loads for step in steps.values()):
+                state = self._brought_near(state, steps)
+            touched = True
+            values = np.array([self.pressures[face.name][number] for face in self.body.pressures])
+            try:
+                state, counts, residual, done, lost = self._step(state, steps, values)
+            except ConvergenceError as error:
+                raise ConvergenceError(f"Step {number + 1} of {self.steps} was not reached: {error} Use smaller steps or a finer mesh "
+                                       "where it folds.") from None
+            work, dissipated = work + done, dissipated + lost
+            yield self._described(state, counts, residual, work, dissipated, time.perf_counter() - began)
+
+    def _step(self, state, steps, pressures):
+        """A step in as many increments as it takes: state, (iterations, increments), residual, work and dissipation in mJ."""
+        body, share, size, counts, work, lost = self.body, 0.0, 1.0, [0, 0], 0.0, 0.0
+        first = body.frame_loads(state), state.pressures
+        while share < 1 - 1e-9:
+            size = min(size, 1 - share)
+            begun = self._begun(state)
+            target = self._target(first, steps, pressures, share, size)
+            try:
+                found, iterations, residual = balance(body, begun, target, self.settings)
+            except ConvergenceError as error:
+                size *= 0.5
+                self.tell(f"increment divided: {error}")
+                if size < self.settings.smallest_increment:
+                    raise
+                continue
+            done, rubbed = self._energies(begun, found)
+            work, lost = work + done, lost + rubbed
+            state, share = found, share + size
+            counts = [counts[0] + iterations, counts[1] + 1]
+            if iterations <= _FAST:
+                size *= 2
+        return state, counts, residual, work, lost
+
+    def _begun(self, state):
+        """The state as an increment begins: anchors of friction, and the points of surfaces that were cut along each other."""
+        x = self.body.points + state.displacement
+        return self.body.again(state, tuple(pair.begin_step(history, contact, x, self.body.points) for pair, history, contact
+                                            in zip(self.body.pairs, state.histories, state.contacts, strict=True)))
+
+    def _target(self, first, steps, pressures, share, size):
+        loads_before, pressures_before = first
+        ways, loads = [], []
+        for k, frame in enumerate(self.body.frames):
+            step = steps.get(frame.name, MotionStep())
+            ways.append(size * step_vector(step.ways))
+            own = {FREEDOMS.index(name): value for name, value in step.loads.items()}
+            loads.append({freedom: loads_before[k, freedom] + (share + size) * (value - loads_before[k, freedom])
+                          for freedom, value in own.items()})
+        return Target(ways, loads, pressures_before + (share + size) * (pressures - pressures_before))
+
+    def _energies(self, before, after):
+        """Work of frames and pressures, and what friction took, within an increment in mJ."""
+        body, work, lost = self.body, 0.0, 0.0
+        loads = 0.5 * (body.frame_loads(before) + body.frame_loads(after))
+        for k, (old, new) in enumerate(zip(before.poses, after.poses, strict=True)):
+            turn = new.rotation @ old.rotation.T
+            spin = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+            work += float(loads[k, :3] @ (new.translation - old.translation) + loads[k, 3:] @ spin)
+        for face, one, two in zip(body.pressures, before.pressures, after.pressures, strict=True):
+            force = np.zeros_like(body.points)
+            face.add_force(body.points + 0.5 * (before.displacement + after.displacement), 0.5 * (one + two), force)
+            work -= float((force * (after.displacement - before.displacement)).sum())
+        for history, contact in zip(after.histories, after.contacts, strict=True):
+            lost += float(history.points.weight @ (-(contact.slip * contact.friction).sum(axis=1) * contact.slides))
+        return work, lost
+
+    def _brought_near(self, state, steps):
+        """The state with loaded frames moved along their forces until their surfaces are closer than some tenths of a micrometre."""
+        ways = [np.zeros(6) for _ in self.body.frames]
+        for k, frame in enumerate(self.body.frames):
+            step = steps.get(frame.name, MotionStep())
+            ways[k][:3] = [np.sign(step.loads.get(name, 0.0)) for name in FREEDOMS[:3]]
+            ways[k][:3] /= max(np.linalg.norm(ways[k][:3]), 1.0)
+        if not self.body.pairs or not any(way.any() for way in ways):
+            return state
+        for _ in range(200):
+            gap = min((float(np.min(contact.projection.gap, initial=np.inf)) for contact in state.contacts), default=np.inf)
+            if gap <= _CLOSER_MM:
+                return state
+            if not np.isfinite(gap):
+                raise InputError("The loaded object is out of reach of the surface that it is to touch; place it nearer, or correct "
+                                 "its pose.")
+            moved = self.body.moved(state, np.zeros(len(self.body.free)), [way * (gap - 0.5 * _CLOSER_MM) for way in ways])
+            assert moved is not None
+            state = self._begun(moved)
+        raise InputError("The loaded object does not come to touch along its load; correct its pose or its load.")
+
+    def _described(self, state, counts, residual, work, dissipated, seconds):
+        least, largest, low, high, share = np.inf, 0.0, np.inf, 0.0, np.nan
+        for _, nodes, block in self.body.blocks:
+            deformed = block.loops.deformation(state.displacement[nodes], block.at_rest)
+            stretches = stretch_range(deformed.C)
+            least, largest = min(least, deformed.J.min()), max(largest, deformed.J.max())
+            low, high = min(low, float(stretches[0].min())), max(high, float(stretches[1].max()))
+            if block.law.stretch_window is not None:
+                outside = block.volume_outside(state.displacement[nodes], block.law.stretch_window) / block.volume
+                share = np.nanmax([share, outside])
+        return SolidLoadStep(state, self.body.frame_loads(state), counts[0], counts[1], residual,
+                             max((contact.penetration_mm() for contact in state.contacts), default=0.0), (float(least), float(largest)),
+                             (low, high), float(share), dissipated, work, seconds)
+
+
+def last(steps: Iterator[SolidLoadStep]) -> SolidLoadStep:
+    """The last of some load steps."""
+    found = None
+    for found in steps:
+        pass
+    if found is None:
+        raise InputError("There is no step.")
+    return found
