@@ -8,15 +8,15 @@ from meshio._vtk_common import meshio_to_vtk_type
 from vtkmodules.vtkCommonDataModel import vtkGenericCell
 
 from softtact.fem import elements
-from softtact.fem.elements import HEX20, HEX27, LINE3, QUAD8, QUAD9, TET4, TRI3, TRI6, WEDGE18, Element, reference_gradients
+from softtact.fem.elements import HEX20, HEX27, LINE3, QUAD8, QUAD9, TET4, TET10, TRI3, TRI6, WEDGE18, Element, reference_gradients
 from softtact.fem.quadrature import gauss
 from softtact.fem.solid_block import HexBlock
 from softtact.materials.laws.registry import make_law
 
 ELEMENTS = {name: value for name, value in vars(elements).items() if isinstance(value, Element)}
 EVERY_ELEMENT = pytest.mark.parametrize("element", ELEMENTS.values(), ids=list(ELEMENTS))
-EVERY_SOLID = pytest.mark.parametrize("element", [HEX20, HEX27, WEDGE18, TET4], ids=["HEX20", "HEX27", "WEDGE18", "TET4"])
-SIMPLICES, WEDGES = (TRI3, TRI6, TET4), (WEDGE18,)
+EVERY_SOLID = pytest.mark.parametrize("element", [HEX20, HEX27, WEDGE18, TET4, TET10], ids=["HEX20", "HEX27", "WEDGE18", "TET4", "TET10"])
+SIMPLICES, WEDGES = (TRI3, TRI6, TET4, TET10), (WEDGE18,)
 LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040})
 
 
@@ -43,7 +43,7 @@ def integral(element, powers):
 
 
 def test_all_records_are_here():
-    assert set(ELEMENTS) == {"LINE3", "QUAD8", "QUAD9", "TRI3", "TRI6", "HEX20", "HEX27", "WEDGE18", "TET4"}
+    assert set(ELEMENTS) == {"LINE3", "QUAD8", "QUAD9", "TRI3", "TRI6", "HEX20", "HEX27", "WEDGE18", "TET4", "TET10"}
     assert ELEMENTS["LINE3"] is LINE3
 
 

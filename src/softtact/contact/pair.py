@@ -2,8 +2,8 @@
 
 Normal: penalty with offsets (augmented Lagrange in terms of lengths): p = k max(0, offset - g), and an augmentation makes a point's
 last overlap its offset, so that the same pressure leaves none. Friction: the traction on the points' surface is that of the step's
-beginning minus k times the way that the point slid on the other surface since, held to mu p. The bound mu p is that of the
-iteration's state, so that every iteration minimises a potential (Tresca's problem), and the tangent is symmetric.
+beginning minus k times the way that the point slid on the other surface since, held to mu p. Of its tangent, the part by which the
+bound changes with the pressure is not symmetric; it is kept apart (`add_coupling`), so that the matrix is symmetric.
 References: Wriggers, Computational Contact Mechanics, 2nd ed. (2006), ch. 4 to 6; Simo and Laursen, Comput. Struct. 42 (1992) 97.
 """
 
@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from softtact.contact import surface_kernels as kernels
-from softtact.contact.facet_shapes import LINE2, QUAD8
+from softtact.contact.facet_shapes import QUAD8
 from softtact.contact.facet_tree import refit
 from softtact.contact.segments import segment_points
 from softtact.contact.surface_kernels import Projection
@@ -22,6 +22,7 @@ from softtact.contact.surfaces import Surface, SurfacePoints, quadrature_points
 _ROUNDING_MM = 1e-7      # surfaces that lie on each other from the start touch, whatever the sign of their rounding
 _RIM = 0.02              # of a facet's size: how far a point beside the other surface's rim still meets it
 _BESIDE = 0.1            # of a facet's width: how far beside the facet that it meets a point may stand in a balanced state
+_YIELD = 1e-6            # a step begins with what slid before at its bound: it may stick as well
 _LEAST_COSINE = 0.1      # of the angle between opposite normals: walls that stand across a surface are not what it meets
 
 
@@ -38,7 +39,7 @@ class PairHistory:
     anchor: Projection
     """Where the points were on the other surface when the step began."""
     start: np.ndarray
-    """(n, 3) in mm: the nodes' places when the step began."""
+    """(p, 3) in mm: by how much the anchors lay beside the points' feet when the step began; 0 but at a surface's end."""
     slid: np.ndarray
     """(p,) in mm: ways that the points slid on the other surface, up to the step's beginning."""
     stiffness: float
@@ -113,8 +114,15 @@ class ContactPair:
 
     def _fresh(self, points, x):
         count = len(points.facet)
-        return PairHistory(points, np.zeros(count), np.zeros((count, 3)), self._project(points, x, None), x.copy(), np.zeros(count),
+        anchor = self._project(points, x, None)
+        return PairHistory(points, np.zeros(count), np.zeros((count, 3)), anchor, self._slip(points, anchor, anchor, x), np.zeros(count),
                            self.stiffness)
+
+    def _slip(self, points, anchor, projection, x):
+        """Vectors (p, 3) in mm from the anchors to the points' feet on the other surface."""
+        way = kernels.places(points, x) - kernels.places_on(anchor.facet, anchor.coordinates, self.other.nodes, self.other.kinds, x)
+        way -= np.einsum("pi,pj,pj->pi", projection.normal, projection.normal, way)
+        return np.where((anchor.facet >= 0)[:, None], way, 0.0)
 
     def _project(self, points, x, hint):
         refit(self._tree, x)
@@ -129,29 +137,40 @@ class ContactPair:
         slid = history.slid + np.linalg.norm(state.slip, axis=1) * (state.pressure > 0)
         traction = np.where((state.pressure > 0)[:, None], state.friction, 0.0)
         if not self.segments or self.itself:
-            return replace(history, traction=traction, anchor=state.projection, start=x.copy(), slid=slid)
+            start = self._slip(history.points, state.projection, state.projection, x)
+            return replace(history, traction=traction, anchor=state.projection, start=start, slid=slid)
         fresh = self._fresh(self._points(x, at_rest), x)
         if not len(fresh.points.facet) or not len(history.points.facet):
             return fresh
         _, near = cKDTree(kernels.places(history.points, at_rest)).query(kernels.places(fresh.points, at_rest))
-        return replace(fresh, offset=self._smooth(fresh.points, state.pressure[near] / history.stiffness), traction=traction[near],
+        return replace(fresh, offset=state.pressure[near] / history.stiffness,
+                       traction=traction[near],
                        slid=slid[near], stiffness=history.stiffness)
 
-    def evaluate(self, history: PairHistory, x: np.ndarray, before: PairState | None = None, *, bounded: bool = False) -> PairState:
+    def evaluate(self, history: PairHistory, x: np.ndarray, before: PairState | None = None, *, nearby: bool = False) -> PairState:
         """`PairState` with nodes at x (n, 3) in mm.
 
-        before: the state that this one follows on: its points keep their facets where they stand over them;  bounded: friction is
-        bounded by mu times the pressure of that state
+        before: the state that this one follows on: its points keep their facets where they stand over them
+        nearby: friction continues that state's along its tangent, for a derivative that agrees with it where points begin to slide
         """
-        bound = before.pressure if before is not None and bounded else None
         projection = self._project(history.points, x, None if before is None else before.projection)
         overlap = np.where(projection.facet >= 0, history.offset - projection.gap, -1.0)
         touches, deep = overlap > -_ROUNDING_MM, np.maximum(overlap, 0.0)
         pressure, slope = history.stiffness * deep, np.where(touches, history.stiffness, 0.0)
         energy = 0.5 * float((history.points.weight * pressure * deep).sum())
-        friction, stiffness, slip, slides, stored = self._friction(history, projection, x, pressure if bound is None else bound,
-                                                                   touches)
+        if nearby and before is not None and self.friction:
+            return self._continued(history, before, projection, pressure, slope, x)
+        friction, stiffness, slip, slides, stored = self._friction(history, projection, x, pressure, touches)
         return PairState(projection, pressure, slope, friction, stiffness, slip, slides, energy + stored)
+
+    def _continued(self, history, before, projection, pressure, slope, x):
+        """The state with friction along the tangent of the one before."""
+        tangential = np.eye(3) - projection.normal[:, :, None] * projection.normal[:, None]
+        slip = self._slip(history.points, history.anchor, projection, x) - np.einsum("pij,pj->pi", tangential, history.start)
+        slip = np.where((before.slope > 0)[:, None], slip, before.slip)
+        grown = before.slides * (pressure - before.pressure) / np.maximum(before.pressure, 1e-300) * (before.pressure > 0)
+        friction = before.friction * (1 + grown)[:, None] - np.einsum("pij,pj->pi", before.stiffness, slip - before.slip)
+        return PairState(projection, pressure, slope, friction, before.stiffness, slip, before.slides, before.energy)
 
     def _friction(self, history, projection, x, pressure, touches):
         count = len(touches)
@@ -159,19 +178,16 @@ class ContactPair:
             return np.zeros((count, 3)), np.zeros((0, 3, 3)), np.zeros((count, 3)), np.ones(count, bool), 0.0
         anchor, bound = history.anchor, self.friction * pressure
         acts = touches & (anchor.facet >= 0)
-        way = kernels.places(history.points, x) - kernels.places(history.points, history.start)
-        way -= (kernels.places_on(anchor.facet, anchor.coordinates, self.other.nodes, self.other.kinds, x)
-                - kernels.places_on(anchor.facet, anchor.coordinates, self.other.nodes, self.other.kinds, history.start))
         tangential = np.eye(3) - projection.normal[:, :, None] * projection.normal[:, None]
-        slip = np.einsum("pij,pj->pi", tangential, way) * acts[:, None]
-        trial = np.einsum("pij,pj->pi", tangential, history.traction) - history.stiffness * slip
+        slip = (self._slip(history.points, anchor, projection, x) - np.einsum("pij,pj->pi", tangential, history.start)) * acts[:, None]
+        trial = np.einsum("pij,pj->pi", tangential, history.traction) - self.stiffness * slip
         size = np.linalg.norm(trial, axis=1)
-        slides = acts & (size > bound)
+        slides = acts & (size > bound * (1 + _YIELD))
         share = np.where(slides, bound / np.maximum(size, 1e-300), 1.0)
         direction = trial / np.maximum(size, 1e-300)[:, None]
-        stiffness = history.stiffness * tangential * (share * acts)[:, None, None]
-        stiffness -= (history.stiffness * share * slides)[:, None, None] * direction[:, :, None] * direction[:, None]
-        energy = np.where(slides, bound * size - 0.5 * bound**2, 0.5 * size**2) / history.stiffness
+        stiffness = self.stiffness * tangential * (share * acts)[:, None, None]
+        stiffness -= (self.stiffness * share * slides)[:, None, None] * direction[:, :, None] * direction[:, None]
+        energy = np.where(slides, bound * size - 0.5 * bound**2, 0.5 * size**2) / self.stiffness
         return (trial * (share * acts)[:, None], stiffness, slip, slides,
                 float((history.points.weight * energy * acts).sum()))
 
@@ -183,6 +199,22 @@ class ContactPair:
         if self.friction:
             anchor = history.anchor
             kernels.add_forces_of(force, points, anchor.facet, anchor.coordinates, other.nodes, other.kinds, state.friction)
+
+    def add_coupling(self, history: PairHistory, state: PairState, change: np.ndarray, force: np.ndarray) -> None:
+        """Add to nodal forces (n, 3) what sliding friction changes by the pressure that changes with the nodes' places (n, 3).
+
+        This part of the tangent is not symmetric, and stands in no matrix.
+        """
+        here = state.slides & (state.slope > 0) & (state.pressure > 0)
+        if not self.friction or not here.any():
+            return
+        points, projection, other, anchor = history.points, state.projection, self.other, history.anchor
+        way = kernels.places(points, change) - kernels.places_on(projection.facet, projection.coordinates, other.nodes, other.kinds,
+                                                                 change)
+        pressure = -state.slope * (way * projection.normal).sum(axis=1) * here
+        direction = state.friction / np.maximum(self.friction * state.pressure, 1e-300)[:, None]
+        kernels.add_forces_of(force, points, anchor.facet, anchor.coordinates, other.nodes, other.kinds,
+                              (self.friction * pressure)[:, None] * direction * here[:, None])
 
     def tangents(self, history: PairHistory, state: PairState, x: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Nodes (q, k) of pairs of facets and their matrices (q, 3 k, 3 k) in N/mm, of which the upper triangle counts."""
@@ -217,44 +249,41 @@ class ContactPair:
         return np.ascontiguousarray(np.where(nodes < 0, nodes[:, :1], nodes)), pair
 
     def augmented(self, history: PairHistory, state: PairState) -> PairHistory:
-        """The history with offsets that hold the points where the surfaces just touch, in the mean around each corner of the facets.
+        """The history with offsets that hold the surfaces where they just touch, in the mean and the slope over each facet.
 
-        Offsets of single points would let the pressure oscillate: there are more points than displacements that could follow them.
-        Where an augmentation did not halve the overlap, the penalty is doubled.
+        There are more points than displacements that could follow them: offsets of single points would leave few of them in touch, and
+        their pressures without order. Where an augmentation came to a stand, the penalty is doubled.
         """
-        gap = np.where(state.projection.facet >= 0, state.projection.gap, np.inf)
-        overlap, stiffness = state.penetration_mm(), history.stiffness
-        factor = 2.0 if overlap > 0.5 * history.overlap_mm else 1.0
-        offset = self._smooth(history.points, np.maximum(0.0, history.offset - gap)) / factor
-        return replace(history, offset=offset, stiffness=factor * stiffness, overlap_mm=overlap)
+        overlap, factor = self.overlap_mm(history, state), 1.0
+        if overlap > 0.5 * history.overlap_mm:
+            factor = 2.0
+        return replace(history, offset=np.maximum(0.0, self._linear(history, state.pressure / history.stiffness)) / factor,
+                       stiffness=factor * history.stiffness, overlap_mm=overlap)
 
-    def _smooth(self, points: SurfacePoints, values: np.ndarray) -> np.ndarray:
-        """Values (p,) replaced by those of linear functions on the facets, through means around their corners."""
-        shares = _corner_shares(points)
-        corners = points.nodes[:, :4]
-        size = int(points.nodes.max(initial=0)) + 1
-        weights = shares * points.weight[:, None]
-        total = np.bincount(corners[corners >= 0], weights[corners >= 0], size)
-        sums = np.bincount(corners[corners >= 0], (weights * values[:, None])[corners >= 0], size)
-        means = np.where(total > 0, sums / np.where(total > 0, total, 1.0), 0.0)
-        return (shares * means[corners]).sum(axis=1)
+    def overlap_mm(self, history: PairHistory, state: PairState) -> float:
+        """Largest overlap (mm), or gap under pressure, of the surfaces, in the mean and the slope over each facet.
 
-    def settled(self, state: PairState, tolerance_mm: float) -> bool:
-        """Whether no point overlaps by more than the tolerance, and those that bear pressure stand over the facets that they meet."""
+        What single points of a rough surface overlap beyond that, no facet could follow: `PairState.penetration_mm` tells it.
+        """
+        off = self._linear(history, np.where(state.pressure > 0, state.pressure / history.stiffness - history.offset, 0.0))
+        return float(np.abs(off).max(initial=0.0))
+
+    def _linear(self, history: PairHistory, values: np.ndarray) -> np.ndarray:
+        """The linear functions on each facet that are nearest to values (p,), at the points."""
+        points = history.points
+        basis = np.column_stack([np.ones(len(values)), points.coordinates[:, :1 if self.surface.is_line else 2]])
+        count, k = len(self.surface.kinds), basis.shape[1]
+        gram, right = np.zeros((count, k, k)), np.zeros((count, k))
+        weighted = basis * points.weight[:, None]
+        np.add.at(gram, points.facet, weighted[:, :, None] * basis[:, None])
+        np.add.at(right, points.facet, weighted * values[:, None])
+        gram += 1e-9 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(k) + 1e-300 * np.eye(k)
+        return (basis * np.linalg.solve(gram, right[..., None])[points.facet, :, 0]).sum(axis=1)
+
+    def settled(self, history: PairHistory, state: PairState, tolerance_mm: float) -> bool:
+        """Whether the surfaces overlap by no more than the tolerance, and points under pressure stand over the facets that they meet."""
         here = np.flatnonzero(state.pressure > 0)
         facets, (xi, eta) = state.projection.facet[here], state.projection.coordinates[here].T
         kinds = self.other.kinds[facets]
         beyond = np.where(kinds >= QUAD8, np.maximum(np.abs(xi), np.abs(eta)) - 1, np.maximum(-np.minimum(xi, eta), xi + eta - 1))
-        return state.penetration_mm() <= tolerance_mm and float(np.max(beyond, initial=0.0)) <= _BESIDE
-
-
-def _corner_shares(points: SurfacePoints) -> np.ndarray:
-    """Linear functions (p, 4) of the facets' corners at the points; 0 behind the last corner."""
-    xi, eta = points.coordinates.T
-    lines, quads, out = points.kind >= LINE2, points.kind >= QUAD8, np.zeros((len(xi), 4))
-    out[:, 0], out[:, 1], out[:, 2] = 1 - xi - eta, xi, eta
-    for corner, (p, q) in enumerate(((-1, -1), (1, -1), (1, 1), (-1, 1))):
-        out[quads, corner] = 0.25 * (1 + p * xi[quads]) * (1 + q * eta[quads])
-    out[lines] = 0.0
-    out[lines, 0], out[lines, 1] = 0.5 * (1 - xi[lines]), 0.5 * (1 + xi[lines])
-    return out
+        return self.overlap_mm(history, state) <= tolerance_mm and float(np.max(beyond, initial=0.0)) <= _BESIDE

@@ -55,13 +55,12 @@ def tetrahedron_rule4() -> Quadrature:
 
 def tetrahedron_rule15() -> Quadrature:
     """Fifteen points of the same tetrahedron, of degree 5. (Keast, Comput. Methods Appl. Mech. Engng 55 (1986) 339, rule 6.)"""
-    groups = (((0.25,), 0.030283678097089), ((1 / 3,), 0.006026785714286), ((1 / 11,), 0.011645249086029))
-    points, weights = [[0.25] * 3], [groups[0][1]]
-    for (near,), weight in groups[1:]:
+    points, weights = [[0.25] * 3], [0.1817020685825351]
+    for near, weight in ((1 / 3, 0.0361607142857143), (1 / 11, 0.0698714945161738)):
         far = 1 - 3 * near
         points += [[near] * 3, [far, near, near], [near, far, near], [near, near, far]]
         weights += [weight] * 4
-    a, b = 0.066550153573664, 0.433449846426336
+    a, b = 0.0665501535736643, 0.4334498464263357
     points += [[a, b, b], [b, a, b], [b, b, a], [a, a, b], [a, b, a], [b, a, a]]
-    weights += [0.010949141561386] * 6
-    return Quadrature(np.array(points), np.array(weights), degree=5)
+    weights += [0.0656948493683187] * 6
+    return Quadrature(np.array(points), np.array(weights) / 6, degree=5)

@@ -6,11 +6,13 @@ Frames' freedoms border the matrix: their columns are directional derivatives of
 forces in N, pressures in MPa.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
+import scipy.sparse.linalg as spla
 from scipy.sparse.csgraph import connected_components
 
 from softtact.contact.pair import ContactPair, PairHistory, PairState
@@ -27,6 +29,7 @@ from softtact.models.solid.frames import Frame, FramePose
 from softtact.models.solid.loads import FacePressure
 
 _CHUNK = 256         # elements whose dense tangents are in memory at once, for each thread
+_COUPLED, _MOST_COUPLED = 1e-6, 60     # relative error and iterations of GMRES
 _PROBE = 1e-7        # mm or radians, for derivatives by a frame's freedom
 AXES = "xyz"
 
@@ -123,6 +126,18 @@ class SolidBody:
         """Let two surfaces meet; before the first state is made."""
         self.pairs.append(pair)
 
+    @contextmanager
+    def frictionless(self) -> Iterator[None]:
+        """While this lasts, nothing rubs."""
+        before = [pair.friction for pair in self.pairs]
+        for pair in self.pairs:
+            pair.friction = 0.0
+        try:
+            yield
+        finally:
+            for pair, friction in zip(self.pairs, before, strict=True):
+                pair.friction = friction
+
     def rest(self) -> SolidState:
         """The state without displacement."""
         histories = tuple(pair.first(self.points) for pair in self.pairs)
@@ -132,10 +147,10 @@ class SolidBody:
         return state
 
     def evaluate(self, displacement: np.ndarray, poses: tuple[FramePose, ...], histories: tuple[PairHistory, ...],
-                 pressures: np.ndarray, before: SolidState | None = None, *, bounded: bool = False) -> SolidState | None:
+                 pressures: np.ndarray, before: SolidState | None = None, *, nearby: bool = False) -> SolidState | None:
         """`SolidState` with the frames' nodes where the poses (one a frame) put them; None where an element is inside out.
 
-        before: the state that this one follows on, with the same histories;  bounded: its pressures bound friction, not the state's own
+        before: the state that this one follows on, with the same histories;  nearby: see `ContactPair.evaluate`
         """
         displacement = displacement.copy()
         for frame, pose in zip(self.frames, poses, strict=True):
@@ -151,7 +166,7 @@ class SolidBody:
         size = float(np.abs(force[~self.free_components]).sum())
         x, contacts, penalties = self.points + displacement, [], 0.0
         for k, (pair, history) in enumerate(zip(self.pairs, histories, strict=True)):
-            contact = pair.evaluate(history, x, None if before is None else before.contacts[k], bounded=bounded)
+            contact = pair.evaluate(history, x, None if before is None else before.contacts[k], nearby=nearby)
             pair.add_forces(history, contact, force)
             penalties += contact.energy
             size += float(history.points.weight @ contact.pressure)
@@ -160,26 +175,20 @@ class SolidBody:
             size += face.add_force(x, float(pressure), force)
         return SolidState(displacement, poses, pressures, histories, tuple(contacts), force, energy + penalties, energy, size)
 
-    def again(self, state: SolidState, histories: tuple[PairHistory, ...] | None = None) -> SolidState:
-        """The same places with friction bounded by the pressure that is there; with other histories, every point also looks anew which
-        facet it meets.
-        """
-        found = self.evaluate(state.displacement, state.poses, state.histories if histories is None else histories, state.pressures,
-                              state if histories is None else None)
+    def again(self, state: SolidState, histories: tuple[PairHistory, ...]) -> SolidState:
+        """The same places with other histories; every point looks anew which facet it meets."""
+        found = self.evaluate(state.displacement, state.poses, histories, state.pressures)
         assert found is not None
         return found
 
-    def moved(self, state: SolidState, step: np.ndarray, ways: Sequence[np.ndarray], *, pressures: np.ndarray | None = None,
-              bounded: bool = True) -> SolidState | None:
-        """The state after a step (unknowns,) of the free displacements and ways (6,) of each frame.
-
-        bounded: friction keeps the bound of the state that the step leaves
-        """
+    def moved(self, state: SolidState, step: np.ndarray, ways: Sequence[np.ndarray], *,
+              pressures: np.ndarray | None = None, nearby: bool = False) -> SolidState | None:
+        """The state after a step (unknowns,) of the free displacements and ways (6,) of each frame."""
         displacement = state.displacement.copy()
         displacement.ravel()[self.free] += step
         poses = tuple(pose.moved(way) for pose, way in zip(state.poses, ways, strict=True))
         return self.evaluate(displacement, poses, state.histories, state.pressures if pressures is None else pressures, state,
-                             bounded=bounded)
+                             nearby=nearby)
 
     def residual(self, state: SolidState) -> np.ndarray:
         """Unbalanced forces (unknowns,) in N."""
@@ -198,10 +207,17 @@ class SolidBody:
         size = float(np.abs(freedom).max())
         ways = [np.zeros(6) for _ in self.frames]
         ways[frame] = freedom * (_PROBE / size)
-        moved = self.moved(state, np.zeros(len(self.free)), ways)
+        moved = self.moved(state, np.zeros(len(self.free)), ways, nearby=True)
         assert moved is not None
         return ((self.residual(moved) - self.residual(state)) * (size / _PROBE),
                 (self.frame_loads(moved) - self.frame_loads(state)) * (size / _PROBE))
+
+    def loads_along(self, state: SolidState, step: np.ndarray) -> np.ndarray:
+        """Derivative (frames, 6) of the frames' loads along a step (unknowns,) of the free displacements."""
+        share = _PROBE / max(float(np.abs(step).max(initial=0.0)), 1e-300)
+        moved = self.moved(state, share * step, [np.zeros(6) for _ in self.frames], nearby=True)
+        assert moved is not None
+        return (self.frame_loads(moved) - self.frame_loads(state)) / share
 
     def factor(self, state: SolidState) -> float:
         """Factor the tangent; returns the diagonal (N/mm) that had to be added to make it positive definite, mostly 0."""
@@ -212,6 +228,30 @@ class SolidBody:
             matrix.data[diagonal] += more
             shift += more
         return shift
+
+    def solve(self, state: SolidState, right: np.ndarray) -> np.ndarray:
+        """Solve with the tangent that `factor` factored at a state, for right-hand sides (unknowns, k).
+
+        Where friction slides, the tangent has a part beside the matrix: GMRES, with the factor as its preconditioner.
+        """
+        found = self.solver.solve(right)
+        if not any(pair.friction and (contact.slides & (contact.pressure > 0)).any()
+                   for pair, contact in zip(self.pairs, state.contacts, strict=True)):
+            return found
+
+        def coupled(y):      # (matrix + coupling) matrix^-1 y
+            x, force = self.solver.solve(np.ascontiguousarray(y)), np.zeros_like(self.points)
+            change = np.zeros(self.points.size)
+            change[self.free] = x
+            for pair, history, contact in zip(self.pairs, state.histories, state.contacts, strict=True):
+                pair.add_coupling(history, contact, change.reshape(-1, 3), force)
+            return y + force.ravel()[self.free]
+
+        operator = spla.LinearOperator((len(right), len(right)), matvec=coupled, dtype=float)
+        for k in range(right.shape[1]):
+            y, _ = spla.gmres(operator, right[:, k], x0=right[:, k], rtol=_COUPLED, restart=_MOST_COUPLED, maxiter=1)
+            found[:, k] = self.solver.solve(y)
+        return found
 
     def tangent(self, state: SolidState) -> sp.csr_matrix:
         """Upper triangle of the residual's derivative by the free displacements in N/mm; the next call fills the same matrix."""

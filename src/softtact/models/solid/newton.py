@@ -1,6 +1,6 @@
 """Balance of a `SolidBody` at a load step: Newton's method of `models.newton`, with the frames' loaded freedoms as unknowns."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -8,6 +8,9 @@ import numpy as np
 from softtact.errors import ConvergenceError
 from softtact.models.newton import Solution, lowers_potential, solve
 from softtact.models.solid.body import SolidBody, SolidState
+
+_SMALL = 1 / 16      # share of a step
+_REMEMBERED = 4      # residuals that a step with friction may not exceed (Grippo, Lampariello and Lucidi, 1986)
 
 
 @dataclass(frozen=True)
@@ -18,7 +21,7 @@ class SolidSettings:
     """Largest unbalanced force over the sum of what presses and holds."""
     penetration_mm: float = 1e-3
     """Largest overlap of surfaces in contact, and widest gap across which pressure acts."""
-    max_iterations: int = 30
+    max_iterations: int = 40
     """Newton steps of a load step, or of an augmentation."""
     max_augmentations: int = 12
     """Changes of the contacts' offsets."""
@@ -55,10 +58,10 @@ class _Balance:
     pending: bool
     shift: float = 0.0
     factorisations: int = 0
+    before: list[float] = field(default_factory=list)
+    share: float = 1.0
 
     def prepared(self, state: SolidState, iteration: int) -> SolidState:
-        if iteration and self.body.pairs and any(pair.friction for pair in self.body.pairs):
-            return self.body.again(state)      # friction's bound is that of the pressure now
         return state
 
     def _loads_off(self, state: SolidState) -> np.ndarray:
@@ -87,12 +90,15 @@ class _Balance:
             column, loads = body.border(state, frame, np.eye(6)[freedom])
             columns.append(column)
             corner[:, k] = [loads[other] for other in unknown]
-        found = body.solver.solve(np.column_stack([residual, *columns]))
+        found = body.solve(state, np.column_stack([residual, *columns]))
         step = -found[:, 0]
         if unknown:
-            B = np.column_stack(columns)
-            schur = 0.5 * (corner + corner.T) - B.T @ found[:, 1:]
-            amount = np.linalg.solve(_definite(schur), -off - B.T @ step)
+            # The loads' derivatives by the displacements: the columns once more where the tangent is symmetric, as without friction.
+            rubs = any(pair.friction for pair in body.pairs)
+            rows = np.array([body.loads_along(state, x) for x in found.T]) if rubs else None
+            felt = np.array([[loads[other] for other in unknown] for loads in rows]).T if rubs else np.column_stack(columns).T @ found
+            schur = corner - felt[:, 1:]
+            amount = np.linalg.solve(schur if rubs else _definite(0.5 * (schur + schur.T)), -off + felt[:, 0])
             step = step - found[:, 1:] @ amount
             for (frame, freedom), value in zip(unknown, amount, strict=True):
                 ways[frame][freedom] += value
@@ -122,6 +128,7 @@ class _Balance:
         return min(1.0, self.settings.largest_step_mm / max(largest, 1e-30))
 
     def moved(self, state: SolidState, step: Any, share: float) -> SolidState | None:
+        self.share = share
         if self.pending and share < 1.0:
             # The prescribed ways are taken whole, or the increment is too large.
             return self.body.moved(state, share * step[0], step[1], pressures=step[2]) if share == 0.5 else None
@@ -135,7 +142,9 @@ class _Balance:
             return smaller
         lower = lowers_potential(state.energy, trial.energy - self._work(state, trial), abs(state.energy) + self.body.energy_noise)
         if any(pair.friction for pair in self.body.pairs):
-            return smaller or bool(lower)
+            # It has no potential. A step is to be no worse than the last ones, or small: points that begin to slide stand in the way
+            # of every larger one.
+            return self.residual(trial) < max([*self.before, residual]) * (2.0 if self.share <= _SMALL else 1.0)
         return smaller if lower is None else lower     # a residual alone may fall and rise in turns where points touch and leave
 
     def _work(self, before: SolidState, after: SolidState) -> float:
@@ -154,6 +163,7 @@ class _Balance:
 
     def accepted(self, state: SolidState, trial: SolidState) -> None:
         self.pending = False
+        self.before = [*self.before, self.residual(state)][-_REMEMBERED:]
 
     def recovered(self, state: SolidState) -> bool:
         return False
@@ -166,12 +176,26 @@ def _definite(schur: np.ndarray) -> np.ndarray:
     return (vectors * np.maximum(np.abs(values), least)) @ vectors.T
 
 
+def _without_friction(body, start, target, settings, pending):
+    """A first guess for a loaded frame: the balance without friction, which has a potential, and so is found from any start."""
+    with body.frictionless():
+        problem = _Balance(body, settings, target, pending)
+        found = solve(problem, body.again(start, start.histories), max_iterations=settings.max_iterations)
+    if found.state is None:
+        return start, found.iterations, pending
+    guess = body.evaluate(found.state.displacement, found.state.poses, start.histories, found.state.pressures, start)
+    return guess, found.iterations, False
+
+
 def balance(body: SolidBody, start: SolidState, target: Target, settings: SolidSettings) -> tuple[SolidState, int, float]:
     """The balanced state of a target, its iterations and the largest unbalanced force (N), contact settled to the penetration.
 
     Raises ConvergenceError where Newton's method or the augmentations do not end.
     """
-    state, iterations, pending = start, 0, True
+    pending = any(way.any() for way in target.ways) or bool(np.any(target.pressures != start.pressures))
+    state, iterations = start, 0
+    if target.unknown and not pending and any(pair.friction for pair in body.pairs):
+        state, iterations, pending = _without_friction(body, start, target, settings, pending)
     for _ in range(settings.max_augmentations + 1):
         problem = _Balance(body, settings, target, pending)
         found: Solution = solve(problem, state, max_iterations=settings.max_iterations)
@@ -179,11 +203,11 @@ def balance(body: SolidBody, start: SolidState, target: Target, settings: SolidS
         if found.state is None:
             raise ConvergenceError(f"{found.residual_n:.3g} N are left unbalanced after {found.iterations} iterations.")
         state, pending = found.state, False
-        if all(pair.settled(contact, settings.penetration_mm)
-               for pair, contact in zip(body.pairs, state.contacts, strict=True)):
+        if all(pair.settled(history, contact, settings.penetration_mm)
+               for pair, history, contact in zip(body.pairs, state.histories, state.contacts, strict=True)):
             return state, iterations, found.residual_n
         state = body.again(state, tuple(pair.augmented(history, contact) for pair, history, contact
                                         in zip(body.pairs, state.histories, state.contacts, strict=True)))
-    worst = max(contact.penetration_mm() for contact in state.contacts)
+    worst = max(pair.overlap_mm(history, contact) for pair, history, contact in zip(body.pairs, state.histories, state.contacts, strict=True))
     raise ConvergenceError(f"The surfaces still overlap by {worst * 1000:.3g} um after {settings.max_augmentations} augmentations.")
 

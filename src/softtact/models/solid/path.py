@@ -13,7 +13,7 @@ from softtact.models.solid.body import SolidBody, SolidState
 from softtact.models.solid.frames import step_vector
 from softtact.models.solid.newton import SolidSettings, Target, balance
 
-_CLOSER_MM = 1e-4      # how near a loaded object is brought before its load acts
+_OVERLAP_MM = 1e-3     # by how much a loaded object is let into the surface before its load acts, so that something stands against it
 _FAST = 8              # iterations of an increment up to which the next one may be larger
 
 
@@ -77,9 +77,10 @@ class SolidPath:
         """
         state = self.body.rest() if start is None else start
         touched, work, dissipated = start is not None, 0.0, 0.0
+        steps: dict[str, MotionStep] = {}
         for number in range(self.steps):
             began = time.perf_counter()
-            steps = {name: motion.steps[number] for name, motion in self.motions.items()}
+            steps = {name: _still_loaded(steps.get(name), motion.steps[number]) for name, motion in self.motions.items()}
             if not touched and any(step.loads for step in steps.values()):
                 state = self._brought_near(state, steps)
             touched = True
@@ -150,7 +151,7 @@ class SolidPath:
         return work, lost
 
     def _brought_near(self, state, steps):
-        """The state with loaded frames moved along their forces until their surfaces are closer than some tenths of a micrometre."""
+        """The state with loaded frames moved along their forces until their surfaces just overlap."""
         ways = [np.zeros(6) for _ in self.body.frames]
         for k, frame in enumerate(self.body.frames):
             step = steps.get(frame.name, MotionStep())
@@ -160,12 +161,12 @@ class SolidPath:
             return state
         for _ in range(200):
             gap = min((float(np.min(contact.projection.gap, initial=np.inf)) for contact in state.contacts), default=np.inf)
-            if gap <= _CLOSER_MM:
+            if gap <= -0.5 * _OVERLAP_MM:
                 return state
             if not np.isfinite(gap):
                 raise InputError("The loaded object is out of reach of the surface that it is to touch; place it nearer, or correct "
                                  "its pose.")
-            moved = self.body.moved(state, np.zeros(len(self.body.free)), [way * (gap - 0.5 * _CLOSER_MM) for way in ways])
+            moved = self.body.moved(state, np.zeros(len(self.body.free)), [way * (gap + _OVERLAP_MM) for way in ways])
             assert moved is not None
             state = self._begun(moved)
         raise InputError("The loaded object does not come to touch along its load; correct its pose or its load.")
@@ -183,6 +184,12 @@ class SolidPath:
         return SolidLoadStep(state, self.body.frame_loads(state), counts[0], counts[1], residual,
                              max((contact.penetration_mm() for contact in state.contacts), default=0.0), (float(least), float(largest)),
                              (low, high), float(share), dissipated, work, seconds)
+
+
+def _still_loaded(before: MotionStep | None, step: MotionStep) -> MotionStep:
+    """A step with the loads of the one before on the freedoms that it does not name."""
+    kept = {} if before is None else {name: load for name, load in before.loads.items() if name not in step.ways}
+    return MotionStep(step.ways, kept | step.loads)
 
 
 def last(steps: Iterator[SolidLoadStep]) -> SolidLoadStep:
