@@ -216,13 +216,18 @@ class ContactPair:
         kernels.add_forces_of(force, points, anchor.facet, anchor.coordinates, other.nodes, other.kinds,
                               (self.friction * pressure)[:, None] * direction * here[:, None])
 
-    def tangents(self, history: PairHistory, state: PairState, x: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Nodes (q, k) of pairs of facets and their matrices (q, 3 k, 3 k) in N/mm, of which the upper triangle counts."""
+    def tangents(self, history: PairHistory, state: PairState, x: np.ndarray, *,
+                 turning: bool = True) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Nodes (q, k) of pairs of facets and their matrices (q, 3 k, 3 k) in N/mm, of which the upper triangle counts.
+
+        turning: with what the pressure does as the surfaces turn and bend
+        """
         points, other, width = history.points, self.other, self.surface.width
         touching = state.slope > 0
         nodes, pair = self._pairs(points, np.where(touching, state.projection.facet, -1))
         out = np.zeros((len(nodes), 3 * nodes.shape[1], 3 * nodes.shape[1]))
-        kernels.add_pair_tangents(out, pair, points, state.projection, other.nodes, other.kinds, x, state.pressure, state.slope, width,
+        kernels.add_pair_tangents(out, pair, points, state.projection, other.nodes, other.kinds, x,
+                                  state.pressure if turning else np.zeros_like(state.pressure), state.slope, width,
                                   not self.rigid)
         if not self.friction:
             return [(nodes, out)]

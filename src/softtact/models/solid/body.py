@@ -27,6 +27,7 @@ from softtact.materials.laws.base import Law
 from softtact.models.solid.blocks import region_blocks
 from softtact.models.solid.frames import Frame, FramePose
 from softtact.models.solid.loads import FacePressure
+from softtact.models.solid.springs import FrustumSprings
 
 _CHUNK = 256         # elements whose dense tangents are in memory at once, for each thread
 _COUPLED, _MOST_COUPLED = 1e-6, 60     # relative error and iterations of GMRES
@@ -78,6 +79,7 @@ class SolidBody:
         self.free = np.flatnonzero(self.free_components.ravel())
         self.pairs: list[ContactPair] = []
         self.pressures: list[FacePressure] = []
+        self.springs: list[FrustumSprings] = []
         self._refuse_loose(held or {})
         point_at_mkl()
         self.solver = make_solver(threads=threads)
@@ -171,6 +173,9 @@ class SolidBody:
             penalties += contact.energy
             size += float(history.points.weight @ contact.pressure)
             contacts.append(contact)
+        for springs in self.springs:
+            stored, pushed = springs.add_force(displacement, force)
+            energy, size = energy + stored, size + pushed
         for face, pressure in zip(self.pressures, pressures, strict=True):
             size += face.add_force(x, float(pressure), force)
         return SolidState(displacement, poses, pressures, histories, tuple(contacts), force, energy + penalties, energy, size)
@@ -222,6 +227,9 @@ class SolidBody:
     def factor(self, state: SolidState) -> float:
         """Factor the tangent; returns the diagonal (N/mm) that had to be added to make it positive definite, mostly 0."""
         matrix = self.tangent(state)
+        if self.solver.factor(matrix):
+            return 0.0
+        matrix = self.tangent(state, turning=False)     # far from balance, pressed surfaces that turn may have no stiffness
         shift, diagonal = 0.0, matrix.indptr[:-1]
         while not self.solver.factor(matrix):
             more = max(3.0 * shift, 1e-4 * float(np.abs(matrix.data[diagonal]).mean()))
@@ -253,12 +261,16 @@ class SolidBody:
             found[:, k] = self.solver.solve(y)
         return found
 
-    def tangent(self, state: SolidState) -> sp.csr_matrix:
-        """Upper triangle of the residual's derivative by the free displacements in N/mm; the next call fills the same matrix."""
+    def tangent(self, state: SolidState, *, turning: bool = True) -> sp.csr_matrix:
+        """Upper triangle of the residual's derivative by the free displacements in N/mm; the next call fills the same matrix.
+
+        turning: with what pressures do as surfaces turn and bend, a part that may be negative
+        """
         x = self.points + state.displacement
-        coupled = [pair.tangents(history, contact, x)
+        coupled = [pair.tangents(history, contact, x, turning=turning)
                    for pair, history, contact in zip(self.pairs, state.histories, state.contacts, strict=True)]
         coupled.append([face.tangents(x, float(p)) for face, p in zip(self.pressures, state.pressures, strict=True) if p])
+        coupled.append([springs.tangents(state.displacement) for springs in self.springs])
         matrix = self._matrix_for([part for parts in coupled for part in parts])
         self._add_blocks(matrix.data, state.displacement)
         for nodes, matrices in (part for parts in coupled for part in parts):
