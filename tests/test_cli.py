@@ -66,7 +66,7 @@ def answer(capsys):
     return run
 
 
-NAMES = ("press", "view", "predict", "complexity", "fit", "export-deck", "detect-discs", "cost", "stage", "config-schema",
+NAMES = ("press", "view", "skin", "predict", "complexity", "fit", "export-deck", "detect-discs", "cost", "stage", "config-schema",
          "completion")
 
 

@@ -61,3 +61,10 @@ def loaded():
     from softtact.geometry.meshes import read_mesh
 
     return softtact.load_sensor("coro"), read_mesh(OBJECT, unit="mm")
+
+
+@pytest.mark.slow
+def test_a_thinner_skin_answers_more_on_a_taxel_than_beside_it(capsys):
+    table = run("skin_of_your_own", "--thickness", 1, 3)
+    assert (table.on_ff > table.beside_ff).all() and table.on_ff.iloc[0] > table.on_ff.iloc[1]
+    assert capsys.readouterr().out.count("fF on the taxel") == 2
