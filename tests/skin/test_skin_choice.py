@@ -8,7 +8,7 @@ import pytest
 
 from softtact.errors import ExtrapolationWarning, InputError
 from softtact.evaluation.claims_of_skin import PRINTED_FRONT
-from softtact.skin.choice import Needs, front_confidence, pareto, printed_criteria, thickness_table, thinnest
+from softtact.skin.choice import Needs, front_confidence, pareto, printed_criteria, thickness_table, thinnest, with_scatter
 from softtact.skin.converter import CONVERTERS, Converter
 from softtact.skin.elastomers import find_elastomer, fingertip_area_mm2, read_elastomers
 from softtact.skin.layout import module_layout
@@ -80,6 +80,9 @@ def test_the_thinnest_layer_meets_force_strain_range_and_weight_together(known):
     assert thin.meets_all and not thick.force_met and not thick.in_budget
     assert thin.at_rest_ff / thick.at_rest_ff == pytest.approx(4, rel=0.02)  # plates, but for the guard gap
     assert thin.weight_g_module == pytest.approx(1.28e-3 * module_layout().area_mm2)
+    worst = with_scatter(table, needs=needs, batch_scatter=0.33, ageing_stiffening=0.2)
+    assert worst.counts_of_worst.iloc[0] == pytest.approx(thin.counts_at_smallest_force * 0.67 / 1.2)
+    assert worst.meets_all_at_worst.tolist() == [True, False]
     chosen = thinnest(table)
     assert chosen.thickness_mm.tolist() == [1.0]
 

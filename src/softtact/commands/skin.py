@@ -58,8 +58,9 @@ def _lines(told):
             f"{row['counts']:8d}"
         )
     if told.get("chosen"):
-        best = told["chosen"]
-        yield f"chosen: {best['thickness_mm']:g} mm of {best['elastomer']}, {best['weight_g_module']:.3g} g a module"
+        yield f"chosen: {_layer(told['chosen'])}"
+    if told.get("chosen_at_worst"):
+        yield f"chosen so that the worst batch meets the needs, too: {_layer(told['chosen_at_worst'])}"
     if told.get("maps"):
         maps = told["maps"]
         yield (f"a finger is felt from {maps['least_force_n']:.3g} N on at best, {maps['worst_force_n']:.3g} N at worst; "
@@ -71,3 +72,7 @@ def _lines(told):
                f"{link['widest_overlap_mm']:.2g} mm; "
                f"{link['bent_too_much']} bend too much and are left out, {link['without_place']} found no place")
     yield f"written: {told['report']}"
+
+
+def _layer(best):
+    return f"{best['thickness_mm']:g} mm of {best['elastomer']}, {best['weight_g_module']:.3g} g a module"

@@ -144,13 +144,18 @@ def _chosen(design, said):
     )
     if said["chosen"] is None:
         return f"No elastomer and thickness on the list meets all needs. {front}"
-    best = said["chosen"]
-    ends = " (the thinnest on the list; a thinner one may do)" if best["thickness_mm"] == min(choice.thicknesses_mm) else ""
+    at_end = said["chosen"]["thickness_mm"] == min(choice.thicknesses_mm)
+    ends = " (the thinnest on the list; a thinner one may do)" if at_end else ""
+    robust = said["chosen_at_worst"]
+    worst = f"The lightest whose worst batch does so, too: {_layer(robust)}." if robust else "No one's worst batch does."
     return (
         f"Lightest layer that tells {choice.smallest_force_n:g} N from noise, stays below a strain of {choice.strain_limit:g} at "
-        f"{choice.range_kpa[1]:g} kPa and in the converter's range: {best['thickness_mm']:g} mm of {best['elastomer']}{ends}, "
-        f"{best['weight_g_module']:.3g} g a module. {front}"
+        f"{choice.range_kpa[1]:g} kPa and in the converter's range: {_layer(said['chosen'])}{ends}. {worst} {front}"
     )
+
+
+def _layer(best):
+    return f"{best['thickness_mm']:g} mm of {best['elastomer']}, {best['weight_g_module']:.3g} g a module"
 
 
 def _figure(path, tables):

@@ -14,7 +14,7 @@ from softtact.progress import announce
 from softtact.reporting import skin_figures as figures
 from softtact.reporting.skin_page import DRAWN_FROM, write_page
 from softtact.skin.analysis import Readings, Skin, analyse
-from softtact.skin.choice import front_confidence, printed_criteria, thickness_table, thinnest
+from softtact.skin.choice import front_confidence, printed_criteria, thickness_table, thinnest, with_scatter
 from softtact.skin.contact import contact_load
 from softtact.skin.design import Choice, Design, LoadChoice
 from softtact.skin.exports import write_exports
@@ -185,14 +185,14 @@ def _choose(study: Study, choice: Choice, tables: dict[str, pd.DataFrame], out: 
     """The tables of the choice; what the command tells of it."""
     known = list(study.elastomers.values())
     target = 1e-3 * choice.target_kpa
+    scatter = {"batch_scatter": choice.batch_scatter, "ageing_stiffening": choice.ageing_stiffening}
     tables["choice_printed"] = printed_criteria(known, stress_mpa=target, area_mm2=study.layout.area_mm2)
     tables["front_confidence"], same = front_confidence(
         known,
         stress_mpa=target,
         draws=choice.draws,
         strain_scatter=choice.strain_scatter,
-        batch_scatter=choice.batch_scatter,
-        ageing_stiffening=choice.ageing_stiffening,
+        **scatter,
         seed=choice.seed,
     )
     bearable = [e for e in known if bears(e, 1e-3 * choice.range_kpa[1])]
@@ -204,23 +204,23 @@ def _choose(study: Study, choice: Choice, tables: dict[str, pd.DataFrame], out: 
         converter=study.converter,
         weight_budget_g=choice.weight_budget_g,
     )
+    table = with_scatter(table, needs=needs_of(choice), **scatter)
     tables["thickness"], tables["choice"] = table, thinnest(table)
     figures.draw_front(out / "figures/front.png", tables["choice_printed"], tables["front_confidence"])
     figures.draw_thickness(
         out / "figures/thickness.png", table, detected_counts=choice.detected_counts, strain_limit=choice.strain_limit
     )
-    best = tables["choice"].iloc[0] if len(tables["choice"]) else None
-    return {
-        "same_front": same,
-        "beyond_curve": [e.name for e in known if e not in bearable],
-        "chosen": None
-        if best is None
-        else {
-            "elastomer": best.elastomer,
-            "thickness_mm": float(best.thickness_mm),
-            "weight_g_module": float(best.weight_g_module),
-        },
-    }
+    robust = thinnest(table.assign(meets_all=table.meets_all_at_worst))
+    return {"same_front": same, "beyond_curve": [e.name for e in known if e not in bearable], "chosen": _lightest(tables["choice"]),
+            "chosen_at_worst": _lightest(robust)}
+
+
+def _lightest(choice: pd.DataFrame) -> dict[str, Any] | None:
+    """The first row of a choice, which is the lightest, in words and numbers; None where nothing meets all needs."""
+    if not len(choice):
+        return None
+    best = choice.iloc[0]
+    return {"elastomer": best.elastomer, "thickness_mm": float(best.thickness_mm), "weight_g_module": float(best.weight_g_module)}
 
 
 def _draw_maps(study: Study, skin: Skin, tables: dict[str, pd.DataFrame], out: Path) -> dict[str, float]:
@@ -289,7 +289,7 @@ def _lay(study: Study, tables: dict[str, pd.DataFrame], out: Path, folder: Path)
         study.design.module.layout(),
         start_mm=None if link.start_mm is None else np.array(link.start_mm),
         direction=np.array(link.direction),
-        rings=int(link.rings),
+        rings=link.rings,
         least_radius_mm=link.least_radius_mm,
     )
     weight = 1e-3 * study.elastomer.density_g_cm3 * study.design.module.layout().area_mm2 * study.design.module.thickness_mm

@@ -93,11 +93,11 @@ class Needs:
     """What a layer has to do."""
 
     range_mpa: tuple[float, float]
-    """Lowest and highest pressure under the probe."""
+    """Lowest and highest pressure under the probe: the one to be told from noise, the other within strain and range."""
     probe_mm: float
     """Diameter of the disc that presses."""
     smallest_force_n: float
-    """Which has to be told from noise."""
+    """Of the probe, which has to be told from noise, too."""
     detected_counts: float
     """Rise of a taxel from which on it counts as told."""
     strain_limit: float
@@ -129,6 +129,19 @@ def thickness_table(
     return table
 
 
+def with_scatter(table: pd.DataFrame, *, needs: Needs, batch_scatter: float, ageing_stiffening: float) -> pd.DataFrame:
+    """A `thickness_table` with what the worst batch does: counts when it is stiff and aged, strain when it is soft and new.
+
+    Both are inversely proportional to the modulus, to first order; scatter and stiffening as in `front_confidence`.
+    """
+    counts = table.counts_at_smallest_force * (1 - batch_scatter) / (1 + ageing_stiffening)
+    strain = table.strain * (1 + batch_scatter)
+    return table.assign(
+        counts_of_worst=counts, strain_of_worst=strain,
+        meets_all_at_worst=table.meets_all & (counts >= needs.detected_counts) & (strain <= needs.strain_limit)
+    )
+
+
 def thinnest(table: pd.DataFrame) -> pd.DataFrame:
     """Of a `thickness_table` the thinnest row that meets all, for each elastomer; the lightest first."""
     met = table[table.meets_all].sort_values(["elastomer", "thickness_mm"])
@@ -137,7 +150,7 @@ def thinnest(table: pd.DataFrame) -> pd.DataFrame:
 
 def _layer_row(elastomer, thickness, layout, needs, converter, spacing):
     area = np.pi * needs.probe_mm**2 / 4
-    small, large = needs.smallest_force_n / area, needs.range_mpa[1]
+    small, large = min(needs.smallest_force_n / area, needs.range_mpa[0]), needs.range_mpa[1]
     row = {
         "elastomer": elastomer.name,
         "thickness_mm": thickness,

@@ -4,7 +4,7 @@ import dataclasses
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, ValidationError, model_validator
+from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt, ValidationError, model_validator
 
 from softtact.errors import InputError
 from softtact.files import read_yaml
@@ -173,7 +173,7 @@ class Link(Section):
     unit: Literal["mm", "cm", "m", "inch", "in"] = "mm"
     start_mm: tuple[float, float, float] | None = None
     direction: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    rings: NonNegativeFloat = 2
+    rings: NonNegativeInt = 2
     least_radius_mm: Length = 10.0
 
 

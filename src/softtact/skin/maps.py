@@ -108,8 +108,8 @@ def crosstalk(
     for pitch in pitches_mm:
         centres = np.vstack([[0.0, 0.0], pitch * np.column_stack([np.cos(angle), np.sin(angle)])])
         reach = pitch + guard_radius_mm + 3 * thickness_mm
-        corners = 2 * reach * np.column_stack([np.cos(np.pi / 2 + 4 * angle[:3]), np.sin(np.pi / 2 + 4 * angle[:3])])
-        corners = corners[[0, 2, 1]] if np.cross(*(corners[1:] - corners[0])) < 0 else corners
+        upright = np.pi / 2 + 2 * np.pi / 3 * np.arange(3)
+        corners = 2 * reach * np.column_stack([np.cos(upright), np.sin(upright)])
         layout = Layout(corners, centres, np.zeros(7, dtype=int), corners[None], radius_mm, guard_radius_mm)
         skin = Skin(
             layout,
