@@ -24,7 +24,7 @@ from softtact.skin.loads import Load
 from softtact.skin.maps import crosstalk, patch_maps
 from softtact.skin.probes import alone, probe_curves
 from softtact.skin.search import main_effects, search
-from softtact.skin.study import Study, bears, needs_of, prepare
+from softtact.skin.study import Study, bears, needs_of, prepare, reaches
 
 
 def run_design(path: Path, design: Design, out: Path, *, threads: int = 1) -> dict[str, Any]:
@@ -52,6 +52,9 @@ def run_design(path: Path, design: Design, out: Path, *, threads: int = 1) -> di
     if design.choice:
         announce(f"{design.skin}: choice of the elastomer and its thickness")
         said |= _choose(study, design.choice, tables, out)
+        if said["left_out"]:
+            names = ", ".join(said["left_out"])
+            said["remarks"].append(f"{names}: left out of the choice; their curves do not reach its pressures.")
     if design.maps:
         announce(f"{design.skin}: maps")
         said["maps"] = _draw_maps(study, skin, tables, out)
@@ -183,8 +186,8 @@ def _write_readings(study: Study, skin: Skin, readings: Readings, out: Path) -> 
 
 def _choose(study: Study, choice: Choice, tables: dict[str, pd.DataFrame], out: Path) -> dict[str, Any]:
     """The tables of the choice; what the command tells of it."""
-    known = list(study.elastomers.values())
     target = 1e-3 * choice.target_kpa
+    known = [e for e in study.elastomers.values() if reaches(e, target)]
     scatter = {"batch_scatter": choice.batch_scatter, "ageing_stiffening": choice.ageing_stiffening}
     tables["choice_printed"] = printed_criteria(known, stress_mpa=target, area_mm2=study.layout.area_mm2)
     tables["front_confidence"], same = front_confidence(
@@ -195,7 +198,7 @@ def _choose(study: Study, choice: Choice, tables: dict[str, pd.DataFrame], out: 
         **scatter,
         seed=choice.seed,
     )
-    bearable = [e for e in known if bears(e, 1e-3 * choice.range_kpa[1])]
+    bearable = [e for e in study.elastomers.values() if bears(e, 1e-3 * choice.range_kpa[1])]
     table = thickness_table(
         bearable,
         study.design.module.layout(),
@@ -211,8 +214,13 @@ def _choose(study: Study, choice: Choice, tables: dict[str, pd.DataFrame], out: 
         out / "figures/thickness.png", table, detected_counts=choice.detected_counts, strain_limit=choice.strain_limit
     )
     robust = thinnest(table.assign(meets_all=table.meets_all_at_worst))
-    return {"same_front": same, "beyond_curve": [e.name for e in known if e not in bearable], "chosen": _lightest(tables["choice"]),
-            "chosen_at_worst": _lightest(robust)}
+    left_out = [e.name for e in study.elastomers.values() if e not in known or e not in bearable]
+    return {
+        "same_front": same,
+        "left_out": left_out,
+        "chosen": _lightest(tables["choice"]),
+        "chosen_at_worst": _lightest(robust),
+    }
 
 
 def _lightest(choice: pd.DataFrame) -> dict[str, Any] | None:

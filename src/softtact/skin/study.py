@@ -42,6 +42,7 @@ def prepare(design: Design, path: Path) -> Study:
         pressures["at 'maps.pressure_kpa'"] = [1e-3 * design.maps.pressure_kpa]
     _refuse_pressures(elastomer, pressures, where)
     _refuse_places(design, layout, folder, where)
+    _refuse_choice(design, elastomers, where)
     _refuse_search(design, elastomers, where)
     return Study(design, where, layout, elastomers, elastomer, design.converter.converter(where), loads)
 
@@ -59,6 +60,28 @@ def bears(elastomer: Elastomer, stress_mpa: float) -> bool:
     except InputError:
         return False
     return True
+
+
+def reaches(elastomer: Elastomer, stress_mpa: float) -> bool:
+    """Whether an elastomer's curve has a strain at a stress, extrapolated or not."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ExtrapolationWarning)
+            return elastomer.strain(stress_mpa) < 1
+    except InputError:
+        return False
+
+
+def _refuse_choice(design, elastomers, where):
+    """Refuse a choice at pressures that no elastomer's curve reaches, or in a range that does not rise."""
+    if design.choice is None:
+        return
+    low, high = design.choice.range_kpa
+    if low >= high:
+        raise InputError(f"{where}, at 'choice.range_kpa': {low:g} to {high:g} kPa does not rise; write the lower pressure first.")
+    for name, pressure, check in (("target_kpa", design.choice.target_kpa, reaches), ("range_kpa", high, bears)):
+        if not any(check(elastomer, 1e-3 * pressure) for elastomer in elastomers.values()):
+            raise InputError(f"{where}, at 'choice.{name}': no elastomer's curve reaches {pressure:g} kPa; choose less pressure.")
 
 
 def _refuse_pressures(elastomer, pressures, where):
