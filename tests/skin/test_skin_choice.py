@@ -43,7 +43,7 @@ def test_the_front_is_rarely_the_same_when_strains_scatter_by_a_tenth(known):
     table, same = front_confidence(
         list(known.values()), stress_mpa=0.01, draws=4000, strain_scatter=0.1, batch_scatter=0.33, ageing_stiffening=0.2, seed=0
     )
-    assert same["strain_scatter"] == pytest.approx(0.2, abs=0.03)  # 20 %, prototyped with other draws
+    assert same["strain_scatter"] == pytest.approx(0.2, abs=0.03)  # 20 % by other draws
     assert table.set_index("elastomer")["all"]["SomaFoama"] > 0.95
 
 
