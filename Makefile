@@ -1,4 +1,4 @@
-# `make`: the default study.  `make tiny`: the smallest study.  `make docs`: the documentation.
+# `make`: the default study.  `make tiny`: the smallest study.  `make grasps`, `make tiny-grasps`: grasps by a robot.  `make docs`: the documentation.
 # `make test`: the tests, in minutes.  `make test-slow`: those that take longer, CalculiX's and whole runs of the workflow among them.
 # `make results`: the results page in docs/, from a finished run of the default study.
 # `make numbers`: the measured numbers in docs/, from benchmarks/results/ and a count of the tests.
@@ -6,7 +6,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 BIN := .venv/bin
 SNAKEMAKE = $(BIN)/snakemake --cores all
 
-.PHONY: study tiny test test-slow lint advice bench docs numbers results clean
+.PHONY: study tiny grasps tiny-grasps test test-slow lint advice bench docs numbers results clean
 
 study: .venv/installed
 	$(SNAKEMAKE)
@@ -15,6 +15,10 @@ study: .venv/installed
 tiny: .venv/installed
 	$(SNAKEMAKE) --configfile config/tiny.yaml
 	@echo "Open results/tiny/report.html"
+
+# Grasps by a robot: hours of presses at 50 N, which go on where they were interrupted.
+grasps tiny-grasps: .venv/installed
+	$(BIN)/softtact grasps config/$(subst -,_,$@).yaml
 
 # Two processes with one thread each: two threads in one process take nearly as long as one.
 test test-slow: export OMP_NUM_THREADS = 1
@@ -42,7 +46,7 @@ advice: .venv/tested
 # The workflow finds its own interpreter; the environment need not be activated.
 .venv/installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[workflow,learn,view,optics,excel,mkl]'
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[workflow,learn,view,optics,excel,robot,mkl]'
 	touch $@
 
 .venv/tested: .venv/installed

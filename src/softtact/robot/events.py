@@ -72,7 +72,7 @@ def press_events(sensor: "Sensor", mesh: trimesh.Trimesh, record: GraspRecord, *
     for force in np.unique(forces[forces > 0]):
         places = np.argwhere(forces == force)
         results = sensor.press_many(mesh, [pose_of(poses[tuple(place)]) for place in places], force_n=[force], model=model,
-                                    workers=workers, device="cpu", label=f"{label}, {force:g} N", **options)
+                                    workers=workers, device="cpu", label=label and f"{label}, {force:g} N", **options)
         for place, result in zip(places, results, strict=True):
             _keep(maps, tuple(place), result)
     return maps
