@@ -71,8 +71,9 @@ def press_events(sensor: "Sensor", mesh: trimesh.Trimesh, record: GraspRecord, *
                      np.ones((events, 2), dtype=np.int8))
     for force in np.unique(forces[forces > 0]):
         places = np.argwhere(forces == force)
-        results = sensor.press_many(mesh, [pose_of(poses[tuple(place)]) for place in places], force_n=[force], model=model,
-                                    workers=workers, device="cpu", label=label and f"{label}, {force:g} N", **options)
+        seen = [set_down(mesh, pose_of(poses[tuple(place)])) for place in places]
+        results = sensor.press_many(mesh, seen, force_n=[force], model=model, workers=workers, device="cpu",
+                                    label=label and f"{label}, {force:g} N", **options)
         for place, result in zip(places, results, strict=True):
             _keep(maps, tuple(place), result)
     return maps
@@ -88,6 +89,14 @@ def _keep(maps: EventMaps, place: tuple[int, ...], result: "PressResult") -> Non
 def pose_of(values: np.ndarray) -> Pose:
     """The `Pose` of seven numbers: x, y, z in mm and the quaternion w, x, y, z."""
     return Pose(np.array(values[:3]), Rotation.from_quat(values[3:], scalar_first=True))
+
+
+def set_down(mesh: trimesh.Trimesh, pose: Pose) -> Pose:
+    """The pose with the mesh's lowest point on the sensing surface, where a press begins: how deep a pad of MuJoCo's sinks says
+    nothing.
+    """
+    lowest = float(pose.apply(mesh.vertices)[:, 2].min())
+    return Pose(pose.translation_mm - [0.0, 0.0, lowest], pose.rotation)
 
 
 def to_dataset(record: GraspRecord, maps: EventMaps, sensor: "Sensor", facts: Mapping[str, Any]) -> "xarray.Dataset":

@@ -19,7 +19,7 @@ from softtact.files import digest, read_dataset, write_csv, write_dataset
 from softtact.geometry.meshes import place, read_mesh
 from softtact.progress import announce, progress
 from softtact.readout.virtual_sensor import VirtualSensorSettings, read_virtual_sensor
-from softtact.robot.events import pose_of, press_events, read_events, to_dataset, write_events
+from softtact.robot.events import pose_of, press_events, read_events, set_down, to_dataset, write_events
 from softtact.robot.grasp import GraspRun
 from softtact.robot.record import FINGERS
 from softtact.robot.scene import Placement, build_scene
@@ -102,7 +102,7 @@ def compare_models(study: GraspStudy, name: str, path: Path, *, workers: int | N
     record = run.run(values.force_n, lift=False)
     row = record.event_row[GRIP]
     sensor = study.sensor(cover_law=values.cover_law)
-    pose, force = pose_of(record.object_pose_sensor[row, 0]), round(float(-record.force_n[row, 0, 2]), 3)
+    pose, force = set_down(mesh, pose_of(record.object_pose_sensor[row, 0])), round(float(-record.force_n[row, 0, 2]), 3)
     maps, valid = [], []
     for model in values.models:
         result = sensor.press(mesh, pose=pose, force_n=[force], model=model, label=f"{name}, {model}", threads=workers)
