@@ -16,6 +16,7 @@ from softtact.commands import (
     complexity,
     config_schema,
     cost,
+    dataset,
     detect_discs,
     export_deck,
     fit,
@@ -30,7 +31,7 @@ from softtact.commands.common import EXIT_TEXT
 from softtact.errors import ConvergenceError, SofttactError
 from softtact.extras import missing_extra
 
-COMMANDS = (press, grasp, grasps, view, predict, complexity, fit, export_deck, detect_discs, cost, stage, config_schema,
+COMMANDS = (press, grasp, grasps, dataset, view, predict, complexity, fit, export_deck, detect_discs, cost, stage, config_schema,
             completion)
 EXAMPLES = """examples:
   softtact press part.stl --unit mm --force 5 --force 20 --out press.nc --vtu press.vtu --plot press.png
