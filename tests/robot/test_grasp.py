@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 from scipy.spatial.transform import Rotation
 
 from softtact.errors import ConvergenceError, InputError
@@ -38,6 +39,12 @@ def test_each_pad_presses_with_the_force_asked_for_and_against_the_other(record)
     left, right = record.force_n[at_event(record, "grip")]
     assert left[2] == pytest.approx(-FORCE_N, rel=1e-4) and right[2] == pytest.approx(-FORCE_N, rel=1e-4)
     assert np.hypot(*left[:2]) < 0.02 * FORCE_N     # no shear worth the name while the fixture bears the weight
+
+
+@pytest.mark.parametrize("force_n", [5.0, 50.0])
+def test_an_object_of_a_third_of_a_gram_bears_any_force(force_n, coro):
+    light = GraspRun(build_scene(trimesh.creation.box((8, 8, 4)), coro, load_scene(), Placement(1.0, 1.0, 10.0))).run(force_n)
+    assert np.allclose(light.force_n[light.event_row[1:], :, 2], -force_n, rtol=1e-3)
 
 
 def test_lifted_the_pads_carry_the_weight(record, scene):

@@ -84,12 +84,12 @@ class GraspRun:
             self._step()
             last.append(-pad_forces(self.scene.model, self.data)[:, 2])
             recent = np.array(last[-window:])
-            if grown == 1.0 and len(last) > window and np.ptp(recent, axis=0).max() < settings.steady_change * force_n \
-                    and recent.min() > 0:
+            if grown == 1.0 and len(last) > window and _is_steady(recent, force_n, settings.steady_change):
                 return self._event()
             if self.data.time - begin > _LONGEST_S:
-                raise ConvergenceError(f"The grip did not become steady in {_LONGEST_S:g} s: the pads press with "
-                                       f"{', '.join(f'{value:.3g}' for value in recent[-1])} N; shift or turn the object.")
+                pressed = ", ".join(f"{value + 0.0:.3g}" for value in recent[-1])
+                raise ConvergenceError(f"The grip did not become steady in {_LONGEST_S:g} s: the pads press with {pressed} N where "
+                                       f"{force_n:g} N were asked for; shift or turn the object, or make it heavier (--mass).")
 
     def let_go(self) -> None:
         """Open the fixture: from now on the fingers alone hold the object."""
@@ -154,6 +154,11 @@ class GraspRun:
     def _note(self):
         mujoco.mj_forward(self.scene.model, self.data)     # poses and forces of this very state
         self._rows.append(row_of(self.scene, self.data) | {"phase": self._phase})
+
+
+def _is_steady(recent, force_n, share):
+    """Whether forces (t, finger) in N changed by less than a share of what was asked for, and are it within that share."""
+    return max(np.ptp(recent, axis=0).max(), np.abs(recent[-1] - force_n).max()) < share * force_n
 
 
 def row_of(scene: Scene, data: Any) -> dict[str, Any]:

@@ -32,7 +32,8 @@ DOWN = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])     # to
 SENSOR_IN_TOOL = {"left": np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]),
                   "right": np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])}
 _PAD_TIME_S, _FIXTURE_TIME_S = 0.004, 0.004     # time constants of MuJoCo's contacts and welds, at least two time steps
-_STIFF = (0.95, 0.99, 0.0005, 0.5, 2.0)
+# Of contacts: stiffness grows with the lighter body's mass, and 0.3 g must still bear 50 N between the pads.
+_STIFF = (0.99, 0.9999, 0.0001, 0.5, 2.0)
 _RIGID = (0.9999, 0.9999, 0.001, 0.5, 2.0)      # holds an object's weight within nanometres
 _TURNING = 10.0                 # weight of turns in a weld: 20 N that are 5 mm off the middle tilt an object by 0.03 mrad
 _TORSION_M = 0.005            # radius of the patch that resists turning: pads are soft, hulls touch in points
