@@ -19,7 +19,7 @@ def draw_grasp(data: "xarray.Dataset", path: str | Path, *, images: np.ndarray |
     from matplotlib.figure import Figure
 
     events, first = data.sizes["event"], 0 if images is None else 1
-    figure = Figure(figsize=(4.2 * first + 7.2, 3.3 * events + 0.6), layout="constrained")
+    figure = Figure(figsize=(4.2 * first + 7.2, 2.6 * events + 0.6), layout="constrained")
     grid = figure.subplots(events, 4 + first, squeeze=False, width_ratios=[3.0] * first + [1.0] * 4)
     deepest = max(float(data.deformation_map_mm.max()), 1e-9)
     highest = max(float(data.tactile_map.max()), 1.0)
