@@ -63,6 +63,11 @@ def test_a_policy_that_closes_and_lifts_earns_the_whole_height(env):
     assert ended and sum(rewards) == pytest.approx(info["risen_mm"] / 40.0, abs=1e-9) and info["risen_mm"] > 39
 
 
+def test_an_unknown_option_of_a_reset_is_refused(env):
+    with pytest.raises(InputError, match="the option 'x' is unknown; use one of x_mm, y_mm, angle_deg"):
+        env.reset(options={"x": 1.0})
+
+
 def test_a_lift_with_too_little_force_loses_the_object(env):
     heavy = gymnasium.make(ID, mass_kg=2.0, mesh=trimesh.creation.box((16, 16, 20)))     # slips below 2 x 9.81 / (2 x 0.8) = 12.3 N
     _, rewards, ended, info = play(heavy, ((-0.3, 0.0, 0.0), 40), ((-0.3, 1.0, 0.0), 200), options=STILL)     # 10.5 N

@@ -1,6 +1,9 @@
 """`softtact grasp` writes what a grasp gave, replays it to the byte, and refuses what it cannot use in one sentence."""
 
 import json
+import os
+import subprocess
+import sys
 
 import pytest
 import trimesh
@@ -29,8 +32,6 @@ GRASP = "grasp part.stl --unit mm --force 10 --model elastic --workers 1"
 
 @pytest.fixture(scope="module")
 def first(folder):
-    import os
-
     os.chdir(folder)
     assert main(f"{GRASP} --x 1 --no-picture --out first".split()) == 0
     return folder / "first/events.nc"
@@ -61,6 +62,13 @@ def test_a_robot_of_ones_own_takes_the_place_of_the_built_one(folder, coro):
     assert main(f"{GRASP} --x 1 --scene scene.yaml --no-picture --out own".split()) == 0
     own, built = read_events(folder / "own/events.nc"), read_events(folder / "first/events.nc")
     assert abs(own.force_n - built.force_n).max() < 0.05 and (own.event_row == built.event_row).all()
+
+
+def test_where_mujoco_does_not_draw_a_sentence_says_so_and_the_maps_are_drawn(folder):
+    line = [sys.executable, "-m", "softtact", *f"{GRASP} --no-lift --video --out blind".split()]
+    done = subprocess.run(line, capture_output=True, text=True, env=os.environ | {"MUJOCO_GL": "wrong"}, check=False)
+    assert done.returncode == 0 and "no picture of the robot: MuJoCo does not draw off screen here" in done.stderr
+    assert sorted(path.name for path in (folder / "blind").iterdir()) == ["events.nc", "grasp.png"]
 
 
 @pytest.mark.parametrize(("line", "said"), [

@@ -59,8 +59,9 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def _grasp(options):
-    import mujoco  # noqa: F401      says at once which extra is missing
+    from softtact.robot.physics_only import import_mujoco
 
+    import_mujoco()     # says at once which extra is missing
     from softtact.robot.events import write_events
 
     if options.out.is_file():

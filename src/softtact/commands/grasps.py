@@ -43,6 +43,9 @@ def _grasps(options):
 
 
 def _run(study, folder, options):
+    from softtact.robot.physics_only import import_mujoco
+
+    import_mujoco()
     from softtact.evaluation.claims_of_grasps import claims_of_grasps
     from softtact.files import read_dataset, write_csv
     from softtact.reporting.grasps_page import draw_objects, draw_one_event, write_grasps_report

@@ -78,6 +78,8 @@ class GraspEnv(gymnasium.Env):
         options: x_mm, y_mm, angle_deg, in place of what is drawn
         """
         super().reset(seed=seed)
+        for name in set(options or {}) - set(_SPREAD):
+            raise InputError(f"reset: the option {name!r} is unknown; use one of {', '.join(_SPREAD)}.")
         drawn = {name: float(self.np_random.uniform(-side, side)) for name, side in _SPREAD.items()}
         placement = replace(Placement(**drawn), **(options or {}))
         self._scene = build_scene(self._mesh, self._sensor.spec, self._settings, placement, mass_kg=self._mass_kg)
