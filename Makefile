@@ -1,4 +1,5 @@
 # `make`: the default study.  `make tiny`: the smallest study.  `make docs`: the documentation.
+# `make skin`, `make grasps`: a robot skin, designed; grasps by a robot.  `make tiny-skin`, `make tiny-grasps`: the smallest ones.
 # `make test`: the tests, in minutes.  `make test-slow`: those that take longer, CalculiX's and whole runs of the workflow among them.
 # `make results`: the results page in docs/, from a finished run of the default study.
 # `make numbers`: the measured numbers in docs/, from benchmarks/results/ and a count of the tests.
@@ -6,7 +7,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 BIN := .venv/bin
 SNAKEMAKE = $(BIN)/snakemake --cores all
 
-.PHONY: study tiny test test-slow lint advice bench docs numbers results clean
+.PHONY: study tiny skin tiny-skin grasps tiny-grasps test test-slow lint advice bench docs numbers results clean
 
 study: .venv/installed
 	$(SNAKEMAKE)
@@ -15,6 +16,16 @@ study: .venv/installed
 tiny: .venv/installed
 	$(SNAKEMAKE) --configfile config/tiny.yaml
 	@echo "Open results/tiny/report.html"
+
+skin: .venv/installed
+	$(BIN)/softtact skin config/skin.yaml --out results/skin
+
+tiny-skin: .venv/installed
+	$(BIN)/softtact skin config/tiny_skin.yaml --out results/tiny_skin
+
+# Grasps by a robot: hours of presses at 50 N, which go on where they were interrupted.
+grasps tiny-grasps: .venv/installed
+	$(BIN)/softtact grasps config/$(subst -,_,$@).yaml
 
 # Two processes with one thread each: two threads in one process take nearly as long as one.
 test test-slow: export OMP_NUM_THREADS = 1
@@ -42,7 +53,7 @@ advice: .venv/tested
 # The workflow finds its own interpreter; the environment need not be activated.
 .venv/installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[workflow,learn,view,optics,excel,mkl]'
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[workflow,learn,view,optics,excel,skin,robot,mkl]'
 	touch $@
 
 .venv/tested: .venv/installed

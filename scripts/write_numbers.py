@@ -16,6 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 NUMBERS = ROOT / "docs" / "reference" / "numbers.md"
 PERFORMANCE = ROOT / "docs" / "performance.md"
 EDGE, FAST = (ROOT / "docs" / "explanation" / f"{name}.md" for name in ("edge", "fast_models"))
+LEARN = ROOT / "docs" / "how-to" / "learn_with_the_environment.md"
 MESHES = {"draft": "draft", "production": "default", "fine": "fine"}     # name in the records, name of the preset
 BLOCK = r"(<!-- numbers: {} -->\n).*?(<!-- end of numbers -->)"
 HEAD = """\
@@ -156,6 +157,16 @@ def choice() -> str:
               f"errors on these objects: {words}.")
 
 
+def environment() -> str:
+    """Observations a second of the environment for learning."""
+    words = {"slide": "slides through new places", "again": "slides through known places", "held": "holds the object",
+             "reset": "starts an episode"}
+    rows = [[row["model"], words[row["case"]], row["places_pressed"], row["per_processor_s"], row["per_wall_s"]]
+            for row in record("environment")["rows"]]
+    head = "model, the hand, places pressed, a second of one core, a second by the clock with other work beside"
+    return f"{source('environment')}\n\n" + table(head, rows)
+
+
 def random_presses() -> str:
     """Outcomes of random presses."""
     outcomes = ["presses", "reached", "outside", "flagged", "stopped", "refused", "nonsense", "hung", "crashed"]
@@ -174,7 +185,7 @@ def numbers_page(counts: dict[str, int]) -> str:
 def pages() -> dict[Path, str]:
     """Texts of the pages whose named tables come from the records."""
     tables = {PERFORMANCE: {"presses": presses(), "fast presses": fast_presses()}, EDGE: {"overhang": overhang()},
-              FAST: {"choice": choice()}}
+              FAST: {"choice": choice()}, LEARN: {"environment": environment()}}
     return {page: _with_tables(page.read_text(encoding="utf-8"), own) for page, own in tables.items()}
 
 

@@ -56,8 +56,22 @@ def test_the_robot_loop_feels_where_the_object_is_and_says_that_it_is_no_robot(c
     assert rows[0] < 0.35 and rows[1] > 0.65
 
 
+@pytest.mark.slow
+def test_a_small_network_learns_the_grip_s_force_from_the_taxels(tmp_path):
+    pytest.importorskip("mujoco", reason="pip install 'softtact[robot]'")
+    errors = run("learn_grip_force", "--episodes", 12, "--out", tmp_path / "force.png")
+    assert errors["network"] < 0.5 * errors["mean force"] and (tmp_path / "force.png").stat().st_size > 0
+
+
 def loaded():
     import softtact
     from softtact.geometry.meshes import read_mesh
 
     return softtact.load_sensor("coro"), read_mesh(OBJECT, unit="mm")
+
+
+@pytest.mark.slow
+def test_a_thinner_skin_answers_more_on_a_taxel_than_beside_it(capsys):
+    table = run("skin_of_your_own", "--thickness", 1, 3)
+    assert (table.on_ff > table.beside_ff).all() and table.on_ff.iloc[0] > table.on_ff.iloc[1]
+    assert capsys.readouterr().out.count("fF on the taxel") == 2

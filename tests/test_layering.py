@@ -22,7 +22,7 @@ ORDER = (
     ("models.foundation", "models.ftir"),
     ("models.meshes", "decks"),
     ("readout", "imaging", "published"),
-    ("press",),
+    ("press", "skin"),
     ("robot", "learning"),
     ("evaluation",),
     ("study",),

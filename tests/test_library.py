@@ -131,6 +131,7 @@ def test_the_costs_of_the_shipped_studies_are_printed_in_any_folder(tmp_path, mo
     ("torch", ["predict", "map.npy", "--network", "model.pt"], "learn"),
     ("optuna", ["stage", "search_hyperparameters"], "learn"),
     ("jinja2", ["stage", "report"], "workflow"),
+    ("skfem", ["skin", str(ROOT / "config/tiny_skin.yaml"), "--out", "results/none"], "skin"),
 ])
 def test_a_command_whose_extra_is_missing_says_which_to_install(package, arguments, extra):
     status, said, complained = without(package, *arguments)
@@ -218,7 +219,8 @@ def part(tmp_path):
 def test_the_wheel_holds_the_sensors_materials_studies_and_types(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
     expected = {"py.typed", "sensors/data/sensors/coro.yaml", "sensors/data/materials/neoprene.yaml", "study/data/config.yaml",
-                "study/data/costs.yaml", "study/data/objects/catalogue.yaml", "study/data/objects/indenters/square.stl"}
+                "study/data/costs.yaml", "study/data/objects/catalogue.yaml", "study/data/objects/indenters/square.stl",
+                "skin/data/elastomers.yaml", "skin/data/fingertips.yaml", "study/data/skin.yaml", "study/data/skin_forearm.stl"}
     assert {f"softtact/{name}" for name in expected} <= names
     sources = {str(path.relative_to(ROOT / "src")) for path in (ROOT / "src").rglob("*.py")}
     assert sources <= names

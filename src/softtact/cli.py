@@ -16,11 +16,15 @@ from softtact.commands import (
     complexity,
     config_schema,
     cost,
+    dataset,
     detect_discs,
     export_deck,
     fit,
+    grasp,
+    grasps,
     predict,
     press,
+    skin,
     stage,
     view,
 )
@@ -28,9 +32,11 @@ from softtact.commands.common import EXIT_TEXT
 from softtact.errors import ConvergenceError, SofttactError
 from softtact.extras import missing_extra
 
-COMMANDS = (press, view, predict, complexity, fit, export_deck, detect_discs, cost, stage, config_schema, completion)
+COMMANDS = (press, grasp, grasps, skin, dataset, view, predict, complexity, fit, export_deck, detect_discs, cost, stage,
+            config_schema, completion)
 EXAMPLES = """examples:
   softtact press part.stl --unit mm --force 5 --force 20 --out press.nc --vtu press.vtu --plot press.png
+  softtact grasp part.stl --unit mm --force 20 --out results/grasp   # a robot grasps it: both sensors
   softtact view press.vtu                     # turn the pressed sensor in a browser
   softtact complexity part.stl --unit mm      # which model the paper's rule takes for it
   softtact fit uniaxial=tension.csv --out card.json

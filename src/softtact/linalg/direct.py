@@ -5,6 +5,7 @@ its own, which knows where the unknowns stand: `multifrontal_solver`.
 """
 
 import ctypes
+import os
 
 import numpy as np
 import scipy.linalg as sla
@@ -51,9 +52,7 @@ def _fill_from_lower(triangle, place, out):
 
 
 def _schur_complement(upper, kept, threads):
-    from pypardiso import PyPardisoSolver
-
-    solver = PyPardisoSolver(mtype=PardisoSolver._POSITIVE)
+    solver = _pypardiso(PardisoSolver._POSITIVE)
     for entry, value in PardisoSolver._PARAMETERS.items():
         solver.set_iparm(entry + 1, value)
     solver.set_iparm(36, 1)               # return the complement of the unknowns marked in perm, in place of a solution
@@ -78,6 +77,15 @@ def _inverse_without_mkl(upper, kept):
     return inverse
 
 
+def _pypardiso(mtype):
+    """A solver of pypardiso's, which looks for MKL in all folders each time, a second or so, unless told where it lies."""
+    from pypardiso import PyPardisoSolver
+
+    solver = PyPardisoSolver(mtype=mtype)
+    os.environ.setdefault("PYPARDISO_MKL_RT", solver.libmkl._name)
+    return solver
+
+
 class PardisoSolver:
     """MKL PARDISO's Cholesky; the analysis is reused while the pattern stays."""
 
@@ -91,9 +99,7 @@ class PardisoSolver:
     _pattern: tuple[np.ndarray, np.ndarray] | None
 
     def __init__(self, *, threads: int = 1) -> None:
-        from pypardiso import PyPardisoSolver
-
-        self._solver, self._pattern, self._upper, self._converted = PyPardisoSolver(mtype=self._POSITIVE), None, None, None
+        self._solver, self._pattern, self._upper, self._converted = _pypardiso(self._POSITIVE), None, None, None
         self._threads = threads
         for entry, value in self._PARAMETERS.items():
             self._solver.set_iparm(entry + 1, value)

@@ -42,7 +42,8 @@ HEADERS = {
     "largest_memory_mb": "largest memory, MB", "claim": "claim", "where": "where", "ours": "ours", "uncertainty": "uncertainty",
     "verdict": "verdict", "seeds": "seeds", "ssim_sd": "SSIM, standard deviation",
     "ssim_least": "SSIM, least", "ssim_most": "SSIM, most", "mae_sd": "standard deviation of the mean error, counts",
-    "rule": "rule", "evidence": "evidence"}
+    "rule": "rule", "evidence": "evidence", "weight_g_module": "weight of a module, g", "weight_g_cm2": "weight, g/cm2",
+    "weight_g": "weight, g", "sensitivity_per_kpa": "sensitivity, 1/kPa", "delta_ff": "rise, fF", "t_min_mm": "t_min, mm"}
 
 
 def header(column: str) -> str:
@@ -57,7 +58,7 @@ def header(column: str) -> str:
 
 
 def _plain(name):
-    for unit, words in (("_n", " N"), ("_s", ", s"), ("_mm", ", mm"), ("_mpa", ", MPa")):
+    for unit, words in (("_n", " N"), ("_s", ", s"), ("_mm", ", mm"), ("_mpa", ", MPa"), ("_kpa", ", kPa"), ("_ff", ", fF")):
         if name.endswith(unit):
             return name.removesuffix(unit).replace("_", " ") + words
     return name.replace("_", " ")

@@ -1,0 +1,90 @@
+"""`softtact dataset`: random presses of objects as a data set for learning."""
+
+import argparse
+from pathlib import Path
+
+import softtact
+from softtact.commands.common import UNITS, add_command, add_repair, check_folders, check_forces, read_object, sensor_spec, show
+from softtact.commands.press_each import MESHES
+from softtact.errors import InputError
+
+EXAMPLES = """
+  softtact dataset part.stl --unit mm --presses 100 --out data.h5
+  softtact dataset objects/ --unit mm --presses 1000 --force 5 --force 20 --seed 7 --format netcdf --out data.nc
+  softtact dataset objects/ --unit mm --presses 1000 --fingers 2 --format lerobot --out data.h5
+  softtact dataset objects/ --unit mm --presses 1000 --cost --out data.h5      # what is left, and how long it takes
+"""
+_FORCES_N = (5.0, 10.0, 20.0, 40.0)
+
+
+def add(commands: argparse._SubParsersAction) -> None:
+    """Add the command to the parser."""
+    command = add_command(commands, "dataset", _dataset, "Random presses of objects as a data set for learning.", EXAMPLES)
+    command.add_argument("mesh", metavar="OBJECT", type=Path, nargs="+", help="STL, OBJ or PLY files of closed bodies, or folders")
+    command.add_argument("--unit", required=True, choices=UNITS, help="the meshes' unit, which the files do not state")
+    add_repair(command)
+    command.add_argument("--presses", type=int, required=True, metavar="N", help="in all; the objects take turns")
+    command.add_argument("--force", type=float, action="append", metavar="N",
+                         help="force in N; repeat it (default: 5, 10, 20 and 40, as far as the sensor bears them)")
+    command.add_argument("--fingers", type=int, choices=(1, 2), default=1,
+                         help="2 presses each object from its other side, too, as in a grip (default: 1)")
+    command.add_argument("--sensor", default="coro", help="name or YAML file of a sensor (default: coro)")
+    command.add_argument("--model", choices=("elastic", "foundation", "hyperelastic", "auto"), default="elastic",
+                         help="elastic by default")
+    command.add_argument("--seed", type=int, default=1, help="of the drawn places (default: 1)")
+    command.add_argument("--format", choices=("hdf5", "netcdf", "lerobot"), default="hdf5",
+                         help="lerobot: HDF5 with the key names of LeRobot's data sets")
+    command.add_argument("--workers", type=int, metavar="N", help="processes (default: one for each core)")
+    command.add_argument("--cost", action="store_true", help="say what is left and how long it takes, and do nothing")
+    command.add_argument("--out", type=Path, required=True, metavar="FILE",
+                         help="the data set; while it grows it is FILE.part, from which the same command goes on")
+
+
+def _dataset(options):
+    from softtact.learning.press_data import PressPlan, check_name, presses_left, write_press_data
+    from softtact.press.sensor import cores
+    from softtact.progress import announce
+    from softtact.study.cost import read_costs
+
+    check_folders(options.out)
+    check_name(options.out, options.format)
+    spec = sensor_spec(options.sensor)
+    forces = sorted(set(options.force or [force for force in _FORCES_N if force <= spec.force_range_n[1]]))
+    check_forces(forces, spec)
+    meshes = _meshes(options)
+    plan = PressPlan(softtact.load_sensor(options.sensor), meshes, options.presses, forces, options.model, options.seed,
+                     fingers=options.fingers)
+    cost = _cost(plan, presses_left(options.out, plan), read_costs(), options.workers or cores())
+    if options.cost:
+        show({"cost": cost}, as_json=options.json, lines=[cost])
+        return
+    announce(f"softtact dataset: {cost}")
+    failed = write_press_data(options.out, plan, form=options.format, workers=options.workers)
+    summary = {"written": str(options.out), "presses": options.presses, "failed": failed, "forces_n": forces,
+               "objects": list(meshes), "format": options.format}
+    show(summary, as_json=options.json, lines=[f"{options.presses} presses of {len(meshes)} objects at {len(forces)} forces, "
+                                               f"{failed} failed: {options.out}"])
+
+
+def _meshes(options):
+    """{name: mesh} of files and folders."""
+    paths = [file for path in options.mesh
+             for file in (sorted(one for one in path.iterdir() if one.suffix.lower() in MESHES) if path.is_dir() else [path])]
+    if not paths:
+        raise InputError(f"{options.mesh[0]}: the folder holds no STL, OBJ or PLY file; name the folder with the meshes.")
+    names = [path.stem for path in paths]
+    for name, path in zip(names, paths, strict=True):
+        if names.count(name) > 1:
+            raise InputError(f"{path}: two objects have the name {name}; rename one, for the data set tells them by it.")
+    return {name: read_object(options, path)[0] for name, path in zip(names, paths, strict=True)}
+
+
+def _cost(plan, left, costs, cores):
+    """What is left to press and how long it takes, in one sentence."""
+    spec, times = plan.sensor.spec, costs["grasps"]["press_s"]
+    bound = "at most " if plan.model == "auto" else ""
+    minutes = left * plan.fingers * times["hyperelastic" if plan.model == "auto" else plan.model] / 60 / cores
+    each = 4 * spec.map_shape[0] * spec.map_shape[1] + 2 * spec.taxels.rows * spec.taxels.columns
+    size_mb = plan.presses * plan.fingers * len(plan.forces_n) * each / 1e6
+    return (f"{left} of {plan.presses} presses left, {bound}{minutes:.0f} minutes on {cores} cores and {size_mb:.0f} MB in all; "
+            f"times: {costs['grasps']['origin']}")

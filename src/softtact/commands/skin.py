@@ -1,0 +1,78 @@
+"""`softtact skin`: design a robot skin, from its module to the readings of its taxels."""
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+from softtact.commands.common import add_command, show
+from softtact.errors import InputError
+
+EXAMPLES = """
+  softtact skin config/skin.yaml --out results/skin
+  softtact skin config/tiny_skin.yaml --out results/tiny_skin --json
+"""
+
+
+def add(commands: argparse._SubParsersAction) -> None:
+    """Add the command to the parser."""
+    command = add_command(
+        commands,
+        "skin",
+        _skin,
+        "Design a capacitive robot skin: readings under loads, elastomer and thickness, maps, exports, a report.",
+        EXAMPLES,
+    )
+    command.add_argument(
+        "design", metavar="DESIGN.yaml", type=Path, help="the design; docs/how-to/design_a_skin.md explains its keys"
+    )
+    command.add_argument(
+        "--out", type=Path, required=True, metavar="FOLDER", help="the folder of the results; report.html is the page"
+    )
+    command.add_argument(
+        "--threads", type=int, default=os.cpu_count() or 1, metavar="N", help="of the solvers (default: all cores)"
+    )
+
+
+def _skin(options):
+    from softtact.skin.design import read_design
+
+    design = read_design(options.design)
+    if options.threads < 1:
+        raise InputError(f"--threads {options.threads}: give 1 or more.")
+    if options.out.exists() and not options.out.is_dir():
+        raise InputError(f"--out {options.out}: it is a file, and the results need a folder; choose another name.")
+    from softtact.reporting.skin_study import run_design
+
+    told = run_design(options.design, design, options.out, threads=options.threads)
+    for remark in told["remarks"]:
+        print(f"softtact skin: WARNING: {remark}", file=sys.stderr)
+    show(told, as_json=options.json, lines=_lines(told))
+
+
+def _lines(told):
+    yield f"{'load':24}{'force, N':>10}{'deepest, mm':>13}{'taxel':>7}{'rise, fF':>10}{'counts':>8}"
+    for row in told["loads"]:
+        yield (
+            f"{row['load']:24}{row['force_n']:10.4g}{row['deepest_mm']:13.4f}{row['taxel']:7d}{row['delta_ff']:10.3f}"
+            f"{row['counts']:8d}"
+        )
+    if told.get("chosen"):
+        yield f"chosen: {_layer(told['chosen'])}"
+    if told.get("chosen_at_worst"):
+        yield f"chosen so that the worst batch meets the needs, too: {_layer(told['chosen_at_worst'])}"
+    if told.get("maps"):
+        maps = told["maps"]
+        yield (f"a finger is felt from {maps['least_force_n']:.3g} N on at best, {maps['worst_force_n']:.3g} N at worst; "
+               f"{maps['asked_n']:g} N is missed on {maps['share_not_felt']:.0%} of the places")
+    if told.get("link"):
+        link = told["link"]
+        yield (f"link: {link['modules']} modules, {link['elastomer_g']:.3g} g of elastomer, bend radius "
+               f"{link['least_bend_radius_mm']:.3g} mm or more, gaps up to {link['widest_gap_mm']:.2g} mm, overlaps up to "
+               f"{link['widest_overlap_mm']:.2g} mm; "
+               f"{link['bent_too_much']} bend too much and are left out, {link['without_place']} found no place")
+    yield f"written: {told['report']}"
+
+
+def _layer(best):
+    return f"{best['thickness_mm']:g} mm of {best['elastomer']}, {best['weight_g_module']:.3g} g a module"

@@ -1,0 +1,185 @@
+"""Data sets of random presses, written block by block so that an interrupted one goes on: HDF5, NetCDF, or LeRobot's key names.
+
+Press n takes object n modulo their number, in a place and with a turn that are drawn by the seed, the object's name and n alone.
+All go through the same forces. With two fingers the object is also pressed from its other side, as in a grip.
+"""
+
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import h5py
+import numpy as np
+import trimesh
+from scipy.spatial.transform import Rotation
+
+import softtact
+from softtact.errors import InputError, OutputError, SofttactError
+from softtact.files import digest
+from softtact.geometry.places import draw_poses
+from softtact.geometry.pose import Pose
+from softtact.learning.press_formats import FORMATS, finish
+from softtact.progress import progress
+
+if TYPE_CHECKING:
+    from softtact.press.sensor import Sensor
+
+_BEHIND = Rotation.from_euler("y", 180, degrees=True)
+_BLOCK = 32     # presses between two writings
+TO_DO, DONE, FAILED = 0, 1, 2
+
+
+@dataclass(frozen=True)
+class PressPlan:
+    """What a data set holds: presses of meshes {name: trimesh in mm} on a sensor through forces (N), on one finger or on two."""
+
+    sensor: "Sensor"
+    meshes: Mapping[str, trimesh.Trimesh]
+    presses: int
+    forces_n: Sequence[float]
+    model: str
+    seed: int
+    fingers: int = 1
+
+    def __post_init__(self) -> None:
+        self.sensor.checked_forces(self.forces_n)
+        if self.presses < 1:
+            raise InputError(f"A data set of {self.presses} presses holds nothing; give 1 or more.")
+
+    @cached_property
+    def settings(self) -> str:
+        """Digest of all that the numbers follow from."""
+        shapes = {name: digest([mesh.vertices.tolist(), mesh.faces.tolist()]) for name, mesh in self.meshes.items()}
+        return digest([self.sensor.spec.model_dump(mode="json"), shapes, list(self.meshes), self.presses, list(self.forces_n),
+                       self.model, self.seed, self.fingers, softtact.__version__])
+
+    @cached_property
+    def poses(self) -> np.ndarray:
+        """(press, 6) in mm and degrees, as `Pose.from_values` takes them."""
+        each = -(-self.presses // len(self.meshes))
+        drawn = [draw_poses(mesh.triangles, count=each, footprint_mm=self.sensor.spec.footprint_mm,
+                            seed=[self.seed, zlib.crc32(name.encode())]) for name, mesh in self.meshes.items()]
+        return np.array(drawn).swapaxes(0, 1).reshape(-1, 6)[:self.presses]
+
+    def mesh_of(self, number: int) -> trimesh.Trimesh:
+        """The mesh of a press."""
+        return list(self.meshes.values())[number % len(self.meshes)]
+
+
+def behind(mesh: trimesh.Trimesh, pose: Pose) -> Pose:
+    """The pose of an object in the frame of a second sensor that faces the first, its upper side touching."""
+    turned = Pose(_BEHIND.apply(pose.translation_mm), _BEHIND * pose.rotation)
+    return Pose(turned.translation_mm - [0.0, 0.0, turned.apply(mesh.vertices)[:, 2].min()], turned.rotation)
+
+
+def write_press_data(path: str | Path, plan: PressPlan, *, form: str = "hdf5", workers: int | None = None,
+                     label: str = "presses") -> int:
+    """Write a data set, or go on with one that stopped; return how many of its presses failed, which hold zeros and a status.
+
+    form: hdf5, netcdf or lerobot. While it grows it stands beside `path`, with the ending `.part`
+    Raises InputError for a form or an ending that is not known, and where another data set is there.
+    """
+    path = Path(path)
+    check_name(path, form)
+    if path.exists():
+        raise InputError(f"{path}: there is a whole data set already; delete it, or give another name.")
+    part = _part(path)
+    with _opened(part, "a") as file:
+        if "settings" in file.attrs:
+            _refuse_other(part, file, plan)
+        else:
+            _begin(file, plan)
+        _fill(file, plan, workers, label)
+        failed = int((file["status"][:] == FAILED).sum())
+    finish(part, path, form)
+    return failed
+
+
+def presses_left(path: str | Path, plan: PressPlan) -> int:
+    """How many presses a data set still needs."""
+    part = _part(Path(path))
+    if not part.exists():
+        return plan.presses
+    with _opened(part, "r") as file:
+        _refuse_other(part, file, plan)
+        return int((file["status"][:] == TO_DO).sum())
+
+
+def check_name(path: Path, form: str) -> None:
+    """Refuse an unknown form, or a name whose ending is not the form's."""
+    if form not in FORMATS:
+        raise InputError(f"The format {form!r} is unknown; use one of {', '.join(FORMATS)}.")
+    if path.suffix.lower() not in FORMATS[form]:
+        raise InputError(f"{path}: the format {form} is written as {' or '.join(FORMATS[form])}; give a name with such an ending.")
+
+
+def _part(path):
+    return path.with_name(f"{path.name}.part")
+
+
+def _opened(path, mode):
+    try:
+        return h5py.File(path, mode, libver="latest")
+    except OSError as error:
+        said = " ".join(str(error).split())[:120]
+        if mode == "a" and not path.exists():
+            raise OutputError(f"{path}: cannot be written ({said}); make its folder, or room on the disk.") from None
+        raise InputError(f"{path}: not readable as a data set that was begun ({said}); delete it and begin anew.") from None
+
+
+def _refuse_other(part, file, plan):
+    if file.attrs.get("settings") != plan.settings:
+        raise InputError(f"{part}: a data set of other objects or settings was begun there; delete it, or give another name.")
+
+
+def _begin(file, plan):
+    """Empty arrays of their final size."""
+    spec, n, f, s = plan.sensor.spec, plan.presses, plan.fingers, len(plan.forces_n)
+    shapes = {"deformation_map_mm": ((n, s, f, *spec.map_shape), "f4", "mm"),
+              "tactile_map": ((n, s, f, spec.taxels.rows, spec.taxels.columns), "u2", "counts"),
+              "indentation_mm": ((n, s, f), "f4", "mm"), "within_validity": ((n, s, f), "i1", "1"), "status": ((n,), "i1", "1")}
+    for name, (shape, kind, units) in shapes.items():
+        file.create_dataset(name, shape, kind, chunks=(min(n, _BLOCK), *shape[1:])).attrs["units"] = units
+    file.create_dataset("force_n", data=np.asarray(plan.forces_n, dtype=float)).attrs["units"] = "N"
+    file.create_dataset("pose", data=plan.poses).attrs["units"] = "mm, degrees"
+    file.create_dataset("object", data=np.arange(n, dtype="i4") % len(plan.meshes)).attrs["units"] = "number in objects"
+    facts = {"settings": plan.settings, "seed": plan.seed, "model": plan.model, "sensor": spec.name,
+             "objects": ",".join(plan.meshes), "source": "simulation, ideal readout", "softtact_version": softtact.__version__}
+    for name, value in facts.items():
+        file.attrs[name] = value
+
+
+def _fill(file, plan, workers, label):
+    left = np.flatnonzero(file["status"][:] == TO_DO)
+    blocks = [left[first:first + _BLOCK] for first in range(0, len(left), _BLOCK)]
+    for block in progress(blocks, label=f"{label}, in blocks of {_BLOCK}"):
+        results = _pressed(plan, block, workers)
+        for number, of_fingers in zip(block, results, strict=True):
+            _keep(file, int(number), of_fingers)
+        file.flush()
+
+
+def _pressed(plan, numbers, workers):
+    """[[result or error of each finger]] of some presses."""
+    meshes = [plan.mesh_of(number) for number in numbers]
+    poses = [[Pose.from_values(plan.poses[number])] for number in numbers]
+    if plan.fingers == 2:
+        poses = [[one[0], behind(mesh, one[0])] for mesh, one in zip(meshes, poses, strict=True)]
+    both = [mesh for mesh in meshes for _ in range(plan.fingers)]
+    results = plan.sensor.press_many(both, [pose for one in poses for pose in one],
+                                     force_n=plan.forces_n, model=plan.model, workers=workers, failures="keep", label="")
+    return [results[first:first + plan.fingers] for first in range(0, len(results), plan.fingers)]
+
+
+def _keep(file: Any, number: int, results: Sequence[Any]) -> None:
+    """Write the results of one press, by finger; one that failed leaves zeros."""
+    if any(isinstance(one, SofttactError) for one in results):
+        file["status"][number] = FAILED
+        return
+    for name in ("deformation_map_mm", "indentation_mm", "within_validity"):
+        file[name][number] = np.stack([getattr(one, name) for one in results], axis=1)
+    file["tactile_map"][number] = np.round(np.stack([one.tactile_map for one in results], axis=1)).astype(np.uint16)
+    file["status"][number] = DONE

@@ -1,0 +1,169 @@
+"""An environment for learning: a gripper with two sensors closes on an object, slides over it and lifts it.
+
+    import gymnasium, softtact.robot.environment
+    env = gymnasium.make("softtact/Grasp-v0")
+
+Importing this module registers the environment.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import mujoco
+import numpy as np
+import trimesh
+
+from softtact.errors import InputError
+from softtact.geometry.meshes import read_mesh
+from softtact.press.sensor import load_sensor
+from softtact.robot.arm import HOME_RAD, JOINTS
+from softtact.robot.grasp import contacts, object_poses, pad_forces
+from softtact.robot.kinematics import inverse_kinematics
+from softtact.robot.record import FINGERS
+from softtact.robot.scene import DOWN, MM, Placement, Scene, build_scene, start
+from softtact.robot.settings import load_scene
+from softtact.robot.taxels import TaxelMemory
+
+ENVIRONMENT = "softtact/Grasp-v0"
+STEP_S = 0.01                 # of an action: 100 observations a second of the scene
+LIFT_MM, SLIDE_MM = 40.0, 8.0     # how high the hand goes, and how far to either side
+_LIFT_MM_S, _SLIDE_MM_S, _FINGER_MM_S = 50.0, 20.0, 20.0
+_BEGIN_MM, _OPEN_MM = 2.0, 0.2    # between object and pad at first; a grip below which the fingers open, as a share of it in mm
+_LETS_GO_MM, _DROPPED_MM = 0.5, 20.0
+_CLOSED_M = -0.1
+_SPREAD = {"x_mm": 2.0, "y_mm": 4.0, "angle_deg": 45.0}     # of where an object stands, to either side
+
+
+class GraspEnv(gymnasium.Env):
+    """Close, slide, lift, 100 steps a second of the scene.
+
+    Action (3,) in -1 to 1: grip (force of each pad from 0, open, to `largest_force_n`), lift (speed of the hand, up to 50 mm/s) and
+    slide (along the sensors' short side, up to 20 mm/s). The fixture lets go when the hand begins to rise; before, the hand can
+    slide over the object.
+    Observation: `tactile` (2, row, column) counts of the ideal readout, `force_n` (2, 3) on each sensor in its frame, `object_pose`
+    (7,) in the left sensor's frame, mm and quaternion w, x, y, z.
+    Reward: height that the object gained, as a share of 40 mm. An episode ends when the object is lifted so high, or dropped.
+    """
+
+    metadata = {"render_modes": []}
+
+    def __init__(self, mesh: trimesh.Trimesh | str | Path | None = None, *, unit: str | None = None, sensor: str = "coro",
+                 model: str = "elastic", largest_force_n: float = 30.0, mass_kg: float | None = None,
+                 scene: Mapping[str, Any] | None = None) -> None:
+        """mesh: trimesh in mm, or a file with its `unit`; by default a cylinder that stands with its flat ends on the pads
+
+        model: elastic or foundation;  scene: keys of a scene file, such as {"friction": 0.4}
+        Raises InputError for a model that is too slow for this, and as `build_scene` does.
+        """
+        if model not in ("elastic", "foundation"):
+            raise InputError(f"model={model!r}: an environment needs a reading in milliseconds; use 'elastic' or 'foundation'.")
+        self._sensor, self._settings, self._mass_kg = load_sensor(sensor), load_scene(**(scene or {})), mass_kg
+        self._mesh = _mesh_of(mesh, unit)
+        self.largest_force_n = float(largest_force_n)
+        self._memory = TaxelMemory(self._sensor, self._mesh, model, self.largest_force_n)
+        taxels = self._sensor.spec.taxels
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (3,), np.float32)
+        self.observation_space = gymnasium.spaces.Dict({
+            "tactile": gymnasium.spaces.Box(0, 65535, (2, taxels.rows, taxels.columns), np.uint16),
+            "force_n": gymnasium.spaces.Box(-np.inf, np.inf, (2, 3), np.float32),
+            "object_pose": gymnasium.spaces.Box(-np.inf, np.inf, (7,), np.float32)})
+        self._joints: np.ndarray | None = None
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], dict[str, Any]]:
+        """A new episode: the hand around the object, which stands in a drawn place.
+
+        options: x_mm, y_mm, angle_deg, in place of what is drawn
+        """
+        super().reset(seed=seed)
+        for name in set(options or {}) - set(_SPREAD):
+            raise InputError(f"reset: the option {name!r} is unknown; use one of {', '.join(_SPREAD)}.")
+        drawn = {name: float(self.np_random.uniform(-side, side)) for name, side in _SPREAD.items()}
+        placement = replace(Placement(**drawn), **(options or {}))
+        self._scene = build_scene(self._mesh, self._sensor.spec, self._settings, placement, mass_kg=self._mass_kg)
+        self._begin()
+        return self._observe(), self._info()
+
+    def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        """Ten milliseconds of the scene."""
+        grip, lift, slide = np.clip(np.asarray(action, dtype=float), -1.0, 1.0)
+        self._move_hand(lift, slide)
+        self._move_fingers(0.5 * (grip + 1.0))
+        before = self._risen_mm()
+        for _ in range(round(STEP_S / self._settings.time_step_s)):
+            mujoco.mj_step(self._scene.model, self._data)
+        mujoco.mj_forward(self._scene.model, self._data)
+        risen = self._risen_mm()
+        ended = risen < -_DROPPED_MM or risen > 0.98 * LIFT_MM
+        return self._observe(), float((risen - before) / LIFT_MM), bool(ended), False, self._info()
+
+    def _begin(self):
+        """The hand where it grips, at rest, with open fingers."""
+        scene: Scene = self._scene
+        if self._joints is None:
+            self._joints = inverse_kinematics(scene.model, np.asarray(self._settings.grip_at_m), DOWN, start_rad=np.array(HOME_RAD))
+        self._data = start(scene)
+        self._arm = [scene.model.actuator(name).id for name in JOINTS]
+        self._fingers = [scene.model.actuator(f"finger_{finger}").id for finger in FINGERS]
+        self._half_mm = self._open_mm = 0.5 * scene.width_mm + _BEGIN_MM
+        for name, angle in zip(JOINTS, self._joints, strict=True):
+            self._data.joint(name).qpos[0] = angle
+        for finger in FINGERS:
+            self._data.joint(f"finger_{finger}").qpos[0] = self._half_mm * MM
+        self._data.ctrl[self._arm], self._data.ctrl[self._fingers] = self._joints, self._half_mm * MM
+        self._aim, self._hand_mm = self._joints, np.zeros(2)     # the arm's servos; the hand aside and up
+        mujoco.mj_forward(scene.model, self._data)
+        self._ground_mm = float(self._data.body("object").xpos[2] / MM)
+
+    def _move_hand(self, lift, slide):
+        """Aim the arm's servos at where the hand is to be at the end of the step."""
+        wanted = self._hand_mm + np.array([slide * _SLIDE_MM_S, lift * _LIFT_MM_S]) * STEP_S
+        wanted = np.clip(wanted, [-SLIDE_MM, 0.0], [SLIDE_MM, LIFT_MM])
+        if (wanted != self._hand_mm).any():
+            self._hand_mm = wanted
+            aside, up = wanted * MM
+            place = np.asarray(self._settings.grip_at_m) + aside * DOWN[:, 1] + [0.0, 0.0, up]
+            self._aim = inverse_kinematics(self._scene.model, place, DOWN, start_rad=self._aim)
+        self._data.ctrl[self._arm] = self._aim
+        if self._hand_mm[1] > _LETS_GO_MM:
+            self._data.eq_active[self._scene.model.equality("fixture").id] = 0
+
+    def _move_fingers(self, share):
+        """Close with a share of the largest force, or open where there is none."""
+        force = share * self.largest_force_n
+        self._scene.model.actuator_forcerange[self._fingers] = (-max(force, 1.0), max(force, 1.0))
+        if share == 0.0:
+            self._half_mm = min(self._half_mm + _FINGER_MM_S * STEP_S, self._open_mm)
+        elif not contacts(self._scene.model, self._data).all():
+            self._half_mm = max(self._half_mm - _FINGER_MM_S * STEP_S, 0.0)
+        closed = share > 0.0 and contacts(self._scene.model, self._data).all()
+        self._data.ctrl[self._fingers] = _CLOSED_M if closed else self._half_mm * MM
+
+    def _risen_mm(self):
+        return float(self._data.body("object").xpos[2] / MM) - self._ground_mm
+
+    def _observe(self):
+        forces, poses = pad_forces(self._scene.model, self._data), object_poses(self._data)
+        counts = [self._memory.counts(finger, poses[finger], -forces[finger, 2]) for finger in (0, 1)]
+        return {"tactile": np.round(counts).astype(np.uint16), "force_n": forces.astype(np.float32),
+                "object_pose": poses[0].astype(np.float32)}
+
+    def _info(self):
+        return {"risen_mm": self._risen_mm(), "opening_mm": self._scene.opening_mm(self._data),
+                "places_pressed": self._memory.places}
+
+
+def _mesh_of(mesh, unit):
+    if mesh is None:
+        return trimesh.creation.cylinder(radius=8.0, height=20.0, sections=64)
+    if isinstance(mesh, trimesh.Trimesh):
+        return mesh
+    if unit is None:
+        raise InputError(f"{mesh}: a mesh file does not state its unit; give unit='mm', or another one.")
+    return read_mesh(mesh, unit=unit)
+
+
+if ENVIRONMENT not in gymnasium.registry:
+    gymnasium.register(ENVIRONMENT, entry_point="softtact.robot.environment:GraspEnv", max_episode_steps=400)

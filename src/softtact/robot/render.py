@@ -1,0 +1,88 @@
+"""Pictures of a grasp from its record, drawn by MuJoCo off screen.
+
+It needs EGL (on Debian libegl1, libegl-mesa0 and libgl1-mesa-dri). A driver that fails may end its process, so the pictures are
+drawn in one of their own. Where that does not work, a sentence says so and there are no pictures.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from softtact.files import atomic_path
+from softtact.progress import announce
+from softtact.robot.arm import JOINTS
+from softtact.robot.record import GraspRecord
+from softtact.robot.scene import MM, SENSOR_IN_TOOL, Scene, quaternion
+
+WHOLE, CLOSE = (60.0, -18.0, 1.9), (20.0, -20.0, 0.28)     # azimuth and elevation in degrees, distance in m
+_NO_PICTURE = "no picture of the robot: MuJoCo does not draw off screen here"
+
+
+def draw_rows(scene: Scene, record: GraspRecord, rows: Sequence[int], *, view: tuple[float, float, float] = CLOSE,
+              size: tuple[int, int] = (480, 640), timeout_s: float = 120.0) -> np.ndarray | None:
+    """Images (row, height, width, 3) of rows of a record, or None where nothing can be drawn, which is said on stderr.
+
+    view: azimuth and elevation in degrees, distance in m, towards the hand, or the middle of the arm from afar
+    """
+    states = np.array([state_of(scene, record, row) for row in rows])
+    with tempfile.TemporaryDirectory(prefix="softtact-grasp-") as folder:
+        mujoco.mj_saveModel(scene.model, str(Path(folder, "scene.mjb")), None)
+        np.savez(Path(folder, "states.npz"), qpos=states, size=size, camera=[_camera(record, row, view) for row in rows])
+        environment = os.environ | {"MUJOCO_GL": os.environ.get("MUJOCO_GL", "egl" if sys.platform == "linux" else "")}
+        try:
+            done = subprocess.run([sys.executable, "-m", "softtact.robot.offscreen", folder], capture_output=True, text=True,
+                                  timeout=timeout_s, env=environment)
+        except subprocess.TimeoutExpired:
+            announce(f"{_NO_PICTURE} (no answer within {timeout_s:g} s).")
+            return None
+        images = Path(folder, "images.npz")
+        if done.returncode or not images.exists():
+            said = done.stderr.strip().splitlines() or ["it said nothing"]
+            announce(f"{_NO_PICTURE} (status {done.returncode}: {said[-1]:.200}).")
+            return None
+        with np.load(images, allow_pickle=False) as kept:
+            return np.asarray(kept["images"])
+
+
+def write_video(path: str | Path, images: np.ndarray, *, fps: float) -> None:
+    """Write images (n, height, width, 3) as an H.264 MP4 file (needs the extra `optics`)."""
+    import av
+
+    with atomic_path(path) as temporary, av.open(str(temporary), "w", format="mp4") as container:
+        stream = container.add_stream("libx264", rate=round(fps))
+        stream.height, stream.width, stream.pix_fmt = images.shape[1], images.shape[2], "yuv420p"
+        for image in images:
+            for packet in stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")):
+                container.mux(packet)
+        for packet in stream.encode():
+            container.mux(packet)
+
+
+def state_of(scene: Scene, record: GraspRecord, row: int) -> np.ndarray:
+    """MuJoCo's qpos of a row of a record."""
+    model = scene.model
+    qpos = np.array(model.qpos0)
+    for name, angle in zip(JOINTS, record.joint_rad[row], strict=True):
+        qpos[model.joint(name).qposadr[0]] = angle
+    for finger in SENSOR_IN_TOOL:
+        qpos[model.joint(f"finger_{finger}").qposadr[0]] = 0.5 * record.opening_mm[row] * MM
+    sensor, seen = record.sensor_pose_world[row, 0], record.object_pose_sensor[row, 0]
+    turn = Rotation.from_quat(sensor[3:], scalar_first=True)
+    first = model.joint("object").qposadr[0]
+    qpos[first:first + 3] = (sensor[:3] + turn.apply(seen[:3])) * MM
+    qpos[first + 3:first + 7] = quaternion(turn * Rotation.from_quat(seen[3:], scalar_first=True))
+    return qpos
+
+
+def _camera(record, row, view):
+    """A camera's six numbers: `view` and the point that it looks at."""
+    hand = record.sensor_pose_world[row, :, :3].mean(axis=0) * MM
+    near = view[2] < 1.0
+    return [*view, *(hand + [0, 0, 0.03] if near else [0.35, 0.0, 0.35])]

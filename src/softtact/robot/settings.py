@@ -1,0 +1,76 @@
+"""What a scene is made of, as its YAML states it: `softtact/robot/data/scene.yaml`, or a user's own with some of its keys."""
+
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, PositiveFloat, ValidationError
+
+from softtact.errors import InputError
+from softtact.files import read_yaml
+from softtact.sensors.fields import Length, Section, plain_value
+
+SHIPPED = Path(str(resources.files("softtact.robot"))) / "data" / "scene.yaml"
+_Point = Annotated[tuple[float, float, float], BeforeValidator(plain_value)]
+_Share = Annotated[float, Field(gt=0.0, lt=1.0)]
+
+
+class SceneSettings(Section):
+    """The keys of a scene file. Reasons of what is assumed stand in the file."""
+
+    mjcf: Path | None = None
+    """A user's own robot, or None for the UR10 and gripper of this package."""
+    time_step_s: Length
+    """Of MuJoCo, in s."""
+    grip_at_m: _Point
+    """(3,) in m in the robot's base frame: where the middle of the grip is."""
+    clearance_mm: Length
+    """How far above the grip the hand starts to come down."""
+    flange_to_grip_mm: Length
+    """From the arm's flange to the middle of the pads."""
+    stroke_mm: PositiveFloat
+    """Between the fingers' faces when they are open, without sensors."""
+    friction: Length
+    """Coulomb's coefficient between pads and object in the scene."""
+    density_kg_m3: Length
+    """Of the object, in kg/m3."""
+    closing_mm_s: Length
+    """Of each finger, in mm/s."""
+    closing_force_n: Length
+    """Largest force of a finger before the first contact."""
+    ramp_s: Length
+    """How long the force grows after the first contact, in s."""
+    steady_change: _Share
+    """Largest change of the force, as a share of it, of a grip that is held, ..."""
+    steady_s: PositiveFloat
+    """... within so many seconds."""
+    lift_mm: Length
+    """How high the object is lifted."""
+    lift_s: Length
+    """How long the lift takes, in s."""
+    record_s: Length
+    """Between two rows of a record, in s."""
+
+
+def load_scene(path: str | Path | None = None, **changes: Any) -> SceneSettings:
+    """The `SceneSettings` that ship, with the keys that a user's YAML file states in their place.
+
+    changes: values by name, in place of the file's;  a relative `mjcf` is found beside its file
+    Raises InputError that names file, field and value.
+    """
+    values = read_yaml(SHIPPED, missing="reinstall softtact.")
+    if path is not None:
+        own = read_yaml(path, missing="there is no such scene file; correct the path.")
+        if not isinstance(own, dict):
+            raise InputError(f"{path}: a scene file must hold keys and values; see docs/how-to/grasp_in_simulation.md.")
+        if own.get("mjcf"):
+            own["mjcf"] = Path(path).parent / str(own["mjcf"])
+        values |= own
+    try:
+        return SceneSettings(**values | changes)
+    except ValidationError as error:
+        fault = error.errors()[0]
+        field = ".".join(map(str, fault["loc"]))
+        said = (f"the key is unknown; use one of {', '.join(SceneSettings.model_fields)}." if fault["type"] == "extra_forbidden"
+                else f"{fault['input']!r} is not usable: {fault['msg']}; correct it.")
+        raise InputError(f"{path or 'scene'}, at '{field}': {said}") from None

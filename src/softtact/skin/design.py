@@ -1,0 +1,239 @@
+"""A skin's design as its YAML file describes it: module, elastomer, converter, loads, and what to find out about them."""
+
+import dataclasses
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt, ValidationError, model_validator
+
+from softtact.errors import InputError
+from softtact.files import read_yaml
+from softtact.sensors.fields import Coefficient, Length, Section
+from softtact.skin.converter import CONVERTERS, Converter
+from softtact.skin.elastomers import fingertip_area_mm2
+from softtact.skin.layout import Layout, hexagon_layout, module_layout
+from softtact.skin.loads import Load, disc, ellipse, mask, refuse_beside
+from softtact.unknown_names import first_fault, known_keys, unknown
+
+Share = Annotated[float, Field(ge=0.0, lt=1.0)]
+
+
+class Module(Section):
+    """The triangular module, all lengths in mm."""
+
+    side_mm: Length = 30.0
+    pitch_mm: Length = 5.0
+    radius_mm: Length = 2.0
+    guard_radius_mm: Length = 2.2
+    thickness_mm: Length = 2.0
+    centres_mm: tuple[tuple[float, float], ...] | None = None
+
+    def layout(self) -> Layout:
+        """Its taxels; overlapping ones are refused."""
+        return module_layout(
+            side_mm=self.side_mm,
+            pitch_mm=self.pitch_mm,
+            radius_mm=self.radius_mm,
+            guard_radius_mm=self.guard_radius_mm,
+            centres_mm=self.centres_mm,
+        )
+
+
+class Mesh(Section):
+    """How fine the meshes are: `spacing` and `layers` of the deformation, `field_*` of the electric field."""
+
+    spacing_mm: PositiveFloat = 1.0
+    layers: PositiveInt = 4
+    field_spacing_mm: PositiveFloat = 1.2
+    field_layers: PositiveInt = 3
+
+
+class ConverterChoice(Section):
+    """A converter by name, with what surrounds it."""
+
+    name: str = "paper"
+    stray_pf: Coefficient = 10.0
+    stray_share: Share = 0.2
+    noise_counts: Coefficient = 1.0
+
+    def converter(self, where: str) -> Converter:
+        """The converter; an unknown name is refused."""
+        if self.name not in CONVERTERS:
+            raise InputError(f"{where}, at 'converter.name': {unknown(self.name, CONVERTERS, kind='converter')}.")
+        return dataclasses.replace(
+            CONVERTERS[self.name], stray_pf=self.stray_pf, stray_share=self.stray_share, noise_counts=self.noise_counts
+        )
+
+
+class LoadChoice(Section):
+    """One load: a pressure on one of `diameter_mm`, `area_mm2` (an ellipse), `fingertip`, `mask`; or `mesh` with a force."""
+
+    name: str
+    at_mm: tuple[float, float] | None = None
+    at_taxel: PositiveInt | None = None
+    pressure_kpa: PositiveFloat | None = None
+    diameter_mm: PositiveFloat | None = None
+    area_mm2: PositiveFloat | None = None
+    fingertip: Literal["cellphone", "keyboard", "mouse"] | None = None
+    mask: str | None = None
+    pixel_mm: PositiveFloat | None = None
+    mesh: str | None = None
+    unit: Literal["mm", "cm", "m", "inch", "in"] = "mm"
+    turned_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    force_n: PositiveFloat | None = None
+    ratio: PositiveFloat = 1.5
+    angle_deg: float = 0.0
+
+    @model_validator(mode="after")
+    def _one_of_each(self) -> "LoadChoice":
+        shapes = [name for name in ("diameter_mm", "area_mm2", "fingertip", "mask", "mesh") if getattr(self, name) is not None]
+        if len(shapes) != 1:
+            raise ValueError(
+                f"load {self.name!r} has {' and '.join(shapes) or 'no shape'}; give one of diameter_mm, area_mm2, "
+                "fingertip, mask, mesh"
+            )
+        if (self.at_mm is None) == (self.at_taxel is None):
+            raise ValueError(f"load {self.name!r}: give either at_mm or at_taxel")
+        needed = "force_n" if self.mesh else "pressure_kpa"
+        if getattr(self, needed) is None:
+            raise ValueError(f"load {self.name!r}: {needed} is missing")
+        if self.mask and self.pixel_mm is None:
+            raise ValueError(f"load {self.name!r}: pixel_mm is missing, the side of the mask's pixels")
+        return self
+
+    def centre(self, layout: Layout, where: str) -> tuple[float, float]:
+        """Where it stands, in mm."""
+        if self.at_mm is not None:
+            return self.at_mm
+        assert self.at_taxel is not None
+        if self.at_taxel > len(layout.centres_mm):
+            raise InputError(
+                f"{where}, load {self.name!r}: there is no taxel {self.at_taxel}; give one of 1 to {len(layout.centres_mm)}."
+            )
+        x, y = layout.centres_mm[self.at_taxel - 1]
+        return float(x), float(y)
+
+    def pressure(self, layout: Layout, *, folder: Path, where: str) -> Load:
+        """The load as forces, for all shapes but a mesh; one that leaves the elastomer is refused."""
+        assert self.pressure_kpa is not None
+        centre, pressure = self.centre(layout, where), 1e-3 * self.pressure_kpa
+        if self.diameter_mm is not None:
+            load = disc(centre, diameter_mm=self.diameter_mm, pressure_mpa=pressure)
+        elif self.mask is not None:
+            assert self.pixel_mm is not None
+            load = mask(folder / self.mask, centre, pixel_mm=self.pixel_mm, pressure_mpa=pressure)
+        else:
+            area = self.area_mm2 if self.area_mm2 is not None else fingertip_area_mm2(str(self.fingertip))
+            load = ellipse(centre, area_mm2=area, pressure_mpa=pressure, ratio=self.ratio, angle_deg=self.angle_deg)
+        refuse_beside(load, layout, where=f"{where}, load {self.name!r}")
+        return load
+
+
+class Probes(Section):
+    """Capacitance against pressure under cylindrical probes, for a modulus that is off by some shares."""
+
+    diameters_mm: tuple[PositiveFloat, ...] = (4.0, 5.0, 6.0, 10.0)
+    pressures_kpa: tuple[PositiveFloat, ...] = (5.0, 10.0, 20.0, 30.0, 40.0, 50.0)
+    modulus_shares: tuple[float, ...] = (-0.1, -0.05, 0.0, 0.05, 0.1)
+    at_taxel: PositiveInt = 7
+
+
+class Choice(Section):
+    """What the elastomer and its thickness are chosen for."""
+
+    target_kpa: PositiveFloat = 10.0
+    range_kpa: tuple[PositiveFloat, PositiveFloat] = (10.0, 50.0)
+    probe_mm: Length = 6.0
+    smallest_force_n: PositiveFloat = 0.05
+    detected_counts: Coefficient = 3.0
+    strain_limit: Share = 0.3
+    weight_budget_g: PositiveFloat | None = None
+    thicknesses_mm: tuple[PositiveFloat, ...] = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0)
+    draws: PositiveInt = 2000
+    strain_scatter: Coefficient = 0.10
+    batch_scatter: Coefficient = 0.33
+    ageing_stiffening: Coefficient = 0.2
+    seed: int = 0
+
+
+class Maps(Section):
+    """What a patch detects, and where."""
+
+    spacing_mm: PositiveFloat = 1.0
+    finger_mm2: PositiveFloat = 69.91
+    pressure_kpa: PositiveFloat = 10.0
+    pitches_mm: tuple[PositiveFloat, ...] = (4.5, 5.0, 6.0, 8.0, 10.0)
+    crosstalk_probe_mm: PositiveFloat = 4.0
+
+
+class Link(Section):
+    """A robot's link to lay modules on."""
+
+    mesh: str
+    unit: Literal["mm", "cm", "m", "inch", "in"] = "mm"
+    start_mm: tuple[float, float, float] | None = None
+    direction: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    rings: NonNegativeInt = 2
+    least_radius_mm: Length = 10.0
+
+
+class Search(Section):
+    """Values of an exhaustive search by the finite elements."""
+
+    elastomers: tuple[str, ...] | None = None
+    thicknesses_mm: tuple[PositiveFloat, ...] = (1.0, 2.0, 3.0)
+    radii_mm: tuple[PositiveFloat, ...] = (1.5, 2.0)
+    pitches_mm: tuple[PositiveFloat, ...] = (4.5, 5.0, 6.0)
+
+
+class Design(Section):
+    """A whole design; sections that are left out are not computed."""
+
+    skin: str
+    module: Module = Module()
+    patch: Literal["none", "hexagon"] = "none"
+    elastomer: str = "SomaFoama"
+    elastomers: str | None = None
+    converter: ConverterChoice = ConverterChoice()
+    mesh: Mesh = Mesh()
+    loads: tuple[LoadChoice, ...]
+    probes: Probes | None = None
+    choice: Choice | None = None
+    maps: Maps | None = None
+    link: Link | None = None
+    search: Search | None = None
+    claims: bool = False
+
+    def layout(self) -> Layout:
+        """The taxels of the module, or of the hexagonal patch of six."""
+        module = self.module.layout()
+        return hexagon_layout(module) if self.patch == "hexagon" else module
+
+
+def read_design(path: str | Path) -> Design:
+    """The design of a YAML file; the first fault becomes one sentence with file, field and remedy."""
+    values = read_yaml(path, missing="there is no such design; give the path of a YAML file, see docs/how-to/design_a_skin.md.")
+    if not isinstance(values, dict):
+        raise InputError(f"{path}: a design holds keys and values; see docs/how-to/design_a_skin.md.")
+    try:
+        design = Design.model_validate(values)
+    except ValidationError as error:
+        raise InputError(f"{path}{_fault(first_fault(error))}") from None
+    names = [load.name for load in design.loads]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise InputError(f"{path}, at 'loads': two loads are called {twice!r}; give each a name of its own.")
+    return design
+
+
+def _fault(fault):
+    """What follows the file's name in the sentence on a fault of pydantic's."""
+    *parents, last = fault["loc"] or ("",)
+    at = f", at {'.'.join(map(str, fault['loc']))!r}"
+    if fault["type"] == "extra_forbidden":
+        said = unknown(last, known_keys(Design, parents), kind="key")
+        return f"{', at ' + repr('.'.join(map(str, parents))) if parents else ''}: {said}{'' if said.endswith('?') else '.'}"
+    if fault["type"] == "missing":
+        return f": the key {'.'.join(map(str, fault['loc']))!r} is missing; add it."
+    given = "" if isinstance(fault["input"], dict) else f" (it is {fault['input']!r:.60})"
+    return f"{at}{given}: {fault['msg'].removeprefix('Value error, ')}; correct it."

@@ -1,0 +1,93 @@
+"""What presses on a skin: pressure on a disc, an ellipse or a mask, as forces on many points whose sum is exact."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from softtact.errors import InputError
+from softtact.skin.layout import Layout
+
+RATIO = 1.5  # of a fingertip's axes, the longer one along y: the authors' published toolbox
+_RADII, _ANGLES = 24, 96  # points of a disc
+
+
+@dataclass(frozen=True)
+class Load:
+    """Forces on points of the upper side, straight down."""
+
+    points_mm: np.ndarray
+    """(point, 2)"""
+    force_n: np.ndarray
+    """(point,): downwards, above 0."""
+    pressure_mpa: float
+    """Which the elastomer's modulus is taken at."""
+    words: str
+    """What it is, for people."""
+
+    @property
+    def total_n(self) -> float:
+        """The whole force."""
+        return float(self.force_n.sum())
+
+
+def ellipse(
+    centre_mm: tuple[float, float], *, area_mm2: float, pressure_mpa: float, ratio: float = RATIO, angle_deg: float = 0.0
+) -> Load:
+    """Even pressure on an ellipse.
+
+    ratio: of its axis along y to that along x, before it is turned by angle_deg, counter-clockwise; 1 for a disc
+    """
+    half = np.sqrt(area_mm2 / (np.pi * ratio)) * np.array([1.0, ratio])
+    share, weight = np.polynomial.legendre.leggauss(_RADII)
+    radius, weight = np.sqrt(0.5 * (share + 1)), 0.5 * weight  # Gauss's points in the squared radius weigh areas
+    angle = 2 * np.pi * (np.arange(_ANGLES) + 0.5) / _ANGLES
+    x, y = (radius[:, None] * half[0] * np.cos(angle)).ravel(), (radius[:, None] * half[1] * np.sin(angle)).ravel()
+    cos, sin = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
+    points = np.column_stack([cos * x - sin * y, sin * x + cos * y]) + centre_mm
+    force = pressure_mpa * area_mm2 * np.repeat(weight / _ANGLES, _ANGLES)
+    shape = f"disc of {2 * half[0]:.3g} mm" if ratio == 1 else f"ellipse of {area_mm2:.4g} mm2"
+    return Load(points, force, pressure_mpa, f"{1e3 * pressure_mpa:g} kPa on a {shape} at ({centre_mm[0]:g}, {centre_mm[1]:g}) mm")
+
+
+def disc(centre_mm: tuple[float, float], *, diameter_mm: float, pressure_mpa: float) -> Load:
+    """Even pressure on a disc, as under the papers' cylindrical probes."""
+    return ellipse(centre_mm, area_mm2=np.pi * diameter_mm**2 / 4, pressure_mpa=pressure_mpa, ratio=1.0)
+
+
+def mask(path: str | Path, centre_mm: tuple[float, float], *, pixel_mm: float, pressure_mpa: float) -> Load:
+    """Even pressure where a picture is dark, as a fingerprint in ink on white paper.
+
+    The middle of the dark pixels comes to centre_mm; rows of the picture run downwards, y upwards.
+    Raises InputError where the file is no picture, or has no dark pixel.
+    """
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(path) as picture:
+            grey = np.asarray(picture.convert("L"))
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such picture; correct the load's `mask`.") from None
+    except (UnidentifiedImageError, OSError) as error:
+        raise InputError(f"{path}: not a readable picture ({error}); save the mask as PNG.") from None
+    row, column = np.nonzero(grey < 128)
+    if not len(row):
+        raise InputError(f"{path}: no pixel is dark, so that nothing presses; draw the contact area in black on white.")
+    points = pixel_mm * np.column_stack([column, -row])
+    area = len(row) * pixel_mm**2
+    return Load(
+        points - points.mean(axis=0) + centre_mm,
+        np.full(len(row), pressure_mpa * pixel_mm**2),
+        pressure_mpa,
+        f"{1e3 * pressure_mpa:g} kPa on the mask {Path(path).name} ({area:.4g} mm2) at ({centre_mm[0]:g}, {centre_mm[1]:g}) mm",
+    )
+
+
+def refuse_beside(load: Load, layout: Layout, *, where: str) -> None:
+    """Refuse a load of which a part lies beside the elastomer."""
+    beside = ~layout.inside(load.points_mm)
+    if beside.any():
+        share = load.force_n[beside].sum() / load.total_n
+        raise InputError(
+            f"{where}: {share:.0%} of the load ({load.words}) lies beside the elastomer; move it inwards or make it smaller."
+        )

@@ -1,0 +1,169 @@
+"""What a patch feels, and where: smallest detectable force, error of localisation, crosstalk against pitch.
+
+All from the taxels' answers to a small force anywhere (`Skin.influence`), to first order in the force.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from softtact.skin.analysis import Skin
+from softtact.skin.converter import Converter
+from softtact.skin.layout import Layout
+from softtact.skin.loads import ellipse
+
+
+@dataclass(frozen=True)
+class PatchMaps:
+    """Maps over the places that a finger can press without leaving the elastomer."""
+
+    places_mm: np.ndarray
+    """(place, 2)"""
+    gain_ff_per_n: np.ndarray
+    """(place, taxel): rise of the capacitances per N of the finger."""
+    smallest_force_n: np.ndarray
+    """(place,): the force at which the taxel that answers most rises by the counts that tell it from noise."""
+    localisation_mm: np.ndarray
+    """(place,): standard error of the best unbiased estimate of the place at the finger's force (Cramer, Rao); inf without one."""
+    centroid_error_mm: np.ndarray
+    """(place,): distance of the readings' centroid from the place, without noise."""
+    force_n: float
+    """Of the finger for the error of localisation."""
+
+    def table(self) -> pd.DataFrame:
+        """A row a place."""
+        return pd.DataFrame(
+            {
+                "x_mm": self.places_mm[:, 0],
+                "y_mm": self.places_mm[:, 1],
+                "smallest_force_n": self.smallest_force_n,
+                "localisation_mm": self.localisation_mm,
+                "centroid_error_mm": self.centroid_error_mm,
+            }
+        )
+
+
+def patch_maps(
+    skin: Skin,
+    *,
+    finger_mm2: float,
+    pressure_mpa: float,
+    young_mpa: float,
+    converter: Converter,
+    detected_counts: float,
+    spacing_mm: float = 1.0,
+) -> PatchMaps:
+    """`PatchMaps` of a round finger of an area that presses evenly with a pressure.
+
+    Places lie `spacing_mm` apart, and the whole finger on the elastomer.
+    """
+    radius = np.sqrt(finger_mm2 / np.pi)
+    low, high = skin.layout.outline_mm.min(axis=0), skin.layout.outline_mm.max(axis=0)
+    grid = np.stack(np.meshgrid(*(np.arange(a, b, spacing_mm) for a, b in zip(low, high, strict=True)), indexing="ij"), -1).reshape(
+        -1, 2
+    )
+    places = grid[skin.layout.inside(grid, margin_mm=radius + _STEP_MM)]
+    force = pressure_mpa * finger_mm2
+    gains = {
+        shift: _gain(skin, places + _STEP_MM * np.array(shift), finger_mm2) / young_mpa
+        for shift in ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
+    }
+    gain = gains[0, 0]
+    slopes = [force * (gains[tuple(axis)] - gains[tuple(-axis)]) / (2 * _STEP_MM) for axis in np.eye(2, dtype=int)]
+    above = np.maximum(force * gain, 0.0)
+    centroid = above @ skin.layout.centres_mm / np.maximum(above.sum(axis=1), 1e-300)[:, None]
+    return PatchMaps(
+        places,
+        gain,
+        detected_counts * converter.step_ff / np.maximum(gain.max(axis=1), 1e-12),
+        _standard_error(np.stack([*slopes, gain], axis=2), converter.noise_ff),
+        np.linalg.norm(centroid - places, axis=1),
+        force,
+    )
+
+
+def crosstalk(
+    pitches_mm: Sequence[float],
+    *,
+    radius_mm: float,
+    guard_radius_mm: float,
+    thickness_mm: float,
+    poisson: float,
+    permittivity: float,
+    young_mpa: float,
+    probe_mm: float,
+    converter: Converter,
+    pressure_mpa: float,
+    spacing_mm: float = 1.0,
+) -> pd.DataFrame:
+    """A row a pitch: what a neighbour rises by as a share of the taxel that a probe presses, and the error of localisation.
+
+    A taxel and six neighbours around it on a triangle that is large enough for them.
+    """
+    rows = []
+    angle = np.pi / 3 * np.arange(6)
+    area = np.pi * probe_mm**2 / 4
+    for pitch in pitches_mm:
+        centres = np.vstack([[0.0, 0.0], pitch * np.column_stack([np.cos(angle), np.sin(angle)])])
+        reach = pitch + guard_radius_mm + 3 * thickness_mm
+        upright = np.pi / 2 + 2 * np.pi / 3 * np.arange(3)
+        corners = 2 * reach * np.column_stack([np.cos(upright), np.sin(upright)])
+        layout = Layout(corners, centres, np.zeros(7, dtype=int), corners[None], radius_mm, guard_radius_mm)
+        skin = Skin(
+            layout,
+            thickness_mm=thickness_mm,
+            poisson=poisson,
+            permittivity=permittivity,
+            spacing_mm=1.5 * spacing_mm,
+            layers=3,
+            field_spacing_mm=2.5,
+        )
+        gain = _gain(skin, np.zeros((1, 2)), area)[0] / young_mpa
+        between = np.array([pitch / 2, 0.0])
+        slopes = [
+            (_gain(skin, (between + _STEP_MM * axis)[None], area) - _gain(skin, (between - _STEP_MM * axis)[None], area))[0]
+            * pressure_mpa
+            * area
+            / (2 * _STEP_MM * young_mpa)
+            for axis in np.eye(2)
+        ]
+        at = _gain(skin, between[None], area)[0] / young_mpa
+        error = _standard_error(np.stack([*slopes, at], axis=1)[None], converter.noise_ff)[0]
+        rows.append(
+            {
+                "pitch_mm": pitch,
+                "own_ff_per_n": gain[0],
+                "neighbour_ff_per_n": gain[1:].mean(),
+                "crosstalk": gain[1:].mean() / gain[0],
+                "localisation_mm": error,
+                "taxels_per_cm2": 200 / (np.sqrt(3) * pitch**2),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+_STEP_MM = 0.25  # of the differences that the slopes are made of
+_KNOWN = 1e-12  # of an information matrix' largest eigenvalue, below which a place is not told
+
+
+def _gain(skin, places, area_mm2):
+    """Rise (place, taxel) per N of an even pressure on a disc, for a modulus of 1 MPa."""
+    unit = ellipse((0.0, 0.0), area_mm2=area_mm2, pressure_mpa=1.0, ratio=1.0)
+    few = slice(0, None, 6)  # every sixth point around: 16 of 96, of 24 radii
+    points, weight = unit.points_mm[few], unit.force_n[few] / unit.force_n[few].sum()
+    values = skin.layer.under((places[:, None] + points).reshape(-1, 2)) @ skin.influence
+    return np.einsum("pkt,k->pt", values.reshape(len(places), len(points), -1), weight)
+
+
+def _standard_error(slopes, noise):
+    """Of the place (n,), from the slopes (n, taxel, 3) of the readings along x, y and the force: all three are unknown."""
+    information = np.einsum("nti,ntj->nij", slopes, slopes) / max(noise, 1e-300) ** 2
+    scale = np.sqrt(np.maximum(np.einsum("nii->ni", information), 1e-300))
+    scaled = information / (scale[:, :, None] * scale[:, None, :])
+    error = np.full(len(slopes), np.inf)
+    told = np.linalg.eigvalsh(scaled)[:, 0] > _KNOWN
+    variance = np.einsum("nii->ni", np.linalg.inv(scaled[told])) / scale[told] ** 2
+    error[told] = np.sqrt(variance[:, :2].sum(axis=1))
+    return error

@@ -1,0 +1,111 @@
+"""The environment for learning: Gymnasium's rules, the same episode for the same seed, and physics that a policy can rely on."""
+
+import warnings
+
+import numpy as np
+import pytest
+import trimesh
+
+from softtact.errors import InputError
+from softtact.geometry.pose import Pose
+
+gymnasium = pytest.importorskip("gymnasium", reason="pip install 'softtact[robot]'")
+pytest.importorskip("mujoco", reason="pip install 'softtact[robot]'")
+
+ID = "softtact.robot.environment:softtact/Grasp-v0"
+CLOSE, HOLD, LIFT, SLIDE = (0.0, 0.0, 0.0), (0.2, 0.0, 0.0), (0.2, 1.0, 0.0), (-0.6, 0.0, 1.0)
+STILL = {"x_mm": 0.0, "y_mm": 0.0, "angle_deg": 0.0}
+
+
+@pytest.fixture(scope="module")
+def env():
+    return gymnasium.make(ID)
+
+
+def play(env, *plan, seed=1, options=None):
+    """Observations of an episode; plan: (action, steps)."""
+    seen = [env.reset(seed=seed, options=options)[0]]
+    rewards = []
+    for action, steps in plan:
+        for _ in range(steps):
+            observation, reward, ended, cut, info = env.step(np.array(action, dtype=np.float32))
+            seen.append(observation)
+            rewards.append(reward)
+            if ended or cut:
+                return seen, rewards, ended, info
+    return seen, rewards, False, info
+
+
+def test_gymnasium_s_checker_has_nothing_against_it(env):
+    from gymnasium.utils.env_checker import check_env
+
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=".*infinity.*")     # forces and poses have no bounds
+        check_env(env.unwrapped)
+
+
+def test_observations_are_of_both_fingers_with_stated_types(env):
+    first = play(env, (CLOSE, 1))[0][0]
+    assert {name: (value.shape, value.dtype.name) for name, value in first.items()} == {
+        "tactile": ((2, 7, 4), "uint16"), "force_n": ((2, 3), "float32"), "object_pose": ((7,), "float32")}
+    assert not first["tactile"].any() and not first["force_n"].any()
+
+
+def test_a_seed_gives_the_same_episode_and_another_one_another(env):
+    plan = ((CLOSE, 30), (HOLD, 10))
+    one, same, other = (play(env, *plan, seed=seed)[0] for seed in (3, 3, 4))
+    assert all(np.array_equal(a[name], b[name]) for a, b in zip(one, same, strict=True) for name in a)
+    assert not np.array_equal(one[-1]["object_pose"], other[-1]["object_pose"])
+
+
+def test_a_policy_that_closes_and_lifts_earns_the_whole_height(env):
+    _, rewards, ended, info = play(env, (CLOSE, 40), (HOLD, 10), (LIFT, 120))
+    assert ended and sum(rewards) == pytest.approx(info["risen_mm"] / 40.0, abs=1e-9) and info["risen_mm"] > 39
+
+
+def test_an_unknown_option_of_a_reset_is_refused(env):
+    with pytest.raises(InputError, match="the option 'x' is unknown; use one of x_mm, y_mm, angle_deg"):
+        env.reset(options={"x": 1.0})
+
+
+def test_a_lift_with_too_little_force_loses_the_object(env):
+    heavy = gymnasium.make(ID, mass_kg=2.0, mesh=trimesh.creation.box((16, 16, 20)))     # slips below 2 x 9.81 / (2 x 0.8) = 12.3 N
+    _, rewards, ended, info = play(heavy, ((-0.3, 0.0, 0.0), 40), ((-0.3, 1.0, 0.0), 200), options=STILL)     # 10.5 N
+    assert ended and info["risen_mm"] < -20 and sum(rewards) < 0
+
+
+def test_while_the_fixture_holds_the_object_the_hand_slides_over_it(env):
+    seen, *_ = play(env, (CLOSE, 40), (SLIDE, 20), options=STILL)
+    before, after = seen[40], seen[-1]
+    assert after["object_pose"][0] - before["object_pose"][0] == pytest.approx(4.0, abs=1.0)     # 20 steps of 0.2 mm, less the lag
+    share = [np.arange(4) @ one["tactile"][0].sum(axis=0) / one["tactile"][0].sum() for one in (before, after)]
+    assert share[1] > share[0] + 0.2      # the pattern moves towards larger x on the left sensor
+
+
+def test_taxels_are_those_of_a_press_at_that_place_and_force(env):
+    seen, *_ = play(env, (CLOSE, 40), (HOLD, 20), options=STILL)
+    inner = env.unwrapped
+    force = float(-seen[-1]["force_n"][0, 2])
+    exact = inner._sensor.press(inner._mesh, pose=Pose.from_values([0] * 6), force_n=[force], model="elastic", threads=1)
+    assert force == pytest.approx(18.0, rel=0.01)
+    assert np.abs(seen[-1]["tactile"][0] - exact.tactile_map[0]).max() <= 0.02 * exact.tactile_map.max()     # linear between forces
+
+
+@pytest.mark.slow
+def test_environments_run_beside_each_other_in_processes():
+    many = gymnasium.make_vec(ID, num_envs=2, vectorization_mode="async", vector_kwargs={"context": "spawn"})
+    try:
+        first, _ = many.reset(seed=[1, 2])
+        assert first["tactile"].shape == (2, 2, 7, 4) and not np.array_equal(*first["object_pose"])
+        assert many.step(np.zeros((2, 3), dtype=np.float32))[0]["force_n"].shape == (2, 2, 3)
+    finally:
+        many.close()
+
+
+@pytest.mark.parametrize(("wrong", "said"), [({"model": "hyperelastic"}, "model='hyperelastic': an environment needs a reading in"),
+                                             ({"mesh": "part.stl"}, "part.stl: a mesh file does not state its unit"),
+                                             ({"largest_force_n": 90.0}, "The force 90 N is out of the range"),
+                                             ({"scene": {"frction": 1}}, "at 'frction': the key is unknown")])
+def test_a_wrong_argument_is_refused_in_one_sentence(wrong, said):
+    with pytest.raises(InputError, match=said):
+        gymnasium.make(ID, **wrong)

@@ -1,0 +1,106 @@
+"""`softtact skin`: from a design to a folder of results, and what it refuses."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from PIL import Image
+
+from softtact.cli import main
+from softtact.files import read_dataset
+from softtact.skin.design import read_design
+
+ROOT = Path(__file__).resolve().parents[2]
+SMALL = {
+    "skin": "small",
+    "mesh": {"spacing_mm": 3.0, "layers": 2, "field_spacing_mm": 3.0, "field_layers": 1},
+    "loads": [{"name": "a", "diameter_mm": 6, "at_taxel": 7, "pressure_kpa": 20}],
+}
+
+
+def written(folder, **changes):
+    path = folder / "design.yaml"
+    path.write_text(yaml.safe_dump(SMALL | changes))
+    return path
+
+
+def test_a_design_becomes_readings_figures_exports_and_a_report(tmp_path, capsys):
+    Image.fromarray(np.pad(np.zeros((20, 10), dtype=np.uint8), 5, constant_values=255)).save(tmp_path / "print.png")
+    loads = [*SMALL["loads"], {"name": "ink", "mask": "print.png", "pixel_mm": 0.2, "at_mm": [15, 9], "pressure_kpa": 10}]
+    assert main(["skin", str(written(tmp_path, loads=loads)), "--out", str(tmp_path / "out"), "--threads", "1", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert [row["load"] for row in told["loads"]] == ["a", "ink"] and told["loads"][1]["force_n"] == pytest.approx(
+        0.01 * 200 * 0.04
+    )
+    readings = read_dataset(tmp_path / "out/readings.nc")
+    assert readings.counts.dims == ("load", "taxel") and int(readings.counts.sel(load="a").values.argmax()) == 6
+    assert readings.delta_ff.values == pytest.approx(readings.capacitance_ff.values - readings.at_rest_ff.values)
+    assert readings.displacement_mm.sel(axis="z").min() < -0.1
+    page = (tmp_path / "out/report.html").read_text()
+    assert page.count("data:image/png") == 2 and "exports/skin.urdf" in page
+    assert (tmp_path / "out/exports/skin.txt").read_text().count("\n") == 16
+
+
+@pytest.mark.slow
+def test_the_tiny_design_computes_every_section(tmp_path, capsys):
+    assert main(["skin", str(ROOT / "config/tiny_skin.yaml"), "--out", str(tmp_path), "--threads", "1"]) == 0
+    said = capsys.readouterr()
+    assert all(words in said.out for words in ("chosen:", "worst batch", "is felt from"))
+    assert "its curve is extrapolated" in said.err
+    tables = {path.stem: pd.read_csv(path) for path in (tmp_path / "tables").glob("*.csv")}
+    assert {
+        "loads",
+        "probes",
+        "choice",
+        "choice_printed",
+        "front_confidence",
+        "thickness",
+        "detection",
+        "crosstalk",
+        "search",
+        "main_effects",
+    } == set(tables)
+    stiff, soft = (
+        tables["probes"].query(f"modulus_share == {share} and pressure_kpa == 40").delta_ff.to_numpy() for share in (0.1, -0.1)
+    )
+    assert (soft > stiff).all()
+    kept = sorted((tmp_path / "search").iterdir())
+    before = [path.stat().st_mtime_ns for path in kept]
+    assert main(["skin", str(ROOT / "config/tiny_skin.yaml"), "--out", str(tmp_path), "--threads", "1"]) == 0
+    assert [path.stat().st_mtime_ns for path in kept] == before  # the search goes on from what is there
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"loads": [SMALL["loads"][0] | {"at_taxel": 13}]}, "load 'a': there is no taxel 13; give one of 1 to 12."),
+        ({"loads": [SMALL["loads"][0] | {"at_taxel": None, "at_mm": [1.0, 1.0]}]}, "lies beside the elastomer; move it inwards"),
+        ({"loads": [SMALL["loads"][0] | {"area_mm2": 5.0}]}, "diameter_mm and area_mm2; give one of"),
+        ({"loads": [SMALL["loads"][0] | {"pressure_kpa": 90}]}, "90 kPa is beyond twice that"),
+        ({"loads": [SMALL["loads"][0], SMALL["loads"][0]]}, "two loads are called 'a'"),
+        ({"choice": {"range_kpa": [50, 10]}}, "50 to 10 kPa does not rise"),
+    ({"choice": {"target_kpa": 300}}, "at 'choice.target_kpa': no elastomer's curve reaches 300 kPa"),
+    ({"elastomer": "SomaFoam"}, "there is no elastomer 'SomaFoam' (did you mean 'SomaFoama'?)"),
+        ({"converter": {"name": "papr"}}, "there is no converter 'papr'; did you mean 'paper'?"),
+        ({"module": {"pitch": 5}}, "at 'module': there is no key 'pitch'; did you mean 'pitch_mm'?"),
+        ({"module": {"pitch_mm": 4.2}}, "mm apart and need more than 4.4 mm"),
+        ({"module": {"guard_radius_mm": {"value": 2.2, "assumed": True}}}, "an assumed value needs a reason"),
+        (
+            {"loads": [{"name": "m", "mask": "no.png", "pixel_mm": 0.1, "at_mm": [15, 9], "pressure_kpa": 10}]},
+            "there is no such picture",
+        ),
+    ],
+)
+def test_what_is_wrong_with_a_design_is_said_in_one_sentence_and_nothing_is_written(changes, said, tmp_path, capsys):
+    assert main(["skin", str(written(tmp_path, **changes)), "--out", str(tmp_path / "out")]) == 1
+    captured = capsys.readouterr()
+    assert said in captured.err and captured.err.count("\n") == 1 and captured.out == "", captured.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_shipped_designs_are_valid():
+    for name in ("skin", "tiny_skin"):
+        assert read_design(ROOT / f"config/{name}.yaml").layout().centres_mm.shape[0] in (12, 72)

@@ -1,0 +1,109 @@
+"""The study of grasps: it runs from its configuration to a report, goes on where it stopped, and judges claims by stated rules."""
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+import xarray
+import yaml
+
+from softtact.cli import main
+from softtact.errors import InputError
+from softtact.evaluation.claims_of_grasps import claims_of_grasps
+from softtact.study.cost import read_costs
+from softtact.study.grasps import cost_lines, load_grasp_study
+
+pytest.importorskip("mujoco", reason="pip install 'softtact[robot]'")
+ROOT = Path(__file__).resolve().parents[2]
+ONE = {"study": "one", "objects": ["object_3"], "positions": 1, "force_n": 10, "trials": 2, "model": "elastic",
+       "one_event": {"objects": [], "models": ["elastic"], "force_n": 10, "cover_law": "mooney_rivlin"}}
+
+
+@pytest.fixture(autouse=True)
+def in_project(monkeypatch):
+    monkeypatch.chdir(ROOT)
+
+
+def config(folder, **changes):
+    path = folder / "study.yaml"
+    path.write_text(yaml.safe_dump(ONE | changes))
+    return path
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("grasps")
+    assert main(["grasps", str(config(folder, **{"catalogue": str(ROOT / "config/objects/catalogue.yaml")})), "--out",
+                 str(folder / "out"), "--workers", "1"]) == 0
+    return folder
+
+
+def test_a_study_leaves_grasps_readings_claims_figures_and_a_report(results):
+    out = results / "out"
+    table = pd.read_csv(out / "grasps.csv")
+    assert table.status.tolist() == ["done"] and table.force_left_n[0] == pytest.approx(10, rel=1e-3)
+    assert (xarray.load_dataset(out / "grasps/object_3-0/readings.nc", engine="h5netcdf").tactile_map.shape) == (2, 2, 7, 4)
+    page = (out / "report.html").read_text()
+    assert "needs the archive" in page and page.count("data:image/png") == 1 and (out / "tables/claims.csv").exists()
+
+
+def test_what_is_done_is_not_done_again_and_other_settings_are(results):
+    kept = [results / f"out/grasps/object_3-0/{name}.nc" for name in ("events", "readings")]
+    catalogue = str(ROOT / "config/objects/catalogue.yaml")
+
+    def run(**changes):
+        from softtact.study.grasp_runs import run_study  # MuJoCo, which may be missing
+
+        before = [path.stat().st_mtime_ns for path in kept]
+        run_study(load_grasp_study(config(results, catalogue=catalogue, **changes)), results / "out", workers=1)
+        return [path.stat().st_mtime_ns > old for path, old in zip(kept, before, strict=True)]
+
+    assert run() == [False, False] and run(trials=3) == [False, True] and run(trials=3, force_n=12) == [True, True]
+
+
+def test_the_paper_s_study_has_its_objects_and_at_least_its_trials():
+    study = load_grasp_study("config/grasps.yaml")
+    assert len({item.entry.name for item in study.items}) == 12 and len(study.items) * study.values.trials >= 2000
+    assert [item.id for item in study.items[:2]] == ["object_1-0", "object_1-1"]
+    assert (study.items[0].x_mm, study.items[0].angle_deg) == (0, 0) and abs(study.items[1].x_mm) <= 3
+
+
+def test_a_position_depends_on_the_seed_and_not_on_the_other_objects(tmp_path):
+    alone = load_grasp_study(config(tmp_path, objects=["coin"], positions=3)).items
+    among = load_grasp_study(config(tmp_path, objects=["egg", "coin"], positions=3)).items
+    other = load_grasp_study(config(tmp_path, objects=["coin"], positions=3, seed=2)).items
+    assert alone == among[3:] and alone[1] != other[1]
+
+
+def test_the_cost_is_told_before_the_work(tmp_path):
+    study = load_grasp_study("config/grasps.yaml")
+    first = next(cost_lines(study, tmp_path, read_costs(), cores=2))
+    # four of the twelve objects go to the hyperelastic model: 4 x 4 positions x 2 fingers x 2 events, and one of each two objects
+    assert "48 grasps, 48 left" in first and "66 hyperelastic" in first
+
+
+@pytest.mark.parametrize(("changes", "said"), [({"objects": ["cion"]}, "'cion'"), ({"model": "best"}, "at 'model'"),
+                                               ({"force": 3}, "'force'"), ({"positions": 0}, "at 'positions'")])
+def test_a_fault_of_the_configuration_is_named(tmp_path, changes, said):
+    with pytest.raises(InputError, match=said):
+        load_grasp_study(config(tmp_path, **changes))
+
+
+GRASP = {"grasp": "a-0", "object": "a", "status": "done", "trials": 50, "force_left_n": 50.0, "force_right_n": 50.0,
+         **{f"{name}_{side}": "elastic" for name in ("model_contact", "model_grip", "rule") for side in ("left", "right")}}
+
+
+def verdicts(row, shares):
+    compared = xarray.Dataset({"lower_share": ("model", shares)}, coords={"model": ["elastic", "hyperelastic"]},
+                              attrs={"force_n": 50.0, "cover_law": "ogden2"})
+    table = claims_of_grasps(pd.DataFrame([row]), {"object_5": compared}, force_n=50.0, policy="paper", model="auto")
+    return table.set_index(table.claim.str.split(" ").str[0]).verdict.to_dict()
+
+
+def test_claims_hold_by_their_rules_alone():
+    good = verdicts(GRASP, [0.02, 0.6])
+    assert good["A"] == good["The"] == good["object"] == "reproduced" and good["Twelve"] == "not reproduced"
+    assert verdicts(GRASP | {"model_grip_left": "hyperelastic"}, [0.02, 0.6])["A"] == "not reproduced"
+    assert verdicts(GRASP | {"force_left_n": 48.0}, [0.02, 0.6])["The"] == "not reproduced"
+    assert verdicts(GRASP, [0.2, 0.6])["object"] == verdicts(GRASP, [0.02, 0.2])["object"] == "not reproduced"
+    assert good["SSIM"] == "needs the archive"
