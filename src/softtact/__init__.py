@@ -10,12 +10,13 @@ if TYPE_CHECKING:
     from softtact.geometry.pose import Pose
     from softtact.press.result import PressResult, read_press
     from softtact.press.sensor import Sensor, load_sensor
+    from softtact.press.solid import SoftObject
 
 __version__ = "0.1.0"
-__all__ = ["ConvergenceError", "InputError", "Motion", "Pose", "PressResult", "Sensor", "__version__", "load_sensor", "read_mesh",
-           "read_press"]
+__all__ = ["ConvergenceError", "InputError", "Motion", "Pose", "PressResult", "Sensor", "SoftObject", "__version__", "load_sensor",
+           "read_mesh", "read_press"]
 _MODULES = {"ConvergenceError": "errors", "InputError": "errors", "Motion": "contact.motion", "Pose": "geometry.pose",
-            "PressResult": "press.result", "Sensor": "press.sensor", "load_sensor": "press.sensor",
+            "PressResult": "press.result", "Sensor": "press.sensor", "SoftObject": "press.solid", "load_sensor": "press.sensor",
             "read_mesh": "geometry.meshes", "read_press": "press.result"}
 
 

@@ -15,7 +15,8 @@ from softtact.materials.laws.registry import make_law
 
 ELEMENTS = {name: value for name, value in vars(elements).items() if isinstance(value, Element)}
 EVERY_ELEMENT = pytest.mark.parametrize("element", ELEMENTS.values(), ids=list(ELEMENTS))
-EVERY_SOLID = pytest.mark.parametrize("element", [HEX20, HEX27, WEDGE18, TET4, TET10], ids=["HEX20", "HEX27", "WEDGE18", "TET4", "TET10"])
+EVERY_SOLID = pytest.mark.parametrize("element", [HEX20, HEX27, WEDGE18, TET4, TET10], ids=["HEX20", "HEX27", "WEDGE18", "TET4",
+"TET10"])
 SIMPLICES, WEDGES = (TRI3, TRI6, TET4, TET10), (WEDGE18,)
 LAW = make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040})
 

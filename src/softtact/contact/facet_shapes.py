@@ -11,12 +11,12 @@ import numpy as np
 from numba import njit
 
 MOST_NODES = 9
-TRI3, TRI6, QUAD8, QUAD9, LINE2, LINE3 = range(6)     # kinds
-KIND_OF = {"triangle": TRI3, "triangle6": TRI6, "quad8": QUAD8, "quad9": QUAD9, "line": LINE2, "line3": LINE3}     # by meshio's names
+TRI3, TRI6, QUAD8, QUAD9, LINE2, LINE3 = range(6)  # kinds
+KIND_OF = {"triangle": TRI3, "triangle6": TRI6, "quad8": QUAD8, "quad9": QUAD9, "line": LINE2, "line3": LINE3}  # by meshio's names
 NODES_OF = np.array([3, 6, 8, 9, 2, 3])
 _QUAD_XI = np.array([-1.0, 1.0, 1.0, -1.0, 0.0, 1.0, 0.0, -1.0, 0.0])
 _QUAD_ETA = np.array([-1.0, -1.0, 1.0, 1.0, -1.0, 0.0, 1.0, 0.0, 0.0])
-MARGIN = 0.5       # of a facet's width
+MARGIN = 0.5  # of a facet's width
 _ITERATIONS, _CONVERGED, _LONGEST_STEP = 25, 1e-13, 0.5
 
 
@@ -131,7 +131,8 @@ def unit_normal(tangents: np.ndarray, normal: np.ndarray) -> float:
 def clamp(kind: int, xi: float, eta: float) -> tuple[float, float]:
     """The nearest coordinates within a facet and a margin around it.
 
-    With the margin, a point that crosses the edge between two facets within Newton's iterations goes on to meet the one that it met,
+    With the margin, a point that crosses the edge between two facets within Newton's iterations goes on to meet the one that it
+    met,
     so that force and tangent are those of one smooth function.
     """
     if kind >= LINE2:
@@ -175,7 +176,7 @@ def closest_on(kind: int, corners: np.ndarray, x: np.ndarray, xi: float, eta: fl
             h11 += tangents[1, i] ** 2 - away * bend1
             h01 += tangents[0, i] * tangents[1, i] - away * bend2
         determinant = h00 * h11 - h01 * h01
-        if not (h00 > 0 and determinant > 1e-12 * h00 * h11):     # far from the facet: the tangents' metric alone
+        if not (h00 > 0 and determinant > 1e-12 * h00 * h11):  # far from the facet: the tangents' metric alone
             h00 = (tangents[0] ** 2).sum()
             h11 = (tangents[1] ** 2).sum()
             h01 = (tangents[0] * tangents[1]).sum()

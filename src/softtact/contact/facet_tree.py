@@ -10,7 +10,7 @@ from numba import njit
 
 from softtact.contact.facet_shapes import LINE2, LINE3, QUAD8, QUAD9, TRI3, TRI6
 
-_LEAF = 4      # triangles in a box that is not divided further
+_LEAF = 4  # triangles in a box that is not divided further
 _DEPTH = 64
 # Flat triangles between the nodes of each kind, and the coordinates of the nodes. A line is a triangle with two equal corners.
 _PARTS = {
@@ -43,7 +43,7 @@ class FacetTree(NamedTuple):
     """(t, 3, 2) coordinates of the triangles' corners on their facets."""
     first: np.ndarray
     """(b,) first triangle of a leaf, or first of the two children."""
-    count: np.ndarray
+    sizes: np.ndarray
     """(b,) triangles of a leaf; 0 of a box with children."""
     low: np.ndarray
     """(b, 3) lowest corners of the boxes in mm."""
@@ -53,16 +53,22 @@ class FacetTree(NamedTuple):
 
 def build_tree(nodes: np.ndarray, kinds: np.ndarray, x: np.ndarray) -> FacetTree:
     """The tree of facets (f, 9) of kinds (f,), with nodes at x (n, 3) in mm."""
-    corners, facets, places = [], [], []
+    parts_of: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     for kind in np.unique(kinds):
         own, parts = np.flatnonzero(kinds == kind), np.array(_PARTS[int(kind)])
-        corners.append(nodes[own][:, parts].reshape(-1, 3))
-        facets.append(np.repeat(own, len(parts)))
-        places.append(np.tile(np.array(_PLACES[int(kind)], float)[parts], (len(own), 1, 1)))
-    corners, facets, places = np.concatenate(corners), np.concatenate(facets), np.concatenate(places)
+        places_of_kind = np.tile(np.array(_PLACES[int(kind)], float)[parts], (len(own), 1, 1))
+        parts_of.append((nodes[own][:, parts].reshape(-1, 3), np.repeat(own, len(parts)), places_of_kind))
+    corners, facets, places = (np.concatenate(arrays) for arrays in zip(*parts_of, strict=True))
     order, first, count = _divide(x[corners].mean(axis=1))
-    tree = FacetTree(np.ascontiguousarray(corners[order]), facets[order], np.ascontiguousarray(places[order]), first, count,
-                     np.empty((len(first), 3)), np.empty((len(first), 3)))
+    tree = FacetTree(
+        np.ascontiguousarray(corners[order]),
+        facets[order],
+        np.ascontiguousarray(places[order]),
+        first,
+        count,
+        np.empty((len(first), 3)),
+        np.empty((len(first), 3)),
+    )
     refit(tree, x)
     return tree
 
@@ -94,13 +100,13 @@ def _divide(centres):
 @njit(cache=True, nogil=True)
 def refit(tree: FacetTree, x: np.ndarray) -> None:
     """Fit the boxes to nodes at x (n, 3) in mm."""
-    for box in range(len(tree.first) - 1, -1, -1):     # children stand behind their parents
+    for box in range(len(tree.first) - 1, -1, -1):  # children stand behind their parents
         first = tree.first[box]
         for i in range(3):
             low, high = np.inf, -np.inf
-            if tree.count[box] == 0:
+            if tree.sizes[box] == 0:
                 low, high = min(tree.low[first, i], tree.low[first + 1, i]), max(tree.high[first, i], tree.high[first + 1, i])
-            for t in range(first, first + tree.count[box]):
+            for t in range(first, first + tree.sizes[box]):
                 for c in range(3):
                     value = x[tree.corners[t, c], i]
                     low, high = min(low, value), max(high, value)
@@ -108,11 +114,13 @@ def refit(tree: FacetTree, x: np.ndarray) -> None:
 
 
 @njit(cache=True, nogil=True)
-def nearest(tree: FacetTree, x: np.ndarray, point: np.ndarray, against: np.ndarray, least_cosine: float, reach: float,
-            excluded: np.ndarray) -> tuple[int, float, float]:
+def nearest(
+    tree: FacetTree, x: np.ndarray, point: np.ndarray, against: np.ndarray, least_cosine: float, reach: float, excluded: np.ndarray
+) -> tuple[int, float, float]:
     """The facet closest to a point (3,) within `reach` (mm), and a first guess of the coordinates there; -1 where there is none.
 
-    against (3,), least_cosine: the facet's normal n is to have -n . against >= least_cosine, with `against` the normal of the surface
+    against (3,), least_cosine: the facet's normal n is to have -n . against >= least_cosine, with `against` the normal of the
+    surface
     that the point lies on;  excluded (k,): nodes whose facets do not count, for a surface that meets itself; -1 counts for nothing
     """
     best, found, xi, eta = reach * reach, -1, 0.0, 0.0
@@ -124,12 +132,12 @@ def nearest(tree: FacetTree, x: np.ndarray, point: np.ndarray, against: np.ndarr
         if _box_distance(tree, box, point) >= best:
             continue
         first = tree.first[box]
-        if tree.count[box] == 0:
+        if tree.sizes[box] == 0:
             near = 0 if _box_distance(tree, first, point) <= _box_distance(tree, first + 1, point) else 1
             stack[left], stack[left + 1] = first + 1 - near, first + near
             left += 2
             continue
-        for t in range(first, first + tree.count[box]):
+        for t in range(first, first + tree.sizes[box]):
             if _touches(tree.corners[t], excluded):
                 continue
             a, b, c = x[tree.corners[t, 0]], x[tree.corners[t, 1]], x[tree.corners[t, 2]]

@@ -15,63 +15,15 @@ from scipy.spatial import cKDTree
 from softtact.contact import surface_kernels as kernels
 from softtact.contact.facet_shapes import QUAD8
 from softtact.contact.facet_tree import refit
+from softtact.contact.pair_state import PairHistory, PairState
 from softtact.contact.segments import segment_points
-from softtact.contact.surface_kernels import Projection
 from softtact.contact.surfaces import Surface, SurfacePoints, quadrature_points
 
-_ROUNDING_MM = 1e-7      # surfaces that lie on each other from the start touch, whatever the sign of their rounding
-_RIM = 0.02              # of a facet's size: how far a point beside the other surface's rim still meets it
-_BESIDE = 0.1            # of a facet's width: how far beside the facet that it meets a point may stand in a balanced state
-_YIELD = 1e-6            # a step begins with what slid before at its bound: it may stick as well
-_LEAST_COSINE = 0.1      # of the angle between opposite normals: walls that stand across a surface are not what it meets
-
-
-@dataclass(frozen=True)
-class PairHistory:
-    """What a pair remembers at a state: it belongs to the state, so that a body pressed twice gives the same."""
-
-    points: SurfacePoints
-    """The points of contact."""
-    offset: np.ndarray
-    """(p,) in mm, of the augmented penalty."""
-    traction: np.ndarray
-    """(p, 3) in MPa: friction on the points' surface when the step began."""
-    anchor: Projection
-    """Where the points were on the other surface when the step began."""
-    start: np.ndarray
-    """(p, 3) in mm: by how much the anchors lay beside the points' feet when the step began; 0 but at a surface's end."""
-    slid: np.ndarray
-    """(p,) in mm: ways that the points slid on the other surface, up to the step's beginning."""
-    stiffness: float
-    """Penalty in N/mm3: the pair's, or larger where its augmentations came to a stand."""
-    overlap_mm: float = np.inf
-    """Deepest overlap at the last augmentation."""
-
-
-@dataclass(frozen=True)
-class PairState:
-    """A pair's contact at given places of all nodes."""
-
-    projection: Projection
-    """The points' closest places."""
-    pressure: np.ndarray
-    """(p,) in MPa per area at rest, positive in compression."""
-    slope: np.ndarray
-    """(p,) in N/mm3."""
-    friction: np.ndarray
-    """(p, 3) in MPa: friction on the points' surface."""
-    stiffness: np.ndarray
-    """(p, 3, 3) in N/mm3: how friction stands against slip."""
-    slip: np.ndarray
-    """(p, 3) in mm: way of the points on the other surface within the step."""
-    slides: np.ndarray
-    """(p,) whether friction is at its bound."""
-    energy: float
-    """Energy in mJ of the penalties."""
-
-    def penetration_mm(self) -> float:
-        """Deepest overlap (mm)."""
-        return float(max(0.0, -np.min(self.projection.gap, initial=0.0)))
+_ROUNDING_MM = 1e-7  # surfaces that lie on each other from the start touch, whatever the sign of their rounding
+_RIM = 0.02  # of a facet's size: how far a point beside the other surface's rim still meets it
+_BESIDE = 0.1  # of a facet's width: how far beside the facet that it meets a point may stand in a balanced state
+_YIELD = 1e-6  # a step begins with what slid before at its bound: it may stick as well
+_LEAST_COSINE = 0.1  # of the angle between opposite normals: walls that stand across a surface are not what it meets
 
 
 @dataclass
@@ -115,8 +67,15 @@ class ContactPair:
     def _fresh(self, points, x):
         count = len(points.facet)
         anchor = self._project(points, x, None)
-        return PairHistory(points, np.zeros(count), np.zeros((count, 3)), anchor, self._slip(points, anchor, anchor, x), np.zeros(count),
-                           self.stiffness)
+        return PairHistory(
+            points,
+            np.zeros(count),
+            np.zeros((count, 3)),
+            anchor,
+            self._slip(points, anchor, anchor, x),
+            np.zeros(count),
+            self.stiffness,
+        )
 
     def _slip(self, points, anchor, projection, x):
         """Vectors (p, 3) in mm from the anchors to the points' feet on the other surface."""
@@ -129,11 +88,24 @@ class ContactPair:
         count = len(points.facet)
         known = hint is not None and len(hint.facet) == count
         before, near = (hint.facet, hint.coordinates) if known else (np.full(count, -1), np.zeros((count, 2)))
-        return kernels.project(points, self.other.nodes, self.other.kinds, self._rims, self._tree, x, self.reach_mm, self._rim_mm,
-                               _LEAST_COSINE, self.itself, before, near)
+        return kernels.project(
+            points,
+            self.other.nodes,
+            self.other.kinds,
+            self._rims,
+            self._tree,
+            x,
+            self.reach_mm,
+            self._rim_mm,
+            _LEAST_COSINE,
+            self.itself,
+            before,
+            near,
+        )
 
     def begin_step(self, history: PairHistory, state: PairState, x: np.ndarray, at_rest: np.ndarray) -> PairHistory:
-        """The history at the begin of a step from a balanced state with nodes at x (n, 3): new anchors and, of segments, new points."""
+        """The history at the begin of a step from a balanced state with nodes at x (n, 3): new anchors and, of segments, new
+        points."""
         slid = history.slid + np.linalg.norm(state.slip, axis=1) * (state.pressure > 0)
         traction = np.where((state.pressure > 0)[:, None], state.friction, 0.0)
         if not self.segments or self.itself:
@@ -143,9 +115,13 @@ class ContactPair:
         if not len(fresh.points.facet) or not len(history.points.facet):
             return fresh
         _, near = cKDTree(kernels.places(history.points, at_rest)).query(kernels.places(fresh.points, at_rest))
-        return replace(fresh, offset=state.pressure[near] / history.stiffness,
-                       traction=traction[near],
-                       slid=slid[near], stiffness=history.stiffness)
+        return replace(
+            fresh,
+            offset=state.pressure[near] / history.stiffness,
+            traction=traction[near],
+            slid=slid[near],
+            stiffness=history.stiffness,
+        )
 
     def evaluate(self, history: PairHistory, x: np.ndarray, before: PairState | None = None, *, nearby: bool = False) -> PairState:
         """`PairState` with nodes at x (n, 3) in mm.
@@ -179,7 +155,9 @@ class ContactPair:
         anchor, bound = history.anchor, self.friction * pressure
         acts = touches & (anchor.facet >= 0)
         tangential = np.eye(3) - projection.normal[:, :, None] * projection.normal[:, None]
-        slip = (self._slip(history.points, anchor, projection, x) - np.einsum("pij,pj->pi", tangential, history.start)) * acts[:, None]
+        slip = (self._slip(history.points, anchor, projection, x) - np.einsum("pij,pj->pi", tangential, history.start)) * acts[
+            :, None
+        ]
         trial = np.einsum("pij,pj->pi", tangential, history.traction) - self.stiffness * slip
         size = np.linalg.norm(trial, axis=1)
         slides = acts & (size > bound * (1 + _YIELD))
@@ -188,14 +166,20 @@ class ContactPair:
         stiffness = self.stiffness * tangential * (share * acts)[:, None, None]
         stiffness -= (self.stiffness * share * slides)[:, None, None] * direction[:, :, None] * direction[:, None]
         energy = np.where(slides, bound * size - 0.5 * bound**2, 0.5 * size**2) / self.stiffness
-        return (trial * (share * acts)[:, None], stiffness, slip, slides,
-                float((history.points.weight * energy * acts).sum()))
+        return (trial * (share * acts)[:, None], stiffness, slip, slides, float((history.points.weight * energy * acts).sum()))
 
     def add_forces(self, history: PairHistory, state: PairState, force: np.ndarray) -> None:
         """Add to nodal forces (n, 3) in N what stands against the contact: the derivative of its potential."""
         points, projection, other = history.points, state.projection, self.other
-        kernels.add_forces_of(force, points, projection.facet, projection.coordinates, other.nodes, other.kinds,
-                              state.pressure[:, None] * projection.normal)
+        kernels.add_forces_of(
+            force,
+            points,
+            projection.facet,
+            projection.coordinates,
+            other.nodes,
+            other.kinds,
+            state.pressure[:, None] * projection.normal,
+        )
         if self.friction:
             anchor = history.anchor
             kernels.add_forces_of(force, points, anchor.facet, anchor.coordinates, other.nodes, other.kinds, state.friction)
@@ -209,15 +193,24 @@ class ContactPair:
         if not self.friction or not here.any():
             return
         points, projection, other, anchor = history.points, state.projection, self.other, history.anchor
-        way = kernels.places(points, change) - kernels.places_on(projection.facet, projection.coordinates, other.nodes, other.kinds,
-                                                                 change)
+        way = kernels.places(points, change) - kernels.places_on(
+            projection.facet, projection.coordinates, other.nodes, other.kinds, change
+        )
         pressure = -state.slope * (way * projection.normal).sum(axis=1) * here
         direction = state.friction / np.maximum(self.friction * state.pressure, 1e-300)[:, None]
-        kernels.add_forces_of(force, points, anchor.facet, anchor.coordinates, other.nodes, other.kinds,
-                              (self.friction * pressure)[:, None] * direction * here[:, None])
+        kernels.add_forces_of(
+            force,
+            points,
+            anchor.facet,
+            anchor.coordinates,
+            other.nodes,
+            other.kinds,
+            (self.friction * pressure)[:, None] * direction * here[:, None],
+        )
 
-    def tangents(self, history: PairHistory, state: PairState, x: np.ndarray, *,
-                 turning: bool = True) -> list[tuple[np.ndarray, np.ndarray]]:
+    def tangents(
+        self, history: PairHistory, state: PairState, x: np.ndarray, *, turning: bool = True
+    ) -> list[tuple[np.ndarray, np.ndarray]]:
         """Nodes (q, k) of pairs of facets and their matrices (q, 3 k, 3 k) in N/mm, of which the upper triangle counts.
 
         turning: with what the pressure does as the surfaces turn and bend
@@ -226,16 +219,27 @@ class ContactPair:
         touching = state.slope > 0
         nodes, pair = self._pairs(points, np.where(touching, state.projection.facet, -1))
         out = np.zeros((len(nodes), 3 * nodes.shape[1], 3 * nodes.shape[1]))
-        kernels.add_pair_tangents(out, pair, points, state.projection, other.nodes, other.kinds, x,
-                                  state.pressure if turning else np.zeros_like(state.pressure), state.slope, width,
-                                  not self.rigid)
+        kernels.add_pair_tangents(
+            out,
+            pair,
+            points,
+            state.projection,
+            other.nodes,
+            other.kinds,
+            x,
+            state.pressure if turning else np.zeros_like(state.pressure),
+            state.slope,
+            width,
+            not self.rigid,
+        )
         if not self.friction:
             return [(nodes, out)]
         anchor = history.anchor
         nodes2, pair = self._pairs(points, np.where(touching, anchor.facet, -1))
         rubbed = np.zeros((len(nodes2), 3 * nodes2.shape[1], 3 * nodes2.shape[1]))
-        kernels.add_friction_tangents(rubbed, pair, points, anchor.facet, anchor.coordinates, other.kinds, state.stiffness, width,
-                                      not self.rigid)
+        kernels.add_friction_tangents(
+            rubbed, pair, points, anchor.facet, anchor.coordinates, other.kinds, state.stiffness, width, not self.rigid
+        )
         return [(nodes, out), (nodes2, rubbed)]
 
     def _pairs(self, points: SurfacePoints, facet: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -248,22 +252,27 @@ class ContactPair:
         _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
         pair = np.full(len(facet), -1)
         pair[meets] = inverse.ravel()
-        nodes = points.nodes[meets[first], :self.surface.width]
+        nodes = points.nodes[meets[first], : self.surface.width]
         if not self.rigid:
-            nodes = np.hstack([nodes, self.other.nodes[facet[meets[first]], :self.other.width]])
+            nodes = np.hstack([nodes, self.other.nodes[facet[meets[first]], : self.other.width]])
         return np.ascontiguousarray(np.where(nodes < 0, nodes[:, :1], nodes)), pair
 
     def augmented(self, history: PairHistory, state: PairState) -> PairHistory:
         """The history with offsets that hold the surfaces where they just touch, in the mean and the slope over each facet.
 
-        There are more points than displacements that could follow them: offsets of single points would leave few of them in touch, and
+        There are more points than displacements that could follow them: offsets of single points would leave few of them in
+        touch, and
         their pressures without order. Where an augmentation came to a stand, the penalty is doubled.
         """
         overlap, factor = self.overlap_mm(history, state), 1.0
         if overlap > 0.5 * history.overlap_mm:
             factor = 2.0
-        return replace(history, offset=np.maximum(0.0, self._linear(history, state.pressure / history.stiffness)) / factor,
-                       stiffness=factor * history.stiffness, overlap_mm=overlap)
+        return replace(
+            history,
+            offset=np.maximum(0.0, self._linear(history, state.pressure / history.stiffness)) / factor,
+            stiffness=factor * history.stiffness,
+            overlap_mm=overlap,
+        )
 
     def overlap_mm(self, history: PairHistory, state: PairState) -> float:
         """Largest overlap (mm), or gap under pressure, of the surfaces, in the mean and the slope over each facet.
@@ -276,7 +285,7 @@ class ContactPair:
     def _linear(self, history: PairHistory, values: np.ndarray) -> np.ndarray:
         """The linear functions on each facet that are nearest to values (p,), at the points."""
         points = history.points
-        basis = np.column_stack([np.ones(len(values)), points.coordinates[:, :1 if self.surface.is_line else 2]])
+        basis = np.column_stack([np.ones(len(values)), points.coordinates[:, : 1 if self.surface.is_line else 2]])
         count, k = len(self.surface.kinds), basis.shape[1]
         gram, right = np.zeros((count, k, k)), np.zeros((count, k))
         weighted = basis * points.weight[:, None]
@@ -286,7 +295,8 @@ class ContactPair:
         return (basis * np.linalg.solve(gram, right[..., None])[points.facet, :, 0]).sum(axis=1)
 
     def settled(self, history: PairHistory, state: PairState, tolerance_mm: float) -> bool:
-        """Whether the surfaces overlap by no more than the tolerance, and points under pressure stand over the facets that they meet."""
+        """Whether the surfaces overlap by no more than the tolerance, and points under pressure stand over the facets that they
+        meet."""
         here = np.flatnonzero(state.pressure > 0)
         facets, (xi, eta) = state.projection.facet[here], state.projection.coordinates[here].T
         kinds = self.other.kinds[facets]

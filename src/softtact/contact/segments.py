@@ -13,15 +13,23 @@ from numba import njit
 from softtact.contact.facet_shapes import QUAD8
 from softtact.contact.surfaces import TRIANGLE_POINTS, TRIANGLE_WEIGHTS, Surface, SurfacePoints, points_at
 
-_TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]])                      # of a quadrilateral's corners
+_TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]])  # of a quadrilateral's corners
 _TRIANGLE_PLACES = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 _QUAD_PLACES = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 _LINE_POINTS, _LINE_WEIGHTS = np.polynomial.legendre.leggauss(3)
-_SLIVER = 1e-10     # share of a facet below which a piece is nothing
+_SLIVER = 1e-10  # share of a facet below which a piece is nothing
 
 
-def segment_points(surface: Surface, other: Surface, x: np.ndarray, at_rest: np.ndarray, *, reach: float,
-                   axisymmetric: bool = False, thickness_mm: float = 1.0) -> SurfacePoints:
+def segment_points(
+    surface: Surface,
+    other: Surface,
+    x: np.ndarray,
+    at_rest: np.ndarray,
+    *,
+    reach: float,
+    axisymmetric: bool = False,
+    thickness_mm: float = 1.0,
+) -> SurfacePoints:
     """Points on the pieces of a surface's facets over those of another one, nodes at x (n, 3) and at rest at `at_rest`, in mm.
 
     reach: farthest distance in mm at which the surfaces can meet
@@ -45,13 +53,15 @@ def _triangles(surface):
     """Facets (t,), corners' nodes (t, 3) and coordinates (t, 3, 2) of the flat triangles between the corners of all facets."""
     quads, triangles = np.flatnonzero(surface.kinds >= QUAD8), np.flatnonzero(surface.kinds < QUAD8)
     corners = np.concatenate([surface.nodes[triangles, :3], surface.nodes[quads][:, _TRIANGLES].reshape(-1, 3)])
-    places = np.concatenate([np.tile(_TRIANGLE_PLACES, (len(triangles), 1, 1)),
-                             np.tile(_QUAD_PLACES[_TRIANGLES], (len(quads), 1, 1))])
+    places = np.concatenate(
+        [np.tile(_TRIANGLE_PLACES, (len(triangles), 1, 1)), np.tile(_QUAD_PLACES[_TRIANGLES], (len(quads), 1, 1))]
+    )
     return np.concatenate([triangles, np.repeat(quads, 2)]), corners, places
 
 
 def _pieces(own, places, others, reach):
-    """Of triangles own (t, 3, 3) with coordinates (t, 3, 2): which (s,) each piece is of, and its corners' coordinates (s, 3, 2)."""
+    """Of triangles own (t, 3, 3) with coordinates (t, 3, 2): which (s,) each piece is of, and its corners' coordinates (s, 3,
+    2)."""
     low, high = others.min(axis=1), others.max(axis=1)
     order = np.argsort(low[:, 0], kind="stable")
     return _cut_all(own, places, others[order], low[order], high[order], float(np.max(high[:, 0] - low[:, 0], initial=0.0)), reach)
@@ -90,7 +100,7 @@ def _cut_all(own, places, others, low, high, widest, reach):
 @njit(cache=True, nogil=True)
 def _longer(which, pieces):
     more, larger = np.empty(2 * len(which), np.int64), np.empty((2 * len(which), 3, 2))
-    more[:len(which)], larger[:len(which)] = which, pieces
+    more[: len(which)], larger[: len(which)] = which, pieces
     return more, larger
 
 
@@ -120,7 +130,7 @@ def _in_plane(triangle, origin, e, f):
 def _faces(other, n, origin, reach):
     """Whether a triangle looks against the normal n, and comes within reach of the plane through `origin`."""
     p, q = other[1] - other[0], other[2] - other[0]
-    turned = ((p[1] * q[2] - p[2] * q[1]) * n[0] + (p[2] * q[0] - p[0] * q[2]) * n[1] + (p[0] * q[1] - p[1] * q[0]) * n[2])
+    turned = (p[1] * q[2] - p[2] * q[1]) * n[0] + (p[2] * q[0] - p[0] * q[2]) * n[1] + (p[0] * q[1] - p[1] * q[0]) * n[2]
     nearest = np.inf
     low, high = np.inf, -np.inf
     for c in range(3):

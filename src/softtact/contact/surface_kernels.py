@@ -26,7 +26,7 @@ from softtact.contact.facet_tree import FacetTree, nearest
 from softtact.contact.surfaces import SurfacePoints
 
 _AT_EDGE = 1e-9
-_LEAVES = 8.0     # a point leaves a rim that it met so much farther out than where it would meet it: else it would come and go
+_LEAVES = 8.0  # a point leaves a rim that it met so much farther out than where it would meet it: else it would come and go
 
 
 class Projection(NamedTuple):
@@ -45,24 +45,42 @@ class Projection(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def project(points: SurfacePoints, nodes: np.ndarray, kinds: np.ndarray, rims: np.ndarray, tree: FacetTree, x: np.ndarray,
-            reach: float, rim: float, least_cosine: float, itself: bool, before: np.ndarray, near: np.ndarray) -> Projection:
+def project(
+    points: SurfacePoints,
+    nodes: np.ndarray,
+    kinds: np.ndarray,
+    rims: np.ndarray,
+    tree: FacetTree,
+    x: np.ndarray,
+    reach: float,
+    rim: float,
+    least_cosine: float,
+    itself: bool,
+    before: np.ndarray,
+    near: np.ndarray,
+) -> Projection:
     """`Projection` of points on the surface of facets nodes (f, 9) and kinds (f,), all nodes at x (n, 3) in mm.
 
     rims (f, 4): which edges end the surface;  rim: how far (mm) beside such an edge a point still meets the plane of its facet
-    reach: farthest distance in mm;  least_cosine: of the angle between the surfaces' opposite normals;  itself: leave out the facets
+    reach: farthest distance in mm;  least_cosine: of the angle between the surfaces' opposite normals;  itself: leave out the
+    facets
     that share a node with the point's own
     before (p,), near (p, 2): facets and coordinates of before, which a point keeps as long as it stands over them: a point on the
     edge between two facets would else change between them from iteration to iteration
     """
     count = len(points.facet)
-    out = Projection(np.full(count, -1), np.zeros((count, 2)), np.full(count, np.inf), np.zeros((count, 3)), np.zeros(count, np.bool_))
+    out = Projection(
+        np.full(count, -1), np.zeros((count, 2)), np.full(count, np.inf), np.zeros((count, 3)), np.zeros(count, np.bool_)
+    )
     room, nobody, own, tangents, normal = room_for_shapes(), np.full(1, -1), np.empty(3), np.empty((2, 3)), np.empty(3)
     for p in range(count):
         _place_of_point(points, p, x, own, tangents)
         unit_normal(tangents, normal)
-        if before[p] >= 0 and _meets(out, p, before[p], near[p, 0], near[p, 1], own, nodes, kinds, rims, x, _LEAVES * rim, room) and (
-                out.inner[p] and abs(out.gap[p]) < reach and -(out.normal[p] * normal).sum() >= least_cosine):
+        if (
+            before[p] >= 0
+            and _meets(out, p, before[p], near[p, 0], near[p, 1], own, nodes, kinds, rims, x, _LEAVES * rim, room)
+            and (out.inner[p] and abs(out.gap[p]) < reach and -(out.normal[p] * normal).sum() >= least_cosine)
+        ):
             continue
         out.facet[p], out.gap[p] = -1, np.inf
         facet, xi, eta = nearest(tree, x, own, normal, least_cosine, reach, points.nodes[p] if itself else nobody)
@@ -118,8 +136,12 @@ def _beyond_rim(kind, xi, eta, rims, tangents, rim):
     if kind >= LINE2:
         return (rims[0] and (-1 - xi) * a > rim) or (rims[1] and (xi - 1) * a > rim)
     if kind >= QUAD8:
-        return ((rims[0] and (-1 - eta) * b > rim) or (rims[1] and (xi - 1) * a > rim) or (rims[2] and (eta - 1) * b > rim)
-                or (rims[3] and (-1 - xi) * a > rim))
+        return (
+            (rims[0] and (-1 - eta) * b > rim)
+            or (rims[1] and (xi - 1) * a > rim)
+            or (rims[2] and (eta - 1) * b > rim)
+            or (rims[3] and (-1 - xi) * a > rim)
+        )
     return (rims[0] and -eta * b > rim) or (rims[1] and (xi + eta - 1) * min(a, b) > rim) or (rims[2] and -xi * a > rim)
 
 
@@ -146,8 +168,15 @@ def places_on(facet: np.ndarray, coordinates: np.ndarray, nodes: np.ndarray, kin
 
 
 @njit(cache=True, nogil=True)
-def add_forces_of(force: np.ndarray, points: SurfacePoints, facet: np.ndarray, coordinates: np.ndarray, nodes: np.ndarray,
-                  kinds: np.ndarray, traction: np.ndarray) -> None:
+def add_forces_of(
+    force: np.ndarray,
+    points: SurfacePoints,
+    facet: np.ndarray,
+    coordinates: np.ndarray,
+    nodes: np.ndarray,
+    kinds: np.ndarray,
+    traction: np.ndarray,
+) -> None:
     """Take tractions (p, 3) in MPa that act on the points' surface from nodal forces (n, 3), and add them on the other one.
 
     So that `force` holds what stands against them: the residual of a potential.
@@ -182,8 +211,19 @@ def _forms(points, p, corners, kind, room, width, coupled, rows):
 
 
 @njit(cache=True, nogil=True)
-def add_pair_tangents(out: np.ndarray, pair: np.ndarray, points: SurfacePoints, projection: Projection, nodes: np.ndarray,
-                      kinds: np.ndarray, x: np.ndarray, pressure: np.ndarray, slope: np.ndarray, width: int, coupled: bool) -> None:
+def add_pair_tangents(
+    out: np.ndarray,
+    pair: np.ndarray,
+    points: SurfacePoints,
+    projection: Projection,
+    nodes: np.ndarray,
+    kinds: np.ndarray,
+    x: np.ndarray,
+    pressure: np.ndarray,
+    slope: np.ndarray,
+    width: int,
+    coupled: bool,
+) -> None:
     """Add the second derivative of the contact's energy to the matrices (pairs, k, k) of pairs of facets.
 
     pair (p,): the points' pairs, -1 for none;  pressure (p,) in MPa and its slope (p,) in N/mm3;  width: nodes of a facet of the
@@ -192,7 +232,7 @@ def add_pair_tangents(out: np.ndarray, pair: np.ndarray, points: SurfacePoints, 
     room, corners, columns = room_for_shapes(), np.zeros((9, 3)), out.shape[1]
     k = columns // 3
     rows, G, N, D, T = np.empty((3, k)), np.empty(columns), np.empty((2, columns)), np.empty((2, columns)), np.empty((2, columns))
-    place, tangents, normal = np.empty(3), np.empty((2, 3)), np.empty(3)
+    place, tangents = np.empty(3), np.empty((2, 3))
     M, kappa, metric = np.empty((2, 2)), np.empty((2, 2)), np.empty((2, 2))
     for p in range(len(pair)):
         if pair[p] < 0:
@@ -262,12 +302,26 @@ def _curvature(kind, corners, room, n, kappa):
 @njit(cache=True, nogil=True)
 def _invert(m):
     determinant = m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0]
-    m[0, 0], m[1, 1], m[0, 1], m[1, 0] = m[1, 1] / determinant, m[0, 0] / determinant, -m[0, 1] / determinant, -m[1, 0] / determinant
+    m[0, 0], m[1, 1], m[0, 1], m[1, 0] = (
+        m[1, 1] / determinant,
+        m[0, 0] / determinant,
+        -m[0, 1] / determinant,
+        -m[1, 0] / determinant,
+    )
 
 
 @njit(cache=True, nogil=True)
-def add_friction_tangents(out: np.ndarray, pair: np.ndarray, points: SurfacePoints, facet: np.ndarray, coordinates: np.ndarray,
-                          kinds: np.ndarray, stiffness: np.ndarray, width: int, coupled: bool) -> None:
+def add_friction_tangents(
+    out: np.ndarray,
+    pair: np.ndarray,
+    points: SurfacePoints,
+    facet: np.ndarray,
+    coordinates: np.ndarray,
+    kinds: np.ndarray,
+    stiffness: np.ndarray,
+    width: int,
+    coupled: bool,
+) -> None:
     """Add w F^T (3 x 3 stiffness of a point, (p, 3, 3) in N/mm3) F of F = (shape values, minus those of the other side)."""
     room, columns = room_for_shapes(), out.shape[1]
     k = columns // 3

@@ -46,11 +46,14 @@ class Surface:
         x (n, 3): the nodes at rest in mm
         """
         corners = np.where(self.kinds >= LINE2, 2, np.where(self.kinds >= QUAD8, 4, 3))
-        normals, owner = self._normals(x), {}
+        normals = self._normals(x)
+        owner: dict[tuple[int, ...], tuple[int, int]] = {}
         out = np.ones((len(self.kinds), 4), dtype=bool)
         for facet, count in enumerate(corners):
             own = self.nodes[facet, :count].tolist()
-            ends = [(node,) for node in own] if count == 2 else [tuple(sorted((own[k], own[(k + 1) % count]))) for k in range(count)]
+            ends = (
+                [(node,) for node in own] if count == 2 else [tuple(sorted((own[k], own[(k + 1) % count]))) for k in range(count)]
+            )
             for edge, key in enumerate(ends):
                 if key in owner:
                     other, its_edge = owner[key]
@@ -103,14 +106,24 @@ def quadrature_points(surface: Surface, x: np.ndarray, *, axisymmetric: bool = F
     return points_at(surface, x, *_rules(surface.kinds), axisymmetric=axisymmetric, thickness_mm=thickness_mm)
 
 
-def points_at(surface: Surface, x: np.ndarray, facet: np.ndarray, coordinates: np.ndarray, share: np.ndarray, *,
-              axisymmetric: bool = False, thickness_mm: float = 1.0) -> SurfacePoints:
+def points_at(
+    surface: Surface,
+    x: np.ndarray,
+    facet: np.ndarray,
+    coordinates: np.ndarray,
+    share: np.ndarray,
+    *,
+    axisymmetric: bool = False,
+    thickness_mm: float = 1.0,
+) -> SurfacePoints:
     """Points at coordinates (p, 2) on facets (p,) that stand for shares (p,) of them, in parent coordinates."""
     values, slopes = _shapes(surface.kinds[facet], coordinates)
     place, weight = _at_rest(surface, x, facet, coordinates, share)
     if surface.is_line:
         weight = weight * (2 * np.pi * place[:, 0] if axisymmetric else thickness_mm)
-    return SurfacePoints(facet, np.ascontiguousarray(surface.nodes[facet]), surface.kinds[facet], values, slopes, weight, coordinates)
+    return SurfacePoints(
+        facet, np.ascontiguousarray(surface.nodes[facet]), surface.kinds[facet], values, slopes, weight, coordinates
+    )
 
 
 def _at_rest(surface, x, facet, coordinates, share):
@@ -162,5 +175,5 @@ def _dunavant():
     return np.array(points), 0.5 * np.array([wa] * 3 + [wb] * 3)
 
 
-_SMOOTH = np.cos(np.radians(45))     # of the angle between facets' normals
+_SMOOTH = np.cos(np.radians(45))  # of the angle between facets' normals
 TRIANGLE_POINTS, TRIANGLE_WEIGHTS = _dunavant()

@@ -22,7 +22,7 @@ class PlainLoops:
 
     def _operator(self, at_rest: ElementArrays) -> np.ndarray:
         """dF (e, g, 3, 3, m, 3) by the displacements of the nodes."""
-        gradients = at_rest.gradients[at_rest.shapes]                       # (e, g, 3, m)
+        gradients = at_rest.gradients[at_rest.shapes]  # (e, g, 3, m)
         out = np.zeros((*gradients.shape[:2], 3, 3, gradients.shape[3], 3))
         for i in range(3):
             out[:, :, i, :, :, i] = gradients
@@ -45,8 +45,15 @@ class PlainLoops:
         S = stress + (pressure * deformed.J).reshape(-1, 1) * _inverses(deformed.C)
         return S[:, _VOIGT].reshape(*deformed.J.shape, 3, 3)
 
-    def tangent(self, deformed: Deformation, at_rest: ElementArrays, stress: np.ndarray, moduli: np.ndarray, volume: VolumeResponse,
-                like: np.ndarray) -> np.ndarray:
+    def tangent(
+        self,
+        deformed: Deformation,
+        at_rest: ElementArrays,
+        stress: np.ndarray,
+        moduli: np.ndarray,
+        volume: VolumeResponse,
+        like: np.ndarray,
+    ) -> np.ndarray:
         """Tangent (e, 3 m, 3 m) in N/mm, see `kernels.tangent`; `like` names the precision of the result."""
         F, J, w, B = deformed.F, deformed.J, at_rest.volumes[at_rest.shapes], self._operator(at_rest)
         inverse = _inverses(deformed.C)[:, _VOIGT].reshape(F.shape)
@@ -54,8 +61,15 @@ class PlainLoops:
         if volume.quartic.size:
             raise NotImplementedError("The quartic penalty is for spatial elements of sensors on frusta.")
         D = moduli[:, _VOIGT][:, :, :, _VOIGT].reshape(*J.shape, 3, 3, 3, 3)
-        D = D + np.einsum("eg,egij,egkl->egijkl", pj + local, inverse, inverse) - np.einsum(
-            "eg,egijkl->egijkl", pj, np.einsum("egik,egjl->egijkl", inverse, inverse) + np.einsum("egil,egjk->egijkl", inverse, inverse))
+        D = (
+            D
+            + np.einsum("eg,egij,egkl->egijkl", pj + local, inverse, inverse)
+            - np.einsum(
+                "eg,egijkl->egijkl",
+                pj,
+                np.einsum("egik,egjl->egijkl", inverse, inverse) + np.einsum("egil,egjk->egijkl", inverse, inverse),
+            )
+        )
         A = np.einsum("egip,egpjql,egkq->egijkl", F, D, F, optimize=True)
         A += np.einsum("ik,eglj->egijkl", np.eye(3), self._whole_stress(deformed, stress, volume.pressure))
         k = B.shape[4] * 3

@@ -58,7 +58,8 @@ class SolidBlock:
     gradients (u, g, m, 3) in 1/mm and volumes (u, g) in mm3 of the shapes that occur; shapes (e,): which is an element's, by
     default each its own; points (g, 3) of the quadrature in parent coordinates; unprojected_penalty_ratio: k / mu;
     quartic_penalty_ratio: q / mu; trilinear: project on trilinear instead of linear functions; basis (g, p): on these instead.
-    Displacements come per element (e, m, 3) in mm. at_rest: all this as `ElementArrays`. loops: what sums over points and nodes, `kernels` or a `DeviceKernels`.
+    Displacements come per element (e, m, 3) in mm. at_rest: all this as `ElementArrays`. loops: what sums over points and nodes,
+    `kernels` or a `DeviceKernels`.
     """
 
     loops = kernels

@@ -15,8 +15,8 @@ from softtact.fem.elements import HEX20, HEX27, QUAD8, QUAD9, TET10, TRI6, WEDGE
 
 GEOMETRIES = ("solid", "plane_strain", "axisymmetric")
 ELEMENTS = {element.meshio_name: element for element in (TET10, HEX20, HEX27, WEDGE18, TRI6, QUAD8, QUAD9)}
-_FLIPPED = {6: [0, 2, 1, 5, 4, 3], 8: [0, 3, 2, 1, 7, 6, 5, 4], 9: [0, 3, 2, 1, 7, 6, 5, 4, 8]}    # a facet seen from its other side
-_CORNERS = {3: 2, 6: 3, 8: 4, 9: 4}     # of a facet of so many nodes
+_FLIPPED = {6: [0, 2, 1, 5, 4, 3], 8: [0, 3, 2, 1, 7, 6, 5, 4], 9: [0, 3, 2, 1, 7, 6, 5, 4, 8]}  # a facet seen from its other side
+_CORNERS = {3: 2, 6: 3, 8: 4, 9: 4}  # of a facet of so many nodes
 
 Facets = dict[str, np.ndarray]
 """{meshio's name of a facet: nodes (f, k)}, seen counter-clockwise from outside."""
@@ -91,7 +91,7 @@ class SolidMesh:
     def _facets_where(self, name, rule):
         found = {}
         for kind, nodes in self.boundary.items():
-            middles = self.points[nodes[:, :_CORNERS[nodes.shape[1]]]].mean(axis=1)
+            middles = self.points[nodes[:, : _CORNERS[nodes.shape[1]]]].mean(axis=1)
             if (here := np.asarray(rule(middles), dtype=bool)).any():
                 found[kind] = nodes[here]
         if not found:
@@ -118,8 +118,12 @@ class SolidMesh:
         faces = {prefix + name: {kind: nodes + shift for kind, nodes in facets.items()} for name, facets in other.faces.items()}
         faces[prefix + "boundary"] = {kind: nodes + shift for kind, nodes in other.boundary.items()}
         cells = tuple((prefix + region, kind, nodes + shift) for region, kind, nodes in other.cells)
-        return replace(self, points=np.vstack([self.points, other.points]), cells=self.cells + cells,
-                       faces=self.faces | {name: face for name, face in faces.items() if name not in self.faces})
+        return replace(
+            self,
+            points=np.vstack([self.points, other.points]),
+            cells=self.cells + cells,
+            faces=self.faces | {name: face for name, face in faces.items() if name not in self.faces},
+        )
 
     def volume_mm3(self) -> float:
         """Volume of all elements in mm3."""
@@ -136,7 +140,8 @@ class SolidMesh:
         return volumes * (2 * np.pi * radius if self.axisymmetric else self.thickness_mm)
 
     def write(self, path: str | Path, point_data: Mapping[str, np.ndarray] | None = None) -> None:
-        """Write the mesh as VTU, its regions as the cells' `region` with their names in `field_data`-like order of the file's name."""
+        """Write the mesh as VTU, its regions as the cells' `region` with their names in `field_data`-like order of the file's
+        name."""
         from softtact.fem.mesh_files import write_mesh
 
         write_mesh(self, Path(path), point_data or {})
@@ -148,17 +153,19 @@ def _boundary(cells):
     for element, nodes in cells:
         for number, face in enumerate(element.faces):
             own = nodes[:, face.nodes]
-            if number == 0 and element.nodes.shape[1] == 3:     # a bottom is seen from inside
+            if number == 0 and element.nodes.shape[1] == 3:  # a bottom is seen from inside
                 own = own[:, _FLIPPED[own.shape[1]]]
             kinds.setdefault(face.element.meshio_name, []).append(own)
     facets = {kind: np.concatenate(own) for kind, own in kinds.items()}
     width = max(_CORNERS[own.shape[1]] for own in facets.values())
-    keys = [np.pad(np.sort(own[:, :_CORNERS[own.shape[1]]], axis=1), ((0, 0), (0, width - _CORNERS[own.shape[1]])), constant_values=-1)
-            for own in facets.values()]
+    keys = [
+        np.pad(np.sort(own[:, : _CORNERS[own.shape[1]]], axis=1), ((0, 0), (0, width - _CORNERS[own.shape[1]])), constant_values=-1)
+        for own in facets.values()
+    ]
     _, inverse, counts = np.unique(np.concatenate(keys), axis=0, return_inverse=True, return_counts=True)
     once, found, start = counts[inverse.ravel()] == 1, {}, 0
     for kind, own in facets.items():
-        single = once[start:start + len(own)]
+        single = once[start : start + len(own)]
         start += len(own)
         if single.any():
             found[kind] = own[single]

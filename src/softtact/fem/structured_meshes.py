@@ -8,9 +8,16 @@ from softtact.fem.elements import HEX27, QUAD9
 from softtact.fem.solid_mesh import SolidMesh
 
 
-
-def box(low: Sequence[float], high: Sequence[float], divisions: Sequence[int], *, region: str = "body", grading: Sequence | None = None,
-        geometry: str = "plane_strain", thickness_mm: float = 1.0) -> SolidMesh:
+def box(
+    low: Sequence[float],
+    high: Sequence[float],
+    divisions: Sequence[int],
+    *,
+    region: str = "body",
+    grading: Sequence | None = None,
+    geometry: str = "plane_strain",
+    thickness_mm: float = 1.0,
+) -> SolidMesh:
     """A box (three numbers each) of HEX27, or a rectangle (two numbers each) of QUAD9, with faces x0, x1, y0, y1 (, z0, z1).
 
     low, high: opposite corners in mm;  divisions: elements along each side;  grading: for each side None, or the elements' ends as
@@ -22,12 +29,13 @@ def box(low: Sequence[float], high: Sequence[float], divisions: Sequence[int], *
     sizes = [len(line) for line in lines]
     numbers = np.arange(len(grid)).reshape(sizes)
     element = HEX27 if d == 3 else QUAD9
-    offsets = (element.nodes + 1).round().astype(int)      # 0, 1, 2 along each side
+    offsets = (element.nodes + 1).round().astype(int)  # 0, 1, 2 along each side
     first = np.stack(np.meshgrid(*[2 * np.arange(n) for n in divisions], indexing="ij"), axis=-1).reshape(-1, 1, d)
     cells = numbers[tuple(np.moveaxis(first + offsets, -1, 0))]
     points = np.column_stack([grid, np.zeros((len(grid), 3 - d))])
-    mesh = SolidMesh(points, ((region, element.meshio_name, cells),), geometry="solid" if d == 3 else geometry,
-                     thickness_mm=thickness_mm)
+    mesh = SolidMesh(
+        points, ((region, element.meshio_name, cells),), geometry="solid" if d == 3 else geometry, thickness_mm=thickness_mm
+    )
     tolerance = 1e-9 * max(h - l for l, h in zip(low, high, strict=True))
     rules = {}
     for i, axis in enumerate("xyz"[:d]):
@@ -53,14 +61,16 @@ def square_to_disc(xy: np.ndarray) -> np.ndarray:
     return np.column_stack([x * np.sqrt(1 - 0.5 * y * y), y * np.sqrt(1 - 0.5 * x * x)])
 
 
-def cylinder(radius_mm: float, height_mm: float, divisions: tuple[int, int], *, region: str = "body",
-             grading: Sequence | None = None) -> SolidMesh:
+def cylinder(
+    radius_mm: float, height_mm: float, divisions: tuple[int, int], *, region: str = "body", grading: Sequence | None = None
+) -> SolidMesh:
     """A cylinder around z from z = 0 up, of HEX27, with the faces side, z0 and z1.
 
     divisions: elements across the diameter and along the height;  grading: of the height, see `box`
     """
-    mesh = box((-1, -1, 0), (1, 1, height_mm), (divisions[0], divisions[0], divisions[1]), region=region,
-               grading=(None, None, grading))
+    mesh = box(
+        (-1, -1, 0), (1, 1, height_mm), (divisions[0], divisions[0], divisions[1]), region=region, grading=(None, None, grading)
+    )
 
     def transform(points):
         return np.column_stack([radius_mm * square_to_disc(points[:, :2]), points[:, 2]])

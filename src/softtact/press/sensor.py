@@ -35,6 +35,7 @@ from softtact.press.many import press_many, raise_first
 from softtact.press.models import MOTIONS, PRESSES
 from softtact.press.placed_object import placed_object
 from softtact.press.result import PressResult
+from softtact.press.solid import SoftObject, press_soft
 from softtact.press.validity import flag_buried, flag_overloaded
 from softtact.sensors.library import material_file, sensor_file
 from softtact.sensors.specification import AnySpec, read_spec
@@ -80,13 +81,14 @@ class Sensor:
     attributes: dict = field(default_factory=dict)
     device: str = "cpu"
 
-    def press(self, mesh: trimesh.Trimesh | str | Path, *, unit: str | None = None,
+    def press(self, mesh: "trimesh.Trimesh | SoftObject | str | Path", *, unit: str | None = None,
               pose: Pose | np.ndarray | Sequence[float] | None = None, force_n: float | Sequence[float] | None = None,
               motion: Motion | None = None, model: str = "auto", policy: str = "error", tolerance_mm: float = TOLERANCE_MM,
               label: str = "press", threads: int | None = None, keep_body: bool = False, keep_object: bool = False,
               time_limit_s: float | None = None, on_step: Callable[[PressResult], None] | None = None) -> PressResult:
         """Press a mesh (trimesh in mm, or a file with its `unit`) through forces (N) or a `Motion`; return a `PressResult`.
 
+        mesh: a rigid object, or a `SoftObject`, for which sensor and object are solids that meet (model `solid`)
         force_n: one force, or an increasing list
 
         motion: steps down by force or to a depth, and aside, with friction where the sensor's `friction.object` states it; the
@@ -105,6 +107,9 @@ class Sensor:
         Raises ConvergenceError at a force that is not reached; its `result` holds the forces before, as those of a
         KeyboardInterrupt and of a TimeLimitError do.
         """
+        if isinstance(mesh, SoftObject):
+            return self._press_soft(mesh, pose, _motion_of(force_n, motion), model,
+                                    Course(label, threads or cores(), keep_body, time_limit_s, on_step))
         mesh, pose = _mesh_of(mesh, unit), Pose.of(pose)
         if model not in MODELS:
             raise InputError(f"Model {model!r} is unknown; use one of {', '.join(MODELS)}.")
@@ -124,6 +129,17 @@ class Sensor:
         except (ConvergenceError, KeyboardInterrupt) as error:
             error.result = _flagged_if_any(error, lambda result: stand(flag_buried(result, height)))     # type: ignore[union-attr]
             raise
+
+    def _press_soft(self, soft: SoftObject, pose: Any, motion: Motion, model: str, course: Course) -> PressResult:
+        """A press of a soft object by the solid model."""
+        if model not in ("auto", "solid"):
+            raise InputError(f"model={model!r}: a soft object is pressed by the solid model alone; use model='solid', or give a "
+                             "rigid mesh.")
+        if course.keep_body or course.time_limit_s is not None:
+            raise InputError("keep_body and time_limit_s are of the layered models; leave them out for a soft object.")
+        for load in (step.loads["z"] for step in motion.steps if step.loads.get("z", 0.0) < 0):
+            self.checked_forces(-load)
+        return press_soft(self, soft, None if pose is None else Pose.of(pose), motion, course)
 
     def _press_motion(self, placed: trimesh.Trimesh, motion: Motion, model: str, course: Course,
                       stand: Callable[[PressResult], PressResult]) -> PressResult:
@@ -228,6 +244,13 @@ def _flagged_if_any(error: BaseException, flag: Callable[[PressResult], PressRes
     """The result that an error holds of the steps before it, flagged; None where it holds none."""
     result = getattr(error, "result", None)
     return None if result is None else flag(result)
+
+
+def _motion_of(force_n: float | Sequence[float] | None, motion: Motion | None) -> Motion:
+    """The motion of a press, be it of forces (N) alone."""
+    if (motion is None) == (force_n is None):
+        raise InputError("A press takes either force_n or motion; give one of them.")
+    return motion if motion is not None else Motion().press(force_n=force_n)
 
 
 def _given(force_n: float | Sequence[float] | None, motion: Motion | None) -> float | Sequence[float]:

@@ -30,10 +30,10 @@ from softtact.progress import announce
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
 
-_PENALTY = 20.0          # times E / h of the softer of both surfaces
-_CELL_OF_LAYERS = 20     # elements along the shorter side of a sensor without frusta
+_PENALTY = 20.0  # times E / h of the softer of both surfaces
+_CELL_OF_LAYERS = 20  # elements along the shorter side of a sensor without frusta
 _HOLDER = "object"
-_ROOT_POINTS = 12        # along the diameter of a frustum's root, for its mean movement
+_ROOT_POINTS = 12  # along the diameter of a frustum's root, for its mean movement
 
 
 @dataclass(frozen=True)
@@ -55,8 +55,10 @@ class SoftObject:
 
     def __post_init__(self) -> None:
         if not 0 < self.held_share < 1:
-            raise InputError(f"SoftObject: held_share={self.held_share:g} leaves nothing to hold or nothing to press; give a share "
-                             "between 0 and 1.")
+            raise InputError(
+                f"SoftObject: held_share={self.held_share:g} leaves nothing to hold or nothing to press; give a share "
+                "between 0 and 1."
+            )
         if len(self.mesh.regions) != 1:
             raise InputError(f"SoftObject: its mesh has the regions {', '.join(self.mesh.regions)}; give a mesh of one region.")
 
@@ -71,7 +73,9 @@ class SoftObject:
         points = points + [0, 0, height_mm]
         low, high = points[:, 2].min(), points[:, 2].max()
         return self.mesh.moved(lambda _: points).with_faces(
-            held=lambda x: x[:, 2] > high - self.held_share * (high - low), pressed=lambda x: x[:, 2] <= high - self.held_share * (high - low))
+            held=lambda x: x[:, 2] > high - self.held_share * (high - low),
+            pressed=lambda x: x[:, 2] <= high - self.held_share * (high - low),
+        )
 
 
 def press_soft(sensor: "Sensor", soft: SoftObject, pose: Pose | None, motion: Motion, course: Course) -> PressResult:
@@ -97,12 +101,14 @@ def press_soft(sensor: "Sensor", soft: SoftObject, pose: Pose | None, motion: Mo
             steps.append(step)
             times.append(time.perf_counter())
             if course.label:
-                announce(f"{course.label}: step {len(steps)} of {len(motion.steps)}, {-step.loads[0, 2]:.4g} N, "
-                         f"{step.iterations} iterations, {times[-1] - start:.0f} s")
+                announce(
+                    f"{course.label}: step {len(steps)} of {len(motion.steps)}, {-step.loads[0, 2]:.4g} N, "
+                    f"{step.iterations} iterations, {times[-1] - start:.0f} s"
+                )
             if course.on_step and len(steps) < len(motion.steps):
                 course.on_step(result())
     except (ConvergenceError, KeyboardInterrupt) as error:
-        error.result = result() if steps else None     # type: ignore[union-attr]
+        error.result = result() if steps else None  # type: ignore[union-attr]
         raise
     return result()
 
@@ -111,8 +117,10 @@ def _refuse_missing(placed: SolidMesh, sensor: "Sensor") -> None:
     (x0, y0, _), (x1, y1, _) = placed.points.min(axis=0), placed.points.max(axis=0)
     half_x, half_y = (0.5 * side for side in sensor.spec.footprint_mm)
     if x0 > half_x or x1 < -half_x or y0 > half_y or y1 < -half_y:
-        raise InputError(f"The soft object misses the sensor: it spans x {x0:.4g} to {x1:.4g} mm and y {y0:.4g} to {y1:.4g} mm, and no "
-                         f"part of it is over the {2 * half_x:g} x {2 * half_y:g} mm footprint about the origin; correct its pose.")
+        raise InputError(
+            f"The soft object misses the sensor: it spans x {x0:.4g} to {x1:.4g} mm and y {y0:.4g} to {y1:.4g} mm, and no "
+            f"part of it is over the {2 * half_x:g} x {2 * half_y:g} mm footprint about the origin; correct its pose."
+        )
 
 
 class SolidPad:
@@ -140,7 +148,7 @@ class SolidPad:
         if self._frusta is None:
             size = min(self.sensor.spec.footprint_mm) / _CELL_OF_LAYERS
             return np.linspace(-side / 2, side / 2, max(4, round(side / size)) + 1)
-        count, pitch = self.sensor.spec.frusta_counts[axis], self._frusta.pitch_mm     # type: ignore[union-attr]
+        count, pitch = self.sensor.spec.frusta_counts[axis], self._frusta.pitch_mm  # type: ignore[union-attr]
         lattice = (np.arange(count + 1) - count / 2) * pitch
         rim = side / 2 - lattice[-1]
         return lattice if rim < 0.05 * pitch else np.concatenate([[-side / 2], lattice, [side / 2]])
@@ -164,16 +172,25 @@ class SolidPad:
         held = ({"shell": "xyz"} if held_to > 0 else {}) | ({"z0": "xyz"} if self._frusta is None and spec.base_held else {})
         top = placed.points[:, 2].max()
         middle = 0.5 * (placed.points.min(axis=0) + placed.points.max(axis=0))
-        body = SolidBody(mesh, laws, held=held, threads=threads,
-                         carried={_HOLDER: ((middle[0], middle[1], top), ["object held"], "xyz")})
+        body = SolidBody(
+            mesh, laws, held=held, threads=threads, carried={_HOLDER: ((middle[0], middle[1], top), ["object held"], "xyz")}
+        )
         if self._frusta is not None:
             body.springs.append(self._springs())
         pressed, surface = Surface.of(mesh.face("object pressed")), Surface.of(mesh.face("z1"))
         size = pressed.size_mm(body.points)
         softer = min(3 * soft.law.mu0, *(3 * law.mu0 for law in self.sensor.laws.values()))
         friction = max(soft.friction, getattr(spec.friction, "object", 0.0))
-        body.add_pair(ContactPair(surface, pressed, stiffness=_PENALTY * softer / size, reach_mm=min(2 * size, 0.5 * self.height_mm + size),
-                                  friction=friction, segments=True))
+        body.add_pair(
+            ContactPair(
+                surface,
+                pressed,
+                stiffness=_PENALTY * softer / size,
+                reach_mm=min(2 * size, 0.5 * self.height_mm + size),
+                friction=friction,
+                segments=True,
+            )
+        )
         return body
 
     def _springs(self) -> FrustumSprings:
@@ -182,9 +199,9 @@ class SolidPad:
         (faces,) = self.mesh.face("z0").values()
         corners = self.mesh.points[faces]
         low, high = corners.min(axis=1)[:, :2], corners.max(axis=1)[:, :2]
-        here = (np.abs(high - low - frusta.pitch_mm) < 1e-6 * frusta.pitch_mm).all(axis=1)     # type: ignore[union-attr]
+        here = (np.abs(high - low - frusta.pitch_mm) < 1e-6 * frusta.pitch_mm).all(axis=1)  # type: ignore[union-attr]
         faces, corners = faces[here], corners[here]
-        weights = _mean_over_disc(corners[0, :, :2], 0.5 * min(frusta.root_diameter_mm, frusta.pitch_mm))     # type: ignore[union-attr]
+        weights = _mean_over_disc(corners[0, :, :2], 0.5 * min(frusta.root_diameter_mm, frusta.pitch_mm))  # type: ignore[union-attr]
         law = self.sensor.prepared("foundation").law
         return FrustumSprings(faces, np.tile(weights, (len(faces), 1)), law)
 
@@ -192,7 +209,7 @@ class SolidPad:
         """The `PressResult` of load steps that took so many seconds (l,) each."""
         sampled = np.array([self._sampled(step.state.displacement) for step in steps])
         forces = np.array([step.loads[0] for step in steps])
-        pair, points = body.pairs[0], [step.state.histories[0].points for step in steps]
+        points = [step.state.histories[0].points for step in steps]
         contact = [step.state.contacts[0] for step in steps]
         area = [float(own.weight[state.pressure > 0].sum()) for own, state in zip(points, contact, strict=True)]
         touch = placed.points[:, 2].min() - self.height_mm
@@ -200,16 +217,24 @@ class SolidPad:
         springs = body.springs[0] if body.springs else None
         compression = [float(springs.compressions(step.state.displacement).max()) if springs else np.nan for step in steps]
         share = np.array([step.extrapolated_volume_fraction for step in steps])
-        valid = np.array([np.isnan(c) or c <= springs.limit_mm for c in compression]) if springs else np.ones(len(steps), bool)     # type: ignore[union-attr]
+        deepest = springs.limit_mm if springs else np.inf
+        valid = ~(np.array(compression) > deepest)
         numbers: dict[str, Any] = {
-            "displacement_mm": sampled, "force_n": forces[:, :3], "torque_nmm": self._torques(body, steps),
-            "pad_force_n": -forces[:, 2], "indentation_mm": down - touch, "contact_area_mm2": np.array(area),
-            "penetration_mm": np.array([step.penetration_mm for step in steps]), "frustum_compression_mm": np.array(compression),
-            "residual_n": np.array([step.residual_n for step in steps]), "extrapolated_volume_fraction": share,
-            "iterations": np.array([step.iterations for step in steps])}
-        assert pair is body.pairs[0]
-        return make_result(self.sensor, "solid", body.solver.name, -sampled[..., 2], -forces[:, 2], seconds, within_validity=valid,
-                           **numbers)
+            "displacement_mm": sampled,
+            "force_n": forces[:, :3],
+            "torque_nmm": self._torques(body, steps),
+            "pad_force_n": -forces[:, 2],
+            "indentation_mm": down - touch,
+            "contact_area_mm2": np.array(area),
+            "penetration_mm": np.array([step.penetration_mm for step in steps]),
+            "frustum_compression_mm": np.array(compression),
+            "residual_n": np.array([step.residual_n for step in steps]),
+            "extrapolated_volume_fraction": share,
+            "iterations": np.array([step.iterations for step in steps]),
+        }
+        return make_result(
+            self.sensor, "solid", body.solver.name, -sampled[..., 2], -forces[:, 2], seconds, within_validity=valid, **numbers
+        )
 
     def _torques(self, body, steps):
         """Torques (l, 3) about the origin of the sensor frame, at the middle of the sensing surface."""
@@ -261,7 +286,7 @@ def _mean_over_disc(corners: np.ndarray, radius: float) -> np.ndarray:
     middle, half = corners.mean(axis=0), 0.5 * np.ptp(corners, axis=0)
     step = (np.arange(_ROOT_POINTS) + 0.5) / _ROOT_POINTS
     angle = 2 * np.pi * (np.arange(4 * _ROOT_POINTS) + 0.5) / (4 * _ROOT_POINTS)
-    r, a = np.meshgrid(radius * np.sqrt(step), angle)     # rings of equal areas
+    r, a = np.meshgrid(radius * np.sqrt(step), angle)  # rings of equal areas
     local = np.column_stack([(r * np.cos(a)).ravel() / half[0], (r * np.sin(a)).ravel() / half[1]])
     # The face may be seen from below: its own coordinates follow from those of its nodes.
     own = np.rint((corners - middle) / half)

@@ -9,29 +9,32 @@ forces in N, pressures in MPa.
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
-from scipy.sparse.csgraph import connected_components
 
-from softtact.contact.pair import ContactPair, PairHistory, PairState
+from softtact.contact.pair import ContactPair
+from softtact.contact.pair_state import PairHistory, PairState
 from softtact.errors import InputError
 from softtact.fem.assembly import SymmetricPattern, add_upper
 from softtact.fem.kernels import add_forces
+from softtact.fem.solid_block import SolidBlock
 from softtact.fem.solid_mesh import SolidMesh
 from softtact.linalg.direct import make_solver
 from softtact.linalg.direct_single import point_at_mkl
 from softtact.linalg.workers import Workers, slices
 from softtact.materials.laws.base import Law
 from softtact.models.solid.blocks import region_blocks
+from softtact.models.solid.checks import refuse_loose
 from softtact.models.solid.frames import Frame, FramePose
 from softtact.models.solid.loads import FacePressure
 from softtact.models.solid.springs import FrustumSprings
 
-_CHUNK = 256         # elements whose dense tangents are in memory at once, for each thread
-_COUPLED, _MOST_COUPLED = 1e-6, 60     # relative error and iterations of GMRES
-_PROBE = 1e-7        # mm or radians, for derivatives by a frame's freedom
+_CHUNK = 256  # elements whose dense tangents are in memory at once, for each thread
+_COUPLED, _MOST_COUPLED = 1e-6, 60  # relative error and iterations of GMRES
+_PROBE = 1e-7  # mm or radians, for derivatives by a frame's freedom
 AXES = "xyz"
 
 
@@ -63,12 +66,20 @@ class SolidBody:
     """Meshed bodies with laws, held faces, frames, contacts and pressures.
 
     mesh: all soft bodies;  laws: by region;  held {face: axes such as "xyz"};  carried {frame: (reference point, faces[, axes])}:
-    faces that a rigid frame moves, along axes such as "z" alone;  rigid {frame: (reference point, triangles' corners (t, 3, 3))}: rigid objects on further nodes
+    faces that a rigid frame moves, along axes such as "z" alone;  rigid {frame: (reference point, triangles' corners (t, 3, 3))}:
+    rigid objects on further nodes
     """
 
-    def __init__(self, mesh: SolidMesh, laws: Mapping[str, Law], *, held: Mapping[str, str] | None = None,
-                 carried: Mapping[str, tuple] | None = None,
-                 rigid: Mapping[str, tuple[Sequence[float], np.ndarray]] | None = None, threads: int = 1) -> None:
+    def __init__(
+        self,
+        mesh: SolidMesh,
+        laws: Mapping[str, Law],
+        *,
+        held: Mapping[str, str] | None = None,
+        carried: Mapping[str, tuple] | None = None,
+        rigid: Mapping[str, tuple[Sequence[float], np.ndarray]] | None = None,
+        threads: int = 1,
+    ) -> None:
         self.mesh, self.laws = mesh, dict(laws)
         self.blocks = region_blocks(mesh, laws)
         self.workers = Workers(threads)
@@ -80,7 +91,7 @@ class SolidBody:
         self.pairs: list[ContactPair] = []
         self.pressures: list[FacePressure] = []
         self.springs: list[FrustumSprings] = []
-        self._refuse_loose(held or {})
+        refuse_loose(mesh, self.free_components, held or {})
         point_at_mkl()
         self.solver = make_solver(threads=threads)
         self._pattern: SymmetricPattern | None = None
@@ -100,25 +111,6 @@ class SolidBody:
             free[frame.carried] = False
         free[n:] = False
         return free
-
-    def _refuse_loose(self, held):
-        """A body that nothing holds has no balance."""
-        edges = [np.column_stack([nodes[:, :1].repeat(nodes.shape[1] - 1, axis=1).ravel(), nodes[:, 1:].ravel()])
-                 for _, nodes, _ in self.blocks]
-        pairs, n = np.concatenate(edges), len(self.mesh.points)
-        count, label = connected_components(sp.coo_matrix((np.ones(len(pairs)), pairs.T), shape=(n, n)), directed=False)
-        dimensions = 3 if self.mesh.geometry == "solid" else 2
-        used = np.zeros(n, bool)
-        for _, nodes, _ in self.blocks:
-            used[nodes.ravel()] = True
-        held_somewhere = np.zeros(count, bool)
-        np.logical_or.at(held_somewhere, label, used & ~self.free_components[:n, :dimensions].all(axis=1))
-        for k in np.flatnonzero(~held_somewhere):
-            own = (label == k) & used
-            if own.any():
-                x, y, z = self.mesh.points[own].mean(axis=0)
-                raise InputError(f"Nothing holds the body around {x:.4g}, {y:.4g}, {z:.4g} mm; hold one of its faces or let a frame "
-                                 f"carry it (held are {', '.join(held) or 'none'}).")
 
     def surface_nodes(self, frame: str) -> np.ndarray:
         """Facets (t, 3) of a rigid object, in nodes of this body."""
@@ -143,13 +135,22 @@ class SolidBody:
     def rest(self) -> SolidState:
         """The state without displacement."""
         histories = tuple(pair.first(self.points) for pair in self.pairs)
-        state = self.evaluate(np.zeros_like(self.points), tuple(FramePose() for _ in self.frames), histories,
-                              np.zeros(len(self.pressures)))
+        state = self.evaluate(
+            np.zeros_like(self.points), tuple(FramePose() for _ in self.frames), histories, np.zeros(len(self.pressures))
+        )
         assert state is not None
         return state
 
-    def evaluate(self, displacement: np.ndarray, poses: tuple[FramePose, ...], histories: tuple[PairHistory, ...],
-                 pressures: np.ndarray, before: SolidState | None = None, *, nearby: bool = False) -> SolidState | None:
+    def evaluate(
+        self,
+        displacement: np.ndarray,
+        poses: tuple[FramePose, ...],
+        histories: tuple[PairHistory, ...],
+        pressures: np.ndarray,
+        before: SolidState | None = None,
+        *,
+        nearby: bool = False,
+    ) -> SolidState | None:
         """`SolidState` with the frames' nodes where the poses (one a frame) put them; None where an element is inside out.
 
         before: the state that this one follows on, with the same histories;  nearby: see `ContactPair.evaluate`
@@ -186,14 +187,22 @@ class SolidBody:
         assert found is not None
         return found
 
-    def moved(self, state: SolidState, step: np.ndarray, ways: Sequence[np.ndarray], *,
-              pressures: np.ndarray | None = None, nearby: bool = False) -> SolidState | None:
+    def moved(
+        self,
+        state: SolidState,
+        step: np.ndarray,
+        ways: Sequence[np.ndarray],
+        *,
+        pressures: np.ndarray | None = None,
+        nearby: bool = False,
+    ) -> SolidState | None:
         """The state after a step (unknowns,) of the free displacements and ways (6,) of each frame."""
         displacement = state.displacement.copy()
         displacement.ravel()[self.free] += step
         poses = tuple(pose.moved(way) for pose, way in zip(state.poses, ways, strict=True))
-        return self.evaluate(displacement, poses, state.histories, state.pressures if pressures is None else pressures, state,
-                             nearby=nearby)
+        return self.evaluate(
+            displacement, poses, state.histories, state.pressures if pressures is None else pressures, state, nearby=nearby
+        )
 
     def residual(self, state: SolidState) -> np.ndarray:
         """Unbalanced forces (unknowns,) in N."""
@@ -204,8 +213,9 @@ class SolidBody:
 
         Of a rigid object that is its force on the bodies that it touches.
         """
-        return np.array([pose.loads(frame, self.points, state.force) for frame, pose in zip(self.frames, state.poses, strict=True)]
-                        ).reshape(-1, 6)
+        return np.array(
+            [pose.loads(frame, self.points, state.force) for frame, pose in zip(self.frames, state.poses, strict=True)]
+        ).reshape(-1, 6)
 
     def border(self, state: SolidState, frame: int, freedom: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of the residual (unknowns,) and of all frames' loads (frames, 6) along a way (6,) of a frame."""
@@ -214,8 +224,10 @@ class SolidBody:
         ways[frame] = freedom * (_PROBE / size)
         moved = self.moved(state, np.zeros(len(self.free)), ways, nearby=True)
         assert moved is not None
-        return ((self.residual(moved) - self.residual(state)) * (size / _PROBE),
-                (self.frame_loads(moved) - self.frame_loads(state)) * (size / _PROBE))
+        return (
+            (self.residual(moved) - self.residual(state)) * (size / _PROBE),
+            (self.frame_loads(moved) - self.frame_loads(state)) * (size / _PROBE),
+        )
 
     def loads_along(self, state: SolidState, step: np.ndarray) -> np.ndarray:
         """Derivative (frames, 6) of the frames' loads along a step (unknowns,) of the free displacements."""
@@ -229,7 +241,7 @@ class SolidBody:
         matrix = self.tangent(state)
         if self.solver.factor(matrix):
             return 0.0
-        matrix = self.tangent(state, turning=False)     # far from balance, pressed surfaces that turn may have no stiffness
+        matrix = self.tangent(state, turning=False)  # far from balance, pressed surfaces that turn may have no stiffness
         shift, diagonal = 0.0, matrix.indptr[:-1]
         while not self.solver.factor(matrix):
             more = max(3.0 * shift, 1e-4 * float(np.abs(matrix.data[diagonal]).mean()))
@@ -243,11 +255,13 @@ class SolidBody:
         Where friction slides, the tangent has a part beside the matrix: GMRES, with the factor as its preconditioner.
         """
         found = self.solver.solve(right)
-        if not any(pair.friction and (contact.slides & (contact.pressure > 0)).any()
-                   for pair, contact in zip(self.pairs, state.contacts, strict=True)):
+        if not any(
+            pair.friction and (contact.slides & (contact.pressure > 0)).any()
+            for pair, contact in zip(self.pairs, state.contacts, strict=True)
+        ):
             return found
 
-        def coupled(y):      # (matrix + coupling) matrix^-1 y
+        def coupled(y):  # (matrix + coupling) matrix^-1 y
             x, force = self.solver.solve(np.ascontiguousarray(y)), np.zeros_like(self.points)
             change = np.zeros(self.points.size)
             change[self.free] = x
@@ -267,24 +281,23 @@ class SolidBody:
         turning: with what pressures do as surfaces turn and bend, a part that may be negative
         """
         x = self.points + state.displacement
-        coupled = [pair.tangents(history, contact, x, turning=turning)
-                   for pair, history, contact in zip(self.pairs, state.histories, state.contacts, strict=True)]
+        coupled = [
+            pair.tangents(history, contact, x, turning=turning)
+            for pair, history, contact in zip(self.pairs, state.histories, state.contacts, strict=True)
+        ]
         coupled.append([face.tangents(x, float(p)) for face, p in zip(self.pressures, state.pressures, strict=True) if p])
         coupled.append([springs.tangents(state.displacement) for springs in self.springs])
         matrix = self._matrix_for([part for parts in coupled for part in parts])
         self._add_blocks(matrix.data, state.displacement)
         for nodes, matrices in (part for parts in coupled for part in parts):
-            add_upper(matrix.data, matrices, self._pattern.positions(nodes))     # type: ignore[union-attr]
+            add_upper(matrix.data, matrices, self._pattern.positions(nodes))  # type: ignore[union-attr]
         return matrix
 
     def _add_blocks(self, values, displacement):
-        def tangents(part):
-            return block.tangent(displacement[nodes[part]], part)
-
         for (_, nodes, block), positions in zip(self.blocks, self._positions, strict=True):
-            parts = slices(len(nodes), _CHUNK)
-            for start in range(0, len(parts), self.workers.threads):      # in turns, so that few are in memory at once
-                several = parts[start:start + self.workers.threads]
+            tangents, parts = partial(_tangents, block, nodes, displacement), slices(len(nodes), _CHUNK)
+            for start in range(0, len(parts), self.workers.threads):  # in turns, so that few are in memory at once
+                several = parts[start : start + self.workers.threads]
                 for part, matrices in zip(several, self.workers.map(tangents, several), strict=True):
                     add_upper(values, matrices, positions[part])
 
@@ -301,6 +314,11 @@ class SolidBody:
         return self._matrix
 
 
+def _tangents(block: SolidBlock, nodes: np.ndarray, displacement: np.ndarray, part: slice) -> np.ndarray:
+    """Tangents of some of a block's elements."""
+    return block.tangent(displacement[nodes[part]], part)
+
+
 def _with_rigid(mesh, carried, rigid):
     """All nodes (n, 3), the frames, and the facets (t, 3) of each rigid object."""
     points, frames, surfaces = [mesh.points], [], {}
@@ -315,5 +333,3 @@ def _with_rigid(mesh, carried, rigid):
         points.append(corners)
         start += len(corners)
     return np.ascontiguousarray(np.vstack(points)), frames, surfaces
-
-

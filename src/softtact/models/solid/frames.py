@@ -1,6 +1,7 @@
 """Rigid frames: what carries an object, or the held side of a soft one, through its six freedoms."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -12,7 +13,8 @@ from softtact.contact.motion import FREEDOMS
 class Frame:
     """A rigid frame and the nodes that it carries.
 
-    name: by which steps drive it;  point (3,): its reference point at rest in mm, about which it turns;  nodes (k,): what it carries
+    name: by which steps drive it;  point (3,): its reference point at rest in mm, about which it turns;  nodes (k,): what it
+    carries
     axes: along which it carries them: with "z" alone they slide on a smooth plate
     """
 
@@ -22,9 +24,9 @@ class Frame:
     axes: str = "xyz"
 
     @property
-    def carried(self) -> tuple[np.ndarray, ...]:
+    def carried(self) -> Any:
         """Index of the carried components in an array (n, 3)."""
-        return np.ix_(self.nodes, ["xyz".index(axis) for axis in self.axes])
+        return np.ix_(self.nodes, np.array(["xyz".index(axis) for axis in self.axes]))
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,10 @@ class FramePose:
 
     def loads(self, frame: Frame, points: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Force (N) and torque (N mm) about the reference point (6,) of nodal forces (n, 3) on the frame's nodes."""
-        own, arm = force[frame.nodes] * [axis in frame.axes for axis in "xyz"], (points[frame.nodes] - frame.point) @ self.rotation.T
+        own, arm = (
+            force[frame.nodes] * [axis in frame.axes for axis in "xyz"],
+            (points[frame.nodes] - frame.point) @ self.rotation.T,
+        )
         return np.concatenate([own.sum(axis=0), np.cross(arm, own).sum(axis=0)])
 
 

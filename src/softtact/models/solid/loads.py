@@ -25,8 +25,11 @@ class FacePressure:
         slopes = self._points.slopes
         corners = self.at_rest[self._points.nodes]
         along = np.einsum("pda,pai->pdi", slopes, corners)
-        size = np.linalg.norm(along[:, 0], axis=1) if self.surface.is_line else np.linalg.norm(
-            np.cross(along[:, 0], along[:, 1]), axis=1)
+        size = (
+            np.linalg.norm(along[:, 0], axis=1)
+            if self.surface.is_line
+            else np.linalg.norm(np.cross(along[:, 0], along[:, 1]), axis=1)
+        )
         self._share = self._points.weight / size
 
     def _tangents(self, x):
@@ -43,7 +46,8 @@ class FacePressure:
         return 2 * np.pi * radius if self.axisymmetric else np.full(len(self._share), self.thickness_mm)
 
     def add_force(self, x: np.ndarray, pressure: float, force: np.ndarray) -> float:
-        """Add to nodal forces (n, 3) in N what stands against the pressure (MPa), nodes at x (n, 3); returns its magnitude's sum."""
+        """Add to nodal forces (n, 3) in N what stands against the pressure (MPa), nodes at x (n, 3); returns its magnitude's
+        sum."""
         along = self._tangents(x)
         push = pressure * (self._share * self._thickness(x))[:, None] * np.cross(along[:, 0], along[:, 1])
         np.add.at(force, self._points.nodes, self._points.values[..., None] * push[:, None])
@@ -58,7 +62,7 @@ class FacePressure:
             d2 = 0 * d2
         # d(a1 x a2) = da1 x a2 + a1 x da2
         spin1, spin2 = -_spin(along[:, 1]), _spin(along[:, 0])
-        turn = d1[:, :, None, None] * spin1[:, None] + d2[:, :, None, None] * spin2[:, None]        # (p, b, i, j)
+        turn = d1[:, :, None, None] * spin1[:, None] + d2[:, :, None, None] * spin2[:, None]  # (p, b, i, j)
         matrix = scale[:, None, None, None, None] * N[:, :, None, None, None] * turn[:, None]
         if self.surface.is_line and self.axisymmetric:
             normal = pressure * (self._share * 2 * np.pi)[:, None] * np.cross(along[:, 0], along[:, 1])

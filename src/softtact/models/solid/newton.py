@@ -9,8 +9,8 @@ from softtact.errors import ConvergenceError
 from softtact.models.newton import Solution, lowers_potential, solve
 from softtact.models.solid.body import SolidBody, SolidState
 
-_SMALL = 1 / 16      # share of a step
-_REMEMBERED = 4      # residuals that a step with friction may not exceed (Grippo, Lampariello and Lucidi, 1986)
+_SMALL = 1 / 16  # share of a step
+_REMEMBERED = 4  # residuals that a step with friction may not exceed (Grippo, Lampariello and Lucidi, 1986)
 
 
 @dataclass(frozen=True)
@@ -93,16 +93,21 @@ class _Balance:
         found = body.solve(state, np.column_stack([residual, *columns]))
         step = -found[:, 0]
         if unknown:
-            # The loads' derivatives by the displacements: the columns once more where the tangent is symmetric, as without friction.
+            # The loads' derivatives by the displacements: the columns once more where the tangent is symmetric, as without
+            # friction.
             rubs = any(pair.friction for pair in body.pairs)
-            rows = np.array([body.loads_along(state, x) for x in found.T]) if rubs else None
-            felt = np.array([[loads[other] for other in unknown] for loads in rows]).T if rubs else np.column_stack(columns).T @ found
+            felt = self._felt(state, found) if rubs else np.column_stack(columns).T @ found
             schur = corner - felt[:, 1:]
             amount = np.linalg.solve(schur if rubs else _definite(0.5 * (schur + schur.T)), -off + felt[:, 0])
             step = step - found[:, 1:] @ amount
             for (frame, freedom), value in zip(unknown, amount, strict=True):
                 ways[frame][freedom] += value
         return state, (step, ways, pressures)
+
+    def _felt(self, state: SolidState, steps: np.ndarray) -> np.ndarray:
+        """Derivatives (unknown, k) of the loaded freedoms' loads along steps (unknowns, k) of the free displacements."""
+        loads = [self.body.loads_along(state, step) for step in steps.T]
+        return np.array([[own[other] for other in self.target.unknown] for own in loads]).T
 
     def _predicted(self, state, residual, off, ways):
         """What is out of balance after the prescribed ways and pressures, to first order; the ways are added to `ways`."""
@@ -138,14 +143,15 @@ class _Balance:
         if self.pending:
             return True
         smaller = self.residual(trial) < residual
-        if np.any(state.pressures):     # their work is no function of the places where the surface is open
+        if np.any(state.pressures):  # their work is no function of the places where the surface is open
             return smaller
         lower = lowers_potential(state.energy, trial.energy - self._work(state, trial), abs(state.energy) + self.body.energy_noise)
         if any(pair.friction for pair in self.body.pairs):
-            # It has no potential. A step is to be no worse than the last ones, or small: points that begin to slide stand in the way
+            # It has no potential. A step is to be no worse than the last ones, or small: points that begin to slide stand in the
+            # way
             # of every larger one.
             return self.residual(trial) < max([*self.before, residual]) * (2.0 if self.share <= _SMALL else 1.0)
-        return smaller if lower is None else lower     # a residual alone may fall and rise in turns where points touch and leave
+        return smaller if lower is None else lower  # a residual alone may fall and rise in turns where points touch and leave
 
     def _work(self, before: SolidState, after: SolidState) -> float:
         """Work in mJ of the loads of the frames' loaded freedoms on a step's way; rotations by their small angles."""
@@ -203,11 +209,20 @@ def balance(body: SolidBody, start: SolidState, target: Target, settings: SolidS
         if found.state is None:
             raise ConvergenceError(f"{found.residual_n:.3g} N are left unbalanced after {found.iterations} iterations.")
         state, pending = found.state, False
-        if all(pair.settled(history, contact, settings.penetration_mm)
-               for pair, history, contact in zip(body.pairs, state.histories, state.contacts, strict=True)):
+        if all(
+            pair.settled(history, contact, settings.penetration_mm)
+            for pair, history, contact in zip(body.pairs, state.histories, state.contacts, strict=True)
+        ):
             return state, iterations, found.residual_n
-        state = body.again(state, tuple(pair.augmented(history, contact) for pair, history, contact
-                                        in zip(body.pairs, state.histories, state.contacts, strict=True)))
-    worst = max(pair.overlap_mm(history, contact) for pair, history, contact in zip(body.pairs, state.histories, state.contacts, strict=True))
+        state = body.again(
+            state,
+            tuple(
+                pair.augmented(history, contact)
+                for pair, history, contact in zip(body.pairs, state.histories, state.contacts, strict=True)
+            ),
+        )
+    worst = max(
+        pair.overlap_mm(history, contact)
+        for pair, history, contact in zip(body.pairs, state.histories, state.contacts, strict=True)
+    )
     raise ConvergenceError(f"The surfaces still overlap by {worst * 1000:.3g} um after {settings.max_augmentations} augmentations.")
-

@@ -13,8 +13,8 @@ from softtact.models.solid.body import SolidBody, SolidState
 from softtact.models.solid.frames import step_vector
 from softtact.models.solid.newton import SolidSettings, Target, balance
 
-_OVERLAP_MM = 1e-3     # by how much a loaded object is let into the surface before its load acts, so that something stands against it
-_FAST = 8              # iterations of an increment up to which the next one may be larger
+_OVERLAP_MM = 1e-3  # by how much a loaded object is let into the surface before its load acts, so that something stands against it
+_FAST = 8  # iterations of an increment up to which the next one may be larger
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,9 @@ class SolidPath:
                 raise InputError(f"There is no {kind} {unknown[0]!r}; there are {', '.join(known) or 'none'}.")
         counts = {len(motion.steps) for motion in self.motions.values()} | {len(values) for values in self.pressures.values()}
         if len(counts) != 1:
-            raise InputError(f"Motions and pressures have {' and '.join(map(str, sorted(counts))) or 'no'} steps; give all as many.")
+            raise InputError(
+                f"Motions and pressures have {' and '.join(map(str, sorted(counts))) or 'no'} steps; give all as many."
+            )
         self.steps = counts.pop()
 
     def run(self, start: SolidState | None = None) -> Iterator[SolidLoadStep]:
@@ -88,8 +90,9 @@ class SolidPath:
             try:
                 state, counts, residual, done, lost = self._step(state, steps, values)
             except ConvergenceError as error:
-                raise ConvergenceError(f"Step {number + 1} of {self.steps} was not reached: {error} Use smaller steps or a finer mesh "
-                                       "where it folds.") from None
+                raise ConvergenceError(
+                    f"Step {number + 1} of {self.steps} was not reached: {error} Use smaller steps or a finer mesh where it folds."
+                ) from None
             work, dissipated = work + done, dissipated + lost
             yield self._described(state, counts, residual, work, dissipated, time.perf_counter() - began)
 
@@ -120,8 +123,13 @@ class SolidPath:
     def _begun(self, state):
         """The state as an increment begins: anchors of friction, and the points of surfaces that were cut along each other."""
         x = self.body.points + state.displacement
-        return self.body.again(state, tuple(pair.begin_step(history, contact, x, self.body.points) for pair, history, contact
-                                            in zip(self.body.pairs, state.histories, state.contacts, strict=True)))
+        return self.body.again(
+            state,
+            tuple(
+                pair.begin_step(history, contact, x, self.body.points)
+                for pair, history, contact in zip(self.body.pairs, state.histories, state.contacts, strict=True)
+            ),
+        )
 
     def _target(self, first, steps, pressures, share, size):
         loads_before, pressures_before = first
@@ -130,8 +138,12 @@ class SolidPath:
             step = steps.get(frame.name, MotionStep())
             ways.append(size * step_vector(step.ways))
             own = {FREEDOMS.index(name): value for name, value in step.loads.items()}
-            loads.append({freedom: loads_before[k, freedom] + (share + size) * (value - loads_before[k, freedom])
-                          for freedom, value in own.items()})
+            loads.append(
+                {
+                    freedom: loads_before[k, freedom] + (share + size) * (value - loads_before[k, freedom])
+                    for freedom, value in own.items()
+                }
+            )
         return Target(ways, loads, pressures_before + (share + size) * (pressures - pressures_before))
 
     def _energies(self, before, after):
@@ -164,8 +176,9 @@ class SolidPath:
             if gap <= -0.5 * _OVERLAP_MM:
                 return state
             if not np.isfinite(gap):
-                raise InputError("The loaded object is out of reach of the surface that it is to touch; place it nearer, or correct "
-                                 "its pose.")
+                raise InputError(
+                    "The loaded object is out of reach of the surface that it is to touch; place it nearer, or correct its pose."
+                )
             moved = self.body.moved(state, np.zeros(len(self.body.free)), [way * (gap + _OVERLAP_MM) for way in ways])
             assert moved is not None
             state = self._begun(moved)
@@ -181,9 +194,20 @@ class SolidPath:
             if block.law.stretch_window is not None:
                 outside = block.volume_outside(state.displacement[nodes], block.law.stretch_window) / block.volume
                 share = np.nanmax([share, outside])
-        return SolidLoadStep(state, self.body.frame_loads(state), counts[0], counts[1], residual,
-                             max((contact.penetration_mm() for contact in state.contacts), default=0.0), (float(least), float(largest)),
-                             (low, high), float(share), dissipated, work, seconds)
+        return SolidLoadStep(
+            state,
+            self.body.frame_loads(state),
+            counts[0],
+            counts[1],
+            residual,
+            max((contact.penetration_mm() for contact in state.contacts), default=0.0),
+            (float(least), float(largest)),
+            (low, high),
+            float(share),
+            dissipated,
+            work,
+            seconds,
+        )
 
 
 def _still_loaded(before: MotionStep | None, step: MotionStep) -> MotionStep:
@@ -194,9 +218,7 @@ def _still_loaded(before: MotionStep | None, step: MotionStep) -> MotionStep:
 
 def last(steps: Iterator[SolidLoadStep]) -> SolidLoadStep:
     """The last of some load steps."""
-    found = None
-    for found in steps:
-        pass
-    if found is None:
+    reached = list(steps)
+    if not reached:
         raise InputError("There is no step.")
-    return found
+    return reached[-1]

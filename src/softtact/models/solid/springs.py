@@ -12,7 +12,7 @@ from scipy.interpolate import PchipInterpolator
 if TYPE_CHECKING:
     from softtact.models.foundation.frustum_spring import FrustumLaw
 
-_LIFTED = 1e-4      # of the first slope: what a lifted frustum still pulls, so that nothing is loose
+_LIFTED = 1e-4  # of the first slope: what a lifted frustum still pulls, so that nothing is loose
 
 
 class FrustumSprings:
@@ -40,7 +40,8 @@ class FrustumSprings:
         return force, slope, energy
 
     def add_force(self, displacement: np.ndarray, force: np.ndarray) -> tuple[float, float]:
-        """Add to nodal forces (n, 3) in N what stands against the springs; returns their energy (mJ) and the sum of their forces."""
+        """Add to nodal forces (n, 3) in N what stands against the springs; returns their energy (mJ) and the sum of their
+        forces."""
         push, _, energy = self._response(self.compressions(displacement))
         sideways = np.einsum("km,kmi->ki", self.weights, displacement[self.nodes][..., :2])
         along = np.column_stack([self._sideways * sideways, -push])

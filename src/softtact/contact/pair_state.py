@@ -1,0 +1,56 @@
+"""What a pair of surfaces in contact has at given places of all nodes, and what it remembers."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from softtact.contact.surface_kernels import Projection
+from softtact.contact.surfaces import SurfacePoints
+
+
+@dataclass(frozen=True)
+class PairHistory:
+    """What a pair remembers at a state: it belongs to the state, so that a body pressed twice gives the same."""
+
+    points: SurfacePoints
+    """The points of contact."""
+    offset: np.ndarray
+    """(p,) in mm, of the augmented penalty."""
+    traction: np.ndarray
+    """(p, 3) in MPa: friction on the points' surface when the step began."""
+    anchor: Projection
+    """Where the points were on the other surface when the step began."""
+    start: np.ndarray
+    """(p, 3) in mm: by how much the anchors lay beside the points' feet when the step began; 0 but at a surface's end."""
+    slid: np.ndarray
+    """(p,) in mm: ways that the points slid on the other surface, up to the step's beginning."""
+    stiffness: float
+    """Penalty in N/mm3: the pair's, or larger where its augmentations came to a stand."""
+    overlap_mm: float = np.inf
+    """Deepest overlap at the last augmentation."""
+
+
+@dataclass(frozen=True)
+class PairState:
+    """A pair's contact at given places of all nodes."""
+
+    projection: Projection
+    """The points' closest places."""
+    pressure: np.ndarray
+    """(p,) in MPa per area at rest, positive in compression."""
+    slope: np.ndarray
+    """(p,) in N/mm3."""
+    friction: np.ndarray
+    """(p, 3) in MPa: friction on the points' surface."""
+    stiffness: np.ndarray
+    """(p, 3, 3) in N/mm3: how friction stands against slip."""
+    slip: np.ndarray
+    """(p, 3) in mm: way of the points on the other surface within the step."""
+    slides: np.ndarray
+    """(p,) whether friction is at its bound."""
+    energy: float
+    """Energy in mJ of the penalties."""
+
+    def penetration_mm(self) -> float:
+        """Deepest overlap (mm)."""
+        return float(max(0.0, -np.min(self.projection.gap, initial=0.0)))
