@@ -3,15 +3,16 @@
 Elements on the same hexahedral grids, each hexahedron cut into six tetrahedra where the element is one:
   tet10    quadratic, four points, J at every point: a plain displacement element
   tet10p0  quadratic, four points, J projected on a constant in each element
-  tet15    quadratic with a bubble on each face and one inside, J projected on linear functions (Crouzeix and Raviart, 1973, in space)
+  tet15    quadratic with a bubble on each face and one inside, J projected on linear functions (after Crouzeix
+           and Raviart, 1973)
   hex27    27 nodes, J projected on linear functions
 All at nu = 0.4995:
   cook     Cook's membrane in plane strain: displacement of the upper corner
   bonded   a square block bonded to plates, as high as a quarter of its half side: force at small strain, and how far the pressure
            at the quadrature points strays from the smooth pressure of the reference, in the middle, over the greatest pressure
 References: the limit that two programs' elements agree on (cook, docs/reference/verification.md); hex27 on a finer grid (bonded).
-Time: processor seconds of one tangent, its factor and its solution, the shortest of three. Writes benchmarks/results/solid_elements.json
-and the table in docs/explanation/solid.md.
+Time: processor seconds of one tangent, its factor and its solution, the shortest of three. Writes
+benchmarks/results/solid_elements.json and the table in docs/explanation/solid.md.
 """
 
 import argparse
@@ -142,7 +143,8 @@ def cook(kind, cells):
     mesh = box((0, 0, 0), (1, 1, 1 / cells), (cells, cells, 1)).moved(
         lambda x: np.column_stack([48 * x[:, 0], 44 * x[:, 0] + x[:, 1] * (44 - 28 * x[:, 0]), 44 * x[:, 2]]))
     body = Body(mesh, kind)
-    body.use(body.held_where((lambda x: x[:, 0] < 1e-9, [0, 1, 2]), (lambda x: (x[:, 2] < 1e-9) | (x[:, 2] > 44 / cells - 1e-9), [2])))
+    body.use(body.held_where((lambda x: x[:, 0] < 1e-9, [0, 1, 2]),
+                             (lambda x: (x[:, 2] < 1e-9) | (x[:, 2] > 44 / cells - 1e-9), [2])))
     load = np.zeros_like(body.points)
     for facets in body.mesh.faces["x1"].values():
         _add_traction(body, facets, load)
@@ -195,7 +197,8 @@ def bonded(kind, cells, layers, reference=None):
     functions = np.column_stack([x**i * y**j for i in range(4) for j in range(4 - i)])
     row = {"force": load, "unknowns": len(body.free), "seconds": seconds}
     if reference is None:
-        return row | {"fit": np.linalg.lstsq(functions, pressure[middle], rcond=None)[0].tolist(), "peak": float(pressure[middle].max())}
+        fit = np.linalg.lstsq(functions, pressure[middle], rcond=None)[0]
+        return row | {"fit": fit.tolist(), "peak": float(pressure[middle].max())}
     stray = np.sqrt(np.mean((pressure[middle] - functions @ np.array(reference["fit"])) ** 2)) / reference["peak"]
     return row | {"error": 100 * (load / reference["force"] - 1), "pressure": 100 * float(stray)}
 

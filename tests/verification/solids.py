@@ -75,5 +75,6 @@ def disc_in_cylinder(radius, far, disc_shares, *, depth_shares, ring_shares):
 
         mesh = mesh.joined(ring.moved(to_ring), prefix="")
     mesh = merged(mesh)
-    return mesh.with_faces(disc=lambda x: (x[:, 2] > -1e-9) & (np.hypot(x[:, 0], x[:, 1]) < radius), z0=lambda x: x[:, 2] < -far + 1e-9,
+    return mesh.with_faces(disc=lambda x: (x[:, 2] > -1e-9) & (np.hypot(x[:, 0], x[:, 1]) < radius),
+                           z0=lambda x: x[:, 2] < -far + 1e-9,
                            side=lambda x: (np.hypot(x[:, 0], x[:, 1]) > 0.6 * far) & (x[:, 2] < -1e-9) & (x[:, 2] > -far + 1e-9))

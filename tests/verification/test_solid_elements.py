@@ -18,6 +18,7 @@ from softtact.models.solid.newton import SolidSettings
 from softtact.models.solid.path import SolidPath, last
 
 TIGHT = SolidSettings(relative_residual=1e-7, penetration_mm=1e-7, max_augmentations=30)
+UNTURNED = np.eye(3)
 RUBBER = make_law("mooney_rivlin", {"c10": 0.08, "c01": 0.03}, bulk_over_shear=20)
 
 
@@ -40,9 +41,9 @@ def cooks_membrane(cells, law, kind):
     return moved[np.argmin(np.abs(body.points - [48, 60, 0]).sum(axis=1)), 1] * (1 if kind == "quad9" else 44 / cells)
 
 
-@pytest.mark.parametrize(("kind", "cells", "allowed"), [("quad9", 16, 0.015), ("hexahedron27", 8, 0.025), ("tetra10", 8, 0.05)])
+@pytest.mark.parametrize(("kind", "cells", "allowed"), [("quad9", 16, 0.015), ("hexahedron27", 8, 0.015), ("tetra10", 8, 0.01)])
 def test_cooks_membrane_at_nu_4995_does_not_lock(kind, cells, allowed, record):
-    """Allowed: what the corner singularity leaves on so few elements; a plain quadratic element of 8 cells is 12 % too stiff."""
+    """Allowed: what the corner singularity leaves on so few elements; a plain quadratic tetrahedron of 8 cells is 6 % too stiff."""
     expected, source = 19.4441, "limit of the displacement element (see Bodies of one material)"
     got = cooks_membrane(cells, elastic(1.0, 0.4995), kind)
     assert record(f"Cook's membrane, nu = 0.4995, {cells} x {cells} {kind}", expected=expected, source=source, got=got) < allowed
@@ -70,7 +71,8 @@ def test_an_axisymmetric_bonded_disc_is_stiffened_as_gent_and_lindley_say(shape,
     body = SolidBody(mesh, {"body": elastic(1.0, 0.5 - 1e-7)}, held={"x0": "x", "y0": "y"}, carried={"plate": ((0, 0, 0), ["y1"])})
     strain = 1e-5
     # With K = 2e6 E the balance's rounding is 1e-5 of the load.
-    step = last(SolidPath(body, {"plate": Motion().step(ways={"y": -strain * half})}, settings=SolidSettings(relative_residual=1e-4)).run())
+    settings = SolidSettings(relative_residual=1e-4)
+    step = last(SolidPath(body, {"plate": Motion().step(ways={"y": -strain * half})}, settings=settings).run())
     got = -step.loads[0, 1] / (np.pi * strain)
     error = record(f"axisymmetric bonded disc, S = {shape:g}: apparent modulus", expected=expected, source=source, got=got)
     assert got < expected and error < 0.1 / shape + 0.002      # 0.002: K is not infinite
@@ -87,7 +89,7 @@ def test_a_tube_of_mooney_rivlin_swells_under_pressure_as_the_closed_form_says(r
             return mu * (l2 - 1 / l2) * R / (R * R + c)
         return quad(per_radius, inner, outer)[0]
 
-    expected, source = inner * (stretch - 1), "closed form, incompressible Mooney-Rivlin; Ogden, Non-Linear Elastic Deformations, 5.3"
+    expected, source = inner * (stretch - 1), "closed form; Ogden, Non-Linear Elastic Deformations, sec. 5.3"
     mesh = box((inner, 0), (outer, 0.5), (8, 1), geometry="axisymmetric")
     law = make_law("mooney_rivlin", {"c10": 0.08, "c01": 0.03}, bulk_over_shear=1e5)
     body = SolidBody(mesh, {"body": law}, held={"y0": "y", "y1": "y"})
@@ -100,12 +102,12 @@ def test_a_tube_of_mooney_rivlin_swells_under_pressure_as_the_closed_form_says(r
 
 
 def two_blocks(geometry):
-    """A block on a softer, wider one, without friction; faces follow x and y in plane strain and in the slice of 3-D."""
+    """A block on another one, without friction, in plane strain or as a slice of a spatial body."""
     high = (0.1,) if geometry == "solid" else ()
     low, cells = (0.0,) * len(high), (1,) * len(high)
     options = {} if high else {"geometry": geometry, "thickness_mm": 0.1}
     lower = box((0, 0, *low), (2, 1, *high), (5, 3, *cells), region="lower", **options)
-    upper = box((0.5, 1, *low), (1.5, 1.6, *high), (3, 2, *cells), **options)
+    upper = box((0, 1, *low), (2, 1.6, *high), (4, 2, *cells), **options)
     mesh = lower.joined(upper, prefix="upper ")
     sides = {"z0": "z", "z1": "z", "upper z0": "z", "upper z1": "z"} if high else {}
     body = SolidBody(mesh, {"lower": RUBBER, "upper body": RUBBER}, held={"y0": "xyz"[:2 + len(high)], **sides},
@@ -117,15 +119,16 @@ def two_blocks(geometry):
 
 def test_plane_strain_is_a_slice_of_a_spatial_body(record):
     """Both have the same functions in the plane, so that what differs is rounding and the balance's tolerance."""
-    motion = {"top": Motion().step(ways={"x": 0.03, "y": -0.15, "rz": 2.0})}
-    flat, solid = (last(SolidPath(two_blocks(geometry), motion, settings=TIGHT).run()).loads[0] for geometry in ("plane_strain", "solid"))
+    motion = {"top": Motion().step(ways={"y": -0.1, "rz": 0.5})}
+    flat, solid = (last(SolidPath(two_blocks(geometry), motion, settings=TIGHT).run()).loads[0]
+                   for geometry in ("plane_strain", "solid"))
     for freedom, name in ((1, "force down, N"), (5, "torque, N mm")):
         expected, source = solid[freedom], "slice of hexahedra between smooth plates"
         assert record(f"plane strain: {name}", expected=expected, source=source, got=flat[freedom]) < 1e-5
 
 
-def leaning_blocks(turn=np.eye(3), mirror=False, friction=0.0):
-    """A block pressed on another and aside, all turned by `turn` or mirrored at x = 0; loads (6,) of the upper frame, turned back."""
+def leaning_blocks(turn=UNTURNED, mirror=False, friction=0.0):
+    """Loads (6,), turned back, of a block pressed on another and aside, all turned by `turn` or mirrored at x = 0."""
     lower, upper = box((0, 0, 0), (2, 2, 1), (2, 2, 1), region="lower"), box((0.4, 0.3, 1), (1.6, 1.7, 1.8), (2, 1, 1))
     mesh = lower.joined(upper, prefix="upper ")
     mesh = (mirrored(mesh, 0) if mirror else mesh).moved(lambda x: x @ turn.T)
@@ -139,7 +142,7 @@ def leaning_blocks(turn=np.eye(3), mirror=False, friction=0.0):
     return np.concatenate([step.loads[0, :3] @ turn, step.loads[0, 3:] @ turn])
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("friction", [0.0, pytest.param(0.3, marks=pytest.mark.slow)])
 def test_a_turned_and_a_mirrored_set_up_give_the_turned_and_mirrored_loads(friction, record):
     source = "invariance"
     first = leaning_blocks(friction=friction)
@@ -153,42 +156,46 @@ def test_a_turned_and_a_mirrored_set_up_give_the_turned_and_mirrored_loads(frict
                       source=source, got=got) < (1e-4)
 
 
-@pytest.mark.parametrize("friction", [0.0, pytest.param(0.3, marks=pytest.mark.xfail(
-    strict=True, reason="friction of the step before keeps its direction in space where the bodies turn"))])
+@pytest.mark.parametrize("friction", [0.0, pytest.param(0.3, marks=[pytest.mark.slow, pytest.mark.xfail(
+    strict=True, reason="friction of the step before keeps its direction in space where the bodies turn")])])
 def test_bodies_in_contact_that_turn_together_keep_their_loads(friction, record):
-    """Frame indifference: both held faces turn by 90 degrees after the press, in three steps; pressure and friction go with them."""
-    lower, upper = box((0, 0, 0), (1, 1, 0.5), (2, 2, 1), region="lower"), box((0.2, 0.2, 0.5), (0.8, 0.8, 1), (2, 2, 1))
+    """Frame indifference: both held faces turn by 30 degrees after the press, and the forces with them.
+
+    Compared are the first and the last turn: as a step begins, the surfaces are cut along each other anew."""
+    lower, upper = box((0, 0, 0), (1, 1, 0.5), (2, 2, 1), region="lower"), box((0, 0, 0.5), (1, 1, 1), (3, 2, 1))
     mesh = lower.joined(upper, prefix="upper ")
     body = SolidBody(mesh, {"lower": RUBBER, "upper body": RUBBER},
                      carried={"base": ((0, 0, 0), ["z0"]), "top": ((0, 0, 0), ["upper z1"])})
     body.add_pair(ContactPair(Surface.of(mesh.face("upper z0")), Surface.of(mesh.face("z1")), stiffness=30.0, reach_mm=0.2,
                               friction=friction, segments=True))
-    turn = {"rx": 0.0, "ry": 0.0, "rz": 30.0}
+    turn = {"rx": 0.0, "ry": 0.0, "rz": 10.0}
     base = Motion().step(ways={}).step(ways=turn).step(ways=turn).step(ways=turn)
-    top = Motion().step(ways={"x": 0.02, "z": -0.06})
+    top = Motion().step(ways={"x": 0.02 if friction else 0.0, "z": -0.03})
     pressed, *_ = SolidPath(body, {"base": Motion().step(ways={}), "top": top}, settings=TIGHT).run()
     # The upper frame was shifted, so its way about the origin is a turn and a shift along the arc.
     shift, ways = pressed.state.poses[1].translation, []
     for k in range(3):
-        a, b = (Rotation.from_euler("z", 30.0 * n, degrees=True).as_matrix() @ shift for n in (k, k + 1))
-        ways.append({**dict(zip("xyz", b - a, strict=True)), "rz": 30.0})
+        a, b = (Rotation.from_euler("z", 10.0 * n, degrees=True).as_matrix() @ shift for n in (k, k + 1))
+        ways.append({**dict(zip("xyz", b - a, strict=True)), "rz": 10.0})
     for way in ways:
         top = top.step(ways=way)
     steps = list(SolidPath(body, {"base": base, "top": top}, settings=TIGHT).run())
-    first, turned = steps[0].loads[1, :3], steps[-1].loads[1, :3] @ Rotation.from_euler("z", 90, degrees=True).as_matrix()
+    first, turned = (steps[k].loads[1, :3] @ Rotation.from_euler("z", 10 * k, degrees=True).as_matrix() for k in (1, 3))
     got = np.abs(turned - first).max() / np.abs(first).max()
     assert friction == 0 or abs(first[0]) > 0.05 * abs(first[2])
-    assert record(f"bodies turned together by 90 degrees, mu = {friction:g}: change of the loads over the largest", expected=0.0,
-                  source="frame indifference", got=got) < 1e-6
+    assert record(f"bodies turned together by 30 degrees, mu = {friction:g}: change of the loads over the largest", expected=0.0,
+                  source="frame indifference", got=got) < 1e-4      # pressures are carried over to the new points
 
 
 def test_a_disc_twisted_on_a_half_space_has_reissner_and_sagocis_torque(record):
     """The torque's singular edge converges at first order; a block of five radii leaves about (1/5)^3 / 2."""
     expected, source = 16 / 3, "Reissner and Sagoci (1944): T = 16/3 G a^3 angle"
-    mesh = disc_in_cylinder(1.0, 5.0, np.array([0, 0.1, 0.5, 0.9, 1.0]), depth_shares=growing(0.02, 5), ring_shares=growing(0.025, 5))
+    mesh = disc_in_cylinder(1.0, 5.0, np.array([0, 0.1, 0.5, 0.9, 1.0]), depth_shares=growing(0.02, 5),
+                            ring_shares=growing(0.025, 5))
     law = elastic(3.0, 0.4995)
     body = SolidBody(mesh, {"body": law}, held={"z0": "xyz", "side": "xyz"}, carried={"disc": ((0, 0, 0), ["disc"])})
     angle = 1e-4
     step = last(SolidPath(body, {"disc": Motion().step(ways={"rz": np.degrees(angle)})}).run())
     got = step.loads[0, 5] / (law.mu0 * angle)
-    assert record("disc twisted on a block of five radii: torque over G a^3 angle", expected=expected, source=source, got=got) < 0.03
+    error = record("disc twisted on a block of five radii: torque over G a^3 angle", expected=expected, source=source, got=got)
+    assert error < 0.03

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from solids import elastic, places_of, pressed_by_roller, roller
 from slabs import graded, mirrored
+from solids import elastic, places_of, pressed_by_roller, roller
 
 from softtact.contact.motion import Motion
 from softtact.contact.pair import ContactPair
@@ -48,7 +48,7 @@ def sheared_blocks(steps, friction):
     """Work, strain energy and dissipation in mJ of a block with a rounded foot, pressed on a wider one and drawn aside."""
     law = make_law("mooney_rivlin", {"c10": 0.08, "c01": 0.03}, bulk_over_shear=20)
     lower, upper = box((0, 0), (3, 1), (12, 3), region="lower"), box((-0.6, 0), (0.6, 0.8), (6, 2))
-    upper = upper.moved(lambda x: x + np.column_stack([1.3 + 0 * x[:, 0], 1 + 0.2 * x[:, 0] ** 2 * (1 - x[:, 1] / 0.8), 0 * x[:, 0]]))
+    upper = upper.moved(lambda x: x + [1.3, 1, 0] + [0, 0.2, 0] * (x[:, :1] ** 2 * (1 - x[:, 1:2] / 0.8)))
     mesh = lower.joined(upper, prefix="upper ")
     body = SolidBody(mesh, {"lower": law, "upper body": law}, held={"y0": "xy"}, carried={"top": ((0, 0, 0), ["upper y1"])})
     body.add_pair(ContactPair(Surface.of(mesh.face("upper y0")), Surface.of(mesh.face("y1")), stiffness=50.0, reach_mm=0.3,
@@ -62,7 +62,7 @@ def sheared_blocks(steps, friction):
     return step.work_mj, step.state.strain_energy, step.dissipated_mj
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("friction", [0.0, pytest.param(0.3, marks=pytest.mark.slow)])
 def test_work_is_strain_energy_and_what_friction_took(friction, record):
     """What is left falls with the increments: the trapezoidal rule's error, and with friction the penalty's, a few per mille."""
     source, left = "conservation of energy", []

@@ -78,7 +78,8 @@ def _elements(body, number, lines, reduced):
     for region, kind, nodes in body.mesh.cells:
         element = ELEMENTS[kind]
         name = f"{element.abaqus_name}R" if element is HEX27 and reduced else element.abaqus_name
-        lines += keywords.elements(name, _label(body, region), range(first, first + len(nodes)), number[nodes[:, element.abaqus_nodes]])
+        own = number[nodes[:, element.abaqus_nodes]]
+        lines += keywords.elements(name, _label(body, region), range(first, first + len(nodes)), own)
         for side, face in enumerate(element.faces, 1):
             corners = np.sort(nodes[:, face.nodes[:3 if len(face.nodes) == 6 else 4]], axis=1)
             faces |= {tuple(own): (first + k, side) for k, own in enumerate(corners.tolist())}
