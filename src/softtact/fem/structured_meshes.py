@@ -11,8 +11,8 @@ from softtact.fem.elements import HEX27, QUAD9, TET10
 from softtact.fem.solid_mesh import Facets, SolidMesh
 
 
-def box(low: Sequence[float], high: Sequence[float], divisions: Sequence[int], *, region: str = "body", grading: Sequence | None = None,
-        geometry: str = "plane_strain", thickness_mm: float = 1.0) -> SolidMesh:
+def box(low: Sequence[float], high: Sequence[float], divisions: Sequence[int], *, region: str = "body",
+        grading: Sequence | None = None, geometry: str = "plane_strain", thickness_mm: float = 1.0) -> SolidMesh:
     """A box (three numbers each) of HEX27, or a rectangle (two numbers each) of QUAD9, with faces x0, x1, y0, y1 (, z0, z1).
 
     low, high: opposite corners in mm;  divisions: elements along each side;  grading: for each side None, or the elements' ends as
