@@ -74,7 +74,7 @@ def test_ironing_needs_the_forces_of_calculix(tmp_path, record):
     lower = box((0, 0, 0), (5, 0.3, 1.2), (15, 1, 3), region="lower")
     upper = rounded(box((-0.8, 0, 0), (0.8, 0.3, 0.8), (6, 1, 2)), 0.3, 1.6, 1.2)
     motion = drawn(Motion().step(ways={"z": -0.2}), 6, 0.15)
-    compared("ironing, mu = 0.3", slice_of(lower, upper, 0.3, 20.0, STIFFER), motion, tmp_path, record, down=0.02, aside=0.05)
+    compared("ironing, mu = 0.3", slice_of(lower, upper, 0.3, 20.0, STIFFER), motion, tmp_path, record, down=0.02, aside=0.06)
 
 
 def drawn(motion, steps, way):
