@@ -1,11 +1,14 @@
 """Structured meshes of simple bodies: boxes, plates, rings, cylinders and spheres of full quadratic elements."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 
-from softtact.fem.elements import HEX27, QUAD9
-from softtact.fem.solid_mesh import SolidMesh
+from softtact.errors import InputError
+from softtact.fem.elements import HEX27, QUAD9, TET10
+from softtact.fem.solid_mesh import Facets, SolidMesh
 
 
 def box(
@@ -78,3 +81,49 @@ def cylinder(
     side = {kind: np.concatenate([mesh.faces[name][kind] for name in ("x0", "x1", "y0", "y1")]) for kind in mesh.faces["x0"]}
     whole = mesh.moved(transform)
     return SolidMesh(whole.points, whole.cells, {"side": side, "z0": mesh.faces["z0"], "z1": mesh.faces["z1"]})
+
+
+def in_tetrahedra(mesh: SolidMesh) -> SolidMesh:
+    """A mesh of hexahedra HEX27 with each one cut into six quadratic tetrahedra on the same nodes; faces keep their names.
+
+    The diagonals run from each element's first corner to the opposite one (Kuhn), so that those of neighbours agree in meshes made
+    from a grid. Raises InputError for other elements.
+    """
+    if other := [kind for _, kind, _ in mesh.cells if kind != HEX27.meshio_name]:
+        raise InputError(f"Elements {other[0]!r} cannot be cut into tetrahedra; give a mesh of {HEX27.meshio_name!r}.")
+    cells = tuple((region, TET10.meshio_name, nodes[:, _kuhn()].reshape(-1, 10)) for region, _, nodes in mesh.cells)
+    whole = replace(mesh, cells=cells, faces={})
+    return replace(whole, faces={name: _facets_within(whole.boundary, face) for name, face in mesh.faces.items()})
+
+
+def _kuhn() -> np.ndarray:
+    """Nodes (6, 10) of HEX27 that are those of its six tetrahedra."""
+    number = {tuple(place): k for k, place in enumerate((HEX27.nodes + 1).round().astype(int).tolist())}
+    shares = np.column_stack([1 - TET10.nodes.sum(axis=1), TET10.nodes])      # of the four corners at the ten nodes
+    out = []
+    for order in permutations(range(3)):
+        corners = np.vstack([np.zeros(3), np.cumsum(2 * np.eye(3)[list(order)], axis=0)])
+        if np.linalg.det(corners[1:]) < 0:
+            corners[[1, 2]] = corners[[2, 1]]
+        out.append([number[tuple(place)] for place in (shares @ corners).round().astype(int).tolist()])
+    return np.array(out)
+
+
+def _facets_within(boundary: Facets, face: Facets) -> Facets:
+    """Those facets of a boundary of which each node is one of a face."""
+    own = np.unique(np.concatenate([nodes.ravel() for nodes in face.values()]))
+    found = {kind: nodes[np.isin(nodes, own).all(axis=1)] for kind, nodes in boundary.items()}
+    return {kind: nodes for kind, nodes in found.items() if len(nodes)}
+
+
+def mirrored(mesh: SolidMesh, axis: int) -> SolidMesh:
+    """The mesh mirrored at the plane through the origin across an axis (0, 1, 2); faces keep their names."""
+    sign = np.ones(3)
+    sign[axis] = -1.0
+    cells = []
+    for region, element, nodes in mesh.parts():
+        exchanged = element.nodes[:, [1, 0, 2][:element.nodes.shape[1]]]      # two parent coordinates, which turns an element round
+        order = np.abs(element.nodes[:, None] - exchanged[None]).sum(axis=2).argmin(axis=1)
+        cells.append((region, element.meshio_name, nodes[:, order]))
+    whole = replace(mesh, points=mesh.points * sign, cells=tuple(cells), faces={})
+    return replace(whole, faces={name: _facets_within(whole.boundary, face) for name, face in mesh.faces.items()})
