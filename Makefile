@@ -42,7 +42,7 @@ advice: .venv/tested
 # The workflow finds its own interpreter; the environment need not be activated.
 .venv/installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[workflow,learn,view,optics,excel,mkl]'
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[workflow,learn,view,optics,mesh,excel,mkl]'
 	touch $@
 
 .venv/tested: .venv/installed

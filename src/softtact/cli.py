@@ -19,6 +19,7 @@ from softtact.commands import (
     detect_discs,
     export_deck,
     fit,
+    mesh,
     predict,
     press,
     stage,
@@ -28,7 +29,7 @@ from softtact.commands.common import EXIT_TEXT
 from softtact.errors import ConvergenceError, SofttactError
 from softtact.extras import missing_extra
 
-COMMANDS = (press, view, predict, complexity, fit, export_deck, detect_discs, cost, stage, config_schema, completion)
+COMMANDS = (press, view, predict, complexity, fit, mesh, export_deck, detect_discs, cost, stage, config_schema, completion)
 EXAMPLES = """examples:
   softtact press part.stl --unit mm --force 5 --force 20 --out press.nc --vtu press.vtu --plot press.png
   softtact view press.vtu                     # turn the pressed sensor in a browser

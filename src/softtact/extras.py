@@ -1,7 +1,8 @@
 """What the core does without: which extra brings which package, and what to say where one is missing."""
 
 EXTRAS = {"snakemake": "workflow", "jinja2": "workflow", "torch": "learn", "optuna": "learn", "pyvista": "view", "vtk": "view",
-          "vtkmodules": "view", "av": "optics", "pypardiso": "mkl", "openpyxl": "excel"}
+          "vtkmodules": "view", "av": "optics", "pypardiso": "mkl", "openpyxl": "excel",
+          "pytetwild": "mesh"}
 
 
 def missing_extra(error: ImportError) -> str | None:
