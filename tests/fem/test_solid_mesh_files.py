@@ -83,7 +83,7 @@ def test_faulty_files_and_rules_are_refused_with_the_place(tmp_path):
         (tmp_path / "text.vtu", {"unit": "mm"}, "not readable"),
         (good, {}, "no unit is stated"),
         (good, {"unit": "foot"}, "not known"),
-        (write(tmp_path / "turned.vtu", [("tetra", TETRAHEDRA[:, [1, 0, 2, 3]])]), {"unit": "mm"}, "5 of 5 elements of the region 'body'"),
+        (write(tmp_path / "turned.vtu", [("tetra", TETRAHEDRA[:, [1, 0, 2, 3]])]), {"unit": "mm"}, "5 of 5 elements of the region"),
         (write(tmp_path / "surface.vtu", [("triangle", np.array([[0, 1, 4]]))]), {"unit": "mm"}, "surface in space"),
         (write(tmp_path / "plane.vtu", [("triangle", np.array([[0, 1, 2]]))]), {"unit": "mm"}, "plane_strain or axisymmetric"),
         (write(tmp_path / "pyramid.vtu", [("pyramid", np.arange(5)[None])]), {"unit": "mm"}, "pyramid"),

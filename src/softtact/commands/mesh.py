@@ -29,10 +29,10 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.add_argument("--envelope", type=float, metavar="MM",
                          help="details smaller than this may be lost (default: a twentieth of the size)")
     command.add_argument("--region", action="append", metavar="NAME",
-                         help="name of the region of a filled surface (default: body); of a file of elements, the sets or groups that "
-                              "are its regions (default: all); repeat it")
+                         help="name of the region of a filled surface (default: body); of a file of elements, the sets or groups "
+                              "that are its regions (default: all); repeat it")
     command.add_argument("--face", action="append", metavar="NAME=RULE",
-                         help="a face by name: the outer facets where a rule such as 'z<0.1' or 'x>2 & y<1' holds, in mm; repeat it")
+                         help="a face by name: outer facets where a rule such as 'z<0.1' or 'x>2 & y<1' holds, in mm; repeat it")
     command.add_argument("--geometry", choices=("plane_strain", "axisymmetric"), help="what a plane mesh of elements stands for")
     command.add_argument("--most-elements", type=int, metavar="N", help="refuse a size that would make more (default: 400000)")
     add_repair(command)
@@ -51,7 +51,8 @@ def _mesh(options):
     write_mesh(mesh, options.out)
     result = {"mesh": str(options.out)} | result | {"regions": mesh.regions, "faces": {name: sum(map(len, facets.values()))
                                                                                       for name, facets in mesh.faces.items()}}
-    lines = [f"{name.replace('_', ' ')}: {short(value)}" for name, value in result.items() if name != "mesh" and value not in ([], {})]
+    told = {name.replace("_", " "): short(value) for name, value in result.items() if name != "mesh" and value not in ([], {})}
+    lines = [f"{name}: {value}" for name, value in told.items()]
     show(result, as_json=options.json, lines=[*lines, f"written: {options.out}"])
 
 
@@ -73,8 +74,8 @@ def _filled(options, rules):
     if options.size > 0:
         count = estimated_elements(surface, options.size)
         low, high = (count * seconds for seconds in _SECONDS)
-        print(f"softtact mesh: about {count:,} elements and {int(_UNKNOWNS * count):,} unknowns (right to a factor of two); meshing "
-              f"takes about {low:.2g} to {high:.2g} s", file=sys.stderr, flush=True)
+        print(f"softtact mesh: about {count:,} elements and {int(_UNKNOWNS * count):,} unknowns (right to a factor of two); "
+              f"meshing takes about {low:.2g} to {high:.2g} s", file=sys.stderr, flush=True)
     began = time.perf_counter()
     mesh = mesh_body(surface, size_mm=options.size, region=(options.region or ["body"])[0], envelope_mm=options.envelope,
                      most_elements=MOST_ELEMENTS if options.most_elements is None else options.most_elements)
@@ -88,10 +89,10 @@ def _taken(options, rules):
 
     for name in ("size", "envelope", "most_elements"):
         if getattr(options, name) is not None:
-            raise InputError(f"--{name.replace('_', '-')}: {options.mesh} has elements already; leave the option out, or give a surface "
-                             f"({', '.join(_SURFACES)}).")
+            raise InputError(f"--{name.replace('_', '-')}: {options.mesh} has elements already; leave the option out, or give a "
+                             f"surface ({', '.join(_SURFACES)}).")
     mesh = read_mesh_file(options.mesh, unit=options.unit, geometry=options.geometry, faces=rules,
                           regions=options.region)
     axes = 3 if mesh.geometry == "solid" else 2
-    return mesh, {"elements": sum(len(nodes) for _, _, nodes in mesh.cells), "nodes": len(mesh.points), "unknowns": axes * len(mesh.points),
-                  "geometry": mesh.geometry, "volume_mm3": mesh.volume_mm3()}
+    return mesh, {"elements": sum(len(nodes) for _, _, nodes in mesh.cells), "nodes": len(mesh.points),
+                  "unknowns": axes * len(mesh.points), "geometry": mesh.geometry, "volume_mm3": mesh.volume_mm3()}

@@ -78,7 +78,7 @@ def mesh_body(surface: str | Path | trimesh.Trimesh, *, size_mm: float, unit: st
     check_fillable(body, size_mm=size_mm, most_elements=most_elements, name=name)
     envelope = _ENVELOPE * size_mm if envelope_mm is None else envelope_mm
     if not 0 < envelope <= size_mm:
-        raise InputError(f"{name}: an envelope of {envelope} mm is not possible; give one above 0 and up to the size, {size_mm:g} mm.")
+        raise InputError(f"{name}: an envelope of {envelope} mm is not possible; give one above 0, up to the size of {size_mm:g} mm.")
     corners, tetrahedra = fill(body, size_mm=size_mm, envelope_mm=envelope, threads=threads)
     points, (nodes,), _ = raised(corners, [("tetra", tetrahedra)])
     mesh = SolidMesh(points, ((region, "tetra10", nodes),))
@@ -120,10 +120,10 @@ def body_report(mesh: SolidMesh, surface: trimesh.Trimesh) -> BodyReport:
     ratio, volume = quality(mesh.points[nodes[:, :4]]), mesh.volume_mm3()
     curved = nodes[np.isin(nodes, facets[:, 3:]).any(axis=1)]     # inside, edges are straight
     used = len(np.unique(nodes))
-    return BodyReport(elements=len(nodes), nodes=used, unknowns=3 * used, volume_mm3=volume, volume_error=volume / volume_of(surface) - 1,
-                      deviation_mm=float(max(away.max(), lost)), deviation_rms_mm=float(np.sqrt(share @ away**2 / share.sum())),
-                      least_quality=float(ratio.min()), mean_quality=float(ratio.mean()),
-                      least_jacobian=float(_jacobian_ratio(mesh.points, curved).min()))
+    return BodyReport(elements=len(nodes), nodes=used, unknowns=3 * used, volume_mm3=volume,
+                      volume_error=volume / volume_of(surface) - 1, deviation_mm=float(max(away.max(), lost)),
+                      deviation_rms_mm=float(np.sqrt(share @ away**2 / share.sum())), least_quality=float(ratio.min()),
+                      mean_quality=float(ratio.mean()), least_jacobian=float(_jacobian_ratio(mesh.points, curved).min()))
 
 
 def _curved(mesh: SolidMesh, closest: ClosestPoints) -> np.ndarray:

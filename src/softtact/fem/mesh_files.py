@@ -43,7 +43,7 @@ def write_mesh(mesh: SolidMesh, path: str | Path, point_data: Mapping[str, np.nd
     elements = len(mesh.cells)
     flags = {_REGION + name: [np.full(len(nodes), int(k < elements and mesh.cells[k][0] == name), np.int8)
                               for k, (_, nodes) in enumerate(blocks)] for name in mesh.regions}
-    flags |= {_FACE + name: [of_face[name].get(kind, np.zeros(len(nodes), np.int8)) if k >= elements else np.zeros(len(nodes), np.int8)
+    flags |= {_FACE + name: [of_face[name][kind] if k >= elements and kind in of_face[name] else np.zeros(len(nodes), np.int8)
                              for k, (kind, nodes) in enumerate(blocks)] for name in mesh.faces}
     flags[_GEOMETRY + mesh.geometry] = [np.full(len(nodes), mesh.thickness_mm) for _, nodes in blocks]
     with atomic_path(path) as temporary:
@@ -88,7 +88,7 @@ def read_mesh_file(path: str | Path, *, unit: str | None = None, geometry: str |
     dimensions = [_dimension(block.type) for block in read.cells]
     d = max(dimensions, default=0)
     if d < 2:
-        raise InputError(f"{path}: it holds no elements (tetrahedra, hexahedra, wedges, triangles or quadrilaterals); mesh the body.")
+        raise InputError(f"{path}: it holds no elements such as tetrahedra, hexahedra or triangles; mesh the body.")
     points = np.zeros((len(read.points), 3))
     points[:, :read.points.shape[1]] = read.points * UNIT_MM[unit or "mm"]
     sets = _sets(read)
@@ -99,7 +99,7 @@ def read_mesh_file(path: str | Path, *, unit: str | None = None, geometry: str |
                    for k, (_, nodes) in zip(elements, cells, strict=True)]
     points, cells, number = _quadratic(path, points, cells)
     kind, thickness = _geometry(path, read, geometry, thickness_mm, d, points)
-    parts = tuple((name, kind_of_cells, nodes[region == name]) for (kind_of_cells, nodes), region in zip(cells, of_elements, strict=True)
+    parts = tuple((name, own, nodes[region == name]) for (own, nodes), region in zip(cells, of_elements, strict=True)
                   for name in dict.fromkeys(region))
     mesh = SolidMesh(points, parts, geometry=kind, thickness_mm=thickness)
     _refuse_inverted(path, mesh)
@@ -121,8 +121,8 @@ def _read(path: Path) -> "meshio.Mesh":
             return meshio.read(path)
     except (Exception, SystemExit) as error:     # meshio's readers fail in many ways, and end the program for an unknown format
         known = "give VTU, or another volume mesh that meshio reads, such as Gmsh or Abaqus"
-        raise InputError(f"{path}: not readable as a mesh of elements ({' '.join(str(error).split())[:120] or type(error).__name__}); "
-                         f"{known}.") from None
+        told = " ".join(str(error).split())[:120] or type(error).__name__
+        raise InputError(f"{path}: not readable as a mesh of elements ({told}); {known}.") from None
 
 
 def _dimension(kind):
@@ -171,8 +171,8 @@ def _regions_of(path, sets, count):
     if (uses != 1).any():
         first = int((uses != 1).argmax())
         told = "in no region" if uses[first] == 0 else f"in {uses[first]} regions"
-        raise InputError(f"{path}: element {first} is {told}, of the sets {', '.join(sets)}; name those sets that are the regions, each "
-                         "element in one of them.")
+        raise InputError(f"{path}: element {first} is {told}, of the sets {', '.join(sets)}; name those sets that are the regions, "
+                         "each element in one of them.")
     return out
 
 
@@ -219,12 +219,13 @@ def _refuse_inverted(path, mesh):
     """Refuse elements whose Jacobian is not positive at all points of quadrature."""
     for region, element, nodes in mesh.parts():
         d = element.nodes.shape[1]
-        jacobian = np.einsum("emi,gmj->egij", mesh.points[nodes][..., :d], element.shape(element.quadrature.points)[1], optimize=True)
+        slopes = element.shape(element.quadrature.points)[1]
+        jacobian = np.einsum("emi,gmj->egij", mesh.points[nodes][..., :d], slopes, optimize=True)
         inverted = np.flatnonzero(np.linalg.det(jacobian).min(axis=1) <= 0)
         if len(inverted):
             x, y, z = mesh.points[nodes[inverted[0]]].mean(axis=0)
-            raise InputError(f"{path}: {len(inverted)} of {len(nodes)} elements of the region {region!r} are inverted (the first is "
-                             f"number {inverted[0]}, at {x:.4g}, {y:.4g}, {z:.4g} mm); number their nodes the other way round, or "
+            raise InputError(f"{path}: {len(inverted)} of {len(nodes)} elements of the region {region!r} are inverted (the first "
+                             f"is number {inverted[0]}, at {x:.4g}, {y:.4g}, {z:.4g} mm); number their nodes the other way round, or "
                              "mesh the body again.")
 
 

@@ -76,7 +76,7 @@ def fill(surface: trimesh.Trimesh, *, size_mm: float, envelope_mm: float, thread
         epsilon=envelope_mm / diagonal, num_threads=threads, vtk_ordering=True)
     tetrahedra = np.asarray(tetrahedra, dtype=np.int64)
     if not len(tetrahedra):
-        raise InputError(f"Elements of {size_mm:g} mm with an envelope of {envelope_mm:g} mm do not fill the body; give smaller ones.")
+        raise InputError(f"Elements of {size_mm:g} mm with an envelope of {envelope_mm:g} mm do not fill the body; give less.")
     used, tetrahedra = np.unique(tetrahedra, return_inverse=True)
     points, tetrahedra = np.asarray(points, dtype=float)[used], tetrahedra.reshape(-1, 4)
     outer = outer_corners(tetrahedra)
