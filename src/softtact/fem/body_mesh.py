@@ -78,7 +78,7 @@ def mesh_body(surface: str | Path | trimesh.Trimesh, *, size_mm: float, unit: st
     check_fillable(body, size_mm=size_mm, most_elements=most_elements, name=name)
     envelope = _ENVELOPE * size_mm if envelope_mm is None else envelope_mm
     if not 0 < envelope <= size_mm:
-        raise InputError(f"{name}: an envelope of {envelope} mm is not possible; give one above 0, up to the size of {size_mm:g} mm.")
+        raise InputError(f"{name}: an envelope of {envelope} mm is not possible; give one above 0, up to {size_mm:g} mm.")
     corners, tetrahedra = fill(body, size_mm=size_mm, envelope_mm=envelope, threads=threads)
     points, (nodes,), _ = raised(corners, [("tetra", tetrahedra)])
     mesh = SolidMesh(points, ((region, "tetra10", nodes),))

@@ -225,8 +225,8 @@ def _refuse_inverted(path, mesh):
         if len(inverted):
             x, y, z = mesh.points[nodes[inverted[0]]].mean(axis=0)
             raise InputError(f"{path}: {len(inverted)} of {len(nodes)} elements of the region {region!r} are inverted (the first "
-                             f"is number {inverted[0]}, at {x:.4g}, {y:.4g}, {z:.4g} mm); number their nodes the other way round, or "
-                             "mesh the body again.")
+                             f"is number {inverted[0]}, at {x:.4g}, {y:.4g}, {z:.4g} mm); number their nodes the other way round, "
+                             "or mesh the body again.")
 
 
 def _face(path, mesh, name, corners):
