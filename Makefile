@@ -53,7 +53,7 @@ advice: .venv/tested
 # The workflow finds its own interpreter; the environment need not be activated.
 .venv/installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[workflow,learn,view,optics,excel,skin,robot,mkl]'
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[workflow,learn,view,optics,mesh,excel,skin,robot,mkl]'
 	touch $@
 
 .venv/tested: .venv/installed

@@ -26,11 +26,13 @@ import record
 from softtact.contact.motion import Motion
 from softtact.contact.pair import ContactPair
 from softtact.contact.surfaces import Surface
-from softtact.decks.solid import calculix_lines
 from softtact.fem.structured_meshes import box, in_tetrahedra
 from softtact.materials.laws.registry import make_law
 from softtact.models.solid.body import SolidBody
 from softtact.models.solid.path import SolidPath
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+from support.solid_decks import calculix_lines
 
 LAW = make_law("mooney_rivlin", {"c10": 0.08, "c01": 0.03}, bulk_over_shear=5)
 PENALTY, WAY_MM, INCREMENTS = 200.0, 0.2, 4

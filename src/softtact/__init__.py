@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from softtact.contact.motion import Motion
     from softtact.errors import ConvergenceError, InputError
+    from softtact.fem.body_mesh import mesh_body
     from softtact.geometry.meshes import read_mesh
     from softtact.geometry.pose import Pose
     from softtact.press.result import PressResult, read_press
@@ -14,9 +15,10 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 __all__ = ["ConvergenceError", "InputError", "Motion", "Pose", "PressResult", "Sensor", "SoftObject", "__version__", "load_sensor",
-           "read_mesh", "read_press"]
+           "mesh_body", "read_mesh", "read_press"]
 _MODULES = {"ConvergenceError": "errors", "InputError": "errors", "Motion": "contact.motion", "Pose": "geometry.pose",
             "PressResult": "press.result", "Sensor": "press.sensor", "SoftObject": "press.solid", "load_sensor": "press.sensor",
+            "mesh_body": "fem.body_mesh",
             "read_mesh": "geometry.meshes", "read_press": "press.result"}
 
 

@@ -22,6 +22,7 @@ from softtact.commands import (
     fit,
     grasp,
     grasps,
+    mesh,
     predict,
     press,
     skin,
@@ -32,7 +33,7 @@ from softtact.commands.common import EXIT_TEXT
 from softtact.errors import ConvergenceError, SofttactError
 from softtact.extras import missing_extra
 
-COMMANDS = (press, grasp, grasps, skin, dataset, view, predict, complexity, fit, export_deck, detect_discs, cost, stage,
+COMMANDS = (press, grasp, grasps, skin, dataset, view, predict, complexity, fit, mesh, export_deck, detect_discs, cost, stage,
             config_schema, completion)
 EXAMPLES = """examples:
   softtact press part.stl --unit mm --force 5 --force 20 --out press.nc --vtu press.vtu --plot press.png

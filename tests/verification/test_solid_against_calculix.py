@@ -6,11 +6,11 @@ import subprocess
 
 import numpy as np
 import pytest
+from support.solid_decks import calculix_lines
 
 from softtact.contact.motion import Motion
 from softtact.contact.pair import ContactPair
 from softtact.contact.surfaces import Surface
-from softtact.decks.solid import calculix_lines
 from softtact.fem.structured_meshes import box
 from softtact.materials.laws.registry import make_law
 from softtact.models.solid.body import SolidBody

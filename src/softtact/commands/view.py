@@ -19,14 +19,16 @@ EXAMPLES = """
 def add(commands: argparse._SubParsersAction) -> None:
     """Add the command to the parser."""
     command = add_command(commands, "view", _view, "Show a pressed sensor from all sides, in a browser or as a picture.", EXAMPLES)
-    command.add_argument("result", metavar="RESULT", type=Path, help="the .nc or .vtu file of softtact press")
+    command.add_argument("result", metavar="RESULT", type=Path,
+                         help="the .nc or .vtu file of softtact press, or of a press of solids (.npz, too)")
     command.add_argument("--save", type=Path, metavar="FILE.png", help="draw a picture, and open nothing")
     command.add_argument("--page", type=Path, metavar="FILE.html", help="write the page, and open nothing")
 
 
 def _view(options):
     from softtact.files import refuse_overwriting
-    from softtact.reporting.press_view import read_view, save_picture, write_page
+    from softtact.reporting.press_view import save_picture, write_page
+    from softtact.reporting.solid_view import read_view
 
     check_folders(options.save, options.page)
     refuse_overwriting([options.result], {"--save": options.save, "--page": options.page})

@@ -60,7 +60,7 @@ def _rigid_bodies(model):
     lines, fixed = ["*MATERIAL, NAME=RIGID", "*ELASTIC", _STIFF], []
     node, element, reference = len(model.points) + 1, keywords.element_count(model) + 1, None
     for body in model.rigid:
-        points, tetrahedra = _tetrahedra(body)
+        points, tetrahedra = tetrahedra_behind(body.points, body.facets)
         numbers = np.arange(element, element + len(tetrahedra))
         lines += keywords.nodes(points, node, name=f"{body.name}_NODES")
         lines += keywords.elements(TET4.abaqus_name, body.name, numbers, tetrahedra + node)
@@ -78,17 +78,17 @@ def _rigid_bodies(model):
     return lines, reference, fixed
 
 
-def _tetrahedra(body):
-    """Points (n + m, 3) and tetrahedra (m, 4): each facet with a point of its own behind it.
+def tetrahedra_behind(points: np.ndarray, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n + m, 3) and tetrahedra (m, 4) of points (n, 3) and facets (m, 3): each facet with a point of its own behind it.
 
     The first face of a tetrahedron is its nodes 1, 2, 3, which turn about the inward normal: the facet's reversed.
     """
-    corners = body.points[body.facets]
+    corners = points[facets]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     apex = corners.mean(axis=1) - _DEPTH_MM * normal
-    tetrahedra = np.column_stack([body.facets[:, ::-1], len(body.points) + np.arange(len(apex))])
-    return np.vstack([body.points, apex]), tetrahedra
+    tetrahedra = np.column_stack([facets[:, ::-1], len(points) + np.arange(len(apex))])
+    return np.vstack([points, apex]), tetrahedra
 
 
 def _linear(settings):

@@ -80,8 +80,8 @@ def held(model: DeckModel) -> list[str]:
 
 
 def material(name: str, card: LawCard) -> list[str]:
-    """*MATERIAL with its *HYPERELASTIC constants, eight a line."""
-    return [f"*MATERIAL, NAME={name}", f"*HYPERELASTIC, {card.form}", rows(card.constants, per_line=8)]
+    """*MATERIAL with the constants of its law, eight a line."""
+    return [f"*MATERIAL, NAME={name}", f"*{card.keyword}, {card.form}", rows(card.constants, per_line=8)]
 
 
 def rubber(model: DeckModel, kinds: dict[str, str], wedge: str, cards: dict[str, LawCard]) -> list[str]:

@@ -22,21 +22,26 @@ _FORMS = {
     "ogden2": ("OGDEN, N=2", ("mu1", "alpha1", "mu2", "alpha2"), 2),
     "ogden3": ("OGDEN, N=3", ("mu1", "alpha1", "mu2", "alpha2", "mu3", "alpha3"), 3),
 }
+_FOAMS = {"hyperfoam1": ("mu1", "alpha1", "nu1"), "hyperfoam2": ("mu1", "alpha1", "mu2", "alpha2", "nu1", "nu2")}
 
 
 @dataclass(frozen=True)
 class LawCard:
-    """`form`: what follows *HYPERELASTIC on its line; `constants` (MPa, 1, then the D_i in 1/MPa) in the order of the data."""
+    """`form`: what follows the keyword on its line; `constants` (MPa, 1, then the D_i in 1/MPa) in the order of the data."""
 
     form: str
     constants: tuple
+    keyword: str = "HYPERELASTIC"
 
 
 def law_card(law: Law | None, *, no_term: float, dialect: str) -> LawCard:
     """The `LawCard` of a law. `no_term`: the D_i (1/MPa) with which the dialect leaves a volumetric term out."""
+    if law is not None and law.name in _FOAMS:
+        names = _FOAMS[law.name]
+        return LawCard(f"N={len(names) // 3}", tuple(law.parameters[name] for name in names), keyword="HYPERFOAM")
     if law is None or law.name not in _FORMS:
         name = getattr(law, "name", None)
-        raise InputError(f"The law {name!r} cannot be written for {dialect}; use one of {', '.join(_FORMS)}.")
+        raise InputError(f"The law {name!r} cannot be written for {dialect}; use one of {', '.join([*_FORMS, *_FOAMS])}.")
     form, names, terms = _FORMS[law.name]
     written = ("quadratic", *(("logarithmic",) if form == "ARRUDA-BOYCE" else ()))
     if law.volumetric.name not in written:

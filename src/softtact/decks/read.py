@@ -32,11 +32,13 @@ class Deck:
 
 @dataclass
 class DeckStep:
-    """name; `boundary` rows (node or set, first component, last component, value); `loads` rows (node, component, value)."""
+    """name; `boundary` rows (node or set, first component, last component, value); `loads` rows (node, component, value);
+    `pressures` rows (element, face such as P1, MPa)."""
 
     name: str
     boundary: list = field(default_factory=list)
     loads: list = field(default_factory=list)
+    pressures: list = field(default_factory=list)
 
 
 def read_deck(path: Path) -> Deck:
@@ -138,6 +140,15 @@ def _hyperelastic(deck, options, data, current):
     deck.materials[current["material"]] = (form, [float(text) for line in _joined(data) for text in _fields(line)])
 
 
+def _foam(deck, options, data, current):
+    deck.materials[current["material"]] = (f"HYPERFOAM, N={options['N']}", [float(text) for line in _joined(data)
+                                                                           for text in _fields(line)])
+
+
+def _pressure(deck, options, data, current):
+    deck.steps[-1].pressures += [(int(element), face, float(value)) for element, face, value in map(_fields, data)]
+
+
 def _section(deck, options, data, current):
     deck.sections[options["ELSET"]] = options["MATERIAL"]
 
@@ -172,5 +183,5 @@ def _load(deck, options, data, current):
 
 
 _READERS = {"HEADING": _heading, "NODE": _node, "ELEMENT": _element, "NSET": _nset, "SURFACE": _surface, "MATERIAL": _material,
-            "HYPERELASTIC": _hyperelastic, "SOLID SECTION": _section, "EQUATION": _equation,
+            "HYPERELASTIC": _hyperelastic, "HYPERFOAM": _foam, "DLOAD": _pressure, "SOLID SECTION": _section, "EQUATION": _equation,
             "SURFACE INTERACTION": _interaction, "RIGID BODY": _rigid, "BOUNDARY": _boundary, "CLOAD": _load}

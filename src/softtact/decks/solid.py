@@ -1,115 +1,307 @@
-"""A `SolidBody` whose frames move without turning, as a deck of CalculiX (ccx 2.20): meshed bodies, laws, contacts, friction.
+"""A press of solids (`SolidBody`) as input for CalculiX or Abaqus.
 
-Elements   C3D20R for hexahedra HEX27 (without the middles of faces and body), C3D15 for wedges, C3D10 for quadratic tetrahedra.
-Contact    SURFACE TO SURFACE with a linear pressure-overclosure of the pair's stiffness; the stick slope of friction is the same.
-           ccx has no augmentation: overlaps are pressure over stiffness.
-Forces     *NODE PRINT gives the reaction of each frame's nodes as their total, sets FRAME1, FRAME2, ..., at each step's end.
+    export_solid("press.inp", body, {"ball": Motion().step(ways={"z": -0.2})}, dialect="calculix")
+
+Elements   CalculiX: C3D10, C3D20R, C3D15, CPE8R, CAX8R, CPE6, CAX6, as they are. Abaqus: the same with a pressure of their own (H),
+           but for foams. Nodes in faces and bodies of our full quadratic elements are left out.
+Frames     move without turning: every node that a frame carries follows its reference node by *EQUATION, so that a way or a force
+           of the reference node drives it. A frame that turns is refused.
+Objects    rigid: R3D3 in Abaqus; in CalculiX, which shifts shells, each facet is the first face of a tetrahedron behind it.
+Contact    surface to surface, linear penalty: `STIFFER` times that of the pair, because neither augments it as we do. Sticking
+           friction is as stiff (CalculiX), or slips elastically by 1 um (Abaqus).
+Steps      those of the motions. A rigid object that is loaded first is brought to touch, in a step of its own.
 """
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
-from softtact.contact.motion import Motion
+from softtact.contact.facet_shapes import LINE2, QUAD8
+from softtact.contact.motion import FREEDOMS, Motion, MotionStep
+from softtact.contact.surfaces import Surface
 from softtact.decks import keywords
+from softtact.decks.calculix import tetrahedra_behind
 from softtact.decks.laws import law_card
 from softtact.errors import InputError
-from softtact.fem.elements import HEX27
-from softtact.fem.solid_mesh import ELEMENTS
+from softtact.fem.elements import TET4, Element
+from softtact.files import atomic_path
 from softtact.models.solid.body import SolidBody
+from softtact.models.solid.frames import Frame
 
-_NO_TERM = 1e20              # a zero D_i would be replaced by a default
-_AXES = "xyz"
+PROGRAMS = {"calculix": "CalculiX", "abaqus": "Abaqus"}
+STIFFER = 50.0
+_NO_TERM = {"calculix": 1e20, "abaqus": 0.0}     # of the D_i that leave a volumetric term out
+_ELASTIC_SLIP_MM = 1e-3
+_TOUCH_MM = 0.01
+_LOOKS = -0.1        # cosine between a facet's normal and one of a surface that it looks at
+_CORNERS = {3: 2, 6: 3, 8: 4, 9: 4}     # of a face of so many nodes
+_INCREMENTS = "0.1, 1, 1e-6, 0.25"
+_RIGID = ["*MATERIAL, NAME=RIGID", "*ELASTIC", "1000, 0.3"]     # of elements whose nodes are all prescribed
 
 
-def calculix_lines(body: SolidBody, motions: Mapping[str, Motion], *, increments: int = 4, fixed: bool = False,
-                   reduced: bool = True, stiffness: float | None = None) -> list[str]:
-    """The deck's lines, with a step for each of the motions' (all of as many steps, {frame: `Motion`}).
+@dataclass(frozen=True)
+class DeckStep:
+    """A step: what is prescribed {(frame, axis): mm from rest} and loaded {(frame, axis): N}, and the faces' pressures in MPa."""
 
-    increments: parts of each step to begin with;  fixed: keep to them;  reduced: C3D20R for hexahedra, else C3D20
-    stiffness: penalty in N/mm3 of the deck's contacts, by default that of each pair
-    Raises InputError for plane bodies, rigid objects, pressures, and motions that turn or load a frame.
+    name: str
+    ways: dict[tuple[int, int], float]
+    loads: dict[tuple[int, int], float]
+    pressures: list[float]
+
+
+def export_solid(path: str | Path, body: SolidBody, motions: Mapping[str, Motion] | None = None,
+                 pressures: Mapping[str, Sequence[float]] | None = None, *, dialect: str, title: str = "press of solids") -> None:
+    """Write a press of solids as a deck, whole or not at all; arguments as `SolidPath` takes them.
+
+    Raises InputError where the deck cannot say it: an unknown dialect, a law that the program lacks, a frame that turns, a freedom
+    that is held after it was loaded, self-contact in CalculiX.
     """
-    _refuse(body, motions)
-    number = _numbers(body)
-    lines = ["*HEADING", "units: mm, N, MPa"] + keywords.nodes(body.points[number > 0], 1, name="ALL")
-    faces = _elements(body, number, lines, reduced)
-    for name, law in body.laws.items():
-        label = _label(body, name)
-        lines += keywords.material(f"RUBBER_{label}", law_card(law, no_term=_NO_TERM, dialect="CalculiX"))
-        lines += [f"*SOLID SECTION, ELSET={label}, MATERIAL=RUBBER_{label}"]
-    for k, frame in enumerate(body.frames, 1):
-        lines += keywords.node_set(f"FRAME{k}", _used(number, frame.nodes))
-    for k, pair in enumerate(body.pairs, 1):
-        lines += _contact(k, pair, faces, pair.stiffness if stiffness is None else stiffness)
-    count = len(next(iter(motions.values())).steps)
-    for step in range(count):
-        lines += _step(body, motions, number, step, increments, fixed)
-    return lines
+    if dialect not in PROGRAMS:
+        raise InputError(f"The format {dialect!r} is unknown; use one of {', '.join(PROGRAMS)}.")
+    lines = _Deck(body, dialect).lines(deck_steps(body, motions or {}, pressures or {}), title)
+    with atomic_path(path) as temporary:
+        temporary.write_text("\n".join(lines) + "\n", encoding="ascii", errors="replace")
 
 
-def _refuse(body, motions):
-    if body.mesh.geometry != "solid" or body.pressures or any(pair.rigid for pair in body.pairs):
-        raise InputError("Only spatial bodies without pressures and rigid objects can be written for CalculiX; mesh the object.")
-    for name, motion in motions.items():
-        if any(step.loads or set(step.ways) - set(_AXES) for step in motion.steps):
-            raise InputError(f"The frame {name!r} turns or is loaded, which this deck does not take; give ways along x, y and z.")
+def deck_steps(body: SolidBody, motions: Mapping[str, Motion], pressures: Mapping[str, Sequence[float]]) -> list[DeckStep]:
+    """The steps of a deck; ways add up from rest."""
+    counts = {len(motion.steps) for motion in motions.values()} | {len(values) for values in pressures.values()}
+    names = [frame.name for frame in body.frames]
+    if unknown := [name for name in motions if name not in names]:
+        raise InputError(f"There is no frame {unknown[0]!r}; there are {', '.join(names) or 'none'}.")
+    if len(counts) != 1:
+        raise InputError(f"Motions and pressures have {' and '.join(map(str, sorted(counts))) or 'no'} steps; give all as many.")
+    ways = {(k, axis): 0.0 for k in range(len(names)) for axis in range(3)}
+    released: set[tuple[int, int]] = set()
+    out = []
+    for number in range(counts.pop()):
+        loads: dict[tuple[int, int], float] = {}
+        for k, name in enumerate(names):
+            step = motions[name].steps[number] if name in motions else MotionStep()
+            _refuse_turning(name, number, step)
+            loads |= {(k, FREEDOMS.index(freedom)): value for freedom, value in step.loads.items()}
+            for freedom, way in step.ways.items():
+                ways[k, FREEDOMS.index(freedom)] += way
+        if held := released - loads.keys():
+            frame, axis = next(iter(held))
+            raise InputError(f"The frame {names[frame]!r} is held along {FREEDOMS[axis]} in step {number + 1}, where the force "
+                             "before left it; a deck cannot know that place: leave that step out, or go on loading it.")
+        released = set(loads)
+        if number == 0 and (touch := _touch(body, loads)):
+            out.append(DeckStep("TOUCH", ways | touch, {}, [0.0] * len(body.pressures)))
+        values = [float(pressures[face.name][number]) if face.name in pressures else 0.0 for face in body.pressures]
+        out.append(DeckStep(f"STEP_{number + 1}", {key: way for key, way in ways.items() if key not in loads}, loads, values))
+    return out
 
 
-def _numbers(body):
-    """The deck's number of each node, 0 where no element of the deck has it."""
-    used = np.zeros(len(body.points), bool)
-    for _, element, nodes in body.mesh.parts():
-        used[nodes[:, element.abaqus_nodes]] = True
-    return np.cumsum(used) * used
+def _refuse_turning(name, number, step):
+    if turned := [freedom for freedom in (*step.ways, *step.loads) if FREEDOMS.index(freedom) > 2]:
+        raise InputError(f"The frame {name!r} turns in step {number + 1} ({turned[0]}), which decks do not take; leave its "
+                         "rotations out.")
 
 
-def _used(number, nodes):
-    return number[nodes][number[nodes] > 0]
+def _touch(body, loads):
+    """Ways {(frame, axis): mm} that bring a rigid object to touch along the one force that acts on it."""
+    first = len(body.mesh.points)
+    rigid = {key: value for key, value in loads.items() if body.frames[key[0]].nodes.min() >= first and value}
+    if not rigid:
+        return {}
+    gap = min((float(np.min(contact.projection.gap, initial=np.inf)) for contact in body.rest().contacts), default=np.inf)
+    if len(rigid) > 1 or not np.isfinite(gap):
+        raise InputError("A deck brings one loaded object to touch, along one axis, from within its pair's reach; place it "
+                         "nearer, or prescribe its way in a step before.")
+    key, value = next(iter(rigid.items()))
+    return {key: float(np.sign(value)) * (max(gap, 0.0) + _TOUCH_MM)}
 
 
-def _label(body, region):
-    return f"REGION{body.mesh.regions.index(region) + 1}"
+class _Deck:
+    """A body in a dialect."""
+
+    def __init__(self, body: SolidBody, dialect: str) -> None:
+        self.body, self.dialect = body, dialect
+        self.parts = [part for part in body.mesh.parts() if len(part[2])]
+        first = np.cumsum([1, *(len(nodes) for _, _, nodes in self.parts)])
+        self.numbers = [np.arange(start, start + len(nodes)) for start, (_, _, nodes) in zip(first, self.parts, strict=False)]
+        self.next_element, self.soft = int(first[-1]), len(body.mesh.points)
+        self.used = np.unique(np.concatenate([nodes[:, element.abaqus_nodes].ravel() for _, element, nodes in self.parts]))
+        self.reference = {k: len(body.points) + 1 + k for k in range(len(body.frames))}
+        self.next_node = len(body.points) + len(body.frames) + 1
+        self._sides: dict[tuple[int, ...], tuple[int, int]] = {}
+
+    def lines(self, steps, title):
+        """All lines."""
+        program = PROGRAMS[self.dialect]
+        lines = ["*HEADING", f"{title}; units: mm, N, MPa", f"** softtact export for {program}"]
+        lines += self._rubber(program) + self._frames() + self._contacts(program)
+        for number, step in enumerate(steps):
+            lines += self._step(step, first=number == 0)
+        return lines
+
+    def _rubber(self, program):
+        body = self.body
+        lines = ["*NODE, NSET=SOFT"] + [f"{k + 1}, " + ", ".join(map(keywords.number, body.points[k])) for k in self.used]
+        for (region, element, nodes), numbers in zip(self.parts, self.numbers, strict=True):
+            kind = self._kind(element, body.laws[region])
+            lines += keywords.elements(kind, name_of(region), numbers, nodes[:, element.abaqus_nodes] + 1)
+        for region in body.mesh.regions:
+            card = law_card(body.laws[region], no_term=_NO_TERM[self.dialect], dialect=program)
+            lines += keywords.material(f"LAW_{name_of(region)}", card)
+            lines += [f"*SOLID SECTION, ELSET={name_of(region)}, MATERIAL=LAW_{name_of(region)}"]
+            lines += [keywords.number(body.mesh.thickness_mm)] if body.mesh.geometry == "plane_strain" else []
+        for axis in range(3):
+            lines += keywords.node_set(f"HELD_{axis + 1}", self._held(axis) + 1)
+        return lines
+
+    def _kind(self, element: Element, law) -> str:
+        letters = {"solid": "C3D", "plane_strain": "CPE", "axisymmetric": "CAX"}[self.body.mesh.geometry]
+        name = letters + (element.abaqus_name or "").removeprefix("C3D")
+        name += "R" if name.endswith(("C3D20", "8")) else ""
+        return name + ("H" if self.dialect == "abaqus" and law.projected_modulus > 0 else "")
+
+    def _held(self, axis):
+        """Soft nodes that are held along an axis, and that no frame carries along it."""
+        if axis == 2 and self.body.mesh.geometry != "solid":
+            return np.zeros(0, dtype=int)
+        carried = [frame.nodes for frame in self.body.frames if "xyz"[axis] in frame.axes]
+        held = self.used[~self.body.free_components[self.used, axis]]
+        return np.setdiff1d(held, np.concatenate([np.zeros(0, dtype=int), *carried]))
+
+    def _frames(self):
+        """Reference nodes, rigid objects, and what follows whom."""
+        lines, taken = [], np.zeros((len(self.body.points), 3), dtype=bool)
+        axes = range(3 if self.body.mesh.geometry == "solid" else 2)
+        for k, frame in reversed(list(enumerate(self.body.frames))):     # a node that two carry follows the last
+            name, own = name_of(frame.name), frame.nodes
+            lines += keywords.nodes([frame.point], self.reference[k], name=f"{name}_REFERENCE")
+            if own.min() >= self.soft:
+                own = np.concatenate([own, self._object(frame, lines)])
+            else:
+                own = np.intersect1d(own, self.used)
+            lines += keywords.node_set(f"{name}_NODES", own + 1)
+            for axis in axes:
+                if "xyz"[axis] in frame.axes and (self.dialect == "calculix" or own.min() < self.soft):
+                    new = own[(own >= len(taken)) | ~taken[np.minimum(own, len(taken) - 1), axis]]
+                    lines += keywords.moving_along(new + 1, self.reference[k], axis + 1)
+                    taken[new[new < len(taken)], axis] = True
+        return lines
+
+    def _object(self, frame: Frame, lines):
+        """Add a rigid object's lines; returns the further nodes, from 0, that it needs."""
+        name, facets = name_of(frame.name), self._facing(self.body.surface_nodes(frame.name))
+        lines += keywords.nodes(self.body.points[frame.nodes], int(frame.nodes[0]) + 1)
+        numbers = np.arange(self.next_element, self.next_element + len(facets))
+        self.next_element += len(facets)
+        if self.dialect == "abaqus":
+            k = self.body.frames.index(frame)
+            lines += keywords.elements("R3D3", name, numbers, facets + 1)
+            lines += [f"*RIGID BODY, REF NODE={self.reference[k]}, ELSET={name}", f"*SURFACE, NAME={name}_SURFACE, TYPE=ELEMENT",
+                      f"{name}, SPOS"]
+            return np.zeros(0, dtype=int)
+        points, tetrahedra = tetrahedra_behind(self.body.points[frame.nodes], facets - frame.nodes[0])
+        behind = np.arange(self.next_node - 1, self.next_node - 1 + len(facets))
+        node = np.concatenate([frame.nodes, behind])
+        self.next_node += len(facets)
+        lines += keywords.nodes(points[len(frame.nodes):], int(behind[0]) + 1)
+        lines += keywords.elements(TET4.abaqus_name, name, numbers, node[tetrahedra] + 1) + _RIGID     # type: ignore[arg-type]
+        lines += [f"*SOLID SECTION, ELSET={name}, MATERIAL=RIGID"]
+        lines += keywords.surface(f"{name}_SURFACE", [(int(number), 1) for number in numbers])
+        return behind
+
+    def _facing(self, facets):
+        """The facets (t, 3) of an object that look at a surface which meets it: the search of CalculiX also finds those behind."""
+        own = _normals(self.body.points, facets)
+        surfaces = [pair.surface for pair in self.body.pairs if np.isin(pair.other.nodes[0, :3], facets).all()]
+        met = [np.unique(_normals(self.body.points, surface.nodes[:, :3]).round(3), axis=0) for surface in surfaces]
+        if not met:
+            return facets
+        looks = np.any([(own @ normals.T).min(axis=1) < _LOOKS for normals in met], axis=0)
+        if not looks.any():
+            raise InputError("A rigid object turns its back on the surface that it is to meet; turn its facets' normals outwards.")
+        return facets[looks]
+
+    def _contacts(self, program):
+        lines = []
+        for number, pair in enumerate(self.body.pairs, start=1):
+            name = f"PAIR_{number}"
+            if pair.itself and self.dialect == "calculix":
+                raise InputError(f"The pair {pair.name!r} is a surface with itself, which {program} does not take; export it for "
+                                 "Abaqus.")
+            lines += keywords.surface(f"{name}_POINTS", self._faces(pair.surface))
+            other = self._object_of(pair.other)
+            if other is None and not pair.itself:
+                other = f"{name}_OTHER"
+                lines += keywords.surface(other, self._faces(pair.other))
+            stiffness = keywords.number(STIFFER * pair.stiffness)
+            lines += [f"*SURFACE INTERACTION, NAME={name}", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", stiffness]
+            if pair.friction:
+                mu = keywords.number(pair.friction)
+                lines += ["*FRICTION", f"{mu}, {stiffness}"] if self.dialect == "calculix" else [
+                    f"*FRICTION, ELASTIC SLIP={keywords.number(_ELASTIC_SLIP_MM)}", mu]
+            lines += [f"*CONTACT PAIR, INTERACTION={name}, TYPE=SURFACE TO SURFACE",
+                      f"{name}_POINTS" + (f", {other}" if other else "")]
+        return lines
+
+    def _object_of(self, surface: Surface) -> str | None:
+        """Name of the rigid object's surface that this one is, None where it is soft."""
+        node = int(surface.nodes[0, 0])
+        frames = (frame for frame in self.body.frames if node >= self.soft and node in frame.nodes)
+        return next((f"{name_of(frame.name)}_SURFACE" for frame in frames), None)
+
+    def _faces(self, surface: Surface) -> list[tuple[int, int]]:
+        """Element numbers and faces, from 1, of a soft surface's facets."""
+        if not self._sides:
+            for (_, element, nodes), numbers in zip(self.parts, self.numbers, strict=True):
+                for side, face in enumerate(element.faces, start=1):
+                    rows = np.sort(nodes[:, face.nodes[:_CORNERS[len(face.nodes)]]], axis=1)
+                    self._sides |= {tuple(row): (number, side) for row, number in zip(rows.tolist(), numbers.tolist(), strict=True)}
+        count = np.where(surface.kinds >= LINE2, 2, np.where(surface.kinds >= QUAD8, 4, 3))
+        keys = [tuple(sorted(own[:k])) for own, k in zip(surface.nodes.tolist(), count, strict=True)]
+        if missing := [key for key in keys if key not in self._sides]:
+            raise InputError(f"A facet of a surface belongs to no element of the deck (nodes {missing[0]}); name mesh faces.")
+        return [self._sides[key] for key in keys]
+
+    def _step(self, step: DeckStep, *, first):
+        label = f", NAME={step.name}" if self.dialect == "abaqus" else ""
+        lines = [] if label else [f"** STEP: {step.name}"]
+        lines += [f"*STEP{label}, NLGEOM=YES, INC=1000" if label else "*STEP, NLGEOM, INC=1000", "*STATIC", _INCREMENTS]
+        lines += ["*BOUNDARY" if first else "*BOUNDARY, OP=NEW"]
+        lines += [f"HELD_{axis + 1}, {axis + 1}, {axis + 1}" for axis in range(3) if len(self._held(axis))]
+        plane = self.body.mesh.geometry != "solid"
+        for (frame, axis), way in step.ways.items():
+            if not (plane and axis == 2):
+                lines += [f"{self.reference[frame]}, {axis + 1}, {axis + 1}, {keywords.number(way)}"]
+        if self.dialect == "abaqus":
+            lines += [f"{self.reference[k]}, 4, 6" for k, frame in enumerate(self.body.frames) if frame.nodes.min() >= self.soft]
+        if step.loads:
+            lines += ["*CLOAD"] + [f"{self.reference[frame]}, {axis + 1}, {keywords.number(value)}"
+                                   for (frame, axis), value in step.loads.items()]
+        for face, pressure in zip(self.body.pressures, step.pressures, strict=True):
+            value = keywords.number(pressure)
+            lines += ["*DLOAD"] + [f"{element}, P{side}, {value}" for element, side in self._faces(face.surface)]
+        return [*lines, *self._output(), "*END STEP"]
+
+    def _output(self):
+        names = [name_of(frame.name) for frame in self.body.frames]
+        if self.dialect == "abaqus":
+            lines = ["*OUTPUT, FIELD, FREQUENCY=1000", "*NODE OUTPUT", "U, RF", "*ELEMENT OUTPUT", "S, LE", "*CONTACT OUTPUT",
+                     "CSTRESS", "*OUTPUT, HISTORY, FREQUENCY=1"]
+            return lines + [line for name in names for line in (f"*NODE OUTPUT, NSET={name}_REFERENCE", "U, RF")]
+        lines = [line for name in names for line in (f"*NODE PRINT, NSET={name}_REFERENCE, FREQUENCY=1000", "U",
+                                                     f"*NODE PRINT, NSET={name}_NODES, TOTALS=ONLY, FREQUENCY=1000", "RF")]
+        return [*lines, "*NODE FILE, FREQUENCY=1000", "U, RF", "*EL FILE, FREQUENCY=1000", "S",
+                *(("*CONTACT FILE, FREQUENCY=1000", "CDIS, CSTR") if self.body.pairs else ())]
 
 
-def _elements(body, number, lines, reduced):
-    """Add *ELEMENT; returns (element, face) by the sorted corners of each face."""
-    first, faces = 1, {}
-    for region, kind, nodes in body.mesh.cells:
-        element = ELEMENTS[kind]
-        name = f"{element.abaqus_name}R" if element is HEX27 and reduced else element.abaqus_name
-        own = number[nodes[:, element.abaqus_nodes]]
-        lines += keywords.elements(name, _label(body, region), range(first, first + len(nodes)), own)
-        for side, face in enumerate(element.faces, 1):
-            corners = np.sort(nodes[:, face.nodes[:3 if len(face.nodes) == 6 else 4]], axis=1)
-            faces |= {tuple(own): (first + k, side) for k, own in enumerate(corners.tolist())}
-        first += len(nodes)
-    return faces
+def _normals(points, facets):
+    a, b, c = (points[facets[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    return normals / np.linalg.norm(normals, axis=1)[:, None]
 
 
-def _contact(k, pair, faces, stiffness):
-    lines = []
-    for name, surface in (("POINTS", pair.surface), ("OTHER", pair.other)):
-        corners = [np.sort(own[:3 if (own >= 0).sum() == 6 else 4]) for own in surface.nodes]
-        lines += keywords.surface(f"{name}{k}", [faces[tuple(own.tolist())] for own in corners])
-    lines += [f"*SURFACE INTERACTION, NAME=CONTACT{k}", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", f"{stiffness:g}, 0."]
-    if pair.friction:
-        lines += ["*FRICTION", f"{pair.friction:g}, {stiffness:g}"]
-    return lines + [f"*CONTACT PAIR, INTERACTION=CONTACT{k}, TYPE=SURFACE TO SURFACE", f"POINTS{k}, OTHER{k}"]
-
-
-def _step(body, motions, number, step, increments, fixed):
-    lines = ["*STEP, NLGEOM, INC=1000", "*STATIC" + (", DIRECT" if fixed else ""), f"{1 / increments:g}, 1.", "*BOUNDARY"]
-    held = ~body.free_components & (number > 0)[:, None]
-    for frame in body.frames:
-        held[frame.carried] = False
-    lines += [f"{number[node]}, {axis + 1}, {axis + 1}" for node, axis in np.argwhere(held)]
-    for frame in body.frames:
-        ways = motions.get(frame.name, Motion()).steps[:step + 1]
-        for axis in frame.axes:
-            way = sum(own.ways.get(axis, 0.0) for own in ways)
-            component = _AXES.index(axis) + 1
-            lines += [f"{n}, {component}, {component}, {keywords.number(way)}" for n in _used(number, frame.nodes)]
-    for k in range(1, len(body.frames) + 1):
-        lines += [f"*NODE PRINT, NSET=FRAME{k}, TOTALS=ONLY, FREQUENCY=1000", "RF"]
-    return lines + ["*END STEP"]
+def name_of(name: str) -> str:
+    """A name as decks take it: capitals, digits and underscores, a letter first."""
+    text = re.sub(r"\W", "_", name.upper(), flags=re.ASCII)
+    return text if text[:1].isalpha() else f"N{text}"

@@ -130,8 +130,10 @@ class SolidBlock:
         return float(self.at_rest.volumes.sum(axis=1)[self.at_rest.shapes].sum())
 
     def volume_outside(self, displacement: np.ndarray, window: tuple[float, float]) -> float:
-        """Volume (mm3) in which an isochoric principal stretch lies outside of `window` (lowest, highest)."""
-        low, high = stretch_range(self.loops.deformation(displacement, self.at_rest).C)
+        """Volume (mm3) in which a principal stretch lies outside of `window` (lowest, highest): an isochoric one, or of a foam's
+        law a whole one.
+        """
+        low, high = stretch_range(self.loops.deformation(displacement, self.at_rest).C, isochoric=self.law.projected_modulus > 0)
         return float(self.at_rest.volumes[self.at_rest.shapes].ravel() @ ((low < window[0]) | (high > window[1])))
 
     def _volumetric(self, J, at_rest):

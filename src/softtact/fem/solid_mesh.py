@@ -3,10 +3,9 @@
 Plane meshes lie in z = 0. Of an axisymmetric body x is the radius and y the axis.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 
@@ -138,13 +137,6 @@ class SolidMesh:
             return volumes
         radius = np.einsum("gm,em->eg", element.shape(rule.points)[0], self.points[nodes][..., 0])
         return volumes * (2 * np.pi * radius if self.axisymmetric else self.thickness_mm)
-
-    def write(self, path: str | Path, point_data: Mapping[str, np.ndarray] | None = None) -> None:
-        """Write the mesh as VTU, its regions as the cells' `region` with their names in `field_data`-like order of the file's
-        name."""
-        from softtact.fem.mesh_files import write_mesh
-
-        write_mesh(self, Path(path), point_data or {})
 
 
 def _boundary(cells):

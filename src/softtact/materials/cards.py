@@ -9,7 +9,7 @@ from softtact.errors import InputError
 from softtact.files import read_json
 from softtact.materials.config import validated
 from softtact.materials.laws.base import Law
-from softtact.materials.laws.registry import make_law
+from softtact.materials.laws.registry import FOAM_LAWS, make_law
 from softtact.materials.linear import LinearConstants
 from softtact.materials.windows import principal_window
 
@@ -61,9 +61,9 @@ def law_from_card(card: dict[str, Any], law: str | None = None) -> Law:
 
 def law_of_entry(name: str, entry: dict[str, Any]) -> Law:
     """The `Law` of one entry of a card, without a window of its own."""
-    if entry.get("bulk_modulus_mpa") is None:
+    if entry.get("bulk_modulus_mpa") is None and name not in FOAM_LAWS:
         raise InputError(f"The card's law {name} has no bulk_modulus_mpa; write the card again with `softtact fit`.")
-    return make_law(name, entry["parameters"], bulk_modulus=entry["bulk_modulus_mpa"])
+    return make_law(name, entry["parameters"], bulk_modulus=entry.get("bulk_modulus_mpa"))
 
 
 def linear_from_card(card: dict[str, Any]) -> LinearConstants:

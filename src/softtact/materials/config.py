@@ -202,8 +202,8 @@ def _resolved(config, path):
 def _check_laws(config):
     """Refuse unknown laws and constants now rather than in the middle of a study."""
     for name in config.fit.laws if config.fit.laws != "all" else []:
-        law_class(name)
+        law_class(name, fitted=True)
     if config.fit.choose != "best":
-        law_class(config.fit.choose)
+        law_class(config.fit.choose, fitted=True)
     for name, entry in config.printed.items():
         LinearConstants.of(entry.parameters) if name == "linear" else make_law(name, entry.parameters)

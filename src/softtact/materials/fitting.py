@@ -144,7 +144,7 @@ def law_names(laws: str | Sequence[str]) -> list[str]:
 
 def fit_law(name: str, curves: Sequence[Curve], **options: Any) -> LawFit:
     """Fit one law to all curves at once; options are those of `FitOptions`."""
-    kind, points, settings = law_class(name), collect(curves), FitOptions(**options)
+    kind, points, settings = law_class(name, fitted=True), collect(curves), FitOptions(**options)
     if len(points.stress) <= len(kind.constants):
         raise InputError(
             f"Law {name} has {len(kind.constants)} constants and the curves only {len(points.stress)} points;"

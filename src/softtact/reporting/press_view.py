@@ -27,7 +27,7 @@ _SHEET_MM = 1.0               # height of the walls where a file does not tell t
 @dataclass(frozen=True)
 class PressView:
     """points_mm (l, n, 3) as pressed, triangles (m, 3) of the sensor, values (l, n): displacement towards the PCB in mm, nan at the
-    object's points;  labels: forces;  object_triangles (k, 3): none where the file does not hold the object
+    object's points;  labels: forces;  object_triangles (k, 3): none where the file does not hold the object;  unit: of the values
     """
 
     points_mm: np.ndarray
@@ -36,6 +36,7 @@ class PressView:
     labels: list
     title: str
     object_triangles: np.ndarray
+    unit: str = UNIT
 
 
 def read_view(path: str | Path) -> PressView:
@@ -73,7 +74,7 @@ def _read_map(path):
 def write_page(view: PressView, path: str | Path) -> None:
     """Write a page that shows the press and needs nothing else."""
     triangles = np.vstack([view.triangles, view.object_triangles])
-    body = html_view(view.points_mm, triangles, view.values, title=view.title, unit=UNIT, labels=view.labels,
+    body = html_view(view.points_mm, triangles, view.values, title=view.title, unit=view.unit, labels=view.labels,
                      see_through=len(view.object_triangles))
     with atomic_path(path) as temporary:
         temporary.write_text(_PAGE.format(title=html.escape(view.title), body=body), encoding="utf-8")
@@ -97,7 +98,7 @@ def _draw_with_pyvista(pyvista, view, path):
     surface, solid = (pyvista.PolyData(view.points_mm[-1], np.column_stack([np.full(len(triangles), 3), triangles]).ravel())
                       for triangles in (view.triangles, view.object_triangles))
     plotter = pyvista.Plotter(off_screen=True, window_size=(1200, 900))
-    bar = {"title": f"{UNIT}\n", "color": "black", "vertical": False, "position_x": 0.25, "position_y": 0.04, "width": 0.5,
+    bar = {"title": f"{view.unit}\n", "color": "black", "vertical": False, "position_x": 0.25, "position_y": 0.04, "width": 0.5,
            "fmt": "%.3g", "title_font_size": 22, "label_font_size": 20, "n_labels": 3}
     plotter.add_mesh(surface, scalars=view.values[-1], cmap="viridis", scalar_bar_args=bar)
     if len(view.object_triangles):
@@ -129,10 +130,11 @@ def _draw_with_matplotlib(view, path):
     drawn = axes.plot_trisurf(*points.T, triangles=triangles, linewidth=0, antialiased=False)
     limits = Normalize(values.min(), values.max())
     drawn.set_facecolor(plt.get_cmap("viridis")(limits(values)))
-    axes.set(xlabel="x (mm)", ylabel="y (mm)", zlabel="z (mm)", zticks=[-2, 0], title=f"{view.title}, {view.labels[-1]}")
+    axes.set(xlabel="x (mm)", ylabel="y (mm)", zlabel="z (mm)", title=f"{view.title}, {view.labels[-1]}")
+    axes.locator_params(axis="z", nbins=3)
     axes.set_box_aspect(np.ptp(points, axis=0))
     axes.view_init(elev=32, azim=-123)
     if len(view.object_triangles):
         axes.plot_trisurf(*points.T, triangles=view.object_triangles, color="#999999", alpha=_SEEN_THROUGH, linewidth=0)
-    figure.colorbar(plt.cm.ScalarMappable(limits, "viridis"), ax=axes, label=UNIT, shrink=0.6)
+    figure.colorbar(plt.cm.ScalarMappable(limits, "viridis"), ax=axes, label=view.unit, shrink=0.6)
     save(figure, path)

@@ -66,7 +66,7 @@ def power_sum_response(C6: np.ndarray, mu: np.ndarray, alpha: np.ndarray, energy
                        tangent: np.ndarray) -> None:
     """Fill energy (n,), stress (n, 6) and, unless it is empty, tangent (n, 6, 6); mu, alpha (terms,)."""
     A, V, c, cb, dev, h = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    N, W, D = np.empty((3, 6)), np.empty((3, 6)), np.empty((3, 3))
+    N, W, D, quotients = np.empty((3, 6)), np.empty((3, 6)), np.empty((3, 3)), np.empty(3)
     for p in range(len(C6)):
         eigen(C6[p], A, V)
         for a in range(3):
@@ -76,7 +76,7 @@ def power_sum_response(C6: np.ndarray, mu: np.ndarray, alpha: np.ndarray, energy
         for a in range(3):
             cb[a] = scale * c[a]
         energy[p] = _principal(cb, mu, alpha, dev, h)
-        _dyads(V, N, W)
+        dyads(V, N, W)
         for k in range(6):
             stress[p, k] = dev[0] / c[0] * N[0, k] + dev[1] / c[1] * N[1, k] + dev[2] / c[2] * N[2, k]
         if len(tangent) == 0:
@@ -86,18 +86,24 @@ def power_sum_response(C6: np.ndarray, mu: np.ndarray, alpha: np.ndarray, energy
             for b in range(3):
                 own = h[a] - 2 * dev[a] if a == b else 0.0
                 D[a, b] = (own - (h[a] + h[b]) / 3 + total / 9) / (c[a] * c[b])
-        q0 = _quotient(c, cb, dev, mu, alpha, 0, 1)
-        q1 = _quotient(c, cb, dev, mu, alpha, 1, 2)
-        q2 = _quotient(c, cb, dev, mu, alpha, 2, 0)
-        for k in range(6):
-            d0 = D[0, 0] * N[0, k] + D[0, 1] * N[1, k] + D[0, 2] * N[2, k]
-            d1 = D[1, 0] * N[0, k] + D[1, 1] * N[1, k] + D[1, 2] * N[2, k]
-            d2 = D[2, 0] * N[0, k] + D[2, 1] * N[1, k] + D[2, 2] * N[2, k]
-            w0, w1, w2 = q0 * W[0, k], q1 * W[1, k], q2 * W[2, k]
-            for m in range(k, 6):
-                value = d0 * N[0, m] + d1 * N[1, m] + d2 * N[2, m] + w0 * W[0, m] + w1 * W[1, m] + w2 * W[2, m]
-                tangent[p, k, m] = value
-                tangent[p, m, k] = value
+        quotients[0] = quotient(c, cb, dev, mu, alpha, 0, 1)
+        quotients[1] = quotient(c, cb, dev, mu, alpha, 1, 2)
+        quotients[2] = quotient(c, cb, dev, mu, alpha, 2, 0)
+        sum_dyads(D, quotients, N, W, tangent[p])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def sum_dyads(D: np.ndarray, Q: np.ndarray, N: np.ndarray, W: np.ndarray, out: np.ndarray) -> None:
+    """sum_ab D_ab N_aN_a x N_bN_b + sum_a Q_a W_a x W_a into `out` (6, 6); D (3, 3) symmetric, N and W of `dyads`."""
+    for k in range(6):
+        d0 = D[0, 0] * N[0, k] + D[0, 1] * N[1, k] + D[0, 2] * N[2, k]
+        d1 = D[1, 0] * N[0, k] + D[1, 1] * N[1, k] + D[1, 2] * N[2, k]
+        d2 = D[2, 0] * N[0, k] + D[2, 1] * N[1, k] + D[2, 2] * N[2, k]
+        w0, w1, w2 = Q[0] * W[0, k], Q[1] * W[1, k], Q[2] * W[2, k]
+        for m in range(k, 6):
+            value = d0 * N[0, m] + d1 * N[1, m] + d2 * N[2, m] + w0 * W[0, m] + w1 * W[1, m] + w2 * W[2, m]
+            out[k, m] = value
+            out[m, k] = value
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -119,7 +125,7 @@ def _principal(cb, mu, alpha, dev, h):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _quotient(c, cb, dev, mu, alpha, a, b):
+def quotient(c: np.ndarray, cb: np.ndarray, dev: np.ndarray, mu: np.ndarray, alpha: np.ndarray, a: int, b: int) -> float:
     """Q_ab = (S_a - S_b)/(c_a - c_b), exact also where c_a = c_b."""
     d = (c[a] - c[b]) / c[b]
     slope = 0.0
@@ -131,7 +137,7 @@ def _quotient(c, cb, dev, mu, alpha, a, b):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _dyads(V, N, W):
+def dyads(V: np.ndarray, N: np.ndarray, W: np.ndarray) -> None:
     """N_a N_a as N (3, 6) and N_a N_b + N_b N_a of the pairs 01, 12, 20 as W (3, 6)."""
     for a in range(3):
         b = (a + 1) % 3
@@ -141,8 +147,8 @@ def _dyads(V, N, W):
             W[a, k] = V[i, a] * V[j, b] + V[j, a] * V[i, b]
 
 
-def stretch_range(C6: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Smallest and largest isochoric principal stretch (n,) at points given by C6 (n, 6).
+def stretch_range(C6: np.ndarray, *, isochoric: bool = True) -> tuple[np.ndarray, np.ndarray]:
+    """Smallest and largest principal stretch (n,), of the isochoric ones or the whole ones, at points given by C6 (n, 6).
 
     Eigenvalues of a symmetric 3 x 3 matrix in closed form (Smith, Comm. ACM 4 (1961) 168).
     """
@@ -153,5 +159,5 @@ def stretch_range(C6: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     deviator = a * (b * c - yz * yz) - xy * (xy * c - yz * zx) + zx * (xy * yz - b * zx)
     angle = np.arccos(np.clip(deviator / (2 * spread**3), -1.0, 1.0)) / 3
     high, low = mean + 2 * spread * np.cos(angle), mean + 2 * spread * np.cos(angle + 2 * np.pi / 3)
-    volume = (high * low * (3 * mean - high - low)) ** (1 / 3)
+    volume = (high * low * (3 * mean - high - low)) ** (1 / 3) if isochoric else 1.0
     return np.sqrt(low / volume), np.sqrt(high / volume)

@@ -1,0 +1,58 @@
+"""Quadratic elements from linear ones: nodes in the middles of edges, of quadrilateral faces and of hexahedra."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from softtact.fem.elements import HEX27, QUAD9, TET10, TRI6, WEDGE18, Element
+
+QUADRATIC = {"tetra": TET10, "hexahedron": HEX27, "wedge": WEDGE18, "triangle": TRI6, "quad": QUAD9}
+_CORNERS = {"tetra": 4, "hexahedron": 8, "wedge": 6, "triangle": 3, "quad": 4}
+
+
+def raised(points: np.ndarray, cells: Sequence[tuple[str, np.ndarray]]) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
+    """Quadratic elements of linear cells [(meshio's name, corners (e, c))] at points (n, 3).
+
+    Returns points (n', 3), nodes (e, m) of each of the cells, and the new number (n,) of each old point, -1 where no cell uses it.
+    New nodes stand in the means of the corners that they lie between.
+    """
+    members = [_members(kind) for kind, _ in cells]
+    width = max(int(own.sum(axis=1).max()) for own in members)
+    keys = [_keys(corners, own, width) for (_, corners), own in zip(cells, members, strict=True)]
+    between, place = np.unique(np.concatenate([key.reshape(-1, width) for key in keys]), axis=0, return_inverse=True)
+    there = between >= 0
+    new = np.where(there[..., None], points[between], 0.0).sum(axis=1) / there.sum(axis=1)[:, None]
+    nodes, start = [], 0
+    for key in keys:
+        count = key.shape[0] * key.shape[1]
+        nodes.append(place.ravel()[start:start + count].reshape(key.shape[:2]))
+        start += count
+    corner = np.flatnonzero(there.sum(axis=1) == 1)
+    number = np.full(len(points), -1)
+    number[between[corner, -1]] = corner
+    return new, nodes, number
+
+
+def _keys(corners, members, width):
+    """The corners (e, m, width), rising behind -1, that each node of an element lies between."""
+    keys = np.where(members[None], corners[:, None, :], -1)
+    return np.sort(keys, axis=2)[..., -width:]
+
+
+def _members(kind: str) -> np.ndarray:
+    """Which corners (m, c) span the smallest face of the cell that holds each node of its quadratic element."""
+    element = QUADRATIC[kind]
+    sides = _sides(element)
+    corners = sides[element.vtk_order[:_CORNERS[kind]]]
+    on_side = np.isclose(sides, 0)                                   # (m, s)
+    return (np.isclose(corners, 0)[None] | ~on_side[:, None]).all(axis=2)
+
+
+def _sides(element: Element) -> np.ndarray:
+    """Linear functions (m, s) of the element's nodes, each zero on one of its sides."""
+    x = element.nodes
+    if element is WEDGE18:
+        return np.column_stack([x[:, :2], 1 - x[:, 0] - x[:, 1], 1 + x[:, 2], 1 - x[:, 2]])
+    if element in (TET10, TRI6):
+        return np.column_stack([x, 1 - x.sum(axis=1)])
+    return np.column_stack([1 + x, 1 - x])

@@ -1,0 +1,62 @@
+"""`softtact mesh`: a surface or another program's elements become a body; what cannot be used is refused before work."""
+
+import json
+
+import meshio
+import numpy as np
+import pytest
+import trimesh
+
+from softtact.cli import main
+from softtact.fem.mesh_files import read_mesh_file
+
+CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
+
+
+@pytest.fixture
+def box(tmp_path):
+    trimesh.creation.box((6, 4, 3)).export(tmp_path / "box.stl")
+    return tmp_path / "box.stl"
+
+
+def test_a_surface_becomes_a_mesh_with_named_faces_and_its_quality_is_told(box, tmp_path, capsys):
+    pytest.importorskip("pytetwild")
+    out = tmp_path / "box.vtu"
+    status = main(["mesh", str(box), "--unit", "mm", "--size", "2.5", "--region", "gel", "--face", "bottom=z<-1.49", "--json",
+                   "--out", str(out)])
+    told = capsys.readouterr()
+    assert status == 0 and "elements and" in told.err      # what it costs is said first
+    result = json.loads(told.out)
+    assert result["volume_error"] == pytest.approx(0, abs=1e-9) and result["least_quality"] > 0.1
+    mesh = read_mesh_file(out)
+    assert mesh.regions == result["regions"] == ["gel"]
+    assert len(mesh.faces["bottom"]["triangle6"]) == result["faces"]["bottom"]
+    assert mesh.points[mesh.face_nodes("bottom")][:, 2].max() == pytest.approx(-1.5)
+
+
+def test_elements_of_another_program_become_a_body(tmp_path, capsys):
+    meshio.Mesh(CORNERS, [("tetra", np.arange(4)[None])]).write(tmp_path / "one.vtk")
+    written = tmp_path / "one.vtu"
+    assert main(["mesh", str(tmp_path / "one.vtk"), "--unit", "cm", "--face", "floor=z<0.1", "--out", str(written)]) == 0
+    assert read_mesh_file(written).volume_mm3() == pytest.approx(1000 / 6)
+    assert "floor" in capsys.readouterr().out
+
+
+def test_what_it_cannot_use_is_refused_in_one_sentence_and_nothing_is_written(box, tmp_path, capsys):
+    meshio.Mesh(CORNERS, [("tetra", np.arange(4)[None])]).write(tmp_path / "one.vtk")
+    for arguments, told in [
+        ([box], "--size"),
+        ([box, "--size", "0"], "not possible"),
+        ([box, "--size", "2", "--face", "bottom"], "NAME=VALUE"),
+        ([box, "--size", "2", "--face", "bottom=z~0"], "not understood"),
+        ([box, "--size", "2", "--geometry", "axisymmetric"], "plane mesh"),
+        ([box, "--size", "2", "--region", "a", "--region", "b"], "one region"),
+        ([box, "--size", "5"], "larger than the body"),
+        ([tmp_path / "one.vtk", "--size", "1"], "has elements already"),
+        ([tmp_path / "none.vtu"], "no such mesh file"),
+    ]:
+        out = tmp_path / "out.vtu"
+        assert main(["mesh", *map(str, arguments), "--unit", "mm", "--out", str(out)]) == 1
+        assert told in capsys.readouterr().err.splitlines()[-1]
+        assert not out.exists()
+    assert main(["mesh", str(box), "--unit", "mm", "--size", "2", "--out", str(tmp_path / "out.stl")]) == 1
