@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 
 import softtact
+from softtact.commands import press_soft
 from softtact.commands.common import (
     add_command,
     add_mesh,
@@ -30,9 +31,10 @@ EXAMPLES = """
   softtact press part.stl --unit mm --force 20 --sensor my_sensor.yaml --policy error --tolerance 0.02
   softtact press part.stl --unit mm --force 5 --model elastic --json > press.json
   softtact press parts/ --unit mm --force 20 --model elastic --out results/ --plot press.png
+  softtact press tomato.stl --unit mm --force 10 --object-law card.json --object-size 2.5
   softtact press part.stl --unit mm --motion "z -0.5; x 1.0 in 10" --model elastic --out slide.nc
 """
-MODELS = ("auto", "elastic", "foundation", "hyperelastic")
+MODELS = ("auto", "elastic", "foundation", "hyperelastic", "solid")
 
 
 def add(commands: argparse._SubParsersAction) -> None:
@@ -58,6 +60,7 @@ def add(commands: argparse._SubParsersAction) -> None:
                          help="where the hyperelastic model sums up elements: cpu (default), cuda, or auto (a GPU if there is one)")
     command.add_argument("--card", action="append", metavar="LAYER=CARD.json",
                          help="a card of `softtact fit` for the dielectric or the cover, in place of the printed constants")
+    press_soft.add_options(command)
     command.add_argument("--time-limit", type=float, metavar="S",
                          help="end after so many seconds; the load steps that were reached are written and shown")
     command.add_argument("--out", type=Path, metavar="FILE.nc",
@@ -75,6 +78,7 @@ def _press(options):
     from softtact.files import refuse_overwriting
 
     _refuse_idle(options)
+    press_soft.check(options)
     if options.time_limit is not None and not options.time_limit > 0:
         raise InputError(f"--time-limit {options.time_limit:g}: a press needs some time; give seconds above 0.")
     spec, pose = sensor_spec(options.sensor), pose_of(options)
@@ -82,7 +86,7 @@ def _press(options):
     several = is_several(options.mesh)
     if not several:
         check_folders(options.out, options.vtu, options.plot)
-    cards = [path for _, path in pairs("--card", options.card)]
+    cards = [path for _, path in pairs("--card", options.card)] + ([options.object_law] if options.object_law else [])
     refuse_overwriting([*options.mesh, sensor_path(options.sensor), *cards],
                        {"--out": options.out, "--vtu": options.vtu, "--plot": options.plot})
     check_names({options.vtu: (".vtu",), options.plot: (".png", ".svg")})
@@ -113,10 +117,10 @@ def _press_one(path, files, label="press", *, options, spec, pose, how, sensors)
                                  device=options.device)
     sensor = replace(sensors["own"], attributes={"mesh_repairs": "; ".join(repairs), **_origin(options, path)})
     on_step = None if files.out is None else lambda result: result.write(files.out)
+    pressed, own = press_soft.arguments(options, mesh, keep_body=files.vtu is not None)
     try:
-        result, error = sensor.press(mesh, pose=pose, **how, model=options.model, policy=options.policy, label=label,
-                                     tolerance_mm=options.tolerance, keep_body=files.vtu is not None, keep_object=True,
-                                     time_limit_s=options.time_limit, on_step=on_step), None
+        result, error = sensor.press(pressed, pose=pose, **how, model=options.model, policy=options.policy, label=label,
+                                     tolerance_mm=options.tolerance, on_step=on_step, **own), None
     except (ConvergenceError, KeyboardInterrupt) as stop:
         if getattr(stop, "result", None) is None:
             raise
