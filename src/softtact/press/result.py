@@ -62,7 +62,7 @@ class PressResult:
     y_mm: np.ndarray = field(metadata=_array("mm", "y", coordinate="y"))
     """(y,) in mm: the map's rows in the sensor frame."""
     model: str = field(metadata=_FACT)
-    """Which model pressed: elastic, foundation or hyperelastic."""
+    """Which model pressed: elastic, foundation, hyperelastic, or solid where the object is soft."""
     sensor: str = field(metadata=_FACT)
     """The sensor's name."""
     solver: str = field(metadata=_FACT)
