@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 _MARGIN, _LEAST_MARGIN_MM = 1.3, 0.1     # of the depth on springs, within which points are looked for at first
 _ROUND_OFF = 1e-6         # of a force
+_NEAR_MM = 0.1            # height over the sensing surface, or depth below it, from which an object is set down first
 _RISE = 1.15              # of the object's depth: points within may touch
 
 
@@ -72,7 +73,7 @@ def elastic_result(sensor: "Sensor", press: LayerPress, forces: np.ndarray, seco
 def press_on_foundation(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, course: Course) -> PressResult:
     """Load step by load step with the foundation model, which has no body to keep."""
     start, compliance = time.perf_counter(), sensor.prepared("foundation", course.threads)
-    surface = HeightField(placed)
+    surface = HeightField(_set_down(sensor, placed))
     underside, touch, stop = Underside(surface, compliance.grid), first_touch_mm(sensor, surface), shell_stop_mm(sensor, surface)
     load_steps: list[Any] = []
     times: list[float] = []
@@ -95,6 +96,16 @@ def press_on_foundation(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, c
     points, _ = _within_reach(underside, underside.points, compliance.foundation_modulus, forces, sensor.spec.thickness_mm, solve,
                               lambda _: load_steps[-1].depth)
     return _of_load_steps(sensor, compliance, points, load_steps, forces, times, touch)
+
+
+def _set_down(sensor: "Sensor", placed: Trimesh) -> Trimesh:
+    """The object where it touches, if its pose is far from there: the model counts its first guesses from the sensing surface."""
+    away = first_touch_mm(sensor, HeightField(placed))
+    if abs(away) <= _NEAR_MM:
+        return placed
+    lowered = placed.copy()
+    lowered.apply_translation([0.0, 0.0, -away])
+    return lowered
 
 
 def repeated(load_steps: Iterable[Any], forces: np.ndarray) -> Iterator[Any]:
