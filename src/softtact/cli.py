@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 import softtact
 from softtact.commands import (
+    calibrate,
     completion,
     complexity,
     config_schema,
@@ -32,7 +33,7 @@ from softtact.commands.common import EXIT_TEXT
 from softtact.errors import ConvergenceError, SofttactError
 from softtact.extras import missing_extra
 
-COMMANDS = (press, grasp, grasps, skin, dataset, view, predict, complexity, fit, export_deck, detect_discs, cost, stage,
+COMMANDS = (press, grasp, grasps, skin, dataset, view, calibrate, predict, complexity, fit, export_deck, detect_discs, cost, stage,
             config_schema, completion)
 EXAMPLES = """examples:
   softtact press part.stl --unit mm --force 5 --force 20 --out press.nc --vtu press.vtu --plot press.png

@@ -11,7 +11,7 @@ from softtact.errors import ConvergenceError
 from softtact.progress import announce
 from softtact.sensors.calibration import CalibrationBlock
 
-_ROUNDS, _SETTLED = 6, 1.0       # of pressing anew, until that changes counts by less than the noise of a mean
+_ROUNDS, _SETTLED = 6, 0.5       # of pressing anew, until that changes counts by less than half of a mean's noise
 _UNKNOWN = 0.5                   # of the prior's standard deviation: what is left above it, the presses do not tell
 _PARTS = 0.35                    # of a direction's length: what is named as a part of it
 

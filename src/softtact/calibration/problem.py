@@ -167,6 +167,10 @@ class Problem:
             changes[axis, :count] = (moved.maps_mm[:count] - ladder.maps_mm[:count]) / step
         return changes
 
+    def at_place(self, k: int) -> tuple[Ladder, np.ndarray | None]:
+        """The presses of experiment k, from 0, where it was last pressed, and their change with the place (see `at`)."""
+        return self._ladders[k][1.0]
+
     def changes(self, vector: np.ndarray) -> list[np.ndarray]:
         """dC/C0 (b, row, column) of each experiment."""
         shares, times = self.creep(vector)
