@@ -12,8 +12,9 @@ from softtact.readout.recording import clipped, dead
 if TYPE_CHECKING:
     import xarray
 
-_SAMPLES, _BINS = 1500, 120      # of a recording, over which creep is followed, and of which the counts are compared
+_SAMPLES, _BINS = 400, 100      # of a recording, over which creep is followed, and of which the counts are compared
 _ONSET = 0.5                     # of a held weight's largest sum of counts: it lies on the sensor from there on
+_OF_MEDIAN = 1.4826              # a normal number's standard deviation over the median of its absolute value
 _LEAST_COUNTS = 30.0             # over the noise, that a finger must move by to be pressed at all
 
 
@@ -94,8 +95,10 @@ def _means(count, most):
 
 
 def _noise(counts):
-    """Standard deviation of a reading: the median over the taxels, so that those under a moving edge do not count."""
-    return float(np.median(np.std(np.diff(counts, axis=0), axis=0)) / np.sqrt(2)) if len(counts) > 2 else 0.0
+    """Standard deviation of a reading: from the median step between readings, so that a press' own steps do not count."""
+    if len(counts) < 3:
+        return 0.0
+    return float(np.median(_OF_MEDIAN * np.median(np.abs(np.diff(counts, axis=0)), axis=0)) / np.sqrt(2))
 
 
 def _check_pressed(name, recording, finger, noise):

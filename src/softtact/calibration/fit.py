@@ -115,8 +115,8 @@ def _descend(problem, start):
 
     low, high = problem.bounds
     inside = np.clip(start, low + 1e-9, high - 1e-9)
-    return least_squares(problem.residuals, inside, jac=jacobian, bounds=(low, high), x_scale=problem.deviation, xtol=1e-6,
-                         ftol=1e-8, max_nfev=30).x
+    return least_squares(problem.residuals, inside, jac=jacobian, bounds=(low, high), x_scale=problem.deviation, xtol=1e-4,
+                         ftol=1e-6, max_nfev=30).x
 
 
 def _differences(function, vector, steps, highest):

@@ -70,6 +70,9 @@ def _frames(recording: "xarray.Dataset") -> Iterator[np.ndarray]:
     for finger, axis in enumerate(axes):
         axis.set(title=f"finger {finger}", xlabel="column", ylabel="row")
     figure.colorbar(images[-1], ax=axes, label="counts over the baseline", shrink=0.8)
+    figure.suptitle(_label(recording, 0), fontsize=9)
+    figure.canvas.draw()
+    figure.set_layout_engine("none")      # laid out once: anew for each frame would take a second each
     for at in np.linspace(time[0], time[-1], number):
         reading = int(np.abs(time - at).argmin())
         for finger, image in enumerate(images):
