@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from softtact.calibration.experiment import Experiment
+from softtact.calibration.fit import CalibrationResult
 from softtact.calibration.ladder import Ladder
 from softtact.calibration.problem import Problem
 from softtact.errors import InputError
@@ -17,6 +18,7 @@ from softtact.readout.calibrated import relative_change
 
 UNEXPLAINED = 0.1      # share of the variance, from which a recording is refused: gains 30 % apart, more than any sensor's
 _CLEARLY = 0.5         # of what is left, below which another reading of the same numbers is the better one
+_AT_BOUND = 0.01       # of ln modulus, or mm
 _PERFECT = 0.01        # what is left is so little that nothing is to be asked
 UNITS = {"kilograms-force": 9.80665, "pounds-force": 4.44822}     # forces of one unit in N
 _OFF_MM = (-1.5, -0.75, 0.0, 0.75, 1.5)
@@ -40,6 +42,20 @@ class PressCheck:
 def check_recordings(problem: Problem) -> list[PressCheck]:
     """A `PressCheck` of each experiment. Raises InputError where a recording is not of the press that it is said to be of."""
     return [_check(problem, k, one) for k, one in enumerate(problem.experiments)]
+
+
+def check_result(result: CalibrationResult) -> None:
+    """Raises InputError where a number ran to the end of its range: what it was fitted to is not what it stands for."""
+    problem = result.problem
+    low, high = problem.bounds
+    for name, value, least, most in zip(problem.names, result.vector, low, high, strict=True):
+        if name == "ln modulus" and min(value - least, most - value) < _AT_BOUND:
+            raise InputError(f"The calibration asks for {result.modulus_scale:.2f} times the moduli, the end of what is "
+                             "looked for; are the forces in newtons, and the objects those that were pressed?")
+        if name.startswith(("x ", "y ")) and min(value - least, most - value) < _AT_BOUND:
+            number = int(name.split()[1])
+            raise InputError(f"{problem.experiments[number - 1].name}: the object would lie {value:.1f} mm along {name[0]}, the "
+                             "end of what is looked for; state where it lay (--place).")
 
 
 def _check(problem, k, one):

@@ -58,7 +58,7 @@ def _calibrate(options):
     spec = sensor_spec(options.sensor)
     fitted = () if options.fit == "none" else tuple(options.fit.split(","))
     from softtact.calibration.advice import quarters, rank
-    from softtact.calibration.checks import check_recordings
+    from softtact.calibration.checks import check_recordings, check_result
     from softtact.calibration.fit import calibrate
     from softtact.calibration.ladder import Presses, uncalibrated
     from softtact.calibration.problem import Problem
@@ -76,6 +76,7 @@ def _calibrate(options):
     problem = Problem(presses, experiments, fitted)
     checks = check_recordings(problem)
     result = calibrate(problem)
+    check_result(result)
     notes += _notes(problem, checks)
     candidates = [one for path in options.candidate or () for one in quarters(path.name, read[path], spec.footprint_mm)]
     advice = rank(result, candidates, largest_n=max(float(one.force_n.max()) for one in experiments)) if candidates else []
