@@ -19,9 +19,12 @@ import torch
 import trimesh
 
 import softtact
+from softtact.calibration.ladder import Presses
+from softtact.calibration.simulated import HiddenConstants, simulate_recording, staircase_force
 from softtact.cli import main
 from softtact.imaging.frames import render_frame
 from softtact.learning.network import TactileNetwork, save_network
+from softtact.readout.tsf85 import write_recording
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -90,7 +93,18 @@ def desk(tmp_path_factory):
         path.parent.mkdir(parents=True, exist_ok=True)
         save_network(path, network, facts={"model": "elastic", "seed": 0, "source": "nothing: a test's"})
     np.save(folder / "map.npy", np.full((57, 33), 0.1))
+    _record(folder)
     return folder
+
+
+def _record(folder):
+    """A recording of a plate on the paper's sensor, its object, and the log of its force."""
+    plate, sensor = trimesh.creation.box((26, 41, 4)), softtact.load_sensor("coro")
+    plate.export(folder / "plate.stl")
+    time_s, force_n = staircase_force([10.0, 30.0], hold_s=0.5, rate_n_per_s=50.0)
+    recording = simulate_recording(Presses(sensor, model="elastic"), plate, HiddenConstants.drawn(sensor, seed=0), time_s, force_n)
+    write_recording(folder / "plate.csv", recording)
+    np.savetxt(folder / "force.csv", np.column_stack([time_s, force_n]), delimiter=",", header="time_s,force_n", comments="")
 
 
 @pytest.mark.slow

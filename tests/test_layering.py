@@ -23,7 +23,7 @@ ORDER = (
     ("models.meshes", "decks"),
     ("readout", "imaging", "published"),
     ("press", "skin"),
-    ("robot", "learning"),
+    ("robot", "learning", "calibration"),
     ("evaluation",),
     ("study",),
     ("reporting",),

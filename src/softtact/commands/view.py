@@ -1,4 +1,4 @@
-"""`softtact view`: a pressed sensor in a browser, or as a picture."""
+"""`softtact view`: a pressed sensor in a browser, or as a picture; a recording as pictures over time."""
 
 import argparse
 import os
@@ -7,21 +7,30 @@ import tempfile
 from pathlib import Path
 
 from softtact.commands.common import add_command, check_folders, check_names, show
+from softtact.errors import InputError
 
 EXAMPLES = """
   softtact press part.stl --unit mm --force 5 --force 20 --model elastic --out press.nc --vtu press.vtu
   softtact view press.nc                           # opens a page that turns; a picture where there is no browser
   softtact view press.vtu --save press.png    # a picture of the whole sensor at the largest force
   softtact view press.nc --page press.html    # the page, to keep or to send
+  softtact view recording.csv --save recording.png     # both fingers at six times; .gif or .mp4 plays it
+  softtact view recording.csv --force-log force.csv --save recording.gif
 """
 
 
 def add(commands: argparse._SubParsersAction) -> None:
     """Add the command to the parser."""
-    command = add_command(commands, "view", _view, "Show a pressed sensor from all sides, in a browser or as a picture.", EXAMPLES)
+    command = add_command(commands, "view", _view, "Show a pressed sensor from all sides, or play a recording.", EXAMPLES)
     command.add_argument("result", metavar="RESULT", type=Path,
-                         help="the .nc or .vtu file of softtact press, or of a press of solids (.npz, too)")
-    command.add_argument("--save", type=Path, metavar="FILE.png", help="draw a picture, and open nothing")
+                         help="the .nc or .vtu file of softtact press, or of a press of solids (.npz, too), or the .csv of a recording of "
+                              "a TSF-85")
+    command.add_argument("--save", type=Path, metavar="FILE.png",
+                         help="draw a picture, and open nothing; of a recording a strip of pictures, or .gif or .mp4")
+    command.add_argument("--force-log", type=Path, metavar="FILE.csv",
+                         help="of a recording: the force over time, with columns time_s and force_n (or force_n_0, force_n_1)")
+    command.add_argument("--baseline", choices=("auto", "subtracted", "kept"), default="auto",
+                         help="of a recording: how the recorder wrote it (default: told by the lowest readings)")
     command.add_argument("--page", type=Path, metavar="FILE.html", help="write the page, and open nothing")
 
 
@@ -31,7 +40,12 @@ def _view(options):
     from softtact.reporting.solid_view import read_view
 
     check_folders(options.save, options.page)
-    refuse_overwriting([options.result], {"--save": options.save, "--page": options.page})
+    refuse_overwriting([options.result, options.force_log], {"--save": options.save, "--page": options.page})
+    if options.result.suffix.lower() == ".csv":
+        return _view_recording(options)
+    if options.force_log or options.baseline != "auto":
+        raise InputError(f"{options.result}: --force-log and --baseline have an effect on the .csv of a recording only; leave them "
+                         "out.")
     check_names({options.save: (".png",), options.page: (".html",)})
     view = read_view(options.result)
     result = {"page": None, "picture": None, "opened": False, "drawn_with": None, "triangles": len(view.triangles)}
@@ -49,6 +63,32 @@ def _view(options):
     if picture:
         result |= {"drawn_with": save_picture(view, picture), "picture": str(picture)}
     show(result, as_json=options.json, lines=_lines(result))
+
+
+def _view_recording(options):
+    """Play a recording into a strip of pictures, a GIF or an MP4."""
+    from softtact.readout.recording import findings, with_force
+    from softtact.readout.tsf85 import read_recording
+    from softtact.reporting.recording_view import save_strip, save_video
+
+    if options.page:
+        raise InputError(f"--page {options.page}: a recording is drawn as .png, .gif or .mp4; give --save.")
+    picture = options.save or Path(f"{options.result.name}.png")
+    check_names({picture: (".png", ".gif", ".mp4")})
+    recording = read_recording(options.result, baseline=options.baseline)
+    if "counts" not in recording:
+        raise InputError(f"{options.result}: it holds the nodes of a simulation and no counts; give the file of its readings.")
+    if options.force_log:
+        recording = with_force(recording, options.force_log)
+    said = findings(recording)
+    for sentence in said:
+        print(f"softtact view: {sentence}", file=sys.stderr)
+    (save_strip if picture.suffix.lower() == ".png" else save_video)(recording, picture)
+    result = {"picture": str(picture), "readings": len(recording.time), "seconds": float(recording.time[-1] - recording.time[0]),
+              "largest_counts": float(recording.counts.max()), "findings": said}
+    show(result, as_json=options.json, lines=[
+        f"{result['readings']} readings in {result['seconds']:.3g} s, up to {result['largest_counts']:g} counts",
+        f"written: {picture}"])
 
 
 def _browser():

@@ -12,7 +12,7 @@ from softtact.contact.shell import Shell
 from softtact.errors import ConvergenceError, ShellWarning
 from softtact.press.result import PressResult
 from softtact.progress import progress
-from softtact.readout.capacitance import ideal_counts
+from softtact.readout.calibrated import counts_of
 
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
@@ -55,11 +55,16 @@ def make_result(sensor: "Sensor", model: str, solver: str, maps: np.ndarray, for
                              "within_validity": np.asarray(numbers.pop("within_validity"), dtype=np.int8)}
     arrays: dict[str, Any] = {name: np.asarray(values) for name, values in numbers.items()}
     _warn_of_shell(spec, forces, arrays.get("pad_force_n", forces))
-    return PressResult(deformation_map_mm=maps, tactile_map=ideal_counts(spec, thinning), normal_force_n=forces, wall_time_s=times,
+    return PressResult(deformation_map_mm=maps, tactile_map=counts_of(spec, thinning), normal_force_n=forces, wall_time_s=times,
                        x_mm=spec.map_x_mm, y_mm=spec.map_y_mm, model=model, sensor=spec.name, solver=solver,
                        largest_counts=spec.largest_counts,
                        attributes={"thickness_mm": spec.thickness_mm, "edge": spec.edge.in_words, **_friction(spec, model),
-                                   **sensor.attributes}, **flags, **arrays)
+                                   **_calibration(spec), **sensor.attributes}, **flags, **arrays)
+
+
+def _calibration(spec):
+    """Attribute that states what a calibrated sensor's readings rest on."""
+    return {} if spec.calibration is None else {"calibration": spec.calibration.source}
 
 
 def _warn_of_shell(spec, forces, on_pad):

@@ -33,7 +33,7 @@ class PressResult:
     deformation_map_mm: np.ndarray = field(metadata=_array("mm", "step", "y", "x"))
     """(step, y, x) in mm: how far the sensing surface moved towards the board, positive."""
     tactile_map: np.ndarray = field(metadata=_array("counts", "step", "row", "column"))
-    """(step, row, column) in counts: the taxels' ideal reading."""
+    """(step, row, column) in counts: the taxels' ideal reading, or that of a calibrated sensor long after the press."""
     normal_force_n: np.ndarray = field(metadata=_array("N", "step"))
     """(step,) in N: how hard the object was pressed, positive into the sensor; pad and shell together."""
     indentation_mm: np.ndarray = field(metadata=_array("mm", "step"))

@@ -51,15 +51,22 @@ def load_sensor(name_or_yaml: str | Path, *, materials: Mapping[str, Law] | None
     name, tsf85, means the same sensor), pad, and without frusta sheet and pad4x4; materials that a
     sensor names are found in the same way
     materials: {"dielectric": Law, "cover": Law}, or one of them, to replace the Mooney-Rivlin constants printed for its materials
+    A `calibration` in the file (see `softtact calibrate`) scales the moduli of the elastic layer and of the laws that are not
+    replaced, and gives the taxels' readings.
     Raises InputError that lists the known names, or names the file and the field that is wrong.
     """
     spec = read_spec(sensor_file(name_or_yaml))
     laws = dict(materials or {})
     for layer in sorted(set(laws) - set(spec.materials)):
         raise InputError(f"{spec.name} has no layer {layer!r} for the material given; its layers are {', '.join(spec.materials)}.")
+    stiffness = 1.0
+    if spec.calibration is not None:
+        stiffness = spec.calibration.modulus_scale
+        layer_of_all = spec.elastic_layer.model_copy(update={"young_mpa": stiffness * spec.elastic_layer.young_mpa})
+        spec = spec.model_copy(update={"elastic_layer": layer_of_all})
     for layer, material in spec.materials.items():
         if layer not in laws:
-            laws[layer] = law_from_printed(material_file(material), "mooney_rivlin")
+            laws[layer] = law_from_printed(material_file(material), "mooney_rivlin").scaled(stiffness)
     return Sensor(spec, laws)
 
 

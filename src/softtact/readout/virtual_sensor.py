@@ -83,6 +83,13 @@ class VirtualSensorSettings:
         kept = {name: getattr(cls, name) for name in ("rate_n_per_s", "load_step_s", "counts_per_relative_change")}
         return cls(**off | kept | {"largest_counts": np.inf} | changes)
 
+    def of_calibrated(self, spec: "SensorSpec") -> Self:
+        """These settings with the scale and the creep of a sensor's own `calibration`, where it has one."""
+        known = spec.calibration
+        return self if known is None else dataclasses.replace(
+            self, counts_per_relative_change=known.counts_per_relative_change, relaxation=known.relaxation,
+            relaxation_s=known.relaxation_s)
+
     def __post_init__(self):
         for name in _LISTS:
             given = getattr(self, name)
@@ -146,6 +153,7 @@ def read_virtual_sensor(spec: "SensorSpec", deformation_map_mm: np.ndarray, *, f
 def read_branches(spec: "SensorSpec", deformation_map_mm: np.ndarray, *, force_n: Sequence[float] | np.ndarray, trials: int,
                   seed: int, item: str, settings: VirtualSensorSettings = VirtualSensorSettings()) -> Branches:
     """`Branches` of counts for maps (force, y, x) in mm at rising forces (force,) in N; `item` tells presses apart."""
+    settings = settings.of_calibrated(spec)
     specimen = make_specimen(spec, seed=seed, settings=settings)
     history = staircase(np.asarray(force_n, dtype=float), rate_n_per_s=settings.rate_n_per_s, hold_s=settings.load_step_s,
                         cycles_before=settings.cycles_before, rest_s=settings.rest_s)
@@ -157,7 +165,10 @@ def read_branches(spec: "SensorSpec", deformation_map_mm: np.ndarray, *, force_n
 
 
 def make_specimen(spec: "SensorSpec", *, seed: int, settings: VirtualSensorSettings = VirtualSensorSettings()) -> Specimen:
-    """The `Specimen` of a seed. All is always drawn, so one effect switched off leaves the others as they were."""
+    """The `Specimen` of a seed. All is always drawn, so one effect switched off leaves the others as they were.
+
+    Of a sensor with a `calibration` it has the gains and zeros found there, which hold what its sheet's thickness does.
+    """
     spec.need_frusta("the virtual sensor", "take the ideal readout, `PressResult.tactile_map`")
     if not settings.electrode_spacing_mm < min(electrode_sides(spec)):
         raise InputError(f"virtual_sensor: electrode_spacing_mm is {settings.electrode_spacing_mm:g}, and a taxel "
@@ -169,6 +180,8 @@ def make_specimen(spec: "SensorSpec", *, seed: int, settings: VirtualSensorSetti
         if number not in range(dead.size):
             raise InputError(f"virtual_sensor: dead_taxels has {number:g}; the taxels are numbered 0 to {dead.size - 1}.")
         dead.flat[int(number)] = True
+    if spec.calibration is not None:
+        return Specimen(np.array(spec.calibration.gain), np.array(spec.calibration.zero_counts), np.zeros(shape), dead)
     sheet_excess = spec.dielectric.sheet_thickness_mm * settings.sheet_scatter * sheet.clip(-_LARGEST_DEVIATION, _LARGEST_DEVIATION)
     return Specimen(1 + settings.gain_scatter * gain, settings.offset_counts * offset, sheet_excess, dead)
 
@@ -183,9 +196,12 @@ def taxel_capacitance(spec: "SensorSpec", displacement_mm: np.ndarray, *, sheet_
     spacing = settings.electrode_spacing_mm
     extra = np.broadcast_to(sheet_excess_mm, (spec.taxels.rows, spec.taxels.columns))
     air = equivalent_air_gap(spec, displacement_mm)
-    inverse = 1 / (air + extra[:, :, *[None] * air.ndim] / spec.dielectric.relative_permittivity)      # (row, column, ..., y, x)
-    weights = electrode_weights(spec, spacing_mm=spacing, shift_mm=shift_mm)
-    means = np.einsum("ry,cx,rc...yx->...rc", *weights, inverse, optimize=True)
+    if np.any(extra):
+        inverse = 1 / (air + extra[:, :, *[None] * air.ndim] / spec.dielectric.relative_permittivity)  # (row, column, ..., y, x)
+        weights = electrode_weights(spec, spacing_mm=spacing, shift_mm=shift_mm)
+        means = np.einsum("ry,cx,rc...yx->...rc", *weights, inverse, optimize=True)
+    else:
+        means = taxel_means(spec, 1 / air, spacing_mm=spacing, shift_mm=shift_mm)
     moved = taxel_means(spec, displacement_mm, spacing_mm=spacing, shift_mm=shift_mm)
     thickness = spec.dielectric_thickness_mm + extra
     gap = np.maximum(thickness - moved, 0.02 * thickness)

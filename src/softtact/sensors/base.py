@@ -9,6 +9,7 @@ from pydantic import Field, PositiveFloat, PositiveInt, ValidationError
 
 from softtact.errors import InputError
 from softtact.files import read_yaml
+from softtact.sensors.calibration import CalibrationBlock
 from softtact.sensors.edge import Edge, EdgeField
 from softtact.sensors.fields import ElasticLayer, Section, Taxels
 from softtact.unknown_names import first_fault, known_keys, unknown
@@ -28,6 +29,7 @@ class BaseSpec(Section):
     taxels: Taxels
     elastic_layer: ElasticLayer
     edge: EdgeField = Edge()
+    calibration: CalibrationBlock | None = None
 
     @property
     def thickness_mm(self) -> float:
@@ -103,6 +105,9 @@ class BaseSpec(Section):
         if np.isfinite(below) and below >= self.held_height_mm:
             raise InputError(f"{where}, at 'edge.held.sides_below_mm': {below:g} mm is not less than the height of the layers, "
                              f"{self.held_height_mm:g} mm, so nothing is held; make it smaller, or write 'held: free'.")
+        fault = self.calibration and self.calibration.fault(self.taxels.rows, self.taxels.columns)
+        if fault:
+            raise InputError(f"{where}: {fault}; calibrate the sensor again.")
         if not self.base_held and not np.isfinite(below):
             raise InputError(f"{where}, at 'edge.held': with support 'none' and free sides nothing holds the sensor; hold the "
                              "sides, or write support: base.")

@@ -222,7 +222,10 @@ def _check_models(values, spec):
 
 
 def _check_sensor(values, spec):
-    """Refuse now a sensor that a model or a network of the study would refuse after hours."""
+    """Refuse now a sensor that a model or a network of the study would refuse after hours, or one with readings of its own."""
+    if spec.calibration is not None:
+        raise InputError(f"the configuration, at 'sensor': {spec.name} is calibrated, and a study draws its specimens and "
+                         "their gain by 'virtual_sensor'; name the sensor that it was calibrated from.")
     for model in values.models.values():
         spec.check_for(model.kind)
     lost, shortest = 2 * max(len(values.network.filters), values.search.space.depth[1]), min(spec.map_shape)

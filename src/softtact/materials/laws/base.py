@@ -7,6 +7,7 @@ The whole energy is psi + U(J), with U the law's volumetric function (`volumetri
 
 import warnings
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from scipy.optimize import brentq
@@ -81,6 +82,13 @@ class Law:
         values = ", ".join(f"{name}={value:g}" for name, value in self.parameters.items())
         volume = "" if isinstance(self.volumetric, Quadratic) else f", volumetric={type(self.volumetric).__name__}"
         return f"{type(self).__name__}({values}, bulk_modulus={self.bulk_modulus:g}{volume})"
+
+    def scaled(self, factor: float) -> Self:
+        """The same law with all of its stresses times a factor above 0."""
+        values = {one.name: self.parameters[one.name] * (factor if one.unit == "MPa" else 1.0) for one in self.constants}
+        law = type(self)(values, bulk_modulus=factor * self.bulk_modulus, volumetric=type(self.volumetric))
+        law.stretch_window = self.stretch_window
+        return law
 
     @property
     def bulk_modulus(self) -> float:

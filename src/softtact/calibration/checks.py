@@ -1,0 +1,128 @@
+"""Whether recordings can be of the presses that they are said to be of: noticed and said before anything is fitted.
+
+Each recording by itself is compared with the press at one common gain and zero, the object up to 1.5 mm beside its place. What then
+is not explained of the counts' variance is small for the right press: gains 20 % apart leave 4 %. A wrong one leaves more, and
+the same counts may fit clearly better turned round, from the other finger, or at a force in another unit.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from softtact.calibration.experiment import Experiment
+from softtact.calibration.fit import CalibrationResult
+from softtact.calibration.ladder import Ladder
+from softtact.calibration.problem import Problem
+from softtact.errors import InputError
+from softtact.readout.calibrated import relative_change
+
+UNEXPLAINED = 0.1      # share of the variance, from which a recording is refused: gains 30 % apart, more than any sensor's
+_CLEARLY = 0.5         # of what is left, below which another reading of the same numbers is the better one
+_AT_BOUND = 0.01       # of ln modulus, or mm
+_PERFECT = 0.01        # what is left is so little that nothing is to be asked
+UNITS = {"kilograms-force": 9.80665, "pounds-force": 4.44822}     # forces of one unit in N
+_OFF_MM = (-1.5, -0.75, 0.0, 0.75, 1.5)
+_BINS = 30
+_TURNS = {"its rows turned round": (-1, 1), "its columns turned round": (1, -1), "rows and columns turned round": (-1, -1)}
+
+
+@dataclass(frozen=True)
+class PressCheck:
+    """unexplained: share of the variance, at a common gain and zero;  turned: the least of it with rows or columns turned round."""
+
+    unexplained: float
+    turned: float
+
+    @property
+    def tells_orientation(self) -> bool:
+        """Whether the press would have shown rows or columns that are turned round."""
+        return self.unexplained < _CLEARLY * self.turned
+
+
+def check_recordings(problem: Problem) -> list[PressCheck]:
+    """A `PressCheck` of each experiment. Raises InputError where a recording is not of the press that it is said to be of."""
+    return [_check(problem, k, one) for k, one in enumerate(problem.experiments)]
+
+
+def check_result(result: CalibrationResult) -> None:
+    """Raises InputError where a number ran to the end of its range: what it was fitted to is not what it stands for."""
+    problem = result.problem
+    low, high = problem.bounds
+    for name, value, least, most in zip(problem.names, result.vector, low, high, strict=True):
+        if name == "ln modulus" and min(value - least, most - value) < _AT_BOUND:
+            raise InputError(f"The calibration asks for {result.modulus_scale:.2f} times the moduli, the end of what is "
+                             "looked for; are the forces in newtons, and the objects those that were pressed?")
+        if name.startswith(("x ", "y ")) and min(value - least, most - value) < _AT_BOUND:
+            number = int(name.split()[1])
+            raise InputError(f"{problem.experiments[number - 1].name}: the object would lie {value:.1f} mm along {name[0]}, the "
+                             "end of what is looked for; state where it lay (--place).")
+
+
+def _check(problem, k, one):
+    ladder, moving = problem.at_place(k)
+    bins = np.unique(np.linspace(0, len(one.counts) - 1, _BINS).astype(int))
+    bins = bins[one.force_of_bins[bins] <= problem.valid_n[k]]
+    usable = one.usable[bins].astype(float)
+    predicted = _predicted(problem, one, ladder, moving, bins, 1.0)
+    here = _unexplained(predicted, one.counts[bins], usable)
+    turned = {words: _unexplained(predicted, one.counts[bins][:, ::y, ::x], usable[:, ::y, ::x])
+              for words, (y, x) in _TURNS.items()}
+    if here > _PERFECT:
+        _refuse_other_finger(one, predicted, bins, here)
+        best = min(turned, key=turned.__getitem__)
+        if turned[best] < _CLEARLY * here:
+            raise InputError(f"{one.name}: its counts follow the press better with {best} ({here:.0%} of their variance are not "
+                             f"explained as they are, {turned[best]:.1%} so); put the object where it lay (--place), or turn the "
+                             "recording's taxels round.")
+        _refuse_unit(problem, one, here)
+    if here > UNEXPLAINED:
+        raise InputError(f"{one.name}: the press explains {1 - here:.0%} of its counts' variance only; is it another object, "
+                         "another place (--place), or another force?")
+    return PressCheck(here, min(turned.values()))
+
+
+def _refuse_other_finger(one, predicted, bins, here):
+    if one.other_counts is None:
+        return
+    other = one.other_counts[bins]
+    if np.ptp(other) > 0.5 * np.ptp(one.counts) and _unexplained(predicted, other, np.ones_like(other)) < _CLEARLY * here:
+        raise InputError(f"{one.name}: the other finger follows the press clearly better; are the fingers swapped? Calibrate that "
+                         "one (--finger).")
+
+
+def _refuse_unit(problem, one, here):
+    """Refuse forces that are clearly better taken in another unit; forces that the sensor does not bear are refused before."""
+    top = problem.presses.reach(one.mesh, one.place, largest_n=max(UNITS.values()) * one.force_n.max())[1]
+    ladder = problem.presses.ladder(one.mesh, one.place, largest_n=top)
+    bins = np.unique(np.linspace(0, len(one.counts) - 1, _BINS).astype(int))
+    for unit, factor in UNITS.items():
+        within = bins[factor * one.force_of_bins[bins] <= top]
+        usable = one.usable[within].astype(float)
+        if len(within) < 3 or np.ptp(one.counts[within]) < 0.5 * np.ptp(one.counts):
+            continue
+        as_given, as_unit = (_unexplained(_predicted(problem, one, ladder, None, within, times), one.counts[within], usable)
+                             for times in (1.0, factor))
+        if as_unit < _CLEARLY * as_given:
+            raise InputError(f"{one.name}: its counts rise as if the forces were in {unit} ({as_given:.0%} of their variance are "
+                             f"not explained by newtons, {as_unit:.1%} by {unit}); give them in newtons.")
+
+
+def _predicted(problem: Problem, one: Experiment, ladder: Ladder, moving: np.ndarray | None, bins: np.ndarray,
+               times: float) -> np.ndarray:
+    """dC/C0 (place, b, row, column) without creep, at `times` the forces, for the object in and beside its place."""
+    weights = (one.bins @ ladder.weights(times * one.force_n))[bins]
+    places = [np.zeros(3)] if moving is None else [np.array([x, y, 0.0]) for x in _OFF_MM for y in _OFF_MM]
+    spec = problem.presses.sensor.spec
+    return np.stack([relative_change(spec, np.tensordot(
+        weights, ladder.maps_mm if moving is None else ladder.maps_mm + np.tensordot(off, moving, 1), 1)) for off in places])
+
+
+def _unexplained(predicted, counts, usable):
+    """Least share of the variance of counts (b, row, column), over the places, that a common gain and zero leave."""
+    total = max(usable.sum(), 1e-30)
+    y = counts - (usable * counts).sum() / total
+    m = predicted - (usable * predicted).sum(axis=(1, 2, 3), keepdims=True) / total
+    gain = (usable * m * y).sum(axis=(1, 2, 3)) / np.maximum((usable * m * m).sum(axis=(1, 2, 3)), 1e-30)
+    gain = np.maximum(gain, 0.0)      # pressing does not lower counts
+    left = (usable * (y - gain[:, None, None, None] * m) ** 2).sum(axis=(1, 2, 3)) / max((usable * y * y).sum(), 1e-30)
+    return float(left.min())

@@ -1,0 +1,200 @@
+"""From experiments to a calibrated sensor: best unknowns, their covariance, and what the presses do not tell."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from softtact.calibration.problem import Linear, Problem
+from softtact.errors import ConvergenceError
+from softtact.progress import announce
+from softtact.sensors.calibration import CalibrationBlock
+
+_ROUNDS, _SETTLED = 6, 0.5       # of pressing anew, until that changes counts by less than half of a mean's noise
+_UNKNOWN = 0.5                   # of the prior's standard deviation: what is left above it, the presses do not tell
+_PARTS = 0.35                    # of a direction's length: what is named as a part of it
+
+
+@dataclass(frozen=True)
+class CalibrationResult:
+    """What a calibration found."""
+
+    problem: Problem
+    """Experiments and unknowns."""
+    vector: np.ndarray
+    """(p,) unknowns by `problem.names`."""
+    linear: Linear
+    """Common scale, gains and zeros."""
+    counts: list[np.ndarray]
+    """Predicted (b, row, column) of each experiment."""
+    covariance: np.ndarray
+    """(q, q) of `names`, with the priors; the misfit beyond noise is counted as noise."""
+    names: list[str]
+    """(q,) `problem.names`, `ln scale`, `gain 0` to the last taxel's, `zero 0` to the last taxel's."""
+    misfit: float
+    """Root mean square of the misfits over their noise: 1 where the model explains all but noise."""
+    not_identifiable: list[str]
+    """Sentences on what these presses do not determine; empty where they determine all."""
+
+    @property
+    def modulus_scale(self) -> float:
+        """Of all moduli, over those of the materials' files; 1 where it was not fitted."""
+        return float(np.exp(self.problem.value(self.vector, "ln modulus", 0.0)))
+
+    def deviation(self, name: str) -> float:
+        """Standard deviation of an unknown by its name."""
+        return float(np.sqrt(self.covariance[self.names.index(name), self.names.index(name)]))
+
+    @property
+    def gain_deviation(self) -> np.ndarray:
+        """(row, column) standard deviation of the gains over the common scale, that of the scale included."""
+        k, s = self.names.index("gain 0"), self.names.index("ln scale")
+        n, c = self.linear.gain.size, self.covariance
+        own = np.diag(c)[k:k + n] + c[s, s] + 2 * c[s, k:k + n]
+        return np.sqrt(own).reshape(self.linear.gain.shape)
+
+    @property
+    def zero_deviation(self) -> np.ndarray:
+        """(row, column) standard deviation of the zeros in counts."""
+        k = self.names.index("zero 0")
+        return np.sqrt(np.diag(self.covariance)[k:]).reshape(self.linear.zero.shape)
+
+    def block(self) -> CalibrationBlock:
+        """The block of a sensor's file."""
+        shares, times = self.problem.creep(self.vector)
+        deviations = {name: float(f"{self.deviation(name):.3g}") for name in self.names if not name.startswith(("gain", "zero"))}
+        deviations |= {"gain, mean": float(f"{self.gain_deviation.mean():.3g}"),
+                       "zero, mean": float(f"{self.zero_deviation.mean():.3g}")}
+        noise = float(np.mean([one.noise_counts for one in self.problem.experiments]))
+        return CalibrationBlock(
+            gain=_rounded(self.linear.gain / self.linear.scale, 5), zero_counts=_rounded(self.linear.zero, 2),
+            counts_per_relative_change=round(self.linear.scale, 3), relaxation=tuple(round(one, 5) for one in shares),
+            relaxation_s=tuple(round(one, 4) for one in times), modulus_scale=round(self.modulus_scale, 5),
+            noise_counts=round(noise, 3), source="; ".join(one.name for one in self.problem.experiments),
+            not_identifiable=tuple(self.not_identifiable), standard_deviations=deviations)
+
+
+def _rounded(values, digits):
+    return tuple(tuple(round(float(one), digits) for one in row) for row in values)
+
+
+def calibrate(problem: Problem, *, label: str = "calibration") -> CalibrationResult:
+    """Fit a `Problem`. Raises ConvergenceError where an object is still on its way after some rounds of pressing anew."""
+    vector = problem.mean.copy()
+    for number in range(1, _ROUNDS + 1):
+        vector = _descend(problem, vector)
+        before = _predicted(problem, vector)
+        problem.at(vector)
+        _, inverse = problem.stacked()
+        change = float(np.sqrt(((inverse * (_predicted(problem, vector) - before)) ** 2).sum() / (inverse > 0).sum()))
+        if label:
+            announce(f"{label}: round {number}; pressing the objects where they lie now changed counts by {change:.2g} of noise")
+        if change <= _SETTLED:
+            break
+    else:
+        raise ConvergenceError(f"The calibration is not settled after {_ROUNDS} rounds: pressing the objects where they lie still "
+                               f"changes counts by {change:.2g} of their noise; state more closely where they lie (--place).")
+    vector = _descend(problem, vector)
+    return _result(problem, vector)
+
+
+def _predicted(problem, vector):
+    change = np.concatenate(problem.changes(vector))
+    best = problem.linear(change)
+    return best.gain * change + best.zero
+
+
+def _descend(problem, start):
+    """The least squares' vector from a start."""
+    if not len(start):
+        return start
+
+    def jacobian(vector):
+        return _differences(problem.residuals, vector, problem.steps, problem.bounds[1])
+
+    low, high = problem.bounds
+    inside = np.clip(start, low + 1e-9, high - 1e-9)
+    return least_squares(problem.residuals, inside, jac=jacobian, bounds=(low, high), x_scale=problem.deviation, xtol=1e-4,
+                         ftol=1e-6, max_nfev=30).x
+
+
+def _differences(function, vector, steps, highest):
+    """Forward differences (n, p) of a function (n,), backward ones at a bound."""
+    here = function(vector)
+    columns = []
+    for k, step in enumerate(steps):
+        signed = step if vector[k] + step < highest[k] else -step
+        moved = vector.copy()
+        moved[k] += signed
+        columns.append((function(moved) - here) / signed)
+    return np.stack(columns, axis=1)
+
+
+def _result(problem, vector):
+    changes = problem.changes(vector)
+    best = problem.linear(np.concatenate(changes))
+    counts, inverse = problem.stacked()
+    predicted = [best.gain * change + best.zero for change in changes]
+    misfits = inverse * (counts - np.concatenate(predicted))
+    used = int((inverse > 0).sum())
+    unknowns = len(vector) + 2 * best.gain.size
+    misfit = float(np.sqrt((misfits**2).sum() / max(used - unknowns, 1)))
+    names, jacobian, prior = sensitivities(problem, vector, best, np.concatenate(changes), inverse)
+    information = jacobian.T @ jacobian / max(misfit, 1.0) ** 2
+    covariance = np.linalg.inv(information + np.diag(prior**-2.0))
+    told = not_identifiable(names, information, covariance, prior, best.gain.shape)
+    return CalibrationResult(problem, vector, best, predicted, covariance, names, misfit, told)
+
+
+def sensitivities(problem: Problem, vector: np.ndarray, best: Linear, change: np.ndarray,
+                  inverse: np.ndarray) -> tuple[list[str], np.ndarray, np.ndarray]:
+    """Names (q,) of all unknowns, derivatives (n, q) of the predicted counts over their noise, and the priors' deviations (q,)."""
+    taxels = best.gain.size
+    own = _differences(lambda moved: (best.gain * np.concatenate(problem.changes(moved))).ravel(), vector, problem.steps,
+                       problem.bounds[1]) if len(vector) else np.zeros((change.size, 0))
+    at = np.tile(np.arange(taxels), len(change))
+    each = (at[:, None] == np.arange(taxels)).astype(float)
+    columns = [own, (best.gain * change).reshape(-1, 1), best.scale * change.reshape(-1, 1) * each, each]
+    names = [*problem.names, "ln scale", *(f"gain {k}" for k in range(taxels)), *(f"zero {k}" for k in range(taxels))]
+    p = problem.priors
+    prior = np.concatenate([problem.deviation, [p.log_scale], np.full(taxels, p.gain), np.full(taxels, p.zero_counts)])
+    return names, inverse.reshape(-1, 1) * np.hstack(columns), prior
+
+
+def not_identifiable(names: Sequence[str], information: np.ndarray, covariance: np.ndarray, prior: np.ndarray,
+                     shape: tuple[int, int]) -> list[str]:
+    """Sentences on unknowns that presses with this information (q, q) leave about as uncertain as they were before.
+
+    A number by itself: more than half of its prior's deviation is left. Several together: a direction in which each of them is told
+    by others, but not all at once (an eigenvector of the information in units of the priors, with less than one of them).
+    """
+    left = np.sqrt(np.diag(covariance)) / prior
+    open_taxels = [int(name.split()[1]) for name, share in zip(names, left, strict=True)
+                   if name.startswith("gain ") and share > _UNKNOWN]
+    said = []
+    if open_taxels:
+        said.append(f"the gain of {len(open_taxels)} of {shape[0] * shape[1]} taxels, which hardly feel these presses and keep the "
+                    f"common gain: {', '.join(map(str, open_taxels))}")
+    for name, share in zip(names, left, strict=True):
+        if share > _UNKNOWN and not name.startswith(("gain ", "zero ")):
+            said.append(f"{in_words(name)}: {share:.0%} of what was uncertain before is left")
+    keep = [k for k, name in enumerate(names) if not name.startswith(("gain ", "zero "))]
+    inner = np.ix_(keep, keep)
+    # What is left of the information on these once gains and zeros are free, too: the inverse of their part of the covariance.
+    scaled = np.linalg.inv(covariance[inner]) * np.outer(prior[keep], prior[keep]) - np.eye(len(keep))
+    values, vectors = np.linalg.eigh(scaled)
+    for value, vector in zip(values, vectors.T, strict=True):
+        parts = [in_words(names[keep[k]]) for k in np.flatnonzero(np.abs(vector) > _PARTS)]
+        if value < 1 and len(parts) > 1:
+            said.append(f"{' and '.join(parts)} apart from each other")
+    return said
+
+
+def in_words(name: str) -> str:
+    """An unknown's name as a message has it."""
+    kind, _, number = name.rpartition(" ")
+    words = {"share": "the share of creep", "ln time": "the time constant of creep", "x": "x of press", "y": "y of press",
+             "angle": "the angle of press"}
+    alone = {"ln scale": "the common gain", "ln modulus": "the modulus scale", "cover": "the cover's thickness"}
+    return alone.get(name) or f"{words[kind]} {number}"

@@ -1,0 +1,139 @@
+"""Presses that the fit starts from: maps at rising forces of an object in a place, and in places and sensors a little off.
+
+A press at any force is taken from a spline through these. Scaling all moduli by s divides all forces by s (equilibrium is linear in
+the stresses, and nothing else has the dimension of a stress), so that a softer sensor is the same one at a larger force.
+"""
+
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import trimesh
+from scipy.interpolate import CubicSpline
+
+from softtact.errors import ConvergenceError, InputError, ShellWarning
+from softtact.press.result import PressResult
+from softtact.press.sensor import Sensor, load_sensor
+
+LEVELS = 9
+SOFTEST = 0.5            # modulus scale down to which forces are pressed
+REACH_LEVELS = 8         # of the first press, which only tells up to which force the model is valid
+COVERS = (0.8, 1.0, 1.25)     # of the cover's thickness, through which its effect is interpolated
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """force_n (l,), rising;  maps_mm (l, y, x) at them."""
+
+    force_n: np.ndarray
+    maps_mm: np.ndarray
+
+    def weights(self, force_n: np.ndarray) -> np.ndarray:
+        """Weights (n, l) of the maps at forces (n,) from 0 to the highest, beyond which that one stays.
+
+        A cubic spline over the root of the force, in which a ball's and a flat punch's depth are both nearly straight.
+        """
+        at = np.sqrt(np.concatenate([[0.0], self.force_n]))
+        spline = CubicSpline(at, np.eye(len(at)))
+        return spline(np.sqrt(np.minimum(force_n, self.force_n[-1])))[:, 1:]
+
+
+class _BeyondError(Exception):
+    """Ends a press beyond its model's validity; `result` holds it so far."""
+
+    def __init__(self, result):
+        super().__init__()
+        self.result = result
+
+
+@dataclass
+class Presses:
+    """The presses of a calibration, each made once. `model` is that of `Sensor.press`; `variants` of the sensor by its cover."""
+
+    sensor: Sensor
+    model: str = "foundation"
+    levels: int = LEVELS
+    known: dict[Any, Ladder] = field(default_factory=dict)
+    variants: dict[float, Sensor] = field(default_factory=dict)
+
+    def ladder(self, mesh: trimesh.Trimesh, place: Sequence[float], *, largest_n: float, cover: float = 1.0) -> Ladder:
+        """The `Ladder` of an object at a place (x, y in mm, degrees) up to a force in N.
+
+        cover: thickness of the cover over the sensor's own. Forces that the model does not reach are left out.
+        """
+        key = (id(mesh), *np.round(place, 6), round(largest_n, 6), cover)
+        if key not in self.known:
+            result = self._press(mesh, place, self._forces(largest_n, self.levels), cover, None)
+            self.known[key] = Ladder(result.normal_force_n, result.deformation_map_mm)
+        return self.known[key]
+
+    def reach(self, mesh: trimesh.Trimesh, place: Sequence[float], *, largest_n: float) -> tuple[float, float]:
+        """Up to which force (N) the model is valid for an object at a place, in coarse steps, and the step after that.
+
+        Both are `largest_n` where it is valid all the way. Beyond validity a press may take minutes, so it ends there.
+        """
+        def stop(result: PressResult) -> None:
+            if not result.within_validity[-1]:
+                raise _BeyondError(result)
+
+        forces = self._forces(largest_n, REACH_LEVELS)
+        result = self._press(mesh, place, forces, 1.0, stop)
+        valid = int(np.cumprod(result.within_validity).sum())
+        return float(forces[valid - 1]) if valid else 0.0, float(forces[min(valid, len(forces) - 1)])
+
+    @staticmethod
+    def _forces(largest_n, count):
+        """Forces (count,) in even steps of their root."""
+        return largest_n * (np.arange(1, count + 1) / count) ** 2
+
+    def _press(self, mesh, place, forces, cover, on_step):
+        with warnings.catch_warnings(action="ignore", category=ShellWarning):
+            try:
+                return self._sensor(cover, forces[-1]).press(placed_at(mesh, place), pose=np.zeros(6), force_n=forces, label="",
+                                                             model=self.model, threads=1, on_step=on_step)
+            except _BeyondError as stopped:
+                return stopped.result
+            except ConvergenceError as error:
+                if error.result is None or len(error.result.normal_force_n) < 3:
+                    raise
+                return error.result
+
+    def _sensor(self, cover, largest_n):
+        """The sensor with a cover of `cover` times its thickness, which bears so large a force (N): a softer one is asked for."""
+        if cover not in self.variants:
+            spec = self.sensor.spec
+            thicker = spec.cover.model_copy(update={"thickness_mm": cover * spec.cover.thickness_mm})
+            self.variants[cover] = self.sensor if cover == 1.0 else replace(
+                self.sensor, spec=spec.model_copy(update={"cover": thicker}), prepared_models={})
+        own = self.variants[cover]
+        low, high = own.spec.force_range_n
+        return replace(own, spec=own.spec.model_copy(update={"force_range_n": (low, max(high, largest_n))}))
+
+
+def placed_at(mesh: trimesh.Trimesh, place: Sequence[float]) -> trimesh.Trimesh:
+    """A copy of the mesh: the middle of its bounding box at x, y (mm), turned about z (degrees), its lowest point at 0."""
+    x, y, angle = place
+    low, high = mesh.bounds
+    placed = mesh.copy()
+    placed.apply_translation([*(-0.5 * (low + high)[:2]), -low[2]])
+    placed.apply_transform(trimesh.transformations.rotation_matrix(np.radians(angle), [0, 0, 1]))
+    placed.apply_translation([x, y, 0])
+    return placed
+
+
+def uncalibrated(name_or_sensor: "str | Sensor") -> Sensor:
+    """A sensor without what an earlier calibration found of it."""
+    sensor = name_or_sensor if isinstance(name_or_sensor, Sensor) else load_sensor(name_or_sensor)
+    if sensor.spec.calibration is not None:
+        raise InputError(f"The sensor {sensor.spec.name} is calibrated already; calibrate the file that it was made from.")
+    sensor.spec.need_frusta("a calibration", "give a sensor of kind frusta")
+    return sensor
+
+
+def cover_weights(cover: float) -> Mapping[float, float]:
+    """{variant: weight} of the parabola through the variants of the cover's thickness, at `cover` times it."""
+    nodes = np.array(COVERS)
+    return {float(node): float(np.prod((cover - np.delete(nodes, k)) / (node - np.delete(nodes, k))))
+            for k, node in enumerate(nodes)}

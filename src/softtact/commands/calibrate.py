@@ -1,0 +1,201 @@
+"""`softtact calibrate`: one's own sensor from recordings of known presses."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from softtact.commands.common import UNITS, add_command, check_folders, check_names, sensor_path, sensor_spec, show
+from softtact.errors import InputError
+
+EXAMPLES = """
+  softtact calibrate plate.csv --press plate.stl --unit mm --force 20 --out mine.yaml --report mine.html
+  softtact calibrate plate.csv ball.csv --press plate.stl --press ball.stl --unit mm --force f1.csv --force f2.csv \\
+      --place 0,0,0 --place 3,6,0 --fit placement,relaxation,modulus --out mine.yaml --report mine.html
+  softtact press part.stl --unit mm --force 20 --sensor mine.yaml     # presses on the calibrated sensor
+"""
+
+
+def add(commands: argparse._SubParsersAction) -> None:
+    """Add the command to the parser."""
+    command = add_command(commands, "calibrate", _calibrate, "Calibrate a sensor from recordings of known presses.", EXAMPLES)
+    command.add_argument("recordings", metavar="RECORDING.csv", type=Path, nargs="+",
+                         help="recordings of the maker's recorder, one press each")
+    command.add_argument("--press", action="append", required=True, type=Path, metavar="OBJECT.stl",
+                         help="what was pressed, lowest side down: one for all recordings, or one for each")
+    command.add_argument("--unit", required=True, choices=UNITS, help="the meshes' unit")
+    command.add_argument("--force", action="append", required=True, metavar="N|FILE.csv",
+                         help="N of a weight that is laid on and held, or a log with time_s and force_n; one for all, or for each")
+    command.add_argument("--place", action="append", metavar="x,y,angle",
+                         help="where the object lay over the sensor's middle, mm and degrees (default: 0,0,0); one for all, or for "
+                              "each")
+    command.add_argument("--finger", type=int, choices=(0, 1), default=0, help="which finger was pressed (default: 0)")
+    command.add_argument("--baseline", choices=("auto", "subtracted", "kept"), default="auto",
+                         help="how the recorder wrote it (default: told by the lowest readings)")
+    command.add_argument("--fit", default="placement,relaxation", metavar="NAMES",
+                         help="what is unknown beside gains and zeros: some of placement,relaxation,modulus,cover, or none "
+                              "(default: placement,relaxation); cover computes two more sensors")
+    command.add_argument("--sensor", default="coro", help="name or YAML file of the sensor (default: coro)")
+    command.add_argument("--model", choices=("foundation", "elastic"), default="foundation", help="model of the presses")
+    command.add_argument("--candidate", action="append", type=Path, metavar="OBJECT.stl",
+                         help="an object that could be pressed next: tells in which of five places it would help most; repeat it")
+    command.add_argument("--hyperelastic-check", action="store_true",
+                         help="press each object once by the hyperelastic model, too, and tell how far its counts lie (a minute "
+                              "each)")
+    command.add_argument("--out", required=True, type=Path, metavar="SENSOR.yaml", help="the calibrated sensor's file to write")
+    command.add_argument("--report", type=Path, metavar="FILE.html", help="a page with residuals of each taxel")
+
+
+def _calibrate(options):
+    from softtact.files import refuse_overwriting
+
+    check_folders(options.out, options.report)
+    check_names({options.out: (".yaml", ".yml"), options.report: (".html",)})
+    count = len(options.recordings)
+    meshes, forces, places = (_for_each(name, getattr(options, name), count) for name in ("press", "force", "place"))
+    logs = [force for force in forces if not _is_number(force)]
+    refuse_overwriting([*options.recordings, *meshes, *logs, *(options.candidate or ()), sensor_path(options.sensor)],
+                       {"--out": options.out, "--report": options.report})
+    spec = sensor_spec(options.sensor)
+    fitted = () if options.fit == "none" else tuple(options.fit.split(","))
+    from softtact.calibration.advice import quarters, rank
+    from softtact.calibration.checks import check_recordings, check_result
+    from softtact.calibration.fit import calibrate
+    from softtact.calibration.ladder import Presses, uncalibrated
+    from softtact.calibration.problem import Problem
+    from softtact.calibration.sensor_file import write_calibrated
+    from softtact.geometry.meshes import read_mesh
+
+    sensor = uncalibrated(sensor_path(options.sensor))
+    read = {path: read_mesh(path, unit=options.unit) for path in dict.fromkeys([*meshes, *(options.candidate or ())])}
+    experiments, notes = [], []
+    for path, mesh, force, place in zip(options.recordings, meshes, forces, places, strict=True):
+        one, said = _experiment(path, read[mesh], force, _place(place), options, spec)
+        experiments.append(one)
+        notes += said
+    presses = Presses(sensor, model=options.model)
+    problem = Problem(presses, experiments, fitted)
+    checks = check_recordings(problem)
+    result = calibrate(problem)
+    check_result(result)
+    notes += _notes(problem, checks)
+    candidates = [one for path in options.candidate or () for one in quarters(path.name, read[path], spec.footprint_mm)]
+    advice = rank(result, candidates, largest_n=max(float(one.force_n.max()) for one in experiments)) if candidates else []
+    differences = _hyperelastic(result) if options.hyperelastic_check else None
+    write_calibrated(options.out, sensor_path(options.sensor), result)
+    if options.report:
+        from softtact.reporting.calibration_page import write_page
+
+        write_page(options.report, result, notes=notes, advice=advice)
+    for note in notes:
+        print(f"softtact calibrate: {note}", file=sys.stderr)
+    written = [str(path) for path in (options.out, options.report) if path]
+    summary = _summary(result, notes, advice, differences) | {"written": written}
+    show(summary, as_json=options.json, lines=_lines(summary))
+
+
+def _for_each(name, values, count):
+    """One value for each recording, of as many or of one that serves all."""
+    values = values or ["0,0,0"]
+    if len(values) not in (1, count):
+        raise InputError(f"--{name} was given {len(values)} times for {count} recordings; give it once for all, or once for each.")
+    return values * count if len(values) == 1 else values
+
+
+def _is_number(text):
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _place(text):
+    try:
+        x, y, angle = map(float, text.split(","))
+    except ValueError:
+        raise InputError(f"--place {text}: it is not three numbers; write x,y,angle in mm and degrees.") from None
+    return x, y, angle
+
+
+def _experiment(path, mesh, force, place, options, spec):
+    """The `Experiment` of a recording, and sentences on what of it is clipped or dead."""
+    from softtact.calibration.experiment import experiment
+    from softtact.readout.recording import findings, with_force
+    from softtact.readout.tsf85 import read_recording
+
+    recording = read_recording(path, baseline=options.baseline)
+    if "counts" not in recording:
+        raise InputError(f"{path}: it holds the nodes of a simulation and no counts; give a recording of the sensor.")
+    held = float(force) if _is_number(force) else None
+    if held is None:
+        recording = with_force(recording, force)
+    top = spec.force_range_n[1]
+    largest = held if held is not None else float(recording.force_n.max())
+    if not 0 < largest <= top:
+        raise InputError(f"--force {force}: its largest force is {largest:g} N, and the sensor {spec.name} bears up to {top:g} N; "
+                         "is it in grams or another unit? Give it in newtons.")
+    said = [one for one in findings(recording, largest=spec.largest_counts) if f"finger {options.finger}," in one]
+    return experiment(recording, mesh, finger=options.finger, force_n=held, place=place, largest_counts=spec.largest_counts), said
+
+
+def _notes(problem, checks):
+    """Sentences on readings that were left out, and on what the recordings could not show."""
+    for one, valid in zip(problem.experiments, problem.valid_n, strict=True):
+        if one.force_of_bins.max() > valid:
+            yield (f"{one.name}: readings above {valid:.3g} N are left out, for which the {problem.presses.model} model is not "
+                   "valid.")
+    if not any(check.tells_orientation for check in checks):
+        yield ("no press tells whether rows or columns are turned round; record one off the middle to be sure.")
+
+
+def _hyperelastic(result):
+    """Root mean square difference of the hyperelastic model's counts to the calibrated ones, at each press' largest force."""
+    import numpy as np
+
+    from softtact.calibration.ladder import placed_at
+    from softtact.readout.calibrated import relative_change
+
+    problem, scale = result.problem, result.modulus_scale
+    differences = []
+    for k, (one, valid) in enumerate(zip(problem.experiments, problem.valid_n, strict=True)):
+        force = min(valid, float(one.force_n.max())) / scale
+        placed = placed_at(one.mesh, problem.place(result.vector, k))
+        ladder = problem.presses.ladder(one.mesh, problem.place(result.vector, k), largest_n=max(force, 1e-6))
+        maps = problem.presses.sensor.press(placed, pose=np.zeros(6), force_n=force, model="hyperelastic").deformation_map_mm[-1]
+        spec = problem.presses.sensor.spec
+        apart = result.linear.gain * (relative_change(spec, maps) - relative_change(spec, ladder.maps_mm[-1]))
+        differences.append(float(np.sqrt(np.mean(apart**2))))
+    return differences
+
+
+def _summary(result, notes, advice, differences):
+    shares, times = result.problem.creep(result.vector)
+    return {"common_gain": result.linear.scale, "gain": (result.linear.gain / result.linear.scale).tolist(),
+            "zero_counts": result.linear.zero.tolist(), "gain_deviation": result.gain_deviation.tolist(),
+            "zero_deviation_counts": result.zero_deviation.tolist(), "relaxation": shares, "relaxation_s": times,
+            "modulus_scale": result.modulus_scale if "ln modulus" in result.problem.names else None,
+            "places": [result.problem.place(result.vector, k) for k in range(len(result.problem.experiments))],
+            "misfit_over_noise": result.misfit, "not_identifiable": result.not_identifiable, "notes": notes,
+            "hyperelastic_difference_counts": differences,
+            "next_press": [{"object": one.candidate.name, "place": one.candidate.place, "force_n": one.largest_n,
+                            "information_nats": one.information, "gain_deviation": one.gain_deviation} for one in advice]}
+
+
+def _lines(summary):
+    gains = [value for row in summary["gain"] for value in row]
+    yield f"common gain: {summary['common_gain']:.1f} counts at dC/C0 = 1; taxels' own {min(gains):.3f} to {max(gains):.3f} of it"
+    if summary["modulus_scale"] is not None:
+        yield f"modulus scale: {summary['modulus_scale']:.3f}"
+    for share, time in zip(summary["relaxation"], summary["relaxation_s"], strict=True):
+        yield f"creep: a share of {share:.3f} in {time:.2f} s"
+    for k, (x, y, angle) in enumerate(summary["places"], 1):
+        yield f"press {k} lay at {x:.2f}, {y:.2f} mm, {angle:.1f} degrees"
+    yield f"misfit: {summary['misfit_over_noise']:.2f} times the noise"
+    yield from (f"not told by these presses: {said}" for said in summary["not_identifiable"])
+    for said, counts in enumerate(summary["hyperelastic_difference_counts"] or (), 1):
+        yield f"the hyperelastic model lies {counts:.1f} counts away from press {said} (root mean square)"
+    for one in summary["next_press"][:3]:
+        place = ", ".join(f"{value:g}" for value in one["place"])
+        yield (f"next press: {one['object']} at {place} up to {one['force_n']:.3g} N adds {one['information_nats']:.2f} nats; "
+               f"gains then within {one['gain_deviation']:.2%}")
+    yield from (f"written: {path}" for path in summary["written"])

@@ -1,0 +1,30 @@
+"""The counts of a sensor whose `calibration` is known; those of an ideal readout where it is not."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from softtact.readout.capacitance import ideal_counts
+from softtact.readout.readout import amplified
+from softtact.readout.virtual_sensor import taxel_capacitance
+
+if TYPE_CHECKING:
+    from softtact.sensors.specification import AnySpec
+
+
+def relative_change(spec: "AnySpec", displacement_mm: np.ndarray, *, shift_mm: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
+    """dC / C0 (..., rows, columns) of the electrodes under a displacement (..., y, x) in mm, with their edges and neighbours.
+
+    shift_mm: (x, y) of the object over the sensor, beside where it was pressed
+    """
+    rest = taxel_capacitance(spec, np.zeros(displacement_mm.shape[-2:]))      # type: ignore[arg-type]
+    return taxel_capacitance(spec, displacement_mm, shift_mm=shift_mm) / rest - 1      # type: ignore[arg-type]
+
+
+def counts_of(spec: "AnySpec", displacement_mm: np.ndarray) -> np.ndarray:
+    """Counts (..., rows, columns) of a sensor's `calibration`, long after the press and without noise; else the ideal ones."""
+    known = spec.calibration
+    if known is None:
+        return ideal_counts(spec, displacement_mm)
+    change = known.counts_per_relative_change * relative_change(spec, displacement_mm)
+    return np.minimum(amplified(change, gain=np.array(known.gain), offset=np.array(known.zero_counts)), spec.largest_counts)

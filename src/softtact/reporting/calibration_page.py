@@ -1,0 +1,139 @@
+"""A calibration as a page: what was found and how surely, residuals of each taxel, what the presses do not tell."""
+
+import base64
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from jinja2 import Environment
+from markupsafe import Markup
+
+import softtact
+from softtact.calibration.advice import Advice
+from softtact.calibration.fit import CalibrationResult, in_words
+from softtact.files import atomic_path
+from softtact.reporting.page_template import STYLE
+from softtact.reporting.style import pyplot
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_PAGE = """<!doctype html><html lang="en"><head><meta charset="utf-8"><title>softtact: calibration of {{ sensor }}</title>
+<meta name="viewport" content="width=device-width"><style>{{ style }}</style></head><body>
+<h1>Calibration of a sensor {{ sensor }}</h1>
+<p>From {{ sources }}, by the {{ model }} model. The misfit is {{ "%.2f"|format(misfit) }} times the noise
+({{ "%.1f"|format(noise) }} counts a reading).</p>
+{% if told %}<div class="box"><b>What these presses do not tell.</b><ul>{% for said in told %}<li>{{ said }}</li>{% endfor %}</ul>
+</div>{% endif %}{% if notes %}<div class="box"><b>What was left out.</b><ul>{% for said in notes %}<li>{{ said }}</li>{% endfor %}
+</ul></div>{% endif %}
+<h2>What was found</h2><table><tr><th>number</th><th>value</th><th>standard deviation</th></tr>
+{% for name, value, deviation in rows %}<tr><td>{{ name }}</td><td>{{ value }}</td><td>{{ deviation }}</td></tr>{% endfor %}</table>
+<p>A misfit beyond noise counts as noise in these deviations; what the model itself has wrong is not in them.</p>
+{% for caption, image in figures %}<figure><img alt="{{ caption }}" src="data:image/png;base64,{{ image }}">
+<figcaption>{{ caption }}</figcaption></figure>{% endfor %}
+{% if advice %}<h2>Which press would help most</h2><table><tr><th>object</th><th>place: x, y in mm, angle in degrees</th>
+<th>up to, N</th><th>information, nats</th><th>mean deviation of the gains afterwards</th></tr>
+{% for one in advice %}<tr><td>{{ one.candidate.name }}</td><td>{{ one.candidate.place|join(", ") }}</td>
+<td>{{ "%.3g"|format(one.largest_n) }}</td><td>{{ "%.2f"|format(one.information) }}</td>
+<td>{{ "%.2f"|format(100 * one.gain_deviation) }} %</td></tr>{% endfor %}</table>{% endif %}
+<p>softtact {{ version }}</p></body></html>
+"""
+
+
+def write_page(path: str | Path, result: CalibrationResult, *, notes: Sequence[str] = (), advice: Sequence[Advice] = ()) -> None:
+    """Write the page of a calibration, its figures inside; notes: sentences on readings that were left out."""
+    problem = result.problem
+    figures = [("Measured (points) and calibrated (lines) counts, summed over the taxels. Grey: forces beyond the model's "
+                "validity, which are left out.", draw_time(result)),
+               ("Each taxel: its gain over the common one, its zero, the root mean square of its residuals.", draw_taxels(result)),
+               ("Root mean square residual of each taxel, one map for each recording.", draw_residuals(result))]
+    page = Environment(autoescape=True).from_string(_PAGE).render(
+        style=Markup(STYLE), sensor=problem.presses.sensor.spec.name, sources="; ".join(one.name for one in problem.experiments),
+        model=problem.presses.model, misfit=result.misfit, told=result.not_identifiable, notes=notes, rows=_rows(result),
+        noise=np.mean([one.noise_counts for one in problem.experiments]), advice=advice, version=softtact.__version__,
+        figures=[(caption, _png(figure)) for caption, figure in figures])
+    with atomic_path(path) as temporary:
+        temporary.write_text(page, encoding="utf-8")
+
+
+def _rows(result):
+    """(name, value, deviation) of the numbers that are not each taxel's own."""
+    scale, gain = result.linear.scale, result.linear.gain / result.linear.scale
+    yield "common gain, counts at dC/C0 = 1", f"{scale:.1f}", f"{100 * result.deviation('ln scale'):.2f} %"
+    yield ("gains over the common one, least to largest", f"{gain.min():.3f} to {gain.max():.3f}",
+           f"{100 * result.gain_deviation.mean():.2f} % in the mean")
+    yield ("zeros, least to largest, counts", f"{result.linear.zero.min():.1f} to {result.linear.zero.max():.1f}",
+           f"{result.zero_deviation.mean():.2f} in the mean")
+    for name, value in zip(result.problem.names, result.vector, strict=True):
+        shown, deviation = (np.exp(value), f"{100 * result.deviation(name):.2f} %") if name.startswith("ln ") else (
+            value, f"{result.deviation(name):.3g}")
+        unit = {"x": " (mm)", "y": " (mm)", "angle": " (degrees)", "ln time": " (s)", "cover": " over the sensor's"}
+        yield in_words(name) + unit.get(name.rpartition(" ")[0] or name, ""), f"{shown:.4g}", deviation
+
+
+def draw_time(result: CalibrationResult) -> "Figure":
+    """Sums of counts over time, measured and calibrated: a panel for each recording."""
+    experiments = result.problem.experiments
+    figure, axes = pyplot().subplots(1, len(experiments), figsize=(3.4 * len(experiments), 2.8), squeeze=False,
+                                     layout="constrained")
+    for axis, one, counts, valid in zip(axes[0], experiments, result.counts, result.problem.valid_n, strict=True):
+        time = one.bins @ one.time_s
+        axis.plot(time, one.counts.sum(axis=(1, 2)), ".", color="0.4", ms=3, label="measured")
+        axis.plot(time, counts.sum(axis=(1, 2)), color="#1f4e79", lw=1.2, label="calibrated")
+        low, high = axis.get_ylim()
+        axis.fill_between(time, low, high, where=one.force_of_bins > valid, color="0.9", zorder=0)
+        axis.set(title=Path(one.name).name, xlabel="time (s)", ylim=(low, high))
+    axes[0, 0].set_ylabel("sum of counts")
+    axes[0, 0].legend(frameon=False, fontsize=8)
+    return figure
+
+
+def draw_taxels(result: CalibrationResult) -> "Figure":
+    """Maps of gains, zeros and residuals."""
+    plt = pyplot()
+    figure, axes = plt.subplots(1, 3, figsize=(9.5, 4.2), layout="constrained")
+    gain = 100 * (result.linear.gain / result.linear.scale - 1)
+    rms = np.sqrt(np.mean(np.concatenate([part for part in _residuals(result)]) ** 2, axis=0))
+    for axis, values, title, unit, cmap in ((axes[0], gain, "gain over the common one", "%", "PuOr"),
+                                            (axes[1], result.linear.zero, "zero", "counts", "PuOr"),
+                                            (axes[2], rms, "residual, root mean square", "counts", "viridis")):
+        limit = float(np.abs(values).max()) or 1.0
+        _draw_map(figure, axis, values, title, unit, cmap, (-limit, limit) if cmap == "PuOr" else (0.0, limit))
+    return figure
+
+
+def draw_residuals(result: CalibrationResult) -> "Figure":
+    """A map of the root mean square residuals for each recording."""
+    experiments, maps = result.problem.experiments, [np.sqrt(np.mean(part**2, axis=0)) for part in _residuals(result)]
+    figure, axes = pyplot().subplots(1, len(maps), figsize=(3.2 * len(maps), 4.2), squeeze=False, layout="constrained")
+    highest = max(float(one.max()) for one in maps) or 1.0
+    for axis, one, values in zip(axes[0], experiments, maps, strict=True):
+        _draw_map(figure, axis, values, Path(one.name).name, "counts", "viridis", (0.0, highest))
+    return figure
+
+
+def _residuals(result):
+    """Measured less calibrated counts (b, row, column) of each recording, 0 where a reading was left out."""
+    _, inverse = result.problem.stacked()
+    ends = np.cumsum([len(one.counts) for one in result.problem.experiments])[:-1]
+    return [np.where(used > 0, one.counts - counts, 0.0) for one, counts, used in
+            zip(result.problem.experiments, result.counts, np.split(inverse, ends), strict=True)]
+
+
+def _draw_map(figure, axis, values, title, unit, cmap, limits):
+    image = axis.imshow(values, origin="lower", vmin=limits[0], vmax=limits[1], cmap=cmap)
+    for (row, column), value in np.ndenumerate(values):
+        light = (value - limits[0]) / (limits[1] - limits[0])
+        dark = not 0.2 < light < 0.8 if cmap == "PuOr" else light < 0.6
+        axis.text(column, row, f"{value:.1f}", ha="center", va="center", fontsize=7, color="white" if dark else "black")
+    axis.set(title=title, xlabel="column (x)", ylabel="row (y)", xticks=range(values.shape[1]), yticks=range(values.shape[0]))
+    figure.colorbar(image, ax=axis, label=unit, shrink=0.8)
+
+
+def _png(figure):
+    content = io.BytesIO()
+    figure.savefig(content, format="png", metadata={"Software": None}, dpi=110)
+    pyplot().close(figure)
+    return base64.b64encode(content.getvalue()).decode()

@@ -1,0 +1,139 @@
+"""A recording of a TSF-85 as a strip of pictures or a video: both fingers' taxels, and sums of counts and force over time."""
+
+import importlib.util
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from softtact.errors import InputError
+from softtact.extras import how_to_install
+from softtact.files import atomic_path
+from softtact.reporting.style import pyplot, save
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.figure import Figure
+
+_FRAMES = 6                   # of a strip
+_COLOURS = ("#1f4e79", "#e08214")
+_RATE_HZ, _MOST_FRAMES = 20, 600     # of a video, which plays in real time, or faster where it would have more frames
+
+
+def save_strip(recording: "xarray.Dataset", path: str | Path) -> None:
+    """Write a PNG: sums of counts (and force, where known) over time above, the taxels at six times below, one row a finger."""
+    save(draw_strip(recording), path)
+
+
+def draw_strip(recording: "xarray.Dataset") -> "Figure":
+    """The figure of `save_strip`. Its times: the largest sum of counts, and five spread evenly over the recording."""
+    time, counts = recording.time.values, recording.counts.values
+    peak = int(np.abs(counts).sum(axis=(2, 3)).max(axis=1).argmax())
+    shown = sorted({peak, *(int(np.abs(time - at).argmin()) for at in np.linspace(time[0], time[-1], _FRAMES))})
+    fingers = counts.shape[1]
+    figure = pyplot().figure(figsize=(1.4 * len(shown) + 1.6, 2.2 + 2.3 * fingers), layout="constrained")
+    rows = figure.add_gridspec(1 + fingers, len(shown), height_ratios=[1.3, *[1.6] * fingers])
+    _draw_time(figure.add_subplot(rows[0, :]), recording, time[shown])
+    axes = [[figure.add_subplot(rows[1 + finger, k]) for k in range(len(shown))] for finger in range(fingers)]
+    limits = _limits(counts)
+    for k, reading in enumerate(shown):
+        for finger in range(fingers):
+            image = _draw_taxels(axes[finger][k], counts[reading, finger], limits)
+            axes[finger][k].set_ylabel(f"finger {finger}\nrow" if k == 0 else "")
+        axes[0][k].set_title(_label(recording, reading), fontsize=8)
+        axes[-1][k].set_xlabel("column")
+    figure.colorbar(image, ax=[one for row in axes for one in row], label="counts over the baseline", shrink=0.7)
+    return figure
+
+
+def save_video(recording: "xarray.Dataset", path: str | Path) -> None:
+    """Write a GIF or an MP4 (extra `optics`) that plays a recording in real time, or faster where it is longer than 30 s."""
+    path = Path(path)
+    write = {".gif": _write_gif, ".mp4": _write_mp4}[path.suffix.lower()]
+    if write is _write_mp4 and importlib.util.find_spec("av") is None:
+        raise InputError(f"{path}: {how_to_install('av')}")
+    with atomic_path(path) as temporary:
+        write(temporary, _frames(recording))
+
+
+def _frames(recording: "xarray.Dataset") -> Iterator[np.ndarray]:
+    """Pictures (height, width, 3) of a recording, even numbers of pixels, as videos need them."""
+    time, counts = recording.time.values, recording.counts.values
+    number = int(np.clip(_RATE_HZ * (time[-1] - time[0]), 1, _MOST_FRAMES))
+    fingers, limits = counts.shape[1], _limits(counts)
+    figure = pyplot().figure(figsize=(2.4 * fingers + 0.8, 5.2), dpi=100, layout="constrained")
+    rows = figure.add_gridspec(2, fingers, height_ratios=[1.0, 2.2])
+    mark = _draw_time(figure.add_subplot(rows[0, :]), recording, time[:1])[0]
+    axes = [figure.add_subplot(rows[1, finger]) for finger in range(fingers)]
+    images = [_draw_taxels(axis, counts[0, finger], limits) for finger, axis in enumerate(axes)]
+    for finger, axis in enumerate(axes):
+        axis.set(title=f"finger {finger}", xlabel="column", ylabel="row")
+    figure.colorbar(images[-1], ax=axes, label="counts over the baseline", shrink=0.8)
+    figure.suptitle(_label(recording, 0), fontsize=9)
+    figure.canvas.draw()
+    figure.set_layout_engine("none")      # laid out once: anew for each frame would take a second each
+    for at in np.linspace(time[0], time[-1], number):
+        reading = int(np.abs(time - at).argmin())
+        for finger, image in enumerate(images):
+            image.set_data(counts[reading, finger])
+        mark.set_xdata([time[reading]] * 2)
+        figure.suptitle(_label(recording, reading), fontsize=9)
+        figure.canvas.draw()
+        frame = np.asarray(figure.canvas.buffer_rgba())[..., :3]
+        yield frame[:frame.shape[0] // 2 * 2, :frame.shape[1] // 2 * 2].copy()
+    pyplot().close(figure)
+
+
+def _write_gif(path, frames):
+    from PIL import Image
+
+    first, *others = [Image.fromarray(frame).quantize(64) for frame in frames]
+    first.save(path, format="GIF", save_all=True, append_images=others, duration=1000 // _RATE_HZ, loop=0)
+
+
+def _write_mp4(path, frames):
+    import av
+
+    with av.open(str(path), "w", format="mp4") as container:
+        stream: Any = container.add_stream("libx264", rate=_RATE_HZ)
+        stream.pix_fmt = "yuv420p"
+        for number, values in enumerate(frames):
+            if not number:
+                stream.height, stream.width = values.shape[:2]
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(np.ascontiguousarray(values), format="rgb24")))
+        container.mux(stream.encode())
+
+
+def _limits(counts):
+    return min(0.0, float(counts.min())), max(float(counts.max()), 1.0)
+
+
+def _label(recording, reading):
+    said = f"{recording.time.values[reading]:.2f} s"
+    if "force_n" not in recording:
+        return said
+    forces = dict.fromkeys(f"{force:.3g}" for force in recording.force_n.values[reading])     # once, where both feel the same
+    return f"{said}\n{' and '.join(forces)} N"
+
+
+def _draw_time(axis, recording, marked):
+    """Sums of counts over time, and the force where it is known; the lines that mark some times (n,)."""
+    time = recording.time.values
+    for finger in range(recording.sizes["finger"]):
+        axis.plot(time, recording.counts.values[:, finger].sum(axis=(1, 2)), color=_COLOURS[finger], lw=1, label=f"finger {finger}")
+    axis.set(xlabel="time (s)", ylabel="sum of counts")
+    if "force_n" in recording:
+        other = axis.twinx()
+        other.plot(time, recording.force_n.values.max(axis=1), color="0.5", ls="--", lw=0.9, label="force")
+        other.set_ylabel("force (N)")
+        other.spines["right"].set_visible(True)
+        axis.plot([], [], color="0.5", ls="--", lw=0.9, label="force")
+    axis.legend(frameon=False, fontsize=7, ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
+    return [axis.axvline(at, color="0.7", lw=0.7, zorder=0) for at in marked]
+
+
+def _draw_taxels(axis, counts, limits):
+    axis.set(xticks=range(counts.shape[1]), yticks=range(counts.shape[0]))
+    axis.tick_params(labelsize=6)
+    return axis.imshow(counts, origin="lower", vmin=limits[0], vmax=limits[1], cmap="viridis")
