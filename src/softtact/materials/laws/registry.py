@@ -66,7 +66,7 @@ def _foam(kind, parameters, bulk_modulus):
         raise InputError(f"Law {kind.name} with {_listing(parameters)} has the initial shear modulus {law.mu0:g} MPa and the bulk "
                          f"modulus {law.bulk_modulus:g} MPa; choose constants that make both positive.")
     if bulk_modulus is not None and not math.isclose(bulk_modulus, law.bulk_modulus, rel_tol=_SAME):
-        raise InputError(f"Law {kind.name} has the bulk modulus {law.bulk_modulus:g} MPa by its constants, not {bulk_modulus:g} MPa; "
+        raise InputError(f"Law {kind.name} has the bulk modulus {law.bulk_modulus:g} MPa by its constants, not {bulk_modulus:g}; "
                          "leave it out, or change nu.")
     return law
 
