@@ -23,8 +23,8 @@ def add(commands: argparse._SubParsersAction) -> None:
     """Add the command to the parser."""
     command = add_command(commands, "view", _view, "Show a pressed sensor from all sides, or play a recording.", EXAMPLES)
     command.add_argument("result", metavar="RESULT", type=Path,
-                         help="the .nc or .vtu file of softtact press, or of a press of solids (.npz, too), or the .csv of a recording of "
-                              "a TSF-85")
+                         help="the .nc or .vtu file of softtact press, or of a press of solids (.npz, too), or the .csv of a "
+                              "recording of a TSF-85")
     command.add_argument("--save", type=Path, metavar="FILE.png",
                          help="draw a picture, and open nothing; of a recording a strip of pictures, or .gif or .mp4")
     command.add_argument("--force-log", type=Path, metavar="FILE.csv",
