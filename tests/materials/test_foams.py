@@ -113,7 +113,7 @@ def test_cards_know_foams_and_fits_of_incompressible_curves_refuse_them():
     for change, told in [({"nu1": 0.5}, "nu1 is 0.5"), ({"alpha1": 0.0}, "alpha1"), ({"mu1": -1.0}, "make both positive")]:
         with pytest.raises(InputError, match=told):
             make_law("hyperfoam1", CONSTANTS["hyperfoam1"] | change)
-    with pytest.raises(InputError, match="by its constants, not 1;"):
+    with pytest.raises(InputError, match="by its constants, not 1 MPa;"):
         law_of_entry("hyperfoam1", entry | {"bulk_modulus_mpa": 1.0})
     with pytest.raises(InputError, match="compressible foams"):
         fit_law("hyperfoam1", [])
