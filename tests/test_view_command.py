@@ -149,7 +149,8 @@ def test_without_pyvista_matplotlib_draws(press_nc, tmp_path):
 
 def test_what_is_no_press_is_refused(tmp_path, capsys):
     for name, content, said in [
-        ("press.csv", b"1,2", "give the .nc or .vtu file"), ("press.nc", b"x", "not a readable NetCDF"),
+        ("press.txt", b"1,2", "give the .nc or .vtu file"), ("press.csv", b"1,2\n", "as the maker's recorder writes it"),
+        ("press.nc", b"x", "not a readable NetCDF"),
         ("press.vtu", b"<", "not readable as VTU"),
     ]:
         (tmp_path / name).write_bytes(content)

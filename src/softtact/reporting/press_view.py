@@ -44,7 +44,8 @@ def read_view(path: str | Path) -> PressView:
     readers = {".nc": _read_map, ".vtu": read_vtu}
     path = Path(path)
     if path.suffix.lower() not in readers:
-        raise InputError(f"{path}: not a press that can be shown; give the .nc or .vtu file of softtact press.")
+        raise InputError(f"{path}: not a press that can be shown; give the .nc or .vtu file of softtact press, or the .csv of a "
+                         "recording.")
     mesh = readers[path.suffix.lower()](path)
     _, triangles, used = mesh.surface()
     _, object_triangles, of_object = mesh.surface(of_object=True)
