@@ -141,7 +141,7 @@ class LumpSearch(_Section):
     height: Positive
     x: list[float] = Field(min_length=4, description="places along the left half; the right half is their mirror image")
     depth: list[Positive] = Field(min_length=4)
-    stiffness_ratio: list[Positive] = Field(min_length=4)
+    stiffness_ratio: list[Annotated[float, Field(gt=1)]] = Field(min_length=3, description="above 1, which is always solved")
     jaw_mm: list[Positive] = Field(min_length=1, description="rising ways at which the films are read")
     noise_n: Positive = Field(description="standard deviation of a film's reading")
     trials: int = Field(20, ge=1)

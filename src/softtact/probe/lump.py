@@ -22,6 +22,9 @@ from softtact.probe.sweep import palpate
 
 _SURE = 0.95
 _STEP = 1e-3      # of a parameter's range, for derivatives of the table's spline
+_STARTS = 12      # best points of the table from which least squares set out, for two lumps may read alike
+_AS_GOOD = chi2.ppf(_SURE, 1)      # by how much the chi2 of another minimum may be larger for it to count
+_RATIOS = 200     # stiffness ratios that the map of detection tries
 
 
 @dataclass(frozen=True)
@@ -31,7 +34,7 @@ class LumpTable:
     x_mm: np.ndarray
     depth_mm: np.ndarray
     stiffness_ratio: np.ndarray
-    """Rising values along each side of the table."""
+    """Rising values along each side of the table; the ratios begin with 1, tissue without a lump."""
     force_n: np.ndarray
     """(x, depth, stiffness, readings) in N; readings are jaw's ways times films."""
     plain_n: np.ndarray
@@ -46,8 +49,9 @@ class LumpTable:
         object.__setattr__(self, "high", np.array([axis[-1] for axis in axes]))
 
     def forces(self, lump: np.ndarray) -> np.ndarray:
-        """(readings,) in N of a lump (3,): x, depth in mm and the logarithm of the stiffness ratio, within the table."""
-        return self._spline(np.clip(lump, self.low, self.high))[0]     # type: ignore[attr-defined]
+        """(readings,) in N of a lump (3,): x, depth in mm and the logarithm of the stiffness ratio; or of several."""
+        found = self._spline(np.clip(lump, self.low, self.high))     # type: ignore[attr-defined]
+        return found if lump.ndim > 1 else found[0]
 
     def jacobian(self, lump: np.ndarray) -> np.ndarray:
         """(readings, 3) derivatives of `forces`, by differences within the table."""
@@ -68,7 +72,9 @@ class FoundLump:
     depth_mm: float
     stiffness_ratio: float
     deviation: np.ndarray
-    """(3,) standard deviations: mm, mm, and of the logarithm of the ratio; inf where the films do not tell."""
+    """(3,) standard deviations at this lump: mm, mm, and of the logarithm of the ratio; inf where the films do not tell."""
+    interval: np.ndarray
+    """(3, 2) 95 % intervals of the same: all lumps that fit as well within noise, each with 1.96 deviations, within the table."""
     chi2: float
     """Squared misfit over the noise; about the number of readings less 3 where lump and table are of one kind."""
     detected: bool
@@ -79,6 +85,7 @@ def lump_table(design: Design, search: LumpSearch, *, threads: int = 1,
                tell: Callable[[str], None] = lambda text: None) -> LumpTable:
     """Solve all lumps of a search. The table is mirrored to the right half, left and right film exchanged.
 
+    A lump's forces are those of plain tissue plus what the lump changes on its own mesh, so that the mesh's change leaves no trace.
     Raises InputError where the films are not symmetric about the middle, or a lump does not fit into the tissue.
     """
     mirror, middle = _mirror(design), design.geometry.middle
@@ -87,16 +94,17 @@ def lump_table(design: Design, search: LumpSearch, *, threads: int = 1,
                          "left half alone.")
     plain = _solved(design, search, None, 0.0, 1.0, threads)
     rows: list[np.ndarray] = []
-    total = len(search.x) * len(search.depth) * len(search.stiffness_ratio)
-    for x, depth, ratio in product(search.x, search.depth, search.stiffness_ratio):
-        tell(f"lump {len(rows) + 1} of {total}")
-        rows.append(_solved(design, search, x, depth, ratio, threads))
-    shape = (len(search.x), len(search.depth), len(search.stiffness_ratio), len(search.jaw_mm), len(mirror))
+    ratios = [1.0, *search.stiffness_ratio]
+    for number, (x, depth) in enumerate(product(search.x, search.depth), start=1):
+        tell(f"place {number} of {len(search.x) * len(search.depth)} of a lump")
+        own = np.array([_solved(design, search, x, depth, ratio, threads) for ratio in ratios])
+        rows.append(plain + own - own[0])
+    shape = (len(search.x), len(search.depth), len(ratios), len(search.jaw_mm), len(mirror))
     left = np.array(rows).reshape(shape)
-    own = search.x if search.x[-1] < middle - 1e-9 else search.x[:-1]
-    right = left[:len(own)][::-1][..., mirror]
-    places = np.concatenate([search.x, 2 * middle - np.array(own)[::-1]])
-    return LumpTable(places, np.array(search.depth), np.array(search.stiffness_ratio),
+    mirrored = search.x if search.x[-1] < middle - 1e-9 else search.x[:-1]
+    right = left[:len(mirrored)][::-1][..., mirror]
+    places = np.concatenate([search.x, 2 * middle - np.array(mirrored)[::-1]])
+    return LumpTable(places, np.array(search.depth), np.array(ratios),
                      np.concatenate([left, right]).reshape(len(places), *shape[1:3], -1), plain, search.noise_n)
 
 
@@ -125,7 +133,7 @@ def find_lump(table: LumpTable, readings_n: np.ndarray) -> FoundLump:
         return (table.forces(lump) - readings_n) / table.noise_n
 
     every = table.force_n.reshape(-1, table.plain_n.size)
-    order = np.argsort(((every - readings_n)**2).sum(axis=1))[:4]
+    order = np.argsort(((every - readings_n)**2).sum(axis=1))[:_STARTS]
     axes = np.meshgrid(table.x_mm, table.depth_mm, np.log(table.stiffness_ratio), indexing="ij")
     starts = np.column_stack([axis.ravel() for axis in axes])[order]
     margin = 1e-6 * (high - low)
@@ -133,8 +141,17 @@ def find_lump(table: LumpTable, readings_n: np.ndarray) -> FoundLump:
                           jac=lambda lump: table.jacobian(lump) / table.noise_n) for start in starts]
     best = min(fits, key=lambda fit: fit.cost)
     off = float((((readings_n - table.plain_n) / table.noise_n)**2).sum())
-    return FoundLump(float(best.x[0]), float(best.x[1]), float(np.exp(best.x[2])), deviations(table, best.x), 2 * float(best.cost),
-                     off > chi2.ppf(_SURE, len(readings_n)))
+    return FoundLump(float(best.x[0]), float(best.x[1]), float(np.exp(best.x[2])), deviations(table, best.x),
+                     _interval(table, fits), 2 * float(best.cost), off > chi2.ppf(_SURE, len(readings_n)))
+
+
+def _interval(table, fits):
+    """(3, 2) from all minima that fit as well as the best within noise."""
+    low, high, least = table.low, table.high, min(fit.cost for fit in fits)
+    near = [fit.x for fit in fits if 2 * (fit.cost - least) <= _AS_GOOD]
+    wide = [np.minimum(1.96 * deviations(table, x), high - low) for x in near]
+    return np.column_stack([np.maximum(np.min(np.array(near) - wide, axis=0), low),
+                            np.minimum(np.max(np.array(near) + wide, axis=0), high)])
 
 
 def deviations(table: LumpTable, lump: np.ndarray) -> np.ndarray:
@@ -154,9 +171,10 @@ def detection_map(table: LumpTable) -> pd.DataFrame:
     rows = []
     for x in table.x_mm:
         for depth in table.depth_mm:
-            logs = np.linspace(np.log(table.stiffness_ratio[0]), np.log(table.stiffness_ratio[-1]), 60)
-            seen = [((table.forces(np.array([x, depth, value])) - table.plain_n)**2).sum() >= needed for value in logs]
-            ratio = float(np.exp(logs[np.argmax(seen)])) if any(seen) else float("inf")
+            logs = np.linspace(0.0, np.log(table.stiffness_ratio[-1]), _RATIOS)
+            forces = table.forces(np.column_stack([np.full(_RATIOS, x), np.full(_RATIOS, depth), logs]))
+            seen = ((forces - table.plain_n)**2).sum(axis=1) >= needed
+            ratio = float(np.exp(logs[np.argmax(seen)])) if seen.any() else float("inf")
             rows.append({"x_mm": x, "depth_mm": depth, "least_stiffness_ratio": ratio})
     return pd.DataFrame(rows)
 
@@ -174,18 +192,29 @@ def recovery(design: Design, search: LumpSearch, table: LumpTable, *, threads: i
     The solver gives the readings, not the table, so that the table's own error counts.
     """
     rng, rows = np.random.default_rng(search.seed), []
-    low, high = table.low, table.high     # type: ignore[attr-defined]
+    low, high = table.low.copy(), table.high     # type: ignore[attr-defined]
+    low[2] = np.log(search.stiffness_ratio[0])
     for number in range(search.trials):
         tell(f"hidden lump {number + 1} of {search.trials}")
         lump = low + rng.uniform(0.1, 0.9, 3) * (high - low)
-        forces = _solved(design, search, lump[0], lump[1], np.exp(lump[2]), threads)
+        with_lump, without = (_solved(design, search, lump[0], lump[1], ratio, threads) for ratio in (np.exp(lump[2]), 1.0))
+        forces = table.plain_n + with_lump - without
         found = find_lump(table, forces + search.noise_n * rng.normal(size=forces.size))
         rows.append({"x_mm": lump[0], "depth_mm": lump[1], "stiffness_ratio": np.exp(lump[2]), "found_x_mm": found.x_mm,
                      "found_depth_mm": found.depth_mm, "found_stiffness_ratio": found.stiffness_ratio,
                      "deviation_x_mm": found.deviation[0], "deviation_depth_mm": found.deviation[1],
-                     "deviation_log_ratio": found.deviation[2], "chi2": found.chi2, "detected": found.detected,
+                     "deviation_log_ratio": found.deviation[2],
+                     "x_within": _within(found, 0, lump), "depth_within": _within(found, 1, lump),
+                     "ratio_within": _within(found, 2, lump),
+                     "depth_interval_mm": float(np.ptp(found.interval[1])), "chi2": found.chi2, "detected": found.detected,
                      "table_error_n": float(np.abs(forces - table.forces(lump)).max())})
     return pd.DataFrame(rows)
+
+
+def _within(found, parameter, lump):
+    """Whether a parameter of the true lump lies in its interval."""
+    low, high = found.interval[parameter]
+    return bool(low <= lump[parameter] <= high)
 
 
 def _solved(design, search, x, depth, ratio, threads):

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import pandas as pd
@@ -16,6 +16,9 @@ from softtact.models.solid.path import SolidPath
 from softtact.probe.design import Design
 from softtact.probe.films import film_reader
 from softtact.probe.structure import JAW, structure_body
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Scenario = Literal["load", "displacement"]
 _REST_TERMS = 3           # of a polynomial of the deflection that gives the tangent at rest
@@ -52,6 +55,15 @@ class Palpation:
                    "jaw_mm": self.jaw_mm, "force_n": self.force_n, "beam_deflection_mm": self.beam_deflection_mm}
         films = {f"film_{name.replace(' ', '_')}_n": force for name, force in zip(self.films, self.film_force_n.T, strict=True)}
         return pd.DataFrame(columns | films | {"extrapolated_volume_fraction": self.extrapolated_volume_fraction})
+
+
+    def dataset(self) -> "xr.Dataset":
+        """The curves with the films by name, for NetCDF."""
+        import xarray
+
+        curves = {name: ("step", getattr(self, name)) for name in ("jaw_mm", "force_n", "beam_deflection_mm")}
+        return xarray.Dataset(curves | {"film_force_n": (("step", "film"), self.film_force_n)}, coords={"film": list(self.films)},
+                              attrs={"tissue": self.tissue, "scenario": self.scenario})
 
 
 @dataclass(frozen=True)

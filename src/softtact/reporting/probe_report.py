@@ -12,7 +12,7 @@ from markupsafe import Markup
 
 import softtact
 from softtact.evaluation.claims_of_probe import claims_of_probe
-from softtact.files import atomic_path, digest, write_csv, write_json
+from softtact.files import atomic_path, digest, write_csv, write_dataset, write_json
 from softtact.probe.design import Design
 from softtact.probe.hardness import hardness_table, verdict
 from softtact.probe.lump import detection_map, lump_table, recovery
@@ -96,6 +96,8 @@ def _sweeps(report, design, sweeps):
         rows.append({"tissue": sweep.tissue, "scenario": sweep.scenario} | own | {
             "secant_least_n_mm": least, "secant_largest_n_mm": largest, "force_n": sweep.force_n[-1],
             "beam_deflection_mm": sweep.beam_deflection_mm[-1], "sweep_s": sweep.wall_time_s})
+        write_dataset(report.out / f"{sweep.tissue}_{sweep.scenario}.nc", sweep.dataset(), seed=None,
+                      settings=design.model_dump(mode="json"))
     slopes = pd.DataFrame(rows)
     report.table("curves.csv", "", pd.concat([sweep.table() for sweep in sweeps]), shown=False)
     moved = [sweep for sweep in sweeps if sweep.scenario == "displacement"]
@@ -153,13 +155,16 @@ def _lump(report, design, *, threads, tell):
                    "Right: lumps that the solver hid, found again from noisy films, with stated standard deviations.",
                    lambda paths: figures.draw_detection(seen, found, paths))
     off = {name: float((found[f"found_{name}"] - found[name]).abs().median()) for name in ("x_mm", "depth_mm", "stiffness_ratio")}
-    inside = float((((found.found_x_mm - found.x_mm) / found.deviation_x_mm).abs() < 2).mean())
-    share = float((seen.least_stiffness_ratio < float("inf")).mean())
+    inside = {name: float(found[f"{name}_within"].mean()) for name in ("x", "depth", "ratio")}
+    least = seen.least_stiffness_ratio
     report.said.append(f"Hidden lumps: median error {off['x_mm']:.2f} mm in x, {off['depth_mm']:.2f} mm in depth, "
                        f"{off['stiffness_ratio']:.2f} in the stiffness ratio, with {search.noise_n:g} N of noise on each film; "
-                       f"{inside:.0%} of x within two stated deviations. Lumps of a ratio up to {search.stiffness_ratio[-1]:g} are "
-                       f"seen at {share:.0%} of the places.")
-    return {"median_error": off, "x_within_two_deviations": inside, "seen_share": share,
+                       f"in their 95 % intervals lie {inside['x']:.0%} of x, {inside['depth']:.0%} of depth, "
+                       f"{inside['ratio']:.0%} of the ratio; half of the intervals of depth are wider than "
+                       f"{found.depth_interval_mm.median():.1f} mm. A lump is seen "
+                       f"from a ratio of {least.min():.2f} to {least.max():.2f}, by its place.")
+    return {"median_error": off, "within_interval": inside, "least_ratio_seen": [float(least.min()), float(least.max())],
+            "median_depth_interval_mm": float(found.depth_interval_mm.median()),
             "largest_table_error_n": float(found.table_error_n.max())}
 
 
