@@ -7,7 +7,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 BIN := .venv/bin
 SNAKEMAKE = $(BIN)/snakemake --cores all
 
-.PHONY: study tiny skin tiny-skin grasps tiny-grasps test test-slow lint advice bench docs numbers results clean
+.PHONY: study tiny skin tiny-skin probe grasps tiny-grasps test test-slow lint advice bench docs numbers results clean
 
 study: .venv/installed
 	$(SNAKEMAKE)
@@ -26,6 +26,11 @@ tiny-skin: .venv/installed
 # Grasps by a robot: hours of presses at 50 N, which go on where they were interrupted.
 grasps tiny-grasps: .venv/installed
 	$(BIN)/softtact grasps config/$(subst -,_,$@).yaml
+
+# The palpation sensor of the fourth paper.
+probe: .venv/installed
+	$(BIN)/softtact palpate config/probe.yaml --out results/probe --threads 2
+	@echo "Open results/probe/report.html"
 
 # Two processes with one thread each: two threads in one process take nearly as long as one.
 test test-slow: export OMP_NUM_THREADS = 1

@@ -66,7 +66,7 @@ def answer(capsys):
     return run
 
 
-NAMES = ("press", "grasp", "grasps", "skin", "dataset", "view", "calibrate", "predict", "complexity", "fit", "mesh",
+NAMES = ("press", "grasp", "grasps", "skin", "palpate", "dataset", "view", "calibrate", "predict", "complexity", "fit", "mesh",
          "export-deck", "detect-discs", "cost", "stage", "config-schema", "completion")
 
 

@@ -22,7 +22,7 @@ ORDER = (
     ("models.foundation", "models.ftir"),
     ("models.meshes", "decks"),
     ("readout", "imaging", "published"),
-    ("press", "skin"),
+    ("press", "skin", "probe"),
     ("robot", "learning", "calibration"),
     ("evaluation",),
     ("study",),

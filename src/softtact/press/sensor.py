@@ -40,7 +40,7 @@ from softtact.press.validity import flag_buried, flag_overloaded
 from softtact.sensors.library import material_file, sensor_file
 from softtact.sensors.specification import AnySpec, read_spec
 
-MODELS = ("auto", *PRESSES)
+MODELS = ("auto", *PRESSES, "solid")     # the last one of soft objects alone
 BODIES: dict[str, Callable[..., LayeredBody]] = {"frusta": build_sensor_body, "layers": build_plain_body}    # by kind
 
 
@@ -120,6 +120,8 @@ class Sensor:
         mesh, pose = _mesh_of(mesh, unit), Pose.of(pose)
         if model not in MODELS:
             raise InputError(f"Model {model!r} is unknown; use one of {', '.join(MODELS)}.")
+        if model == "solid":
+            raise InputError("model='solid' presses a soft object; give a SoftObject, or another model for a rigid mesh.")
         placed = place(mesh, pose=pose)
         stand = self._standing(placed, motion) if keep_object else lambda result: result
         course = Course(label, threads or cores(), keep_body, time_limit_s, on_step and (lambda result: on_step(stand(result))))

@@ -1,0 +1,46 @@
+"""`softtact palpate`: a palpation sensor under load and displacement of a jaw."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from softtact.commands.common import add_command, show
+from softtact.errors import InputError
+
+EXAMPLES = """
+  softtact palpate config/tiny_probe.yaml --out results/tiny_probe      # within a minute
+  softtact palpate config/probe.yaml --out results/probe --threads 2
+"""
+
+
+def add(commands: argparse._SubParsersAction) -> None:
+    """Add the command to the parser."""
+    command = add_command(commands, "palpate", _palpate, "Press tissue on a palpation sensor; write a report.", EXAMPLES)
+    command.add_argument("design", type=Path, metavar="DESIGN.yaml", help="the sensor, its tissues and sweeps")
+    command.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="for tables, pictures, fields and report.html")
+    command.add_argument("--threads", type=int, default=1, metavar="N", help="threads of the solver (default: 1)")
+
+
+def _palpate(options):
+    from softtact.probe.design import load_design
+    from softtact.progress import Watch
+    from softtact.reporting.probe_report import palpation_study
+
+    if options.threads < 1:
+        raise InputError(f"--threads {options.threads}: give 1 or more.")
+    if options.out.exists() and not options.out.is_dir():
+        raise InputError(f"--out {options.out}: it is a file; give a folder.")
+    design = load_design(options.design)
+    watch = Watch("palpate")
+    summary = palpation_study(design, options.out, threads=options.threads, tell=watch.beat)
+    watch.end()
+    print(f"softtact palpate: wrote {options.out / 'report.html'}", file=sys.stderr)
+    show(summary, as_json=options.json, lines=_lines(summary))
+
+
+def _lines(summary):
+    for own in summary["slopes"]:
+        yield (f"{own['tissue']}, {own['scenario']}: trend line {own['line_n_mm']:.2f} N/mm, at rest {own['initial_n_mm']:.2f}, "
+               f"F/d {own['secant_least_n_mm']:.2f} to {own['secant_largest_n_mm']:.2f}")
+    for claim in summary["claims"]:
+        yield f"{claim['verdict']}: {claim['claim']} ({claim['ours']})"

@@ -1,0 +1,98 @@
+"""The claims of the palpation sensor's paper, each with a verdict computed by the rule beside it."""
+
+import pandas as pd
+
+from softtact.evaluation.claim_rows import COLUMNS, UNDECIDED, row, verdict_of
+
+PRINTED_N_MM = {"ecoflex_00_30": 55.218, "dragon_skin_20": 79.204}     # sec. IV, the slopes of figure 4
+_SOFT_FIRST = tuple(PRINTED_N_MM)
+_MEASURED = "_tension"      # ends the name of a tissue that has the same rubber's measured curve in place of table II
+_NEAR, _CONSTANT = 0.10, 0.05
+
+
+def claims_of_probe(curves: pd.DataFrame, slopes: pd.DataFrame, hardness: pd.DataFrame | None, *, mesh_error: str) -> pd.DataFrame:
+    """Data frame with `claim_rows.COLUMNS` from the tables of `softtact palpate`.
+
+    curves: a row for each step;  slopes: for each tissue and scenario;  hardness: over load and height, or None
+    mesh_error: what the numbers of ours are worth, in words
+    """
+    rows = [_slope(slopes, tissue, printed, mesh_error) for tissue, printed in PRINTED_N_MM.items()]
+    rows += [_slope(slopes, f"{tissue}{_MEASURED}", printed, mesh_error) for tissue, printed in PRINTED_N_MM.items()
+             if f"{tissue}{_MEASURED}" in set(slopes.tissue)]
+    rows += [_larger_deflection(curves), _order(slopes, mesh_error), _property(slopes, mesh_error), _one_load(curves)]
+    if hardness is not None and hardness.tissue_height_mm.nunique() > 1:
+        rows.append(_height(hardness))
+    return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def _moved(slopes, tissue):
+    """The row of a tissue under the moved jaw, or None."""
+    found = slopes[(slopes.tissue == tissue) & (slopes.scenario == "displacement")]
+    return found.iloc[0] if len(found) else None
+
+
+def _slope(slopes, tissue, printed, mesh_error):
+    own = _moved(slopes, tissue)
+    rule = f"slope of the trend line within {_NEAR:.0%} of the printed one, both sides"
+    if own is None:
+        return row(f"F/d of {tissue}", "sec. IV, fig. 4", f"{printed} N/mm", "not run", UNDECIDED, rule, "slopes.csv")
+    off = own.line_n_mm / printed - 1
+    ours = (f"{own.line_n_mm:.2f} N/mm ({off:+.1%}); F/d from {own.secant_least_n_mm:.2f} to {own.secant_largest_n_mm:.2f}, "
+            f"tangent at rest {own.initial_n_mm:.2f}")
+    return row(f"F/d of {tissue}", "sec. IV, fig. 4", f"{printed} N/mm", ours, verdict_of(abs(off) <= _NEAR), rule, "slopes.csv",
+               uncertainty=mesh_error)
+
+
+def _larger_deflection(curves):
+    claim, rule = "The softer tissue bends the beam more at the same load", "at every load"
+    pair = [curves[(curves.tissue == name) & (curves.scenario == "load")] for name in _SOFT_FIRST]
+    if any(part.empty for part in pair):
+        return row(claim, "fig. 3", "larger deflection", "not run", UNDECIDED, rule, "curves.csv")
+    ratio = pair[0].beam_deflection_mm.to_numpy() / pair[1].beam_deflection_mm.to_numpy()
+    return row(claim, "fig. 3", "larger deflection",
+               f"by {ratio.min() - 1:.1%} to {ratio.max() - 1:.1%} up to {pair[0].force_n.max():g} N",
+               verdict_of(bool((ratio > 1).all())), rule, "curves.csv", uncertainty="the same mesh for both")
+
+
+def _order(slopes, mesh_error):
+    own = [_moved(slopes, name) for name in _SOFT_FIRST]
+    claim, paper = "F/d ranks the rubbers by hardness", "Ecoflex 00-30 below Dragon Skin 20"
+    rule = "slope of the trend line of the harder rubber larger"
+    if any(part is None for part in own):
+        return row(claim, "sec. IV", paper, "not run", UNDECIDED, rule, "slopes.csv")
+    soft, hard = (part.line_n_mm for part in own)
+    return row(claim, "sec. IV", paper, f"{soft:.2f} and {hard:.2f} N/mm", verdict_of(bool(soft < hard)), rule, "slopes.csv",
+               uncertainty=mesh_error)
+
+
+def _property(slopes, mesh_error):
+    moved = slopes[(slopes.scenario == "displacement") & slopes.tissue.isin(_SOFT_FIRST)]
+    change = (moved.secant_largest_n_mm / moved.secant_least_n_mm - 1).max()
+    said = "; ".join(f"{own.tissue}: {own.secant_least_n_mm:.2f} to {own.secant_largest_n_mm:.2f} N/mm"
+                     for own in moved.itertuples())
+    return row("F/d is a property of the tissue, whatever the load", "eq. 3, 4", "a constant of the material", said,
+               verdict_of(change <= _CONSTANT), f"F/d of a tissue changes by {_CONSTANT:.0%} at most over the sweep", "slopes.csv",
+               uncertainty=mesh_error)
+
+
+def _one_load(curves):
+    """How much of the printed contrast is left where both tissues bear the same load."""
+    moved = [curves[(curves.tissue == name) & (curves.scenario == "load")] for name in _SOFT_FIRST]
+    printed = PRINTED_N_MM[_SOFT_FIRST[1]] / PRINTED_N_MM[_SOFT_FIRST[0]]
+    rule = f"contrast at the largest common load within {_NEAR:.0%} of the printed one"
+    claim = "The contrast of F/d is the tissues', not that of two ranges of load"
+    if any(part.empty for part in moved):
+        return row(claim, "sec. IV", f"{printed:.3f}", "not run", UNDECIDED, rule, "curves.csv")
+    soft, hard = ((part.force_n / part.beam_deflection_mm).iloc[-1] for part in moved)
+    return row(claim, "sec. IV", f"{printed:.3f}", f"{hard / soft:.3f} at {moved[0].force_n.iloc[-1]:g} N for both",
+               verdict_of(bool(abs(hard / soft / printed - 1) <= _NEAR)), rule, "curves.csv", uncertainty="the same mesh for both")
+
+
+def _height(hardness):
+    last = hardness[hardness.jaw_mm == hardness.jaw_mm.max()]
+    change = last.groupby("tissue").relative_hardness_n_mm.agg(lambda values: values.max() / values.min() - 1)
+    said = "; ".join(f"{name}: changes by {value:.1%}" for name, value in change.items())
+    return row("F/d does not depend on the tissue's height", "eq. 3", "not claimed: C is for one geometry", said,
+               verdict_of(bool(change.max() <= _CONSTANT)),
+               f"F/d at the same way of the jaw changes by {_CONSTANT:.0%} at most over the heights", "hardness.csv",
+               uncertainty="the same mesh sizes")

@@ -1,0 +1,268 @@
+"""The YAML file of a palpation sensor: an elastic beam on two supports with a soft filler between them, tissue and jaw above.
+
+Lengths are in mm, forces in N, moduli in MPa. x runs along the beam from the left support's outer end, y up from the base.
+"""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import pydantic
+from pydantic import Field
+
+from softtact.errors import InputError
+from softtact.files import read_yaml
+from softtact.materials.config import validated
+from softtact.materials.laws.base import Law
+from softtact.materials.laws.registry import make_law
+from softtact.materials.linear import LinearConstants
+
+Positive = Annotated[float, Field(gt=0)]
+REGIONS = ("left support", "right support", "filler", "beam", "tissue")
+
+
+class _Section(pydantic.BaseModel):
+    model_config = pydantic.ConfigDict(extra="forbid", frozen=True)
+
+
+class Material(_Section):
+    """A material by a law's constants and K, by mu and K of a neo-Hookean law, or by E and nu of one."""
+
+    law: str = "neo_hooke"
+    parameters: dict[str, float] | None = Field(None, description="of the law, MPa or 1")
+    shear_mpa: Positive | None = Field(None, description="mu of W = mu/2 (I1bar - 3) + kappa/2 (J - 1)^2")
+    bulk_mpa: Positive | None = Field(None, description="kappa")
+    young_mpa: Positive | None = None
+    poisson: float | None = Field(None, gt=-1, lt=0.5)
+    stretch_window: tuple[Positive, Positive] | None = Field(None, description="lowest and highest principal stretch of its data")
+    assumed: bool = False
+    source: str = Field(min_length=1, description="where the constants stand, or why they are assumed")
+
+    @pydantic.model_validator(mode="after")
+    def _one_way(self):
+        names = ("parameters", "shear_mpa", "bulk_mpa", "young_mpa", "poisson")
+        given = {name for name in names if getattr(self, name) is not None}
+        if given not in ({"parameters", "bulk_mpa"}, {"shear_mpa", "bulk_mpa"}, {"young_mpa", "poisson"}):
+            raise ValueError("give shear_mpa and bulk_mpa, young_mpa and poisson, or parameters and bulk_mpa")
+        if self.law != "neo_hooke" and self.parameters is None:
+            raise ValueError(f"the law {self.law} needs its parameters")
+        return self
+
+    def make(self) -> Law:
+        """The `Law`. Raises InputError for constants that make none."""
+        if self.young_mpa is not None and self.poisson is not None:
+            linear = LinearConstants(self.young_mpa, self.poisson)
+            return make_law("neo_hooke", {"c10": linear.mu_mpa / 2}, bulk_modulus=linear.bulk_modulus_mpa)
+        parameters = self.parameters if self.shear_mpa is None else {"c10": self.shear_mpa / 2}
+        law = make_law(self.law, parameters or {}, bulk_modulus=self.bulk_mpa)
+        law.stretch_window = self.stretch_window
+        return law
+
+
+class Geometry(_Section):
+    """Sizes in mm."""
+
+    support_length: Positive
+    support_height: Positive
+    filler_length: Positive
+    beam_height: Positive
+    tissue_height: Positive
+    depth: Positive = Field(description="out of the plane")
+
+    @property
+    def length(self) -> float:
+        """Of beam and tissue: both supports and the filler."""
+        return 2 * self.support_length + self.filler_length
+
+    @property
+    def middle(self) -> float:
+        """x of the beam's middle."""
+        return 0.5 * self.length
+
+    @property
+    def levels(self) -> tuple[float, float, float, float]:
+        """y of the base, the beam's bottom and top, and the tissue's top."""
+        beam = self.support_height + self.beam_height
+        return 0.0, self.support_height, beam, beam + self.tissue_height
+
+
+class Film(_Section):
+    """A force-sensing film on the top or the bottom of a part."""
+
+    on: Literal["left support", "right support", "filler", "beam"]
+    side: Literal["top", "bottom"]
+    start: float = Field(description="x of its left end")
+    end: float
+    assumed: bool = False
+    source: str = Field(min_length=1)
+
+
+class Steps(_Section):
+    """Equal steps up to a value."""
+
+    to: Positive
+    by: Positive
+
+    @property
+    def values(self) -> np.ndarray:
+        """The steps' ends; the last one is `to`."""
+        return np.linspace(0, self.to, max(1, round(self.to / self.by)) + 1)[1:]
+
+
+class Lump(_Section):
+    """A rectangular inclusion in the tissue."""
+
+    x: float = Field(description="of its middle")
+    depth: Positive = Field(description="of its middle below the jaw's face of the tissue")
+    width: Positive
+    height: Positive
+    stiffness_ratio: Positive = Field(description="its moduli over those of the tissue")
+
+
+class Hardness(_Section):
+    """The study of how relative hardness depends on load and on the tissue's height."""
+
+    tissue_heights: list[Positive] = Field(min_length=1)
+    shares: list[Annotated[float, Field(gt=0, le=1)]] = Field(min_length=2, description="of the jaw's way, used of a sweep")
+    steps: int = Field(8, ge=4)
+
+    @pydantic.model_validator(mode="after")
+    def _enough(self):
+        if min(self.shares) * self.steps < 3:
+            raise ValueError(f"the least share {min(self.shares):g} of {self.steps} steps leaves fewer than three; give more steps")
+        return self
+
+
+class LumpSearch(_Section):
+    """The study of a hidden lump: a table of film forces over its place, depth and stiffness, and what can be told from it."""
+
+    tissue: str
+    width: Positive
+    height: Positive
+    x: list[float] = Field(min_length=4, description="places along the left half; the right half is their mirror image")
+    depth: list[Positive] = Field(min_length=4)
+    stiffness_ratio: list[Annotated[float, Field(gt=1)]] = Field(min_length=3, description="above 1, which is always solved")
+    jaw_mm: list[Positive] = Field(min_length=1, description="rising ways at which the films are read")
+    noise_n: Positive = Field(description="standard deviation of a film's reading")
+    trials: int = Field(20, ge=1)
+    seed: int = Field(0, ge=0)
+    assumed: bool = False
+    source: str = Field(min_length=1)
+
+    @pydantic.model_validator(mode="after")
+    def _rises(self):
+        for name in ("x", "depth", "stiffness_ratio", "jaw_mm"):
+            values = getattr(self, name)
+            if any(b <= a for a, b in zip(values, values[1:], strict=False)):
+                raise ValueError(f"{name} is {values}; give rising values")
+        return self
+
+
+class MeshSizes(_Section):
+    """Sides of the quadratic elements in mm."""
+
+    along: Positive = 2.0
+    tissue: Positive = 2.0
+    base: Positive = 1.25
+    edge: Positive | None = Field(None, description="first elements beside the supports' inner edges, where the beam is bent most")
+    beam_layers: int = Field(2, ge=2, multiple_of=2, description="elements across the beam, an even number: its middle has nodes")
+    depth_layers: int = Field(2, ge=1, description="elements across the depth of a solid")
+
+
+class Design(_Section):
+    """A palpation sensor, the tissues that it touches and the sweeps."""
+
+    name: str = Field(pattern=r"^[a-z0-9_]+$")
+    model: Literal["plane_strain", "solid"] = "plane_strain"
+    geometry: Geometry
+    supports: Material
+    filler: Material
+    beam: Material
+    tissues: dict[str, Material] = Field(min_length=1)
+    jaw: Literal["bonded", "sliding"] = "bonded"
+    tissue_on_beam: Literal["bonded"] | Annotated[float, Field(ge=0)] = Field("bonded", description="or its friction")
+    beam_on_base: Literal["bonded"] | Annotated[float, Field(ge=0)] = Field("bonded", description="or its friction")
+    films: dict[str, Film] = Field(min_length=1)
+    load_n: Steps
+    displacement_mm: Steps
+    mesh: MeshSizes = MeshSizes()
+    lump: Lump | None = None
+    variants: dict[str, dict[str, Any]] = Field(default_factory=dict, description="other values of these keys, by name")
+    variant_steps: int = Field(6, ge=3, description="steps of the jaw's way in a variant")
+    hardness: Hardness | None = None
+    search: LumpSearch | None = None
+
+    @pydantic.model_validator(mode="after")
+    def _fits(self):
+        if self.tissue_on_beam != "bonded" and self.beam_on_base != "bonded":
+            raise ValueError("the beam is loose on both sides; set tissue_on_beam or beam_on_base to bonded")
+        for name, film in self.films.items():
+            low, high = self.span(film.on)
+            if not low <= film.start < film.end <= high:
+                raise ValueError(f"the film {name} from {film.start:g} to {film.end:g} mm does not lie on the {film.on}, which "
+                                 f"reaches from {low:g} to {high:g} mm")
+        if self.displacement_mm.to >= self.geometry.tissue_height:
+            raise ValueError(f"the jaw's way of {self.displacement_mm.to:g} mm is more than the tissue's height; make it smaller")
+        if self.lump:
+            self._lump_fits(self.lump)
+        if self.search and self.search.tissue not in self.tissues:
+            raise ValueError(f"search.tissue is {self.search.tissue!r}, which is none of {', '.join(self.tissues)}")
+        return self
+
+    def _lump_fits(self, lump):
+        half, height = 0.5 * lump.width, 0.5 * lump.height
+        if not (half < lump.x < self.geometry.length - half and height < lump.depth < self.geometry.tissue_height - height):
+            raise ValueError(f"the lump at x = {lump.x:g} mm in a depth of {lump.depth:g} mm leaves the tissue; move it, or "
+                             "make it smaller")
+
+    def span(self, part: str) -> tuple[float, float]:
+        """x of a part's ends."""
+        g = self.geometry
+        return {"left support": (0.0, g.support_length), "filler": (g.support_length, g.support_length + g.filler_length),
+                "right support": (g.support_length + g.filler_length, g.length)}.get(part, (0.0, g.length))
+
+    def tissue(self, name: str) -> Material:
+        """A tissue by its name; InputError lists those there are."""
+        if name not in self.tissues:
+            raise InputError(f"There is no tissue {name!r}; there are {', '.join(self.tissues)}.")
+        return self.tissues[name]
+
+    def with_(self, **changes: Any) -> "Design":
+        """The design with other values of its keys, checked again: a mapping changes a section's own keys, None leaves a key out.
+
+        Raises InputError where they do not fit.
+        """
+        return validated(Design, _changed(self.model_dump(exclude_none=True), changes), where=self.name)
+
+    def variant(self, name: str) -> "Design":
+        """The design of one of its variants. Raises InputError where its values do not fit."""
+        return self.with_(variants={}, variant_steps=self.variant_steps, **self.variants[name])
+
+
+def _changed(values, changes):
+    """A mapping with other values, those of mappings within it changed likewise."""
+    out = dict(values)
+    for name, value in changes.items():
+        if isinstance(value, dict) and isinstance(out.get(name), dict) and value:
+            out[name] = _changed(out[name], value)
+        elif value is None:
+            out.pop(name, None)
+        else:
+            out[name] = value
+    return out
+
+
+def load_design(path: str | Path) -> Design:
+    """Read a design's YAML; what is wrong is told in one sentence."""
+    design = validated(Design, read_yaml(path, missing="there is no such design; config/probe.yaml is one."), where=str(path))
+    for name, material in ({"supports": design.supports, "filler": design.filler, "beam": design.beam} | design.tissues).items():
+        try:
+            material.make()
+        except InputError as error:     # of constants, which know no file
+            raise InputError(f"{path}: {name}: {error}") from None
+    for name in design.variants:
+        try:
+            design.variant(name)
+        except InputError as error:
+            raise InputError(f"{path}: variants.{name}: {error}") from None
+    return design

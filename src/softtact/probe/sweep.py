@@ -1,0 +1,136 @@
+"""Sweeps of a palpation sensor: the jaw loaded or moved step by step, with the beam's deflection and the films' forces."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+import pandas as pd
+
+from softtact.contact.motion import Motion
+from softtact.errors import InputError
+from softtact.materials.laws.base import Law
+from softtact.models.solid.body import SolidBody
+from softtact.models.solid.path import SolidPath
+from softtact.probe.design import Design
+from softtact.probe.films import film_reader
+from softtact.probe.structure import JAW, structure_body
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Scenario = Literal["load", "displacement"]
+_REST_TERMS = 3           # of a polynomial of the deflection that gives the tangent at rest
+
+
+@dataclass(frozen=True)
+class Palpation:
+    """A sweep; s steps."""
+
+    scenario: Scenario
+    tissue: str
+    jaw_mm: np.ndarray
+    """(s,) way of the jaw, down."""
+    force_n: np.ndarray
+    """(s,) of the jaw on the tissue."""
+    beam_deflection_mm: np.ndarray
+    """(s,) of the beam's middle, down."""
+    film_force_n: np.ndarray
+    """(s, films), positive in compression."""
+    films: tuple[str, ...]
+    """Names of the films."""
+    extrapolated_volume_fraction: np.ndarray
+    """(s,) share of a region strained beyond the data of its law; nan where no law tells."""
+    body: SolidBody
+    """The body, at rest."""
+    displacement_mm: np.ndarray
+    """(n, 3) of its nodes at the last step."""
+    wall_time_s: float
+    """Time of the sweep."""
+
+    def table(self) -> pd.DataFrame:
+        """A row for each step."""
+        columns = {"tissue": self.tissue, "scenario": self.scenario, "step": np.arange(1, len(self.force_n) + 1),
+                   "jaw_mm": self.jaw_mm, "force_n": self.force_n, "beam_deflection_mm": self.beam_deflection_mm}
+        films = {f"film_{name.replace(' ', '_')}_n": force for name, force in zip(self.films, self.film_force_n.T, strict=True)}
+        return pd.DataFrame(columns | films | {"extrapolated_volume_fraction": self.extrapolated_volume_fraction})
+
+
+    def dataset(self) -> "xr.Dataset":
+        """The curves with the films by name, for NetCDF."""
+        import xarray
+
+        curves = {name: ("step", getattr(self, name)) for name in ("jaw_mm", "force_n", "beam_deflection_mm")}
+        return xarray.Dataset(curves | {"film_force_n": (("step", "film"), self.film_force_n)}, coords={"film": list(self.films)},
+                              attrs={"tissue": self.tissue, "scenario": self.scenario})
+
+
+@dataclass(frozen=True)
+class Slope:
+    """The relative hardness F/d of a sweep."""
+
+    line_n_mm: float
+    """Slope in N/mm of the least-squares line with an intercept through rest and all steps, as a chart's trend line."""
+    intercept_n: float
+    """Of that line."""
+    secant_n_mm: tuple[float, float]
+    """Least and largest F/d of the steps."""
+    initial_n_mm: float
+    """Tangent dF/dd at rest."""
+    final_n_mm: float
+    """Tangent at the last step, from the last two."""
+
+
+def slope(force_n: np.ndarray, deflection_mm: np.ndarray) -> Slope:
+    """`Slope` of forces (s,) and deflections (s,), two steps or more.
+
+    The tangent at rest is that of the polynomial F = a d + b d^2 + c d^3 through the first three steps, or of two.
+    Raises InputError where the beam does not deflect.
+    """
+    if len(force_n) < 2 or not (np.diff(deflection_mm, prepend=0.0) > 0).all():
+        raise InputError("A slope needs two steps or more under which the beam's deflection grows; give smaller or more steps.")
+    force, deflection = np.append(0.0, force_n), np.append(0.0, deflection_mm)
+    line, intercept = np.polyfit(deflection, force, 1)
+    d, f = deflection_mm[:_REST_TERMS], force_n[:_REST_TERMS]
+    initial = np.linalg.solve((d / d[-1])[:, None] ** np.arange(1, len(d) + 1), f)[0] / d[-1]
+    secant = force_n / deflection_mm
+    return Slope(float(line), float(intercept), (float(secant.min()), float(secant.max())), float(initial),
+                 float((force[-1] - force[-2]) / (deflection[-1] - deflection[-2])))
+
+
+def palpate(design: Design, tissue: str, scenario: Scenario, *, law: Law | None = None, values: np.ndarray | None = None,
+            threads: int = 1, tell: Callable[[str], None] = lambda text: None) -> Palpation:
+    """Sweep the jaw over a tissue of a design by load (N) or displacement (mm).
+
+    law: in place of the tissue's;  values: rising ends of the steps, those of the design by default
+    Raises InputError for an unknown tissue, ConvergenceError where a step is not reached.
+    """
+    began = time.perf_counter()
+    body = structure_body(design, law or design.tissue(tissue).make(), threads=threads)
+    readers = [film_reader(body, design, film) for film in design.films.values()]
+    middle = _beam_middle(body, design)
+    if values is None:
+        values = (design.load_n if scenario == "load" else design.displacement_mm).values
+    motion = Motion()
+    for way, value in zip(np.diff(values, prepend=0.0), values, strict=True):
+        motion = motion.step(loads={"y": -float(value)}) if scenario == "load" else motion.step(ways={"y": -float(way)})
+    rows, films, outside, state = [], [], [], None
+    for step in SolidPath(body, {JAW: motion}, tell=tell).run():
+        state = step.state
+        rows.append((-state.poses[0].translation[1], -step.loads[0, 1], -state.displacement[middle, 1]))
+        films.append([reader.force_n(state.displacement) for reader in readers])
+        outside.append(step.extrapolated_volume_fraction)
+        tell(f"{tissue}, {scenario}: step {len(rows)} of {len(values)}, {rows[-1][1]:.3g} N")
+    assert state is not None
+    jaw, force, deflection = np.array(rows).T
+    return Palpation(scenario, tissue, jaw, force, deflection, np.array(films), tuple(design.films), np.array(outside), body,
+                     state.displacement, time.perf_counter() - began)
+
+
+def _beam_middle(body, design):
+    """The node in the middle of the beam's length, height and, of a solid, depth."""
+    g = design.geometry
+    own = np.unique(np.concatenate([nodes.ravel() for region, nodes, _ in body.blocks if region == "beam"]))
+    place = [g.middle, 0.5 * (g.levels[1] + g.levels[2]), 0.5 * g.depth if design.model == "solid" else 0.0]
+    return own[np.linalg.norm(body.points[own] - place, axis=1).argmin()]

@@ -1,0 +1,172 @@
+"""Figures of a palpation sensor: mesh and deformed shape, and the curves as the paper draws them."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib.tri as mtri
+import numpy as np
+import pandas as pd
+
+from softtact.fem.solid_mesh import SolidMesh
+from softtact.files import atomic_path
+from softtact.probe.hardness import HardnessVerdict
+from softtact.probe.sweep import Palpation
+from softtact.reporting.style import pyplot, save
+
+COLOURS = ("#1f4e79", "#e08214", "#3f9c6d", "#8a3a8f", "#555555")
+_GRID = [(0, 1, 4), (0, 4, 3), (1, 2, 5), (1, 5, 4), (3, 4, 7), (3, 7, 6), (4, 5, 8), (4, 8, 7)]     # triangles of 3 x 3 nodes
+
+
+def words(name: str) -> str:
+    """A tissue's name for readers."""
+    return name.replace("_", " ").replace("00 ", "00-").title()
+
+
+def plane_triangles(mesh: SolidMesh) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (t, 3) of all elements (of a solid: of the section z = 0), and the four corners (e, 4) of each element."""
+    triangles, corners = [], []
+    for _, element, nodes in mesh.parts():
+        own = element.nodes
+        if own.shape[1] == 3:
+            front = np.abs(mesh.points[nodes][..., 2]).min(axis=1) < 1e-9
+            nodes, own = nodes[front][:, own[:, 2] < -0.5], own[own[:, 2] < -0.5, :2]
+        order = np.lexsort((own[:, 0], own[:, 1]))       # rows of rising y, each of rising x
+        grid = nodes[:, order]
+        triangles.append(grid[:, np.array(_GRID)].reshape(-1, 3))
+        corners.append(grid[:, [0, 2, 8, 6]])
+    return np.concatenate(triangles), np.concatenate(corners)
+
+
+def draw_shapes(sweeps: Sequence[Palpation], paths: Sequence[Path]) -> None:
+    """Figure 2: the mesh at rest, and deformed under the jaw's last way with the vertical displacement."""
+    plt = pyplot()
+    figure, axes = plt.subplots(len(sweeps) + 1, 1, figsize=(7.5, 2.0 * (len(sweeps) + 1)), sharex=True, layout="constrained")
+    _draw_mesh(axes[0], sweeps[0].body.mesh, sweeps[0].body.mesh.points)
+    _shade_regions(axes[0], sweeps[0].body.mesh)
+    axes[0].set_title("At rest, with the elements")
+    low = min(sweep.displacement_mm[:, 1].min() for sweep in sweeps)
+    for ax, sweep in zip(axes[1:], sweeps, strict=True):
+        mesh, points = sweep.body.mesh, sweep.body.mesh.points + sweep.displacement_mm[:len(sweep.body.mesh.points)]
+        triangles, _ = plane_triangles(mesh)
+        image = ax.tripcolor(mtri.Triangulation(points[:, 0], points[:, 1], triangles), sweep.displacement_mm[:len(points), 1],
+                             shading="gouraud", vmin=low, vmax=0, cmap="viridis")
+        _draw_mesh(ax, mesh, points, width=0.2)
+        ax.set_title(f"{words(sweep.tissue)}: jaw {sweep.jaw_mm[-1]:.3g} mm, {sweep.force_n[-1]:.3g} N, beam "
+                     f"{sweep.beam_deflection_mm[-1]:.3f} mm")
+    figure.colorbar(image, ax=axes[1:], label="vertical displacement, mm", shrink=0.8)
+    axes[-1].set_xlabel("x, mm")
+    save(figure, *paths)
+
+
+def _draw_mesh(ax, mesh, points, width=0.4):
+    from matplotlib.collections import PolyCollection
+
+    _, corners = plane_triangles(mesh)
+    ax.add_collection(PolyCollection(points[corners][..., :2], facecolors="none", edgecolors="0.25", linewidths=width))
+    ax.autoscale_view()
+    ax.set_aspect("equal")
+    ax.set_ylabel("y, mm")
+
+
+def _shade_regions(ax, mesh):
+    from matplotlib.collections import PolyCollection
+
+    shades = {"tissue": "#f3d9c9", "beam": "#7f7f7f", "filler": "#cfe2f3", "lump": "#b34a4a"}
+    for region, element, nodes in mesh.parts():
+        own = SolidMesh(mesh.points, ((region, element.meshio_name, nodes),), geometry=mesh.geometry)
+        _, corners = plane_triangles(own)
+        ax.add_collection(PolyCollection(mesh.points[corners][..., :2], facecolors=shades.get(region, "#d9d9d9"), zorder=0))
+
+
+def draw_curves(sweeps: Sequence[Palpation], slopes: pd.DataFrame, paths: Sequence[Path]) -> None:
+    """Figures 3 and 4: deflection under rising load, and force against deflection under a moved jaw with the trend lines."""
+    plt = pyplot()
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+    tissues = list(dict.fromkeys(sweep.tissue for sweep in sweeps))
+    for sweep in sweeps:
+        number = tissues.index(sweep.tissue)
+        colour, marker = COLOURS[number % len(COLOURS)], "os^v"[number % 4]
+        if sweep.scenario == "load":
+            left.plot(sweep.force_n, sweep.beam_deflection_mm, marker, ms=4, mfc="none", color=colour, label=words(sweep.tissue))
+            continue
+        own = slopes[(slopes.tissue == sweep.tissue) & (slopes.scenario == sweep.scenario)].iloc[0]
+        right.plot(sweep.beam_deflection_mm, sweep.force_n, marker, ms=4, mfc="none", color=colour,
+                   label=f"{words(sweep.tissue)}: {own.line_n_mm:.1f} N/mm, at rest {own.initial_n_mm:.1f}")
+        ends = np.array([0.0, sweep.beam_deflection_mm[-1]])
+        right.plot(ends, own.intercept_n + own.line_n_mm * ends, "-", lw=0.8, color=colour)
+    left.set(xlabel="load on the jaw, N", ylabel="deflection of the beam's middle, mm", title="Load (the paper's figure 3)")
+    right.set(xlabel="deflection of the beam's middle, mm", ylabel="force on the jaw, N",
+              title="Jaw moved (the paper's figure 4)")
+    for ax in (left, right):
+        ax.legend(frameon=False, fontsize=8)
+        ax.set_xlim(left=0)
+        ax.set_ylim(bottom=0)
+    save(figure, *paths)
+
+
+def draw_films(sweeps: Sequence[Palpation], paths: Sequence[Path]) -> None:
+    """Forces on the films as shares of the jaw's force, under a moved jaw."""
+    plt = pyplot()
+    moved = [sweep for sweep in sweeps if sweep.scenario == "displacement"]
+    figure, axes = plt.subplots(1, len(moved), figsize=(3.6 * len(moved), 3.2), sharey=True, squeeze=False, layout="constrained")
+    for ax, sweep in zip(axes[0], moved, strict=True):
+        for number, (name, force) in enumerate(zip(sweep.films, sweep.film_force_n.T, strict=True)):
+            ax.plot(sweep.force_n, force / sweep.force_n, "-" if number % 2 else "--", label=name,
+                    color=COLOURS[number % len(COLOURS)])
+        ax.set(xlabel="force on the jaw, N", title=words(sweep.tissue))
+    axes[0, 0].set_ylabel("film's force over the jaw's")
+    axes[0, 0].legend(frameon=False, fontsize=8)
+    save(figure, *paths)
+
+
+def draw_hardness(table: pd.DataFrame, verdicts: dict[str, HardnessVerdict], paths: Sequence[Path]) -> None:
+    """The paper's relative hardness and the apparent modulus against load, for each tissue and height."""
+    plt = pyplot()
+    figure, axes = plt.subplots(1, 2, figsize=(11, 3.6), layout="constrained")
+    titles = {"relative_hardness_n_mm": "F/d of the beam, N/mm", "apparent_modulus_mpa": "apparent modulus at rest, MPa"}
+    tissues, styles = list(dict.fromkeys(table.tissue)), ("-", "--", ":", "-.")
+    heights = sorted(set(table.tissue_height_mm))
+    for ax, (column, title) in zip(axes, titles.items(), strict=True):
+        for (tissue, height), own in table.groupby(["tissue", "tissue_height_mm"], sort=False):
+            ax.plot(own.force_n, own[column], styles[heights.index(height) % len(styles)], marker="o", ms=3,
+                    color=COLOURS[tissues.index(tissue) % len(COLOURS)], label=f"{words(tissue)}, {height:g} mm")
+        ax.set(xlabel="largest force of the sweep, N", ylabel=title, xscale="log", yscale="log",
+               title=f"changes with load by up to {verdicts[column].change_with_load:.0%}")
+    axes[1].legend(frameon=False, fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    save(figure, *paths)
+
+
+def draw_detection(detection: pd.DataFrame, recovered: pd.DataFrame, paths: Sequence[Path]) -> None:
+    """Where a lump is seen, and how well hidden lumps were found, with their stated deviations."""
+    plt = pyplot()
+    figure, (left, *others) = plt.subplots(1, 4, figsize=(13, 3.2), layout="constrained", width_ratios=(1.6, 1, 1, 1))
+    grid = detection.pivot(index="depth_mm", columns="x_mm", values="least_stiffness_ratio")
+    seen = np.ma.masked_invalid(grid.to_numpy())
+    image = left.pcolormesh(grid.columns, grid.index, seen, shading="nearest", cmap="viridis_r")
+    left.invert_yaxis()
+    left.set(xlabel="x of the lump, mm", ylabel="depth below the jaw, mm", title="least stiffness ratio that is seen (white: none)")
+    figure.colorbar(image, ax=left)
+    logs = recovered.assign(log_ratio=np.log(recovered.stiffness_ratio), found_log_ratio=np.log(recovered.found_stiffness_ratio))
+    names = {"x_mm": "x, mm", "depth_mm": "depth, mm", "log_ratio": "log of the stiffness ratio"}
+    for ax, (column, title) in zip(others, names.items(), strict=True):
+        deviation = logs[f"deviation_{column}"].clip(upper=float(np.ptp(logs[column])))
+        ax.errorbar(logs[column], logs[f"found_{column}"], yerr=deviation, fmt="o", ms=3, lw=0.8, color=COLOURS[0])
+        ends = [logs[column].min(), logs[column].max()]
+        ax.plot(ends, ends, "-", lw=0.8, color="0.5")
+        ax.set(xlabel=f"true {title}", ylabel="found")
+    save(figure, *paths)
+
+
+def write_fields(sweep: Palpation, path: Path) -> None:
+    """The last step as VTU: elements by their corners, displacement in mm, and the region's number."""
+    import meshio
+
+    mesh = sweep.body.mesh
+    cells, regions = [], []
+    for region, element, nodes in mesh.parts():
+        corners = 4 if element.nodes.shape[1] == 2 else 8
+        cells.append(("quad" if corners == 4 else "hexahedron", nodes[:, :corners]))
+        regions.append(np.full(len(nodes), mesh.regions.index(region), dtype=np.int32))
+    with atomic_path(path) as temporary:
+        meshio.Mesh(mesh.points, cells, point_data={"displacement_mm": sweep.displacement_mm[:len(mesh.points)]},
+                    cell_data={"region": regions}).write(temporary, file_format="vtu")

@@ -1,0 +1,50 @@
+"""A design that cannot be built is refused in one sentence that names the key."""
+
+from pathlib import Path
+
+import pytest
+import yaml
+from support.probes import small_design
+
+from softtact.errors import InputError
+from softtact.probe.design import load_design
+
+TISSUE = {"law": "yeoh", "bulk_mpa": 1.0, "source": "a test's"}
+
+
+@pytest.mark.parametrize(("changes", "said"), [
+    ({"films": {"left": {"end": 16}}}, "film left from 0 to 16 mm does not lie on the left support"),
+    ({"tissue_on_beam": 0.3, "beam_on_base": 0.3}, "loose on both sides"),
+    ({"tissue_on_beam": -0.3}, "tissue_on_beam"),
+    ({"displacement_mm": {"to": 15.0}}, "more than the tissue's height"),
+    ({"lump": {"x": 2.0, "depth": 5, "width": 5, "height": 5, "stiffness_ratio": 9}}, "leaves the tissue"),
+    ({"beam": {"poisson": 0.5}}, "less than 0.5"),
+    ({"beam": {"bulk_mpa": 5.0}}, "young_mpa and poisson"),
+    ({"tissues": {"rubber": TISSUE}}, "yeoh needs its parameters"),
+    ({"tissue": {}}, "did you mean 'tissues'"),
+    ({"mesh": {"beam_layers": 3}}, "multiple of 2"),
+])
+def test_a_value_that_does_not_fit_is_named(changes, said):
+    with pytest.raises(InputError, match=said):
+        small_design(**changes)
+
+
+def test_a_files_fault_names_the_file_and_the_variant(tmp_path):
+    path = tmp_path / "design.yaml"
+    values = small_design().model_dump(exclude_none=True) | {"variants": {"odd": {"jaw": "loose"}}}
+    path.write_text(yaml.safe_dump(values | {"mesh": {}}))
+    with pytest.raises(InputError, match=r"design\.yaml: variants\.odd: .*jaw is 'loose'"):
+        load_design(path)
+
+
+def test_an_unknown_tissue_is_refused_with_those_there_are():
+    with pytest.raises(InputError, match="there are rubber"):
+        small_design().tissue("liver")
+
+
+def test_the_shipped_designs_are_read():
+    for name in ("probe", "tiny_probe"):
+        design = load_design(Path(__file__).resolve().parents[2] / f"config/{name}.yaml")
+        for tissue in ("ecoflex_00_30", "dragon_skin_20"):     # table II: kappa = mu/(1 - 2 x 0.455), within 0.01 %
+            own = design.tissue(tissue)
+            assert own.bulk_mpa == pytest.approx(own.shear_mpa / (1 - 2 * 0.455), rel=1.1e-4)

@@ -1,0 +1,35 @@
+"""`softtact palpate` from a file to a report."""
+
+from pathlib import Path
+
+import pandas as pd
+import yaml
+
+from softtact.cli import main
+from softtact.files import read_dataset
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def test_the_command_writes_tables_pictures_fields_and_a_page(tmp_path, capsys):
+    design = yaml.safe_load((ROOT / "config/tiny_probe.yaml").read_text())
+    design |= {"load_n": {"to": 5, "by": 2.5}, "variants": {}, "hardness": None}
+    (tmp_path / "design.yaml").write_text(yaml.safe_dump(design))
+    assert main(["palpate", str(tmp_path / "design.yaml"), "--out", str(tmp_path / "out")]) == 0
+    said = capsys.readouterr().out
+    assert "ecoflex_00_30, load: trend line" in said and "not reproduced: F/d is a property" in said
+    curves = pd.read_csv(tmp_path / "out/curves.csv")
+    assert len(curves) == 2 * (3 + 2) and (curves.film_left_n > 0).all()
+    page = (tmp_path / "out/report.html").read_text()
+    assert page.count("data:image/png") == 3 and "polystyrene has 3,000 to 3,600 MPa" in page
+    films = read_dataset(tmp_path / "out/dragon_skin_20_load.nc").film_force_n
+    assert films.dims == ("step", "film") and films.shape == (2, 4)
+    assert (tmp_path / "out/fields_dragon_skin_20.vtu").stat().st_size > 0
+
+
+def test_a_design_that_cannot_be_built_writes_nothing(tmp_path, capsys):
+    design = yaml.safe_load((ROOT / "config/tiny_probe.yaml").read_text())
+    design["geometry"]["beam_height"] = -1
+    (tmp_path / "design.yaml").write_text(yaml.safe_dump(design))
+    assert main(["palpate", str(tmp_path / "design.yaml"), "--out", str(tmp_path / "out")]) == 1
+    assert "geometry.beam_height is -1" in capsys.readouterr().err and not (tmp_path / "out").exists()
