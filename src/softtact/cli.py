@@ -35,8 +35,8 @@ from softtact.commands.common import EXIT_TEXT
 from softtact.errors import ConvergenceError, SofttactError
 from softtact.extras import missing_extra
 
-COMMANDS = (press, grasp, grasps, skin, palpate, dataset, view, calibrate, predict, complexity, fit, mesh, export_deck, detect_discs,
-            cost, stage, config_schema, completion)
+COMMANDS = (press, grasp, grasps, skin, palpate, dataset, view, calibrate, predict, complexity, fit, mesh, export_deck,
+            detect_discs, cost, stage, config_schema, completion)
 EXAMPLES = """examples:
   softtact press part.stl --unit mm --force 5 --force 20 --out press.nc --vtu press.vtu --plot press.png
   softtact grasp part.stl --unit mm --force 20 --out results/grasp   # a robot grasps it: both sensors
