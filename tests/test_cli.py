@@ -67,7 +67,7 @@ def answer(capsys):
 
 
 NAMES = ("press", "grasp", "grasps", "skin", "dataset", "view", "predict", "complexity", "fit", "mesh", "export-deck",
-         "detect-discs", "cost", "stage", "config-schema", "completion")
+         "detect-discs", "palpate", "cost", "stage", "config-schema", "completion")
 
 
 def test_every_commands_help_has_examples_and_the_exit_statuses(capsys):
