@@ -33,9 +33,9 @@ def test_a_lump_between_the_tables_points_is_found(table):
 def test_the_stated_deviation_is_the_scatter_of_many_readings(table):
     lump, rng = np.array([30.0, 6.0, np.log(6.0)]), np.random.default_rng(3)
     exact = table.forces(lump)
-    found = [find_lump(table, exact + 1e-3 * rng.normal(size=3)) for _ in range(40)]
+    found = [find_lump(table, exact + 1e-3 * rng.normal(size=3)) for _ in range(20)]
     scatter = np.std([[own.x_mm, own.depth_mm, np.log(own.stiffness_ratio)] for own in found], axis=0, ddof=1)
-    assert scatter == pytest.approx(deviations(table, lump), rel=0.35)      # 40 draws: 11 % standard error, three of them
+    assert scatter == pytest.approx(deviations(table, lump), rel=0.48)      # 20 draws: 16 % standard error, three of them
 
 
 def test_two_lumps_that_read_alike_both_lie_in_the_interval():

@@ -3,7 +3,8 @@
 The solver makes a table of the films' forces over (x, depth, log of the stiffness ratio); between its points a cubic spline gives
 the forces f(p) and their derivatives. Readings are compared with it by least squares, weighted with the films' noise s; the
 covariance of the estimate is s^2 (J^T J)^-1. A lump is seen where its forces differ from plain tissue's by more than noise does:
-chi2 = |f(p) - f_0|^2/s^2 beyond the 95 % point, with a probability of 95 % (non-central chi2 with |df|^2/s^2).
+chi2 = |f(p) - f_0|^2/s^2 beyond the 95 % point, with a probability of 95 % (non-central chi2 with |df|^2/s^2). The plain tissue is
+taken as known: it was read before.
 """
 
 from collections.abc import Callable
@@ -20,11 +21,13 @@ from softtact.errors import InputError
 from softtact.probe.design import Design, LumpSearch
 from softtact.probe.sweep import palpate
 
+PARAMETERS = ("x_mm", "depth_mm", "log_ratio")
 _SURE = 0.95
 _STEP = 1e-3      # of a parameter's range, for derivatives of the table's spline
 _STARTS = 12      # best points of the table from which least squares set out, for two lumps may read alike
 _AS_GOOD = chi2.ppf(_SURE, 1)      # by how much the chi2 of another minimum may be larger for it to count
-_RATIOS = 200     # stiffness ratios that the map of detection tries
+_LEAST_CHANGE = 1e-3      # of the stiffness, and the number of ratios, that the map of detection tries
+_RATIOS = 200
 
 
 @dataclass(frozen=True)
@@ -171,7 +174,7 @@ def detection_map(table: LumpTable) -> pd.DataFrame:
     rows = []
     for x in table.x_mm:
         for depth in table.depth_mm:
-            logs = np.linspace(0.0, np.log(table.stiffness_ratio[-1]), _RATIOS)
+            logs = np.log1p(np.geomspace(_LEAST_CHANGE, table.stiffness_ratio[-1] - 1, _RATIOS))
             forces = table.forces(np.column_stack([np.full(_RATIOS, x), np.full(_RATIOS, depth), logs]))
             seen = ((forces - table.plain_n)**2).sum(axis=1) >= needed
             ratio = float(np.exp(logs[np.argmax(seen)])) if seen.any() else float("inf")
@@ -202,19 +205,17 @@ def recovery(design: Design, search: LumpSearch, table: LumpTable, *, threads: i
         found = find_lump(table, forces + search.noise_n * rng.normal(size=forces.size))
         rows.append({"x_mm": lump[0], "depth_mm": lump[1], "stiffness_ratio": np.exp(lump[2]), "found_x_mm": found.x_mm,
                      "found_depth_mm": found.depth_mm, "found_stiffness_ratio": found.stiffness_ratio,
-                     "deviation_x_mm": found.deviation[0], "deviation_depth_mm": found.deviation[1],
-                     "deviation_log_ratio": found.deviation[2],
-                     "x_within": _within(found, 0, lump), "depth_within": _within(found, 1, lump),
-                     "ratio_within": _within(found, 2, lump),
-                     "depth_interval_mm": float(np.ptp(found.interval[1])), "chi2": found.chi2, "detected": found.detected,
+                     **_intervals(found, lump), "chi2": found.chi2, "detected": found.detected,
                      "table_error_n": float(np.abs(forces - table.forces(lump)).max())})
     return pd.DataFrame(rows)
 
 
-def _within(found, parameter, lump):
-    """Whether a parameter of the true lump lies in its interval."""
-    low, high = found.interval[parameter]
-    return bool(low <= lump[parameter] <= high)
+def _intervals(found, lump):
+    """The intervals' ends, and whether the true lump (3,) lies in them."""
+    columns = {}
+    for name, (low, high), true in zip(PARAMETERS, found.interval, lump, strict=True):
+        columns |= {f"{name}_low": low, f"{name}_high": high, f"{name}_within": bool(low <= true <= high)}
+    return columns
 
 
 def _solved(design, search, x, depth, ratio, threads):

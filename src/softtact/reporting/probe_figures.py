@@ -137,7 +137,7 @@ def draw_hardness(table: pd.DataFrame, verdicts: dict[str, HardnessVerdict], pat
 
 
 def draw_detection(detection: pd.DataFrame, recovered: pd.DataFrame, paths: Sequence[Path]) -> None:
-    """Where a lump is seen, and how well hidden lumps were found, with their stated deviations."""
+    """Where a lump is seen, and how well hidden lumps were found, with their 95 % intervals."""
     plt = pyplot()
     figure, (left, *others) = plt.subplots(1, 4, figsize=(13, 3.2), layout="constrained", width_ratios=(1.6, 1, 1, 1))
     grid = detection.pivot(index="depth_mm", columns="x_mm", values="least_stiffness_ratio")
@@ -149,8 +149,9 @@ def draw_detection(detection: pd.DataFrame, recovered: pd.DataFrame, paths: Sequ
     logs = recovered.assign(log_ratio=np.log(recovered.stiffness_ratio), found_log_ratio=np.log(recovered.found_stiffness_ratio))
     names = {"x_mm": "x, mm", "depth_mm": "depth, mm", "log_ratio": "log of the stiffness ratio"}
     for ax, (column, title) in zip(others, names.items(), strict=True):
-        deviation = logs[f"deviation_{column}"].clip(upper=float(np.ptp(logs[column])))
-        ax.errorbar(logs[column], logs[f"found_{column}"], yerr=deviation, fmt="o", ms=3, lw=0.8, color=COLOURS[0])
+        middle = logs[f"found_{column}"]
+        around = [(middle - logs[f"{column}_low"]).clip(lower=0), (logs[f"{column}_high"] - middle).clip(lower=0)]
+        ax.errorbar(logs[column], middle, yerr=around, fmt="o", ms=3, lw=0.8, color=COLOURS[0])
         ends = [logs[column].min(), logs[column].max()]
         ax.plot(ends, ends, "-", lw=0.8, color="0.5")
         ax.set(xlabel=f"true {title}", ylabel="found")

@@ -15,7 +15,7 @@ from softtact.evaluation.claims_of_probe import claims_of_probe
 from softtact.files import atomic_path, digest, write_csv, write_dataset, write_json
 from softtact.probe.design import Design
 from softtact.probe.hardness import hardness_table, verdict
-from softtact.probe.lump import detection_map, lump_table, recovery
+from softtact.probe.lump import PARAMETERS, detection_map, lump_table, recovery
 from softtact.probe.sweep import palpate, slope
 from softtact.reporting import probe_figures as figures
 from softtact.reporting.page_template import STYLE
@@ -152,19 +152,21 @@ def _lump(report, design, *, threads, tell):
     report.table("lump_detection.csv", "Least stiffness ratio of a lump that is seen", seen)
     report.table("lump_recovery.csv", "Hidden lumps and what the films told of them", found)
     report.picture("lump", "Left: least stiffness ratio of a lump that the films tell from plain tissue with 95 % probability. "
-                   "Right: lumps that the solver hid, found again from noisy films, with stated standard deviations.",
+                   "Right: lumps that the solver hid, found again from noisy films, with their 95 % intervals.",
                    lambda paths: figures.draw_detection(seen, found, paths))
     off = {name: float((found[f"found_{name}"] - found[name]).abs().median()) for name in ("x_mm", "depth_mm", "stiffness_ratio")}
-    inside = {name: float(found[f"{name}_within"].mean()) for name in ("x", "depth", "ratio")}
+    inside = {name: float(found[f"{name}_within"].mean()) for name in PARAMETERS}
+    depths = (found.depth_mm_high - found.depth_mm_low).median()
     least = seen.least_stiffness_ratio
     report.said.append(f"Hidden lumps: median error {off['x_mm']:.2f} mm in x, {off['depth_mm']:.2f} mm in depth, "
                        f"{off['stiffness_ratio']:.2f} in the stiffness ratio, with {search.noise_n:g} N of noise on each film; "
-                       f"in their 95 % intervals lie {inside['x']:.0%} of x, {inside['depth']:.0%} of depth, "
-                       f"{inside['ratio']:.0%} of the ratio; half of the intervals of depth are wider than "
-                       f"{found.depth_interval_mm.median():.1f} mm. A lump is seen "
-                       f"from a ratio of {least.min():.2f} to {least.max():.2f}, by its place.")
+                       f"in their 95 % intervals lie {inside['x_mm']:.0%} of x, {inside['depth_mm']:.0%} of depth, "
+                       f"{inside['log_ratio']:.0%} of the ratio; half of the intervals of depth are wider than "
+                       f"{depths:.1f} mm. A lump is seen "
+                       f"from a ratio of {least.min():.2f} to {least.max():.2f}, by its place, where the "
+                       "plain tissue is known.")
     return {"median_error": off, "within_interval": inside, "least_ratio_seen": [float(least.min()), float(least.max())],
-            "median_depth_interval_mm": float(found.depth_interval_mm.median()),
+            "median_depth_interval_mm": float(depths),
             "largest_table_error_n": float(found.table_error_n.max())}
 
 

@@ -1,0 +1,27 @@
+"""What the study of hardness says of a measure, on numbers that are known."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from softtact.probe.hardness import apparent_modulus, verdict
+
+ROWS = [("soft", 10, 1, 1.0), ("soft", 10, 2, 1.2), ("soft", 20, 1, 0.9), ("soft", 20, 2, 1.0),
+        ("hard", 10, 1, 2.0), ("hard", 10, 2, 3.0), ("hard", 20, 1, 1.5), ("hard", 20, 2, 2.5)]
+TABLE = pd.DataFrame(ROWS, columns=["tissue", "tissue_height_mm", "jaw_mm", "index"])
+
+
+def test_a_measure_is_judged_by_its_worst_change():
+    own = verdict(TABLE, "index")
+    assert own.change_with_load == pytest.approx(2.5 / 1.5 - 1)       # hard, 20 mm high
+    assert own.change_with_height == pytest.approx(0.2)                # both at the largest way
+    assert own.contrast == pytest.approx(2.5) and own.apart
+
+
+def test_values_that_overlap_do_not_tell_tissues_apart():
+    assert not verdict(TABLE.assign(index=np.where(TABLE.tissue == "hard", 0.7, 1.0) * TABLE["index"]), "index").apart
+
+
+def test_stiffening_leaves_the_modulus_at_rest():
+    c = np.linspace(0.1, 1, 6)
+    assert apparent_modulus(4 * c + 3 * c**2, c, height_mm=15, area_mm2=500) == pytest.approx(4 * 15 / 500)
