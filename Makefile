@@ -1,5 +1,5 @@
 # `make`: the default study.  `make tiny`: the smallest study.  `make docs`: the documentation.
-# `make skin`, `make grasps`: a robot skin, designed; grasps by a robot.  `make tiny-skin`, `make tiny-grasps`: the smallest ones.
+# `make skin`, `make grasps`, `make probe`: a robot skin, grasps by a robot, a palpation sensor.  `make studies`: the smallest of all studies.
 # `make test`: the tests, in minutes.  `make test-slow`: those that take longer, CalculiX's and whole runs of the workflow among them.
 # `make results`: the results page in docs/, from a finished run of the default study.
 # `make numbers`: the measured numbers in docs/, from benchmarks/results/ and a count of the tests.
@@ -7,7 +7,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 BIN := .venv/bin
 SNAKEMAKE = $(BIN)/snakemake --cores all
 
-.PHONY: study tiny skin tiny-skin probe grasps tiny-grasps test test-slow lint advice bench docs numbers results clean
+.PHONY: study tiny studies skin tiny-skin probe tiny-probe grasps tiny-grasps test test-slow lint advice bench docs numbers results clean
 
 study: .venv/installed
 	$(SNAKEMAKE)
@@ -28,9 +28,11 @@ grasps tiny-grasps: .venv/installed
 	$(BIN)/softtact grasps config/$(subst -,_,$@).yaml
 
 # The palpation sensor of the fourth paper.
-probe: .venv/installed
-	$(BIN)/softtact palpate config/probe.yaml --out results/probe --threads 2
-	@echo "Open results/probe/report.html"
+probe tiny-probe: .venv/installed
+	$(BIN)/softtact palpate config/$(subst -,_,$@).yaml --out results/$(subst -,_,$@)
+	@echo "Open results/$(subst -,_,$@)/report.html"
+
+studies: tiny tiny-skin tiny-grasps tiny-probe
 
 # Two processes with one thread each: two threads in one process take nearly as long as one.
 test test-slow: export OMP_NUM_THREADS = 1

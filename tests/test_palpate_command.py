@@ -18,7 +18,7 @@ def test_the_command_writes_tables_pictures_fields_and_a_page(tmp_path, capsys):
     assert main(["palpate", str(tmp_path / "design.yaml"), "--out", str(tmp_path / "out")]) == 0
     said = capsys.readouterr().out
     assert "ecoflex_00_30, load: trend line" in said and "not reproduced: F/d is a property" in said
-    curves = pd.read_csv(tmp_path / "out/curves.csv")
+    curves = pd.read_csv(tmp_path / "out/tables/curves.csv")
     assert len(curves) == 2 * (3 + 2) and (curves.film_left_n > 0).all()
     page = (tmp_path / "out/report.html").read_text()
     assert page.count("data:image/png") == 3 and "polystyrene has 3,000 to 3,600 MPa" in page

@@ -35,11 +35,12 @@ def _slope(slopes, tissue, printed, mesh_error):
     own = _moved(slopes, tissue)
     rule = f"slope of the trend line within {_NEAR:.0%} of the printed one, both sides"
     if own is None:
-        return row(f"F/d of {tissue}", "sec. IV, fig. 4", f"{printed} N/mm", "not run", UNDECIDED, rule, "slopes.csv")
+        return row(f"F/d of {tissue}", "sec. IV, fig. 4", f"{printed} N/mm", "not run", UNDECIDED, rule, "tables/slopes.csv")
     off = own.line_n_mm / printed - 1
     ours = (f"{own.line_n_mm:.2f} N/mm ({off:+.1%}); F/d from {own.secant_least_n_mm:.2f} to {own.secant_largest_n_mm:.2f}, "
             f"tangent at rest {own.initial_n_mm:.2f}")
-    return row(f"F/d of {tissue}", "sec. IV, fig. 4", f"{printed} N/mm", ours, verdict_of(abs(off) <= _NEAR), rule, "slopes.csv",
+    return row(f"F/d of {tissue}", "sec. IV, fig. 4", f"{printed} N/mm", ours, verdict_of(abs(off) <= _NEAR), rule,
+               "tables/slopes.csv",
                uncertainty=mesh_error)
 
 
@@ -47,11 +48,11 @@ def _larger_deflection(curves):
     claim, rule = "The softer tissue bends the beam more at the same load", "at every load"
     pair = [curves[(curves.tissue == name) & (curves.scenario == "load")] for name in _SOFT_FIRST]
     if any(part.empty for part in pair):
-        return row(claim, "fig. 3", "larger deflection", "not run", UNDECIDED, rule, "curves.csv")
+        return row(claim, "fig. 3", "larger deflection", "not run", UNDECIDED, rule, "tables/curves.csv")
     ratio = pair[0].beam_deflection_mm.to_numpy() / pair[1].beam_deflection_mm.to_numpy()
     return row(claim, "fig. 3", "larger deflection",
                f"by {ratio.min() - 1:.1%} to {ratio.max() - 1:.1%} up to {pair[0].force_n.max():g} N",
-               verdict_of(bool((ratio > 1).all())), rule, "curves.csv", uncertainty="the same mesh for both")
+               verdict_of(bool((ratio > 1).all())), rule, "tables/curves.csv", uncertainty="the same mesh for both")
 
 
 def _order(slopes, mesh_error):
@@ -59,9 +60,9 @@ def _order(slopes, mesh_error):
     claim, paper = "F/d ranks the rubbers by hardness", "Ecoflex 00-30 below Dragon Skin 20"
     rule = "slope of the trend line of the harder rubber larger"
     if any(part is None for part in own):
-        return row(claim, "sec. IV", paper, "not run", UNDECIDED, rule, "slopes.csv")
+        return row(claim, "sec. IV", paper, "not run", UNDECIDED, rule, "tables/slopes.csv")
     soft, hard = (part.line_n_mm for part in own)
-    return row(claim, "sec. IV", paper, f"{soft:.2f} and {hard:.2f} N/mm", verdict_of(bool(soft < hard)), rule, "slopes.csv",
+    return row(claim, "sec. IV", paper, f"{soft:.2f} and {hard:.2f} N/mm", verdict_of(bool(soft < hard)), rule, "tables/slopes.csv",
                uncertainty=mesh_error)
 
 
@@ -71,7 +72,8 @@ def _property(slopes, mesh_error):
     said = "; ".join(f"{own.tissue}: {own.secant_least_n_mm:.2f} to {own.secant_largest_n_mm:.2f} N/mm"
                      for own in moved.itertuples())
     return row("F/d is a property of the tissue, whatever the load", "eq. 3, 4", "a constant of the material", said,
-               verdict_of(change <= _CONSTANT), f"F/d of a tissue changes by {_CONSTANT:.0%} at most over the sweep", "slopes.csv",
+               verdict_of(change <= _CONSTANT), f"F/d of a tissue changes by {_CONSTANT:.0%} at most over the sweep",
+               "tables/slopes.csv",
                uncertainty=mesh_error)
 
 
@@ -82,10 +84,11 @@ def _one_load(curves):
     rule = f"contrast at the largest common load within {_NEAR:.0%} of the printed one"
     claim = "The contrast of F/d is the tissues', not that of two ranges of load"
     if any(part.empty for part in moved):
-        return row(claim, "sec. IV", f"{printed:.3f}", "not run", UNDECIDED, rule, "curves.csv")
+        return row(claim, "sec. IV", f"{printed:.3f}", "not run", UNDECIDED, rule, "tables/curves.csv")
     soft, hard = ((part.force_n / part.beam_deflection_mm).iloc[-1] for part in moved)
     return row(claim, "sec. IV", f"{printed:.3f}", f"{hard / soft:.3f} at {moved[0].force_n.iloc[-1]:g} N for both",
-               verdict_of(bool(abs(hard / soft / printed - 1) <= _NEAR)), rule, "curves.csv", uncertainty="the same mesh for both")
+               verdict_of(bool(abs(hard / soft / printed - 1) <= _NEAR)), rule, "tables/curves.csv",
+               uncertainty="the same mesh for both")
 
 
 def _height(hardness):
@@ -94,5 +97,5 @@ def _height(hardness):
     said = "; ".join(f"{name}: changes by {value:.1%}" for name, value in change.items())
     return row("F/d does not depend on the tissue's height", "eq. 3", "not claimed: C is for one geometry", said,
                verdict_of(bool(change.max() <= _CONSTANT)),
-               f"F/d at the same way of the jaw changes by {_CONSTANT:.0%} at most over the heights", "hardness.csv",
+               f"F/d at the same way of the jaw changes by {_CONSTANT:.0%} at most over the heights", "tables/hardness.csv",
                uncertainty="the same mesh sizes")

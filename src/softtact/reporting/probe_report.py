@@ -49,11 +49,11 @@ class _Report:
     said: list[str] = field(default_factory=list)
 
     def table(self, name: str, title: str, frame: pd.DataFrame, *, shown: bool = True) -> None:
-        write_csv(self.out / name, frame)
+        write_csv(self.out / "tables" / name, frame)
         if shown:
             html = frame.rename(columns=lambda text: text.replace("_", " ")).to_html(
                 index=False, border=0, na_rep="", float_format=lambda value: f"{value:.4g}")
-            self.tables.append({"title": title, "html": Markup(html), "file": name})
+            self.tables.append({"title": title, "html": Markup(html), "file": f"tables/{name}"})
 
     def picture(self, name: str, caption: str, draw: Callable[[list[Path]], None]) -> None:
         path = self.out / f"{name}.png"
