@@ -43,10 +43,10 @@ def pressed_by_roller(soft, law, roller_mesh, *, held, face="y1", stiffness, rea
 
 def places_of(body, state, pair=0):
     """Places (p, 3) in mm of a pair's points, and their pressures (p,) in MPa."""
-    from softtact.contact import surface_kernels
+    from softtact.contact.surface_places import places
 
     history = state.histories[pair]
-    return surface_kernels.places(history.points, body.points + state.displacement), state.contacts[pair].pressure
+    return places(history.points, body.points + state.displacement), state.contacts[pair].pressure
 
 
 def merged(mesh, tolerance=1e-7):

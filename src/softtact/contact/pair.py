@@ -17,6 +17,7 @@ from softtact.contact.facet_shapes import QUAD8
 from softtact.contact.facet_tree import refit
 from softtact.contact.pair_state import PairHistory, PairState
 from softtact.contact.segments import segment_points
+from softtact.contact.surface_places import frames_on, places, places_on
 from softtact.contact.surfaces import Surface, SurfacePoints, quadrature_points
 
 _ROUNDING_MM = 1e-7  # surfaces that lie on each other from the start touch, whatever the sign of their rounding
@@ -70,7 +71,7 @@ class ContactPair:
         return PairHistory(
             points,
             np.zeros(count),
-            np.zeros((count, 3)),
+            np.zeros((count, 2)),
             anchor,
             self._slip(points, anchor, anchor, x),
             np.zeros(count),
@@ -79,9 +80,13 @@ class ContactPair:
 
     def _slip(self, points, anchor, projection, x):
         """Vectors (p, 3) in mm from the anchors to the points' feet on the other surface."""
-        way = kernels.places(points, x) - kernels.places_on(anchor.facet, anchor.coordinates, self.other.nodes, self.other.kinds, x)
+        way = places(points, x) - places_on(anchor.facet, anchor.coordinates, self.other.nodes, self.other.kinds, x)
         way -= np.einsum("pi,pj,pj->pi", projection.normal, projection.normal, way)
         return np.where((anchor.facet >= 0)[:, None], way, 0.0)
+
+    def _frames(self, anchor, x):
+        """Directions (p, 2, 3) at the anchors, which turn with the other surface."""
+        return frames_on(anchor.facet, anchor.coordinates, self.other.nodes, self.other.kinds, x)
 
     def _project(self, points, x, hint):
         refit(self._tree, x)
@@ -110,15 +115,16 @@ class ContactPair:
         traction = np.where((state.pressure > 0)[:, None], state.friction, 0.0)
         if not self.segments or self.itself:
             start = self._slip(history.points, state.projection, state.projection, x)
-            return replace(history, traction=traction, anchor=state.projection, start=start, slid=slid)
+            kept = np.einsum("pki,pi->pk", self._frames(state.projection, x), traction)
+            return replace(history, traction=kept, anchor=state.projection, start=start, slid=slid)
         fresh = self._fresh(self._points(x, at_rest), x)
         if not len(fresh.points.facet) or not len(history.points.facet):
             return fresh
-        _, near = cKDTree(kernels.places(history.points, at_rest)).query(kernels.places(fresh.points, at_rest))
+        _, near = cKDTree(places(history.points, at_rest)).query(places(fresh.points, at_rest))
         return replace(
             fresh,
             offset=state.pressure[near] / history.stiffness,
-            traction=traction[near],
+            traction=np.einsum("pki,pi->pk", self._frames(fresh.anchor, x), traction[near]),
             slid=slid[near],
             stiffness=history.stiffness,
         )
@@ -158,7 +164,8 @@ class ContactPair:
         slip = (self._slip(history.points, anchor, projection, x) - np.einsum("pij,pj->pi", tangential, history.start)) * acts[
             :, None
         ]
-        trial = np.einsum("pij,pj->pi", tangential, history.traction) - self.stiffness * slip
+        before = np.einsum("pki,pk->pi", self._frames(anchor, x), history.traction)
+        trial = np.einsum("pij,pj->pi", tangential, before) - self.stiffness * slip
         size = np.linalg.norm(trial, axis=1)
         slides = acts & (size > bound * (1 + _YIELD))
         share = np.where(slides, bound / np.maximum(size, 1e-300), 1.0)
@@ -193,7 +200,7 @@ class ContactPair:
         if not self.friction or not here.any():
             return
         points, projection, other, anchor = history.points, state.projection, self.other, history.anchor
-        way = kernels.places(points, change) - kernels.places_on(
+        way = places(points, change) - places_on(
             projection.facet, projection.coordinates, other.nodes, other.kinds, change
         )
         pressure = -state.slope * (way * projection.normal).sum(axis=1) * here

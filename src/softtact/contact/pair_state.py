@@ -17,7 +17,8 @@ class PairHistory:
     offset: np.ndarray
     """(p,) in mm, of the augmented penalty."""
     traction: np.ndarray
-    """(p, 3) in MPa: friction on the points' surface when the step began."""
+    """(p, 2) in MPa: friction on the points' surface when the step began, along the other surface's directions at the anchors
+    (`surface_places.frames_on`): so it turns with that surface."""
     anchor: Projection
     """Where the points were on the other surface when the step began."""
     start: np.ndarray

@@ -23,6 +23,7 @@ from softtact.contact.facet_shapes import (
     unit_normal,
 )
 from softtact.contact.facet_tree import FacetTree, nearest
+from softtact.contact.surface_places import place_of_point
 from softtact.contact.surfaces import SurfacePoints
 
 _AT_EDGE = 1e-9
@@ -74,7 +75,7 @@ def project(
     )
     room, nobody, own, tangents, normal = room_for_shapes(), np.full(1, -1), np.empty(3), np.empty((2, 3)), np.empty(3)
     for p in range(count):
-        _place_of_point(points, p, x, own, tangents)
+        place_of_point(points, p, x, own, tangents)
         unit_normal(tangents, normal)
         if (
             before[p] >= 0
@@ -105,21 +106,6 @@ def _meets(out, p, facet, xi, eta, own, nodes, kinds, rims, x, rim, room):
 
 
 @njit(cache=True, nogil=True)
-def _place_of_point(points, p, x, place, tangents):
-    place[:], tangents[:] = 0.0, 0.0
-    for a in range(9):
-        node = points.nodes[p, a]
-        if node < 0:
-            break
-        for i in range(3):
-            place[i] += points.values[p, a] * x[node, i]
-            tangents[0, i] += points.slopes[p, 0, a] * x[node, i]
-            tangents[1, i] += points.slopes[p, 1, a] * x[node, i]
-    if points.kind[p] >= LINE2:
-        tangents[1, 2] = 1.0
-
-
-@njit(cache=True, nogil=True)
 def _inside(kind, xi, eta):
     limit = 1 + 2 * MARGIN - _AT_EDGE
     if kind >= LINE2:
@@ -143,28 +129,6 @@ def _beyond_rim(kind, xi, eta, rims, tangents, rim):
             or (rims[3] and (-1 - xi) * a > rim)
         )
     return (rims[0] and -eta * b > rim) or (rims[1] and (xi + eta - 1) * min(a, b) > rim) or (rims[2] and -xi * a > rim)
-
-
-@njit(cache=True, nogil=True)
-def places(points: SurfacePoints, x: np.ndarray) -> np.ndarray:
-    """Places (p, 3) in mm of the points, nodes at x (n, 3); of displacements, those of the points."""
-    out, tangents = np.zeros((len(points.facet), 3)), np.empty((2, 3))
-    for p in range(len(points.facet)):
-        _place_of_point(points, p, x, out[p], tangents)
-    return out
-
-
-@njit(cache=True, nogil=True)
-def places_on(facet: np.ndarray, coordinates: np.ndarray, nodes: np.ndarray, kinds: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Places (p, 3) of coordinates (p, 2) on facets (p,) of a surface; zeros where the facet is -1."""
-    out, room = np.zeros((len(facet), 3)), room_for_shapes()
-    for p in range(len(facet)):
-        if facet[p] >= 0:
-            evaluate_shapes(kinds[facet[p]], coordinates[p, 0], coordinates[p, 1], room)
-            for a in range(NODES_OF[kinds[facet[p]]]):
-                for i in range(3):
-                    out[p, i] += room.values[a] * x[nodes[facet[p], a], i]
-    return out
 
 
 @njit(cache=True, nogil=True)
