@@ -160,7 +160,9 @@ def test_a_turned_and_a_mirrored_set_up_give_the_turned_and_mirrored_loads(frict
 def test_bodies_in_contact_that_turn_together_keep_their_loads(friction, record):
     """Frame indifference: both held faces turn by 30 degrees after the press, and the forces with them.
 
-    Compared are the first and the last turn: as a step begins, the surfaces are cut along each other anew."""
+    Compared are the first and the last turn: as a step begins, the surfaces are cut along each other anew, and pressures and
+    friction
+    are carried over to the new points."""
     lower, upper = box((0, 0, 0), (1, 1, 0.5), (2, 2, 1), region="lower"), box((0, 0, 0.5), (1, 1, 1), (3, 2, 1))
     mesh = lower.joined(upper, prefix="upper ")
     body = SolidBody(mesh, {"lower": RUBBER, "upper body": RUBBER},
@@ -183,7 +185,7 @@ def test_bodies_in_contact_that_turn_together_keep_their_loads(friction, record)
     got = np.abs(turned - first).max() / np.abs(first).max()
     assert friction == 0 or abs(first[0]) > 0.05 * abs(first[2])
     assert record(f"bodies turned together by 30 degrees, mu = {friction:g}: change of the loads over the largest", expected=0.0,
-                  source="frame indifference", got=got) < (3e-4 if friction else 1e-4)      # pressures and friction are carried over to new points
+                  source="frame indifference", got=got) < (3e-4 if friction else 1e-4)
 
 
 def test_a_disc_twisted_on_a_half_space_has_reissner_and_sagocis_torque(record):
