@@ -2,7 +2,7 @@
 
 EXTRAS = {"snakemake": "workflow", "jinja2": "workflow", "torch": "learn", "optuna": "learn", "pyvista": "view", "vtk": "view",
           "vtkmodules": "view", "av": "optics", "pypardiso": "mkl", "openpyxl": "excel", "skfem": "skin",
-          "mujoco": "robot", "gymnasium": "robot", "pytetwild": "mesh"}
+          "mujoco": "robot", "gymnasium": "robot", "pytetwild": "mesh", "warp": "device"}
 
 
 def missing_extra(error: ImportError) -> str | None:

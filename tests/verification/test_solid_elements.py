@@ -160,9 +160,8 @@ def test_a_turned_and_a_mirrored_set_up_give_the_turned_and_mirrored_loads(frict
 def test_bodies_in_contact_that_turn_together_keep_their_loads(friction, record):
     """Frame indifference: both held faces turn by 30 degrees after the press, and the forces with them.
 
-    Compared are the first and the last turn: as a step begins, the surfaces are cut along each other anew, and pressures and
-    friction
-    are carried over to the new points."""
+    Compared are the first and the last turn: as a step begins, the surfaces are cut along each other anew, and what they carry
+    moves to the new points."""
     lower, upper = box((0, 0, 0), (1, 1, 0.5), (2, 2, 1), region="lower"), box((0, 0, 0.5), (1, 1, 1), (3, 2, 1))
     mesh = lower.joined(upper, prefix="upper ")
     body = SolidBody(mesh, {"lower": RUBBER, "upper body": RUBBER},

@@ -56,20 +56,7 @@ class PlainLoops:
     ) -> np.ndarray:
         """Tangent (e, 3 m, 3 m) in N/mm, see `kernels.tangent`; `like` names the precision of the result."""
         F, J, w, B = deformed.F, deformed.J, at_rest.volumes[at_rest.shapes], self._operator(at_rest)
-        inverse = _inverses(deformed.C)[:, _VOIGT].reshape(F.shape)
-        pj, local = volume.pressure * J, 0.5 * volume.unprojected * (J**2 + 1)
-        if volume.quartic.size:
-            raise NotImplementedError("The quartic penalty is for spatial elements of sensors on frusta.")
-        D = moduli[:, _VOIGT][:, :, :, _VOIGT].reshape(*J.shape, 3, 3, 3, 3)
-        D = (
-            D
-            + np.einsum("eg,egij,egkl->egijkl", pj + local, inverse, inverse)
-            - np.einsum(
-                "eg,egijkl->egijkl",
-                pj,
-                np.einsum("egik,egjl->egijkl", inverse, inverse) + np.einsum("egil,egjk->egijkl", inverse, inverse),
-            )
-        )
+        inverse, D = _inverses(deformed.C)[:, _VOIGT].reshape(F.shape), material_tensor(deformed, moduli, volume)
         A = np.einsum("egip,egpjql,egkq->egijkl", F, D, F, optimize=True)
         A += np.einsum("ik,eglj->egijkl", np.eye(3), self._whole_stress(deformed, stress, volume.pressure))
         k = B.shape[4] * 3
@@ -78,13 +65,30 @@ class PlainLoops:
         cofactor = np.einsum("eg,egip,egpj->egij", J, F, inverse).reshape(*J.shape, 9)
         change = np.einsum("eg,egp,egpk->egk", w, cofactor, B, optimize=True)
         seen = np.einsum("gp,egk->epk", at_rest.basis, change)
-        gram = at_rest.gram_inverse[at_rest.shapes]
-        if volume.stiffness.size:
-            inner = gram @ np.einsum("eg,gp,gq->epq", w * volume.stiffness, at_rest.basis, at_rest.basis) @ gram
-        else:
-            inner = volume.modulus * gram
+        inner = mode_moduli(at_rest, volume)
         out += np.einsum("epk,epq,eql->ekl", seen, inner, seen, optimize=True)
         return out.astype(like.dtype, copy=False)
+
+
+def material_tensor(deformed: Deformation, moduli: np.ndarray, volume: VolumeResponse) -> np.ndarray:
+    """dS_ij / dE_kl (e, g, 3, 3, 3, 3) in MPa at the points, the pressure kept; from the law's moduli (e*g, 6, 6)."""
+    if volume.quartic.size:
+        raise NotImplementedError("The quartic penalty is for spatial elements of sensors on frusta.")
+    J, inverse = deformed.J, _inverses(deformed.C)[:, _VOIGT].reshape(*deformed.J.shape, 3, 3)
+    pj, local = volume.pressure * J, 0.5 * volume.unprojected * (J**2 + 1)
+    crossed = np.einsum("egik,egjl->egijkl", inverse, inverse) + np.einsum("egil,egjk->egijkl", inverse, inverse)
+    D = moduli[:, _VOIGT][:, :, :, _VOIGT].reshape(*J.shape, 3, 3, 3, 3)
+    D = D + np.einsum("eg,egij,egkl->egijkl", pj + local, inverse, inverse)
+    return D - np.einsum("eg,egijkl->egijkl", pj, crossed)
+
+
+def mode_moduli(at_rest: ElementArrays, volume: VolumeResponse) -> np.ndarray:
+    """By what the elements' projected changes of volume are multiplied: (e, p, p) in MPa/mm3."""
+    gram = at_rest.gram_inverse[at_rest.shapes]
+    if not volume.stiffness.size:
+        return volume.modulus * gram
+    weighted = at_rest.volumes[at_rest.shapes] * volume.stiffness
+    return gram @ np.einsum("eg,gp,gq->epq", weighted, at_rest.basis, at_rest.basis) @ gram
 
 
 def _inverses(C6: np.ndarray) -> np.ndarray:

@@ -28,6 +28,7 @@ from softtact.linalg.workers import Workers, slices
 from softtact.materials.laws.base import Law
 from softtact.models.solid.blocks import region_blocks
 from softtact.models.solid.checks import refuse_loose
+from softtact.models.solid.device import find_device, sum_on
 from softtact.models.solid.frames import Frame, FramePose
 from softtact.models.solid.loads import FacePressure
 from softtact.models.solid.springs import FrustumSprings
@@ -67,7 +68,8 @@ class SolidBody:
 
     mesh: all soft bodies;  laws: by region;  held {face: axes such as "xyz"};  carried {frame: (reference point, faces[, axes])}:
     faces that a rigid frame moves, along axes such as "z" alone;  rigid {frame: (reference point, triangles' corners (t, 3, 3))}:
-    rigid objects on further nodes
+    rigid objects on further nodes;  device: where spatial elements are summed up: `cpu`, `warp` (Warp's kernels on the processor),
+    `cuda`, or `auto`: a GPU where there is one
     """
 
     def __init__(
@@ -79,9 +81,12 @@ class SolidBody:
         carried: Mapping[str, tuple] | None = None,
         rigid: Mapping[str, tuple[Sequence[float], np.ndarray]] | None = None,
         threads: int = 1,
+        device: str = "cpu",
     ) -> None:
         self.mesh, self.laws = mesh, dict(laws)
         self.blocks = region_blocks(mesh, laws)
+        if (where := find_device(device)) != "cpu":
+            sum_on(self.blocks, where)
         self.workers = Workers(threads)
         # What rounding hides of the energy is in proportion to modulus times volume, however small the strain.
         self.energy_noise = 3e-4 * sum(block.law.mu0 * block.volume for _, _, block in self.blocks)
