@@ -5,6 +5,7 @@
 
 import argparse
 import time
+from functools import partial
 
 import numpy as np
 import record
@@ -35,7 +36,7 @@ def row(name, mesh, device):
     out = {"elements": name, "count": len(nodes), "device": device,
            "difference": float(np.abs(got - expected).max() / np.abs(expected).max())}
     for what in ("evaluate", "tangent"):
-        times = [[seconds(lambda one=one: getattr(one, what)(moved)) for one in (block, other)] for _ in range(REPEATS)]
+        times = [[seconds(partial(getattr(one, what), moved)) for one in (block, other)] for _ in range(REPEATS)]
         compiled, warp = np.min(times, axis=0)
         out |= {f"{what}_compiled_s": compiled, f"{what}_warp_s": warp, f"{what}_ratio": warp / compiled}
     return out
