@@ -69,8 +69,13 @@ def test_frusta_stand_below_the_sheet_one_to_an_element_with_weights_that_make_a
     down[:, 2] = -0.1 - 0.01 * pad.mesh.points[:, 0]
     expected = 0.1 + 0.01 * pad.mesh.points[springs.nodes].mean(axis=1)[:, 0]
     np.testing.assert_allclose(springs.compressions(down), expected, atol=1e-12)
-    force = np.zeros_like(down)
+    force, even = np.zeros_like(down), np.zeros_like(down)
     springs.add_force(down, force)
+    even[:, 2] = -0.1
+    law, pushed = sensor.prepared("foundation").law, np.zeros_like(down)
+    springs.add_force(even, pushed)
+    one = np.interp(0.1, law.compression_mm, law.force_n)      # of a frustum's unit cell
+    assert -pushed[:, 2].sum() == pytest.approx(540 * one, rel=0.01)
     h, v = 1e-6, np.random.default_rng(0).standard_normal(down.shape)
     ahead, behind = np.zeros_like(down), np.zeros_like(down)
     springs.add_force(down + h * v, ahead)

@@ -109,14 +109,13 @@ class ContactPair:
         )
 
     def begin_step(self, history: PairHistory, state: PairState, x: np.ndarray, at_rest: np.ndarray) -> PairHistory:
-        """The history at the begin of a step from a balanced state with nodes at x (n, 3): new anchors and, of segments, new
-        points."""
+        """The history as a step begins, from a balanced state with nodes at x (n, 3): new anchors and, of segments, new points."""
         slid = history.slid + np.linalg.norm(state.slip, axis=1) * (state.pressure > 0)
         traction = np.where((state.pressure > 0)[:, None], state.friction, 0.0)
         if not self.segments or self.itself:
             start = self._slip(history.points, state.projection, state.projection, x)
             kept = np.einsum("pki,pi->pk", self._frames(state.projection, x), traction)
-            return replace(history, traction=kept, anchor=state.projection, start=start, slid=slid)
+            return replace(history, traction=kept, anchor=state.projection, start=start, slid=slid, overlap_mm=np.inf)
         fresh = self._fresh(self._points(x, at_rest), x)
         if not len(fresh.points.facet) or not len(history.points.facet):
             return fresh
@@ -161,9 +160,8 @@ class ContactPair:
         anchor, bound = history.anchor, self.friction * pressure
         acts = touches & (anchor.facet >= 0)
         tangential = np.eye(3) - projection.normal[:, :, None] * projection.normal[:, None]
-        slip = (self._slip(history.points, anchor, projection, x) - np.einsum("pij,pj->pi", tangential, history.start)) * acts[
-            :, None
-        ]
+        slip = self._slip(history.points, anchor, projection, x) - np.einsum("pij,pj->pi", tangential, history.start)
+        slip = np.where(acts[:, None], slip, 0.0)
         before = np.einsum("pki,pk->pi", self._frames(anchor, x), history.traction)
         trial = np.einsum("pij,pj->pi", tangential, before) - self.stiffness * slip
         size = np.linalg.norm(trial, axis=1)
@@ -200,9 +198,7 @@ class ContactPair:
         if not self.friction or not here.any():
             return
         points, projection, other, anchor = history.points, state.projection, self.other, history.anchor
-        way = places(points, change) - places_on(
-            projection.facet, projection.coordinates, other.nodes, other.kinds, change
-        )
+        way = places(points, change) - places_on(projection.facet, projection.coordinates, other.nodes, other.kinds, change)
         pressure = -state.slope * (way * projection.normal).sum(axis=1) * here
         direction = state.friction / np.maximum(self.friction * state.pressure, 1e-300)[:, None]
         kernels.add_forces_of(
@@ -267,9 +263,8 @@ class ContactPair:
     def augmented(self, history: PairHistory, state: PairState) -> PairHistory:
         """The history with offsets that hold the surfaces where they just touch, in the mean and the slope over each facet.
 
-        There are more points than displacements that could follow them: offsets of single points would leave few of them in
-        touch, and
-        their pressures without order. Where an augmentation came to a stand, the penalty is doubled.
+        There are more points than displacements that could follow them: offsets of single points would leave few of them in touch,
+        and their pressures without order. Where an augmentation came to a stand, the penalty is doubled.
         """
         overlap, factor = self.overlap_mm(history, state), 1.0
         if overlap > 0.5 * history.overlap_mm:
@@ -302,8 +297,7 @@ class ContactPair:
         return (basis * np.linalg.solve(gram, right[..., None])[points.facet, :, 0]).sum(axis=1)
 
     def settled(self, history: PairHistory, state: PairState, tolerance_mm: float) -> bool:
-        """Whether the surfaces overlap by no more than the tolerance, and points under pressure stand over the facets that they
-        meet."""
+        """Whether surfaces overlap by no more than the tolerance, and points that press stand over the facets that they meet."""
         here = np.flatnonzero(state.pressure > 0)
         facets, (xi, eta) = state.projection.facet[here], state.projection.coordinates[here].T
         kinds = self.other.kinds[facets]

@@ -28,7 +28,7 @@ class PairHistory:
     stiffness: float
     """Penalty in N/mm3: the pair's, or larger where its augmentations came to a stand."""
     overlap_mm: float = np.inf
-    """Deepest overlap at the last augmentation."""
+    """Deepest overlap at the step's last augmentation; infinite before its first one."""
 
 
 @dataclass(frozen=True)

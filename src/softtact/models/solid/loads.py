@@ -46,8 +46,7 @@ class FacePressure:
         return 2 * np.pi * radius if self.axisymmetric else np.full(len(self._share), self.thickness_mm)
 
     def add_force(self, x: np.ndarray, pressure: float, force: np.ndarray) -> float:
-        """Add to nodal forces (n, 3) in N what stands against the pressure (MPa), nodes at x (n, 3); returns its magnitude's
-        sum."""
+        """Add to nodal forces (n, 3) in N what stands against the pressure (MPa), nodes at x (n, 3); returns its sum."""
         along = self._tangents(x)
         push = pressure * (self._share * self._thickness(x))[:, None] * np.cross(along[:, 0], along[:, 1])
         np.add.at(force, self._points.nodes, self._points.values[..., None] * push[:, None])

@@ -20,7 +20,7 @@ class SolidSettings:
     relative_residual: float = 1e-6
     """Largest unbalanced force over the sum of what presses and holds."""
     penetration_mm: float = 1e-3
-    """Largest overlap of surfaces in contact, and widest gap across which pressure acts."""
+    """Largest overlap of surfaces in contact, and widest gap across which pressure acts, in the mean and the slope over a facet."""
     max_iterations: int = 40
     """Newton steps of a load step, or of an augmentation."""
     max_augmentations: int = 12
@@ -56,8 +56,6 @@ class _Balance:
     settings: SolidSettings
     target: Target
     pending: bool
-    shift: float = 0.0
-    factorisations: int = 0
     before: list[float] = field(default_factory=list)
     share: float = 1.0
 
@@ -77,8 +75,7 @@ class _Balance:
 
     def step(self, state: SolidState) -> tuple[SolidState, Any]:
         body, unknown = self.body, self.target.unknown
-        self.shift = body.factor(state)
-        self.factorisations += 1
+        body.factor(state)
         residual, off = body.residual(state).copy(), self._loads_off(state)
         ways = [np.zeros(6) for _ in body.frames]
         pressures = state.pressures
@@ -93,8 +90,7 @@ class _Balance:
         found = body.solve(state, np.column_stack([residual, *columns]))
         step = -found[:, 0]
         if unknown:
-            # The loads' derivatives by the displacements: the columns once more where the tangent is symmetric, as without
-            # friction.
+            # The loads' derivatives by the displacements: the columns once more where the tangent is symmetric, without friction.
             rubs = any(pair.friction for pair in body.pairs)
             felt = self._felt(state, found) if rubs else np.column_stack(columns).T @ found
             schur = corner - felt[:, 1:]
@@ -147,9 +143,8 @@ class _Balance:
             return smaller
         lower = lowers_potential(state.energy, trial.energy - self._work(state, trial), abs(state.energy) + self.body.energy_noise)
         if any(pair.friction for pair in self.body.pairs):
-            # It has no potential. A step is to be no worse than the last ones, or small: points that begin to slide stand in the
-            # way
-            # of every larger one.
+            # It has no potential. A step is to be no worse than the last ones, or small: points that begin to slide stand in
+            # the way of every larger one.
             return self.residual(trial) < max([*self.before, residual]) * (2.0 if self.share <= _SMALL else 1.0)
         return smaller if lower is None else lower  # a residual alone may fall and rise in turns where points touch and leave
 
