@@ -74,6 +74,22 @@ def test_the_residual_is_the_derivative_of_the_potential_with_friction_but_for_t
     assert body.residual(state) @ v == pytest.approx((ahead - behind) / (2 * h), rel=3e-2)
 
 
+def test_with_its_coupling_the_tangent_of_sliding_friction_is_the_derivative_of_the_residual_but_for_turning_normals():
+    body, rng = two_blocks(0.4)
+    state = pressed_state(body, rng, [0.01, -0.03, -0.05, 0, 0, 0])
+    state = body.evaluate(state.displacement, state.poses, state.histories, np.zeros(1))
+    v, h = rng.standard_normal(len(body.free)), 1e-7
+    ahead, behind = (body.residual(body.moved(state, s * h * v, [np.zeros(6)])) for s in (1, -1))
+    change, coupling = np.zeros(body.points.size), np.zeros_like(body.points)
+    change[body.free] = v
+    body.pairs[0].add_coupling(state.histories[0], state.contacts[0], change.reshape(-1, 3), coupling)
+    expected, symmetric = (ahead - behind) / (2 * h), whole_matrix(body, state) @ v
+    error, without = (np.abs(got - expected).max() / np.abs(expected).max()
+                      for got in (symmetric + coupling.ravel()[body.free], symmetric))
+    assert state.contacts[0].slides.any()
+    assert error < 0.02 < 0.1 < without
+
+
 def test_a_follower_pressure_on_a_closed_surface_has_no_resultant_and_a_symmetric_derivative():
     body, rng = two_blocks(0.0)
     x = body.points + 0.02 * rng.standard_normal(body.points.shape)

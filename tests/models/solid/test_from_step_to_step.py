@@ -1,5 +1,6 @@
-"""The penalty of a contact stays what it is over many steps, however small the overlaps of the steps before were."""
+"""What goes on from step to step of a path: the penalty of a contact, and the loads of freedoms that a step does not name."""
 
+import pytest
 import trimesh
 
 from softtact.contact.motion import Motion
@@ -11,7 +12,8 @@ from softtact.models.solid.body import SolidBody
 from softtact.models.solid.path import SolidPath
 
 
-def test_the_penalty_of_a_plate_pressed_in_eight_steps_is_no_larger_than_in_one():
+def block_under_a_plate():
+    """A bonded block of 2 x 2 x 1 mm and a rigid plate that lies on it."""
     mesh = box((-1, -1, 0), (1, 1, 1), (3, 3, 2))
     plate = trimesh.creation.box((4, 4, 1))
     plate.apply_translation([0, 0, 1.5])
@@ -19,7 +21,18 @@ def test_the_penalty_of_a_plate_pressed_in_eight_steps_is_no_larger_than_in_one(
                      rigid={"plate": ((0, 0, 1), plate.triangles)})
     body.add_pair(ContactPair(Surface.of(mesh.face("z1")), Surface.of({"triangle": body.surface_nodes("plate")}), stiffness=20.0,
                               reach_mm=0.5, rigid=True))
-    motion = Motion()
+    return body
+
+
+def test_a_load_stays_while_a_later_step_moves_the_object_aside():
+    body = block_under_a_plate()
+    steps = list(SolidPath(body, {"plate": Motion().press(force_n=0.2).slide(x_mm=0.3)}).run())
+    assert [step.loads[0, 2] for step in steps] == pytest.approx([-0.2, -0.2], rel=1e-4)
+    assert steps[1].state.poses[0].translation[0] == pytest.approx(0.3)
+
+
+def test_the_penalty_of_a_plate_pressed_in_eight_steps_is_no_larger_than_in_one():
+    body, motion = block_under_a_plate(), Motion()
     for _ in range(8):
         motion = motion.step(ways={"z": -0.02})
     largest = [step.state.histories[0].stiffness for step in SolidPath(body, {"plate": motion}).run()]
