@@ -25,12 +25,13 @@ def _palpate(options):
     from softtact.probe.design import load_design
     from softtact.progress import Watch
     from softtact.reporting.probe_report import palpation_study
+    from softtact.study.config import here_or_shipped
 
     if options.threads < 1:
         raise InputError(f"--threads {options.threads}: give 1 or more.")
     if options.out.exists() and not options.out.is_dir():
         raise InputError(f"--out {options.out}: it is a file; give a folder.")
-    design = load_design(options.design)
+    design = load_design(here_or_shipped(options.design))
     watch = Watch("palpate")
     summary = palpation_study(design, options.out, threads=options.threads, tell=watch.beat)
     watch.end()

@@ -36,15 +36,17 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 def _skin(options):
     from softtact.skin.design import read_design
+    from softtact.study.config import here_or_shipped
 
-    design = read_design(options.design)
+    path = here_or_shipped(options.design)
+    design = read_design(path)
     if options.threads < 1:
         raise InputError(f"--threads {options.threads}: give 1 or more.")
     if options.out.exists() and not options.out.is_dir():
         raise InputError(f"--out {options.out}: it is a file, and the results need a folder; choose another name.")
     from softtact.reporting.skin_study import run_design
 
-    told = run_design(options.design, design, options.out, threads=options.threads)
+    told = run_design(path, design, options.out, threads=options.threads)
     for remark in told["remarks"]:
         print(f"softtact skin: WARNING: {remark}", file=sys.stderr)
     show(told, as_json=options.json, lines=_lines(told))
