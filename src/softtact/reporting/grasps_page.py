@@ -115,7 +115,7 @@ def draw_one_event(path: Path, compared: Mapping[str, "xarray.Dataset"]) -> None
         for place, model, values, share in zip(axes, data.model.values, data.deformation_map_mm.values, data.lower_share.values,
                                                strict=True):
             image = place.imshow(values, origin="lower", extent=extent, vmin=0, vmax=deepest, cmap="viridis")
-            place.set_title(f"{name.replace('_', ' ')}, {model}\nlower feature: {share:.2f} of the raised", fontsize=8)
+            place.set_title(f"{name.replace('_', ' ')}, {model}\nlower feature: {share:z.2f} of the raised", fontsize=8)
             place.set_xlabel("x (mm)"), place.set_ylabel("y (mm)")
         figure.colorbar(image, ax=list(axes), label="towards the PCB (mm)", shrink=0.8)
     save(figure, path)

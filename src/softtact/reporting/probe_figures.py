@@ -6,6 +6,7 @@ from pathlib import Path
 import matplotlib.tri as mtri
 import numpy as np
 import pandas as pd
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from softtact.fem.solid_mesh import SolidMesh
 from softtact.files import atomic_path
@@ -112,7 +113,7 @@ def draw_films(sweeps: Sequence[Palpation], paths: Sequence[Path]) -> None:
     for ax, sweep in zip(axes[0], moved, strict=True):
         for number, (name, force) in enumerate(zip(sweep.films, sweep.film_force_n.T, strict=True)):
             ax.plot(sweep.force_n, force / sweep.force_n, "-" if number % 2 else "--", label=name,
-                    color=COLOURS[number % len(COLOURS)])
+                    color=COLOURS[number % len(COLOURS)], zorder=2 + (number % 2 == 0))     # dashes above
         ax.set(xlabel="force on the jaw, N", title=words(sweep.tissue))
     axes[0, 0].set_ylabel("film's force over the jaw's")
     axes[0, 0].legend(frameon=False, fontsize=8)
@@ -132,6 +133,10 @@ def draw_hardness(table: pd.DataFrame, verdicts: dict[str, HardnessVerdict], pat
                     color=COLOURS[tissues.index(tissue) % len(COLOURS)], label=f"{words(tissue)}, {height:g} mm")
         ax.set(xlabel="largest force of the sweep, N", ylabel=title, xscale="log", yscale="log",
                title=f"changes with load by up to {verdicts[column].change_with_load:.0%}")
+        for axis in (ax.xaxis, ax.yaxis):     # plain numbers
+            axis.set_major_locator(LogLocator(subs=(1, 2, 3, 5, 7)))
+            axis.set_major_formatter("{x:g}")
+            axis.set_minor_formatter(NullFormatter())
     axes[1].legend(frameon=False, fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
     save(figure, *paths)
 

@@ -50,10 +50,12 @@ def draw_probes(path: Path, table: "pd.DataFrame") -> None:
     colours = plt.get_cmap("coolwarm")(np.linspace(0, 1, table.modulus_share.nunique()))
     for axes, diameter in zip(panels[0], diameters, strict=True):
         for hue, (share, rows) in zip(colours, table[table.diameter_mm == diameter].groupby("modulus_share"), strict=True):
-            colour = hue if share else "black"
+            colour, name = (hue, f"E {share:+.0%}") if share else ("black", "E")
             axes.plot(rows.pressure_kpa, rows.delta_ff, ":", color=colour)
-            axes.plot(rows.pressure_kpa.where(rows.within_test), rows.delta_ff, "-", color=colour, label=f"E {share:+.0%}")
+            axes.plot(rows.pressure_kpa.where(rows.within_test), rows.delta_ff, "-", color=colour, label=name)
         axes.set(xlabel="pressure (kPa)", title=f"probe of {diameter:g} mm")
+    if not table.within_test.all():
+        panels[0][0].plot([], [], ":", color="grey", label="beyond the tested stress")
     panels[0][0].set_ylabel("rise of the capacitance (fF)")
     panels[0][0].legend(frameon=False, fontsize=8)
     save(figure, path, path.with_suffix(".svg"))
