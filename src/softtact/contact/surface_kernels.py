@@ -163,7 +163,7 @@ def add_forces_of(
 
 
 @njit(cache=True, nogil=True)
-def _forms(points, p, corners, kind, room, width, coupled, rows):
+def _forms(points, p, kind, room, width, coupled, rows):
     """Shape values of both sides into rows (1, k) and the other side's slopes (2, k), nodes of the other side behind `width`."""
     rows[:] = 0.0
     for a in range(NODES_OF[points.kind[p]]):
@@ -193,11 +193,8 @@ def add_pair_tangents(
     pair (p,): the points' pairs, -1 for none;  pressure (p,) in MPa and its slope (p,) in N/mm3;  width: nodes of a facet of the
     points' side, behind which those of the other side stand where `coupled`
     """
-    room, corners, columns = room_for_shapes(), np.zeros((9, 3)), out.shape[1]
-    k = columns // 3
-    rows, G, N, D, T = np.empty((3, k)), np.empty(columns), np.empty((2, columns)), np.empty((2, columns)), np.empty((2, columns))
-    place, tangents = np.empty(3), np.empty((2, 3))
-    M, kappa, metric = np.empty((2, 2)), np.empty((2, 2)), np.empty((2, 2))
+    room, corners, k = room_for_shapes(), np.zeros((9, 3)), out.shape[1] // 3
+    rows, G, place, tangents, kappa = np.empty((3, k)), np.empty(3 * k), np.empty(3), np.empty((2, 3)), np.empty((2, 2))
     for p in range(len(pair)):
         if pair[p] < 0:
             continue
@@ -207,39 +204,50 @@ def add_pair_tangents(
             corners[a] = x[nodes[facet, a]]
         evaluate_shapes(kind, projection.coordinates[p, 0], projection.coordinates[p, 1], room)
         place_on(kind, corners, room, place, tangents)
-        _forms(points, p, corners, kind, room, width, coupled, rows)
-        for a in range(k):
-            for i in range(3):
-                G[3 * a + i] = rows[0, a] * n[i]
+        _forms(points, p, kind, room, width, coupled, rows)
+        _along(rows[0], n, G)
         _add_square(out[pair[p]], points.weight[p] * slope[p], G)
-        if pressure[p] == 0 or not projection.inner[p]:
-            continue
-        _curvature(kind, corners, room, n, kappa)
-        gap = projection.gap[p]
-        for i in range(2):
-            for j in range(2):
-                metric[i, j] = (tangents[i] * tangents[j]).sum()
-                M[i, j] = metric[i, j] - gap * kappa[i, j]
-        _invert(M)
-        _invert(metric)
-        for d in range(2):
-            for a in range(k):
-                for i in range(3):
-                    N[d, 3 * a + i] = rows[1 + d, a] * n[i]
-                    T[d, 3 * a + i] = rows[0, a] * tangents[d, i] + gap * N[d, 3 * a + i]
-        for d in range(2):
-            D[d] = M[d, 0] * T[0] + M[d, 1] * T[1]
-        for d in range(2):
-            T[d] = N[d] + kappa[d, 0] * D[0] + kappa[d, 1] * D[1]
-        w = -points.weight[p] * pressure[p]
-        for r in range(columns):
-            for c in range(r, columns):
-                value = 0.0
-                for i in range(2):
-                    value -= N[i, r] * D[i, c] + D[i, r] * N[i, c]
-                    for j in range(2):
-                        value += gap * metric[i, j] * T[i, r] * T[j, c] - kappa[i, j] * D[i, r] * D[j, c]
-                out[pair[p], r, c] += w * value
+        if pressure[p] != 0 and projection.inner[p]:
+            _curvature(kind, corners, room, n, kappa)
+            _add_turning(out[pair[p]], -points.weight[p] * pressure[p], rows, n, tangents, kappa, projection.gap[p])
+
+
+@njit(cache=True, nogil=True)
+def _along(values, direction, form):
+    """The form (3 k,) of nodal values (k,) along a direction (3,)."""
+    for a in range(len(values)):
+        for i in range(3):
+            form[3 * a + i] = values[a] * direction[i]
+
+
+@njit(cache=True, nogil=True)
+def _add_turning(matrix, factor, rows, n, tangents, kappa, gap):
+    """The upper triangle of factor times d2g, see the module's docstring; rows: see `_forms`."""
+    columns = len(matrix)
+    N, D, T = np.empty((2, columns)), np.empty((2, columns)), np.empty((2, columns))
+    M, metric = np.empty((2, 2)), np.empty((2, 2))
+    for i in range(2):
+        for j in range(2):
+            metric[i, j] = (tangents[i] * tangents[j]).sum()
+            M[i, j] = metric[i, j] - gap * kappa[i, j]
+    _invert(M)
+    _invert(metric)
+    for d in range(2):
+        _along(rows[1 + d], n, N[d])
+        _along(rows[0], tangents[d], T[d])
+        T[d] += gap * N[d]
+    for d in range(2):
+        D[d] = M[d, 0] * T[0] + M[d, 1] * T[1]
+    for d in range(2):
+        T[d] = N[d] + kappa[d, 0] * D[0] + kappa[d, 1] * D[1]
+    for r in range(columns):
+        for c in range(r, columns):
+            value = 0.0
+            for i in range(2):
+                value -= N[i, r] * D[i, c] + D[i, r] * N[i, c]
+                for j in range(2):
+                    value += gap * metric[i, j] * T[i, r] * T[j, c] - kappa[i, j] * D[i, r] * D[j, c]
+            matrix[r, c] += factor * value
 
 
 @njit(cache=True, nogil=True)
@@ -289,13 +297,13 @@ def add_friction_tangents(
     """Add w F^T (3 x 3 stiffness of a point, (p, 3, 3) in N/mm3) F of F = (shape values, minus those of the other side)."""
     room, columns = room_for_shapes(), out.shape[1]
     k = columns // 3
-    rows, corners = np.empty((3, k)), np.zeros((9, 3))
+    rows = np.empty((3, k))
     for p in range(len(pair)):
         if pair[p] < 0:
             continue
         kind = kinds[facet[p]]
         evaluate_shapes(kind, coordinates[p, 0], coordinates[p, 1], room)
-        _forms(points, p, corners, kind, room, width, coupled, rows)
+        _forms(points, p, kind, room, width, coupled, rows)
         for a in range(k):
             for b in range(a, k):
                 factor = points.weight[p] * rows[0, a] * rows[0, b]

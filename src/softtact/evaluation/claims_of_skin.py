@@ -71,8 +71,7 @@ def _of_the_authors_case(layout: Layout, ecoflex: Elastomer, meshes: pd.DataFram
         "within 0.1 % on a mesh with one quadratic element across the guard gap",
         "tables/convergence.csv",
         uncertainty=f"of the mesh: on the finest one {finest.capacitance_ff:.3f} fF, {finest.capacitance_ff / ORACLE_FF - 1:+.2%} "
-        "from "
-        "the authors' number, which was not converged; rises above rest differ by "
+        "from the authors' number, which was not converged; rises above rest differ by "
         f"{abs((ours - skin.at_rest_ff[6]) / finest.delta_ff - 1):.2%}",
     )
     deepest = np.linalg.norm(unit / _STIFF_MPA, axis=1).max()
