@@ -13,7 +13,7 @@ MOST_LINES = 350
 ORDER = (
     ("errors", "extras"),
     ("unknown_names", "progress", "devices"),
-    ("files", "workbooks"),
+    ("files", "workbooks", "drawing"),
     ("tables",),
     ("linalg", "geometry", "materials"),
     ("sensors", "contact", "fem"),

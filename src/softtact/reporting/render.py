@@ -5,7 +5,6 @@ process of its own and within a time. What then stands in a figure is told in th
 """
 
 import json
-import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softtact.progress import announce
+from softtact.drawing import drawn_apart
 
 if TYPE_CHECKING:
     import trimesh
@@ -58,18 +57,8 @@ def rendered(views: Sequence[View], *, size: tuple[int, int] = (900, 675), timeo
     """Images (h, w, 3) of the views in 0 to 255, or None where rendering failed, after a sentence in the log."""
     with tempfile.TemporaryDirectory(prefix="softtact-render-") as folder:
         _write(views, size, Path(folder))
-        try:
-            done = subprocess.run([*_COMMAND, folder], capture_output=True, text=True, timeout=timeout_s)
-        except subprocess.TimeoutExpired:
-            announce(f"{FALLBACK} (no answer within {timeout_s:g} s).")
-            return None
-        images = Path(folder, "images.npz")
-        if done.returncode or not images.exists():
-            said = done.stderr.strip().splitlines() or ["it said nothing"]
-            announce(f"{FALLBACK} (status {done.returncode}: {said[-1]:.200}).")
-            return None
-        with np.load(images, allow_pickle=False) as kept:
-            return [kept[f"view{k}"] for k in range(len(views))]
+        images = drawn_apart(_COMMAND, Path(folder), sentence=FALLBACK, timeout_s=timeout_s)
+    return None if images is None else [images[f"view{k}"] for k in range(len(views))]
 
 
 def _write(views, size, folder):

@@ -5,7 +5,6 @@ drawn in one of their own. Where that does not work, a sentence says so and ther
 """
 
 import os
-import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -15,8 +14,8 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from softtact.drawing import drawn_apart
 from softtact.files import atomic_path
-from softtact.progress import announce
 from softtact.robot.arm import JOINTS
 from softtact.robot.record import GraspRecord
 from softtact.robot.scene import MM, SENSOR_IN_TOOL, Scene, quaternion
@@ -36,19 +35,9 @@ def draw_rows(scene: Scene, record: GraspRecord, rows: Sequence[int], *, view: t
         mujoco.mj_saveModel(scene.model, str(Path(folder, "scene.mjb")), None)
         np.savez(Path(folder, "states.npz"), qpos=states, size=size, camera=[_camera(record, row, view) for row in rows])
         environment = os.environ | {"MUJOCO_GL": os.environ.get("MUJOCO_GL", "egl" if sys.platform == "linux" else "")}
-        try:
-            done = subprocess.run([sys.executable, "-m", "softtact.robot.offscreen", folder], capture_output=True, text=True,
-                                  timeout=timeout_s, env=environment)
-        except subprocess.TimeoutExpired:
-            announce(f"{_NO_PICTURE} (no answer within {timeout_s:g} s).")
-            return None
-        images = Path(folder, "images.npz")
-        if done.returncode or not images.exists():
-            said = done.stderr.strip().splitlines() or ["it said nothing"]
-            announce(f"{_NO_PICTURE} (status {done.returncode}: {said[-1]:.200}).")
-            return None
-        with np.load(images, allow_pickle=False) as kept:
-            return np.asarray(kept["images"])
+        images = drawn_apart([sys.executable, "-m", "softtact.robot.offscreen"], Path(folder), sentence=_NO_PICTURE,
+                             timeout_s=timeout_s, environment=environment)
+    return None if images is None else images["images"]
 
 
 def write_video(path: str | Path, images: np.ndarray, *, fps: float) -> None:
