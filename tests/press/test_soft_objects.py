@@ -86,6 +86,15 @@ def test_frusta_stand_below_the_sheet_one_to_an_element_with_weights_that_make_a
     np.testing.assert_allclose(product, (ahead - behind) / (2 * h), atol=1e-6 * np.abs(product).max())
 
 
+@pytest.mark.parametrize("height", [-3.0, 0.0, 40.0])
+def test_the_height_of_a_pose_does_not_count_and_a_tilted_object_touches_where_it_is_over_the_pad(height):
+    long = SoftObject(box((-15, -1, 0), (15, 1, 3), (10, 1, 2)), SOFT)
+    placed = long.placed(softtact.Pose.from_values([0.0, 0.0, height, 0.0, 5.0, 0.0]), 2.0, (10.0, 16.0))
+    over = np.abs(placed.points[:, 0]) <= 5.0
+    assert placed.points[over, 2].min() == pytest.approx(2.0)
+    assert placed.points[:, 2].min() < 1.5, "its end hangs beside the pad"
+
+
 def test_what_cannot_be_is_refused_in_one_sentence():
     sensor = softtact.load_sensor("pad4x4")
     with pytest.raises(InputError, match="misses the sensor"):

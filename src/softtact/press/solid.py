@@ -6,6 +6,7 @@ any `SolidMesh`, whose upper part a rigid holder carries: a finger that presses,
 
 import time
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -62,15 +63,18 @@ class SoftObject:
         if len(self.mesh.regions) != 1:
             raise InputError(f"SoftObject: its mesh has the regions {', '.join(self.mesh.regions)}; give a mesh of one region.")
 
-    def placed(self, pose: Pose | None, height_mm: float) -> SolidMesh:
-        """The body in the frame of the solid sensor, whose surface is at `height_mm`; by default centred, just touching."""
+    def placed(self, pose: Pose | None, height_mm: float, footprint_mm: tuple[float, float]) -> SolidMesh:
+        """The body in the frame of the solid sensor, whose surface is at `height_mm`, where it just touches over the footprint.
+
+        pose: by default centred; its height does not count. Raises InputError where no node is over the footprint (x, y in mm).
+        """
         points = self.mesh.points
-        if pose is None:
-            middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-            points = points - [middle[0], middle[1], points[:, 2].min()]
-        else:
-            points = pose.apply(points)
-        points = points + [0, 0, height_mm]
+        middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        points = points - [middle[0], middle[1], 0.0] if pose is None else pose.apply(points)
+        over = (np.abs(points[:, :2]) <= 0.5 * np.asarray(footprint_mm)).all(axis=1)
+        if not over.any():
+            raise InputError(_missing(points, footprint_mm))
+        points = points + [0.0, 0.0, height_mm - points[over, 2].min()]
         low, high = points[:, 2].min(), points[:, 2].max()
         return self.mesh.moved(lambda _: points).with_faces(
             held=lambda x: x[:, 2] > high - self.held_share * (high - low),
@@ -85,26 +89,24 @@ def press_soft(sensor: "Sensor", soft: SoftObject, pose: Pose | None, motion: Mo
     """
     start = time.perf_counter()
     pad = SolidPad(sensor)
-    placed = soft.placed(pose, pad.height_mm)
-    _refuse_missing(placed, sensor)
+    placed = soft.placed(pose, pad.height_mm, sensor.spec.footprint_mm)
     body = pad.with_object(placed, soft, threads=course.threads)
-    if course.label:
-        announce(f"{course.label}: {len(body.free)} unknowns, {len(motion.steps)} load steps of the solid model")
+    tell = partial(_tell, course.label)
+    tell(f"{len(body.free)} unknowns, {len(motion.steps)} load steps of the solid model")
     steps: list[SolidLoadStep] = []
     times: list[float] = []
 
     def result() -> PressResult:
-        return pad.result(body, steps, np.diff([start, *times]), placed)
+        return pad.result(body, steps, np.diff([start, *times]))
 
     try:
-        for step in SolidPath(body, {_HOLDER: motion}, settings=SolidSettings()).run():
+        for step in SolidPath(body, {_HOLDER: motion}, settings=SolidSettings(), tell=tell).run():
             steps.append(step)
             times.append(time.perf_counter())
-            if course.label:
-                announce(
-                    f"{course.label}: step {len(steps)} of {len(motion.steps)}, {-step.loads[0, 2]:.4g} N, "
-                    f"{step.iterations} iterations, {times[-1] - start:.0f} s"
-                )
+            tell(
+                f"step {len(steps)} of {len(motion.steps)}, {-step.loads[0, 2]:.4g} N, {step.iterations} iterations, "
+                f"{times[-1] - start:.0f} s"
+            )
             if course.on_step and len(steps) < len(motion.steps):
                 course.on_step(result())
     except (ConvergenceError, KeyboardInterrupt) as error:
@@ -113,14 +115,19 @@ def press_soft(sensor: "Sensor", soft: SoftObject, pose: Pose | None, motion: Mo
     return result()
 
 
-def _refuse_missing(placed: SolidMesh, sensor: "Sensor") -> None:
-    (x0, y0, _), (x1, y1, _) = placed.points.min(axis=0), placed.points.max(axis=0)
-    half_x, half_y = (0.5 * side for side in sensor.spec.footprint_mm)
-    if x0 > half_x or x1 < -half_x or y0 > half_y or y1 < -half_y:
-        raise InputError(
-            f"The soft object misses the sensor: it spans x {x0:.4g} to {x1:.4g} mm and y {y0:.4g} to {y1:.4g} mm, and no "
-            f"part of it is over the {2 * half_x:g} x {2 * half_y:g} mm footprint about the origin; correct its pose."
-        )
+def _tell(label: str, text: str) -> None:
+    """Progress on stderr, where the press has a label."""
+    if label:
+        announce(f"{label}: {text}")
+
+
+def _missing(points: np.ndarray, footprint_mm: tuple[float, float]) -> str:
+    """What is said of an object of which no node is over the sensor."""
+    (x0, y0, _), (x1, y1, _) = points.min(axis=0), points.max(axis=0)
+    return (
+        f"The soft object misses the sensor: it spans x {x0:.4g} to {x1:.4g} mm and y {y0:.4g} to {y1:.4g} mm, and none of its "
+        f"nodes is over the {footprint_mm[0]:g} x {footprint_mm[1]:g} mm footprint about the origin; correct its pose."
+    )
 
 
 class SolidPad:
@@ -205,14 +212,13 @@ class SolidPad:
         law = self.sensor.prepared("foundation").law
         return FrustumSprings(faces, np.tile(weights, (len(faces), 1)), law)
 
-    def result(self, body: SolidBody, steps: list[SolidLoadStep], seconds: np.ndarray, placed: SolidMesh) -> PressResult:
+    def result(self, body: SolidBody, steps: list[SolidLoadStep], seconds: np.ndarray) -> PressResult:
         """The `PressResult` of load steps that took so many seconds (l,) each."""
         sampled = np.array([self._sampled(step.state.displacement) for step in steps])
         forces = np.array([step.loads[0] for step in steps])
         points = [step.state.histories[0].points for step in steps]
         contact = [step.state.contacts[0] for step in steps]
         area = [float(own.weight[state.pressure > 0].sum()) for own, state in zip(points, contact, strict=True)]
-        touch = placed.points[:, 2].min() - self.height_mm
         down = np.array([-step.state.poses[0].translation[2] for step in steps])
         springs = body.springs[0] if body.springs else None
         compression = [float(springs.compressions(step.state.displacement).max()) if springs else np.nan for step in steps]
@@ -224,7 +230,7 @@ class SolidPad:
             "force_n": forces[:, :3],
             "torque_nmm": self._torques(body, steps),
             "pad_force_n": -forces[:, 2],
-            "indentation_mm": down - touch,
+            "indentation_mm": down,
             "contact_area_mm2": np.array(area),
             "penetration_mm": np.array([step.penetration_mm for step in steps]),
             "frustum_compression_mm": np.array(compression),

@@ -162,7 +162,8 @@ def _lump(report, design, *, threads, tell):
     least = seen.least_stiffness_ratio
     report.said.append(f"Hidden lumps: median error {off['x_mm']:.2f} mm in x, {off['depth_mm']:.2f} mm in depth, "
                        f"{off['stiffness_ratio']:.2f} in the stiffness ratio, with {search.noise_n:g} N of noise on each film (the "
-                       f"same guess for every lump: {blind['x_mm']:.2f} mm, {blind['depth_mm']:.2f} mm, {blind['stiffness_ratio']:.2f}); "
+                       f"same guess for every lump: {blind['x_mm']:.2f} mm, {blind['depth_mm']:.2f} mm, "
+                       f"{blind['stiffness_ratio']:.2f}); "
                        f"in their 95 % intervals lie {inside['x_mm']:.0%} of x, {inside['depth_mm']:.0%} of depth, "
                        f"{inside['log_ratio']:.0%} of the ratio; half of the intervals of depth are wider than "
                        f"{depths:.1f} mm. A lump is seen "
