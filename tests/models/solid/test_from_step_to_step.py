@@ -32,6 +32,19 @@ def test_a_load_stays_while_a_later_step_tilts_the_object():
     assert heights[1] > heights[0], "it rises, for one side presses more"
 
 
+@pytest.mark.parametrize("gap", [0.0005, 0.3])
+def test_a_soft_object_that_hangs_above_is_brought_to_touch_before_its_load_acts(gap):
+    lower = box((-1, -1, 0), (1, 1, 1), (3, 3, 2), region="lower")
+    upper = box((-0.5, -0.5, 1 + gap), (0.5, 0.5, 2 + gap), (2, 2, 2))
+    mesh, law = lower.joined(upper, prefix="upper "), make_law("neo_hooke", {"c10": 0.1})
+    body = SolidBody(mesh, {"lower": law, "upper body": law}, held={"z0": "xyz"}, carried={"holder": ((0, 0, 2), ["upper z1"])})
+    body.add_pair(ContactPair(Surface.of(mesh.face("z1")), Surface.of(mesh.face("upper z0")), stiffness=20.0, reach_mm=0.5,
+                              segments=True))
+    (step,) = SolidPath(body, {"holder": Motion().press(force_n=0.05)}).run()
+    assert step.loads[0, 2] == pytest.approx(-0.05, rel=1e-5)
+    assert -gap - 0.3 < step.state.poses[0].translation[2] < -gap
+
+
 def test_the_penalty_of_a_plate_pressed_in_eight_steps_is_no_larger_than_in_one():
     body, motion = block_under_a_plate(), Motion()
     for _ in range(8):

@@ -27,7 +27,7 @@ from softtact.linalg.direct_single import point_at_mkl
 from softtact.linalg.workers import Workers, slices
 from softtact.materials.laws.base import Law
 from softtact.models.solid.blocks import region_blocks
-from softtact.models.solid.checks import refuse_loose
+from softtact.models.solid.checks import bodies_of, refuse_loose
 from softtact.models.solid.device import find_device, sum_on
 from softtact.models.solid.frames import Frame, FramePose
 from softtact.models.solid.loads import FacePressure
@@ -116,6 +116,16 @@ class SolidBody:
             free[frame.carried] = False
         free[n:] = False
         return free
+
+    def shifted_with(self, frame: int, way: np.ndarray) -> np.ndarray:
+        """The step (unknowns,) that shifts by a way (3,) in mm all bodies that this frame carries and nothing else holds."""
+        body, carrier = bodies_of(self.mesh), self.frames[frame]
+        bound = np.flatnonzero(~self.free_components[: len(body), : 3 if self.mesh.geometry == "solid" else 2].all(axis=1))
+        elsewhere = np.setdiff1d(body[np.setdiff1d(bound, carrier.nodes)], -1)
+        mine = np.setdiff1d(body[carrier.nodes[carrier.nodes < len(body)]], elsewhere)
+        shift = np.zeros_like(self.points)
+        shift[: len(body)][np.isin(body, mine)] = way
+        return shift.ravel()[self.free]
 
     def surface_nodes(self, frame: str) -> np.ndarray:
         """Facets (t, 3) of a rigid object, in nodes of this body."""

@@ -179,7 +179,8 @@ class SolidPath:
                 raise InputError(
                     "The loaded object is out of reach of the surface that it is to touch; place it nearer, or correct its pose."
                 )
-            moved = self.body.moved(state, np.zeros(len(self.body.free)), [way * (gap + _OVERLAP_MM) for way in ways])
+            on = [way * (gap + _OVERLAP_MM) for way in ways]
+            moved = self.body.moved(state, sum(self.body.shifted_with(k, way[:3]) for k, way in enumerate(on)), on)
             assert moved is not None
             state = self._begun(moved)
         raise InputError("The loaded object does not come to touch along its load; correct its pose or its load.")
