@@ -64,8 +64,7 @@ def project(
 
     rims (f, 4): which edges end the surface;  rim: how far (mm) beside such an edge a point still meets the plane of its facet
     reach: farthest distance in mm;  least_cosine: of the angle between the surfaces' opposite normals;  itself: leave out the
-    facets
-    that share a node with the point's own
+    facets that share a node with the point's own
     before (p,), near (p, 2): facets and coordinates of before, which a point keeps as long as it stands over them: a point on the
     edge between two facets would else change between them from iteration to iteration
     """
@@ -85,9 +84,36 @@ def project(
             continue
         out.facet[p], out.gap[p] = -1, np.inf
         facet, xi, eta = nearest(tree, x, own, normal, least_cosine, reach, points.nodes[p] if itself else nobody)
-        if facet >= 0 and not _meets(out, p, facet, xi, eta, own, nodes, kinds, rims, x, rim, room):
+        if facet >= 0 and not (
+            _meets(out, p, facet, xi, eta, own, nodes, kinds, rims, x, rim, room)
+            and (out.gap[p] >= 0 or _beside2(out, p, own, nodes, kinds, x, room) <= max(rim, -out.gap[p]) ** 2)
+        ):
             out.facet[p], out.gap[p] = -1, np.inf
     return out
+
+
+@njit(cache=True, nogil=True)
+def _beside2(out, p, own, nodes, kinds, x, room):
+    """Square (mm2) of how far beside its facet point p, at `own` (3,), stands.
+
+    A point behind its nearest facet's plane is inside only where it stands over that facet: beside it there may be walls, which the
+    search for facets leaves out, and the plane goes on where no surface is.
+    """
+    facet, (xi, eta), total = out.facet[p], out.coordinates[p], 0.0
+    kind = kinds[facet]
+    if kind >= QUAD8:
+        xi, eta = min(max(xi, -1.0), 1.0), min(max(eta, -1.0), 1.0)
+    else:
+        xi, eta = max(xi, 0.0), max(eta, 0.0)
+        size = max(xi + eta, 1.0)
+        xi, eta = xi / size, eta / size
+    evaluate_shapes(kind, xi, eta, room)
+    for i in range(3):
+        place = 0.0
+        for a in range(NODES_OF[kind]):
+            place += room.values[a] * x[nodes[facet, a], i]
+        total += (own[i] - place) ** 2
+    return total - out.gap[p] ** 2
 
 
 @njit(cache=True, nogil=True)
