@@ -22,6 +22,8 @@ import softtact
 from softtact.calibration.ladder import Presses
 from softtact.calibration.simulated import HiddenConstants, simulate_recording, staircase_force
 from softtact.cli import main
+from softtact.fem.mesh_files import write_mesh
+from softtact.fem.structured_meshes import cylinder
 from softtact.imaging.frames import render_frame
 from softtact.learning.network import TactileNetwork, save_network
 from softtact.readout.tsf85 import write_recording
@@ -94,7 +96,25 @@ def desk(tmp_path_factory):
         save_network(path, network, facts={"model": "elastic", "seed": 0, "source": "nothing: a test's"})
     np.save(folder / "map.npy", np.full((57, 33), 0.1))
     _record(folder)
+    _body(folder)
     return folder
+
+
+def _body(folder):
+    """A coarse cylinder as a sensor of kind solid, in place of the fingertip on its page, and the ball."""
+    write_mesh(cylinder(8.0, 12.0, (5, 3)), folder / "fingertip.vtu")
+    (folder / "fingertip.yaml").write_text("""
+name: fingertip
+kind: solid
+mesh: {file: fingertip.vtu}
+regions: {body: {law: neo_hooke, parameters: {c10: 0.1}}}
+faces: {skin: "z>0.01"}
+held: {z0: xyz}
+contact: {face: skin}
+readings: {points_mm: [[0, 0, 12]], radius_mm: 2.0}
+force_range_n: [0, 20]
+""")
+    trimesh.creation.icosphere(2, radius=5.0).export(folder / "ball.stl")
 
 
 def _record(folder):

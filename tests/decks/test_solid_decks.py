@@ -3,16 +3,19 @@
 import numpy as np
 import pytest
 import trimesh
+import yaml
 from deck_study import needs_ccx, run_ccx
 from support.tetrahedra import tetrahedra_box
 
+from softtact.cli import main
 from softtact.contact.motion import Motion
 from softtact.contact.pair import ContactPair
 from softtact.contact.surfaces import Surface
 from softtact.decks.read import read_deck
 from softtact.decks.solid import export_solid
 from softtact.errors import InputError
-from softtact.fem.structured_meshes import box
+from softtact.fem.mesh_files import write_mesh
+from softtact.fem.structured_meshes import box, cylinder, in_tetrahedra
 from softtact.materials.laws.registry import make_law
 from softtact.models.solid.body import SolidBody
 from softtact.models.solid.loads import FacePressure
@@ -128,3 +131,20 @@ def test_calculix_brings_a_loaded_plate_to_touch_and_to_where_it_bears_its_force
     ours = [-step.loads[0, 2] for step in SolidPath(body, {"plate": ways}).run()]
     print(f"ours {ours} at {places}")
     assert ours == pytest.approx(forces, rel=0.01)      # overlaps of 0.1 um in ways of 60 um, and of 1 um of ours
+
+
+@needs_ccx
+@pytest.mark.slow
+def test_calculix_finds_the_same_force_of_a_ball_on_a_sensor_of_kind_solid(tmp_path):
+    """Expected: 2 %. The same tetrahedra, K = 5 mu so that neither projects J; a penalty there, augmented here."""
+    mesh = in_tetrahedra(cylinder(3.0, 2.0, (6, 4)))
+    write_mesh(mesh, tmp_path / "disc.vtu")
+    law = {"law": "neo_hooke", "parameters": {"c10": 0.1}, "bulk_over_shear": 5}
+    (tmp_path / "disc.yaml").write_text(yaml.safe_dump({
+        "name": "disc", "kind": "solid", "mesh": {"file": "disc.vtu"}, "held": {"z0": "xyz"}, "contact": {"face": "z1"},
+        "regions": {"body": law}, "force_range_n": [0, 5]}))
+    ball, deck = tmp_path / "ball.stl", tmp_path / "press.inp"
+    trimesh.creation.icosphere(4, 4.0).export(ball)
+    asked = ["--unit", "mm", "--sensor", str(tmp_path / "disc.yaml"), "--force", "0.5", "--force", "1"]
+    assert main(["export-deck", str(ball), *asked, "--format", "calculix", "--control", "indentation", "--out", str(deck)]) == 0
+    assert [-table[0, 2] for table in run_ccx(deck).of("OBJECT_NODES")] == pytest.approx([0.5, 1.0], rel=0.02)

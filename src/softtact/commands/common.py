@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     import trimesh
 
     from softtact.geometry.pose import Pose
+    from softtact.sensors.solid import SolidSpec
     from softtact.sensors.specification import AnySpec
 
 UNITS = ("mm", "cm", "m", "inch", "in")
@@ -76,7 +77,7 @@ def show(result: Any, *, as_json: bool, lines: Iterable[str]) -> None:
     print(json.dumps(result, indent=2) if as_json else "\n".join(lines))
 
 
-def check_forces(forces: Iterable[float], spec: "AnySpec") -> None:
+def check_forces(forces: Iterable[float], spec: "AnySpec | SolidSpec") -> None:
     """Refuse a force that the sensor does not bear, before a mesh is read or a solver loaded."""
     low, high = spec.force_range_n
     for force in forces:
@@ -97,6 +98,14 @@ def pose_of(options: argparse.Namespace) -> "Pose | None":
     from softtact.geometry.pose import Pose
 
     return Pose.parse(options.pose) if options.pose else None
+
+
+def origin(options: argparse.Namespace, path: Path) -> dict[str, str]:
+    """What a press came from, as attributes of its file."""
+    import hashlib
+
+    return {"mesh": path.name, "mesh_sha256": hashlib.sha256(path.read_bytes()).hexdigest(), "unit": options.unit,
+            "pose": options.pose or "centred, touching", "command": " ".join(["softtact", *options.given])}
 
 
 def check_folders(*paths: Path | None) -> None:

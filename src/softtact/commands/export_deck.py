@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 import softtact
+from softtact.commands import press_solid
 from softtact.commands.common import (
     add_command,
     add_mesh,
@@ -27,7 +28,8 @@ DECK_FORMATS = ("calculix", "abaqus")
 def add(commands: argparse._SubParsersAction) -> None:
     """Add the command to the parser."""
     command = add_command(commands, "export-deck", _export_deck,
-                           "Write the hyperelastic press of a mesh as an input deck for another solver.", EXAMPLES)
+                           "Write the hyperelastic press of a mesh, or one on a solid, as an input deck for another solver.",
+                          EXAMPLES)
     add_mesh(command)
     add_repair(command)
     command.add_argument("--force", type=float, action="append", required=True, metavar="N",
@@ -40,6 +42,38 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def _export_deck(options):
+    if press_solid.is_solid(options.sensor):
+        return _export_solid(options)
+    return _export_layered(options)
+
+
+def _export_solid(options):
+    """The deck of a press on a sensor of kind solid."""
+    from softtact.contact.motion import Motion
+    from softtact.decks.solid import export_solid
+    from softtact.files import refuse_overwriting
+
+    spec, forces, pose = press_solid.spec_of(options.sensor), sorted(set(options.force)), pose_of(options)
+    check_forces(forces, spec)
+    check_folders(options.out)
+    refuse_overwriting([options.mesh, sensor_path(options.sensor), *spec.paths], {"--out": options.out})
+    mesh, repairs = read_object(options, options.mesh)
+    sensor, motion = softtact.load_solid_sensor(options.sensor), Motion().press(force_n=forces)
+    if options.control == "indentation":
+        found = sensor.press(mesh, pose=pose, motion=motion, label="export-deck").frame_way_mm[:, 0, 2]
+        motion = Motion().press(depth_mm=(-found).tolist())
+    body = sensor.body_with(mesh, pose, motion)
+    export_solid(options.out, body, {"object": motion}, dialect=options.format, title=f"{options.mesh.name} on {spec.name}")
+    result = {"deck": str(options.out), "format": options.format, "nodes": len(body.mesh.points),
+              "elements": {region: sum(len(nodes) for own, _, nodes in body.mesh.cells if own == region)
+                           for region in body.mesh.regions},
+              "facets": {"object": len(body.surface_nodes("object"))},
+              "steps": [f"step_{number}" for number in range(1, len(forces) + 1)], "repairs": repairs}
+    _show(result, options)
+
+
+def _export_layered(options):
+    """The deck of the hyperelastic press on layers."""
     from softtact.files import refuse_overwriting
     from softtact.geometry.meshes import check_over_sensor, place
 
@@ -58,5 +92,9 @@ def _export_deck(options):
               "elements": {part.name: len(part.elements) for part in model.parts}, "tied_nodes": len(model.ties),
               "facets": {body.name: len(body.facets) for body in model.rigid}, "steps": [step.name for step in model.steps],
               "repairs": repairs}
+    _show(result, options)
+
+
+def _show(result, options):
     lines = [f"{name}: {value}" for name, value in result.items() if name != "deck" and value != []]
     show(result, as_json=options.json, lines=[*lines, f"written: {options.out}"])

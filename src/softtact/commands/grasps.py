@@ -24,7 +24,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def _grasps(options):
-    from softtact.press.sensor import cores
+    from softtact.press.asked import cores
     from softtact.progress import announce
     from softtact.study.cost import read_costs
     from softtact.study.grasps import cost_lines, load_grasp_study

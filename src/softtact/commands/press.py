@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 import softtact
-from softtact.commands import press_soft
+from softtact.commands import press_soft, press_solid
 from softtact.commands.common import (
     add_command,
     add_mesh,
@@ -14,6 +14,7 @@ from softtact.commands.common import (
     check_folders,
     check_forces,
     check_names,
+    origin,
     pairs,
     pose_of,
     read_object,
@@ -33,6 +34,7 @@ EXAMPLES = """
   softtact press parts/ --unit mm --force 20 --model elastic --out results/ --plot press.png
   softtact press tomato.stl --unit mm --force 10 --object-law card.json --object-size 2.5
   softtact press part.stl --unit mm --motion "z -0.5; x 1.0 in 10" --model elastic --out slide.nc
+  softtact press ball.stl --unit mm --force 5 --sensor dome.yaml --out press.nc     # a sensor of kind solid
 """
 MODELS = ("auto", "elastic", "foundation", "hyperelastic", "solid")
 
@@ -77,26 +79,28 @@ def add(commands: argparse._SubParsersAction) -> None:
 def _press(options):
     from softtact.files import refuse_overwriting
 
-    _refuse_idle(options)
-    press_soft.check(options)
+    solid = press_solid.is_solid(options.sensor)
+    (press_solid.refuse_idle if solid else _refuse_idle)(options)
+    press_soft.check(options, solid=solid)
     if options.time_limit is not None and not options.time_limit > 0:
         raise InputError(f"--time-limit {options.time_limit:g}: a press needs some time; give seconds above 0.")
-    spec, pose = sensor_spec(options.sensor), pose_of(options)
+    spec, pose = press_solid.spec_of(options.sensor) if solid else sensor_spec(options.sensor), pose_of(options)
     how = _how(options, spec)
     several = is_several(options.mesh)
     if not several:
         check_folders(options.out, options.vtu, options.plot)
     cards = [path for _, path in pairs("--card", options.card)] + ([options.object_law] if options.object_law else [])
+    cards += spec.paths if solid else []
     refuse_overwriting([*options.mesh, sensor_path(options.sensor), *cards],
                        {"--out": options.out, "--vtu": options.vtu, "--plot": options.plot})
     check_names({options.vtu: (".vtu",), options.plot: (".png", ".svg")})
     if not several:
         check_names({options.out: (".nc",)})
-    press = partial(_press_one, options=options, spec=spec, pose=pose, how=how, sensors={})
+    press = partial(press_solid.press_one if solid else _press_one, options=options, spec=spec, pose=pose, how=how, sensors={})
     if several:
         return press_each(options, press)
     summary, error = press(options.mesh[0], Files(options.out, options.vtu, options.plot))
-    show(summary, as_json=options.json, lines=_press_lines(summary))
+    show(summary, as_json=options.json, lines=press_solid.lines(summary) if solid else _press_lines(summary))
     if error:
         raise error
 
@@ -115,12 +119,12 @@ def _press_one(path, files, label="press", *, options, spec, pose, how, sensors)
     if not sensors:
         sensors["own"] = replace(softtact.load_sensor(options.sensor, materials=_cards(options)), **_quality(options),
                                  device=options.device)
-    sensor = replace(sensors["own"], attributes={"mesh_repairs": "; ".join(repairs), **_origin(options, path)})
+    sensor = replace(sensors["own"], attributes={"mesh_repairs": "; ".join(repairs), **origin(options, path)})
     on_step = None if files.out is None else lambda result: result.write(files.out)
     pressed, own = press_soft.arguments(options, mesh, keep_body=files.vtu is not None)
     try:
         result, error = sensor.press(pressed, pose=pose, **how, model=options.model, policy=options.policy, label=label,
-                                     tolerance_mm=options.tolerance, on_step=on_step, **own), None
+                                     tolerance_mm=options.tolerance, on_step=on_step, time_limit_s=options.time_limit, **own), None
     except (ConvergenceError, KeyboardInterrupt) as stop:
         if getattr(stop, "result", None) is None:
             raise
@@ -145,14 +149,6 @@ def _refuse_idle(options):
         raise InputError(f"--tolerance {options.tolerance:g}: it has no effect on the policy paper; leave one of the two out.")
     if options.full_scale and not options.plot:
         raise InputError("--full-scale: it has no effect without --plot; give --plot FILE.png, or leave it out.")
-
-
-def _origin(options, path):
-    """What a press came from, as attributes of its file."""
-    import hashlib
-
-    return {"mesh": path.name, "mesh_sha256": hashlib.sha256(path.read_bytes()).hexdigest(), "unit": options.unit,
-            "pose": options.pose or "centred, touching", "command": " ".join(["softtact", *options.given])}
 
 
 def _how(options, spec):

@@ -4,7 +4,6 @@
     result = sensor.press(mesh, force_n=[5, 20, 50], model="auto")
 """
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -19,7 +18,7 @@ from softtact.contact.height_field import HeightField
 from softtact.contact.motion import Motion
 from softtact.devices import find_device
 from softtact.errors import ConvergenceError, InputError
-from softtact.geometry.meshes import check_over_sensor, place, read_mesh
+from softtact.geometry.meshes import check_over_sensor, place
 from softtact.geometry.pose import Pose
 from softtact.materials.config import law_from_printed
 from softtact.materials.laws.base import Law
@@ -28,6 +27,7 @@ from softtact.models.hyperelastic.body import LayeredBody
 from softtact.models.hyperelastic.build import build_sensor_body
 from softtact.models.hyperelastic.build_plain import build_plain_body
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
+from softtact.press.asked import check_loads, checked_forces, cores, given_forces, mesh_of, motion_of
 from softtact.press.cache import cached_compliance, cached_foundation
 from softtact.press.choice import TOLERANCE_MM, press_auto, with_expected_error
 from softtact.press.making import Course
@@ -115,9 +115,9 @@ class Sensor:
         KeyboardInterrupt and of a TimeLimitError do.
         """
         if isinstance(mesh, SoftObject):
-            return self._press_soft(mesh, pose, _motion_of(force_n, motion), model,
+            return self._press_soft(mesh, pose, motion_of(force_n, motion), model,
                                     Course(label, threads or cores(), keep_body, time_limit_s, on_step))
-        mesh, pose = _mesh_of(mesh, unit), Pose.of(pose)
+        mesh, pose = mesh_of(mesh, unit), Pose.of(pose)
         if model not in MODELS:
             raise InputError(f"Model {model!r} is unknown; use one of {', '.join(MODELS)}.")
         if model == "solid":
@@ -127,7 +127,7 @@ class Sensor:
         course = Course(label, threads or cores(), keep_body, time_limit_s, on_step and (lambda result: on_step(stand(result))))
         if motion is not None and force_n is None and not motion.forces_n:
             return self._press_motion(placed, motion, model, course, stand)
-        forces = self.checked_forces(_given(force_n, motion))
+        forces = self.checked_forces(given_forces(force_n, motion))
         check_over_sensor(placed, self.spec.footprint_mm)
         height = self._height_mm(placed)
         # Dense products of some hundred rows would wait for each other on more threads, up to five times as long.
@@ -144,10 +144,9 @@ class Sensor:
         if model not in ("auto", "solid"):
             raise InputError(f"model={model!r}: a soft object is pressed by the solid model alone; use model='solid', or give a "
                              "rigid mesh.")
-        if course.keep_body or course.time_limit_s is not None:
-            raise InputError("keep_body and time_limit_s are of the layered models; leave them out for a soft object.")
-        for load in (step.loads["z"] for step in motion.steps if step.loads.get("z", 0.0) < 0):
-            self.checked_forces(-load)
+        if course.keep_body:
+            raise InputError("keep_body is of the layered models; leave it out for a soft object.")
+        check_loads(motion, self.spec.force_range_n, self.spec.name)
         return press_soft(self, soft, None if pose is None else Pose.of(pose), motion, course)
 
     def _press_motion(self, placed: trimesh.Trimesh, motion: Motion, model: str, course: Course,
@@ -157,8 +156,7 @@ class Sensor:
         if press is None:
             raise InputError(f"model={model!r}: the {model} model presses straight down by force only; use elastic or hyperelastic "
                              "for this motion, or give force_n.")
-        for load in (step.loads["z"] for step in motion.steps if step.loads.get("z", 0.0) < 0):
-            self.checked_forces(-load)
+        check_loads(motion, self.spec.force_range_n, self.spec.name)
         check_over_sensor(placed, self.spec.footprint_mm)
         height = self._height_mm(placed)
         try:
@@ -229,47 +227,10 @@ class Sensor:
 
     def checked_forces(self, force_n: float | Sequence[float]) -> np.ndarray:
         """Forces (N) as an increasing array within the sensor's range; others are refused."""
-        forces = np.atleast_1d(np.asarray(force_n, dtype=float))
-        low, high = self.spec.force_range_n
-        outside = forces[~((forces > low) & (forces <= high))]
-        if len(outside):
-            raise InputError(f"The force {outside[0]:g} N is out of the range of {self.spec.name}; "
-                             f"give forces above {low:g} N and up to {high:g} N.")
-        if (np.diff(forces) <= 0).any():
-            raise InputError("The forces must increase; sort them and leave out doubles.")
-        return forces
-
-
-def _mesh_of(mesh: trimesh.Trimesh | str | Path, unit: str | None) -> trimesh.Trimesh:
-    """A mesh in mm, read where it is the path of a file."""
-    if isinstance(mesh, trimesh.Trimesh):
-        return mesh
-    if unit is None:
-        raise InputError(f"{mesh}: a mesh file does not state its unit; give unit='mm', or another one.")
-    return read_mesh(mesh, unit=unit)
+        return checked_forces(force_n, self.spec.force_range_n, self.spec.name)
 
 
 def _flagged_if_any(error: BaseException, flag: Callable[[PressResult], PressResult]) -> PressResult | None:
     """The result that an error holds of the steps before it, flagged; None where it holds none."""
     result = getattr(error, "result", None)
     return None if result is None else flag(result)
-
-
-def _motion_of(force_n: float | Sequence[float] | None, motion: Motion | None) -> Motion:
-    """The motion of a press, be it of forces (N) alone."""
-    if (motion is None) == (force_n is None):
-        raise InputError("A press takes either force_n or motion; give one of them.")
-    return motion if motion is not None else Motion().press(force_n=force_n)
-
-
-def _given(force_n: float | Sequence[float] | None, motion: Motion | None) -> float | Sequence[float]:
-    """The forces (N) of a press, be they a motion's."""
-    given = motion.forces_n if motion is not None and force_n is None else force_n
-    if given is None or (motion is not None and force_n is not None):
-        raise InputError("A press takes either force_n or motion; give one of them.")
-    return given
-
-
-def cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -26,7 +26,7 @@ from softtact.models.solid.path import SolidLoadStep, SolidPath
 from softtact.models.solid.springs import FrustumSprings
 from softtact.press.making import Course, make_result
 from softtact.press.result import PressResult
-from softtact.progress import announce
+from softtact.progress import Watch, announce
 
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
@@ -74,11 +74,14 @@ class SoftObject:
         over = (np.abs(points[:, :2]) <= 0.5 * np.asarray(footprint_mm)).all(axis=1)
         if not over.any():
             raise InputError(_missing(points, footprint_mm))
-        points = points + [0.0, 0.0, height_mm - points[over, 2].min()]
-        low, high = points[:, 2].min(), points[:, 2].max()
+        return self.with_faces(points + [0.0, 0.0, height_mm - points[over, 2].min()], np.array([0.0, 0.0, -1.0]))
+
+    def with_faces(self, points: np.ndarray, direction: np.ndarray) -> SolidMesh:
+        """The body with its nodes at points (n, 3), and faces `held`, its rear as seen along a unit vector (3,), and `pressed`."""
+        along = points @ direction
+        end = along.min() + self.held_share * np.ptp(along)
         return self.mesh.moved(lambda _: points).with_faces(
-            held=lambda x: x[:, 2] > high - self.held_share * (high - low),
-            pressed=lambda x: x[:, 2] <= high - self.held_share * (high - low),
+            held=lambda x: x @ direction < end, pressed=lambda x: x @ direction >= end
         )
 
 
@@ -91,6 +94,7 @@ def press_soft(sensor: "Sensor", soft: SoftObject, pose: Pose | None, motion: Mo
     pad = SolidPad(sensor)
     placed = soft.placed(pose, pad.height_mm, sensor.spec.footprint_mm)
     body = pad.with_object(placed, soft, threads=course.threads)
+    body.watch = Watch(course.label, limit_s=course.time_limit_s)
     tell = partial(_tell, course.label)
     tell(f"{len(body.free)} unknowns, {len(motion.steps)} load steps of the solid model")
     steps: list[SolidLoadStep] = []
@@ -112,6 +116,8 @@ def press_soft(sensor: "Sensor", soft: SoftObject, pose: Pose | None, motion: Mo
     except (ConvergenceError, KeyboardInterrupt) as error:
         error.result = result() if steps else None  # type: ignore[union-attr]
         raise
+    finally:
+        body.watch.end()
     return result()
 
 

@@ -7,8 +7,8 @@ import meshio
 import numpy as np
 
 from softtact.errors import InputError
+from softtact.fem.flat_facets import outer_triangles
 from softtact.fem.mesh_files import read_mesh_file
-from softtact.fem.solid_mesh import SolidMesh
 from softtact.files import read_dataset
 from softtact.models.solid.result import read_solid_result
 from softtact.models.solid.result_files import KIND
@@ -17,9 +17,6 @@ from softtact.reporting.press_view import PressView
 
 UNIT = "displacement (mm)"
 _STEP = re.compile(r"displacement_mm_step(\d+)")
-_QUARTERS = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]
-_CUT = {"triangle6": _QUARTERS, "quad8": [[0, 4, 7], [4, 1, 5], [5, 2, 6], [6, 3, 7], [4, 5, 6], [4, 6, 7]],
-        "quad9": [[0, 4, 8], [4, 1, 8], [1, 5, 8], [5, 2, 8], [2, 6, 8], [6, 3, 8], [3, 7, 8], [7, 0, 8]]}     # into flat triangles
 
 
 def read_view(path: str | Path) -> PressView:
@@ -31,12 +28,6 @@ def read_view(path: str | Path) -> PressView:
     if ending == ".vtu" and path.is_file() and b'"region:' in path.read_bytes():
         return view_of_vtu(path)
     return press_view.read_view(path)
-
-
-def outer_triangles(mesh: SolidMesh) -> np.ndarray:
-    """Triangles (t, 3) of the mesh's outside, through the nodes in the middles of edges; of a plane mesh all of it."""
-    facets = mesh.boundary.items() if mesh.geometry == "solid" else ((kind, nodes) for _, kind, nodes in mesh.cells)
-    return np.concatenate([nodes[:, _CUT[kind]].reshape(-1, 3) for kind, nodes in facets])
 
 
 def view_of_result(path: Path) -> PressView:

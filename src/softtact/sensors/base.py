@@ -119,7 +119,7 @@ class BaseSpec(Section):
         try:
             spec = cls.model_validate(values)
         except ValidationError as error:
-            raise InputError(_sentence(cls, first_fault(error), where)) from None
+            raise InputError(sentence(cls, first_fault(error), where)) from None
         spec._check(where)
         return spec
 
@@ -145,8 +145,8 @@ def read_mapping(path: str | Path) -> dict[str, Any]:
     return values
 
 
-def _sentence(cls: type[Section], fault: Any, where: str) -> str:
-    """What is wrong with a field, and what to do."""
+def sentence(cls: type[Section], fault: Any, where: str) -> str:
+    """What is wrong with a field of a file, and what to do, from pydantic's first fault."""
     field = ".".join(str(part) for part in fault["loc"])
     if fault["type"] == "extra_forbidden":
         *parents, last = fault["loc"]

@@ -55,7 +55,7 @@ def test_files_give_the_result_back(pressed, tmp_path):
         pressed.write(tmp_path / name)
         found = read_solid_result(tmp_path / name)
         for field in SolidResult.__dataclass_fields__:
-            if field != "mesh":
+            if field not in ("mesh", "attributes"):     # files add their provenance to the attributes
                 assert np.array_equal(np.asarray(getattr(found, field)), np.asarray(getattr(pressed, field)),
                                       equal_nan=field not in ("frames", "pairs")), field
         assert np.array_equal(found.mesh.points, pressed.mesh.points) and found.mesh.regions == ["rubber"]

@@ -29,9 +29,10 @@ from softtact.materials.laws.base import Law
 from softtact.models.solid.blocks import region_blocks
 from softtact.models.solid.checks import bodies_of, refuse_loose
 from softtact.models.solid.device import find_device, sum_on
-from softtact.models.solid.frames import Frame, FramePose
+from softtact.models.solid.frames import FramePose, make_frames
 from softtact.models.solid.loads import FacePressure
 from softtact.models.solid.springs import FrustumSprings
+from softtact.progress import Watch
 
 _CHUNK = 256  # elements whose dense tangents are in memory at once, for each thread
 _COUPLED, _MOST_COUPLED = 1e-6, 60  # relative error and iterations of GMRES
@@ -87,10 +88,10 @@ class SolidBody:
         self.blocks = region_blocks(mesh, laws)
         if (where := find_device(device)) != "cpu":
             sum_on(self.blocks, where)
-        self.workers = Workers(threads)
+        self.workers, self.watch = Workers(threads), Watch()
         # What rounding hides of the energy is in proportion to modulus times volume, however small the strain.
         self.energy_noise = 3e-4 * sum(block.law.mu0 * block.volume for _, _, block in self.blocks)
-        self.points, self.frames, self._surfaces = _with_rigid(mesh, carried or {}, rigid or {})
+        self.points, self.frames, self._surfaces = make_frames(mesh, carried or {}, rigid or {})
         self.free_components = self._free(held or {})
         self.free = np.flatnonzero(self.free_components.ravel())
         self.pairs: list[ContactPair] = []
@@ -332,19 +333,3 @@ class SolidBody:
 def _tangents(block: SolidBlock, nodes: np.ndarray, displacement: np.ndarray, part: slice) -> np.ndarray:
     """Tangents of some of a block's elements."""
     return block.tangent(displacement[nodes[part]], part)
-
-
-def _with_rigid(mesh, carried, rigid):
-    """All nodes (n, 3), the frames, and the facets (t, 3) of each rigid object."""
-    points, frames, surfaces = [mesh.points], [], {}
-    for name, (point, faces, *axes) in carried.items():
-        nodes = np.unique(np.concatenate([mesh.face_nodes(face) for face in faces]))
-        frames.append(Frame(name, np.asarray(point, float), nodes, *axes))
-    start = len(mesh.points)
-    for name, (point, triangles) in rigid.items():
-        corners, inverse = np.unique(np.asarray(triangles, float).reshape(-1, 3), axis=0, return_inverse=True)
-        surfaces[name] = start + inverse.reshape(-1, 3)
-        frames.append(Frame(name, np.asarray(point, float), np.arange(start, start + len(corners))))
-        points.append(corners)
-        start += len(corners)
-    return np.ascontiguousarray(np.vstack(points)), frames, surfaces

@@ -1,5 +1,6 @@
 """Rigid frames: what carries an object, or the held side of a soft one, through its six freedoms."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -7,6 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from softtact.contact.motion import FREEDOMS
+from softtact.fem.solid_mesh import SolidMesh
 
 
 @dataclass(frozen=True)
@@ -61,3 +63,20 @@ def step_vector(ways: dict[str, float]) -> np.ndarray:
     out = np.array([ways.get(name, 0.0) for name in FREEDOMS])
     out[3:] = np.radians(out[3:])
     return out
+
+
+def make_frames(mesh: SolidMesh, carried: Mapping[str, tuple], rigid: Mapping[str, tuple]
+                ) -> tuple[np.ndarray, list[Frame], dict[str, np.ndarray]]:
+    """All nodes (n, 3) in mm, the frames, and the facets (t, 3) of each rigid object; arguments as `SolidBody` takes them."""
+    points, frames, surfaces = [mesh.points], [], {}
+    for name, (point, faces, *axes) in carried.items():
+        nodes = np.unique(np.concatenate([mesh.face_nodes(face) for face in faces]))
+        frames.append(Frame(name, np.asarray(point, float), nodes, *axes))
+    start = len(mesh.points)
+    for name, (point, triangles) in rigid.items():
+        corners, inverse = np.unique(np.asarray(triangles, float).reshape(-1, 3), axis=0, return_inverse=True)
+        surfaces[name] = start + inverse.reshape(-1, 3)
+        frames.append(Frame(name, np.asarray(point, float), np.arange(start, start + len(corners))))
+        points.append(corners)
+        start += len(corners)
+    return np.ascontiguousarray(np.vstack(points)), frames, surfaces

@@ -41,6 +41,8 @@ class Target:
     """Of each frame {freedom: load at the increment's end in N or N mm}."""
     pressures: np.ndarray
     """(f,) in MPa at the increment's end."""
+    name: str = "balance"
+    """What progress calls it."""
 
     @property
     def unknown(self) -> list[tuple[int, int]]:
@@ -58,6 +60,7 @@ class _Balance:
     pending: bool
     before: list[float] = field(default_factory=list)
     share: float = 1.0
+    taken: int = 0
 
     def prepared(self, state: SolidState, iteration: int) -> SolidState:
         return state
@@ -163,8 +166,9 @@ class _Balance:
         return work
 
     def accepted(self, state: SolidState, trial: SolidState) -> None:
-        self.pending = False
+        self.pending, self.taken = False, self.taken + 1
         self.before = [*self.before, self.residual(state)][-_REMEMBERED:]
+        self.body.watch.beat(f"{self.target.name}, iteration {self.taken}, largest unbalanced force {self.residual(trial):.2g} N")
 
     def recovered(self, state: SolidState) -> bool:
         return False
@@ -220,4 +224,9 @@ def balance(body: SolidBody, start: SolidState, target: Target, settings: SolidS
         pair.overlap_mm(history, contact)
         for pair, history, contact in zip(body.pairs, state.histories, state.contacts, strict=True)
     )
+    if worst <= settings.penetration_mm:
+        raise ConvergenceError(
+            "Points that press lie beside the facets that they meet, as where a surface ends or an edge presses into it: "
+            "let the surface reach further, or round the edge."
+        )
     raise ConvergenceError(f"The surfaces still overlap by {worst * 1000:.3g} um after {settings.max_augmentations} augmentations.")

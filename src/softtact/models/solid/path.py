@@ -2,12 +2,12 @@
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from softtact.contact.motion import FREEDOMS, Motion, MotionStep
-from softtact.errors import ConvergenceError, InputError
+from softtact.errors import ConvergenceError, InputError, TimeLimitError
 from softtact.materials.laws.stretches import stretch_range
 from softtact.models.solid.body import SolidBody, SolidState
 from softtact.models.solid.frames import step_vector
@@ -88,7 +88,9 @@ class SolidPath:
             touched = True
             values = np.array([self.pressures[face.name][number] for face in self.body.pressures])
             try:
-                state, counts, residual, done, lost = self._step(state, steps, values)
+                state, counts, residual, done, lost = self._step(state, steps, values, f"step {number + 1} of {self.steps}")
+            except TimeLimitError:
+                raise
             except ConvergenceError as error:
                 raise ConvergenceError(
                     f"Step {number + 1} of {self.steps} was not reached: {error} Use smaller steps or a finer mesh where it folds."
@@ -96,16 +98,19 @@ class SolidPath:
             work, dissipated = work + done, dissipated + lost
             yield self._described(state, counts, residual, work, dissipated, time.perf_counter() - began)
 
-    def _step(self, state, steps, pressures):
+    def _step(self, state, steps, pressures, name):
         """A step in as many increments as it takes: state, (iterations, increments), residual, work and dissipation in mJ."""
         body, share, size, counts, work, lost = self.body, 0.0, 1.0, [0, 0], 0.0, 0.0
         first = body.frame_loads(state), state.pressures
         while share < 1 - 1e-9:
             size = min(size, 1 - share)
             begun = self._begun(state)
-            target = self._target(first, steps, pressures, share, size)
+            part = name if size == 1 else f"{name}, {100 * share:.3g} to {100 * (share + size):.3g} % of it"
+            target = replace(self._target(first, steps, pressures, share, size), name=part)
             try:
                 found, iterations, residual = balance(body, begun, target, self.settings)
+            except TimeLimitError:
+                raise
             except ConvergenceError as error:
                 size *= 0.5
                 self.tell(f"increment divided: {error}")

@@ -7,9 +7,9 @@
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from softtact.models.solid import result_files
 from softtact.models.solid.body import SolidBody
 from softtact.models.solid.fields import nodal_fields, pressure_at_nodes
 from softtact.models.solid.path import SolidLoadStep, SolidPath
+from softtact.models.solid.readings import ReadingPoints
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -75,6 +76,14 @@ class SolidResult:
     """(t, 3) their facets."""
     object_displacement_mm: np.ndarray
     """(s, r, 3) of the same nodes."""
+    reading_points_mm: np.ndarray
+    """(k, 3) places of readings at rest; none where a body has no readings."""
+    reading_displacement_mm: np.ndarray
+    """(s, k, 3) mean displacement of the surface around them."""
+    reading_pressure_mpa: np.ndarray
+    """(s, k) mean contact pressure per area at rest around them; nan off the surface in contact."""
+    attributes: dict[str, Any] = field(default_factory=dict)
+    """Where the result comes from, in words and numbers; files keep it."""
 
     @property
     def steps(self) -> int:
@@ -119,8 +128,8 @@ def solid_result(path: SolidPath) -> SolidResult:
     return gathered(path.body, steps)
 
 
-def gathered(body: SolidBody, steps: Iterable[SolidLoadStep]) -> SolidResult:
-    """The `SolidResult` of load steps."""
+def gathered(body: SolidBody, steps: Iterable[SolidLoadStep], readings: ReadingPoints | None = None) -> SolidResult:
+    """The `SolidResult` of load steps; `readings` are taken from the body's first pair in contact."""
     steps = list(steps)
     if not steps:
         raise InputError("There is no load step to keep; solve one.")
@@ -146,7 +155,18 @@ def gathered(body: SolidBody, steps: Iterable[SolidLoadStep]) -> SolidResult:
         work_mj=each(lambda step: step.work_mj), dissipated_mj=each(lambda step: step.dissipated_mj),
         strain_energy_mj=each(lambda step: step.state.strain_energy), wall_time_s=each(lambda step: step.wall_time_s),
         object_points_mm=body.points[n:], object_triangles=np.concatenate([np.zeros((0, 3), int), *(own - n for own in surfaces)]),
-        object_displacement_mm=each(lambda step: step.state.displacement[n:]))
+        object_displacement_mm=each(lambda step: step.state.displacement[n:]), **_read(body, steps, readings))
+
+
+def _read(body, steps, readings):
+    """The readings of load steps by their names in `SolidResult`."""
+    if readings is None:
+        return {"reading_points_mm": np.zeros((0, 3)), "reading_displacement_mm": np.zeros((len(steps), 0, 3)),
+                "reading_pressure_mpa": np.zeros((len(steps), 0))}
+    moved = [readings.displacement_mm(step.state.displacement) for step in steps]
+    pressures = [readings.pressure_mpa(body.pairs[0], step.state.histories[0], step.state.contacts[0]) for step in steps]
+    return {"reading_points_mm": readings.points_mm, "reading_displacement_mm": np.array(moved),
+            "reading_pressure_mpa": np.array(pressures)}
 
 
 def _names(body):
@@ -160,4 +180,4 @@ def read_solid_result(path: str | Path) -> SolidResult:
     dataset = result_files.read(path)
     values = {name: dataset[name].values for name in result_files.DIMENSIONS}
     return SolidResult(mesh=result_files.mesh_of(dataset), frames=tuple(map(str, dataset["frame"].values)),
-                       pairs=tuple(map(str, dataset["pair"].values)), **values)
+                       pairs=tuple(map(str, dataset["pair"].values)), attributes=result_files.facts_of(dataset), **values)

@@ -26,6 +26,8 @@ DIMENSIONS: dict[str, tuple[tuple[str, ...], str]] = {
     "extrapolated_volume_fraction": (("step",), "1"), "work_mj": (("step",), "mJ"), "dissipated_mj": (("step",), "mJ"),
     "strain_energy_mj": (("step",), "mJ"), "wall_time_s": (("step",), "s"), "object_points_mm": (("object_node", _XYZ), "mm"),
     "object_triangles": (("object_facet", "object_corner"), "1"), "object_displacement_mm": (("step", "object_node", _XYZ), "mm"),
+    "reading_points_mm": (("reading", _XYZ), "mm"), "reading_displacement_mm": (("step", "reading", _XYZ), "mm"),
+    "reading_pressure_mpa": (("step", "reading"), "MPa"),
 }     # {field of `SolidResult`: (dimensions, unit)}
 
 
@@ -43,7 +45,12 @@ def dataset_of(result: "SolidResult") -> "xr.Dataset":
     coordinates = {"step": np.arange(1, result.steps + 1), "frame": np.array(result.frames, dtype=str),
                    "pair": np.array(result.pairs, dtype=str), "load": ["fx", "fy", "fz", "mx", "my", "mz"], _XYZ: ["x", "y", "z"]}
     attributes = {"kind": KIND, "geometry": result.mesh.geometry, "thickness_mm": result.mesh.thickness_mm}
-    return xr.Dataset(arrays, coordinates, attributes)
+    return xr.Dataset(arrays, coordinates, result.attributes | attributes)
+
+
+def facts_of(dataset: "xr.Dataset") -> dict[str, Any]:
+    """What a data set says of where it comes from."""
+    return {str(name): value for name, value in dataset.attrs.items() if name not in ("kind", "geometry", "thickness_mm")}
 
 
 def mesh_of(dataset: "xr.Dataset") -> SolidMesh:

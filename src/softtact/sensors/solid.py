@@ -1,0 +1,144 @@
+"""Sensors of `kind: solid`: any soft body of elements, such as a fingertip's dome, with what it is made of and what holds it.
+
+    name: dome
+    kind: solid
+    mesh: {file: dome.vtu}                   # of `softtact mesh`; another program's mesh states its unit
+    regions: {body: {material: neoprene}}    # or {card: my_card.json}, or {law: neo_hooke, parameters: {c10: 0.1}}
+    faces: {base: "z<0.01", skin: "z>0.01"}  # outer facets by rules, beside those that the mesh file names
+    held: {base: xyz}
+    contact: {face: skin, friction: 0.3}
+    readings: {points_mm: [[0, 0, 5], [2, 0, 4.5]], radius_mm: 1.0}
+    force_range_n: [0, 20]
+"""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, PositiveFloat, PrivateAttr, ValidationError
+
+from softtact.errors import InputError
+from softtact.materials.cards import law_from_card, load_card
+from softtact.materials.config import law_from_printed
+from softtact.materials.laws.base import Law
+from softtact.materials.laws.registry import make_law
+from softtact.sensors.base import read_mapping, sentence
+from softtact.sensors.fields import Coefficient, Length, Section
+from softtact.sensors.library import material_file
+from softtact.unknown_names import first_fault
+
+_SURFACES = (".stl", ".obj", ".ply")
+_SOURCES = ("material", "card", "law")
+BULK_OVER_SHEAR = 20.0     # where a law by itself states none, as for all laws
+
+
+class MeshFile(Section):
+    """The body's elements: VTU, or any format that `softtact mesh` reads; `unit` where the file does not state one."""
+
+    file: str
+    unit: str | None = None
+
+
+class Region(Section):
+    """The law of a region: a material's printed constants, a card of `softtact fit`, or constants in MPa."""
+
+    material: str | None = None
+    card: str | None = None
+    law: str | None = Field(None, description="name of the law; of a material, the one whose printed constants are taken")
+    parameters: dict[str, float] | None = None
+    bulk_over_shear: PositiveFloat | None = None
+
+
+class ContactFace(Section):
+    """The face that objects meet, with Coulomb's coefficient."""
+
+    face: str
+    friction: Coefficient = 0.0
+
+
+class ReadingPlaces(Section):
+    """Where readings are taken: means over the parts of a face that lie within a radius of points."""
+
+    points_mm: Annotated[tuple[tuple[float, float, float], ...], Field(min_length=1)]
+    radius_mm: Length
+    face: str | None = Field(None, description="by default the face of the contact")
+
+
+class SolidSpec(Section):
+    """A soft body as a sensor. Frame: that of its mesh, in mm; objects come down along z unless a motion says otherwise."""
+
+    name: str
+    kind: Literal["solid"]
+    mesh: MeshFile
+    regions: Annotated[dict[str, Region], Field(min_length=1)]
+    faces: dict[str, str] = {}
+    held: Annotated[dict[str, str], Field(min_length=1)]
+    contact: ContactFace
+    readings: ReadingPlaces | None = None
+    force_range_n: tuple[float, PositiveFloat]
+    _folder: Path = PrivateAttr(Path())     # of the sensor's file, which its paths are relative to
+
+    @property
+    def mesh_path(self) -> Path:
+        """The mesh file as seen from here."""
+        return self._folder / self.mesh.file
+
+    @property
+    def paths(self) -> list[Path]:
+        """All files that the sensor is read from beside its own."""
+        return [self.mesh_path, *(self._folder / region.card for region in self.regions.values() if region.card)]
+
+    def law_of(self, name: str) -> Law:
+        """The law of a region. Raises InputError where what it is made from does not give one."""
+        region = self.regions[name]
+        if region.card:
+            return law_from_card(load_card(self._folder / region.card), region.law)
+        if region.material:
+            return law_from_printed(material_file(region.material), region.law or "mooney_rivlin")
+        return make_law(str(region.law), region.parameters or {}, bulk_over_shear=region.bulk_over_shear or BULK_OVER_SHEAR)
+
+    @classmethod
+    def from_yaml(cls, path: str | Path) -> Self:
+        """Read a sensor file of this kind; the first fault becomes one sentence that names the file and the field."""
+        values = read_mapping(path)
+        if values.get("kind") != "solid":
+            raise InputError(f"{path}, at 'kind': {values.get('kind', 'frusta')!r} is not solid; press such a sensor with "
+                             "load_sensor, or write kind: solid.")
+        try:
+            spec = cls.model_validate(values)
+        except ValidationError as error:
+            raise InputError(sentence(cls, first_fault(error), str(path))) from None
+        spec._folder = Path(path).parent
+        spec._check(str(path))
+        return spec
+
+    def _check(self, where: str) -> None:
+        """Refuse values that are right each by itself and wrong together."""
+        if Path(self.mesh.file).suffix.lower() in _SURFACES:
+            filled = Path(self.mesh.file).with_suffix(".vtu").name
+            raise InputError(f"{where}, at 'mesh.file': {self.mesh.file} is a surface, and the body needs elements; run `softtact "
+                             f"mesh {self.mesh.file} --unit mm --size ... --out {filled}` and name the file that it writes.")
+        for name, region in self.regions.items():
+            if fault := _region_fault(region):
+                raise InputError(f"{where}, at 'regions.{name}': {fault}")
+        if self.force_range_n[0] < 0 or self.force_range_n[0] >= self.force_range_n[1]:
+            raise InputError(f"{where}, at 'force_range_n': {list(self.force_range_n)} is no range; write [least, largest] in N.")
+
+
+def _region_fault(region: Region) -> str | None:
+    """What is wrong with what a region's law is made from, and what to do; None where nothing is."""
+    given = [name for name in _SOURCES if getattr(region, name) is not None]
+    if not given:
+        return "it has no law; give 'material', 'card', or 'law' with 'parameters'."
+    if region.material and region.card:
+        return "it has a material and a card; leave one of them out."
+    plain = given == ["law"]
+    if plain and region.parameters is None:
+        return f"the law {region.law!r} has no parameters; give its constants in MPa."
+    if not plain and (region.parameters is not None or region.bulk_over_shear is not None):
+        return f"'parameters' and 'bulk_over_shear' are of a law by itself; leave them out, or leave {given[0]!r} out."
+    return None
+
+
+def kind_of(path: str | Path) -> Any:
+    """The `kind` that a sensor file states; `frusta` where it states none."""
+    return read_mapping(path).get("kind", "frusta")
