@@ -24,8 +24,15 @@ def machine():
 
 def versions():
     """Of Python, the packages that compute, and CalculiX where it is installed."""
-    packages = {name: importlib.metadata.version(name) for name in ("numpy", "scipy", "numba", "pypardiso", "mkl")}
+    packages = {name: _version(name) for name in ("numpy", "scipy", "numba", "pypardiso", "mkl")}
     return {"python": platform.python_version(), **packages, "ccx": _ccx_version()}
+
+
+def _version(name):
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return None
 
 
 def _ccx_version():

@@ -1,10 +1,14 @@
 """Direct solvers behind one interface: the same answers, and what they say of matrices that they cannot factor."""
 
+import importlib.metadata
+import os
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
 
 from softtact.linalg.direct import PardisoSolver, SuperLUSolver, condensed_inverse, make_solver
+from softtact.linalg.direct_single import point_at_mkl
 
 pytest.importorskip("pypardiso")
 from softtact.linalg.direct_single import PardisoSingle
@@ -76,3 +80,13 @@ def test_a_condensed_inverse_is_the_inverse_at_what_is_kept():
 
 def test_the_solver_is_named():
     assert make_solver().name == "pardiso" and PardisoSingle().name == "pardiso, single precision"
+
+
+def test_a_machine_without_mkl_takes_the_solver_that_is_there(monkeypatch):
+    def nothing(name):
+        raise importlib.metadata.PackageNotFoundError(name)
+
+    monkeypatch.delenv("PYPARDISO_MKL_RT", raising=False)
+    monkeypatch.setattr(importlib.metadata, "files", nothing)
+    point_at_mkl()
+    assert "PYPARDISO_MKL_RT" not in os.environ

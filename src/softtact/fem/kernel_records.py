@@ -54,3 +54,9 @@ class VolumeResponse(NamedTuple):
     stiffness: np.ndarray
     unprojected: float
     quartic: np.ndarray
+
+    def of(self, part: slice) -> "VolumeResponse":
+        """The response of some of the elements."""
+        return self._replace(energies=self.energies[part], pressure=self.pressure[part],
+                             stiffness=self.stiffness[part] if self.stiffness.size else self.stiffness,
+                             quartic=self.quartic[part] if self.quartic.size else self.quartic)

@@ -72,14 +72,19 @@ class PlainLoops:
 
 def material_tensor(deformed: Deformation, moduli: np.ndarray, volume: VolumeResponse) -> np.ndarray:
     """dS_ij / dE_kl (e, g, 3, 3, 3, 3) in MPa at the points, the pressure kept; from the law's moduli (e*g, 6, 6)."""
-    if volume.quartic.size:
-        raise NotImplementedError("The quartic penalty is for spatial elements of sensors on frusta.")
+    refuse_quartic(volume)
     J, inverse = deformed.J, _inverses(deformed.C)[:, _VOIGT].reshape(*deformed.J.shape, 3, 3)
     pj, local = volume.pressure * J, 0.5 * volume.unprojected * (J**2 + 1)
     crossed = np.einsum("egik,egjl->egijkl", inverse, inverse) + np.einsum("egil,egjk->egijkl", inverse, inverse)
     D = moduli[:, _VOIGT][:, :, :, _VOIGT].reshape(*J.shape, 3, 3, 3, 3)
     D = D + np.einsum("eg,egij,egkl->egijkl", pj + local, inverse, inverse)
     return D - np.einsum("eg,egijkl->egijkl", pj, crossed)
+
+
+def refuse_quartic(volume: VolumeResponse) -> None:
+    """Refuse a penalty that these loops do not know."""
+    if volume.quartic.size:
+        raise NotImplementedError("The quartic penalty is for spatial elements of sensors on frusta.")
 
 
 def mode_moduli(at_rest: ElementArrays, volume: VolumeResponse) -> np.ndarray:

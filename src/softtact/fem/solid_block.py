@@ -35,6 +35,7 @@ from softtact.materials.laws.base import Law
 from softtact.materials.laws.stretches import stretch_range
 
 _NONE = np.zeros((0, 0))
+_POINTS_AT_ONCE = 20_000     # of a law, in each thread
 _AT_ONCE = 400   # elements whose fields at the points are in memory at once, mostly in the processor's cache
 
 
@@ -123,6 +124,16 @@ class SolidBlock:
         response, volume = self.law.isochoric(deformed.C, tangent=True), self._volumetric(deformed.J, at_rest)
         return self.loops.tangent(deformed, at_rest, response.stress, response.tangent, volume,     # type: ignore[arg-type]
                                   np.empty(0, precision))
+
+    def add_tangent(self, values: np.ndarray, positions: np.ndarray, displacement: np.ndarray, *,
+                    workers: Workers = SERIAL) -> None:
+        """Add the tangent of all elements to a matrix's values, see `assembly.add_upper`; of loops that sum it up on a device."""
+        deformed = self.loops.deformation(displacement, self.at_rest)
+        parts = workers.map(lambda part: self.law.isochoric(deformed.C[part], tangent=True),
+                            slices(len(deformed.C), _POINTS_AT_ONCE))
+        stress, moduli = (np.concatenate([getattr(part, name) for part in parts]) for name in ("stress", "tangent"))
+        volume = self._volumetric(deformed.J, self.at_rest)
+        self.loops.add_tangent(values, positions, deformed, self.at_rest, stress, moduli, volume)     # type: ignore[attr-defined]
 
     @property
     def volume(self) -> float:

@@ -36,8 +36,14 @@ class PardisoSingle(PardisoSolver):
 
 
 def point_at_mkl() -> None:
-    """Tell pypardiso where MKL is: its own search through the installation takes half a second for every solver."""
+    """Tell pypardiso where MKL is: its own search through the installation takes half a second for every solver.
+
+    Where no package `mkl` is installed, it is left to that search, or to the solver that takes PARDISO's place.
+    """
     if "PYPARDISO_MKL_RT" not in os.environ:
-        files = importlib.metadata.files("mkl") or []
+        try:
+            files = importlib.metadata.files("mkl") or []
+        except importlib.metadata.PackageNotFoundError:
+            return
         found = [str(file.locate()) for file in files if "libmkl_rt" in file.name]
         os.environ.update({"PYPARDISO_MKL_RT": found[0]} if found else {})

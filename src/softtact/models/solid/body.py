@@ -311,6 +311,9 @@ class SolidBody:
 
     def _add_blocks(self, values, displacement):
         for (_, nodes, block), positions in zip(self.blocks, self._positions, strict=True):
+            if hasattr(block.loops, "add_tangent"):
+                block.add_tangent(values, positions, displacement[nodes], workers=self.workers)
+                continue
             tangents, parts = partial(_tangents, block, nodes, displacement), slices(len(nodes), _CHUNK)
             for start in range(0, len(parts), self.workers.threads):  # in turns, so that few are in memory at once
                 several = parts[start : start + self.workers.threads]
