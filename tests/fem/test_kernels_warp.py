@@ -1,5 +1,8 @@
 """The loops over elements as Warp kernels: the same numbers as the compiled ones, to rounding, on every device that is here."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -70,3 +73,10 @@ def test_an_unknown_device_and_a_gpu_that_is_not_there_are_refused():
         assert find_device("auto") == "cpu"
         with pytest.raises(InputError, match="finds no GPU"):
             find_device("cuda")
+
+
+def test_what_warp_says_of_itself_does_not_stand_in_the_output():
+    lines = ["from softtact.models.solid.device import find_device; find_device('auto')",
+             "from softtact.fem.kernels_warp import WarpKernels; WarpKernels('cpu')"]
+    for line in lines:
+        assert subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True).stdout == ""

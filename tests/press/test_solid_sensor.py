@@ -120,6 +120,19 @@ def test_the_command_writes_shows_and_exports_it(folder, tmp_path, capsys):
     assert "C3D20RH" in deck.read_text() and "OBJECT_REFERENCE" in deck.read_text()
 
 
+def test_several_objects_are_pressed_one_by_one_and_stand_in_one_table(folder, tmp_path, capsys):
+    objects = tmp_path / "objects"
+    objects.mkdir()
+    for name in ("low", "high"):
+        trimesh.creation.box((4, 4, 1)).export(objects / f"{name}.stl")
+    assert main(["press", str(objects), "--unit", "mm", "--sensor", str(folder / "block.yaml"), "--force", "0.2", "--json",
+                 "--out", str(tmp_path), "--vtu", "press.vtu"]) == 0
+    rows = json.loads(capsys.readouterr().out)["objects"]
+    assert [(row["object"], row["status"], row["model"]) for row in rows] == [("high", "done", "solid"), ("low", "done", "solid")]
+    assert rows[0]["force_z_n"] == pytest.approx(-0.2, rel=1e-4)
+    assert (tmp_path / "low/press.vtu").stat().st_size and read_solid_result(tmp_path / "high/press.nc").steps == 1
+
+
 def test_a_card_on_the_command_line_takes_the_place_of_a_regions_law(folder, capsys):
     from softtact.materials.config import law_from_printed
     from softtact.sensors.library import material_file

@@ -22,7 +22,7 @@ from softtact.commands.common import (
     sensor_spec,
     show,
 )
-from softtact.commands.press_each import Files, is_several, press_each
+from softtact.commands.press_each import LAYERED, Files, is_several, press_each
 from softtact.errors import ConvergenceError, InputError
 
 EXAMPLES = """
@@ -98,7 +98,7 @@ def _press(options):
         check_names({options.out: (".nc",)})
     press = partial(press_solid.press_one if solid else _press_one, options=options, spec=spec, pose=pose, how=how, sensors={})
     if several:
-        return press_each(options, press)
+        return press_each(options, press, press_solid.COLUMNS if solid else LAYERED)
     summary, error = press(options.mesh[0], Files(options.out, options.vtu, options.plot))
     show(summary, as_json=options.json, lines=press_solid.lines(summary) if solid else _press_lines(summary))
     if error:

@@ -11,8 +11,32 @@ from softtact.errors import ConvergenceError, InputError, SofttactError
 from softtact.progress import announce
 
 MESHES = (".stl", ".obj", ".ply")
-_COLUMNS = ("object", "status", "model", "force_n", "indentation_mm", "contact_area_mm2", "largest_deformation_mm", "counts",
-            "message")
+
+
+@dataclass(frozen=True)
+class Column:
+    """A number of the table of all objects."""
+
+    name: str
+    """In the table's file."""
+    title: str
+    """Over the printed table."""
+    style: str
+    """How it is printed, width and digits."""
+    of: Callable[[dict[str, Any]], float]
+    """What it is of a summary: that of the last load step."""
+
+
+def last(key: str) -> Callable[[dict[str, Any]], float]:
+    """What a summary has under a key at its last load step."""
+    return lambda summary: float(summary[key][-1])
+
+
+LAYERED = (Column("force_n", "force, N", "9.4g", last("normal_force_n")),
+           Column("indentation_mm", "indentation, mm", "17.4f", last("indentation_mm")),
+           Column("contact_area_mm2", "contact, mm2", "14.1f", last("contact_area_mm2")),
+           Column("largest_deformation_mm", "deepest, mm", "13.4f", last("largest_deformation_mm")),
+           Column("counts", "counts, sum", "13.0f", lambda summary: float(sum(map(sum, summary["tactile_map"][-1])))))
 
 
 @dataclass(frozen=True)
@@ -29,16 +53,18 @@ def is_several(meshes: Sequence[Path]) -> bool:
     return len(meshes) > 1 or meshes[0].is_dir()
 
 
-def press_each(options: argparse.Namespace, press: Callable[..., tuple[dict[str, Any], BaseException | None]]) -> None:
+def press_each(options: argparse.Namespace, press: Callable[..., tuple[dict[str, Any], BaseException | None]],
+               columns: Sequence[Column] = LAYERED) -> None:
     """Press each object with press(path, files, label), which gives a summary and the error that ended it early or None.
 
+    columns: what the table of all objects tells beside their names, status and model
     Raises the kind of error that the first failed one had, after all are done and the table is shown.
     """
     objects, rows, folder = _named(options.mesh), [], _folder(options)
     try:
         for number, (name, path) in enumerate(objects.items(), start=1):
             announce(f"softtact press: {number} of {len(objects)}: {path}")
-            row, error = _row(name, path, folder / name, options, press)
+            row, error = _row(name, path, folder / name, options, press, columns)
             rows.append((row, error))
             if error:
                 announce(f"softtact press: {name}: {error}")
@@ -46,7 +72,7 @@ def press_each(options: argparse.Namespace, press: Callable[..., tuple[dict[str,
                 raise error
     finally:
         if rows:
-            _tell(rows, folder, options)
+            _tell(rows, folder, options, columns)
     failed = [(row, error) for row, error in rows if error]
     if failed:
         kind = ConvergenceError if all(isinstance(error, ConvergenceError) for _, error in failed) else InputError
@@ -84,7 +110,7 @@ def _folder(options):
     return options.out
 
 
-def _row(name, path, folder, options, press):
+def _row(name, path, folder, options, press, columns):
     """A row of the table, and the error of an object that failed or None; its files are written."""
     files = Files(folder / "press.nc", *(given and folder / given for given in (options.vtu, options.plot)))
     for old in (files.out, files.vtu, files.plot):
@@ -93,31 +119,32 @@ def _row(name, path, folder, options, press):
     try:
         summary, error = press(path, files, label=name)
     except (SofttactError, KeyboardInterrupt) as stop:
-        return dict.fromkeys(_COLUMNS) | {"object": name, "status": "failed", "message": str(stop)}, stop
-    return {"object": name, "status": "stopped early" if error else "done", "model": summary["model"],
-            "force_n": summary["normal_force_n"][-1], "counts": sum(map(sum, summary["tactile_map"][-1])),
-            "message": str(error or ""),
-            **{key: summary[key][-1] for key in ("indentation_mm", "contact_area_mm2", "largest_deformation_mm")}}, error
+        return dict.fromkeys(_names(columns)) | {"object": name, "status": "failed", "message": str(stop)}, stop
+    told = {"object": name, "status": "stopped early" if error else "done", "model": summary["model"]}
+    return told | {column.name: column.of(summary) for column in columns} | {"message": str(error or "")}, error
 
 
-def _tell(rows, folder, options):
+def _names(columns):
+    return ("object", "status", "model", *(column.name for column in columns), "message")
+
+
+def _tell(rows, folder, options, columns):
     """Write the table of all objects and show it."""
     import pandas as pd
 
     from softtact.files import write_csv
 
     table = [row for row, _ in rows]
-    write_csv(folder / "summary.csv", pd.DataFrame(table, columns=list(_COLUMNS)))
-    show({"objects": table, "written": str(folder)}, as_json=options.json, lines=_lines(table, folder))
+    write_csv(folder / "summary.csv", pd.DataFrame(table, columns=list(_names(columns))))
+    show({"objects": table, "written": str(folder)}, as_json=options.json, lines=_lines(table, folder, columns))
 
 
-def _lines(table, folder):
+def _lines(table, folder, columns=LAYERED):
     width = max(len("object"), *(len(row["object"]) for row in table)) + 2
-    yield (f"{'object':{width}}{'status':15}{'model':14}{'force, N':>9}{'indentation, mm':>17}{'contact, mm2':>14}"
-           f"{'deepest, mm':>13}{'counts, sum':>13}")
+    titles = "".join(f"{column.title:>{column.style.partition('.')[0]}}" for column in columns)
+    yield f"{'object':{width}}{'status':15}{'model':14}{titles}"
     for row in table:
-        numbers = "" if row["model"] is None else (
-            f"{row['model']:14}{row['force_n']:9.4g}{row['indentation_mm']:17.4f}{row['contact_area_mm2']:14.1f}"
-            f"{row['largest_deformation_mm']:13.4f}{row['counts']:13.0f}")
+        numbers = "" if row["model"] is None else f"{row['model']:14}" + "".join(
+            f"{row[column.name]:{column.style}}" for column in columns)
         yield f"{row['object']:{width}}{row['status']:15}{numbers}".rstrip()
     yield f"written: {folder}"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from softtact.commands import press_soft
 from softtact.commands.common import origin, pairs, read_object, sensor_path
+from softtact.commands.press_each import Column, last
 from softtact.errors import ConvergenceError, InputError
 
 if TYPE_CHECKING:
@@ -18,6 +19,17 @@ if TYPE_CHECKING:
 _LAYERED = {"policy": ("error", "leave it out"), "tolerance": (0.01, "leave it out"),
             "mesh_quality": ("default", "give a finer mesh to the sensor's file"),
             "plot": (None, "write --vtu, or --out and draw it with `softtact view --save`"), "full_scale": (False, "leave it out")}
+
+
+
+def _force(axis: str) -> Column:
+    place = "xyz".index(axis)
+    return Column(f"force_{axis}_n", f"force {axis}, N", "12.4g", lambda summary: float(summary["load"][-1][place]))
+
+
+COLUMNS = (*map(_force, "xyz"),
+           Column("largest_displacement_mm", "most moved, mm", "16.4f", last("largest_displacement_mm")),
+           Column("largest_pressure_mpa", "pressure, MPa", "15.4g", last("largest_pressure_mpa")))
 
 
 def is_solid(sensor: str) -> bool:

@@ -22,6 +22,7 @@ def find_device(name: str) -> str:
         if name == "auto":
             return "cpu"
         raise InputError(f"device={name!r}: {how_to_install('warp')}") from None
+    warp.config.log_level = warp.LOG_WARNING     # what it tells beside would stand in a command's output
     if warp.is_cuda_available():
         return "cuda"
     if name == "auto":
