@@ -252,10 +252,12 @@ class SolidBody:
         assert moved is not None
         return (self.frame_loads(moved) - self.frame_loads(state)) / share
 
-    def factor(self, state: SolidState) -> float:
-        """Factor the tangent; returns the diagonal (N/mm) that had to be added to make it positive definite, mostly 0."""
-        matrix = self.tangent(state)
-        if self.solver.factor(matrix):
+    def factor(self, state: SolidState, *, turning: bool = True) -> float:
+        """Factor the tangent; returns the diagonal (N/mm) that had to be added to make it positive definite, mostly 0.
+
+        turning: see `tangent`
+        """
+        if turning and self.solver.factor(self.tangent(state)):
             return 0.0
         matrix = self.tangent(state, turning=False)  # far from balance, pressed surfaces that turn may have no stiffness
         shift, diagonal = 0.0, matrix.indptr[:-1]

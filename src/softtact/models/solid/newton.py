@@ -61,6 +61,7 @@ class _Balance:
     before: list[float] = field(default_factory=list)
     share: float = 1.0
     taken: int = 0
+    just_predicted: bool = False
 
     def prepared(self, state: SolidState, iteration: int) -> SolidState:
         return state
@@ -78,7 +79,8 @@ class _Balance:
 
     def step(self, state: SolidState) -> tuple[SolidState, Any]:
         body, unknown = self.body, self.target.unknown
-        body.factor(state)
+        # Right after a prescribed way surfaces overlap by far more than in balance, and turning them costs the definiteness.
+        body.factor(state, turning=not self.just_predicted)
         residual, off = body.residual(state).copy(), self._loads_off(state)
         ways = [np.zeros(6) for _ in body.frames]
         pressures = state.pressures
@@ -166,6 +168,7 @@ class _Balance:
         return work
 
     def accepted(self, state: SolidState, trial: SolidState) -> None:
+        self.just_predicted = self.pending
         self.pending, self.taken = False, self.taken + 1
         self.before = [*self.before, self.residual(state)][-_REMEMBERED:]
         self.body.watch.beat(f"{self.target.name}, iteration {self.taken}, largest unbalanced force {self.residual(trial):.2g} N")
