@@ -136,7 +136,7 @@ class SolidSensor:
         pose, direction = Pose.of(pose), first_direction(motion)
         if isinstance(pressed, SoftObject):
             return self._with_soft(pressed, pose, direction, threads)
-        vertices = self._placed(np.asarray(pressed.vertices), pose, direction)
+        vertices = self._placed(np.asarray(pressed.vertices), pose)
         triangles = vertices[pressed.faces]
         triangles = triangles + self._touching(triangles, direction)
         ends = triangles.reshape(-1, 3)
@@ -146,7 +146,7 @@ class SolidSensor:
         return body
 
     def _with_soft(self, soft: SoftObject, pose: Pose | None, direction: np.ndarray, threads: int) -> SolidBody:
-        points = self._placed(soft.mesh.points, pose, direction)
+        points = self._placed(soft.mesh.points, pose)
         points = points + self._touching(fine_triangles(soft.mesh.boundary, points), direction)
         placed = soft.with_faces(points, direction)
         region = placed.regions[0]
@@ -156,8 +156,8 @@ class SolidSensor:
         body.add_pair(self._pair(body, Surface.of(mesh.face("object pressed")), soft=soft))
         return body
 
-    def _placed(self, points: np.ndarray, pose: Pose | None, direction: np.ndarray) -> np.ndarray:
-        """An object's points (n, 3) in its pose, or centred over the contact's face as seen along its way."""
+    def _placed(self, points: np.ndarray, pose: Pose | None) -> np.ndarray:
+        """An object's points (n, 3) in its pose, or with the middle of their bounding box at that of the contact's face."""
         if pose is not None:
             return pose.apply(points)
         face = self.mesh.points[self.mesh.face_nodes(self.spec.contact.face)]
