@@ -129,7 +129,7 @@ def test_figure_7_outlines_only_the_chosen_model(without_renderer):
     maps = {"elastic": np.ones((57, 33)), "hyperelastic": np.ones((57, 33))}
     counts = {model: np.ones((7, 4)) for model in maps}
     item = {"name": "object_5", "mesh": trimesh.creation.box((4, 4, 4)), "chosen": "elastic", "force": 50.0, "trials": 5,
-            "deformation": maps,
+            "source": "virtual sensor", "deformation": maps,
             "tactile": counts, "sensor": np.ones((7, 4)), "extent": (-11, 11, -18.5, 18.5)}
     figure = fig7_maps.draw([item], largest_counts=2400)
     red = [axes.get_ylabel().split("\n")[0] for axes in figure.axes
@@ -206,6 +206,10 @@ def test_the_page_holds_its_figures_and_links_its_data(tmp_path):
     assert "another mesh, friction, scatter" in page
     facts["config"]["models"]["felt"]["friction"] = None
     assert "another mesh, scatter" in render_page(inputs, facts, folder=folder, run=NO_RUN)
+    facts["config"]["data"] = {"source": "recorded"}
+    page = render_page(inputs, facts, folder=folder, run=NO_RUN)
+    assert "read from recordings of a TSF-85" in page and "none of its numbers is judged" in page
+    assert "virtual s" not in page      # neither a virtual sensor nor a virtual specimen
 
 
 def test_the_page_of_an_archives_study_tells_of_the_archive_and_of_no_virtual_sensor(tmp_path):

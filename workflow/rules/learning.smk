@@ -351,7 +351,7 @@ if CURVES:
             run_stage("find_limits")
 
 
-if not STUDY.archive:
+if STUDY.virtual:
 
     rule compare_gains:
         input:

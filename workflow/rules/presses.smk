@@ -1,4 +1,4 @@
-# Every item pressed with every model, and read by the virtual sensor.
+# Every item pressed with every model, and read by the virtual sensor or from recordings of a real one.
 
 # After each press: how many there are of all. The shell counts, for a total among the settings would rerun all when it changes.
 PRESSES = len(STUDY.pressed_with) * len(STUDY.items())
@@ -74,26 +74,55 @@ rule repeat_press:
         run_stage("simulate_press")
 
 
-rule read_virtual_sensor:
-    input:
-        code=code("read_virtual_sensor"),
-        press=f"{RESULTS}/presses/{{set}}/{{item}}/{STUDY.values.reference}.nc",
-    output:
-        tactile=f"{RESULTS}/tactile/{{set}}/{{item}}.nc",
-    params:
-        files=files,
-        settings=lambda w: as_settings(
-            sensor=STUDY.sensor,
-            virtual_sensor=STUDY.values.virtual_sensor,
-            trials=STUDY.trials_of(w.set),
-            seed=STUDY.values.seed,
-        ),
-    log:
-        log_of("read_virtual_sensor", "{set}/{item}"),
-    benchmark:
-        benchmark_of("read_virtual_sensor", "{set}/{item}")
-    shell:
-        run_stage("read_virtual_sensor")
+if STUDY.virtual:
+
+    rule read_virtual_sensor:
+        input:
+            code=code("read_virtual_sensor"),
+            press=f"{RESULTS}/presses/{{set}}/{{item}}/{STUDY.values.reference}.nc",
+        output:
+            tactile=f"{RESULTS}/tactile/{{set}}/{{item}}.nc",
+        params:
+            files=files,
+            settings=lambda w: as_settings(
+                sensor=STUDY.sensor,
+                virtual_sensor=STUDY.values.virtual_sensor,
+                trials=STUDY.trials_of(w.set),
+                seed=STUDY.values.seed,
+            ),
+        log:
+            log_of("read_virtual_sensor", "{set}/{item}"),
+        benchmark:
+            benchmark_of("read_virtual_sensor", "{set}/{item}")
+        shell:
+            run_stage("read_virtual_sensor")
+
+else:
+
+    rule read_recordings:
+        input:
+            code=code("read_recordings"),
+            recordings=lambda w: [one.file for one in STUDY.recordings[f"{w.set}/{w.item}"]],
+            force_logs=lambda w: [one.force_log for one in STUDY.recordings[f"{w.set}/{w.item}"]],
+        output:
+            tactile=f"{RESULTS}/tactile/{{set}}/{{item}}.nc",
+        params:
+            files=files,
+            settings=lambda w: as_settings(
+                sensor=STUDY.sensor,
+                set=w.set,
+                item=w.item,
+                forces_n=STUDY.values.forces_n,
+                fingers=[one.finger for one in STUDY.recordings[f"{w.set}/{w.item}"]],
+                baselines=[one.baseline for one in STUDY.recordings[f"{w.set}/{w.item}"]],
+            ),
+        log:
+            log_of("read_recordings", "{set}/{item}"),
+        benchmark:
+            benchmark_of("read_recordings", "{set}/{item}")
+        priority: 1     # before the presses: an unusable recording is refused in the first minute
+        shell:
+            run_stage("read_recordings")
 
 
 rule press_section:

@@ -14,7 +14,7 @@ rule import_published:
     params:
         files=files,
         settings=as_settings(
-            **STUDY.values.data.model_dump(mode="json", exclude={"source"}),
+            **STUDY.values.data.model_dump(mode="json", exclude={"source", "recordings"}),
             models=STUDY.tested,
             sensor=STUDY.sensor,
             seed=STUDY.values.seed,

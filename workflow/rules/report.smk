@@ -213,7 +213,7 @@ rule draw_fig7_maps:
         files=files,
         settings=as_settings(
             units=[(item.id, item.unit) for item in SHOWN],
-            trials=STUDY.trials_of("grasps"),
+            trials=[STUDY.readings_of(item) for item in SHOWN],
             largest_counts=STUDY.spec.largest_counts,
         ),
     log:
@@ -328,8 +328,9 @@ rule report:
         **(
             {"inventory": rules.import_published.output.inventory, "counts": rules.import_published.output.counts}
             if STUDY.archive
-            else {"policies": rules.compare_policies.output.policies, "gains": rules.compare_gains.output.gains}
+            else {"policies": rules.compare_policies.output.policies}
         ),
+        **({"gains": rules.compare_gains.output.gains} if STUDY.virtual else {}),
         figures=[
             *(f"{RESULTS}/figures/material_{name}.png" for name in STUDY.values.materials),
             *(figure_files(name)["png"] for name in FIGURES[:1]),

@@ -18,6 +18,7 @@ from softtact.evaluation.claims_of_scores import VIRTUAL, claims_of_scores
 from softtact.evaluation.claims_of_study import claims_of_study
 from softtact.evaluation.claims_of_times import claims_of_times
 from softtact.evaluation.score_tables import untrained
+from softtact.published.archive import SOURCE as PUBLISHED
 
 
 def claims(*, cards: Sequence[dict[str, Any]], complexity: pd.DataFrame, ftir: dict[str, Any], ssim: pd.DataFrame,
@@ -28,7 +29,7 @@ def claims(*, cards: Sequence[dict[str, Any]], complexity: pd.DataFrame, ftir: d
            taxels: pd.DataFrame | None = None) -> pd.DataFrame:
     """Data frame with `claim_rows.COLUMNS`; the arguments are what the study's files hold.
 
-    source: of the readings; against the virtual sensor's no verdict is given on the paper's numbers
+    source: of the readings; only against the published archive's is a verdict given on the paper's numbers
     sensor: its name;  searches: {model: best.json};  repeated: {model: difference of a press done twice, mm}
     summary, per_item, ceiling, features, scores, taxels: tables of the evaluation, without which their claims are left open
     """
@@ -42,7 +43,7 @@ def claims(*, cards: Sequence[dict[str, Any]], complexity: pd.DataFrame, ftir: d
             *claims_in_print(printed_counts=printed_counts, printed_times=printed_times)]
     frame = pd.DataFrame(rows, columns=COLUMNS)
     # The archive has maps and readings; stress-strain curves and camera frames of the paper are not in it.
-    return frame if source == VIRTUAL else frame.replace({"verdict": {ARCHIVE: MEASUREMENTS}})
+    return frame.replace({"verdict": {ARCHIVE: MEASUREMENTS}}) if source == PUBLISHED else frame
 
 
 def _ftir(ftir):

@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 
 from softtact.evaluation.claims_of_scores import PRINTED_SSIM
+from softtact.published.archive import SOURCE as PUBLISHED
 
 CLEAR = 0.01      # of mean SSIM: below, a difference is no more than another seed may make (assumed)
 COLUMNS = ["model", "set", "ssim", "paper", "sensor_ssim", "perfect_model_gain", "more_maps_gain", "other_network_gain", "limit",
@@ -60,7 +61,7 @@ def _largest(gains):
 
 def _sentence(score, paper, curve, gains, limit, source, mean):
     against = "" if np.isnan(paper) else (f" ({'at least' if score >= paper else 'below'} the paper's {paper:g}, which is of other "
-                                          "readings)" if source != "published archive" else f" (paper: {paper:g})")
+                                          "readings)" if source != PUBLISHED else f" (paper: {paper:g})")
     told = [f"a perfect model would bring {gains['model']:+.3f}" if not np.isnan(gains["model"]) else "",
             f"going from {curve.maps.iloc[-2]} to {curve.maps.iloc[-1]} maps brought {gains['data']:+.3f}"
             if not np.isnan(gains["data"]) else "", f"the best network trained here {gains['network']:+.3f}"]

@@ -18,7 +18,7 @@ class Samples:
 
     maps_mm (n, y, x) float32;  counts (n, row, column) float32;  labels: a row each of set, item, trial, force_n
     model: what made the deformation maps;  split: train, validation, unseen or grasps
-    source: what made the readings ("virtual sensor", "published archive")
+    source: what made the readings ("virtual sensor", "recording of a TSF-85", "published archive")
     """
 
     maps_mm: np.ndarray

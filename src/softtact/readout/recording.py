@@ -94,20 +94,23 @@ def findings(recording: "xarray.Dataset", *, largest: float | None = None) -> li
     said = []
     for finger, row, column in np.argwhere(at_end.any(axis=0)):
         first = int(np.argmax(at_end[:, finger, row, column]))
-        said.append(f"{file}, row {_row(recording, first)}: {_taxel(finger, row, column)} reads "
+        said.append(f"{file}, row {row_of(recording, first)}: {taxel_in_words(finger, row, column)} reads "
                     f"{counts[first, finger, row, column]:g} counts, the end of its range; "
                     f"{at_end[:, finger, row, column].sum()} readings of it are clipped.")
     for finger, row, column in np.argwhere(stuck):
-        said.append(f"{file}, row {_row(recording, 0)}: {_taxel(finger, row, column)} reads {counts[0, finger, row, column]:g} "
-                    f"counts in all {len(counts)} readings while others of its finger move; it may be dead.")
+        said.append(f"{file}, row {row_of(recording, 0)}: {taxel_in_words(finger, row, column)} reads "
+                    f"{counts[0, finger, row, column]:g} counts in all {len(counts)} readings while others of its finger move; it "
+                    "may be dead.")
     return said
 
 
-def _row(recording, reading):
+def row_of(recording: "xarray.Dataset", reading: int) -> int:
+    """Row of its file that a reading stands in, or its own number where there is no file."""
     return int(recording.row_of_file[reading]) if "row_of_file" in recording else reading
 
 
-def _taxel(finger, row, column):
+def taxel_in_words(finger: int, row: int, column: int) -> str:
+    """A taxel for a message."""
     return f"finger {finger}, taxel {row * COLUMNS + column} (row {row}, column {column})"
 
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import xarray
 
 TIME = "Time(ms)"
+RECORDER = "recorder of the TSF-85"       # source of its recordings
 BASELINES = ("auto", "subtracted", "kept")
 _STATIC = re.compile(r"S(\d+)_(\d+)")
 _LOW = 0.02             # of the readings of a taxel: as low as at rest, wherever in the recording it is at rest
@@ -124,7 +125,7 @@ def _of_recorder(path, table, baseline):
     shape = (len(time), FINGERS, len(AXES))
     others = {name: values if name == "dynamic" else values.reshape(shape) for name, values in others.items()}
     return make_recording(1e-3 * (time - time[0]), counts, baseline=base, row_of_file=rows[1:], start_ms=int(time[0]),
-                          source="recorder of the TSF-85", file=str(path), **others)
+                          source=RECORDER, file=str(path), **others)
 
 
 def _optional():
@@ -203,7 +204,7 @@ def _how_written(path, base, readings):
     off, on = (float(np.sqrt(np.mean(values**2))) for values in (low, low - base))
     if min(off, on) > _CLEARLY * max(off, on):
         raise InputError(f"{path}: whether the baseline is taken off its readings is not clear, for the lowest lie {off:.0f} "
-                         f"counts from 0 and {on:.0f} from the baseline; state it (--baseline subtracted, or kept).")
+                         f"counts from 0 and {on:.0f} from the baseline; state it (`baseline`, --baseline: subtracted, or kept).")
     return "subtracted" if off < on else "kept"
 
 

@@ -2,6 +2,7 @@
 
 
 from collections.abc import Sequence
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from softtact.reporting.render import View, add_view, part_of, rendered, tell_fallback
@@ -17,7 +18,7 @@ def draw(objects: Sequence[dict[str, Any]], *, largest_counts: float) -> "Figure
     """Figure from a list of objects.
 
     Each {name, mesh, chosen, deformation {model: (y, x)} in mm, tactile {model: (row, column)} in counts, sensor (row, column),
-    trials (that its mean is of), extent, force}.
+    source (of its readings), trials (that their mean is of), extent, force}.
     largest_counts: where the colours of tactile maps end
     """
     plt = pyplot()
@@ -43,13 +44,18 @@ def draw(objects: Sequence[dict[str, Any]], *, largest_counts: float) -> "Figure
                 _outline(axis)
         axis = figure.add_subplot(grid[-1, k])
         counts = draw_map(axis, item["sensor"], extent=item["extent"], limits=(0, largest_counts))
-        _label(axis, k, "virtual\nsensor\nx (mm)")
+        _label(axis, k, f"{fill(item['source'], 12)}\nx (mm)")
         axis.set_xlabel("y (mm)")
     figure.colorbar(counts, ax=figure.axes[-1], label="counts", shrink=0.8)
     figure.suptitle(f"{objects[0]['force']:g} N; maps turned 90 degrees counter-clockwise; red: the model that the complexity "
-                    f"rule chose; sensor: mean of {objects[0]['trials']} trials")
+                    f"rule chose; sensor: mean of {_trials(objects)} trials")
     tell_fallback(figure, images)
     return figure
+
+
+def _trials(objects):
+    least, most = (pick(item["trials"] for item in objects) for pick in (min, max))
+    return most if least == most else f"{least} to {most}"
 
 
 def _label(axis, column, text):

@@ -13,7 +13,7 @@ from markupsafe import Markup
 import softtact
 from softtact.evaluation.score_tables import ALL_FORCES, forces_of
 from softtact.files import read_json
-from softtact.reporting.gaps import missing
+from softtact.reporting.gaps import missing, recorded
 from softtact.reporting.page_template import PAGE, SOURCES, STYLE
 from softtact.reporting.run_record import run_sentence
 from softtact.reporting.tables import machine
@@ -33,16 +33,17 @@ CAPTIONS = {
                  "more than the noise left in a mean of few trials. Red marks: predictors without a network, on the hyperelastic "
                  "maps where they look at a map. A bar below the red dash is a network that is not trained.",
     "fig7_maps": "Figure 7. Objects seen from the side that touches, deformation maps of both models in mm (one scale for both), "
-                 "tactile maps predicted from them, and the virtual sensor's (mean of its trials). Jet colours and turned 90 "
-                 "degrees as printed; tactile maps from 0 to the readout's largest count; red: the model chosen by the complexity "
-                 "rule.",
+                 "tactile maps predicted from them, and those that the sensor (virtual, or recorded) read, the mean of its "
+                 "trials. Jet colours and turned 90 degrees as printed; tactile maps from 0 to the readout's largest count; red: "
+                 "the model chosen by the complexity rule.",
     "fig8_policies": "Figure 8. Left: what each policy costs and which error it accepts, against the study's hyperelastic model. "
                      "Right: the error that was expected before the costly model ran, against the true one.",
     "fig9_networks": "Figure 9. The paper's network and another architecture on the same split. Left: mean SSIM with its 95 % "
                      "interval (bootstrap over objects, then trials). Right: loss and SSIM of the validation maps after an epoch.",
     "fig10_learning_curve": "Figure 10. Mean SSIM against the number of training maps, with its 95 % interval (bootstrap over "
-                            "objects, then trials): equal steps of the optimiser for each. The reference's maps are those that the "
-                            "virtual sensor itself felt, so that line is what the same network reads from a perfect model.",
+                            "objects, then trials): equal steps of the optimiser for each. Where the readings are a virtual "
+                            "sensor's, the reference's maps are those that it felt itself, so that line is what the same network "
+                            "reads from a perfect model.",
 }
 TITLES = {"summary": "Scores with their 95 % interval, by set",
           "levels": "Scores at each force",
@@ -81,7 +82,7 @@ def render_page(inputs: dict[str, Any], settings: dict[str, Any], *, folder: Pat
     scores = pd.read_csv(inputs["scores"], dtype={"force": str})
     return Environment(autoescape=True).from_string(PAGE).render(
         study=settings["study"], style=Markup(STYLE), facts=_archive_facts(settings, archive) if archive else _facts(settings),
-        synthetic=_synthetic_but_for_the_archive(ftir) if archive else _synthetic(ftir, settings["config"]),
+        synthetic=_synthetic_but_for_the_archive(ftir) if archive else _synthetic(ftir, settings),
         missing=missing(settings, archive=archive is not None),
         tables=_tables(inputs, folder), verdicts_on_networks=read_json(inputs["verdicts"])["sentences"],
         result=Markup(_html(result_table(scores))), result_link=_link(inputs["scores"], folder),
@@ -124,12 +125,13 @@ def _tables(inputs, folder):
 
 
 def _facts(settings):
-    said = {name: f"{settings[name]} {words} in {settings['presses'][name]} places, each read {settings['trials'][name]} times"
+    said = {name: f"{settings[name]} {words} in {settings['presses'][name]} places, each read {settings['trials'][name]:.3g} times"
             for name, words in (("indenters", "indenters"), ("unseen", "unseen ones"), ("grasps", "objects"))}
     forces = ", ".join(f"{force:g}" for force in settings["forces_n"])
+    reader = "from recordings of a TSF-85 (tactile/)" if recorded(settings) else "by the virtual sensor"
     another = "It is not the paper's sensor: the paper's numbers and claims below are another sensor's. "
     return (f"Sensor {settings['sensor']}. {'' if settings['sensor'].startswith(PAPERS_SENSOR) else another}"
-            f"Pressed at {forces} N with each model and read by the virtual sensor: {'; '.join(said.values())}. "
+            f"Pressed at {forces} N with each model and read {reader}: {'; '.join(said.values())}. "
             f"Seed {settings['seed']}.")
 
 
@@ -151,12 +153,15 @@ def _synthetic_but_for_the_archive(ftir):
             "order, how the taxels lie, and which indenters are held out is assumed.")
 
 
-def _synthetic(ftir, config):
+def _synthetic(ftir, settings):
+    config = settings["config"]
     rubs = "friction, " if config.get("models", {}).get(config.get("reference"), {}).get("friction") else ""
+    readings = ("the readings are own recordings of a TSF-85, so SSIM values below are against them" if recorded(settings) else
+                f"the readings come from a virtual sensor (another law, another mesh, {rubs}scatter, hysteresis, noise). SSIM "
+                "values below are against that virtual sensor")
     return ("The paper's curves, camera frames and taxel readings are not published here. Stress-strain curves are made from "
-            f"its printed constants with noise; the measured contact area is from: {ftir['source']}; the readings come from a "
-            f"virtual sensor (another law, another mesh, {rubs}scatter, hysteresis, noise). SSIM values below are "
-            "against that virtual sensor and are not the paper's.")
+            f"its printed constants with noise; the measured contact area is from: {ftir['source']}; {readings} and are not the "
+            "paper's.")
 
 
 def result_table(scores: pd.DataFrame) -> pd.DataFrame:

@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from importlib import resources
 from itertools import groupby
 from pathlib import Path
+from statistics import mean
 from typing import Any
 
 from softtact.errors import InputError
@@ -17,13 +18,15 @@ from softtact.materials.config import load_material
 from softtact.progress import announce
 from softtact.published.archive import SOURCE as PUBLISHED
 from softtact.published.archive import Archive, find_archive
+from softtact.readout.recorded_press import SOURCE as RECORDED
 from softtact.readout.ssim import check_window
 from softtact.readout.virtual_sensor import VirtualSensorSettings, make_specimen
 from softtact.sensors.library import is_shipped, material_file, sensor_file
 from softtact.sensors.specification import SensorSpec
 from softtact.study.faults import refuse_unknown, validated
-from softtact.study.keys import CENTRED, Values
+from softtact.study.keys import CENTRED, Recording, Values
 from softtact.study.objects import Item, check_shapes, items_of_set, make_item, read_catalogue
+from softtact.study.recordings import recordings_of
 
 SHIPPED = Path(str(resources.files("softtact.study"))) / "data"     # what stands in the project's config/
 SETS = ("indenters", "unseen", "grasps")
@@ -37,7 +40,8 @@ class Study:
     values: the configuration;  spec: the sensor
     materials: {name: MaterialConfig};  items_of: {set: {id: Item}} in the order of the configuration
     section_item: what figure 2 presses
-    archive: the published files that maps and readings come from, or None where they are generated
+    archive: the published files that maps and readings come from, or None where items are pressed
+    recordings: {SET/ITEM: recordings that its readings come from}, or None
     """
 
     values: Values
@@ -46,6 +50,12 @@ class Study:
     items_of: dict
     section_item: Item
     archive: Archive | None = None
+    recordings: dict[str, list[Recording]] | None = None
+
+    @property
+    def virtual(self) -> bool:
+        """Whether the readings are the virtual sensor's, which feels the reference's presses."""
+        return self.archive is None and self.recordings is None
 
     @property
     def tested(self) -> list[str]:
@@ -54,8 +64,8 @@ class Study:
 
     @property
     def learnt_from(self) -> list[str]:
-        """The models whose maps data sets are made of: those under test, and the reference, as if a model were perfect."""
-        return self.tested if self.archive else list(dict.fromkeys([*self.tested, self.values.reference]))
+        """The models whose maps data sets are made of: those under test, and the reference where the virtual sensor felt it."""
+        return list(dict.fromkeys([*self.tested, self.values.reference])) if self.virtual else self.tested
 
     @property
     def pressed_with(self) -> list[str]:
@@ -65,12 +75,12 @@ class Study:
     @property
     def source(self) -> str:
         """What the readings are from, in words."""
-        return PUBLISHED if self.archive else "virtual sensor"
+        return "virtual sensor" if self.virtual else PUBLISHED if self.archive else RECORDED
 
     @property
     def counts_per_relative_change(self) -> float | None:
-        """Gain of the virtual sensor's readings; None where they are an archive's, whose gain is not known."""
-        return None if self.archive else VirtualSensorSettings.from_dict(self.values.virtual_sensor).counts_per_relative_change
+        """Gain of the virtual sensor's readings; None where they are a real sensor's, whose gain is not known."""
+        return VirtualSensorSettings.from_dict(self.values.virtual_sensor).counts_per_relative_change if self.virtual else None
 
     @property
     def name(self) -> str:
@@ -82,9 +92,17 @@ class Study:
         """The sensor's description as plain JSON values; what is assumed, and why, is left out."""
         return self.spec.model_dump(mode="json")
 
-    def trials_of(self, set_name: str) -> int:
-        """How often the virtual sensor reads each press of a set."""
-        return getattr(self.values.objects, set_name).trials or self.values.trials
+    def trials_of(self, set_name: str) -> float:
+        """How often each press of a set is read; of recordings, the mean over its items."""
+        if self.recordings is None:
+            return getattr(self.values.objects, set_name).trials or self.values.trials
+        return mean(map(self.readings_of, self.items_of[set_name].values())) if self.items_of[set_name] else 0
+
+    def readings_of(self, item: Item) -> int:
+        """How often an item's press is read."""
+        if self.recordings is not None:
+            return len(self.recordings[f"{item.set}/{item.id}"])
+        return getattr(self.values.objects, item.set).trials or self.values.trials
 
     def named(self) -> dict[str, Any]:
         """What the configuration names, as plain JSON values: the sensor, the materials' settings, the items of each set."""
@@ -150,7 +168,8 @@ def load_study(values: dict[str, Any]) -> Study:
     catalogue = read_catalogue(here_or_shipped(checked.objects.catalogue))
     items_of = {name: items_of_set(name, getattr(checked.objects, name), catalogue, spec=spec, seed=checked.seed) for name in SETS}
     check_shapes(items_of)
-    study = Study(checked, spec, materials, items_of, _section_item(checked, catalogue), _archive(checked))
+    study = Study(checked, spec, materials, items_of, _section_item(checked, catalogue), _archive(checked),
+                  recordings_of(checked.data, items_of, spec))
     _say_outside_paths(study)
     return study
 
@@ -169,7 +188,8 @@ def _say_outside_paths(study):
     named = [("objects.catalogue", values.objects.catalogue), *((f"object {item.object}", item.file) for item in study.items()),
              *((f"material {name}", path) for name, config in study.materials.items() for path in config.measured_files),
              ("ftir.measured", values.ftir.measured), ("sensor", sensor_file(values.sensor)),
-             ("data.folder", values.data.folder if values.data.source == "published" else None)]
+             ("data.folder", values.data.folder if values.data.source == "published" else None),
+             *(("data.recordings", str(Path(path).parent)) for one in values.data.recordings for path in (one.file, one.force_log))]
     for what, path in dict.fromkeys(named):
         if path is None or is_shipped(path) or Path(path).is_relative_to(SHIPPED):
             continue
@@ -186,7 +206,7 @@ def _section_item(values, catalogue):
 
 def _archive(values):
     """The published files that the study reads, or None."""
-    if values.data.source == "generated":
+    if values.data.source != "published":
         return None
     return find_archive(values.data.folder, models=values.tested, variant=values.data.variant)
 

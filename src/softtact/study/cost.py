@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from softtact.errors import InputError
 from softtact.files import read_yaml
-from softtact.study.config import SETS, Study, here_or_shipped
+from softtact.study.config import Study, here_or_shipped
 
 if TYPE_CHECKING:
     from softtact.learning.settings import Search
@@ -88,11 +88,11 @@ def _presses(study, measured, folder):
 
 def _readings(study, measured, folder):
     files = [folder / "tactile" / item.set / f"{item.id}.nc" for item in study.items()]
-    trials, load_steps = {name: study.trials_of(name) for name in SETS}, len(study.values.forces_n)
-    numbers = sum(trials[item.set] for item in study.items()) * load_steps * READING_NUMBERS
+    stage = "read_virtual_sensor" if study.virtual else "read_recordings"
+    numbers = sum(map(study.readings_of, study.items())) * len(study.values.forces_n) * READING_NUMBERS
     taxels = study.spec.taxels.rows * study.spec.taxels.columns
-    seconds = _own(folder, "read_virtual_sensor/*/*.tsv") or measured["reading_s"]
-    return Cost("read_virtual_sensor", len(files), _left(files), seconds, numbers * taxels * 2 * BYTES / 1e6)
+    seconds = _own(folder, f"{stage}/*/*.tsv") or measured["reading_s"]     # of both: most of it is the start of a program
+    return Cost(stage, len(files), _left(files), seconds, numbers * taxels * 2 * BYTES / 1e6)
 
 
 @dataclass(frozen=True)
@@ -110,9 +110,9 @@ class Sizes:
         maps = {name: len(items) * load_steps for name, items in study.items_of.items()}
         trained = round(dataset.train_fraction * maps["indenters"])
         each = study.trials_of("indenters")
-        return cls(train=trained * (1 if dataset.training_trials == "mean" else each),
-                   validation=(maps["indenters"] - trained) * each,
-                   tests=sum(maps[name] * study.trials_of(name) for name in ("unseen", "grasps")))
+        return cls(train=round(trained * (1 if dataset.training_trials == "mean" else each)),
+                   validation=round((maps["indenters"] - trained) * each),
+                   tests=round(sum(maps[name] * study.trials_of(name) for name in ("unseen", "grasps"))))
 
 
 def _learning(study, measured, folder):

@@ -230,10 +230,25 @@ class Model(Section):
         return ["frustum_law", "card_dielectric", "card_cover"] if self.kind == "foundation" else []
 
 
-class Data(Section):
-    """Where maps and readings come from: presses and the virtual sensor, or the archive that the paper's authors published."""
+class Recording(Section):
+    """A recording of one press of an item by a TSF-85, with its force."""
 
-    source: Literal["generated", "published"] = "generated"
+    item: Annotated[str, Field(pattern=r"^[a-z]+/[a-z0-9_-]+$")] = Field(description="SET/ITEM of the study, unseen/hexagon say")
+    file: str = Field(description="CSV of the maker's recorder")
+    force_log: str = Field(description="CSV with time_s or Time(ms), and force_n, over the recording's time")
+    finger: Literal[0, 1] = Field(0, description="that was pressed")
+    baseline: Literal["auto", "subtracted", "kept"] = Field("auto", description="how the recorder wrote the readings")
+
+
+class Data(Section):
+    """Where maps and readings come from.
+
+    generated: presses, and the virtual sensor;  recorded: presses, and recordings of a real sensor;  published: both from the
+    archive that the paper's authors published
+    """
+
+    source: Literal["generated", "recorded", "published"] = "generated"
+    recordings: list[Recording] = Field([], description="where the source is recorded; several of an item are its trials")
     folder: str = Field("dataset", description="of the archive's CSV files (docs/how-to/published_archive.md)")
     variant: str | None = Field(None, description="ending of the files to read, V1 say, where there are several of a kind")
     unseen: list[Name] = Field([], description="the archive's indenters that training never sees, donut_m for its DonutM")
@@ -246,6 +261,13 @@ class Data(Section):
     def _has_unseen_indenters(self):
         if self.source == "published" and not self.unseen:
             raise ValueError("'unseen' is empty; name indenters of the archive that training must not see")
+        return self
+
+    @model_validator(mode="after")
+    def _uses_its_recordings(self):
+        if self.recordings and self.source != "recorded":
+            raise ValueError(f"'recordings' are listed, and the source is {self.source!r}, which reads none; write 'source: "
+                             "recorded', or leave them out")
         return self
 
 

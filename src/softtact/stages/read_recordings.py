@@ -1,0 +1,56 @@
+"""The readings of an item from recordings of a real sensor, a trial each, in place of the virtual sensor's.
+
+inputs: recordings, force_logs (lists of CSV);  outputs: tactile
+settings: sensor, set, item, forces_n, fingers and baselines (lists, one for each recording)
+"""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray
+
+from softtact.errors import InputError
+from softtact.files import write_dataset
+from softtact.progress import announce
+from softtact.readout.recorded_press import SOURCE, RecordedPress, readings_at
+from softtact.readout.recording import COLUMNS, dead, with_force
+from softtact.readout.tsf85 import RECORDER, read_recording
+from softtact.sensors.specification import SensorSpec
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+_AXES = ("trial", "force", "row", "column")
+
+
+def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
+    """Write the counts at the study's forces on the way up and, where all recordings have it, on the way down."""
+    spec, forces = SensorSpec.from_dict(settings["sensor"]), settings["forces_n"]
+    recordings = inputs["recordings"]
+    presses = [_read(path, log, forces, finger=finger, baseline=baseline, largest_counts=spec.largest_counts)
+               for path, log, finger, baseline in zip(recordings, inputs["force_logs"], settings["fingers"], settings["baselines"],
+                                                      strict=True)]
+    counts = {"tactile_map": [press.loading for press in presses], "unloading_tactile_map": [press.unloading for press in presses]}
+    held = [str(path) for path, press in zip(recordings, presses, strict=True) if press.unloading is None]
+    if held:
+        announce(f"{settings['set']}/{settings['item']}: no readings on the way down, for {', '.join(held)} "
+                 f"{'ends' if len(held) == 1 else 'end'} above {forces[0]:g} N.")
+        del counts["unloading_tactile_map"]
+    data = xarray.Dataset({name: (_AXES, np.array(trials), {"units": "counts"}) for name, trials in counts.items()}
+                          | {"force_n": ("force", np.array(forces, dtype=float), {"units": "N"})},
+                          attrs={"source": SOURCE, "set": settings["set"], "item": settings["item"],
+                                 "files": "; ".join(map(str, recordings))})
+    write_dataset(outputs["tactile"], data, seed=None, settings=settings)
+
+
+def _read(path: "Path", log: "Path", forces: list[float], *, finger: int, baseline: str, largest_counts: float) -> RecordedPress:
+    """One recording at the forces; what no sensor read is refused."""
+    recording = read_recording(path, baseline=baseline)
+    if recording.attrs["source"] != RECORDER:
+        raise InputError(f"{path}: it is of the {recording.attrs['source']}, which no sensor read; give a file of the TSF-85's "
+                         "recorder.")
+    still = [str(row * COLUMNS + column) for row, column in np.argwhere(dead(recording)[finger])]
+    if still:
+        announce(f"{path}: taxel {', '.join(still)} of finger {finger} never changes while others do; it may be dead, and is taken "
+                 "as it reads.")
+    return readings_at(with_force(recording, log), forces, finger=finger, largest_counts=largest_counts)
