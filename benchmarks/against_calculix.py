@@ -23,6 +23,9 @@ from pathlib import Path
 import numpy as np
 import record
 import trimesh
+from free_bodies.free_body import FreeBody, RigidContact
+from free_bodies.free_press import FreeSettings, press_to_indentations
+from free_bodies.tetrahedra import LinearTetrahedra
 from sensor_meshes import Stack, compressed, layered_mesh, octagon_cell, tetrahedra_of, triangles_of, wedges_of
 from threadpoolctl import threadpool_limits
 
@@ -33,9 +36,6 @@ from softtact.fem.elements import TET4
 from softtact.linalg.direct_single import PardisoSingle
 from softtact.linalg.workers import Workers
 from softtact.materials.laws.registry import make_law
-from softtact.models.solid.free_body import FreeBody, RigidContact
-from softtact.models.solid.free_press import FreeSettings, press_to_indentations
-from softtact.models.solid.tetrahedra import LinearTetrahedra
 from softtact.sensors.library import sensor_file
 from softtact.sensors.specification import SensorSpec
 

@@ -1,6 +1,6 @@
 """Which element for the sensor? Error against unknowns and time: `python benchmarks/discretisation.py` (an hour on one thread).
 
-Every kind of element on meshes of the same cells, in the same press (`softtact.models.solid.free_press`):
+Every kind of element on meshes of the same cells, in the same press (`free_bodies.free_press`):
   cell   one frustum of an endless lattice with its sheet and cover, tip held, its side on the PCB, the top lowered to 0.2 mm in
          eight steps: error of the mean pressure, at K = 20 mu0 and at nu = 0.4995
   patch  6 x 6 frusta, sides symmetric, tips held sideways, tips and cone sides on the PCB; a flat punch of 3 mm radius at 8 N:
@@ -18,14 +18,14 @@ from pathlib import Path
 import numpy as np
 import record
 from element_kinds import KINDS, discretise, face_points
+from free_bodies.free_body import FreeBody, RigidContact, flat_surface, ground
+from free_bodies.free_press import FreeSettings, press_to_forces, press_to_indentations
 from scipy.spatial import cKDTree
 from sensor_meshes import Stack, layered_mesh, octagon_cell
 
 from softtact.errors import ConvergenceError
 from softtact.fem.extruded_mesh import cell_mesh_2d
 from softtact.materials.laws.registry import make_law
-from softtact.models.solid.free_body import FreeBody, RigidContact, flat_surface, ground
-from softtact.models.solid.free_press import FreeSettings, press_to_forces, press_to_indentations
 from softtact.sensors.library import sensor_file
 from softtact.sensors.specification import SensorSpec
 

@@ -7,13 +7,13 @@ coordinates, or so many that the projection changes nothing (a plain displacemen
 from dataclasses import dataclass
 
 import numpy as np
+from free_bodies.free_body import SolidElements
+from free_bodies.tetrahedra import LinearTetrahedra
 from sensor_meshes import compressed, tetrahedra_of, wedges_of
 
 from softtact.fem.elements import HEX20, HEX27, QUAD8, QUAD9, TRI6, WEDGE18, reference_gradients
 from softtact.fem.quadrature import gauss, wedge_rule
 from softtact.fem.solid_block import SolidBlock
-from softtact.models.solid.free_body import SolidElements
-from softtact.models.solid.tetrahedra import LinearTetrahedra
 
 _TET_EDGES = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
 _TET_FACES = np.array([[0, 1, 2, 4, 5, 6], [0, 1, 3, 4, 8, 7], [1, 2, 3, 5, 9, 8], [2, 0, 3, 6, 7, 9]])

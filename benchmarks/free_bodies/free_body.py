@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from free_bodies.contact_correction import ContactCorrection
+from free_bodies.tetrahedra import LinearTetrahedra
 from softtact.contact.penalty import penalty
 from softtact.fem.assembly import SymmetricPattern, add_upper
 from softtact.fem.solid_block import SolidBlock
@@ -17,8 +19,6 @@ from softtact.linalg.block_tridiagonal import BlockTridiagonalSolver
 from softtact.linalg.direct import PardisoSolver, SuperLUSolver, make_solver
 from softtact.linalg.direct_single import point_at_mkl
 from softtact.linalg.workers import SERIAL, Workers
-from softtact.models.solid.contact_correction import ContactCorrection
-from softtact.models.solid.tetrahedra import LinearTetrahedra
 
 # Heights (n,) and outward normals (n, 3) of a rigid surface over places x (n,), y (n,).
 Surface = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]

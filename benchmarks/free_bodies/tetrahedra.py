@@ -16,9 +16,9 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numba import njit
 
+from free_bodies.small_tensors import cofactor, combined, cross, dot, left_cauchy_green, symmetric_times, times
+from free_bodies.tetrahedra_forces import add_forces
 from softtact.materials.laws.invariants import InvariantLaw
-from softtact.models.solid.small_tensors import cofactor, combined, cross, dot, left_cauchy_green, symmetric_times, times
-from softtact.models.solid.tetrahedra_forces import add_forces
 
 _PLACE = ((0, 3, 5), (3, 1, 4), (5, 4, 2))     # of a symmetric matrix's entries in xx, yy, zz, xy, yz, zx
 

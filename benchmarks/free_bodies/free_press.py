@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from free_bodies.free_body import FreeBody, FreeState
 from softtact.errors import ConvergenceError
 from softtact.models.newton import lowers_potential, solve
-from softtact.models.solid.free_body import FreeBody, FreeState
 
 
 @dataclass(frozen=True)

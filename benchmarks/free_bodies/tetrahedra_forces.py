@@ -7,7 +7,7 @@ sees that no row overlaps another, and computes several lanes at once. A third o
 import numpy as np
 from numba import njit
 
-from softtact.models.solid.small_tensors import cofactor, combined, left_cauchy_green, symmetric_times, times
+from free_bodies.small_tensors import cofactor, combined, left_cauchy_green, symmetric_times, times
 
 _LANES = 16
 # First rows: displacements of nodes 1 to 3 from node 0's, gradients, volume, psi and its derivatives by i1 and i2, forces ...

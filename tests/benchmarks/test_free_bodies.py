@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from free_bodies.free_body import FreeBody, RigidContact, SolidElements, flat_surface, ground
+from free_bodies.free_press import FreeSettings, _least_squares, press_to_forces, press_to_indentations
+from free_bodies.tetrahedra import LinearTetrahedra
 
 from softtact.fem.solid_block import SolidBlock
 from softtact.linalg.direct_single import PardisoSingle
 from softtact.materials.laws.registry import make_law
-from softtact.models.solid.free_body import FreeBody, RigidContact, SolidElements, flat_surface, ground
-from softtact.models.solid.free_press import FreeSettings, _least_squares, press_to_forces, press_to_indentations
-from softtact.models.solid.tetrahedra import LinearTetrahedra
 
 LAWS = {
     "mooney_rivlin": make_law("mooney_rivlin", {"c10": 0.1706, "c01": 0.0040}, bulk_modulus=7.0),

@@ -15,7 +15,7 @@ from softtact.linalg.block_tridiagonal import BlockTridiagonalSolver
 from softtact.linalg.direct import PardisoSolver, SuperLUSolver
 
 if TYPE_CHECKING:
-    from softtact.models.solid.free_body import FreeState, RigidContact
+    from free_bodies.free_body import FreeState, RigidContact
 
 _INNER_ITERATIONS = 15
 _INNER_TOLERANCE = 0.02   # of the residual that the step is to cut
