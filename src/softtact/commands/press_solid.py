@@ -111,17 +111,17 @@ def _plain(value: Any) -> Any:
 
 def lines(summary: dict[str, Any]) -> Iterator[str]:
     """What is printed of a summary."""
-    yield f"{'force x, y, z, N':>27}{'way x, y, z, mm':>27}{'most moved, mm':>16}{'pressure, MPa':>15}"
+    yield f"{'force x, y, z, N':>33}{'way x, y, z, mm':>33}{'most moved, mm':>16}{'pressure, MPa':>15}"
     names = ("load", "way_mm", "largest_displacement_mm", "largest_pressure_mpa")
     for load, way, moved, pressure in zip(*(summary[name] for name in names), strict=True):
-        yield "".join(f"{value:9.3g}" for value in (*load[:3], *way)) + f"{moved:16.4f}{pressure:15.4g}"
+        yield "".join(f"{value:11.3g}" for value in (*load[:3], *way)) + f"{moved:16.4f}{pressure:15.4g}"
     if summary["reading_points_mm"]:
         yield "readings at the last step:"
-        yield f"{'point x, y, z, mm':>27}{'displacement x, y, z, mm':>27}{'pressure, MPa':>15}"
+        yield f"{'point x, y, z, mm':>33}{'displacement x, y, z, mm':>33}{'pressure, MPa':>15}"
         read = (summary[f"reading_{name}"][-1] for name in ("displacement_mm", "pressure_mpa"))
         for point, moved, pressure in zip(summary["reading_points_mm"], *read, strict=True):
             told = "-" if pressure is None else f"{pressure:.4g}"
-            yield "".join(f"{value:9.3g}" for value in (*point, *moved)) + f"{told:>15}"
+            yield "".join(f"{value:11.3g}" for value in (*point, *moved)) + f"{told:>15}"
     yield f"iterations: {sum(summary['iterations'])}; deepest overlap in a contact: {1e3 * max(summary['penetration_mm']):.2g} um"
     yield f"largest unbalanced force: {max(summary['residual_n']):.2g} N"
     if None not in summary["extrapolated_volume_fraction"]:
