@@ -10,6 +10,7 @@ import yaml
 from softtact.cli import main
 from softtact.errors import InputError
 from softtact.evaluation.claims_of_grasps import claims_of_grasps
+from softtact.geometry.pose import Pose
 from softtact.study.cost import read_costs
 from softtact.study.grasps import cost_lines, load_grasp_study
 
@@ -107,3 +108,13 @@ def test_claims_hold_by_their_rules_alone():
     assert verdicts(GRASP | {"force_left_n": 48.0}, [0.02, 0.6])["The"] == "not reproduced"
     assert verdicts(GRASP, [0.2, 0.6])["object"] == verdicts(GRASP, [0.02, 0.2])["object"] == "not reproduced"
     assert good["SSIM"] == "needs the archive"
+
+
+def test_the_rule_is_asked_for_the_place_of_an_object_not_for_its_middle(tmp_path):
+    # Off the middle the key's teeth are over the pad, and much of its smooth head is not.
+    study = load_grasp_study(config(tmp_path, objects=["key"]))
+    entry = study.items[0].entry
+    aside = Pose.from_values([2.46, -4.96, 0, 0, 0, 148.44])
+    assert study.ruled_model(entry, "left") == "elastic"
+    assert study.ruled_at(entry, Pose.from_values([0, 0, 0, 0, 0, 0])) == "elastic"
+    assert study.ruled_at(entry, aside) == "hyperelastic"

@@ -134,13 +134,14 @@ def _row(study: GraspStudy, item: GraspItem, done: Any) -> dict[str, Any]:
     if isinstance(done, Exception):
         return row | {"status": "failed", "message": str(done)}
     data, readings = done
-    at = int(data.event_row[GRIP])
+    at, mesh = int(data.event_row[GRIP]), read_mesh(item.entry.file, unit=item.entry.unit)
     row |= {"status": "done", "message": "", "trials": readings.sizes["trial"],
             "contact_s": float(data.time_s[int(data.event_row[0])]), "grip_s": float(data.time_s[at])}
     for finger, name in enumerate(FINGERS):
+        pose = set_down(mesh, pose_of(data.object_pose_sensor.values[at, finger]))
         spread = readings.tactile_map.values[finger].std(axis=0, ddof=1) if readings.sizes["trial"] > 1 else np.zeros(1)
         row |= {f"force_{name}_n": -float(data.force_n[at, finger, 2]), f"model_contact_{name}": data.model.values[0, finger],
-                f"model_grip_{name}": data.model.values[GRIP, finger], f"rule_{name}": study.ruled_model(item.entry, name),
+                f"model_grip_{name}": data.model.values[GRIP, finger], f"rule_{name}": study.ruled_at(item.entry, pose),
                 f"valid_{name}": int(data.within_validity[GRIP, finger]),
                 f"deepest_{name}_mm": float(data.deformation_map_mm[GRIP, finger].max()),
                 f"counts_{name}": float(readings.tactile_map[finger].sum(dim=("row", "column")).mean()),

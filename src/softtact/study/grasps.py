@@ -15,6 +15,7 @@ from softtact.errors import InputError
 from softtact.files import digest, read_yaml
 from softtact.geometry.complexity import choose_model, score
 from softtact.geometry.meshes import place, read_mesh
+from softtact.geometry.pose import Pose
 from softtact.materials.config import law_from_printed
 from softtact.models.hyperelastic.presets import PRESETS
 from softtact.press.sensor import Sensor, load_sensor
@@ -103,15 +104,24 @@ class GraspStudy:
         return replace(load_sensor(self.values.sensor, materials=cover), mesh=mesh(), solver=solver())
 
     def ruled_model(self, entry: CatalogueEntry, side: str) -> str:
-        """The model that the paper's rule takes for an object as a finger, `left` or `right`, sees it."""
+        """The model that the paper's rule takes for an object as a finger, `left` or `right`, sees it where it is centred."""
         return _ruled(entry.file, entry.unit, side, self.spec.footprint_mm, self.spec.thickness_mm)
+
+    def ruled_at(self, entry: CatalogueEntry, pose: Pose) -> str:
+        """The model that the paper's rule takes for an object in a pose: what of it is over the pad counts."""
+        placed = place(read_mesh(entry.file, unit=entry.unit), pose=pose)
+        return _chosen(placed, self.spec.footprint_mm, self.spec.thickness_mm)
 
 
 @lru_cache
 def _ruled(file, unit, side, footprint_mm, reach_mm):
     mesh = read_mesh(file, unit=unit)
     mesh.apply_transform(_SIDES[side])
-    counts = score(place(mesh).triangles, footprint_mm=footprint_mm, reach_mm=reach_mm)
+    return _chosen(place(mesh), footprint_mm, reach_mm)
+
+
+def _chosen(placed, footprint_mm, reach_mm):
+    counts = score(placed.triangles, footprint_mm=footprint_mm, reach_mm=reach_mm)
     return choose_model(counts.NPt, counts.CHt, counts.NPo, counts.CHo)
 
 
