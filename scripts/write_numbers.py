@@ -160,11 +160,15 @@ def choice() -> str:
 def environment() -> str:
     """Observations a second of the environment for learning."""
     words = {"slide": "slides through new places", "again": "slides through known places", "held": "holds the object",
-             "reset": "starts an episode"}
+             "reset": "starts an episode", "episodes": "plays whole episodes at random"}
     rows = [[row["model"], words[row["case"]], row["places_pressed"], row["per_processor_s"], row["per_wall_s"]]
             for row in record("environment")["rows"]]
     head = "model, the hand, places pressed, a second of one core, a second by the clock with other work beside"
-    return f"{source('environment')}\n\n" + table(head, rows)
+    off = [[row["model"], row["object"], row["step_mm"], row["mean_counts"], row["largest_counts"], row["largest_reading"],
+            f"{row['mean_largest_share']:.1%}", f"{row['largest_share']:.1%}"] for row in record("environment")["errors"]]
+    of_errors = ("model, object, step of places (mm), mean error (counts), largest error (counts), largest reading (counts), "
+                 "largest error of a place in its largest reading: mean, at most")
+    return f"{source('environment')}\n\n{table(head, rows)}\n\n{table(of_errors, off)}"
 
 
 def random_presses() -> str:

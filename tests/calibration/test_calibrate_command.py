@@ -7,7 +7,9 @@ import pytest
 from support.calibration import BAR, PLATE, small_sensor_file
 
 import softtact
+from softtact.calibration.ladder import placed_at
 from softtact.cli import main
+from softtact.readout.calibrated import relative_change
 from softtact.readout.tsf85 import read_recording, write_recording
 
 
@@ -47,6 +49,7 @@ def test_calibrate_writes_a_sensor_that_presses_and_a_page_with_its_residuals(fo
 @pytest.mark.parametrize(("line", "sentence"), [
     (BOTH.replace("--press bar.stl", "--press bar.stl --press bar.stl"), "--press was given 3 times for 2 recordings"),
     (BOTH.replace("--fit none", "--fit friction"), "no unknown 'friction'"),
+    (BOTH.replace("--fit none", "--fit cover"), "The elastic model is one layer and knows no cover"),
     (BOTH.replace("--force plate_force.csv --force bar_force.csv", "--force 2000"), "--force 2000: its largest force is 2000 N"),
     (BOTH + " --place 1,2", "--place 1,2: it is not three numbers"),
     (BOTH + " --finger 1", "plate.csv: finger 1 moves by"),
@@ -58,6 +61,19 @@ def test_what_cannot_be_calibrated_is_refused_and_nothing_is_written(folder, cap
     before = set(folder.iterdir())
     assert main(line.split()) == 1
     assert sentence in capsys.readouterr().err and set(folder.iterdir()) == before
+
+
+def test_calibrate_tells_how_far_the_hyperelastic_model_lies_from_the_calibrated_sensor(folder, capsys):
+    line = (f"calibrate bar.csv --press bar.stl --force bar_force.csv --place=-0.8,-1.2,0 {OPTIONS} "
+            "--hyperelastic-check --json")
+    assert main(line.split()) == 0
+    told = json.loads(capsys.readouterr().out)
+    sensor, gain = softtact.load_sensor("small.yaml"), told["common_gain"] * np.array(told["gain"])
+    presses = [sensor.press(placed_at(BAR, (-0.8, -1.2, 0)), pose=np.zeros(6), force_n=5.0, model=model, label="")
+               for model in ("elastic", "hyperelastic")]
+    apart = gain * np.subtract(*(relative_change(sensor.spec, one.deformation_map_mm[0]) for one in presses))
+    assert told["hyperelastic_difference_counts"] == [pytest.approx(np.sqrt(np.mean(apart**2)), rel=1e-3)]
+    assert told["hyperelastic_difference_counts"][0] > 100      # the elastic model is of the surface, not of the electrodes' plane
 
 
 @pytest.mark.parametrize("name", ["bar.png", "bar.gif", "bar.mp4"])

@@ -15,9 +15,10 @@ from softtact.calibration.advice import Candidate, rank
 from softtact.calibration.checks import check_recordings, check_result
 from softtact.calibration.experiment import experiment
 from softtact.calibration.fit import CalibrationResult, calibrate
-from softtact.calibration.ladder import Presses
+from softtact.calibration.ladder import Presses, with_cover
 from softtact.calibration.problem import Problem
 from softtact.calibration.sensor_file import write_calibrated
+from softtact.calibration.simulated import HiddenConstants
 from softtact.errors import InputError
 from softtact.readout.recording import make_recording
 from softtact.readout.virtual_sensor import make_specimen
@@ -210,3 +211,32 @@ def test_the_press_that_covers_what_was_not_pressed_is_advised(bench, experiment
 def test_an_unknown_that_is_none_is_refused(bench, experiments):
     with pytest.raises(InputError, match="no unknown 'friction' to calibrate; write some of placement"):
         Problem(bench.presses, experiments, ("friction",))
+
+
+def test_a_thicker_cover_stands_further_out_of_the_same_shell(bench):
+    spec = bench.presses.sensor.spec
+    thicker = with_cover(spec, 1.2)
+    assert thicker.cover.thickness_mm == pytest.approx(1.2 * spec.cover.thickness_mm)
+    assert thicker.thickness_mm - thicker.edge.held_below_mm == pytest.approx(spec.thickness_mm - spec.edge.held_below_mm)
+    low = spec.model_copy(update={"edge": type(spec.edge)(held={"sides_below_mm": 0.2})})
+    with pytest.raises(InputError, match="under a cover of 1.2 mm, .* its shell would stand 0.1 mm out of it"):
+        with_cover(low, 0.8)
+
+
+@pytest.mark.slow
+def test_a_cover_s_thickness_comes_back_and_is_written(tmp_path):
+    """A cover 10 % thicker than the file says, between the thicknesses that are pressed: within 1 %, and gains within 2 %."""
+    file = small_sensor_file(tmp_path)
+    sensor = softtact.load_sensor(file)
+    true = Presses(replace(sensor, spec=with_cover(sensor.spec, 1.1), prepared_models={}), model="foundation")
+    specimen = Bench(true, replace(HiddenConstants.drawn(sensor, seed=1), modulus_scale=1.0))
+    presses = {"plate": (PLATE, (0, 0, 0)), "ball": (BALL, (1.0, 1.2, 0)), "bar": (BAR, (-0.8, -1.2, 0))}
+    recorded = [specimen.experiment(*press, levels=(1.0, 2.0, 4.0), file=name) for name, press in presses.items()]
+    result = calibrate(Problem(Presses(sensor, model="foundation"), recorded, ("relaxation", "cover")), label="")
+    assert result.problem.value(result.vector, "cover", 1.0) == pytest.approx(1.1, rel=0.01)
+    assert np.abs(result.linear.gain / specimen.hidden.effective_gain(true.sensor) - 1).max() < 0.02
+    write_calibrated(tmp_path / "mine.yaml", file, result)
+    mine = softtact.load_sensor(tmp_path / "mine.yaml").spec
+    assert mine.cover.thickness_mm == pytest.approx(1.1 * sensor.spec.cover.thickness_mm, rel=0.01)
+    assert mine.edge.held_below_mm - mine.cover.thickness_mm == pytest.approx(
+        sensor.spec.edge.held_below_mm - sensor.spec.cover.thickness_mm, abs=1e-4)

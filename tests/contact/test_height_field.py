@@ -42,3 +42,16 @@ def test_penalty_pressure_and_slope_are_derivatives_of_its_energy():
     assert p == pytest.approx(-(energy[0] - energy[1]) / (2 * step), rel=1e-5, abs=1e-9)
     away = np.array([True, False, True, True])   # at the smoothing depth itself the slope has a kink
     assert slope[away] == pytest.approx((-(pressure[0] - pressure[1]) / (2 * step))[away], rel=1e-4, abs=1e-6)
+
+
+def test_a_height_field_that_has_moved_is_that_of_the_moved_object():
+    mesh = trimesh.creation.icosphere(subdivisions=3, radius=5.0)
+    way = np.array([1.3, -0.7])
+    moved = mesh.copy()
+    moved.apply_translation([*way, 0.0])
+    rng = np.random.default_rng(0)
+    x, y = rng.uniform(-6, 6, (2, 400))
+    for a, b in zip(HeightField(mesh).moved(way)(x, y), HeightField(moved)(x, y), strict=True):
+        assert a == pytest.approx(b, abs=1e-9)
+    lowest = [field.lowest_over([1, -1], [2, 0]) for field in (HeightField(mesh).moved(way), HeightField(moved))]
+    assert lowest[0] == pytest.approx(lowest[1])

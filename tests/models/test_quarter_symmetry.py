@@ -206,3 +206,13 @@ def test_a_matrix_that_is_not_definite_is_refused(definite, monkeypatch):
     shifted.sort_indices()
     with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
         condensed_inverse(shifted, kept)
+
+
+@pytest.mark.parametrize("held_below_mm", [0.0, np.inf])
+def test_fields_of_the_whole_top_are_what_the_compliance_between_places_gives(held_below_mm):
+    slab = QuarterSlab(FOOTPRINT, [SOFT, STIFF], CELLS, base_held=True, held_below_mm=held_below_mm)
+    compliance, grid = blocks_of(slab, dofs(slab.top, 2)), surface_grid(slab)
+    loaded, loads = np.array([0, 3, 7, grid.count // 2, grid.count - 2]), np.arange(10.0).reshape(5, 2)
+    for every, nodes in ((1, np.arange(grid.count)), (2, grid.second_nodes)):
+        fields = compliance.fields(slab.top.shape, *grid.quarter(loaded), loads, every=every)
+        assert fields.reshape(2, -1).T == pytest.approx(compliance.between(*grid.quarter(nodes), *grid.quarter(loaded)) @ loads)

@@ -11,9 +11,9 @@ import numpy as np
 
 from softtact.calibration.experiment import Experiment
 from softtact.calibration.fit import CalibrationResult
-from softtact.calibration.ladder import Ladder
 from softtact.calibration.problem import Problem
 from softtact.errors import InputError
+from softtact.press.ladder import Ladder
 from softtact.readout.calibrated import relative_change
 
 UNEXPLAINED = 0.1      # share of the variance, from which a recording is refused: gains 30 % apart, more than any sensor's

@@ -11,33 +11,18 @@ from typing import Any
 
 import numpy as np
 import trimesh
-from scipy.interpolate import CubicSpline
 
 from softtact.errors import ConvergenceError, InputError, ShellWarning
+from softtact.press.ladder import Ladder, even_in_root
 from softtact.press.result import PressResult
 from softtact.press.sensor import Sensor, load_sensor
+from softtact.sensors.edge import SidesBelow
+from softtact.sensors.frusta import SensorSpec
 
 LEVELS = 9
 SOFTEST = 0.5            # modulus scale down to which forces are pressed
 REACH_LEVELS = 8         # of the first press, which only tells up to which force the model is valid
 COVERS = (0.8, 1.0, 1.25)     # of the cover's thickness, through which its effect is interpolated
-
-
-@dataclass(frozen=True)
-class Ladder:
-    """force_n (l,), rising;  maps_mm (l, y, x) at them."""
-
-    force_n: np.ndarray
-    maps_mm: np.ndarray
-
-    def weights(self, force_n: np.ndarray) -> np.ndarray:
-        """Weights (n, l) of the maps at forces (n,) from 0 to the highest, beyond which that one stays.
-
-        A cubic spline over the root of the force, in which a ball's and a flat punch's depth are both nearly straight.
-        """
-        at = np.sqrt(np.concatenate([[0.0], self.force_n]))
-        spline = CubicSpline(at, np.eye(len(at)))
-        return spline(np.sqrt(np.minimum(force_n, self.force_n[-1])))[:, 1:]
 
 
 class _BeyondError(Exception):
@@ -65,7 +50,7 @@ class Presses:
         """
         key = (id(mesh), *np.round(place, 6), round(largest_n, 6), cover)
         if key not in self.known:
-            result = self._press(mesh, place, self._forces(largest_n, self.levels), cover, None)
+            result = self._press(mesh, place, even_in_root(largest_n, self.levels), cover, None)
             self.known[key] = Ladder(result.normal_force_n, result.deformation_map_mm)
         return self.known[key]
 
@@ -78,15 +63,10 @@ class Presses:
             if not result.within_validity[-1]:
                 raise _BeyondError(result)
 
-        forces = self._forces(largest_n, REACH_LEVELS)
+        forces = even_in_root(largest_n, REACH_LEVELS)
         result = self._press(mesh, place, forces, 1.0, stop)
         valid = int(np.cumprod(result.within_validity).sum())
         return float(forces[valid - 1]) if valid else 0.0, float(forces[min(valid, len(forces) - 1)])
-
-    @staticmethod
-    def _forces(largest_n, count):
-        """Forces (count,) in even steps of their root."""
-        return largest_n * (np.arange(1, count + 1) / count) ** 2
 
     def _press(self, mesh, place, forces, cover, on_step):
         with warnings.catch_warnings(action="ignore", category=ShellWarning):
@@ -103,10 +83,8 @@ class Presses:
     def _sensor(self, cover, largest_n):
         """The sensor with a cover of `cover` times its thickness, which bears so large a force (N): a softer one is asked for."""
         if cover not in self.variants:
-            spec = self.sensor.spec
-            thicker = spec.cover.model_copy(update={"thickness_mm": cover * spec.cover.thickness_mm})
             self.variants[cover] = self.sensor if cover == 1.0 else replace(
-                self.sensor, spec=spec.model_copy(update={"cover": thicker}), prepared_models={})
+                self.sensor, spec=with_cover(self.sensor.spec, cover), prepared_models={})
         own = self.variants[cover]
         low, high = own.spec.force_range_n
         return replace(own, spec=own.spec.model_copy(update={"force_range_n": (low, max(high, largest_n))}))
@@ -121,6 +99,22 @@ def placed_at(mesh: trimesh.Trimesh, place: Sequence[float]) -> trimesh.Trimesh:
     placed.apply_transform(trimesh.transformations.rotation_matrix(np.radians(angle), [0, 0, 1]))
     placed.apply_translation([x, y, 0])
     return placed
+
+
+def with_cover(spec: SensorSpec, times: float) -> SensorSpec:
+    """A sensor with a cover of so many times its thickness, in the same shell: a thicker cover stands further out of it.
+
+    Raises InputError where the shell would stand out of a thinner one.
+    """
+    thickness = times * spec.cover.thickness_mm
+    update: dict[str, Any] = {"cover": spec.cover.model_copy(update={"thickness_mm": thickness})}
+    if isinstance(spec.edge.held, SidesBelow):
+        below = spec.edge.held.sides_below_mm + thickness - spec.cover.thickness_mm
+        if below <= 0:
+            raise InputError(f"{spec.name}: under a cover of {thickness:.3g} mm, which 'cover' is fitted from, its shell would "
+                             f"stand {-below:.3g} mm out of it (edge.held.sides_below_mm); leave 'cover' out of --fit.")
+        update["edge"] = spec.edge.model_copy(update={"held": SidesBelow(sides_below_mm=below)})
+    return spec.model_copy(update=update)
 
 
 def uncalibrated(name_or_sensor: "str | Sensor") -> Sensor:

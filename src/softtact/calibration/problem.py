@@ -15,8 +15,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from softtact.calibration.experiment import Experiment
-from softtact.calibration.ladder import COVERS, SOFTEST, Ladder, Presses, cover_weights
+from softtact.calibration.ladder import COVERS, SOFTEST, Presses, cover_weights
 from softtact.errors import InputError
+from softtact.press.ladder import Ladder
 from softtact.readout.calibrated import relative_change
 from softtact.readout.hysteresis import lagged
 
@@ -87,6 +88,9 @@ class Problem:
         unknown = [name for name in self.fitted if name not in FITTED]
         if unknown:
             raise InputError(f"There is no unknown {unknown[0]!r} to calibrate; write some of {', '.join(FITTED)}.")
+        if "cover" in self.fitted and self.presses.model == "elastic":
+            raise InputError("The elastic model is one layer and knows no cover, so its thickness cannot be fitted; leave 'cover' "
+                             "out of --fit, or give --model foundation.")
         self.names, mean, deviation = [], [], []
 
         def add(name, value, width):

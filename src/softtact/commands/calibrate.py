@@ -33,14 +33,14 @@ def add(commands: argparse._SubParsersAction) -> None:
                          help="how the recorder wrote it (default: told by the lowest readings)")
     command.add_argument("--fit", default="placement,relaxation", metavar="NAMES",
                          help="what is unknown beside gains and zeros: some of placement,relaxation,modulus,cover, or none "
-                              "(default: placement,relaxation); cover computes two more sensors")
+                              "(default: placement,relaxation); cover is of the foundation model and computes two more sensors")
     command.add_argument("--sensor", default="coro", help="name or YAML file of the sensor (default: coro)")
     command.add_argument("--model", choices=("foundation", "elastic"), default="foundation", help="model of the presses")
     command.add_argument("--candidate", action="append", type=Path, metavar="OBJECT.stl",
                          help="an object that could be pressed next: tells in which of five places it would help most; repeat it")
     command.add_argument("--hyperelastic-check", action="store_true",
-                         help="press each object once by the hyperelastic model, too, and tell how far its counts lie (a minute "
-                              "each)")
+                         help="press each object once by the hyperelastic model, too, and tell how far its counts lie from the "
+                              "calibrated ones (a minute each)")
     command.add_argument("--out", required=True, type=Path, metavar="SENSOR.yaml", help="the calibrated sensor's file to write")
     command.add_argument("--report", type=Path, metavar="FILE.html", help="a page with residuals of each taxel")
 
@@ -60,6 +60,7 @@ def _calibrate(options):
     from softtact.calibration.advice import quarters, rank
     from softtact.calibration.checks import check_recordings, check_result
     from softtact.calibration.fit import calibrate
+    from softtact.calibration.hyperelastic_check import hyperelastic_differences
     from softtact.calibration.ladder import Presses, uncalibrated
     from softtact.calibration.problem import Problem
     from softtact.calibration.sensor_file import write_calibrated
@@ -80,7 +81,7 @@ def _calibrate(options):
     notes += _notes(problem, checks)
     candidates = [one for path in options.candidate or () for one in quarters(path.name, read[path], spec.footprint_mm)]
     advice = rank(result, candidates, largest_n=max(float(one.force_n.max()) for one in experiments)) if candidates else []
-    differences = _hyperelastic(result) if options.hyperelastic_check else None
+    differences = hyperelastic_differences(result) if options.hyperelastic_check else None
     write_calibrated(options.out, sensor_path(options.sensor), result)
     if options.report:
         from softtact.reporting.calibration_page import write_page
@@ -148,32 +149,14 @@ def _notes(problem, checks):
         yield ("no press tells whether rows or columns are turned round; record one off the middle to be sure.")
 
 
-def _hyperelastic(result):
-    """Root mean square difference of the hyperelastic model's counts to the calibrated ones, at each press' largest force."""
-    import numpy as np
-
-    from softtact.calibration.ladder import placed_at
-    from softtact.readout.calibrated import relative_change
-
-    problem, scale = result.problem, result.modulus_scale
-    differences = []
-    for k, (one, valid) in enumerate(zip(problem.experiments, problem.valid_n, strict=True)):
-        force = min(valid, float(one.force_n.max())) / scale
-        placed = placed_at(one.mesh, problem.place(result.vector, k))
-        ladder = problem.presses.ladder(one.mesh, problem.place(result.vector, k), largest_n=max(force, 1e-6))
-        maps = problem.presses.sensor.press(placed, pose=np.zeros(6), force_n=force, model="hyperelastic").deformation_map_mm[-1]
-        spec = problem.presses.sensor.spec
-        apart = result.linear.gain * (relative_change(spec, maps) - relative_change(spec, ladder.maps_mm[-1]))
-        differences.append(float(np.sqrt(np.mean(apart**2))))
-    return differences
-
-
 def _summary(result, notes, advice, differences):
     shares, times = result.problem.creep(result.vector)
     return {"common_gain": result.linear.scale, "gain": (result.linear.gain / result.linear.scale).tolist(),
             "zero_counts": result.linear.zero.tolist(), "gain_deviation": result.gain_deviation.tolist(),
             "zero_deviation_counts": result.zero_deviation.tolist(), "relaxation": shares, "relaxation_s": times,
             "modulus_scale": result.modulus_scale if "ln modulus" in result.problem.names else None,
+            "cover_mm": result.problem.value(result.vector, "cover", 1.0) * result.problem.presses.sensor.spec.cover.thickness_mm
+            if "cover" in result.problem.names else None,
             "places": [result.problem.place(result.vector, k) for k in range(len(result.problem.experiments))],
             "misfit_over_noise": result.misfit, "not_identifiable": result.not_identifiable, "notes": notes,
             "hyperelastic_difference_counts": differences,
@@ -186,6 +169,8 @@ def _lines(summary):
     yield f"common gain: {summary['common_gain']:.1f} counts at dC/C0 = 1; taxels' own {min(gains):.3f} to {max(gains):.3f} of it"
     if summary["modulus_scale"] is not None:
         yield f"modulus scale: {summary['modulus_scale']:.3f}"
+    if summary["cover_mm"] is not None:
+        yield f"cover: {summary['cover_mm']:.3f} mm thick"
     for share, time in zip(summary["relaxation"], summary["relaxation_s"], strict=True):
         yield f"creep: a share of {share:.3f} in {time:.2f} s"
     for k, (x, y, angle) in enumerate(summary["places"], 1):
@@ -193,7 +178,8 @@ def _lines(summary):
     yield f"misfit: {summary['misfit_over_noise']:.2f} times the noise"
     yield from (f"not told by these presses: {said}" for said in summary["not_identifiable"])
     for said, counts in enumerate(summary["hyperelastic_difference_counts"] or (), 1):
-        yield f"the hyperelastic model lies {counts:.1f} counts away from press {said} (root mean square)"
+        yield (f"the hyperelastic model lies {counts:.1f} counts away from press {said} (root mean square)" if counts is not None
+               else f"press {said} was not checked: the hyperelastic model does not reach a force for which the other is valid")
     for one in summary["next_press"][:3]:
         place = ", ".join(f"{value:g}" for value in one["place"])
         yield (f"next press: {one['object']} at {place} up to {one['force_n']:.3g} N adds {one['information_nats']:.2f} nats; "

@@ -3,8 +3,10 @@
 Vertical lines through query points are cut with the triangles found in a grid of bins; no sampling of the surface takes place.
 """
 
+import copy
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 import trimesh
@@ -34,6 +36,12 @@ class HeightField:
             return np.zeros(2), np.ones(2)
         points = self.triangles[..., :2].reshape(-1, 2)
         return points.min(axis=0) - 1e-9, points.max(axis=0) + 1e-9
+
+    def moved(self, offset_mm: np.ndarray) -> Self:
+        """The object's after a way (2,) along x and y; what the search for triangles is made of is shared."""
+        other = copy.copy(self)
+        other.triangles, other._origin = self.triangles + [*offset_mm, 0.0], self._origin + offset_mm
+        return other
 
     def __call__(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Heights (n,) and normals (n, 3) pointing out of the object (downwards) for points (n,), (n,)."""

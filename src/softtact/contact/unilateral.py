@@ -64,7 +64,7 @@ class DenseCompliance:
     """What a matrix (c, c) in mm/N does to forces (c, l), in double and in single precision."""
 
     def __init__(self, matrix: np.ndarray) -> None:
-        self._double, self._single = matrix.astype(np.float64), matrix.astype(np.float32)
+        self._double, self._single = (matrix.astype(kind, copy=False) for kind in (np.float64, np.float32))
 
     def double(self, force: np.ndarray) -> np.ndarray:
         """Displacements (c, l) of forces (c, l) in double precision."""

@@ -210,6 +210,25 @@ class ParityBlocks:
         args = [np.ascontiguousarray(values) for values in (rows, row_signs < 0, columns, column_signs < 0)]
         return _between(self.blocks, *args)
 
+    def fields(self, shape: tuple[int, int], columns: np.ndarray, column_signs: np.ndarray, loads: np.ndarray, *,
+               every: int = 1) -> np.ndarray:
+        """Displacements (l, 2 ny - 1, 2 nx - 1) over the whole rectangle under loads (c, l) at places as for `between`.
+
+        shape: (rows, columns) of the quarter's nodes, whose numbers are those of the blocks' first places
+        every: only every so many-th of these nodes, the middle among them: ny along y and nx along x
+
+        Parity by parity: the rectangle's matrix, four times as large as the quarter's blocks, is not put together.
+        """
+        signs = np.where(column_signs < 0, -1.0, 1.0)
+        (ny, nx), places = shape, self.blocks.shape[2]
+        of_parity = np.zeros((len(PARITIES), places, loads.shape[1]), dtype=self.blocks.dtype)
+        for total, (p, q) in zip(of_parity, PARITIES, strict=True):
+            np.add.at(total, columns, signs[:, :1]**p * signs[:, 1:]**q * loads)
+        rows = self.blocks[:, :ny * nx].reshape(len(PARITIES), ny, nx, places)[:, ::every, ::every]
+        ee, eo, oe, oo = 0.25 * (rows @ of_parity[:, None])
+        even, odd = (np.concatenate([(a - b)[:, :0:-1], a + b], axis=1) for a, b in ((ee, oe), (eo, oo)))
+        return np.moveaxis(np.concatenate([(even - odd)[:0:-1], even + odd]), -1, 0)
+
 
 @njit(cache=True, nogil=True)
 def _between(blocks, rows, row_negative, columns, column_negative):

@@ -1,7 +1,6 @@
 """Presses of a placed object with the elastic and the foundation model: from its underside and forces to a `PressResult`."""
 
 import time
-from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +15,7 @@ from softtact.errors import ConvergenceError, InputError
 from softtact.models.elastic.compliance import LayerPress, press_layer, rest_on_shell
 from softtact.models.foundation.solve import FoundationMaps, lifted, press_foundation
 from softtact.press.elastic_motion import press_motion
-from softtact.press.making import Course, make_result, shell_of, timed
+from softtact.press.making import Course, make_result, shell_of, timed, warn_of_shell
 from softtact.press.result import PressResult
 from softtact.press.validity import valid_elastic, valid_foundation
 from softtact.progress import Watch
@@ -32,19 +31,54 @@ _RISE = 1.15              # of the object's depth: points within may touch
 
 def press_elastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, course: Course) -> PressResult:
     """All load steps at once with the elastic model, which has no body to keep: the surface's compliance is all that it knows."""
-    start, compliance = time.perf_counter(), sensor.prepared("elastic", course.threads)
+    start = time.perf_counter()
+    sensor.prepared("elastic", course.threads)
     surface = HeightField(placed)
-    underside, touch, stop = Underside(surface, compliance.grid), first_touch_mm(sensor, surface), shell_stop_mm(sensor, surface)
-
-    def solve(points):
-        on_pad = pad_forces(forces, stop_mm=stop, touch_mm=touch,
-                            depth_of=lambda force: press_layer(compliance, points, [force]).contact.depth[0])
-        return press_layer(compliance, points, on_pad) if on_pad.any() else rest_on_shell(compliance, points, len(forces), stop)
-
-    _, press = _within_reach(underside, underside.nodes, compliance.foundation_modulus, forces, sensor.spec.deepest_mm, solve,
-                             lambda press: press.contact.depth[-1])
+    touch = first_touch_mm(sensor, surface)
+    press = _elastic(sensor, surface, forces, touch)
     seconds = np.full(len(forces), (time.perf_counter() - start) / len(forces))
     return elastic_result(sensor, press, forces, seconds, touch_mm=touch)
+
+
+def thinning_maps(sensor: "Sensor", surface: HeightField, forces_n: np.ndarray, *, model: str) -> np.ndarray:
+    """Maps (l, ny, nx) in mm of how much thinner a sensor becomes at rising forces (N): all that its readings need of a press.
+
+    surface: the underside of an object whose lowest point is about at the sensing surface;  model: elastic or foundation
+    Raises InputError where the object is beside the sensor, ConvergenceError for a force that is not reached.
+    """
+    if model == "foundation":
+        return _on_foundation(sensor, surface, forces_n, Course(label=""), time.perf_counter()).deformation_map_mm
+    press = _elastic(sensor, surface, forces_n, first_touch_mm(sensor, surface), patches=True)
+    warn_of_shell(sensor.spec, forces_n, _exactly(forces_n, press.contact.force.sum(axis=0)))
+    return press.maps if press.lower_maps is None else press.maps - press.lower_maps
+
+
+def _elastic(sensor, surface, forces, touch, *, patches=False):
+    """The `LayerPress` of an object by its underside, which touches after coming down by `touch`."""
+    compliance = sensor.prepared("elastic")
+    underside, stop = Underside(surface, compliance.grid), shell_stop_mm(sensor, surface)
+
+    def solve(points):
+        if (alone := _not_as_deep(lambda: press_layer(compliance, points, forces, patches=patches), stop)) is not None:
+            return alone
+        on_pad = pad_forces(forces, stop_mm=stop, touch_mm=touch,
+                            depth_of=lambda force: press_layer(compliance, points, [force], patches=patches).contact.depth[0])
+        return (press_layer(compliance, points, on_pad, patches=patches) if on_pad.any()
+                else rest_on_shell(compliance, points, len(forces), stop))
+
+    return _within_reach(underside, underside.nodes, compliance.foundation_modulus, forces, sensor.spec.deepest_mm, solve,
+                         lambda press: press.contact.depth[-1])[1]
+
+
+def _not_as_deep(press, stop_mm):
+    """What `press` makes of all forces on the pad, where the object does not come down to the shell; else None."""
+    try:
+        found = press()
+    except ConvergenceError:     # of a force that the pad would not bear alone
+        if np.isinf(stop_mm):
+            raise
+        return None
+    return found if found.contact.depth[-1] <= stop_mm else None
 
 
 def first_touch_mm(sensor: "Sensor", surface: HeightField) -> float:
@@ -72,8 +106,14 @@ def elastic_result(sensor: "Sensor", press: LayerPress, forces: np.ndarray, seco
 
 def press_on_foundation(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, course: Course) -> PressResult:
     """Load step by load step with the foundation model, which has no body to keep."""
-    start, compliance = time.perf_counter(), sensor.prepared("foundation", course.threads)
-    surface = HeightField(_set_down(sensor, placed))
+    start = time.perf_counter()
+    sensor.prepared("foundation", course.threads)
+    return _on_foundation(sensor, HeightField(_set_down(sensor, placed)), forces, course, start)
+
+
+def _on_foundation(sensor: "Sensor", surface: HeightField, forces: np.ndarray, course: Course, start: float) -> PressResult:
+    """The result for an object by its underside, near the sensing surface."""
+    compliance = sensor.prepared("foundation")
     underside, touch, stop = Underside(surface, compliance.grid), first_touch_mm(sensor, surface), shell_stop_mm(sensor, surface)
     load_steps: list[Any] = []
     times: list[float] = []
@@ -86,11 +126,7 @@ def press_on_foundation(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, c
     def solve(points):
         load_steps.clear()
         times.clear()
-        on_pad = pad_forces(forces, stop_mm=stop, touch_mm=touch,
-                            depth_of=lambda force: next(press_foundation(compliance, points, [force])).depth)
-        steps = repeated(press_foundation(compliance, points, np.unique(on_pad)), on_pad) if on_pad.any() else \
-            [lifted(compliance, points, stop)] * len(forces)
-        timed(map(record, steps), len(forces), course, times,
+        timed(map(record, _steps_on_pad(compliance, points, forces, stop, touch)), len(forces), course, times,
               lambda: _of_load_steps(sensor, compliance, points, load_steps, forces, times, touch), start=start)
 
     points, _ = _within_reach(underside, underside.points, compliance.foundation_modulus, forces, sensor.spec.thickness_mm, solve,
@@ -108,14 +144,27 @@ def _set_down(sensor: "Sensor", placed: Trimesh) -> Trimesh:
     return lowered
 
 
-def repeated(load_steps: Iterable[Any], forces: np.ndarray) -> Iterator[Any]:
-    """Load steps of different forces, in their order, once for each of forces (l,) among which are equal ones."""
-    one, before = None, None
-    steps = iter(load_steps)
-    for force in forces:
-        one = one if force == before else next(steps)
-        before = force
-        yield one
+def _steps_on_pad(compliance, points, forces, stop, touch):
+    """A `FoundationLoadStep` for each force (l,); once the object comes down to the shell, always that of rest on it."""
+    steps, reached = press_foundation(compliance, points, forces), 0
+    while reached < len(forces):
+        try:
+            step = next(steps)
+        except ConvergenceError:     # of a force that the pad would not bear alone
+            if np.isinf(stop):
+                raise
+            break
+        if step.depth > stop:
+            break
+        reached += 1
+        yield step
+    if reached == len(forces):
+        return
+    on_pad = pad_forces(forces, stop_mm=stop, touch_mm=touch,
+                        depth_of=lambda force: next(press_foundation(compliance, points, [force])).depth)
+    *_, rest = press_foundation(compliance, points, np.unique(on_pad)) if on_pad.any() else [lifted(compliance, points, stop)]
+    for _ in forces[reached:]:
+        yield rest
 
 
 def _exactly(forces, found):

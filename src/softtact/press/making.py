@@ -16,6 +16,7 @@ from softtact.readout.calibrated import counts_of
 
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
+    from softtact.sensors.specification import AnySpec
 
 @dataclass(frozen=True)
 class Course:
@@ -54,7 +55,7 @@ def make_result(sensor: "Sensor", model: str, solver: str, maps: np.ndarray, for
     flags: dict[str, Any] = {"converged": np.ones(len(forces), dtype=np.int8),
                              "within_validity": np.asarray(numbers.pop("within_validity"), dtype=np.int8)}
     arrays: dict[str, Any] = {name: np.asarray(values) for name, values in numbers.items()}
-    _warn_of_shell(spec, forces, arrays.get("pad_force_n", forces))
+    warn_of_shell(spec, forces, arrays.get("pad_force_n", forces))
     return PressResult(deformation_map_mm=maps, tactile_map=counts_of(spec, thinning), normal_force_n=forces, wall_time_s=times,
                        x_mm=spec.map_x_mm, y_mm=spec.map_y_mm, model=model, sensor=spec.name, solver=solver,
                        largest_counts=spec.largest_counts,
@@ -67,8 +68,8 @@ def _calibration(spec):
     return {} if spec.calibration is None else {"calibration": spec.calibration.source}
 
 
-def _warn_of_shell(spec, forces, on_pad):
-    """Warn of the first load step at which the shell carries a part."""
+def warn_of_shell(spec: "AnySpec", forces: np.ndarray, on_pad: np.ndarray) -> None:
+    """Warn of the first load step at which the shell carries a part of the forces (l,) in N, the pad the rest."""
     resting = np.flatnonzero(forces - on_pad > _HARDLY * forces)
     if len(resting):
         first = resting[0]

@@ -25,7 +25,7 @@ from softtact.robot.kinematics import inverse_kinematics
 from softtact.robot.record import FINGERS
 from softtact.robot.scene import DOWN, MM, Placement, Scene, build_scene, start
 from softtact.robot.settings import load_scene
-from softtact.robot.taxels import TaxelMemory
+from softtact.robot.taxels import STEP_MM, TaxelMemory
 
 ENVIRONMENT = "softtact/Grasp-v0"
 STEP_S = 0.01                 # of an action: 100 observations a second of the scene
@@ -52,10 +52,11 @@ class GraspEnv(gymnasium.Env):
 
     def __init__(self, mesh: trimesh.Trimesh | str | Path | None = None, *, unit: str | None = None, sensor: str = "coro",
                  model: str = "elastic", largest_force_n: float = 30.0, mass_kg: float | None = None,
-                 scene: Mapping[str, Any] | None = None) -> None:
+                 scene: Mapping[str, Any] | None = None, place_step_mm: float = STEP_MM) -> None:
         """mesh: trimesh in mm, or a file with its `unit`; by default a cylinder that stands with its flat ends on the pads
 
         model: elastic or foundation;  scene: keys of a scene file, such as {"friction": 0.4}
+        place_step_mm: between the places that are pressed (`TaxelMemory`)
         Raises InputError for a model that is too slow for this, and as `build_scene` does.
         """
         if model not in ("elastic", "foundation"):
@@ -63,7 +64,7 @@ class GraspEnv(gymnasium.Env):
         self._sensor, self._settings, self._mass_kg = load_sensor(sensor), load_scene(**(scene or {})), mass_kg
         self._mesh = _mesh_of(mesh, unit)
         self.largest_force_n = float(largest_force_n)
-        self._memory = TaxelMemory(self._sensor, self._mesh, model, self.largest_force_n)
+        self._memory = TaxelMemory(self._sensor, self._mesh, model, self.largest_force_n, place_step_mm)
         taxels = self._sensor.spec.taxels
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (3,), np.float32)
         self.observation_space = gymnasium.spaces.Dict({

@@ -1,74 +1,131 @@
 """Readings of a sensor for a loop that asks a hundred times a second: pressed once for a place, then taken from memory.
 
-A place is the object's x and y in the sensor's frame and its turn about z, rounded to a grid. At a new place the true mesh is
-pressed through a ladder of forces, all at once. Between two forces the counts are interpolated linearly, as the virtual sensor
-does it.
+A place is the object's x and y in the sensor's frame and its turn about z, on a grid. At a new place the true mesh is pressed
+through a ladder of forces, all at once. Between two forces its maps are interpolated (`Ladder`).
+Between places the object carries its map along: the map of a place is moved and turned as the object is, and scaled so that the
+sensor sinks by as much volume as there. What is bound to the sensor's edges does not move with the object; so along x, the way that
+a hand slides, the maps of the two places beside the object are weighted by how near they are. How far readings are off is in
+`benchmarks/environment.py`.
+Readings do not depend on what was asked for before.
 Tilt is left out: how far a held object tilts in the scene follows from MuJoCo's contacts, not from the rubber.
 """
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import trimesh
+from scipy.ndimage import affine_transform
 from scipy.spatial.transform import Rotation
+from threadpoolctl import ThreadpoolController
 
+from softtact.contact.height_field import HeightField
 from softtact.errors import InputError
+from softtact.geometry.meshes import place
 from softtact.geometry.pose import Pose
+from softtact.press.fast import thinning_maps
+from softtact.press.ladder import Ladder, even_in_root
 from softtact.press.sensor import Sensor
+from softtact.readout.calibrated import counts_of
 from softtact.robot.events import set_down
 
-# The mesh as each finger sees it: the right one from behind.
+# The mesh as each finger sees it, the right one from behind, where it turns the other way round.
 _FACING = (Rotation.identity(), Rotation.from_euler("y", 180, degrees=True))
-_LADDER = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0)     # of the largest force; a contact grows fastest at first
+_SENSE = (1.0, -1.0)
+_FORCES = 5              # of the ladder
+STEP_MM = 2.0            # of the grid of places: as exact in the elastic model as 1 mm
+_STEP_DEG = 2.0          # of the grid of turns, which hardly change while a hand slides
+_AT_PLACE = 0.02         # of a step along x, from a place that is taken alone
+_MOST = 2.0              # times may a carried map be scaled: beyond, next to nothing of the object is over the sensor
 
 
 @dataclass
 class TaxelMemory:
     """Counts of both sensors under one object.
 
-    largest_force_n: up to which forces are asked for;  step_mm, step_deg: of the grid of places
+    model: elastic or foundation;  largest_force_n: up to which forces are asked for
+    step_mm: of the grid of places along x and y
     """
 
     sensor: Sensor
     mesh: trimesh.Trimesh
     model: str
     largest_force_n: float
-    step_mm: float = 0.2
-    step_deg: float = 1.0
-    _kept: dict = field(default_factory=dict)
+    step_mm: float = STEP_MM
+    _ladders: dict = field(default_factory=dict)
+    _surfaces: dict = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.forces_n = self.sensor.checked_forces(self.largest_force_n) * np.array(_LADDER)
+        side = min(self.sensor.spec.footprint_mm)
+        if not 0 < self.step_mm < side:
+            raise InputError(f"place_step_mm={self.step_mm:g}: give a length in mm above 0 and below the sensor's shorter side, "
+                             f"{side:g}.")
+        self.forces_n = even_in_root(self.sensor.checked_forces(self.largest_force_n)[0], _FORCES)
+        self._threads: ThreadpoolController | None = None
+        self._step = np.array([self.step_mm, self.step_mm, _STEP_DEG])
+        spec = self.sensor.spec
+        self._first_mm = np.array([spec.map_y_mm[0], spec.map_x_mm[0]])     # as maps are indexed: y, x
+        self._pitch_mm = np.array([np.ptp(line) / (len(line) - 1) for line in (spec.map_y_mm, spec.map_x_mm)])
 
     @property
     def places(self) -> int:
         """How many places were pressed."""
-        return len(self._kept)
+        return len(self._ladders)
 
     def counts(self, finger: int, pose: np.ndarray, force_n: float) -> np.ndarray:
         """(row, column) of a finger, 0 left or 1 right, under an object at a pose (7,) and a normal force (N) up to the largest."""
         if force_n <= 0:
-            return np.zeros((self.sensor.spec.taxels.rows, self.sensor.spec.taxels.columns))
-        steps = self._at(finger, pose)
-        place = np.searchsorted(self.forces_n, min(force_n, self.largest_force_n))
-        low = self.forces_n[place - 1] if place else 0.0
-        share = (min(force_n, self.largest_force_n) - low) / (self.forces_n[place] - low)
-        return (1 - share) * (steps[place - 1] if place else 0.0) + share * steps[place]
+            return counts_of(self.sensor.spec, np.zeros(self.sensor.spec.map_shape))
+        at = self._place(finger, pose)
+        carried: Any = 0.0
+        for number, share in self._beside(at):
+            ladder = self._ladder(finger, number)
+            pressed = np.tensordot(ladder.weights(np.array([force_n]))[0], ladder.maps_mm, 1)
+            carried = carried + share * self._carried(pressed, number * self._step, at, _SENSE[finger])
+        return counts_of(self.sensor.spec, carried)
 
-    def _at(self, finger, pose):
-        """Counts (force, row, column) at the place of the grid nearest to a pose."""
-        seen = _FACING[finger].inv() * Rotation.from_quat(pose[3:], scalar_first=True)
-        turn = np.degrees(2 * np.arctan2(seen.as_quat()[2], seen.as_quat()[3]))      # about z: the swing, a tilt, is left out
-        x, y = (round(float(value) / self.step_mm) for value in pose[:2])
-        key = finger, x, y, round(float(turn) / self.step_deg) % round(360 / self.step_deg)
-        if key not in self._kept:
-            self._kept[key] = self._pressed(*key)
-        return self._kept[key]
+    @staticmethod
+    def _place(finger, pose):
+        """x, y in mm and the turn about z in degrees (3,) of a pose; the swing, a tilt, is left out."""
+        seen = (_FACING[finger].inv() * Rotation.from_quat(pose[3:], scalar_first=True)).as_quat()
+        return np.array([*pose[:2], np.degrees(2 * np.arctan2(seen[2], seen[3]))])
+
+    def _beside(self, at):
+        """Numbers (3,) of the places to both sides of x, y and turn, and their shares; of one place where it is at x."""
+        steps = at / self._step
+        nearest = np.round(steps).astype(int)
+        beyond = steps[0] - nearest[0]
+        if abs(beyond) < _AT_PLACE:
+            return [(nearest, 1.0)]
+        return [(nearest, 1 - abs(beyond)), (nearest + [np.sign(beyond).astype(int), 0, 0], abs(beyond))]
+
+    def _ladder(self, finger, number):
+        """The `Ladder` of a place by its numbers (3,), pressed where it is new."""
+        key = finger, *(int(one) for one in number[:2]), int(number[2]) % round(360 / _STEP_DEG)
+        if key not in self._ladders:
+            self._ladders[key] = self._pressed(*key)
+        return self._ladders[key]
 
     def _pressed(self, finger, x, y, turn):
-        rotation = _FACING[finger] * Rotation.from_euler("z", turn * self.step_deg, degrees=True)
-        pose = set_down(self.mesh, Pose(np.array([x * self.step_mm, y * self.step_mm, 0.0]), rotation))
+        if (finger, turn) not in self._surfaces:
+            pose = Pose(np.zeros(3), _FACING[finger] * Rotation.from_euler("z", turn * self._step[2], degrees=True))
+            self._surfaces[finger, turn] = HeightField(place(self.mesh, pose=set_down(self.mesh, pose)))
+        surface = self._surfaces[finger, turn].moved(np.array([x, y]) * self.step_mm)
+        self.sensor.prepared(self.model)
+        self._threads = self._threads or ThreadpoolController()     # which takes milliseconds, and needs the libraries loaded
         try:
-            return self.sensor.press(self.mesh, pose=pose, force_n=self.forces_n, model=self.model, threads=1, label="").tactile_map
+            with self._threads.limit(limits=1):
+                maps = thinning_maps(self.sensor, surface, self.forces_n, model=self.model)
         except InputError:     # the object is beside this sensor
-            return np.zeros((len(self.forces_n), self.sensor.spec.taxels.rows, self.sensor.spec.taxels.columns))
+            maps = np.zeros((_FORCES, *self.sensor.spec.map_shape))
+        return Ladder(self.forces_n, maps)
+
+    def _carried(self, pressed, here, there, sense):
+        """A map (y, x) of an object in one place (x, y, turn) as it is in another one nearby."""
+        angle = sense * np.radians(here[2] - there[2])
+        back = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])     # of y, x, from there to here
+        offset = back @ (self._first_mm - there[1::-1]) + here[1::-1] - self._first_mm
+        carried = affine_transform(pressed, back * self._pitch_mm / self._pitch_mm[:, None], offset / self._pitch_mm, order=1,
+                                   mode="nearest")
+        sunk, now = np.maximum(pressed, 0.0).sum(), np.maximum(carried, 0.0).sum()
+        return carried * min(sunk / now, _MOST) if now > 0 else carried

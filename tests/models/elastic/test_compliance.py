@@ -142,3 +142,13 @@ def test_a_compliance_is_computed_once_and_then_read_from_the_users_cache(tmp_pa
     np.testing.assert_array_equal(again.blocks.blocks, first.blocks.blocks)
     cached_compliance(coarse.model_copy(update={"footprint_mm": (9.6, 9.0)}))      # another sensor, another file
     assert len(list(tmp_path.glob("softtact/compliance-*.npz"))) == 2
+
+
+def test_points_inside_a_large_contact_may_share_their_pressure():
+    """Four level points each, but for two rows along the edge, where pressure is steep: maps within 1 % (0.6 %), the same force."""
+    compliance, wide = cached_compliance(CORO), trimesh.creation.cylinder(radius=8.0, height=5.0, sections=64)
+    points = Underside(HeightField(place(wide, pose=Pose.from_values([1.3, 0.7, 2.5, 0, 0, 17.0]))), compliance.grid).nodes(1.0)
+    each, shared = (press_layer(compliance, points, FORCES, patches=patches) for patches in (False, True))
+    assert np.abs(shared.maps - each.maps).max() < 0.01 * each.maps.max()
+    assert shared.contact.force.sum(axis=0) == pytest.approx(FORCES) and shared.contact.force.shape == each.contact.force.shape
+    assert shared.contact.depth == pytest.approx(each.contact.depth, rel=1e-3)

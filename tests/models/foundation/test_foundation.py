@@ -10,10 +10,11 @@ from foundation_study import BOX, PUNCH, SMALL, TILTED, assert_close, force_of, 
 from support.laws import LAWS
 
 from softtact.contact.node_grid import NodeGrid
+from softtact.contact.patches import pressure_weights
 from softtact.errors import ConvergenceError, InputError
 from softtact.models.foundation import solve
 from softtact.models.foundation.compliance import FoundationCompliance, foundation_compliance
-from softtact.models.foundation.dof_maps import Places, Sideways, _pressure_weights, lattice_places
+from softtact.models.foundation.dof_maps import Places, Sideways, lattice_places
 from softtact.models.foundation.finite_displacement import membrane_loads
 from softtact.models.foundation.partial_contact import SoftEdges
 from softtact.models.foundation.solve import FoundationMaps, FoundationSettings, _Press, press_foundation
@@ -312,7 +313,7 @@ def test_points_on_free_sides_count_with_the_part_of_their_surroundings_that_is_
     """Simpson's weights of a uniform pressure on quadratic elements, to the sides; and areas that add up to the surface's."""
     grid = NodeGrid(np.linspace(-1, 1, 9), np.linspace(-1, 1, 9), sides=True)
     nodes = np.arange(grid.count)
-    weights = _pressure_weights(SimpleNamespace(nodes=nodes), grid)
+    weights = pressure_weights(SimpleNamespace(nodes=nodes), grid)
     simpson = np.array([1, 4, 2, 4, 2, 4, 2, 4, 1])
     np.testing.assert_allclose(weights, np.outer(simpson, simpson).ravel() / 4)
     assert grid.areas(nodes).sum() == pytest.approx(4.0)

@@ -19,9 +19,10 @@ import numpy as np
 import scipy.linalg as sla
 
 from softtact.contact.object_points import ObjectPoints
+from softtact.contact.patches import patches_of
 from softtact.errors import ConvergenceError
 from softtact.models.foundation.compliance import FoundationCompliance
-from softtact.models.foundation.dof_maps import Places, patches_of
+from softtact.models.foundation.dof_maps import Places
 from softtact.models.foundation.finite_displacement import Effects, FiniteDisplacement
 from softtact.models.foundation.partial_contact import SoftEdges
 

@@ -1,0 +1,40 @@
+"""How far the hyperelastic model, which a calibration takes too long to fit by, lies from the calibrated sensor."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from softtact.calibration.fit import CalibrationResult
+from softtact.calibration.ladder import Presses, cover_weights, with_cover
+from softtact.errors import ConvergenceError
+from softtact.progress import announce
+from softtact.readout.calibrated import relative_change
+
+
+def hyperelastic_differences(result: CalibrationResult) -> list[float | None]:
+    """How far, in counts (root mean square), the hyperelastic model lies from the calibrated one at each press' largest force.
+
+    That is the largest for which the calibrated one is valid. Both have the calibrated gains, moduli, cover and places, and no
+    creep. None where there is no valid force, or where the hyperelastic model does not reach it.
+    """
+    return [_difference(result, k) for k in range(len(result.problem.experiments))]
+
+
+def _difference(result, k):
+    problem, one = result.problem, result.problem.experiments[k]
+    cover = problem.value(result.vector, "cover", 1.0)
+    sensor, place = problem.presses.sensor, problem.place(result.vector, k)
+    force = min(problem.valid_n[k], float(one.force_n.max()) / result.modulus_scale)
+    if force == 0:
+        return None
+    announce(f"{one.name}: pressing by the hyperelastic model at {force:.3g} N")
+    thicker = replace(sensor, spec=with_cover(sensor.spec, cover), prepared_models={})
+    try:
+        other = Presses(thicker, model="hyperelastic", levels=1).ladder(one.mesh, place, largest_n=force).maps_mm[-1]
+    except ConvergenceError:
+        return None
+    shares = cover_weights(cover) if "cover" in problem.names else {1.0: 1.0}
+    own = sum(share * problem.presses.ladder(one.mesh, place, largest_n=force, cover=variant).maps_mm[-1]
+              for variant, share in shares.items())
+    apart = result.linear.gain * (relative_change(sensor.spec, other) - relative_change(sensor.spec, own))
+    return float(np.sqrt(np.mean(apart**2)))
