@@ -46,12 +46,13 @@ def test_penalty_pressure_and_slope_are_derivatives_of_its_energy():
 
 def test_a_height_field_that_has_moved_is_that_of_the_moved_object():
     mesh = trimesh.creation.icosphere(subdivisions=3, radius=5.0)
-    way = np.array([1.3, -0.7])
+    way = np.array([1.3, -0.7, 0.4])
     moved = mesh.copy()
-    moved.apply_translation([*way, 0.0])
+    moved.apply_translation(way)
     rng = np.random.default_rng(0)
     x, y = rng.uniform(-6, 6, (2, 400))
     for a, b in zip(HeightField(mesh).moved(way)(x, y), HeightField(moved)(x, y), strict=True):
         assert a == pytest.approx(b, abs=1e-9)
     lowest = [field.lowest_over([1, -1], [2, 0]) for field in (HeightField(mesh).moved(way), HeightField(moved))]
     assert lowest[0] == pytest.approx(lowest[1])
+    assert HeightField(mesh).moved(way).lowest_mm == pytest.approx(HeightField(moved).lowest_mm)

@@ -38,9 +38,9 @@ class HeightField:
         return points.min(axis=0) - 1e-9, points.max(axis=0) + 1e-9
 
     def moved(self, offset_mm: np.ndarray) -> Self:
-        """The object's after a way (2,) along x and y; what the search for triangles is made of is shared."""
-        other = copy.copy(self)
-        other.triangles, other._origin = self.triangles + [*offset_mm, 0.0], self._origin + offset_mm
+        """The object's after a way (3,) without a turn; the bins in which triangles are searched for are shared."""
+        other, way = copy.copy(self), np.asarray(offset_mm, dtype=float)
+        other.triangles, other._origin, other.lowest_mm = self.triangles + way, self._origin + way[:2], self.lowest_mm + way[2]
         return other
 
     def __call__(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -43,11 +43,12 @@ def press_elastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, course:
 def thinning_maps(sensor: "Sensor", surface: HeightField, forces_n: np.ndarray, *, model: str) -> np.ndarray:
     """Maps (l, ny, nx) in mm of how much thinner a sensor becomes at rising forces (N): all that its readings need of a press.
 
-    surface: the underside of an object whose lowest point is about at the sensing surface;  model: elastic or foundation
+    surface: the underside of an object;  model: elastic or foundation
     Raises InputError where the object is beside the sensor, ConvergenceError for a force that is not reached.
     """
     if model == "foundation":
-        return _on_foundation(sensor, surface, forces_n, Course(label=""), time.perf_counter()).deformation_map_mm
+        near = _set_down(sensor, surface)
+        return _on_foundation(sensor, near, forces_n, Course(label=""), time.perf_counter()).deformation_map_mm
     press = _elastic(sensor, surface, forces_n, first_touch_mm(sensor, surface), patches=True)
     warn_of_shell(sensor.spec, forces_n, _exactly(forces_n, press.contact.force.sum(axis=0)))
     return press.maps if press.lower_maps is None else press.maps - press.lower_maps
@@ -108,7 +109,7 @@ def press_on_foundation(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, c
     """Load step by load step with the foundation model, which has no body to keep."""
     start = time.perf_counter()
     sensor.prepared("foundation", course.threads)
-    return _on_foundation(sensor, HeightField(_set_down(sensor, placed)), forces, course, start)
+    return _on_foundation(sensor, _set_down(sensor, HeightField(placed)), forces, course, start)
 
 
 def _on_foundation(sensor: "Sensor", surface: HeightField, forces: np.ndarray, course: Course, start: float) -> PressResult:
@@ -134,14 +135,10 @@ def _on_foundation(sensor: "Sensor", surface: HeightField, forces: np.ndarray, c
     return _of_load_steps(sensor, compliance, points, load_steps, forces, times, touch)
 
 
-def _set_down(sensor: "Sensor", placed: Trimesh) -> Trimesh:
-    """The object where it touches, if its pose is far from there: the model counts its first guesses from the sensing surface."""
-    away = first_touch_mm(sensor, HeightField(placed))
-    if abs(away) <= _NEAR_MM:
-        return placed
-    lowered = placed.copy()
-    lowered.apply_translation([0.0, 0.0, -away])
-    return lowered
+def _set_down(sensor: "Sensor", surface: HeightField) -> HeightField:
+    """The underside where it touches, if it is far from there: the model counts its first guesses from the sensing surface."""
+    away = first_touch_mm(sensor, surface)
+    return surface if abs(away) <= _NEAR_MM else surface.moved(np.array([0.0, 0.0, -away]))
 
 
 def _steps_on_pad(compliance, points, forces, stop, touch):

@@ -35,6 +35,7 @@ _SENSE = (1.0, -1.0)
 _FORCES = 5              # of the ladder
 STEP_MM = 2.0            # of the grid of places: as exact in the elastic model as 1 mm
 _STEP_DEG = 2.0          # of the grid of turns, which hardly change while a hand slides
+_SURFACES = 8            # undersides that are kept: some MB each of a fine mesh
 _AT_PLACE = 0.02         # of a step along x, from a place that is taken alone
 _MOST = 2.0              # times may a carried map be scaled: beyond, next to nothing of the object is over the sensor
 
@@ -107,10 +108,7 @@ class TaxelMemory:
         return self._ladders[key]
 
     def _pressed(self, finger, x, y, turn):
-        if (finger, turn) not in self._surfaces:
-            pose = Pose(np.zeros(3), _FACING[finger] * Rotation.from_euler("z", turn * self._step[2], degrees=True))
-            self._surfaces[finger, turn] = HeightField(place(self.mesh, pose=set_down(self.mesh, pose)))
-        surface = self._surfaces[finger, turn].moved(np.array([x, y]) * self.step_mm)
+        surface = self._surface(finger, turn).moved(np.array([x, y, 0]) * self.step_mm)
         self.sensor.prepared(self.model)
         self._threads = self._threads or ThreadpoolController()     # which takes milliseconds, and needs the libraries loaded
         try:
@@ -118,7 +116,16 @@ class TaxelMemory:
                 maps = thinning_maps(self.sensor, surface, self.forces_n, model=self.model)
         except InputError:     # the object is beside this sensor
             maps = np.zeros((_FORCES, *self.sensor.spec.map_shape))
-        return Ladder(self.forces_n, maps)
+        return Ladder(self.forces_n, maps.astype(np.float32))
+
+    def _surface(self, finger, turn):
+        """The underside of the object in the sensor's middle; of the last few turns it is kept."""
+        if (finger, turn) not in self._surfaces:
+            if len(self._surfaces) == _SURFACES:
+                self._surfaces.pop(next(iter(self._surfaces)))
+            pose = Pose(np.zeros(3), _FACING[finger] * Rotation.from_euler("z", turn * _STEP_DEG, degrees=True))
+            self._surfaces[finger, turn] = HeightField(place(self.mesh, pose=set_down(self.mesh, pose)))
+        return self._surfaces[finger, turn]
 
     def _carried(self, pressed, here, there, sense):
         """A map (y, x) of an object in one place (x, y, turn) as it is in another one nearby."""
