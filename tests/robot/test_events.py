@@ -7,6 +7,7 @@ import pytest
 import trimesh
 
 import softtact
+from softtact.errors import InputError
 from softtact.robot.events import NO_PRESS, press_events, read_events, record_of, to_dataset, write_events
 from softtact.robot.grasp import GraspRun
 from softtact.robot.scene import Placement, build_scene
@@ -88,3 +89,19 @@ def test_a_file_pressed_again_is_the_same_file(sensor, stud, record, maps, tmp_p
     again = press_events(sensor, stud, record_of(data), model="elastic", workers=1, label="")
     write_events(tmp_path / "two.nc", to_dataset(record_of(data), again, sensor, {"x_mm": 0.0}))
     assert (tmp_path / "one.nc").read_bytes() == (tmp_path / "two.nc").read_bytes()
+
+
+def test_the_shear_of_an_event_is_pressed_where_it_is_asked_for(record):
+    pad, ball = softtact.load_sensor("pad4x4"), trimesh.creation.icosphere(3, radius=4.0)
+    forces, poses = record.force_n.copy(), record.object_pose_sensor.copy()
+    contact, grip = record.event_row
+    poses[[contact, grip]] = [0, 0, 4, 1, 0, 0, 0]
+    forces[contact], forces[grip] = [[0, 0, -0.5], [0, 0, -0.5]], [[0.0, -0.3, -1.0], [0.0, 0.0, -1.0]]
+    sheared = replace(record, force_n=forces, object_pose_sensor=poses)
+    maps = press_events(pad, ball, sheared, model="elastic", workers=1, label="", friction=0.8)
+    np.testing.assert_allclose(maps.pressed_shear_n, [[[0, 0], [0, 0]], [[0, -0.3], [0, 0]]], atol=4e-3)
+    np.testing.assert_allclose(maps.pressed_force_n, [[0.5, 0.5], [1, 1]], rtol=1e-3)
+    left, right = maps.deformation_map_mm[1]
+    assert np.abs(left - right).max() > 0.005 * right.max()
+    with pytest.raises(InputError, match="shear is pressed with elastic or hyperelastic"):
+        press_events(pad, ball, sheared, model="auto", workers=1, label="", friction=0.8)

@@ -23,7 +23,8 @@ EXAMPLES = """
   softtact grasp --replay results/grasp/events.nc --out results/again      # the same maps, without the robot
 """
 _OF_GRASP = {"unit": None, "force": None, "x": 0.0, "y": 0.0, "angle": 0.0, "mass": None, "scene": None, "lift": True,
-             "model": "auto", "policy": "error", "tolerance": 0.01, "sensor": "coro"}     # what a replay takes from its file
+             "model": "auto", "policy": "error", "tolerance": 0.01, "sensor": "coro",
+             "shear": False}     # what a replay takes from its file
 
 
 def add(commands: argparse._SubParsersAction) -> None:
@@ -48,6 +49,8 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.add_argument("--model", choices=("auto", "elastic", "foundation", "hyperelastic"), default="auto",
                          help="a model by its name; auto (default) lets the policy choose at each event")
     command.add_argument("--policy", choices=("error", "paper"), default="error", help="how auto chooses, as in softtact press")
+    command.add_argument("--shear", action="store_true",
+                         help="press the shear of each event, too, with the scene's friction; --model elastic or hyperelastic")
     command.add_argument("--tolerance", type=float, default=0.01, metavar="MM", help="for the policy error (default: 0.01)")
     command.add_argument("--workers", type=int, metavar="N", help="processes that press (default: one for each core)")
     command.add_argument("--replay", type=Path, metavar="events.nc",
@@ -87,6 +90,8 @@ def _new(options):
                              "force; or give --replay events.nc.")
     spec = sensor_spec(options.sensor)
     check_forces([options.force], spec)
+    if options.shear and options.model not in ("elastic", "hyperelastic"):
+        raise InputError(f"--shear: {options.model} does not move an object aside; name --model elastic or hyperelastic.")
     if options.mass is not None and not options.mass > 0:
         raise InputError(f"--mass {options.mass:g}: an object weighs something; give kg above 0.")
     settings = load_scene(options.scene)
@@ -96,7 +101,7 @@ def _new(options):
     facts = {"mesh": str(options.mesh), "mesh_sha256": _digest(options.mesh), "unit": options.unit, "repair": int(options.repair),
              "sensor_asked_for": options.sensor, "requested_force_n": options.force, "x_mm": options.x, "y_mm": options.y,
              "angle_deg": options.angle, "mass_kg": scene.mass_kg, "model_asked_for": options.model, "policy": options.policy,
-             "tolerance_mm": options.tolerance, "scene": settings.model_dump_json()}
+             "tolerance_mm": options.tolerance, "shear": int(options.shear), "scene": settings.model_dump_json()}
     return _felt(mesh, record, facts, options.workers), scene, record
 
 
@@ -131,9 +136,12 @@ def _replayed(options):
 def _felt(mesh, record, facts, workers):
     """The data set of a record: what both sensors feel at its events."""
     from softtact.robot.events import press_events, to_dataset
+    from softtact.robot.settings import SceneSettings
 
     sensor = softtact.load_sensor(facts["sensor_asked_for"])
     choice = {"policy": facts["policy"], "tolerance_mm": facts["tolerance_mm"]}
+    if facts.get("shear"):
+        choice["friction"] = SceneSettings.model_validate_json(facts["scene"]).friction
     maps = press_events(sensor, mesh, record, model=facts["model_asked_for"], workers=workers, **choice)
     return to_dataset(record, maps, sensor, facts)
 

@@ -1,7 +1,7 @@
 """What the sensors feel at the events of a grasp: presses of the true mesh on both fingers, kept with the grasp in `events.nc`.
 
-A press takes the object's pose in the sensor's frame and the normal force from the record, nothing else. So a file that is pressed
-again (`press_events` of `record_of`) gives the same maps.
+A press takes the object's pose in the sensor's frame and the normal force from the record, where it is asked for the shear force,
+too, and nothing else. So a file that is pressed again (`press_events` of `record_of`) gives the same maps.
 """
 
 from collections.abc import Mapping
@@ -17,6 +17,8 @@ from softtact.errors import InputError
 from softtact.files import PROVENANCE, read_dataset, write_dataset
 from softtact.geometry.pose import Pose
 from softtact.robot.record import EVENTS, FINGERS, PHASES, GraspRecord
+from softtact.robot.shear import MODELS as SHEAR_MODELS
+from softtact.robot.shear import press_with_shear, with_friction
 
 if TYPE_CHECKING:
     import xarray
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
     from softtact.press.result import PressResult
     from softtact.press.sensor import Sensor
 
+_LEAST_SHEAR_N = 0.01     # below, shear is the scene's own rounding
 _FORCE_DIGITS = 3     # forces are pressed with to 1 mN: both fingers' then agree, and one call presses both
 NO_PRESS = "none"     # model of a finger that touches nothing
 _POSE = "mm; quaternion w, x, y, z"
@@ -33,7 +36,8 @@ _OF_RECORD = {"time_s": (("time",), "s"), "phase": (("time",), "1"), "joint_rad"
               "contact": (("time", "finger"), "1"), "event_row": (("event",), "1")}
 _OF_MAPS = {"deformation_map_mm": (("event", "finger", "y", "x"), "mm"),
             "tactile_map": (("event", "finger", "row", "column"), "counts"),
-            "pressed_force_n": (("event", "finger"), "N"), "model": (("event", "finger"), ""),
+            "pressed_force_n": (("event", "finger"), "N"), "pressed_shear_n": (("event", "finger", "aside"), "N"),
+            "model": (("event", "finger"), ""),
             "selection_reason": (("event", "finger"), ""), "within_validity": (("event", "finger"), "1")}
 
 
@@ -47,6 +51,8 @@ class EventMaps:
     """(event, finger, row, column) in counts: the taxels' ideal reading."""
     pressed_force_n: np.ndarray
     """(event, finger) in N: sum of the pressure on the sensing surface that the model found, with what its shell carries."""
+    pressed_shear_n: np.ndarray
+    """(event, finger, 2) in N: shear along x and y that the press had; zero where none was asked for."""
     model: np.ndarray
     """(event, finger): which model pressed, or `none`."""
     selection_reason: np.ndarray
@@ -56,9 +62,11 @@ class EventMaps:
 
 
 def press_events(sensor: "Sensor", mesh: trimesh.Trimesh, record: GraspRecord, *, model: str = "auto", workers: int | None = None,
-                 label: str = "grasp", **options: Any) -> EventMaps:
+                 label: str = "grasp", friction: float | None = None, **options: Any) -> EventMaps:
     """Press the mesh on both sensors at each event of a record, by the model that is named or, with `auto`, chosen.
 
+    friction: Coulomb's coefficient of the object on the sensors, with which the record's shear forces are pressed, too, where they
+        are above 10 mN; the model must then be named, elastic or hyperelastic
     options: policy, tolerance_mm, as for `Sensor.press`
     Raises InputError for a force out of the sensor's range, ConvergenceError as a press does.
     """
@@ -67,8 +75,19 @@ def press_events(sensor: "Sensor", mesh: trimesh.Trimesh, record: GraspRecord, *
     forces = np.round(np.maximum(-record.force_n[record.event_row, :, 2], 0.0), _FORCE_DIGITS) + 0.0
     poses = record.object_pose_sensor[record.event_row]
     maps = EventMaps(np.zeros((events, 2, *spec.map_shape)), np.zeros((events, 2, spec.taxels.rows, spec.taxels.columns)),
-                     np.zeros((events, 2)), np.full((events, 2), NO_PRESS, dtype=object), np.full((events, 2), "", dtype=object),
-                     np.ones((events, 2), dtype=np.int8))
+                     np.zeros((events, 2)), np.zeros((events, 2, 2)), np.full((events, 2), NO_PRESS, dtype=object),
+                     np.full((events, 2), "", dtype=object), np.ones((events, 2), dtype=np.int8))
+    shears = np.zeros((events, 2, 2)) if friction is None else record.force_n[record.event_row, :, :2]
+    sheared = (np.linalg.norm(shears, axis=2) > _LEAST_SHEAR_N) & (forces > 0)
+    if friction is not None and model not in SHEAR_MODELS:
+        raise InputError(f"model={model!r}: shear is pressed with {' or '.join(SHEAR_MODELS)}; name one of them.")
+    for event, finger in np.argwhere(sheared):
+        pose = set_down(mesh, pose_of(poses[event, finger]))
+        pressed = press_with_shear(with_friction(sensor, float(friction)), mesh, pose, force_n=float(forces[event, finger]),     # type: ignore[arg-type]
+                                   shear_n=shears[event, finger], model=model, threads=workers)
+        _keep(maps, (event, finger), pressed.result, step=-1)
+        maps.pressed_shear_n[event, finger] = pressed.shear_n
+    forces = np.where(sheared, 0.0, forces)
     for force in np.unique(forces[forces > 0]):
         places = np.argwhere(forces == force)
         seen = [set_down(mesh, pose_of(poses[tuple(place)])) for place in places]
@@ -79,11 +98,11 @@ def press_events(sensor: "Sensor", mesh: trimesh.Trimesh, record: GraspRecord, *
     return maps
 
 
-def _keep(maps: EventMaps, place: tuple[int, ...], result: "PressResult") -> None:
-    maps.deformation_map_mm[place], maps.tactile_map[place] = result.deformation_map_mm[0], result.tactile_map[0]
-    maps.pressed_force_n[place] = result.pad_force_n[0] + result.shell_force_n[0]     # type: ignore[index]
+def _keep(maps: EventMaps, place: tuple[int, ...], result: "PressResult", *, step: int = 0) -> None:
+    maps.deformation_map_mm[place], maps.tactile_map[place] = result.deformation_map_mm[step], result.tactile_map[step]
+    maps.pressed_force_n[place] = result.pad_force_n[step] + result.shell_force_n[step]     # type: ignore[index]
     maps.model[place], maps.selection_reason[place] = result.model, result.selection_reason or "named by the user"
-    maps.within_validity[place] = result.within_validity[0]
+    maps.within_validity[place] = result.within_validity[step]
 
 
 def pose_of(values: np.ndarray) -> Pose:
