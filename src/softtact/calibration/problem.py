@@ -87,8 +87,8 @@ class Problem:
     def __post_init__(self) -> None:
         if "friction" in self.fitted:
             raise InputError("Friction cannot be told from presses straight down: it changes a map by some percent, as gains do, "
-                             "and the models of a calibration have none; leave 'friction' out of --fit, and state 'friction.object' in "
-                             "the sensor's file.")
+                             "and the models of a calibration have none; leave 'friction' out of --fit, and state "
+                             "'friction.object' in the sensor's file.")
         unknown = [name for name in self.fitted if name not in FITTED]
         if unknown:
             raise InputError(f"There is no unknown {unknown[0]!r} to calibrate; write some of {', '.join(FITTED)}.")
