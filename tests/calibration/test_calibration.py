@@ -209,8 +209,8 @@ def test_the_press_that_covers_what_was_not_pressed_is_advised(bench, experiment
 
 
 def test_an_unknown_that_is_none_is_refused(bench, experiments):
-    with pytest.raises(InputError, match="no unknown 'friction' to calibrate; write some of placement"):
-        Problem(bench.presses, experiments, ("friction",))
+    with pytest.raises(InputError, match="no unknown 'gap' to calibrate; write some of placement"):
+        Problem(bench.presses, experiments, ("gap",))
 
 
 def test_a_thicker_cover_stands_further_out_of_the_same_shell(bench):
