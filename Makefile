@@ -40,7 +40,7 @@ test test-slow: export MKL_NUM_THREADS = 1
 test test-slow: export OPENBLAS_NUM_THREADS = 1
 PYTEST = $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 test: .venv/tested
-	$(PYTEST) -m 'not gold and not slow'
+	$(PYTEST) -m 'not gold and not slow' --durations 25 --durations-min 5
 
 test-slow: .venv/tested
 	$(PYTEST) -m 'slow and not gold'
