@@ -70,6 +70,7 @@ def test_forces_of_tetrahedra_are_differences_of_the_naive_energy():
             assert force[node, axis] == pytest.approx(slope, abs=1e-8)   # central difference: rounding 1e-11, curvature 1e-10
 
 
+@pytest.mark.slow
 def test_tetrahedra_agree_with_solid_blocks_of_one_point():
     for name in LAWS:
         for threads in [1, 2]:

@@ -81,6 +81,7 @@ def cell_error(mesh, forces, solve, **elements):
     return solve(deck_model(body, PLATE, indentations_mm=depths), **elements).force / forces - 1
 
 
+@pytest.mark.slow
 def test_a_unit_cell_needs_nearly_the_force_of_calculix(solve):
     """The default mesh, until the sides lie on the board. Left: the elements; +5.1, +4.6, +0.6, +1.7 % measured.
 

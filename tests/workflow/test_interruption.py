@@ -63,6 +63,7 @@ def test_sigkill_in_every_stage_is_survived_and_ends_with_the_same_files(finishe
     assert results(project) == results(finished)
 
 
+@pytest.mark.slow
 def test_a_damaged_file_is_reported_and_once_deleted_made_again_with_all_that_depends_on_it(finished, finished_once):
     damaged = finished.folder / "results/tiny/presses/grasps/object_5/elastic.nc"
     damaged.write_text("half of a f")
