@@ -15,7 +15,7 @@ from statistics import median
 ROOT = Path(__file__).resolve().parents[1]
 NUMBERS = ROOT / "docs" / "reference" / "numbers.md"
 PERFORMANCE = ROOT / "docs" / "performance.md"
-EDGE, FAST = (ROOT / "docs" / "explanation" / f"{name}.md" for name in ("edge", "fast_models"))
+EDGE, FAST, SOLID = (ROOT / "docs" / "explanation" / f"{name}.md" for name in ("edge", "fast_models", "solid"))
 LEARN = ROOT / "docs" / "how-to" / "learn_with_the_environment.md"
 MESHES = {"draft": "draft", "production": "default", "fine": "fine"}     # name in the records, name of the preset
 BLOCK = r"(<!-- numbers: {} -->\n).*?(<!-- end of numbers -->)"
@@ -171,6 +171,33 @@ def environment() -> str:
     return f"{source('environment')}\n\n{table(head, rows)}\n\n{table(of_errors, off)}"
 
 
+def solid_races() -> str:
+    """A press of two solids by us and by CalculiX: processor time, and what of ours the factor and the assembly take."""
+    rows = []
+    for row in record("solid_races")["rows"]:
+        ours, other = row["ours"], row["calculix"]
+        shares = [f"{ours['shares'][part] / ours['seconds']:.0%}" for part in ("factor", "assembly")]
+        rows.append([f"{ours['unknowns']:,}", ours["iterations"], f"{ours['cpu_seconds']:.3g}", f"{other['cpu_seconds']:.3g}",
+                     f"{other['cpu_seconds'] / ours['cpu_seconds']:.1f}", f"{other['difference']:.1%}", *shares,
+                     f"{ours['peak_gb']:.1f}"])
+    head = ("unknowns, Newton steps, ours (s), CalculiX (s), ratio, forces apart, factor of our time, assembly of our time, "
+            "memory (GB)")
+    return f"{source('solid_races')} Seconds are of the processor.\n\n{table(head, rows)}"
+
+
+def solid_kernels() -> str:
+    """Warp's kernels over the compiled loops: times on the processor, and on a GPU."""
+    rows = []
+    for name, where in (("solid_kernels", "processor"), ("solid_kernels_cuda", "GPU")):
+        for row in record(name)["rows"]:
+            ratios = [f"{row[f'{what}_ratio']:.2g}" for what in ("forces", "tangents", "matrix")]
+            rows.append([where, row["threads"], row["elements"], f"{row['unknowns']:,}", *ratios,
+                         f"{max(row['difference'], row['matrix_difference']):.0e}"])
+    gpu = record("solid_kernels_cuda")
+    head = "Warp on, threads of the loops, elements, unknowns, forces, tangents, matrix, largest difference"
+    return (f"{source('solid_kernels')} `solid_kernels_cuda.json`, {gpu['date'][:10]}, {gpu['device']}.\n\n{table(head, rows)}")
+
+
 def random_presses() -> str:
     """Outcomes of random presses."""
     outcomes = ["presses", "reached", "outside", "flagged", "stopped", "refused", "nonsense", "hung", "crashed"]
@@ -189,7 +216,8 @@ def numbers_page(counts: dict[str, int]) -> str:
 def pages() -> dict[Path, str]:
     """Texts of the pages whose named tables come from the records."""
     tables = {PERFORMANCE: {"presses": presses(), "fast presses": fast_presses()}, EDGE: {"overhang": overhang()},
-              FAST: {"choice": choice()}, LEARN: {"environment": environment()}}
+              FAST: {"choice": choice()}, SOLID: {"races": solid_races(), "kernels": solid_kernels()},
+              LEARN: {"environment": environment()}}
     return {page: _with_tables(page.read_text(encoding="utf-8"), own) for page, own in tables.items()}
 
 

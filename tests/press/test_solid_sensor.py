@@ -15,7 +15,7 @@ from softtact.fem.mesh_files import write_mesh
 from softtact.fem.structured_meshes import box
 from softtact.materials.laws.registry import make_law
 from softtact.models.solid.result import read_solid_result
-from softtact.press.touching import way_to_touch
+from softtact.press.touching import first_direction, way_to_touch
 
 RUBBER = make_law("neo_hooke", {"c10": 0.1}, bulk_over_shear=20)
 BLOCK = {"name": "block", "kind": "solid", "mesh": {"file": "block.vtu"},
@@ -80,6 +80,13 @@ def test_a_ball_touches_a_plane_and_an_edge_where_geometry_says():
     assert way_to_touch(ball + [0, 0, -9], plane, -down) == pytest.approx(6.5, abs=5e-3)
     assert way_to_touch(ball + [9, 0, 0], plane, np.array([-1.0, 0, 0])) == pytest.approx(9 - 5 - np.sqrt(4 - 0.25), abs=0.1)
     assert way_to_touch(ball + [9, 0, 9], plane, down) == np.inf
+
+
+@pytest.mark.parametrize(("steps", "direction"), [
+    ("fz -2; x 1", (0, 0, -1)), ("z -3 x 4", (0.8, 0, -0.6)), ("fz -2 x 5", (0, 0, -1)), ("rz 5", (0, 0, -1)),
+    ("fx 3 fz -4", (0.6, 0, -0.8))])
+def test_an_object_comes_along_its_first_force_or_else_its_first_way(steps, direction):
+    assert first_direction(Motion.parse(steps)) == pytest.approx(direction)
 
 
 def test_two_equal_soft_blocks_share_the_way(folder):

@@ -4,10 +4,10 @@ The sensor's layers are meshed as a solid, its frusta are springs (`models/solid
 any `SolidMesh`, whose upper part a rigid holder carries: a finger that presses, or the bench that the sensor is pressed against.
 """
 
-import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -21,7 +21,6 @@ from softtact.fem.structured_meshes import box
 from softtact.geometry.pose import Pose
 from softtact.materials.laws.base import Law
 from softtact.models.solid.body import SolidBody
-from softtact.models.solid.newton import SolidSettings
 from softtact.models.solid.path import SolidLoadStep, SolidPath
 from softtact.models.solid.springs import FrustumSprings
 from softtact.press.making import Course, make_result
@@ -31,9 +30,10 @@ from softtact.progress import Watch, announce
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
 
+OBJECT = "object"  # the frame that moves what is pressed
+Result = TypeVar("Result")
 _PENALTY = 20.0  # times E / h of the softer of both surfaces
 _CELL_OF_LAYERS = 20  # elements along the shorter side of a sensor without frusta
-_HOLDER = "object"
 _ROOT_POINTS = 12  # along the diameter of a frustum's root, for its mean movement
 
 
@@ -90,41 +90,56 @@ def press_soft(sensor: "Sensor", soft: SoftObject, pose: Pose | None, motion: Mo
 
     Raises InputError where the object misses the sensor, ConvergenceError with the steps before as its `result`.
     """
-    start = time.perf_counter()
     pad = SolidPad(sensor)
     placed = soft.placed(pose, pad.height_mm, sensor.spec.footprint_mm)
     body = pad.with_object(placed, soft, threads=course.threads)
-    body.watch = Watch(course.label, limit_s=course.time_limit_s)
-    tell = partial(_tell, course.label)
-    tell(f"{len(body.free)} unknowns, {len(motion.steps)} load steps of the solid model")
-    steps: list[SolidLoadStep] = []
-    times: list[float] = []
+    return pressed_solid(
+        body,
+        OBJECT,
+        motion,
+        partial(pad.result, body),
+        label=course.label,
+        time_limit_s=course.time_limit_s,
+        on_step=course.on_step,
+    )
 
-    def result() -> PressResult:
-        return pad.result(body, steps, np.diff([start, *times]))
 
+def pressed_solid(
+    body: SolidBody,
+    frame: str,
+    motion: Motion,
+    gather: Callable[[list[SolidLoadStep]], Result],
+    *,
+    label: str = "",
+    time_limit_s: float | None = None,
+    on_step: Callable[[Result], None] | None = None,
+) -> Result:
+    """What `gather` makes of the load steps of a body whose one frame is moved; progress is told where there is a label.
+
+    on_step: called with what is made of the steps so far, at each that is reached but the last
+    A ConvergenceError, of which a time limit is one, and a KeyboardInterrupt hold what is made of the steps before as `result`.
+    """
+
+    def tell(text: str) -> None:
+        if label:
+            announce(f"{label}: {text}")
+
+    count, steps = len(motion.steps), list[SolidLoadStep]()
+    body.watch = Watch(label, limit_s=time_limit_s)
+    tell(f"{len(body.free)} unknowns, {count} load steps of the solid model")
     try:
-        for step in SolidPath(body, {_HOLDER: motion}, settings=SolidSettings(), tell=tell).run():
+        for step in SolidPath(body, {frame: motion}, tell=tell).run():
             steps.append(step)
-            times.append(time.perf_counter())
-            tell(
-                f"step {len(steps)} of {len(motion.steps)}, {-step.loads[0, 2]:.4g} N, {step.iterations} iterations, "
-                f"{times[-1] - start:.0f} s"
-            )
-            if course.on_step and len(steps) < len(motion.steps):
-                course.on_step(result())
+            force = float(np.linalg.norm(step.loads[0, :3]))
+            tell(f"step {len(steps)} of {count}, {force:.4g} N, {step.iterations} iterations, {step.wall_time_s:.0f} s")
+            if on_step and len(steps) < count:
+                on_step(gather(steps))
     except (ConvergenceError, KeyboardInterrupt) as error:
-        error.result = result() if steps else None  # type: ignore[union-attr]
+        error.result = gather(steps) if steps else None  # type: ignore[union-attr]
         raise
     finally:
         body.watch.end()
-    return result()
-
-
-def _tell(label: str, text: str) -> None:
-    """Progress on stderr, where the press has a label."""
-    if label:
-        announce(f"{label}: {text}")
+    return gather(steps)
 
 
 def _missing(points: np.ndarray, footprint_mm: tuple[float, float]) -> str:
@@ -186,7 +201,7 @@ class SolidPad:
         top = placed.points[:, 2].max()
         middle = 0.5 * (placed.points.min(axis=0) + placed.points.max(axis=0))
         body = SolidBody(
-            mesh, laws, held=held, threads=threads, carried={_HOLDER: ((middle[0], middle[1], top), ["object held"], "xyz")}
+            mesh, laws, held=held, threads=threads, carried={OBJECT: ((middle[0], middle[1], top), ["object held"], "xyz")}
         )
         if self._frusta is not None:
             body.springs.append(self._springs())
@@ -218,8 +233,8 @@ class SolidPad:
         law = self.sensor.prepared("foundation").law
         return FrustumSprings(faces, np.tile(weights, (len(faces), 1)), law)
 
-    def result(self, body: SolidBody, steps: list[SolidLoadStep], seconds: np.ndarray) -> PressResult:
-        """The `PressResult` of load steps that took so many seconds (l,) each."""
+    def result(self, body: SolidBody, steps: list[SolidLoadStep]) -> PressResult:
+        """The `PressResult` of load steps."""
         sampled = np.array([self._sampled(step.state.displacement) for step in steps])
         forces = np.array([step.loads[0] for step in steps])
         points = [step.state.histories[0].points for step in steps]
@@ -228,6 +243,7 @@ class SolidPad:
         down = np.array([-step.state.poses[0].translation[2] for step in steps])
         springs = body.springs[0] if body.springs else None
         compression = [float(springs.compressions(step.state.displacement).max()) if springs else np.nan for step in steps]
+        seconds = np.array([step.wall_time_s for step in steps])
         share = np.array([step.extrapolated_volume_fraction for step in steps])
         deepest = springs.limit_mm if springs else np.inf
         valid = ~(np.array(compression) > deepest)

@@ -17,7 +17,7 @@ import trimesh
 from softtact.contact.motion import Motion
 from softtact.contact.pair import ContactPair
 from softtact.contact.surfaces import Surface
-from softtact.errors import ConvergenceError, InputError
+from softtact.errors import InputError
 from softtact.fem.face_rules import with_named_faces
 from softtact.fem.flat_facets import fine_triangles
 from softtact.fem.mesh_files import read_mesh_file
@@ -25,17 +25,14 @@ from softtact.fem.solid_mesh import SolidMesh
 from softtact.geometry.pose import Pose
 from softtact.materials.laws.base import Law
 from softtact.models.solid.body import SolidBody
-from softtact.models.solid.path import SolidLoadStep, SolidPath
 from softtact.models.solid.readings import ReadingPoints
 from softtact.models.solid.result import SolidResult, gathered
 from softtact.press.asked import check_loads, cores, mesh_of, motion_of
-from softtact.press.solid import SoftObject
+from softtact.press.solid import OBJECT, SoftObject, pressed_solid
 from softtact.press.touching import first_direction, way_to_touch
-from softtact.progress import Watch, announce
 from softtact.sensors.library import sensor_file
 from softtact.sensors.solid import SolidSpec
 
-OBJECT = "object"     # the frame that moves what is pressed on the sensor
 _PENALTY = 20.0       # times E / h of the softer surface
 _REACH = 2.0          # times the length of a facet: how far apart surfaces may be that meet
 
@@ -106,22 +103,8 @@ class SolidSensor:
         check_loads(motion, self.spec.force_range_n, self.spec.name)
         body = self.body_with(mesh if isinstance(mesh, SoftObject) else mesh_of(mesh, unit), pose, motion,
                               threads=threads or cores())
-        tell = (lambda text: announce(f"{label}: {text}")) if label else (lambda text: None)
-        tell(f"{len(body.free)} unknowns, {len(motion.steps)} load steps of the solid model")
-        body.watch = Watch(label, limit_s=time_limit_s)
-        steps: list[SolidLoadStep] = []
-        result = partial(gathered, body, steps, self.reading_points())
-        try:
-            for step in SolidPath(body, {OBJECT: motion}, tell=tell).run():
-                steps.append(step)
-                if on_step and len(steps) < len(motion.steps):
-                    on_step(result())
-        except (ConvergenceError, KeyboardInterrupt) as error:
-            error.result = result() if steps else None     # type: ignore[union-attr]
-            raise
-        finally:
-            body.watch.end()
-        return result()
+        return pressed_solid(body, OBJECT, motion, partial(gathered, body, readings=self.reading_points()), label=label,
+                             time_limit_s=time_limit_s, on_step=on_step)
 
     def reading_points(self) -> ReadingPoints | None:
         """Where readings are taken; None where the file names no places."""

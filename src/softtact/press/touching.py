@@ -13,12 +13,12 @@ _MIRROR = np.diag([1.0, 1.0, -1.0])
 
 
 def first_direction(motion: Motion) -> np.ndarray:
-    """Unit vector (3,) along which a motion's first step moves or loads the object; down where it only turns it."""
-    step = motion.steps[0]
-    given = {**step.ways, **step.loads}
-    way = np.array([given.get(name, 0.0) for name in FREEDOMS[:3]])
-    length = np.linalg.norm(way)
-    return way / length if length else np.array([0.0, 0.0, -1.0])
+    """Unit vector (3,) along which a motion's first step loads the object or, without a force, moves it; else down."""
+    for given in (motion.steps[0].loads, motion.steps[0].ways):
+        way = np.array([given.get(name, 0.0) for name in FREEDOMS[:3]])
+        if way.any():
+            return np.asarray(way / np.linalg.norm(way))
+    return np.array([0.0, 0.0, -1.0])
 
 
 def way_to_touch(coming: np.ndarray, surface: np.ndarray, direction: np.ndarray) -> float:
