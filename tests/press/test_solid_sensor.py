@@ -89,6 +89,29 @@ def test_an_object_comes_along_its_first_force_or_else_its_first_way(steps, dire
     assert first_direction(Motion.parse(steps)) == pytest.approx(direction)
 
 
+def test_a_plate_that_slides_pulls_with_the_friction_of_the_file(folder):
+    sensor = sensor_of(folder, "rough", contact={"face": "z1", "friction": 0.3}, held={"z0": "xyz"})
+    motion = Motion().press(depth_mm=0.05).slide(x_mm=0.3, steps=3)
+    force = sensor.press(folder / "plate.stl", unit="mm", motion=motion, label="").load("object")[-1]
+    assert force[0] == pytest.approx(-0.3 * force[2], rel=0.01) and abs(force[1]) < 0.01 * force[0]
+
+
+@pytest.mark.parametrize("direction", [(0, 0, -1), (1, 0, 0)])
+def test_a_holder_takes_the_rear_of_a_soft_object_as_seen_along_its_way(direction):
+    soft = softtact.SoftObject(box((0, 0, 0), (2, 2, 2), (5, 5, 5)), RUBBER, held_share=0.2)
+    placed = soft.with_faces(soft.mesh.points, np.array(direction, dtype=float))
+    along = placed.points @ direction
+    assert along[placed.face_nodes("held")].max() == pytest.approx(along.min() + 0.4)      # a fifth of 2 mm
+    assert along[placed.face_nodes("pressed")].min() == pytest.approx(along.min() + 0.4)
+
+
+def test_a_law_without_a_bulk_modulus_has_the_one_of_all_laws(folder):
+    law = sensor_of(folder).laws["rubber"]
+    assert law.bulk_modulus == make_law("neo_hooke", {"c10": 0.1}).bulk_modulus
+    stiffer = {"rubber": {"law": "neo_hooke", "parameters": {"c10": 0.1}, "bulk_over_shear": 40}}
+    assert sensor_of(folder, regions=stiffer).laws["rubber"].bulk_modulus == pytest.approx(2 * law.bulk_modulus)
+
+
 def test_two_equal_soft_blocks_share_the_way(folder):
     # Each block is 1 mm high; the object's upper share of 0.3 is held, so that 0.7 mm of it and 1 mm of the sensor bear one stress.
     block = box((0, 0, 0), (2, 2, 1), (2, 2, 2), region="rubber")

@@ -27,6 +27,18 @@ def test_both_forces_are_those_asked_for(sensor, ball, shear):
     assert found.way_mm @ np.array(shear) > 0          # the object goes where it pushes
 
 
+def test_the_way_is_found_in_a_few_presses(sensor, ball, monkeypatch):
+    presses, press = [], type(sensor).press
+
+    def counted(*given, **options):
+        presses.append(options["motion"])
+        return press(*given, **options)
+
+    monkeypatch.setattr(type(sensor), "press", counted)
+    press_with_shear(sensor, ball, None, force_n=1.0, shear_n=np.array([0.1, -0.1]), threads=1)
+    assert len(presses) <= 3      # a probe, a step of Newton's method, and one that mends what has slid
+
+
 def test_the_opposite_shear_is_felt_mirrored(sensor, ball):
     one, other = (press_with_shear(sensor, ball, None, force_n=1.0, shear_n=np.array([sign * 0.3, 0.0]), threads=1).result
                   for sign in (1, -1))

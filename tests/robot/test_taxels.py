@@ -66,3 +66,14 @@ def test_between_two_places_readings_hardly_jump():
 def test_an_object_beside_the_sensor_is_not_felt():
     memory = TaxelMemory(load_sensor("coro"), CYLINDER, "elastic", LARGEST_N)
     assert memory.counts(0, np.array([30.0, 0, 0, 1, 0, 0, 0]), 5.0).max() < 1e-9
+
+
+def test_a_map_that_is_carried_over_the_side_keeps_its_volume():
+    sensor = load_sensor("coro")
+    memory = TaxelMemory(sensor, CYLINDER, "elastic", LARGEST_N)
+    x, y = np.meshgrid(sensor.spec.map_x_mm, sensor.spec.map_y_mm)
+    pressed = np.exp(-((x - 8) ** 2 + (y + 5) ** 2) / 8)      # 3 mm from the side, to which it is moved by 1 mm
+    carried = memory._carried(pressed, np.array([0.0, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]), 1.0)
+    assert carried.sum() == pytest.approx(pressed.sum(), rel=1e-9)
+    _, column = np.unravel_index(carried.argmax(), carried.shape)
+    assert sensor.spec.map_x_mm[column] == pytest.approx(9, abs=0.4)      # half a step of the map

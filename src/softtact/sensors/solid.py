@@ -28,7 +28,6 @@ from softtact.unknown_names import first_fault
 
 _SURFACES = (".stl", ".obj", ".ply")
 _SOURCES = ("material", "card", "law")
-BULK_OVER_SHEAR = 20.0     # where a law by itself states none, as for all laws
 
 
 class MeshFile(Section):
@@ -94,7 +93,9 @@ class SolidSpec(Section):
             return law_from_card(load_card(self._folder / region.card), region.law)
         if region.material:
             return law_from_printed(material_file(region.material), region.law or "mooney_rivlin")
-        return make_law(str(region.law), region.parameters or {}, bulk_over_shear=region.bulk_over_shear or BULK_OVER_SHEAR)
+        if region.bulk_over_shear is None:
+            return make_law(str(region.law), region.parameters or {})
+        return make_law(str(region.law), region.parameters or {}, bulk_over_shear=region.bulk_over_shear)
 
     @classmethod
     def from_yaml(cls, path: str | Path) -> Self:
