@@ -91,7 +91,6 @@ def press(mesh, threads):
     began, busy, clock = time.perf_counter(), time.process_time(), Clock()
     body = make_body(mesh, threads)
     clock.watch(body, "tangent", "assembly")
-    clock.watch(body.solver, "factor", "factor")
     clock.watch(body.solver, "solve", "solution")
     clock.watch(body, "evaluate", "forces and contact")
     steps = list(SolidPath(body, {"top": MOTION}).run())

@@ -35,9 +35,8 @@ def cooks_membrane(cells, law, kind):
     state, load = body.rest(), np.zeros_like(body.points)
     points = quadrature_points(Surface.of(mesh.face("x1")), body.points)
     np.add.at(load[:, 1], points.nodes, points.values * points.weight[:, None] / points.weight.sum())
-    assert body.factor(state) == 0
     moved = np.zeros_like(body.points)
-    moved.ravel()[body.free] = body.solver.solve(load.ravel()[body.free])
+    moved.ravel()[body.free] = body.solve(state, load.ravel()[body.free, None])[:, 0]
     return moved[np.argmin(np.abs(body.points - [48, 60, 0]).sum(axis=1)), 1] * (1 if kind == "quad9" else 44 / cells)
 
 

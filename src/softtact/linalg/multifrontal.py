@@ -101,7 +101,7 @@ def keep(p: int, fronts: Fronts, store: Store) -> None:
         triangle[at] = np.float32(1.0) / panel[k * width + k]
         triangle[at + 1:at + own - k] = panel[k * width + k + 1:k * width + own]
         at += own - k
-    for k in range(own if bound else 0):
+    for k in range(own):
         row = panel[k * width + own:(k + 1) * width]
         out = store.short[fronts.short_at[p] + k * bound:fronts.short_at[p] + (k + 1) * bound]
         largest = np.float32(0.0)

@@ -1,4 +1,4 @@
-"""Cholesky's method for the matrix of a wide and thin body, of which it is known where each unknown stands.
+"""Cholesky's method for the matrix of a body of which it is known where each unknown stands, in plan or in space.
 
 In single precision, and solved from 16 bits, for steps that are corrected by a residual in double precision. What it gains over a
 general solver: docs/notebook/2026-11-25-linear-solver.md.
@@ -25,6 +25,7 @@ from softtact.linalg.workers import SERIAL, Workers, slices
 _PARTS = 32              # of all operations: what takes less than such a share is one thread's, from its first piece to its last
 _SOLVED_APART = 4        # parts that are solved on threads of their own
 _SLACK = 1.05            # of arrays, for the next pattern
+_SLOWER = 20             # an operation of a solution, which waits for memory, beside one of a factor
 _COLUMNS = 256           # of a large front that one thread couples at once
 
 
@@ -49,13 +50,19 @@ class DissectedSolver:
     _store: Any      # `Store`, None before the first factor
 
     def __init__(self, places: np.ndarray, *, workers: Workers = SERIAL) -> None:
-        """places (n, 2): where each unknown stands in plan, in mm"""
+        """places (n, 2 or 3): where each unknown stands, in plan where the body is wide and thin, or in space; in mm"""
         self._places, self._workers, self._pattern, self._frames = places, workers, None, None
         self._store = None
 
     @property
     def unknowns(self) -> int:
         return len(self._places)
+
+    @property
+    def solves_per_factor(self) -> float:
+        """How many solutions take as long as a factor, by their operations."""
+        own, bound = np.diff(self._fronts.own_at).astype(float), np.diff(self._fronts.bound_at)
+        return float((own**3 / 3 + own**2 * bound + own * bound**2).sum() / (own * (own / 2 + bound)).sum()) / _SLOWER
 
     def factor(self, upper: sp.csr_matrix) -> bool:
         """Factor the matrix whose upper triangle (csr, sorted, with its diagonal) is given; False if not positive definite."""

@@ -2,9 +2,12 @@
 
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager
+from functools import cache
 from typing import TypeVar
 
 import numpy as np
+from threadpoolctl import ThreadpoolController
 
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
@@ -28,6 +31,16 @@ class Workers:
 
 
 SERIAL = Workers()
+
+
+def one_thread_each() -> AbstractContextManager:
+    """While this lasts, BLAS stays on the thread that calls it: threads that call it would wait for each other's threads."""
+    return _libraries().limit(limits=1)
+
+
+@cache
+def _libraries():
+    return ThreadpoolController()     # which takes milliseconds, and needs the libraries loaded
 
 
 def slices(count: int, size: int) -> list[slice]:

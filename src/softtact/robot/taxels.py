@@ -17,12 +17,12 @@ import numpy as np
 import trimesh
 from scipy.ndimage import affine_transform
 from scipy.spatial.transform import Rotation
-from threadpoolctl import ThreadpoolController
 
 from softtact.contact.height_field import HeightField
 from softtact.errors import InputError
 from softtact.geometry.meshes import place
 from softtact.geometry.pose import Pose
+from softtact.linalg.workers import one_thread_each
 from softtact.press.fast import thinning_maps
 from softtact.press.ladder import Ladder, even_in_root
 from softtact.press.sensor import Sensor
@@ -62,7 +62,6 @@ class TaxelMemory:
             raise InputError(f"place_step_mm={self.step_mm:g}: give a length in mm above 0 and below the sensor's shorter side, "
                              f"{side:g}.")
         self.forces_n = even_in_root(self.sensor.checked_forces(self.largest_force_n)[0], _FORCES)
-        self._threads: ThreadpoolController | None = None
         self._step = np.array([self.step_mm, self.step_mm, _STEP_DEG])
         spec = self.sensor.spec
         self._first_mm = np.array([spec.map_y_mm[0], spec.map_x_mm[0]])     # as maps are indexed: y, x
@@ -110,9 +109,8 @@ class TaxelMemory:
     def _pressed(self, finger, x, y, turn):
         surface = self._surface(finger, turn).moved(np.array([x, y, 0]) * self.step_mm)
         self.sensor.prepared(self.model)
-        self._threads = self._threads or ThreadpoolController()     # which takes milliseconds, and needs the libraries loaded
         try:
-            with self._threads.limit(limits=1):
+            with one_thread_each():
                 maps = thinning_maps(self.sensor, surface, self.forces_n, model=self.model)
         except InputError:     # the object is beside this sensor
             maps = np.zeros((_FORCES, *self.sensor.spec.map_shape))

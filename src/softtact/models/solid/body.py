@@ -22,8 +22,7 @@ from softtact.fem.assembly import SymmetricPattern, add_upper
 from softtact.fem.kernels import add_forces
 from softtact.fem.solid_block import SolidBlock
 from softtact.fem.solid_mesh import SolidMesh
-from softtact.linalg.direct import make_solver
-from softtact.linalg.direct_single import point_at_mkl
+from softtact.linalg.refined import RefinedSolver, symmetric_product
 from softtact.linalg.workers import Workers, slices
 from softtact.materials.laws.base import Law
 from softtact.models.solid.blocks import region_blocks
@@ -98,8 +97,7 @@ class SolidBody:
         self.pressures: list[FacePressure] = []
         self.springs: list[FrustumSprings] = []
         refuse_loose(mesh, self.free_components, held or {})
-        point_at_mkl()
-        self.solver = make_solver(threads=threads)
+        self.solver = RefinedSolver(self.points[self.free // 3], workers=self.workers)
         self._pattern: SymmetricPattern | None = None
         self._known_pairs: set[tuple[int, int]] = set()
 
@@ -252,45 +250,46 @@ class SolidBody:
         assert moved is not None
         return (self.frame_loads(moved) - self.frame_loads(state)) / share
 
-    def factor(self, state: SolidState, *, turning: bool = True) -> float:
-        """Factor the tangent; returns the diagonal (N/mm) that had to be added to make it positive definite, mostly 0.
+    def solve(self, state: SolidState, right: np.ndarray, *, turning: bool = True) -> np.ndarray:
+        """Solve with the tangent at a state for right-hand sides (unknowns, k), or with one near it that is positive definite.
 
         turning: see `tangent`
         """
-        if turning and self.solver.factor(self.tangent(state)):
-            return 0.0
-        matrix = self.tangent(state, turning=False)  # far from balance, pressed surfaces that turn may have no stiffness
-        shift, diagonal = 0.0, matrix.indptr[:-1]
-        while not self.solver.factor(matrix):
-            more = max(3.0 * shift, 1e-4 * float(np.abs(matrix.data[diagonal]).mean()))
-            matrix.data[diagonal] += more
-            shift += more
-        return shift
-
-    def solve(self, state: SolidState, right: np.ndarray) -> np.ndarray:
-        """Solve with the tangent that `factor` factored at a state, for right-hand sides (unknowns, k).
-
-        Where friction slides, the tangent has a part beside the matrix: GMRES, with the factor as its preconditioner.
-        """
-        found = self.solver.solve(right)
+        found = self.solver.solve(self.tangent(state), right) if turning else None
+        if found is None:
+            found = self._definite(state, right)
         if not any(
             pair.friction and (contact.slides & (contact.pressure > 0)).any()
             for pair, contact in zip(self.pairs, state.contacts, strict=True)
         ):
             return found
 
-        def coupled(y):  # (matrix + coupling) matrix^-1 y
-            x, force = self.solver.solve(np.ascontiguousarray(y)), np.zeros_like(self.points)
-            change = np.zeros(self.points.size)
+        def coupling(x):
+            change, force = np.zeros(self.points.size), np.zeros_like(self.points)
             change[self.free] = x
             for pair, history, contact in zip(self.pairs, state.histories, state.contacts, strict=True):
                 pair.add_coupling(history, contact, change.reshape(-1, 3), force)
-            return y + force.ravel()[self.free]
+            return force.ravel()[self.free]
 
-        operator = spla.LinearOperator((len(right), len(right)), matvec=coupled, dtype=float)
+        def whole(y):
+            x = self.solver.precondition(y)
+            return symmetric_product(self._matrix, x) + coupling(x)
+
+        operator = spla.LinearOperator((len(right), len(right)), matvec=whole, dtype=float)
         for k in range(right.shape[1]):
-            y, _ = spla.gmres(operator, right[:, k], x0=right[:, k], rtol=_COUPLED, restart=_MOST_COUPLED, maxiter=1)
-            found[:, k] = self.solver.solve(y)
+            size = _COUPLED * float(np.linalg.norm(right[:, k]))
+            y, _ = spla.gmres(operator, -coupling(found[:, k]), atol=size, rtol=0.0, restart=_MOST_COUPLED, maxiter=1)
+            found[:, k] += self.solver.precondition(y)
+        return found
+
+    def _definite(self, state, right):
+        """With the tangent without the part that surfaces have as they turn, and as stiff as it takes to be positive definite."""
+        matrix = self.tangent(state, turning=False)  # far from balance, pressed surfaces that turn may have no stiffness
+        shift, diagonal = 0.0, matrix.indptr[:-1]
+        while (found := self.solver.solve(matrix, right, doubt=not shift)) is None:
+            more = max(3.0 * shift, 1e-4 * float(np.abs(matrix.data[diagonal]).mean()))
+            matrix.data[diagonal] += more
+            shift += more
         return found
 
     def tangent(self, state: SolidState, *, turning: bool = True) -> sp.csr_matrix:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from softtact.errors import ConvergenceError
+from softtact.linalg.workers import one_thread_each
 from softtact.models.newton import Solution, lowers_potential, solve
 from softtact.models.solid.body import SolidBody, SolidState
 
@@ -79,8 +80,6 @@ class _Balance:
 
     def step(self, state: SolidState) -> tuple[SolidState, Any]:
         body, unknown = self.body, self.target.unknown
-        # Right after a prescribed way surfaces overlap by far more than in balance, and turning them costs the definiteness.
-        body.factor(state, turning=not self.just_predicted)
         residual, off = body.residual(state).copy(), self._loads_off(state)
         ways = [np.zeros(6) for _ in body.frames]
         pressures = state.pressures
@@ -92,7 +91,8 @@ class _Balance:
             column, loads = body.border(state, frame, np.eye(6)[freedom])
             columns.append(column)
             corner[:, k] = [loads[other] for other in unknown]
-        found = body.solve(state, np.column_stack([residual, *columns]))
+        # Right after a prescribed way surfaces overlap by far more than in balance, and turning them costs the definiteness.
+        found = body.solve(state, np.column_stack([residual, *columns]), turning=not self.just_predicted)
         step = -found[:, 0]
         if unknown:
             # The loads' derivatives by the displacements: the columns once more where the tangent is symmetric, without friction.
@@ -200,6 +200,11 @@ def balance(body: SolidBody, start: SolidState, target: Target, settings: SolidS
 
     Raises ConvergenceError where Newton's method or the augmentations do not end.
     """
+    with one_thread_each():
+        return _balance(body, start, target, settings)
+
+
+def _balance(body, start, target, settings):
     pending = any(way.any() for way in target.ways) or bool(np.any(target.pressures != start.pressures))
     state, iterations = start, 0
     if target.unknown and not pending and any(pair.friction for pair in body.pairs):

@@ -1,0 +1,159 @@
+"""Systems with one symmetric matrix after the other: conjugate gradients, with a factor of few digits as their preconditioner.
+
+A factor in single precision takes a fraction of the time and memory of one in double precision. A solve with it leaves 3e-4 of the
+energy norm (`multifrontal`), two leave 1e-7. And a solve takes a fiftieth of a factor's time or less, so that the factor of an
+earlier matrix serves as long as its many solves take less time than a new factor
+(docs/notebook/2026-11-26-solids-in-single-precision.md).
+Matrices for which single precision has too few digits, as of a stiff plate that floats on a gel, get factors in double precision.
+Reference: Saad, Iterative Methods for Sparse Linear Systems, 2nd ed. (2003), section 9.2.
+"""
+
+import numpy as np
+import scipy.sparse as sp
+from numba import njit
+
+from softtact.linalg.block_tridiagonal import BlockTridiagonalSolver
+from softtact.linalg.direct import PardisoSolver, make_solver
+from softtact.linalg.direct_single import point_at_mkl
+from softtact.linalg.multifrontal_solver import DissectedSolver
+from softtact.linalg.workers import SERIAL, Workers
+
+_ENOUGH = 1e-3    # of the solution's energy norm: the last correction; what is left is that times what a solve leaves
+_WORTH = 0.6      # of a factor's time: solves with an old factor that take more are given up
+_MOST_STEPS = 30  # with its own factor; a matrix that takes more needs more digits
+
+
+class _Indefinite(Exception):
+    """A direction was met along which the matrix is not positive."""
+
+
+class RefinedSolver:
+    """Solves with a factor in single precision, of this matrix or of one before, as long as that is enough."""
+
+    _exact: PardisoSolver | BlockTridiagonalSolver | None
+
+    def __init__(self, places: np.ndarray, *, workers: Workers = SERIAL) -> None:
+        """places (n, 2 or 3): where each unknown stands, in mm"""
+        self._threads = workers.threads
+        self._quick, self._exact = DissectedSolver(places, workers=workers), None
+        self._upkeep: _Upkeep | None = None     # of the factor that is there
+
+    @property
+    def name(self) -> str:
+        return "conjugate gradients, " + self._quick.name if self._exact is None else self._exact.name
+
+    def solve(self, upper: sp.csr_matrix, right: np.ndarray, *, doubt: bool = False) -> np.ndarray | None:
+        """Solve a matrix, given by its upper triangle (csr, sorted, with its diagonal), for right-hand sides (n, k).
+
+        None if it is not positive definite;  doubt: whether to ask double precision before that is said
+        """
+        if self._exact is not None:
+            return self._exact.solve(right) if self._exact.factor(upper) else None
+        try:
+            found = self._with_old_factor(upper, right)
+            if found is None:
+                found = self._with_new_factor(upper, right)
+        except _Indefinite:
+            return None
+        if found is None and (doubt or self._upkeep is not None):
+            found = self._exactly(upper, right)
+        return found
+
+    def _with_old_factor(self, upper, right):
+        if self._upkeep is None or self._upkeep.due:
+            return None
+        found, steps = self._refined(upper, right, int(_WORTH * self._quick.solves_per_factor))
+        self._upkeep.add(steps)
+        return found
+
+    def _with_new_factor(self, upper, right):
+        self._upkeep = _Upkeep(self._quick.solves_per_factor) if self._quick.factor(upper) else None
+        if self._upkeep is None:
+            return None
+        found, steps = self._refined(upper, right, _MOST_STEPS * right.shape[1])
+        self._upkeep.add(steps)
+        return found
+
+    def _exactly(self, upper, right):
+        """With a factor in double precision; from now on always, if the matrix is positive definite."""
+        point_at_mkl()
+        exact = make_solver(threads=self._threads)
+        if not exact.factor(upper):
+            exact.close()
+            return None
+        self.close()
+        self._exact = exact
+        return exact.solve(right)
+
+    def precondition(self, right: np.ndarray) -> np.ndarray:
+        """About the solution (n,) with the last matrix, by the factor that is there."""
+        return self._quick.solve(right) if self._exact is None else self._exact.solve(right)
+
+    def _refined(self, upper, right, most):
+        """The solutions (n, k) by conjugate gradients, None where they do not end in so many steps together; and the steps."""
+        found, steps = np.empty_like(right), 0
+        for k in range(right.shape[1]):
+            one, taken = _conjugate_gradients(upper, right[:, k], self._quick.solve, most - steps)
+            steps += taken
+            if one is None:
+                return None, steps
+            found[:, k] = one
+        return found, steps
+
+    def close(self) -> None:
+        """Forget the factors."""
+        for solver in (self._quick, self._exact):
+            if solver is not None:
+                solver.close()
+        self._upkeep = None
+
+
+class _Upkeep:
+    """When a factor is due: as soon as the last system took more than an average one since the last factor, this included."""
+
+    def __init__(self, factor):
+        """factor: its price in solves"""
+        self.spent, self.systems, self.due = factor, 0, False
+
+    def add(self, solves):
+        self.spent, self.systems = self.spent + solves, self.systems + 1
+        self.due = solves * self.systems > self.spent
+
+
+def _conjugate_gradients(upper, right, precondition, most):
+    """The solution (n,), None if it is not good enough after so many steps; and the steps."""
+    found, rest, way, before, first = np.zeros_like(right), right.copy(), np.zeros_like(right), 1.0, 0.0
+    for step in range(most):
+        correction = precondition(rest)
+        size = float(rest @ correction)     # square of the energy norm of what is off, as the factor sees it
+        first = first or size
+        if size > 0.0:
+            way = correction + (size / before) * way
+            pushed = symmetric_product(upper, way)
+            stiffness = float(way @ pushed)
+            if stiffness <= 0.0:
+                raise _Indefinite
+            found += (size / stiffness) * way
+            rest -= (size / stiffness) * pushed
+            before = size
+        if size <= _ENOUGH**2 * first:
+            return found, step + 1
+    return None, most
+
+
+def symmetric_product(upper: sp.csr_matrix, x: np.ndarray) -> np.ndarray:
+    """Product (n,) of a symmetric matrix, given by its upper triangle (csr, sorted, with its diagonal), and x (n,)."""
+    return _symmetric_product(upper.indptr, upper.indices, upper.data, x)
+
+
+@njit(cache=True, nogil=True)
+def _symmetric_product(indptr, indices, data, x):
+    out = np.zeros_like(x)
+    for row in range(len(x)):
+        first = indptr[row]
+        total = data[first] * x[row]
+        for e in range(first + 1, indptr[row + 1]):
+            total += data[e] * x[indices[e]]
+            out[indices[e]] += data[e] * x[row]
+        out[row] += total
+    return out
