@@ -5,9 +5,10 @@ wider block in four equal increments, without friction, on the same mesh of quad
 we also bring the overlap below 1 um.
   CalculiX   C3D10, contact surface to surface, its direct solver and its criteria; timed is its whole process
   NGSolve    order 2, `ContactBoundary` with the penalty's energy, Newton's method to 1e-6 of the force, UMFPACK
-  we         timed from the mesh's arrays to the forces, in a fresh process with compiled kernels in the cache; imports do not count
+  we         timed from the mesh's arrays to the forces, in a fresh process with compiled kernels in the cache (imports do not
+             count); Newton's method to 1e-6 of the force, its systems by `linalg.refined`
 The programs run in turns; the shortest of the runs counts. Void is a row whose forces differ by more than 2 %.
-Also told: what a Newton step of ours costs (assembly, factor, solution, contact and forces), the memory's peak, and the growth from
+Also told: what a press of ours spends (assembly, solution with its factors, contact and forces), the memory's peak, the growth from
 10,000 unknowns on. Writes benchmarks/results/solid_races.json.
 """
 
@@ -239,12 +240,17 @@ def main():
     options.add_argument("--repeats", type=int, default=2)
     options.add_argument("--rivals", nargs="*", default=["calculix", "ngsolve"], choices=["calculix", "ngsolve"])
     options.add_argument("--try", dest="trial", action="store_true", help="print only, leave the record as it is")
+    options.add_argument("--keep", action="store_true", help="leave rows of the record at other sizes as they are")
     options.add_argument("--child", nargs=3, help=argparse.SUPPRESS)
     given = options.parse_args()
     if given.child:
         kind, unknowns, threads = given.child
         return {"ours": ours, "ngsolve": ngsolve_child}[kind](float(unknowns), int(threads))
     rows = [race(unknowns, threads, given.repeats, given.rivals) for threads in given.threads for unknowns in given.unknowns]
+    if given.keep:
+        sizes = {row["ours"]["unknowns"] for row in rows}
+        rows = sorted(rows + [row for row in record.read("solid_races")["rows"] if row["ours"]["unknowns"] not in sizes],
+                      key=lambda row: row["ours"]["unknowns"])
     if not given.trial:
         print(record.write("solid_races", rows=rows))
 

@@ -48,7 +48,7 @@ class Watch:
         spent = now - self._start
         if self._limit_s is not None and spent > self._limit_s:
             self.end()
-            raise TimeLimitError(f"The time limit of {self._limit_s:g} s was reached at {where}; the steps before are kept: give "
+            raise TimeLimitError(f"The time limit of {self._limit_s:g} s was reached: {where}; the steps before are kept: give "
                                  "more time (--time-limit, time_limit_s), or ask for smaller forces.")
         if self._label and now - self._shown >= (_ON_SCREEN_S if self._screen else _IN_A_LOG_S):
             print(f"{chr(13) if self._screen else ''}{self._label}: {where}, {spent:.0f} s", file=sys.stderr, flush=True,

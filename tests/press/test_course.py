@@ -50,7 +50,7 @@ def test_an_interruption_of_the_keyboard_takes_the_steps_before_with_it(sensor, 
 
 
 def test_a_press_ends_at_its_time_limit_and_says_how_far_it_was(sensor):
-    with pytest.raises(TimeLimitError, match=r"The time limit of 1e-06 s was reached at .*; the steps before are kept") as caught:
+    with pytest.raises(TimeLimitError, match=r"The time limit of 1e-06 s was reached: .*; the steps before are kept") as caught:
         sensor.press(BALL, force_n=[0.5], model="hyperelastic", label="", time_limit_s=1e-6)
     assert caught.value.result is None
 

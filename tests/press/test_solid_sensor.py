@@ -127,7 +127,7 @@ def test_a_press_whose_time_is_over_gives_the_steps_before(folder, monkeypatch):
 
     sensor, clock = sensor_of(folder), [0.0]
     monkeypatch.setattr(progress.time, "monotonic", lambda: clock[0])
-    with pytest.raises(TimeLimitError, match="time limit of 5 s was reached at step 2 of 2") as stopped:
+    with pytest.raises(TimeLimitError, match="time limit of 5 s was reached: step 2 of 2") as stopped:
         sensor.press(folder / "plate.stl", unit="mm", force_n=[0.1, 0.2], label="", time_limit_s=5,
                      on_step=lambda result: clock.__setitem__(0, 6.0))
     assert stopped.value.result.steps == 1
