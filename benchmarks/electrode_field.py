@@ -22,18 +22,18 @@ from softtact.readout.virtual_sensor import VirtualSensorSettings, read_branches
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "readout"))
 from naive_grid import EPSILON_0_PF_PER_MM, Fineness, GridField
 
-GAIN, FORCES = 2600.0, [10.0, 50.0]
-OBJECTS = {"circle_m, middle": (None, (0, 0, 0, 0, 0, 0)),
-           "ball R 8, corner": (trimesh.creation.icosphere(subdivisions=4, radius=8.0), (6.0, 12.0, 0, 0, 0, 0)),
-           "box 30 x 8, across the rim": (trimesh.creation.box((30.0, 8.0, 6.0)), (0, 5.0, 0, 0, 0, 0))}
+GAIN = 2600.0
+OBJECTS = {"circle_m, middle": (None, (0, 0, 0, 0, 0, 0), [10.0, 50.0]),
+           "ball R 8, corner": (trimesh.creation.icosphere(subdivisions=4, radius=8.0), (6.0, 12.0, 0, 0, 0, 0), [3.0, 10.0]),
+           "box 30 x 8, across the rim": (trimesh.creation.box((30.0, 8.0, 6.0)), (0, 5.0, 0, 0, 0, 0), [10.0, 50.0])}
 
 
-def by_virtual_electrodes(spec, maps):
+def by_virtual_electrodes(spec, maps, forces):
     """Counts (force, rows, columns) with the electrodes' assumed edges and coupling, and nothing else of the virtual sensor."""
     default = VirtualSensorSettings()
     settings = VirtualSensorSettings.ideal(counts_per_relative_change=GAIN, **{name: getattr(default, name) for name in (
         "electrode_spacing_mm", "outer_fringe", "inner_fringe", "coupling")})
-    return read_branches(spec, maps, force_n=FORCES, trials=1, seed=0, item="", settings=settings).loading[0]
+    return read_branches(spec, maps, force_n=forces, trials=1, seed=0, item="", settings=settings).loading[0]
 
 
 def by_field(spec, maps, rest):
@@ -47,10 +47,11 @@ def by_field(spec, maps, rest):
 
 
 def differences(one, other):
-    """Root mean square and largest difference in counts, and the slope of `one` over `other`."""
-    apart = one - other
+    """Root mean square and largest difference in counts, the best common gain of `other`, and the rms that it leaves."""
+    gain = float((one * other).sum() / (other**2).sum())
+    apart, left = one - other, one - gain * other
     return {"rms_counts": round(float(np.sqrt(np.mean(apart**2))), 1), "largest_counts": round(float(np.abs(apart).max()), 1),
-            "slope": round(float((one * other).sum() / (other**2).sum()), 4)}
+            "gain": round(gain, 4), "rms_counts_left": round(float(np.sqrt(np.mean(left**2))) / gain, 1)}
 
 
 def at_rest(spec, rest):
@@ -71,12 +72,12 @@ def main():
     """Press, read, compare, write."""
     sensor = softtact.load_sensor("coro")
     spec, rest, rows = sensor.spec, GridField(sensor.spec, np.zeros(sensor.spec.map_shape), threads=2), []
-    for name, (mesh, pose) in OBJECTS.items():
+    for name, (mesh, pose, forces) in OBJECTS.items():
         mesh = read_mesh("config/objects/indenters/circle_m.stl", unit="mm") if mesh is None else mesh
-        maps = sensor.press(mesh, pose=pose, force_n=FORCES, model="foundation").deformation_map_mm
+        maps = sensor.press(mesh, pose=pose, force_n=forces, model="foundation").deformation_map_mm
         plain = ideal_counts(spec.model_copy(update={"largest_counts": np.inf}), maps, counts_per_relative_change=GAIN)
-        assumed, (together, alone) = by_virtual_electrodes(spec, maps), by_field(spec, maps, rest)
-        for k, force in enumerate(FORCES):
+        assumed, (together, alone) = by_virtual_electrodes(spec, maps, forces), by_field(spec, maps, rest)
+        for k, force in enumerate(forces):
             row = {"object": name, "force_n": force, "largest": round(float(together[k].max()), 1)}
             for label, counts in (("gap", plain), ("assumed", assumed), ("alone", alone)):
                 row[label] = differences(counts[k], together[k])

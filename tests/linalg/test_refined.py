@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from softtact.linalg.refined import RefinedSolver, symmetric_product
+from softtact.linalg.refined import RefinedSolver
 
 
 def body(cells=(9, 8, 7), *, stiffness=None, held=0.2):
@@ -40,11 +40,6 @@ def factors_of(solver, monkeypatch):
     made, inner = [], solver._quick.factor
     monkeypatch.setattr(solver._quick, "factor", lambda upper: made.append(1) or inner(upper))
     return made
-
-
-def test_a_symmetric_product_is_that_of_the_whole_matrix(right):
-    upper, _ = body()
-    np.testing.assert_allclose(symmetric_product(upper, right[:, 0]), whole(upper) @ right[:, 0], atol=1e-13)
 
 
 def test_a_solution_is_good_to_a_millionth_of_its_energy_norm(right):

@@ -71,6 +71,8 @@ class GridField:
         spec = self.spec
         at = np.column_stack([np.clip(y, spec.map_y_mm[0], spec.map_y_mm[-1]), np.clip(x, spec.map_x_mm[0], spec.map_x_mm[-1])])
         self._moved = RegularGridInterpolator((spec.map_y_mm, spec.map_x_mm), self._map)(at)
+        if self._moved.max() > 0.9 * h:
+            raise ValueError(f"The fabric moves by {self._moved.max():.3g} mm: elements in frusta of {h:g} mm would turn over.")
         places = self._rest.copy()
         places[2] = np.where(z > 0, z - self._moved * np.clip(z / h, 0, 1), z)
         self.mesh = MeshHex(places, self.mesh.t)

@@ -12,6 +12,7 @@ from softtact.readout.electrodes import electrode_sides
 pytest.importorskip("skfem")
 SMALL = CORO.model_copy(update={"footprint_mm": (11.0, 10.0), "map_shape": (17, 17),
                                 "taxels": CORO.taxels.model_copy(update={"rows": 2, "columns": 2})})
+NINE = CORO.model_copy(update={"footprint_mm": (16.5, 15.9), "taxels": CORO.taxels.model_copy(update={"rows": 3, "columns": 3})})
 COARSE = Fineness(side=7, between=2, frusta=3, sheet=2, outwards=6)
 
 
@@ -33,20 +34,18 @@ def test_charges_are_reciprocal_and_add_up_to_those_of_all_driven_together():
 
 def test_an_electrode_among_neighbours_has_the_area_of_its_whole_taxel():
     """Neighbours at the same potential guard it, and the 0.3 mm between two are closer than the gap; 0.3 % less measured."""
-    wide = CORO.model_copy(update={"footprint_mm": (16.5, 15.9), "taxels": CORO.taxels.model_copy(update={"rows": 3, "columns": 3})})
-    inner = GridField(wide, np.zeros(wide.map_shape), fineness=COARSE).driven_together[1, 1]
-    plates = EPSILON_0_PF_PER_MM * 5.5 * 5.3 / float(equivalent_air_gap(wide, 0.0))
+    inner = GridField(NINE, np.zeros(NINE.map_shape), fineness=COARSE).driven_together[1, 1]
+    plates = EPSILON_0_PF_PER_MM * 5.5 * 5.3 / float(equivalent_air_gap(NINE, 0.0))
     assert inner == pytest.approx(plates, rel=0.01)
-    assert np.prod(electrode_sides(wide, spacing_mm=0.3)) < 0.9 * 5.5 * 5.3      # so its own area does not explain it
+    assert np.prod(electrode_sides(NINE, spacing_mm=0.3)) < 0.9 * 5.5 * 5.3      # so its own area does not explain it
 
 
 def test_a_uniform_press_is_read_inside_as_the_gap_formula_says():
     """At the border field lines go around the fabric, which changes less with the gap: 6 and 11 % less, measured."""
-    wide = CORO.model_copy(update={"footprint_mm": (16.5, 15.9), "taxels": CORO.taxels.model_copy(update={"rows": 3, "columns": 3})})
-    down = np.full(wide.map_shape, 0.1)
-    rest, pressed = (GridField(wide, u, fineness=COARSE).driven_together for u in (0 * down, down))
+    down = np.full(NINE.map_shape, 0.1)
+    rest, pressed = (GridField(NINE, u, fineness=COARSE).driven_together for u in (0 * down, down))
     counts = 1000 * (pressed / rest - 1)
-    expected = ideal_counts(wide, down)
+    expected = ideal_counts(NINE, down)
     assert counts[1, 1] == pytest.approx(expected[1, 1], rel=0.01)
     assert counts[0, 1] / expected[0, 1] == pytest.approx(0.94, abs=0.01)
     assert counts[0, 0] / expected[0, 0] == pytest.approx(0.89, abs=0.01)

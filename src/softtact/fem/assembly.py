@@ -9,8 +9,6 @@ import numpy as np
 import scipy.sparse as sp
 from numba import njit
 
-from softtact.linalg.workers import SERIAL, Workers
-
 
 class SymmetricPattern:
     """Pattern of the unknowns that meet in an element.
@@ -36,104 +34,6 @@ class SymmetricPattern:
         """Places (e, k (k + 1) / 2) in the values of the entries (i, j >= i) of elements (e, m), k = 3 m; -1 where held."""
         return _positions(np.ascontiguousarray(nodes), self.number, self._rank, self._starts, self._neighbours, self._before,
                           self.indptr)
-
-
-class SymmetricProduct:
-    """A x for symmetric matrices of one pattern, given by their upper triangles (csr, sorted, with their diagonals).
-
-    Values are read once, not once for each triangle, and the columns of rows that have the same ones (a node's three) once for all.
-    """
-
-    _parts: list[tuple[int, np.ndarray]]
-
-    def __init__(self, indptr: np.ndarray, indices: np.ndarray) -> None:
-        self._indptr, self._indices = indptr, indices
-        alike = _rows_alike(indptr, indices)
-        first = np.cumsum([0, *alike])
-        half = np.searchsorted(indptr[first], indptr[-1] // 2)
-        self._parts = [(0, alike[:half]), (first[half], alike[half:])]     # as many values in each; sums do not depend on threads
-
-    def __call__(self, data: np.ndarray, x: np.ndarray, *, workers: Workers = SERIAL) -> np.ndarray:
-        """A x (n,) in double precision, whatever that of the values."""
-        one, other = workers.map(lambda part: _symmetric_product(self._indptr, self._indices, data, *part, x), self._parts)
-        return one + other
-
-
-@njit(cache=True, nogil=True)
-def _rows_alike(indptr, indices):
-    """How many rows, one after the other, have the same columns from their diagonals on, all of them in threes: else ones."""
-    alike, count, row = np.empty(len(indptr) - 1, np.int8), 0, 0
-    while row < len(indptr) - 1:
-        together = row + 2 < len(indptr) - 1
-        for later in range(1, 3):
-            if together:
-                first, second, end = indptr[row] + later, indptr[row + later], indptr[row + later + 1]
-                together = indptr[row + 1] - first == end - second and (indices[first:indptr[row + 1]] == indices[second:end]).all()
-        together = together and _in_threes(indices[indptr[row]:indptr[row + 1]])
-        alike[count] = 3 if together else 1
-        row += alike[count]
-        count += 1
-    return alike[:count].copy()
-
-
-@njit(cache=True, nogil=True)
-def _in_threes(columns):
-    """Whether columns come in groups of three that follow on each other."""
-    if len(columns) % 3:
-        return False
-    for k in range(0, len(columns), 3):
-        if columns[k + 1] != columns[k] + 1 or columns[k + 2] != columns[k] + 2:
-            return False
-    return True
-
-
-@njit(cache=True, nogil=True)
-def _symmetric_product(indptr, indices, data, row, alike, x):
-    """What the rows from `row` on give, by their upper halves."""
-    out = np.zeros(len(x))
-    for rows in alike:
-        if rows == 3:
-            _add_three_rows(row, indptr, indices, data, x, out)
-        else:
-            own, total = x[row], 0.0
-            for k in range(indptr[row], indptr[row + 1]):
-                column, value = indices[k], data[k]
-                total += value * x[column]
-                if column != row:
-                    out[column] += value * own
-            out[row] += total
-        row += rows
-    return out
-
-
-@njit(cache=True, nogil=True, fastmath=True)
-def _add_three_rows(row, indptr, indices, data, x, out):
-    # Unsigned places: numba asks of signed ones whether they count from the end.
-    one, two, three = np.uintp(1), np.uintp(2), np.uintp(3)
-    columns = indices[indptr[row]:indptr[row + 1]]
-    first, second, third = (data[indptr[row]:indptr[row + 1]], data[indptr[row + 1]:indptr[row + 2]],
-                            data[indptr[row + 2]:indptr[row + 3]])
-    x0, x1, x2 = x[row], x[row + 1], x[row + 2]
-    total0 = first[0] * x0 + first[1] * x1 + first[2] * x2
-    total1 = first[1] * x0 + second[0] * x1 + second[1] * x2
-    total2 = first[2] * x0 + second[1] * x1 + third[0] * x2
-    k, end = three, np.uintp(len(columns))
-    while k < end:
-        c = np.uintp(columns[k])
-        a0, a1, a2 = first[k], first[k + one], first[k + two]
-        b0, b1, b2 = second[k - one], second[k], second[k + one]
-        c0, c1, c2 = third[k - two], third[k - one], third[k]
-        y0, y1, y2 = x[c], x[c + one], x[c + two]
-        total0 += a0 * y0 + a1 * y1 + a2 * y2
-        total1 += b0 * y0 + b1 * y1 + b2 * y2
-        total2 += c0 * y0 + c1 * y1 + c2 * y2
-        out[c] += a0 * x0 + b0 * x1 + c0 * x2
-        out[c + one] += a1 * x0 + b1 * x1 + c1 * x2
-        out[c + two] += a2 * x0 + b2 * x1 + c2 * x2
-        k += three
-    out[row] += total0
-    out[row + 1] += total1
-    out[row + 2] += total2
 
 
 def _ragged(elements):

@@ -62,7 +62,7 @@ class DissectedSolver:
     def solves_per_factor(self) -> float:
         """How many solutions take as long as a factor, by their operations."""
         own, bound = np.diff(self._fronts.own_at).astype(float), np.diff(self._fronts.bound_at)
-        return float((own**3 / 3 + own**2 * bound + own * bound**2).sum() / (own * (own / 2 + bound)).sum()) / _SLOWER
+        return float(_operations(self._fronts).sum() / (own * (own / 2 + bound)).sum()) / _SLOWER
 
     def factor(self, upper: sp.csr_matrix) -> bool:
         """Factor the matrix whose upper triangle (csr, sorted, with its diagonal) is given; False if not positive definite."""
@@ -143,6 +143,9 @@ class DissectedSolver:
         pieces, self._apart, shared = _apart_first(pieces, _SOLVED_APART)
         fronts, self._order = lay_out(indptr, indices, pieces, bordered=last is not None)
         self._parts, levels = _share_out(pieces, fronts)
+        if self._places.shape[1] == 3:     # large fronts: sparing memory comes before sharing out evenly
+            self._parts = _in_lanes(self._parts, fronts, self._workers.threads)
+            levels = [np.array([p]) for level in levels for p in level]
         self._fronts, room = with_room(fronts, self._parts, levels)
         self._first_shared, self._first_last = int(fronts.own_at[len(pieces) - len(shared)]), len(self._order)
         self._shared = shared
@@ -206,8 +209,7 @@ def _share_out(pieces, fronts):
     Pieces (k,) of each part of the former, the costliest part first; pieces (k,) of the latter that do not wait for each other, in
     the order in which these groups do.
     """
-    own, bound = np.diff(fronts.own_at).astype(float), np.diff(fronts.bound_at)
-    operations = own**3 / 3 + own**2 * bound + own * bound**2
+    operations = _operations(fronts)
     whole = [operations[_below(pieces, p)].sum() for p in range(len(pieces))]
     large = {p for p in range(len(pieces)) if pieces[p].before and whole[p] > operations.sum() / _PARTS}
     parents = {child: p for p, piece in enumerate(pieces) for child in piece.before}
@@ -217,3 +219,18 @@ def _share_out(pieces, fronts):
         waits[p] = 1 + max(waits.get(child, 0) for child in pieces[p].before)
     levels = [np.array([p for p in waits if waits[p] == level]) for level in sorted(set(waits.values()))]
     return [np.array(_below(pieces, p)) for p in sorted(tops, key=lambda p: -whole[p])], levels
+
+
+def _in_lanes(parts, fronts, count):
+    """Parts (k,) one behind the other in so many lanes of like cost, which take each other's room as they end."""
+    operations = _operations(fronts)
+    lanes: list[list] = [[] for _ in range(count)]
+    for part in parts:
+        min(lanes, key=lambda lane: sum(operations[own].sum() for own in lane)).append(part)
+    return [np.concatenate(lane) for lane in lanes if lane]
+
+
+def _operations(fronts):
+    """Of each piece's factor (p,)."""
+    own, bound = np.diff(fronts.own_at).astype(float), np.diff(fronts.bound_at)
+    return own**3 / 3 + own**2 * bound + own * bound**2

@@ -8,14 +8,16 @@ Matrices for which single precision has too few digits, as of a stiff plate that
 Reference: Saad, Iterative Methods for Sparse Linear Systems, 2nd ed. (2003), section 9.2.
 """
 
+from functools import partial
+
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 
 from softtact.linalg.block_tridiagonal import BlockTridiagonalSolver
 from softtact.linalg.direct import PardisoSolver, make_solver
 from softtact.linalg.direct_single import point_at_mkl
 from softtact.linalg.multifrontal_solver import DissectedSolver
+from softtact.linalg.symmetric_product import SymmetricProduct
 from softtact.linalg.workers import SERIAL, Workers
 
 _ENOUGH = 1e-3    # of the solution's energy norm: the last correction; what is left is that times what a solve leaves
@@ -31,10 +33,11 @@ class RefinedSolver:
     """Solves with a factor in single precision, of this matrix or of one before, as long as that is enough."""
 
     _exact: PardisoSolver | BlockTridiagonalSolver | None
+    _product: tuple[tuple[np.ndarray, np.ndarray], SymmetricProduct] | None     # of the last pattern
 
     def __init__(self, places: np.ndarray, *, workers: Workers = SERIAL) -> None:
         """places (n, 2 or 3): where each unknown stands, in mm"""
-        self._threads = workers.threads
+        self._workers, self._product = workers, None
         self._quick, self._exact = DissectedSolver(places, workers=workers), None
         self._upkeep: _Upkeep | None = None     # of the factor that is there
 
@@ -77,13 +80,20 @@ class RefinedSolver:
     def _exactly(self, upper, right):
         """With a factor in double precision; from now on always, if the matrix is positive definite."""
         point_at_mkl()
-        exact = make_solver(threads=self._threads)
+        exact = make_solver(threads=self._workers.threads)
         if not exact.factor(upper):
             exact.close()
             return None
         self.close()
         self._exact = exact
         return exact.solve(right)
+
+    def product(self, upper: sp.csr_matrix, x: np.ndarray) -> np.ndarray:
+        """Product (n,) of a matrix, given by its upper triangle as for `solve`, and x (n,)."""
+        pattern = upper.indptr, upper.indices
+        if self._product is None or not all(a is b for a, b in zip(pattern, self._product[0], strict=True)):
+            self._product = pattern, SymmetricProduct(*pattern)
+        return self._product[1](upper.data, x, workers=self._workers)
 
     def precondition(self, right: np.ndarray) -> np.ndarray:
         """About the solution (n,) with the last matrix, by the factor that is there."""
@@ -93,7 +103,7 @@ class RefinedSolver:
         """The solutions (n, k) by conjugate gradients, None where they do not end in so many steps together; and the steps."""
         found, steps = np.empty_like(right), 0
         for k in range(right.shape[1]):
-            one, taken = _conjugate_gradients(upper, right[:, k], self._quick.solve, most - steps)
+            one, taken = _conjugate_gradients(partial(self.product, upper), right[:, k], self._quick.solve, most - steps)
             steps += taken
             if one is None:
                 return None, steps
@@ -120,7 +130,7 @@ class _Upkeep:
         self.due = solves * self.systems > self.spent
 
 
-def _conjugate_gradients(upper, right, precondition, most):
+def _conjugate_gradients(product, right, precondition, most):
     """The solution (n,), None if it is not good enough after so many steps; and the steps."""
     found, rest, way, before, first = np.zeros_like(right), right.copy(), np.zeros_like(right), 1.0, 0.0
     for step in range(most):
@@ -129,7 +139,7 @@ def _conjugate_gradients(upper, right, precondition, most):
         first = first or size
         if size > 0.0:
             way = correction + (size / before) * way
-            pushed = symmetric_product(upper, way)
+            pushed = product(way)
             stiffness = float(way @ pushed)
             if stiffness <= 0.0:
                 raise _Indefinite
@@ -139,21 +149,3 @@ def _conjugate_gradients(upper, right, precondition, most):
         if size <= _ENOUGH**2 * first:
             return found, step + 1
     return None, most
-
-
-def symmetric_product(upper: sp.csr_matrix, x: np.ndarray) -> np.ndarray:
-    """Product (n,) of a symmetric matrix, given by its upper triangle (csr, sorted, with its diagonal), and x (n,)."""
-    return _symmetric_product(upper.indptr, upper.indices, upper.data, x)
-
-
-@njit(cache=True, nogil=True)
-def _symmetric_product(indptr, indices, data, x):
-    out = np.zeros_like(x)
-    for row in range(len(x)):
-        first = indptr[row]
-        total = data[first] * x[row]
-        for e in range(first + 1, indptr[row + 1]):
-            total += data[e] * x[indices[e]]
-            out[indices[e]] += data[e] * x[row]
-        out[row] += total
-    return out

@@ -8,7 +8,7 @@ import scipy.optimize
 import scipy.sparse as sp
 
 from softtact.contact.penalty import Contact, penalty
-from softtact.fem.assembly import SymmetricProduct
+from softtact.linalg.symmetric_product import SymmetricProduct
 from softtact.models.hyperelastic import newton_step
 from softtact.models.hyperelastic.newton_step import ContactStepper, LinearGaps
 from softtact.models.hyperelastic.preconditioner import ContactFactor

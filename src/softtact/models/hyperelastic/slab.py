@@ -15,12 +15,13 @@ import scipy.sparse as sp
 from softtact.contact.friction import Coulomb, FrictionResponse
 from softtact.contact.history import ContactHistory
 from softtact.contact.penalty import Contact
-from softtact.fem.assembly import SymmetricProduct, add_upper, upper_pattern, upper_positions
+from softtact.fem.assembly import add_upper, upper_pattern, upper_positions
 from softtact.fem.extruded_mesh import SheetMesh2D, extrude
 from softtact.fem.graded_mesh import cover_mesh
 from softtact.fem.kernels import add_forces
 from softtact.fem.point_location import interpolation_2d
 from softtact.fem.solid_block import HexBlock, SolidBlock, WedgeBlock, hanging_node_constraints, joined
+from softtact.linalg.symmetric_product import SymmetricProduct
 from softtact.linalg.workers import SERIAL, Workers
 from softtact.materials.laws.base import Law
 from softtact.models.hyperelastic.newton_step import LinearGaps

@@ -22,7 +22,7 @@ from softtact.fem.assembly import SymmetricPattern, add_upper
 from softtact.fem.kernels import add_forces
 from softtact.fem.solid_block import SolidBlock
 from softtact.fem.solid_mesh import SolidMesh
-from softtact.linalg.refined import RefinedSolver, symmetric_product
+from softtact.linalg.refined import RefinedSolver
 from softtact.linalg.workers import Workers, slices
 from softtact.materials.laws.base import Law
 from softtact.models.solid.blocks import region_blocks
@@ -273,7 +273,7 @@ class SolidBody:
 
         def whole(y):
             x = self.solver.precondition(y)
-            return symmetric_product(self._matrix, x) + coupling(x)
+            return self.solver.product(self._matrix, x) + coupling(x)
 
         operator = spla.LinearOperator((len(right), len(right)), matvec=whole, dtype=float)
         for k in range(right.shape[1]):
