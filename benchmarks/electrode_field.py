@@ -24,7 +24,7 @@ from naive_grid import EPSILON_0_PF_PER_MM, Fineness, GridField
 
 GAIN = 2600.0
 OBJECTS = {"circle_m, middle": (None, (0, 0, 0, 0, 0, 0), [10.0, 50.0]),
-           "ball R 8, corner": (trimesh.creation.icosphere(subdivisions=4, radius=8.0), (6.0, 12.0, 0, 0, 0, 0), [3.0, 10.0]),
+           "ball R 8, corner": (trimesh.creation.icosphere(subdivisions=4, radius=8.0), (6.0, 12.0, 0, 0, 0, 0), [2.0, 5.0]),
            "box 30 x 8, across the rim": (trimesh.creation.box((30.0, 8.0, 6.0)), (0, 5.0, 0, 0, 0, 0), [10.0, 50.0])}
 
 
@@ -40,7 +40,7 @@ def by_field(spec, maps, rest):
     """Counts (2, force, rows, columns): electrodes driven together, and alone."""
     out = []
     for deformation in maps:
-        pressed = GridField(spec, deformation, threads=2)
+        pressed = GridField(spec, deformation)
         out.append([GAIN * (now / before - 1) for now, before in ((pressed.driven_together, rest.driven_together),
                                                                   (pressed.driven_alone, rest.driven_alone))])
     return np.swapaxes(out, 0, 1)
@@ -71,7 +71,7 @@ def at_rest(spec, rest):
 def main():
     """Press, read, compare, write."""
     sensor = softtact.load_sensor("coro")
-    spec, rest, rows = sensor.spec, GridField(sensor.spec, np.zeros(sensor.spec.map_shape), threads=2), []
+    spec, rest, rows = sensor.spec, GridField(sensor.spec, np.zeros(sensor.spec.map_shape)), []
     for name, (mesh, pose, forces) in OBJECTS.items():
         mesh = read_mesh("config/objects/indenters/circle_m.stl", unit="mm") if mesh is None else mesh
         maps = sensor.press(mesh, pose=pose, force_n=forces, model="foundation").deformation_map_mm
@@ -83,8 +83,8 @@ def main():
                 row[label] = differences(counts[k], together[k])
             rows.append(row)
             print(row, flush=True)
-    finer = GridField(spec, np.zeros(spec.map_shape), threads=2, fineness=Fineness().finer(1.5))
-    mesh_error = float(np.abs(rest.driven_together / finer.driven_together - 1).max())
+    coarser = GridField(spec, np.zeros(spec.map_shape), fineness=Fineness().finer(2 / 3))
+    mesh_error = float(np.abs(coarser.driven_together / rest.driven_together - 1).max())
     print(record.write("electrode_field", gain=GAIN, rest=at_rest(spec, rest), mesh_error=round(mesh_error, 5), rows=rows))
 
 

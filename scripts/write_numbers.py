@@ -15,7 +15,8 @@ from statistics import median
 ROOT = Path(__file__).resolve().parents[1]
 NUMBERS = ROOT / "docs" / "reference" / "numbers.md"
 PERFORMANCE = ROOT / "docs" / "performance.md"
-EDGE, FAST, SOLID = (ROOT / "docs" / "explanation" / f"{name}.md" for name in ("edge", "fast_models", "solid"))
+EDGE, FAST, SOLID, VIRTUAL = (ROOT / "docs" / "explanation" / f"{name}.md"
+                               for name in ("edge", "fast_models", "solid", "virtual_sensor"))
 LEARN = ROOT / "docs" / "how-to" / "learn_with_the_environment.md"
 MESHES = {"draft": "draft", "production": "default", "fine": "fine"}     # name in the records, name of the preset
 BLOCK = r"(<!-- numbers: {} -->\n).*?(<!-- end of numbers -->)"
@@ -200,6 +201,24 @@ def solid_kernels() -> str:
     return (f"{source('solid_kernels')} `solid_kernels_cuda.json`, {gpu['date'][:10]}, {gpu['device']}.\n\n{table(head, rows)}")
 
 
+def electrode_field() -> str:
+    """What the gap formula and the assumed edges leave out of the field of the electrode grid."""
+    read = record("electrode_field")
+    rest, rows = read["rest"], []
+    for row in read["rows"]:
+        cells = [f"{row[way][f'{kind}_counts']:.3g}" for way in ("gap", "assumed") for kind in ("rms", "largest")]
+        alone = row["alone"]
+        rows.append([row["object"], f"{row['force_n']:g}", f"{row['largest']:.4g}", *cells, f"{alone['gain']:.2f}",
+                     f"{alone['rms_counts_left']:.3g}"])
+    head = ("object, N, largest reading, gap: rms, largest, assumed edges: rms, largest, grounded neighbours: gain, rms beside it")
+    shares, over = rest["share_of_a_free_edge"], rest["over_plates"]
+    said = (f"At rest a corner, side and inner electrode hold {over[0]:.3f}, {over[1]:.3f} and {over[2]:.3f} of the charge of "
+            f"plates of their size; edges have {shares['inner']:.2f} (between neighbours) and {shares['outer']:.2f} (border) of a "
+            "free edge's share, where 0.1 and 1 are assumed. Elements half as large again change a charge by up to "
+            f"{read['mesh_error']:.1%}.")
+    return f"{source('electrode_field')} Counts at a gain of {read['gain']:g}.\n\n{said}\n\n{table(head, rows)}"
+
+
 def random_presses() -> str:
     """Outcomes of random presses."""
     outcomes = ["presses", "reached", "outside", "flagged", "stopped", "refused", "nonsense", "hung", "crashed"]
@@ -219,7 +238,7 @@ def pages() -> dict[Path, str]:
     """Texts of the pages whose named tables come from the records."""
     tables = {PERFORMANCE: {"presses": presses(), "fast presses": fast_presses()}, EDGE: {"overhang": overhang()},
               FAST: {"choice": choice()}, SOLID: {"races": solid_races(), "kernels": solid_kernels()},
-              LEARN: {"environment": environment()}}
+              VIRTUAL: {"electrode field": electrode_field()}, LEARN: {"environment": environment()}}
     return {page: _with_tables(page.read_text(encoding="utf-8"), own) for page, own in tables.items()}
 
 

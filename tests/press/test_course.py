@@ -92,6 +92,15 @@ def test_auto_takes_the_cheapest_model_within_the_tolerance_by_default(fakes):
     assert result.model == "elastic" and result.expected_error_mm[0] < 0.01
 
 
+def test_a_model_is_taken_only_where_nine_of_ten_presses_like_it_are_within_the_tolerance(fakes):
+    expected = chosen().expected_error_mm[0]
+    times = choice.INTERVALS["elastic"][1]
+    assert times > 1.0
+    assert chosen(tolerance_mm=1.01 * times * expected).model == "elastic"
+    between = chosen(tolerance_mm=0.5 * (1.0 + times) * expected)
+    assert between.model != "elastic" and "mostly below" in between.selection_reason
+
+
 def test_a_model_that_does_not_hold_is_not_taken_whatever_error_it_tells(fakes):
     fakes["elastic"] = replace(fakes["elastic"], within_validity=np.zeros(1, dtype=np.int8))
     result = chosen()
