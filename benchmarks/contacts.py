@@ -23,6 +23,7 @@ import trimesh
 import softtact
 from softtact.errors import SofttactError
 from softtact.geometry.pose import Pose
+from softtact.models.hyperelastic.presets import PRESETS
 
 COUNTS = {"easy": 70, "unseen": 35, "hard": 100}
 FORCES = {"easy": [2.0, 5.0, 10.0, 20.0, 35.0, 50.0], "unseen": [3.0, 8.0, 15.0, 30.0, 45.0], "hard": [2.0, 5.0, 10.0, 20.0]}
@@ -134,9 +135,7 @@ def press_one(job):
         return contact.name, "there"
     warnings.simplefilter("ignore")
     sensor = softtact.load_sensor(contact.sensor)
-    if quality == "draft":
-        from softtact.models.hyperelastic.presets import mesh_and_solver
-        sensor.mesh, sensor.solver = mesh_and_solver("draft")
+    sensor.mesh, sensor.solver = (make() for make in PRESETS[quality])
     start, reason, result = time.perf_counter(), "", None
     try:
         result = sensor.press(contact.mesh, pose=placed_pose(contact), force_n=list(contact.forces_n), model="hyperelastic",
@@ -200,7 +199,7 @@ def main():
     one.add_argument("--threads", type=int, default=1, help="of each press")
     one.add_argument("--first", type=Path, help="file with names of contacts that are pressed before the others")
     one.add_argument("--limit", type=float, default=IN_TIME_S, help="seconds of one press")
-    one.add_argument("--mesh-quality", default="default")
+    one.add_argument("--mesh-quality", default="default", choices=PRESETS)
     one.set_defaults(act=press)
     two = commands.add_parser("report")
     two.set_defaults(act=report)

@@ -172,6 +172,24 @@ def environment() -> str:
     return f"{source('environment')}\n\n{table(head, rows)}\n\n{table(of_errors, off)}"
 
 
+def expected_error() -> str:
+    """How well the error of the fast models is told for objects that nothing was fitted to."""
+    read = record("expected_error")
+    of = lambda name, digits=2: ", ".join(f"{value:.{digits}f}" for value in read[name])  # noqa: E731
+    fit, test = read["fit"], read["test"]
+    rows = [["fitted to, tested on: valid load steps of objects", f"{fit['presses']} of {fit['objects']}, "
+             f"{test['presses']} of {test['objects']}"],
+            ["true over expected error, each object left out in turn: 10, 90 %", of("interval")],
+            ["share of the unseen presses between these (0.8 would be right), above (0.1)",
+             f"{read['coverage_unseen']:.2f}, {read['above_unseen']:.2f}"],
+            ["true over expected error of the unseen: 5, 25, 50, 75, 95 %", of("true_over_expected_unseen")],
+            ["elastic model: true over expected (both models' difference): 5, 25, 50, 75, 95 %", of("elastic_true_over_expected")],
+            ["the same: 90 %; share of the unseen above it",
+             f"{read['elastic_interval'][1]:.3f}, {read['elastic_above_unseen']:.2f}"],
+            ["elastic model alone: error over its map's root mean square: 5, 25, 50, 75, 95 %", of("elastic_relative")]]
+    return f"{source('expected_error')}\n\n{table('what, value', rows)}"
+
+
 def solid_races() -> str:
     """A press of two solids by us and by others: processor time, and what of ours goes where."""
     rows = []
@@ -237,7 +255,8 @@ def numbers_page(counts: dict[str, int]) -> str:
 def pages() -> dict[Path, str]:
     """Texts of the pages whose named tables come from the records."""
     tables = {PERFORMANCE: {"presses": presses(), "fast presses": fast_presses()}, EDGE: {"overhang": overhang()},
-              FAST: {"choice": choice()}, SOLID: {"races": solid_races(), "kernels": solid_kernels()},
+              FAST: {"choice": choice(), "expected error": expected_error()},
+              SOLID: {"races": solid_races(), "kernels": solid_kernels()},
               VIRTUAL: {"electrode field": electrode_field()}, LEARN: {"environment": environment()}}
     return {page: _with_tables(page.read_text(encoding="utf-8"), own) for page, own in tables.items()}
 

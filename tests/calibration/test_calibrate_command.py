@@ -48,7 +48,7 @@ def test_calibrate_writes_a_sensor_that_presses_and_a_page_with_its_residuals(fo
 
 @pytest.mark.parametrize(("line", "sentence"), [
     (BOTH.replace("--press bar.stl", "--press bar.stl --press bar.stl"), "--press was given 3 times for 2 recordings"),
-    (BOTH.replace("--fit none", "--fit friction"), "Friction cannot be told from presses straight down"),
+    (BOTH.replace("--fit none", "--fit friction"), "The elastic model is one layer and errs by more than friction changes"),
     (BOTH.replace("--fit none", "--fit gap"), "no unknown 'gap'"),
     (BOTH.replace("--fit none", "--fit cover"), "The elastic model is one layer and knows no cover"),
     (BOTH.replace("--force plate_force.csv --force bar_force.csv", "--force 2000"), "--force 2000: its largest force is 2000 N"),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from softtact.errors import InputError
-from softtact.press.choice import FoundationError, calibrate, cheapest, expected_errors, rms
+from softtact.press.choice import ELASTIC_RELATIVE, INTERVALS, FoundationError, calibrate, cheapest, expected_errors, rms
 from softtact.press.sensor import load_sensor
 
 
@@ -35,6 +35,11 @@ def test_calibration_finds_the_constants_that_errors_were_made_with():
 def test_the_constants_that_presses_state_their_errors_by_are_those_of_the_record():
     record = json.loads((Path(__file__).parents[2] / "benchmarks" / "results" / "expected_error.json").read_text())
     assert asdict(FoundationError()) == pytest.approx(record["coefficients"], rel=2e-3)      # given with three digits
+    assert INTERVALS["foundation"] == pytest.approx(record["interval"], abs=0.006)
+    assert INTERVALS["elastic"] == pytest.approx(record["elastic_interval"], abs=0.006)
+    alone = record["elastic_relative"]
+    assert ELASTIC_RELATIVE == pytest.approx(alone[2], abs=0.006)
+    assert INTERVALS["elastic alone"] == pytest.approx([alone[0] / alone[2], alone[4] / alone[2]], abs=0.02)
 
 
 def test_an_error_grows_with_the_cube_of_the_compression_and_the_square_of_the_depth():

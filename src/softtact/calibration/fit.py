@@ -196,5 +196,6 @@ def in_words(name: str) -> str:
     kind, _, number = name.rpartition(" ")
     words = {"share": "the share of creep", "ln time": "the time constant of creep", "x": "x of press", "y": "y of press",
              "angle": "the angle of press"}
-    alone = {"ln scale": "the common gain", "ln modulus": "the modulus scale", "cover": "the cover's thickness"}
+    alone = {"ln scale": "the common gain", "ln modulus": "the modulus scale", "cover": "the cover's thickness",
+             "friction": "the object's friction"}
     return alone.get(name) or f"{words[kind]} {number}"

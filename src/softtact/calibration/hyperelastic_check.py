@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from softtact.calibration.fit import CalibrationResult
-from softtact.calibration.ladder import Presses, cover_weights, with_cover
+from softtact.calibration.ladder import COVERS, Presses, parabola, with_cover
 from softtact.errors import ConvergenceError
 from softtact.progress import announce
 from softtact.readout.calibrated import relative_change
@@ -14,8 +14,8 @@ from softtact.readout.calibrated import relative_change
 def hyperelastic_differences(result: CalibrationResult) -> list[float | None]:
     """How far, in counts (root mean square), the hyperelastic model lies from the calibrated one at each press' largest force.
 
-    That is the largest for which the calibrated one is valid. Both have the calibrated gains, moduli, cover and places, and no
-    creep. None where there is no valid force, or where the hyperelastic model does not reach it.
+    That is the largest for which the calibrated one is valid. Both have the calibrated gains, moduli, cover, friction and places,
+    and no creep. None where there is no valid force, or where the hyperelastic model does not reach it.
     """
     return [_difference(result, k) for k in range(len(result.problem.experiments))]
 
@@ -28,13 +28,18 @@ def _difference(result, k):
     if force == 0:
         return None
     announce(f"{one.name}: pressing by the hyperelastic model at {force:.3g} N")
-    thicker = replace(sensor, spec=with_cover(sensor.spec, cover), prepared_models={})
+    friction, spec = problem.value(result.vector, "friction", 0.0), with_cover(sensor.spec, cover)
+    if "friction" in problem.names:
+        spec = spec.model_copy(update={"friction": spec.friction.model_copy(update={"object": friction})})
+    calibrated = replace(sensor, spec=spec, prepared_models={})
     try:
-        other = Presses(thicker, model="hyperelastic", levels=1).ladder(one.mesh, place, largest_n=force).maps_mm[-1]
+        other = Presses(calibrated, model="hyperelastic", levels=1).ladder(one.mesh, place, largest_n=force).maps_mm[-1]
     except ConvergenceError:
         return None
-    shares = cover_weights(cover) if "cover" in problem.names else {1.0: 1.0}
+    shares = parabola(COVERS, cover) if "cover" in problem.names else {1.0: 1.0}
     own = sum(share * problem.presses.ladder(one.mesh, place, largest_n=force, cover=variant).maps_mm[-1]
               for variant, share in shares.items())
+    own = own + sum(share * np.tensordot(ladder.weights(np.array([force]))[0], ladder.maps_mm, 1)
+                    for share, ladder in problem.rubbed(k, friction))
     apart = result.linear.gain * (relative_change(sensor.spec, other) - relative_change(sensor.spec, own))
     return float(np.sqrt(np.mean(apart**2)))

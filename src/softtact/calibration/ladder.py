@@ -126,8 +126,7 @@ def uncalibrated(name_or_sensor: "str | Sensor") -> Sensor:
     return sensor
 
 
-def cover_weights(cover: float) -> Mapping[float, float]:
-    """{variant: weight} of the parabola through the variants of the cover's thickness, at `cover` times it."""
-    nodes = np.array(COVERS)
-    return {float(node): float(np.prod((cover - np.delete(nodes, k)) / (node - np.delete(nodes, k))))
-            for k, node in enumerate(nodes)}
+def parabola(nodes: Sequence[float], at: float) -> Mapping[float, float]:
+    """{node: weight} of the parabola through values at three nodes, at a place between them."""
+    x = np.array(nodes)
+    return {float(node): float(np.prod((at - np.delete(x, k)) / (node - np.delete(x, k)))) for k, node in enumerate(x)}

@@ -15,13 +15,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from softtact.calibration.experiment import Experiment
-from softtact.calibration.ladder import COVERS, SOFTEST, Presses, cover_weights
+from softtact.calibration.ladder import COVERS, SOFTEST, Presses, parabola
+from softtact.calibration.rubbing import FRICTIONS, friction_weights, rubbing
 from softtact.errors import InputError
 from softtact.press.ladder import Ladder
 from softtact.readout.calibrated import relative_change
 from softtact.readout.hysteresis import lagged
 
-FITTED = ("placement", "relaxation", "modulus", "cover")
+FITTED = ("placement", "relaxation", "modulus", "cover", "friction")
 HARDEST = 1 / SOFTEST
 
 
@@ -47,6 +48,8 @@ class Priors:
     """Of the logarithm of the modulus scale: batches of soft rubber differ by a third."""
     cover: float = 0.15
     """Of the cover's thickness, as a share."""
+    friction: tuple[float, float] = (0.2, 0.2)
+    """Mean and standard deviation of the object's coefficient on the cover."""
     place_mm: float = 1.0
     """Of where the object was put by hand."""
     angle_deg: float = 3.0
@@ -59,6 +62,7 @@ _OFF = (0.5, 0.5, 2.0)     # mm, mm and degrees, over which the maps' change wit
 _STEPS = {"share": (2e-3, -1.0, 0.4), "ln time": (0.02, -3.0, 3.0),
           "ln modulus": (0.01, float(np.log(SOFTEST)), float(np.log(HARDEST))),
           "cover": (0.01, COVERS[0] - 1, COVERS[-1] - 1),
+          "friction": (0.01, FRICTIONS[0] - 0.2, FRICTIONS[-1] - 0.2),
           "x": (0.02, -5.0, 5.0), "y": (0.02, -5.0, 5.0), "angle": (0.2, -15.0, 15.0)}
 
 
@@ -85,16 +89,14 @@ class Problem:
     valid_n: list[float] = field(init=False)
 
     def __post_init__(self) -> None:
-        if "friction" in self.fitted:
-            raise InputError("Friction cannot be told from presses straight down: it changes a map by some percent, as gains do, "
-                             "and the models of a calibration have none; leave 'friction' out of --fit, and state "
-                             "'friction.object' in the sensor's file.")
         unknown = [name for name in self.fitted if name not in FITTED]
         if unknown:
             raise InputError(f"There is no unknown {unknown[0]!r} to calibrate; write some of {', '.join(FITTED)}.")
-        if "cover" in self.fitted and self.presses.model == "elastic":
-            raise InputError("The elastic model is one layer and knows no cover, so its thickness cannot be fitted; leave 'cover' "
-                             "out of --fit, or give --model foundation.")
+        reasons = {"cover": "knows no cover, so its thickness", "friction": "errs by more than friction changes, so that"}
+        for name, said in reasons.items():
+            if name in self.fitted and self.presses.model == "elastic":
+                raise InputError(f"The elastic model is one layer and {said} cannot be fitted; leave {name!r} out of --fit, or "
+                                 "give --model foundation.")
         self.names, mean, deviation = [], [], []
 
         def add(name, value, width):
@@ -111,6 +113,8 @@ class Problem:
             add("ln modulus", 0.0, p.log_modulus)
         if "cover" in self.fitted:
             add("cover", 1.0, p.cover)
+        if "friction" in self.fitted:
+            add("friction", *p.friction)
         if "placement" in self.fitted:
             for k, one in enumerate(self.experiments, 1):
                 for axis, value, width in zip(("x", "y", "angle"), one.place, (p.place_mm, p.place_mm, p.angle_deg), strict=True):
@@ -122,6 +126,9 @@ class Problem:
         self._usable = [one.usable & (one.force_of_bins <= valid)[:, None, None]
                         for one, valid in zip(self.experiments, self.valid_n, strict=True)]
         self._known: list[dict] = [{} for _ in self.experiments]
+        # Where the objects were put: what friction changes hardly depends on a millimetre.
+        self._rubbing = [rubbing(self.presses.sensor, one.mesh, one.place, largest_n=top, name=one.name)
+                         for one, top in zip(self.experiments, self._top, strict=True)] if "friction" in self.fitted else []
         self.at(self.mean)
 
     @property
@@ -175,6 +182,11 @@ class Problem:
             changes[axis, :count] = (moved.maps_mm[:count] - ladder.maps_mm[:count]) / step
         return changes
 
+    def rubbed(self, k: int, friction: float) -> list[tuple[float, Ladder]]:
+        """What friction of the object changes in experiment k, from 0: weights of ladders of maps; none where it is not fitted."""
+        weights = friction_weights(friction)
+        return [(weights[one], ladder) for one, ladder in self._rubbing[k].items()] if self._rubbing else []
+
     def at_place(self, k: int) -> tuple[Ladder, np.ndarray | None]:
         """The presses of experiment k, from 0, where it was last pressed, and their change with the place (see `at`)."""
         return self._ladders[k][1.0]
@@ -183,7 +195,8 @@ class Problem:
         """dC/C0 (b, row, column) of each experiment."""
         shares, times = self.creep(vector)
         scale, cover = np.exp(self.value(vector, "ln modulus", 0.0)), self.value(vector, "cover", 1.0)
-        return [self._change(k, (*shares, *times, scale, cover, *self.place(vector, k)), shares, times)
+        friction = self.value(vector, "friction", 0.0)
+        return [self._change(k, (*shares, *times, scale, cover, friction, *self.place(vector, k)), shares, times)
                 for k in range(len(self.experiments))]
 
     def _change(self, k, key, shares, times):
@@ -191,18 +204,24 @@ class Problem:
         if key not in self._known[k]:
             if len(self._known[k]) > 2 * len(self.names) + 4:
                 self._known[k].clear()
-            scale, cover, *place = key[len(shares) + len(times):]
-            self._known[k][key] = self._read(k, shares, times, scale, cover, place)
+            scale, cover, friction, *place = key[len(shares) + len(times):]
+            self._known[k][key] = self._read(k, shares, times, scale, cover, friction, place)
         return self._known[k][key]
 
-    def _read(self, k, shares, times, scale, cover, place):
+    def _read(self, k, shares, times, scale, cover, friction, place):
         one, off = self.experiments[k], np.subtract(place, self._places[k])
-        maps = 0.0
-        for variant, share in (cover_weights(cover) if "cover" in self.fitted else {1.0: 1.0}).items():
-            ladder, moving = self._ladders[k][variant]
+
+        def felt(ladder, maps):     # in the recording's bins
             weights = one.bins @ lagged(ladder.weights(one.force_n / scale), one.time_s, shares=shares, time_constants_s=times)
+            return np.tensordot(weights, maps, 1)
+
+        maps = 0.0
+        for variant, share in (parabola(COVERS, cover) if "cover" in self.fitted else {1.0: 1.0}).items():
+            ladder, moving = self._ladders[k][variant]
             pressed = ladder.maps_mm if moving is None else ladder.maps_mm + np.tensordot(off, moving, 1)
-            maps = maps + share * np.tensordot(weights, pressed, 1)
+            maps = maps + share * felt(ladder, pressed)
+        for share, ladder in self.rubbed(k, friction):
+            maps = maps + share * felt(ladder, ladder.maps_mm)
         return relative_change(self.presses.sensor.spec, maps)
 
     def stacked(self) -> tuple[np.ndarray, np.ndarray]:

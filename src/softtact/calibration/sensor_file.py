@@ -21,11 +21,14 @@ def write_calibrated(path: str | Path, sensor_file: str | Path, result: Calibrat
     block = result.block()
     if "cover" in result.problem.names:
         spec: Any = result.problem.presses.sensor.spec     # of kind frusta, else there were no presses
-        found = with_cover(spec, result.problem.value(result.vector, "cover", 1.0))
-        values["cover"]["thickness_mm"] = _calibrated(found.cover.thickness_mm, block.source)
-        if isinstance(found.edge.held, SidesBelow):
-            values["edge"] = found.edge.model_dump(mode="json") | {
-                "held": {"sides_below_mm": _calibrated(found.edge.held.sides_below_mm, block.source)}}
+        thicker = with_cover(spec, result.problem.value(result.vector, "cover", 1.0))
+        values["cover"]["thickness_mm"] = _calibrated(thicker.cover.thickness_mm, block.source)
+        if isinstance(thicker.edge.held, SidesBelow):
+            values["edge"] = thicker.edge.model_dump(mode="json") | {
+                "held": {"sides_below_mm": _calibrated(thicker.edge.held.sides_below_mm, block.source)}}
+    if "friction" in result.problem.names:
+        found = round(result.problem.value(result.vector, "friction", 0.0), 4)
+        values["friction"] = values.get("friction", {}) | {"object": {"value": found, "reason": f"calibrated from {block.source}"}}
     values["calibration"] = block.model_dump(mode="json")
     spec_from_dict(values, where=str(path))
     text = yaml.safe_dump(values, sort_keys=False, default_flow_style=None, width=120, allow_unicode=True)

@@ -32,8 +32,10 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.add_argument("--baseline", choices=("auto", "subtracted", "kept"), default="auto",
                          help="how the recorder wrote it (default: told by the lowest readings)")
     command.add_argument("--fit", default="placement,relaxation", metavar="NAMES",
-                         help="what is unknown beside gains and zeros: some of placement,relaxation,modulus,cover, or none "
-                              "(default: placement,relaxation); cover is of the foundation model and computes two more sensors")
+                         help="what is unknown beside gains and zeros: some of placement,relaxation,modulus,cover,friction, or "
+                              "none (default: placement,relaxation); cover and friction are of the foundation model; cover "
+                              "computes two more sensors, friction presses each object five times by the hyperelastic model (some "
+                              "ten minutes each)")
     command.add_argument("--sensor", default="coro", help="name or YAML file of the sensor (default: coro)")
     command.add_argument("--model", choices=("foundation", "elastic"), default="foundation", help="model of the presses")
     command.add_argument("--candidate", action="append", type=Path, metavar="OBJECT.stl",
@@ -157,6 +159,7 @@ def _summary(result, notes, advice, differences):
             "modulus_scale": result.modulus_scale if "ln modulus" in result.problem.names else None,
             "cover_mm": result.problem.value(result.vector, "cover", 1.0) * result.problem.presses.sensor.spec.cover.thickness_mm
             if "cover" in result.problem.names else None,
+            "friction": result.problem.value(result.vector, "friction", 0.0) if "friction" in result.problem.names else None,
             "places": [result.problem.place(result.vector, k) for k in range(len(result.problem.experiments))],
             "misfit_over_noise": result.misfit, "not_identifiable": result.not_identifiable, "notes": notes,
             "hyperelastic_difference_counts": differences,
@@ -171,6 +174,8 @@ def _lines(summary):
         yield f"modulus scale: {summary['modulus_scale']:.3f}"
     if summary["cover_mm"] is not None:
         yield f"cover: {summary['cover_mm']:.3f} mm thick"
+    if summary["friction"] is not None:
+        yield f"friction of the object on the cover: {summary['friction']:.2f}"
     for share, time in zip(summary["relaxation"], summary["relaxation_s"], strict=True):
         yield f"creep: a share of {share:.3f} in {time:.2f} s"
     for k, (x, y, angle) in enumerate(summary["places"], 1):
