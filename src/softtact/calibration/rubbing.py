@@ -1,8 +1,8 @@
 """What the friction of an object changes of its press: by the hyperelastic model, for the fast models have none.
 
-Where they touch the object keeps the cover from slipping outwards, which changes a map by some per cent of its maximum. Nearly all
-points stick from a coefficient of 0.2 on, so that presses straight down hardly tell larger ones apart. A press with friction depends
-on its way, so that as many load steps are taken as of the calibration's own presses.
+Where they touch the object keeps the cover from slipping outwards, which changes a map by some per cent of its maximum. Most
+points stick from a coefficient of 0.2 on, so that presses straight down hardly tell larger ones apart. A press with friction
+depends on its way, so that as many load steps are taken as of the calibration's own presses.
 """
 
 import warnings
