@@ -74,19 +74,18 @@ def told(table, error):
 def report(table):
     """Fit, leave-one-object-out, and the test; the numbers for the record."""
     own = table[table.foundation_valid == 1]
-    test = own.object.str.startswith("unseen")
-    seen, unseen = own[~test], own[test]
+    told_apart = table.object.str.startswith("unseen")
+    seen, unseen = own[~told_apart], own[told_apart]
     error = fitted(seen)
     left_out = np.concatenate([own_rows.foundation_true_mm.to_numpy() / told(own_rows, fitted(seen[seen.object != name]))
                                for name, own_rows in seen.groupby("object")])
     low, high = np.quantile(left_out, [0.1, 0.9])
     ratio = unseen.foundation_true_mm.to_numpy() / told(unseen, error)
-    elastic = table[(table.elastic_valid == 1) & ~table.object.str.startswith("unseen")]
+    elastic = table[(table.elastic_valid == 1) & ~told_apart]
     both, other = (rows[(rows.elastic_valid == 1) & (rows.foundation_valid == 1)] for rows in (seen, unseen))
     elastic_ratio, elastic_unseen = (rows.elastic_true_mm / np.hypot(rows.apart_mm, told(rows, error)) for rows in (both, other))
     return {"presses": len(table), "objects": int(table.object.nunique()), "valid": len(own),
-            "fit": {"presses": len(seen), "objects": int(seen.object.nunique())},
-            "test": {"presses": len(unseen), "objects": int(unseen.object.nunique())},
+            "fit": _count(table[~told_apart], seen), "test": _count(table[told_apart], unseen),
             "coefficients": {"at_rest": error.at_rest, "growth": error.growth, "deep": error.deep},
             "interval": [float(low), float(high)], "coverage_left_out": _share(left_out, low, high),
             "coverage_unseen": _share(ratio, low, high), "above_unseen": float(np.mean(ratio > high)),
@@ -96,6 +95,11 @@ def report(table):
             "elastic_true_over_expected": _quantiles(elastic_ratio),
             "elastic_interval": [float(value) for value in np.quantile(elastic_ratio, [0.1, 0.9])],
             "elastic_above_unseen": float(np.mean(elastic_unseen > np.quantile(elastic_ratio, 0.9)))}
+
+
+def _count(pressed, valid):
+    """Load steps that the hyperelastic model holds for, those of them that the foundation model does, and objects."""
+    return {"load_steps": len(pressed), "presses": len(valid), "objects": int(pressed.object.nunique())}
 
 
 def _share(values, low, high):

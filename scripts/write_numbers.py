@@ -177,8 +177,9 @@ def expected_error() -> str:
     read = record("expected_error")
     of = lambda name, digits=2: ", ".join(f"{value:.{digits}f}" for value in read[name])  # noqa: E731
     fit, test = read["fit"], read["test"]
-    rows = [["fitted to, tested on: valid load steps of objects", f"{fit['presses']} of {fit['objects']}, "
-             f"{test['presses']} of {test['objects']}"],
+    rows = [["fitted to, tested on: objects", f"{fit['objects']}, {test['objects']}"],
+            ["their load steps for which the hyperelastic model holds", f"{fit['load_steps']}, {test['load_steps']}"],
+            ["those of them for which the foundation model holds, too", f"{fit['presses']}, {test['presses']}"],
             ["true over expected error, each object left out in turn: 10, 90 %", of("interval")],
             ["share of the unseen presses between these (0.8 would be right), above (0.1)",
              f"{read['coverage_unseen']:.2f}, {read['above_unseen']:.2f}"],
