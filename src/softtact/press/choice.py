@@ -32,8 +32,8 @@ TOLERANCE_MM = 0.01
 CALIBRATED_ON = "coro"
 ELASTIC_RELATIVE = 0.45     # of its map's root mean square: the elastic model's error where no foundation model is beside it
 # True over expected error from the 10th to the 90th percentile: of the foundation model, objects left out in turn (of objects that
-# nothing was fitted to 7 % lie above); of the elastic model told by what both models disagree by; and of the elastic model by itself
-# from the 5th to the 95th (0.311 to 0.760 over 0.45).
+# nothing was fitted to 7 % lie above); of the elastic model told by what both models disagree by; and, from the 5th to the 95th, of
+# the elastic model by itself (0.311 to 0.760 over 0.45).
 INTERVALS = {"foundation": (0.80, 1.64), "elastic": (0.98, 1.05), "elastic alone": (0.69, 1.68)}
 _POWER, _DEPTH_POWER = 3, 2      # of the compression and of the depth, with which the foundation model's relative error grows
 _KNOWN = 0.5     # of a frustum's height: the error was calibrated up to a compression of 0.36, and is not told much beyond
