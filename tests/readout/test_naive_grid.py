@@ -9,7 +9,6 @@ from support.sensors import CORO
 from softtact.readout.capacitance import equivalent_air_gap, ideal_counts
 from softtact.readout.electrodes import electrode_sides
 
-pytest.importorskip("skfem")
 SMALL = CORO.model_copy(update={"footprint_mm": (11.0, 10.0), "map_shape": (17, 17),
                                 "taxels": CORO.taxels.model_copy(update={"rows": 2, "columns": 2})})
 NINE = CORO.model_copy(update={"footprint_mm": (16.5, 15.9), "taxels": CORO.taxels.model_copy(update={"rows": 3, "columns": 3})})
