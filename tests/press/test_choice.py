@@ -9,7 +9,16 @@ import numpy as np
 import pytest
 
 from softtact.errors import InputError
-from softtact.press.choice import ELASTIC_RELATIVE, INTERVALS, FoundationError, calibrate, cheapest, expected_errors, rms
+from softtact.press.choice import (
+    ELASTIC_RELATIVE,
+    INTERVALS,
+    FoundationError,
+    calibrate,
+    cheapest,
+    expected_errors,
+    foundation_error,
+    rms,
+)
 from softtact.press.sensor import load_sensor
 
 
@@ -40,6 +49,13 @@ def test_the_constants_that_presses_state_their_errors_by_are_those_of_the_recor
     alone = record["elastic_relative"]
     assert ELASTIC_RELATIVE == pytest.approx(alone[2], abs=0.006)
     assert INTERVALS["elastic alone"] == pytest.approx([alone[0] / alone[2], alone[4] / alone[2]], abs=0.02)
+
+
+def test_no_error_is_told_where_frusta_are_compressed_beyond_half_of_their_height():
+    foundation = press([0.1, 0.1, 0.1], [0.1, 0.29, 0.31])
+    told = foundation_error(foundation, height_mm=0.6, thickness_mm=2.5, model=FoundationError(at_rest=0.0, growth=1.0, deep=0.0))
+    assert np.isfinite(told[:2]).all() and np.isinf(told[2])
+    assert told[1] / told[0] == pytest.approx(2.9**3) and told[0] == pytest.approx((0.1 / 0.6) ** 3 * rms(maps(0.1)).item())
 
 
 def test_an_error_grows_with_the_cube_of_the_compression_and_the_square_of_the_depth():

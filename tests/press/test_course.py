@@ -98,13 +98,30 @@ def test_a_model_is_taken_only_where_nine_of_ten_presses_like_it_are_within_the_
     assert times > 1.0
     assert chosen(tolerance_mm=1.01 * times * expected).model == "elastic"
     between = chosen(tolerance_mm=0.5 * (1.0 + times) * expected)
-    assert between.model != "elastic" and "mostly below" in between.selection_reason
+    assert between.model != "elastic"
+    um, tolerance_um = 1e3 * expected, 0.5e3 * (1.0 + times) * expected
+    assert f"elastic {um:.3g} (mostly below {times * um:.3g}) um" in between.selection_reason
+    assert f"asked for {tolerance_um:.3g} um" in between.selection_reason
 
 
 def test_a_model_that_does_not_hold_is_not_taken_whatever_error_it_tells(fakes):
     fakes["elastic"] = replace(fakes["elastic"], within_validity=np.zeros(1, dtype=np.int8))
     result = chosen()
     assert result.model == "foundation" and "the elastic model does not hold from 0.5 N on" in result.selection_reason
+
+
+def test_the_first_force_that_a_model_does_not_hold_for_is_said(fakes):
+    valid = np.array([1, 0], dtype=np.int8)
+    fakes["elastic"] = replace(fakes["elastic"], normal_force_n=np.array([0.3, 0.5]), within_validity=valid)
+    assert "the elastic model does not hold from 0.5 N on" in chosen().selection_reason
+
+
+def test_a_fast_model_by_itself_states_the_interval_of_its_own(sensor):
+    for model, name in (("elastic", "elastic alone"), ("foundation", "foundation")):
+        told = choice.with_expected_error(sensor, replace(
+            sensor.press(BALL, force_n=[0.5], model="elastic", label=""), model=model, attributes={},
+            frustum_compression_mm=np.array([0.01]), expected_error_mm=np.array([np.nan]))).attributes
+        assert (told["expected_error_times_low"], told["expected_error_times_high"]) == choice.INTERVALS[name]
 
 
 def test_a_model_that_fails_falls_through_to_the_next(fakes):
