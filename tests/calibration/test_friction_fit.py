@@ -10,7 +10,7 @@ from support.calibration import Bench, small_sensor_file
 from softtact.calibration.fit import calibrate
 from softtact.calibration.ladder import Presses
 from softtact.calibration.problem import Problem
-from softtact.calibration.rubbing import FRICTIONS, friction_weights
+from softtact.calibration.rubbing import FRICTIONS, friction_weights, with_friction
 from softtact.calibration.simulated import HiddenConstants
 from softtact.models.hyperelastic.presets import PRESETS
 from softtact.press.sensor import load_sensor
@@ -32,8 +32,7 @@ def test_friction_of_an_object_comes_back_and_gains_are_nearer_with_it(tmp_path)
     """Recordings are of hyperelastic presses with a friction of 0.08 at other forces than the fit's. Measured: 0.087."""
     sensor = load_sensor(small_sensor_file(tmp_path))
     sensor.mesh, sensor.solver = (make() for make in PRESETS["draft"])
-    spec = sensor.spec
-    rubbed = spec.model_copy(update={"friction": spec.friction.model_copy(update={"object": 0.08})})
+    rubbed = with_friction(sensor.spec, 0.08)
     drawn = HiddenConstants.drawn(sensor, seed=1)
     hidden = replace(drawn, modulus_scale=1.0, relaxation=(), relaxation_s=(), sheet_excess_mm=0 * drawn.sheet_excess_mm)
     real = Bench(Presses(replace(sensor, spec=rubbed, prepared_models={}), model="hyperelastic"), hidden)

@@ -100,7 +100,7 @@ def test_a_model_is_taken_only_where_nine_of_ten_presses_like_it_are_within_the_
     between = chosen(tolerance_mm=0.5 * (1.0 + times) * expected)
     assert between.model != "elastic"
     um, tolerance_um = 1e3 * expected, 0.5e3 * (1.0 + times) * expected
-    assert f"elastic {um:.3g} (mostly below {times * um:.3g}) um" in between.selection_reason
+    assert f"elastic {um:.3g} (90 % below {times * um:.3g}) um" in between.selection_reason
     assert f"asked for {tolerance_um:.3g} um" in between.selection_reason
 
 

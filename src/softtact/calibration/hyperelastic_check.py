@@ -6,6 +6,7 @@ import numpy as np
 
 from softtact.calibration.fit import CalibrationResult
 from softtact.calibration.ladder import COVERS, Presses, parabola, with_cover
+from softtact.calibration.rubbing import with_friction
 from softtact.errors import ConvergenceError
 from softtact.progress import announce
 from softtact.readout.calibrated import relative_change
@@ -30,7 +31,7 @@ def _difference(result, k):
     announce(f"{one.name}: pressing by the hyperelastic model at {force:.3g} N")
     friction, spec = problem.value(result.vector, "friction", 0.0), with_cover(sensor.spec, cover)
     if "friction" in problem.names:
-        spec = spec.model_copy(update={"friction": spec.friction.model_copy(update={"object": friction})})
+        spec = with_friction(spec, friction)
     calibrated = replace(sensor, spec=spec, prepared_models={})
     try:
         other = Presses(calibrated, model="hyperelastic", levels=1).ladder(one.mesh, place, largest_n=force).maps_mm[-1]

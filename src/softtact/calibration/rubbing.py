@@ -17,6 +17,7 @@ from softtact.errors import ShellWarning
 from softtact.press.ladder import Ladder
 from softtact.press.sensor import Sensor
 from softtact.progress import announce
+from softtact.sensors.frusta import SensorSpec
 
 FRICTIONS = (0.0, 0.05, 0.1, 0.2, 0.6)     # coefficients of the object, between which its effect is interpolated
 
@@ -36,9 +37,13 @@ def rubbing(sensor: Sensor, mesh: trimesh.Trimesh, place: Sequence[float], *, la
             for friction, ladder in zip(FRICTIONS[1:], ladders[1:], strict=True)}
 
 
+def with_friction(spec: SensorSpec, friction: float) -> SensorSpec:
+    """A sensor on whose cover the object has this coefficient of friction."""
+    return spec.model_copy(update={"friction": spec.friction.model_copy(update={"object": friction})})
+
+
 def _ladder(sensor, friction, mesh, place, largest_n):
-    spec = sensor.spec.model_copy(update={"friction": sensor.spec.friction.model_copy(update={"object": friction})})
-    rubbed = replace(sensor, spec=spec, prepared_models={})
+    rubbed = replace(sensor, spec=with_friction(sensor.spec, friction), prepared_models={})
     return Presses(rubbed, model="hyperelastic", levels=LEVELS).ladder(mesh, np.asarray(place, dtype=float), largest_n=largest_n)
 
 

@@ -158,7 +158,7 @@ def _by_error(sensor, placed, forces, tolerance_mm, course):
             said.append(f"the {name} model does not hold from {first:g} N on")
     mostly = {name: INTERVALS[name][1] * values for name, values in errors.items()}
     model = cheapest(mostly, tolerance_mm)
-    told = [f"{name} {1e3 * values.max():.3g} (mostly below {1e3 * mostly[name].max():.3g}) um" for name, values in errors.items()
+    told = [f"{name} {1e3 * values.max():.3g} (90 % below {1e3 * mostly[name].max():.3g}) um" for name, values in errors.items()
             if np.isfinite(values).all()]
     reason = "; ".join([f"expected errors: {', '.join(told)}; asked for {1e3 * tolerance_mm:.3g} um" if told else
                         "no fast model tells an error", *said])

@@ -90,6 +90,21 @@ def test_with_its_coupling_the_tangent_of_sliding_friction_is_the_derivative_of_
     assert error < 0.02 < 0.1 < without
 
 
+def test_a_solution_with_sliding_friction_is_that_of_the_matrix_and_its_coupling():
+    body, rng = two_blocks(0.4)
+    state = pressed_state(body, rng, [0.01, -0.03, -0.05, 0, 0, 0])
+    state = body.evaluate(state.displacement, state.poses, state.histories, np.zeros(1))
+    right = rng.standard_normal((len(body.free), 2))
+    for k, found in enumerate(body.solve(state, right, turning=False).T):
+        change, coupling = np.zeros(body.points.size), np.zeros_like(body.points)
+        change[body.free] = found
+        body.pairs[0].add_coupling(state.histories[0], state.contacts[0], change.reshape(-1, 3), coupling)
+        felt = coupling.ravel()[body.free]
+        assert np.linalg.norm(felt) > 0.01 * np.linalg.norm(right[:, k])
+        off = body.solver.product(body._matrix, found) + felt - right[:, k]
+        assert np.linalg.norm(off) < 2e-6 * np.linalg.norm(right[:, k])      # what GMRES is asked for, twice
+
+
 def test_a_follower_pressure_on_a_closed_surface_has_no_resultant_and_a_symmetric_derivative():
     body, rng = two_blocks(0.0)
     x = body.points + 0.02 * rng.standard_normal(body.points.shape)

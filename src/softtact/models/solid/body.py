@@ -253,6 +253,7 @@ class SolidBody:
     def solve(self, state: SolidState, right: np.ndarray, *, turning: bool = True) -> np.ndarray:
         """Solve with the tangent at a state for right-hand sides (unknowns, k), or with one near it that is positive definite.
 
+        Where friction slides, the tangent has a part beside the matrix: GMRES, with the factor as its preconditioner.
         turning: see `tangent`
         """
         found = self.solver.solve(self.tangent(state), right) if turning else None
@@ -271,14 +272,16 @@ class SolidBody:
                 pair.add_coupling(history, contact, change.reshape(-1, 3), force)
             return force.ravel()[self.free]
 
-        def whole(y):
-            x = self.solver.precondition(y)
+        def whole(x):
             return self.solver.product(self._matrix, x) + coupling(x)
 
-        operator = spla.LinearOperator((len(right), len(right)), matvec=whole, dtype=float)
+        operator = spla.LinearOperator(
+            (len(right), len(right)), matvec=lambda y: whole(self.solver.precondition(y)), dtype=float
+        )
         for k in range(right.shape[1]):
             size = _COUPLED * float(np.linalg.norm(right[:, k]))
-            y, _ = spla.gmres(operator, -coupling(found[:, k]), atol=size, rtol=0.0, restart=_MOST_COUPLED, maxiter=1)
+            rest = right[:, k] - whole(found[:, k])
+            y, _ = spla.gmres(operator, rest, atol=size, rtol=0.0, restart=_MOST_COUPLED, maxiter=1)
             found[:, k] += self.solver.precondition(y)
         return found
 
