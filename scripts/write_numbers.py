@@ -234,8 +234,8 @@ def electrode_field() -> str:
     said = (f"At rest a corner, side and inner electrode hold {over[0]:.3f}, {over[1]:.3f} and {over[2]:.3f} of the charge of "
             f"plates of their size; edges have {shares['inner']:.2f} (between neighbours) and {shares['outer']:.2f} (border) of a "
             "free edge's share, where 0.1 and 1 are assumed. Elements half as large again change a charge by up to "
-            f"{read['mesh_error']:.1%}.\n\nDifferences in counts from the field with all electrodes driven together, over the 28 taxels; "
-            "grounded neighbours: the gain that is left, and what it leaves:")
+            f"{read['mesh_error']:.1%}.\n\nDifferences in counts from the field with all electrodes driven together, over the 28 "
+            "taxels; grounded neighbours: the gain that is left, and what it leaves:")
     return f"{source('electrode_field')} Counts at a gain of {read['gain']:g}.\n\n{said}\n\n{table(head, rows)}"
 
 
