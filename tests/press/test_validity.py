@@ -12,7 +12,7 @@ from softtact.press.sensor import Sensor
 from softtact.press.validity import valid_elastic, valid_foundation, valid_hyperelastic
 
 GOOD = {"compression_mm": [0.1, 0.2, 0.3], "contact_error_mm": [0.0, 0.001, 0.001], "points": [9, 40, 80],
-        "depth_mm": [0.1, 0.2, 0.3], "forces_n": [5.0, 20.0, 50.0]}
+        "rough": [False, False, False], "depth_mm": [0.1, 0.2, 0.3], "forces_n": [5.0, 20.0, 50.0]}
 
 
 def valid(**changed):
@@ -26,7 +26,8 @@ def test_all_load_steps_of_a_good_press_hold():
 
 
 @pytest.mark.parametrize("changed", [
-    {"compression_mm": [0.1, 0.2, 0.41]}, {"contact_error_mm": [0.0, 0.001, 0.0031]}, {"points": [9, 40, 8]}])
+    {"compression_mm": [0.1, 0.2, 0.41]}, {"contact_error_mm": [0.0, 0.001, 0.0031]}, {"points": [9, 40, 8]},
+    {"rough": [False, False, True]}])
 def test_each_criterion_flags_its_own_load_step_alone(changed):
     assert valid(**changed) == [True, True, False]
 

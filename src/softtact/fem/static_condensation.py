@@ -56,6 +56,7 @@ class Condensation:
         self._dofs = tuple(np.ascontiguousarray(dofs) for dofs in element_dofs)
         self._store = _Store(rows=np.zeros((bodies, inner, inner + outer), dtype=np.float32),
                              outer=np.zeros((bodies, outer, outer), dtype=np.float32), modified=np.zeros(bodies, dtype=bool))
+        self._mended: dict[int, np.ndarray | None] = {}     # by body: the outer matrix made positive, None where it is as it stands
 
     @property
     def outer(self) -> np.ndarray:
@@ -77,6 +78,8 @@ class Condensation:
         springs = springs or Springs(np.zeros((len(bodies), 0)), np.zeros((0, 1), dtype=np.int64), np.zeros((0, 1)))
         damping = np.zeros(len(bodies)) if damping is None else damping
         _set(bodies, damping, tuple(tangents), self._dofs, springs, self._store, ROUTINES)
+        for body in bodies:
+            self._mended.pop(int(body), None)
 
     def residual(self, inner: np.ndarray, *, bodies: np.ndarray | None = None,
                  workers: Workers = SERIAL) -> tuple[np.ndarray, np.ndarray]:
@@ -99,17 +102,23 @@ class Condensation:
         return np.arange(len(self._store.rows)) if bodies is None else bodies
 
     def positive_outer(self, *, workers: Workers = SERIAL) -> np.ndarray:
-        """The condensed matrices without their modes of negative stiffness."""
+        """The condensed matrices with the eigenvalues of those that are indefinite made positive, as in `set`.
+
+        With zeros in their place a step would go as far along these modes as all else lets it.
+        """
+        unknown = [body for body in range(len(self.outer)) if body not in self._mended]
+        workers.map(self._mend, chunks(np.array(unknown, dtype=np.int64), _AT_ONCE))
         out = self.outer.copy()
-
-        def mend(bodies):
-            """Most have none, which a Cholesky factor tells in a hundredth of the time of their modes."""
-            indefinite = [body for body in bodies if spotrf(out[body].T, overwrite_a=0)[1]]
-            values, vectors = np.linalg.eigh(out[indefinite])
-            out[indefinite] = np.matmul(vectors * np.maximum(values, 0.0)[:, None, :], vectors.transpose(0, 2, 1))
-
-        workers.map(mend, chunks(np.arange(len(out)), _AT_ONCE))
+        for body, mended in self._mended.items():
+            if mended is not None:
+                out[body] = mended
         return out
+
+    def _mend(self, bodies):
+        """Note for bodies what is left of them made positive; a Cholesky factor tells soonest that one is as it stands."""
+        for body in map(int, bodies):
+            definite = spotrf(self.outer[body].T, overwrite_a=0)[1] == 0
+            self._mended[body] = None if definite else _made_positive(self.outer[body].astype(np.float64))
 
     @property
     def modified(self) -> int:

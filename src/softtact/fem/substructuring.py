@@ -55,7 +55,7 @@ class LayerwiseElimination:
         return self.stages[-1].condensed.outer
 
     def positive_matrices(self, *, workers: Workers = SERIAL) -> np.ndarray:
-        """The same without their modes of negative stiffness."""
+        """The same with the modes of negative stiffness made positive, see `Condensation.positive_outer`."""
         return self.stages[-1].condensed.positive_outer(workers=workers)
 
     def set(self, bodies: np.ndarray, layers: Iterable[tuple[Sequence[np.ndarray], Springs | None]], *,

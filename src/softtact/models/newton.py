@@ -57,14 +57,19 @@ class Solution:
     """The last largest unbalanced force in N."""
 
 
-def solve(problem: Problem, state: Any, *, max_iterations: int) -> Solution:
-    """Balance of a problem, from a state on; `Solution.state` is None where it was not reached in so many iterations."""
+def solve(problem: Problem, state: Any, *, max_iterations: int, nearly_n: float = 0.0) -> Solution:
+    """Balance of a problem, from a state on; `Solution.state` is None where it was not reached in so many iterations.
+
+    nearly_n: where no larger force is unbalanced after these, as many follow
+    """
     residual = float("inf")
-    for iteration in range(max_iterations):
+    for iteration in range(2 * max_iterations):
         state = problem.prepared(state, iteration)
         residual = problem.residual(state)
         if problem.balanced(state, residual):
             return Solution(state, iteration, residual)
+        if iteration == max_iterations and residual > nearly_n:
+            return Solution(None, iteration, residual)
         state, step = problem.step(state)
         trial = None if step is None else line_search(problem, state, step, residual)
         if trial is not None:
@@ -72,7 +77,7 @@ def solve(problem: Problem, state: Any, *, max_iterations: int) -> Solution:
             state = trial
         elif not problem.recovered(state):
             return Solution(None, iteration, residual)
-    return Solution(None, max_iterations, residual)
+    return Solution(None, 2 * max_iterations, residual)
 
 
 def line_search(problem: Problem, state: Any, step: Any, residual: float) -> Any:

@@ -27,14 +27,14 @@ def valid_foundation(compression_mm: np.ndarray, depth_mm: np.ndarray, *, frustu
 
 
 def valid_hyperelastic(*, compression_mm: np.ndarray, contact_error_mm: np.ndarray, points: np.ndarray, depth_mm: np.ndarray,
-                       forces_n: np.ndarray, frustum_mm: float, allowed_mm: float) -> np.ndarray:
-    """Which load steps (l,) of a hyperelastic press hold, by its most compressed frustum, contacts and course.
+                       rough: np.ndarray, forces_n: np.ndarray, frustum_mm: float, allowed_mm: float) -> np.ndarray:
+    """Which load steps (l,) of a hyperelastic press hold, by its most compressed frustum, contacts, balance and course.
 
     contact_error_mm (l,): deepest overlap, or widest gap under pressure, of which `allowed_mm` were asked for
     points (l,): of the cover that carry the object;  compression_mm, frustum_mm: nan without frusta, where nothing asks for them
-    forces_n (l,): where they do not grow, depths need not either
+    rough (l,): whether more than the tolerance is left unbalanced;  forces_n (l,): where they do not grow, depths need not either
     """
-    return (~(compression_mm >= _FULL_POCKET * frustum_mm) & (contact_error_mm < _OVERLAP_LEFT * allowed_mm)
+    return (~rough & ~(compression_mm >= _FULL_POCKET * frustum_mm) & (contact_error_mm < _OVERLAP_LEFT * allowed_mm)
             & (points >= _FEWEST_POINTS) & ((np.diff(forces_n) <= 0).any() | _grows(depth_mm, slack_mm=allowed_mm)))
 
 

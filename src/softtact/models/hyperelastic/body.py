@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from softtact.fem.kernels_torch import DeviceKernels
 
 _DAMPINGS = 4         # steps that are tried with ever more damping of the cells that they throw too far
-_FIRST_SHIFT = 0.01   # N/mm on every free unknown of the slab, then more until the tangent is positive definite ...
+_FIRST_SHIFT = 0.001   # N/mm on every free unknown of the slab, then more until the tangent is positive definite ...
 _MORE, _LESS = 4.0, 0.25   # of the shift before: the next that is tried, and from where a later search begins
 _MOST_SHIFTS = 20     # ... but a tangent that is not even finite will never be
 
@@ -74,14 +74,16 @@ class Step:
         return max(np.abs(self.slab).max(), np.abs(self.support).max(initial=0.0), abs(self.indentation))
 
 
-def _shifts(last):
+def _shifts(last, again):
     """What is tried, one after the other, until a tangent is positive definite, so that every step lowers the energy.
 
-    last: what was enough for the tangent before; where that was much, less of it is tried at once
+    last: what was enough for the tangent before, None where nothing was needed; where it was much, less of it is tried at once
+    again: the tangent before was the same but for damped cells; what was enough for it is where to begin
     """
-    first = max(_FIRST_SHIFT, _LESS * last)
-    if first == _FIRST_SHIFT:
+    first = max(_FIRST_SHIFT, (1.0 if again else _LESS) * (last or 0.0))
+    if first == _FIRST_SHIFT and not (again and last is not None):
         yield None
+    if first == _FIRST_SHIFT and not (again and last):
         yield 0.0
     for number in range(_MOST_SHIFTS):
         yield first * _MORE**number
@@ -99,7 +101,7 @@ class LayeredBody:
         slab.build_pattern(self.cells.eliminated, self.cells.outer_dofs)
         self.solver = DissectedSolver(slab.points[slab.unknowns // 3, :2], workers=self.workers)
         self.stepper = ContactStepper(DissectedContact(self.solver, workers=self.workers))
-        self._shift = 0.0     # that made the last tangent positive definite
+        self._shift: float | None = None     # that made the last tangent positive definite
 
     def sum_with(self, loops: "ModuleType | DeviceKernels") -> None:
         """Let elements be summed by `loops`: `kernels`, as from the start, or `device_kernels`."""
@@ -129,7 +131,7 @@ class LayeredBody:
         """Forget all tangents and factors of an earlier press: what is kept decides the last digits of a result."""
         self.cells.reset()
         self.stepper.reset()
-        self._shift = 0.0
+        self._shift = None
         self.friction.reset()
 
     def evaluate(self, slab_displacement: np.ndarray, support_displacement: np.ndarray, indentation: float,
@@ -181,49 +183,49 @@ class LayeredBody:
         Where nothing touches, a force finds no stiffness: the step is then not finite.
         """
         state = self.friction.for_tangent(state)
-        for _ in range(_DAMPINGS):
-            step = self._newton_step(state, force_n, surface, largest_mm, kept_mm)
+        for number in range(_DAMPINGS):
+            step = self._newton_step(state, force_n, surface, largest_mm, kept_mm, again=number > 0)
             if not (np.isfinite(step.largest()) and self.cells.damp(step.slab, step.support)):
                 break
         return step
 
-    def _newton_step(self, state, force_n, surface, largest_mm, kept_mm):
-        """The step with the cells as they are damped now."""
+    def _newton_step(self, state, force_n, surface, largest_mm, kept_mm, *, again):
+        """The step with the cells as they are damped now; again: it was found before with less damping."""
         self.cells.refresh(state, kept_mm=kept_mm, workers=self.workers)
         residual, kept = self.cells.condensed_residual(state, workers=self.workers)
         contact = StepContact(self.slab, state.slab, state.indentation, surface, largest_mm=largest_mm, workers=self.workers)
         step, indentation_increment = self._step_of_unknowns(state, residual.ravel()[self.slab.unknowns], contact, force_n,
-                                                 largest_mm)
+                                                             largest_mm, again=again)
         full = np.zeros(3 * self.slab.nodes)
         full[self.slab.unknowns] = step
         slab, support = self.cells.recover(kept, full.reshape(-1, 3), workers=self.workers)
         return Step(slab=slab, support=support, indentation=indentation_increment, projection=contact.projection)
 
-    def _step_of_unknowns(self, state, residual, contact, force_n, largest_mm):
+    def _step_of_unknowns(self, state, residual, contact, force_n, largest_mm, *, again):
         """Step of the global unknowns, and how far the object goes down; the tangent is made positive definite where it is not.
 
         Not a number where that cannot be done, which fails Newton's method there.
         """
         excess, border = None if force_n is None else state.force - force_n, self.slab.friction_border(state.slab)
         positive = None
-        for shift in _shifts(self._shift):
+        for shift in _shifts(self._shift, again):
             if shift is not None and positive is None:
                 positive = self.cells.positive_outer(workers=self.workers)
             step = self.stepper.step(self._rubber_tangent(state, shift, positive), residual, contact, friction_border=border,
                                      excess=excess, largest=largest_mm)
             if step is not None:
-                self._shift = shift or 0.0
+                self._shift = shift
                 return step
         return np.full(len(residual), np.nan), np.nan
 
     def _rubber_tangent(self, state, shift, positive):
-        """The rubber's tangent as it is (None), or without the cells' modes of negative stiffness and stiffened by a shift.
+        """The rubber's tangent as it is (None), or with the cells' modes of negative stiffness made positive, stiffened by a shift.
 
-        positive: what the cells leave without these modes
+        positive: what the cells leave with these modes made positive
         """
         if shift is None:
             return self.slab.rubber_tangent(state.slab, self.cells.outer, workers=self.workers)
-        rubber = self.slab.rubber_tangent(state.slab, positive, workers=self.workers)
+        rubber = self.slab.rubber_tangent(state.slab, positive, positive=shift > 0, workers=self.workers)
         self.slab.add_to_diagonal(rubber, shift)
         return rubber
 

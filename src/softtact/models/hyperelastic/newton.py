@@ -16,6 +16,8 @@ _MOST_INCREMENTS = 100  # of the first touch's depth, until a point of the cover
 # Pressing apart is in vain where so many passes that moved anything have not brought the overlap below this share of the least
 # before. Passes that move nothing add up: the force of a single point at an edge is below the tolerance.
 _WORTH_A_PASS, _PASSES_IN_VAIN = 0.8, 3
+DEEP = 0.55        # of a frustum's height, or of the layers': from here on elements of the default mesh may be unstable
+_ROUGH_AGAIN = 8   # iterations after which a roughly balanced load step is taken once its overlaps were pressed apart
 _NEARLY = 3.0      # times what is allowed may be left where points have run under an edge: to press these apart takes tens of steps
 
 
@@ -32,6 +34,9 @@ class NewtonSettings:
     augmentations where they took so many: one that crawls would go on for hours
     first_touch_mm, first_touch_tolerance_n: overlap at which the press begins, and the residual that is good enough there
     largest_way_mm: way of an object at once where a `Motion` moves it down or aside
+    max_iterations: of an increment, and as many again where by then no more than nearly_balanced, a share of the force, is left
+    rough_tolerance: in place of relative_tolerance after rough_after iterations where frusta are pressed beyond `DEEP`: they fold
+    on and on under the same force. Results flag such a load step.
     projection_iterations: iterations that look anew which facet each point faces
     kept_tangent_mm: a cell that moved less since its last tangent keeps it
     With friction
@@ -44,6 +49,9 @@ class NewtonSettings:
     full_depth_mm: float = 0.2
     max_augmentations: int = 20
     max_iterations: int = 30
+    nearly_balanced: float = 0.02
+    rough_tolerance: float = 3e-3
+    rough_after: int = 30
     load_step_iterations: int = 100
     largest_step_mm: float = 0.12
     smallest_increment_n: float = 0.02
@@ -105,7 +113,10 @@ def augment(body: LayeredBody, surface: Surface, found: Solution, force: float |
         start = body.augmented(found.state, allowed_mm=allowed)
         if force is not None:
             start = body.indented_to(start, force)
-        found = settle(body, surface, start, force, tolerance_at(force, settings), settings)
+        tolerance = tolerance_at(force, settings)
+        if found.residual_n > tolerance:     # rough it is, and will be again
+            settings = replace(settings, rough_after=_ROUGH_AGAIN)
+        found = settle(body, surface, start, force, tolerance, settings)
         spent = found.iterations
         iterations += spent
     return replace(found, iterations=iterations)
@@ -117,7 +128,12 @@ def most_iterations(body: LayeredBody, settings: NewtonSettings) -> int:
 
 
 def tolerance_at(force: float | None, settings: NewtonSettings) -> float:
-    return settings.relative_tolerance * max(force or 0.0, settings.smallest_scale_n)
+    """Largest unbalanced force (N) that is left at a force (N)."""
+    return settings.relative_tolerance * _scale(force, settings)
+
+
+def _scale(force, settings):
+    return max(force or 0.0, settings.smallest_scale_n)
 
 
 def settle(body: LayeredBody, surface: Surface, state: BodyState, force: float | None, tolerance: float,
@@ -144,7 +160,8 @@ def settle(body: LayeredBody, surface: Surface, state: BodyState, force: float |
 
 
 def _newton(body, surface, state, force, tolerance, settings):
-    return solve(_Press(body, surface, force, tolerance, settings), state, max_iterations=settings.max_iterations)
+    return solve(_Press(body, surface, force, tolerance, settings), state, max_iterations=settings.max_iterations,
+                 nearly_n=settings.nearly_balanced * _scale(force, settings))
 
 
 class _Press:
@@ -175,7 +192,13 @@ class _Press:
         return self.body.residual_norm(state, self.force)
 
     def balanced(self, state, residual):
-        return residual <= self.tolerance
+        return residual <= self.tolerance or self._roughly(state, residual)
+
+    def _roughly(self, state, residual):
+        settings = self.settings
+        if self.iterations < settings.rough_after or self.body.friction.active:
+            return False
+        return residual <= settings.rough_tolerance * _scale(self.force, settings) and self.body.most_compressed(state)[0] > DEEP
 
     def step(self, state):
         surface = self.surface if self.projected else None

@@ -129,18 +129,21 @@ class ContactStepper:
         """Newton's step of the convex problem, with the present factor if it still serves."""
         slope, gradient = problem.points.slope(at.change), problem.gradient(at)
         if self._factored and self.factor.follow(problem, slope):
-            direction, good = self._conjugate_gradients(problem, slope, -gradient)
+            direction, good, positive = self._conjugate_gradients(problem, slope, -gradient)
             if good:
                 return direction
+            if not positive:     # no factor of this matrix would be found
+                return None
         self.factors += 1
         self._factored = self.factor.renew(problem, slope)
         if not self._factored:
             return None
-        direction, good = self._conjugate_gradients(problem, slope, -gradient)
+        direction, good, _ = self._conjugate_gradients(problem, slope, -gradient)
         return direction if good or direction.x.any() else None
 
     def _conjugate_gradients(self, problem, slope, right):
-        """Approximate solution of the Newton system, and whether it is as good as wanted; given up where it would take too long."""
+        """Approximate solution of the Newton system, whether it is as good as wanted, and whether the matrix is positive
+        definite as far as was seen; given up where it would take too long."""
         found, r = problem.nowhere(), right
         z = self.factor.solve(r, held=problem.held)
         p, size = z, r @ z
@@ -151,19 +154,19 @@ class ContactStepper:
             q = problem.product(slope, along)
             curvature = p @ q
             if not curvature > 0:
-                return found, False
+                return found, False, False
             found = found.plus(size / curvature, along)
             r = r - (size / curvature) * q
             if problem.small(r):
-                return found, True
+                return found, True, True
             z = self.factor.solve(r, held=problem.held)
             size, before = r @ z, size
             if size <= _FORCING**2 * first:
-                return found, True
+                return found, True, True
             if iteration >= _JUDGED_AFTER and size > first * _FORCING ** (2 * iteration / _MOST_ITERATIONS):
-                return found, False
+                return found, False, True
             p = z + (size / before) * p
-        return found, False
+        return found, False, True
 
 
 class _Problem:

@@ -14,10 +14,9 @@ from softtact.contact.height_field import MovedSurface
 from softtact.contact.motion import Motion, MotionStep
 from softtact.errors import ConvergenceError, InputError, TimeLimitError
 from softtact.models.hyperelastic.body import BodyState, LayeredBody
-from softtact.models.hyperelastic.newton import NewtonSettings, augment, first_touch, most_iterations, settle, tolerance_at
+from softtact.models.hyperelastic.newton import DEEP, NewtonSettings, augment, first_touch, most_iterations, settle, tolerance_at
 from softtact.models.hyperelastic.rigid_contact import Surface
 
-_DEEP = 0.55           # of a frustum's height, or of the layers': from here on elements of the default mesh may be unstable
 DEFAULT = NewtonSettings()
 _CLEAR_MM = 0.1        # over the surface, from where on no contact law acts
 _SMALLEST_SHARE = 1 / 64     # of the way that an object may go at once, until a motion's step is given up
@@ -37,6 +36,8 @@ class LoadStep:
     """Largest unbalanced nodal force."""
     penetration_mm: float
     """Deepest overlap left."""
+    rough: bool = False
+    """Whether it is balanced no better than `NewtonSettings.rough_tolerance` asks for."""
     elsewhere_n: float = 0.0
     """What of the force something else than the body carries."""
 
@@ -268,7 +269,8 @@ def _advance(body, surface, state, reached, stage, settings):
             iterations += found.iterations
         if found.state is not None and at >= stage.end:
             return LoadStep(force_n=stage.control(at).force, state=found.state, iterations=iterations,
-                            residual_n=found.residual_n, penetration_mm=body.penetration(found.state))
+                            residual_n=found.residual_n, penetration_mm=body.penetration(found.state),
+                            rough=found.residual_n > tolerance_at(max(_force(control, state), found.state.force), settings))
         increment = 2 * increment if found.state is not None else 0.5 * (at - reached)
         if found.state is None and (increment < stage.smallest or iterations >= most_iterations(body, settings)):
             raise ConvergenceError(_failure(body, state, stage, reached, at, found.residual_n, iterations))
@@ -294,7 +296,7 @@ def _begun(body, surface, state, control, growth):
 def _failure(body, state, stage, reached, at, residual, iterations):
     share, most_compressed = body.most_compressed(state)
     remedy = stage.remedy
-    if share > _DEEP:
+    if share > DEEP:
         remedy += ", or press with MeshSettings.stable() (--mesh-quality stable)"
     return (f"{stage.failure(reached, at)} (unbalanced force {residual:.2g} N, {iterations} iterations in all); "
             f"{most_compressed}. {remedy}.")

@@ -20,6 +20,7 @@ from softtact.fem.extruded_mesh import SheetMesh2D, extrude
 from softtact.fem.graded_mesh import cover_mesh
 from softtact.fem.kernels import add_forces
 from softtact.fem.point_location import interpolation_2d
+from softtact.fem.positive_tangents import make_positive
 from softtact.fem.solid_block import HexBlock, SolidBlock, WedgeBlock, hanging_node_constraints, joined
 from softtact.linalg.symmetric_product import SymmetricProduct
 from softtact.linalg.workers import SERIAL, Workers
@@ -252,11 +253,17 @@ class Slab:
         add_upper(whole.data, np.matmul(weighted.transpose(0, 2, 1), shapes), self._top_positions)
         return whole
 
-    def rubber_tangent(self, state: SlabState, condensed: list[np.ndarray], *, workers: Workers = SERIAL) -> sp.csr_matrix:
-        """Upper triangle (csr) of the tangent with friction, but without the object's pressure; valid until the next call."""
+    def rubber_tangent(self, state: SlabState, condensed: list[np.ndarray], *, positive: bool = False,
+                       workers: Workers = SERIAL) -> sp.csr_matrix:
+        """Upper triangle (csr) of the tangent with friction, but without the object's pressure; valid until the next call.
+
+        positive: the elements' modes of negative stiffness are made positive
+        """
         matrix = self._matrix
         matrix.data[:] = 0.0
         blocks = workers.map(lambda group: group[1].tangent(state.displacement[group[0]], precision=matrix.dtype.type), self.groups)
+        if positive:
+            workers.map(make_positive, [part for block in blocks for part in np.array_split(block, workers.threads)])
         for part, positions in zip([*blocks, *condensed], self._positions, strict=True):
             add_upper(matrix.data, part, positions)
         if state.friction_response is not None:
