@@ -146,3 +146,30 @@ def test_soft_modes_that_go_down_stay_so_beside_one_of_any_stiffness(stiffest):
     step = body.recover(half, np.zeros((1, outer)))
     assert np.isfinite(body.outer).all()
     assert (step * force).sum() < 0 and np.linalg.norm(step) < np.linalg.norm(force) / 0.1     # of the softest mode alone
+
+
+def one_body(outer_values):
+    """A body of two inner unknowns and as many outer ones as there are eigenvalues to be left on these."""
+    rng, count = np.random.default_rng(6), len(outer_values)
+    basis = np.linalg.qr(rng.normal(size=(count, count)))[0]
+    coupling, matrix = rng.normal(size=(2, count)), np.eye(2 + count)
+    matrix[:2, 2:], matrix[2:, :2] = coupling, coupling.T
+    matrix[2:, 2:] = (basis * np.array(outer_values)) @ basis.T + coupling.T @ coupling
+    return matrix, basis
+
+
+def test_what_a_body_leaves_is_made_positive_with_eigenvalues_of_the_same_size():
+    matrix, basis = one_body([-3.0, -0.5, 2.0, 10.0])
+    body = Condensation(1, 2, 4, [np.arange(6)[None]])
+    body.set(np.array([0]), [packed(matrix[None, None])])
+    np.testing.assert_allclose(body.positive_outer()[0], (basis * [3.0, 0.5, 2.0, 10.0]) @ basis.T, atol=1e-4)
+    assert np.linalg.eigvalsh(body.outer[0].astype(float))[0] < -2.9     # itself it stays
+
+
+def test_what_was_made_positive_is_found_anew_with_the_body():
+    body = Condensation(1, 2, 4, [np.arange(6)[None]])
+    for values in ([-3.0, -0.5, 2.0, 10.0], [1.0, 0.5, 2.0, 10.0]):
+        matrix, basis = one_body(values)
+        body.set(np.array([0]), [packed(matrix[None, None])])
+        np.testing.assert_allclose(body.positive_outer()[0], (basis * np.abs(values)) @ basis.T, atol=1e-4)
+        assert (body.positive_outer() == body.positive_outer()).all()

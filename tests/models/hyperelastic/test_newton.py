@@ -57,6 +57,16 @@ def test_overlaps_that_were_not_augmented_are_outside_validity(cylinder_press):
     assert cylinder_press.within_validity.all() and not left.within_validity.any()
 
 
+@pytest.mark.parametrize(("rough_after", "rough"), [(30, False), (0, True)])
+def test_a_load_step_says_whether_it_is_balanced_roughly(monkeypatch, rough_after, rough):
+    """As where frusta fold: pressed beyond a share of their height, here none, half of the force may soon be left unbalanced."""
+    monkeypatch.setattr("softtact.models.hyperelastic.newton.DEEP", -1.0)
+    settings = NewtonSettings(rough_tolerance=0.5, rough_after=rough_after, max_augmentations=0)
+    ball = HeightField(place(trimesh.creation.icosphere(subdivisions=3, radius=4.0), pose=None))
+    step, = press_load_steps(small_body(), ball, [10.0], settings=settings)
+    assert step.rough == rough and (settings.relative_tolerance * 10 < step.residual_n <= 5.0) == rough
+
+
 def test_a_tip_between_the_contact_points_finds_its_first_touch():
     """The cap of a small sphere on a corner of the grid is nearer to the surface than any point that feels contact."""
     result = press_small(trimesh.creation.icosphere(subdivisions=4, radius=2.0), [0.2, 1.0])

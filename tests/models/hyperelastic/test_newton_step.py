@@ -166,6 +166,22 @@ def test_a_body_that_is_not_stable_has_no_step():
     assert scene.step(dense_stepper()) is None
 
 
+class KeptFactor(ContactFactor):
+    """A factor that serves on as it is."""
+
+    def follow(self, problem, slope):
+        return True
+
+
+def test_no_factor_is_tried_of_a_body_whose_negative_stiffness_was_met():
+    scene, stepper = Scene(5), ContactStepper(KeptFactor(DenseSolver()))
+    scene.points = replace(scene.points, gaps=np.full(POINTS, 0.1))     # no contact, which would be stiffer than that
+    scene.step(stepper, excess=None)
+    factors = stepper.factors
+    scene.matrix = -scene.matrix
+    assert scene.step(stepper, excess=None) is None and stepper.factors == factors
+
+
 def test_a_symmetric_matrix_times_a_vector_is_found_from_its_upper_triangle():
     """Nodes of three components have three rows of the same columns; the last node here is held along its last component."""
     for components in [1, 2, 3, 4]:
