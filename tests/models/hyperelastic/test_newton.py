@@ -61,6 +61,7 @@ def test_overlaps_that_were_not_augmented_are_outside_validity(cylinder_press):
 def test_a_load_step_says_whether_it_is_balanced_roughly(monkeypatch, rough_after, rough):
     """As where frusta fold: pressed beyond a share of their height, here none, half of the force may soon be left unbalanced."""
     monkeypatch.setattr("softtact.models.hyperelastic.newton.DEEP", -1.0)
+    monkeypatch.setattr("softtact.models.hyperelastic.newton._ROUGH_SOON", 0)
     settings = NewtonSettings(rough_tolerance=0.5, rough_after=rough_after, max_augmentations=0)
     ball = HeightField(place(trimesh.creation.icosphere(subdivisions=3, radius=4.0), pose=None))
     step, = press_load_steps(small_body(), ball, [10.0], settings=settings)

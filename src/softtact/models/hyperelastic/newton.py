@@ -17,7 +17,9 @@ _MOST_INCREMENTS = 100  # of the first touch's depth, until a point of the cover
 # before. Passes that move nothing add up: the force of a single point at an edge is below the tolerance.
 _WORTH_A_PASS, _PASSES_IN_VAIN = 0.8, 3
 DEEP = 0.55        # of a frustum's height, or of the layers': from here on elements of the default mesh may be unstable
-_ROUGH_AGAIN = 8   # iterations after which a roughly balanced load step is taken once its overlaps were pressed apart
+# Iterations after which a rough balance is taken where one was before overlaps were pressed apart, or where a frustum has lost so
+# much of its height that its pocket is full, and the load step beyond validity whatever its balance.
+_ROUGH_SOON, _FULL = 8, 0.8
 _NEARLY = 3.0      # times what is allowed may be left where points have run under an edge: to press these apart takes tens of steps
 
 
@@ -115,7 +117,7 @@ def augment(body: LayeredBody, surface: Surface, found: Solution, force: float |
             start = body.indented_to(start, force)
         tolerance = tolerance_at(force, settings)
         if found.residual_n > tolerance:     # rough it is, and will be again
-            settings = replace(settings, rough_after=_ROUGH_AGAIN)
+            settings = replace(settings, rough_after=_ROUGH_SOON)
         found = settle(body, surface, start, force, tolerance, settings)
         spent = found.iterations
         iterations += spent
@@ -196,9 +198,11 @@ class _Press:
 
     def _roughly(self, state, residual):
         settings = self.settings
-        if self.iterations < settings.rough_after or self.body.friction.active:
+        if self.iterations < _ROUGH_SOON or self.body.friction.active:
             return False
-        return residual <= settings.rough_tolerance * _scale(self.force, settings) and self.body.most_compressed(state)[0] > DEEP
+        share = self.body.most_compressed(state)[0]
+        late = self.iterations >= settings.rough_after or share > _FULL
+        return late and share > DEEP and residual <= settings.rough_tolerance * _scale(self.force, settings)
 
     def step(self, state):
         surface = self.surface if self.projected else None
