@@ -2,13 +2,15 @@
 
 import json
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import trimesh
 
-from softtact.errors import InputError
+from softtact.errors import ConvergenceError, InputError
 from softtact.press.choice import (
     ELASTIC_RELATIVE,
     INTERVALS,
@@ -17,6 +19,7 @@ from softtact.press.choice import (
     cheapest,
     expected_errors,
     foundation_error,
+    models_to_prepare,
     rms,
 )
 from softtact.press.sensor import load_sensor
@@ -90,13 +93,28 @@ def test_beyond_the_presses_it_is_known_of_no_error_is_promised():
 
 
 def test_a_policy_or_tolerance_that_makes_no_sense_is_refused():
-    import trimesh
-
     sensor, ball = load_sensor("coro"), trimesh.creation.icosphere(radius=5.0)
     with pytest.raises(InputError, match="policy 'cheap' is unknown"):
         sensor.press(ball, force_n=1.0, policy="cheap")
     with pytest.raises(InputError, match="tolerance -1 mm is not positive"):
         sensor.press(ball, force_n=1.0, policy="error", tolerance_mm=-1.0)
+
+
+@pytest.mark.parametrize(("seconds", "fast"), [(700.0, ()), (500.0, ("elastic", "foundation"))])
+def test_no_preparation_of_more_than_ten_minutes_is_begun_unasked(seconds, fast, monkeypatch):
+    sensor, pressed = load_sensor("coro"), []
+
+    def failing(name, *_):
+        pressed.append(name)
+        raise ConvergenceError("a stub")      # falls through to the next model
+
+    monkeypatch.setattr("softtact.press.sensor.seconds_to_prepare_foundation", lambda spec, laws: seconds)
+    monkeypatch.setattr("softtact.press.choice.PRESSES", {name: partial(failing, name) for name in
+                                                          ("elastic", "foundation", "hyperelastic")})
+    with pytest.raises(ConvergenceError):
+        sensor.press(trimesh.creation.icosphere(radius=4.0), force_n=[5.0], label="")
+    assert pressed == [*fast, "hyperelastic"]
+    assert models_to_prepare(sensor, policy="error") == fast
 
 
 def test_many_presses_need_as_many_poses_as_meshes():

@@ -65,7 +65,6 @@ def _calibrate(options):
     from softtact.calibration.hyperelastic_check import hyperelastic_differences
     from softtact.calibration.ladder import Presses, uncalibrated
     from softtact.calibration.problem import Problem
-    from softtact.calibration.sensor_file import write_calibrated
     from softtact.geometry.meshes import read_mesh
 
     sensor = uncalibrated(sensor_path(options.sensor))
@@ -84,6 +83,16 @@ def _calibrate(options):
     candidates = [one for path in options.candidate or () for one in quarters(path.name, read[path], spec.footprint_mm)]
     advice = rank(result, candidates, largest_n=max(float(one.force_n.max()) for one in experiments)) if candidates else []
     differences = hyperelastic_differences(result) if options.hyperelastic_check else None
+    _write(options, result, notes, advice)
+    written = [str(path) for path in (options.out, options.report) if path]
+    summary = _summary(result, notes, advice, differences) | {"written": written}
+    show(summary, as_json=options.json, lines=_lines(summary))
+
+
+def _write(options, result, notes, advice):
+    """Write the calibrated sensor's file and, where asked for, the page; tell the notes."""
+    from softtact.calibration.sensor_file import write_calibrated
+
     write_calibrated(options.out, sensor_path(options.sensor), result)
     if options.report:
         from softtact.reporting.calibration_page import write_page
@@ -91,9 +100,6 @@ def _calibrate(options):
         write_page(options.report, result, notes=notes, advice=advice)
     for note in notes:
         print(f"softtact calibrate: {note}", file=sys.stderr)
-    written = [str(path) for path in (options.out, options.report) if path]
-    summary = _summary(result, notes, advice, differences) | {"written": written}
-    show(summary, as_json=options.json, lines=_lines(summary))
 
 
 def _for_each(name, values, count):

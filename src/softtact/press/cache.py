@@ -16,6 +16,7 @@ from softtact.sensors.frusta import SensorSpec
 from softtact.sensors.specification import AnySpec
 
 _POINTS = 1881  # of the paper's map
+_FOUNDATION_TAKES = 60, 2.5     # seconds for that, and the power of a map's points with which they grow
 _FORMAT = 12    # of the files; another one makes them again
 
 
@@ -46,22 +47,43 @@ def cached_surface_compliance(spec: AnySpec, *, threads: int = 1) -> SurfaceComp
 
 def cached_foundation(spec: SensorSpec, laws: Mapping[str, Law], *, threads: int = 1) -> FoundationCompliance:
     """The `FoundationCompliance` of a sensor with its laws {"dielectric", "cover"}, by the values that it depends on."""
-    dielectric, cover = laws["dielectric"], laws["cover"]
-    return _cached("foundation", [*_of_frusta(spec), repr(dielectric), repr(cover)], FoundationCompliance,
+    return _cached("foundation", _of_foundation(spec, laws), FoundationCompliance,
                    f"{spec.name}: computing a frustum's law and the slab's compliance, once for this sensor and these laws "
-                   f"({_about(spec, 60, 2.5)})",
-                   lambda: foundation_compliance(spec, dielectric_law=dielectric, cover_law=cover, threads=threads))
+                   f"({_about(spec, *_FOUNDATION_TAKES)})",
+                   lambda: foundation_compliance(spec, dielectric_law=laws["dielectric"], cover_law=laws["cover"],
+                                                 threads=threads))
+
+
+def seconds_to_prepare_foundation(spec: SensorSpec, laws: Mapping[str, Law]) -> float:
+    """About how long `cached_foundation` takes, on two cores; 0 where it was computed before."""
+    return 0.0 if _file("foundation", _of_foundation(spec, laws)).exists() else _seconds(spec, *_FOUNDATION_TAKES)
+
+
+def _of_foundation(spec, laws):
+    return [*_of_frusta(spec), repr(laws["dielectric"]), repr(laws["cover"])]
+
+
+def in_words(seconds: float) -> str:
+    """A time that a preparation takes, roughly."""
+    return f"about {seconds / 60:.0f} minutes" if seconds > 90 else "about a minute" if seconds > 40 else "some ten seconds"
 
 
 def _about(spec, seconds, power):
-    """How long it takes, in words: seconds for the paper's sensor, which grow with a power of the map's points."""
-    took = seconds * (math.prod(spec.map_shape) / _POINTS) ** power
-    return f"about {took / 60:.0f} minutes" if took > 90 else "about a minute" if took > 40 else "some ten seconds"
+    return in_words(_seconds(spec, seconds, power))
+
+
+def _seconds(spec, seconds, power):
+    """How long it takes: seconds for the paper's sensor, which grow with a power of the map's points."""
+    return seconds * (math.prod(spec.map_shape) / _POINTS) ** power
+
+
+def _file(kind, values):
+    cache = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "softtact"
+    return cache / f"{kind}-{digest([_FORMAT, *values])}.npz"
 
 
 def _cached(kind, values, cls, message, compute):
-    cache = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "softtact"
-    path = cache / f"{kind}-{digest([_FORMAT, *values])}.npz"
+    path = _file(kind, values)
     if not path.exists():
         announce(message if importlib.util.find_spec("pypardiso") else f"{message}; without MKL "
                  "some minutes; pip install 'softtact[mkl]' brings it")

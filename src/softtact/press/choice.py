@@ -19,6 +19,7 @@ from trimesh import Trimesh
 
 from softtact.errors import ConvergenceError, InputError, ShellWarning, TimeLimitError
 from softtact.geometry.complexity import OVERLAP_THRESHOLD, TOTAL_THRESHOLD, choose_model, score
+from softtact.press.cache import in_words
 from softtact.press.making import Course
 from softtact.press.models import PRESSES
 from softtact.press.result import PressResult
@@ -36,6 +37,7 @@ ELASTIC_RELATIVE = 0.45     # of its map's root mean square: the elastic model's
 # the elastic model by itself (0.311 to 0.760 over 0.45).
 INTERVALS = {"foundation": (0.80, 1.64), "elastic": (0.98, 1.05), "elastic alone": (0.69, 1.68)}
 _POWER, _DEPTH_POWER = 3, 2      # of the compression and of the depth, with which the foundation model's relative error grows
+_LONGEST_S = 600.0     # of a preparation that nobody has asked for by its model's name
 _KNOWN = 0.5     # of a frustum's height: the error was calibrated up to a compression of 0.36, and is not told much beyond
 
 
@@ -126,8 +128,10 @@ def press_auto(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, course: Co
         return _by_counts(sensor, placed, forces, course)
     if not tolerance_mm > 0:
         raise InputError(f"The tolerance {tolerance_mm:g} mm is not positive; give the largest error of a map in mm.")
-    if np.isnan(sensor.spec.frustum_height_mm):
-        return _without_frusta(sensor, placed, forces, course)
+    reason = _why_not_fast(sensor)
+    if reason:
+        result = PRESSES["hyperelastic"](sensor, placed, forces, course)
+        return replace(result, selection_reason=f"{reason}: the hyperelastic model", expected_error_mm=np.zeros(len(forces)))
     return _by_error(sensor, placed, forces, tolerance_mm, course)
 
 
@@ -140,11 +144,20 @@ def _by_counts(sensor, placed, forces, course):
     return replace(result, selection_reason=reason)
 
 
-def _without_frusta(sensor, placed, forces, course):
-    """The hyperelastic press: what the cheap models err by was calibrated on frusta, and nothing tells it without."""
-    result = PRESSES["hyperelastic"](sensor, placed, forces, course)
-    return replace(result, selection_reason=f"{sensor.spec.name} has no frusta, on which the expected errors were calibrated: the "
-                   "hyperelastic model", expected_error_mm=np.zeros(len(forces)))
+def models_to_prepare(sensor: "Sensor", *, policy: str) -> tuple[str, ...]:
+    """Names of the fast models that a policy may press."""
+    return ("elastic",) if policy == "paper" else () if _why_not_fast(sensor) else ("elastic", "foundation")
+
+
+def _why_not_fast(sensor):
+    """Why the fast models are not asked for their errors, in words; empty where they are."""
+    if np.isnan(sensor.spec.frustum_height_mm):
+        return f"{sensor.spec.name} has no frusta, on which the expected errors were calibrated"
+    wait = sensor.seconds_to_prepare_foundation()
+    if wait <= _LONGEST_S:
+        return ""
+    return (f"the foundation model, which tells errors, would take {in_words(wait)} to prepare, once for {sensor.spec.name} "
+            "(a press by --model foundation does it)")
 
 
 def _by_error(sensor, placed, forces, tolerance_mm, course):

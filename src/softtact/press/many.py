@@ -18,7 +18,7 @@ from softtact.devices import find_device
 from softtact.errors import ConvergenceError, InputError, SofttactError
 from softtact.geometry.meshes import check_over_sensor, place
 from softtact.geometry.pose import Pose
-from softtact.press.choice import with_expected_error
+from softtact.press.choice import models_to_prepare, with_expected_error
 from softtact.press.fast import elastic_result, first_touch_mm, shell_stop_mm
 from softtact.press.result import PressResult
 from softtact.press.validity import flag_buried
@@ -27,7 +27,7 @@ from softtact.progress import progress
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
 
-_PREPARED = {"elastic": ("elastic",), "foundation": ("foundation",), "hyperelastic": (), "auto": ("elastic", "foundation")}
+_PREPARED: dict[str, tuple[str, ...]] = {"elastic": ("elastic",), "foundation": ("foundation",), "hyperelastic": ()}
 
 
 def press_many(sensor: "Sensor", meshes: list[trimesh.Trimesh], poses: list[Pose | None], force_n: np.ndarray, *, model: str,
@@ -36,9 +36,9 @@ def press_many(sensor: "Sensor", meshes: list[trimesh.Trimesh], poses: list[Pose
     jobs = list(zip(meshes, poses, strict=True))
     if jobs and on_gpu(device, model) and sensor.spec.base_held:     # the batch does not know how a free lower side moves
         return press_batch(sensor, jobs, force_n, device="cuda" if device == "auto" else device, workers=workers, label=label)
-    for name in _PREPARED.get(model, ()):
-        if model != "auto" or name != "foundation" or not np.isnan(sensor.spec.frustum_height_mm):
-            sensor.prepared(name)
+    names = models_to_prepare(sensor, policy=options.get("policy", "error")) if model == "auto" else _PREPARED.get(model, ())
+    for name in names:
+        sensor.prepared(name)
     act = partial(_pressed, force_n=force_n, model=model, options=options)
     return list(progress(_each(sensor, act, jobs, workers), label=label, total=len(jobs)))
 

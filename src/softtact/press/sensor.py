@@ -28,7 +28,7 @@ from softtact.models.hyperelastic.build import build_sensor_body
 from softtact.models.hyperelastic.build_plain import build_plain_body
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.press.asked import check_loads, checked_forces, cores, given_forces, mesh_of, motion_of
-from softtact.press.cache import cached_compliance, cached_foundation
+from softtact.press.cache import cached_compliance, cached_foundation, seconds_to_prepare_foundation
 from softtact.press.choice import TOLERANCE_MM, press_auto, with_expected_error
 from softtact.press.making import Course
 from softtact.press.many import press_many, raise_first
@@ -213,6 +213,12 @@ class Sensor:
             self.prepared_models[model] = (cached_compliance(self.spec, threads=threads) if model == "elastic"
                                  else cached_foundation(self.spec, self.laws, threads=threads))     # type: ignore[arg-type]
         return self.prepared_models[model]
+
+    def seconds_to_prepare_foundation(self) -> float:
+        """About how long the foundation model's `prepared` takes; 0 where it is there."""
+        if "foundation" in self.prepared_models:
+            return 0.0
+        return seconds_to_prepare_foundation(self.spec, self.laws)     # type: ignore[arg-type]
 
     def body(self, *, threads: int = 1, surface: HeightField | None = None) -> LayeredBody:
         """The `LayeredBody` that the hyperelastic model presses on."""

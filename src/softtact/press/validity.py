@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from softtact.models.hyperelastic.newton import FULL_POCKET
 from softtact.press.result import PressResult
 
 _DEEPEST_LINEAR = 0.5       # of the layer's thickness: a linear layer does not know that it ends
 _HARDLY_COMPRESSED = 0.33   # of a frustum's height; the foundation model then errs by 2 % at most (docs/explanation/fast_models.md)
-_FULL_POCKET = 0.8          # of a frustum's height: above, its pocket is full and contacts begin that the models leave out
 _OVERLAP_LEFT = 3.0         # times the allowed overlap, or gap under pressure: above, pressing apart has failed
 _FEWEST_POINTS = 9          # of the cover that carry the object: fewer do not resolve where a spike touches, and how deep
 
@@ -34,7 +34,7 @@ def valid_hyperelastic(*, compression_mm: np.ndarray, contact_error_mm: np.ndarr
     points (l,): of the cover that carry the object;  compression_mm, frustum_mm: nan without frusta, where nothing asks for them
     rough (l,): whether more than the tolerance is left unbalanced;  forces_n (l,): where they do not grow, depths need not either
     """
-    return (~rough & ~(compression_mm >= _FULL_POCKET * frustum_mm) & (contact_error_mm < _OVERLAP_LEFT * allowed_mm)
+    return (~rough & ~(compression_mm >= FULL_POCKET * frustum_mm) & (contact_error_mm < _OVERLAP_LEFT * allowed_mm)
             & (points >= _FEWEST_POINTS) & ((np.diff(forces_n) <= 0).any() | _grows(depth_mm, slack_mm=allowed_mm)))
 
 

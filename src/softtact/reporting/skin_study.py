@@ -38,6 +38,33 @@ def run_design(path: Path, design: Design, out: Path, *, threads: int = 1) -> di
     _write_readings(study, skin, readings, out)
     tables: dict[str, pd.DataFrame] = {"loads": _load_table(study, readings)}
     said: dict[str, Any] = {"remarks": readings.remarks}
+    _compute_sections(study, skin, tables, said, out, threads)
+    if design.link:
+        positions, normals, said["link"] = _lay(study, tables, out, path.parent)
+    else:
+        positions, normals = _flat(study.layout)
+    write_exports(out / "exports", "skin", positions, normals, radius_mm=study.layout.radius_mm)
+    if design.claims:
+        announce(f"{design.skin}: the papers' claims and the meshes' convergence")
+        tables["claims"], tables["convergence"] = claims_of_skin(study.elastomers, threads=threads)
+    for name, table in tables.items():
+        write_csv(out / f"tables/{name}.csv", table)
+    drawn = [f"load_{number + 1}" for number in range(len(study.loads))]
+    drawn += [name for name, table in DRAWN_FROM.items() if table in tables]
+    write_page(out, design, tables, said, figures=drawn)
+    return {
+        "skin": design.skin,
+        "out": str(out),
+        "report": str(out / "report.html"),
+        "taxels": len(positions),
+        "loads": tables["loads"].to_dict("records"),
+        **said,
+    }
+
+
+def _compute_sections(study, skin, tables, said, out, threads):
+    """Add what a design asks for of probes, choice, maps and search to the tables, and to what is said of it."""
+    design = study.design
     if design.probes:
         announce(f"{design.skin}: probes")
         one = _skin(study, alone(study.layout, design.probes.at_taxel - 1), threads)
@@ -60,27 +87,6 @@ def run_design(path: Path, design: Design, out: Path, *, threads: int = 1) -> di
         said["maps"] = _draw_maps(study, skin, tables, out)
     if design.search:
         _search(study, tables, out)
-    if design.link:
-        positions, normals, said["link"] = _lay(study, tables, out, path.parent)
-    else:
-        positions, normals = _flat(study.layout)
-    write_exports(out / "exports", "skin", positions, normals, radius_mm=study.layout.radius_mm)
-    if design.claims:
-        announce(f"{design.skin}: the papers' claims and the meshes' convergence")
-        tables["claims"], tables["convergence"] = claims_of_skin(study.elastomers, threads=threads)
-    for name, table in tables.items():
-        write_csv(out / f"tables/{name}.csv", table)
-    drawn = [f"load_{number + 1}" for number in range(len(study.loads))]
-    drawn += [name for name, table in DRAWN_FROM.items() if table in tables]
-    write_page(out, design, tables, said, figures=drawn)
-    return {
-        "skin": design.skin,
-        "out": str(out),
-        "report": str(out / "report.html"),
-        "taxels": len(positions),
-        "loads": tables["loads"].to_dict("records"),
-        **said,
-    }
 
 
 def _skin(study, layout, threads):

@@ -102,17 +102,11 @@ def crosstalk(
 
     A taxel and six neighbours around it on a triangle that is large enough for them.
     """
-    rows = []
-    angle = np.pi / 3 * np.arange(6)
     area = np.pi * probe_mm**2 / 4
+    rows = []
     for pitch in pitches_mm:
-        centres = np.vstack([[0.0, 0.0], pitch * np.column_stack([np.cos(angle), np.sin(angle)])])
-        reach = pitch + guard_radius_mm + 3 * thickness_mm
-        upright = np.pi / 2 + 2 * np.pi / 3 * np.arange(3)
-        corners = 2 * reach * np.column_stack([np.cos(upright), np.sin(upright)])
-        layout = Layout(corners, centres, np.zeros(7, dtype=int), corners[None], radius_mm, guard_radius_mm)
         skin = Skin(
-            layout,
+            _seven_taxels(pitch, radius_mm, guard_radius_mm, margin_mm=3 * thickness_mm),
             thickness_mm=thickness_mm,
             poisson=poisson,
             permittivity=permittivity,
@@ -121,27 +115,36 @@ def crosstalk(
             field_spacing_mm=2.5,
         )
         gain = _gain(skin, np.zeros((1, 2)), area)[0] / young_mpa
-        between = np.array([pitch / 2, 0.0])
-        slopes = [
-            (_gain(skin, (between + _STEP_MM * axis)[None], area) - _gain(skin, (between - _STEP_MM * axis)[None], area))[0]
-            * pressure_mpa
-            * area
-            / (2 * _STEP_MM * young_mpa)
-            for axis in np.eye(2)
-        ]
-        at = _gain(skin, between[None], area)[0] / young_mpa
-        error = _standard_error(np.stack([*slopes, at], axis=1)[None], converter.noise_ff)[0]
+        between = _gain_and_slopes(skin, np.array([pitch / 2, 0.0]), area, force_n=pressure_mpa * area) / young_mpa
         rows.append(
             {
                 "pitch_mm": pitch,
                 "own_ff_per_n": gain[0],
                 "neighbour_ff_per_n": gain[1:].mean(),
                 "crosstalk": gain[1:].mean() / gain[0],
-                "localisation_mm": error,
+                "localisation_mm": _standard_error(between[None], converter.noise_ff)[0],
                 "taxels_per_cm2": 200 / (np.sqrt(3) * pitch**2),
             }
         )
     return pd.DataFrame(rows)
+
+
+def _seven_taxels(pitch, radius, guard_radius, *, margin_mm):
+    """Layout of a taxel and its six neighbours on a triangle that reaches so far beyond them."""
+    angle, upright = np.pi / 3 * np.arange(6), np.pi / 2 + 2 * np.pi / 3 * np.arange(3)
+    centres = np.vstack([[0.0, 0.0], pitch * np.column_stack([np.cos(angle), np.sin(angle)])])
+    corners = 2 * (pitch + guard_radius + margin_mm) * np.column_stack([np.cos(upright), np.sin(upright)])
+    return Layout(corners, centres, np.zeros(7, dtype=int), corners[None], radius, guard_radius)
+
+
+def _gain_and_slopes(skin, place, area, *, force_n):
+    """Change (taxels, 3) of the readings at a force by its place along x and y (fF/mm), and by itself (fF/N), times E."""
+    ahead, behind = (
+        np.stack([_gain(skin, (place + step * axis)[None], area)[0] for axis in np.eye(2)], axis=1)
+        for step in (_STEP_MM, -_STEP_MM)
+    )
+    at = _gain(skin, place[None], area)[0]
+    return np.column_stack([force_n * (ahead - behind) / (2 * _STEP_MM), at])
 
 
 _STEP_MM = 0.25  # of the differences that the slopes are made of

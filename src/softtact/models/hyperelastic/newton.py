@@ -17,9 +17,8 @@ _MOST_INCREMENTS = 100  # of the first touch's depth, until a point of the cover
 # before. Passes that move nothing add up: the force of a single point at an edge is below the tolerance.
 _WORTH_A_PASS, _PASSES_IN_VAIN = 0.8, 3
 DEEP = 0.55        # of a frustum's height, or of the layers': from here on elements of the default mesh may be unstable
-# Iterations after which a rough balance is taken where one was before overlaps were pressed apart, or where a frustum has lost so
-# much of its height that its pocket is full, and the load step beyond validity whatever its balance.
-_ROUGH_SOON, _FULL = 8, 0.8
+FULL_POCKET = 0.8   # of a frustum's height: beyond, its pocket is full and contacts begin that the model leaves out
+_ROUGH_SOON = 8     # iterations after which a rough balance is taken there, or where one was before overlaps were pressed apart
 _NEARLY = 3.0      # times what is allowed may be left where points have run under an edge: to press these apart takes tens of steps
 
 
@@ -201,7 +200,7 @@ class _Press:
         if self.iterations < _ROUGH_SOON or self.body.friction.active:
             return False
         share = self.body.most_compressed(state)[0]
-        late = self.iterations >= settings.rough_after or share > _FULL
+        late = self.iterations >= settings.rough_after or share > FULL_POCKET
         return late and share > DEEP and residual <= settings.rough_tolerance * _scale(self.force, settings)
 
     def step(self, state):
