@@ -77,6 +77,7 @@ class Step:
 def _shifts(last, again):
     """What is tried, one after the other, until a tangent is positive definite, so that every step lowers the energy.
 
+    None: nothing;  0: the cells' modes of negative stiffness are made positive;  more: the cover's, too, and so many N/mm added
     last: what was enough for the tangent before, None where nothing was needed; where it was much, less of it is tried at once
     again: the tangent before was the same but for damped cells; what was enough for it is where to begin
     """
@@ -219,10 +220,7 @@ class LayeredBody:
         return np.full(len(residual), np.nan), np.nan
 
     def _rubber_tangent(self, state, shift, positive):
-        """The rubber's tangent as it is (None), or with the cells' modes of negative stiffness made positive, stiffened by a shift.
-
-        positive: what the cells leave with these modes made positive
-        """
+        """The rubber's tangent with a shift, see `_shifts`; positive: what the cells leave with their modes made positive."""
         if shift is None:
             return self.slab.rubber_tangent(state.slab, self.cells.outer, workers=self.workers)
         rubber = self.slab.rubber_tangent(state.slab, positive, positive=shift > 0, workers=self.workers)

@@ -19,6 +19,7 @@ from softtact.models.hyperelastic.rigid_contact import Surface
 
 DEFAULT = NewtonSettings()
 _CLEAR_MM = 0.1        # over the surface, from where on no contact law acts
+_WAYS_WITHOUT_FRICTION = 3.0     # at once down to the shell, where the way does not matter but its end
 _SMALLEST_SHARE = 1 / 64     # of the way that an object may go at once, until a motion's step is given up
 
 
@@ -184,7 +185,8 @@ def _up_to(body, surface, state, reached, force, stop_mm, settings):
             raise
         failed = error
     begin, end = (Control(None, depth, np.zeros(2)) for depth in (state.indentation, stop_mm))
-    stopped = _advance(body, surface, state, 0.0, ToStop(begin, end, state.force, settings.largest_way_mm, 1), settings)
+    way = settings.largest_way_mm * (1.0 if body.friction.active else _WAYS_WITHOUT_FRICTION)
+    stopped = _advance(body, surface, state, 0.0, ToStop(begin, end, state.force, way, 1), settings)
     if failed is not None and stopped.state.force >= force:
         raise failed
     return stopped, stopped
