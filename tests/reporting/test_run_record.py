@@ -24,3 +24,10 @@ def test_jobs_are_summed_by_stage_and_the_last_row_is_all(tmp_path):
 
 def test_without_benchmarks_it_says_so(tmp_path):
     assert "No job has left a benchmark." in run_sentence(run_record(tmp_path))
+
+
+def test_a_job_that_was_killed_while_it_wrote_its_benchmark_does_not_count(tmp_path):
+    benchmark(tmp_path, "evaluate/all.tsv", 5.0, 150.0)
+    for name, written in (("one", ""), ("two", HEADER)):
+        (tmp_path / f"evaluate/{name}.tsv").write_text(written)
+    assert list(run_record(tmp_path).jobs) == [1, 1]

@@ -104,3 +104,16 @@ def test_every_measured_time_is_positive_and_says_where_it_comes_from():
     assert "AMD" in measured["origin"]
     numbers = [value for part in (measured["presses"], measured["networks"]) for times in part.values() for value in times.values()]
     assert all(value > 0 for value in [*numbers, measured["start_s"], measured["reading_s"], measured["all_else_s"]])
+
+
+@pytest.mark.parametrize("written", ["", "s\th:m:s\tmax_rss\n", "s\th:m:s\tmax_rss\n40"])
+def test_a_benchmark_that_a_killed_job_left_half_written_tells_nothing(tmp_path, written):
+    """A run that goes on reads those of the run that was killed."""
+    study, without = costs_of("tiny", results=tmp_path)
+    for first, *more in study.press_jobs("hyperelastic"):
+        stage = "simulate_presses" if more else "simulate_press"
+        path = tmp_path / study.name / f"benchmarks/{stage}/{first.set}/{first.id}/hyperelastic.tsv"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(written)
+    _, costs = costs_of("tiny", results=tmp_path)
+    assert costs == without

@@ -48,7 +48,9 @@ def _row(stage, seconds, memory):
 
 
 def _read(path):
-    """A benchmark's seconds and memory; a job too short to be looked at has no memory."""
+    """A benchmark's seconds and memory; a job too short to be looked at has no memory, one killed while it wrote them no row."""
+    if not path.stat().st_size:
+        return pd.DataFrame({"s": [], "max_rss": []})
     frame = pd.read_csv(path, sep="\t", na_values=["NA", "-"])
     return pd.DataFrame({"s": frame["s"].astype(float), "max_rss": pd.to_numeric(frame.get("max_rss"), errors="coerce")})
 

@@ -205,21 +205,23 @@ def _left(files):
 
 def _own(folder, pattern):
     """Mean wall time of the study's own finished jobs, or None."""
-    times = [_wall_s(path) for path in folder.glob(f"benchmarks/{pattern}")]
+    times = [seconds for path in folder.glob(f"benchmarks/{pattern}") if (seconds := _wall_s(path)) is not None]
     return mean(times) if times else None
 
 
 def _own_press_s(folder, model, jobs):
     """The same for one press of a model, several of which may share a job; jobs: [[Item]]."""
-    done = {}
+    seconds, presses = 0.0, 0
     for items in jobs:
         stage = "simulate_press" if len(items) == 1 else "simulate_presses"
         path = folder / "benchmarks" / stage / items[0].set / items[0].id / f"{model}.tsv"
-        if path.exists():
-            done[path] = len(items)
-    return sum(map(_wall_s, done)) / sum(done.values()) if done else None
+        took = _wall_s(path) if path.exists() else None
+        if took is not None:
+            seconds, presses = seconds + took, presses + len(items)
+    return seconds / presses if presses else None
 
 
 def _wall_s(path):
-    """Seconds of wall time in Snakemake's benchmark of a job."""
-    return float(path.read_text(encoding="utf-8").splitlines()[1].split("\t")[0])
+    """Seconds of wall time in Snakemake's benchmark of a job; None of one that was killed while it wrote them."""
+    names, *rows = [line.split("\t") for line in path.read_text(encoding="utf-8").splitlines()] or [[]]
+    return float(rows[0][0]) if rows and len(rows[0]) == len(names) else None
