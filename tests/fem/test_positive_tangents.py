@@ -21,5 +21,10 @@ def test_negative_modes_resist_by_as_much_and_all_others_as_before():
     np.testing.assert_allclose(tangents[1], (vectors * np.abs(values)) @ vectors.T, atol=1e-5 * 50)
 
 
+def test_tangents_that_are_not_finite_stay_so():
+    tangents = np.full((1, 4, 4), np.nan, dtype=np.float32)
+    assert make_positive(tangents) == 0 and np.isnan(tangents).all()
+
+
 def test_no_tangents_are_no_matter():
     assert make_positive(np.zeros((0, 4, 4), dtype=np.float32)) == 0

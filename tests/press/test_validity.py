@@ -70,5 +70,16 @@ def test_the_load_steps_before_a_force_that_is_not_reached_are_flagged_alike():
     assert stopped.value.result.indentation_mm[0] > 0.1 and stopped.value.result.within_validity.tolist() == [0]
 
 
+@pytest.mark.parametrize(("rough_after", "expected"), [(30, 1), (0, 0)])
+def test_a_press_flags_a_load_step_that_is_balanced_roughly(monkeypatch, rough_after, expected):
+    """Half of the force may soon be left, and any overlap: nothing else could flag it."""
+    monkeypatch.setattr("softtact.models.hyperelastic.newton.DEEP", -1.0)
+    monkeypatch.setattr("softtact.models.hyperelastic.newton._ROUGH_SOON", 0)
+    solver = NewtonSettings(rough_tolerance=0.5, rough_after=rough_after, largest_penetration_mm=1.0)
+    result = Sensor(SMALL, LAWS, mesh=COARSE, solver=solver).press(trimesh.creation.icosphere(subdivisions=3, radius=4.0),
+                                                                   force_n=[10.0], model="hyperelastic")
+    assert result.within_validity[0] == expected
+
+
 def test_depths_may_fall_where_the_force_does_not_grow():
     assert valid(depth_mm=[0.3, 0.2, 0.1], forces_n=[50.0, 20.0, 20.0]) == [True, True, True]

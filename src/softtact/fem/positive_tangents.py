@@ -15,7 +15,7 @@ _NOTHING = 2e-5     # of the largest stiffness: rounding of a tangent in single 
 def make_positive(tangents: np.ndarray) -> int:
     """Give the indefinite ones among symmetric tangents (e, k, k), in single precision, |eigenvalues|; in place.
 
-    Returns how many were.
+    Returns how many were. Those that are not even finite stay, for no factor will be found of them.
     """
     return int(_make_positive(tangents, np.empty(tangents.shape[1:], dtype=np.float32), ROUTINES))
 
@@ -30,7 +30,7 @@ def _make_positive(tangents, scratch, blas):
         for i in range(len(tangent)):
             scratch[i, i] += nothing
         call(blas.potrf, (lower, count, scratch.ctypes.data, count, info))
-        if size[1] != 0:
+        if size[1] != 0 and np.isfinite(tangent).all():
             values, vectors = np.linalg.eigh(tangent.astype(np.float64))
             tangent[:] = ((vectors * np.abs(values)) @ vectors.T).astype(np.float32)
             changed += 1

@@ -117,8 +117,8 @@ class Condensation:
     def _mend(self, bodies):
         """Note for bodies what is left of them made positive; a Cholesky factor tells soonest that one is as it stands."""
         for body in map(int, bodies):
-            definite = spotrf(self.outer[body].T, overwrite_a=0)[1] == 0
-            self._mended[body] = None if definite else _made_positive(self.outer[body].astype(np.float64))
+            stays = spotrf(self.outer[body].T, overwrite_a=0)[1] == 0 or not np.isfinite(self.outer[body]).all()
+            self._mended[body] = None if stays else _made_positive(self.outer[body].astype(np.float64))
 
     @property
     def modified(self) -> int:

@@ -1,15 +1,21 @@
 """Steps that are exact in the contact: against a general minimiser, and what a factor serves for."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import scipy.optimize
 import scipy.sparse as sp
+import trimesh
+from support.bodies import small_body
 
+from softtact.contact.height_field import HeightField
 from softtact.contact.penalty import Contact, penalty
+from softtact.geometry.meshes import place
 from softtact.linalg.symmetric_product import SymmetricProduct
 from softtact.models.hyperelastic import newton_step
+from softtact.models.hyperelastic.body import _shifts
 from softtact.models.hyperelastic.newton_step import ContactStepper, LinearGaps
 from softtact.models.hyperelastic.preconditioner import ContactFactor
 
@@ -212,3 +218,25 @@ def test_a_step_is_in_balance_with_what_the_points_face_where_it_leads(exact):
     assert np.abs(left).max() < 1e-8 * np.abs(scene.residual).max()
     assert abs(scene.excess - indentation_increment @ (carried - before)) < 1e-8 * abs(scene.excess)
     assert not carried[1::2].any()
+
+
+@pytest.mark.parametrize(("last", "again", "first"), [
+    (None, False, [None, 0.0, 0.001]), (0.0, False, [None, 0.0, 0.001]), (0.016, False, [0.004, 0.016]),
+    (None, True, [None, 0.0, 0.001]), (0.0, True, [0.0, 0.001]), (0.016, True, [0.016, 0.064])])
+def test_a_damped_tangent_begins_with_what_was_enough_before_and_another_one_with_less(last, again, first):
+    assert list(itertools.islice(_shifts(last, again), len(first))) == pytest.approx(first)
+
+
+def test_a_body_whose_tangent_is_not_positive_definite_is_given_one_that_is():
+    """Nodes of the cover displaced at random: its elements are indefinite, and so is the whole."""
+    body, rng = small_body(), np.random.default_rng(3)
+    slab, support = body.rest()
+    slab += rng.normal(scale=0.02, size=slab.shape) * (body.slab.points[:, 2:] > -1.0)
+    surface = HeightField(place(trimesh.creation.icosphere(subdivisions=2, radius=4.0), pose=None))
+    state = body.evaluate(slab, support, -1.0, body.slab.project(slab, surface))
+    body.cells.refresh(state)
+    least = [np.linalg.eigvalsh((upper + sp.triu(upper, 1).T).toarray().astype(float))[0] for upper in
+             (body.slab.rubber_tangent(state.slab, body.cells.positive_outer(), positive=positive).copy()
+              for positive in (False, True))]
+    assert least[0] < -0.01 and least[1] > -1e-3
+    body.close()
