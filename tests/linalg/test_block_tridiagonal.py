@@ -7,7 +7,7 @@ import pytest
 import scipy.sparse as sp
 
 from softtact.linalg import direct
-from softtact.linalg.block_tridiagonal import BlockTridiagonalSolver, inverse_among, layers
+from softtact.linalg.block_tridiagonal import BlockTridiagonalSolver, layers
 
 
 def slab(nx=3, ny=7, nz=2, *, shift=0.2, beside=0):
@@ -46,18 +46,9 @@ def test_a_solution_is_that_of_a_dense_solver(beside, columns):
     np.testing.assert_allclose(solver.solve(right), np.linalg.solve(matrix.toarray(), right), atol=1e-13)
 
 
-@pytest.mark.parametrize("beside", [0, 2])
-def test_the_inverse_among_some_unknowns_is_that_part_of_the_dense_inverse(beside):
-    matrix = slab(beside=beside)
-    kept = np.array([40, 3, 17, 0, 41, 22])
-    dense = np.linalg.inv(matrix.toarray())
-    np.testing.assert_allclose(inverse_among(upper_of(matrix), kept), dense[np.ix_(kept, kept)], atol=1e-13)
-
-
 def test_a_matrix_that_is_not_positive_definite_is_reported_and_the_next_one_factored():
     matrix, solver = slab(), BlockTridiagonalSolver()
     indefinite = matrix - 3.0 * sp.eye(matrix.shape[0])
-    assert inverse_among(upper_of(indefinite), np.array([0])) is None
     assert not solver.factor(upper_of(indefinite)) and solver.factor(upper_of(matrix))
     right = np.ones(matrix.shape[0])
     np.testing.assert_allclose(matrix @ solver.solve(right), right, atol=1e-12)
@@ -66,6 +57,3 @@ def test_a_matrix_that_is_not_positive_definite_is_reported_and_the_next_one_fac
 def test_it_takes_the_place_of_mkl_where_that_is_missing(monkeypatch):
     monkeypatch.setitem(sys.modules, "pypardiso", None)
     assert direct.make_solver().name == BlockTridiagonalSolver.name
-    matrix, kept = slab(), np.array([5, 2, 30])
-    inverse = direct.condensed_inverse(upper_of(matrix), kept)
-    np.testing.assert_allclose(inverse, np.linalg.inv(matrix.toarray())[np.ix_(kept, kept)], atol=1e-13)

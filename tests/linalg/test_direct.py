@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from softtact.linalg.direct import PardisoSolver, SuperLUSolver, condensed_inverse, make_solver
+from softtact.linalg.direct import PardisoSolver, SuperLUSolver, make_solver
 from softtact.linalg.direct_single import point_at_mkl
 
 pytest.importorskip("pypardiso")
@@ -70,12 +70,6 @@ def test_places_of_64_bits_are_refused_before_they_are_read_as_others():
     upper.indices, upper.indptr = upper.indices.astype(np.int64), upper.indptr.astype(np.int64)
     with pytest.raises(TypeError, match="32 bits"):
         PardisoSolver().factor(upper)
-
-
-def test_a_condensed_inverse_is_the_inverse_at_what_is_kept():
-    whole, upper = box(5)
-    kept = np.array([3, 70, 11, 124])
-    np.testing.assert_allclose(condensed_inverse(upper, kept), np.linalg.inv(whole.toarray())[np.ix_(kept, kept)], rtol=1e-10)
 
 
 def test_the_solver_is_named():

@@ -2,10 +2,8 @@
 
 import numpy as np
 import pytest
-import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
-from softtact.linalg.direct import condensed_inverse
 from softtact.models.elastic.compliance import surface_grid
 from softtact.models.quarter_symmetry import PARITIES, ElasticLayer, ParityBlocks, QuarterSlab
 
@@ -163,49 +161,6 @@ def test_interpolation_is_exact_for_quadratic_fields():
 
     nodes = field(*(grid.ravel() for grid in np.meshgrid(slab.x, slab.y)))
     np.testing.assert_allclose(slab.interpolation(points) @ nodes, field(*points.T), atol=1e-11)
-
-
-# --- condensed inverses ---
-
-
-@pytest.fixture(scope="module")
-def definite():
-    """A sparse positive definite matrix (n, n), its upper triangle, and some of its rows in no order."""
-    rng = np.random.default_rng(5)
-    random = sp.random(300, 300, density=0.02, random_state=rng)
-    matrix = (random @ random.T + sp.diags(rng.uniform(0.1, 1.0, 300))).tocsr()
-    upper = sp.triu(matrix, format="csr")
-    upper.sort_indices()
-    return matrix.toarray(), upper, rng.permutation(300)[:70]
-
-
-def test_a_condensed_inverse_is_the_dense_one_s_rows_and_columns(definite):
-    pytest.importorskip("pypardiso")
-    dense, upper, kept = definite
-    expected = np.linalg.inv(dense)[np.ix_(kept, kept)]
-    np.testing.assert_allclose(condensed_inverse(upper, kept), expected, atol=1e-10 * np.abs(expected).max())
-
-
-def test_a_missing_mkl_is_made_up_for(definite, monkeypatch):
-    def missing(*_):
-        raise ImportError("no MKL for this processor")
-
-    dense, upper, kept = definite
-    monkeypatch.setattr("softtact.linalg.direct._schur_complement", missing)
-    expected = np.linalg.inv(dense)[np.ix_(kept, kept)]
-    np.testing.assert_allclose(condensed_inverse(upper, kept), expected, atol=1e-10 * np.abs(expected).max())
-
-
-def test_a_matrix_that_is_not_definite_is_refused(definite, monkeypatch):
-    def missing(*_):
-        raise ImportError("no MKL for this processor")
-
-    monkeypatch.setattr("softtact.linalg.direct._schur_complement", missing)
-    dense, upper, kept = definite
-    shifted = (upper - 5.0 * sp.eye(300, format="csr")).tocsr()
-    shifted.sort_indices()
-    with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
-        condensed_inverse(shifted, kept)
 
 
 @pytest.mark.parametrize("held_below_mm", [0.0, np.inf])

@@ -49,33 +49,6 @@ class BlockTridiagonalSolver:
         self._factors = []
 
 
-def inverse_among(upper: sp.csr_matrix, kept: np.ndarray) -> np.ndarray | None:
-    """Rows and columns `kept` (k,) of the inverse of a matrix by its upper triangle (csr), (k, k); None if not positive definite.
-
-    It is Y^T Y with L Y = their columns of the unit matrix. One layer's factor and rows of Y are in memory at a time.
-    """
-    blocks = _Blocks(upper)
-    place = np.empty(len(blocks.order), dtype=int)
-    place[blocks.order] = np.arange(len(place))
-    rows, by_place = np.sort(place[kept]), np.argsort(place[kept])
-    inverse, passed_on, done = np.zeros((len(kept), len(kept))), 0.0, 0
-    for own, (factor, coupling) in zip(blocks.parts, blocks.factors(), strict=False):
-        first, begun = np.searchsorted(rows, [own.start, own.stop])     # columns beyond are still zero
-        columns = np.zeros((own.stop - own.start, begun))
-        columns[:, :first] = passed_on
-        columns[rows[first:begun] - own.start, np.arange(first, begun)] = 1.0
-        columns = _lower(factor, columns)
-        inverse[:begun, :begun] += columns.T @ columns
-        if coupling is not None:
-            passed_on = -coupling.T @ columns[len(columns) - len(coupling):]
-        done += 1
-    if done < len(blocks.parts):
-        return None
-    out = np.empty_like(inverse)
-    out[np.ix_(by_place, by_place)] = inverse
-    return out
-
-
 class _Blocks:
     """A matrix in the order of its layers: `order` (n,), and the `parts` (slices) of the layers in it."""
 

@@ -8,12 +8,10 @@ import ctypes
 import os
 
 import numpy as np
-import scipy.linalg as sla
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
-from numba import njit
 
-from softtact.linalg.block_tridiagonal import BlockTridiagonalSolver, inverse_among
+from softtact.linalg.block_tridiagonal import BlockTridiagonalSolver
 
 
 def make_solver(*, threads: int = 1) -> "PardisoSolver | BlockTridiagonalSolver":
@@ -22,59 +20,6 @@ def make_solver(*, threads: int = 1) -> "PardisoSolver | BlockTridiagonalSolver"
         return PardisoSolver(threads=threads)
     except (ImportError, OSError):   # MKL is not installed, or not made for this processor
         return BlockTridiagonalSolver()
-
-
-def condensed_inverse(upper: sp.csr_matrix, kept: np.ndarray, *, threads: int = 1, dtype: type = np.float64) -> np.ndarray:
-    """Rows and columns `kept` (k,) of the inverse of a positive definite matrix, given by its upper triangle (csr, sorted).
-
-    The rest is eliminated by a factor that ends before them (Schur complement); what is left is dense, and inverted in its place.
-    dtype: of the result, all is computed in double precision. Where MKL is missing it takes two to three times as long.
-    """
-    try:
-        stiffness = _schur_complement(upper, kept, threads)
-    except (ImportError, OSError):
-        return _inverse_without_mkl(upper, kept).astype(dtype, copy=False)
-    lower, fault = sla.lapack.dpotrf(stiffness, lower=1, overwrite_a=1)
-    inverse, also = sla.lapack.dpotri(lower, lower=1, overwrite_c=1)
-    if fault or also:
-        raise np.linalg.LinAlgError("The condensed stiffness is not positive definite.")
-    out = np.empty(inverse.shape, dtype=dtype)
-    _fill_from_lower(inverse.T, np.argsort(kept), out)   # PARDISO keeps the matrix' own order
-    return out
-
-
-@njit(cache=True, nogil=True)
-def _fill_from_lower(triangle, place, out):
-    """Rows and columns `place` (k,) of `out` (k, k) become a symmetric matrix, of which triangle[j, i] is given for j <= i."""
-    for j in range(len(place)):
-        for i in range(j, len(place)):
-            out[place[i], place[j]] = out[place[j], place[i]] = triangle[j, i]
-
-
-def _schur_complement(upper, kept, threads):
-    solver = _pypardiso(PardisoSolver._POSITIVE)
-    for entry, value in PardisoSolver._PARAMETERS.items():
-        solver.set_iparm(entry + 1, value)
-    solver.set_iparm(36, 1)               # return the complement of the unknowns marked in perm, in place of a solution
-    solver.perm = np.zeros(upper.shape[0], dtype=np.int32)
-    solver.perm[kept] = 1
-    solver.set_phase(PardisoSolver._ANALYSE_AND_FACTOR)
-    count = len(kept)
-    room = np.zeros((upper.shape[0], -(-count * count // upper.shape[0])), order="F")
-    before = solver.libmkl.MKL_Set_Num_Threads_Local(threads)
-    try:
-        out = solver._call_pardiso(upper, room)
-    finally:
-        solver.libmkl.MKL_Set_Num_Threads_Local(before)
-        solver.free_memory(everything=True)
-    return out.T.ravel()[:count * count].reshape(count, count).T     # symmetric, and in LAPACK's order without a copy
-
-
-def _inverse_without_mkl(upper, kept):
-    inverse = inverse_among(upper, kept)
-    if inverse is None:
-        raise np.linalg.LinAlgError("The stiffness is not positive definite.")
-    return inverse
 
 
 def _pypardiso(mtype):

@@ -141,7 +141,7 @@ def _take_over(c, start, end, fronts, store, out, skipped, width):
     out: the front's rows, `width` wide, without those and the columns that are `skipped`
     """
     place, given = _bound_of(c, fronts, fronts.place), _update_of(c, fronts, store)
-    bound, runs = len(place), _runs(place)
+    bound, runs = len(place), runs_of(place)
     for i in range(np.searchsorted(place, start), np.searchsorted(place, end)):
         row = (place[i] - skipped) * width - skipped
         for r in range(len(runs) - 1):
@@ -152,8 +152,8 @@ def _take_over(c, start, end, fronts, store, out, skipped, width):
 
 
 @njit(cache=True, nogil=True)
-def _runs(places):
-    """Where places begin that do not follow on the ones before, and the end."""
+def runs_of(places):
+    """Where places (k,) begin that do not follow on the ones before, and the end."""
     starts = np.empty(len(places) + 1, np.int64)
     count = 0
     for k in range(len(places)):

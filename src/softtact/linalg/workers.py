@@ -35,7 +35,12 @@ SERIAL = Workers()
 
 def one_thread_each() -> AbstractContextManager:
     """While this lasts, BLAS stays on the thread that calls it: threads that call it would wait for each other's threads."""
-    return _libraries().limit(limits=1)
+    return threads_of_blas(1)
+
+
+def threads_of_blas(count: int) -> AbstractContextManager:
+    """While this lasts, BLAS works on so many threads."""
+    return _libraries().limit(limits=count)
 
 
 @cache

@@ -34,22 +34,23 @@ def _of_frusta(spec):
 def cached_compliance(spec: AnySpec, *, threads: int = 1) -> Compliance:
     """The elastic layer's `Compliance`, by the values that it depends on."""
     return _cached("compliance", _of_layer(spec), Compliance,
-                   f"{spec.name}: computing the elastic layer's compliance, once for this sensor ({_about(spec, 15, 2.0)})",
+                   f"{spec.name}: computing the elastic layer's compliance, once for this sensor ({_about(spec, 6, 2.0)})",
                    lambda: elastic_compliance(spec, threads=threads))
 
 
 def cached_surface_compliance(spec: AnySpec, *, threads: int = 1) -> SurfaceCompliance:
     """The elastic layer's `SurfaceCompliance`, by the values that it depends on."""
     return _cached("surface", _of_layer(spec), SurfaceCompliance,
-                   f"{spec.name}: computing the elastic layer's compliance to forces in all directions, once for this sensor (a "
-                   "minute or two; 230 MB for the paper's)", lambda: surface_compliance(spec, threads=threads))
+                   _sooner_with_mkl(f"{spec.name}: computing the elastic layer's compliance to forces in all directions, once for "
+                                    "this sensor (a minute or two; 230 MB for the paper's)"),
+                   lambda: surface_compliance(spec, threads=threads))
 
 
 def cached_foundation(spec: SensorSpec, laws: Mapping[str, Law], *, threads: int = 1) -> FoundationCompliance:
     """The `FoundationCompliance` of a sensor with its laws {"dielectric", "cover"}, by the values that it depends on."""
     return _cached("foundation", _of_foundation(spec, laws), FoundationCompliance,
-                   f"{spec.name}: computing a frustum's law and the slab's compliance, once for this sensor and these laws "
-                   f"({_about(spec, *_FOUNDATION_TAKES)})",
+                   _sooner_with_mkl(f"{spec.name}: computing a frustum's law and the slab's compliance, once for this sensor and "
+                                    f"these laws ({_about(spec, *_FOUNDATION_TAKES)})"),
                    lambda: foundation_compliance(spec, dielectric_law=laws["dielectric"], cover_law=laws["cover"],
                                                  threads=threads))
 
@@ -77,6 +78,12 @@ def _seconds(spec, seconds, power):
     return seconds * (math.prod(spec.map_shape) / _POINTS) ** power
 
 
+def _sooner_with_mkl(message):
+    if importlib.util.find_spec("pypardiso"):
+        return message
+    return f"{message}; without MKL some minutes; pip install 'softtact[mkl]' brings it"
+
+
 def _file(kind, values):
     cache = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "softtact"
     return cache / f"{kind}-{digest([_FORMAT, *values])}.npz"
@@ -85,8 +92,7 @@ def _file(kind, values):
 def _cached(kind, values, cls, message, compute):
     path = _file(kind, values)
     if not path.exists():
-        announce(message if importlib.util.find_spec("pypardiso") else f"{message}; without MKL "
-                 "some minutes; pip install 'softtact[mkl]' brings it")
+        announce(message)
         with atomic_path(path) as temporary:
             compute().save(temporary)
     return cls.load(path)

@@ -2,7 +2,7 @@
 
 Of a sensor that is free below the sides alone are held, and the compliance tells how its lower side moves, too.
 The vertical compliance of the top's nodes (mm/N) is computed once for a sensor (`elastic_compliance`), by quarters of the layer
-(`quarter_slab`). The nodes lie at half the map's spacing.
+(`quarter_symmetry`). The nodes lie at half the map's spacing.
 """
 
 from collections.abc import Sequence
@@ -27,6 +27,7 @@ from softtact.sensors.base import BaseSpec
 _SHARES = (0.34, 0.3, 0.22, 0.14)     # of the layer's thickness, from below, that its element layers have
 _SINGLE = 2                            # rows of points along a contact's edge, where pressure is steep, that share none
 _REACH = 1                            # nodes that the preconditioner looks around; 2 and 3 cost as much as they save
+_MARGIN = 8                           # nodes about these that it is computed with: those beyond change it by less than 1e-6
 
 
 @dataclass(frozen=True)
@@ -121,17 +122,20 @@ def confined_modulus(layer: fields.ElasticLayer) -> float:
 def _stencil(blocks, shape):
     """The whole top's stiffness about its middle, cut off `_REACH` nodes away."""
     offset = np.arange(-_REACH, _REACH + 1)
-    first = [2 * (side // 4) for side in shape]     # the quarter's middle, far from all sides; nodes of four kinds follow it
-    patch = (np.arange(first[0] - _REACH, first[0] + _REACH + 2)[:, None] * shape[1]
-             + np.arange(first[1] - _REACH, first[1] + _REACH + 2))
-    stiffness = ParityBlocks(np.stack([_inverse_among(block, patch.ravel()) for block in blocks]))
+    first = [2 * (side // 4) - _REACH for side in shape]     # the quarter's middle; nodes of four kinds follow it
+    lines = [np.arange(start, start + 2 * _REACH + 2) for start in first]
+    window = [np.arange(max(0, own[0] - _MARGIN), min(side, own[-1] + 1 + _MARGIN)) for own, side in zip(lines, shape, strict=True)]
+    patch, near = (rows[:, None] * shape[1] + columns for rows, columns in (lines, window))
+    near = near.ravel()
+    stiffness = ParityBlocks(np.stack([_inverse_among(block[np.ix_(near, near)], np.searchsorted(near, patch.ravel()))
+                                       for block in blocks]))
     place = np.arange(patch.size).reshape(patch.shape)
     values = np.zeros((2, 2, len(offset), len(offset)))
     for j, i in ((0, 0), (0, 1), (1, 0), (1, 1)):
-        around = place[j:j + len(offset), i:i + len(offset)].ravel()
-        ones = np.ones((len(around), 2), dtype=int)
+        others = place[j:j + len(offset), i:i + len(offset)].ravel()
+        ones = np.ones((len(others), 2), dtype=int)
         own = place[j + _REACH, i + _REACH].reshape(1)
-        values[j, i] = stiffness.between(own, ones[:1], around, ones).reshape(values.shape[2:])
+        values[j, i] = stiffness.between(own, ones[:1], others, ones).reshape(values.shape[2:])
     return Stencil(values)
 
 

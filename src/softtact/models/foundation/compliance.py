@@ -1,8 +1,8 @@
 """What the foundation model knows of a sensor: sheet and cover as a linear slab, on frusta with their unit cell's nonlinear law.
 
-The slab's movements under unit forces at its top and at the frusta are computed once, from one quarter of it (`quarter_slab`). The
-frusta's linear stiffness against all but compression is part of the slab; their compression is a movement of its own, against
-which the press sets the law (`foundation_press`).
+The slab's movements under unit forces at its top and at the frusta are computed once, from one quarter of it
+(`quarter_symmetry`). The frusta's linear stiffness against all but compression is part of the slab; their compression is a movement
+of its own, against which the press sets the law (`foundation_press`).
 """
 
 from dataclasses import dataclass, replace
@@ -31,7 +31,7 @@ _TIE = 20.0     # N/mm of the springs that tie the frusta's descents to the slab
 
 @dataclass(frozen=True)
 class FoundationCompliance:
-    """What the slab on its frusta does under downwards forces, by parity (see `quarter_slab`), and the law of the frusta.
+    """What the slab on its frusta does under downwards forces, by parity (see `quarter_symmetry`), and the law of the frusta.
 
     surface: among the grid's nodes in the quarter (a,), the frusta (b,) and the electrode plane at the map's points (c,), without
         sides where the grid is so
@@ -90,7 +90,7 @@ def foundation_compliance(spec: SensorSpec, *, dielectric_law: Law, cover_law: L
     electrodes = slab.below_top(slab.boundary_over(slab.layers[0][0]))
     rows = np.concatenate([columns, 3 * electrodes[::2, ::2].ravel() + 2,
                            *(3 * slab.top[::2, ::2].ravel() + axis for axis in (0, 1))])
-    parts = (_of_parity(slab, stiffness, descents, followed, rows, len(columns), parity, threads)
+    parts = (_of_parity(slab, stiffness, descents, centres, followed, rows, len(columns), parity, threads)
              for parity in progress(PARITIES, label=f"{spec.name}: compliance, a quarter's parities"))
     surface, sideways, both, own = _stacked(parts, len(PARITIES))
     membrane, lateral = both[:, :3 * len(centres), :len(columns)], both[:, 3 * len(centres):]
@@ -152,7 +152,7 @@ def _lateral_movement(roots, frustum, centres):
     return sp.vstack([sp.kron(sp.eye(len(centres)), row[None]) @ roots for row in frustum.lateral])
 
 
-def _of_parity(slab, stiffness, descents, followed, rows, loaded, parity, threads):
+def _of_parity(slab, stiffness, descents, centres, followed, rows, loaded, parity, threads):
     """Blocks of one parity: surface (loaded + c, loaded), sideways (2 c, loaded), followed (f, loaded + c), for downwards forces;
     and `followed` (f, f) for forces of their own.
 
@@ -161,7 +161,7 @@ def _of_parity(slab, stiffness, descents, followed, rows, loaded, parity, thread
     count = descents.shape[0]
     tied = sp.bmat([[stiffness + _TIE * descents.T @ descents, -_TIE * descents.T], [-_TIE * descents, _TIE * sp.eye(count)]],
                    format="csr")
-    whole = slab.compliance(tied, rows, parity, threads=threads, dtype=np.float32)
+    whole = slab.compliance(tied, rows, parity, threads=threads, dtype=np.float32, beyond=centres)
     own = np.arange(loaded - count, loaded)
     whole[own, own] -= 1 / _TIE
     place = (len(rows) - loaded) // 3

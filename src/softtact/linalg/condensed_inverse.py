@@ -1,0 +1,156 @@
+"""The inverse of a sparse positive definite matrix among some of its unknowns: the surface of a body, under forces on it.
+
+All other unknowns are eliminated piece by piece of a dissection (`nested_dissection`), in dense fronts as in `multifrontal`, but in
+double precision, and no factor is kept. What is left on those of interest, the Schur complement, is dense and inverted in its
+place. Of all matrices the upper triangle counts, row by row. For a wide layer and its top it takes half the time and memory of
+PARDISO's Schur complement (docs/notebook/2026-11-27-compliance-of-large-pads.md).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numba import njit
+from scipy.linalg import blas, lapack
+
+from softtact.linalg.multifrontal import runs_of
+from softtact.linalg.nested_dissection import Piece, dissect
+from softtact.linalg.workers import threads_of_blas
+
+
+def condensed_inverse(upper: sp.csr_matrix, kept: np.ndarray, places: np.ndarray, *, threads: int = 1,
+                      dtype: type = np.float64) -> np.ndarray:
+    """Rows and columns `kept` (k,) of the inverse of a matrix given by its upper triangle (csr, sorted): an upper triangle (k, k).
+
+    places (n, 2 or 3): where each unknown stands, in plan where the body is wide and thin, or in space; in mm
+    dtype: of the result, and what the last factor is inverted in: single precision rounds it by some 3e-7 of the diagonal and takes
+    half as long
+    What stands below the diagonal means nothing: `mirror` it. Raises LinAlgError for a matrix that is not positive definite.
+    """
+    pieces = dissect(upper.indptr, upper.indices, places, without=kept)
+    with threads_of_blas(threads):
+        lower = _factor(_left_on(upper, kept, pieces)).T.astype(dtype, order="F", copy=False)     # a lower one to Fortran
+        invert, = lapack.get_lapack_funcs(("potri",), (lower,))
+        inverse, fault = invert(lower, lower=1, overwrite_c=1)
+        _refuse(fault)
+    return inverse.T
+
+
+@njit(cache=True, nogil=True)
+def mirror(triangle: np.ndarray, place: np.ndarray, out: np.ndarray) -> None:
+    """Rows and columns `place` (k,) of `out` become the symmetric matrix of which the upper triangle (k, k) is given."""
+    for i in range(len(place)):
+        for j in range(i, len(place)):
+            out[place[i], place[j]] = out[place[j], place[i]] = triangle[i, j]
+
+
+def _refuse(fault):
+    if fault:
+        raise np.linalg.LinAlgError("The stiffness is not positive definite: something may be held by nothing.")
+
+
+def _factor(triangle):
+    """Overwrite the upper triangle of a matrix A, row by row, by R of A = R'.R."""
+    factor, fault = lapack.dpotrf(triangle.T, lower=1, clean=0, overwrite_a=1)
+    _refuse(fault)
+    return factor.T
+
+
+@dataclass(frozen=True)
+class _Front:
+    """A piece's upper triangle, in three parts.
+
+    own (k, k): of what it eliminates;  coupled (k, b): what that is coupled with;  rest (b, b): among these, passed on
+    """
+
+    own: np.ndarray
+    coupled: np.ndarray
+    rest: np.ndarray
+
+    @classmethod
+    def of(cls, own: int, bound: int) -> "_Front":
+        return cls(*(np.zeros(shape) for shape in ((own, own), (own, bound), (bound, bound))))
+
+    def eliminate(self) -> np.ndarray:
+        """The rest, less what the piece's own unknowns did to it."""
+        if not self.own.size:
+            return self.rest
+        factor = _factor(self.own)
+        if not self.rest.size:
+            return self.rest
+        coupled = blas.dtrsm(1.0, factor.T, self.coupled.T, side=1, lower=1, trans_a=1, overwrite_b=1)
+        return blas.dsyrk(-1.0, coupled, beta=1.0, c=self.rest.T, lower=1, overwrite_c=1).T
+
+
+def _left_on(upper, kept, pieces: Sequence[Piece]):
+    """The Schur complement on the unknowns `kept`, its upper triangle; they come behind all pieces."""
+    pieces = [*pieces, Piece(own=kept, before=(len(pieces) - 1,))]
+    starts = np.cumsum([0, *(len(piece.own) for piece in pieces)])
+    rows = _in_order(upper, np.concatenate([piece.own for piece in pieces]))
+    place = np.zeros(upper.shape[0], dtype=np.int64)
+    passed_on: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+    for number, piece in enumerate(pieces):
+        first, end = starts[number:number + 2]
+        given = [passed_on.pop(child) for child in piece.before]
+        bound = _bound(rows, first, end, [ranks for ranks, _ in given])
+        front = _Front.of(end - first, len(bound))
+        place[first:end], place[bound] = np.arange(end - first), end - first + np.arange(len(bound))
+        _take_up(rows.indptr, rows.indices, rows.data, first, end, place, front.own, front.coupled)
+        while given:
+            ranks, rest = given.pop()
+            _take_over(rest, place[ranks], front.own, front.coupled, front.rest)
+        if number == len(pieces) - 1:
+            return front.own
+        passed_on[number] = bound, front.eliminate()
+
+
+def _in_order(upper, order):
+    """The matrix' upper triangle (csr) with its unknowns in the order (n,) of elimination."""
+    rank = np.empty(len(order), dtype=np.int32)
+    rank[order] = np.arange(len(order))
+    row, column = np.repeat(rank, np.diff(upper.indptr)), rank[upper.indices]
+    return sp.csr_matrix((upper.data, (np.minimum(row, column), np.maximum(row, column))), shape=upper.shape)
+
+
+def _bound(rows, first, end, given):
+    """Ranks (b,), rising, of later unknowns that those from `first` to `end` are coupled with, by the matrix or what is given."""
+    coupled = np.unique(rows.indices[rows.indptr[first]:rows.indptr[end]])
+    return np.unique(np.concatenate([ranks[ranks >= end] for ranks in (coupled, *given)]))
+
+
+@njit(cache=True, nogil=True)
+def _take_up(indptr, indices, values, first, end, place, own, coupled):
+    """Add the matrix' rows from `first` to `end` to a front, in which each unknown has its `place`."""
+    count = len(own)
+    for i in range(end - first):
+        for e in range(indptr[first + i], indptr[first + i + 1]):
+            j = place[indices[e]]
+            if j < count:
+                own[i, j] += values[e]
+            else:
+                coupled[i, j - count] += values[e]
+
+
+@njit(cache=True, nogil=True)
+def _take_over(given, place, own, coupled, rest):
+    """Add an upper triangle (c, c) to a front's rows and columns `place` (c,), which rise."""
+    count = len(own)
+    split = np.searchsorted(place, count)
+    mine, others = runs_of(place[:split]), split + runs_of(place[split:])
+    for i in range(len(place)):
+        if i < split:
+            _add(given[i], place, mine, i, 0, own[place[i]])
+            _add(given[i], place, others, i, count, coupled[place[i]])
+        else:
+            _add(given[i], place, others, i, count, rest[place[i] - count])
+
+
+@njit(cache=True, nogil=True)
+def _add(given, place, runs, start, skipped, out):
+    """Add what a row (c,) has from `start` on in `runs` of places; `out` lacks the first `skipped` places."""
+    for r in range(len(runs) - 1):
+        first, last = max(runs[r], start), runs[r + 1]
+        if first < last:
+            to = place[first] - skipped
+            out[to:to + last - first] += given[first:last]
