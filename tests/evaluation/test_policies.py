@@ -5,6 +5,7 @@ import pytest
 import xarray
 
 from softtact.evaluation.policies import choices, policy_table, press_table, told_over_true
+from softtact.press.choice import INTERVALS
 
 FORCES = np.array([10.0, 20.0])
 BUMP = np.exp(-np.linspace(-2, 2, 9)[:, None] ** 2 - np.linspace(-2, 2, 7) ** 2)
@@ -53,6 +54,14 @@ def test_the_expected_error_sends_a_press_to_the_cheapest_model_that_will_do(tab
     of_cup = table.index[table.item == "cup"][0]
     taken = [choices(table, tolerance)[f"error, {1e3 * tolerance:g} um"][of_cup] for tolerance in (0.5, 0.01, 1e-5)]
     assert taken == ["elastic", "foundation", "hyperelastic"]
+
+
+def test_a_model_is_taken_where_nine_of_ten_presses_are_within_the_tolerance_as_by_default(table):
+    row, cup = table[table.item == "cup"].iloc[0], table.index[table.item == "cup"][0]
+    mostly = INTERVALS["foundation"][1] * row.foundation_expected_mm
+    assert mostly > 1.2 * row.foundation_expected_mm
+    for tolerance, model in ((1.01 * mostly, "foundation"), (0.99 * mostly, "hyperelastic")):
+        assert choices(table, tolerance)[f"error, {1e3 * tolerance:g} um"][cup] == model
 
 
 def test_the_error_policy_pays_for_both_cheap_models_and_others_for_their_own(table):
