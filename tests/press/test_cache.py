@@ -63,8 +63,8 @@ def test_the_slab_on_frusta_is_computed_anew_for_its_own_values_alone(values, an
 
 
 def test_a_preparation_takes_no_time_once_it_is_there(computed):
-    assert cache.seconds_to_prepare_foundation(CORO, LAWS) == pytest.approx(60.0)      # as much as the paper's own map
+    assert cache.seconds_to_prepare_foundation(CORO, LAWS) == pytest.approx(30.0)      # as much as the paper's own map
     large = changed(CORO, map_shape=[91, 91], footprint_mm=[60.0, 60.0])
-    assert cache.in_words(cache.seconds_to_prepare_foundation(large, LAWS)) == "about 41 minutes"
+    assert cache.in_words(cache.seconds_to_prepare_foundation(large, LAWS)) == "about 5 minutes"
     cache.cached_foundation(CORO, LAWS)
     assert cache.seconds_to_prepare_foundation(CORO, LAWS) == 0.0

@@ -100,8 +100,8 @@ def test_a_policy_or_tolerance_that_makes_no_sense_is_refused():
         sensor.press(ball, force_n=1.0, policy="error", tolerance_mm=-1.0)
 
 
-@pytest.mark.parametrize(("seconds", "fast"), [(700.0, ()), (500.0, ("elastic", "foundation"))])
-def test_no_preparation_of_more_than_ten_minutes_is_begun_unasked(seconds, fast, monkeypatch):
+@pytest.mark.parametrize(("seconds", "fast"), [(130.0, ()), (110.0, ("elastic", "foundation"))])
+def test_no_preparation_of_more_than_two_minutes_is_begun_unasked(seconds, fast, monkeypatch):
     sensor, pressed = load_sensor("coro"), []
 
     def failing(name, *_):

@@ -23,7 +23,7 @@ from numba import njit
 from softtact.fem.elements import HEX27, dofs_of
 from softtact.fem.levels import with_level
 from softtact.fem.solid_block import HexBlock
-from softtact.linalg.condensed_inverse import condensed_inverse, mirror
+from softtact.linalg.dissected_inverse import inverse_between
 from softtact.materials.laws.registry import make_law
 
 _SAME_MM = 1e-9
@@ -155,27 +155,23 @@ class QuarterSlab:
         return matrices
 
     def compliance(self, stiffness: sp.csr_matrix, kept: np.ndarray, parity: tuple[int, ...], *, threads: int = 1,
-                   dtype: type = np.float64, beyond: np.ndarray | None = None) -> np.ndarray:
-        """Compliance (k, k) among the unknowns `kept` of a stiffness, in one parity; zero for those that it holds.
+                   dtype: type = np.float64) -> np.ndarray:
+        """Compliance (k, k) among the unknowns `kept` of a stiffness, in one parity; zero for those that it holds."""
+        return self.responses(stiffness, picked(kept, self.unknowns), parity, threads=threads, dtype=dtype)
 
-        beyond: where unknowns (m, 2) that the stiffness has beyond the slab's own stand in plan, in mm
-        """
-        free = np.concatenate([self.free(parity), np.arange(self.unknowns, stiffness.shape[0])])
-        place = np.full(stiffness.shape[0], -1)
-        place[free] = np.arange(len(free))
-        there = np.flatnonzero(place[kept] >= 0)
-        stands = np.concatenate([np.repeat(self.points[:, :2], 3, axis=0), np.zeros((0, 2)) if beyond is None else beyond])
-        triangle = condensed_inverse(_upper_of(stiffness, free), place[kept[there]], stands[free], threads=threads, dtype=dtype)
-        out: np.ndarray = np.zeros((len(kept), len(kept)), dtype=dtype)
-        mirror(triangle, there, out)
-        return out
+    def responses(self, stiffness: sp.csr_matrix, functionals: sp.csr_matrix, parity: tuple[int, ...], *, threads: int = 1,
+                  dtype: type = np.float64) -> np.ndarray:
+        """What functionals (m, unknowns) of displacements do under unit loads that work on each of them (m, m), in one parity."""
+        free = self.free(parity)
+        upper = sp.triu(stiffness, format="csr")[free][:, free]
+        upper.sort_indices()
+        places = np.repeat(self.points[:, :2], 3, axis=0)[free]
+        return inverse_between(upper, functionals[:, free], places, threads=threads, dtype=dtype)
 
 
-def _upper_of(matrix, some):
-    """The upper triangle (csr, sorted) of a symmetric matrix among some of its unknowns, in rising order."""
-    upper = sp.triu(matrix, format="csr")[some][:, some]
-    upper.sort_indices()
-    return upper
+def picked(some: np.ndarray, count: int) -> sp.csr_matrix:
+    """The functionals (k, count) that pick some unknowns (k,), by their numbers, of so many."""
+    return sp.csr_matrix((np.ones(len(some)), some, np.arange(len(some) + 1)), shape=(len(some), count))
 
 
 def _element_layers(layers, held_below_mm):

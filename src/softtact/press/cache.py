@@ -1,6 +1,5 @@
 """What a sensor's fast models start from: computed once for a sensor, and kept in the user's cache."""
 
-import importlib.util
 import math
 import os
 from collections.abc import Mapping
@@ -16,7 +15,7 @@ from softtact.sensors.frusta import SensorSpec
 from softtact.sensors.specification import AnySpec
 
 _POINTS = 1881  # of the paper's map
-_FOUNDATION_TAKES = 60, 2.5     # seconds for that, and the power of a map's points with which they grow
+_FOUNDATION_TAKES = 30, 1.5     # seconds for that, and the power of a map's points with which they grow
 _FORMAT = 12    # of the files; another one makes them again
 
 
@@ -34,23 +33,23 @@ def _of_frusta(spec):
 def cached_compliance(spec: AnySpec, *, threads: int = 1) -> Compliance:
     """The elastic layer's `Compliance`, by the values that it depends on."""
     return _cached("compliance", _of_layer(spec), Compliance,
-                   f"{spec.name}: computing the elastic layer's compliance, once for this sensor ({_about(spec, 6, 2.0)})",
+                   f"{spec.name}: computing the elastic layer's compliance, once for this sensor ({_about(spec, 4, 2.0)})",
                    lambda: elastic_compliance(spec, threads=threads))
 
 
 def cached_surface_compliance(spec: AnySpec, *, threads: int = 1) -> SurfaceCompliance:
     """The elastic layer's `SurfaceCompliance`, by the values that it depends on."""
     return _cached("surface", _of_layer(spec), SurfaceCompliance,
-                   _sooner_with_mkl(f"{spec.name}: computing the elastic layer's compliance to forces in all directions, once for "
-                                    "this sensor (a minute or two; 230 MB for the paper's)"),
+                   f"{spec.name}: computing the elastic layer's compliance to forces in all directions, once for this sensor "
+                   f"({_about(spec, 30, 2.0)}; 230 MB for the paper's)",
                    lambda: surface_compliance(spec, threads=threads))
 
 
 def cached_foundation(spec: SensorSpec, laws: Mapping[str, Law], *, threads: int = 1) -> FoundationCompliance:
     """The `FoundationCompliance` of a sensor with its laws {"dielectric", "cover"}, by the values that it depends on."""
     return _cached("foundation", _of_foundation(spec, laws), FoundationCompliance,
-                   _sooner_with_mkl(f"{spec.name}: computing a frustum's law and the slab's compliance, once for this sensor and "
-                                    f"these laws ({_about(spec, *_FOUNDATION_TAKES)})"),
+                   f"{spec.name}: computing a frustum's law and the slab's compliance, once for this sensor and these laws "
+                   f"({_about(spec, *_FOUNDATION_TAKES)})",
                    lambda: foundation_compliance(spec, dielectric_law=laws["dielectric"], cover_law=laws["cover"],
                                                  threads=threads))
 
@@ -66,7 +65,9 @@ def _of_foundation(spec, laws):
 
 def in_words(seconds: float) -> str:
     """A time that a preparation takes, roughly."""
-    return f"about {seconds / 60:.0f} minutes" if seconds > 90 else "about a minute" if seconds > 40 else "some ten seconds"
+    if seconds > 90:
+        return f"about {seconds / 60:.0f} minutes"
+    return "about a minute" if seconds > 45 else "half a minute" if seconds > 20 else "some seconds"
 
 
 def _about(spec, seconds, power):
@@ -76,12 +77,6 @@ def _about(spec, seconds, power):
 def _seconds(spec, seconds, power):
     """How long it takes: seconds for the paper's sensor, which grow with a power of the map's points."""
     return seconds * (math.prod(spec.map_shape) / _POINTS) ** power
-
-
-def _sooner_with_mkl(message):
-    if importlib.util.find_spec("pypardiso"):
-        return message
-    return f"{message}; without MKL some minutes; pip install 'softtact[mkl]' brings it"
 
 
 def _file(kind, values):

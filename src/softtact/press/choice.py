@@ -37,7 +37,7 @@ ELASTIC_RELATIVE = 0.45     # of its map's root mean square: the elastic model's
 # the elastic model by itself (0.311 to 0.760 over 0.45).
 INTERVALS = {"foundation": (0.80, 1.64), "elastic": (0.98, 1.05), "elastic alone": (0.69, 1.68)}
 _POWER, _DEPTH_POWER = 3, 2      # of the compression and of the depth, with which the foundation model's relative error grows
-_LONGEST_S = 600.0     # of a preparation that nobody has asked for by its model's name
+_LONGEST_S = 120.0     # of a preparation that nobody has asked for by its model's name
 _KNOWN = 0.5     # of a frustum's height: the error was calibrated up to a compression of 0.36, and is not told much beyond
 
 

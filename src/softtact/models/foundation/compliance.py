@@ -14,19 +14,16 @@ import scipy.sparse as sp
 
 from softtact.contact.node_grid import NodeGrid
 from softtact.files import read_arrays
-from softtact.linalg.direct import make_solver
 from softtact.materials.laws.base import Law
 from softtact.models.elastic.compliance import map_cells, surface_grid
 from softtact.models.foundation.frustum_spring import FrustumLaw, frustum_law
-from softtact.models.quarter_symmetry import PARITIES, ElasticLayer, ParityBlocks, QuarterSlab
+from softtact.models.quarter_symmetry import PARITIES, ElasticLayer, ParityBlocks, QuarterSlab, picked
 from softtact.progress import progress
 from softtact.sensors.frusta import SensorSpec
 
 SHEET_SHARES, COVER_SHARES = (1.0,), (0.45, 0.35, 0.2)
 _BLOCKS = ("surface", "sideways", "membrane", "lateral", "lateral_self")
 _GROUND = 2e-3  # of a frustum's stiffness at rest: a lifted one pulls by so much of it, single precision still tells 1e-5 mm
-_AT_ONCE = 256  # loads for which the slab is solved together
-_TIE = 20.0     # N/mm of the springs that tie the frusta's descents to the slab while it is condensed, and are taken off again
 
 
 @dataclass(frozen=True)
@@ -86,18 +83,17 @@ def foundation_compliance(spec: SensorSpec, *, dielectric_law: Law, cover_law: L
         frustum, ground = _with_ground(frustum)
         stiffness = stiffness + ground * descents.T @ descents
     followed = sp.vstack([_membrane(slab, spec, centres), _lateral_movement(roots, frustum, centres)]).tocsr()
-    columns = np.concatenate([3 * slab.top.ravel() + 2, slab.unknowns + np.arange(len(centres))])
-    electrodes = slab.below_top(slab.boundary_over(slab.layers[0][0]))
-    rows = np.concatenate([columns, 3 * electrodes[::2, ::2].ravel() + 2,
-                           *(3 * slab.top[::2, ::2].ravel() + axis for axis in (0, 1))])
-    parts = (_of_parity(slab, stiffness, descents, centres, followed, rows, len(columns), parity, threads)
+    electrodes, top = slab.below_top(slab.boundary_over(slab.layers[0][0])), slab.top
+    sideways = np.concatenate([3 * top[::2, ::2].ravel() + axis for axis in (0, 1)])
+    rows = 3 * top.ravel() + 2, 3 * electrodes[::2, ::2].ravel() + 2, sideways
+    parts = (_of_parity(slab, stiffness, descents, followed, rows, parity, threads)
              for parity in progress(PARITIES, label=f"{spec.name}: compliance, a quarter's parities"))
-    surface, sideways, both, own = _stacked(parts, len(PARITIES))
-    membrane, lateral = both[:, :3 * len(centres), :len(columns)], both[:, 3 * len(centres):]
+    surface, aside, both, own = _stacked(parts, len(PARITIES))
+    membrane, lateral = both[:, :3 * len(centres), :surface.shape[2]], both[:, 3 * len(centres):]
     own = own[:, 3 * len(centres):, 3 * len(centres):]
     return FoundationCompliance(
         grid=surface_grid(slab), counts=spec.frusta_counts, foundation_modulus=_foundation_modulus(spec, frustum, cover_law),
-        law=frustum, surface=ParityBlocks(surface), sideways=ParityBlocks(sideways), membrane=ParityBlocks(membrane),
+        law=frustum, surface=ParityBlocks(surface), sideways=ParityBlocks(aside), membrane=ParityBlocks(membrane),
         lateral=ParityBlocks(lateral), lateral_self=ParityBlocks(own))
 
 
@@ -152,43 +148,19 @@ def _lateral_movement(roots, frustum, centres):
     return sp.vstack([sp.kron(sp.eye(len(centres)), row[None]) @ roots for row in frustum.lateral])
 
 
-def _of_parity(slab, stiffness, descents, centres, followed, rows, loaded, parity, threads):
+def _of_parity(slab, stiffness, descents, followed, rows, parity, threads):
     """Blocks of one parity: surface (loaded + c, loaded), sideways (2 c, loaded), followed (f, loaded + c), for downwards forces;
     and `followed` (f, f) for forces of their own.
 
-    The frusta's descents are unknowns of their own, tied by springs, so that they stay when the rest is condensed.
+    rows: numbers of the unknowns on the top, in the electrode plane, and of the top sideways (2 c)
     """
-    count = descents.shape[0]
-    tied = sp.bmat([[stiffness + _TIE * descents.T @ descents, -_TIE * descents.T], [-_TIE * descents, _TIE * sp.eye(count)]],
-                   format="csr")
-    whole = slab.compliance(tied, rows, parity, threads=threads, dtype=np.float32, beyond=centres)
-    own = np.arange(loaded - count, loaded)
-    whole[own, own] -= 1 / _TIE
-    place = (len(rows) - loaded) // 3
-    free = slab.free(parity)
-    upper = sp.triu(stiffness[free][:, free], format="csr")
-    upper.sort_indices()
-    top, plane = (_picked(some, slab.unknowns) for some in (rows[:loaded - count], rows[loaded:loaded + place]))
-    responding = sp.vstack([top, descents, plane, followed], format="csr")
-    both = _response(upper, responding[:, free], followed[:, free], threads)
-    return whole[:loaded + place, :loaded], -whole[loaded + place:, :loaded], -both[:loaded + place].T, both[loaded + place:]
-
-
-def _picked(rows, count):
-    """The matrix that picks some unknowns, by their numbers, of so many."""
-    return sp.csr_matrix((np.ones(len(rows)), rows, np.arange(len(rows) + 1)), shape=(len(rows), count))
-
-
-def _response(upper, rows, loads, threads):
-    """`rows` (r, n) of the displacements under `loads` (m, n), (r, m); some loads at a time, for displacements are many."""
-    solver = make_solver(threads=threads)
-    solver.factor(upper)
-    out = np.empty((rows.shape[0], loads.shape[0]))
-    for first in range(0, loads.shape[0], _AT_ONCE):
-        some = slice(first, first + _AT_ONCE)
-        out[:, some] = rows @ solver.solve(np.asfortranarray(loads[some].toarray().T))
-    solver.close()
-    return out
+    top, plane, sideways = (picked(numbers, slab.unknowns) for numbers in rows)
+    whole = slab.responses(stiffness, sp.vstack([top, descents, plane, sideways, followed], format="csr"), parity, threads=threads,
+                           dtype=np.float32)
+    loaded = top.shape[0] + descents.shape[0]
+    under = loaded + plane.shape[0]
+    behind = under + sideways.shape[0]
+    return whole[:under, :loaded], -whole[under:behind, :loaded], -whole[behind:, :under], whole[behind:, behind:]
 
 
 def _stacked(parts, count):

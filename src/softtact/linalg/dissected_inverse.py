@@ -1,9 +1,10 @@
-"""The inverse of a sparse positive definite matrix among some of its unknowns: the surface of a body, under forces on it.
+"""What a sparse positive definite matrix' inverse does between some functionals: how a surface moves under forces on it.
 
-All other unknowns are eliminated piece by piece of a dissection (`nested_dissection`), in dense fronts as in `multifrontal`, but in
-double precision, and no factor is kept. What is left on those of interest, the Schur complement, is dense and inverted in its
-place. Of all matrices the upper triangle counts, row by row. For a wide layer and its top it takes half the time and memory of
-PARDISO's Schur complement (docs/notebook/2026-11-27-compliance-of-large-pads.md).
+G = A K^-1 A' of a stiffness K and functionals A is the negative Schur complement of the bordered matrix [[K, A'], [A, 0]] on the
+border. So all of K is eliminated piece by piece of a dissection (`nested_dissection`), in dense fronts as in `multifrontal` but in
+double precision, and no factor is kept. A front carries the functionals of its own part of the body alone: no dense inverse and no
+solution for each load. Of all matrices the upper triangle counts, row by row.
+Against PARDISO's Schur complement and LAPACK's inverse: docs/notebook/2026-11-27-compliance-of-large-pads.md.
 """
 
 from collections.abc import Sequence
@@ -19,42 +20,33 @@ from softtact.linalg.nested_dissection import Piece, dissect
 from softtact.linalg.workers import threads_of_blas
 
 
-def condensed_inverse(upper: sp.csr_matrix, kept: np.ndarray, places: np.ndarray, *, threads: int = 1,
-                      dtype: type = np.float64) -> np.ndarray:
-    """Rows and columns `kept` (k,) of the inverse of a matrix given by its upper triangle (csr, sorted): an upper triangle (k, k).
+def inverse_between(upper: sp.csr_matrix, functionals: sp.csr_matrix, places: np.ndarray, *, threads: int = 1,
+                    dtype: type = np.float64) -> np.ndarray:
+    """G = A K^-1 A' (m, m) of a matrix K (n, n) and functionals A (m, n); rows of A that are zero give zeros.
 
+    upper: K's upper triangle (csr, sorted);  dtype: of the result, all is computed in double precision
     places (n, 2 or 3): where each unknown stands, in plan where the body is wide and thin, or in space; in mm
-    dtype: of the result, and what the last factor is inverted in: single precision rounds it by some 3e-7 of the diagonal and takes
-    half as long
-    What stands below the diagonal means nothing: `mirror` it. Raises LinAlgError for a matrix that is not positive definite.
+    Raises LinAlgError for a matrix that is not positive definite.
     """
-    pieces = dissect(upper.indptr, upper.indices, places, without=kept)
+    pieces = dissect(upper.indptr, upper.indices, places)
     with threads_of_blas(threads):
-        lower = _factor(_left_on(upper, kept, pieces)).T.astype(dtype, order="F", copy=False)     # a lower one to Fortran
-        invert, = lapack.get_lapack_funcs(("potri",), (lower,))
-        inverse, fault = invert(lower, lower=1, overwrite_c=1)
-        _refuse(fault)
-    return inverse.T
+        left = _left_on_border(upper, functionals, pieces)
+    out: np.ndarray = np.empty(left.shape, dtype=dtype)
+    _negate_and_mirror(left, out)
+    return out
 
 
 @njit(cache=True, nogil=True)
-def mirror(triangle: np.ndarray, place: np.ndarray, out: np.ndarray) -> None:
-    """Rows and columns `place` (k,) of `out` become the symmetric matrix of which the upper triangle (k, k) is given."""
-    for i in range(len(place)):
-        for j in range(i, len(place)):
-            out[place[i], place[j]] = out[place[j], place[i]] = triangle[i, j]
+def _negate_and_mirror(triangle, out):
+    """`out` (m, m) becomes minus the symmetric matrix of which the upper triangle (m, m) is given."""
+    for i in range(len(triangle)):
+        for j in range(i, len(triangle)):
+            out[i, j] = out[j, i] = -triangle[i, j]
 
 
 def _refuse(fault):
     if fault:
         raise np.linalg.LinAlgError("The stiffness is not positive definite: something may be held by nothing.")
-
-
-def _factor(triangle):
-    """Overwrite the upper triangle of a matrix A, row by row, by R of A = R'.R."""
-    factor, fault = lapack.dpotrf(triangle.T, lower=1, clean=0, overwrite_a=1)
-    _refuse(fault)
-    return factor.T
 
 
 @dataclass(frozen=True)
@@ -76,19 +68,21 @@ class _Front:
         """The rest, less what the piece's own unknowns did to it."""
         if not self.own.size:
             return self.rest
-        factor = _factor(self.own)
+        factor, fault = lapack.dpotrf(self.own.T, lower=1, clean=0, overwrite_a=1)     # row by row is a lower one to Fortran
+        _refuse(fault)
         if not self.rest.size:
             return self.rest
-        coupled = blas.dtrsm(1.0, factor.T, self.coupled.T, side=1, lower=1, trans_a=1, overwrite_b=1)
+        coupled = blas.dtrsm(1.0, factor, self.coupled.T, side=1, lower=1, trans_a=1, overwrite_b=1)
         return blas.dsyrk(-1.0, coupled, beta=1.0, c=self.rest.T, lower=1, overwrite_c=1).T
 
 
-def _left_on(upper, kept, pieces: Sequence[Piece]):
-    """The Schur complement on the unknowns `kept`, its upper triangle; they come behind all pieces."""
-    pieces = [*pieces, Piece(own=kept, before=(len(pieces) - 1,))]
+def _left_on_border(upper, functionals, pieces: Sequence[Piece]):
+    """The Schur complement on the bordering unknowns (m, m), its upper triangle; they come behind all pieces."""
+    size, border = upper.shape[0], functionals.shape[0]
+    pieces = [*pieces, Piece(own=np.arange(size, size + border), before=(len(pieces) - 1,))]
     starts = np.cumsum([0, *(len(piece.own) for piece in pieces)])
-    rows = _in_order(upper, np.concatenate([piece.own for piece in pieces]))
-    place = np.zeros(upper.shape[0], dtype=np.int64)
+    rows = _in_order(upper, functionals, np.concatenate([piece.own for piece in pieces]))
+    place = np.zeros(size + border, dtype=np.int64)
     passed_on: dict[int, tuple[np.ndarray, np.ndarray]] = {}
     for number, piece in enumerate(pieces):
         first, end = starts[number:number + 2]
@@ -105,12 +99,15 @@ def _left_on(upper, kept, pieces: Sequence[Piece]):
         passed_on[number] = bound, front.eliminate()
 
 
-def _in_order(upper, order):
-    """The matrix' upper triangle (csr) with its unknowns in the order (n,) of elimination."""
+def _in_order(upper, functionals, order):
+    """The bordered matrix' upper triangle (csr) with its unknowns in the order (n + m,) of elimination."""
     rank = np.empty(len(order), dtype=np.int32)
     rank[order] = np.arange(len(order))
-    row, column = np.repeat(rank, np.diff(upper.indptr)), rank[upper.indices]
-    return sp.csr_matrix((upper.data, (np.minimum(row, column), np.maximum(row, column))), shape=upper.shape)
+    size, border = upper.shape[0], functionals.tocoo()
+    row, column = np.repeat(rank[:size], np.diff(upper.indptr)), rank[upper.indices]
+    places = [np.concatenate([find(row, column), of_border]) for find, of_border in (
+        (np.minimum, rank[border.col]), (np.maximum, (size + border.row).astype(np.int32)))]
+    return sp.csr_matrix((np.concatenate([upper.data, border.data]), places), shape=(len(order), len(order)))
 
 
 def _bound(rows, first, end, given):
