@@ -41,7 +41,7 @@ def cached_surface_compliance(spec: AnySpec, *, threads: int = 1) -> SurfaceComp
     """The elastic layer's `SurfaceCompliance`, by the values that it depends on."""
     return _cached("surface", _of_layer(spec), SurfaceCompliance,
                    f"{spec.name}: computing the elastic layer's compliance to forces in all directions, once for this sensor "
-                   f"({_about(spec, 30, 2.0)}; 230 MB for the paper's)",
+                   f"({_about(spec, 12, 2.0)}; 230 MB for the paper's)",
                    lambda: surface_compliance(spec, threads=threads))
 
 
