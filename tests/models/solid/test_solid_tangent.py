@@ -1,10 +1,13 @@
 """The tangent is the derivative of the residual, and the residual that of the potential, with contact and pressure in them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from softtact.contact.pair import ContactPair
 from softtact.contact.surfaces import Surface
+from softtact.errors import ConvergenceError
 from softtact.fem.kernels_plain import PlainLoops
 from softtact.fem.structured_meshes import box
 from softtact.materials.laws.registry import make_law
@@ -134,3 +137,12 @@ def test_fast_loops_of_spatial_elements_agree_with_the_plain_ones():
     one, other = fast.evaluate(moved), plain.evaluate(moved)
     np.testing.assert_allclose(one.force, other.force, atol=1e-13)
     np.testing.assert_allclose(fast.tangent(moved), plain.tangent(moved), atol=1e-12 * np.abs(one.force).max() + 1e-11)
+
+
+@pytest.mark.parametrize("turning", [True, False])
+def test_a_tangent_that_is_no_number_ends_the_increment(turning):
+    mesh = box((0, 0, 0), (2, 2, 1), (2, 2, 1))
+    body = SolidBody(mesh, {"body": RUBBER}, held={"z0": "xyz"})
+    state = replace(body.rest(), displacement=np.where(body.points[:, 2:] > 0.9, np.nan, np.zeros_like(body.points)))
+    with pytest.raises(ConvergenceError, match="no number"):
+        body.solve(state, np.ones((len(body.free), 1)), turning=turning)
