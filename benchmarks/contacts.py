@@ -187,6 +187,7 @@ def report(arguments):
                                  "seconds": float(data["seconds"]), "threads": int(data["threads"]),
                                  "reached_n": float(data["force_n"][-1]) if "force_n" in data else 0.0,
                                  "steps": len(data["force_n"]) if "force_n" in data else 0, "asked": len(contact.forces_n),
+                                 "flagged": int((data["valid"] == 0).sum()) if "valid" in data else 0,
                                  "reason": str(data["reason"])})
     for which in COUNTS:
         own = [row for row in rows if row["set"] == which]

@@ -247,10 +247,24 @@ def random_presses() -> str:
     return f"{source('random_presses')}\n\n" + table("model, " + ", ".join(outcomes), rows)
 
 
+def hard_contacts() -> str:
+    """Random presses under tilted edges and over the rim: how many reach their forces in three minutes, and how soon."""
+    contacts = [row for row in record("contacts")["rows"] if row["set"] == "hard"]
+    rows: list[list[object]] = []
+    for said, own in (("one", [row for row in contacts if row["threads"] == 1]),
+                      ("two, what stopped on one", [row for row in contacts if row["threads"] == 2]), ("in all", contacts)):
+        reached = [row for row in own if row["steps"] == row["asked"]]
+        rows.append([said, len(own), len(reached), f"{median(row['seconds'] for row in own):.0f}",
+                     sum(row["flagged"] > 0 for row in reached), ", ".join(row["name"][5:] for row in own if row not in reached)])
+    head = "threads, contacts, reached 20 N in 180 s, median (s), flagged at a load step, stopped by the time limit"
+    return f"{source('contacts')} Seconds of one thread are the processor's, of two the clock's.\n\n{table(head, rows)}"
+
+
 def numbers_page(counts: dict[str, int]) -> str:
     """The text of docs/reference/numbers.md."""
     parts = {"Tests": tests(counts), "Whole runs": whole_runs(), "Growth of a hyperelastic press with the sensor": growth(),
-             "Error of the meshes": mesh_errors(), "Random presses": random_presses()}
+             "Error of the meshes": mesh_errors(), "Random presses": random_presses(),
+             "Presses under tilted edges and over the rim": hard_contacts()}
     return HEAD + "".join(f"\n## {title}\n{text}\n" for title, text in parts.items())
 
 
