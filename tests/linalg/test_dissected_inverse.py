@@ -64,6 +64,13 @@ def test_a_matrix_that_is_not_positive_definite_is_refused(where):
         inverse_between(indefinite, functionals(20, len(shift), width=2), places)
 
 
+def test_a_matrix_that_holds_what_is_no_number_is_refused():
+    _, upper, places = plate(40, 30)
+    upper.data[700] = np.nan
+    with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
+        inverse_between(upper, functionals(20, upper.shape[0], width=2), places)
+
+
 def test_a_part_that_no_functional_asks_for_must_be_positive_definite_too():
     upper = sp.diags([1.0, 2.0, -3.0], format="csr")
     with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):

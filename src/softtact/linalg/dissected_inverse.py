@@ -69,7 +69,7 @@ class _Front:
         if not self.own.size:
             return self.rest
         factor, fault = lapack.dpotrf(self.own.T, lower=1, clean=0, overwrite_a=1)     # row by row is a lower one to Fortran
-        _refuse(fault)
+        _refuse(fault or not np.isfinite(factor[-1, -1]))     # what is no number goes through to the last pivot
         if not self.rest.size:
             return self.rest
         coupled = blas.dtrsm(1.0, factor, self.coupled.T, side=1, lower=1, trans_a=1, overwrite_b=1)

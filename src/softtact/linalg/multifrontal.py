@@ -152,7 +152,7 @@ def _take_over(c, start, end, fronts, store, out, skipped, width):
 
 
 @njit(cache=True, nogil=True)
-def runs_of(places):
+def runs_of(places: np.ndarray) -> np.ndarray:
     """Where places (k,) begin that do not follow on the ones before, and the end."""
     starts = np.empty(len(places) + 1, np.int64)
     count = 0
