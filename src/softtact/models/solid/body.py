@@ -289,7 +289,7 @@ class SolidBody:
         """With the tangent without the part that surfaces have as they turn, and as stiff as it takes to be positive definite."""
         matrix = self.tangent(state, turning=False)  # far from balance, pressed surfaces that turn may have no stiffness
         if not np.isfinite(matrix.data).all():  # no shift makes it positive definite
-            raise ConvergenceError("The tangent holds what is no number: some element is turned inside out.")
+            raise ConvergenceError("The tangent holds what is no number; an element may be turned inside out.")
         shift, diagonal = 0.0, matrix.indptr[:-1]
         while (found := self.solver.solve(matrix, right, doubt=not shift)) is None:
             more = max(3.0 * shift, 1e-4 * float(np.abs(matrix.data[diagonal]).mean()))
