@@ -9,11 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from scipy.linalg.lapack import spotrf
 
 from softtact.linalg.lapack import ROUTINES, address, call, keep_alive
 from softtact.linalg.row_loops import add_row, row_product
-from softtact.linalg.workers import SERIAL, Workers, chunks, slices
+from softtact.linalg.workers import SERIAL, Workers, slices
 
 _AT_ONCE = 60                # bodies that one thread reduces or recovers at once
 _SMALLEST_STIFFNESS = 0.02   # N/mm of a mode of a folding body; the softest mode of a frustum at rest has 0.03
@@ -56,7 +55,8 @@ class Condensation:
         self._dofs = tuple(np.ascontiguousarray(dofs) for dofs in element_dofs)
         self._store = _Store(rows=np.zeros((bodies, inner, inner + outer), dtype=np.float32),
                              outer=np.zeros((bodies, outer, outer), dtype=np.float32), modified=np.zeros(bodies, dtype=bool))
-        self._mended: dict[int, np.ndarray | None] = {}     # by body: the outer matrix made positive, None where it is as it stands
+        self._judged = np.zeros(bodies, dtype=bool)     # whether `make_positive` has seen a body since it was set ...
+        self._positive: dict[int, np.ndarray] = {}      # ... and what it left of the indefinite ones
 
     @property
     def outer(self) -> np.ndarray:
@@ -78,8 +78,9 @@ class Condensation:
         springs = springs or Springs(np.zeros((len(bodies), 0)), np.zeros((0, 1), dtype=np.int64), np.zeros((0, 1)))
         damping = np.zeros(len(bodies)) if damping is None else damping
         _set(bodies, damping, tuple(tangents), self._dofs, springs, self._store, ROUTINES)
+        self._judged[bodies] = False
         for body in bodies:
-            self._mended.pop(int(body), None)
+            self._positive.pop(int(body), None)
 
     def residual(self, inner: np.ndarray, *, bodies: np.ndarray | None = None,
                  workers: Workers = SERIAL) -> tuple[np.ndarray, np.ndarray]:
@@ -101,24 +102,28 @@ class Condensation:
     def _chosen(self, bodies):
         return np.arange(len(self._store.rows)) if bodies is None else bodies
 
-    def positive_outer(self, *, workers: Workers = SERIAL) -> np.ndarray:
+    @property
+    def not_judged(self) -> np.ndarray:
+        """Bodies (b,) that `make_positive` has not seen as they are set now."""
+        return np.flatnonzero(~self._judged)
+
+    def make_positive(self, bodies: np.ndarray) -> None:
+        """Prepare `positive_outer` of some bodies (b,); many threads may, each with its own."""
+        made, changed = np.empty((len(bodies), *self.outer.shape[1:]), dtype=np.float32), np.zeros(len(bodies), dtype=bool)
+        _make_outer_positive(self.outer, bodies, made, changed, ROUTINES)
+        self._positive.update({int(bodies[k]): made[k].copy() for k in np.flatnonzero(changed)})
+        self._judged[bodies] = True
+
+    def positive_outer(self) -> np.ndarray:
         """The condensed matrices with the eigenvalues of those that are indefinite made positive, as in `set`.
 
         With zeros in their place a step would go as far along these modes as all else lets it.
         """
-        unknown = [body for body in range(len(self.outer)) if body not in self._mended]
-        workers.map(self._mend, chunks(np.array(unknown, dtype=np.int64), _AT_ONCE))
+        self.make_positive(self.not_judged)
         out = self.outer.copy()
-        for body, mended in self._mended.items():
-            if mended is not None:
-                out[body] = mended
+        for body, positive in self._positive.items():
+            out[body] = positive
         return out
-
-    def _mend(self, bodies):
-        """Note for bodies what is left of them made positive; a Cholesky factor tells soonest that one is as it stands."""
-        for body in map(int, bodies):
-            stays = spotrf(self.outer[body].T, overwrite_a=0)[1] == 0 or not np.isfinite(self.outer[body]).all()
-            self._mended[body] = None if stays else _made_positive(self.outer[body].astype(np.float64))
 
     @property
     def modified(self) -> int:
@@ -217,6 +222,20 @@ def _condense(matrix, rows, outer, blas):
         for j in range(i):
             outer[i, j] = outer[j, i]
     return modified
+
+
+@njit(cache=True, nogil=True)
+def _make_outer_positive(outer, bodies, made, changed, blas):
+    """Fill in what is left of the bodies that are indefinite; a Cholesky factor tells soonest which are not."""
+    size = np.array([outer.shape[1], 0], dtype=np.int32)
+    lower, count, info = address(blas.letters, 0), address(size, 0), address(size, 1)
+    for b in range(len(bodies)):
+        made[b] = outer[bodies[b]]
+        call(blas.potrf, (lower, count, made[b].ctypes.data, count, info))
+        changed[b] = size[1] != 0 and np.isfinite(outer[bodies[b]]).all()
+        if changed[b]:
+            made[b] = _made_positive(outer[bodies[b]].astype(np.float64))
+    keep_alive(size)
 
 
 @njit(cache=True, nogil=True)

@@ -52,11 +52,12 @@ class LayerwiseElimination:
     @property
     def matrices(self) -> np.ndarray:
         """What is left of each body: (bodies, m, m), m as in `outer`."""
-        return self.stages[-1].condensed.outer
+        return self.last.outer
 
-    def positive_matrices(self, *, workers: Workers = SERIAL) -> np.ndarray:
-        """The same with the modes of negative stiffness made positive, see `Condensation.positive_outer`."""
-        return self.stages[-1].condensed.positive_outer(workers=workers)
+    @property
+    def last(self) -> Condensation:
+        """The layer of which `matrices` are what is left."""
+        return self.stages[-1].condensed
 
     def set(self, bodies: np.ndarray, layers: Iterable[tuple[Sequence[np.ndarray], Springs | None]], *,
             damping: np.ndarray | None = None) -> None:

@@ -23,11 +23,13 @@ from softtact.fem.point_location import interpolation_2d
 from softtact.fem.positive_tangents import make_positive
 from softtact.fem.solid_block import HexBlock, SolidBlock, WedgeBlock, hanging_node_constraints, joined
 from softtact.linalg.symmetric_product import SymmetricProduct
-from softtact.linalg.workers import SERIAL, Workers
+from softtact.linalg.workers import SERIAL, Workers, chunks
 from softtact.materials.laws.base import Law
 from softtact.models.hyperelastic.newton_step import LinearGaps
 from softtact.models.hyperelastic.rigid_contact import ContactProjection, Surface, TopContact
 from softtact.models.hyperelastic.slab_nodes import CoverSide, sheet_nodes, without_zeros
+
+_AT_ONCE = 8     # elements whose tangents one thread makes positive at once; those that need it lie side by side
 
 
 @dataclass(frozen=True)
@@ -245,6 +247,7 @@ class Slab:
         self._top_positions = upper_positions(indptr, indices, self._top_dofs)
         self._matrix = sp.csr_matrix((np.zeros(len(indices), dtype=precision), indices, indptr), shape=(len(keep),) * 2)
         self.product = SymmetricProduct(indptr, indices)
+        self._values_at, self._values = None, {}
 
     def tangent(self, state: SlabState, condensed: list[np.ndarray], *, workers: Workers = SERIAL) -> sp.csr_matrix:
         """Upper triangle (csr) of the tangent with the cells' condensed blocks [(f, k, k)] and the object's contact."""
@@ -260,15 +263,26 @@ class Slab:
         positive: the elements' modes of negative stiffness are made positive
         """
         matrix = self._matrix
-        matrix.data[:] = 0.0
-        blocks = workers.map(lambda group: group[1].tangent(state.displacement[group[0]], precision=matrix.dtype.type), self.groups)
-        if positive:
-            workers.map(make_positive, [part for block in blocks for part in np.array_split(block, workers.threads)])
-        for part, positions in zip([*blocks, *condensed], self._positions, strict=True):
+        matrix.data[:] = self._beside_cells(state.displacement, positive, workers)
+        for part, positions in zip(condensed, self._positions[len(self.groups):], strict=True):
             add_upper(matrix.data, part, positions)
         if state.friction_response is not None:
             add_upper(matrix.data, self.top.friction_tangent(state)[0], self._top_positions)
         return matrix
+
+    def _beside_cells(self, displacement, positive, workers):
+        """What the elements outside of cells add to the matrix' values; a step tries several tangents that differ by the cells."""
+        if self._values_at is not displacement:
+            self._values_at, self._values = displacement, {}
+        if positive not in self._values:
+            values = np.zeros_like(self._matrix.data)
+            blocks = workers.map(lambda group: group[1].tangent(displacement[group[0]], precision=values.dtype.type), self.groups)
+            if positive:
+                workers.map(make_positive, [part for block in blocks for part in chunks(block, _AT_ONCE)])
+            for block, positions in zip(blocks, self._positions, strict=False):
+                add_upper(values, block, positions)
+            self._values[positive] = values
+        return self._values[positive]
 
     def linear_gaps(self, displacement: np.ndarray, projection: ContactProjection, indentation: float,
                     history: ContactHistory) -> LinearGaps:

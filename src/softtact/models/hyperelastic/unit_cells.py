@@ -54,7 +54,10 @@ class SheetCells:
 
     def positive_outer(self, *, workers: Workers = SERIAL) -> list[np.ndarray]:
         """The condensed matrices without their modes of negative stiffness."""
-        return [kind.elimination.positive_matrices(workers=workers) for kind in self.kinds]
+        kinds = [kind.elimination.last for kind in self.kinds]
+        tasks = [(kind, part) for kind in kinds for part in chunks(kind.not_judged, _CHUNK)]
+        workers.map(lambda task: task[0].make_positive(task[1]), tasks)
+        return [kind.positive_outer() for kind in kinds]
 
     def refresh(self, state: "BodyState", *, kept_mm: float = 0.0, workers: Workers = SERIAL) -> int:
         """Recompute the condensed tangents of the cells that moved by more than `kept_mm` or changed contact since their last one.
