@@ -247,7 +247,8 @@ class Slab:
         self._top_positions = upper_positions(indptr, indices, self._top_dofs)
         self._matrix = sp.csr_matrix((np.zeros(len(indices), dtype=precision), indices, indptr), shape=(len(keep),) * 2)
         self.product = SymmetricProduct(indptr, indices)
-        self._values_at, self._values = None, {}
+        self._values_at: np.ndarray | None = None     # displacement of what `_beside_cells` keeps, by whether it is made positive
+        self._values: dict[bool, np.ndarray] = {}
 
     def tangent(self, state: SlabState, condensed: list[np.ndarray], *, workers: Workers = SERIAL) -> sp.csr_matrix:
         """Upper triangle (csr) of the tangent with the cells' condensed blocks [(f, k, k)] and the object's contact."""
