@@ -227,6 +227,23 @@ def test_a_damped_tangent_begins_with_what_was_enough_before_and_another_one_wit
     assert list(itertools.islice(_shifts(last, again), len(first))) == pytest.approx(first)
 
 
+def test_a_tangent_is_of_its_own_state_whatever_was_asked_before():
+    """Several tangents of one step share what the cover adds; that of another state, or made positive, is another one."""
+    body, rng = small_body(), np.random.default_rng(4)
+    surface = HeightField(place(trimesh.creation.icosphere(subdivisions=2, radius=4.0), pose=None))
+    slab, support = body.rest()
+    states = [body.evaluate(moved, support, -1.0, body.slab.project(moved, surface)).slab for moved in
+              (slab + rng.normal(scale=0.02, size=slab.shape) * (body.slab.points[:, 2:] > -1.0) for _ in range(2))]
+    cells = [np.zeros_like(outer) for outer in body.cells.outer]
+    asked = [(0, False), (0, True), (1, True), (1, False), (0, False)]
+    first = {}
+    for which, positive in asked:
+        values = body.slab.rubber_tangent(states[which], cells, positive=positive).data.copy()
+        assert (values == first.setdefault((which, positive), values)).all()
+    assert len({values.tobytes() for values in first.values()}) == 4
+    body.close()
+
+
 def test_a_body_whose_tangent_is_not_positive_definite_is_given_one_that_is():
     """Nodes of the cover displaced at random: its elements are indefinite, and so is the whole."""
     body, rng = small_body(), np.random.default_rng(3)
