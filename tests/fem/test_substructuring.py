@@ -168,7 +168,7 @@ def test_what_a_body_leaves_is_made_positive_with_eigenvalues_of_the_same_size()
 
 def test_what_was_made_positive_is_found_anew_with_the_body():
     body = Condensation(1, 2, 4, [np.arange(6)[None]])
-    for values in ([-3.0, -0.5, 2.0, 10.0], [1.0, 0.5, 2.0, 10.0]):
+    for values in ([-3.0, -0.5, 2.0, 10.0], [1.0, 0.5, 2.0, 10.0], [-2.0, 0.5, 2.0, 10.0]):
         matrix, basis = one_body(values)
         body.set(np.array([0]), [packed(matrix[None, None])])
         np.testing.assert_allclose(body.positive_outer()[0], (basis * np.abs(values)) @ basis.T, atol=1e-4)

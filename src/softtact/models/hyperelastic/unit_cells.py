@@ -19,7 +19,7 @@ from softtact.models.hyperelastic.slab import CellGroup, Slab
 if TYPE_CHECKING:
     from softtact.models.hyperelastic.body import BodyState
 
-_CHUNK = 8                          # cells that one thread condenses at once
+_CHUNK = 8                          # cells that one thread condenses, or makes positive, at once
 _ELEMENTS_KEEP_MM = 0.004           # by which an element's nodes may move against each other before its tangent is found anew
 _REFRESH_SLOPE = 0.2                # a cell keeps no tangent where a contact point's stiffness changed by this share of the penalty
 _REFRESH_WITH_FRICTION = 20.0       # ... or, with friction, by this many N/mm3: with 100 light presses creep and fail
