@@ -58,6 +58,21 @@ def test_forces_that_are_all_different_are_grouped():
     assert np.abs(predict(train) - train.counts).max() < 20     # a group spans 2.5 N
 
 
+def test_the_penalty_of_the_ridge_is_a_thousandth_of_the_mean_sum_of_squares():
+    """Against the normal equations of centred columns, since the constant is free; most taxels have no depth at all."""
+    train = samples(READINGS["quadratic"])
+    maps = np.zeros_like(train.maps_mm)
+    maps[:, 20:36, 8:24] = np.linspace(0, 1, 24, dtype=np.float32)[:, None, None]
+    lone = Samples(maps, 100 * np.float32(taxel_depths(Samples(maps, train.counts, train.labels, "elastic", "train", "x"))),
+                   train.labels, "elastic", "train", "virtual sensor")
+    x, y = (array.reshape(24, 28).astype(float) for array in (taxel_depths(lone), lone.counts))
+    centred = x - x.mean(axis=0)
+    weights = np.linalg.solve(centred.T @ centred + 1e-3 * (x**2).sum() / 28 * np.eye(28), centred.T @ (y - y.mean(axis=0)))
+    expected = (centred @ weights + y.mean(axis=0)).reshape(24, 7, 4)
+    assert np.abs(expected - lone.counts).max() > 1e-3
+    assert make_predictors(lone, spec=CORO, counts_per_relative_change=GAIN)["ridge"](lone) == pytest.approx(expected, abs=1e-6)
+
+
 def test_the_nearest_map_gives_the_mean_reading_of_its_trials():
     train = samples(READINGS["quadratic"])
     twice = Samples(np.repeat(train.maps_mm, 2, axis=0), np.repeat(train.counts, 2, axis=0) + np.resize([-4, 4], 48)[:, None, None],

@@ -275,6 +275,13 @@ def test_the_difference_of_two_laws_is_that_of_their_stresses():
     assert set(outside) == {"uniaxial", "equibiaxial", "planar"} and outside["uniaxial"].max() > 1.4
 
 
+def test_just_outside_the_data_is_a_tenth_of_their_log_range_beyond_both_ends():
+    """Along tension no principal stretch leaves 0.7071 to 2 while the stretch stays there; (2/0.7071)**0.1 = 2**0.15 further."""
+    path = paths_outside((2**-0.5, 2.0))["uniaxial"]
+    low, high = path[path < 1], path[path > 1]
+    assert (low.min(), low.max(), high.min(), high.max()) == pytest.approx((2**-0.65, 2**-0.5, 2.0, 2**1.15))
+
+
 def test_a_law_used_outside_its_card_warns_and_inside_it_does_not(card, recwarn):
     law = law_from_card(card)
     law.nominal_stress("uniaxial", np.array([0.7, 1.5]))

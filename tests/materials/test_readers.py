@@ -91,6 +91,7 @@ def test_an_unreadable_or_implausible_curve_is_refused_by_file_row_value_and_rem
         (HEADER + "1,0\n1.5,350\n", "row 3: the stress 350 MPa is beyond 200 MPa, .* nominal_stress_kpa"),
         (HEADER + "0.7,0.47\n1,0\n", "row 2: the stress 0.47 MPa has the wrong sign .* compression negative"),
         (HEADER + "1,0\n1.2,0.2\n1.1,0.1\n", "row 4: the stretch turns back to 1.1; keep one loading branch"),
+        (HEADER + "1,0\n0.9,-0.1\n1.1,0.1\n1.3,0.2\n", "row 3: the stretch turns back to 0.9; keep one loading branch"),
         ("lambda,nominal_stress_mpa\n1,0\n", "no column holds the stretch among lambda, nominal_stress_mpa; name one"),
         ("stretch,engineering_strain,nominal_stress_mpa\n1,0,0\n", "several columns hold the stretch"),
     ]:

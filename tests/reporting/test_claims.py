@@ -255,6 +255,8 @@ def test_the_papers_numbers_against_each_other_are_consistent_or_contradict_but_
                   "The elastic model's longest time is 64",
                   "The longest elastic time is near", "object 3: NPt", "object 6: NPo"):
         assert verdict(frame, start) == "consistent in print", start
+    maps = frame.loc[[claim.startswith("The data set holds") for claim in frame.index]].iloc[0]
+    assert maps.paper == "53,400" and maps.ours.startswith("53,400 (13,000 + 400 + 2,000 grasps x 20 maps")
     slower = PRINTED_TIMES | {"hyperelastic": (3.5 * 37.4, 48.0, 1863.0, 110.9)}
     assert verdict(table(printed_times=slower), "Hyperelastic maps take 3.5 times longer") == "contradicts itself"
 

@@ -18,6 +18,7 @@ from softtact.skin.choice import front_confidence, printed_criteria, thickness_t
 from softtact.skin.contact import contact_load
 from softtact.skin.design import Choice, Design, LoadChoice
 from softtact.skin.exports import write_exports
+from softtact.skin.finite import press_at_finite_strains
 from softtact.skin.layout import Layout
 from softtact.skin.link import lay_modules
 from softtact.skin.loads import Load
@@ -115,15 +116,17 @@ def _readings(study: Study, skin: Skin, folder: Path) -> Readings:
 def _pressed(study: Study, skin: Skin, choice: LoadChoice, folder: Path) -> Load:
     assert choice.mesh is not None and choice.force_n is not None
     mesh = read_mesh(folder / choice.mesh, unit=choice.unit)
-    return contact_load(
-        skin,
-        mesh,
-        choice.centre(study.layout, study.where),
-        force_n=choice.force_n,
-        elastomer=study.elastomer,
-        turned_deg=choice.turned_deg,
-        name=choice.name,
-    )
+    how: dict[str, Any] = {
+        "force_n": choice.force_n,
+        "elastomer": study.elastomer,
+        "turned_deg": choice.turned_deg,
+        "name": choice.name,
+    }
+    centre = choice.centre(study.layout, study.where)
+    if choice.strains == "small":
+        return contact_load(skin, mesh, centre, **how)
+    announce(f"{study.design.skin}: load {choice.name!r} at finite strains")
+    return press_at_finite_strains(skin, mesh, centre, friction=choice.friction, **how)
 
 
 def _load_table(study: Study, readings: Readings) -> pd.DataFrame:

@@ -62,7 +62,7 @@ class Skin:
         field_layers: int = 3,
         threads: int = 1,
     ) -> None:
-        self.layout, self.thickness_mm, self.permittivity, self._threads = layout, thickness_mm, permittivity, threads
+        self.layout, self.thickness_mm, self.permittivity, self.threads = layout, thickness_mm, permittivity, threads
         self.layer = ElasticLayer(
             LayerMesh(even_plan(layout, spacing_mm=spacing_mm), np.linspace(0.0, thickness_mm, layers + 1)),
             poisson=poisson,
@@ -85,7 +85,7 @@ class Skin:
     def field(self, displacement_mm: np.ndarray | None = None) -> Field:
         """The field after a displacement (node, 3) of the layer's nodes, or at rest."""
         moved = None if displacement_mm is None else self.to_field @ displacement_mm
-        return Field(self.field_mesh, self.layout, permittivity=self.permittivity, displacement_mm=moved, threads=self._threads)
+        return Field(self.field_mesh, self.layout, permittivity=self.permittivity, displacement_mm=moved, threads=self.threads)
 
     @cached_property
     def to_field(self) -> sp.csr_matrix:
@@ -116,12 +116,14 @@ def analyse(skin: Skin, loads: Sequence[Load], *, elastomer: Elastomer, converte
             warnings.simplefilter("always", ExtrapolationWarning)
             young = elastomer.young_mpa(load.pressure_mpa)
         remarks += [str(warning.message) for warning in said]
-        moved = skin.layer.displacement(load, young_mpa=young)
+        moved = load.displacement_mm
+        if moved is None:
+            moved = skin.layer.displacement(load, young_mpa=young)
         rows.append(skin.field(moved).capacitance_ff)
         tops.append(moved[skin.layer.mesh.top])
         moduli.append(young)
         squeezed = -moved[:, 2].min() / skin.thickness_mm
-        if squeezed > _LARGE:
+        if squeezed > _LARGE and load.displacement_mm is None:
             remarks.append(
                 f"{load.words}: the elastomer gives way by {squeezed:.0%} of its thickness, where small strains are coarse; take "
                 "the reading as a trend."

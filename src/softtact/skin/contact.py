@@ -36,9 +36,7 @@ def contact_load(
     The modulus is the secant one at the mean pressure on the nodes that touch, found by repetition.
     Raises InputError where no part of the mesh is above the elastomer.
     """
-    placed = mesh.copy()
-    placed.vertices = Rotation.from_euler("xyz", turned_deg, degrees=True).apply(mesh.vertices)
-    placed.apply_translation([*(np.array(centre_mm) - placed.bounds.mean(axis=0)[:2]), 0.0])
+    placed = placed_over(mesh, centre_mm, turned_deg)
     top = skin.layer.mesh.top
     nodes = skin.layer.mesh.nodes_mm[top, :2]
     height, _ = HeightField(placed)(*nodes.T)
@@ -63,6 +61,14 @@ def contact_load(
         f"load {name!r}: {force_n:g} N presses it deeper than {_DEPTHS[-1]:.0%} of the {skin.thickness_mm:g} mm of elastomer, "
         "where small strains mean nothing; choose a smaller force_n."
     )
+
+
+def placed_over(mesh: trimesh.Trimesh, centre_mm: tuple[float, float], turned_deg: tuple[float, float, float]) -> trimesh.Trimesh:
+    """A copy, turned about fixed x, y, z in degrees, with the middle of its bounding box over a place in mm."""
+    placed = mesh.copy()
+    placed.vertices = Rotation.from_euler("xyz", turned_deg, degrees=True).apply(mesh.vertices)
+    placed.apply_translation([*(np.array(centre_mm) - placed.bounds.mean(axis=0)[:2]), 0.0])
+    return placed
 
 
 def _settled(skin, nodes, gap, force_n, elastomer):

@@ -24,6 +24,8 @@ class Load:
     """Which the elastomer's modulus is taken at."""
     words: str
     """What it is, for people."""
+    displacement_mm: np.ndarray | None = None
+    """(node, 3) of the layer under it, where it was found with the load, at finite strains."""
 
     @property
     def total_n(self) -> float:
