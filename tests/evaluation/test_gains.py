@@ -22,3 +22,6 @@ def test_faint_readings_hide_what_a_higher_gain_shows():
     assert table.percentile_counts.is_monotonic_increasing and table.ssim_gap_elastic.is_monotonic_decreasing
     assert table.mae_share_gap_elastic.to_numpy() == pytest.approx(table.mae_share_gap_elastic[0], rel=0.05)
     assert (table.ssim_mean < table.ssim_gap_elastic).all()
+    alone = gain_table(presses[:1], {"elastic": blurred[:1]}, spec=CORO, settings=settings, seed=0,
+                       ssim={"window": 3, "data_range": 2400.0})  # fmt: skip
+    assert "ssim_mean" not in alone and alone.ssim_gap_elastic.notna().all()     # there are no other presses to take the mean of

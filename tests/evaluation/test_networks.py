@@ -21,7 +21,7 @@ class NamedEcho(Echo):
 
 
 def test_a_row_per_network_and_set_with_scores_weights_and_times():
-    splits = {name: {"elastic": make_samples(split=name, noise=20)} for name in ("unseen", "grasps")}
+    splits = {name: {"elastic": make_samples(split=name, noise=20)} for name in ("unseen", "grasps", "validation")}
     ceiling = pd.concat([score_sensor(split["elastic"], ssim=SSIM) for split in splits.values()])
     timing = pd.DataFrame({"epoch": [1, 2, 3], "wall_time_s": [9.0, 2.0, 4.0]})
     history = pd.DataFrame({"epoch": [1, 2, 3], "train_loss": 90.0, "validation_loss": [9.0, 2.0, 4.0], "learning_rate": 1e-4})
@@ -34,8 +34,10 @@ def test_a_row_per_network_and_set_with_scores_weights_and_times():
     table = compare_networks(networks, scores, ceiling, beside, maps_mm=maps, taxels=28, seed=1)
     assert (table.mean_reading_ssim == 0.25).all() and table.gap_formula_ssim.isna().all() and (table.skill > 0).all()
     assert (table.best_epoch == 2).all() and (table.learning_rate == 1e-4).all()
-    assert table.columns.tolist() == COLUMNS and len(table) == 4
+    assert table.columns.tolist() == COLUMNS and len(table) == 6
     assert (table.weights == 1).all() and (table.epochs == 3).all() and (table.epoch_s == 4.0).all() and (table.map_s > 0).all()
+    unseen = scores[(scores["set"] == "unseen")].groupby("predictor").mae_counts.mean()
+    assert table.groupby("architecture").unseen_loss.first().to_dict() == pytest.approx((28 * unseen).to_dict())
     means = table.groupby("architecture").ssim.mean()
     assert means["compact"] > means["printed"]
     assert ((table.ssim_low <= table.ssim) & (table.ssim <= table.ssim_high)).all()

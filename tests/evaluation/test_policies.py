@@ -50,6 +50,19 @@ def test_the_error_to_expect_is_found_from_indenters_alone():
     assert beside == alone and alone.at_rest == pytest.approx(0.03 / 1.03)
 
 
+def test_the_calibration_goes_by_the_share_of_a_frustums_height():
+    """Twice the height and twice the compression are the same shares; the same compression of twice the height is another."""
+    def calibrated(height_mm, most):
+        presses = []
+        for name, apart, compression in (("ring", 0.03, 0.1 * most), ("star", 0.3, most)):
+            one = press(name, "indenters", apart=apart)
+            squeezed = one["foundation"].assign(frustum_compression_mm=("step", compression * np.array([0.9, 1.0])))
+            presses.append(one | {"foundation": squeezed})
+        return press_table(presses, {"ring": "elastic", "star": "elastic"}, height_mm=height_mm)[1]
+
+    assert calibrated(1.0, 0.8) == calibrated(0.5, 0.4) != calibrated(1.0, 0.4)
+
+
 def test_the_expected_error_sends_a_press_to_the_cheapest_model_that_will_do(table):
     of_cup = table.index[table.item == "cup"][0]
     taken = [choices(table, tolerance)[f"error, {1e3 * tolerance:g} um"][of_cup] for tolerance in (0.5, 0.01, 1e-5)]

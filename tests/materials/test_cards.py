@@ -12,7 +12,7 @@ from softtact.materials.bulk import bulk_modulus
 from softtact.materials.card_making import make_card
 from softtact.materials.cards import law_from_card, linear_from_card, load_card
 from softtact.materials.consistency import disagreements
-from softtact.materials.curves import VolumetricCurve, synthetic_curve
+from softtact.materials.curves import Curve, VolumetricCurve, synthetic_curve
 from softtact.materials.laws.registry import make_law
 from softtact.materials.linear import LinearConstants, young_modulus
 from softtact.materials.readers import read_curve, read_curves
@@ -273,6 +273,22 @@ def test_the_difference_of_two_laws_is_that_of_their_stresses():
     outside = paths_outside((0.7, 1.4))
     assert difference(one, other, inside)[0] == pytest.approx(2 / 3) == difference(one, other, outside)[0]
     assert set(outside) == {"uniaxial", "equibiaxial", "planar"} and outside["uniaxial"].max() > 1.4
+
+
+def test_youngs_modulus_has_the_error_that_what_is_left_of_the_points_gives():
+    """Noise d (1, -2, 2, -1) at strains -0.1, -0.05, 0.05, 0.1 is normal to e and e^2: E = 0.5 MPa whatever d is.
+
+    Its root mean square is d (10/4)^(1/2); the variance is 10 d^2/(4 - 2) and e'e = 0.025, so E's error is d (5/0.025)^(1/2).
+    """
+    strain, d = np.array([-0.1, -0.05, 0.05, 0.1]), 1e-3
+    stress = 0.5 * strain - 0.3 * strain**2 + d * np.array([1.0, -2.0, 2.0, -1.0])
+    found = young_modulus([Curve("uniaxial", 1 + strain, stress, "measured", "by hand")], small_strain=0.1001)
+    assert found == pytest.approx((0.5, d * np.sqrt(5 / 0.025), d * np.sqrt(10 / 4)))
+
+
+def test_two_tests_are_enough_to_leave_one_out(curves_of):
+    card = make_card(curves_of("neo_hooke", {"c10": 0.2}, modes={"uniaxial": (0.7, 1.5), "planar": (0.8, 1.5)}), laws=["neo_hooke"])
+    assert set(card["laws"]["neo_hooke"]["left_out"]) == {"uniaxial", "planar"}
 
 
 def test_just_outside_the_data_is_a_tenth_of_their_log_range_beyond_both_ends():

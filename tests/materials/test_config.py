@@ -7,6 +7,7 @@ from table1 import TABLE_1
 from softtact.errors import InputError
 from softtact.materials.config import law_from_printed, load_material
 from softtact.materials.consistency import printed_warnings
+from softtact.materials.making import curves_of
 
 
 def test_the_printed_laws_have_the_papers_constants(material_yaml):
@@ -67,6 +68,19 @@ def test_a_users_own_files_are_found_beside_the_yaml(tmp_path):
     assert config.modes == ["uniaxial"]
 
 
+def test_a_users_rows_in_disorder_are_refused_unless_the_yaml_says_sort(tmp_path):
+    (tmp_path / "a.csv").write_text("stretch,nominal_stress_mpa\n1.0,0\n0.8,-0.3\n1.2,0.2\n")
+
+    def stretches(**options):
+        curves = {"kind": "measured", "files": [{"file": "a.csv", "mode": "uniaxial"} | options]}
+        (tmp_path / "mine.yaml").write_text(yaml.safe_dump({"material": "mine", "curves": curves}))
+        return curves_of(load_material(tmp_path / "mine.yaml").curve_settings)[0].stretch.tolist()
+
+    with pytest.raises(InputError, match="turns back to 0.8"):
+        stretches()
+    assert stretches(sort=True) == [0.8, 1.0, 1.2]
+
+
 def test_a_wrong_key_or_value_is_refused_in_one_sentence(tmp_path, material_yaml):
     for path, value, sentence in [
         (["curves", "nois"], 0.1, "the key curves.nois is unknown"),
@@ -79,6 +93,8 @@ def test_a_wrong_key_or_value_is_refused_in_one_sentence(tmp_path, material_yaml
             r"curves.modes.uniaxial is \[1.6, 0.6\]; a window is \[from, to\]",
         ),
         (["fit", "laws"], ["gents"], "Law 'gents' is unknown"),
+        (["fit", "laws"], ["blatz_ko"], "Law 'blatz_ko' is one of compressible foams, and a fit takes"),
+        (["fit", "choose"], "blatz_ko", "Law 'blatz_ko' is one of compressible foams, and a fit takes"),
         (["fit", "poisson"], 0.6, "fit.poisson is 0.6; input should be less than 0.5"),
         (
             ["printed", "mooney_rivlin"],

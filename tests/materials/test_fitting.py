@@ -8,7 +8,7 @@ from table1 import TABLE_1
 
 from softtact.errors import InputError
 from softtact.materials.curves import synthetic_curve
-from softtact.materials.fitting import collect, errors_of, fit_family, fit_law, rms
+from softtact.materials.fitting import _unseen, collect, errors_of, fit_family, fit_law, rms
 from softtact.materials.laws.registry import LAWS, make_law
 from softtact.materials.readers import read_curves
 
@@ -83,6 +83,14 @@ def test_constants_that_the_curves_cannot_tell_apart_have_no_covariance(curves_o
     fit = fit_law("mooney_rivlin", curves_of("mooney_rivlin", TRUTH["mooney_rivlin"], noise=0.01, modes={"planar": (0.7, 1.6)}))
     assert fit.covariance is None
     assert fit.not_identifiable == ["c10", "c01"]
+
+
+def test_a_constant_of_small_effect_is_not_taken_for_an_unseen_one():
+    """Columns of sizes 1 and 1e-6 that do not depend on each other, and two that do beside one that does not."""
+    points = np.array([1.0, 2.0, 3.0, 4.0])
+    assert _unseen(np.column_stack([points, 1e-6 * points**2])).tolist() == [False, False]
+    assert _unseen(np.column_stack([points, 1e-6 * points, points**2])).tolist() == [True, True, False]
+    assert _unseen(np.column_stack([points, 0 * points])).tolist() == [False, True]
 
 
 def test_constants_that_the_curves_do_not_hold_are_named(curves_of):

@@ -60,6 +60,9 @@ def test_stress_without_strain_is_told(offset, end):
 
 def test_a_preload_is_told_where_no_row_is_without_strain():
     assert "MPa at no strain" in told(STRAIN[1:], rubber(1 + STRAIN[1:]) + 0.08)
+    compression = np.linspace(0, -0.5, 61)[1:]
+    assert "MPa at no strain" in told(compression, rubber(1 + compression) - 0.08)
+    assert "MPa at no strain" not in told(compression, rubber(1 + compression) + 0.08)  # slack, if anything
 
 
 @pytest.mark.parametrize("slack", [0.05, 0.15, 0.4])

@@ -87,6 +87,7 @@ def test_an_unreadable_or_implausible_curve_is_refused_by_file_row_value_and_rem
             "row 2: '1,0' is not a number; write it with a decimal point",
         ),
         (HEADER + "0,0\n0.1,0.1\n", "row 2: the stretch 0 is not positive; .* name it engineering_strain"),
+        (HEADER + "0,1\n-0.3,1.2\n", "row 2: the stretch 0 is not positive; .* engineering_strain_percent.$"),  # nor swapped
         (HEADER + "1,0\n50,0.1\n", "row 3: the stretch 50 is above 25, .* name it engineering_strain_percent"),
         (HEADER + "1,0\n1.5,350\n", "row 3: the stress 350 MPa is beyond 200 MPa, .* nominal_stress_kpa"),
         (HEADER + "0.7,0.47\n1,0\n", "row 2: the stress 0.47 MPa has the wrong sign .* compression negative"),

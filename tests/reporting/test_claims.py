@@ -165,6 +165,8 @@ def test_the_hybrid_is_judged_on_accuracy_and_time_together():
     ssim.loc[(ssim.model == "elastic") & (ssim["item"] == "object_5"), "ssim"] = 0.3        # loses what the rule sends elsewhere
     both = pd.concat([times(1.0, 9.0).assign(item=item) for item in items])
     assert verdict(table(ssim=ssim, complexity=chosen, timing=both), name) == "reproduced"
+    for missing in ({"timing": TIMING.iloc[:0]}, {"ssim": ssim[ssim.model == "elastic"]}):
+        assert verdict(table(**({"ssim": ssim, "complexity": chosen, "timing": both} | missing)), name) == "undecided"
     slow = pd.concat([times(99.0, 9.0).assign(item=item) for item in items])
     assert verdict(table(ssim=ssim, complexity=chosen, timing=slow), name) == "not reproduced"
     wrong = chosen.assign(model=["hyperelastic", "elastic", "elastic"])
