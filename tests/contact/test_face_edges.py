@@ -28,6 +28,16 @@ def test_the_first_column_that_an_edge_comes_to_is_the_hardest_for_it_follows_cl
     assert 0 < first < middle < last
 
 
+def test_an_edge_along_one_side_softens_all_points_of_a_column_by_that_columns_compliance():
+    assert np.allclose(of_columns(1, 1, 0.5)[2], 0.4 * 0.5) and np.allclose(of_columns(1, 0.5, 0)[1], 0.3 * 0.5)
+
+
+def test_faces_do_not_notice_each_other():
+    shares = [np.repeat([1, 0.5, 0], 3), np.tile([1, 0.5, 0], 3), np.ones(9)]
+    alone = [contact_compliance(share, WIDTH) for share in shares]
+    assert np.allclose(contact_compliance(np.concatenate(shares), np.ones(3)), np.concatenate(alone))
+
+
 def test_a_mirrored_edge_is_felt_alike():
     assert np.allclose(of_columns(0, 0.3, 1), of_columns(1, 0.3, 0)[::-1])
 

@@ -35,6 +35,11 @@ def test_an_object_that_is_not_over_the_shell_never_rests(parts):
     assert np.isinf(shell().stop_mm(surface_of(*parts)))
 
 
+@pytest.mark.parametrize("at", [(6, 0), (-6, 0), (0, 4), (0, -4), (4, 4), (-4, 4), (4, -4), (-4, -4), (6, 4), (-6, -4)])
+def test_each_side_of_the_shell_holds_along_its_whole_length(at):
+    assert shell().stop_mm(surface_of(block(1.0, 1.0, at=at, lowest=0.2))) == pytest.approx(0.7)
+
+
 def test_without_a_shell_nothing_rests():
     assert np.isinf(shell(below_mm=np.inf).stop_mm(surface_of(block(14.0, 4.0))))
 

@@ -139,7 +139,7 @@ def test_a_pitted_plate_has_its_pits(pits):
 
 
 def probe_tables(*, soft=55.0, hard=79.0, low=50.0, high=52.0, bends=1.5):
-    """Two tissues: slopes of the trend line, F/d from `low` to `high` of both, the softer bends `bends` times as far at 1, 2, 5 N."""
+    """Two tissues: slopes of the trend line, F/d from `low` to `high`; the softer bends `bends` times as far at 1, 2 and 5 N."""
     slopes = pd.DataFrame([{"tissue": tissue, "scenario": "displacement", "line_n_mm": line, "secant_least_n_mm": low,
                             "secant_largest_n_mm": high, "initial_n_mm": low - 1}
                            for tissue, line in (("ecoflex_00_30", soft), ("dragon_skin_20", hard))])  # fmt: skip

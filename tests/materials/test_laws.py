@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from law_constants import C_PER_E, COLUMN, PARAMETERS, ROW
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from softtact.errors import InputError
@@ -153,6 +154,19 @@ def test_mooney_rivlin_follows_its_textbook_curves():
         }
         law = make_law("mooney_rivlin", {"c10": c10, "c01": c01})
         assert np.allclose(law.nominal_stress(mode, L), textbook[mode], rtol=1e-12, atol=1e-15), mode
+
+
+def test_arruda_boyce_is_eight_chains_of_langevins_function():
+    """P = mu/3 lambda_m/c L^-1(c/lambda_m) (l - l^-2), c^2 = I1/3, Arruda and Boyce 1993: what the series of five terms leaves out.
+
+    Its relative size is near (c/lambda_m)^10: 1e-6 at lambda_m = 5 and l = 1.6.
+    """
+    law = make_law("arruda_boyce", {"mu": 0.3, "lambda_m": 5.0})
+    for stretch in (0.6, 1.3, 1.6):
+        chain = np.sqrt((stretch**2 + 2 / stretch) / 3)
+        inverse = brentq(lambda beta: 1 / np.tanh(beta) - 1 / beta - chain / 5, 1e-3, 50, xtol=1e-14)  # noqa: B023
+        expected = 0.3 / 3 * 5 / chain * inverse * (stretch - stretch**-2)
+        assert law.nominal_stress("uniaxial", stretch) == pytest.approx(expected, rel=2e-6), stretch
 
 
 def test_compressible_uniaxial_stress_agrees_with_calculix():

@@ -7,6 +7,7 @@ from softtact.errors import InputError
 from softtact.materials.checks import refuse_mixed_units
 from softtact.materials.curves import Curve, VolumetricCurve, join_by_mode, write_curve
 from softtact.materials.readers import read_curve, read_curves
+from softtact.materials.windows import refuse_idle
 
 PLAIN = "stretch,nominal_stress_mpa\n0.8,-0.3\n1.0,0.0\n1.2,0.2\n"
 
@@ -106,6 +107,34 @@ def test_an_unreadable_or_implausible_curve_is_refused_by_file_row_value_and_rem
 def test_a_missing_file_is_refused(tmp_path):
     with pytest.raises(InputError, match="uniaxial.csv: there is no such file"):
         read_curve(tmp_path / "uniaxial.csv")
+
+
+def test_a_mode_for_all_files_that_changes_nothing_is_refused_and_one_that_does_is_not(write_file, published):
+    path = write_file(PLAIN, "planar.csv")
+    assert read_curves([path], mode="uniaxial")[0].mode == "uniaxial"
+    with pytest.raises(InputError, match="the mode uniaxial for all files has no effect, for each states its own"):
+        read_curves([f"equibiaxial={path}"], mode="uniaxial")
+    with pytest.raises(InputError, match="has no effect"):
+        read_curves(published / "literature" / "Treloar_1944", layout="literature", mode="uniaxial")
+
+
+def test_a_mapped_header_that_no_file_has_is_refused(write_file):
+    columns = {"engineering_strain": "Dehnung"}
+    with pytest.raises(InputError, match="`columns` maps engineering_strain to 'Dehnung', which no file has in its header"):
+        read_curves([write_file(PLAIN, "planar.csv")], columns=columns)
+
+
+def test_a_window_or_a_weight_that_changes_nothing_is_refused():
+    for window, weights, modes, sentence in (
+        ({"planr": (1, 2)}, {}, ["planar"], "The window of 'planr': .*planar"),
+        ({}, {"planar": 2.0}, ["uniaxial", "equibiaxial"], "The weight of planar has no effect, for there is no planar curve"),
+        ({}, {"uniaxial": 2.0}, ["uniaxial"], "The weight of the only mode has no effect"),
+        ({}, {"uniaxial": 2.0}, ["uniaxial", "volumetric"], "The weight of the only mode has no effect"),
+        ({}, {"volumetric": 2.0}, ["uniaxial", "planar", "volumetric"], "for K is fitted to that curve alone"),
+    ):
+        with pytest.raises(InputError, match=sentence):
+            refuse_idle(window, weights, modes=modes)
+    refuse_idle({"uniaxial": (0.5, 2)}, {"uniaxial": 2.0}, modes=["uniaxial", "planar"])
 
 
 def test_a_file_without_a_mode_is_refused(write_file):

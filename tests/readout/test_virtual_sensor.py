@@ -175,6 +175,13 @@ def test_one_effect_switched_off_leaves_the_other_draws_as_they_were():
     assert (with_sheet.gain == without.gain).all() and (with_sheet.offset_counts == without.offset_counts).all()
 
 
+def test_sheets_scatter_about_their_thickness_as_stated():
+    """40 specimens of 28 taxels: the mean of 1,120 draws is good to 0.03 standard deviations, the deviation to 2 %."""
+    made = [make_specimen(CORO, seed=seed, settings=VirtualSensorSettings(sheet_scatter=0.02)) for seed in range(40)]
+    share = np.array([one.sheet_excess_mm for one in made]) / CORO.dielectric.sheet_thickness_mm / 0.02
+    assert abs(share.mean()) < 0.12 and share.std() == pytest.approx(1.0, abs=0.1)
+
+
 def test_by_default_readings_are_whole_counts_in_the_range_and_near_the_ideal_ones():
     readings, ideal = default(), ideal_counts(CORO, PRESS)
     assert (readings == np.round(readings)).all() and readings.min() >= 0 and readings.max() <= 2400
