@@ -11,15 +11,15 @@ if TYPE_CHECKING:
     from softtact.geometry.pose import Pose
     from softtact.press.result import PressResult, read_press
     from softtact.press.sensor import Sensor, load_sensor
-    from softtact.press.solid import SoftObject
+    from softtact.press.soft_object import SoftObject
     from softtact.press.solid_sensor import SolidSensor, load_solid_sensor
 
 __version__ = "0.1.0"
 __all__ = ["ConvergenceError", "InputError", "Motion", "Pose", "PressResult", "Sensor", "SoftObject", "SolidSensor",
            "__version__", "load_sensor", "load_solid_sensor", "mesh_body", "read_mesh", "read_press"]
 _MODULES = {"ConvergenceError": "errors", "InputError": "errors", "Motion": "contact.motion", "Pose": "geometry.pose",
-            "PressResult": "press.result", "Sensor": "press.sensor", "SoftObject": "press.solid", "load_sensor": "press.sensor",
-            "SolidSensor": "press.solid_sensor", "load_solid_sensor": "press.solid_sensor",
+            "PressResult": "press.result", "Sensor": "press.sensor", "load_sensor": "press.sensor",
+            "SoftObject": "press.soft_object", "SolidSensor": "press.solid_sensor", "load_solid_sensor": "press.solid_sensor",
             "mesh_body": "fem.body_mesh",
             "read_mesh": "geometry.meshes", "read_press": "press.result"}
 

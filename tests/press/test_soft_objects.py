@@ -8,7 +8,8 @@ from softtact.contact.motion import Motion
 from softtact.errors import InputError
 from softtact.fem.structured_meshes import box, cylinder
 from softtact.materials.laws.registry import make_law
-from softtact.press.solid import SoftObject, SolidPad
+from softtact.press.soft_object import SoftObject
+from softtact.press.solid_pad import SolidPad
 
 SOFT = make_law("neo_hooke", {"c10": 0.035}, bulk_over_shear=20)
 STIFF = make_law("neo_hooke", {"c10": 200.0}, bulk_over_shear=5)

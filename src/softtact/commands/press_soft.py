@@ -9,7 +9,7 @@ from softtact.errors import InputError
 if TYPE_CHECKING:
     import trimesh
 
-    from softtact.press.solid import SoftObject
+    from softtact.press.soft_object import SoftObject
 
 _HELD = 0.3     # default share of the height
 
@@ -56,7 +56,7 @@ def soft_object(options: argparse.Namespace, mesh: "trimesh.Trimesh") -> "SoftOb
     """The `SoftObject` of a mesh (mm) with the law, size and held share of the command line."""
     from softtact.fem.body_mesh import mesh_body
     from softtact.materials.cards import law_from_card, load_card
-    from softtact.press.solid import SoftObject
+    from softtact.press.soft_object import SoftObject
 
     body = mesh_body(mesh, size_mm=options.object_size)
     return SoftObject(body, law_from_card(load_card(options.object_law)), held_share=options.object_held)

@@ -35,7 +35,8 @@ from softtact.press.many import press_many, raise_first
 from softtact.press.models import MOTIONS, PRESSES
 from softtact.press.placed_object import placed_object
 from softtact.press.result import PressResult
-from softtact.press.solid import SoftObject, press_soft
+from softtact.press.soft_object import SoftObject
+from softtact.press.solid import press_soft
 from softtact.press.validity import flag_buried, flag_overloaded
 from softtact.sensors.library import material_file, sensor_file
 from softtact.sensors.specification import AnySpec, read_spec

@@ -28,7 +28,8 @@ from softtact.models.solid.body import SolidBody
 from softtact.models.solid.readings import ReadingPoints
 from softtact.models.solid.result import SolidResult, gathered
 from softtact.press.asked import check_loads, cores, mesh_of, motion_of
-from softtact.press.solid import OBJECT, SoftObject, pressed_solid
+from softtact.press.soft_object import OBJECT, SoftObject
+from softtact.press.solid import pressed_solid
 from softtact.press.touching import first_direction, way_to_touch
 from softtact.sensors.library import sensor_file
 from softtact.sensors.solid import SolidSpec
