@@ -85,3 +85,17 @@ def test_the_pad_carries_nothing_where_the_object_rests_before_it_touches():
 def test_a_motion_that_goes_below_the_shell_is_refused_with_both_depths():
     with pytest.raises(ConvergenceError, match=r"Step 2 .* 0\.6 mm deep, but rests on the shell beside the pad after 0\.5 mm"):
         shell().refuse_motion(surface_of(block(14.0, 4.0)), np.zeros(2), 0.6, 0.0, step=2)
+
+
+def test_the_top_of_a_shell_is_a_ring_around_the_pad_that_looks_up():
+    """14 x 10 mm less 10.002 x 6.002: the shell of 2 mm begins a micrometre beside the pad."""
+    triangles = shell().top_mm(3.0)
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    assert (normals[:, 2] > 0).all() and np.abs(normals[:, :2]).max() == 0 and (triangles[..., 2] == 2.5).all()
+    assert 0.5 * normals[:, 2].sum() == pytest.approx(14.002 * 10.002 - 10.002 * 6.002)
+
+
+def test_points_over_a_shell_are_beside_the_pad_and_within_its_width():
+    points = np.array([[0, 0, 9], [5.0, 0, 0], [5.1, 0, 0], [0, -3.1, 0], [7.1, 0, 0], [6, 4, 0], [6, 5.2, 0]])
+    assert shell().beneath(points).tolist() == [False, False, True, True, False, True, False]
+    assert not shell(below_mm=np.inf).beneath(points).any()

@@ -1,15 +1,21 @@
 """A soft object on a sensor: sensor and object as solids that meet; a stiff one agrees with the rigid models."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import trimesh
 
 import softtact
 from softtact.contact.motion import Motion
-from softtact.errors import InputError
+from softtact.contact.shell import Shell
+from softtact.errors import InputError, ShellWarning
 from softtact.fem.structured_meshes import box, cylinder
 from softtact.materials.laws.registry import make_law
 from softtact.press.soft_object import SoftObject
 from softtact.press.solid_pad import SolidPad
+from softtact.press.vtu import LAYERS, of_bodies, read_vtu
+from softtact.sensors.edge import Edge
 
 SOFT = make_law("neo_hooke", {"c10": 0.035}, bulk_over_shear=20)
 STIFF = make_law("neo_hooke", {"c10": 200.0}, bulk_over_shear=5)
@@ -25,13 +31,12 @@ def presses():
     """The plug on `pad4x4`, pressed by 0.15 mm: stiff and soft."""
     sensor = softtact.load_sensor("pad4x4")
     motion = Motion().press(depth_mm=0.15)
-    return {name: sensor.press(plug(law), motion=motion, label="") for name, law in (("stiff", STIFF), ("soft", SOFT))}
+    return {name: sensor.press(plug(law), motion=motion, label="", keep_body=True)
+            for name, law in (("stiff", STIFF), ("soft", SOFT))}  # fmt: skip
 
 
 @pytest.mark.slow
 def test_a_stiff_object_is_felt_as_the_hyperelastic_model_feels_a_rigid_one(presses):
-    import trimesh
-
     rigid = trimesh.creation.cylinder(radius=3.0, height=3.0, sections=96)
     expected = softtact.load_sensor("pad4x4").press(rigid, motion=Motion().press(depth_mm=0.15), model="hyperelastic", label="")
     found = presses["stiff"]
@@ -58,6 +63,46 @@ def test_the_force_on_the_pad_is_that_of_the_holder_and_a_result_is_read_back(pr
     assert np.abs(soft.force_n[0, :2]).max() < 2e-3 * soft.normal_force_n[0]
     soft.write(tmp_path / "press.nc")
     np.testing.assert_array_equal(softtact.read_press(tmp_path / "press.nc").deformation_map_mm, soft.deformation_map_mm)
+
+
+@pytest.mark.slow
+def test_layers_and_object_are_written_whole_with_the_pressure_of_the_force(presses, tmp_path):
+    """The pad has 10 x 16 x 1.8 mm3, the plug 27 pi, of elements whose sides are curves; the pressure sums to the force."""
+    soft = presses["soft"]
+    soft.write_vtu(tmp_path / "press.vtu")
+    mesh = read_vtu(tmp_path / "press.vtu")
+    assert {layer for _, _, layer in mesh.cells} == {LAYERS[name] for name in ("sheet", "cover", "pressed face", "object")}
+    bodies = of_bodies(soft.bodies, soft.normal_force_n)
+    top = next(nodes for _, nodes, layer in bodies.cells if layer == LAYERS["pressed face"])
+    area = np.ptp(bodies.points[top], axis=1)[:, :2].prod(axis=1)
+    assert area.sum() == pytest.approx(160.0) and bodies.points[top, 2] == pytest.approx(0.0, abs=1e-9)
+    assert bodies.pressure_mpa[0] @ area == pytest.approx(soft.normal_force_n[0], rel=0.01)  # bent faces turn it
+    for of_object, low, high in ((False, -1.8, 0.0), (True, 0.0, 3.0)):
+        points, triangles, _ = mesh.surface(of_object=of_object)
+        outside = trimesh.Trimesh(points, triangles, process=True)
+        assert outside.is_watertight and (points[:, 2].min(), points[:, 2].max()) == pytest.approx((low, high), abs=1e-6)
+
+
+@pytest.mark.slow
+def test_a_plate_wider_than_the_pad_comes_to_rest_on_the_shell_and_the_pad_feels_no_more():
+    """A stiff bar over a pad that stands 0.05 mm out of its shell: what is added from there on, the shell carries.
+
+    Where there is no shell, the same bar presses the pad harder; a soft one bends down to the shell beside the pad.
+    """
+    sensor = softtact.load_sensor("pad4x4")
+    low = replace(sensor, spec=sensor.spec.model_copy(update={"edge": Edge(held={"sides_below_mm": 0.05})}), prepared_models={})
+
+    def bar(law):
+        return SoftObject(box((-6.5, -2, 0), (6.5, 2, 2), (13, 4, 1)), law, held_share=0.5)
+
+    motion = Motion().press(depth_mm=0.03).press(depth_mm=0.05).press(depth_mm=0.08)
+    with pytest.warns(ShellWarning, match="rests on the shell"):
+        rests = low.press(bar(STIFF), motion=motion, label="")
+    free = sensor.press(bar(STIFF), motion=motion, label="")
+    assert rests.shell_force_n[0] == pytest.approx(0.0, abs=1e-6) and rests.shell_force_n[2] > 0.5 * rests.normal_force_n[2]
+    assert rests.pad_force_n[2] == pytest.approx(rests.pad_force_n[1], rel=0.05)
+    assert free.pad_force_n[2] > 1.3 * rests.pad_force_n[2] and (free.shell_force_n == 0).all()
+    assert (rests.pad_force_n + rests.shell_force_n) == pytest.approx(rests.normal_force_n)
 
 
 def test_frusta_stand_below_the_sheet_one_to_an_element_with_weights_that_make_a_mean():
@@ -89,11 +134,21 @@ def test_frusta_stand_below_the_sheet_one_to_an_element_with_weights_that_make_a
 
 @pytest.mark.parametrize("height", [-3.0, 0.0, 40.0])
 def test_the_height_of_a_pose_does_not_count_and_a_tilted_object_touches_where_it_is_over_the_pad(height):
-    long = SoftObject(box((-15, -1, 0), (15, 1, 3), (10, 1, 2)), SOFT)
-    placed = long.placed(softtact.Pose.from_values([0.0, 0.0, height, 0.0, 5.0, 0.0]), 2.0, (10.0, 16.0))
+    long, shell = SoftObject(box((-15, -1, 0), (15, 1, 3), (10, 1, 2)), SOFT), Shell((10.0, 16.0), np.inf, 2.0)
+    placed = long.placed(softtact.Pose.from_values([0.0, 0.0, height, 0.0, 5.0, 0.0]), 2.0, shell)
     over = np.abs(placed.points[:, 0]) <= 5.0
     assert placed.points[over, 2].min() == pytest.approx(2.0)
     assert placed.points[:, 2].min() < 1.5, "its end hangs beside the pad"
+
+
+def test_a_tilted_object_touches_the_shell_first_where_that_stands_high():
+    """At 5 degrees a bar is tan 5 x 2 mm = 0.17 mm lower over the shell's outer side, x = 7 mm, than over the pad's, x = 5 mm."""
+    long = SoftObject(box((-15, -1, 0), (15, 1, 3), (30, 1, 2)), SOFT)
+    pose = softtact.Pose.from_values([0.0, 0.0, 0.0, 0.0, 5.0, 0.0])
+    for below, lowest_over_pad in ((0.05, 2.0 - 0.05 + 2 * np.tan(np.radians(5))), (0.5, 2.0)):
+        placed = long.placed(pose, 2.0, Shell((10.0, 16.0), below, 2.0))
+        over = np.abs(placed.points[:, 0]) <= 5.0
+        assert placed.points[over, 2].min() == pytest.approx(lowest_over_pad, abs=0.05)  # nodes are 0.5 mm apart
 
 
 def test_what_cannot_be_is_refused_in_one_sentence():

@@ -49,7 +49,7 @@ def arguments(options: argparse.Namespace, mesh: "trimesh.Trimesh", *, keep_body
     """What `Sensor.press` presses, and the arguments that only a rigid or only a soft object has."""
     if options.object_law is None:
         return mesh, {"keep_body": keep_body, "keep_object": True}
-    return soft_object(options, mesh), {}
+    return soft_object(options, mesh), {"keep_body": keep_body}
 
 
 def soft_object(options: argparse.Namespace, mesh: "trimesh.Trimesh") -> "SoftObject":

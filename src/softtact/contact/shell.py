@@ -45,6 +45,25 @@ class Shell:
         lowest = min(surface.lowest_over(low - way, high - way) for low, high in boxes)
         return lowest + self.below_mm if lowest < NO_CONTACT_MM else np.inf
 
+    @property
+    def exists(self) -> bool:
+        """Whether there is one."""
+        return bool(np.isfinite(self.below_mm))
+
+    def top_mm(self, height_mm: float = 0.0) -> np.ndarray:
+        """Its top as triangles (8, 3, 3), counter-clockwise from above, where the pad's free surface is at `height_mm`."""
+        signs = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+        inner, z = 0.5 * np.asarray(self.footprint_mm) + _BESIDE_MM, np.full(4, height_mm - self.below_mm)
+        low, high = (np.column_stack([signs * side, z]) for side in (inner, inner + self.width_mm))
+        low_next, high_next = np.roll(low, -1, axis=0), np.roll(high, -1, axis=0)
+        return np.concatenate([np.stack([high, high_next, low_next], axis=1), np.stack([high, low_next, low], axis=1)])
+
+    def beneath(self, points_mm: np.ndarray) -> np.ndarray:
+        """Which of points (n, 2 or more) lie over it, by x and y (n,)."""
+        inner = 0.5 * np.asarray(self.footprint_mm) + _BESIDE_MM
+        x = np.abs(points_mm[:, :2])
+        return self.exists & (x > inner).any(axis=1) & (x <= inner + self.width_mm).all(axis=1)
+
     def refuse_motion(self, surface: HeightField, offset_mm: np.ndarray, indentation_mm: float, touch_mm: float, *,
                       step: int) -> None:
         """Raise ConvergenceError where an object is lower than the shell lets it, after a motion's step of that number.

@@ -111,8 +111,8 @@ class PressResult:
     def pressed_body(self, load_step: int = -1) -> "PressedBody":
         """The `PressedBody` at the load step of number `load_step`, by default the last one: nodes, cells and displacements."""
         if not self.bodies:
-            raise InputError(f"This result of the {self.model} model keeps no body; press with model='hyperelastic' and "
-                             "keep_body=True.")
+            raise InputError(f"This result of the {self.model} model keeps no body; press with model='hyperelastic', or a "
+                             "soft object, and keep_body=True.")
         return self.bodies[load_step]
 
     def plot(self, path: str | Path | None = None, *, full_scale: bool = False) -> "Figure":

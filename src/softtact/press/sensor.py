@@ -108,7 +108,7 @@ class Sensor:
         within `tolerance_mm` of the hyperelastic one; see `choice`) or `paper` (complexity of the contact).
         threads: by default one for each core.
         keep_body: let the result hold the deformed body at each force (`PressResult.pressed_body`), some 20 MB each; of the
-        hyperelastic model, for the others have displacements of the map's plane alone.
+        hyperelastic model and of a soft object's press, for the others have displacements of the map's plane alone.
         keep_object: let the result hold the object where it stands at each step (`PressResult.placed_object`).
         time_limit_s: seconds after which the press ends in a TimeLimitError;  on_step: called with the result so far at each
         load step that is reached but the last.
@@ -145,8 +145,6 @@ class Sensor:
         if model not in ("auto", "solid"):
             raise InputError(f"model={model!r}: a soft object is pressed by the solid model alone; use model='solid', or give a "
                              "rigid mesh.")
-        if course.keep_body:
-            raise InputError("keep_body is of the layered models; leave it out for a soft object.")
         check_loads(motion, self.spec.force_range_n, self.spec.name)
         return press_soft(self, soft, None if pose is None else Pose.of(pose), motion, course)
 

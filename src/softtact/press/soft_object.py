@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from softtact.contact.shell import Shell
 from softtact.errors import InputError
 from softtact.fem.solid_mesh import SolidMesh
 from softtact.geometry.pose import Pose
@@ -38,18 +39,21 @@ class SoftObject:
         if len(self.mesh.regions) != 1:
             raise InputError(f"SoftObject: its mesh has the regions {', '.join(self.mesh.regions)}; give a mesh of one region.")
 
-    def placed(self, pose: Pose | None, height_mm: float, footprint_mm: tuple[float, float]) -> SolidMesh:
-        """The body in the frame of the solid sensor, whose surface is at `height_mm`, where it just touches over the footprint.
+    def placed(self, pose: Pose | None, height_mm: float, shell: Shell) -> SolidMesh:
+        """The body in the frame of the solid sensor, whose surface is at `height_mm`, where it just touches pad or shell.
 
-        pose: by default centred; its height does not count. Raises InputError where no node is over the footprint (x, y in mm).
+        pose: by default centred; its height does not count. Raises InputError where no node is over the pad.
         """
         points = self.mesh.points
         middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
         points = points - [middle[0], middle[1], 0.0] if pose is None else pose.apply(points)
-        over = (np.abs(points[:, :2]) <= 0.5 * np.asarray(footprint_mm)).all(axis=1)
+        over = (np.abs(points[:, :2]) <= 0.5 * np.asarray(shell.footprint_mm)).all(axis=1)
         if not over.any():
-            raise InputError(_missing(points, footprint_mm))
-        return self.with_faces(points + [0.0, 0.0, height_mm - points[over, 2].min()], np.array([0.0, 0.0, -1.0]))
+            raise InputError(_missing(points, shell.footprint_mm))
+        lift = height_mm - points[over, 2].min()
+        if (beside := shell.beneath(points)).any():
+            lift = max(lift, height_mm - shell.below_mm - points[beside, 2].min())
+        return self.with_faces(points + [0.0, 0.0, lift], np.array([0.0, 0.0, -1.0]))
 
     def with_faces(self, points: np.ndarray, direction: np.ndarray) -> SolidMesh:
         """The body with its nodes at points (n, 3), and faces `held`, its rear as seen along a unit vector (3,), and `pressed`."""

@@ -33,13 +33,13 @@ def press_soft(sensor: "Sensor", soft: SoftObject, pose: Pose | None, motion: Mo
     Raises InputError where the object misses the sensor, ConvergenceError with the steps before as its `result`.
     """
     pad = SolidPad(sensor)
-    placed = soft.placed(pose, pad.height_mm, sensor.spec.footprint_mm)
+    placed = soft.placed(pose, pad.height_mm, pad.shell)
     body = pad.with_object(placed, soft, threads=course.threads)
     return pressed_solid(
         body,
         OBJECT,
         motion,
-        partial(pad.result, body),
+        partial(pad.result, body, keep_body=course.keep_body),
         label=course.label,
         time_limit_s=course.time_limit_s,
         on_step=course.on_step,

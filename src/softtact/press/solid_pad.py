@@ -1,5 +1,6 @@
 """A sensor's layers as a solid of finite strain, its frusta as springs, and what a press of it by a soft object gives."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,10 +10,11 @@ from softtact.contact.surfaces import Surface
 from softtact.fem.elements import QUAD9
 from softtact.fem.solid_mesh import SolidMesh
 from softtact.fem.structured_meshes import box
+from softtact.models.hyperelastic.deformed_mesh import Cells, PressedBody
 from softtact.models.solid.body import SolidBody
 from softtact.models.solid.path import SolidLoadStep
 from softtact.models.solid.springs import FrustumSprings
-from softtact.press.making import make_result
+from softtact.press.making import make_result, shell_of
 from softtact.press.result import PressResult
 from softtact.press.soft_object import OBJECT, SoftObject
 
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
 
 _PENALTY = 20.0  # times E / h of the softer of both surfaces
 _CELL_OF_LAYERS = 20  # elements along the shorter side of a sensor without frusta
+_REGION = {"dielectric": "sheet", "cover": "cover"}  # what files of pressed bodies call the layers
+_SHELL = "shell"  # the frame that never moves
 _ROOT_POINTS = 12  # along the diameter of a frustum's root, for its mean movement
 
 
@@ -31,7 +35,7 @@ class SolidPad:
     """
 
     def __init__(self, sensor: "Sensor") -> None:
-        self.sensor, spec = sensor, sensor.spec
+        self.sensor, self.shell, spec = sensor, shell_of(sensor), sensor.spec
         self._frusta = getattr(spec.dielectric, "frusta", None)
         self._lines = [self._along(axis) for axis in range(2)]
         dielectric, cover = _layers(spec)
@@ -64,7 +68,7 @@ class SolidPad:
         return np.unique(np.round(ends, 9))
 
     def with_object(self, placed: SolidMesh, soft: SoftObject, *, threads: int) -> SolidBody:
-        """Both as one `SolidBody`, the holder's frame `object` and the pair in contact with it."""
+        """Both as one `SolidBody`, the holder's frame `object`, the pair of both in contact, and that of object and shell."""
         spec, region = self.sensor.spec, placed.regions[0]
         held_to = self.height_mm - spec.edge.held_below_mm
         pad = self.mesh.with_faces(shell=lambda x: _on_rim(x, self._lines) & (x[:, 2] < held_to)) if held_to > 0 else self.mesh
@@ -73,9 +77,10 @@ class SolidPad:
         held = ({"shell": "xyz"} if held_to > 0 else {}) | ({"z0": "xyz"} if self._frusta is None and spec.base_held else {})
         top = placed.points[:, 2].max()
         middle = 0.5 * (placed.points.min(axis=0) + placed.points.max(axis=0))
-        body = SolidBody(
-            mesh, laws, held=held, threads=threads, carried={OBJECT: ((middle[0], middle[1], top), ["object held"], "xyz")}
-        )
+        wide = self.shell.exists and (np.abs(placed.points[:, :2]) > 0.5 * np.asarray(spec.footprint_mm)).any()
+        rests_on = {_SHELL: ((0.0, 0.0, self.height_mm), self.shell.top_mm(self.height_mm))} if wide else {}
+        carried = {OBJECT: ((middle[0], middle[1], top), ["object held"], "xyz")}
+        body = SolidBody(mesh, laws, held=held, threads=threads, carried=carried, rigid=rests_on)
         if self._frusta is not None:
             body.springs.append(self._springs())
         pressed, surface = Surface.of(mesh.face("object pressed")), Surface.of(mesh.face("z1"))
@@ -92,6 +97,9 @@ class SolidPad:
                 segments=True,
             )
         )
+        if wide:
+            top_side, own = Surface.of({"triangle": body.surface_nodes(_SHELL)}), _PENALTY * 3 * soft.law.mu0 / size
+            body.add_pair(ContactPair(pressed, top_side, stiffness=own, reach_mm=2 * size, rigid=True))
         return body
 
     def _springs(self) -> FrustumSprings:
@@ -106,10 +114,11 @@ class SolidPad:
         law = self.sensor.prepared("foundation").law
         return FrustumSprings(faces, np.tile(weights, (len(faces), 1)), law)
 
-    def result(self, body: SolidBody, steps: list[SolidLoadStep]) -> PressResult:
-        """The `PressResult` of load steps."""
+    def result(self, body: SolidBody, steps: list[SolidLoadStep], *, keep_body: bool = False) -> PressResult:
+        """The `PressResult` of load steps; keep_body: with a `PressedBody` at each."""
         sampled = np.array([self._sampled(step.state.displacement) for step in steps])
         forces = np.array([step.loads[0] for step in steps])
+        on_shell = np.array([step.loads[1:, 2].sum() for step in steps])  # of the shell's frame, where there is one
         points = [step.state.histories[0].points for step in steps]
         contact = [step.state.contacts[0] for step in steps]
         area = [float(own.weight[state.pressure > 0].sum()) for own, state in zip(points, contact, strict=True)]
@@ -124,7 +133,7 @@ class SolidPad:
             "displacement_mm": sampled,
             "force_n": forces[:, :3],
             "torque_nmm": self._torques(body, steps),
-            "pad_force_n": -forces[:, 2],
+            "pad_force_n": -forces[:, 2] - on_shell,
             "indentation_mm": down,
             "contact_area_mm2": np.array(area),
             "penetration_mm": np.array([step.penetration_mm for step in steps]),
@@ -133,9 +142,22 @@ class SolidPad:
             "extrapolated_volume_fraction": share,
             "iterations": np.array([step.iterations for step in steps]),
         }
-        return make_result(
+        made = make_result(
             self.sensor, "solid", body.solver.name, -sampled[..., 2], -forces[:, 2], seconds, within_validity=valid, **numbers
         )
+        return replace(made, bodies=tuple(self._pressed_body(body, step) for step in steps)) if keep_body else made
+
+    def _pressed_body(self, body: SolidBody, step: SolidLoadStep) -> PressedBody:
+        """Layers and object at a load step, in the sensor's frame."""
+        mesh, points, state = body.mesh, step.state.histories[0].points, step.state.contacts[0]
+        cells = tuple(Cells(element.meshio_name, nodes[:, element.vtk_order], _REGION.get(region, "object"))
+                      for region, element, nodes in mesh.parts())  # fmt: skip
+        (top,) = mesh.face("z1").values()
+        area = np.ptp(mesh.points[top], axis=1)[:, :2].prod(axis=1)
+        pressed = np.bincount(points.facet, weights=points.weight * state.pressure, minlength=len(top))
+        moved = step.state.displacement[: len(mesh.points)].astype(np.float32)
+        at_rest = mesh.points - [0.0, 0.0, self.height_mm]
+        return PressedBody(at_rest, moved, cells, top[:, :8], (pressed / area).astype(np.float32))
 
     def _torques(self, body, steps):
         """Torques (l, 3) about the origin of the sensor frame, at the middle of the sensing surface."""

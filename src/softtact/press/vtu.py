@@ -1,6 +1,7 @@
 """The pressed sensor as a mesh with displacements, for ParaView and `softtact view`.
 
 hyperelastic: the solver's own mesh, all of it (`Sensor.press(keep_body=True)`), and the object's pressure on the cover's faces.
+solid: layers and soft object, all of both; its frusta are springs, and are not drawn.
 elastic, foundation: the deformation map as a surface in the sensor's walls and bottom at rest; only the map's vertical
 displacement is known there, and no pressure on the map's grid.
 The object stands beside it where it was kept (`Sensor.press(keep_object=True)`).
@@ -27,7 +28,7 @@ _LOAD_STEP = re.compile(r"displacement_mm_(.+?)N(?:_step(\d+))?")
 # Faces of a cell of VTK's by its corners; the cells that are drawn by `surface`.
 _FACES = {"hexahedron": ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
           "wedge": ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)), "quad": ((0, 1, 2, 3),),
-          "triangle": ((0, 1, 2),)}
+          "tetra": ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)), "triangle": ((0, 1, 2),)}
 
 
 @dataclass(frozen=True)

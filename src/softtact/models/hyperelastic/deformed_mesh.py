@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from softtact.models.hyperelastic.body import BodyState, LayeredBody
 
 REGIONS = ("frusta", "sheet", "cover")     # from below; their numbers are the cell data `layer`
+OBJECT_LAYER = 5                           # the number of a soft object's cells
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,8 @@ class Cells:
 class PressedBody:
     """Sheet, cover and frusta: points_mm (n, 3) at rest, displacement_mm (n, 3) in single precision, cells a tuple of `Cells`.
 
+    Of a press of a soft object (model `solid`) the frusta are springs and have no cells; the object's have the region `object`.
+
     top (t, 8): the cover's upper faces;  pressure_mpa (t,): the object's mean pressure on each, positive in compression
 
     The sensor's frame: z = 0 is the top at rest, a displacement towards the PCB has a negative z. A frustum's root repeats nodes
@@ -43,8 +46,9 @@ class PressedBody:
     pressure_mpa: np.ndarray
 
     def to_meshio(self) -> meshio.Mesh:
-        """As a meshio mesh at rest; cell data `layer`: 0 frusta, 1 sheet, 2 cover."""
-        layers = [np.full(len(cells.nodes), REGIONS.index(cells.region)) for cells in self.cells]
+        """As a meshio mesh at rest; cell data `layer`: 0 frusta, 1 sheet, 2 cover, 5 a soft object."""
+        numbers = {region: number for number, region in enumerate(REGIONS)} | {"object": OBJECT_LAYER}
+        layers = [np.full(len(cells.nodes), numbers[cells.region]) for cells in self.cells]
         return meshio.Mesh(self.points_mm, [(cells.kind, cells.nodes) for cells in self.cells], cell_data={"layer": layers})
 
 
