@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from softtact.evaluation import claims_of_choice
+from softtact.evaluation import claims_of_choice, claims_of_skin
 from softtact.evaluation.claim_rows import within
 from softtact.evaluation.claims_of_grasps import claims_of_grasps
 from softtact.evaluation.claims_of_materials import claims_of_materials
@@ -13,6 +13,8 @@ from softtact.evaluation.claims_of_scores import claims_of_scores
 from softtact.evaluation.claims_of_study import claims_of_study
 from softtact.evaluation.claims_of_times import claims_of_times
 from softtact.reporting.tables import PRINTED_TIMES
+from softtact.skin.elastomers import read_elastomers
+from softtact.skin.layout import module_layout
 
 
 def by_start(rows, start):
@@ -186,3 +188,21 @@ def test_height_counts_where_several_heights_were_run_at_the_largest_way_of_the_
     assert by_start(of_probe(hardness), "F/d does not depend")["verdict"] == verdict
     one = of_probe(hardness[hardness.tissue_height_mm == 12])
     assert not any(row["claim"].startswith("F/d does not depend") for row in one)
+
+
+def test_a_skins_claims_on_the_choice_of_an_elastomer_tell_what_was_prototyped():
+    """0.2467 mm and six points from table II's moduli: numbers of another program."""
+    elastomers = list(read_elastomers().values())
+    rows = [*claims_of_skin._of_choice(elastomers, module_layout()), *claims_of_skin._of_table_2(elastomers)]
+    assert by_start(rows, "At 10 kPa the lightest")["ours"] == "SomaFoama + SrTiO3, 0.2467 mm"
+    assert by_start(rows, "The front and the thickness")["ours"] == "6 points, 0.154 mm"
+    assert [row["verdict"] for row in rows] == ["reproduced", "reproduced", "reproduced", "contradicts itself"]
+
+
+def test_without_the_lightest_elastomer_the_claims_on_it_are_not_reproduced_and_that_on_the_heaviest_alone_does_not_save_them():
+    left = [one for name, one in read_elastomers().items() if name not in ("SomaFoama + SrTiO3", "Ecoflex 00-30 + SrTiO3")]
+    rows = list(claims_of_skin._of_choice(left, module_layout()))
+    assert {by_start(rows, start)["verdict"] for start in ("At 10 kPa", "Four elastomers")} == {"not reproduced"}
+    pair = by_start(rows, "The lightest is the least sensitive")
+    assert pair["ours"].endswith("most sensitive Polytek polyurethane, heaviest Polytek polyurethane")
+    assert pair["verdict"] == "not reproduced"

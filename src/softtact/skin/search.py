@@ -50,26 +50,19 @@ def search(
         key = digest([_FORMAT, elastomer.model_dump(), thickness, radius, pitch, gap_mm, side_mm, vars(needs), vars(converter)])
         path = Path(folder) / f"{key}.json"
         if not path.exists():
-            table = thickness_table(
-                [elastomer],
-                layouts[radius, pitch],
-                needs=needs,
-                thicknesses_mm=[thickness],
-                converter=converter,
-                weight_budget_g=None,
-            )
-            told = {name: value.item() if isinstance(value, np.generic) else value for name, value in table.iloc[0].items()}
-            write_json(
-                path,
-                told
-                | {
-                    "radius_mm": radius,
-                    "pitch_mm": pitch,
-                    "crosstalk": _crosstalk(thickness, radius, radius + gap_mm, pitch, elastomer.poisson),
-                },
-            )
+            beside = _crosstalk(thickness, radius, radius + gap_mm, pitch, elastomer.poisson)
+            told = _told(elastomer, layouts[radius, pitch], thickness, needs=needs, converter=converter)
+            write_json(path, told | {"radius_mm": radius, "pitch_mm": pitch, "crosstalk": beside})
         rows.append(read_json(path))
     return _judged(pd.DataFrame(rows), weight_budget_g)
+
+
+def _told(elastomer, layout, thickness, *, needs, converter):
+    """What `thickness_table` tells of one thickness, as plain values."""
+    table = thickness_table(
+        [elastomer], layout, needs=needs, thicknesses_mm=[thickness], converter=converter, weight_budget_g=None
+    )
+    return {name: value.item() if isinstance(value, np.generic) else value for name, value in table.iloc[0].items()}
 
 
 def main_effects(table: pd.DataFrame) -> pd.DataFrame:
