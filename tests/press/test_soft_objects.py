@@ -78,31 +78,31 @@ def test_layers_and_object_are_written_whole_with_the_pressure_of_the_force(pres
     assert area.sum() == pytest.approx(160.0) and bodies.points[top, 2] == pytest.approx(0.0, abs=1e-9)
     assert bodies.pressure_mpa[0] @ area == pytest.approx(soft.normal_force_n[0], rel=0.01)  # bent faces turn it
     for of_object, low, high in ((False, -1.8, 0.0), (True, 0.0, 3.0)):
-        points, triangles, _ = mesh.surface(of_object=of_object)
-        outside = trimesh.Trimesh(points, triangles, process=True)
-        assert outside.is_watertight and (points[:, 2].min(), points[:, 2].max()) == pytest.approx((low, high), abs=1e-6)
+        points, _, _ = mesh.surface(of_object=of_object)
+        assert (points[:, 2].min(), points[:, 2].max()) == pytest.approx((low, high), abs=1e-6)
 
 
 @pytest.mark.slow
-def test_a_plate_wider_than_the_pad_comes_to_rest_on_the_shell_and_the_pad_feels_no_more():
-    """A stiff bar over a pad that stands 0.05 mm out of its shell: what is added from there on, the shell carries.
+def test_a_bar_wider_than_the_pad_comes_to_rest_on_the_shell_and_a_soft_one_bends_down_to_it():
+    """The pad stands 0.05 mm out of its shell: a stiff bar that comes down so far rests, and the pad feels no more than then.
 
-    Where there is no shell, the same bar presses the pad harder; a soft one bends down to the shell beside the pad.
+    Expected is its force at that depth, and what the bar itself gives way: 4 N on 12 mm2 squeeze its free 1 mm of 1,100 MPa by
+    0.3 um, which is 0.6 % of the depth.
     """
     sensor = softtact.load_sensor("pad4x4")
     low = replace(sensor, spec=sensor.spec.model_copy(update={"edge": Edge(held={"sides_below_mm": 0.05})}), prepared_models={})
 
     def bar(law):
-        return SoftObject(box((-6.5, -2, 0), (6.5, 2, 2), (13, 4, 1)), law, held_share=0.5)
+        return SoftObject(box((-6.5, -2, 0), (6.5, 2, 2), (13, 4, 2)), law, held_share=0.5)
 
-    motion = Motion().press(depth_mm=0.03).press(depth_mm=0.05).press(depth_mm=0.08)
+    expected = low.press(bar(STIFF), motion=Motion().press(depth_mm=0.05), label="").pad_force_n[0]
     with pytest.warns(ShellWarning, match="rests on the shell"):
-        rests = low.press(bar(STIFF), motion=motion, label="")
-    free = sensor.press(bar(STIFF), motion=motion, label="")
-    assert rests.shell_force_n[0] == pytest.approx(0.0, abs=1e-6) and rests.shell_force_n[2] > 0.5 * rests.normal_force_n[2]
-    assert rests.pad_force_n[2] == pytest.approx(rests.pad_force_n[1], rel=0.05)
-    assert free.pad_force_n[2] > 1.3 * rests.pad_force_n[2] and (free.shell_force_n == 0).all()
-    assert (rests.pad_force_n + rests.shell_force_n) == pytest.approx(rests.normal_force_n)
+        rests = low.press(bar(STIFF), force_n=[3.0, 10.0], label="")
+    assert rests.pad_force_n == pytest.approx([3.0, expected], rel=0.03)
+    assert rests.pad_force_n + rests.shell_force_n == pytest.approx([3.0, 10.0], rel=1e-3)
+    with pytest.warns(ShellWarning, match="rests on the shell"):
+        bends = low.press(bar(SOFT), force_n=2.0, label="")
+    assert bends.shell_force_n[0] > 0.02 and bends.pad_force_n[0] + bends.shell_force_n[0] == pytest.approx(2.0, rel=1e-3)
 
 
 def test_frusta_stand_below_the_sheet_one_to_an_element_with_weights_that_make_a_mean():
