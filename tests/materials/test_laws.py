@@ -6,7 +6,7 @@ from law_constants import C_PER_E, COLUMN, PARAMETERS, ROW
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from softtact.errors import InputError
+from softtact.errors import ExtrapolationWarning, InputError
 from softtact.materials.laws.registry import LAWS, make_law
 from softtact.materials.laws.volumetric import VOLUMETRIC_FUNCTIONS
 
@@ -179,6 +179,22 @@ def test_compressible_stress_tends_to_the_incompressible_one():
     stretch = np.array([0.5, 0.8, 1.3, 2.5])
     law = make_law("ogden2", PARAMETERS["ogden2"], bulk_over_shear=1e6)
     assert law.uniaxial_compressible(stretch) == pytest.approx(law.nominal_stress("uniaxial", stretch), rel=1e-4)
+
+
+def test_the_plane_modulus_is_youngs_over_1_minus_the_square_of_poissons():
+    """mu = 0.5 MPa, K = 2 MPa: E = 9 K mu/(3 K + mu) = 18/13, nu = (3 K - 2 mu)/(6 K + 2 mu) = 5/13, E/(1 - nu^2) = 1.625 MPa."""
+    law = make_law("neo_hooke", {"c10": 0.25}, bulk_modulus=2.0)
+    assert law.plane_modulus == pytest.approx(18 / 13 / (1 - (5 / 13) ** 2)) == pytest.approx(1.625)
+
+
+def test_a_law_warns_beyond_either_end_of_its_window_and_not_at_the_ends(recwarn):
+    law = make_law("neo_hooke", {"c10": 0.25})
+    law.stretch_window = (0.5, 4.0)      # of principal stretches: in tension l and l**-0.5
+    law.nominal_stress("uniaxial", np.array([0.5, 3.99]))
+    assert not recwarn.list
+    for stretch in (0.49, 4.01):
+        with pytest.warns(ExtrapolationWarning, match="rests on data from 0.5 to 4"):
+            law.nominal_stress("uniaxial", stretch)
 
 
 def test_bulk_modulus_is_the_stated_multiple_of_mu0_or_the_stated_value():

@@ -86,6 +86,9 @@ def test_a_taxel_that_is_clipped_in_use_is_refused_and_one_clipped_beyond_is_not
     assert readings_at(recording(force, counts=full), FORCES, largest_counts=1900.0).loading.max() == 50 * SLOPE.max()
     said = refusal(recording(force, counts=np.minimum(read, 1800.0)), FORCES, largest_counts=1800.0)
     assert "row 73: finger 0, taxel 27 (row 6, column 3) reads the end of its range" in said     # the 71st reading, at 49 N
+    up = np.append(np.arange(0.0, 50.0, 0.7), 50.0)      # the last reading alone is at the end, 37 counts per N times 50 N
+    said = refusal(recording(up, counts=up[:, None, None] * SLOPE), FORCES, largest_counts=1850.0)
+    assert f"row {len(up) + 2}: finger 0, taxel 27" in said
 
 
 @pytest.fixture

@@ -22,7 +22,7 @@ SMALLEST_SOLID = 0.7    # volume ratio; a foam's goes below
 
 
 def checked(path: str | Path, rows: np.ndarray, x: np.ndarray, y: np.ndarray, *, mode: str, raw: np.ndarray,
-            compression: bool = False) -> tuple[str, ...]:
+            compression: bool) -> tuple[str, ...]:
     """Remarks (a tuple of sentences) on a curve; what cannot be right is refused.
 
     rows: (n,) numbers of the file's rows;  x, y: (n,) stretch and nominal stress, or volume ratio and pressure, in MPa
