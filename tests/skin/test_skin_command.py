@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import trimesh
 import yaml
 from PIL import Image
 
@@ -42,6 +43,18 @@ def test_a_design_becomes_readings_figures_exports_and_a_report(tmp_path, capsys
     page = (tmp_path / "out/report.html").read_text()
     assert page.count("data:image/png") == 2 and "exports/skin.urdf" in page
     assert (tmp_path / "out/exports/skin.txt").read_text().count("\n") == 16
+
+
+def test_an_object_presses_at_finite_strains_where_the_design_says_so(tmp_path, capsys):
+    trimesh.creation.icosphere(subdivisions=4, radius=8.0).export(tmp_path / "ball.stl")
+    ball = {"mesh": "ball.stl", "at_taxel": 7, "force_n": 0.1}
+    loads = [{"name": "small", **ball}, {"name": "finite", "strains": "finite", **ball}]
+    assert main(["skin", str(written(tmp_path, loads=loads)), "--out", str(tmp_path / "out"), "--threads", "1", "--json"]) == 0
+    small, finite = json.loads(capsys.readouterr().out)["loads"]
+    assert "finite strains by a law off the curve by" in finite["what"] and "finite strains" not in small["what"]
+    assert finite["taxel"] == small["taxel"] == 7 and finite["force_n"] == pytest.approx(0.1)
+    assert finite["delta_ff"] == pytest.approx(small["delta_ff"], rel=0.3)  # two models on elements 3 mm wide
+    assert finite["delta_ff"] != small["delta_ff"]
 
 
 @pytest.mark.slow
