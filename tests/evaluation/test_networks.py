@@ -1,12 +1,14 @@
 """The table of architectures: each network's scores, weights and times."""
 
+from typing import ClassVar
+
 import numpy as np
 import pandas as pd
 import pytest
 import torch
 from test_scoring import SSIM, Echo, make_samples
 
-from softtact.evaluation.networks import COLUMNS, Trained, compare_networks, count_weights, score_networks
+from softtact.evaluation.networks import COLUMNS, Trained, compare_networks, count_weights, score_networks, time_of_a_map
 from softtact.evaluation.score_tables import score_table
 from softtact.evaluation.scoring import score_sensor
 from softtact.learning.network import CompactNetwork, TactileNetwork
@@ -38,10 +40,23 @@ def test_a_row_per_network_and_set_with_scores_weights_and_times():
     assert (table.weights == 1).all() and (table.epochs == 3).all() and (table.epoch_s == 4.0).all() and (table.map_s > 0).all()
     unseen = scores[(scores["set"] == "unseen")].groupby("predictor").mae_counts.mean()
     assert table.groupby("architecture").unseen_loss.first().to_dict() == pytest.approx((28 * unseen).to_dict())
+    assert table.groupby("architecture").remains.first().to_dict() == {"compact": "noise", "printed": "optimiser"}
     means = table.groupby("architecture").ssim.mean()
     assert means["compact"] > means["printed"]
     assert ((table.ssim_low <= table.ssim) & (table.ssim <= table.ssim_high)).all()
     assert table.sensor_ssim.tolist() == pytest.approx(2 * [float(ceiling[ceiling["set"] == s].ssim.mean()) for s in splits])
+
+
+def test_a_map_is_timed_alone_in_seconds():
+    class Seen(Echo):
+        counts: ClassVar[list[int]] = []
+
+        def forward(self, maps):
+            self.counts.append(len(maps))
+            return super().forward(maps)
+
+    took = time_of_a_map(Seen(), make_samples(trials=1).maps_mm, repeats=3)
+    assert Seen.counts == [1, 1, 1, 1] and 0 < took < 1      # the first one allocates
 
 
 def test_the_compact_network_has_a_thousandth_of_the_printed_ones_weights():
