@@ -1,5 +1,7 @@
 """An object on a skin at finite strains: its law, an even squeeze in closed form, and small forces against small strains."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import trimesh
@@ -8,12 +10,13 @@ from scipy.optimize import brentq
 from support.skins import small_skin
 
 from softtact.errors import InputError
-from softtact.skin.analysis import analyse
+from softtact.skin.analysis import Skin, analyse
 from softtact.skin.contact import contact_load
 from softtact.skin.converter import CONVERTERS
 from softtact.skin.design import LoadChoice
 from softtact.skin.elastomers import Elastomer, read_elastomers
 from softtact.skin.finite import compression_law, press_at_finite_strains, solid_layer
+from softtact.skin.layout import module_layout
 
 
 def linear(poisson, *, young_mpa=0.2):
@@ -72,9 +75,28 @@ def test_a_small_force_gives_what_small_strains_give():
     assert finite.displacement_mm[:, 2].min() == pytest.approx(expected, rel=0.05)
 
 
-def test_finite_strains_are_for_objects_that_press():
-    with pytest.raises(ValidationError, match="strains: finite is for a mesh that presses"):
-        LoadChoice(name="one", at_taxel=1, diameter_mm=6, pressure_kpa=40, strains="finite")
+def test_finite_strains_are_for_objects_and_friction_is_for_finite_strains():
+    for keys, sentence in (
+        ({"diameter_mm": 6, "pressure_kpa": 40, "strains": "finite"}, "strains: finite is for a mesh that presses"),
+        ({"mesh": "ball.stl", "force_n": 1, "friction": 0.5}, "friction is for strains: finite"),
+    ):
+        with pytest.raises(ValidationError, match=sentence):
+            LoadChoice(name="one", at_taxel=1, **keys)
+
+
+@pytest.mark.slow
+def test_friction_is_balanced_under_a_cap_whose_pole_is_a_fan_of_needles_and_keeps_it_from_coming_down_as_far():
+    """From the guess without friction points that stick in truth overshoot in turns, whatever the increment.
+
+    Free points are pushed aside under the cap; the more of them friction keeps, the less it comes down, by some percent.
+    """
+    cap = trimesh.load(Path(__file__).resolve().parents[2] / "config/objects/indenters/sphere_m.stl")
+    skin = Skin(module_layout(), thickness_mm=3.0, poisson=0.4, permittivity=1.0, spacing_mm=2.0, layers=2)
+    ecoflex, deepest = read_elastomers()["Ecoflex 00-30"], []
+    for friction in (0.0, 0.1, 0.5):
+        load = press_at_finite_strains(skin, cap, (15.0, 5.66), force_n=1.0, elastomer=ecoflex, friction=friction)
+        deepest.append(-load.displacement_mm[:, 2].min())
+    assert deepest[0] > deepest[1] > deepest[2] > 0.95 * deepest[0]
 
 
 def test_an_object_beside_the_skin_is_refused_at_finite_strains_too():

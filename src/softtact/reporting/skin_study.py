@@ -126,7 +126,7 @@ def _pressed(study: Study, skin: Skin, choice: LoadChoice, folder: Path) -> Load
     if choice.strains == "small":
         return contact_load(skin, mesh, centre, **how)
     announce(f"{study.design.skin}: load {choice.name!r} at finite strains")
-    return press_at_finite_strains(skin, mesh, centre, **how)
+    return press_at_finite_strains(skin, mesh, centre, friction=choice.friction, **how)
 
 
 def _load_table(study: Study, readings: Readings) -> pd.DataFrame:

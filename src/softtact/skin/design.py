@@ -4,7 +4,7 @@ import dataclasses
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt, ValidationError, model_validator
+from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt, ValidationError, model_validator
 
 from softtact.errors import InputError
 from softtact.files import read_yaml
@@ -82,6 +82,7 @@ class LoadChoice(Section):
     turned_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
     force_n: PositiveFloat | None = None
     strains: Literal["small", "finite"] = "small"
+    friction: NonNegativeFloat = 0.0
     ratio: PositiveFloat = 1.5
     angle_deg: float = 0.0
 
@@ -103,6 +104,8 @@ class LoadChoice(Section):
                 f"load {self.name!r}: strains: finite is for a mesh that presses, since an even pressure has no stable balance "
                 "there; leave it out"
             )
+        if self.friction and self.strains == "small":
+            raise ValueError(f"load {self.name!r}: friction is for strains: finite; add that or leave friction out")
         if self.mask and self.pixel_mm is None:
             raise ValueError(f"load {self.name!r}: pixel_mm is missing, the side of the mask's pixels")
         return self

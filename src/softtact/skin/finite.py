@@ -73,11 +73,12 @@ def press_at_finite_strains(
     force_n: float,
     elastomer: Elastomer,
     turned_deg: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    friction: float = 0.0,
     name: str = "mesh",
 ) -> Load:
     """The load of an object that comes straight down, with the displacement of the layer's nodes, floor bonded and sides free.
 
-    centre_mm, turned_deg: as `contact_load` has them; like that one it is without friction
+    centre_mm, turned_deg: as `contact_load` has them;  friction: Coulomb's coefficient of object and elastomer
     Raises InputError where no part of the mesh is above the elastomer, ConvergenceError where the force is not reached.
     """
     placed = placed_over(mesh, centre_mm, turned_deg)
@@ -98,7 +99,7 @@ def press_at_finite_strains(
     own = 9 * law.bulk_modulus * law.mu0 / (3 * law.bulk_modulus + law.mu0)  # Young's modulus
     body.add_pair(
         ContactPair(face, Surface.of({"triangle": body.surface_nodes(_OBJECT)}), stiffness=_PENALTY * own / size,
-                    reach_mm=2 * size, rigid=True)
+                    reach_mm=2 * size, friction=friction, rigid=True)
     )  # fmt: skip
     (step,) = SolidPath(body, {_OBJECT: Motion().press(force_n=force_n)}, tell=lambda text: announce(f"{name}: {text}")).run()
     at = f"({centre_mm[0]:g}, {centre_mm[1]:g}) mm"

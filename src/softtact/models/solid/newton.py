@@ -206,15 +206,34 @@ def balance(body: SolidBody, start: SolidState, target: Target, settings: SolidS
 
 def _balance(body, start, target, settings):
     pending = any(way.any() for way in target.ways) or bool(np.any(target.pressures != start.pressures))
-    state, iterations = start, 0
+    taken = 0
     if target.unknown and not pending and any(pair.friction for pair in body.pairs):
-        state, iterations, pending = _without_friction(body, start, target, settings, pending)
+        guess, taken, still = _without_friction(body, start, target, settings, pending)
+        try:
+            return _settled(body, guess, target, settings, still, taken)
+        except _UnbalancedError as error:
+            # Points that slid far in the guess and stick in truth overshoot in turns. From where they were they stick at once.
+            taken = error.iterations
+    return _settled(body, start, target, settings, pending, taken)
+
+
+class _UnbalancedError(ConvergenceError):
+    """Newton's method did not end; it carries the steps that were taken."""
+
+    def __init__(self, words: str, iterations: int) -> None:
+        super().__init__(words)
+        self.iterations = iterations
+
+
+def _settled(body, state, target, settings, pending, iterations):
+    """Newton's method from a state, and augmentations until the contacts are settled; `iterations` were taken before."""
     for _ in range(settings.max_augmentations + 1):
         problem = _Balance(body, settings, target, pending)
         found: Solution = solve(problem, state, max_iterations=settings.max_iterations)
         iterations += found.iterations
         if found.state is None:
-            raise ConvergenceError(f"{found.residual_n:.3g} N are left unbalanced after {found.iterations} iterations.")
+            said = f"{found.residual_n:.3g} N are left unbalanced after {found.iterations} iterations."
+            raise _UnbalancedError(said, iterations)
         state, pending = found.state, False
         if all(
             pair.settled(history, contact, settings.penetration_mm)
