@@ -39,13 +39,8 @@ def contact_load(
     placed = placed_over(mesh, centre_mm, turned_deg)
     top = skin.layer.mesh.top
     nodes = skin.layer.mesh.nodes_mm[top, :2]
-    height, _ = HeightField(placed)(*nodes.T)
-    over = height < NO_CONTACT_MM
-    if not over.any():
-        raise InputError(
-            f"load {name!r}: the mesh at ({centre_mm[0]:g}, {centre_mm[1]:g}) mm lies beside the elastomer; correct at_mm."
-        )
-    gap = np.where(over, height - height[over].min(), np.inf)
+    height = underside(placed, nodes, centre_mm, name)
+    gap = height - height.min()
     for depth in _DEPTHS:
         near = np.flatnonzero(gap < depth * skin.thickness_mm)
         forces, pressure, indentation = _settled(skin, top[near], gap[near], force_n, elastomer)
@@ -69,6 +64,17 @@ def placed_over(mesh: trimesh.Trimesh, centre_mm: tuple[float, float], turned_de
     placed.vertices = Rotation.from_euler("xyz", turned_deg, degrees=True).apply(mesh.vertices)
     placed.apply_translation([*(np.array(centre_mm) - placed.bounds.mean(axis=0)[:2]), 0.0])
     return placed
+
+
+def underside(placed: trimesh.Trimesh, points_mm: np.ndarray, centre_mm: tuple[float, float], name: str) -> np.ndarray:
+    """Height (n,) in mm of the mesh's underside over points (n, 2), infinite beside it. InputError where it is over none."""
+    height, _ = HeightField(placed)(*points_mm.T)
+    over = height < NO_CONTACT_MM
+    if not over.any():
+        raise InputError(
+            f"load {name!r}: the mesh at ({centre_mm[0]:g}, {centre_mm[1]:g}) mm lies beside the elastomer; correct at_mm."
+        )
+    return np.where(over, height, np.inf)
 
 
 def _settled(skin, nodes, gap, force_n, elastomer):

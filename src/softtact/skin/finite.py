@@ -7,11 +7,9 @@ import numpy as np
 import trimesh
 from scipy.optimize import least_squares
 
-from softtact.contact.height_field import NO_CONTACT_MM, HeightField
 from softtact.contact.motion import Motion
 from softtact.contact.pair import ContactPair
 from softtact.contact.surfaces import Surface
-from softtact.errors import InputError
 from softtact.fem.solid_mesh import SolidMesh
 from softtact.materials.laws.base import Law
 from softtact.materials.laws.registry import make_law
@@ -19,7 +17,7 @@ from softtact.models.solid.body import SolidBody
 from softtact.models.solid.path import SolidLoadStep, SolidPath
 from softtact.progress import announce
 from softtact.skin.analysis import Skin
-from softtact.skin.contact import placed_over
+from softtact.skin.contact import placed_over, underside
 from softtact.skin.elastomers import Elastomer
 from softtact.skin.layer_mesh import LayerMesh
 from softtact.skin.loads import Load
@@ -84,13 +82,8 @@ def press_at_finite_strains(
     placed = placed_over(mesh, centre_mm, turned_deg)
     layer = solid_layer(skin.layer.mesh)
     top = layer.points[layer.face_nodes("top")]
-    height, _ = HeightField(placed)(*top[:, :2].T)
-    over = height < NO_CONTACT_MM
-    if not over.any():
-        raise InputError(
-            f"load {name!r}: the mesh at ({centre_mm[0]:g}, {centre_mm[1]:g}) mm lies beside the elastomer; correct at_mm."
-        )
-    placed.apply_translation([0.0, 0.0, float(top[0, 2] - height[over].min())])
+    lowest = underside(placed, top[:, :2], centre_mm, name).min()
+    placed.apply_translation([0.0, 0.0, float(top[0, 2] - lowest)])
     law, off = compression_law(elastomer)
     body = SolidBody(layer, {_LAYER: law}, held={"floor": "xyz"}, threads=skin.threads,
                      rigid={_OBJECT: (placed.bounds.mean(axis=0), np.asarray(placed.triangles))})  # fmt: skip
