@@ -15,7 +15,7 @@ from softtact.materials.laws.base import Law
 from softtact.materials.laws.registry import make_law
 from softtact.models.solid.body import SolidBody
 from softtact.models.solid.path import SolidLoadStep, SolidPath
-from softtact.progress import announce
+from softtact.progress import Watch, announce
 from softtact.skin.analysis import Skin
 from softtact.skin.contact import placed_over, underside
 from softtact.skin.elastomers import Elastomer
@@ -94,7 +94,11 @@ def press_at_finite_strains(
         ContactPair(face, Surface.of({"triangle": body.surface_nodes(_OBJECT)}), stiffness=_PENALTY * own / size,
                     reach_mm=2 * size, friction=friction, rigid=True)
     )  # fmt: skip
-    (step,) = SolidPath(body, {_OBJECT: Motion().press(force_n=force_n)}, tell=lambda text: announce(f"{name}: {text}")).run()
+    body.watch = Watch(name)
+    try:
+        (step,) = SolidPath(body, {_OBJECT: Motion().press(force_n=force_n)}, tell=lambda text: announce(f"{name}: {text}")).run()
+    finally:
+        body.watch.end()
     at = f"({centre_mm[0]:g}, {centre_mm[1]:g}) mm"
     words = f"{force_n:g} N by {name} at {at}, finite strains by a law off the curve by {off:.0%}"
     return _load_of(body, step, force_n, len(layer.points), words)
