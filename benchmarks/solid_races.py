@@ -4,10 +4,14 @@ A block of rubber with a rounded foot (Mooney-Rivlin, K = 5 mu, so that no progr
 wider block in four equal increments, without friction, on the same mesh of quadratic tetrahedra for all. Penalty 200 N/mm3 for all;
 we also bring the overlap below 1 um.
   CalculiX   C3D10, contact surface to surface, its direct solver and its criteria; timed is its whole process
-  NGSolve    order 2, `ContactBoundary` with the penalty's energy, Newton's method to 1e-6 of the force, UMFPACK
+  NGSolve    order 2, `ContactBoundary` with the penalty's energy, Newton's method to 1e-6 of the force, PARDISO (UMFPACK
+             needs more than 22 GB for 400,000 unknowns)
   we         timed from the mesh's arrays to the forces, in a fresh process with compiled kernels in the cache (imports do not
              count); Newton's method to 1e-6 of the force, its systems by `linalg.refined`
 The programs run in turns; the shortest of the runs counts. Void is a row whose forces differ by more than 2 %.
+Where others take hours: `--increments 1` presses the first increment only, and `--limit calculix=12` stops CalculiX at 12 times our
+time by the clock. Its row then says `stopped`, as it does where memory ends; its ratio is a lower bound, and its forces are not
+compared.
 Also told: what a press of ours spends (assembly, solution with its factors, contact and forces), the memory's peak, the growth from
 10,000 unknowns on. Writes benchmarks/results/solid_races.json.
 """
@@ -15,6 +19,7 @@ Also told: what a press of ours spends (assembly, solution with its factors, con
 import argparse
 import json
 import resource
+import signal
 import subprocess
 import sys
 import tempfile
@@ -37,9 +42,14 @@ from support.solid_decks import calculix_lines
 
 LAW = make_law("mooney_rivlin", {"c10": 0.08, "c01": 0.03}, bulk_over_shear=5)
 PENALTY, WAY_MM, INCREMENTS = 200.0, 0.2, 4
-MOTION = Motion()
-for _ in range(INCREMENTS):
-    MOTION = MOTION.step(ways={"z": -WAY_MM / INCREMENTS})
+
+
+def motion(increments):
+    """The first of the increments."""
+    whole = Motion()
+    for _ in range(increments):
+        whole = whole.step(ways={"z": -WAY_MM / INCREMENTS})
+    return whole
 
 
 def make_mesh(unknowns):
@@ -82,19 +92,18 @@ class Clock:
         setattr(thing, method, timed)
 
 
-def ours(unknowns, threads):
-    press(make_mesh(2000), threads)     # compiles, and starts the solver's library
-    mesh = make_mesh(unknowns)
-    print(json.dumps(press(mesh, threads)))
+def ours(unknowns, threads, increments):
+    press(make_mesh(2000), threads, 1)     # compiles, and starts the solver's library
+    print(json.dumps(press(make_mesh(unknowns), threads, increments)))
 
 
-def press(mesh, threads):
+def press(mesh, threads, increments):
     began, busy, clock = time.perf_counter(), time.process_time(), Clock()
     body = make_body(mesh, threads)
     clock.watch(body, "tangent", "assembly")
     clock.watch(body.solver, "solve", "solution")
     clock.watch(body, "evaluate", "forces and contact")
-    steps = list(SolidPath(body, {"top": MOTION}).run())
+    steps = list(SolidPath(body, {"top": motion(increments)}).run())
     seconds = time.perf_counter() - began
     iterations = sum(step.iterations for step in steps)
     body.solver.close()
@@ -108,23 +117,37 @@ def press(mesh, threads):
 # Others ---------------------------------------------------------------------------------------------------------------------
 
 
-def calculix(unknowns, threads):
+def calculix(unknowns, threads, increments, limit_s):
     """Forces, seconds and iterations of ccx."""
     body = make_body(make_mesh(unknowns), 1)
-    lines = calculix_lines(body, {"top": MOTION}, increments=1, fixed=True)
+    lines = calculix_lines(body, {"top": motion(increments)}, increments=1, fixed=True)
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "race.inp").write_text("\n".join(lines) + "\n", encoding="utf-8")
-        before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-        done = subprocess.run(["ccx", "race"], cwd=folder, capture_output=True, text=True, env=record.threads_of(threads),
-                              check=False)
-        seconds, after = time.perf_counter() - began, resource.getrusage(resource.RUSAGE_CHILDREN)
-        table = (Path(folder) / "race.dat").read_text(encoding="utf-8").split("\n") if done.returncode == 0 else []
+        found, said = timed(["ccx", "race"], threads, limit_s, folder)
+        table = (Path(folder) / "race.dat").read_text(encoding="utf-8").split("\n") if not found["stopped"] else []
     forces = [-float(line.split()[2]) for line in table if len(line.split()) == 3]
-    return {"force_n": forces, "seconds": seconds, "iterations": done.stdout.count(" iteration "),
-            "cpu_seconds": after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime}
+    return found | {"force_n": forces, "iterations": said.count(" iteration ")}
 
 
-def ngsolve_child(unknowns, threads):
+def timed(command, threads, limit_s, folder=None):
+    """Seconds of a program, by the clock and of the processor, why it was stopped ("" where it ended); and what it said."""
+    before, began, stopped = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter(), ""
+    try:
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, env=record.threads_of(threads), check=False,
+                              timeout=limit_s)
+        said = done.stdout
+        if done.returncode == -signal.SIGKILL:
+            stopped = "out of memory"
+        elif done.returncode:
+            raise RuntimeError(f"{command[0]}: {done.stderr[-2000:] or said[-2000:]}")
+    except subprocess.TimeoutExpired as late:
+        stopped, said = "out of time", (late.stdout or b"").decode()
+    seconds, after = time.perf_counter() - began, resource.getrusage(resource.RUSAGE_CHILDREN)
+    return {"seconds": seconds, "cpu_seconds": after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime,
+            "stopped": stopped}, said
+
+
+def ngsolve_child(unknowns, threads, increments):
     """The press by NGSolve; its mesh is made from ours."""
     import ngsolve as ng
     from netgen.meshing import Element2D, Element3D, FaceDescriptor, MeshPoint, Pnt
@@ -147,12 +170,12 @@ def ngsolve_child(unknowns, threads):
     mesh = ng.Mesh(mesh)
     began = time.perf_counter()
     with ng.TaskManager():
-        forces, iterations, free = _ngsolve_press(ng, mesh)
+        forces, iterations, free = _ngsolve_press(ng, mesh, increments)
     print(json.dumps({"force_n": forces, "seconds": time.perf_counter() - began, "iterations": iterations, "unknowns": free,
                       "cpu_seconds": time.process_time()}))
 
 
-def _ngsolve_press(ng, mesh):
+def _ngsolve_press(ng, mesh, increments):
     space = ng.VectorH1(mesh, order=2, dirichlet="held|top")
     u, moved = space.TrialFunction(), ng.GridFunction(space)
     F = ng.Id(3) + ng.Grad(u)
@@ -172,7 +195,7 @@ def _ngsolve_press(ng, mesh):
     top.Set(ng.CF((0, 0, 1)), definedon=mesh.Boundaries("top"))
     residual, step = moved.vec.CreateVector(), moved.vec.CreateVector()
     forces, iterations = [], 0
-    for _ in range(INCREMENTS):
+    for _ in range(increments):
         moved.vec.data -= WAY_MM / INCREMENTS * top.vec
         for _ in range(40):
             contact.Update(moved, form, 5, 0.3)
@@ -182,7 +205,7 @@ def _ngsolve_press(ng, mesh):
             if off < 1e-6 * max(abs(force), 1e-9):
                 break
             form.AssembleLinearization(moved.vec)
-            step.data = form.mat.Inverse(space.FreeDofs(), inverse="umfpack") * residual
+            step.data = form.mat.Inverse(space.FreeDofs(), inverse="pardiso") * residual
             share, before = 1.0, form.Energy(moved.vec)
             while share > 1e-3:
                 moved.vec.data -= share * step
@@ -197,40 +220,47 @@ def _ngsolve_press(ng, mesh):
     return forces, iterations, sum(space.FreeDofs())
 
 
-def child(kind, unknowns, threads):
+def child(kind, unknowns, threads, increments, limit_s=None):
     """A run of us or of NGSolve in a fresh process."""
-    command = [sys.executable, __file__, "--child", kind, str(unknowns), str(threads)]
-    done = subprocess.run(command, capture_output=True, text=True, env=record.threads_of(threads), check=False)
-    if done.returncode:
-        raise RuntimeError(done.stderr[-2000:])
-    return json.loads(done.stdout.strip().split("\n")[-1])
+    command = [sys.executable, __file__, "--child", kind, str(unknowns), str(threads), str(increments)]
+    found, said = timed(command, threads, limit_s)
+    return found | {"force_n": [], "iterations": None} if found["stopped"] else json.loads(said.strip().split("\n")[-1])
 
 
 # The race -------------------------------------------------------------------------------------------------------------------
 
 
-def race(unknowns, threads, repeats, rivals):
-    """One row: all in turns `repeats` times."""
-    runs = {"ours": lambda: child("ours", unknowns, threads), "calculix": lambda: calculix(unknowns, threads),
-            "ngsolve": lambda: child("ngsolve", unknowns, threads)}
+def race(unknowns, threads, repeats, rivals, increments, limits):
+    """One row: all in turns `repeats` times; others are stopped at `limits[name]` times our seconds."""
+    runs = {"calculix": calculix, "ngsolve": lambda *given: child("ngsolve", *given)}
     found = {name: [] for name in ("ours", *rivals)}
     for _ in range(repeats):
-        for name, results in found.items():
-            results.append(runs[name]())
-    row = {"threads": threads} | {name: min(results, key=lambda run: run["seconds"]) for name, results in found.items()}
+        found["ours"].append(child("ours", unknowns, threads, increments))
+        for name in rivals:
+            limit_s = limits[name] * found["ours"][-1]["seconds"] if name in limits else None
+            found[name].append(runs[name](unknowns, threads, increments, limit_s))
+    row = {"threads": threads, "increments": increments}
+    row |= {name: min(results, key=lambda run: run["seconds"]) for name, results in found.items()}
     own = row["ours"]
     print(f"{own['unknowns']:9,} unknowns, {threads} threads: ours {own['seconds']:.1f} s, {own['iterations']} iterations, "
           f"{own['peak_gb']:.1f} GB; " + ", ".join(f"{k} {v:.1f} s" for k, v in own["shares"].items()), flush=True)
     for name in rivals:
-        other = row[name]
-        if len(other["force_n"]) != INCREMENTS:
-            print(f"   {name}: no result")
-            continue
-        difference = float(np.abs(np.subtract(own["force_n"], other["force_n"])).max() / max(other["force_n"]))
-        other |= {"difference": difference, "void": difference > 0.02, "ratio": other["seconds"] / own["seconds"]}
-        print(f"   {name}: {other['seconds']:.1f} s, {other['iterations']} iterations, ratio {other['ratio']:.1f}, "
-              f"forces differ by {100 * difference:.2f} %{'  void' if other['void'] else ''}", flush=True)
+        compare(name, own, row[name], increments)
     return row
+
+
+def compare(name, own, other, increments):
+    """Add the ratio of times and the difference of forces to the other program's run, and tell them."""
+    other["ratio"] = other["seconds"] / own["seconds"]
+    if other.get("stopped"):
+        print(f"   {name}: {other['stopped']} after {other['seconds']:.1f} s, {other['ratio']:.1f} times ours", flush=True)
+        return
+    if len(other["force_n"]) != increments:
+        raise RuntimeError(f"{name} gives {len(other['force_n'])} forces, not {increments}.")
+    difference = float(np.abs(np.subtract(own["force_n"], other["force_n"])).max() / max(other["force_n"]))
+    other |= {"difference": difference, "void": difference > 0.02}
+    print(f"   {name}: {other['seconds']:.1f} s, {other['iterations']} iterations, ratio {other['ratio']:.1f}, "
+          f"forces differ by {100 * difference:.2f} %{'  void' if other['void'] else ''}", flush=True)
 
 
 def main():
@@ -241,16 +271,20 @@ def main():
     options.add_argument("--rivals", nargs="*", default=["calculix", "ngsolve"], choices=["calculix", "ngsolve"])
     options.add_argument("--try", dest="trial", action="store_true", help="print only, leave the record as it is")
     options.add_argument("--keep", action="store_true", help="leave rows of the record at other sizes as they are")
-    options.add_argument("--child", nargs=3, help=argparse.SUPPRESS)
+    options.add_argument("--increments", type=int, default=INCREMENTS, help=f"press so many of the {INCREMENTS} increments")
+    options.add_argument("--limit", nargs="+", default=[], metavar="NAME=TIMES", help="stop a rival at so many times our seconds")
+    options.add_argument("--child", nargs=4, help=argparse.SUPPRESS)
     given = options.parse_args()
     if given.child:
-        kind, unknowns, threads = given.child
-        return {"ours": ours, "ngsolve": ngsolve_child}[kind](float(unknowns), int(threads))
-    rows = [race(unknowns, threads, given.repeats, given.rivals) for threads in given.threads for unknowns in given.unknowns]
+        kind, unknowns, threads, increments = given.child
+        return {"ours": ours, "ngsolve": ngsolve_child}[kind](float(unknowns), int(threads), int(increments))
+    limits = {name: float(times) for name, times in (text.split("=") for text in given.limit)}
+    rows = [race(unknowns, threads, given.repeats, given.rivals, given.increments, limits)
+            for threads in given.threads for unknowns in given.unknowns]
     if given.keep:
-        sizes = {row["ours"]["unknowns"] for row in rows}
-        rows = sorted(rows + [row for row in record.read("solid_races")["rows"] if row["ours"]["unknowns"] not in sizes],
-                      key=lambda row: row["ours"]["unknowns"])
+        done = {(row["ours"]["unknowns"], row["increments"]) for row in rows}
+        kept = [row for row in record.read("solid_races")["rows"] if (row["ours"]["unknowns"], row["increments"]) not in done]
+        rows = sorted(rows + kept, key=lambda row: (-row["increments"], row["ours"]["unknowns"]))
     if not given.trial:
         print(record.write("solid_races", rows=rows))
 

@@ -197,14 +197,20 @@ def solid_races() -> str:
     for row in record("solid_races")["rows"]:
         ours, shares = row["ours"], row["ours"]["shares"]
         others = [row.get(name) for name in ("calculix", "ngsolve")]
-        ratios = [f"{other['cpu_seconds'] / ours['cpu_seconds']:.2g}" if other else "" for other in others]
-        apart = max((other["difference"] for other in others if other), default=None)
-        rows.append([f"{ours['unknowns']:,}", ours["iterations"], f"{ours['cpu_seconds']:.3g}", *ratios,
+        ratios = [_ratio(other, ours) if other else "" for other in others]
+        apart = max((other["difference"] for other in others if other and not other.get("stopped")), default=None)
+        rows.append([f"{ours['unknowns']:,}", row["increments"], ours["iterations"], f"{ours['cpu_seconds']:.3g}", *ratios,
                      "" if apart is None else f"{apart:.1%}", *(f"{shares[part] / ours['seconds']:.0%}"
                                                                 for part in ("solution", "assembly")), f"{ours['peak_gb']:.1f}"])
-    head = ("unknowns, Newton steps, ours (s), CalculiX / ours, NGSolve / ours, forces apart, solution of our time, "
+    head = ("unknowns, increments, Newton steps, ours (s), CalculiX / ours, NGSolve / ours, forces apart, solution of our time, "
             "assembly of our time, memory (GB)")
-    return f"{source('solid_races')} Seconds are of the processor; empty: not run.\n\n{table(head, rows)}"
+    told = "Seconds are of the processor; empty: not run; above: stopped there."
+    return f"{source('solid_races')} {told}\n\n{table(head, rows)}"
+
+
+def _ratio(other: dict, ours: dict) -> str:
+    """Another program's processor time over ours, a lower bound where it was stopped."""
+    return ("above " if other.get("stopped") else "") + f"{other['cpu_seconds'] / ours['cpu_seconds']:.2g}"
 
 
 def solid_kernels() -> str:

@@ -1,5 +1,7 @@
 """A hidden lump from film forces, on a table that is made from formulas, and one lump by the solver."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.probes import small_design
@@ -49,6 +51,40 @@ def test_two_lumps_that_read_alike_both_lie_in_the_interval():
 def test_a_parameter_that_no_film_feels_has_no_finite_deviation(table):
     blind = LumpTable(X, DEPTH, RATIO, np.broadcast_to(table.force_n[:, :1], table.force_n.shape), table.plain_n, 1e-3)
     assert deviations(blind, np.array([30.0, 6.0, 1.0]))[1] > 1e6
+
+
+def spread(x, depth, log_ratio):
+    """Two made-up films: a lump's force spreads as far along the beam as the lump is deep."""
+    return np.stack([log_ratio / depth * np.exp(-0.5 * ((x - film) / (2 * depth))**2) for film in (24.0, 43.0)], axis=-1)
+
+
+@pytest.fixture(scope="module")
+def beside():
+    axes = np.linspace(5, 62, 39), np.linspace(3, 12, 19), np.geomspace(1, 16, 9)
+    grid = np.meshgrid(axes[0], axes[1], np.log(axes[2]), indexing="ij")
+    return LumpTable(*axes, spread(*grid), np.zeros(2), 1e-3, np.array([0.0, -8.0, 8.0]))
+
+
+def test_presses_beside_a_lump_tell_its_depth_where_one_press_cannot(beside):
+    lump, one = np.array([30.0, 6.0, np.log(4.0)]), replace(beside, move_mm=np.zeros(1))
+    readings = np.concatenate([spread(lump[0] + move, *lump[1:]) for move in (0, -8, 8)])
+    # Two readings for three unknowns, and six.
+    assert deviations(one, lump)[1] > 1e3
+    assert deviations(beside, lump)[1] < 0.1
+    found = find_lump(beside, readings)
+    assert (found.x_mm, found.depth_mm, found.stiffness_ratio) == pytest.approx((30.0, 6.0, 4.0), rel=0.01)
+
+
+def test_a_lump_stays_within_the_table_in_every_press(beside):
+    assert (beside.low[0], beside.high[0]) == (13.0, 54.0)
+    assert set(detection_map(beside).x_mm) == {13.0, 54.0} | {x for x in beside.x_mm if 13 <= x <= 54}
+
+
+def test_moves_beyond_the_table_are_refused():
+    search = LumpSearch(tissue="rubber", width=6, height=5, x=[5, 14.5, 24, 33.5], depth=[3.5, 7, 10.5, 12],
+                        stiffness_ratio=[2, 4, 8], jaw_mm=[0.5], noise_n=0.01, moves=[-30, 30], source="a test's")
+    with pytest.raises(InputError, match="moves reach 60 mm, and the table of lumps 57 mm, from 5 to 62 mm"):
+        lump_table(small_design(), search)
 
 
 def test_more_noise_hides_more_lumps(table):

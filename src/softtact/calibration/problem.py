@@ -89,37 +89,10 @@ class Problem:
     valid_n: list[float] = field(init=False)
 
     def __post_init__(self) -> None:
-        unknown = [name for name in self.fitted if name not in FITTED]
-        if unknown:
-            raise InputError(f"There is no unknown {unknown[0]!r} to calibrate; write some of {', '.join(FITTED)}.")
-        reasons = {"cover": "knows no cover, so its thickness", "friction": "errs by more than friction changes, so that"}
-        for name, said in reasons.items():
-            if name in self.fitted and self.presses.model == "elastic":
-                raise InputError(f"The elastic model is one layer and {said} cannot be fitted; leave {name!r} out of --fit, or "
-                                 "give --model foundation.")
-        self.names, mean, deviation = [], [], []
-
-        def add(name, value, width):
-            self.names.append(name)
-            mean.append(value)
-            deviation.append(width)
-
-        p = self.priors
-        if "relaxation" in self.fitted:
-            for k, (share, time) in enumerate(zip(p.shares, p.times_s, strict=True), 1):
-                add(f"share {k}", share, p.share)
-                add(f"ln time {k}", np.log(time), p.log_time)
-        if "modulus" in self.fitted:
-            add("ln modulus", 0.0, p.log_modulus)
-        if "cover" in self.fitted:
-            add("cover", 1.0, p.cover)
-        if "friction" in self.fitted:
-            add("friction", *p.friction)
-        if "placement" in self.fitted:
-            for k, one in enumerate(self.experiments, 1):
-                for axis, value, width in zip(("x", "y", "angle"), one.place, (p.place_mm, p.place_mm, p.angle_deg), strict=True):
-                    add(f"{axis} {k}", value, width)
-        self.mean, self.deviation = np.array(mean), np.array(deviation)
+        self._check_fitted()
+        unknowns = list(self._unknowns())
+        self.names = [name for name, _, _ in unknowns]
+        self.mean, self.deviation = (np.array([row[k] for row in unknowns]) for k in (1, 2))
         softest = SOFTEST if "modulus" in self.fitted else 1.0
         reach = [self.presses.reach(one.mesh, one.place, largest_n=one.force_n.max() / softest) for one in self.experiments]
         self.valid_n, self._top = [valid for valid, _ in reach], [top for _, top in reach]
@@ -130,6 +103,34 @@ class Problem:
         self._rubbing = [rubbing(self.presses.sensor, one.mesh, one.place, largest_n=top, name=one.name)
                          for one, top in zip(self.experiments, self._top, strict=True)] if "friction" in self.fitted else []
         self.at(self.mean)
+
+    def _check_fitted(self):
+        unknown = [name for name in self.fitted if name not in FITTED]
+        if unknown:
+            raise InputError(f"There is no unknown {unknown[0]!r} to calibrate; write some of {', '.join(FITTED)}.")
+        reasons = {"cover": "knows no cover, so its thickness", "friction": "errs by more than friction changes, so that"}
+        for name, said in reasons.items():
+            if name in self.fitted and self.presses.model == "elastic":
+                raise InputError(f"The elastic model is one layer and {said} cannot be fitted; leave {name!r} out of --fit, or "
+                                 "give --model foundation.")
+
+    def _unknowns(self):
+        """(name, mean, standard deviation) of each number that is fitted besides gains and zeros."""
+        p = self.priors
+        if "relaxation" in self.fitted:
+            for k, (share, time) in enumerate(zip(p.shares, p.times_s, strict=True), 1):
+                yield f"share {k}", share, p.share
+                yield f"ln time {k}", np.log(time), p.log_time
+        if "modulus" in self.fitted:
+            yield "ln modulus", 0.0, p.log_modulus
+        if "cover" in self.fitted:
+            yield "cover", 1.0, p.cover
+        if "friction" in self.fitted:
+            yield "friction", *p.friction
+        if "placement" in self.fitted:
+            for k, one in enumerate(self.experiments, 1):
+                for axis, value, width in zip(("x", "y", "angle"), one.place, (p.place_mm, p.place_mm, p.angle_deg), strict=True):
+                    yield f"{axis} {k}", value, width
 
     @property
     def steps(self) -> np.ndarray:

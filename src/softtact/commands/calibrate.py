@@ -48,15 +48,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def _calibrate(options):
-    from softtact.files import refuse_overwriting
-
-    check_folders(options.out, options.report)
-    check_names({options.out: (".yaml", ".yml"), options.report: (".html",)})
-    count = len(options.recordings)
-    meshes, forces, places = (_for_each(name, getattr(options, name), count) for name in ("press", "force", "place"))
-    logs = [force for force in forces if not _is_number(force)]
-    refuse_overwriting([*options.recordings, *meshes, *logs, *(options.candidate or ()), sensor_path(options.sensor)],
-                       {"--out": options.out, "--report": options.report})
+    given = _checked(options)
     spec = sensor_spec(options.sensor)
     fitted = () if options.fit == "none" else tuple(options.fit.split(","))
     from softtact.calibration.advice import quarters, rank
@@ -68,25 +60,36 @@ def _calibrate(options):
     from softtact.geometry.meshes import read_mesh
 
     sensor = uncalibrated(sensor_path(options.sensor))
-    read = {path: read_mesh(path, unit=options.unit) for path in dict.fromkeys([*meshes, *(options.candidate or ())])}
-    experiments, notes = [], []
-    for path, mesh, force, place in zip(options.recordings, meshes, forces, places, strict=True):
-        one, said = _experiment(path, read[mesh], force, _place(place), options, spec)
-        experiments.append(one)
-        notes += said
-    presses = Presses(sensor, model=options.model)
-    problem = Problem(presses, experiments, fitted)
+    objects = [mesh for _, mesh, _, _ in given] + (options.candidate or [])
+    meshes = {path: read_mesh(path, unit=options.unit) for path in dict.fromkeys(objects)}
+    read = [_experiment(path, meshes[mesh], force, _place(place), options, spec) for path, mesh, force, place in given]
+    experiments, notes = [one for one, _ in read], [said for _, of_one in read for said in of_one]
+    problem = Problem(Presses(sensor, model=options.model), experiments, fitted)
     checks = check_recordings(problem)
     result = calibrate(problem)
     check_result(result)
     notes += _notes(problem, checks)
-    candidates = [one for path in options.candidate or () for one in quarters(path.name, read[path], spec.footprint_mm)]
+    candidates = [one for path in options.candidate or () for one in quarters(path.name, meshes[path], spec.footprint_mm)]
     advice = rank(result, candidates, largest_n=max(float(one.force_n.max()) for one in experiments)) if candidates else []
     differences = hyperelastic_differences(result) if options.hyperelastic_check else None
     _write(options, result, notes, advice)
     written = [str(path) for path in (options.out, options.report) if path]
     summary = _summary(result, notes, advice, differences) | {"written": written}
     show(summary, as_json=options.json, lines=_lines(summary))
+
+
+def _checked(options):
+    """(recording, mesh, force, place) of each recording, as they were written, once nothing that is read would be written over."""
+    from softtact.files import refuse_overwriting
+
+    check_folders(options.out, options.report)
+    check_names({options.out: (".yaml", ".yml"), options.report: (".html",)})
+    count = len(options.recordings)
+    meshes, forces, places = (_for_each(name, getattr(options, name), count) for name in ("press", "force", "place"))
+    logs = [force for force in forces if not _is_number(force)]
+    refuse_overwriting([*options.recordings, *meshes, *logs, *(options.candidate or ()), sensor_path(options.sensor)],
+                       {"--out": options.out, "--report": options.report})
+    return list(zip(options.recordings, meshes, forces, places, strict=True))
 
 
 def _write(options, result, notes, advice):

@@ -144,6 +144,8 @@ class LumpSearch(_Section):
     stiffness_ratio: list[Annotated[float, Field(gt=1)]] = Field(min_length=3, description="above 1, which is always solved")
     jaw_mm: list[Positive] = Field(min_length=1, description="rising ways at which the films are read")
     noise_n: Positive = Field(description="standard deviation of a film's reading")
+    moves: list[float] = Field([0.0], min_length=1, description="by how many mm the sensor is moved back along the tissue for each "
+                               "press of a lump, from the first place on: a lump's x is larger by so much")
     trials: int = Field(20, ge=1)
     seed: int = Field(0, ge=0)
     assumed: bool = False

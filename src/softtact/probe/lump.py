@@ -5,10 +5,14 @@ the forces f(p) and their derivatives. Readings are compared with it by least sq
 covariance of the estimate is s^2 (J^T J)^-1. A lump is seen where its forces differ from plain tissue's by more than noise does:
 chi2 = |f(p) - f_0|^2/s^2 beyond the 95 % point, with a probability of 95 % (non-central chi2 with |df|^2/s^2). The plain tissue is
 taken as known: it was read before.
+
+The sensor may read the lump in several presses, moved along the tissue between them. One press tells a deep stiff lump hardly from
+a soft one near the jaw; the presses beside it tell how far the lump's forces spread, which grows with its depth. A move is taken as
+a lump that lies elsewhere in the same tissue: tissue is the same beyond the jaw's ends.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
@@ -39,21 +43,36 @@ class LumpTable:
     stiffness_ratio: np.ndarray
     """Rising values along each side of the table; the ratios begin with 1, tissue without a lump."""
     force_n: np.ndarray
-    """(x, depth, stiffness, readings) in N; readings are jaw's ways times films."""
-    plain_n: np.ndarray
-    """(readings,) of tissue without a lump."""
+    """(x, depth, stiffness, films) in N of one press; `films` are jaw's ways times films."""
+    unladen_n: np.ndarray
+    """(films,) of tissue without a lump."""
     noise_n: float
     """Standard deviation of a reading."""
+    move_mm: np.ndarray = field(default_factory=lambda: np.zeros(1))
+    """(presses,) by how far a lump's x is larger in each press than in `lump`; the readings are those of all presses in turn."""
 
     def __post_init__(self) -> None:
         axes = (self.x_mm, self.depth_mm, np.log(self.stiffness_ratio))
         object.__setattr__(self, "_spline", RegularGridInterpolator(axes, self.force_n, method="cubic"))
-        object.__setattr__(self, "low", np.array([axis[0] for axis in axes]))
-        object.__setattr__(self, "high", np.array([axis[-1] for axis in axes]))
+        low, high = (np.array([axis[end] for axis in axes]) for end in (0, -1))
+        object.__setattr__(self, "low", low - [self.move_mm.min(), 0, 0])
+        object.__setattr__(self, "high", high - [self.move_mm.max(), 0, 0])
+
+    @property
+    def plain_n(self) -> np.ndarray:
+        """(readings,) of tissue without a lump."""
+        return np.tile(self.unladen_n, len(self.move_mm))
 
     def forces(self, lump: np.ndarray) -> np.ndarray:
         """(readings,) in N of a lump (3,): x, depth in mm and the logarithm of the stiffness ratio; or of several."""
-        found = self._spline(np.clip(lump, self.low, self.high))     # type: ignore[attr-defined]
+        within = np.clip(lump, self.low, self.high)     # type: ignore[attr-defined]
+        ends = self.x_mm[[0, -1]]
+        presses = []
+        for move in self.move_mm:
+            at = within.copy()
+            at[..., 0] = np.clip(at[..., 0] + move, *ends)      # rounding must not leave the table
+            presses.append(self._spline(at))     # type: ignore[attr-defined]
+        found = np.concatenate(presses, axis=-1)
         return found if lump.ndim > 1 else found[0]
 
     def jacobian(self, lump: np.ndarray) -> np.ndarray:
@@ -65,6 +84,13 @@ class LumpTable:
             ahead, behind = np.minimum(lump + step, self.high), np.maximum(lump - step, self.low)     # type: ignore[attr-defined]
             columns.append((self.forces(ahead) - self.forces(behind)) / (ahead - behind)[k])
         return np.column_stack(columns)
+
+    def points(self) -> np.ndarray:
+        """(m, 3) lumps of the table's points that lie within it in every press, and of the ends in x."""
+        low, high = self.low[0], self.high[0]     # type: ignore[attr-defined]
+        x = np.unique(np.clip(self.x_mm, low, high))
+        axes = np.meshgrid(x, self.depth_mm, np.log(self.stiffness_ratio), indexing="ij")
+        return np.column_stack([axis.ravel() for axis in axes])
 
 
 @dataclass(frozen=True)
@@ -95,6 +121,7 @@ def lump_table(design: Design, search: LumpSearch, *, threads: int = 1,
     if search.x[-1] > middle + 1e-9:
         raise InputError(f"search.x reaches {search.x[-1]:g} mm, beyond the beam's middle at {middle:g} mm; give the "
                          "left half alone.")
+    _check_moves(search, 2 * middle)
     plain = _solved(design, search, None, 0.0, 1.0, threads)
     rows: list[np.ndarray] = []
     ratios = [1.0, *search.stiffness_ratio]
@@ -108,7 +135,16 @@ def lump_table(design: Design, search: LumpSearch, *, threads: int = 1,
     right = left[:len(mirrored)][::-1][..., mirror]
     places = np.concatenate([search.x, 2 * middle - np.array(mirrored)[::-1]])
     return LumpTable(places, np.array(search.depth), np.array(ratios),
-                     np.concatenate([left, right]).reshape(len(places), *shape[1:3], -1), plain, search.noise_n)
+                     np.concatenate([left, right]).reshape(len(places), *shape[1:3], -1), plain, search.noise_n,
+                     np.array(search.moves))
+
+
+def _check_moves(search, length):
+    """Lumps must lie within the table in every press."""
+    nearest, reach = search.x[0], max(search.moves) - min(search.moves)
+    if length - 2 * nearest <= reach:
+        raise InputError(f"search.moves reach {reach:g} mm, and the table of lumps {length - 2 * nearest:g} mm, from {nearest:g} "
+                         f"to {length - nearest:g} mm; move the sensor less.")
 
 
 def _mirror(design):
@@ -129,16 +165,14 @@ def find_lump(table: LumpTable, readings_n: np.ndarray) -> FoundLump:
     """The lump that fits readings (readings,) in N best, from several starts. Raises InputError for another number of readings."""
     if readings_n.shape != table.plain_n.shape:
         raise InputError(f"There are {readings_n.size} readings, and the table has {table.plain_n.size}; give one for each "
-                         "way and film.")
+                         "press, way and film.")
     low, high = table.low, table.high     # type: ignore[attr-defined]
 
     def misfit(lump):
         return (table.forces(lump) - readings_n) / table.noise_n
 
-    every = table.force_n.reshape(-1, table.plain_n.size)
-    order = np.argsort(((every - readings_n)**2).sum(axis=1))[:_STARTS]
-    axes = np.meshgrid(table.x_mm, table.depth_mm, np.log(table.stiffness_ratio), indexing="ij")
-    starts = np.column_stack([axis.ravel() for axis in axes])[order]
+    points = table.points()
+    starts = points[np.argsort(((table.forces(points) - readings_n)**2).sum(axis=1))[:_STARTS]]
     margin = 1e-6 * (high - low)
     fits = [least_squares(misfit, np.clip(start, low + margin, high - margin), bounds=(low, high), x_scale=high - low,
                           jac=lambda lump: table.jacobian(lump) / table.noise_n) for start in starts]
@@ -172,7 +206,7 @@ def detection_map(table: LumpTable) -> pd.DataFrame:
     """For each x and depth of the table the least stiffness ratio that is seen, inf where none of the table's is."""
     needed = _noncentrality(len(table.plain_n)) * table.noise_n**2
     rows = []
-    for x in table.x_mm:
+    for x in np.unique(table.points()[:, 0]):
         for depth in table.depth_mm:
             logs = np.log1p(np.geomspace(_LEAST_CHANGE, table.stiffness_ratio[-1] - 1, _RATIOS))
             forces = table.forces(np.column_stack([np.full(_RATIOS, x), np.full(_RATIOS, depth), logs]))
@@ -192,22 +226,27 @@ def recovery(design: Design, search: LumpSearch, table: LumpTable, *, threads: i
              tell: Callable[[str], None] = lambda text: None) -> pd.DataFrame:
     """Lumps drawn within the table, solved, read with noise and found again: true, found and stated deviation of each.
 
-    The solver gives the readings, not the table, so that the table's own error counts.
+    The solver gives the readings, not the table, so that the table's own error counts. `alone_...`: found by the first press.
     """
+    first = replace(table, move_mm=table.move_mm[:1])
     rng, rows = np.random.default_rng(search.seed), []
     low, high = table.low.copy(), table.high     # type: ignore[attr-defined]
     low[2] = np.log(search.stiffness_ratio[0])
     for number in range(search.trials):
         tell(f"hidden lump {number + 1} of {search.trials}")
         lump = low + rng.uniform(0.1, 0.9, 3) * (high - low)
-        with_lump, without = (_solved(design, search, lump[0], lump[1], ratio, threads) for ratio in (np.exp(lump[2]), 1.0))
-        forces = table.plain_n + with_lump - without
-        found = find_lump(table, forces + search.noise_n * rng.normal(size=forces.size))
-        rows.append({"x_mm": lump[0], "depth_mm": lump[1], "stiffness_ratio": np.exp(lump[2]), "found_x_mm": found.x_mm,
-                     "found_depth_mm": found.depth_mm, "found_stiffness_ratio": found.stiffness_ratio,
-                     **_intervals(found, lump), "chi2": found.chi2, "detected": found.detected,
+        changes = [_changed(design, search, lump + [move, 0, 0], threads) for move in search.moves]
+        forces = table.plain_n + np.concatenate(changes)
+        readings = forces + search.noise_n * rng.normal(size=forces.size)
+        found, alone = find_lump(table, readings), find_lump(first, readings[:len(first.plain_n)])
+        rows.append({"x_mm": lump[0], "depth_mm": lump[1], "stiffness_ratio": np.exp(lump[2]), **_named("found", found),
+                     **_named("alone", alone), **_intervals(found, lump), "chi2": found.chi2, "detected": found.detected,
                      "table_error_n": float(np.abs(forces - table.forces(lump)).max())})
     return pd.DataFrame(rows)
+
+
+def _named(how, found):
+    return {f"{how}_{name}": getattr(found, name) for name in ("x_mm", "depth_mm", "stiffness_ratio")}
 
 
 def _intervals(found, lump):
@@ -216,6 +255,13 @@ def _intervals(found, lump):
     for name, (low, high), true in zip(PARAMETERS, found.interval, lump, strict=True):
         columns |= {f"{name}_low": low, f"{name}_high": high, f"{name}_within": bool(low <= true <= high)}
     return columns
+
+
+def _changed(design, search, lump, threads):
+    """(films,) in N by which a lump (3,) changes the readings of a press."""
+    x, depth, log_ratio = lump
+    with_lump, without = (_solved(design, search, x, depth, ratio, threads) for ratio in (np.exp(log_ratio), 1.0))
+    return with_lump - without
 
 
 def _solved(design, search, x, depth, ratio, threads):

@@ -155,24 +155,29 @@ def _lump(report, design, *, threads, tell):
                    "Right: lumps that the solver hid, found again from noisy films, with their 95 % intervals.",
                    lambda paths: figures.draw_detection(seen, found, paths))
     names = ("x_mm", "depth_mm", "stiffness_ratio")
-    off = {name: float((found[f"found_{name}"] - found[name]).abs().median()) for name in names}
+    off, alone = ({name: float((found[f"{how}_{name}"] - found[name]).abs().median()) for name in names}
+                  for how in ("found", "alone"))
     blind = {name: float((found[name] - found[name].median()).abs().median()) for name in names}     # the best constant guess
     inside = {name: float(found[f"{name}_within"].mean()) for name in PARAMETERS}
     depths = (found.depth_mm_high - found.depth_mm_low).median()
     least = seen.least_stiffness_ratio
-    report.said.append(f"Hidden lumps: median error {off['x_mm']:.2f} mm in x, {off['depth_mm']:.2f} mm in depth, "
-                       f"{off['stiffness_ratio']:.2f} in the stiffness ratio, with {search.noise_n:g} N of noise on each film (the "
-                       f"same guess for every lump: {blind['x_mm']:.2f} mm, {blind['depth_mm']:.2f} mm, "
-                       f"{blind['stiffness_ratio']:.2f}); "
+    report.said.append(f"Hidden lumps: median error {_told(off)}, with {search.noise_n:g} N of noise on each film, in "
+                       f"{len(search.moves)} press{'es' if len(search.moves) > 1 else ''} each (in the first alone: "
+                       f"{_told(alone)}; the same guess for every lump: {_told(blind)}); "
                        f"in their 95 % intervals lie {inside['x_mm']:.0%} of x, {inside['depth_mm']:.0%} of depth, "
                        f"{inside['log_ratio']:.0%} of the ratio; half of the intervals of depth are wider than "
                        f"{depths:.1f} mm. A lump is seen "
                        f"from a ratio of {least.min():.2f} to {least.max():.2f}, by its place, where the "
                        "plain tissue is known.")
-    return {"median_error": off, "median_error_of_one_guess": blind, "within_interval": inside,
+    return {"median_error": off, "median_error_in_one_press": alone, "median_error_of_one_guess": blind, "within_interval": inside,
             "least_ratio_seen": [float(least.min()), float(least.max())],
             "median_depth_interval_mm": float(depths),
             "largest_table_error_n": float(found.table_error_n.max())}
+
+
+def _told(error):
+    """Median errors of a lump in words."""
+    return f"{error['x_mm']:.2f} mm in x, {error['depth_mm']:.2f} mm in depth, {error['stiffness_ratio']:.2f} in the ratio"
 
 
 def _variants(design, *, threads, tell):
