@@ -236,6 +236,8 @@ def race(unknowns, threads, repeats, rivals, increments, limits):
     found = {name: [] for name in ("ours", *rivals)}
     for _ in range(repeats):
         found["ours"].append(child("ours", unknowns, threads, increments))
+        if found["ours"][-1].get("stopped"):
+            raise MemoryError(f"Our own press of {unknowns:g} unknowns was killed; free memory, or ask for fewer unknowns.")
         for name in rivals:
             limit_s = limits[name] * found["ours"][-1]["seconds"] if name in limits else None
             found[name].append(runs[name](unknowns, threads, increments, limit_s))
