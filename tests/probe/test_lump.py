@@ -8,7 +8,7 @@ from support.probes import small_design
 
 from softtact.errors import InputError
 from softtact.probe.design import LumpSearch
-from softtact.probe.lump import LumpTable, detection_map, deviations, find_lump, lump_table
+from softtact.probe.lump import LumpTable, detection_map, deviations, find_lump, lump_table, recovery
 
 X, DEPTH, RATIO = np.linspace(5, 62, 9), np.array([3.0, 6.0, 9.0, 12.0]), np.array([1.0, 2.0, 4.0, 8.0, 16.0])
 
@@ -73,6 +73,24 @@ def test_presses_beside_a_lump_tell_its_depth_where_one_press_cannot(beside):
     assert deviations(beside, lump)[1] < 0.1
     found = find_lump(beside, readings)
     assert (found.x_mm, found.depth_mm, found.stiffness_ratio) == pytest.approx((30.0, 6.0, 4.0), rel=0.01)
+
+
+def test_hidden_lumps_are_read_where_the_sensor_was_moved_to(monkeypatch):
+    def solved(design, search, x, depth, ratio, threads):
+        # middle, left, right film
+        if x is None:
+            return np.zeros(3)
+        return np.array([np.log(ratio) / depth * np.exp(-0.5 * ((x - film) / (2 * depth))**2) for film in (33.5, 12.0, 55.0)])
+
+    monkeypatch.setattr("softtact.probe.lump._solved", solved)
+    search = LumpSearch(tissue="rubber", width=6, height=5, x=np.linspace(5, 33.5, 20).tolist(),
+                        depth=np.linspace(3.5, 12, 15).tolist(), stiffness_ratio=[1.5, 2, 3, 4, 6, 8], jaw_mm=[0.5], noise_n=1e-5,
+                        moves=[0, -4, 7], trials=6, source="a test's")
+    design = small_design()
+    found = recovery(design, search, lump_table(design, search))
+    # Spline and noise put it off by 0.001 mm; a move with the wrong sign by millimetres.
+    assert (found.found_x_mm - found.x_mm).abs().max() < 0.01
+    assert (found.found_depth_mm - found.depth_mm).abs().max() < 0.01
 
 
 def test_a_lump_stays_within_the_table_in_every_press(beside):
