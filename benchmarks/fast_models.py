@@ -1,6 +1,7 @@
 """Seconds of twenty load steps to 50 N with the fast models, and presses per second: `python benchmarks/fast_models.py` from the
 project's folder; `--many N` presses as many random poses of ten indenters (default 1000, of one load step each), over one and two
-processes, and with the elastic model as one batch on a GPU where there is one; 0 keeps what the record holds of them.
+processes; 0 keeps what the record holds of them. With `--device cuda` only these presses are made, by the elastic model: in one
+process, in one for each core, and as one batch on the GPU (benchmarks/results/fast_models_cuda.json).
 
 Preparation that is made once per sensor, and compiled kernels, are made before the clock starts. Times depend on the machine and on
 what else it does: compare the ratios of one run.
@@ -47,16 +48,10 @@ def _seconds(sensor, mesh, model):
     return time.perf_counter() - start
 
 
-def many(sensor, count, *, seed=1):
-    """Presses per second of random poses, by model, and by processes or on a GPU."""
-    rng = np.random.default_rng(seed)
-    meshes = [read_mesh(f"config/objects/indenters/{MANY[k % len(MANY)]}.stl", unit="mm") for k in range(count)]
-    poses = [_random_pose(mesh, rng) for mesh in meshes]
-    ways = [(model, "cpu", workers) for model in MODELS for workers in (1, 2)]
-    if torch.cuda.is_available():
-        ways.append(("elastic", "cuda", softtact.press.sensor.cores()))
-        sensor.press_many(meshes[:2], poses[:2], force_n=[20.0], model="elastic", device="cuda", label="")     # starts CUDA
-    rows = []
+def many(sensor, count, ways):
+    """Presses per second of random poses, for each way: (model, device, processes)."""
+    meshes, poses = random_presses(count)
+    rows, maps = [], {}
     for model, device, workers in ways:
         for batch in sorted({min(batch, count) for batch in (10, 100, count)}):
             start = time.perf_counter()
@@ -68,7 +63,25 @@ def many(sensor, count, *, seed=1):
                          "per_second": round(batch / seconds, 2), "failed": failed, "memory_gb": _memory_gb(),
                          "gpu_memory_gb": round(torch.cuda.max_memory_allocated() / 1e9, 2) if device == "cuda" else None})
             print(rows[-1], flush=True)
-    return rows
+        maps[device] = {k: result.deformation_map_mm for k, result in enumerate(results) if not isinstance(result, Exception)}
+    return rows, maps
+
+
+def random_presses(count, *, seed=1):
+    """(meshes, poses): ten indenters in turns, each in a pose of its own."""
+    rng = np.random.default_rng(seed)
+    meshes = [read_mesh(f"config/objects/indenters/{MANY[k % len(MANY)]}.stl", unit="mm") for k in range(count)]
+    return meshes, [_random_pose(mesh, rng) for mesh in meshes]
+
+
+def on_gpu(sensor, count):
+    """The elastic model's presses on the processor and on the GPU, and how far their maps lie apart."""
+    meshes, poses = random_presses(2)
+    sensor.press_many(meshes, poses, force_n=[20.0], model="elastic", device="cuda", label="")     # starts CUDA
+    cores = softtact.press.sensor.cores()
+    rows, maps = many(sensor, count, [("elastic", "cpu", 1), ("elastic", "cpu", cores), ("elastic", "cuda", cores)])
+    apart = max(float(np.abs(maps["cuda"][k] - maps["cpu"][k]).max()) for k in maps["cuda"].keys() & maps["cpu"].keys())
+    print(record.write("fast_models_cuda", device=torch.cuda.get_device_name(), many=rows, largest_difference_mm=apart))
 
 
 def _random_pose(mesh, rng):
@@ -86,11 +99,15 @@ def _memory_gb():
 
 
 def main():
-    """Measure, print, and write benchmarks/results/fast_models.json."""
+    """Measure, print, and write benchmarks/results/fast_models.json, or with `--device cuda` fast_models_cuda.json."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--many", type=int, default=1000, metavar="N", help="random poses (default: 1000; 0: as recorded)")
+    parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help="cuda: many presses on a GPU and beside it")
     options = parser.parse_args()
     sensor, prepared = softtact.load_sensor("coro"), {}
+    if options.device == "cuda":
+        on_gpu(sensor, options.many)
+        return
     for model in MODELS:
         start = time.perf_counter()
         sensor.prepared(model)
@@ -100,8 +117,9 @@ def main():
     rows = twenty_load_steps(sensor, files)
     median = {model: float(np.median([row[model] for row in rows if row[model]])) for model in MODELS}
     print("median", median)
+    ways = [(model, "cpu", workers) for model in MODELS for workers in (1, 2)]
     record.write("fast_models", prepared_or_loaded_s=prepared, load_steps=len(FORCES), seconds=rows, median_s=median,
-                 many=many(sensor, options.many) if options.many else record.read("fast_models")["many"])
+                 many=many(sensor, options.many, ways)[0] if options.many else record.read("fast_models")["many"])
 
 
 if __name__ == "__main__":

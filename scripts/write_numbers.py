@@ -9,6 +9,8 @@ import json
 import re
 import subprocess
 import sys
+from itertools import pairwise
+from math import log
 from pathlib import Path
 from statistics import median
 
@@ -77,7 +79,13 @@ def presses() -> str:
     """Time and memory of a hyperelastic press on each mesh."""
     rows = [[MESHES[row["mesh"]], row["levels"], row["threads"], f"{row['seconds']:.0f}", row["iterations"],
              f"{row['memory_gb']:.1f}"] for row in record("press")["rows"]]
-    return f"{source('press')}\n\n" + table("mesh, load steps, threads, seconds, iterations, peak memory (GB)", rows)
+    gpu = record("press_cuda")
+    seconds = {(row["mesh"], row["device"]): row["seconds"] for row in gpu["rows"]}
+    beside = ", ".join(f"{seconds[mesh, 'cuda'] / seconds[mesh, 'cpu']:.2f} ({MESHES[mesh]} mesh)"
+                       for mesh in MESHES if (mesh, "cuda") in seconds)
+    return (f"{source('press')}\n\n" + table("mesh, load steps, threads, seconds, iterations, peak memory (GB)", rows)
+            + f"\n\nElements summed up on a GPU, an {gpu['device']} (`press_cuda.json`, {gpu['date'][:10]}): {beside} times as long "
+              "as on two cores of the same machine.")
 
 
 def fast_presses() -> str:
@@ -90,7 +98,17 @@ def fast_presses() -> str:
                 if entry["model"] == model and entry["batch"] == 1000}
         rows.append([model, f"{median(seconds):.2f}", f"{seconds[0]:.2f} to {seconds[-1]:.2f}", rate[1], rate[2]])
     head = "model, median (s), range (s), presses per second with 1 process, with 2 processes"
-    return f"{source('fast_models')} One process, {read['levels']} load steps to 50 N.\n\n" + table(head, rows)
+    return f"{source('fast_models')} One process, {read['levels']} load steps to 50 N.\n\n{table(head, rows)}\n\n{_batch_on_gpu()}"
+
+
+def _batch_on_gpu() -> str:
+    """Presses per second of the elastic model as one batch on a GPU, and beside it on the processor."""
+    read = record("fast_models_cuda")
+    most = max(row["batch"] for row in read["many"])
+    one, many, gpu = (row for row in read["many"] if row["batch"] == most)
+    return (f"{most:,} presses of the elastic model as one batch on an {read['device']} (`fast_models_cuda.json`, {read['date'][:10]}): "
+            f"{gpu['per_second']:.0f} a second; beside it {one['per_second']:.0f} in one process, {many['per_second']:.0f} in "
+            f"{many['workers']}. Maps lie within {read['largest_difference_mm']:.0e} mm of each other.")
 
 
 def growth() -> str:
@@ -205,7 +223,20 @@ def solid_races() -> str:
     head = ("unknowns, increments, Newton steps, ours (s), CalculiX / ours, NGSolve / ours, forces apart, solution of our time, "
             "assembly of our time, memory (GB)")
     told = "Seconds are of the processor; empty: not run; above: stopped there."
-    return f"{source('solid_races')} {told}\n\n{table(head, rows)}"
+    return f"{source('solid_races')} {told}\n\n{table(head, rows)}\n\n{_growth_of_solids()}"
+
+
+def _growth_of_solids() -> str:
+    """With which power of the unknowns processor time and memory of the first increment grow."""
+    ours = [row["ours"] for row in record("solid_races")["rows"] if row["increments"] == 1]
+
+    def power(what, small, large):
+        return log(large[what] / small[what]) / log(large["unknowns"] / small["unknowns"])
+
+    steps = ", ".join(f"{power('cpu_seconds', *pair):.2f} from {pair[0]['unknowns']:,} to {pair[1]['unknowns']:,}"
+                      for pair in pairwise(ours))
+    return (f"Time of the first increment grows with the power {steps}; memory over all with the power "
+            f"{power('peak_gb', ours[0], ours[-1]):.2f}.")
 
 
 def _ratio(other: dict, ours: dict) -> str:
