@@ -102,8 +102,9 @@ def batch_on_gpu() -> str:
     one, many, gpu = (row for row in read["many"] if row["batch"] == most)
     rows = [["one process", f"{one['per_second']:.0f}"], [f"{many['workers']} processes", f"{many['per_second']:.0f}"],
             ["one batch on the GPU", f"{gpu['per_second']:.0f}"]]
-    return (f"`fast_models_cuda.json`, {read['date'][:10]}, {read['device']} and {read['machine']['cores']} cores. {most:,} presses; "
-            f"maps within {read['largest_difference_mm']:.0e} mm of each other.\n\n{table('elastic model, presses per second', rows)}")
+    return (f"`fast_models_cuda.json`, {read['date'][:10]}, {read['device']} and {read['machine']['cores']} cores. "
+            f"{most:,} presses; maps within {read['largest_difference_mm']:.0e} mm of each other.\n\n"
+            + table("elastic model, presses per second", rows))
 
 
 def growth() -> str:

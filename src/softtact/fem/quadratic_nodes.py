@@ -1,13 +1,15 @@
-"""Quadratic elements from linear ones: nodes in the middles of edges, of quadrilateral faces and of hexahedra."""
+"""Quadratic elements from linear ones: nodes in the middles of edges, of quadrilateral faces and of hexahedra; and the way back."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
+import scipy.sparse as sp
 
 from softtact.fem.elements import HEX27, QUAD9, TET10, TRI6, WEDGE18, Element
 
 QUADRATIC = {"tetra": TET10, "hexahedron": HEX27, "wedge": WEDGE18, "triangle": TRI6, "quad": QUAD9}
 _CORNERS = {"tetra": 4, "hexahedron": 8, "wedge": 6, "triangle": 3, "quad": 4}
+_LINEAR = {element.meshio_name: kind for kind, element in QUADRATIC.items()}
 
 
 def raised(points: np.ndarray, cells: Sequence[tuple[str, np.ndarray]]) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
@@ -31,6 +33,30 @@ def raised(points: np.ndarray, cells: Sequence[tuple[str, np.ndarray]]) -> tuple
     number = np.full(len(points), -1)
     number[between[corner, -1]] = corner
     return new, nodes, number
+
+
+def shares_of_corners(count: int, parts: Iterable[tuple[Element, np.ndarray]]) -> sp.csr_matrix | None:
+    """Values at so many nodes from those at the corners of elements [(element, nodes (e, m))]: (count, count), others' rows empty.
+
+    A node takes the mean of the corners that it lies between, itself where it is one. None where an element, like HEX20, has no
+    node in the middle of some of its faces.
+    """
+    rows, columns, values = [np.empty(0, int)], [np.empty(0, int)], [np.empty(0)]
+    known = np.zeros(count, dtype=bool)
+    for element, nodes in parts:
+        if element.meshio_name not in _LINEAR:
+            return None
+        kind = _LINEAR[element.meshio_name]
+        members, corners = _members(kind), nodes[:, element.vtk_order[:_CORNERS[kind]]]
+        new, first = np.unique(nodes, return_index=True)
+        first = first[~known[new]]     # each node once, whatever elements share it
+        known[new] = True
+        at, member = members.shape[0], members[first % members.shape[0]]
+        own = corners[first // at]
+        rows.append(np.repeat(nodes.ravel()[first], member.sum(axis=1)))
+        columns.append(own[member])
+        values.append((member / member.sum(axis=1, keepdims=True))[member])
+    return sp.csr_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(count, count))
 
 
 def _keys(corners, members, width):

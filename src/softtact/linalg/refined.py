@@ -5,6 +5,7 @@ energy norm (`multifrontal`), two leave 1e-7. And a solve takes a fiftieth of a 
 earlier matrix serves as long as its many solves take less time than a new factor
 (docs/notebook/2026-11-26-solids-in-single-precision.md).
 Matrices for which single precision has too few digits, as of a stiff plate that floats on a gel, get factors in double precision.
+Large matrices of quadratic elements do without a factor of the whole (`two_levels`) as long as that takes few steps.
 Reference: Saad, Iterative Methods for Sparse Linear Systems, 2nd ed. (2003), section 9.2.
 """
 
@@ -18,11 +19,13 @@ from softtact.linalg.direct import PardisoSolver, make_solver
 from softtact.linalg.direct_single import point_at_mkl
 from softtact.linalg.multifrontal_solver import DissectedSolver
 from softtact.linalg.symmetric_product import SymmetricProduct
+from softtact.linalg.two_levels import TwoLevels
 from softtact.linalg.workers import SERIAL, Workers
 
 _ENOUGH = 1e-3    # of the solution's energy norm: the last correction; what is left is that times what a solve leaves
 _WORTH = 0.6      # of a factor's time: solves with an old factor that take more are given up
 _MOST_STEPS = 30  # with its own factor; a matrix that takes more needs more digits
+_MOST_CYCLES = 30  # of two levels; a matrix that takes more is better factored
 
 
 class _Indefinite(Exception):
@@ -33,27 +36,35 @@ class RefinedSolver:
     """Solves with a factor in single precision, of this matrix or of one before, as long as that is enough."""
 
     _exact: PardisoSolver | BlockTridiagonalSolver | None
+    _levels: TwoLevels | None     # while they serve
     _product: tuple[tuple[np.ndarray, np.ndarray], SymmetricProduct] | None     # of the last pattern
 
-    def __init__(self, places: np.ndarray, *, workers: Workers = SERIAL) -> None:
-        """places (n, 2 or 3): where each unknown stands, in mm"""
+    def __init__(self, places: np.ndarray, *, lift: sp.csr_matrix | None = None, workers: Workers = SERIAL) -> None:
+        """places (n, 2 or 3): where each unknown stands, in mm;  lift (n, c): values at all of them from those at the
+        corners of quadratic elements, where the systems are to be solved on these two levels"""
         self._workers, self._product = workers, None
         self._quick, self._exact = DissectedSolver(places, workers=workers), None
+        self._levels = TwoLevels(places, lift, workers=workers) if lift is not None else None
         self._upkeep: _Upkeep | None = None     # of the factor that is there
 
     @property
     def name(self) -> str:
+        if self._levels is not None:
+            return "conjugate gradients, " + self._levels.name
         return "conjugate gradients, " + self._quick.name if self._exact is None else self._exact.name
 
-    def solve(self, upper: sp.csr_matrix, right: np.ndarray, *, doubt: bool = False) -> np.ndarray | None:
+    def solve(self, upper: sp.csr_matrix, right: np.ndarray, *, doubt: bool = False, factored: bool = False) -> np.ndarray | None:
         """Solve a matrix, given by its upper triangle (csr, sorted, with its diagonal), for right-hand sides (n, k).
 
-        None if it is not positive definite;  doubt: whether to ask double precision before that is said
+        None if it is not positive definite;  doubt: whether to ask double precision before that is said;  factored: whether
+        `precondition` is to be as good as a factor
         """
         if self._exact is not None:
             return self._exact.solve(right) if self._exact.factor(upper) else None
         try:
-            found = self._with_old_factor(upper, right)
+            found = None if factored else self._with_levels(upper, right, doubt)
+            if found is None:
+                found = self._with_old_factor(upper, right)
             if found is None:
                 found = self._with_new_factor(upper, right)
         except _Indefinite:
@@ -62,18 +73,31 @@ class RefinedSolver:
             found = self._exactly(upper, right)
         return found
 
+    def _with_levels(self, upper, right, doubt):
+        """None where there are none, or where they fail or take too many steps: they are not tried again then."""
+        if self._levels is None:
+            return None
+        found, product = None, partial(self.product, upper)
+        if self._levels.factor(upper, product):
+            found, _ = self._refined(product, right, self._levels.solve, _MOST_CYCLES * right.shape[1])
+        elif not doubt:
+            raise _Indefinite
+        if found is None:
+            self._levels.close()
+            self._levels = None
+        return found
+
     def _with_old_factor(self, upper, right):
         if self._upkeep is None or self._upkeep.due:
             return None
-        found, steps = self._refined(upper, right, int(_WORTH * self._quick.solves_per_factor))
-        self._upkeep.add(steps)
-        return found
+        return self._with_factor(upper, right, int(_WORTH * self._quick.solves_per_factor))
 
     def _with_new_factor(self, upper, right):
         self._upkeep = _Upkeep(self._quick.solves_per_factor) if self._quick.factor(upper) else None
-        if self._upkeep is None:
-            return None
-        found, steps = self._refined(upper, right, _MOST_STEPS * right.shape[1])
+        return None if self._upkeep is None else self._with_factor(upper, right, _MOST_STEPS * right.shape[1])
+
+    def _with_factor(self, upper, right, most):
+        found, steps = self._refined(partial(self.product, upper), right, self._quick.solve, most)
         self._upkeep.add(steps)
         return found
 
@@ -99,11 +123,12 @@ class RefinedSolver:
         """About the solution (n,) with the last matrix, by the factor that is there."""
         return self._quick.solve(right) if self._exact is None else self._exact.solve(right)
 
-    def _refined(self, upper, right, most):
+    @staticmethod
+    def _refined(product, right, precondition, most):
         """The solutions (n, k) by conjugate gradients, None where they do not end in so many steps together; and the steps."""
         found, steps = np.empty_like(right), 0
         for k in range(right.shape[1]):
-            one, taken = _conjugate_gradients(partial(self.product, upper), right[:, k], self._quick.solve, most - steps)
+            one, taken = _conjugate_gradients(product, right[:, k], precondition, most - steps)
             steps += taken
             if one is None:
                 return None, steps
@@ -112,7 +137,7 @@ class RefinedSolver:
 
     def close(self) -> None:
         """Forget the factors."""
-        for solver in (self._quick, self._exact):
+        for solver in (self._levels, self._quick, self._exact):
             if solver is not None:
                 solver.close()
         self._upkeep = None

@@ -27,6 +27,7 @@ from softtact.linalg.workers import Workers, slices
 from softtact.materials.laws.base import Law
 from softtact.models.solid.blocks import region_blocks
 from softtact.models.solid.checks import bodies_of, refuse_loose
+from softtact.models.solid.corners import lift_from_corners
 from softtact.models.solid.device import find_device, sum_on
 from softtact.models.solid.frames import FramePose, make_frames
 from softtact.models.solid.loads import FacePressure
@@ -97,7 +98,8 @@ class SolidBody:
         self.pressures: list[FacePressure] = []
         self.springs: list[FrustumSprings] = []
         refuse_loose(mesh, self.free_components, held or {})
-        self.solver = RefinedSolver(self.points[self.free // 3], workers=self.workers)
+        lift = lift_from_corners(mesh, laws, self.free)
+        self.solver = RefinedSolver(self.points[self.free // 3], lift=lift, workers=self.workers)
         self._pattern: SymmetricPattern | None = None
         self._known_pairs: set[tuple[int, int]] = set()
 
@@ -256,13 +258,14 @@ class SolidBody:
         Where friction slides, the tangent has a part beside the matrix: GMRES, with the factor as its preconditioner.
         turning: see `tangent`
         """
-        found = self.solver.solve(self.tangent(state), right) if turning else None
-        if found is None:
-            found = self._definite(state, right)
-        if not any(
+        slides = any(
             pair.friction and (contact.slides & (contact.pressure > 0)).any()
             for pair, contact in zip(self.pairs, state.contacts, strict=True)
-        ):
+        )
+        found = self.solver.solve(self.tangent(state), right, factored=slides) if turning else None
+        if found is None:
+            found = self._definite(state, right, factored=slides)
+        if not slides:
             return found
 
         def coupling(x):
@@ -285,13 +288,13 @@ class SolidBody:
             found[:, k] += self.solver.precondition(y)
         return found
 
-    def _definite(self, state, right):
+    def _definite(self, state, right, *, factored):
         """With the tangent without the part that surfaces have as they turn, and as stiff as it takes to be positive definite."""
         matrix = self.tangent(state, turning=False)  # far from balance, pressed surfaces that turn may have no stiffness
         if not np.isfinite(matrix.data).all():  # no shift makes it positive definite
             raise ConvergenceError("The tangent holds what is no number; an element may be turned inside out.")
         shift, diagonal = 0.0, matrix.indptr[:-1]
-        while (found := self.solver.solve(matrix, right, doubt=not shift)) is None:
+        while (found := self.solver.solve(matrix, right, doubt=not shift, factored=factored)) is None:
             more = max(3.0 * shift, 1e-4 * float(np.abs(matrix.data[diagonal]).mean()))
             matrix.data[diagonal] += more
             shift += more
