@@ -84,3 +84,12 @@ def test_a_machine_without_mkl_takes_the_solver_that_is_there(monkeypatch):
     monkeypatch.setattr(importlib.metadata, "files", nothing)
     point_at_mkl()
     assert "PYPARDISO_MKL_RT" not in os.environ
+
+
+def test_a_solver_that_nobody_closes_gives_its_memory_back(monkeypatch):
+    freed = []
+    monkeypatch.setattr("pypardiso.PyPardisoSolver.free_memory", lambda self, everything=False: freed.append(everything))
+    solver = PardisoSolver()
+    assert not freed
+    del solver
+    assert freed == [True]

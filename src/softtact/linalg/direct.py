@@ -6,6 +6,7 @@ its own, which knows where the unknowns stand: `multifrontal_solver`.
 
 import ctypes
 import os
+import weakref
 
 import numpy as np
 import scipy.sparse as sp
@@ -49,6 +50,8 @@ class PardisoSolver:
         for entry, value in self._PARAMETERS.items():
             self._solver.set_iparm(entry + 1, value)
         self._solver.set_iparm(self._FROM_ZERO + 1, 1)
+        # Factors live outside Python's memory, where they would outlive a solver that nobody closed.
+        weakref.finalize(self, self._solver.free_memory, everything=True).atexit = False
 
     def factor(self, upper: sp.csr_matrix) -> bool:
         """Factor the matrix whose upper triangle (csr, sorted, with its diagonal) is given; False if not positive definite."""

@@ -5,7 +5,7 @@ Le, Maiolino, Mastrogiovanni and Cannata, sec. III-B: sensitivity S, eq. (5), we
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 import pandas as pd
@@ -16,6 +16,7 @@ from softtact.skin.elastomers import Elastomer
 from softtact.skin.layout import Layout
 from softtact.skin.loads import disc
 
+_SKINS = 8  # kept with their meshes: as many as there are thicknesses in a table, for the next elastomer
 SPECIMEN_MM = 6.0  # thickness of the tested specimens, which the printed t_min is a share of: the authors' published toolbox
 
 
@@ -182,7 +183,7 @@ def _layer_row(elastomer, thickness, layout, needs, converter, spacing):
     }
 
 
-@cache
+@lru_cache(maxsize=_SKINS)
 def _skin(corners, radius, guard, thickness, poisson, spacing):
     """A module with one taxel in its middle, of permittivity 1."""
     triangle = np.frombuffer(corners).reshape(3, 2)

@@ -1,4 +1,4 @@
-"""The corners' share in the nodes of solids whose systems two levels solve: those that are large, and not nearly incompressible."""
+"""The corners' share in the nodes of solids whose systems two levels solve: large, spatial, and not nearly incompressible."""
 
 from collections.abc import Mapping
 
@@ -18,7 +18,8 @@ def lift_from_corners(mesh: SolidMesh, laws: Mapping[str, Law], free: np.ndarray
 
     None where two levels do not serve (docs/notebook/2026-11-27-large-solids.md).
     """
-    if len(free) < _LARGE or any(law.bulk_modulus > _MOST_BULK * law.mu0 for law in laws.values()):
+    plane = mesh.geometry != "solid"  # whose factors take few operations
+    if plane or len(free) < _LARGE or any(law.bulk_modulus > _MOST_BULK * law.mu0 for law in laws.values()):
         return None
     shares = shares_of_corners(len(mesh.points), ((element, nodes) for _, element, nodes in mesh.parts()))
     if shares is None:
