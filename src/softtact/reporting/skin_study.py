@@ -68,14 +68,7 @@ def _compute_sections(study, skin, tables, said, out, threads):
     design = study.design
     if design.probes:
         announce(f"{design.skin}: probes")
-        one = _skin(study, alone(study.layout, design.probes.at_taxel - 1), threads)
-        tables["probes"] = probe_curves(
-            one,
-            study.elastomer,
-            diameters_mm=design.probes.diameters_mm,
-            pressures_kpa=design.probes.pressures_kpa,
-            modulus_shares=design.probes.modulus_shares,
-        )
+        tables["probes"] = _probe(study, threads)
         figures.draw_probes(out / "figures/probes.png", tables["probes"])
     if design.choice:
         announce(f"{design.skin}: choice of the elastomer and its thickness")
@@ -88,6 +81,18 @@ def _compute_sections(study, skin, tables, said, out, threads):
         said["maps"] = _draw_maps(study, skin, tables, out)
     if design.search:
         _search(study, tables, out)
+
+
+def _probe(study, threads):
+    """Curves of the probes, on a module with one taxel."""
+    probes = study.design.probes
+    return probe_curves(
+        _skin(study, alone(study.layout, probes.at_taxel - 1), threads),
+        study.elastomer,
+        diameters_mm=probes.diameters_mm,
+        pressures_kpa=probes.pressures_kpa,
+        modulus_shares=probes.modulus_shares,
+    )
 
 
 def _skin(study, layout, threads):
