@@ -92,7 +92,7 @@ def fast_presses() -> str:
                 if entry["model"] == model and entry["batch"] == most}
         rows.append([model, f"{median(seconds):.2f}", f"{seconds[0]:.2f} to {seconds[-1]:.2f}", rate[1], rate[2]])
     head = "model, median (s), range (s), presses per second with 1 process, with 2 processes"
-    return f"{source('fast_models')} One process, {read['load_steps']} load steps to 50 N.\n\n{table(head, rows)}"
+    return f"{source('fast_models')} One process, {read['load_steps']} load steps to 50 N; {most} presses.\n\n{table(head, rows)}"
 
 
 def batch_on_gpu() -> str:

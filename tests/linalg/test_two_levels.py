@@ -48,6 +48,14 @@ def test_a_cycle_is_symmetric_and_positive_and_comes_near_the_inverse():
     assert 0.2 < values.min() and values.max() < 1.01
 
 
+def test_the_corners_are_factored_by_where_they_stand():
+    _, places, lift = system(2)
+    at = TwoLevels(places, lift)._corners._places
+    between = np.asarray(lift.sum(axis=1)).ravel() == 1.0     # not beside the floor, whose corners are held
+    assert between.sum() > len(at)
+    np.testing.assert_allclose((lift @ at)[between], places[between], atol=1e-14)
+
+
 def test_the_steps_do_not_grow_with_the_body():
     steps = []
     for n in (3, 6):

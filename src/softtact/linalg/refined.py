@@ -33,7 +33,7 @@ class _Indefinite(Exception):
 
 
 class RefinedSolver:
-    """Solves with a factor in single precision, of this matrix or of one before, as long as that is enough."""
+    """Solves on two levels of nodes, or with a factor in single precision of this matrix or of one before, while that is enough."""
 
     _exact: PardisoSolver | BlockTridiagonalSolver | None
     _levels: TwoLevels | None     # while they serve

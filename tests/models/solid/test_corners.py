@@ -33,15 +33,27 @@ def blocks(kind, *, bulk=5.0, friction=0.0):
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 @pytest.mark.parametrize("kind", ["tetrahedra", "hexahedra"])
 def test_two_levels_give_the_presses_of_a_factor(kind, friction, monkeypatch):
+    motion = Motion().step(ways={"z": -0.1}).step(ways={"x": 0.1})
     steps = {}
     for large in (0, 10**9):
         monkeypatch.setattr(corners, "_LARGE", large)
         body = blocks(kind, friction=friction)
         assert ("two levels" in body.solver.name) == (large == 0)
-        steps[large] = last(SolidPath(body, {"top": Motion().step(ways={"z": -0.1})}).run())
+        steps[large] = last(SolidPath(body, {"top": motion}).run())
         assert ("two levels" in body.solver.name) == (large == 0)     # to the end
+    assert (steps[0].dissipated_mj > 1e-5) == (friction > 0)     # points slide, whose coupling GMRES solves
     # Newton's method leaves 1e-6 of the force.
     np.testing.assert_allclose(steps[0].loads, steps[10**9].loads, rtol=0, atol=1e-5 * np.abs(steps[10**9].loads).max())
+
+
+def test_a_system_with_sliding_points_is_solved_with_a_factor_on_two_levels_too(monkeypatch):
+    motion, found = Motion().step(ways={"z": -0.1}).step(ways={"x": 0.1}), {}
+    state = last(SolidPath(blocks("tetrahedra", friction=0.3), {"top": motion}).run()).state
+    for large in (0, 10**9):
+        monkeypatch.setattr(corners, "_LARGE", large)
+        body = blocks("tetrahedra", friction=0.3)     # which has no factor yet
+        found[large] = body.solve(state, np.ones((len(body.free), 1)))
+    np.testing.assert_allclose(found[0], found[10**9], rtol=0, atol=1e-5 * np.abs(found[0]).max())     # GMRES leaves 1e-6
 
 
 def test_small_bodies_nearly_incompressible_ones_and_plane_ones_keep_the_factor(monkeypatch):
