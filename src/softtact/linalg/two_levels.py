@@ -1,8 +1,8 @@
 """A preconditioner for matrices of quadratic elements: a factor of the part on their corners, and Chebyshev's polynomial around it.
 
 That is p-multigrid with two levels. The corners hold an eighth of a spatial body's unknowns, so that the factor takes a fiftieth of
-the operations of a whole one. Displacements that bend from corner to corner are stiff, and few steps of Chebyshev's polynomial of the scaled
-matrix settle them.
+the operations of a whole one. Displacements that bend from corner to corner are stiff, and few steps of Chebyshev's polynomial of
+the scaled matrix settle them.
 Measured in docs/notebook/2026-11-27-large-solids.md.
 References: Ronquist and Patera, J. Sci. Comput. 2 (1987) 389; Saad, Iterative Methods for Sparse Linear Systems, 2nd ed. (2003),
 section 12.3.
