@@ -18,9 +18,9 @@ import softtact
 from softtact.evaluation.policies import MODELS, policy_table, press_table, told_over_true
 from softtact.geometry.complexity import choose_model, score
 from softtact.geometry.meshes import place, read_mesh
-from softtact.reporting.fig8_policies import draw
 from softtact.reporting.style import save
 from softtact.sensors.edge import Edge
+from softtact.studies.hybrid.figures.fig8_policies import draw
 
 MESH, FAST = "fine", MODELS[:2]
 TOLERANCES_MM = [0.003, 0.006, 0.008, 0.02, 0.04, 0.08]

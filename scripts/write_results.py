@@ -22,9 +22,9 @@ from PIL import Image
 
 from softtact.errors import InputError
 from softtact.reporting.run_record import run_record, run_sentence
-from softtact.reporting.tables import machine
 from softtact.reporting.words import KINDS, PREDICTORS, SETS, header
-from softtact.study.code_closure import code_closure
+from softtact.studies.code_closure import code_closure
+from softtact.studies.hybrid.tables import machine
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE, FOLDER = ROOT / "docs" / "results.md", ROOT / "docs" / "results"

@@ -23,7 +23,7 @@ from softtact.materials.readers import read_curve
 from softtact.reporting.press_view import read_view
 from softtact.sensors.library import material_file, sensor_file
 from softtact.sensors.specification import SensorSpec
-from softtact.study.config import load_study
+from softtact.studies.hybrid.config import load_study
 
 ROOT = Path(__file__).resolve().parents[1]
 BOX = trimesh.creation.box(extents=(4, 5, 6))

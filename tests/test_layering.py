@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 SOURCE = Path(__file__).parents[1] / "src/softtact"
-MOST_LINES = 350
+MOST_LINES = 500
 # From below: a package imports from those of the lines before its own, and from itself; those of one line know nothing of each
 # other.
 ORDER = (
@@ -25,9 +25,8 @@ ORDER = (
     ("press", "skin", "probe"),
     ("robot", "learning", "calibration"),
     ("evaluation",),
-    ("study",),
     ("reporting",),
-    ("stages",),
+    ("studies",),
     ("commands",),
     ("cli",),
     ("__main__",),
@@ -114,7 +113,7 @@ def test_the_imports_that_are_checked_are_those_that_python_makes(graph):
     """One of each kind: of names, of a module, within a function."""
     assert "fem.kernels" in graph["fem.solid_block"]
     assert "linalg.multifrontal" in graph["linalg.multifrontal_solver"]
-    assert "stages.__main__" in graph["commands.stage"]
+    assert "studies.hybrid.stages.__main__" in graph["commands.stage"]
 
 
 def test_no_file_is_longer_than_can_be_read_at_once():

@@ -17,7 +17,7 @@ from softtact.models.foundation.compliance import foundation_compliance
 from softtact.readout.capacitance import ideal_counts
 from softtact.readout.virtual_sensor import read_virtual_sensor
 from softtact.sensors.library import sensor_file
-from softtact.study.config import load_study
+from softtact.studies.hybrid.config import load_study
 
 ROOT = Path(__file__).resolve().parents[1]
 MAP, TAXELS, FORCES = (13, 21), (3, 5), [2.0, 6.0]

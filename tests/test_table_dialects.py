@@ -9,7 +9,7 @@ from support.table_files import dialects, faults
 from softtact.errors import InputError
 from softtact.learning.prediction import read_maps
 from softtact.materials.readers import read_curve
-from softtact.stages.validate_ftir import _measured_curve
+from softtact.studies.hybrid.stages.validate_ftir import _measured_curve
 
 quick = settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture])
 # Name in the header -> what is written there of a stretch, or of a nominal stress in MPa at a stretch; and its unit.

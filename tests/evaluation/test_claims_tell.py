@@ -4,17 +4,18 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from softtact.evaluation import claims_of_choice, claims_of_skin
 from softtact.evaluation.claim_rows import within
-from softtact.evaluation.claims_of_grasps import claims_of_grasps
-from softtact.evaluation.claims_of_materials import claims_of_materials
-from softtact.evaluation.claims_of_probe import claims_of_probe
-from softtact.evaluation.claims_of_scores import claims_of_scores
-from softtact.evaluation.claims_of_study import claims_of_study
-from softtact.evaluation.claims_of_times import claims_of_times
-from softtact.reporting.tables import PRINTED_TIMES
 from softtact.skin.elastomers import read_elastomers
 from softtact.skin.layout import module_layout
+from softtact.studies.grasps.claims import claims_of_grasps
+from softtact.studies.hybrid.claims import of_choice as claims_of_choice
+from softtact.studies.hybrid.claims.of_materials import claims_of_materials
+from softtact.studies.hybrid.claims.of_scores import claims_of_scores
+from softtact.studies.hybrid.claims.of_study import claims_of_study
+from softtact.studies.hybrid.claims.of_times import claims_of_times
+from softtact.studies.hybrid.tables import PRINTED_TIMES
+from softtact.studies.palpation.claims import claims_of_probe
+from softtact.studies.skin import claims as claims_of_skin
 
 
 def by_start(rows, start):

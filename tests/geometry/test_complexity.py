@@ -10,7 +10,7 @@ import yaml
 from softtact.errors import InputError
 from softtact.geometry.complexity import choose_model, hull_edges, overlap_points, score, score_file, score_objects
 from softtact.geometry.pose import Pose
-from softtact.stages import score_complexity
+from softtact.studies.hybrid.stages import score_complexity
 
 FOOTPRINT = (22.0, 37.0)
 OBJECTS = Path(__file__).parents[2] / "config" / "objects"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from softtact.errors import InputError
-from softtact.stages.validate_ftir import _measured
+from softtact.studies.hybrid.stages.validate_ftir import _measured
 
 FORCES = np.array([10.0, 50.0])
 

@@ -8,7 +8,7 @@ from support.sensors import CORO
 
 from softtact.errors import InputError
 from softtact.files import read_dataset, read_json, write_json
-from softtact.stages import draw_fig5_ftir, press_on_glass, validate_ftir
+from softtact.studies.hybrid.stages import draw_fig5_ftir, press_on_glass, validate_ftir
 
 ROOT = Path(__file__).parents[2]
 SENSOR = CORO.model_dump(mode="json")

@@ -8,7 +8,7 @@ from formula_study import MODELS
 from softtact.errors import ConvergenceError, InputError
 from softtact.learning.dataset import SPLITS, build_datasets
 from softtact.learning.samples import read_samples
-from softtact.stages import build_dataset
+from softtact.studies.hybrid.stages import build_dataset
 
 
 def build(study, **changes):

@@ -9,7 +9,7 @@ from softtact.files import read_json
 from softtact.materials.cards import law_from_card, load_card
 from softtact.materials.config import load_material
 from softtact.materials.readers import read_curve
-from softtact.stages import draw_material, fit_material, make_curves
+from softtact.studies.hybrid.stages import draw_material, fit_material, make_curves
 
 
 def as_passed(settings):

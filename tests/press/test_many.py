@@ -15,7 +15,7 @@ from softtact.geometry.pose import Pose
 from softtact.models.elastic.compliance import elastic_compliance
 from softtact.press.many import press_batch
 from softtact.press.sensor import Sensor
-from softtact.stages import simulate_press, simulate_presses
+from softtact.studies.hybrid.stages import simulate_press, simulate_presses
 
 SMALL = CORO.model_copy(update={"footprint_mm": (7.2, 7.2), "map_shape": (13, 13)})
 MESHES = [trimesh.creation.cylinder(radius=1.5, height=2.0), trimesh.creation.icosphere(radius=4.0),

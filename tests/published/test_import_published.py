@@ -11,7 +11,7 @@ from support.sensors import CORO
 from softtact.errors import InputError
 from softtact.files import read_dataset
 from softtact.learning.samples import read_samples
-from softtact.stages import build_dataset, import_published
+from softtact.studies.hybrid.stages import build_dataset, import_published
 
 SPLITS = ("train", "validation", "unseen", "grasps")
 

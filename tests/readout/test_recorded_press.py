@@ -10,7 +10,7 @@ from softtact.learning.dataset import read_tactile
 from softtact.readout.recorded_press import readings_at
 from softtact.readout.recording import make_recording
 from softtact.readout.tsf85 import write_recording
-from softtact.stages import read_recordings
+from softtact.studies.hybrid.stages import read_recordings
 
 SLOPE = 10.0 + np.arange(28).reshape(7, 4)      # counts per N of each taxel
 FORCES = [5.0, 12.5, 50.0]

@@ -21,7 +21,7 @@ from softtact.readout.virtual_sensor import (
     read_virtual_sensor,
     taxel_capacitance,
 )
-from softtact.stages import read_virtual_sensor as stage
+from softtact.studies.hybrid.stages import read_virtual_sensor as stage
 
 FORCES = np.array([10.0, 20.0, 40.0])
 X, Y = np.meshgrid(CORO.map_x_mm, CORO.map_y_mm)

@@ -5,11 +5,11 @@ import pandas as pd
 import pytest
 import xarray
 
-from softtact.evaluation.claims import claims
-from softtact.evaluation.claims_of_choice import detail_family
 from softtact.evaluation.features import feature_table
 from softtact.geometry.complexity import choose_model
-from softtact.reporting.tables import PRINTED_COUNTS, PRINTED_TIMES, table2_complexity, table3_timing
+from softtact.studies.hybrid.claims.of_choice import detail_family
+from softtact.studies.hybrid.claims.table import claims
+from softtact.studies.hybrid.tables import PRINTED_COUNTS, PRINTED_TIMES, table2_complexity, table3_timing
 
 
 def choose(*counts, rule="any"):

@@ -9,10 +9,11 @@ import pytest
 import trimesh
 
 from softtact.files import write_csv, write_json
-from softtact.reporting import fig4_complexity, fig5_ftir, fig6_ssim, fig7_maps, fig9_networks, fig10_learning_curve, render
-from softtact.reporting.page import render_page
+from softtact.reporting import render
 from softtact.reporting.run_record import run_record
 from softtact.reporting.style import draw_map, pyplot, save
+from softtact.studies.hybrid.figures import fig4_complexity, fig5_ftir, fig6_ssim, fig7_maps, fig9_networks, fig10_learning_curve
+from softtact.studies.hybrid.page import render_page
 
 SSIM = pd.DataFrame([{"model": model, "set": name, "item": item, "trial": trial, "force_n": 10.0, "mae_counts": 9.0,
                       "ssim": 0.5 + 0.1 * trial}
@@ -181,7 +182,7 @@ def test_the_page_holds_its_figures_and_links_its_data(tmp_path):
     inputs["figures"] = [folder / "figures" / f"{name}.png" for name in ("fig6_ssim", "fig5_ftir", "material_foam")]
     for path in inputs["figures"]:
         save(fig6_ssim.draw(SSIM, CEILING), path)
-    source = {"data": [folder / "evaluation/ssim.csv"], "code": ["src/softtact/stages/draw_fig6_ssim.py"]}
+    source = {"data": [folder / "evaluation/ssim.csv"], "code": ["src/softtact/studies/hybrid/stages/draw_fig6_ssim.py"]}
     facts = {"study": "mine", "sensor": "pad: 30 x 20 mm", "indenters": 3, "unseen": 1, "grasps": 2, "forces_n": [10.0], "seed": 1,
              "presses": {"indenters": 4, "unseen": 1, "grasps": 2}, "trials": {"indenters": 2, "unseen": 2, "grasps": 50},
              "sources": {"fig6_ssim": source}, "config": {"reference": "felt", "tested": ["hyper"],
@@ -191,7 +192,7 @@ def test_the_page_holds_its_figures_and_links_its_data(tmp_path):
     assert page.count("data:image/png;base64,") == 3
     assert page.count("The words allow this.") == 1 and "Material foam: test curves" in page
     assert 'href="figures/fig6_ssim.svg"' in page and 'href="tables/table2.csv"' in page
-    assert 'href="evaluation/ssim.csv"' in page and 'href="sources.html#softtact/stages/draw_fig6_ssim.py"' in page
+    assert 'href="evaluation/ssim.csv"' in page and 'href="sources.html#softtact/studies/hybrid/stages/draw_fig6_ssim.py"' in page
     assert 'href="sources.html#config"' in page
     assert "pad: 30 x 20 mm. It is not the paper" in page
     for first, then in itertools.pairwise([

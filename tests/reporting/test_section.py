@@ -11,7 +11,7 @@ from softtact.models.hyperelastic.build import build_sensor_body
 from softtact.models.hyperelastic.deformed_mesh import REGIONS, pressed_body
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.press.vtu import of_bodies, of_map, read_vtu
-from softtact.reporting.section import row_under_load, section, top_surface
+from softtact.studies.hybrid.figures.section import row_under_load, section, top_surface
 
 SMALL = CORO.model_copy(update={"footprint_mm": (6.0, 8.4)})   # 5 x 7 frusta
 SQUEEZE = 0.1

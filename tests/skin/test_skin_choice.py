@@ -7,12 +7,12 @@ import pandas as pd
 import pytest
 
 from softtact.errors import ExtrapolationWarning, InputError
-from softtact.evaluation.claims_of_skin import PRINTED_FRONT
 from softtact.skin.choice import Needs, front_confidence, pareto, printed_criteria, thickness_table, thinnest, with_scatter
 from softtact.skin.converter import CONVERTERS, Converter
 from softtact.skin.elastomers import find_elastomer, fingertip_area_mm2, read_elastomers
 from softtact.skin.layout import module_layout
 from softtact.skin.search import main_effects
+from softtact.studies.skin.claims import PRINTED_FRONT
 
 PAPER = CONVERTERS["paper"]
 

@@ -3,8 +3,8 @@
 import pytest
 
 from softtact.evaluation.claim_rows import CONTRADICTION, MEASUREMENTS, REPRODUCED
-from softtact.evaluation.claims_of_skin import claims_of_skin
 from softtact.skin.elastomers import read_elastomers
+from softtact.studies.skin.claims import claims_of_skin
 
 
 @pytest.mark.slow

@@ -5,11 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from softtact.study.code_closure import code_closure
+from softtact.studies.code_closure import code_closure
 
 SOURCE = Path(__file__).resolve().parents[2] / "src"
-UNRELATED = {"cli.py", "study/config.py", "study/code_closure.py", "stages/__main__.py"}     # an edit of these reruns nothing
-STAGES = sorted(path.stem for path in (SOURCE / "softtact/stages").glob("[!_]*.py"))
+# An edit of these reruns nothing.
+UNRELATED = {"cli.py", "studies/hybrid/config.py", "studies/code_closure.py", "studies/hybrid/stages/__main__.py"}
+STAGES = sorted(path.stem for path in (SOURCE / "softtact/studies/hybrid/stages").glob("[!_]*.py"))
 
 
 @pytest.fixture
@@ -63,14 +64,14 @@ def test_circular_imports_end(package):
 
 def test_no_stage_depends_on_the_command_line_or_the_runner():
     for stage in STAGES:
-        closure = code_closure(f"softtact.stages.{stage}", source=SOURCE)
+        closure = code_closure(f"softtact.studies.hybrid.stages.{stage}", source=SOURCE)
         names = {str(Path(path).relative_to(SOURCE / "softtact")) for path in closure}
-        assert f"stages/{stage}.py" in names
+        assert f"studies/hybrid/stages/{stage}.py" in names
         assert not names & UNRELATED, stage
 
 
 def test_the_fits_do_not_depend_on_learning_or_mechanics():
-    closure = code_closure("softtact.stages.fit_material", source=SOURCE)
+    closure = code_closure("softtact.studies.hybrid.stages.fit_material", source=SOURCE)
     folders = {Path(path).relative_to(SOURCE / "softtact").parts[0] for path in closure}
     assert folders <= {"__init__.py", "errors.py", "files.py", "progress.py", "tables.py", "unknown_names.py",
-                       "workbooks.py", "materials", "stages"}
+                       "workbooks.py", "materials", "studies"}

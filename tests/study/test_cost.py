@@ -10,8 +10,8 @@ import yaml
 from softtact.cli import main
 from softtact.errors import InputError
 from softtact.learning.settings import Search
-from softtact.study.config import load_study, read_values
-from softtact.study.cost import cost_lines, epochs_of_a_trial, read_costs, study_costs
+from softtact.studies.cost import cost_lines, epochs_of_a_trial, read_costs, study_costs
+from softtact.studies.hybrid.config import load_study, read_values
 
 ROOT = Path(__file__).resolve().parents[2]
 

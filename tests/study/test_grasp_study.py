@@ -9,10 +9,10 @@ import yaml
 
 from softtact.cli import main
 from softtact.errors import InputError
-from softtact.evaluation.claims_of_grasps import claims_of_grasps
 from softtact.geometry.pose import Pose
-from softtact.study.cost import read_costs
-from softtact.study.grasps import cost_lines, load_grasp_study
+from softtact.studies.cost import read_costs
+from softtact.studies.grasps.claims import claims_of_grasps
+from softtact.studies.grasps.config import cost_lines, load_grasp_study
 
 pytest.importorskip("mujoco", reason="pip install 'softtact[robot]'")
 ROOT = Path(__file__).resolve().parents[2]
@@ -53,7 +53,7 @@ def test_what_is_done_is_not_done_again_and_other_settings_are(results):
     catalogue = str(ROOT / "config/objects/catalogue.yaml")
 
     def run(**changes):
-        from softtact.study.grasp_runs import run_study  # MuJoCo, which may be missing
+        from softtact.studies.grasps.run import run_study  # MuJoCo, which may be missing
 
         before = [path.stat().st_mtime_ns for path in kept]
         run_study(load_grasp_study(config(results, catalogue=catalogue, **changes)), results / "out", workers=1)

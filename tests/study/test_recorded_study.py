@@ -5,8 +5,8 @@ from support.recordings import write_recordings
 from support.studies import ROOT, merged
 
 from softtact.errors import InputError
-from softtact.study.config import load_study
-from softtact.study.cost import read_costs, study_costs
+from softtact.studies.cost import read_costs, study_costs
+from softtact.studies.hybrid.config import load_study
 
 ITEMS = ["indenters/circle_m", "indenters/square", "indenters/donut_m", "unseen/ellipse", "grasps/object_5"]
 

@@ -10,8 +10,8 @@ from softtact.materials.config import load_material
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.sensors.library import SHIPPED
 from softtact.sensors.specification import SensorSpec
-from softtact.study.config import load_study
-from softtact.study.keys import Mesh
+from softtact.studies.hybrid.config import load_study
+from softtact.studies.hybrid.keys import Mesh
 
 
 @pytest.fixture(autouse=True)

@@ -1,4 +1,4 @@
-"""Stands in for `python -m softtact.stages`: writes small outputs that follow from the command line alone.
+"""Stands in for `python -m softtact.studies.hybrid.stages`: writes small outputs that follow from the command line alone.
 
 Usage: stub_runner.py NAME --in name=path ... --out name=path ... --settings JSON --threads N
 A press waits SOFTTACT_STUB_WAIT_S seconds, to be caught in the middle. With SOFTTACT_STUB_KILLED=FOLDER each stage's first job

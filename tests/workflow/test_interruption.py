@@ -58,7 +58,7 @@ def test_sigkill_in_every_stage_is_survived_and_ends_with_the_same_files(finishe
     finished.snakemake()
     project.snakemake("--retries", "1", environment={"SOFTTACT_STUB_KILLED": str(killed)})
     elsewhere = {"import_published", "read_recordings"}      # of studies with readings of a real sensor
-    stages = {path.stem for path in (project.folder / "src/softtact/stages").glob("[!_]*.py")} - elsewhere
+    stages = {path.stem for path in (project.folder / "src/softtact/studies/hybrid/stages").glob("[!_]*.py")} - elsewhere
     assert {path.name for path in killed.iterdir()} == stages
     assert results(project) == results(finished)
 

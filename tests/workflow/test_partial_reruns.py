@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from softtact.study.code_closure import code_closure
+from softtact.studies.code_closure import code_closure
 
-STAGES = Path(__file__).resolve().parents[2] / "src/softtact/stages"
+STAGES = Path(__file__).resolve().parents[2] / "src/softtact/studies/hybrid/stages"
 FIGURES = sorted(path.stem for path in STAGES.glob("draw_*.py"))
 SIMULATION = {"make_curves", "fit_material", "mesh_sensor", "precompute_compliance", "simulate_press"}
 LEARNING = {"search_hyperparameters", "train_cnn", "evaluate"}
@@ -117,5 +117,5 @@ def edit_source(project, path):
 def own_files(project, stage, *, but_not):
     """Source files that a stage imports and the named other stages do not."""
     folder = project.folder / "src"
-    closures = [set(code_closure(f"softtact.stages.{name}", source=folder)) for name in [stage, *but_not]]
+    closures = [set(code_closure(f"softtact.studies.hybrid.stages.{name}", source=folder)) for name in [stage, *but_not]]
     return sorted(closures[0].difference(*closures[1:]))

@@ -7,9 +7,9 @@ import re
 import sys
 from pathlib import Path
 
-from softtact.study.code_closure import code_closure
-from softtact.study.config import load_study
-from softtact.study.cost import cost_lines, read_costs, study_costs
+from softtact.studies.code_closure import code_closure
+from softtact.studies.hybrid.config import load_study
+from softtact.studies.cost import cost_lines, read_costs, study_costs
 from softtact.errors import InputError
 from softtact.files import read_yaml
 
@@ -29,7 +29,7 @@ if not _there.is_dir() or not os.access(_there, os.W_OK):
 # The running interpreter, activated or not. It reaches the shell by the environment, for where it lies is no reason to
 # run anything again.
 os.environ["SOFTTACT_PYTHON"] = sys.executable
-os.environ.setdefault("SOFTTACT_RUNNER", "-m softtact.stages")
+os.environ.setdefault("SOFTTACT_RUNNER", "-m softtact.studies.hybrid.stages")
 
 
 wildcard_constraints:
@@ -41,7 +41,7 @@ wildcard_constraints:
 
 def code(stage):
     """The source files whose edit is a reason to run a stage again."""
-    return code_closure(f"softtact.stages.{stage}") if Path(f"src/softtact/stages/{stage}.py").exists() else []
+    return code_closure(f"softtact.studies.hybrid.stages.{stage}") if Path(f"src/softtact/studies/hybrid/stages/{stage}.py").exists() else []
 
 
 def log_of(stage, part="all"):

@@ -282,8 +282,8 @@ if CURVES:
 
 def drawn_by(stage):
     """The source files that a figure's page links to: its stage, and what that draws with."""
-    files = [path for path in code(stage) if "/reporting/" in path and not path.endswith(("/style.py", "/render.py"))]
-    return [f"src/softtact/stages/{stage}.py", *files]
+    files = [path for path in code(stage) if ("/reporting/" in path or "/figures/" in path) and not path.endswith(("/style.py", "/render.py"))]
+    return [f"src/softtact/studies/hybrid/stages/{stage}.py", *files]
 
 
 def data_of(rule):
@@ -305,7 +305,7 @@ SOURCES = {
         for name in (*FIGURES, *VIEWS)
     },
 }
-STAGES = sorted(path.stem for path in Path("src/softtact/stages").glob("[!_]*.py"))
+STAGES = sorted(path.stem for path in Path("src/softtact/studies/hybrid/stages").glob("[!_]*.py"))
 
 
 rule report:

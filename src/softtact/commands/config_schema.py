@@ -38,7 +38,7 @@ def schema_of(kind: str) -> dict[str, Any]:
     """The JSON schema of a kind of file, generated from the types that read it."""
     from softtact.materials.config import MaterialConfig
     from softtact.sensors.specification import sensor_schema
-    from softtact.study.keys import Values
+    from softtact.studies.hybrid.keys import Values
 
     schema = {"study": Values.model_json_schema, "sensor": sensor_schema, "material": MaterialConfig.model_json_schema}[kind]
     return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | schema()

@@ -23,8 +23,8 @@ def add(commands: argparse._SubParsersAction) -> None:
 def _cost(options):
     from dataclasses import asdict
 
-    from softtact.study.config import load_study, read_values
-    from softtact.study.cost import cost_lines, read_costs, study_costs
+    from softtact.studies.cost import cost_lines, read_costs, study_costs
+    from softtact.studies.hybrid.config import load_study, read_values
 
     study, measured = load_study(read_values(options.configfile)), read_costs()
     costs = study_costs(study, measured)

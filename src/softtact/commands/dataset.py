@@ -44,7 +44,7 @@ def _dataset(options):
     from softtact.learning.press_data import PressPlan, check_name, presses_left, write_press_data
     from softtact.press.asked import cores
     from softtact.progress import announce
-    from softtact.study.cost import read_costs
+    from softtact.studies.cost import read_costs
 
     check_folders(options.out)
     check_name(options.out, options.format)

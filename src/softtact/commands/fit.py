@@ -67,7 +67,7 @@ def _fit(options):
     card = make_card(curves, **settings | _fit_settings(options))
     write_json(options.out, card)
     if options.plot:
-        from softtact.reporting.material_plot import plot_material
+        from softtact.studies.hybrid.figures.material_plot import plot_material
 
         plot_material(card, curves, options.plot)
     show(card, as_json=options.json, lines=[*_fit_lines(card), f"written: {options.out}"])

@@ -26,8 +26,8 @@ def add(commands: argparse._SubParsersAction) -> None:
 def _grasps(options):
     from softtact.press.asked import cores
     from softtact.progress import announce
-    from softtact.study.cost import read_costs
-    from softtact.study.grasps import cost_lines, load_grasp_study
+    from softtact.studies.cost import read_costs
+    from softtact.studies.grasps.config import cost_lines, load_grasp_study
 
     study = load_grasp_study(options.config)
     folder = options.out or Path("results") / study.values.study
@@ -46,10 +46,10 @@ def _run(study, folder, options):
     from softtact.robot.physics_only import import_mujoco
 
     import_mujoco()
-    from softtact.evaluation.claims_of_grasps import claims_of_grasps
     from softtact.files import read_dataset, write_csv
-    from softtact.reporting.grasps_page import draw_objects, draw_one_event, write_grasps_report
-    from softtact.study.grasp_runs import run_study
+    from softtact.studies.grasps.claims import claims_of_grasps
+    from softtact.studies.grasps.report import draw_objects, draw_one_event, write_grasps_report
+    from softtact.studies.grasps.run import run_study
 
     grasps = run_study(study, folder, workers=options.workers)
     values = study.values
@@ -92,7 +92,7 @@ def _pictures(study, events):
     from softtact.robot.render import draw_rows
     from softtact.robot.scene import Placement, build_scene
     from softtact.robot.settings import load_scene
-    from softtact.study.grasps import entry_of
+    from softtact.studies.grasps.config import entry_of
 
     pictures = {}
     for name, data in events.items():

@@ -24,8 +24,8 @@ def add(commands: argparse._SubParsersAction) -> None:
 def _palpate(options):
     from softtact.probe.design import load_design
     from softtact.progress import Watch
-    from softtact.reporting.probe_report import palpation_study
-    from softtact.study.config import here_or_shipped
+    from softtact.studies.hybrid.config import here_or_shipped
+    from softtact.studies.palpation.report import palpation_study
 
     if options.threads < 1:
         raise InputError(f"--threads {options.threads}: give 1 or more.")

@@ -36,7 +36,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 def _skin(options):
     from softtact.skin.design import read_design
-    from softtact.study.config import here_or_shipped
+    from softtact.studies.hybrid.config import here_or_shipped
 
     path = here_or_shipped(options.design)
     design = read_design(path)
@@ -44,7 +44,7 @@ def _skin(options):
         raise InputError(f"--threads {options.threads}: give 1 or more.")
     if options.out.exists() and not options.out.is_dir():
         raise InputError(f"--out {options.out}: it is a file, and the results need a folder; choose another name.")
-    from softtact.reporting.skin_study import run_design
+    from softtact.studies.skin.run import run_design
 
     told = run_design(path, design, options.out, threads=options.threads)
     for remark in told["remarks"]:

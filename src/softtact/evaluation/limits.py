@@ -13,8 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from softtact.evaluation.claims_of_scores import PRINTED_SSIM
 from softtact.published.archive import SOURCE as PUBLISHED
+from softtact.published.counts import PRINTED_SSIM
 
 CLEAR = 0.01      # of mean SSIM: below, a difference is no more than another seed may make (assumed)
 COLUMNS = ["model", "set", "ssim", "paper", "sensor_ssim", "perfect_model_gain", "more_maps_gain", "other_network_gain", "limit",

@@ -13,6 +13,12 @@ PRINTED = [  # what is counted, where it is printed, how many
     ("real maps of objects", "text", 2000),
 ]
 
+# Mean SSIM that the paper prints (sec. 4.2), by set and model.
+PRINTED_SSIM = {"validation": {"hyperelastic": 0.87, "elastic": 0.86}, "unseen": {"hyperelastic": 0.81, "elastic": 0.82},
+                "grasps": {"hyperelastic": 0.72, "elastic": 0.63}}
+# Maps as the paper counts them: 13,000 to train, 400 unseen cases, 2,000 grasps of 20 maps each, from closing to held.
+SETS, MAPS_OF_A_GRASP, ALL_MAPS = (13_000, 400, 2_000), 20, 53_400
+
 
 def counts_table(found: dict[str, int]) -> pd.DataFrame:
     """A row per printed count: what, where, printed, found, meets.  found {what: number}; what is not found was not there."""

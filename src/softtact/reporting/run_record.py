@@ -1,12 +1,11 @@
 """What a study's jobs took: Snakemake's benchmark of each, summed by stage."""
 
 import os
+import platform
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-
-from softtact.reporting.tables import machine
 
 COLUMNS = ["stage", "jobs", "total_s", "mean_s", "longest_s", "largest_memory_mb"]
 
@@ -59,3 +58,13 @@ def _largest(values):
     known = np.asarray(values, dtype=float)
     known = known[np.isfinite(known)]
     return float(known.max()) if len(known) else np.nan
+
+
+def machine() -> str:
+    """Processor and system in words."""
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as lines:
+            names = {line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")}
+    except OSError:
+        names = {platform.processor() or platform.machine()}
+    return f"{', '.join(sorted(names))}; {platform.system()}; Python {platform.python_version()}"

@@ -1,0 +1,262 @@
+"""A study's configuration, checked before any work starts.
+
+`load_study` is the one way in. It also reads the files that the configuration names (sensor, materials, objects), so
+that rules hand their stages plain values, and a comment in a YAML file reruns nothing. A sensor or a material is found by its name
+(`softtact.sensors.library`); a file below config/ that the working folder does not have is the one that ships with the package.
+"""
+
+from dataclasses import asdict, dataclass
+from importlib import resources
+from itertools import groupby
+from pathlib import Path
+from statistics import mean
+from typing import Any
+
+from softtact.errors import InputError
+from softtact.files import read_yaml
+from softtact.materials.config import load_material
+from softtact.progress import announce
+from softtact.published.archive import SOURCE as PUBLISHED
+from softtact.published.archive import Archive, find_archive
+from softtact.readout.recorded_press import SOURCE as RECORDED
+from softtact.readout.ssim import check_window
+from softtact.readout.virtual_sensor import VirtualSensorSettings, make_specimen
+from softtact.sensors.library import is_shipped, material_file, sensor_file
+from softtact.sensors.specification import SensorSpec
+from softtact.studies.faults import refuse_unknown, validated
+from softtact.studies.hybrid.keys import CENTRED, Recording, Values
+from softtact.studies.hybrid.objects import Item, check_shapes, items_of_set, make_item, read_catalogue
+from softtact.studies.hybrid.recordings import recordings_of
+
+SHIPPED = Path(str(resources.files("softtact.studies"))) / "data"     # what stands in the project's config/
+SETS = ("indenters", "unseen", "grasps")
+TOGETHER = 50     # presses of a fast model in one job at most: a minute's work, and a command line within the system's limit
+
+
+@dataclass(frozen=True)
+class Study:
+    """A checked configuration with the files that it names.
+
+    values: the configuration;  spec: the sensor
+    materials: {name: MaterialConfig};  items_of: {set: {id: Item}} in the order of the configuration
+    section_item: what figure 2 presses
+    archive: the published files that maps and readings come from, or None where items are pressed
+    recordings: {SET/ITEM: recordings that its readings come from}, or None
+    """
+
+    values: Values
+    spec: SensorSpec
+    materials: dict
+    items_of: dict
+    section_item: Item
+    archive: Archive | None = None
+    recordings: dict[str, list[Recording]] | None = None
+
+    @property
+    def virtual(self) -> bool:
+        """Whether the readings are the virtual sensor's, which feels the reference's presses."""
+        return self.archive is None and self.recordings is None
+
+    @property
+    def tested(self) -> list[str]:
+        """The models that a network is trained for: of an archive, those whose simulations are there."""
+        return list(self.archive.simulated) if self.archive else self.values.tested
+
+    @property
+    def learnt_from(self) -> list[str]:
+        """The models whose maps data sets are made of: those under test, and the reference where the virtual sensor felt it."""
+        return list(dict.fromkeys([*self.tested, self.values.reference])) if self.virtual else self.tested
+
+    @property
+    def pressed_with(self) -> list[str]:
+        """The models that every item is pressed with: those learnt from, and those that policies choose between."""
+        return [] if self.archive else list(dict.fromkeys([*self.learnt_from, *self.values.choice.models.values()]))
+
+    @property
+    def source(self) -> str:
+        """What the readings are from, in words."""
+        return "virtual sensor" if self.virtual else PUBLISHED if self.archive else RECORDED
+
+    @property
+    def counts_per_relative_change(self) -> float | None:
+        """Gain of the virtual sensor's readings; None where they are a real sensor's, whose gain is not known."""
+        return VirtualSensorSettings.from_dict(self.values.virtual_sensor).counts_per_relative_change if self.virtual else None
+
+    @property
+    def name(self) -> str:
+        """The study's name, and its folder below results/."""
+        return self.values.study
+
+    @property
+    def sensor(self) -> dict[str, Any]:
+        """The sensor's description as plain JSON values; what is assumed, and why, is left out."""
+        return self.spec.model_dump(mode="json")
+
+    def trials_of(self, set_name: str) -> float:
+        """How often each press of a set is read; of recordings, the mean over its items."""
+        if self.recordings is None:
+            return getattr(self.values.objects, set_name).trials or self.values.trials
+        return mean(map(self.readings_of, self.items_of[set_name].values())) if self.items_of[set_name] else 0
+
+    def readings_of(self, item: Item) -> int:
+        """How often an item's press is read."""
+        if self.recordings is not None:
+            return len(self.recordings[f"{item.set}/{item.id}"])
+        return getattr(self.values.objects, item.set).trials or self.values.trials
+
+    def named(self) -> dict[str, Any]:
+        """What the configuration names, as plain JSON values: the sensor, the materials' settings, the items of each set."""
+        materials = {name: {"curves": material.curve_settings, "fit": material.fit_settings}
+                     for name, material in self.materials.items()}
+        items = {name: [asdict(item) for item in items.values()] for name, items in self.items_of.items()}
+        return {"sensor": self.sensor, "materials": materials, "items": items, "section": asdict(self.section_item)}
+
+    def items(self) -> list[Item]:
+        """The items of all sets, in order."""
+        return [item for items in self.items_of.values() for item in items.values()]
+
+    def press_jobs(self, model: str) -> list[list[Item]]:
+        """[[Item]]: what a model presses in one job each, in the order of `items`.
+
+        A fast model presses an object's places together, for to start takes it longer than to press. Another object is another
+        job, so that a change of one presses that one again.
+        """
+        if self.values.models[model].kind == "hyperelastic":
+            return [[item] for item in self.items()]
+        places = [list(same) for _, same in groupby(self.items(), key=lambda item: (item.set, item.object))]
+        return [same[first:first + TOGETHER] for same in places for first in range(0, len(same), TOGETHER)]
+
+
+def read_values(configfile: str | Path | None = None, *, default: str | Path = "config/config.yaml") -> dict[str, Any]:
+    """The configuration mapping of a file over the default one, merged as Snakemake does it."""
+    values = _read_yaml(here_or_shipped(default))
+    return values if configfile is None else _merged(values, _read_yaml(here_or_shipped(configfile)))
+
+
+def here_or_shipped(path: str | Path) -> Path:
+    """A file as it is named or, where the working folder has no such file below config/, the one that ships with the package."""
+    path = Path(path)
+    if path.exists() or path.parts[:1] != ("config",):
+        return path
+    shipped = SHIPPED.joinpath(*path.parts[1:])
+    return shipped if shipped.exists() else path
+
+
+def _merged(base, over):
+    return base | {key: _merged(base[key], value) if isinstance(base.get(key), dict) and isinstance(value, dict) else value
+                   for key, value in over.items()}
+
+
+def _read_yaml(path):
+    """A mapping of a YAML file; what is none is refused."""
+    values = read_yaml(path, missing="there is no such configuration; give the path of one, from the project's folder.")
+    if not isinstance(values, dict):
+        raise InputError(f"{path}: it holds no keys; write a configuration such as config/tiny.yaml.")
+    return values
+
+
+def load_study(values: dict[str, Any]) -> Study:
+    """The `Study` of a configuration mapping; the first fault becomes an `InputError` of one sentence."""
+    checked = validated(Values, values, where="the configuration")
+    spec = SensorSpec.from_yaml(_named("sensor", sensor_file, checked.sensor))
+    _check_forces(checked, spec)
+    materials = _materials(checked, spec)
+    _check_models(checked, spec)
+    _check_sensor(checked, spec)
+    checked = _with_range(checked, spec)
+    make_specimen(spec, seed=checked.seed, settings=VirtualSensorSettings.from_dict(checked.virtual_sensor))
+    catalogue = read_catalogue(here_or_shipped(checked.objects.catalogue))
+    items_of = {name: items_of_set(name, getattr(checked.objects, name), catalogue, spec=spec, seed=checked.seed) for name in SETS}
+    check_shapes(items_of)
+    study = Study(checked, spec, materials, items_of, _section_item(checked, catalogue), _archive(checked),
+                  recordings_of(checked.data, items_of, spec))
+    _say_outside_paths(study)
+    return study
+
+
+def _named(key, find, name):
+    """The file of a name in the configuration, as `find` of the library gives it; a refusal says where the name stands."""
+    try:
+        return find(name)
+    except InputError as error:
+        raise InputError(f"the configuration, at {key!r}: {str(error)[0].lower()}{str(error)[1:]}") from None
+
+
+def _say_outside_paths(study):
+    """Say on stderr which files of the configuration lie outside the folder that the study runs in."""
+    values = study.values
+    named = [("objects.catalogue", values.objects.catalogue), *((f"object {item.object}", item.file) for item in study.items()),
+             *((f"material {name}", path) for name, config in study.materials.items() for path in config.measured_files),
+             ("ftir.measured", values.ftir.measured), ("sensor", sensor_file(values.sensor)),
+             ("data.folder", values.data.folder if values.data.source == "published" else None),
+             *(("data.recordings", str(Path(path).parent)) for one in values.data.recordings for path in (one.file, one.force_log))]
+    for what, path in dict.fromkeys(named):
+        if path is None or is_shipped(path) or Path(path).is_relative_to(SHIPPED):
+            continue
+        if not Path(path).resolve().is_relative_to(Path.cwd().resolve()):
+            announce(f"the configuration, at {what!r}: {path} lies outside this project, {Path.cwd()}; it is read from there.")
+
+
+def _section_item(values, catalogue):
+    """The item that the section's press presses, centred."""
+    name = values.section.object
+    refuse_unknown(name, list(catalogue), kind="object", where="the configuration, at 'section.object'")
+    return make_item(catalogue[name], CENTRED, None, first=True)
+
+
+def _archive(values):
+    """The published files that the study reads, or None."""
+    if values.data.source != "published":
+        return None
+    return find_archive(values.data.folder, models=values.tested, variant=values.data.variant)
+
+
+def _check_forces(values, spec):
+    low, high = spec.force_range_n
+    for key, force in [*(("forces_n", force) for force in values.forces_n), ("section.force_n", values.section.force_n)]:
+        if not low < force <= high:
+            raise InputError(f"the configuration, at '{key}': {force:g} N is out of the range of {spec.name}, above "
+                             f"{low:g} and up to {high:g} N; leave it out or change the sensor's force_range_n.")
+
+
+def _materials(values, spec):
+    """{name: MaterialConfig} of the listed materials, among which the sensor's own must be."""
+    for layer in (spec.dielectric, spec.cover):
+        if layer.material not in values.materials:
+            raise InputError(f"the configuration, at 'materials': sensor {spec.name} is made of {layer.material!r}, "
+                             "which is not in the list; add it.")
+    return {name: load_material(_named("materials", material_file, name)) for name in values.materials}
+
+
+def _check_models(values, spec):
+    for name in [*values.tested, values.reference, *values.choice.models.values()]:
+        refuse_unknown(name, list(values.models), kind="model", where="the configuration, at 'models'")
+    for name, model in values.models.items():
+        where = f"the configuration, at 'models.{name}'"
+        if model.friction and model.kind != "hyperelastic":
+            raise InputError(f"{where}: a model of kind {model.kind!r} knows no friction; leave 'friction' out.")
+        if model.device != "cpu" and model.kind != "hyperelastic":
+            raise InputError(f"{where}: a model of kind {model.kind!r} has no 'device'; leave it out.")
+        if model.friction:
+            SensorSpec.from_dict({**spec.model_dump(mode="json"), "friction": model.friction.model_dump()}, where=where)
+
+
+def _check_sensor(values, spec):
+    """Refuse now a sensor that a model or a network of the study would refuse after hours, or one with readings of its own."""
+    if spec.calibration is not None:
+        raise InputError(f"the configuration, at 'sensor': {spec.name} is calibrated, and a study draws its specimens and "
+                         "their gain by 'virtual_sensor'; name the sensor that it was calibrated from.")
+    for model in values.models.values():
+        spec.check_for(model.kind)
+    lost, shortest = 2 * max(len(values.network.filters), values.search.space.depth[1]), min(spec.map_shape)
+    if shortest <= lost:
+        raise InputError(f"{spec.name}, at 'map_shape': the printed and the searched network's layers take up to {lost} rows and "
+                         f"columns, and the map has {shortest}; give it more points.")
+    check_window(values.ssim.window, (spec.taxels.rows, spec.taxels.columns))
+
+
+def _with_range(values, spec):
+    """The configuration with the sensor's range of counts as that of the SSIM, unless it says another."""
+    if "data_range" in values.ssim.model_fields_set:
+        return values
+    return values.model_copy(update={"ssim": values.ssim.model_copy(update={"data_range": spec.largest_counts})})

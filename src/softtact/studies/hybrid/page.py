@@ -1,0 +1,215 @@
+"""report.html: one file, figures inside, links from each to its data, its code and the configuration."""
+
+import base64
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from jinja2 import Environment
+from markupsafe import Markup
+
+import softtact
+from softtact.evaluation.score_tables import ALL_FORCES, forces_of
+from softtact.files import read_json
+from softtact.reporting.page_template import PAGE, SOURCES, STYLE
+from softtact.reporting.run_record import machine, run_sentence
+from softtact.reporting.words import KINDS, PREDICTORS, SETS, force_in_words, header
+from softtact.studies.hybrid.gaps import missing, recorded
+
+CAPTIONS = {
+    "fig2_section": "Figure 2. Section through the sensor at rest and pressed: how the frusta fold. Curved elements are cut by "
+                    "their shape functions; displacements are to scale.",
+    "pressed_sensor": "The sensor's surface in the same press: turn it by mouse, touch or arrow keys, and slide from rest to "
+                      "pressed. Grey: the object, lifted from the surface.",
+    "fig4_complexity": "Figure 4. Above: mesh (grey) and convex hull (lines in the colour of the chosen model) of two objects, "
+                       "seen from the side that touches. Below: the part over the sensor and within its reach. Right: the ratios "
+                       "of all objects with the two thresholds.",
+    "fig5_ftir": "Figure 5. Contact area of the dielectric pressed on glass.",
+    "fig6_ssim": "Figure 6. SSIM of the networks' readings per item: bars are means, boxes quartiles over forces and trials; "
+                 "black dashes, where trials are repeated: the sensor's own trials against each other, which no model passes by "
+                 "more than the noise left in a mean of few trials. Red marks: predictors without a network, on the hyperelastic "
+                 "maps where they look at a map. A bar below the red dash is a network that is not trained.",
+    "fig7_maps": "Figure 7. Objects seen from the side that touches, deformation maps of both models in mm (one scale for both), "
+                 "tactile maps predicted from them, and those that the sensor (virtual, or recorded) read, the mean of its "
+                 "trials. Jet colours and turned 90 degrees as printed; tactile maps from 0 to the readout's largest count; red: "
+                 "the model chosen by the complexity rule.",
+    "fig8_policies": "Figure 8. Left: what each policy costs and which error it accepts, against the study's hyperelastic model. "
+                     "Right: the error that was expected before the costly model ran, against the true one.",
+    "fig9_networks": "Figure 9. The paper's network and another architecture on the same split. Left: mean SSIM with its 95 % "
+                     "interval (bootstrap over objects, then trials). Right: loss and SSIM of the validation maps after an epoch.",
+    "fig10_learning_curve": "Figure 10. Mean SSIM against the number of training maps, with its 95 % interval (bootstrap over "
+                            "objects, then trials): equal steps of the optimiser for each. Where the readings are a virtual "
+                            "sensor's, the reference's maps are those that it felt itself, so that line is what the same network "
+                            "reads from a perfect model.",
+}
+TITLES = {"summary": "Scores with their 95 % interval, by set",
+          "levels": "Scores at each force",
+          "networks": "Architectures on the same split: scores with their 95 % interval beside predictors without a network, how "
+                      "the training ended, and times",
+          "seeds": "The same training from several seeds, on the same presses and split",
+          "limits": "What limits the scores: model, data or network",
+          "gains": "How SSIM depends on the gain of the readings, at the largest force on grasped objects, without any network",
+          "policies": "Policies that choose a model, on the presses that the expected error was not calibrated on",
+          "table1": "Table 1. Material laws",
+          "contradictions": "Where the paper's table 1 contradicts itself",
+          "table2": "Table 2. Complexity and choice of model",
+          "counts": "The archive's counts against those in print",
+          "table3": "Table 3. Time per tactile map"}
+_STAGE_OF = {"policies": "compare_policies", "networks": "compare_networks", "levels": "compare_networks",
+             "counts": "import_published",
+             "summary": "evaluate", "gains": "compare_gains", "limits": "find_limits",
+             "seeds": "gather_seeds"}   # others: make_tables
+_DRAWN_BY_MATPLOTLIB = "Views are rendered off screen by VTK; a figure says so where matplotlib drew them instead."
+_WITH_VIEWS = ("fig4_complexity", "fig7_maps")
+_FOLDERS = ("presses", "tactile", "dataset", "learning", "evaluation", "section", "tables", "figures", "logs")
+PAPERS_SENSOR = "coro: "     # how the line on it begins
+
+
+def render_page(inputs: dict[str, Any], settings: dict[str, Any], *, folder: Path, run: pd.DataFrame) -> str:
+    """The page as text; `inputs` and `settings` as in the stage, links relative to `folder`, run as of `run_record`."""
+    claims = pd.read_csv(inputs["claims"], keep_default_na=False)
+    ftir = read_json(inputs["ftir"])
+    archive = read_json(inputs["inventory"]) if "inventory" in inputs else None
+    said = {"fig5_ftir": ftir["verdict"], **dict.fromkeys(_WITH_VIEWS, _DRAWN_BY_MATPLOTLIB)}
+    figures = [_figure(path, folder, settings["sources"].get(path.stem, {})) | {"said": said.get(path.stem, "")}
+               for path in inputs["figures"]]
+    rows = [row | {"link": row.get("evidence", "") if (folder / row.get("evidence", "")).is_file() else ""}
+            for row in claims.to_dict("records")]
+    counts = ", ".join(f"{number} {verdict}" for verdict, number in claims.verdict.value_counts().items())
+    scores = pd.read_csv(inputs["scores"], dtype={"force": str})
+    return Environment(autoescape=True).from_string(PAGE).render(
+        study=settings["study"], style=Markup(STYLE), facts=_archive_facts(settings, archive) if archive else _facts(settings),
+        synthetic=_synthetic_but_for_the_archive(ftir) if archive else _synthetic(ftir, settings),
+        missing=missing(settings, archive=archive is not None),
+        tables=_tables(inputs, folder), verdicts_on_networks=read_json(inputs["verdicts"])["sentences"],
+        result=Markup(_html(result_table(scores))), result_link=_link(inputs["scores"], folder),
+        run=Markup(_html(run)), run_said=run_sentence(run),
+        run_link="tables/run.csv", figures=figures, claims=rows, verdicts=f"{len(claims)} claims, {counts}",
+        claim_columns=list(claims.columns), header=header, claims_link=_link(inputs["claims"], folder),
+        claims_code=("evaluation/claims.py", code_link("softtact/studies/hybrid/claims/table.py")), config=f"{SOURCES_PAGE}#config",
+        sources=SOURCES_PAGE, version=softtact.__version__, machine=machine(),
+        folders=[name for name in _FOLDERS if (folder / name).is_dir()])
+
+
+SOURCES_PAGE = "sources.html"
+
+
+def render_sources(paths: Iterable[str | Path], *, study: str, config: str, named: str, page: str) -> str:
+    """The page of the configuration (YAML texts) and of source files below src/, each under its own anchor."""
+    files = [(_below_src(path), Path(path).read_text(encoding="utf-8")) for path in paths]
+    return Environment(autoescape=True).from_string(SOURCES).render(
+        study=study, style=Markup(STYLE), files=files, config=config, named=named, page=page, version=softtact.__version__)
+
+
+def code_link(name: str) -> str:
+    """Where the page of sources holds a file, given by its path below src/."""
+    return f"{SOURCES_PAGE}#{name}"
+
+
+def _below_src(path):
+    return Path(path).as_posix().removeprefix("src/")
+
+
+def _tables(inputs, folder):
+    tables = []
+    for name, title in TITLES.items():
+        if name in inputs:
+            stage = f"softtact/studies/hybrid/stages/{_STAGE_OF.get(name, 'make_tables')}.py"
+            tables.append({"title": title, "html": Markup(_html(_in_words(pd.read_csv(inputs[name])))), "link": _link(inputs[name],
+                                                                                                                      folder),
+                           "code": (stage.removeprefix("softtact/"), code_link(stage))})
+    return tables
+
+
+def _facts(settings):
+    said = {name: f"{settings[name]} {words} in {settings['presses'][name]} places, each read {settings['trials'][name]:.3g} times"
+            for name, words in (("indenters", "indenters"), ("unseen", "unseen ones"), ("grasps", "objects"))}
+    forces = ", ".join(f"{force:g}" for force in settings["forces_n"])
+    reader = "from recordings of a TSF-85 (tactile/)" if recorded(settings) else "by the virtual sensor"
+    another = "It is not the paper's sensor: the paper's numbers and claims below are another sensor's. "
+    return (f"Sensor {settings['sensor']}. {'' if settings['sensor'].startswith(PAPERS_SENSOR) else another}"
+            f"Pressed at {forces} N with each model and read {reader}: {'; '.join(said.values())}. "
+            f"Seed {settings['seed']}.")
+
+
+def _archive_facts(settings, archive):
+    """What stands for the presses of a study on the published archive."""
+    items = archive["items"]
+    return (f"Maps and readings are those of the published archive: {archive['tests_used']} of {archive['tests']} tests of "
+            f"{len(items['indenters'])} indenters, {len(items['unseen'])} held-out ones (our choice: the paper does not name its "
+            f"own) and {len(items['grasps'])} objects; {archive['tests_left_out']} odd tests are left out "
+            f"(published/outliers.csv). {archive['sentence']} No object was pressed, so figures 2, 7 and 8 and our times "
+            "are not here. "
+            f"Seed {settings['seed']}.")
+
+
+def _synthetic_but_for_the_archive(ftir):
+    return ("Stress-strain curves are made from the paper's printed constants with noise; the measured contact area is from: "
+            f"{ftir['source']}; tables 1 and 2 and figures 4 and 5 are of our own curves, objects and specimen. "
+            "Maps and readings, and so all SSIM values, are of the published archive; that maps and readings match by their "
+            "order, how the taxels lie, and which indenters are held out is assumed.")
+
+
+def _synthetic(ftir, settings):
+    config = settings["config"]
+    rubs = "friction, " if config.get("models", {}).get(config.get("reference"), {}).get("friction") else ""
+    readings = ("the readings are own recordings of a TSF-85, so SSIM values below are against them" if recorded(settings) else
+                f"the readings come from a virtual sensor (another law, another mesh, {rubs}scatter, hysteresis, noise). SSIM "
+                "values below are against that virtual sensor")
+    return ("The paper's curves, camera frames and taxel readings are not published here. Stress-strain curves are made from "
+            f"its printed constants with noise; the measured contact area is from: {ftir['source']}; {readings} and are not the "
+            "paper's.")
+
+
+def result_table(scores: pd.DataFrame) -> pd.DataFrame:
+    """Of a `score_table` the grasped objects at the largest force, the paper's test 2, and over all forces, in words."""
+    forces = forces_of(scores)
+    rows = scores[(scores["set"] == "grasps") & scores.force.isin([forces[-1], ALL_FORCES])]
+    shown = rows.assign(predictor=rows.predictor.map(PREDICTORS), kind=rows.kind.map(KINDS), force=rows.force.map(force_in_words))
+    return shown.sort_values(["force", "model"], kind="stable").drop(columns=["set", "overlap", "maps"])
+
+
+def _summary(summary):
+    """The summary with the interval in words."""
+    interval = ["one item: none" if low != low else f"{low:.3f} to {high:.3f}"
+                for low, high in zip(summary.ssim_low, summary.ssim_high, strict=True)]
+    place = list(summary.columns).index("ssim_low")
+    shown = summary.drop(columns=["ssim_low", "ssim_high"])
+    shown.insert(place, "95 % interval of the mean", interval)
+    return shown
+
+
+def _in_words(frame):
+    """A table with what stands in files by name, in words."""
+    frame = _summary(frame) if {"ssim_low", "ssim_high"} <= set(frame) else frame
+    words = {"predictor": PREDICTORS, "kind": KINDS, "set": SETS}
+    return frame.assign(**{name: frame[name].map(lambda value, known=known: known.get(value, value))
+                           for name, known in words.items() if name in frame})
+
+
+def _html(frame):
+    return frame.rename(columns=header).to_html(index=False, na_rep="", float_format=lambda value: f"{value:.4g}", border=0)
+
+
+def _link(path, folder):
+    return os.path.relpath(path, folder)
+
+
+def _figure(path, folder, source):
+    """What the template shows of a figure; source: {data: [paths], code: [paths below src/]} of what drew it."""
+    material = path.stem.removeprefix("material_")
+    caption = CAPTIONS.get(path.stem) or (f"Material {material}: test curves and the laws fitted to them, what they leave, and the "
+                                          "stretches over which each law is stable.")
+    shown = {"name": path.stem, "caption": caption, "data": [(_short(p, folder), _link(p, folder)) for p in source.get("data", ())],
+             "code": [(name.removeprefix("softtact/"), code_link(name)) for name in map(_below_src, source.get("code", ()))]}
+    if path.suffix == ".html":
+        return shown | {"html": Markup(path.read_text(encoding="utf-8")), "files": [("HTML", _link(path, folder))]}
+    return shown | {"image": base64.b64encode(path.read_bytes()).decode(),
+                    "files": [("PNG", _link(path, folder)), ("SVG", _link(path.with_suffix(".svg"), folder))]}
+
+
+def _short(path, folder):
+    """A file's path as seen from the results, without the way up to what lies outside."""
+    return _link(path, folder).replace("../", "")

@@ -1,0 +1,109 @@
+"""Run one stage on files, as the workflow does.
+
+Example:
+    python -m softtact.studies.hybrid.stages fit_material --in curves=a.csv --in curves=b.csv --out card=x.json --settings '{...}'
+"""
+
+import argparse
+import importlib
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from softtact.errors import InputError, SofttactError
+from softtact.extras import missing_extra
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the stage that the command line names; return its exit status."""
+    options = add_arguments(argparse.ArgumentParser(prog="softtact stage", description=__doc__)).parse_args(arguments)
+    try:
+        run_stage(options)
+    except SofttactError as error:
+        return _said(options, error)
+    except ModuleNotFoundError as error:
+        sentence = missing_extra(error)
+        if sentence is None:
+            raise
+        return _said(options, sentence)
+    return 0
+
+
+def _said(options, sentence):
+    print(f"softtact {options.stage}: {sentence}", file=sys.stderr)
+    return 1
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
+    """Declare a stage's command line on `parser`."""
+    parser.add_argument("stage", metavar="NAME", help="a module of softtact.studies.hybrid.stages, named as the workflow's rule")
+    parser.add_argument("--in", dest="inputs", action="append", default=[], metavar="NAME=PATH",
+                        help="an input file; the same name again, or NAME[]=PATH, makes a list")
+    parser.add_argument("--out", dest="outputs", action="append", default=[], metavar="NAME=PATH",
+                        help="an output file; lists as for --in")
+    parser.add_argument("--settings", default="{}", metavar="JSON", help="the values that the stage uses")
+    parser.add_argument("--threads", type=int, default=1, metavar="N", help="cores that it may use (default: 1)")
+    return parser
+
+
+def run_stage(options: argparse.Namespace) -> None:
+    """Import the stage module and call its `run`."""
+    from softtact.files import refuse_overwriting
+
+    run = find_stage(options.stage)
+    inputs, outputs = _named_paths(options.inputs, option="--in"), _named_paths(options.outputs, option="--out")
+    refuse_overwriting((path for _, path in _flat(inputs)), dict(_flat(outputs)))
+    run(inputs=inputs, outputs=outputs, settings=_settings(options.settings), threads=options.threads)
+
+
+def find_stage(name: str) -> Callable[..., None]:
+    """The `run` function of stage `name`."""
+    stages = sorted(path.stem for path in Path(__file__).parent.glob("[!_]*.py"))
+    if name not in stages:
+        raise InputError(f"there is no stage {name!r}; the stages are {', '.join(stages)}.")
+    return importlib.import_module(f"softtact.studies.hybrid.stages.{name}").run
+
+
+class _Named(dict):
+    """{name: path or list of paths}; a stage that asks for one that was not given is answered with what to give."""
+
+    def __init__(self, option, paths):
+        super().__init__(paths)
+        self.option = option
+
+    def __missing__(self, name):
+        raise InputError(f"{self.option} {name}=PATH is missing, which this stage needs; give it.")
+
+
+def _named_paths(pairs, *, option):
+    """{name: Path} of NAME=PATH arguments; a repeated name or NAME[] gives a list in the order given."""
+    paths, lists = {}, set()
+    for pair in pairs:
+        key, _, path = pair.partition("=")
+        name = key.removesuffix("[]")
+        if not name or not path:
+            raise InputError(f"{option} {pair}: write it as NAME=PATH.")
+        if key != name or name in paths:
+            lists.add(name)
+        paths.setdefault(name, []).append(Path(path))
+    return _Named(option, {name: found if name in lists else found[0] for name, found in paths.items()})
+
+
+def _flat(named):
+    """(--out NAME, path) of each path, the lists' paths numbered."""
+    for name, paths in named.items():
+        for k, path in enumerate(paths if isinstance(paths, list) else [paths]):
+            yield f"--out {name}{f'[{k}]' * isinstance(paths, list)}", path
+
+
+def _settings(text):
+    from softtact.files import parse_json  # NumPy, which the parser does without
+
+    try:
+        return parse_json(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"--settings is not valid JSON ({error}).") from None
+
+
+if __name__ == "__main__":
+    sys.exit(main())

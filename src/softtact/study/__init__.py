@@ -1,1 +1,0 @@
-"""A study: its configuration, checked, and what the configuration names."""
