@@ -15,7 +15,6 @@ from softtact.commands import (
     calibrate,
     completion,
     complexity,
-    config_schema,
     cost,
     dataset,
     detect_discs,
@@ -36,7 +35,7 @@ from softtact.errors import ConvergenceError, SofttactError
 from softtact.extras import missing_extra
 
 COMMANDS = (press, grasp, grasps, skin, palpate, dataset, view, calibrate, predict, complexity, fit, mesh, export_deck,
-            detect_discs, cost, stage, config_schema, completion)
+            detect_discs, cost, stage, completion)
 EXAMPLES = """examples:
   softtact press part.stl --unit mm --force 5 --force 20 --out press.nc --vtu press.vtu --plot press.png
   softtact grasp part.stl --unit mm --force 20 --out results/grasp   # a robot grasps it: both sensors

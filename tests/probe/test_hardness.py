@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from softtact.probe.hardness import apparent_modulus, verdict
+from softtact.probe.sweep import apparent_modulus, verdict
 
 ROWS = [("soft", 10, 1, 1.0), ("soft", 10, 2, 1.2), ("soft", 20, 1, 0.9), ("soft", 20, 2, 1.0),
         ("hard", 10, 1, 2.0), ("hard", 10, 2, 3.0), ("hard", 20, 1, 1.5), ("hard", 20, 2, 2.5)]

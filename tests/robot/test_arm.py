@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from softtact.errors import InputError
-from softtact.robot.arm import HOME_RAD, JOINTS
-from softtact.robot.kinematics import inverse_kinematics
+from softtact.robot.arm import HOME_RAD, JOINTS, inverse_kinematics
 from softtact.robot.scene import DOWN, build_scene
 from softtact.robot.settings import load_scene
 

@@ -9,11 +9,19 @@ import trimesh
 import softtact
 from softtact.errors import InputError
 from softtact.geometry.pose import Pose
-from softtact.robot.events import NO_PRESS, press_events, read_events, record_of, to_dataset, write_events
+from softtact.robot.events import (
+    NO_PRESS,
+    press_events,
+    press_with_shear,
+    read_events,
+    record_of,
+    to_dataset,
+    with_friction,
+    write_events,
+)
 from softtact.robot.grasp import GraspRun
 from softtact.robot.scene import Placement, build_scene
 from softtact.robot.settings import load_scene
-from softtact.robot.shear import press_with_shear, with_friction
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,8 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from softtact.errors import ConvergenceError, InputError
+from softtact.robot.events import EVENTS, PHASES
 from softtact.robot.grasp import GraspRun, object_poses
-from softtact.robot.record import EVENTS, PHASES
 from softtact.robot.scene import Placement, build_scene
 from softtact.robot.settings import load_scene
 

@@ -6,7 +6,7 @@ import trimesh
 
 import softtact
 from softtact.errors import InputError
-from softtact.robot.shear import press_with_shear, with_friction
+from softtact.robot.events import press_with_shear, with_friction
 
 
 @pytest.fixture(scope="module")

@@ -7,11 +7,19 @@ import pandas as pd
 import pytest
 
 from softtact.errors import ExtrapolationWarning, InputError
-from softtact.skin.choice import Needs, front_confidence, pareto, printed_criteria, thickness_table, thinnest, with_scatter
-from softtact.skin.converter import CONVERTERS, Converter
+from softtact.skin.analysis import CONVERTERS, Converter
+from softtact.skin.choice import (
+    Needs,
+    front_confidence,
+    main_effects,
+    pareto,
+    printed_criteria,
+    thickness_table,
+    thinnest,
+    with_scatter,
+)
 from softtact.skin.elastomers import find_elastomer, fingertip_area_mm2, read_elastomers
 from softtact.skin.layout import module_layout
-from softtact.skin.search import main_effects
 from softtact.studies.skin.claims import PRINTED_FRONT
 
 PAPER = CONVERTERS["paper"]

@@ -10,12 +10,10 @@ from scipy.optimize import brentq
 from support.skins import small_skin
 
 from softtact.errors import InputError
-from softtact.skin.analysis import Skin, analyse
-from softtact.skin.contact import contact_load
-from softtact.skin.converter import CONVERTERS
+from softtact.skin.analysis import CONVERTERS, Skin, analyse
+from softtact.skin.contact import compression_law, contact_load, press_at_finite_strains, solid_layer
 from softtact.skin.design import LoadChoice
 from softtact.skin.elastomers import Elastomer, read_elastomers
-from softtact.skin.finite import compression_law, press_at_finite_strains, solid_layer
 from softtact.skin.layout import module_layout
 
 

@@ -8,10 +8,9 @@ from support.skins import small_skin
 from softtact.errors import InputError
 from softtact.skin.analysis import Skin
 from softtact.skin.electrostatics import VACUUM_FF_PER_MM, Field
-from softtact.skin.layer_mesh import LayerMesh
+from softtact.skin.layer_mesh import LayerMesh, even_plan, taxel_plan
 from softtact.skin.layout import module_layout
 from softtact.skin.loads import Load, disc, ellipse
-from softtact.skin.plan import even_plan, taxel_plan
 
 
 def test_a_field_of_degree_two_is_interpolated_exactly_within_the_layer():

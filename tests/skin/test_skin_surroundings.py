@@ -9,14 +9,12 @@ from scipy.spatial.transform import Rotation
 from support.skins import small_skin
 
 from softtact.errors import InputError
+from softtact.skin.analysis import CONVERTERS
 from softtact.skin.contact import contact_load
-from softtact.skin.converter import CONVERTERS
 from softtact.skin.elastomers import read_elastomers
-from softtact.skin.exports import icub_text, mujoco_xml, upright, urdf
 from softtact.skin.layout import module_layout
-from softtact.skin.link import lay_modules
+from softtact.skin.link import Surface, icub_text, lay_modules, mujoco_xml, upright, urdf
 from softtact.skin.maps import patch_maps
-from softtact.skin.surface import Surface
 
 FOAM = read_elastomers()["SomaFoama"]
 

@@ -62,7 +62,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def _grasp(options):
-    from softtact.robot.physics_only import import_mujoco
+    from softtact.robot.settings import import_mujoco
 
     import_mujoco()     # says at once which extra is missing
     from softtact.robot.events import write_events
@@ -152,8 +152,7 @@ def _digest(path):
 
 def _pictures(options, data, scene, record):
     """Paths of the pictures that are written."""
-    from softtact.robot.picture import draw_grasp
-    from softtact.robot.render import WHOLE, draw_rows, write_video
+    from softtact.robot.render import WHOLE, draw_grasp, draw_rows, write_video
 
     written = []
     if options.picture:

@@ -43,7 +43,7 @@ def _grasps(options):
 
 
 def _run(study, folder, options):
-    from softtact.robot.physics_only import import_mujoco
+    from softtact.robot.settings import import_mujoco
 
     import_mujoco()
     from softtact.files import read_dataset, write_csv

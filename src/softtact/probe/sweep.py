@@ -1,4 +1,4 @@
-"""Sweeps of a palpation sensor: the jaw loaded or moved step by step, with the beam's deflection and the films' forces."""
+"""Sweeps of a palpation sensor, and measures of hardness from them."""
 
 import time
 from collections.abc import Callable
@@ -13,12 +13,13 @@ from softtact.errors import InputError
 from softtact.materials.laws.base import Law
 from softtact.models.solid.body import SolidBody
 from softtact.models.solid.path import SolidPath
-from softtact.probe.design import Design
+from softtact.probe.design import Design, Hardness
 from softtact.probe.films import film_reader
 from softtact.probe.structure import JAW, structure_body
 
 if TYPE_CHECKING:
     import xarray as xr
+
 
 Scenario = Literal["load", "displacement"]
 _REST_TERMS = 3           # of a polynomial of the deflection that gives the tangent at rest
@@ -134,3 +135,57 @@ def _beam_middle(body, design):
     own = np.unique(np.concatenate([nodes.ravel() for region, nodes, _ in body.blocks if region == "beam"]))
     place = [g.middle, 0.5 * (g.levels[1] + g.levels[2]), 0.5 * g.depth if design.model == "solid" else 0.0]
     return own[np.linalg.norm(body.points[own] - place, axis=1).argmin()]
+
+
+def apparent_modulus(force_n: np.ndarray, compression_mm: np.ndarray, *, height_mm: float, area_mm2: float) -> float:
+    """E_a in MPa of a sweep (s,), two steps or more."""
+    if len(force_n) < 2:
+        raise InputError("An apparent modulus needs two steps or more; give smaller steps.")
+    terms = np.column_stack([compression_mm, compression_mm**2])
+    return float(np.linalg.lstsq(terms, force_n, rcond=None)[0][0] * height_mm / area_mm2)
+
+
+def hardness_table(design: Design, settings: Hardness, *, threads: int = 1, tell: Callable[[str], None] = lambda text: None
+                   ) -> pd.DataFrame:
+    """A row for each tissue, height and share of the jaw's way: the largest force, F/d there, and the index."""
+    rows = []
+    for height in settings.tissue_heights:
+        own = design.with_(geometry={"tissue_height": height})
+        ways = np.linspace(0, design.displacement_mm.to, settings.steps + 1)[1:]
+        for tissue in design.tissues:
+            sweep = palpate(own, tissue, "displacement", values=ways, threads=threads, tell=tell)
+            for share in settings.shares:
+                count = round(share * settings.steps)
+                force, deflection = sweep.force_n[:count], sweep.beam_deflection_mm[:count]
+                index = apparent_modulus(force, sweep.jaw_mm[:count] - deflection, height_mm=height,
+                                         area_mm2=design.geometry.length * design.geometry.depth)
+                rows.append({"tissue": tissue, "tissue_height_mm": height, "jaw_mm": sweep.jaw_mm[count - 1], "force_n": force[-1],
+                             "relative_hardness_n_mm": force[-1] / deflection[-1], "apparent_modulus_mpa": index})
+    return pd.DataFrame(rows)
+
+
+@dataclass(frozen=True)
+class HardnessVerdict:
+    """What a table of `hardness_table` says of a measure of hardness."""
+
+    change_with_load: float
+    """Largest value over the least of a tissue of one height, less 1; the worst of them."""
+    change_with_height: float
+    """The same over heights, at the largest load."""
+    contrast: float
+    """Least ratio, over heights, of the hardest tissue's largest-load value to the softest one's."""
+    apart: bool
+    """Whether the values of any two tissues do not overlap, whatever load and height."""
+
+
+def verdict(table: pd.DataFrame, column: str) -> HardnessVerdict:
+    """`HardnessVerdict` of a column of `hardness_table`."""
+    def change(groups):
+        return float(max(group.max() / group.min() - 1 for _, group in groups))
+
+    last = table[table.jaw_mm == table.jaw_mm.max()]
+    ranges = table.groupby("tissue")[column].agg(["min", "max"]).sort_values("min")
+    by_height = last.groupby("tissue_height_mm")[column]
+    return HardnessVerdict(change(table.groupby(["tissue", "tissue_height_mm"])[column]), change(last.groupby("tissue")[column]),
+                           float((by_height.max() / by_height.min()).min()),
+                           bool((ranges["min"].to_numpy()[1:] > ranges["max"].to_numpy()[:-1]).all()))

@@ -1,8 +1,4 @@
-"""Views of solids for figures: rendered off screen by VTK, or drawn by matplotlib where that does not work.
-
-VTK needs some OpenGL (its wheels bring a software one). A driver that fails may end the process or never answer, so it runs in a
-process of its own and within a time. What then stands in a figure is told in the log and in the figure.
-"""
+"""Views of solids for figures."""
 
 import json
 import sys
@@ -22,9 +18,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.gridspec import SubplotSpec
 
+
 FALLBACK = "3-D views drawn by matplotlib: no off-screen renderer here"
 TIMEOUT_S = 120.0
-_COMMAND = (sys.executable, "-m", "softtact.reporting.offscreen")
+_COMMAND = (sys.executable, "-m", "softtact.reporting.render")
 
 
 @dataclass(frozen=True)
@@ -126,3 +123,41 @@ def _shaded(corners, part):
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
     light = 0.45 + 0.55 * np.abs(normal @ np.array([0.4, 0.3, 0.86]))
     return np.column_stack([light[:, None] * np.array(to_rgb(part.colour)), np.full(len(corners), part.opacity)])
+
+
+def main(folder: str | Path) -> None:
+    """Read views.json and arrays.npz, write images.npz."""
+    import pyvista
+
+    pyvista.OFF_SCREEN = True
+    folder = Path(folder)
+    spec = json.loads((folder / "views.json").read_text(encoding="utf-8"))
+    with np.load(folder / "arrays.npz", allow_pickle=False) as arrays:
+        images = {f"view{v}": _image(pyvista, v, view, spec["size"], arrays) for v, view in enumerate(spec["views"])}
+    np.savez_compressed(folder / "images.npz", **images)
+
+
+def _image(pyvista, number, view, size, arrays):
+    """One view as an image (h, w, 3)."""
+    plotter = pyvista.Plotter(off_screen=True, window_size=size)
+    plotter.set_background("white")
+    for p, look in enumerate(view["parts"]):
+        triangles = arrays[f"triangles_{number}_{p}"]
+        faces = np.hstack([np.full((len(triangles), 1), 3), triangles]).astype(np.int64)
+        surface = pyvista.PolyData(arrays[f"points_{number}_{p}"], faces.ravel())
+        if look["as_lines"]:
+            plotter.add_mesh(surface.extract_all_edges(), color=look["colour"], line_width=1.8, opacity=look["opacity"])
+        else:
+            plotter.add_mesh(surface, color=look["colour"], opacity=look["opacity"], smooth_shading=look["edges"] is None,
+                             split_sharp_edges=look["edges"] is None, show_edges=look["edges"] is not None,
+                             edge_color=look["edges"] or "black", line_width=0.6, specular=0.25, specular_power=12, ambient=0.12)
+    plotter.enable_anti_aliasing("ssaa")
+    plotter.camera_position = [view["seen_from"], (0.0, 0.0, 0.0), view["up"]]
+    plotter.reset_camera()
+    image = plotter.screenshot(return_img=True)
+    plotter.close()
+    return image
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,13 +1,12 @@
-"""The UR10 as its maker's Denavit-Hartenberg table has it, and the small MJCF of primitives that stands for it.
-
-Source: Universal Robots, "DH Parameters for calculations of kinematics and dynamics", table of the UR10 (CB3). Each joint turns by
-its angle about z, then come d along z, a along x and alpha about x. The links are capsules between the frames: they show the arm
-and give it inertia, nothing collides with them.
-"""
+"""The UR10 and its inverse kinematics."""
 
 from typing import Any
 
+import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
+
+from softtact.errors import InputError
 
 D_M = (0.1273, 0.0, 0.0, 0.163941, 0.1157, 0.0922)
 A_M = (0.0, -0.612, -0.5723, 0.0, 0.0, 0.0)
@@ -44,3 +43,35 @@ def add_arm(spec: Any) -> Any:
         servo = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         servo.set_to_position(kp=_STIFFNESS_NM, kv=_DAMPING_NMS)
     return body.add_body(name="flange", gravcomp=1.0, **place)
+
+
+_DAMPING, _ITERATIONS = 1e-3, 200
+_NEAR_M, _NEAR_RAD, _LARGEST_STEP = 1e-8, 1e-8, 0.3
+
+
+def inverse_kinematics(model: Any, position_m: np.ndarray, rotation: np.ndarray, *, start_rad: np.ndarray) -> np.ndarray:
+    """Joint angles (6,) in rad that bring the site `grip` to a position (3,) in m with a rotation (3, 3), in the world.
+
+    start_rad: (6,) where the search starts; the solution nearby is found
+    Raises InputError where the place is out of reach.
+    """
+    data = mujoco.MjData(model)
+    addresses = [model.joint(name).qposadr[0] for name in JOINTS]
+    freedoms = [model.joint(name).dofadr[0] for name in JOINTS]
+    site = model.site("grip").id
+    angles = np.array(start_rad, dtype=float)
+    jacobian = np.zeros((6, model.nv))
+    for _ in range(_ITERATIONS):
+        data.qpos[addresses] = angles
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        away = position_m - data.site_xpos[site]
+        turn = Rotation.from_matrix(rotation @ data.site_xmat[site].reshape(3, 3).T).as_rotvec()
+        if np.linalg.norm(away) < _NEAR_M and np.linalg.norm(turn) < _NEAR_RAD:
+            return (angles + np.pi) % (2 * np.pi) - np.pi
+        mujoco.mj_jacSite(model, data, jacobian[:3], jacobian[3:], site)
+        j = jacobian[:, freedoms]
+        step = j.T @ np.linalg.solve(j @ j.T + _DAMPING**2 * np.eye(6), np.concatenate([away, turn]))
+        angles += step * min(1.0, _LARGEST_STEP / np.abs(step).max())
+    raise InputError(f"grip_at_m: the hand does not reach {np.round(position_m, 4).tolist()} m with its fingers down; give a place "
+                     "that is nearer to the robot.")

@@ -19,10 +19,9 @@ import trimesh
 from softtact.errors import InputError
 from softtact.geometry.meshes import read_mesh
 from softtact.press.sensor import load_sensor
-from softtact.robot.arm import HOME_RAD, JOINTS
+from softtact.robot.arm import HOME_RAD, JOINTS, inverse_kinematics
+from softtact.robot.events import FINGERS
 from softtact.robot.grasp import contacts, object_poses, pad_forces
-from softtact.robot.kinematics import inverse_kinematics
-from softtact.robot.record import FINGERS
 from softtact.robot.scene import DOWN, MM, Placement, Scene, build_scene, start
 from softtact.robot.settings import load_scene
 from softtact.robot.taxels import STEP_MM, TaxelMemory

@@ -10,9 +10,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from softtact.errors import ConvergenceError
-from softtact.robot.arm import HOME_RAD, JOINTS
-from softtact.robot.kinematics import inverse_kinematics
-from softtact.robot.record import FINGERS, PHASES, GraspRecord
+from softtact.robot.arm import HOME_RAD, JOINTS, inverse_kinematics
+from softtact.robot.events import FINGERS, PHASES, GraspRecord
 from softtact.robot.scene import DOWN, MM, Scene, quaternion, start
 
 _APPROACH_S, _DESCENT_S, _SETTLE_S = 1.0, 0.5, 0.3

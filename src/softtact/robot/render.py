@@ -1,14 +1,11 @@
-"""Pictures of a grasp from its record, drawn by MuJoCo off screen.
-
-It needs EGL (on Debian libegl1, libegl-mesa0 and libgl1-mesa-dri). A driver that fails may end its process, so the pictures are
-drawn in one of their own. Where that does not work, a sentence says so and there are no pictures.
-"""
+"""Pictures of a grasp."""
 
 import os
 import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
@@ -16,9 +13,14 @@ from scipy.spatial.transform import Rotation
 
 from softtact.drawing import drawn_apart
 from softtact.files import atomic_path
+from softtact.press.plot import save
 from softtact.robot.arm import JOINTS
-from softtact.robot.record import GraspRecord
+from softtact.robot.events import GraspRecord
 from softtact.robot.scene import MM, SENSOR_IN_TOOL, Scene, quaternion
+
+if TYPE_CHECKING:
+    import xarray
+
 
 WHOLE, CLOSE = (60.0, -18.0, 1.9), (20.0, -20.0, 0.28)     # azimuth and elevation in degrees, distance in m
 _NO_PICTURE = "no picture of the robot: MuJoCo does not draw off screen here"
@@ -35,7 +37,7 @@ def draw_rows(scene: Scene, record: GraspRecord, rows: Sequence[int], *, view: t
         mujoco.mj_saveModel(scene.model, str(Path(folder, "scene.mjb")), None)
         np.savez(Path(folder, "states.npz"), qpos=states, size=size, camera=[_camera(record, row, view) for row in rows])
         environment = os.environ | {"MUJOCO_GL": os.environ.get("MUJOCO_GL", "egl" if sys.platform == "linux" else "")}
-        images = drawn_apart([sys.executable, "-m", "softtact.robot.offscreen"], Path(folder), sentence=_NO_PICTURE,
+        images = drawn_apart([sys.executable, "-m", "softtact.robot.render"], Path(folder), sentence=_NO_PICTURE,
                              timeout_s=timeout_s, environment=environment)
     return None if images is None else images["images"]
 
@@ -75,3 +77,73 @@ def _camera(record, row, view):
     hand = record.sensor_pose_world[row, :, :3].mean(axis=0) * MM
     near = view[2] < 1.0
     return [*view, *(hand + [0, 0, 0.03] if near else [0.35, 0.0, 0.35])]
+
+
+def draw_grasp(data: "xarray.Dataset", path: str | Path, *, images: np.ndarray | None) -> None:
+    """Write a PNG or SVG with a row for each event: robot, maps and counts of both fingers.
+
+    data: of an `events.nc`;  images: (event, height, width, 3) of the robot, or None without
+    """
+    from matplotlib.figure import Figure
+
+    events, first = data.sizes["event"], 0 if images is None else 1
+    figure = Figure(figsize=(4.2 * first + 7.2, 2.6 * events + 0.6), layout="constrained")
+    grid = figure.subplots(events, 4 + first, squeeze=False, width_ratios=[3.0] * first + [1.0] * 4)
+    deepest = max(float(data.deformation_map_mm.max()), 1e-9)
+    highest = max(float(data.tactile_map.max()), 1.0)
+    extent = [float(data[axis][end]) for axis in ("x", "y") for end in (0, -1)]
+    for event in range(events):
+        row = int(data.event_row[event])
+        if images is not None:
+            grid[event, 0].imshow(images[event])
+            grid[event, 0].set_axis_off()
+        head = f"{data.event.values[event]}, {float(data.time_s[row]):.2f} s"
+        grid[event, 0].set_title(head, fontsize=9, loc="left")
+        for finger, name in enumerate(data.finger.values):
+            force = -float(data.force_n[row, finger, 2])
+            maps, counts = grid[event, first + 2 * finger], grid[event, first + 2 * finger + 1]
+            shown = maps.imshow(data.deformation_map_mm[event, finger], origin="lower", extent=extent, vmin=0, vmax=deepest,
+                                cmap="viridis")
+            read = counts.imshow(data.tactile_map[event, finger], origin="lower", extent=extent, vmin=0, vmax=highest,
+                                 cmap="viridis")
+            maps.set_title(f"{name}: {force:.3g} N\n{data.model.values[event, finger]}", fontsize=8)
+            for axes in (maps, counts):
+                axes.set_xlabel("x (mm)", fontsize=7)
+                axes.tick_params(labelsize=7)
+            maps.set_ylabel("y (mm)", fontsize=7)
+    bars = figure.colorbar(shown, ax=grid, label="towards the PCB (mm)", shrink=0.6), \
+        figure.colorbar(read, ax=grid, label="counts, ideal readout", shrink=0.6)
+    for bar in bars:
+        bar.ax.tick_params(labelsize=7)
+    save(figure, path)
+
+
+def main(folder: str | Path) -> None:
+    """Read scene.mjb and states.npz, write images.npz."""
+    import mujoco
+
+    folder = Path(folder)
+    model = mujoco.MjModel.from_binary_path(str(folder / "scene.mjb"))
+    data = mujoco.MjData(model)
+    with np.load(folder / "states.npz", allow_pickle=False) as states:
+        qpos, camera_of, (height, width) = states["qpos"], states["camera"], states["size"]
+    images = np.empty((len(qpos), height, width, 3), dtype=np.uint8)
+    with mujoco.Renderer(model, height=int(height), width=int(width)) as renderer:
+        for number, (position, camera) in enumerate(zip(qpos, camera_of, strict=True)):
+            data.qpos[:] = position
+            mujoco.mj_forward(model, data)
+            renderer.update_scene(data, camera=_free_camera(mujoco, camera))
+            images[number] = renderer.render()
+    np.savez(folder / "images.npz", images=images)
+
+
+def _free_camera(mujoco, values):
+    """A free camera of azimuth and elevation in degrees, distance in m and the point (3,) that it looks at."""
+    camera = mujoco.MjvCamera()
+    camera.azimuth, camera.elevation, camera.distance = values[:3]
+    camera.lookat[:] = values[3:]
+    return camera
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 
 from softtact.errors import InputError
 from softtact.robot.arm import HOME_RAD, JOINTS, add_arm
-from softtact.robot.record import FINGERS
+from softtact.robot.events import FINGERS
 from softtact.robot.settings import SceneSettings
 
 if TYPE_CHECKING:

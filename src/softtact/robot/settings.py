@@ -1,5 +1,6 @@
-"""What a scene is made of, as its YAML states it: `softtact/robot/data/scene.yaml`, or a user's own with some of its keys."""
+"""Settings of a scene."""
 
+import os
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any
@@ -74,3 +75,16 @@ def load_scene(path: str | Path | None = None, **changes: Any) -> SceneSettings:
         said = (f"the key is unknown; use one of {', '.join(SceneSettings.model_fields)}." if fault["type"] == "extra_forbidden"
                 else f"{fault['input']!r} is not usable: {fault['msg']}; correct it.")
         raise InputError(f"{path or 'scene'}, at '{field}': {said}") from None
+
+
+def import_mujoco() -> None:
+    """Import MuJoCo with its graphics off in this process; pictures are drawn in another one (`softtact.robot.render`)."""
+    wanted = os.environ.get("MUJOCO_GL")
+    os.environ["MUJOCO_GL"] = "disable"
+    try:
+        import mujoco  # noqa: F401
+    finally:
+        if wanted is None:
+            del os.environ["MUJOCO_GL"]
+        else:
+            os.environ["MUJOCO_GL"] = wanted

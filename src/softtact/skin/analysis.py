@@ -1,4 +1,4 @@
-"""From loads to counts: deformed mesh, capacitances on it, readings of the converter."""
+"""From loads to counts: deformed mesh, capacitances on it, counts of the converter."""
 
 import warnings
 from collections.abc import Sequence
@@ -6,17 +6,80 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import pandas as pd
 import scipy.sparse as sp
 
-from softtact.errors import ExtrapolationWarning
-from softtact.skin.converter import Converter
+from softtact.errors import ExtrapolationWarning, InputError
 from softtact.skin.elasticity import ElasticLayer
 from softtact.skin.elastomers import Elastomer
 from softtact.skin.electrostatics import Field
-from softtact.skin.layer_mesh import LayerMesh
+from softtact.skin.layer_mesh import LayerMesh, even_plan, taxel_plan
 from softtact.skin.layout import Layout
-from softtact.skin.loads import Load
-from softtact.skin.plan import even_plan, taxel_plan
+from softtact.skin.loads import Load, disc, refuse_beside
+
+
+@dataclass(frozen=True)
+class Converter:
+    """Counts of a capacitance, and the range that it has to stay in."""
+
+    step_ff: float
+    """fF a count."""
+    range_pf: tuple[float, float]
+    """Lowest and highest capacitance, of a taxel with its stray."""
+    offset_step_pf: float
+    """An offset is taken off in such steps before conversion; 0 for none."""
+    stray_pf: float = 10.0
+    """Of the lines to a taxel."""
+    stray_share: float = 0.2
+    """How far the stray may be from that, as a share."""
+    noise_counts: float = 1.0
+    """Standard deviation of a reading."""
+
+    @property
+    def noise_ff(self) -> float:
+        """Standard deviation of a reading in fF."""
+        return self.noise_counts * self.step_ff
+
+    def counts(self, capacitance_ff: np.ndarray) -> np.ndarray:
+        """Change of a reading's whole counts by capacitances (load, taxel), the first row being the skin at rest.
+
+        An offset in whole steps brings each taxel at rest into the range first. Raises InputError where a taxel leaves the range.
+        """
+        total = 1e-3 * np.asarray(capacitance_ff) + self.stray_pf
+        if self.offset_step_pf:
+            total = total - self.offset_step_pf * np.round(total[0] / self.offset_step_pf)
+        self.refuse_outside(total)
+        reading = np.floor(1e3 * total / self.step_ff)
+        return (reading - reading[0])[1:].astype(int)
+
+    def largest_change_ff(self, at_rest_ff: float) -> float:
+        """By how much a taxel's capacitance may rise within the range, with the stray anywhere in its share."""
+        if self.offset_step_pf:
+            return 1e3 * (self.range_pf[1] - 0.5 * self.offset_step_pf)
+        return 1e3 * (self.range_pf[1] - self.stray_pf * (1 + self.stray_share)) - at_rest_ff
+
+    def fits_at_rest(self, at_rest_ff: float) -> bool:
+        """Whether a taxel at rest is within the range, with the stray anywhere in its share."""
+        if self.offset_step_pf:
+            return True
+        return bool(1e-3 * at_rest_ff + self.stray_pf * (1 - self.stray_share) >= self.range_pf[0])
+
+    def refuse_outside(self, total_pf: np.ndarray) -> None:
+        """Refuse capacitances in pF, stray included, beyond the range."""
+        low, high = self.range_pf
+        outside = (total_pf < low) | (total_pf > high)
+        if outside.any():
+            raise InputError(
+                f"converter: taxel {int(np.nonzero(outside)[-1][0]) + 1} with its stray has {total_pf[outside][0]:.4g} pF, and the "
+                f"range is {low:g} to {high:g} pF; correct `converter.stray_pf`, or take smaller taxels or a thicker layer."
+            )
+
+
+# "paper": Le et al. 2011, sec. II. "adi": the maker's data sheet of the AD7147 and its forum.
+CONVERTERS = {
+    "paper": Converter(step_ff=0.32, range_pf=(4.0, 30.0), offset_step_pf=0.0),
+    "adi": Converter(step_ff=0.244, range_pf=(-8.0, 8.0), offset_step_pf=0.32),
+}
 
 
 @dataclass(frozen=True)
@@ -46,7 +109,7 @@ class Skin:
     """A layer of elastomer on taxels: meshes and factors once, then any load.
 
     spacing_mm, layers: of the mesh for deformations;  field_spacing_mm, field_layers: of that for the field, which has one element
-    across each guard gap; `softtact.skin.convergence` tells what that is worth.
+    across each guard gap; `softtact.skin.analysis` tells what that is worth.
     """
 
     def __init__(
@@ -140,3 +203,114 @@ def analyse(skin: Skin, loads: Sequence[Load], *, elastomer: Elastomer, converte
 
 
 _LARGE = 0.3  # of the thickness: the strain up to which the papers' elastomers were tested
+
+
+_PLACES = 6  # ratios of pressure to modulus that are solved, at the extremes of a Chebyshev polynomial
+
+
+def alone(layout: Layout, taxel: int) -> Layout:
+    """The same elastomer with one taxel (counted from 0); the others become a part of the guard, which is driven alike."""
+    return Layout(
+        layout.outline_mm,
+        layout.centres_mm[[taxel]],
+        layout.module[[taxel]],
+        layout.corners_mm,
+        layout.radius_mm,
+        layout.guard_radius_mm,
+    )
+
+
+def probe_curves(
+    skin: Skin,
+    elastomer: Elastomer,
+    *,
+    diameters_mm: Sequence[float],
+    pressures_kpa: Sequence[float],
+    modulus_shares: Sequence[float],
+) -> pd.DataFrame:
+    """A row for each diameter, share and pressure: capacitance of the first taxel of a skin, and what it rises by.
+
+    modulus_shares: by how much Young's modulus is off, 0 for the curve as it is. Deformations are proportional to pressure over
+    modulus, and the capacitance is a smooth function of that ratio, which is solved at a few places and interpolated.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ExtrapolationWarning)
+        moduli = np.array([elastomer.young_mpa(1e-3 * pressure) for pressure in pressures_kpa])
+    pressures = 1e-3 * np.asarray(pressures_kpa)
+    ratio = {share: pressures / ((1 + share) * moduli) for share in modulus_shares}
+    largest = max(values.max() for values in ratio.values())
+    places = largest * 0.5 * (1 - np.cos(np.pi * np.arange(1, _PLACES + 1) / _PLACES))
+    rows = []
+    for diameter in diameters_mm:
+        x, y = skin.layout.centres_mm[0]
+        load = disc((float(x), float(y)), diameter_mm=diameter, pressure_mpa=1.0)
+        refuse_beside(load, skin.layout, where=f"probes, diameter {diameter:g} mm")
+        unit = skin.layer.displacement(load, young_mpa=1.0)
+        rise = [skin.field(place * unit).capacitance_ff[0] - skin.at_rest_ff[0] for place in places]
+        polynomial = np.polynomial.Polynomial.fit([0.0, *places], [0.0, *rise], _PLACES)
+        rows += [
+            {
+                "diameter_mm": diameter,
+                "modulus_share": share,
+                "pressure_kpa": pressure,
+                "young_mpa": (1 + share) * modulus,
+                "capacitance_ff": skin.at_rest_ff[0] + polynomial(value),
+                "delta_ff": polynomial(value),
+                "within_test": bool(elastomer.tested_mpa[0] <= 1e-3 * pressure <= elastomer.tested_mpa[1]),
+            }
+            for share, values in ratio.items()
+            for pressure, modulus, value in zip(pressures_kpa, moduli, values, strict=True)
+        ]
+    return pd.DataFrame(rows)
+
+
+_DEFORMATION = {"coarse": (1.5, 2), "standard": (1.0, 4), "fine": (0.75, 5)}  # spacing in mm, layers
+_FIELD = {
+    "coarse": (1, (0.5, 1.0)),
+    "standard": (1, (1 / 3, 2 / 3, 1.0)),
+    "fine": (2, (0.03, 0.1, 0.25, 0.6, 1.0)),
+    "finest": (3, (0.01, 0.03, 0.08, 0.2, 0.4, 0.7, 1.0)),
+}  # points around the gap, levels as shares
+
+
+def mesh_convergence(
+    layout: Layout, load: Load, *, taxel: int, thickness_mm: float, poisson: float, permittivity: float, young_mpa: float
+) -> pd.DataFrame:
+    """A row a mesh: largest displacement in mm, capacitance of a taxel (counted from 0) in fF at rest and under the load.
+
+    The field's meshes are compared on the deformation of the standard mesh.
+    """
+    rows, solved = [], {}
+    for name, (spacing, layers) in _DEFORMATION.items():
+        layer = ElasticLayer(
+            LayerMesh(even_plan(layout, spacing_mm=spacing), np.linspace(0.0, thickness_mm, layers + 1)), poisson=poisson
+        )
+        moved = layer.displacement(load, young_mpa=young_mpa)
+        solved[name] = layer, moved
+        rows.append({"mesh": name, "of": "deformation", "nodes": len(moved), "largest_displacement_mm": -moved[:, 2].min()})
+    one = Layout(
+        layout.outline_mm,
+        layout.centres_mm[taxel][None],
+        np.zeros(1, dtype=int),
+        layout.corners_mm,
+        layout.radius_mm,
+        layout.guard_radius_mm,
+    )
+    layer, moved = solved["standard"]
+    for name, (refinement, levels) in _FIELD.items():
+        mesh = LayerMesh(taxel_plan(one, spacing_mm=1.2, refinement=refinement), thickness_mm * np.array([0.0, *levels]))
+        at_rest, pressed = (
+            Field(mesh, one, permittivity=permittivity, displacement_mm=u, order=4).capacitance_ff[0]
+            for u in (None, layer.at(mesh.nodes_mm, moved))
+        )
+        rows.append(
+            {
+                "mesh": name,
+                "of": "field",
+                "nodes": len(mesh.nodes_mm),
+                "at_rest_ff": at_rest,
+                "capacitance_ff": pressed,
+                "delta_ff": pressed - at_rest,
+            }
+        )
+    return pd.DataFrame(rows)

@@ -1,16 +1,31 @@
-"""A rigid mesh pressed on the skin: where it touches, and with which forces; the papers take an even pressure instead."""
+"""A rigid object pressed on the skin: where it touches, and with which forces.
+
+At small strains the layer has one modulus, and contact is without friction. At finite strains the solid model takes a foam's law
+that follows the elastomer's curve. The papers take an even pressure instead.
+"""
 
 import warnings
 
 import numpy as np
 import trimesh
+from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
+from softtact.contact.motion import Motion
+from softtact.contact.pair import ContactPair
+from softtact.contact.surfaces import Surface
 from softtact.contact.unilateral import active_set
 from softtact.errors import ExtrapolationWarning, InputError
+from softtact.fem.solid_mesh import SolidMesh
+from softtact.materials.laws.base import Law
+from softtact.materials.laws.registry import make_law
+from softtact.models.solid.body import SolidBody
+from softtact.models.solid.path import SolidLoadStep, SolidPath
+from softtact.progress import Watch, announce
 from softtact.skin.analysis import Skin
 from softtact.skin.elastomers import Elastomer
+from softtact.skin.layer_mesh import LayerMesh
 from softtact.skin.loads import Load
 
 _DEPTHS = (0.15, 0.3, 0.6)  # of the thickness: points further below an object are not looked at, unless it comes down as far
@@ -102,3 +117,103 @@ def _compliance(skin, nodes):
         nodal[some, 2, np.arange(len(some))] = -1.0
         columns.append(-skin.layer.respond(nodal)[nodes, 2])
     return np.concatenate(columns, axis=1)
+
+
+_OBJECT, _LAYER = "object", "elastomer"
+_PENALTY = 20.0  # times E / h of the layer's facets
+_POINTS = 26  # of the elastomer's curve
+_MIRRORED = [0, 2, 1, 3, 6, 5, 4, 7, 9, 8]  # a tetrahedron's nodes in the order of its mirror image
+
+
+def compression_law(elastomer: Elastomer) -> tuple[Law, float]:
+    """The foam's law `hyperfoam1` with the elastomer's Poisson's ratio, fitted to its curve over the tested stresses.
+
+    Returned with it: by how much it departs from the curve at most, as a share of the highest stress. The curve's stress is a
+    nominal one. The window of the law's stretches is that of the test, from 1 down to its end and what it widens across.
+    """
+    stress = np.linspace(*elastomer.tested_mpa, _POINTS)
+    stretch = 1 - elastomer.fit(stress)
+
+    def law_of(values):
+        return make_law("hyperfoam1", {"mu1": float(np.exp(values[0])), "alpha1": float(values[1]), "nu1": elastomer.poisson})
+
+    def misfit(values):
+        return (-law_of(values).nominal_stress("uniaxial", stretch) - stress) / stress[-1]
+
+    shear = stress[-1] / (1 - stretch[-1]) / (2 * (1 + elastomer.poisson))
+    found = least_squares(misfit, [np.log(shear), 2.0], bounds=([-20, -25], [3, 25]))
+    law = law_of(found.x)
+    across = float(law.lateral_stretch("uniaxial", stretch[-1]))
+    law.stretch_window = (float(stretch[-1]), max(across, 1.0))
+    return law, float(np.abs(found.fun).max())
+
+
+def solid_layer(mesh: LayerMesh) -> SolidMesh:
+    """The layer as a `SolidMesh` on the same nodes, with the faces `floor` and `top`."""
+    cells = np.ascontiguousarray(mesh.basis.element_dofs.T, dtype=np.int64)
+    a, b, c, d = np.moveaxis(mesh.nodes_mm[cells[:, :4]], 1, 0)
+    mirrored = np.einsum("ei,ei->e", np.cross(b - a, c - a), d - a) < 0
+    cells[mirrored] = cells[mirrored][:, _MIRRORED]
+    height = mesh.levels_mm[-1]
+    return SolidMesh(mesh.nodes_mm, ((_LAYER, "tetra10", cells),)).with_faces(
+        floor=lambda x: x[:, 2] < 1e-9, top=lambda x: x[:, 2] > height - 1e-9
+    )
+
+
+def press_at_finite_strains(
+    skin: Skin,
+    mesh: trimesh.Trimesh,
+    centre_mm: tuple[float, float],
+    *,
+    force_n: float,
+    elastomer: Elastomer,
+    turned_deg: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    friction: float = 0.0,
+    name: str = "mesh",
+) -> Load:
+    """The load of an object that comes straight down, with the displacement of the layer's nodes, floor bonded and sides free.
+
+    centre_mm, turned_deg: as `contact_load` has them;  friction: Coulomb's coefficient of object and elastomer
+    Raises InputError where no part of the mesh is above the elastomer, ConvergenceError where the force is not reached.
+    """
+    placed = placed_over(mesh, centre_mm, turned_deg)
+    layer = solid_layer(skin.layer.mesh)
+    top = layer.points[layer.face_nodes("top")]
+    lowest = underside(placed, top[:, :2], centre_mm, name).min()
+    placed.apply_translation([0.0, 0.0, float(top[0, 2] - lowest)])
+    law, off = compression_law(elastomer)
+    body = SolidBody(layer, {_LAYER: law}, held={"floor": "xyz"}, threads=skin.threads,
+                     rigid={_OBJECT: (placed.bounds.mean(axis=0), np.asarray(placed.triangles))})  # fmt: skip
+    face = Surface.of(layer.face("top"))
+    size = face.size_mm(body.points)
+    own = 9 * law.bulk_modulus * law.mu0 / (3 * law.bulk_modulus + law.mu0)  # Young's modulus
+    body.add_pair(
+        ContactPair(face, Surface.of({"triangle": body.surface_nodes(_OBJECT)}), stiffness=_PENALTY * own / size,
+                    reach_mm=2 * size, friction=friction, rigid=True)
+    )  # fmt: skip
+    body.watch = Watch(name)
+    try:
+        (step,) = SolidPath(body, {_OBJECT: Motion().press(force_n=force_n)}, tell=lambda text: announce(f"{name}: {text}")).run()
+    finally:
+        body.watch.end()
+    at = f"({centre_mm[0]:g}, {centre_mm[1]:g}) mm"
+    words = f"{force_n:g} N by {name} at {at}, finite strains by a law off the curve by {off:.0%}"
+    return _load_of(body, step, force_n, len(layer.points), words)
+
+
+def _load_of(body: SolidBody, step: SolidLoadStep, force_n: float, nodes: int, words: str) -> Load:
+    """What the balanced step presses with, at the points of contact; strain beyond the elastomer's test is told in words."""
+    points, pressure = step.state.histories[0].points, step.state.contacts[0].pressure
+    touching = pressure > 0
+    forces = (points.weight * pressure)[touching]
+    area = float(points.weight[touching].sum())
+    at = np.einsum("pk,pki->pi", points.values, body.points[points.nodes])[touching, :2]
+    beyond = step.extrapolated_volume_fraction
+    return Load(
+        at,
+        forces * (force_n / forces.sum()),
+        force_n / area,
+        f"{words}, {1e3 * force_n / area:.3g} kPa in the mean"
+        + (f", {beyond:.0%} of the volume strained beyond the tests" if beyond > 0.005 else ""),
+        step.state.displacement[:nodes],
+    )

@@ -1,19 +1,141 @@
-"""Modules laid on a robot's link: side by side from a start, straight along the surface, with what does not fit told.
-
-On a cylinder or a cone the flat tiling closes without gaps; on a surface that bends both ways it cannot, and gaps or overlaps
-appear between modules that were reached on different ways.
-"""
+"""Modules laid on a robot's link side by side, and their taxels for other programs."""
 
 from collections import deque
 from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree as xml
 
 import numpy as np
 import pandas as pd
 import trimesh
+from scipy.spatial.transform import Rotation
 
+import softtact
 from softtact.errors import InputError
+from softtact.files import atomic_path
 from softtact.skin.layout import Layout
-from softtact.skin.surface import Place, Surface
+
+_AHEAD = 1e-12  # of an inner product below which a way runs along an edge
+_MOST_FACES = 100_000
+_SHARP = np.cos(np.radians(40.0))     # beyond this angle an edge between facets is one of the body, as a lid's
+
+
+@dataclass(frozen=True)
+class Place:
+    """A point of the surface with a direction along it."""
+
+    face: int
+    """Number of the facet."""
+    point: np.ndarray
+    """(3,) in mm."""
+    direction: np.ndarray
+    """(3,) unit vector in the facet's plane."""
+
+
+class Surface:
+    """A closed mesh to walk on."""
+
+    def __init__(self, mesh: trimesh.Trimesh) -> None:
+        self.mesh = mesh
+        self._corners, self._normals = np.asarray(mesh.triangles), np.asarray(mesh.face_normals)
+        self._angles = np.asarray(mesh.face_angles)
+        flat = np.asarray(mesh.faces).ravel()
+        self._order = np.argsort(flat, kind="stable")     # corners of facets, vertex by vertex
+        self._first = np.searchsorted(flat[self._order], np.arange(len(mesh.vertices) + 1))
+        self._neighbour = _neighbours(np.asarray(mesh.faces))
+
+    def at(self, point: np.ndarray, direction: np.ndarray) -> Place:
+        """The place nearest to a point, with a direction made tangential; one along the normal is refused."""
+        nearest = trimesh.triangles.closest_point(self._corners, np.broadcast_to(point, (len(self._corners), 3)))
+        face = int(np.linalg.norm(nearest - point, axis=1).argmin())
+        return Place(face, self._inside(face, nearest[face]), self._tangent(face, direction))
+
+    def walk(self, start: Place, *, angle: float, length_mm: float) -> Place:
+        """Where a straight way ends that begins at an angle to the left of the start's direction; its direction ends the way's."""
+        face, point = start.face, start.point
+        direction = self.turned(start, angle)
+        crossed, left = -1, length_mm
+        for _ in range(_MOST_FACES):
+            edge, ahead = self._exit(face, point, direction, crossed)
+            if ahead >= left:
+                return Place(face, point + left * direction, direction)
+            point, left = point + ahead * direction, left - ahead
+            face, crossed, direction = self._cross(face, edge, direction)
+        raise InputError(f"link.mesh: a way of {length_mm:g} mm on it crosses more than {_MOST_FACES} facets; simplify the mesh.")
+
+    def turned(self, place: Place, angle: float) -> np.ndarray:
+        """The place's direction turned to the left by an angle, seen from outside."""
+        aside = np.cross(self._normals[place.face], place.direction)
+        return np.cos(angle) * place.direction + np.sin(angle) * aside
+
+    def normal(self, place: Place) -> np.ndarray:
+        """Outward unit normal (3,), smooth over facets that bend little and sharp at edges."""
+        weights = trimesh.triangles.points_to_barycentric(self._corners[place.face][None], place.point[None])[0]
+        normal = weights @ np.array([self._corner_normal(place.face, corner) for corner in range(3)])
+        return normal / np.linalg.norm(normal)
+
+    def _corner_normal(self, face, corner):
+        """Mean normal at a facet's corner of the facets there that are within sharp edges, weighted by their angles."""
+        vertex = self.mesh.faces[face][corner]
+        around = self._order[self._first[vertex]:self._first[vertex + 1]]
+        normals = self._normals[around // 3]
+        smooth = normals @ self._normals[face] > _SHARP
+        mean = (self._angles[around // 3, around % 3] * smooth) @ normals
+        return mean / np.linalg.norm(mean)
+
+    def _tangent(self, face, direction):
+        normal = self._normals[face]
+        flat = np.asarray(direction, dtype=float) - (direction @ normal) * normal
+        length = np.linalg.norm(flat)
+        if length < 1e-6 * max(np.linalg.norm(direction), 1e-300) or length == 0:
+            raise InputError("link.direction: it stands upright on the surface at the start; give one along the surface.")
+        return flat / length
+
+    def _inside(self, face, point):
+        """The point moved a little towards the facet's middle, off its edges."""
+        return point + 1e-6 * (self._corners[face].mean(axis=0) - point)
+
+    def _inwards(self, face, edge):
+        """Along an edge (3,), and across it into the facet (3,), both unit vectors."""
+        a, b = self._corners[face][edge], self._corners[face][(edge + 1) % 3]
+        along = (b - a) / np.linalg.norm(b - a)
+        return along, np.cross(self._normals[face], along)
+
+    def _exit(self, face, point, direction, crossed):
+        """The edge where a way leaves a facet, and how far ahead."""
+        best, ahead = 0, np.inf
+        for edge in range(3):
+            if edge == crossed:
+                continue
+            _, inwards = self._inwards(face, edge)
+            speed = direction @ inwards
+            if speed < -_AHEAD:
+                way = max(0.0, -((point - self._corners[face][edge]) @ inwards) / speed)
+                if way < ahead:
+                    best, ahead = edge, way
+        return best, ahead
+
+    def _cross(self, face, edge, direction):
+        """The facet behind an edge, the edge's number in it, and the direction there, as if both were unfolded."""
+        along, inwards = self._inwards(face, edge)
+        other, own = self._neighbour[face, edge]
+        if other < 0:
+            raise InputError("link.mesh: the surface has an open edge within the modules; close the mesh.")
+        _, behind = self._inwards(other, own)
+        turned = (direction @ along) * along - (direction @ inwards) * behind
+        return int(other), int(own), turned / np.linalg.norm(turned)
+
+
+def _neighbours(faces):
+    """Facet behind each edge and the edge's number there: (facet, 3, 2), -1 where there is none."""
+    edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    order = np.lexsort(edges.T)
+    same = (edges[order[1:]] == edges[order[:-1]]).all(axis=1)
+    found = np.full((len(edges), 2), -1)
+    for one, other in ((order[:-1][same], order[1:][same]), (order[1:][same], order[:-1][same])):
+        found[one] = np.column_stack([other // 3, other % 3])
+    return found.reshape(-1, 3, 2)
+
 
 _NEAR = 0.9  # of the distance between neighbours' middles: nearer to any other module there is no place
 _NO_BEND = 1e-9
@@ -154,3 +276,82 @@ def _edge_towards(corners, direction):
     """Middle of the side of a triangle that lies furthest along a direction."""
     middles = 0.5 * (corners + np.roll(corners, -1, axis=0))
     return middles[(middles @ direction).argmax()]
+
+
+_M = 1e-3  # metres in a millimetre: all three formats are in metres
+
+
+def write_exports(folder: str | Path, name: str, positions_mm: np.ndarray, normals: np.ndarray, *, radius_mm: float) -> list[Path]:
+    """Write NAME.txt, NAME.urdf and NAME.xml of taxels at (taxel, 3) with unit normals (taxel, 3); return their paths."""
+    folder = Path(folder)
+    texts = {
+        folder / f"{name}.txt": icub_text(name, positions_mm, normals),
+        folder / f"{name}.urdf": urdf(name, positions_mm, normals),
+        folder / f"{name}.xml": mujoco_xml(name, positions_mm, normals, radius_mm=radius_mm),
+    }
+    for path, text in texts.items():
+        with atomic_path(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+    return list(texts)
+
+
+def icub_text(name: str, positions_mm: np.ndarray, normals: np.ndarray) -> str:
+    """The skin of an iCub part: four lines about it, then `x y z nx ny nz` for each taxel in m, as its skinManager reads them."""
+    rows = [
+        " ".join(f"{value:.6f}" for value in (*(_M * place), *normal)) for place, normal in zip(positions_mm, normals, strict=True)
+    ]
+    return "\n".join(
+        [f"name {name}", f"version softtact_{softtact.__version__}", f"numTaxels {len(rows)}", "[calibration]", *rows, ""]
+    )
+
+
+def urdf(name: str, positions_mm: np.ndarray, normals: np.ndarray) -> str:
+    """A link with a massless frame for each taxel, its z axis along the normal."""
+    robot = xml.Element("robot", name=name)
+    xml.SubElement(robot, "link", name=name)
+    for number, (place, normal) in enumerate(zip(positions_mm, normals, strict=True), start=1):
+        xml.SubElement(robot, "link", name=f"{name}_taxel_{number}")
+        joint = xml.SubElement(robot, "joint", name=f"{name}_joint_{number}", type="fixed")
+        xml.SubElement(joint, "parent", link=name)
+        xml.SubElement(joint, "child", link=f"{name}_taxel_{number}")
+        roll, pitch = -np.arcsin(np.clip(normal[1], -1.0, 1.0)), np.arctan2(normal[0], normal[2])  # that take z to the normal
+        xml.SubElement(joint, "origin", xyz=_row(_M * place), rpy=_row((roll, pitch, 0.0)))
+    return _text(robot)
+
+
+def mujoco_xml(name: str, positions_mm: np.ndarray, normals: np.ndarray, *, radius_mm: float) -> str:
+    """A body of sites, one a taxel, each with a touch sensor; include it, or copy the sites into a body of your own."""
+    model = xml.Element("mujoco", model=name)
+    body = xml.SubElement(xml.SubElement(model, "worldbody"), "body", name=name)
+    sensors = xml.SubElement(model, "sensor")
+    for number, (place, normal) in enumerate(zip(positions_mm, normals, strict=True), start=1):
+        x, y, z, w = upright(normal).as_quat()
+        xml.SubElement(
+            body,
+            "site",
+            name=f"{name}_{number}",
+            type="cylinder",
+            size=_row((_M * radius_mm, 0.5 * _M)),
+            pos=_row(_M * place),
+            quat=_row((w, x, y, z)),
+        )
+        xml.SubElement(sensors, "touch", name=f"{name}_touch_{number}", site=f"{name}_{number}")
+    return _text(model)
+
+
+def upright(normal: np.ndarray) -> Rotation:
+    """The smallest rotation that takes z to a unit normal."""
+    axis = np.cross([0.0, 0.0, 1.0], normal)
+    sine, cosine = np.linalg.norm(axis), float(normal[2])
+    if sine < 1e-12:
+        return Rotation.from_rotvec([0.0 if cosine > 0 else np.pi, 0.0, 0.0])
+    return Rotation.from_rotvec(axis / sine * np.arctan2(sine, cosine))
+
+
+def _row(values):
+    return " ".join(f"{value:.9g}" for value in values)
+
+
+def _text(root):
+    xml.indent(root)
+    return xml.tostring(root, encoding="unicode") + "\n"

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from softtact.skin.analysis import Skin
-from softtact.skin.converter import Converter
+from softtact.skin.analysis import Converter, Skin
 from softtact.skin.layout import Layout
 from softtact.skin.loads import ellipse
 

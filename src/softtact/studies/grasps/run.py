@@ -19,9 +19,8 @@ from softtact.files import digest, read_dataset, write_csv, write_dataset
 from softtact.geometry.meshes import place, read_mesh
 from softtact.progress import announce, progress
 from softtact.readout.virtual_sensor import VirtualSensorSettings, read_virtual_sensor
-from softtact.robot.events import pose_of, press_events, read_events, set_down, to_dataset, write_events
+from softtact.robot.events import FINGERS, pose_of, press_events, read_events, set_down, to_dataset, write_events
 from softtact.robot.grasp import GraspRun
-from softtact.robot.record import FINGERS
 from softtact.robot.scene import Placement, build_scene
 from softtact.robot.settings import load_scene
 from softtact.studies.grasps.config import GraspItem, GraspStudy, entry_of

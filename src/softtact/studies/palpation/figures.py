@@ -10,8 +10,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from softtact.fem.solid_mesh import SolidMesh
 from softtact.files import atomic_path
-from softtact.probe.hardness import HardnessVerdict
-from softtact.probe.sweep import Palpation
+from softtact.probe.sweep import HardnessVerdict, Palpation
 from softtact.reporting.style import pyplot, save
 
 COLOURS = ("#1f4e79", "#e08214", "#3f9c6d", "#8a3a8f", "#555555")

@@ -13,9 +13,8 @@ from markupsafe import Markup
 import softtact
 from softtact.files import atomic_path, digest, write_csv, write_dataset, write_json
 from softtact.probe.design import Design
-from softtact.probe.hardness import hardness_table, verdict
 from softtact.probe.lump import PARAMETERS, detection_map, lump_table, recovery
-from softtact.probe.sweep import palpate, slope
+from softtact.probe.sweep import hardness_table, palpate, slope, verdict
 from softtact.reporting.page_template import STYLE
 from softtact.reporting.run_record import machine
 from softtact.studies.palpation import figures

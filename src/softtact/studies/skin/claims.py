@@ -13,9 +13,8 @@ import pandas as pd
 from softtact.errors import ExtrapolationWarning
 from softtact.evaluation.claim_rows import COLUMNS, CONSISTENT, CONTRADICTION, MEASUREMENTS, row, verdict_of
 from softtact.files import read_yaml
-from softtact.skin.analysis import Skin
+from softtact.skin.analysis import Skin, mesh_convergence
 from softtact.skin.choice import SPECIMEN_MM, pareto, printed_criteria
-from softtact.skin.convergence import mesh_convergence
 from softtact.skin.elastomers import DATA, Elastomer
 from softtact.skin.layout import Layout, module_layout
 from softtact.skin.loads import Load, disc, ellipse

@@ -10,19 +10,14 @@ import xarray as xr
 from softtact.files import write_csv, write_dataset
 from softtact.geometry.meshes import read_mesh
 from softtact.progress import announce
-from softtact.skin.analysis import Readings, Skin, analyse
-from softtact.skin.choice import front_confidence, printed_criteria, thickness_table, thinnest, with_scatter
-from softtact.skin.contact import contact_load
-from softtact.skin.design import Choice, Design, LoadChoice
-from softtact.skin.exports import write_exports
-from softtact.skin.finite import press_at_finite_strains
+from softtact.skin.analysis import Readings, Skin, alone, analyse, probe_curves
+from softtact.skin.choice import front_confidence, main_effects, printed_criteria, search, thickness_table, thinnest, with_scatter
+from softtact.skin.contact import contact_load, press_at_finite_strains
+from softtact.skin.design import Choice, Design, LoadChoice, Study, bears, needs_of, prepare, reaches
 from softtact.skin.layout import Layout
-from softtact.skin.link import lay_modules
+from softtact.skin.link import lay_modules, write_exports
 from softtact.skin.loads import Load
 from softtact.skin.maps import crosstalk, patch_maps
-from softtact.skin.probes import alone, probe_curves
-from softtact.skin.search import main_effects, search
-from softtact.skin.study import Study, bears, needs_of, prepare, reaches
 from softtact.studies.skin import figures
 from softtact.studies.skin.claims import claims_of_skin
 from softtact.studies.skin.report import DRAWN_FROM, write_page
