@@ -218,9 +218,9 @@ def part(tmp_path):
 
 def test_the_wheel_holds_the_sensors_materials_studies_and_types(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
-    expected = {"py.typed", "sensors/data/sensors/coro.yaml", "sensors/data/materials/neoprene.yaml", "study/data/config.yaml",
-                "study/data/costs.yaml", "study/data/objects/catalogue.yaml", "study/data/objects/indenters/square.stl",
-                "skin/data/elastomers.yaml", "skin/data/fingertips.yaml", "study/data/skin.yaml", "study/data/skin_forearm.stl"}
+    expected = {"py.typed", "sensors/data/sensors/coro.yaml", "sensors/data/materials/neoprene.yaml", "studies/data/config.yaml",
+                "studies/data/costs.yaml", "studies/data/objects/catalogue.yaml", "studies/data/objects/indenters/square.stl",
+                "skin/data/elastomers.yaml", "skin/data/fingertips.yaml", "studies/data/skin.yaml", "studies/data/skin_forearm.stl"}
     assert {f"softtact/{name}" for name in expected} <= names
     sources = {str(path.relative_to(ROOT / "src")) for path in (ROOT / "src").rglob("*.py")}
     assert sources <= names
