@@ -181,7 +181,7 @@ def test_the_page_holds_its_figures_and_links_its_data(tmp_path):
     write_json(inputs["ftir"], {"source": "virtual dielectric", "verdict": "The words allow this."})
     inputs["figures"] = [folder / "figures" / f"{name}.png" for name in ("fig6_ssim", "fig5_ftir", "material_foam")]
     for path in inputs["figures"]:
-        save(fig6_ssim.draw(SSIM, CEILING), path)
+        save(fig6_ssim.draw(SSIM, CEILING), path, path.with_suffix(".svg"))
     source = {"data": [folder / "evaluation/ssim.csv"], "code": ["src/softtact/studies/hybrid/stages/draw_fig6_ssim.py"]}
     facts = {"study": "mine", "sensor": "pad: 30 x 20 mm", "indenters": 3, "unseen": 1, "grasps": 2, "forces_n": [10.0], "seed": 1,
              "presses": {"indenters": 4, "unseen": 1, "grasps": 2}, "trials": {"indenters": 2, "unseen": 2, "grasps": 50},

@@ -1,61 +1,52 @@
 """A calibration as a page: what was found and how surely, residuals of each taxel, what the presses do not tell."""
 
-import base64
 import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from jinja2 import Environment
-from markupsafe import Markup
+import pandas as pd
 
-import softtact
 from softtact.calibration.advice import Advice
 from softtact.calibration.fit import CalibrationResult, in_words
-from softtact.files import atomic_path
-from softtact.reporting.page_template import STYLE
+from softtact.reporting.page import Page
 from softtact.reporting.style import pyplot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_PAGE = """<!doctype html><html lang="en"><head><meta charset="utf-8"><title>softtact: calibration of {{ sensor }}</title>
-<meta name="viewport" content="width=device-width"><style>{{ style }}</style></head><body>
-<h1>Calibration of a sensor {{ sensor }}</h1>
-<p>From {{ sources }}, by the {{ model }} model. The misfit is {{ "%.2f"|format(misfit) }} times the noise
-({{ "%.1f"|format(noise) }} counts a reading).</p>
-{% if told %}<div class="box"><b>What these presses do not tell.</b><ul>{% for said in told %}<li>{{ said }}</li>{% endfor %}</ul>
-</div>{% endif %}{% if notes %}<div class="box"><b>What was left out.</b><ul>{% for said in notes %}<li>{{ said }}</li>{% endfor %}
-</ul></div>{% endif %}
-<h2>What was found</h2><table><tr><th>number</th><th>value</th><th>standard deviation</th></tr>
-{% for name, value, deviation in rows %}<tr><td>{{ name }}</td><td>{{ value }}</td><td>{{ deviation }}</td></tr>{% endfor %}</table>
-<p>A misfit beyond noise counts as noise in these deviations; what the model itself has wrong is not in them.</p>
-{% for caption, image in figures %}<figure><img alt="{{ caption }}" src="data:image/png;base64,{{ image }}">
-<figcaption>{{ caption }}</figcaption></figure>{% endfor %}
-{% if advice %}<h2>Which press would help most</h2><table><tr><th>object</th><th>place: x, y in mm, angle in degrees</th>
-<th>up to, N</th><th>information, nats</th><th>mean deviation of the gains afterwards</th></tr>
-{% for one in advice %}<tr><td>{{ one.candidate.name }}</td><td>{{ one.candidate.place|join(", ") }}</td>
-<td>{{ "%.3g"|format(one.largest_n) }}</td><td>{{ "%.2f"|format(one.information) }}</td>
-<td>{{ "%.2f"|format(100 * one.gain_deviation) }} %</td></tr>{% endfor %}</table>{% endif %}
-<p>softtact {{ version }}</p></body></html>
-"""
-
 
 def write_page(path: str | Path, result: CalibrationResult, *, notes: Sequence[str] = (), advice: Sequence[Advice] = ()) -> None:
     """Write the page of a calibration, its figures inside; notes: sentences on readings that were left out."""
     problem = result.problem
-    figures = [("Measured (points) and calibrated (lines) counts, summed over the taxels. Grey: forces beyond the model's "
-                "validity, which are left out.", draw_time(result)),
-               ("Each taxel: its gain over the common one, its zero, the root mean square of its residuals.", draw_taxels(result)),
-               ("Root mean square residual of each taxel, one map for each recording.", draw_residuals(result))]
-    page = Environment(autoescape=True).from_string(_PAGE).render(
-        style=Markup(STYLE), sensor=problem.presses.sensor.spec.name, sources="; ".join(one.name for one in problem.experiments),
-        model=problem.presses.model, misfit=result.misfit, told=result.not_identifiable, notes=notes, rows=_rows(result),
-        noise=np.mean([one.noise_counts for one in problem.experiments]), advice=advice, version=softtact.__version__,
-        figures=[(caption, _png(figure)) for caption, figure in figures])
-    with atomic_path(path) as temporary:
-        temporary.write_text(page, encoding="utf-8")
+    noise = np.mean([one.noise_counts for one in problem.experiments])
+    page = Page("Calibration of a sensor", problem.presses.sensor.spec.name, folder=Path(path).parent)
+    page.text(f"From {'; '.join(one.name for one in problem.experiments)}, by the {problem.presses.model} model. The misfit is "
+              f"{result.misfit:.2f} times the noise ({noise:.1f} counts a reading).")
+    page.box("What these presses do not tell.", result.not_identifiable)
+    page.box("What was left out.", notes)
+    page.section("What was found", anchor="found")
+    page.table(pd.DataFrame(_rows(result), columns=["number", "value", "standard deviation"]))
+    page.text("A misfit beyond noise counts as noise in these deviations; what the model itself has wrong is not in them.")
+    page.section("Figures")
+    for caption, figure in (
+            ("Measured (points) and calibrated (lines) counts, summed over the taxels. Grey: forces beyond the model's validity, "
+             "which are left out.", draw_time(result)),
+            ("Each taxel: its gain over the common one, its zero, the root mean square of its residuals.", draw_taxels(result)),
+            ("Root mean square residual of each taxel, one map for each recording.", draw_residuals(result))):
+        page.figure(_png(figure), caption)
+    if advice:
+        page.section("Which press would help most", anchor="advice")
+        page.table(pd.DataFrame([_advised(one) for one in advice]))
+    page.write(path)
+
+
+def _advised(one):
+    """A row for a press that would help."""
+    return {"object": one.candidate.name, "place: x, y in mm, angle in degrees": ", ".join(map(str, one.candidate.place)),
+            "up to, N": f"{one.largest_n:.3g}", "information, nats": f"{one.information:.2f}",
+            "mean deviation of the gains afterwards": f"{100 * one.gain_deviation:.2f} %"}
 
 
 def _rows(result):
@@ -136,4 +127,4 @@ def _png(figure):
     content = io.BytesIO()
     figure.savefig(content, format="png", metadata={"Software": None}, dpi=110)
     pyplot().close(figure)
-    return base64.b64encode(content.getvalue()).decode()
+    return content.getvalue()

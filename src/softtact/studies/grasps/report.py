@@ -1,18 +1,13 @@
 """The report of the study of grasps: objects in the hand, what both sensors feel, one event by two models, claims."""
 
-import base64
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
-from jinja2 import Environment
 
-import softtact
-from softtact.files import atomic_path
-from softtact.reporting.page_template import STYLE
-from softtact.reporting.run_record import machine
+from softtact.reporting.page import Page
 from softtact.reporting.style import pyplot, save
 
 if TYPE_CHECKING:
@@ -20,21 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _MOST_COLUMNS = 6
-_PAGE = """<!doctype html><html lang="en"><head><meta charset="utf-8"><title>softtact: {{ study }}</title>
-<meta name="viewport" content="width=device-width"><style>{{ style }}</style></head><body>
-<h1>Grasps by a robot: the study <i>{{ study }}</i></h1>
-<p class="box"><b>What is synthetic here.</b> Robot and objects move in MuJoCo. Readings are the virtual sensor's, a simulation. No
-score here is the paper's.</p>
-<p>{{ said }}</p>
-{% for f in figures %}<figure><img alt="{{ f.caption }}" src="data:image/png;base64,{{ f.image }}">
-<figcaption>{{ f.caption }} <a href="{{ f.link }}">PNG</a>.</figcaption></figure>{% endfor %}
-<h2>The paper's claims</h2><p>Each verdict is computed by the rule beside it. <a href="tables/claims.csv">CSV</a>.</p>
-<table><tr>{% for c in columns %}<th>{{ c }}</th>{% endfor %}</tr>{% for row in claims %}
-<tr class="{{ row.verdict.split()[0] }}">{% for c in columns %}<td>{{ row[c] }}</td>{% endfor %}</tr>{% endfor %}</table>
-<h2>Grasps</h2><p><a href="grasps.csv">CSV</a>; each grasp in time: <a href="grasps">grasps/</a>.</p>{{ grasps }}
-<h2>Configuration</h2><pre>{{ config }}</pre>
-<p>softtact {{ version }}; {{ machine }}.</p></body></html>
-"""
 _SHOWN = ["grasp", "status", "x_mm", "y_mm", "angle_deg", "trials", "force_left_n", "force_right_n", "model_grip_left",
           "model_grip_right", "deepest_left_mm", "deepest_right_mm", "counts_left", "counts_right", "trial_sd_left_counts",
           "trial_sd_right_counts", "message"]
@@ -43,27 +23,31 @@ _SHOWN = ["grasp", "status", "x_mm", "y_mm", "angle_deg", "trials", "force_left_
 def write_grasps_report(folder: Path, *, study: str, grasps: pd.DataFrame, claims: pd.DataFrame,
                         figures: Sequence[tuple[Path, str]], config: str) -> None:
     """Write report.html below a folder; figures: [(PNG, caption)]."""
+    page = Page("Grasps by a robot: the study", study, folder=folder)
+    page.box("What is synthetic here.", "Robot and objects move in MuJoCo. Readings are the virtual sensor's, a simulation. No "
+             "score here is the paper's.")
+    page.text(_result(grasps))
+    page.section("Figures")
+    for path, caption in figures:
+        page.figure(path, caption)
+    page.claims(claims, file=folder / "tables/claims.csv")
+    page.section("Grasps")
+    page.table(grasps[[name for name in _SHOWN if name in grasps]], file=folder / "grasps.csv",
+               links=[("Each grasp in time", [("grasps", "grasps")])])
+    page.section("Configuration")
+    page.code(config)
+    page.write(folder / "report.html")
+
+
+def _result(grasps):
+    """How many grasps were done, and whether their models are valid, in sentences."""
     done = grasps[grasps.status == "done"]
-    said = (f"{len(done)} of {len(grasps)} grasps done, {done.object.nunique() if len(done) else 0} objects, "
-            f"{int(done.trials.sum()) if len(done) else 0} trials.")
-    if len(done) and not (done[["valid_left", "valid_right"]] == 1).to_numpy().all():
-        invalid = int((done[["valid_left", "valid_right"]] != 1).to_numpy().sum())
-        said += f" {invalid} presses at the grip are beyond what their model is valid for; their maps are not to be relied on."
-    shown = [{"caption": caption, "link": str(path.relative_to(folder)), "image": base64.b64encode(path.read_bytes()).decode()}
-             for path, caption in figures]
-    table = grasps[[name for name in _SHOWN if name in grasps]]
-    page = Environment(autoescape=True).from_string(_PAGE).render(
-        study=study, style=STYLE, said=said, figures=shown, columns=list(claims.columns), claims=claims.to_dict("records"),
-        grasps=_safe(table.to_html(index=False, na_rep="", border=0, float_format=lambda value: f"{value:.4g}")), config=config,
-        version=softtact.__version__, machine=machine())
-    with atomic_path(folder / "report.html") as temporary:
-        temporary.write_text(page, encoding="utf-8")
-
-
-def _safe(html: str) -> Any:
-    from markupsafe import Markup
-
-    return Markup(html)
+    objects, trials = (done.object.nunique(), int(done.trials.sum())) if len(done) else (0, 0)
+    result = f"{len(done)} of {len(grasps)} grasps done, {objects} objects, {trials} trials."
+    invalid = int((done[["valid_left", "valid_right"]] != 1).to_numpy().sum()) if len(done) else 0
+    if invalid:
+        result += f" {invalid} presses at the grip are beyond what their model is valid for; their maps are not to be relied on."
+    return result
 
 
 def draw_objects(path: Path, events: Mapping[str, "xarray.Dataset"], readings: Mapping[str, "xarray.Dataset"],

@@ -1,21 +1,17 @@
 """report.html: one file, figures inside, links from each to its data, its code and the configuration."""
 
-import base64
-import os
 from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from jinja2 import Environment
-from markupsafe import Markup
 
-import softtact
 from softtact.evaluation.score_tables import ALL_FORCES, forces_of
 from softtact.files import read_json
-from softtact.reporting.page_template import PAGE, SOURCES, STYLE
-from softtact.reporting.run_record import machine, run_sentence
-from softtact.reporting.words import KINDS, PREDICTORS, SETS, force_in_words, header
+from softtact.reporting.page import Page
+from softtact.reporting.run_record import run_sentence
+from softtact.reporting.words import KINDS, PREDICTORS, SETS, force_in_words
 from softtact.studies.hybrid.gaps import missing, recorded
 
 CAPTIONS = {
@@ -69,28 +65,25 @@ PAPERS_SENSOR = "coro: "     # how the line on it begins
 
 def render_page(inputs: dict[str, Any], settings: dict[str, Any], *, folder: Path, run: pd.DataFrame) -> str:
     """The page as text; `inputs` and `settings` as in the stage, links relative to `folder`, run as of `run_record`."""
-    claims = pd.read_csv(inputs["claims"], keep_default_na=False)
     ftir = read_json(inputs["ftir"])
     archive = read_json(inputs["inventory"]) if "inventory" in inputs else None
-    said = {"fig5_ftir": ftir["verdict"], **dict.fromkeys(_WITH_VIEWS, _DRAWN_BY_MATPLOTLIB)}
-    figures = [_figure(path, folder, settings["sources"].get(path.stem, {})) | {"said": said.get(path.stem, "")}
-               for path in inputs["figures"]]
-    rows = [row | {"link": row.get("evidence", "") if (folder / row.get("evidence", "")).is_file() else ""}
-            for row in claims.to_dict("records")]
-    counts = ", ".join(f"{number} {verdict}" for verdict, number in claims.verdict.value_counts().items())
-    scores = pd.read_csv(inputs["scores"], dtype={"force": str})
-    return Environment(autoescape=True).from_string(PAGE).render(
-        study=settings["study"], style=Markup(STYLE), facts=_archive_facts(settings, archive) if archive else _facts(settings),
-        synthetic=_synthetic_but_for_the_archive(ftir) if archive else _synthetic(ftir, settings),
-        missing=missing(settings, archive=archive is not None),
-        tables=_tables(inputs, folder), verdicts_on_networks=read_json(inputs["verdicts"])["sentences"],
-        result=Markup(_html(result_table(scores))), result_link=_link(inputs["scores"], folder),
-        run=Markup(_html(run)), run_said=run_sentence(run),
-        run_link="tables/run.csv", figures=figures, claims=rows, verdicts=f"{len(claims)} claims, {counts}",
-        claim_columns=list(claims.columns), header=header, claims_link=_link(inputs["claims"], folder),
-        claims_code=("evaluation/claims.py", code_link("softtact/studies/hybrid/claims/table.py")), config=f"{SOURCES_PAGE}#config",
-        sources=SOURCES_PAGE, version=softtact.__version__, machine=machine(),
-        folders=[name for name in _FOLDERS if (folder / name).is_dir()])
+    page = Page("Simulating a soft tactile sensor: the study", settings["study"], folder=folder)
+    for sentence in read_json(inputs["verdicts"])["sentences"]:
+        (partial(page.box, "") if sentence.startswith("Not trained") else page.text)(sentence)
+    page.box("What is not here.", missing(settings, archive=archive is not None))
+    page.box("What is synthetic here.", _synthetic_but_for_the_archive(ftir) if archive else _synthetic(ftir, settings))
+    page.text(_archive_facts(settings, archive) if archive else _facts(settings))
+    for text, anchor in (("Configuration", "config"), ("Code", "code")):
+        page.other_page(text, f"{SOURCES_PAGE}#{anchor}")
+    _show_figures(page, inputs["figures"], settings["sources"], {"fig5_ftir": ftir["verdict"]})
+    _show_tables(page, inputs)
+    page.claims(pd.read_csv(inputs["claims"], keep_default_na=False), file=inputs["claims"],
+                links=[_code("softtact/studies/hybrid/claims/table.py")])
+    page.section("What was run, on what, how long", anchor="run")
+    page.text(run_sentence(run))
+    page.table(run, file=folder / "tables/run.csv", links=[("Each job's", [(name, name) for name in ("benchmarks", "logs")])])
+    page.text("", links=[("Folders", [(name, name) for name in _FOLDERS if (folder / name).is_dir()])])
+    return page.render()
 
 
 SOURCES_PAGE = "sources.html"
@@ -98,29 +91,59 @@ SOURCES_PAGE = "sources.html"
 
 def render_sources(paths: Iterable[str | Path], *, study: str, config: str, named: str, page: str) -> str:
     """The page of the configuration (YAML texts) and of source files below src/, each under its own anchor."""
-    files = [(_below_src(path), Path(path).read_text(encoding="utf-8")) for path in paths]
-    return Environment(autoescape=True).from_string(SOURCES).render(
-        study=study, style=Markup(STYLE), files=files, config=config, named=named, page=page, version=softtact.__version__)
+    sources = Page("Configuration and code of the study", study, folder=".")
+    sources.text("As they were when the report was made.", links=[("", [("Report", page)])])
+    sources.section("Configuration", anchor="config")
+    files = [(name, name) for name in ("config.yaml", "config_named.yaml")]
+    sources.text("With all defaults. The first file runs the same study by snakemake --configfile config.yaml; the second holds "
+                 "what it names: sensor, materials, objects.", links=[("", files)])
+    sources.code(config)
+    sources.section("What it names", anchor="named")
+    sources.code(named)
+    sources.section("Code")
+    names = {_below_src(path): path for path in paths}
+    sources.text("", links=[("", [(name, f"#{name}") for name in names])])
+    for name, path in names.items():
+        sources.code(Path(path).read_text(encoding="utf-8"), title=name)
+    return sources.render()
 
 
-def code_link(name: str) -> str:
-    """Where the page of sources holds a file, given by its path below src/."""
-    return f"{SOURCES_PAGE}#{name}"
+def _code(*names):
+    """Links to source files on the page of sources, given by their paths below src/."""
+    return "Code", [(name.removeprefix("softtact/"), f"{SOURCES_PAGE}#{name}") for name in names]
 
 
 def _below_src(path):
     return Path(path).as_posix().removeprefix("src/")
 
 
-def _tables(inputs, folder):
-    tables = []
+def _show_figures(page, paths, sources, more):
+    """The figures with links to data and code; sources: {figure: {data: paths, code: paths}}, more: {figure: a sentence}."""
+    page.section("Figures")
+    more |= dict.fromkeys(_WITH_VIEWS, _DRAWN_BY_MATPLOTLIB)
+    for path in paths:
+        material, source = path.stem.removeprefix("material_"), sources.get(path.stem, {})
+        caption = CAPTIONS.get(path.stem) or (f"Material {material}: test curves and the laws fitted to them, what they leave, and "
+                                              "the stretches over which each law is stable.")
+        data = [(page.link(file).replace("../", ""), page.link(file)) for file in source.get("data", ())]
+        page.figure(path, caption, remark=more.get(path.stem, ""),
+                    links=[("Data", data), _code(*map(_below_src, source.get("code", ()))), _CONFIGURATION])
+
+
+def _show_tables(page, inputs):
+    page.section("Result in one table")
+    page.text("Grasped objects: at the largest force, the paper's test 2, and over all forces. Skill is (score - best trivial) / "
+              "(ceiling - best trivial) of the mean SSIM; below 0, that predictor reads better than the network. The file holds "
+              "all sets and forces.")
+    page.table(result_table(pd.read_csv(inputs["scores"], dtype={"force": str})), file=inputs["scores"])
+    page.section("Tables")
     for name, title in TITLES.items():
         if name in inputs:
-            stage = f"softtact/studies/hybrid/stages/{_STAGE_OF.get(name, 'make_tables')}.py"
-            tables.append({"title": title, "html": Markup(_html(_in_words(pd.read_csv(inputs[name])))), "link": _link(inputs[name],
-                                                                                                                      folder),
-                           "code": (stage.removeprefix("softtact/"), code_link(stage))})
-    return tables
+            code = _code(f"softtact/studies/hybrid/stages/{_STAGE_OF.get(name, 'make_tables')}.py")
+            page.table(_in_words(pd.read_csv(inputs[name])), title, file=inputs[name], links=[code, _CONFIGURATION])
+
+
+_CONFIGURATION = ("", [("Configuration", f"{SOURCES_PAGE}#config")])
 
 
 def _facts(settings):
@@ -187,29 +210,3 @@ def _in_words(frame):
     words = {"predictor": PREDICTORS, "kind": KINDS, "set": SETS}
     return frame.assign(**{name: frame[name].map(lambda value, known=known: known.get(value, value))
                            for name, known in words.items() if name in frame})
-
-
-def _html(frame):
-    return frame.rename(columns=header).to_html(index=False, na_rep="", float_format=lambda value: f"{value:.4g}", border=0)
-
-
-def _link(path, folder):
-    return os.path.relpath(path, folder)
-
-
-def _figure(path, folder, source):
-    """What the template shows of a figure; source: {data: [paths], code: [paths below src/]} of what drew it."""
-    material = path.stem.removeprefix("material_")
-    caption = CAPTIONS.get(path.stem) or (f"Material {material}: test curves and the laws fitted to them, what they leave, and the "
-                                          "stretches over which each law is stable.")
-    shown = {"name": path.stem, "caption": caption, "data": [(_short(p, folder), _link(p, folder)) for p in source.get("data", ())],
-             "code": [(name.removeprefix("softtact/"), code_link(name)) for name in map(_below_src, source.get("code", ()))]}
-    if path.suffix == ".html":
-        return shown | {"html": Markup(path.read_text(encoding="utf-8")), "files": [("HTML", _link(path, folder))]}
-    return shown | {"image": base64.b64encode(path.read_bytes()).decode(),
-                    "files": [("PNG", _link(path, folder)), ("SVG", _link(path.with_suffix(".svg"), folder))]}
-
-
-def _short(path, folder):
-    """A file's path as seen from the results, without the way up to what lies outside."""
-    return _link(path, folder).replace("../", "")
