@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from support.skins import small_skin
 
 from softtact.errors import InputError
-from softtact.skin.analysis import CONVERTERS, Skin, analyse
+from softtact.skin.analysis import CONVERTERS, LayerMeshSizes, Skin, analyse
 from softtact.skin.contact import compression_law, contact_load, press_at_finite_strains, solid_layer
 from softtact.skin.design import LoadChoice
 from softtact.skin.elastomers import Elastomer, read_elastomers
@@ -89,7 +89,7 @@ def test_friction_is_balanced_under_a_cap_whose_pole_is_a_fan_of_needles_and_kee
     Free points are pushed aside under the cap; the more of them friction keeps, the less it comes down, by some percent.
     """
     cap = trimesh.load(Path(__file__).resolve().parents[2] / "config/objects/indenters/sphere_m.stl")
-    skin = Skin(module_layout(), thickness_mm=3.0, poisson=0.4, permittivity=1.0, spacing_mm=2.0, layers=2)
+    skin = Skin(module_layout(), thickness_mm=3.0, poisson=0.4, permittivity=1.0, mesh=LayerMeshSizes(spacing_mm=2.0, layers=2))
     ecoflex, deepest = read_elastomers()["Ecoflex 00-30"], []
     for friction in (0.0, 0.1, 0.5):
         load = press_at_finite_strains(skin, cap, (15.0, 5.66), force_n=1.0, elastomer=ecoflex, friction=friction)

@@ -13,7 +13,7 @@ from softtact.skin.analysis import CONVERTERS
 from softtact.skin.contact import contact_load
 from softtact.skin.elastomers import read_elastomers
 from softtact.skin.layout import module_layout
-from softtact.skin.link import Surface, icub_text, lay_modules, mujoco_xml, upright, urdf
+from softtact.skin.link import GeodesicMesh, icub_text, lay_modules, mujoco_xml, upright, urdf
 from softtact.skin.maps import patch_maps
 
 FOAM = read_elastomers()["SomaFoama"]
@@ -40,7 +40,7 @@ def cylinder():
 
 def test_a_straight_way_around_a_cylinder_comes_back(cylinder):
     """Around the prism's own circumference, to 1e-6 of it."""
-    surface = Surface(cylinder)
+    surface = GeodesicMesh(cylinder)
     start = surface.at(np.array([40.0, 1.0, 5.0]), np.array([0.0, 1.0, 0.0]))
     around = 128 * 2 * 40.0 * np.sin(np.pi / 128)
     end = surface.walk(start, angle=0.0, length_mm=around)

@@ -1,13 +1,13 @@
 """A palpation sensor for tests: coarse, with few steps, with one tissue."""
 
 from softtact.materials.config import validated
-from softtact.probe.design import Design
+from softtact.probe.design import PalpationDesign
 
 _FILM = {"source": "a test's"}
 
 
 def small_design(**changes):
-    """A `Design` of the paper's sizes on elements of 5 mm; `changes` as `Design.with_` takes them."""
+    """A `PalpationDesign` of the paper's sizes on elements of 5 mm; `changes` as `PalpationDesign.with_` takes them."""
     soft = {"shear_mpa": 0.0633, "bulk_mpa": 0.703, "source": "table II"}
     values = {
         "name": "small",
@@ -23,4 +23,4 @@ def small_design(**changes):
         "load_n": {"to": 5, "by": 2.5}, "displacement_mm": {"to": 2, "by": 1},
         "mesh": {"along": 5, "tissue": 5, "base": 2.5},
     }
-    return validated(Design, values, where="small").with_(**changes)
+    return validated(PalpationDesign, values, where="small").with_(**changes)

@@ -16,16 +16,13 @@ from softtact.materials.config import validated
 from softtact.materials.laws.base import Law
 from softtact.materials.laws.registry import make_law
 from softtact.materials.linear import LinearConstants
+from softtact.sensors.fields import Section
 
 Positive = Annotated[float, Field(gt=0)]
 REGIONS = ("left support", "right support", "filler", "beam", "tissue")
 
 
-class _Section(pydantic.BaseModel):
-    model_config = pydantic.ConfigDict(extra="forbid", frozen=True)
-
-
-class Material(_Section):
+class Material(Section):
     """A material by a law's constants and K, by mu and K of a neo-Hookean law, or by E and nu of one."""
 
     law: str = "neo_hooke"
@@ -59,7 +56,7 @@ class Material(_Section):
         return law
 
 
-class Geometry(_Section):
+class Geometry(Section):
     """Sizes in mm."""
 
     support_length: Positive
@@ -86,7 +83,7 @@ class Geometry(_Section):
         return 0.0, self.support_height, beam, beam + self.tissue_height
 
 
-class Film(_Section):
+class Film(Section):
     """A force-sensing film on the top or the bottom of a part."""
 
     on: Literal["left support", "right support", "filler", "beam"]
@@ -97,7 +94,7 @@ class Film(_Section):
     source: str = Field(min_length=1)
 
 
-class Steps(_Section):
+class Steps(Section):
     """Equal steps up to a value."""
 
     to: Positive
@@ -109,7 +106,7 @@ class Steps(_Section):
         return np.linspace(0, self.to, max(1, round(self.to / self.by)) + 1)[1:]
 
 
-class Lump(_Section):
+class Lump(Section):
     """A rectangular inclusion in the tissue."""
 
     x: float = Field(description="of its middle")
@@ -119,7 +116,7 @@ class Lump(_Section):
     stiffness_ratio: Positive = Field(description="its moduli over those of the tissue")
 
 
-class Hardness(_Section):
+class Hardness(Section):
     """The study of how relative hardness depends on load and on the tissue's height."""
 
     tissue_heights: list[Positive] = Field(min_length=1)
@@ -133,7 +130,7 @@ class Hardness(_Section):
         return self
 
 
-class LumpSearch(_Section):
+class LumpSearch(Section):
     """The study of a hidden lump: a table of film forces over its place, depth and stiffness, and what can be told from it."""
 
     tissue: str
@@ -160,7 +157,7 @@ class LumpSearch(_Section):
         return self
 
 
-class MeshSizes(_Section):
+class MeshSizes(Section):
     """Sides of the quadratic elements in mm."""
 
     along: Positive = 2.0
@@ -171,7 +168,7 @@ class MeshSizes(_Section):
     depth_layers: int = Field(2, ge=1, description="elements across the depth of a solid")
 
 
-class Design(_Section):
+class PalpationDesign(Section):
     """A palpation sensor, the tissues that it touches and the sweeps."""
 
     name: str = Field(pattern=r"^[a-z0-9_]+$")
@@ -229,14 +226,14 @@ class Design(_Section):
             raise InputError(f"There is no tissue {name!r}; there are {', '.join(self.tissues)}.")
         return self.tissues[name]
 
-    def with_(self, **changes: Any) -> "Design":
+    def with_(self, **changes: Any) -> "PalpationDesign":
         """The design with other values of its keys, checked again: a mapping changes a section's own keys, None leaves a key out.
 
         Raises InputError where they do not fit.
         """
-        return validated(Design, _changed(self.model_dump(exclude_none=True), changes), where=self.name)
+        return validated(PalpationDesign, _changed(self.model_dump(exclude_none=True), changes), where=self.name)
 
-    def variant(self, name: str) -> "Design":
+    def variant(self, name: str) -> "PalpationDesign":
         """The design of one of its variants. Raises InputError where its values do not fit."""
         return self.with_(variants={}, variant_steps=self.variant_steps, **self.variants[name])
 
@@ -254,9 +251,10 @@ def _changed(values, changes):
     return out
 
 
-def load_design(path: str | Path) -> Design:
+def load_design(path: str | Path) -> PalpationDesign:
     """Read a design's YAML; what is wrong is told in one sentence."""
-    design = validated(Design, read_yaml(path, missing="there is no such design; config/probe.yaml is one."), where=str(path))
+    values = read_yaml(path, missing="there is no such design; config/probe.yaml is one.")
+    design = validated(PalpationDesign, values, where=str(path))
     for name, material in ({"supports": design.supports, "filler": design.filler, "beam": design.beam} | design.tissues).items():
         try:
             material.make()

@@ -11,7 +11,7 @@ import numpy as np
 
 from softtact.fem.kernels import add_forces
 from softtact.models.solid.body import SolidBody
-from softtact.probe.design import Design, Film
+from softtact.probe.design import Film, PalpationDesign
 
 _MASS = np.array([[4, 2, -1], [2, 16, 2], [-1, 2, 4]]) / 30      # of a quadratic line of length 1
 _ROUNDING_MM = 1e-6
@@ -40,7 +40,7 @@ class FilmReader:
         return float(self.sign * (self.weight @ force[self.nodes, 1]))
 
 
-def film_reader(body: SolidBody, design: Design, film: Film) -> FilmReader:
+def film_reader(body: SolidBody, design: PalpationDesign, film: Film) -> FilmReader:
     """The reader of a film of a design's body."""
     own = np.unique(np.concatenate([nodes.ravel() for region, nodes, _ in body.blocks if region == film.on]))
     y = body.points[own, 1]

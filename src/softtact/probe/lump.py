@@ -22,7 +22,7 @@ from scipy.optimize import brentq, least_squares
 from scipy.stats import chi2, ncx2
 
 from softtact.errors import InputError
-from softtact.probe.design import Design, LumpSearch
+from softtact.probe.design import LumpSearch, PalpationDesign
 from softtact.probe.sweep import palpate
 
 PARAMETERS = ("x_mm", "depth_mm", "log_ratio")
@@ -110,7 +110,7 @@ class FoundLump:
     """Whether the readings differ from those of plain tissue beyond the 95 % point of noise."""
 
 
-def lump_table(design: Design, search: LumpSearch, *, threads: int = 1,
+def lump_table(design: PalpationDesign, search: LumpSearch, *, threads: int = 1,
                tell: Callable[[str], None] = lambda text: None) -> LumpTable:
     """Solve all lumps of a search. The table is mirrored to the right half, left and right film exchanged.
 
@@ -222,7 +222,7 @@ def _noncentrality(readings):
     return float(brentq(lambda value: ncx2.sf(bound, readings, value) - _SURE, 1e-3, 1e4))
 
 
-def recovery(design: Design, search: LumpSearch, table: LumpTable, *, threads: int = 1,
+def recovery(design: PalpationDesign, search: LumpSearch, table: LumpTable, *, threads: int = 1,
              tell: Callable[[str], None] = lambda text: None) -> pd.DataFrame:
     """Lumps drawn within the table, solved, read with noise and found again: true, found and stated deviation of each.
 

@@ -13,7 +13,7 @@ from softtact.fem.structured_meshes import box
 from softtact.materials.bulk import small_strain_constants
 from softtact.materials.laws.base import Law
 from softtact.models.solid.body import SolidBody
-from softtact.probe.design import Design
+from softtact.probe.design import PalpationDesign
 
 JAW = "jaw"
 _LAYERS = ("base", "beam", "tissue")
@@ -28,7 +28,7 @@ def lines(breaks: list[float], size: float) -> np.ndarray:
     return np.concatenate([*parts, kept[-1:]])
 
 
-def structure_mesh(design: Design) -> SolidMesh:
+def structure_mesh(design: PalpationDesign) -> SolidMesh:
     """The `SolidMesh`: regions as in REGIONS, and `lump`; faces `base bottom`, `tissue top`, and those of loose layers."""
     groups: list[list[int]] = [[0]]
     for layer, bond in ((1, design.beam_on_base), (2, design.tissue_on_beam)):
@@ -106,7 +106,7 @@ def _regions(design, middles):
     return names
 
 
-def structure_laws(design: Design, tissue: Law) -> dict[str, Law]:
+def structure_laws(design: PalpationDesign, tissue: Law) -> dict[str, Law]:
     """Laws by region, with a tissue's."""
     laws = {"left support": design.supports.make(), "right support": design.supports.make(), "filler": design.filler.make(),
             "beam": design.beam.make(), "tissue": tissue}
@@ -124,7 +124,7 @@ def stiffer(law: Law, ratio: float) -> Law:
     return made
 
 
-def structure_body(design: Design, tissue: Law, *, threads: int = 1) -> SolidBody:
+def structure_body(design: PalpationDesign, tissue: Law, *, threads: int = 1) -> SolidBody:
     """The `SolidBody`: its base is held, the frame `jaw` carries the tissue's top and moves along y."""
     mesh, laws = structure_mesh(design), structure_laws(design, tissue)
     g = design.geometry

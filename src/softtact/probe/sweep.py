@@ -13,7 +13,7 @@ from softtact.errors import InputError
 from softtact.materials.laws.base import Law
 from softtact.models.solid.body import SolidBody
 from softtact.models.solid.path import SolidPath
-from softtact.probe.design import Design, Hardness
+from softtact.probe.design import Hardness, PalpationDesign
 from softtact.probe.films import film_reader
 from softtact.probe.structure import JAW, structure_body
 
@@ -100,7 +100,7 @@ def slope(force_n: np.ndarray, deflection_mm: np.ndarray) -> Slope:
                  float((force[-1] - force[-2]) / (deflection[-1] - deflection[-2])))
 
 
-def palpate(design: Design, tissue: str, scenario: Scenario, *, law: Law | None = None, values: np.ndarray | None = None,
+def palpate(design: PalpationDesign, tissue: str, scenario: Scenario, *, law: Law | None = None, values: np.ndarray | None = None,
             threads: int = 1, tell: Callable[[str], None] = lambda text: None) -> Palpation:
     """Sweep the jaw over a tissue of a design by load (N) or displacement (mm).
 
@@ -145,7 +145,7 @@ def apparent_modulus(force_n: np.ndarray, compression_mm: np.ndarray, *, height_
     return float(np.linalg.lstsq(terms, force_n, rcond=None)[0][0] * height_mm / area_mm2)
 
 
-def hardness_table(design: Design, settings: Hardness, *, threads: int = 1, tell: Callable[[str], None] = lambda text: None
+def hardness_table(design: PalpationDesign, settings: Hardness, *, threads: int = 1, tell: Callable[[str], None] = lambda text: None
                    ) -> pd.DataFrame:
     """A row for each tissue, height and share of the jaw's way: the largest force, F/d there, and the index."""
     rows = []

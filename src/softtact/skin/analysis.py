@@ -1,4 +1,7 @@
-"""From loads to counts: deformed mesh, capacitances on it, counts of the converter."""
+"""From loads to counts: the deformed mesh, the capacitances on it, and the counts of the converter.
+
+The converter is a capacitance-to-digital converter like the AD7147, with the stray capacitance of its lines.
+"""
 
 import warnings
 from collections.abc import Sequence
@@ -10,28 +13,38 @@ import pandas as pd
 import scipy.sparse as sp
 
 from softtact.errors import ExtrapolationWarning, InputError
-from softtact.skin.elasticity import ElasticLayer
+from softtact.skin.elasticity import BondedLayer
 from softtact.skin.elastomers import Elastomer
-from softtact.skin.electrostatics import Field
-from softtact.skin.layer_mesh import LayerMesh, even_plan, taxel_plan
+from softtact.skin.electrostatics import ElectricField
+from softtact.skin.layer_mesh import LayerMesh, even_mesh, taxel_mesh
 from softtact.skin.layout import Layout
 from softtact.skin.loads import Load, disc, refuse_beside
+
+_LARGE_STRAIN = 0.3     # of the thickness: the papers' elastomers were tested up to it
+_RATIOS = 6             # of pressure to modulus that are solved for a curve, at the extremes of a Chebyshev polynomial
+_DEFORMATION_MESHES = {"coarse": (1.5, 2), "standard": (1.0, 4), "fine": (0.75, 5)}     # spacing in mm, layers
+_FIELD_MESHES = {
+    "coarse": (1, (0.5, 1.0)),
+    "standard": (1, (1 / 3, 2 / 3, 1.0)),
+    "fine": (2, (0.03, 0.1, 0.25, 0.6, 1.0)),
+    "finest": (3, (0.01, 0.03, 0.08, 0.2, 0.4, 0.7, 1.0)),
+}     # refinement around the gap, heights of the levels as shares of the thickness
 
 
 @dataclass(frozen=True)
 class Converter:
-    """Counts of a capacitance, and the range that it has to stay in."""
+    """Counts of a capacitance, and the range that it must stay in."""
 
     step_ff: float
-    """fF a count."""
+    """fF of a count."""
     range_pf: tuple[float, float]
-    """Lowest and highest capacitance, of a taxel with its stray."""
+    """Lowest and highest capacitance, of a taxel with its stray capacitance."""
     offset_step_pf: float
-    """An offset is taken off in such steps before conversion; 0 for none."""
+    """An offset is subtracted in such steps before conversion; 0 for none."""
     stray_pf: float = 10.0
     """Of the lines to a taxel."""
     stray_share: float = 0.2
-    """How far the stray may be from that, as a share."""
+    """Tolerance of the stray capacitance, as a share of it."""
     noise_counts: float = 1.0
     """Standard deviation of a reading."""
 
@@ -41,9 +54,9 @@ class Converter:
         return self.noise_counts * self.step_ff
 
     def counts(self, capacitance_ff: np.ndarray) -> np.ndarray:
-        """Change of a reading's whole counts by capacitances (load, taxel), the first row being the skin at rest.
+        """Whole counts above rest (load, taxel) of capacitances (1 + load, taxel), whose first row is the skin at rest.
 
-        An offset in whole steps brings each taxel at rest into the range first. Raises InputError where a taxel leaves the range.
+        First an offset in whole steps brings each taxel at rest into the range. Raises InputError where a taxel leaves the range.
         """
         total = 1e-3 * np.asarray(capacitance_ff) + self.stray_pf
         if self.offset_step_pf:
@@ -53,13 +66,13 @@ class Converter:
         return (reading - reading[0])[1:].astype(int)
 
     def largest_change_ff(self, at_rest_ff: float) -> float:
-        """By how much a taxel's capacitance may rise within the range, with the stray anywhere in its share."""
+        """Largest rise of a taxel's capacitance within the range, for every stray capacitance within its tolerance."""
         if self.offset_step_pf:
             return 1e3 * (self.range_pf[1] - 0.5 * self.offset_step_pf)
         return 1e3 * (self.range_pf[1] - self.stray_pf * (1 + self.stray_share)) - at_rest_ff
 
     def fits_at_rest(self, at_rest_ff: float) -> bool:
-        """Whether a taxel at rest is within the range, with the stray anywhere in its share."""
+        """Whether a taxel at rest is within the range, for every stray capacitance within its tolerance."""
         if self.offset_step_pf:
             return True
         return bool(1e-3 * at_rest_ff + self.stray_pf * (1 - self.stray_share) >= self.range_pf[0])
@@ -83,8 +96,22 @@ CONVERTERS = {
 
 
 @dataclass(frozen=True)
+class LayerMeshSizes:
+    """Sizes of both meshes of a skin; `mesh_convergence` shows the error that they leave."""
+
+    spacing_mm: float = 1.0
+    """Of the mesh for the deformation, in the plane."""
+    layers: int = 4
+    """Of elements across the thickness, of the mesh for the deformation."""
+    field_spacing_mm: float = 1.2
+    """Of the mesh for the electric field, in the plane; it has one element across each guard gap."""
+    field_layers: int = 3
+    """Of elements across the thickness, of the mesh for the electric field."""
+
+
+@dataclass(frozen=True)
 class Readings:
-    """What a skin does under loads."""
+    """Response of a skin to loads."""
 
     capacitance_ff: np.ndarray
     """(load, taxel): of the deformed skin."""
@@ -106,37 +133,19 @@ class Readings:
 
 
 class Skin:
-    """A layer of elastomer on taxels: meshes and factors once, then any load.
+    """A layer of elastomer on taxels. Meshes and factors are made once and serve every load."""
 
-    spacing_mm, layers: of the mesh for deformations;  field_spacing_mm, field_layers: of that for the field, which has one element
-    across each guard gap; `softtact.skin.analysis` tells what that is worth.
-    """
-
-    def __init__(
-        self,
-        layout: Layout,
-        *,
-        thickness_mm: float,
-        poisson: float,
-        permittivity: float,
-        spacing_mm: float = 1.0,
-        layers: int = 4,
-        field_spacing_mm: float = 1.2,
-        field_layers: int = 3,
-        threads: int = 1,
-    ) -> None:
+    def __init__(self, layout: Layout, *, thickness_mm: float, poisson: float, permittivity: float,
+                 mesh: LayerMeshSizes = LayerMeshSizes(), threads: int = 1) -> None:
         self.layout, self.thickness_mm, self.permittivity, self.threads = layout, thickness_mm, permittivity, threads
-        self.layer = ElasticLayer(
-            LayerMesh(even_plan(layout, spacing_mm=spacing_mm), np.linspace(0.0, thickness_mm, layers + 1)),
-            poisson=poisson,
-            threads=threads,
-        )
-        self.field_mesh = LayerMesh(
-            taxel_plan(layout, spacing_mm=field_spacing_mm), np.linspace(0.0, thickness_mm, field_layers + 1)
-        )
+        self.layer = BondedLayer(
+            LayerMesh(even_mesh(layout, spacing_mm=mesh.spacing_mm), np.linspace(0.0, thickness_mm, mesh.layers + 1)),
+            poisson=poisson, threads=threads)
+        self.field_mesh = LayerMesh(taxel_mesh(layout, spacing_mm=mesh.field_spacing_mm),
+                                    np.linspace(0.0, thickness_mm, mesh.field_layers + 1))
 
     @cached_property
-    def at_rest(self) -> Field:
+    def at_rest(self) -> ElectricField:
         """The field without a load."""
         return self.field()
 
@@ -145,22 +154,23 @@ class Skin:
         """Capacitances (taxel,) without a load."""
         return self.at_rest.capacitance_ff
 
-    def field(self, displacement_mm: np.ndarray | None = None) -> Field:
+    def field(self, displacement_mm: np.ndarray | None = None) -> ElectricField:
         """The field after a displacement (node, 3) of the layer's nodes, or at rest."""
         moved = None if displacement_mm is None else self.to_field @ displacement_mm
-        return Field(self.field_mesh, self.layout, permittivity=self.permittivity, displacement_mm=moved, threads=self.threads)
+        return ElectricField(self.field_mesh, self.layout, permittivity=self.permittivity, displacement_mm=moved,
+                             threads=self.threads)
 
     @cached_property
     def to_field(self) -> sp.csr_matrix:
-        """Values at the field's nodes from those at the layer's, as a sparse matrix."""
+        """Sparse matrix that interpolates values from the layer's nodes to the field's."""
         return self.layer.mesh.interpolation(self.field_mesh.nodes_mm)
 
     @cached_property
     def influence(self) -> np.ndarray:
         """Rise of each capacitance in fF per N straight down on a node of the layer, for a modulus of 1 MPa: (node, taxel).
 
-        To first order in the force: the adjoint of elasticity applied to the shape derivative of each capacitance, so that one
-        solve for a taxel gives its answer to a force anywhere.
+        To first order in the force: the adjoint of elasticity applied to the shape derivative of each capacitance. One solve for a
+        taxel gives its response to a force at any place.
         """
         gradient = self.at_rest.gradient()
         nodal = np.stack([self.to_field.T @ gradient[:, axis] for axis in range(3)], axis=1)
@@ -175,63 +185,37 @@ def analyse(skin: Skin, loads: Sequence[Load], *, elastomer: Elastomer, converte
     """`Readings` of loads one by one, each solved with the elastomer's secant modulus at its pressure."""
     rows, tops, moduli, remarks = [], [], [], []
     for load in loads:
-        with warnings.catch_warnings(record=True) as said:
+        with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", ExtrapolationWarning)
             young = elastomer.young_mpa(load.pressure_mpa)
-        remarks += [str(warning.message) for warning in said]
-        moved = load.displacement_mm
-        if moved is None:
-            moved = skin.layer.displacement(load, young_mpa=young)
-        rows.append(skin.field(moved).capacitance_ff)
-        tops.append(moved[skin.layer.mesh.top])
+        remarks += [str(warning.message) for warning in caught]
+        displacement = load.displacement_mm
+        if displacement is None:
+            displacement = skin.layer.displacement(load, young_mpa=young)
+        rows.append(skin.field(displacement).capacitance_ff)
+        tops.append(displacement[skin.layer.mesh.top])
         moduli.append(young)
-        squeezed = -moved[:, 2].min() / skin.thickness_mm
-        if squeezed > _LARGE and load.displacement_mm is None:
-            remarks.append(
-                f"{load.words}: the elastomer gives way by {squeezed:.0%} of its thickness, where small strains are coarse; take "
-                "the reading as a trend."
-            )
+        compression = -displacement[:, 2].min() / skin.thickness_mm
+        if compression > _LARGE_STRAIN and load.displacement_mm is None:
+            remarks.append(f"{load.words}: the elastomer is compressed by {compression:.0%} of its thickness, where small strains "
+                           "are coarse; take the reading as a trend.")
     capacitance = np.array(rows)
-    return Readings(
-        capacitance,
-        skin.at_rest_ff,
-        converter.counts(np.vstack([skin.at_rest_ff, capacitance])),
-        np.array(tops),
-        np.array(moduli),
-        list(dict.fromkeys(remarks)),
-    )
-
-
-_LARGE = 0.3  # of the thickness: the strain up to which the papers' elastomers were tested
-
-
-_PLACES = 6  # ratios of pressure to modulus that are solved, at the extremes of a Chebyshev polynomial
+    return Readings(capacitance, skin.at_rest_ff, converter.counts(np.vstack([skin.at_rest_ff, capacitance])), np.array(tops),
+                    np.array(moduli), list(dict.fromkeys(remarks)))
 
 
 def alone(layout: Layout, taxel: int) -> Layout:
-    """The same elastomer with one taxel (counted from 0); the others become a part of the guard, which is driven alike."""
-    return Layout(
-        layout.outline_mm,
-        layout.centres_mm[[taxel]],
-        layout.module[[taxel]],
-        layout.corners_mm,
-        layout.radius_mm,
-        layout.guard_radius_mm,
-    )
+    """The same elastomer with one taxel (counted from 0); the others become a part of the guard, which is driven with it."""
+    return Layout(layout.outline_mm, layout.centres_mm[[taxel]], layout.module[[taxel]], layout.corners_mm, layout.radius_mm,
+                  layout.guard_radius_mm)
 
 
-def probe_curves(
-    skin: Skin,
-    elastomer: Elastomer,
-    *,
-    diameters_mm: Sequence[float],
-    pressures_kpa: Sequence[float],
-    modulus_shares: Sequence[float],
-) -> pd.DataFrame:
-    """A row for each diameter, share and pressure: capacitance of the first taxel of a skin, and what it rises by.
+def probe_curves(skin: Skin, elastomer: Elastomer, *, diameters_mm: Sequence[float], pressures_kpa: Sequence[float],
+                 modulus_shares: Sequence[float]) -> pd.DataFrame:
+    """A row for each diameter, share and pressure: capacitance of a skin's first taxel under a cylindrical probe, and its rise.
 
-    modulus_shares: by how much Young's modulus is off, 0 for the curve as it is. Deformations are proportional to pressure over
-    modulus, and the capacitance is a smooth function of that ratio, which is solved at a few places and interpolated.
+    Le et al. 2011, fig. 6. modulus_shares: error of Young's modulus, 0 for the curve as it is. Deformations are proportional to
+    pressure over modulus. The capacitance is a smooth function of that ratio, which is solved at a few values and interpolated.
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ExtrapolationWarning)
@@ -239,78 +223,47 @@ def probe_curves(
     pressures = 1e-3 * np.asarray(pressures_kpa)
     ratio = {share: pressures / ((1 + share) * moduli) for share in modulus_shares}
     largest = max(values.max() for values in ratio.values())
-    places = largest * 0.5 * (1 - np.cos(np.pi * np.arange(1, _PLACES + 1) / _PLACES))
+    solved = largest * 0.5 * (1 - np.cos(np.pi * np.arange(1, _RATIOS + 1) / _RATIOS))
     rows = []
     for diameter in diameters_mm:
         x, y = skin.layout.centres_mm[0]
         load = disc((float(x), float(y)), diameter_mm=diameter, pressure_mpa=1.0)
         refuse_beside(load, skin.layout, where=f"probes, diameter {diameter:g} mm")
         unit = skin.layer.displacement(load, young_mpa=1.0)
-        rise = [skin.field(place * unit).capacitance_ff[0] - skin.at_rest_ff[0] for place in places]
-        polynomial = np.polynomial.Polynomial.fit([0.0, *places], [0.0, *rise], _PLACES)
+        rise = [skin.field(value * unit).capacitance_ff[0] - skin.at_rest_ff[0] for value in solved]
+        polynomial = np.polynomial.Polynomial.fit([0.0, *solved], [0.0, *rise], _RATIOS)
         rows += [
-            {
-                "diameter_mm": diameter,
-                "modulus_share": share,
-                "pressure_kpa": pressure,
-                "young_mpa": (1 + share) * modulus,
-                "capacitance_ff": skin.at_rest_ff[0] + polynomial(value),
-                "delta_ff": polynomial(value),
-                "within_test": bool(elastomer.tested_mpa[0] <= 1e-3 * pressure <= elastomer.tested_mpa[1]),
-            }
+            {"diameter_mm": diameter, "modulus_share": share, "pressure_kpa": pressure, "young_mpa": (1 + share) * modulus,
+             "capacitance_ff": skin.at_rest_ff[0] + polynomial(value), "delta_ff": polynomial(value),
+             "within_test": bool(elastomer.tested_mpa[0] <= 1e-3 * pressure <= elastomer.tested_mpa[1])}
             for share, values in ratio.items()
             for pressure, modulus, value in zip(pressures_kpa, moduli, values, strict=True)
         ]
     return pd.DataFrame(rows)
 
 
-_DEFORMATION = {"coarse": (1.5, 2), "standard": (1.0, 4), "fine": (0.75, 5)}  # spacing in mm, layers
-_FIELD = {
-    "coarse": (1, (0.5, 1.0)),
-    "standard": (1, (1 / 3, 2 / 3, 1.0)),
-    "fine": (2, (0.03, 0.1, 0.25, 0.6, 1.0)),
-    "finest": (3, (0.01, 0.03, 0.08, 0.2, 0.4, 0.7, 1.0)),
-}  # points around the gap, levels as shares
+def mesh_convergence(layout: Layout, load: Load, *, taxel: int, thickness_mm: float, poisson: float, permittivity: float,
+                     young_mpa: float) -> pd.DataFrame:
+    """A row for each mesh: largest displacement in mm, capacitance of a taxel (counted from 0) in fF at rest and under the load.
 
-
-def mesh_convergence(
-    layout: Layout, load: Load, *, taxel: int, thickness_mm: float, poisson: float, permittivity: float, young_mpa: float
-) -> pd.DataFrame:
-    """A row a mesh: largest displacement in mm, capacitance of a taxel (counted from 0) in fF at rest and under the load.
-
-    The field's meshes are compared on the deformation of the standard mesh.
+    The same load on finer and finer meshes. The field's meshes are compared on the deformation of the standard mesh, with one
+    taxel, whose neighbours are part of the guard.
     """
     rows, solved = [], {}
-    for name, (spacing, layers) in _DEFORMATION.items():
-        layer = ElasticLayer(
-            LayerMesh(even_plan(layout, spacing_mm=spacing), np.linspace(0.0, thickness_mm, layers + 1)), poisson=poisson
-        )
-        moved = layer.displacement(load, young_mpa=young_mpa)
-        solved[name] = layer, moved
-        rows.append({"mesh": name, "of": "deformation", "nodes": len(moved), "largest_displacement_mm": -moved[:, 2].min()})
-    one = Layout(
-        layout.outline_mm,
-        layout.centres_mm[taxel][None],
-        np.zeros(1, dtype=int),
-        layout.corners_mm,
-        layout.radius_mm,
-        layout.guard_radius_mm,
-    )
-    layer, moved = solved["standard"]
-    for name, (refinement, levels) in _FIELD.items():
-        mesh = LayerMesh(taxel_plan(one, spacing_mm=1.2, refinement=refinement), thickness_mm * np.array([0.0, *levels]))
+    for name, (spacing, layers) in _DEFORMATION_MESHES.items():
+        layer = BondedLayer(LayerMesh(even_mesh(layout, spacing_mm=spacing), np.linspace(0.0, thickness_mm, layers + 1)),
+                            poisson=poisson)
+        displacement = layer.displacement(load, young_mpa=young_mpa)
+        solved[name] = layer, displacement
+        rows.append({"mesh": name, "of": "deformation", "nodes": len(displacement),
+                     "largest_displacement_mm": -displacement[:, 2].min()})
+    one = alone(layout, taxel)
+    layer, displacement = solved["standard"]
+    for name, (refinement, levels) in _FIELD_MESHES.items():
+        mesh = LayerMesh(taxel_mesh(one, spacing_mm=1.2, refinement=refinement), thickness_mm * np.array([0.0, *levels]))
         at_rest, pressed = (
-            Field(mesh, one, permittivity=permittivity, displacement_mm=u, order=4).capacitance_ff[0]
-            for u in (None, layer.at(mesh.nodes_mm, moved))
-        )
-        rows.append(
-            {
-                "mesh": name,
-                "of": "field",
-                "nodes": len(mesh.nodes_mm),
-                "at_rest_ff": at_rest,
-                "capacitance_ff": pressed,
-                "delta_ff": pressed - at_rest,
-            }
-        )
+            ElectricField(mesh, one, permittivity=permittivity, displacement_mm=u, order=4).capacitance_ff[0]
+            for u in (None, layer.at(mesh.nodes_mm, displacement)))
+        rows.append({"mesh": name, "of": "field", "nodes": len(mesh.nodes_mm), "at_rest_ff": at_rest, "capacitance_ff": pressed,
+                     "delta_ff": pressed - at_rest})
     return pd.DataFrame(rows)

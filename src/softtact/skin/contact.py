@@ -1,7 +1,7 @@
 """A rigid object pressed on the skin: where it touches, and with which forces.
 
 At small strains the layer has one modulus, and contact is without friction. At finite strains the solid model takes a foam's law
-that follows the elastomer's curve. The papers take an even pressure instead.
+that follows the elastomer's curve. The papers assume a uniform pressure instead.
 """
 
 import warnings
@@ -28,28 +28,24 @@ from softtact.skin.elastomers import Elastomer
 from softtact.skin.layer_mesh import LayerMesh
 from softtact.skin.loads import Load
 
-_DEPTHS = (0.15, 0.3, 0.6)  # of the thickness: points further below an object are not looked at, unless it comes down as far
-_AT_ONCE = 200  # columns of the compliance that are solved together
+_DEPTHS = (0.15, 0.3, 0.6)  # of the thickness: candidates for contact lie at most so far below the object's lowest point
+_BLOCK = 200  # columns of the compliance that are solved together
 _GUESS_MPA = 0.1
-_PASSES, _SETTLED = 20, 1e-3  # of the secant modulus, which depends on the pressure
+_ITERATIONS, _TOLERANCE = 20, 1e-3  # of the secant modulus, which depends on the pressure
+_OBJECT, _LAYER = "object", "elastomer"
+_PENALTY = 20.0  # times E / h of the layer's facets
+_POINTS = 26  # of the elastomer's curve
+_MIRRORED = [0, 2, 1, 3, 6, 5, 4, 7, 9, 8]  # order of a tetrahedron's nodes in its mirror image
 
 
-def contact_load(
-    skin: Skin,
-    mesh: trimesh.Trimesh,
-    centre_mm: tuple[float, float],
-    *,
-    force_n: float,
-    elastomer: Elastomer,
-    turned_deg: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    name: str = "mesh",
-) -> Load:
-    """Forces of frictionless contact on the nodes of the upper side, so that nothing penetrates and nothing pulls.
+def contact_load(skin: Skin, mesh: trimesh.Trimesh, centre_mm: tuple[float, float], *, force_n: float, elastomer: Elastomer,
+                 turned_deg: tuple[float, float, float] = (0.0, 0.0, 0.0), name: str = "mesh") -> Load:
+    """Frictionless contact at small strains: nodal forces on the upper side, without penetration and without tension.
 
-    centre_mm: where the middle of the mesh's bounding box comes to, after turns about fixed x, y, z in degrees; it comes
+    centre_mm: place of the middle of the mesh's bounding box, after rotations about fixed x, y, z in degrees; the object moves
     straight down
-    The modulus is the secant one at the mean pressure on the nodes that touch, found by repetition.
-    Raises InputError where no part of the mesh is above the elastomer.
+    The modulus is the secant one at the mean pressure on the nodes in contact, found by iteration.
+    Raises InputError where no part of the mesh is above the elastomer, and where it would be pressed too deep.
     """
     placed = placed_over(mesh, centre_mm, turned_deg)
     top = skin.layer.mesh.top
@@ -58,23 +54,17 @@ def contact_load(
     gap = height - height.min()
     for depth in _DEPTHS:
         near = np.flatnonzero(gap < depth * skin.thickness_mm)
-        forces, pressure, indentation = _settled(skin, top[near], gap[near], force_n, elastomer)
+        forces, pressure, indentation = _contact_forces(skin, top[near], gap[near], force_n, elastomer)
         if indentation < depth * skin.thickness_mm:
             touching = forces > 0
-            return Load(
-                nodes[near[touching]],
-                forces[touching],
-                pressure,
-                f"{force_n:g} N by {name} at ({centre_mm[0]:g}, {centre_mm[1]:g}) mm, {1e3 * pressure:.3g} kPa in the mean",
-            )
-    raise InputError(
-        f"load {name!r}: {force_n:g} N presses it deeper than {_DEPTHS[-1]:.0%} of the {skin.thickness_mm:g} mm of elastomer, "
-        "where small strains mean nothing; choose a smaller force_n."
-    )
+            words = f"{force_n:g} N by {name} at ({centre_mm[0]:g}, {centre_mm[1]:g}) mm, {1e3 * pressure:.3g} kPa in the mean"
+            return Load(nodes[near[touching]], forces[touching], pressure, words)
+    raise InputError(f"load {name!r}: {force_n:g} N presses it deeper than {_DEPTHS[-1]:.0%} of the {skin.thickness_mm:g} mm of "
+                     "elastomer, where small strains do not hold; choose a smaller force_n, or strains: finite.")
 
 
 def placed_over(mesh: trimesh.Trimesh, centre_mm: tuple[float, float], turned_deg: tuple[float, float, float]) -> trimesh.Trimesh:
-    """A copy, turned about fixed x, y, z in degrees, with the middle of its bounding box over a place in mm."""
+    """A copy, rotated about fixed x, y, z in degrees, with the middle of its bounding box over a place in mm."""
     placed = mesh.copy()
     placed.vertices = Rotation.from_euler("xyz", turned_deg, degrees=True).apply(mesh.vertices)
     placed.apply_translation([*(np.array(centre_mm) - placed.bounds.mean(axis=0)[:2]), 0.0])
@@ -82,54 +72,47 @@ def placed_over(mesh: trimesh.Trimesh, centre_mm: tuple[float, float], turned_de
 
 
 def underside(placed: trimesh.Trimesh, points_mm: np.ndarray, centre_mm: tuple[float, float], name: str) -> np.ndarray:
-    """Height (n,) in mm of the mesh's underside over points (n, 2), infinite beside it. InputError where it is over none."""
+    """Height (n,) in mm of the mesh's underside over points (n, 2), infinite beside it. InputError where it is beside all."""
     height, _ = HeightField(placed)(*points_mm.T)
     over = height < NO_CONTACT_MM
     if not over.any():
-        raise InputError(
-            f"load {name!r}: the mesh at ({centre_mm[0]:g}, {centre_mm[1]:g}) mm lies beside the elastomer; correct at_mm."
-        )
+        raise InputError(f"load {name!r}: the mesh at ({centre_mm[0]:g}, {centre_mm[1]:g}) mm lies beside the elastomer; correct "
+                         "at_mm.")
     return np.where(over, height, np.inf)
 
 
-def _settled(skin, nodes, gap, force_n, elastomer):
-    """Forces (c,) on nodes under gaps (c,), mean pressure, and how far the object comes down, with the modulus at that pressure."""
+def _contact_forces(skin, nodes, gap, force_n, elastomer):
+    """Forces (c,) on nodes under gaps (c,), mean pressure and indentation, with the modulus at that pressure."""
     compliance = _compliance(skin, nodes)
     node_area = skin.layout.area_mm2 / len(skin.layer.mesh.top)
     young = elastomer.young_gentle_mpa or _GUESS_MPA
-    for _ in range(_PASSES):
+    for _ in range(_ITERATIONS):
         step = next(iter(active_set(compliance / young, gap, [force_n])))
         pressure = force_n / (node_area * np.count_nonzero(step.nodal_force))
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ExtrapolationWarning)  # `analyse` says so of the modulus that is found
+            warnings.simplefilter("ignore", ExtrapolationWarning)  # `analyse` warns of the modulus that is found
             before, young = young, elastomer.young_mpa(pressure)
-        if abs(young / before - 1) < _SETTLED:
+        if abs(young / before - 1) < _TOLERANCE:
             break
     return step.nodal_force, pressure, step.indentation
 
 
 def _compliance(skin, nodes):
-    """Displacement down (c, c) of nodes under unit forces down on them, for a modulus of 1 MPa."""
+    """Compliance (c, c): displacement down of nodes under unit forces down, for a modulus of 1 MPa."""
     columns = []
-    for start in range(0, len(nodes), _AT_ONCE):
-        some = nodes[start : start + _AT_ONCE]
-        nodal = np.zeros((len(skin.layer.mesh.nodes_mm), 3, len(some)))
-        nodal[some, 2, np.arange(len(some))] = -1.0
+    for start in range(0, len(nodes), _BLOCK):
+        block = nodes[start:start + _BLOCK]
+        nodal = np.zeros((len(skin.layer.mesh.nodes_mm), 3, len(block)))
+        nodal[block, 2, np.arange(len(block))] = -1.0
         columns.append(-skin.layer.respond(nodal)[nodes, 2])
     return np.concatenate(columns, axis=1)
 
 
-_OBJECT, _LAYER = "object", "elastomer"
-_PENALTY = 20.0  # times E / h of the layer's facets
-_POINTS = 26  # of the elastomer's curve
-_MIRRORED = [0, 2, 1, 3, 6, 5, 4, 7, 9, 8]  # a tetrahedron's nodes in the order of its mirror image
-
-
 def compression_law(elastomer: Elastomer) -> tuple[Law, float]:
-    """The foam's law `hyperfoam1` with the elastomer's Poisson's ratio, fitted to its curve over the tested stresses.
+    """The law `hyperfoam1` with the elastomer's Poisson's ratio, fitted to its curve (nominal stress) over the tested stresses.
 
-    Returned with it: by how much it departs from the curve at most, as a share of the highest stress. The curve's stress is a
-    nominal one. The window of the law's stretches is that of the test, from 1 down to its end and what it widens across.
+    The second value is the largest deviation from the curve, as a share of the highest stress. The law's stretch window is that of
+    the test, from its smallest stretch to 1, or to the lateral stretch there.
     """
     stress = np.linspace(*elastomer.tested_mpa, _POINTS)
     stretch = 1 - elastomer.fit(stress)
@@ -143,13 +126,13 @@ def compression_law(elastomer: Elastomer) -> tuple[Law, float]:
     shear = stress[-1] / (1 - stretch[-1]) / (2 * (1 + elastomer.poisson))
     found = least_squares(misfit, [np.log(shear), 2.0], bounds=([-20, -25], [3, 25]))
     law = law_of(found.x)
-    across = float(law.lateral_stretch("uniaxial", stretch[-1]))
-    law.stretch_window = (float(stretch[-1]), max(across, 1.0))
+    lateral = float(law.lateral_stretch("uniaxial", stretch[-1]))
+    law.stretch_window = (float(stretch[-1]), max(lateral, 1.0))
     return law, float(np.abs(found.fun).max())
 
 
 def solid_layer(mesh: LayerMesh) -> SolidMesh:
-    """The layer as a `SolidMesh` on the same nodes, with the faces `floor` and `top`."""
+    """The layer as a `SolidMesh` of the same nodes, with the faces `floor` and `top`."""
     cells = np.ascontiguousarray(mesh.basis.element_dofs.T, dtype=np.int64)
     a, b, c, d = np.moveaxis(mesh.nodes_mm[cells[:, :4]], 1, 0)
     mirrored = np.einsum("ei,ei->e", np.cross(b - a, c - a), d - a) < 0
@@ -160,20 +143,12 @@ def solid_layer(mesh: LayerMesh) -> SolidMesh:
     )
 
 
-def press_at_finite_strains(
-    skin: Skin,
-    mesh: trimesh.Trimesh,
-    centre_mm: tuple[float, float],
-    *,
-    force_n: float,
-    elastomer: Elastomer,
-    turned_deg: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    friction: float = 0.0,
-    name: str = "mesh",
-) -> Load:
-    """The load of an object that comes straight down, with the displacement of the layer's nodes, floor bonded and sides free.
+def press_at_finite_strains(skin: Skin, mesh: trimesh.Trimesh, centre_mm: tuple[float, float], *, force_n: float,
+                            elastomer: Elastomer, turned_deg: tuple[float, float, float] = (0.0, 0.0, 0.0),
+                            friction: float = 0.0, name: str = "mesh") -> Load:
+    """The load of an object that moves straight down, with the displacement of the layer's nodes; floor bonded, sides free.
 
-    centre_mm, turned_deg: as `contact_load` has them;  friction: Coulomb's coefficient of object and elastomer
+    centre_mm, turned_deg: as in `contact_load`;  friction: Coulomb's coefficient of object and elastomer
     Raises InputError where no part of the mesh is above the elastomer, ConvergenceError where the force is not reached.
     """
     placed = placed_over(mesh, centre_mm, turned_deg)
@@ -181,14 +156,14 @@ def press_at_finite_strains(
     top = layer.points[layer.face_nodes("top")]
     lowest = underside(placed, top[:, :2], centre_mm, name).min()
     placed.apply_translation([0.0, 0.0, float(top[0, 2] - lowest)])
-    law, off = compression_law(elastomer)
+    law, deviation = compression_law(elastomer)
     body = SolidBody(layer, {_LAYER: law}, held={"floor": "xyz"}, threads=skin.threads,
                      rigid={_OBJECT: (placed.bounds.mean(axis=0), np.asarray(placed.triangles))})  # fmt: skip
     face = Surface.of(layer.face("top"))
     size = face.size_mm(body.points)
-    own = 9 * law.bulk_modulus * law.mu0 / (3 * law.bulk_modulus + law.mu0)  # Young's modulus
+    young = 9 * law.bulk_modulus * law.mu0 / (3 * law.bulk_modulus + law.mu0)
     body.add_pair(
-        ContactPair(face, Surface.of({"triangle": body.surface_nodes(_OBJECT)}), stiffness=_PENALTY * own / size,
+        ContactPair(face, Surface.of({"triangle": body.surface_nodes(_OBJECT)}), stiffness=_PENALTY * young / size,
                     reach_mm=2 * size, friction=friction, rigid=True)
     )  # fmt: skip
     body.watch = Watch(name)
@@ -197,23 +172,19 @@ def press_at_finite_strains(
     finally:
         body.watch.end()
     at = f"({centre_mm[0]:g}, {centre_mm[1]:g}) mm"
-    words = f"{force_n:g} N by {name} at {at}, finite strains by a law off the curve by {off:.0%}"
+    words = f"{force_n:g} N by {name} at {at}, finite strains by a law off the curve by {deviation:.0%}"
     return _load_of(body, step, force_n, len(layer.points), words)
 
 
 def _load_of(body: SolidBody, step: SolidLoadStep, force_n: float, nodes: int, words: str) -> Load:
-    """What the balanced step presses with, at the points of contact; strain beyond the elastomer's test is told in words."""
+    """The `Load` of an equilibrium: forces at the points in contact; its words name strain beyond the elastomer's test."""
     points, pressure = step.state.histories[0].points, step.state.contacts[0].pressure
     touching = pressure > 0
     forces = (points.weight * pressure)[touching]
     area = float(points.weight[touching].sum())
     at = np.einsum("pk,pki->pi", points.values, body.points[points.nodes])[touching, :2]
     beyond = step.extrapolated_volume_fraction
-    return Load(
-        at,
-        forces * (force_n / forces.sum()),
-        force_n / area,
-        f"{words}, {1e3 * force_n / area:.3g} kPa in the mean"
-        + (f", {beyond:.0%} of the volume strained beyond the tests" if beyond > 0.005 else ""),
-        step.state.displacement[:nodes],
-    )
+    words += f", {1e3 * force_n / area:.3g} kPa in the mean"
+    if beyond > 0.005:
+        words += f", {beyond:.0%} of the volume strained beyond the tests"
+    return Load(at, forces * (force_n / forces.sum()), force_n / area, words, step.state.displacement[:nodes])

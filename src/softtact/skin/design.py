@@ -12,7 +12,7 @@ from softtact.errors import ExtrapolationWarning, InputError
 from softtact.files import read_yaml
 from softtact.geometry.meshes import read_mesh
 from softtact.sensors.fields import Coefficient, Length, Section
-from softtact.skin.analysis import CONVERTERS, Converter
+from softtact.skin.analysis import CONVERTERS, Converter, LayerMeshSizes
 from softtact.skin.choice import Needs
 from softtact.skin.elastomers import Elastomer, find_elastomer, fingertip_area_mm2, read_elastomers
 from softtact.skin.layout import Layout, hexagon_layout, module_layout
@@ -34,26 +34,25 @@ class Module(Section):
 
     def layout(self) -> Layout:
         """Its taxels; overlapping ones are refused."""
-        return module_layout(
-            side_mm=self.side_mm,
-            pitch_mm=self.pitch_mm,
-            radius_mm=self.radius_mm,
-            guard_radius_mm=self.guard_radius_mm,
-            centres_mm=self.centres_mm,
-        )
+        return module_layout(side_mm=self.side_mm, pitch_mm=self.pitch_mm, radius_mm=self.radius_mm,
+                             guard_radius_mm=self.guard_radius_mm, centres_mm=self.centres_mm)
 
 
-class Mesh(Section):
-    """How fine the meshes are: `spacing` and `layers` of the deformation, `field_*` of the electric field."""
+class MeshChoice(Section):
+    """Sizes of the meshes, as `LayerMeshSizes` has them."""
 
     spacing_mm: PositiveFloat = 1.0
     layers: PositiveInt = 4
     field_spacing_mm: PositiveFloat = 1.2
     field_layers: PositiveInt = 3
 
+    def sizes(self) -> LayerMeshSizes:
+        """The same for `Skin`."""
+        return LayerMeshSizes(self.spacing_mm, self.layers, self.field_spacing_mm, self.field_layers)
+
 
 class ConverterChoice(Section):
-    """A converter by name, with what surrounds it."""
+    """A converter by its name, with stray capacitance and noise."""
 
     name: str = "paper"
     stray_pf: Coefficient = 10.0
@@ -64,9 +63,8 @@ class ConverterChoice(Section):
         """The converter; an unknown name is refused."""
         if self.name not in CONVERTERS:
             raise InputError(f"{where}, at 'converter.name': {unknown(self.name, CONVERTERS, kind='converter')}.")
-        return dataclasses.replace(
-            CONVERTERS[self.name], stray_pf=self.stray_pf, stray_share=self.stray_share, noise_counts=self.noise_counts
-        )
+        return dataclasses.replace(CONVERTERS[self.name], stray_pf=self.stray_pf, stray_share=self.stray_share,
+                                   noise_counts=self.noise_counts)
 
 
 class LoadChoice(Section):
@@ -94,20 +92,16 @@ class LoadChoice(Section):
     def _one_of_each(self) -> "LoadChoice":
         shapes = [name for name in ("diameter_mm", "area_mm2", "fingertip", "mask", "mesh") if getattr(self, name) is not None]
         if len(shapes) != 1:
-            raise ValueError(
-                f"load {self.name!r} has {' and '.join(shapes) or 'no shape'}; give one of diameter_mm, area_mm2, "
-                "fingertip, mask, mesh"
-            )
+            raise ValueError(f"load {self.name!r} has {' and '.join(shapes) or 'no shape'}; give one of diameter_mm, area_mm2, "
+                             "fingertip, mask, mesh")
         if (self.at_mm is None) == (self.at_taxel is None):
             raise ValueError(f"load {self.name!r}: give either at_mm or at_taxel")
         needed = "force_n" if self.mesh else "pressure_kpa"
         if getattr(self, needed) is None:
             raise ValueError(f"load {self.name!r}: {needed} is missing")
         if self.strains == "finite" and not self.mesh:
-            raise ValueError(
-                f"load {self.name!r}: strains: finite is for a mesh that presses, since an even pressure has no stable balance "
-                "there; leave it out"
-            )
+            raise ValueError(f"load {self.name!r}: strains: finite is for a mesh that presses, because a uniform pressure has no "
+                             "stable equilibrium there; leave it out")
         if self.friction and self.strains == "small":
             raise ValueError(f"load {self.name!r}: friction is for strains: finite; add that or leave friction out")
         if self.mask and self.pixel_mm is None:
@@ -115,19 +109,18 @@ class LoadChoice(Section):
         return self
 
     def centre(self, layout: Layout, where: str) -> tuple[float, float]:
-        """Where it stands, in mm."""
+        """Its centre in mm."""
         if self.at_mm is not None:
             return self.at_mm
         assert self.at_taxel is not None
         if self.at_taxel > len(layout.centres_mm):
-            raise InputError(
-                f"{where}, load {self.name!r}: there is no taxel {self.at_taxel}; give one of 1 to {len(layout.centres_mm)}."
-            )
+            raise InputError(f"{where}, load {self.name!r}: there is no taxel {self.at_taxel}; give one of 1 to "
+                             f"{len(layout.centres_mm)}.")
         x, y = layout.centres_mm[self.at_taxel - 1]
         return float(x), float(y)
 
     def pressure(self, layout: Layout, *, folder: Path, where: str) -> Load:
-        """The load as forces, for all shapes but a mesh; one that leaves the elastomer is refused."""
+        """The load as forces, for all shapes but a mesh; a load beside the elastomer is refused."""
         assert self.pressure_kpa is not None
         centre, pressure = self.centre(layout, where), 1e-3 * self.pressure_kpa
         if self.diameter_mm is not None:
@@ -143,7 +136,7 @@ class LoadChoice(Section):
 
 
 class Probes(Section):
-    """Capacitance against pressure under cylindrical probes, for a modulus that is off by some shares."""
+    """Capacitance against pressure under cylindrical probes, for errors of the modulus given as shares."""
 
     diameters_mm: tuple[PositiveFloat, ...] = (4.0, 5.0, 6.0, 10.0)
     pressures_kpa: tuple[PositiveFloat, ...] = (5.0, 10.0, 20.0, 30.0, 40.0, 50.0)
@@ -152,7 +145,7 @@ class Probes(Section):
 
 
 class Choice(Section):
-    """What the elastomer and its thickness are chosen for."""
+    """Requirements by which the elastomer and its thickness are chosen."""
 
     target_kpa: PositiveFloat = 10.0
     range_kpa: tuple[PositiveFloat, PositiveFloat] = (10.0, 50.0)
@@ -170,7 +163,7 @@ class Choice(Section):
 
 
 class Maps(Section):
-    """What a patch detects, and where."""
+    """Maps of detection and localisation over a patch."""
 
     spacing_mm: PositiveFloat = 1.0
     finger_mm2: PositiveFloat = 69.91
@@ -180,7 +173,7 @@ class Maps(Section):
 
 
 class Link(Section):
-    """A robot's link to lay modules on."""
+    """A robot's link that modules are laid on."""
 
     mesh: str
     unit: Literal["mm", "cm", "m", "inch", "in"] = "mm"
@@ -191,7 +184,7 @@ class Link(Section):
 
 
 class Search(Section):
-    """Values of an exhaustive search by the finite elements."""
+    """Values of which a search takes all combinations."""
 
     elastomers: tuple[str, ...] | None = None
     thicknesses_mm: tuple[PositiveFloat, ...] = (1.0, 2.0, 3.0)
@@ -199,8 +192,8 @@ class Search(Section):
     pitches_mm: tuple[PositiveFloat, ...] = (4.5, 5.0, 6.0)
 
 
-class Design(Section):
-    """A whole design; sections that are left out are not computed."""
+class SkinDesign(Section):
+    """A whole design; a section that is left out is not computed."""
 
     skin: str
     module: Module = Module()
@@ -208,7 +201,7 @@ class Design(Section):
     elastomer: str = "SomaFoama"
     elastomers: str | None = None
     converter: ConverterChoice = ConverterChoice()
-    mesh: Mesh = Mesh()
+    mesh: MeshChoice = MeshChoice()
     loads: tuple[LoadChoice, ...]
     probes: Probes | None = None
     choice: Choice | None = None
@@ -223,29 +216,29 @@ class Design(Section):
         return hexagon_layout(module) if self.patch == "hexagon" else module
 
 
-def read_design(path: str | Path) -> Design:
+def read_design(path: str | Path) -> SkinDesign:
     """The design of a YAML file; the first fault becomes one sentence with file, field and remedy."""
     values = read_yaml(path, missing="there is no such design; give the path of a YAML file, see docs/how-to/design_a_skin.md.")
     if not isinstance(values, dict):
         raise InputError(f"{path}: a design holds keys and values; see docs/how-to/design_a_skin.md.")
     try:
-        design = Design.model_validate(values)
+        design = SkinDesign.model_validate(values)
     except ValidationError as error:
         raise InputError(f"{path}{_fault(first_fault(error))}") from None
     names = [load.name for load in design.loads]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
-        raise InputError(f"{path}, at 'loads': two loads are called {twice!r}; give each a name of its own.")
+        raise InputError(f"{path}, at 'loads': two loads are called {twice!r}; give each its own name.")
     return design
 
 
 def _fault(fault):
-    """What follows the file's name in the sentence on a fault of pydantic's."""
+    """The sentence on a fault of pydantic's, from the field on."""
     *parents, last = fault["loc"] or ("",)
     at = f", at {'.'.join(map(str, fault['loc']))!r}"
     if fault["type"] == "extra_forbidden":
-        said = unknown(last, known_keys(Design, parents), kind="key")
-        return f"{', at ' + repr('.'.join(map(str, parents))) if parents else ''}: {said}{'' if said.endswith('?') else '.'}"
+        reason = unknown(last, known_keys(SkinDesign, parents), kind="key")
+        return f"{', at ' + repr('.'.join(map(str, parents))) if parents else ''}: {reason}{'' if reason.endswith('?') else '.'}"
     if fault["type"] == "missing":
         return f": the key {'.'.join(map(str, fault['loc']))!r} is missing; add it."
     given = "" if isinstance(fault["input"], dict) else f" (it is {fault['input']!r:.60})"
@@ -253,10 +246,10 @@ def _fault(fault):
 
 
 @dataclass
-class Study:
-    """A design with what its names mean, all checked before any work begins."""
+class PreparedDesign:
+    """A design whose names are resolved to layout, materials, converter and loads; all is checked."""
 
-    design: Design
+    design: SkinDesign
     where: str
     """The design's file."""
     layout: Layout
@@ -267,8 +260,8 @@ class Study:
     """By name; None for a mesh, which has no forces before it is pressed."""
 
 
-def prepare(design: Design, path: Path) -> Study:
-    """Check a design as far as that takes no time; the first fault is an InputError."""
+def prepare(design: SkinDesign, path: Path) -> PreparedDesign:
+    """Resolve and check a design, as far as that takes no time; the first fault is an InputError."""
     where, layout, folder = str(path), design.layout(), path.parent
     elastomers = read_elastomers(folder / design.elastomers if design.elastomers else None)
     elastomer = find_elastomer(design.elastomer, elastomers, where=f"{where}, at 'elastomer'")
@@ -282,11 +275,11 @@ def prepare(design: Design, path: Path) -> Study:
     _refuse_places(design, layout, folder, where)
     _refuse_choice(design, elastomers, where)
     _refuse_search(design, elastomers, where)
-    return Study(design, where, layout, elastomers, elastomer, design.converter.converter(where), loads)
+    return PreparedDesign(design, where, layout, elastomers, elastomer, design.converter.converter(where), loads)
 
 
 def needs_of(choice: Choice) -> Needs:
-    """What a layer has to do, in MPa, mm and N."""
+    """The requirements of a choice in MPa, mm and N."""
     low, high = (1e-3 * value for value in choice.range_kpa)
     return Needs((low, high), choice.probe_mm, choice.smallest_force_n, choice.detected_counts, choice.strain_limit)
 
@@ -335,7 +328,7 @@ def _refuse_pressures(elastomer, pressures, where):
 
 
 def _refuse_places(design, layout, folder, where):
-    """Refuse meshes that cannot be read, and probes without a taxel or beside the elastomer."""
+    """Refuse loads and probes without a taxel or beside the elastomer, and meshes that cannot be read."""
     for load in design.loads:
         load.centre(layout, where)
         if load.mesh:

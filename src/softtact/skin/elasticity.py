@@ -1,11 +1,9 @@
-"""How a layer of elastomer deforms: linear elasticity, bonded to its board, its sides free.
+"""Deformation of a layer of elastomer: linear elasticity, bonded to its board, with free sides.
 
-The papers' own analysis: a secant modulus at the load (Le et al. 2011, sec. III), small strains. `Deforms` is what another model of
-the solid has to offer in its place.
+The analysis of the papers: small strains, with a secant modulus at the load (Le et al. 2011, sec. III).
 """
 
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -16,27 +14,17 @@ from softtact.skin.layer_mesh import LayerMesh
 from softtact.skin.loads import Load
 
 
-class Deforms(Protocol):
-    """A layer that gives way to a load."""
+class BondedLayer:
+    """A layer of one Poisson's ratio, factored once for every load and modulus.
 
-    def displacement(self, load: Load, *, young_mpa: float) -> np.ndarray:
-        """Displacement (node, 3) in mm of the nodes of its mesh."""
-
-    def at(self, points_mm: np.ndarray, displacement_mm: np.ndarray) -> np.ndarray:
-        """Displacement (n, 3) at points (n, 3), of that of the nodes."""
-
-
-class ElasticLayer:
-    """A layer of one Poisson's ratio; factored once, for any load and any modulus.
-
-    Displacements are inversely proportional to Young's modulus, so that all is kept for 1 MPa.
+    Displacements are inversely proportional to Young's modulus, so stiffness and factors are those of 1 MPa.
     """
 
     def __init__(self, mesh: LayerMesh, *, poisson: float, threads: int = 1) -> None:
         self.mesh, self.poisson, self._threads = mesh, poisson, threads
         nodes = len(mesh.nodes_mm)
         free = np.setdiff1d(np.arange(nodes), mesh.floor)
-        self._free = (free + nodes * np.arange(3)[:, None]).ravel()  # all along x, then y, then z
+        self._free = (free + nodes * np.arange(3)[:, None]).ravel()  # first x of all nodes, then y, then z
 
     def displacement(self, load: Load, *, young_mpa: float) -> np.ndarray:
         """Displacement (node, 3) in mm of the nodes."""
@@ -52,11 +40,11 @@ class ElasticLayer:
         return np.moveaxis(found.reshape(3, nodal_n.shape[0], *nodal_n.shape[2:]), 0, 1)
 
     def at(self, points_mm: np.ndarray, displacement_mm: np.ndarray) -> np.ndarray:
-        """Displacement (n, 3) at points (n, 3), of that of the nodes."""
+        """Displacement (n, 3) at points (n, 3), interpolated from that of the nodes."""
         return self.mesh.interpolation(points_mm) @ displacement_mm
 
     def under(self, points_mm: np.ndarray) -> sp.csr_matrix:
-        """Values at points (n, 2) of the upper side from those at the nodes, as a matrix (n, node)."""
+        """Matrix (n, node) that interpolates values from the nodes to points (n, 2) of the upper side."""
         return self.mesh.interpolation(np.column_stack([points_mm, np.full(len(points_mm), self.mesh.levels_mm[-1])]))
 
     @cached_property
@@ -84,7 +72,7 @@ def _product(i, j):
 
 
 def upper_triangle(matrix: sp.csr_matrix) -> sp.csr_matrix:
-    """The upper triangle, as `softtact.linalg.direct` takes it."""
+    """The upper triangle, in the format that `softtact.linalg.direct` takes."""
     upper = sp.triu(matrix).tocsr()
     upper.sort_indices()
     return sp.csr_matrix((upper.data, upper.indices.astype(np.int32), upper.indptr.astype(np.int32)), shape=upper.shape)

@@ -18,7 +18,7 @@ from softtact.unknown_names import first_fault, nearest
 DATA = Path(str(resources.files("softtact.skin"))) / "data"
 STRAINS = (0.05, 0.30)  # static strains of the tests: Le, Maiolino, Mastrogiovanni and Cannata, sec. III-A
 STRESS_MPA = 0.055  # highest stress of any test, the same place
-_BEYOND = 2.0  # times the highest stress tested: further no curve is followed
+_BEYOND = 2.0  # times the highest tested stress: no curve is extrapolated further
 
 
 class Elastomer(Section):
@@ -35,12 +35,12 @@ class Elastomer(Section):
 
     @cached_property
     def tested_mpa(self) -> tuple[float, float]:
-        """Lowest and highest stress of the test: where the curve passes the tested strains, and at most 55 kPa."""
+        """Lowest and highest stress of the test: where the curve reaches the tested strains, and at most 55 kPa."""
         at = [self._stress_at(strain) for strain in STRAINS]
         return at[0], min(at[1], STRESS_MPA)
 
     def strain(self, stress_mpa: float) -> float:
-        """Compressive strain at a stress in MPa; outside of the test an `ExtrapolationWarning` says so.
+        """Compressive strain at a stress in MPa, with an `ExtrapolationWarning` outside of the test.
 
         Raises InputError beyond twice the highest tested stress, and where the polynomial gives no strain above zero.
         """
@@ -70,13 +70,13 @@ class Elastomer(Section):
         return stress_mpa / self.strain(stress_mpa)
 
     def tested_young_mpa(self, stress_mpa: float) -> float:
-        """The same without a curve's end: below the lowest tested stress the modulus there, since fits do not pass through zero."""
+        """`young_mpa`, constant below the lowest tested stress, because the fits do not pass through zero; without warnings."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ExtrapolationWarning)
             return self.young_mpa(max(stress_mpa, self.tested_mpa[0]))
 
     def fit(self, stress_mpa: Any) -> Any:
-        """The polynomial's strain at a stress or an array of them, whatever it is worth."""
+        """The polynomial's strain at a stress or an array of stresses, within the test and outside."""
         return 0.01 * np.polynomial.polynomial.polyval(stress_mpa, self.strain_percent)
 
     def _stress_at(self, strain):
@@ -88,22 +88,19 @@ class Elastomer(Section):
 
 
 def read_elastomers(path: str | Path | None = None) -> dict[str, Elastomer]:
-    """Elastomers by name: those that ship, and those of a user's file, which add to them or replace them."""
+    """Elastomers by name: the shipped ones, and those of a user's file, which add to them or replace them."""
     found: dict[str, Elastomer] = {}
     for file in [DATA / "elastomers.yaml", *([Path(path)] if path else [])]:
         values = read_yaml(file, missing="there is no such file of elastomers; correct `elastomers`.")
         if not isinstance(values, dict) or not isinstance(values.get("elastomers"), list):
-            raise InputError(
-                f"{file}: a file of elastomers holds a list `elastomers`; write it as {DATA / 'elastomers.yaml'} does."
-            )
+            raise InputError(f"{file}: a file of elastomers holds a list `elastomers`; write it like {DATA / 'elastomers.yaml'}.")
         for number, entry in enumerate(values["elastomers"], start=1):
             try:
                 elastomer = Elastomer.model_validate(entry)
             except ValidationError as error:
                 fault = first_fault(error)
-                raise InputError(
-                    f"{file}, elastomer {number}, at {'.'.join(map(str, fault['loc']))!r}: {fault['msg']}; correct it."
-                ) from None
+                raise InputError(f"{file}, elastomer {number}, at {'.'.join(map(str, fault['loc']))!r}: {fault['msg']}; correct "
+                                 "it.") from None
             found[elastomer.name] = elastomer
     return found
 

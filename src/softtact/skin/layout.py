@@ -1,4 +1,4 @@
-"""Where the taxels of a skin lie: the triangular module of the papers, and a hexagonal patch of six.
+"""Places of a skin's taxels: the triangular module of the papers, and a hexagonal patch of six modules.
 
 Le, Maiolino, Mastrogiovanni, Cannata and Schmitz, Humanoids 2011, sec. II; the centres are those of the authors' published toolbox.
 """
@@ -12,29 +12,14 @@ from scipy.spatial.distance import pdist, squareform
 from softtact.errors import InputError
 
 SIDE_MM, PITCH_MM = 30.0, 5.0  # of the module that the centres are given for
-CENTRES_MM = np.array(
-    [
-        (15, 20.32),
-        (12.5, 15.99),
-        (17.5, 15.99),
-        (12.5, 9.99),
-        (17.5, 9.99),
-        (7.5, 7.33),
-        (15, 5.66),
-        (22.5, 7.33),
-        (5, 3),
-        (10, 3),
-        (20, 3),
-        (25, 3),
-    ],
-    dtype=float,
-)
-_TOUCH_MM = 1e-9  # below which two lengths are the same
+CENTRES_MM = np.array([(15, 20.32), (12.5, 15.99), (17.5, 15.99), (12.5, 9.99), (17.5, 9.99), (7.5, 7.33), (15, 5.66), (22.5, 7.33),
+                       (5, 3), (10, 3), (20, 3), (25, 3)], dtype=float)
+_ROUNDING_MM = 1e-9
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Taxels on one flat piece of elastomer, which covers one module or several."""
+    """Taxels under one flat piece of elastomer, which covers one module or several."""
 
     outline_mm: np.ndarray
     """(corner, 2): of the elastomer, convex, counter-clockwise."""
@@ -47,7 +32,7 @@ class Layout:
     radius_mm: float
     """Of a taxel."""
     guard_radius_mm: float
-    """Where the guard around a taxel begins; between the two lies no electrode."""
+    """Where the guard around a taxel begins; there is no electrode between both."""
 
     @property
     def area_mm2(self) -> float:
@@ -55,21 +40,15 @@ class Layout:
         return float(abs(polygon_area(self.outline_mm)))
 
     def inside(self, points_mm: np.ndarray, *, margin_mm: float = 0.0) -> np.ndarray:
-        """Whether points (n, 2) lie on the elastomer, `margin_mm` away from its sides or more."""
-        return _depth(points_mm, self.outline_mm) >= margin_mm - _TOUCH_MM
+        """Whether points (n, 2) lie on the elastomer, at least `margin_mm` away from its sides."""
+        return _depth(points_mm, self.outline_mm) >= margin_mm - _ROUNDING_MM
 
 
-def module_layout(
-    *,
-    side_mm: float = SIDE_MM,
-    pitch_mm: float = PITCH_MM,
-    radius_mm: float = 2.0,
-    guard_radius_mm: float = 2.2,
-    centres_mm: Sequence[Sequence[float]] | np.ndarray | None = None,
-) -> Layout:
-    """One triangular module with its side along x and its left corner in the origin.
+def module_layout(*, side_mm: float = SIDE_MM, pitch_mm: float = PITCH_MM, radius_mm: float = 2.0, guard_radius_mm: float = 2.2,
+                  centres_mm: Sequence[Sequence[float]] | np.ndarray | None = None) -> Layout:
+    """One triangular module with a side along x and its left corner in the origin.
 
-    centres_mm: (taxel, 2), or None for the published ones, moved about the module's centre in the ratio of the pitches
+    centres_mm: (taxel, 2), or None for the published ones, scaled about the module's centre by the ratio of the pitches
     Raises InputError where taxels overlap or leave the module.
     """
     corners = side_mm * np.array([(0.0, 0.0), (1.0, 0.0), (0.5, np.sqrt(0.75))])
@@ -95,14 +74,8 @@ def hexagon_layout(module: Layout) -> Layout:
         corners.append(corners[-1] @ mirror)
     side = np.linalg.norm(module.corners_mm[0, 1] - module.corners_mm[0, 0])
     angles = np.pi / 3 * np.arange(6)
-    return Layout(
-        side * np.column_stack([np.cos(angles), np.sin(angles)]),
-        np.concatenate(centres),
-        np.repeat(np.arange(6), len(module.centres_mm)),
-        np.stack(corners),
-        module.radius_mm,
-        module.guard_radius_mm,
-    )
+    return Layout(side * np.column_stack([np.cos(angles), np.sin(angles)]), np.concatenate(centres),
+                  np.repeat(np.arange(6), len(module.centres_mm)), np.stack(corners), module.radius_mm, module.guard_radius_mm)
 
 
 def polygon_area(corners: np.ndarray) -> float:
@@ -112,13 +85,13 @@ def polygon_area(corners: np.ndarray) -> float:
 
 
 def _mirror(angle):
-    """The reflection (2, 2) at the line through the origin at an angle."""
+    """The reflection (2, 2) at a line through the origin at an angle."""
     cos, sin = np.cos(2 * angle), np.sin(2 * angle)
     return np.array([[cos, sin], [sin, -cos]])
 
 
 def _depth(points, outline):
-    """Distance (n,) of points from the nearest side's line, negative outside of a convex polygon."""
+    """Distance (n,) of points from the line of the nearest side, negative outside of a convex polygon."""
     along = np.roll(outline, -1, axis=0) - outline
     inwards = np.column_stack([-along[:, 1], along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
     return ((np.asarray(points, dtype=float)[:, None] - outline) * inwards).sum(axis=2).min(axis=1)

@@ -1,4 +1,4 @@
-"""What presses on a skin: pressure on a disc, an ellipse or a mask, as forces on many points whose sum is exact."""
+"""Loads on a skin: pressure on a disc, an ellipse or a mask, as forces on many points whose sum is exact."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,11 +21,11 @@ class Load:
     force_n: np.ndarray
     """(point,): downwards, above 0."""
     pressure_mpa: float
-    """Which the elastomer's modulus is taken at."""
+    """At which the elastomer's modulus is taken."""
     words: str
-    """What it is, for people."""
+    """Description for messages and tables."""
     displacement_mm: np.ndarray | None = None
-    """(node, 3) of the layer under it, where it was found with the load, at finite strains."""
+    """(node, 3) of the layer under the load, where it was solved with it, at finite strains."""
 
     @property
     def total_n(self) -> float:
@@ -33,16 +33,15 @@ class Load:
         return float(self.force_n.sum())
 
 
-def ellipse(
-    centre_mm: tuple[float, float], *, area_mm2: float, pressure_mpa: float, ratio: float = RATIO, angle_deg: float = 0.0
-) -> Load:
-    """Even pressure on an ellipse.
+def ellipse(centre_mm: tuple[float, float], *, area_mm2: float, pressure_mpa: float, ratio: float = RATIO,
+            angle_deg: float = 0.0) -> Load:
+    """Uniform pressure on an ellipse.
 
     ratio: of its axis along y to that along x, before it is turned by angle_deg, counter-clockwise; 1 for a disc
     """
     half = np.sqrt(area_mm2 / (np.pi * ratio)) * np.array([1.0, ratio])
     share, weight = np.polynomial.legendre.leggauss(_RADII)
-    radius, weight = np.sqrt(0.5 * (share + 1)), 0.5 * weight  # Gauss's points in the squared radius weigh areas
+    radius, weight = np.sqrt(0.5 * (share + 1)), 0.5 * weight  # Gauss points in the squared radius, for equal areas
     angle = 2 * np.pi * (np.arange(_ANGLES) + 0.5) / _ANGLES
     x, y = (radius[:, None] * half[0] * np.cos(angle)).ravel(), (radius[:, None] * half[1] * np.sin(angle)).ravel()
     cos, sin = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
@@ -53,14 +52,14 @@ def ellipse(
 
 
 def disc(centre_mm: tuple[float, float], *, diameter_mm: float, pressure_mpa: float) -> Load:
-    """Even pressure on a disc, as under the papers' cylindrical probes."""
+    """Uniform pressure on a disc, as under the papers' cylindrical probes."""
     return ellipse(centre_mm, area_mm2=np.pi * diameter_mm**2 / 4, pressure_mpa=pressure_mpa, ratio=1.0)
 
 
 def mask(path: str | Path, centre_mm: tuple[float, float], *, pixel_mm: float, pressure_mpa: float) -> Load:
-    """Even pressure where a picture is dark, as a fingerprint in ink on white paper.
+    """Uniform pressure where a picture is dark, as a fingerprint in ink on white paper.
 
-    The middle of the dark pixels comes to centre_mm; rows of the picture run downwards, y upwards.
+    The mean of the dark pixels lies at centre_mm; rows of the picture run downwards, y upwards.
     Raises InputError where the file is no picture, or has no dark pixel.
     """
     from PIL import Image, UnidentifiedImageError
@@ -90,6 +89,5 @@ def refuse_beside(load: Load, layout: Layout, *, where: str) -> None:
     beside = ~layout.inside(load.points_mm)
     if beside.any():
         share = load.force_n[beside].sum() / load.total_n
-        raise InputError(
-            f"{where}: {share:.0%} of the load ({load.words}) lies beside the elastomer; move it inwards or make it smaller."
-        )
+        raise InputError(f"{where}: {share:.0%} of the load ({load.words}) lies beside the elastomer; move it inwards or make it "
+                         "smaller.")

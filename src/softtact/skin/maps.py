@@ -1,6 +1,6 @@
-"""What a patch feels, and where: smallest detectable force, error of localisation, crosstalk against pitch.
+"""Maps of a patch: smallest detectable force, error of localisation, crosstalk against pitch.
 
-All from the taxels' answers to a small force anywhere (`Skin.influence`), to first order in the force.
+All follow from the taxels' responses to a small force at any place (`Skin.influence`), to first order in the force.
 """
 
 from collections.abc import Sequence
@@ -9,23 +9,26 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from softtact.skin.analysis import Converter, Skin
+from softtact.skin.analysis import Converter, LayerMeshSizes, Skin
 from softtact.skin.layout import Layout
 from softtact.skin.loads import ellipse
+
+_STEP_MM = 0.25  # of the central differences for the slopes
+_SINGULAR = 1e-12  # smallest eigenvalue of a scaled information matrix below which the readings do not give the place
 
 
 @dataclass(frozen=True)
 class PatchMaps:
-    """Maps over the places that a finger can press without leaving the elastomer."""
+    """Maps over the places where a finger lies on the elastomer as a whole."""
 
     places_mm: np.ndarray
     """(place, 2)"""
     gain_ff_per_n: np.ndarray
     """(place, taxel): rise of the capacitances per N of the finger."""
     smallest_force_n: np.ndarray
-    """(place,): the force at which the taxel that answers most rises by the counts that tell it from noise."""
+    """(place,): the force at which the most sensitive taxel rises by the counts that are detected above noise."""
     localisation_mm: np.ndarray
-    """(place,): standard error of the best unbiased estimate of the place at the finger's force (Cramer, Rao); inf without one."""
+    """(place,): Cramer-Rao bound of the place's standard error at the finger's force; inf where readings do not give it."""
     centroid_error_mm: np.ndarray
     """(place,): distance of the readings' centroid from the place, without noise."""
     force_n: float
@@ -33,103 +36,72 @@ class PatchMaps:
 
     def table(self) -> pd.DataFrame:
         """A row a place."""
-        return pd.DataFrame(
-            {
-                "x_mm": self.places_mm[:, 0],
-                "y_mm": self.places_mm[:, 1],
-                "smallest_force_n": self.smallest_force_n,
-                "localisation_mm": self.localisation_mm,
-                "centroid_error_mm": self.centroid_error_mm,
-            }
-        )
+        return pd.DataFrame({
+            "x_mm": self.places_mm[:, 0], "y_mm": self.places_mm[:, 1], "smallest_force_n": self.smallest_force_n,
+            "localisation_mm": self.localisation_mm, "centroid_error_mm": self.centroid_error_mm})
 
 
-def patch_maps(
-    skin: Skin,
-    *,
-    finger_mm2: float,
-    pressure_mpa: float,
-    young_mpa: float,
-    converter: Converter,
-    detected_counts: float,
-    spacing_mm: float = 1.0,
-) -> PatchMaps:
-    """`PatchMaps` of a round finger of an area that presses evenly with a pressure.
+def patch_maps(skin: Skin, *, finger_mm2: float, pressure_mpa: float, young_mpa: float, converter: Converter,
+               detected_counts: float, spacing_mm: float = 1.0) -> PatchMaps:
+    """`PatchMaps` of a round finger of an area that presses with a uniform pressure.
 
-    Places lie `spacing_mm` apart, and the whole finger on the elastomer.
+    Places lie `spacing_mm` apart, with the whole finger on the elastomer.
     """
     radius = np.sqrt(finger_mm2 / np.pi)
     low, high = skin.layout.outline_mm.min(axis=0), skin.layout.outline_mm.max(axis=0)
-    grid = np.stack(np.meshgrid(*(np.arange(a, b, spacing_mm) for a, b in zip(low, high, strict=True)), indexing="ij"), -1).reshape(
-        -1, 2
-    )
+    lines = (np.arange(a, b, spacing_mm) for a, b in zip(low, high, strict=True))
+    grid = np.stack(np.meshgrid(*lines, indexing="ij"), -1).reshape(-1, 2)
     places = grid[skin.layout.inside(grid, margin_mm=radius + _STEP_MM)]
     force = pressure_mpa * finger_mm2
-    gains = {
-        shift: _gain(skin, places + _STEP_MM * np.array(shift), finger_mm2) / young_mpa
-        for shift in ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
-    }
+    gains = {shift: _gain(skin, places + _STEP_MM * np.array(shift), finger_mm2) / young_mpa
+             for shift in ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))}
     gain = gains[0, 0]
     slopes = [force * (gains[tuple(axis)] - gains[tuple(-axis)]) / (2 * _STEP_MM) for axis in np.eye(2, dtype=int)]
     above = np.maximum(force * gain, 0.0)
     centroid = above @ skin.layout.centres_mm / np.maximum(above.sum(axis=1), 1e-300)[:, None]
-    return PatchMaps(
-        places,
-        gain,
-        detected_counts * converter.step_ff / np.maximum(gain.max(axis=1), 1e-12),
-        _standard_error(np.stack([*slopes, gain], axis=2), converter.noise_ff),
-        np.linalg.norm(centroid - places, axis=1),
-        force,
-    )
+    return PatchMaps(places, gain, detected_counts * converter.step_ff / np.maximum(gain.max(axis=1), 1e-12),
+                     _standard_error(np.stack([*slopes, gain], axis=2), converter.noise_ff),
+                     np.linalg.norm(centroid - places, axis=1), force)
 
 
-def crosstalk(
-    pitches_mm: Sequence[float],
-    *,
-    radius_mm: float,
-    guard_radius_mm: float,
-    thickness_mm: float,
-    poisson: float,
-    permittivity: float,
-    young_mpa: float,
-    probe_mm: float,
-    converter: Converter,
-    pressure_mpa: float,
-    spacing_mm: float = 1.0,
-) -> pd.DataFrame:
-    """A row a pitch: what a neighbour rises by as a share of the taxel that a probe presses, and the error of localisation.
+@dataclass(frozen=True)
+class TaxelLayer:
+    """Taxels of one size under a layer of elastomer, whatever their pitch."""
 
-    A taxel and six neighbours around it on a triangle that is large enough for them.
+    radius_mm: float
+    """Of a taxel."""
+    guard_radius_mm: float
+    """Where the guard around a taxel begins."""
+    thickness_mm: float
+    """Of the elastomer."""
+    poisson: float
+    permittivity: float
+    young_mpa: float
+
+
+def crosstalk(pitches_mm: Sequence[float], layer: TaxelLayer, *, probe_mm: float, pressure_mpa: float, converter: Converter,
+              spacing_mm: float = 1.0) -> pd.DataFrame:
+    """A row for each pitch: rise of a neighbour as a share of that of the pressed taxel, and the error of localisation.
+
+    A taxel and its six neighbours lie on a triangle that is large enough for them; the probe is a disc of a diameter.
     """
     area = np.pi * probe_mm**2 / 4
     rows = []
     for pitch in pitches_mm:
-        skin = Skin(
-            _seven_taxels(pitch, radius_mm, guard_radius_mm, margin_mm=3 * thickness_mm),
-            thickness_mm=thickness_mm,
-            poisson=poisson,
-            permittivity=permittivity,
-            spacing_mm=1.5 * spacing_mm,
-            layers=3,
-            field_spacing_mm=2.5,
-        )
-        gain = _gain(skin, np.zeros((1, 2)), area)[0] / young_mpa
-        between = _gain_and_slopes(skin, np.array([pitch / 2, 0.0]), area, force_n=pressure_mpa * area) / young_mpa
-        rows.append(
-            {
-                "pitch_mm": pitch,
-                "own_ff_per_n": gain[0],
-                "neighbour_ff_per_n": gain[1:].mean(),
-                "crosstalk": gain[1:].mean() / gain[0],
-                "localisation_mm": _standard_error(between[None], converter.noise_ff)[0],
-                "taxels_per_cm2": 200 / (np.sqrt(3) * pitch**2),
-            }
-        )
+        skin = Skin(_seven_taxels(pitch, layer.radius_mm, layer.guard_radius_mm, margin_mm=3 * layer.thickness_mm),
+                    thickness_mm=layer.thickness_mm, poisson=layer.poisson, permittivity=layer.permittivity,
+                    mesh=LayerMeshSizes(spacing_mm=1.5 * spacing_mm, layers=3, field_spacing_mm=2.5))
+        gain = _gain(skin, np.zeros((1, 2)), area)[0] / layer.young_mpa
+        between = _gain_and_slopes(skin, np.array([pitch / 2, 0.0]), area, force_n=pressure_mpa * area) / layer.young_mpa
+        rows.append({"pitch_mm": pitch, "own_ff_per_n": gain[0], "neighbour_ff_per_n": gain[1:].mean(),
+                     "crosstalk": gain[1:].mean() / gain[0],
+                     "localisation_mm": _standard_error(between[None], converter.noise_ff)[0],
+                     "taxels_per_cm2": 200 / (np.sqrt(3) * pitch**2)})
     return pd.DataFrame(rows)
 
 
 def _seven_taxels(pitch, radius, guard_radius, *, margin_mm):
-    """Layout of a taxel and its six neighbours on a triangle that reaches so far beyond them."""
+    """Layout of a taxel and its six neighbours on a triangle, with a margin around them."""
     angle, upright = np.pi / 3 * np.arange(6), np.pi / 2 + 2 * np.pi / 3 * np.arange(3)
     centres = np.vstack([[0.0, 0.0], pitch * np.column_stack([np.cos(angle), np.sin(angle)])])
     corners = 2 * (pitch + guard_radius + margin_mm) * np.column_stack([np.cos(upright), np.sin(upright)])
@@ -137,7 +109,7 @@ def _seven_taxels(pitch, radius, guard_radius, *, margin_mm):
 
 
 def _gain_and_slopes(skin, place, area, *, force_n):
-    """Change (taxels, 3) of the readings at a force by its place along x and y (fF/mm), and by itself (fF/N), times E."""
+    """Derivatives (taxels, 3) of the readings at a force: by its place along x and y (fF/mm) and by the force (fF/N), times E."""
     ahead, behind = (
         np.stack([_gain(skin, (place + step * axis)[None], area)[0] for axis in np.eye(2)], axis=1)
         for step in (_STEP_MM, -_STEP_MM)
@@ -146,12 +118,8 @@ def _gain_and_slopes(skin, place, area, *, force_n):
     return np.column_stack([force_n * (ahead - behind) / (2 * _STEP_MM), at])
 
 
-_STEP_MM = 0.25  # of the differences that the slopes are made of
-_KNOWN = 1e-12  # of an information matrix' largest eigenvalue, below which a place is not told
-
-
 def _gain(skin, places, area_mm2):
-    """Rise (place, taxel) per N of an even pressure on a disc, for a modulus of 1 MPa."""
+    """Rise (place, taxel) per N of a uniform pressure on a disc, for a modulus of 1 MPa."""
     unit = ellipse((0.0, 0.0), area_mm2=area_mm2, pressure_mpa=1.0, ratio=1.0)
     few = slice(0, None, 6)  # every sixth point around: 16 of 96, of 24 radii
     points, weight = unit.points_mm[few], unit.force_n[few] / unit.force_n[few].sum()
@@ -160,12 +128,12 @@ def _gain(skin, places, area_mm2):
 
 
 def _standard_error(slopes, noise):
-    """Of the place (n,), from the slopes (n, taxel, 3) of the readings along x, y and the force: all three are unknown."""
+    """Standard error of the place (n,), from the slopes (n, taxel, 3) of the readings by x, y and force, all three unknown."""
     information = np.einsum("nti,ntj->nij", slopes, slopes) / max(noise, 1e-300) ** 2
     scale = np.sqrt(np.maximum(np.einsum("nii->ni", information), 1e-300))
     scaled = information / (scale[:, :, None] * scale[:, None, :])
     error = np.full(len(slopes), np.inf)
-    told = np.linalg.eigvalsh(scaled)[:, 0] > _KNOWN
-    variance = np.einsum("nii->ni", np.linalg.inv(scaled[told])) / scale[told] ** 2
-    error[told] = np.sqrt(variance[:, :2].sum(axis=1))
+    regular = np.linalg.eigvalsh(scaled)[:, 0] > _SINGULAR
+    variance = np.einsum("nii->ni", np.linalg.inv(scaled[regular])) / scale[regular] ** 2
+    error[regular] = np.sqrt(variance[:, :2].sum(axis=1))
     return error

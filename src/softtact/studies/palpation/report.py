@@ -12,7 +12,7 @@ from markupsafe import Markup
 
 import softtact
 from softtact.files import atomic_path, digest, write_csv, write_dataset, write_json
-from softtact.probe.design import Design
+from softtact.probe.design import PalpationDesign
 from softtact.probe.lump import PARAMETERS, detection_map, lump_table, recovery
 from softtact.probe.sweep import hardness_table, palpate, slope, verdict
 from softtact.reporting.page_template import STYLE
@@ -60,7 +60,7 @@ class _Report:
         self.pictures.append({"file": path.name, "caption": caption, "image": base64.b64encode(path.read_bytes()).decode()})
 
 
-def palpation_study(design: Design, out: Path, *, threads: int = 1,
+def palpation_study(design: PalpationDesign, out: Path, *, threads: int = 1,
                     tell: Callable[[str], None] = lambda text: None) -> dict[str, Any]:
     """Run a design's sweeps and studies, write them to the folder `out`; returns the summary (also `summary.json`).
 
@@ -207,7 +207,7 @@ def _write_page(report, design, sweeps):
         temporary.write_text(page, encoding="utf-8")
 
 
-def assumptions(design: Design) -> list[str]:
+def assumptions(design: PalpationDesign) -> list[str]:
     """What a design marks as assumed, a sentence each."""
     materials = {"supports": design.supports, "filler": design.filler, "beam": design.beam} | design.tissues
     said = [f"{name}: {material.source}" for name, material in materials.items() if material.assumed]

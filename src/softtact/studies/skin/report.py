@@ -14,7 +14,7 @@ from softtact.files import atomic_path
 from softtact.reporting.page_template import STYLE
 from softtact.reporting.run_record import machine
 from softtact.reporting.words import header
-from softtact.skin.design import Design
+from softtact.skin.design import SkinDesign
 
 CAPTIONS = {
     "probes": "Rise of the pressed taxel under cylindrical probes, for Young's modulus as measured and off by the legend's shares. "
@@ -66,7 +66,7 @@ PAGE = """<!doctype html><html lang="en"><head><meta charset="utf-8"><title>soft
 """
 
 
-def write_page(out: Path, design: Design, tables: dict[str, pd.DataFrame], said: dict[str, Any], *, figures: list[str]) -> None:
+def write_page(out: Path, design: SkinDesign, tables: dict[str, pd.DataFrame], said: dict[str, Any], *, figures: list[str]) -> None:
     """Write report.html into `out`, from the tables by name and the figures of these names below figures/."""
     page = (
         Environment(autoescape=True)

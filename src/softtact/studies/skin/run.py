@@ -11,19 +11,28 @@ from softtact.files import write_csv, write_dataset
 from softtact.geometry.meshes import read_mesh
 from softtact.progress import announce
 from softtact.skin.analysis import Readings, Skin, alone, analyse, probe_curves
-from softtact.skin.choice import front_confidence, main_effects, printed_criteria, search, thickness_table, thinnest, with_scatter
+from softtact.skin.choice import (
+    SearchSpace,
+    front_confidence,
+    main_effects,
+    printed_criteria,
+    search,
+    thickness_table,
+    thinnest,
+    with_scatter,
+)
 from softtact.skin.contact import contact_load, press_at_finite_strains
-from softtact.skin.design import Choice, Design, LoadChoice, Study, bears, needs_of, prepare, reaches
+from softtact.skin.design import Choice, LoadChoice, PreparedDesign, SkinDesign, bears, needs_of, prepare, reaches
 from softtact.skin.layout import Layout
 from softtact.skin.link import lay_modules, write_exports
 from softtact.skin.loads import Load
-from softtact.skin.maps import crosstalk, patch_maps
+from softtact.skin.maps import TaxelLayer, crosstalk, patch_maps
 from softtact.studies.skin import figures
 from softtact.studies.skin.claims import claims_of_skin
 from softtact.studies.skin.report import DRAWN_FROM, write_page
 
 
-def run_design(path: Path, design: Design, out: Path, *, threads: int = 1) -> dict[str, Any]:
+def run_design(path: Path, design: SkinDesign, out: Path, *, threads: int = 1) -> dict[str, Any]:
     """Compute all sections of a design into the folder `out`; return what a command tells of it."""
     study = prepare(design, path)
     (out / "tables").mkdir(parents=True, exist_ok=True)
@@ -91,21 +100,11 @@ def _probe(study, threads):
 
 
 def _skin(study, layout, threads):
-    mesh = study.design.mesh
-    return Skin(
-        layout,
-        thickness_mm=study.design.module.thickness_mm,
-        poisson=study.elastomer.poisson,
-        permittivity=study.elastomer.permittivity_fe,
-        spacing_mm=mesh.spacing_mm,
-        layers=mesh.layers,
-        field_spacing_mm=mesh.field_spacing_mm,
-        field_layers=mesh.field_layers,
-        threads=threads,
-    )
+    return Skin(layout, thickness_mm=study.design.module.thickness_mm, poisson=study.elastomer.poisson,
+                permittivity=study.elastomer.permittivity_fe, mesh=study.design.mesh.sizes(), threads=threads)
 
 
-def _readings(study: Study, skin: Skin, folder: Path) -> Readings:
+def _readings(study: PreparedDesign, skin: Skin, folder: Path) -> Readings:
     choices = {load.name: load for load in study.design.loads}
     for name, load in study.loads.items():
         if load is None:
@@ -113,7 +112,7 @@ def _readings(study: Study, skin: Skin, folder: Path) -> Readings:
     return analyse(skin, [load for load in study.loads.values() if load], elastomer=study.elastomer, converter=study.converter)
 
 
-def _pressed(study: Study, skin: Skin, choice: LoadChoice, folder: Path) -> Load:
+def _pressed(study: PreparedDesign, skin: Skin, choice: LoadChoice, folder: Path) -> Load:
     assert choice.mesh is not None and choice.force_n is not None
     mesh = read_mesh(folder / choice.mesh, unit=choice.unit)
     how: dict[str, Any] = {
@@ -129,7 +128,7 @@ def _pressed(study: Study, skin: Skin, choice: LoadChoice, folder: Path) -> Load
     return press_at_finite_strains(skin, mesh, centre, friction=choice.friction, **how)
 
 
-def _load_table(study: Study, readings: Readings) -> pd.DataFrame:
+def _load_table(study: PreparedDesign, readings: Readings) -> pd.DataFrame:
     """A row a load: what it is and what it does."""
     rows = []
     for number, (name, load) in enumerate(study.loads.items()):
@@ -151,7 +150,7 @@ def _load_table(study: Study, readings: Readings) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _write_readings(study: Study, skin: Skin, readings: Readings, out: Path) -> None:
+def _write_readings(study: PreparedDesign, skin: Skin, readings: Readings, out: Path) -> None:
     """readings.nc, and a figure for each load."""
     top = skin.layer.mesh.nodes_mm[skin.layer.mesh.top, :2]
     per_taxel = {"capacitance_ff": ("fF", "of the deformed skin"), "delta_ff": ("fF", "above rest"), "counts": ("1", "above rest")}
@@ -193,7 +192,7 @@ def _write_readings(study: Study, skin: Skin, readings: Readings, out: Path) -> 
         )
 
 
-def _choose(study: Study, choice: Choice, tables: dict[str, pd.DataFrame], out: Path) -> dict[str, Any]:
+def _choose(study: PreparedDesign, choice: Choice, tables: dict[str, pd.DataFrame], out: Path) -> dict[str, Any]:
     """The tables of the choice; what the command tells of it."""
     target = 1e-3 * choice.target_kpa
     known = [e for e in study.elastomers.values() if reaches(e, target)]
@@ -240,7 +239,7 @@ def _lightest(choice: pd.DataFrame) -> dict[str, Any] | None:
     return {"elastomer": best.elastomer, "thickness_mm": float(best.thickness_mm), "weight_g_module": float(best.weight_g_module)}
 
 
-def _draw_maps(study: Study, skin: Skin, tables: dict[str, pd.DataFrame], out: Path) -> dict[str, float]:
+def _draw_maps(study: PreparedDesign, skin: Skin, tables: dict[str, pd.DataFrame], out: Path) -> dict[str, float]:
     """The maps; what a command tells of them."""
     settings = study.design.maps
     assert settings is not None
@@ -257,18 +256,10 @@ def _draw_maps(study: Study, skin: Skin, tables: dict[str, pd.DataFrame], out: P
     )
     module = study.design.module
     tables["detection"] = maps.table()
-    tables["crosstalk"] = crosstalk(
-        settings.pitches_mm,
-        radius_mm=module.radius_mm,
-        guard_radius_mm=module.guard_radius_mm,
-        thickness_mm=module.thickness_mm,
-        poisson=study.elastomer.poisson,
-        permittivity=study.elastomer.permittivity_fe,
-        young_mpa=young,
-        probe_mm=settings.crosstalk_probe_mm,
-        converter=study.converter,
-        pressure_mpa=pressure,
-    )
+    layer = TaxelLayer(module.radius_mm, module.guard_radius_mm, module.thickness_mm, study.elastomer.poisson,
+                       study.elastomer.permittivity_fe, young)
+    tables["crosstalk"] = crosstalk(settings.pitches_mm, layer, probe_mm=settings.crosstalk_probe_mm, converter=study.converter,
+                                    pressure_mpa=pressure)
     figures.draw_maps(out / "figures/maps.png", study.layout, maps, tables["crosstalk"])
     return {
         "least_force_n": float(maps.smallest_force_n.min()),
@@ -278,17 +269,14 @@ def _draw_maps(study: Study, skin: Skin, tables: dict[str, pd.DataFrame], out: P
     }
 
 
-def _search(study: Study, tables: dict[str, pd.DataFrame], out: Path) -> None:
+def _search(study: PreparedDesign, tables: dict[str, pd.DataFrame], out: Path) -> None:
     settings, choice, module = study.design.search, study.design.choice or Choice(), study.design.module
     assert settings is not None
     names = settings.elastomers or [e.name for e in study.elastomers.values() if bears(e, 1e-3 * choice.range_kpa[1])]
     tables["search"] = search(
         {name: study.elastomers[name] for name in names},
-        thicknesses_mm=settings.thicknesses_mm,
-        radii_mm=settings.radii_mm,
-        pitches_mm=settings.pitches_mm,
-        side_mm=module.side_mm,
-        gap_mm=module.guard_radius_mm - module.radius_mm,
+        SearchSpace(settings.thicknesses_mm, settings.radii_mm, settings.pitches_mm,
+                    gap_mm=module.guard_radius_mm - module.radius_mm, side_mm=module.side_mm),
         needs=needs_of(choice),
         converter=study.converter,
         weight_budget_g=choice.weight_budget_g,
@@ -297,7 +285,8 @@ def _search(study: Study, tables: dict[str, pd.DataFrame], out: Path) -> None:
     tables["main_effects"] = main_effects(tables["search"])
 
 
-def _lay(study: Study, tables: dict[str, pd.DataFrame], out: Path, folder: Path) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
+def _lay(study: PreparedDesign, tables: dict[str, pd.DataFrame], out: Path, folder: Path
+         ) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
     """Places and normals of the taxels on a link, and what a command tells of the modules."""
     link = study.design.link
     assert link is not None
