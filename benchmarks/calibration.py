@@ -15,13 +15,13 @@ from dataclasses import replace
 import numpy as np
 import record
 import trimesh
+from simulated_recordings import HiddenConstants, simulate_recording, staircase_force
 
 import softtact
 from softtact.calibration.experiment import experiment
 from softtact.calibration.fit import calibrate
 from softtact.calibration.ladder import Presses
 from softtact.calibration.problem import Problem
-from softtact.calibration.simulated import HiddenConstants, simulate_recording, staircase_force
 from softtact.readout.calibrated import relative_change
 from softtact.readout.readout import amplified
 from softtact.readout.virtual_sensor import taxel_capacitance

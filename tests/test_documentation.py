@@ -17,10 +17,10 @@ import pandas as pd
 import pytest
 import torch
 import trimesh
+from simulated_recordings import HiddenConstants, simulate_recording, staircase_force
 
 import softtact
 from softtact.calibration.ladder import Presses
-from softtact.calibration.simulated import HiddenConstants, simulate_recording, staircase_force
 from softtact.cli import main
 from softtact.fem.mesh_files import write_mesh
 from softtact.fem.structured_meshes import cylinder

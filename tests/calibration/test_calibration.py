@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
+from simulated_recordings import HiddenConstants
 from support.calibration import BALL, BAR, BLOCK, PLATE, Bench, small_sensor_file
 
 import softtact
@@ -18,7 +19,6 @@ from softtact.calibration.fit import CalibrationResult, calibrate
 from softtact.calibration.ladder import Presses, with_cover
 from softtact.calibration.problem import Problem
 from softtact.calibration.sensor_file import write_calibrated
-from softtact.calibration.simulated import HiddenConstants
 from softtact.errors import InputError
 from softtact.readout.recording import make_recording
 from softtact.readout.virtual_sensor import make_specimen

@@ -6,12 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from make_objects import LOW_FEATURE, make_mesh, object_5, object_6, to_mesh, write_objects
 from scipy import ndimage
 
 from softtact.contact.height_field import HeightField
 from softtact.geometry.meshes import default_pose, place, read_mesh
-from softtact.geometry.shapes import LOW_FEATURE, make_mesh, object_5, object_6, write_objects
-from softtact.geometry.solids import to_mesh
 
 OBJECTS = Path(__file__).parents[2] / "config" / "objects"
 CATALOGUE = yaml.safe_load((OBJECTS / "catalogue.yaml").read_text())

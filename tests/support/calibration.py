@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import trimesh
 import yaml
+from simulated_recordings import HiddenConstants, simulate_recording, staircase_force
 
 from softtact.calibration.experiment import experiment
 from softtact.calibration.ladder import Presses
-from softtact.calibration.simulated import HiddenConstants, simulate_recording, staircase_force
 from softtact.press.sensor import load_sensor
 from softtact.sensors.base import read_mapping
 from softtact.sensors.library import sensor_file

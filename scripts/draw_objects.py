@@ -1,4 +1,4 @@
-"""All objects of a catalogue on one sheet, as the sensor sees them: `python -m softtact.studies.hybrid.object_sheet`."""
+"""All objects of a catalogue on one sheet, as the sensor sees them: `python scripts/draw_objects.py`."""
 
 import argparse
 from collections.abc import Iterable, Sequence
