@@ -33,7 +33,7 @@ from softtact.contact.height_field import HeightField
 from softtact.decks import keywords
 from softtact.decks.laws import law_card
 from softtact.fem.elements import TET4
-from softtact.linalg.direct_single import PardisoSingle
+from softtact.linalg.direct import PardisoSingle
 from softtact.linalg.workers import Workers
 from softtact.materials.laws.registry import make_law
 from softtact.sensors.library import sensor_file

@@ -12,7 +12,7 @@ import numpy as np
 import record
 from scipy.ndimage import gaussian_filter
 
-from softtact.imaging import pooling
+from softtact.imaging import outline
 from softtact.imaging.discs import PASSES, Scene, grey
 from softtact.imaging.frames import expose, illumination
 
@@ -57,11 +57,11 @@ def estimates(image):
 
 def _circles(image):
     """The frame fitted with outlines that are held to circles."""
-    free, pooling.SHAPE_SD = pooling.SHAPE_SD, 1e-4 * pooling.SHAPE_SD
+    free, outline.SHAPE_SD = outline.SHAPE_SD, 1e-4 * outline.SHAPE_SD
     try:
         return Scene(image, passes=PASSES)
     finally:
-        pooling.SHAPE_SD = free
+        outline.SHAPE_SD = free
 
 
 def bound(diameter, places, shape):

@@ -10,7 +10,7 @@ from pathlib import Path
 import record
 from stand_in import SEED, SOURCE, stand_in
 
-from softtact.evaluation.learning_curve import learning_curve
+from softtact.evaluation.retraining import Experiment, learning_curve
 from softtact.evaluation.scoring import score_sensor
 from softtact.learning.settings import Training
 from softtact.learning.training import prepare_torch
@@ -37,8 +37,9 @@ def main(folder):
     """Train, print, draw and write."""
     data = stand_in(Path(folder))
     tests = {name: data[name] for name in TESTS}
-    curve = learning_curve(data["train"], data["validation"], tests, sizes=SIZES, steps=STEPS, network={"architecture": "compact"},
-                           options=Training(learning_rate=3e-3), ssim=SSIM, seed=SEED, device=prepare_torch(threads=1))
+    experiment = Experiment(data["train"], tests, network={"architecture": "compact"}, options=Training(learning_rate=3e-3),
+                            ssim=SSIM, device=prepare_torch(threads=1))
+    curve = learning_curve(experiment, sizes=SIZES, steps=STEPS, seed=SEED)
     print(curve.round(4).to_string(index=False))
     ceilings = {name: float(score_sensor(samples, ssim=SSIM).ssim.mean()) for name, samples in tests.items()}
     save(draw(curve, ceilings), record.RESULTS / "learning_curve.png")

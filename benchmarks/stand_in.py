@@ -13,8 +13,7 @@ import softtact
 from softtact.files import read_yaml, write_dataset
 from softtact.geometry.meshes import read_mesh
 from softtact.geometry.pose import Pose
-from softtact.learning.dataset import SPLITS, build_datasets
-from softtact.learning.samples import read_samples
+from softtact.learning.dataset import SPLITS, build_datasets, read_samples
 from softtact.readout.virtual_sensor import read_virtual_sensor
 
 SOURCE = "virtual sensor on foundation presses"

@@ -11,9 +11,9 @@ MOST_LINES = 500
 # From below: a package imports from those of the lines before its own, and from itself; those of one line know nothing of each
 # other.
 ORDER = (
-    ("errors", "extras"),
+    ("errors",),
     ("unknown_names", "progress", "devices"),
-    ("files", "workbooks", "drawing"),
+    ("files", "drawing"),
     ("tables",),
     ("linalg", "geometry", "materials"),
     ("sensors", "contact", "fem"),

@@ -13,8 +13,7 @@ import trimesh
 import yaml
 
 import softtact
-from softtact.errors import InputError
-from softtact.extras import EXTRAS, missing_extra
+from softtact.errors import EXTRAS, InputError, missing_extra
 from softtact.sensors.library import known_names, material_file, sensor_file
 
 ROOT = Path(__file__).resolve().parents[1]

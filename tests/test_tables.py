@@ -3,8 +3,7 @@
 import openpyxl
 import pytest
 
-from softtact.errors import InputError
-from softtact.extras import missing_extra
+from softtact.errors import InputError, missing_extra
 from softtact.materials.readers import read_curve
 from softtact.tables import read_table
 

@@ -16,8 +16,7 @@ from softtact.contact.penalty import penalty
 from softtact.fem.assembly import SymmetricPattern, add_upper
 from softtact.fem.solid_block import SolidBlock
 from softtact.linalg.block_tridiagonal import BlockTridiagonalSolver
-from softtact.linalg.direct import PardisoSolver, SuperLUSolver, make_solver
-from softtact.linalg.direct_single import point_at_mkl
+from softtact.linalg.direct import PardisoSolver, SuperLUSolver, make_solver, point_at_mkl
 from softtact.linalg.workers import SERIAL, Workers
 
 # Heights (n,) and outward normals (n, 3) of a rigid surface over places x (n,), y (n,).

@@ -31,8 +31,7 @@ from softtact.commands import (
     view,
 )
 from softtact.commands.common import EXIT_TEXT
-from softtact.errors import ConvergenceError, SofttactError
-from softtact.extras import missing_extra
+from softtact.errors import ConvergenceError, SofttactError, missing_extra
 
 COMMANDS = (press, grasp, grasps, skin, palpate, dataset, view, calibrate, predict, complexity, fit, mesh, export_deck,
             detect_discs, cost, stage, completion)

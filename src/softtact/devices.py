@@ -4,8 +4,7 @@ import os
 import re
 from pathlib import Path
 
-from softtact.errors import InputError
-from softtact.extras import how_to_install
+from softtact.errors import InputError, how_to_install
 
 _DRIVERS = ("/dev/nvidiactl", "/dev/dxg", "/dev/kfd")     # NVIDIA's, that of Windows' subsystem for Linux, AMD's
 

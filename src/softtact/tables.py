@@ -6,6 +6,8 @@ A table is read as it says of itself, or refused; nothing in it is guessed.
   fields      each row as many as the header, so that a comma in a number, or the name of a row, shifts no column
   numbers     a decimal point, or a comma where the caller says so; none of thousands, for 1,234 may be either
   `#`         begins a line of notes
+
+Sheets of an Excel workbook as rows of cells; openpyxl reads them, which the extra `excel` brings.
 """
 
 import codecs
@@ -18,7 +20,6 @@ from pathlib import Path
 from statistics import median
 
 from softtact.errors import InputError
-from softtact.workbooks import WORKBOOKS, Cell, read_sheet
 
 SEPARATORS = "\t;,"
 DECIMALS = (".", ",")
@@ -29,6 +30,8 @@ _NOT_CP1252 = set(b"\0\x81\x8d\x8f\x90\x9d")     # bytes that are no letter ther
 _NAMES = {",": "commas", ";": "semicolons", "\t": "tabs"}
 _STATE = "state the decimal comma (--decimal ,)"
 _ROWS_TO_COMPARE = 5    # of fewer rows nothing can be told from how long their numbers are
+WORKBOOKS = (".xlsx", ".xlsm")
+Cell = str | float
 
 
 @dataclass(frozen=True)
@@ -309,3 +312,49 @@ def _of_sheet(path, records, *, what, marker, layout, decimal):
     first = _header_at(path, ["\t".join(map(str, cells)) for _, cells in records], marker, layout)
     (_, header), *rows = records[first:]
     return Table(path, [str(name).strip() for name in header], rows, notes, decimal)
+
+
+def read_sheet(path: str | Path, *, sheet: str | None = None) -> list[tuple[int, list[Cell]]]:
+    """[(row number from 1, cells)] of a sheet: numbers as float, all else as text, "" where nothing stands.
+
+    sheet: its name; without one the workbook's only sheet that holds anything
+    Raises InputError that names the file and the remedy.
+    """
+    import openpyxl  # of an extra: where it is missing, the command says which
+
+    if not Path(path).is_file():
+        raise InputError(f"{path}: there is no such file; give the path of a workbook.")
+    try:
+        book = openpyxl.load_workbook(path, data_only=True)
+        sheets = {page.title: page for page in book.worksheets}
+    except Exception as error:     # the reader of the zip and its XML raises whatever its parts do
+        said = " ".join(str(error).split())[:120]
+        raise InputError(f"{path}: not a readable workbook ({said}); save it again as .xlsx, or as CSV.") from None
+    page = sheets[_chosen(path, sheets, sheet)]
+    return [(row, [_cell(path, cell) for cell in cells]) for row, cells in enumerate(page.iter_rows(), 1)]
+
+
+def _chosen(path, sheets, sheet):
+    """The name of the sheet to read."""
+    if sheet is not None:
+        if sheet not in sheets:
+            raise InputError(f"{path}: there is no sheet {sheet!r}; name one of {', '.join(sheets)}.")
+        return sheet
+    filled = [name for name, page in sheets.items() if any(value is not None for row in page.values for value in row)]
+    if len(filled) != 1:
+        found = f"several sheets hold something, {', '.join(filled)}" if filled else "no sheet holds anything"
+        raise InputError(f"{path}: {found}; name the one to read (--sheet NAME).")
+    return filled[0]
+
+
+def _cell(path, cell):
+    """A cell's content. A number that is shown as percent is refused: what is seen is a hundred times what is stored."""
+    value = cell.value
+    if value is None:
+        return ""
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        if "%" in (cell.number_format or ""):
+            raise InputError(f"{path}, cell {cell.coordinate}: it is shown as percent, so it holds {value:g} for what looks like "
+                             f"{100 * value:g}; format the column as numbers, and let its header say whether they are percent.")
+        return float(value)
+    return str(value)

@@ -7,7 +7,7 @@ from free_bodies.free_press import FreeSettings, _least_squares, press_to_forces
 from free_bodies.tetrahedra import LinearTetrahedra
 
 from softtact.fem.solid_block import SolidBlock
-from softtact.linalg.direct_single import PardisoSingle
+from softtact.linalg.direct import PardisoSingle
 from softtact.materials.laws.registry import make_law
 
 LAWS = {

@@ -12,13 +12,11 @@ from simulated_recordings import HiddenConstants
 from support.calibration import BALL, BAR, BLOCK, PLATE, Bench, small_sensor_file
 
 import softtact
-from softtact.calibration.advice import Candidate, rank
-from softtact.calibration.checks import check_recordings, check_result
+from softtact.calibration.checks import Candidate, check_recordings, check_result, rank
 from softtact.calibration.experiment import experiment
-from softtact.calibration.fit import CalibrationResult, calibrate
+from softtact.calibration.fit import CalibrationResult, calibrate, write_calibrated
 from softtact.calibration.ladder import Presses, with_cover
 from softtact.calibration.problem import Problem
-from softtact.calibration.sensor_file import write_calibrated
 from softtact.errors import InputError
 from softtact.readout.recording import make_recording
 from softtact.readout.virtual_sensor import make_specimen

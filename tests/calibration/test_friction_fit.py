@@ -9,9 +9,8 @@ from simulated_recordings import HiddenConstants
 from support.calibration import Bench, small_sensor_file
 
 from softtact.calibration.fit import calibrate
-from softtact.calibration.ladder import Presses
+from softtact.calibration.ladder import FRICTIONS, Presses, friction_weights, with_friction
 from softtact.calibration.problem import Problem
-from softtact.calibration.rubbing import FRICTIONS, friction_weights, with_friction
 from softtact.models.hyperelastic.presets import PRESETS
 from softtact.press.sensor import load_sensor
 

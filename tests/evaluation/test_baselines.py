@@ -5,8 +5,8 @@ import pandas as pd
 import pytest
 from support.sensors import CORO
 
-from softtact.evaluation.baselines import KINDS, make_predictors, moved_by_a_taxel, score_baselines, taxel_depths, taxel_table
-from softtact.learning.samples import Samples
+from softtact.evaluation.score_tables import KINDS, make_predictors, moved_by_a_taxel, score_baselines, taxel_depths, taxel_table
+from softtact.learning.dataset import Samples
 from softtact.readout.capacitance import ideal_counts
 
 SSIM = {"window": 3, "data_range": 2400}

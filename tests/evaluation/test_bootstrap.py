@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from softtact.evaluation.bootstrap import by_trial, interval_of_mean
+from softtact.evaluation.scoring import by_trial, interval_of_mean
 
 
 def interval(values, items, trials=None, **options):

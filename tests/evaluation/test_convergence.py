@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from softtact.evaluation.convergence import convergence
+from softtact.evaluation.networks import convergence
 
 
 def history(validation, train):

@@ -5,7 +5,7 @@ import pytest
 import xarray
 from support.sensors import CORO
 
-from softtact.evaluation.gains import SHARES, gain_table
+from softtact.evaluation.limits import SHARES, gain_table
 from softtact.readout.virtual_sensor import VirtualSensorSettings
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from softtact.evaluation.overlap import contact_patch_overlap
+from softtact.evaluation.scoring import contact_patch_overlap
 
 
 def patch(rows, columns, *, counts=1000.0):

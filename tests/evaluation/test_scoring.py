@@ -6,9 +6,16 @@ import pytest
 import torch
 import xarray
 
-from softtact.evaluation.scoring import predict_grasps, score_items, score_samples, score_sensor, summarise_scores
-from softtact.evaluation.timing import summarise_times, time_presses
-from softtact.learning.samples import Samples
+from softtact.evaluation.scoring import (
+    predict_grasps,
+    score_items,
+    score_samples,
+    score_sensor,
+    summarise_scores,
+    summarise_times,
+    time_presses,
+)
+from softtact.learning.dataset import Samples
 
 SSIM = {"window": 3, "data_range": 2400}
 FORCES = [10.0, 20.0]

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from softtact.geometry.meshes import place, read_mesh
-from softtact.geometry.places import RIM_MM, draw_poses
-from softtact.geometry.pose import Pose
+from softtact.geometry.pose import RIM_MM, Pose, draw_poses
 
 OBJECTS = Path(__file__).parents[2] / "config" / "objects"
 FOOTPRINT = (22.0, 37.0)

@@ -5,7 +5,7 @@ import pandas as pd
 import xarray
 
 from softtact.files import write_dataset
-from softtact.learning.samples import Samples
+from softtact.learning.dataset import Samples
 
 FORCES = np.array([10.0, 20.0, 30.0])
 Y, X = np.linspace(-18, 18, 57), np.linspace(-10.5, 10.5, 33)

@@ -6,8 +6,7 @@ import pytest
 from formula_study import MODELS
 
 from softtact.errors import ConvergenceError, InputError
-from softtact.learning.dataset import SPLITS, build_datasets
-from softtact.learning.samples import read_samples
+from softtact.learning.dataset import SPLITS, build_datasets, read_samples
 from softtact.studies.hybrid.stages import build_dataset
 
 

@@ -8,8 +8,7 @@ import pytest
 import yaml
 
 from softtact.errors import InputError
-from softtact.learning.dataset import assign_splits, check_items, list_load_steps
-from softtact.learning.samples import object_of
+from softtact.learning.dataset import assign_splits, check_items, list_load_steps, object_of
 from softtact.studies.hybrid.config import load_study
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from formula_study import make_samples
 
-from softtact.evaluation.learning_curve import COLUMNS, learning_curve
+from softtact.evaluation.retraining import SIZES_COLUMNS, Experiment, learning_curve
 from softtact.learning.settings import Training
 from softtact.learning.training import prepare_torch
 
@@ -15,9 +15,11 @@ SIZES = (4, 16, 64)
 def curve():
     unseen = make_samples(16, first=1000, split="unseen")
     validation = make_samples(8, first=500, split="validation")
-    return learning_curve(make_samples(64), validation, {"validation": validation, "unseen": unseen}, sizes=SIZES, steps=48,
-                          network={"architecture": "compact", "filters": (4, 8, 16)}, options=Training(batch=8, learning_rate=3e-3),
-                          ssim={"window": 3, "data_range": 2400}, seed=1, device=prepare_torch(threads=1))
+    experiment = Experiment(make_samples(64), {"validation": validation, "unseen": unseen},
+                            network={"architecture": "compact", "filters": (4, 8, 16)},
+                            options=Training(batch=8, learning_rate=3e-3),
+                            ssim={"window": 3, "data_range": 2400}, device=prepare_torch(threads=1))
+    return learning_curve(experiment, sizes=SIZES, steps=48, seed=1)
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +35,7 @@ def test_more_maps_read_unseen_dents_better_in_equal_steps(found):
 
 
 def test_a_row_per_size_and_set_the_same_again(found):
-    assert found.columns.tolist() == COLUMNS and len(found) == 6
+    assert found.columns.tolist() == SIZES_COLUMNS and len(found) == 6
     pd.testing.assert_frame_equal(found, curve(), check_exact=True)
 
 

@@ -24,9 +24,8 @@ from support.sensors import CORO
 from softtact.errors import InputError
 from softtact.evaluation.scoring import SSIM_COLUMNS
 from softtact.files import read_dataset, read_json
-from softtact.learning.dataset import SPLITS
+from softtact.learning.dataset import SPLITS, read_samples
 from softtact.learning.network import load_network, predict
-from softtact.learning.samples import read_samples
 
 SPACE = {"filters": [[2, 4], [2, 4], [2, 4]], "dense": [8, 24], "learning_rate": [1e-3, 1e-2]}
 SETTINGS = {"search": {"trials": 2, "max_epochs": 2, "batch": 8, "space": SPACE},

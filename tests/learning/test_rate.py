@@ -6,8 +6,8 @@ import pytest
 from formula_study import TINY, make_samples
 
 from softtact.errors import InputError
-from softtact.learning.rate import best_rate, try_rates
 from softtact.learning.settings import Network, Training, chosen_training, found_for
+from softtact.learning.training import best_rate, try_rates
 
 TRIAL, SEARCH = {"architecture": "printed", "learning_rate": 2e-4}, {"filters": [3], "dense": 8, "learning_rate": 5e-3}
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from softtact.linalg import dense_cholesky
-from softtact.linalg.dense_cholesky import factor_in_place
+from softtact.linalg import lapack
+from softtact.linalg.lapack import factor_in_place
 from softtact.linalg.workers import Workers
 
-BLOCK = dense_cholesky._BLOCK
+BLOCK = lapack._BLOCK
 
 
 def positive_matrix(size):

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from softtact.linalg.direct import PardisoSolver, SuperLUSolver, make_solver
-from softtact.linalg.direct_single import point_at_mkl
+from softtact.linalg.direct import PardisoSolver, SuperLUSolver, make_solver, point_at_mkl
 
 pytest.importorskip("pypardiso")
-from softtact.linalg.direct_single import PardisoSingle
+from softtact.linalg.direct import PardisoSingle
 
 SOLVERS = {"pardiso": (PardisoSolver, 1e-12), "rough": (PardisoSingle, 1e-4), "superlu": (SuperLUSolver, 1e-12)}
 

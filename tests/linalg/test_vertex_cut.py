@@ -6,9 +6,8 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import maximum_bipartite_matching
 from scipy.spatial import Delaunay
 
-from softtact.linalg.nested_dissection import dissect
+from softtact.linalg.nested_dissection import dissect, least_cover, shortened
 from softtact.linalg.symbolic import lay_out
-from softtact.linalg.vertex_cut import least_cover, shortened
 
 
 @pytest.fixture(scope="module")

@@ -7,14 +7,12 @@ import pytest
 
 from softtact.errors import ExtrapolationWarning, InputError
 from softtact.files import write_json
-from softtact.materials.agreement import difference, partings, paths_inside, paths_outside
-from softtact.materials.bulk import bulk_modulus
-from softtact.materials.card_making import make_card
+from softtact.materials.card_making import difference, make_card, partings, paths_inside, paths_outside
 from softtact.materials.cards import law_from_card, linear_from_card, load_card
 from softtact.materials.consistency import disagreements
 from softtact.materials.curves import Curve, VolumetricCurve, synthetic_curve
 from softtact.materials.laws.registry import make_law
-from softtact.materials.linear import LinearConstants, young_modulus
+from softtact.materials.linear import LinearConstants, bulk_modulus, young_modulus
 from softtact.materials.readers import read_curve, read_curves
 from softtact.press.hyperelastic import _warn_extrapolation
 

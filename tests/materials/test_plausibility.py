@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from softtact.errors import InputError
-from softtact.materials.branches import order
-from softtact.materials.plausibility import remarks
-from softtact.materials.readers import read_curves
+from softtact.materials.checks import remarks
+from softtact.materials.readers import order, read_curves
 
 MU = 0.35
 EXPONENT = {"uniaxial": -2, "planar": -3, "equibiaxial": -5}

@@ -5,9 +5,8 @@ import pytest
 
 from softtact.errors import InputError
 from softtact.materials.checks import refuse_mixed_units
-from softtact.materials.curves import Curve, VolumetricCurve, join_by_mode, write_curve
+from softtact.materials.curves import Curve, VolumetricCurve, join_by_mode, refuse_idle, write_curve
 from softtact.materials.readers import read_curve, read_curves
-from softtact.materials.windows import refuse_idle
 
 PLAIN = "stretch,nominal_stress_mpa\n0.8,-0.3\n1.0,0.0\n1.2,0.2\n"
 

@@ -5,9 +5,9 @@ import pytest
 from scipy.optimize import brentq
 
 from softtact.materials.config import law_from_printed
+from softtact.materials.consistency import is_stable, log_tangent, plane_tangent, stable_range, stable_ranges
 from softtact.materials.laws.base import TEST_PATHS
 from softtact.materials.laws.registry import LAWS, make_law
-from softtact.materials.stability import is_stable, log_tangent, plane_tangent, stable_range, stable_ranges
 
 
 def test_at_rest_the_tangent_is_that_of_an_incompressible_plane():

@@ -10,7 +10,7 @@ from support.sensors import CORO
 
 from softtact.errors import InputError
 from softtact.files import read_dataset
-from softtact.learning.samples import read_samples
+from softtact.learning.dataset import read_samples
 from softtact.studies.hybrid.stages import build_dataset, import_published
 
 SPLITS = ("train", "validation", "unseen", "grasps")

@@ -5,9 +5,7 @@ import pytest
 from small_archive import Archive, counts_of, dent
 
 from softtact.errors import InputError
-from softtact.published.archive import find_archive
-from softtact.published.arrangement import ARRANGEMENTS, arrange, correlations
-from softtact.published.counts import PRINTED, counts_sentence, counts_table
+from softtact.published.archive import ARRANGEMENTS, PRINTED, arrange, correlations, counts_sentence, counts_table, find_archive
 from softtact.published.importing import files_table, found_counts, items_of, read_archive, sign_towards_pcb
 from softtact.published.pairing import object_name
 

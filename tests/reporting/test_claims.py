@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 import xarray
 
-from softtact.evaluation.features import feature_table
+from softtact.evaluation.curve_shape import feature_table
 from softtact.geometry.complexity import choose_model
 from softtact.studies.hybrid.claims.of_choice import detail_family
 from softtact.studies.hybrid.claims.table import claims

@@ -74,7 +74,7 @@ def test_an_edit_of_a_materials_law_reruns_the_fits_and_after(finished):
 
 def test_an_edit_of_how_laws_are_fitted_plans_the_fits_again(finished):
     """Snakemake plans what depends on them, too; where the cards come out the same their bytes stop it."""
-    edit_source(finished, "src/softtact/materials/prediction.py")
+    edit_source(finished, "src/softtact/materials/card_making.py")
     plan = finished.plan()
     assert "fit_material" in plan and "mesh_sensor" not in plan
 

@@ -1,19 +1,34 @@
-"""From experiments to a calibrated sensor: best unknowns, their covariance, and what the presses do not tell."""
+"""From experiments to a calibrated sensor: best unknowns, their covariance, and what the presses do not tell.
+
+The file of a calibrated sensor: a copy of the sensor's own with a block `calibration`, which `load_sensor` reads.
+
+How far the hyperelastic model, which a calibration takes too long to fit by, lies from the calibrated sensor.
+"""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import yaml
 from scipy.optimize import least_squares
 
+from softtact.calibration.ladder import COVERS, Presses, parabola, with_cover, with_friction
 from softtact.calibration.problem import Linear, Problem
 from softtact.errors import ConvergenceError
+from softtact.files import atomic_path
 from softtact.progress import announce
+from softtact.readout.calibrated import relative_change
+from softtact.sensors.base import read_mapping
 from softtact.sensors.calibration import CalibrationBlock
+from softtact.sensors.edge import SidesBelow
+from softtact.sensors.specification import spec_from_dict
 
 _ROUNDS, _SETTLED = 6, 0.5       # of pressing anew, until that changes counts by less than half of a mean's noise
 _UNKNOWN = 0.5                   # of the prior's standard deviation: what is left above it, the presses do not tell
 _PARTS = 0.35                    # of a direction's length: what is named as a part of it
+_HEAD = "# Made by `softtact calibrate` from {source}. Counts: gain x counts_per_relative_change x dC/C0 + zero_counts.\n"
 
 
 @dataclass(frozen=True)
@@ -199,3 +214,62 @@ def in_words(name: str) -> str:
     alone = {"ln scale": "the common gain", "ln modulus": "the modulus scale", "cover": "the cover's thickness",
              "friction": "the object's friction"}
     return alone.get(name) or f"{words[kind]} {number}"
+
+
+def write_calibrated(path: str | Path, sensor_file: str | Path, result: CalibrationResult) -> None:
+    """Write the sensor in `sensor_file` with what a calibration found; the file is checked before it takes its place."""
+    values = read_mapping(sensor_file)
+    block = result.block()
+    if "cover" in result.problem.names:
+        spec: Any = result.problem.presses.sensor.spec     # of kind frusta, else there were no presses
+        thicker = with_cover(spec, result.problem.value(result.vector, "cover", 1.0))
+        values["cover"]["thickness_mm"] = _calibrated(thicker.cover.thickness_mm, block.source)
+        if isinstance(thicker.edge.held, SidesBelow):
+            values["edge"] = thicker.edge.model_dump(mode="json") | {
+                "held": {"sides_below_mm": _calibrated(thicker.edge.held.sides_below_mm, block.source)}}
+    if "friction" in result.problem.names:
+        found = round(result.problem.value(result.vector, "friction", 0.0), 4)
+        values["friction"] = values.get("friction", {}) | {"object": {"value": found, "reason": f"calibrated from {block.source}"}}
+    values["calibration"] = block.model_dump(mode="json")
+    spec_from_dict(values, where=str(path))
+    text = yaml.safe_dump(values, sort_keys=False, default_flow_style=None, width=120, allow_unicode=True)
+    with atomic_path(path) as temporary:
+        temporary.write_text(_HEAD.format(source=block.source) + text, encoding="utf-8")
+
+
+def _calibrated(value_mm, source):
+    return {"value": round(value_mm, 5), "reason": f"calibrated from {source}"}
+
+
+def hyperelastic_differences(result: CalibrationResult) -> list[float | None]:
+    """How far, in counts (root mean square), the hyperelastic model lies from the calibrated one at each press' largest force.
+
+    That is the largest for which the calibrated one is valid. Both have the calibrated gains, moduli, cover, friction and places,
+    and no creep. None where there is no valid force, or where the hyperelastic model does not reach it.
+    """
+    return [_difference(result, k) for k in range(len(result.problem.experiments))]
+
+
+def _difference(result, k):
+    problem, one = result.problem, result.problem.experiments[k]
+    cover = problem.value(result.vector, "cover", 1.0)
+    sensor, place = problem.presses.sensor, problem.place(result.vector, k)
+    force = min(problem.valid_n[k], float(one.force_n.max()) / result.modulus_scale)
+    if force == 0:
+        return None
+    announce(f"{one.name}: pressing by the hyperelastic model at {force:.3g} N")
+    friction, spec = problem.value(result.vector, "friction", 0.0), with_cover(sensor.spec, cover)
+    if "friction" in problem.names:
+        spec = with_friction(spec, friction)
+    calibrated = replace(sensor, spec=spec, prepared_models={})
+    try:
+        other = Presses(calibrated, model="hyperelastic", levels=1).ladder(one.mesh, place, largest_n=force).maps_mm[-1]
+    except ConvergenceError:
+        return None
+    shares = parabola(COVERS, cover) if "cover" in problem.names else {1.0: 1.0}
+    own = sum(share * problem.presses.ladder(one.mesh, place, largest_n=force, cover=variant).maps_mm[-1]
+              for variant, share in shares.items())
+    own = own + sum(share * np.tensordot(ladder.weights(np.array([force]))[0], ladder.maps_mm, 1)
+                    for share, ladder in problem.rubbed(k, friction))
+    apart = result.linear.gain * (relative_change(sensor.spec, other) - relative_change(sensor.spec, own))
+    return float(np.sqrt(np.mean(apart**2)))

@@ -15,8 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from softtact.calibration.experiment import Experiment
-from softtact.calibration.ladder import COVERS, SOFTEST, Presses, parabola
-from softtact.calibration.rubbing import FRICTIONS, friction_weights, rubbing
+from softtact.calibration.ladder import COVERS, FRICTIONS, SOFTEST, Presses, friction_weights, parabola, rubbing
 from softtact.errors import InputError
 from softtact.press.ladder import Ladder
 from softtact.readout.calibrated import relative_change

@@ -51,10 +51,8 @@ def _calibrate(options):
     given = _checked(options)
     spec = sensor_spec(options.sensor)
     fitted = () if options.fit == "none" else tuple(options.fit.split(","))
-    from softtact.calibration.advice import quarters, rank
-    from softtact.calibration.checks import check_recordings, check_result
-    from softtact.calibration.fit import calibrate
-    from softtact.calibration.hyperelastic_check import hyperelastic_differences
+    from softtact.calibration.checks import check_recordings, check_result, quarters, rank
+    from softtact.calibration.fit import calibrate, hyperelastic_differences
     from softtact.calibration.ladder import Presses, uncalibrated
     from softtact.calibration.problem import Problem
     from softtact.geometry.meshes import read_mesh
@@ -94,7 +92,7 @@ def _checked(options):
 
 def _write(options, result, notes, advice):
     """Write the calibrated sensor's file and, where asked for, the page; tell the notes."""
-    from softtact.calibration.sensor_file import write_calibrated
+    from softtact.calibration.fit import write_calibrated
 
     write_calibrated(options.out, sensor_path(options.sensor), result)
     if options.report:

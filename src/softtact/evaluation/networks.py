@@ -1,4 +1,15 @@
-"""Several networks on the same split: how well each reads, and what it costs."""
+"""Several networks on the same split: how well each reads, and what it costs.
+
+How a training ended, and what is left of its loss: the sensor's noise, the data, the optimiser or the network.
+
+Judged by the losses alone, in this order:
+noise        the losses on validation and unseen indenters are within CLOSE of what the sensor's own trials differ by
+optimiser    the best validation loss still fell by more than STILL over the last quarter of the epochs: train for longer
+data         the loss on validation maps, or on unseen indenters, is more than GAP times the training loss: the network reads what
+             it has seen and not the rest, so that more maps would bring the two together (validation maps alone are of indenters
+             that training saw)
+network      neither: this network, from these weights and with this rate, fits no better
+"""
 
 import statistics
 from collections.abc import Sequence
@@ -7,21 +18,20 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from softtact.evaluation.convergence import COLUMNS as CONVERGENCE
-from softtact.evaluation.convergence import convergence
 from softtact.evaluation.score_tables import ALL_FORCES
-from softtact.evaluation.scoring import score_samples, summarise_scores
-from softtact.evaluation.timing import seconds
+from softtact.evaluation.scoring import score_samples, seconds, summarise_scores
 from softtact.learning.network import predict
 
 if TYPE_CHECKING:
     import torch
 
-    from softtact.learning.samples import Samples
+    from softtact.learning.dataset import Samples
 
 BESIDE = {"mean_reading_ssim": "mean_reading", "quadratic_ssim": "quadratic", "gap_formula_ssim": "gap_formula"}
+CONVERGENCE = ["learning_rate", "best_epoch", "train_loss", "validation_loss", "unseen_loss", "late_fall", "remains"]
 COLUMNS = ["model", "architecture", "weights", "set", "items", "maps", "ssim", "ssim_low", "ssim_high", "mae_counts", "overlap",
            "sensor_ssim", *BESIDE, "skill", "skill_simple", *CONVERGENCE, "epochs", "epoch_s", "map_s"]
+CLOSE, STILL, GAP = 1.25, 0.02, 1.5
 
 
 class Trained(NamedTuple):
@@ -86,3 +96,24 @@ def time_of_a_map(network: "torch.nn.Module", maps_mm: np.ndarray, *, repeats: i
     one = maps_mm[:1]
     predict(network, one)
     return statistics.median(seconds(predict, network, one) for _ in range(repeats))
+
+
+def convergence(history: "pd.DataFrame", *, noise_loss: float = np.nan, unseen_loss: float = np.nan) -> dict[str, Any]:
+    """CONVERGENCE of a training's history.csv; losses in counts, summed over the taxels, at the best epoch.
+
+    late_fall: share by which the best validation loss fell over the last quarter of the epochs
+    noise_loss: the same loss of the sensor's trials against each other; nan where it was read once
+    unseen_loss: the same of the best network on indenters that training never saw; nan where it is not known
+    """
+    best = history.loc[history.validation_loss.idxmin()]
+    early = history.validation_loss.iloc[:max(1, (3 * len(history)) // 4)].min()
+    fall = 1.0 - best.validation_loss / early
+    test_loss = np.fmax(best.validation_loss, unseen_loss)
+    if test_loss <= CLOSE * noise_loss:
+        remains = "noise"
+    elif fall > STILL or len(history) < 4:
+        remains = "optimiser"
+    else:
+        remains = "data" if test_loss > GAP * best.train_loss else "network"
+    return {"learning_rate": history.learning_rate.iloc[0], "best_epoch": int(best.epoch), "train_loss": best.train_loss,
+            "validation_loss": best.validation_loss, "unseen_loss": unseen_loss, "late_fall": fall, "remains": remains}

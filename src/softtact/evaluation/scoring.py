@@ -1,15 +1,27 @@
-"""How well a network reads what it never saw, and how well the sensor repeats itself."""
+"""How well a network reads what it never saw, and how well the sensor repeats itself.
 
+How sure a mean score is: a bootstrap that respects what belongs together.
+
+Maps of one object are alike, and so are maps of one trial (one loading, one drift). So objects are drawn with replacement,
+then trials of each drawn object; a trial brings all its maps.
+
+Do the network and the sensor feel the contact in the same place? Overlap of the two contact patches on the taxels.
+
+How long a map takes: the solver's time from the press files, and the network's, measured here.
+"""
+
+import statistics
+import time
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 import xarray
+from scipy import stats
 
-from softtact.evaluation.bootstrap import interval_of_mean
-from softtact.evaluation.overlap import contact_patch_overlap
+from softtact.learning.dataset import Samples, object_of
 from softtact.learning.network import predict
-from softtact.learning.samples import Samples, object_of
 from softtact.readout.ssim import map_ssim, mean_absolute_counts, others_mean, own_range_ssim
 
 if TYPE_CHECKING:
@@ -17,6 +29,10 @@ if TYPE_CHECKING:
 
 SSIM_COLUMNS = ["model", "set", "item", "trial", "force_n", "ssim", "ssim_own_range", "mae_counts", "mean_counts", "overlap"]
 CEILING_COLUMNS = ["set", "item", "force_n", "ssim", "ssim_own_range", "mae_counts", "mean_counts"]
+LEVEL, REPEATS = 0.95, 2000
+SHARE = 0.1             # of the reading's largest count, from which on a taxel belongs to the patch
+FLOOR_COUNTS = 30.0     # at least: some four standard deviations of the virtual sensor's offsets and noise together
+TIMING_COLUMNS = ["model", "item", "set", "force_n", "solver_s", "network_s"]
 
 
 def score_samples(network: "torch.nn.Module", samples: Samples, *, ssim: dict[str, Any]) -> pd.DataFrame:
@@ -119,3 +135,85 @@ def score_items(scores: pd.DataFrame, *, seed: int) -> pd.DataFrame:
         rows.append({"model": model, "set": set_name, "item": item, "maps": len(group), "ssim": group.ssim.mean(), "ssim_low": low,
                      "ssim_high": high, "mae_counts": group.mae_counts.mean(), "overlap": group.overlap.mean()})
     return pd.DataFrame(rows)
+
+
+def interval_of_mean(values: np.ndarray, items: "np.ndarray | pd.Series", trials: "np.ndarray | pd.Series", *, seed: int,
+                     level: float = LEVEL, repeats: int = REPEATS) -> tuple[float, float]:
+    """(low, high) of the mean of `values` (n,), by percentiles over `repeats` draws; items, trials (n,) say what belongs together.
+
+    With a single item nothing tells how items differ: (nan, nan). With few, plain percentiles are too narrow (by a third for
+    five), so they are taken farther out, to where Student's interval of a normal sample ends (expanded percentiles, Hesterberg
+    2015).
+    """
+    sums, counts, n_trials = by_trial(values, items, trials)     # (item, trial) each, and (item,)
+    if len(n_trials) < 2:
+        return np.nan, np.nan
+    rng = np.random.default_rng(seed)
+    drawn = rng.integers(len(n_trials), size=(repeats, len(n_trials)))                          # (repeats, item)
+    picks = np.floor(rng.random((*drawn.shape, sums.shape[1])) * n_trials[drawn, None]).astype(int)   # (repeats, item, trial)
+    taken = np.arange(sums.shape[1]) < n_trials[drawn, None]     # an item brings as many trials as it has
+    total, count = ((table[drawn[..., None], picks] * taken).sum(axis=(1, 2)) for table in (sums, counts))
+    n = len(n_trials)
+    tail = stats.norm.cdf(-np.sqrt(n / (n - 1)) * stats.t.ppf(0.5 * (1 + level), n - 1))
+    low, high = np.quantile(total / count, [tail, 1 - tail])
+    return float(low), float(high)
+
+
+def by_trial(values: np.ndarray, items: "np.ndarray | pd.Series",
+             trials: "np.ndarray | pd.Series") -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Sums and counts of `values` per item and trial, trials counted from 0 within an item; and each item's number of trials."""
+    _, item = np.unique(np.asarray(items).astype(str), return_inverse=True)
+    pairs, pair = np.unique(np.stack([item, np.asarray(trials)]), axis=1, return_inverse=True)
+    n_trials = np.bincount(pairs[0])
+    column = np.arange(pairs.shape[1]) - (np.cumsum(n_trials) - n_trials)[pairs[0]]
+    sums, counts = np.zeros((2, len(n_trials), n_trials.max()))
+    sums[pairs[0], column] = np.bincount(pair.ravel(), weights=values)
+    counts[pairs[0], column] = np.bincount(pair.ravel())
+    return sums, counts, n_trials
+
+
+def contact_patch_overlap(predicted: np.ndarray, measured: np.ndarray, *, share: float = SHARE,
+                          floor_counts: float = FLOOR_COUNTS) -> np.ndarray:
+    """Intersection over union (n,) of the contact patches of tactile maps (n, row, column) in counts.
+
+    A patch is the taxels above a threshold: `share` of the *measured* map's maximum, but no less than `floor_counts`. Both
+    maps are cut at the same counts, so a prediction of the right shape that is far too faint loses its patch. Two empty
+    patches agree: 1.
+    """
+    threshold = np.maximum(share * measured.max(axis=(1, 2), keepdims=True), floor_counts)
+    ours, theirs = predicted > threshold, measured > threshold
+    both, either = ((ours & theirs).sum(axis=(1, 2)), (ours | theirs).sum(axis=(1, 2)))
+    return np.where(either == 0, 1.0, both / np.maximum(either, 1))
+
+
+def time_presses(presses: "Iterable[xarray.Dataset]", networks: "dict[str, torch.nn.Module]", *,
+                 predict: "Callable[[torch.nn.Module, np.ndarray], np.ndarray]", repeats: int = 3) -> pd.DataFrame:
+    """A row per map: model, item, set, force_n, solver_s, network_s.
+
+    presses: data sets of `simulate_press`;  networks {model: network};  predict(network, maps (1, y, x))
+    network_s: median over `repeats` of one map alone through the network, as one press would use it
+    """
+    rows = []
+    for press in presses:
+        names = [press.attrs[name] for name in ("model", "item", "set")]
+        network = networks[names[0]]
+        predict(network, press.deformation_map_mm.values[:1])  # the first call allocates: it is no map's cost
+        for load_step, force in enumerate(press.normal_force_n.values):
+            one = press.deformation_map_mm.values[load_step:load_step + 1]
+            network_s = statistics.median(seconds(predict, network, one) for _ in range(repeats))
+            rows.append((*names, float(force), float(press.wall_time_s.values[load_step]), network_s))
+    return pd.DataFrame(rows, columns=TIMING_COLUMNS)
+
+
+def seconds(call: Callable[..., object], *arguments: object) -> float:
+    """Wall time of one call, s."""
+    start = time.perf_counter()
+    call(*arguments)
+    return time.perf_counter() - start
+
+
+def summarise_times(timing: pd.DataFrame) -> pd.DataFrame:
+    """Time per map of solver and network together, s: model, maps, mean, min, max, sd."""
+    total = timing.assign(total_s=timing.solver_s + timing.network_s)
+    return total.groupby("model", sort=False).total_s.agg(
+        maps="size", mean="mean", min="min", max="max", sd="std").reset_index()

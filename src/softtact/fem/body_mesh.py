@@ -17,8 +17,7 @@ from softtact.errors import InputError
 from softtact.fem.elements import TET10, TRI6
 from softtact.fem.quadratic_nodes import raised
 from softtact.fem.solid_mesh import SolidMesh
-from softtact.geometry.bodies import volume_of
-from softtact.geometry.meshes import UNIT_MM, check_body, plausible_facets, read_mesh, refuse_folded
+from softtact.geometry.meshes import UNIT_MM, check_body, plausible_facets, read_mesh, refuse_folded, volume_of
 from softtact.geometry.tetrahedra import ClosestPoints, check_fillable, fill, quality
 
 MOST_ELEMENTS = 400_000      # about 1.7 million unknowns

@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from softtact.linalg.lapack import ROUTINES, address, call, keep_alive
-from softtact.linalg.row_loops import add_row, row_product
+from softtact.linalg.lapack import ROUTINES, add_row, address, call, keep_alive, row_product
 from softtact.linalg.workers import SERIAL, Workers, slices
 
 _AT_ONCE = 60                # bodies that one thread reduces or recovers at once

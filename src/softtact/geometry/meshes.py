@@ -2,15 +2,18 @@
 
 What a solver would silently get wrong (open, inverted, overlapping or wrongly scaled meshes) is refused here, in one
 sentence with its remedy.
+
+Closed meshes as solids: their union, and whether one that faces inwards is a cavity of them.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import trimesh
+from manifold3d import Manifold, Mesh64
 
 from softtact.errors import InputError
-from softtact.geometry.bodies import OVERLAP, is_cavity, union_of, volume_of
 from softtact.geometry.obj import read_obj
 from softtact.geometry.ply import read_ply
 from softtact.geometry.pose import Pose
@@ -24,6 +27,7 @@ _MERGE_DECIMALS = 5  # of a coordinate in mm: corners closer than 10 nm are one
 _FLAT = 1e-6  # thickness over size below which a mesh is no body
 _FOLD = 5e-7  # one minus the cosine of the angle, 1e-3, below which two facets on one side of an edge lie on each other
 _SLIVER = 1e-3  # of the size: facets lower than this have no certain normal
+OVERLAP = 1e-6  # of a body's volume: what is less is round-off
 
 
 def read_triangles(path: str | Path, *, unit: str, min_size_mm: float = MIN_SIZE_MM,
@@ -227,3 +231,34 @@ def _refuse_overlapping(path: Path, mesh: trimesh.Trimesh) -> None:
     if outside:
         raise InputError(f"{path}: {outside} of its {len(pieces)} closed pieces face inwards and are no cavities of the others; "
                          "flip them, for example with 'Recalculate outside' of Blender.")
+
+
+def volume_of(mesh: trimesh.Trimesh) -> float:
+    """Volume of a closed mesh, negative of one that faces inwards; trimesh's own warns of a division by a volume of 0."""
+    a, b, c = np.moveaxis(mesh.triangles - mesh.vertices.mean(axis=0), 1, 0)
+    return float(np.einsum("kd,kd->", a, np.cross(b, c)) / 6)
+
+
+def solid_of(mesh: trimesh.Trimesh, *, inverted: bool = False) -> Manifold:
+    """`Manifold` of a closed mesh, of which the facets are turned if it is `inverted`; empty where it is none."""
+    faces = mesh.faces[:, ::-1] if inverted else mesh.faces
+    return Manifold(Mesh64(np.ascontiguousarray(mesh.vertices, dtype=float), np.ascontiguousarray(faces, dtype=np.uint64)))
+
+
+def union_of(meshes: Sequence[trimesh.Trimesh]) -> Manifold | None:
+    """One `Manifold` of closed meshes, or None where one of them is none, or there are none."""
+    solids = [solid_of(mesh) for mesh in meshes]
+    if not solids or any(solid.is_empty() for solid in solids):
+        return None
+    union = solids[0]
+    for solid in solids[1:]:
+        union = union + solid
+    return union
+
+
+def is_cavity(piece: trimesh.Trimesh, solid: Manifold) -> bool:
+    """Whether a closed mesh that faces inwards lies within a `Manifold`."""
+    if solid is None:
+        return False
+    cavity = solid_of(piece, inverted=True)
+    return (solid ^ cavity).volume() > (1 - OVERLAP) * cavity.volume()

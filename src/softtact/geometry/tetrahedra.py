@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from softtact.errors import InputError
-from softtact.extras import how_to_install
-from softtact.geometry.bodies import volume_of
+from softtact.errors import InputError, how_to_install
+from softtact.geometry.meshes import volume_of
 
 ELEMENTS_PER_CUBE = 13     # in a cube whose sides are the size: measured 10 to 30, fewest where the size is small against the body
 _CORNER_SHARE = 0.5        # of its quality that a tetrahedron may lose where a corner of it moves onto the surface

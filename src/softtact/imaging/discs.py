@@ -24,10 +24,11 @@ from softtact.imaging.outline import (
     box,
     contrast_light,
     corners,
+    first_priors,
     fit_outline,
     inside,
+    pooled_priors,
 )
-from softtact.imaging.pooling import first_priors, pooled_priors
 from softtact.imaging.regions import EDGE_SCALE, FAINTEST, find_regions, is_ring, noise_of, smooth_surface
 
 DTYPES = {"disc": int, "x_mm": float, "y_mm": float, "area_mm2": float, "area_sd_mm2": float, "diameter_mm": float,

@@ -1,23 +1,50 @@
-"""Frames from files: an image, a folder of images, the pages of a TIFF, a video. One frame is in memory at a time."""
+"""Frames from files: an image, a folder of images, the pages of a TIFF, a video. One frame is in memory at a time.
 
-from collections.abc import Iterator
+Frames of PNG, JPEG, BMP and GIF files, at the depth and with the colours that the file holds.
+
+Frames of TIFF files: their pages, or the planes that ImageJ and others put behind a single page.
+
+Light grows with the values that this gives: white-is-zero is turned, palettes and inks become RGB (TIFF 6.0, Adobe 1992).
+Reduced copies (thumbnails, pyramids) are no frames.
+
+Frames of a video at the depth that it was coded with.
+"""
+
+import importlib.util
+import logging
+import math
+import warnings
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
+from typing import cast
 
+import imagecodecs
 import numpy as np
+import tifffile
+from PIL import ExifTags, Image, ImageOps
 
-from softtact.errors import InputError
-from softtact.imaging.stills import still_frames
-from softtact.imaging.tiff import tiff_frames
-from softtact.imaging.video import video_frames
+from softtact.errors import FrameWarning, InputError, how_to_install
 
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp")
 STACKS = (".tif", ".tiff")
 VIDEOS = (".mp4", ".avi", ".mov", ".mkv")
 ANIMATIONS = (".gif",)
 LOSSY = (".jpg", ".jpeg", *VIDEOS)
-_READERS = {**dict.fromkeys(IMAGES + ANIMATIONS, still_frames), **dict.fromkeys(STACKS, tiff_frames),
-            **dict.fromkeys(VIDEOS, video_frames)}
+MOST_PIXELS = 100_000_000   # of a frame; detection takes about 170 bytes for each
+SRGB_HINT = ("the file says that its values are encoded for a screen (sRGB), and they are taken as proportional to light; "
+             "give --transfer srgb, or --transfer linear if they are.")
+_FORMATS = ("PNG", "JPEG", "BMP", "DIB", "GIF")
+_DEEP_COLOURS = (2, 4, 6)   # colour types of a PNG (RGB, grey and alpha, RGBA) that Pillow cuts to 8 bits
+_DEPTH, _COLOUR_TYPE = 24, 25     # bytes of a PNG file
+_ENCODED = 0.6              # a larger gamma in a PNG says that values are proportional to light
+_AS_STORED = ("1", "L", "LA", "RGB", "RGBA", "I", "F", "I;16", "I;16B", "I;16L", "I;16N")
+_EXIF_SRGB = 1
+_ORIENTATION, _ICC_PROFILE = 274, 34675
+_ASSOCIATED, _UNASSOCIATED = 1, 2     # alpha that the colours are multiplied by already, and that they are not
+_MOST_BITS = 16
+_ENOUGH = 0.9     # of the stated length; what ends before was cut off
 
 
 def read_frames(path: str | Path, *, every: int = 1) -> Iterator[tuple[str, np.ndarray]]:
@@ -94,3 +121,245 @@ def _short(error):
     """The first line of what a reader said."""
     lines = str(error).splitlines()
     return lines[0].rstrip(".") if lines else type(error).__name__
+
+
+def still_frames(file: Path) -> Iterator[tuple[int | None, Callable[[], np.ndarray]]]:
+    """Pairs (number, function that reads the frame): those of an animation, or the one picture, whose number is None.
+
+    A function is to be called before the next pair is asked for.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+        try:
+            image = Image.open(file, formats=_FORMATS)
+        except Image.DecompressionBombError as error:
+            raise InputError(f"{' '.join(str(error).split(',')[:1])}; crop it, or average pixels.") from None
+    with image:
+        check_size(image.width, image.height)
+        frames = getattr(image, "n_frames", 1) if image.format in ("PNG", "GIF") else 1
+        _warn_of_encoding(image)
+        if _is_deep(file, image):
+            if frames > 1:
+                raise ValueError(f"it is an animation of {frames} frames with 16 bits")
+            yield None, partial(_deep_png, file, image)
+            return
+        for number in range(frames):
+            yield number if frames > 1 or image.format == "GIF" else None, partial(_frame, image, number)
+
+
+def check_size(width: int, height: int) -> None:
+    """Refuse a frame that does not fit into memory, or whose sides are damaged."""
+    if width * height > MOST_PIXELS:
+        raise InputError(f"a frame of {width} x {height} pixels is larger than {MOST_PIXELS / 1e6:.0f} million pixels; "
+                         "crop it, or average pixels.")
+
+
+def _is_deep(file, image):
+    """Whether a PNG holds 16 bits of colours or of grey with alpha."""
+    if image.format != "PNG":
+        return False
+    with file.open("rb") as stream:
+        head = stream.read(_COLOUR_TYPE + 1)
+    return head[_DEPTH] == 16 and head[_COLOUR_TYPE] in _DEEP_COLOURS
+
+
+def _deep_png(file, image):
+    return turned(imagecodecs.png_decode(file.read_bytes()), image.getexif().get(ExifTags.Base.Orientation, 1))
+
+
+def _frame(image, number):
+    """One frame of an open image as (rows, columns) or (rows, columns, channels)."""
+    image.seek(number)
+    image.load()
+    upright = ImageOps.exif_transpose(image) or image
+    if upright.mode in _AS_STORED:
+        return np.asarray(upright)
+    transparent = upright.mode == "PA" or "transparency" in upright.info
+    return np.asarray(upright.convert("RGBA" if transparent else "RGB"))     # palettes, CMYK, YCbCr, Lab
+
+
+def turned(frame: np.ndarray, orientation: int) -> np.ndarray:
+    """A frame as it is to be looked at, from the orientation 1 to 8 of TIFF and Exif."""
+    if orientation >= 5:
+        frame = frame.swapaxes(0, 1)
+    if orientation in (3, 4, 7, 8):
+        frame = frame[::-1]
+    return frame[:, ::-1] if orientation in (2, 3, 6, 7) else frame
+
+
+def _warn_of_encoding(image):
+    exif_srgb = image.getexif().get_ifd(ExifTags.IFD.Exif).get(ExifTags.Base.ColorSpace) == _EXIF_SRGB
+    if exif_srgb or "srgb" in image.info or "icc_profile" in image.info or 0 < image.info.get("gamma", 1.0) < _ENCODED:
+        warnings.warn(SRGB_HINT, FrameWarning, stacklevel=2)
+
+
+def tiff_frames(file: Path) -> Iterator[tuple[int | None, Callable[[], np.ndarray]]]:
+    """Pairs (number, function that reads the frame); the number of the only frame of a file is None.
+
+    A function is to be called before the next pair is asked for.
+    """
+    with tifffile.TiffFile(file, _multifile=False) as stack:
+        pages = [page for page in stack.pages if not _layout(page).is_reduced] or list(stack.pages)
+        sizes = {(_layout(page).imagelength, _layout(page).imagewidth) for page in pages}
+        if len(sizes) > 1:
+            raise ValueError("its pages differ in size, " + ", ".join(f"{c} x {r}" for r, c in sorted(sizes))
+                             + ", and one scale does not suit them")
+        behind = {series.keyframe.index: series for series in _series(stack) if len(series.pages) == 1}
+        if any(_ICC_PROFILE in page.tags for page in pages if isinstance(page, tifffile.TiffPage)):
+            warnings.warn(SRGB_HINT, FrameWarning, stacklevel=2)
+        frames = [frame for page in pages for frame in _frames_of(stack, page, behind.get(page.index))]
+        for number, read in enumerate(frames):
+            yield number if len(frames) > 1 else None, read
+
+
+def _series(stack):
+    """The series of a file; what tifffile only logs, such as planes that are missing at the end, is raised."""
+    said: list[str] = []
+    logger, handler = logging.getLogger("tifffile"), logging.Handler(logging.ERROR)
+    handler.emit = lambda record: said.append(record.getMessage())
+    logger.addHandler(handler)
+    try:
+        series = stack.series
+    finally:
+        logger.removeHandler(handler)
+    if said:
+        raise ValueError(said[0].partition("> ")[2] or said[0])
+    return series
+
+
+def _layout(page: tifffile.TiffPage | tifffile.TiffFrame) -> tifffile.TiffPage:
+    """The page whose tags a page shares: itself, but in long stacks that are read in haste."""
+    return cast(tifffile.TiffPage, page.keyframe)
+
+
+def _frames_of(stack, page, series):
+    """Functions that read the frames of one page: its own, and what lies behind it without pages of its own."""
+    key = _layout(page)
+    check_size(key.imagewidth, key.imagelength)
+    planes = series.size // page.size if series is not None and page.size else 1
+    if planes == 1 and key.imagedepth == 1:
+        return [partial(_read, stack, page)]
+    if key.imagedepth > 1 or series.dataoffset is None:
+        raise ValueError(f"it holds {planes * key.imagedepth} planes in one page in a way that is not known")
+    return [partial(_read_behind, stack, page, series.dataoffset + number * page.nbytes) for number in range(planes)]
+
+
+def _check_extent(stack, page):
+    """Refuse a page whose data lie beyond the end of the file, or are missing: they would be read as 0."""
+    extents = list(zip(page.dataoffsets, page.databytecounts, strict=True))
+    if not extents or any(count == 0 or offset + count > stack.filehandle.size for offset, count in extents):
+        raise ValueError("parts of its data are missing")
+
+
+def _read(stack, page):
+    _check_extent(stack, page)
+    return _light(page.asarray(), page)
+
+
+def _read_behind(stack, page, offset):
+    """The plane at an offset of the file, in the layout of `page`."""
+    if offset + page.nbytes > stack.filehandle.size:
+        raise ValueError("planes are missing at its end")
+    stack.filehandle.seek(offset)
+    plane = stack.filehandle.read_array(np.dtype(page.dtype).newbyteorder(stack.byteorder), math.prod(page.shape))
+    return _light(plane.reshape(page.shape), page)
+
+
+def _light(values, page):
+    """Values of a page as light: (rows, columns) or (rows, columns, channels)."""
+    key = _layout(page)
+    if key.axes not in ("YX", "YXS", "SYX"):
+        raise ValueError(f"its axes {key.axes} are not those of a picture")
+    if key.axes == "SYX":     # planes of colour, one after the other
+        values = values.transpose(1, 2, 0)
+    values = _meaning(_without_extra(values, key), key)
+    orientation = key.tags.valueof(_ORIENTATION, 1)
+    return turned(values, orientation)
+
+
+def _without_extra(values, key):
+    """The values without channels that are no colour; alpha stays where colours are not multiplied by it."""
+    extra = tuple(key.extrasamples)
+    if not extra:
+        return values
+    colours = values.shape[2] - len(extra)
+    if extra == (_ASSOCIATED,) or (extra == (0,) and colours == 3):
+        return values[..., :colours]
+    if extra == (_UNASSOCIATED,):
+        return values
+    raise ValueError(f"{len(extra)} of its {values.shape[2]} channels have no stated meaning")
+
+
+def _meaning(values, key):
+    """Values that grow with light, by the page's photometric interpretation."""
+    name = key.photometric.name
+    if name == "MINISWHITE":
+        return _negative(values, key)
+    if name == "PALETTE":
+        return np.moveaxis(np.asarray(key.colormap)[:, values], 0, -1)
+    if name == "SEPARATED" and values.shape[2:] == (4,):
+        ink = values / np.float64(2**key.bitspersample - 1)
+        return (1 - ink[..., :3]) * (1 - ink[..., 3:])
+    if name in ("MINISBLACK", "RGB") or (name == "YCBCR" and key.compression.name == "JPEG"):     # which the codec turns into RGB
+        return values
+    raise ValueError(f"its values mean {name}, which is not read here")
+
+
+def _negative(values, key):
+    """White-is-zero turned around."""
+    if values.dtype.kind == "f":
+        return -values
+    if values.dtype.kind == "b":
+        return ~values
+    if values.dtype.kind == "i":
+        return -values.astype(np.int64)
+    return (2**key.bitspersample - 1 - values.astype(np.uint64)).astype(values.dtype)
+
+
+def video_frames(file: Path) -> Iterator[tuple[int, Callable[[], np.ndarray]]]:
+    """Pairs (number, function that gives the frame): (rows, columns) of a deep grey video, (rows, columns, 3) of others."""
+    if importlib.util.find_spec("av") is None:
+        raise InputError(f"{file}: {how_to_install('av')}")
+    import av
+
+    try:
+        with av.open(str(file)) as container:
+            yield from _decoded(container)
+    except av.error.FFmpegError as error:
+        raise ValueError(str(error)) from None
+
+
+def _decoded(container):
+    if not container.streams.video:
+        raise ValueError("it holds no video")
+    stream = container.streams.video[0]
+    check_size(stream.width, stream.height)
+    if stream.sample_aspect_ratio not in (None, 0, 1):
+        raise ValueError(f"its pixels are {stream.sample_aspect_ratio} times as wide as high")
+    stream.thread_type, end_s, count = "AUTO", 0.0, 0
+    for frame in container.decode(stream):
+        if frame.is_corrupt:
+            raise ValueError(f"frame {count} is damaged")
+        yield count, partial(_values, frame)
+        end_s, count = max(end_s, frame.time or 0.0), count + 1
+    if count < _ENOUGH * stream.frames or end_s < _ENOUGH * _length_s(container, stream):
+        raise ValueError("it ends before its stated length")
+
+
+def _length_s(container, stream):
+    """Seconds until the last frame begins, as the file states it for its video alone; 0 where it does not."""
+    if len(container.streams) > 1 or not container.duration or not stream.average_rate:
+        return 0.0
+    return container.duration / 1e6 - 2 / float(stream.average_rate)
+
+
+def _values(frame):
+    bits, grey = max(part.bits for part in frame.format.components), frame.format.name.startswith("gray")
+    if bits > _MOST_BITS:
+        raise ValueError(f"its frames have {bits} bits ({frame.format.name})")
+    deep = bits > 8 and not frame.format.has_palette
+    return frame.to_ndarray(format=("gray16le" if grey else "rgb48le") if deep else "rgb24")
+
+
+_READERS = {**dict.fromkeys(IMAGES + ANIMATIONS, still_frames), **dict.fromkeys(STACKS, tiff_frames),
+            **dict.fromkeys(VIDEOS, video_frames)}

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import optuna.storages.journal
     import torch
 
-    from softtact.learning.samples import Samples
+    from softtact.learning.dataset import Samples
 
 WAIT_S = 1.0     # between two looks at what other processes have left to do
 

@@ -15,8 +15,7 @@ from collections import namedtuple
 import numpy as np
 from numba import njit
 
-from softtact.linalg.lapack import Routines, address, call, keep_alive
-from softtact.linalg.row_loops import add_row, row_product
+from softtact.linalg.lapack import Routines, add_row, address, call, keep_alive, row_product
 
 # Of all pieces one behind the other: piece p has those from at[p] to at[p + 1]. Unknowns are numbered as they are eliminated.
 #   own_at (p + 1,): its unknowns;  bound_at (p + 1,), bound: later unknowns of its front, rising

@@ -15,8 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from softtact.linalg.block_tridiagonal import BlockTridiagonalSolver
-from softtact.linalg.direct import PardisoSolver, make_solver
-from softtact.linalg.direct_single import point_at_mkl
+from softtact.linalg.direct import PardisoSolver, make_solver, point_at_mkl
 from softtact.linalg.multifrontal_solver import DissectedSolver
 from softtact.linalg.symmetric_product import SymmetricProduct
 from softtact.linalg.two_levels import TwoLevels

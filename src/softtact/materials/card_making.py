@@ -1,23 +1,36 @@
-"""A material card made: the family of laws fitted, judged and compared (docs/reference/materials.md)."""
+"""A material card made: the family of laws fitted, judged and compared (docs/reference/materials.md).
 
-from collections.abc import Sequence
+Do the laws of one card tell the same story, where the data are and just outside?
+
+The difference of two laws on a path is the root mean square of the difference of their nominal stresses over that of their mean.
+
+How well a law fitted to some tests predicts one that it has not seen.
+"""
+
+import itertools
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from softtact.errors import InputError
-from softtact.materials.agreement import THRESHOLD, differences, partings, paths_inside, paths_outside
-from softtact.materials.bulk import bulk_modulus, poisson_ratio, small_strain_constants
 from softtact.materials.cards import law_of_entry, linear_from_card
 from softtact.materials.checks import refuse_mixed_units
-from softtact.materials.consistency import against_linear, printed_warnings
-from softtact.materials.curves import VOLUMETRIC, Curve, VolumetricCurve, common_kind, join_by_mode
-from softtact.materials.fitting import STARTS, FitOptions, fit_law, law_names
-from softtact.materials.linear import LinearConstants, young_modulus
-from softtact.materials.prediction import predict_left_out
-from softtact.materials.stability import SCAN, covers, stable_ranges
-from softtact.materials.windows import principal_window, refuse_idle
+from softtact.materials.consistency import SCAN, against_linear, covers, printed_warnings, stable_ranges
+from softtact.materials.curves import (
+    VOLUMETRIC,
+    Curve,
+    VolumetricCurve,
+    common_kind,
+    join_by_mode,
+    path_window,
+    principal_window,
+    refuse_idle,
+)
+from softtact.materials.fitting import STARTS, FitOptions, errors_of, fit_law, law_names
+from softtact.materials.laws.base import TEST_PATHS, Law
+from softtact.materials.linear import LinearConstants, bulk_modulus, poisson_ratio, small_strain_constants, young_modulus
 from softtact.progress import progress
 
 _SYSTEMATIC = 0.7   # neighbouring residuals so alike are the law's misfit; noise gives 0 +- 1/sqrt(points)
@@ -27,6 +40,9 @@ _NOTABLE = 0.01     # relative error from which that is worth saying
 LARGEST_ERROR = 0.25
 
 _BOUNDS = {"bulk_over_shear": (2 / 3, np.inf), "poisson": (-1.0, 0.5), "small_strain": (0.0, 1.0)}
+THRESHOLD = 0.2     # laws that part by more are named
+MARGIN = 0.1        # "just outside": so much farther, as a share of the window's extent in log stretch
+_POINTS = 33
 
 
 @dataclass(frozen=True)
@@ -257,3 +273,74 @@ def _consistency_warnings(card, threshold):
     linear = linear_from_card(card) if "linear" in card["laws"] else None
     parted = partings(card["chosen"], card["agreement"], among=list(usable), threshold=threshold)
     return [*parted, *against_linear(usable, linear)]
+
+
+def paths_inside(windows: Mapping[str, tuple[float, float]]) -> dict[str, np.ndarray]:
+    """{mode: stretches (n,)} over the windows {mode: (min, max)} of the tests."""
+    return {mode: np.geomspace(*window, _POINTS) for mode, window in windows.items() if mode in TEST_PATHS}
+
+
+def paths_outside(principal: tuple[float, float]) -> dict[str, np.ndarray]:
+    """{mode: stretches (n,)} just beyond the window `principal` of principal stretches, in both directions of all three paths."""
+    paths = {}
+    for mode in TEST_PATHS:
+        low, high = path_window(principal, mode)
+        reach = (high / low) ** MARGIN
+        paths[mode] = np.concatenate([np.geomspace(low / reach, low, _POINTS), np.geomspace(high, high * reach, _POINTS)])
+    return paths
+
+
+def difference(one: Law, other: Law, paths: Mapping[str, np.ndarray]) -> tuple[float, str]:
+    """(largest difference of two laws over the paths, its mode)"""
+    found = [(_difference(one, other, mode, stretch), mode) for mode, stretch in paths.items()]
+    return max(found)
+
+
+def _difference(one, other, mode, stretch):
+    a, b = one.nominal_stress(mode, stretch), other.nominal_stress(mode, stretch)
+    with np.errstate(invalid="ignore"):
+        value = np.sqrt(np.mean((a - b) ** 2) / np.mean((0.5 * (a + b)) ** 2))
+    return float(value) if np.isfinite(value) else np.inf
+
+
+def differences(laws: Mapping[str, Law], paths: Mapping[str, np.ndarray]) -> dict[str, dict[str, dict[str, Any]]]:
+    """{law: {other: {"difference": share, or None where one does not exist, "mode": ...}}} of laws {name: Law}, each pair twice."""
+    table: dict[str, dict[str, dict[str, Any]]] = {name: {} for name in laws}
+    for one, other in itertools.combinations(laws, 2):
+        value, mode = difference(laws[one], laws[other], paths)
+        entry = {"difference": value if np.isfinite(value) else None, "mode": mode}
+        table[one][other] = table[other][one] = entry
+    return table
+
+
+def partings(chosen: str, agreement: Mapping[str, Any], *, among: Collection[str], threshold: float = THRESHOLD) -> Iterator[str]:
+    """Sentences on the laws of the list `among` that part from the chosen one by more than `threshold`."""
+    for place, where in (("inside", "within the data"), ("outside", "just outside the data")):
+        named = [f"{name} by {_share(entry)} ({entry['mode']})" for name, entry in agreement[place].get(chosen, {}).items()
+                 if name in among and (entry["difference"] is None or entry["difference"] > threshold)]
+        if named:
+            remedy = "the curves do not say which is right there" if place == "outside" else "the others do not fit"
+            yield f"{chosen} and other laws part {where}: {', '.join(named)}; {remedy}."
+
+
+def _share(entry):
+    return "any amount" if entry["difference"] is None else f"{entry['difference']:.0%}"
+
+
+def predict_left_out(name: str, curves: Sequence[Curve], **options: Any) -> dict[str, dict[str, float] | None]:
+    """{mode: {"rmse_mpa", "relative_error"}} of the law fitted to all curves but that mode's; {} with fewer than two.
+
+    options: those of `FitOptions`. A law that the other curves have too few points for, or that does not exist where the one
+    left out goes, has None.
+    """
+    if len(curves) < 2:
+        return {}
+    return {curve.mode: _error(name, curve, [other for other in curves if other is not curve], options) for curve in curves}
+
+
+def _error(name, left_out, others, options):
+    try:
+        rmse, relative = errors_of(fit_law(name, others, **options).make(), [left_out])
+    except InputError:
+        return None
+    return {"rmse_mpa": rmse, "relative_error": relative} if rmse == rmse else None

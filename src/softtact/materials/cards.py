@@ -8,10 +8,10 @@ import pydantic
 from softtact.errors import InputError
 from softtact.files import read_json
 from softtact.materials.config import validated
+from softtact.materials.curves import principal_window
 from softtact.materials.laws.base import Law
 from softtact.materials.laws.registry import FOAM_LAWS, make_law
 from softtact.materials.linear import LinearConstants
-from softtact.materials.windows import principal_window
 
 
 class _CardLaw(pydantic.BaseModel):

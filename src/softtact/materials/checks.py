@@ -1,13 +1,24 @@
-"""What makes a test curve unfit for a fit: refused with row and remedy, or, where it may be right, said in a remark."""
+"""What makes a test curve unfit for a fit: refused with row and remedy, or, where it may be right, said in a remark.
 
-from collections.abc import Sequence
+What is odd in a test curve and may yet be right, each in a sentence, judged by what a rubber can be.
+
+The measure is the neo-Hookean law, stress = mu (l_1^2 - l_3^2) / stretch: whatever the rubber, at small strain the curve is that
+straight line through zero (nothing else is isotropic and incompressible), and in tension it softens from there before it stiffens.
+  unit of strain   the curve has the form of that law in percent, and not as a ratio, or the other way round
+  modulus          from silicone gels to hard polyurethane
+  zero             a preload has stress at no strain, slack has strain at no stress
+  sign             a compression test without a minus steepens from the start
+"""
+
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
+from scipy.optimize import nnls
 
 from softtact.errors import InputError
 from softtact.materials.curves import VOLUMETRIC, Curve, VolumetricCurve
-from softtact.materials.plausibility import remarks, secant_modulus
+from softtact.materials.laws.base import principal_stretches
 
 # No elastomer goes beyond these; values beyond are percent or another unit.
 LARGEST_STRETCH = 25.0
@@ -19,6 +30,17 @@ SIGN_TOLERANCE = 0.05
 UNIT_JUMP = (200.0, 5000.0)
 MODULI_APART = 50.0
 SMALLEST_SOLID = 0.7    # volume ratio; a foam's goes below
+_MODULI_MPA = (0.001, 30.0)     # initial shear moduli of gels, and of hard polyurethane
+_COMMON_MPA = 10.0              # a silicone's curve is so straight up to a stretch of 2 that in percent it would be one of 20 MPa
+# Another reading of a curve is told of where it leaves less than this share of the error: real rubbers leave half or more of it.
+_MUCH_BETTER = 0.2
+_LARGEST_STRETCH = 25.0         # see `checks`
+_FAR = 4.0                      # stretch beyond which no rubber stays as straight as one does over some percent
+_NEAR_ZERO = 0.005              # strain of a row that counts as one without strain
+_START = 0.2                    # strain up to which a curve is a straight line over the neo-Hookean law's
+_PRELOAD = (0.05, 0.3)          # of the stress at `_START`, where there is a row without strain, and where the line is lengthened
+_SLACK_STRAINS = (0.05, 0.1, 0.2, 0.4)      # the modulus over the first two of these against that over the last two
+_SLACK = 0.5                    # their ratio; of twelve published curves it is 0.7 and more
 
 
 def checked(path: str | Path, rows: np.ndarray, x: np.ndarray, y: np.ndarray, *, mode: str, raw: np.ndarray,
@@ -124,3 +146,172 @@ def _of_volume(ratio):
     if ratio.min() < SMALLEST_SOLID:
         yield (f"the volume falls to {ratio.min():.3g} of what it was, as a foam's does; if the column holds percent, name it "
                "volumetric_strain_percent")
+
+
+def remarks(stretch: np.ndarray, stress: np.ndarray, *, mode: str, compression: bool) -> Iterator[str]:
+    """Sentences on a curve of shape: stretch (n,), nominal stress (n,) in MPa; `compression`: it was said to be without a minus."""
+    unit = _unit_of_strain(stretch, stress, mode) or _modulus(stretch, stress, mode)
+    found = [unit, _positive_compression(stretch, stress, mode), _negative_tension(stretch, stress, mode) if compression else None]
+    if not any(found):      # of a curve in another unit or of another sign, zero says nothing
+        found = [_preload(stretch, stress, mode) or _slack(stretch, stress, mode) or _bent(stretch, stress, mode)]
+    yield from (remark for remark in found if remark)
+
+
+def secant_modulus(mode: str, stretch: np.ndarray, stress: np.ndarray) -> float:
+    """Shear modulus (MPa) of the neo-Hookean law closest to a curve."""
+    unit = _neo_hooke(mode, stretch)
+    return float(unit @ stress / (unit @ unit)) if unit.any() else 0.0
+
+
+def _neo_hooke(mode, stretch):
+    """Nominal stress (n,) over the shear modulus."""
+    square = principal_stretches(mode, stretch) ** 2
+    return (square[:, 0] - square[:, 2]) / stretch
+
+
+def _unit_of_strain(stretch, stress, mode):
+    """Percent that were called a ratio, or a ratio that was called percent."""
+    strain, largest = np.abs(stretch - 1), np.abs(stretch - 1).max()
+    percent = (1 + (stretch - 1) / 100, stretch**0.01)      # of engineering or true strain
+    as_percent = largest > 0.5 and any(_better(stretch, stress, other, mode) or _all_but_noise(stretch, stress, other, mode)
+                                       for other in percent)
+    coarse = stretch.max() > 3 and strain[strain > 1e-9].min() >= 0.5 and np.median(np.abs(np.diff(stretch))) >= 0.3
+    if as_percent or coarse:
+        return (f"the stretch goes to {stretch.max():.3g}, and the curve is that of a strain in percent; if the column holds "
+                "percent, name it engineering_strain_percent")
+    ratio = 1 + 100 * (stretch - 1)
+    as_ratio = 0 < ratio.min() and 1.2 < ratio.max() < _LARGEST_STRETCH and _better(stretch, stress, ratio, mode)
+    if as_ratio or largest < 0.02:
+        return (f"the largest strain is {largest:.2%}{', and the curve is that of a larger one' if as_ratio else ''}; if the "
+                "column holds a ratio and not percent, name it engineering_strain")
+    return None
+
+
+def _better(stretch, stress, other, mode):
+    """Whether the curve follows the law much better over other stretches, and is a rubber's there."""
+    better = _misfit(_neo_hooke(mode, other), stress) < _MUCH_BETTER * _misfit(_neo_hooke(mode, stretch), stress)
+    return better and _as_stiff_as_rubber(mode, other, stress)
+
+
+def _as_stiff_as_rubber(mode, stretch, stress):
+    return _MODULI_MPA[0] < secant_modulus(mode, stretch, stress) < _COMMON_MPA
+
+
+def _all_but_noise(stretch, stress, other, mode):
+    """Whether a far curve follows Mooney's and Rivlin's law over other stretches but for its noise, and not over its own."""
+    if stretch.max() < _FAR or not _as_stiff_as_rubber(mode, other, stress):
+        return False
+    own, there = (_mooney_misfit(mode, x, stress) for x in (stretch, other))
+    noise = _left(np.vander(other - 1, 5), stress)
+    largest = np.abs(stress).max()
+    return there <= 1.2 * noise + 0.003 * largest and own**2 - there**2 > (0.006 * largest) ** 2
+
+
+def _mooney_misfit(mode, stretch, stress):
+    """Root mean square (MPa) of what the law with its two constants, neither of them negative, leaves."""
+    unit = _neo_hooke(mode, stretch)
+    columns = np.column_stack([unit, unit * _second(mode, stretch)])
+    return nnls(columns, stress)[1] / np.sqrt(len(stress))
+
+
+def _second(mode, stretch):
+    """What the constant c01 is multiplied by beside c10: the square of the middle principal stretch."""
+    return principal_stretches(mode, stretch)[:, 1] ** 2
+
+
+def _left(columns, stress):
+    """Root mean square (MPa) of what a least squares fit leaves."""
+    found = np.linalg.lstsq(columns, stress, rcond=None)[0]
+    return float(np.sqrt(np.mean((stress - columns @ found) ** 2)))
+
+
+def _modulus(stretch, stress, mode):
+    start = np.abs(stretch - 1) <= 0.5
+    own = start if start.sum() >= 3 else np.full(len(stretch), True)
+    modulus = secant_modulus(mode, stretch[own], stress[own])
+    if 0 < modulus < _MODULI_MPA[0] or modulus > _MODULI_MPA[1]:
+        return (f"its shear modulus is {modulus:.3g} MPa, and rubbers have {_MODULI_MPA[0]:g} to {_MODULI_MPA[1]:g} MPa; check the "
+                "units of strain and stress")
+    return None
+
+
+def _positive_compression(stretch, stress, mode):
+    """A tension curve that steepens from the start, as the same curve in compression would."""
+    if stretch.min() < 0.999 or not 1.05 < stretch.max() < 1.95:
+        return None
+    as_tension = _misfit(_neo_hooke(mode, stretch), stress)
+    as_compression = _misfit(_neo_hooke(mode, 2 - stretch), -stress)
+    if as_compression < _MUCH_BETTER * as_tension:
+        return ("it steepens from the start, as a compression test written without a minus would; if it is one, say"
+                " `compression: true`")
+    return None
+
+
+def _negative_tension(stretch, stress, mode):
+    """A curve that was said to be of compression and softens from the start, as tension does."""
+    if stretch.max() > 1.001 or not stretch.min() < 0.95:
+        return None
+    as_compression = _misfit(_neo_hooke(mode, stretch), stress)
+    if _misfit(_neo_hooke(mode, 2 - stretch), -stress) < _MUCH_BETTER * as_compression:
+        return "it softens from the start, as a tension test would; if it is one, leave `compression` out"
+    return None
+
+
+def _preload(stretch, stress, mode):
+    """Stress at no strain: of the rows without strain, else where the straight line of the first strains meets it."""
+    strain, unit = np.abs(stretch - 1), _neo_hooke(mode, stretch)
+    start, none = strain <= _START, strain <= _NEAR_ZERO
+    if start.sum() < 3 or strain.min() > 0.05:
+        return None
+    slope, at_zero = np.polyfit(unit[start], stress[start], 1)
+    scale = max(slope, secant_modulus(mode, stretch, stress)) * np.abs(_neo_hooke(mode, np.array([1 + _START]))[0])
+    noise = np.sqrt(np.mean((stress[start] - at_zero - slope * unit[start]) ** 2))
+    if none.any():
+        at_zero = float(np.mean(stress[none] - slope * unit[none]))
+    offset = abs(at_zero) if none.any() else at_zero * _loading(stretch)
+    if offset > max(_PRELOAD[0 if none.any() else 1] * scale, 3 * noise) > 0:
+        return (f"it has a stress of {at_zero:.3g} MPa at no strain, as a preload or an offset of the load cell gives; take it off "
+                "the column")
+    return None
+
+
+def _slack(stretch, stress, mode):
+    """Strain at no stress: a modulus over the first strains far below that over the next ones."""
+    strain, unit = np.abs(stretch - 1), _neo_hooke(mode, stretch)
+    if strain.min() > _SLACK_STRAINS[0]:
+        return None
+    scale = min(strain.max() / _SLACK_STRAINS[-1], 1.0)
+    (low, high), (next_low, next_high) = scale * np.reshape(_SLACK_STRAINS, (2, 2))
+    moduli = [_modulus_between(strain, stress, unit, *ends) for ends in ((low, high), (next_low, next_high))]
+    if None not in moduli and (moduli[0] < _SLACK * moduli[1] or moduli[1] < 0.05 * secant_modulus(mode, stretch, stress)):
+        return ("its stress hardly rises over the first strains, as that of a slack specimen or of a plate without contact; take "
+                "the strain without stress off the column")
+    return None
+
+
+def _bent(stretch, stress, mode):
+    """A curve that bends over small strains, where a rubber's is straight over the neo-Hookean law's."""
+    unit, largest = _neo_hooke(mode, stretch), np.abs(stretch - 1).max()
+    if largest > 0.25 or len(stretch) < 8:
+        return None
+    line, noise = _left(np.vander(unit, 2), stress), _left(np.vander(unit, 5), stress)
+    if line > max(0.015 * np.abs(stress).max(), 3 * noise):
+        return (f"it bends over strains up to {largest:.2g} as a rubber's curve does over larger ones; if the column holds a ratio "
+                "and not percent, name it engineering_strain")
+    return None
+
+
+def _modulus_between(strain, stress, unit, low, high):
+    """Shear modulus (MPa) of the points with a strain between two values; None without any."""
+    own = (strain > low * (1 - 1e-9)) & (strain <= high * (1 + 1e-9)) & (unit != 0)
+    return float(unit[own] @ stress[own] / (unit[own] @ unit[own])) if own.any() else None
+
+
+def _loading(stretch):
+    """+1 in tension, -1 in compression, by the larger strain."""
+    return 1.0 if stretch.max() - 1 >= 1 - stretch.min() else -1.0
+
+
+def _misfit(unit, stress):
+    """Root mean square (MPa) of what the best multiple of `unit` leaves."""
+    return float(np.sqrt(np.mean((stress - unit * (unit @ stress) / (unit @ unit)) ** 2))) if unit.any() else np.inf

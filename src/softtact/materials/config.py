@@ -14,10 +14,10 @@ from pydantic import Field
 
 from softtact.errors import InputError
 from softtact.files import read_yaml
+from softtact.materials.curves import refuse_idle
 from softtact.materials.laws.base import Law
 from softtact.materials.laws.registry import law_class, make_law
 from softtact.materials.linear import LinearConstants
-from softtact.materials.windows import refuse_idle
 from softtact.unknown_names import first_fault, known_keys, unknown
 
 Mode = Literal["uniaxial", "equibiaxial", "planar", "volumetric"]

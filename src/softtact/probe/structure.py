@@ -10,8 +10,8 @@ from softtact.contact.pair import ContactPair
 from softtact.contact.surfaces import Surface
 from softtact.fem.solid_mesh import SolidMesh
 from softtact.fem.structured_meshes import box
-from softtact.materials.bulk import small_strain_constants
 from softtact.materials.laws.base import Law
+from softtact.materials.linear import small_strain_constants
 from softtact.models.solid.body import SolidBody
 from softtact.probe.design import PalpationDesign
 

@@ -4,12 +4,22 @@
 
 The names are those that the repository's viewer opens (Lab-CORO/TactileDataset, GUI.py 12-18). Files of the share carry endings
 (`_V1`, `_V2`, `_V1_Noise`) and write Isaac as `Issac` too, so a file is known by how its name begins.
+
+How tax1 to tax28 lie under the map: nobody states it, but maps and readings tell.
+
+A taxel is pressed where the map over it is deep. So the mean depth over each taxel's share of the map is correlated with the
+counts, for each of the eight ways to number a grid row by row or column by column from any corner; the right one correlates best.
+
+What the archive holds against the three counts in print, which contradict each other.
 """
 
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
+import pandas as pd
 
 from softtact.errors import InputError
 
@@ -20,6 +30,23 @@ SETS = {"flat": "Flat", "curved": "Curved"}
 MODELS = {"abaqus": "hyperelastic", "isaac": "elastic"}     # the paper's solver of each model
 SPELLINGS = {"abaqus": "abaqus", "isaac": "isaac", "issac": "isaac"}
 _NAME = re.compile(r"(flat|curved)_(real|simulation)_(abaqus|isaac|issac)(?:_(.*))?", flags=re.IGNORECASE)
+ARRANGEMENTS = [f"{order}{flip}" for order in ("rows", "columns") for flip in ("", "_x", "_y", "_xy")]
+PRINTED = [  # what is counted, where it is printed, how many
+    ("real maps", "abstract", 53400),
+    ("real maps", "repository", 15400),
+    ("maps of hyperelastic", "repository", 15400),
+    ("maps of elastic", "repository", 15400),
+    ("real maps", "text", 15400),
+    ("real maps of indenters to train on", "text", 13000),
+    ("real maps of unseen indenters", "text", 400),
+    ("real maps of objects", "text", 2000),
+]
+
+# Mean SSIM that the paper prints (sec. 4.2), by set and model.
+PRINTED_SSIM = {"validation": {"hyperelastic": 0.87, "elastic": 0.86}, "unseen": {"hyperelastic": 0.81, "elastic": 0.82},
+                "grasps": {"hyperelastic": 0.72, "elastic": 0.63}}
+# Maps as the paper counts them: 13,000 to train, 400 unseen cases, 2,000 grasps of 20 maps each, from closing to held.
+MAPS_OF_SETS, MAPS_OF_A_GRASP, ALL_MAPS = (13_000, 400, 2_000), 20, 53_400
 
 
 @dataclass(frozen=True)
@@ -106,3 +133,50 @@ def _check_complete(folder, real, simulated, models):
         wanted = " or ".join(f"Flat_Simulation_{name}*.csv with Curved_Simulation_{name}*.csv" for name in solvers)
         raise InputError(f"{folder}: there is no {wanted or 'simulation of a tested model'}; put both there. "
                          f"They come from {WHERE}.")
+
+
+def arrange(counts: np.ndarray, arrangement: str, *, shape: tuple[int, int]) -> np.ndarray:
+    """Counts (n, taxel) as tactile maps (n, row, column) of `shape`; `_x` and `_y`: numbered from the far end of that axis."""
+    order, _, flips = arrangement.partition("_")
+    rows, columns = shape
+    maps = counts.reshape(-1, rows, columns) if order == "rows" else counts.reshape(-1, columns, rows).swapaxes(1, 2)
+    return np.ascontiguousarray(maps[:, ::-1 if "y" in flips else 1, ::-1 if "x" in flips else 1])
+
+
+def taxel_depths(maps_mm: np.ndarray, *, shape: tuple[int, int]) -> np.ndarray:
+    """Mean of maps (n, y, x) over each taxel's share of the grid: (n, row, column)."""
+    rows, columns = (np.array_split(np.arange(size), parts) for size, parts in zip(maps_mm.shape[1:], shape, strict=True))
+    return np.stack([np.stack([maps_mm[:, r[:, None], c].mean(axis=(1, 2)) for c in columns], axis=-1) for r in rows], axis=1)
+
+
+def correlations(maps_mm: np.ndarray, counts: np.ndarray, *, shape: tuple[int, int]) -> dict[str, float]:
+    """{arrangement: correlation over the taxels of depth and counts, each less its mean over the map}.
+
+    maps_mm (n, y, x);  counts (n, taxel).  Without the means a strong press would correlate with any arrangement.
+    """
+    depth = _within(taxel_depths(maps_mm, shape=shape))
+    return {name: _correlation(depth, _within(arrange(counts, name, shape=shape))) for name in ARRANGEMENTS}
+
+
+def _within(values):
+    return values - values.mean(axis=(1, 2), keepdims=True)
+
+
+def _correlation(a, b):
+    return float((a * b).sum() / max(np.sqrt((a * a).sum() * (b * b).sum()), 1e-300))
+
+
+def counts_table(found: dict[str, int]) -> pd.DataFrame:
+    """A row per printed count: what, where, printed, found, meets.  found {what: number}; what is not found was not there."""
+    rows = [(what, where, printed, found.get(what), found.get(what) == printed) for what, where, printed in PRINTED]
+    return pd.DataFrame(rows, columns=["what", "where", "printed", "found", "meets"])
+
+
+def counts_sentence(table: pd.DataFrame) -> str:
+    """Which of the three counts in print the archive meets."""
+    verdicts = []
+    for where, rows in table.groupby("where", sort=False):
+        misses = [f"{row.what}: {row.printed} printed, {'no file' if pd.isna(row.found) else int(row.found)} found"
+                  for row in rows[~rows.meets].itertuples()]
+        verdicts.append(f"the count of the {where} is {'met' if not misses else 'not met (' + ', '.join(misses) + ')'}")
+    return f"{'; '.join(verdicts)}.".capitalize()

@@ -8,11 +8,9 @@ import numpy as np
 import xarray
 
 from softtact.errors import InputError
-from softtact.published.archive import MODELS, SETS, SOURCE, Archive
-from softtact.published.arrangement import ARRANGEMENTS, arrange, correlations
-from softtact.published.outliers import Outliers
+from softtact.published.archive import ARRANGEMENTS, MODELS, SETS, SOURCE, Archive, arrange, correlations
 from softtact.published.pairing import MAP_COLUMNS, MAP_ROWS, TAXELS, PairedTest, object_name, pair
-from softtact.published.table import read_table
+from softtact.published.table import Outliers, read_table
 from softtact.sensors.base import BaseSpec
 
 SOLVERS = {model: solver.capitalize() for solver, model in MODELS.items()}

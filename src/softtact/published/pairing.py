@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from softtact.published.outliers import Outliers
-from softtact.published.table import Table
+from softtact.published.table import Outliers, Table
 
 MAP_ROWS, MAP_COLUMNS, TAXELS = 57, 33, 28
 # Beyond these a test is left out. The layered sensor is 2.5 mm thick; counts run to 2400 in the paper's figures and the raw

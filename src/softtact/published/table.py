@@ -1,21 +1,95 @@
-"""One CSV of the archive as arrays: read in pieces, numbers as float32, a code for each test, never an object per cell."""
+"""One CSV of the archive as arrays: read in pieces, numbers as float32, a code for each test, never an object per cell.
+
+Outliers of the archive: each by file and row, counted, and with what was done about it.
+
+How a CSV of the archive is written: encoding, separator, decimal sign, and which column holds what, by the columns' names.
+
+Names that end in rising numbers (`tax1` to `tax28`, `x0` to `x32`), or that are numbers themselves, order the values, wherever
+their columns stand. A force's name says so. A file whose names do not tell is refused, for a column in the place of another would
+shift every taxel in silence.
+"""
 
 import csv
 import os
+import re
 import warnings
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from softtact.errors import InputError
-from softtact.published.layout import read_layout
-from softtact.published.outliers import Outliers
+from softtact.tables import encoding_of
 
 PIECE = 57 * 200    # rows read at a time: some 4 MB
 MOST_SURPLUS = 0.5      # share of rows with too many fields from which the file is not written as its header says
 TEXTS_KEPT = 1000   # words in place of numbers, for naming; one for each of the first rows that have them
+_PATH = "path"
+_ROW_NUMBERS = re.compile(r"(Unnamed: \d+)?")      # a nameless column, and pandas' name of one
+_UNIT = r"\s*(?:_(?P<suffix>n|kn|mn)|[\[(](?P<unit>.*)[\])])?"
+_FORCE = re.compile(r"((normal|contact|measured)?[ _]?(force|load)([ _]?z|[ _]normal)?|f[ _]?z?)" + _UNIT, flags=re.IGNORECASE)
+_NUMBERED = re.compile(r"(.*?)(\d+)")
+_NUMBER = re.compile(r"[+-]?\d+([.,]\d+)?([eE][+-]?\d+)?")
+# 1,234 is a number with a decimal comma, or twelve hundred and thirty-four; 0,123 and 12,3456 are only the one.
+_MAYBE_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One outlier. row: the line of its first occurrence, 1 being the header;  path: the test, '' for a file;  count: occurrences
+    done: "left out" (the test) or "kept"."""
+
+    file: str
+    row: int
+    path: str
+    what: str
+    count: int
+    done: str
+
+    def __str__(self):
+        return f"{self.file}, row {self.row}{f', {self.path}' if self.path else ''}: {self.what}"
+
+
+class Outliers:
+    """The findings, as they come up."""
+
+    def __init__(self) -> None:
+        self.findings: list[Finding] = []
+
+    def leave_out(self, file: str | Path, row: int, path: str, what: str, *, count: int = 1) -> None:
+        """A finding for which its test is not used."""
+        self.findings.append(Finding(str(file), int(row), path, what, int(count), "left out"))
+
+    def keep(self, file: str | Path, row: int, path: str, what: str, *, count: int = 1) -> None:
+        """A finding that is only told."""
+        self.findings.append(Finding(str(file), int(row), path, what, int(count), "kept"))
+
+    def left_out(self) -> list[str]:
+        """The tests that are not used, in the order of their first finding."""
+        return list(dict.fromkeys(f.path for f in self.findings if f.done == "left out"))
+
+    def leaves_out(self, path: str, *, files: Collection[str]) -> bool:
+        """Whether a test is not used for a finding in one of the files."""
+        return any(f.path == path and f.file in files and f.done == "left out" for f in self.findings)
+
+    def table(self) -> pd.DataFrame:
+        """A row per finding."""
+        return pd.DataFrame([asdict(f) for f in self.findings], columns=[field.name for field in fields(Finding)])
+
+    def refuse(self, tests: int, *, outliers: str, largest_share: float) -> None:
+        """Refuse an archive that is odder than the user allows.
+
+        tests: how many there are;  outliers: leave_out or refuse;  largest_share: of tests that may be left out
+        """
+        left = len(self.left_out())
+        if left and (outliers == "refuse" or left > largest_share * tests):
+            first = [str(f) for f in self.findings if f.done == "left out"][:3]
+            allowed = "none may be" if outliers == "refuse" else f"at most {largest_share:.0%} may be"
+            remedy = "set 'data.outliers' to leave_out" if outliers == "refuse" else "raise 'data.largest_outlier_share'"
+            raise InputError(f"{left} of {tests} tests of the archive are outliers, and {allowed} ({'; '.join(first)}); "
+                             f"correct the files or {remedy}.")
 
 
 @dataclass(frozen=True)
@@ -120,3 +194,110 @@ def _codes(paths, codes):
 def _where_it_breaks(error):
     """The parser's complaint, e.g. `Expected 35 fields in line 9, saw 40`."""
     return str(error).rsplit("C error: ", 1)[-1].strip()
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a CSV is written.
+
+    encoding, separator, decimal;  columns: their names;  path, force: which is `Path`, and the force (or None)
+    numbers: which are values, in their order
+    """
+
+    encoding: str
+    separator: str
+    decimal: str
+    columns: list
+    path: int
+    numbers: list
+    force: int | None
+
+
+def read_layout(path: Path, *, columns: int, force: bool, outliers: Outliers) -> Layout:
+    """The `Layout` of a file with `columns` values a row, and a force where `force`; other columns are refused."""
+    encoding = encoding_of(path)
+    with open(path, encoding=encoding, newline="") as lines:
+        header = lines.readline().rstrip("\r\n")
+    separator = max(",;\t", key=re.sub(r'"[^"]*"', "", header).count)
+    names = [name.strip() for name in next(csv.reader([header], delimiter=separator), [])]
+    found = [k for k, name in enumerate(names) if name.lower() == _PATH]
+    if len(found) != 1:
+        raise InputError(f"{path}: {len(found)} columns are named 'Path' where one is needed (row 1 is {header[:60]!r}); "
+                         "fetch it again.")
+    numbers = [k for k in range(len(names)) if k != found[0] and not _ROW_NUMBERS.fullmatch(names[k])]
+    if len(numbers) < len(names) - 1:
+        outliers.keep(path.name, 1, "", "a column without a name is passed over: row numbers of a former table")
+    if len(numbers) != columns + force:
+        raise InputError(f"{path}: row 1 names {len(numbers)} columns of numbers beside 'Path' where {columns + force} are needed"
+                         f"{' (force and the taxels)' if force else ''}; fetch it again.")
+    force_at = _force_column(path, names, numbers) if force else None
+    values = _in_order(path, names, [k for k in numbers if k != force_at], outliers)
+    decimal = _decimal(path, encoding, separator, found[0])
+    if (separator, decimal) != (",", "."):
+        outliers.keep(path.name, 1, "", f"fields end with {separator!r} and decimals are written with {decimal!r}; read so")
+    return Layout(encoding, separator, decimal, names, found[0], values, force_at)
+
+
+def _force_column(path, names, numbers):
+    """Which column holds the force in N: the one whose name says so."""
+    told = {k: _FORCE.fullmatch(names[k]) for k in numbers}
+    named = [k for k, match in told.items() if match]
+    if len(named) != 1:
+        raise InputError(f"{path}: {len(named)} columns are named as a force where one is needed (row 1 names "
+                         f"{', '.join(names[k] for k in numbers)[:100]} ...); name the one of the normal force 'force'.")
+    match = told[named[0]]
+    unit = (match["suffix"] or match["unit"] or "N").strip()
+    if unit not in ("N", "n"):
+        raise InputError(f"{path}: the column {names[named[0]]!r} is in {unit}; convert it to N, and name it 'force'.")
+    return named[0]
+
+
+def _in_order(path, names, numbers, outliers):
+    """The columns of values by the numbers in their names; another order in the file is reported."""
+    order = _numbers_of([names[k] for k in numbers])
+    if order is None:
+        raise InputError(f"{path}: the names {names[numbers[0]]!r} to {names[numbers[-1]]!r} do not tell the order of the columns; "
+                         "name them with one word and numbers without a gap, such as tax1 to tax28 or x0 to x32.")
+    ordered = [numbers[k] for k in sorted(range(len(numbers)), key=lambda k: order[k])]
+    if ordered != numbers:
+        outliers.keep(path.name, 1, "", f"the columns are not in the order of their names (the first is {names[numbers[0]]!r}); "
+                      "they are taken in this order")
+    return ordered
+
+
+def _numbers_of(names):
+    """A number for each name, by which they are ordered; None where the names do not tell one."""
+    if all(_NUMBER.fullmatch(name) for name in names):     # positions, or numbers without a word
+        values = [float(name.replace(",", ".")) for name in names]
+        return values if len(set(values)) == len(names) else None
+    parts = [_NUMBERED.fullmatch(name) for name in names]
+    if None in parts or len({part[1].lower() for part in parts}) != 1:
+        return None
+    values = [int(part[2]) for part in parts]
+    return values if sorted(values) == list(range(min(values), min(values) + len(values))) else None
+
+
+def _decimal(path, encoding, separator, path_at):
+    """The decimal sign: that of the first number which has one, be it thousands of rows below."""
+    maybe = None
+    for row, cell in _signs(path, encoding, separator, path_at):
+        if "." in cell:
+            return "."
+        if not _MAYBE_THOUSANDS.fullmatch(cell):
+            return ","
+        maybe = maybe or (row, cell)
+    if maybe is None:
+        return "."
+    raise InputError(f"{path}, row {maybe[0]}: whether the comma of {maybe[1]!r} is a decimal one or of thousands is told by no "
+                     "number of the file; write the numbers with decimal points.")
+
+
+def _signs(path, encoding, separator, path_at) -> Iterator[tuple[int, str]]:
+    """(row, text) of the numbers with a point or a comma in them. A row with other fields than the header tells nothing."""
+    with open(path, encoding=encoding, newline="") as lines:
+        width = None
+        for row, cells in enumerate(csv.reader(lines, delimiter=separator), 1):
+            width = width or len(cells)
+            if row == 1 or len(cells) != width:
+                continue
+            yield from ((row, cell.strip()) for k, cell in enumerate(cells) if k != path_at and re.search(r"\d*[.,]\d", cell))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from softtact.calibration.advice import Advice
+from softtact.calibration.checks import Advice
 from softtact.calibration.fit import CalibrationResult, in_words
 from softtact.reporting.page import Page
 from softtact.reporting.style import pyplot

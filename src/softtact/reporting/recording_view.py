@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softtact.errors import InputError
-from softtact.extras import how_to_install
+from softtact.errors import InputError, how_to_install
 from softtact.files import atomic_path
 from softtact.reporting.style import pyplot, save
 

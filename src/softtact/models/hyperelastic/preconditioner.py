@@ -15,8 +15,8 @@ import scipy.sparse as sp
 from numba import njit
 
 from softtact.linalg.block_tridiagonal import BlockTridiagonalSolver
-from softtact.linalg.dense_cholesky import factor_in_place
 from softtact.linalg.direct import PardisoSolver, SuperLUSolver
+from softtact.linalg.lapack import factor_in_place
 from softtact.linalg.multifrontal_solver import Bordered, DissectedSolver
 from softtact.linalg.nodal_frames import NodeFrames
 from softtact.linalg.workers import SERIAL, Workers

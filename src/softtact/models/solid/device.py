@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from softtact.errors import InputError
-from softtact.extras import how_to_install
+from softtact.errors import InputError, how_to_install
 from softtact.fem.kernels_plain import PlainLoops
 from softtact.fem.solid_block import SolidBlock
 

@@ -14,7 +14,7 @@ import xarray
 
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
 from softtact.errors import ConvergenceError, InputError
-from softtact.evaluation.features import feature_masks
+from softtact.evaluation.curve_shape import feature_masks
 from softtact.files import digest, read_dataset, write_csv, write_dataset
 from softtact.geometry.meshes import place, read_mesh
 from softtact.progress import announce, progress

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from softtact.published.counts import SETS as PAPERS_MAPS
+from softtact.published.archive import MAPS_OF_SETS
 
 PAPERS_INDENTERS, PAPERS_OBJECTS = 49, 12
 _OWN_READINGS = ("Readings are own recordings of a real sensor, not the paper's, so none of its numbers is judged on them. That a "
@@ -44,8 +44,8 @@ def _sizes(settings):
     maps = {name: count * load_steps for name, count in presses.items()}
     grasps = round(presses["grasps"] * settings["trials"]["grasps"])
     return (f"Sizes: {settings['indenters']} of the paper's {PAPERS_INDENTERS} indenters with {maps['indenters']:,} of "
-            f"{PAPERS_MAPS[0]:,} maps to train and validate, {maps['unseen']:,} of {PAPERS_MAPS[1]:,} unseen cases, "
-            f"{settings['grasps']} of {PAPERS_OBJECTS} objects with {grasps:,} of {PAPERS_MAPS[2]:,} grasps (readings "
+            f"{MAPS_OF_SETS[0]:,} maps to train and validate, {maps['unseen']:,} of {MAPS_OF_SETS[1]:,} unseen cases, "
+            f"{settings['grasps']} of {PAPERS_OBJECTS} objects with {grasps:,} of {MAPS_OF_SETS[2]:,} grasps (readings "
             f"of {presses['grasps']} presses).")
 
 

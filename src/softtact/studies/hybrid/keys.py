@@ -17,7 +17,7 @@ from pydantic import (
 
 from softtact.learning.settings import LearningCurve, Network, Repeats, Search, Ssim, Training
 from softtact.materials.laws.registry import LAWS
-from softtact.published.arrangement import ARRANGEMENTS
+from softtact.published.archive import ARRANGEMENTS
 from softtact.readout.virtual_sensor import VirtualSensorSettings
 from softtact.sensors.specification import ORIENTATIONS
 from softtact.unknown_names import unknown

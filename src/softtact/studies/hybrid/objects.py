@@ -91,7 +91,7 @@ def _drawn(entry, count, *, spec, seed):
     if not count:
         return {}
     from softtact.geometry.meshes import read_triangles
-    from softtact.geometry.places import draw_poses
+    from softtact.geometry.pose import draw_poses
 
     _check_mesh(entry)
     poses = draw_poses(read_triangles(entry.file, unit=entry.unit), count=count, footprint_mm=spec.footprint_mm,

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from softtact.evaluation.claim_rows import CONSISTENT, CONTRADICTION, row
-from softtact.published.counts import ALL_MAPS, MAPS_OF_A_GRASP, SETS
+from softtact.published.archive import ALL_MAPS, MAPS_OF_A_GRASP, MAPS_OF_SETS
 
 Counts = tuple[int, int, int, int, str]
 Times = tuple[float, float, float, float]
@@ -23,7 +23,7 @@ def claims_in_print(*, printed_counts: dict[str, Counts], printed_times: dict[st
     for name, times, printed in (("elastic", elastic, 64), ("hyperelastic", hyper, 38)):
         yield _follows(f"The {name} model's longest time is {printed} times its shortest", "sec. 4.2", printed, times[2] / times[1],
                        f"{times[2]:g} s / {times[1]:g} s of table 3", "tables/table3_timing.csv")
-    train, unseen, grasps = SETS
+    train, unseen, grasps = MAPS_OF_SETS
     yield _follows("The data set holds 53,400 maps", "abstract", ALL_MAPS, train + unseen + grasps * MAPS_OF_A_GRASP,
                    f"{train:,} + {unseen:,} + {grasps:,} grasps x {MAPS_OF_A_GRASP} maps from closing to held; that there are "
                    f"{MAPS_OF_A_GRASP} is our reading", "tables/claims.csv")

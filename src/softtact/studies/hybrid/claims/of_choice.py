@@ -10,7 +10,7 @@ import trimesh
 
 from softtact.evaluation.claim_rows import CONSISTENT, CONTRADICTION, UNDECIDED, row, verdict_of
 from softtact.geometry.complexity import score
-from softtact.learning.samples import object_of
+from softtact.learning.dataset import object_of
 
 if TYPE_CHECKING:
     from softtact.studies.hybrid.claims.in_print import Counts

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from softtact.evaluation.claim_rows import ARCHIVE, CONTRADICTION, UNDECIDED, row, verdict_of
+from softtact.published.archive import PRINTED_SSIM
 from softtact.published.archive import SOURCE as PUBLISHED
-from softtact.published.counts import PRINTED_SSIM
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -10,8 +10,7 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from softtact.errors import InputError, SofttactError
-from softtact.extras import missing_extra
+from softtact.errors import InputError, SofttactError, missing_extra
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

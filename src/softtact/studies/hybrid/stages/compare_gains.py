@@ -6,7 +6,7 @@ outputs: gains (CSV);  settings: sensor, virtual_sensor, ssim, seed
 
 from typing import Any
 
-from softtact.evaluation.gains import gain_table
+from softtact.evaluation.limits import gain_table
 from softtact.files import read_dataset, write_csv
 from softtact.learning.settings import Ssim
 from softtact.readout.virtual_sensor import VirtualSensorSettings

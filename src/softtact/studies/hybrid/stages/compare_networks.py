@@ -13,8 +13,8 @@ import pandas as pd
 from softtact.evaluation.networks import Trained, compare_networks, score_networks
 from softtact.evaluation.score_tables import level_table, score_table, verdicts
 from softtact.files import write_csv, write_json
+from softtact.learning.dataset import read_samples
 from softtact.learning.network import load_network
-from softtact.learning.samples import read_samples
 from softtact.learning.settings import Ssim
 from softtact.learning.training import prepare_torch
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pandas as pd
 
-from softtact.learning.samples import object_of
+from softtact.learning.dataset import object_of
 from softtact.reporting.style import save
 from softtact.studies.hybrid.figures.fig6_ssim import draw
 

@@ -9,11 +9,10 @@ from typing import Any
 
 import pandas as pd
 
-from softtact.evaluation.scoring import predict_grasps, score_items, score_samples, score_sensor, summarise_scores
-from softtact.evaluation.timing import time_presses
+from softtact.evaluation.scoring import predict_grasps, score_items, score_samples, score_sensor, summarise_scores, time_presses
 from softtact.files import read_dataset, write_csv, write_dataset
+from softtact.learning.dataset import read_samples
 from softtact.learning.network import load_network, predict
-from softtact.learning.samples import read_samples
 from softtact.learning.settings import Ssim
 from softtact.learning.training import prepare_torch
 

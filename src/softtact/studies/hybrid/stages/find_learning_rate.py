@@ -7,10 +7,9 @@ settings: training, network, ssim, seed, threads (by default those of the job)
 from typing import Any
 
 from softtact.files import write_csv, write_json
-from softtact.learning.rate import best_rate, try_rates
-from softtact.learning.samples import read_samples
+from softtact.learning.dataset import read_samples
 from softtact.learning.settings import Network, Ssim, Training, chosen_network
-from softtact.learning.training import prepare_torch
+from softtact.learning.training import best_rate, prepare_torch, try_rates
 
 
 def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import pandas as pd
 
-from softtact.evaluation.seeds import spread_of_seeds
+from softtact.evaluation.retraining import spread_of_seeds
 from softtact.files import write_csv
 
 

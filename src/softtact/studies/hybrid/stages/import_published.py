@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 from softtact.errors import InputError
 from softtact.files import write_csv, write_dataset, write_json
 from softtact.progress import announce
-from softtact.published.archive import find_archive
-from softtact.published.counts import counts_sentence, counts_table
+from softtact.published.archive import counts_sentence, counts_table, find_archive
 from softtact.published.importing import (
     Tables,
     files_table,
@@ -28,7 +27,7 @@ from softtact.published.pairing import MAP_COLUMNS, MAP_ROWS, TAXELS, PairedTest
 from softtact.sensors.specification import SensorSpec
 
 if TYPE_CHECKING:
-    from softtact.published.outliers import Outliers
+    from softtact.published.table import Outliers
 
 TOLD = 20   # findings in the log; all stand in the table
 

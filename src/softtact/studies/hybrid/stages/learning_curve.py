@@ -8,9 +8,9 @@ from typing import Any
 
 import pandas as pd
 
-from softtact.evaluation.learning_curve import COLUMNS, learning_curve
+from softtact.evaluation.retraining import SIZES_COLUMNS, Experiment, learning_curve
 from softtact.files import read_json, write_csv
-from softtact.learning.samples import read_samples
+from softtact.learning.dataset import read_samples
 from softtact.learning.settings import LearningCurve, Network, Ssim, Training, chosen_network, chosen_training, found_for
 from softtact.learning.training import prepare_torch
 
@@ -24,13 +24,14 @@ def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, 
     best, trial = (read_json(inputs[name]) if name in inputs else None for name in ("best", "rate"))
     train, tests = read_samples(inputs["train"]), {name: read_samples(inputs[name]) for name in TESTS}
     sizes = sorted({max(1, round(share * len(train))) for share in curve.shares})
-    shared = {"sizes": sizes, "steps": curve.steps, "ssim": Ssim.from_dict(settings["ssim"], where="ssim").model_dump(),
-              "seed": settings["seed"], "device": prepare_torch(threads=settings.get("threads", threads), device=options.device)}
+    shared: dict[str, Any] = {"ssim": Ssim.from_dict(settings["ssim"], where="ssim").model_dump(),
+                              "device": prepare_torch(threads=settings.get("threads", threads), device=options.device)}
     tables = []
     for kind in curve.networks:
         network = Network.from_dict(settings["network"] | {"architecture": kind}, where="network")
-        table = learning_curve(train, tests["validation"], tests, network=chosen_network(network, best),
-                               options=chosen_training(options, network, found_for(network, search=best, trial=trial)),
-                               **shared)
+        found = found_for(network, search=best, trial=trial)
+        experiment = Experiment(train, tests, network=chosen_network(network, best),
+                                options=chosen_training(options, network, found), **shared)
+        table = learning_curve(experiment, sizes=sizes, steps=curve.steps, seed=settings["seed"])
         tables.append(table.assign(model=train.model, architecture=kind))
-    write_csv(outputs["curve"], pd.concat(tables)[["model", "architecture", *COLUMNS]])
+    write_csv(outputs["curve"], pd.concat(tables)[["model", "architecture", *SIZES_COLUMNS]])

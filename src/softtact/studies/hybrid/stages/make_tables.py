@@ -12,7 +12,7 @@ import pandas as pd
 
 from softtact.files import read_dataset, read_json, write_csv
 from softtact.geometry.complexity import choose_model
-from softtact.learning.samples import object_of
+from softtact.learning.dataset import object_of
 from softtact.studies.hybrid.claims.table import claims
 from softtact.studies.hybrid.tables import (
     PRINTED_COUNTS,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
-from softtact.evaluation.features import feature_table
+from softtact.evaluation.curve_shape import feature_table
 from softtact.files import read_dataset, write_csv
 from softtact.geometry.meshes import place, read_mesh
 from softtact.geometry.pose import Pose

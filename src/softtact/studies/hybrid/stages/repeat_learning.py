@@ -9,9 +9,9 @@ from typing import Any
 
 import pandas as pd
 
-from softtact.evaluation.seeds import COLUMNS, train_seeds
+from softtact.evaluation.retraining import SEEDS_COLUMNS, Experiment, train_seeds
 from softtact.files import read_json, write_csv
-from softtact.learning.samples import read_samples
+from softtact.learning.dataset import read_samples
 from softtact.learning.settings import Network, Repeats, Ssim, Training, chosen_network, chosen_training, found_for
 from softtact.learning.training import prepare_torch
 
@@ -24,14 +24,14 @@ def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, 
     options = Training.from_dict(settings["training"], where="training")
     best, trial = (read_json(inputs[name]) if name in inputs else None for name in ("best", "rate"))
     train, tests = read_samples(inputs["train"]), {name: read_samples(inputs[name]) for name in TESTS}
-    shared: dict[str, Any] = {"seeds": range(settings["seed"], settings["seed"] + repeats.seeds),
-                              "ssim": Ssim.from_dict(settings["ssim"], where="ssim").model_dump(),
+    shared: dict[str, Any] = {"ssim": Ssim.from_dict(settings["ssim"], where="ssim").model_dump(),
                               "device": prepare_torch(threads=settings.get("threads", threads), device=options.device)}
     tables = []
     for kind in repeats.networks:
         network = Network.from_dict(settings["network"] | {"architecture": kind}, where="network")
         found = found_for(network, search=best, trial=trial)
-        table = train_seeds(train, tests["validation"], tests, network=chosen_network(network, best),
-                            options=chosen_training(options, network, found), **shared)
+        experiment = Experiment(train, tests, network=chosen_network(network, best),
+                                options=chosen_training(options, network, found), **shared)
+        table = train_seeds(experiment, seeds=range(settings["seed"], settings["seed"] + repeats.seeds))
         tables.append(table.assign(model=train.model, architecture=kind))
-    write_csv(outputs["seeds"], pd.concat(tables)[["model", "architecture", *COLUMNS]])
+    write_csv(outputs["seeds"], pd.concat(tables)[["model", "architecture", *SEEDS_COLUMNS]])

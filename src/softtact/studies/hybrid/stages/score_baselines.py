@@ -9,9 +9,9 @@ from typing import Any
 
 import pandas as pd
 
-from softtact.evaluation.baselines import score_baselines, taxel_table
+from softtact.evaluation.score_tables import score_baselines, taxel_table
 from softtact.files import write_csv
-from softtact.learning.samples import read_samples
+from softtact.learning.dataset import read_samples
 from softtact.learning.settings import Ssim
 from softtact.sensors.specification import SensorSpec
 

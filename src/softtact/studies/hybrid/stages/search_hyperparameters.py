@@ -7,7 +7,7 @@ settings: search, network, ssim, device, seed
 from typing import Any
 
 from softtact.files import write_csv, write_json
-from softtact.learning.samples import read_samples
+from softtact.learning.dataset import read_samples
 from softtact.learning.search import best_trial, search_hyperparameters, search_table
 from softtact.learning.settings import Network, Search, Ssim
 from softtact.learning.training import prepare_torch

@@ -10,8 +10,8 @@ from typing import Any
 import pandas as pd
 
 from softtact.files import digest, read_json, write_csv
+from softtact.learning.dataset import read_samples
 from softtact.learning.network import save_network
-from softtact.learning.samples import read_samples
 from softtact.learning.settings import Network, Ssim, Training, chosen_network, chosen_training, found_for
 from softtact.learning.training import Run, prepare_torch, start_run, train_network
 
