@@ -1,10 +1,10 @@
-"""A small network that tells the grip's force from the taxels, learnt in the environment for learning.
+"""A small network that estimates the grip's force from the taxels, trained in the environment for learning.
 
     python examples/learn_grip_force.py --episodes 60 --out grip_force.png
 
-A random policy closes the gripper on a cylinder in drawn places and with drawn forces. A network of one hidden layer learns the
-force of each pad from the 2 x 28 taxels. Episodes of the test are other ones than those of the training. Beside it stand the mean
-force, and a line on the sum of all counts. Taxels are those of an ideal readout: what is learnt is the simulation, not a real
+A random policy closes the gripper on a cylinder at random places and with random forces. A network of one hidden layer learns the
+force of the pads from the 2 x 28 taxels. The test has other episodes than the training. The network is compared with the mean force
+and with a line on the sum of all counts. Taxels are those of an ideal readout, so the network learns the simulation, not a real
 sensor.
 Needs the extras `robot` and `learn`.
 """
@@ -27,12 +27,12 @@ def main(arguments=None):
     taxels, force, episode = collect(options.episodes, seed=options.seed)
     test = episode % 4 == 3                              # every fourth episode
     network = learn(taxels[~test], force[~test], seed=options.seed)
-    told = {"mean force": np.full(test.sum(), force[~test].mean()), "line on the sum of counts": line(taxels, force, test),
-            "network": network(taxels[test])}
-    errors = {name: float(np.sqrt(np.mean((values - force[test]) ** 2))) for name, values in told.items()}
+    estimates = {"mean force": np.full(test.sum(), force[~test].mean()), "line on the sum of counts": line(taxels, force, test),
+                 "network": network(taxels[test])}
+    errors = {name: float(np.sqrt(np.mean((values - force[test]) ** 2))) for name, values in estimates.items()}
     for name, error in errors.items():
         print(f"{name:27} root mean square error {error:6.3f} N on {test.sum()} observations of {len(set(episode[test]))} episodes")
-    draw(force[test], told, options.out)
+    draw(force[test], estimates, options.out)
     print(f"written: {options.out}")
     return errors
 
@@ -67,11 +67,11 @@ def learn(taxels, force, *, seed):
             torch.nn.functional.mse_loss(network(x[part])[:, 0], y[part]).backward()
             optimiser.step()
 
-    def tell(values):
+    def estimate(values):
         with torch.no_grad():
             return network(torch.tensor(values / scale))[:, 0].numpy() * largest
 
-    return tell
+    return estimate
 
 
 def line(taxels, force, test):
@@ -80,16 +80,16 @@ def line(taxels, force, test):
     return np.polyval(np.polyfit(sums[~test], force[~test], 1), sums[test])
 
 
-def draw(force, told, path):
-    """True against told force, a colour for each way to tell."""
+def draw(force, estimates, path):
+    """Estimated against true force, a colour for each estimator."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(4.6, 4.4), layout="constrained")
     axes = figure.subplots()
-    for name, values in told.items():
+    for name, values in estimates.items():
         axes.plot(force, values, ".", markersize=3, label=name)
     axes.plot([0, force.max()], [0, force.max()], "k-", linewidth=0.8)
-    axes.set(xlabel="force of a pad in the scene (N)", ylabel="force told from the taxels (N)", aspect="equal")
+    axes.set(xlabel="force of a pad in the scene (N)", ylabel="force estimated from the taxels (N)", aspect="equal")
     axes.legend(frameon=False, fontsize=8)
     figure.savefig(path, dpi=150)
 

@@ -15,7 +15,7 @@ import torch
 
 
 class PressDataset(torch.utils.data.Dataset):
-    """The samples of an HDF5 file, read when they are asked for; each worker of a loader opens the file for itself."""
+    """The samples of an HDF5 file, read on demand; each worker of a loader opens the file."""
 
     def __init__(self, path):
         self.path, self._file = path, None

@@ -1,12 +1,11 @@
-"""A small training set: one indenter in random places, pressed through some forces, read by the virtual sensor.
+"""A small training set: one indenter in random places, pressed with some forces, read by the virtual sensor.
 
     python examples/make_training_set.py --presses 40 --out training_set.nc
 
-Writes pairs of deformation map (mm, what a simulation gives) and tactile map (counts, what a sensor would read), with force and
-pose of each. The presses are the elastic model's: some tenths of a second each. The readings are the virtual sensor's, a simulation
-with creep, scatter and noise of its own (docs/virtual_sensor.md); `--ideal` takes a ideal readout of the same map. Neither is a
-measurement. A network that learns from readings of its own input's maps learns the readout only: the studies therefore read a
-press of another law and mesh.
+It writes pairs of a deformation map (mm, from the simulation) and a tactile map (counts, as a sensor would read), with the force
+and pose of each. The elastic model presses, in some tenths of a second each. The virtual sensor reads, with creep, scatter and
+noise (docs/explanation/virtual_sensor.md); `--ideal` takes an ideal readout of the same map. Neither is a measurement. A network
+that learns from readings of its input maps learns only the readout. The studies therefore read a press of another law and mesh.
 """
 
 import argparse
@@ -39,7 +38,7 @@ def main(arguments=None):
 
 
 def random_poses(spec, count, *, seed):
-    """Poses (count, 6) in mm and degrees: anywhere within a quarter of the sides from the middle, turned about z; touching."""
+    """Poses (count, 6) in mm and degrees: within a quarter of the sides from the middle, rotated about z, touching."""
     rng, sides = np.random.default_rng(seed), np.array(spec.footprint_mm)
     poses = np.zeros((count, 6))
     poses[:, :2] = rng.uniform(-0.25, 0.25, (count, 2)) * sides
@@ -68,7 +67,7 @@ def parse(arguments):
     parser.add_argument("--presses", type=int, default=40)
     parser.add_argument("--sensor", default="coro")
     parser.add_argument("--model", default="elastic", choices=("elastic", "foundation"))
-    parser.add_argument("--ideal", action="store_true", help="a ideal readout in place of the virtual sensor")
+    parser.add_argument("--ideal", action="store_true", help="an ideal readout in place of the virtual sensor")
     parser.add_argument("--workers", type=int, help="processes; by default one for each core")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--out", type=Path, default=Path("training_set.nc"))

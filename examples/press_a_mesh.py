@@ -1,10 +1,10 @@
-"""Press a mesh on the sensor and look at what it feels.
+"""Press a mesh on the sensor and draw the result.
 
     python examples/press_a_mesh.py config/objects/grasped/object_1.stl --unit mm --force 5 20 50 --out press.png
 
-Prints, for each force, how deep the object went, its contact area and the largest count, and draws the deformation of the electrode
-plane above the counts of the taxels. With the elastic model some tenths of a second; its first press prepares the sensor (some ten
-seconds, kept in the user's cache).
+It prints the indentation, the contact area and the largest count for each force, and draws the deformation of the electrode plane
+above the counts of the taxels. The elastic model takes some tenths of a second; its first press prepares the sensor in some ten
+seconds and keeps that in the user's cache.
 """
 
 import argparse

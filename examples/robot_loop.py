@@ -2,10 +2,9 @@
 
     python examples/robot_loop.py --steps 5 --batch 16
 
-There is no robot here and nothing is learnt: a random policy moves an indenter sideways over the sensor, and the loop only shows
-where a simulator, a policy and a reward would go. Each press stands alone: the model knows no sliding, no history and no friction.
-Expect a few contacts a second on a core with the elastic model. `--network` reads the taxels by a network that a study trained, in
-place of the ideal readout.
+There is no robot and no learning here. A random policy moves an indenter sideways over the sensor; the loop shows where simulator,
+policy and reward belong. Presses are independent of each other: no sliding, no history, no friction. Expect a few contacts a second
+on a core with the elastic model. `--network` reads the taxels by a network that a study trained, in place of the ideal readout.
 """
 
 import argparse
@@ -25,7 +24,7 @@ INDENTER = Path(__file__).parents[1] / "config/objects/indenters/circle_s.stl"
 
 @dataclass
 class TactileSensor:
-    """Call it with poses (n, 6) of the object (x, y, z mm; rx, ry, rz degrees) and a friction_state force in N.
+    """Call it with poses (n, 6) of the object (x, y, z mm; rx, ry, rz degrees) and a normal force in N.
 
     It gives tactile maps (n, row, column) in counts.
     sensor: a `softtact` sensor;  mesh: the object, in mm;  network: or None for the ideal readout
@@ -48,7 +47,7 @@ class TactileSensor:
 
 
 class RandomPolicy:
-    """Steps (n, 2) in mm, drawn; it looks at nothing. A trained policy would take the tactile maps."""
+    """Random steps (n, 2) in mm, whatever the maps. A trained policy would use the tactile maps."""
 
     def __init__(self, *, seed):
         self._rng = np.random.default_rng(seed)
@@ -58,7 +57,7 @@ class RandomPolicy:
 
 
 def centre_of_touch(tactile):
-    """Where each map's counts lie: (n, 2), row and column from 0 to 1; what a reward could be made of."""
+    """Centroid (n, 2) of each map's counts, row and column from 0 to 1; a reward could use it."""
     rows, columns = (np.linspace(0, 1, count) for count in tactile.shape[1:])
     total = np.maximum(tactile.sum(axis=(1, 2)), 1e-9)
     return np.column_stack([(tactile.sum(axis=2) @ rows) / total, (tactile.sum(axis=1) @ columns) / total])
@@ -67,11 +66,11 @@ def centre_of_touch(tactile):
 def main(arguments=None):
     options = parse(arguments)
     sensor = softtact.load_sensor("coro")
-    feel = TactileSensor(sensor, read_mesh(INDENTER, unit="mm"), network=trained(options.network), workers=options.workers)
+    read = TactileSensor(sensor, read_mesh(INDENTER, unit="mm"), network=trained(options.network), workers=options.workers)
     policy, poses = RandomPolicy(seed=options.seed), np.zeros((options.batch, 6))
     reach, start = 0.25 * np.array(sensor.spec.footprint_mm), time.perf_counter()
     for step in range(options.steps):
-        tactile = feel(poses, force_n=options.force)                                       # (n, 7, 4) counts
+        tactile = read(poses, force_n=options.force)                                       # (n, 7, 4) counts
         poses[:, :2] = np.clip(poses[:, :2] + policy(tactile), -reach, reach)
         row, column = centre_of_touch(tactile).mean(axis=0)
         print(f"step {step}: {tactile.shape} counts up to {tactile.max():.0f}, mean centre of touch ({row:.2f}, {column:.2f})")
@@ -93,7 +92,7 @@ def parse(arguments):
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--steps", type=int, default=5)
     parser.add_argument("--batch", type=int, default=16, help="contacts at once")
-    parser.add_argument("--force", type=float, default=15.0, help="of every friction_state, in N")
+    parser.add_argument("--force", type=float, default=15.0, help="normal force of each contact, in N")
     parser.add_argument("--network", type=Path, help="model.pt of a study, trained on the elastic model's maps")
     parser.add_argument("--workers", type=int, default=1, help="processes")
     parser.add_argument("--seed", type=int, default=1)

@@ -26,9 +26,9 @@ def main(arguments: Sequence[str] | None = None) -> pd.DataFrame:
         skin = Skin(module_layout(), thickness_mm=thickness, poisson=elastomer.poisson, permittivity=elastomer.permittivity_fe)
         x, y = skin.layout.centres_mm[6]
         young = elastomer.young_mpa(0.01)
-        # To first order in the load, one solve a taxel tells its answer to a touch anywhere.
-        on, beside = (skin.first_order_ff(disc((x + way, y), diameter_mm=4.0, pressure_mpa=0.01), young_mpa=young)[6]
-                      for way in (0.0, 2.5))
+        # To first order in the load, one solve for a taxel gives its response to a touch at any place.
+        on, beside = (skin.first_order_ff(disc((x + shift, y), diameter_mm=4.0, pressure_mpa=0.01), young_mpa=young)[6]
+                      for shift in (0.0, 2.5))
         rows.append({"thickness_mm": thickness, "on_ff": on, "beside_ff": beside})
         print(f"{thickness:g} mm: {on:.2f} fF on the taxel, {beside:.2f} fF beside it")
     return pd.DataFrame(rows)

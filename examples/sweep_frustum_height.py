@@ -1,12 +1,12 @@
-"""How sensitive a dielectric is with higher or lower frusta: capacitance gained per pressure, in the frusta's unit cell.
+"""Sensitivity of a dielectric over the height of its frusta: capacitance against pressure, in the frusta's unit cell.
 
     python examples/sweep_frustum_height.py --heights 0.3 0.4 0.5 0.6 0.7 --out frustum_height.png
 
-One frustum of an endless lattice, with its board and folding sides, is pressed by a plate at finite strain (Mooney-Rivlin constants
-as the paper prints them). Its compression gives the capacitance between board and electrode plane. Expect: higher frusta gain more
-per pressure, less than in proportion, and every curve flattens as the sides fold onto the board. No sheet and no cover deform here,
-so this is the most that the dielectric can give under an even pressure, not the sensor's reading under an object. A coarse mesh of
-the cell keeps a height at some seconds; `--fine` takes the mesh of the press.
+A plate presses one frustum of an infinite lattice at finite strain, with its board and folding sides (Mooney-Rivlin constants as
+the paper prints them). Its compression gives the capacitance between board and electrode plane. Higher frusta gain more per
+pressure, less than in proportion, and every curve flattens as the sides fold onto the board. Sheet and cover do not deform here. So
+this is the largest gain of the dielectric under a uniform pressure, not the sensor's reading under an object. A coarse mesh of the
+cell takes some seconds for a height; `--fine` takes the mesh of the press.
 """
 
 import argparse

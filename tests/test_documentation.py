@@ -180,7 +180,8 @@ def test_the_numbers_in_the_pages_are_those_of_the_records():
 
 
 def test_packages_import_downwards_only_as_the_page_about_the_code_draws_them():
-    picture = (ROOT / "docs/explanation/code_layout.md").read_text(encoding="utf-8").split("```")[1]
+    page = (ROOT / "docs/explanation/code_layout.md").read_text(encoding="utf-8")
+    picture = next(block for block in page.split("```") if " commands/ " in block)
     rows = [re.findall(r"\b([a-z]+)/(?=\s|$)", row, flags=re.MULTILINE) for row in re.split("─+", picture)]
     depth = {package: number for number, row in enumerate(rows) for package in row}
     source = ROOT / "src/softtact"

@@ -1,6 +1,6 @@
 """The command `softtact`: its commands are the modules of `softtact.commands`.
 
-What the user can mend ends with one sentence on stderr and an exit status of its own (`softtact.commands.common.EXIT_STATUS`).
+An error that the user can correct ends with one sentence on stderr and an exit status (`softtact.commands.common.EXIT_STATUS`).
 Heavy imports stand inside the commands' functions, so that `softtact --help` answers at once.
 """
 
@@ -42,14 +42,14 @@ EXAMPLES = """examples:
   softtact complexity part.stl --unit mm      # which model the paper's rule takes for it
   softtact fit uniaxial=tension.csv --out card.json
   softtact cost --configfile config/paper.yaml   # jobs, hours and disk of a study, before it runs
-  softtact press --help                       # each command's help has examples of its own
+  softtact press --help                       # each command's help has examples
 """
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return its exit status."""
     parser = _parser()
-    if "_ARGCOMPLETE" in os.environ:     # a shell asks what could come next
+    if "_ARGCOMPLETE" in os.environ:     # a shell asks for completions
         import argcomplete
 
         argcomplete.autocomplete(parser)
@@ -58,31 +58,31 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         options.run(options)
     except ConvergenceError as error:
-        return _said(options, error, status=3)
+        return _refused(options, error, status=3)
     except SofttactError as error:
-        return _said(options, error, status=1)
+        return _refused(options, error, status=1)
     except ModuleNotFoundError as error:
         sentence = missing_extra(error)
         if sentence is None:
             raise
-        return _said(options, sentence, status=1)
-    except BrokenPipeError:     # `| head` has seen enough; what is still in the buffer must not raise at the end
+        return _refused(options, sentence, status=1)
+    except BrokenPipeError:     # `| head` has closed the pipe; the rest of the buffer must not raise at the end
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as error:
         place = error.filename or "a file"
-        return _said(options, f"{place}: {error.strerror or error}; make room or choose another place.", status=4)
+        return _refused(options, f"{place}: {error.strerror or error}; make room or choose another place.", status=4)
     except KeyboardInterrupt:
-        return _said(options, "interrupted; what was reached is written and shown, no half-written file is left.", status=130)
+        return _refused(options, "interrupted; what was reached is written and shown, no half-written file is left.", status=130)
     return 0
 
 
-def _said(options, sentence, *, status):
+def _refused(options, sentence, *, status):
     print(f"softtact {options.command}: {sentence}", file=sys.stderr)
     return status
 
 
 class _Parser(argparse.ArgumentParser):
-    """An argument parser whose complaint is one sentence."""
+    """An argument parser whose error message is one sentence."""
 
     _words: Sequence[str] = ()
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from softtact.errors import InputError
-from softtact.reporting.view3d import html_view
+from softtact.reporting.view3d import ColourScale, html_view
 
 POINTS = np.array([[0, 0, 0], [9, 0, 0], [0, 9, 0], [0, 0, 9.0]])
 FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
@@ -60,7 +60,7 @@ def drawn(folder, text, *, window):
 def test_a_tall_thing_is_whole_in_a_wide_and_in_a_narrow_window(window, tmp_path):
     """Its parts at the top and at the bottom, in yellow, are both seen."""
     corners = np.array([[x, y, z] for z in (0, 90) for x, y in ((0, 0), (9, 0), (0, 9))], dtype=float)
-    text = view(points_mm=corners, triangles=[[0, 1, 2], [3, 4, 5]], values=np.ones(6), limits=(0, 1))
+    text = view(points_mm=corners, triangles=[[0, 1, 2], [3, 4, 5]], values=np.ones(6), scale=ColourScale((0, 1)))
     red, _, blue = drawn(tmp_path, text, window=window)
     height = min(0.75 * window[0], 0.75 * window[1])
     top = int(np.flatnonzero((red - blue > 80).any(axis=1))[0])     # the colour bar lies below the canvas
@@ -71,8 +71,8 @@ def test_a_tall_thing_is_whole_in_a_wide_and_in_a_narrow_window(window, tmp_path
 @needs_browser
 def test_a_browser_draws_two_views_in_their_colours(tmp_path):
     """The first is red, the second blue."""
-    high = view(values=np.ones(4), limits=(0, 1), map_name="winter_r")
-    text = view(values=np.zeros(4), limits=(0, 1), map_name="autumn") + high
+    high = view(values=np.ones(4), scale=ColourScale((0, 1), "winter_r"))
+    text = view(values=np.zeros(4), scale=ColourScale((0, 1), "autumn")) + high
     red, green, blue = drawn(tmp_path, text, window=(600, 1200))
     upper, lower = np.s_[60:460], np.s_[640:1100]     # the canvas of either view
     assert (red - np.maximum(green, blue) > 80)[upper].sum() > 10_000

@@ -75,7 +75,7 @@ def test_where_mujoco_does_not_draw_a_sentence_says_so_and_the_maps_are_drawn(fo
     ("grasp part.stl --force 10 --out o", "--unit is missing: a grasp needs a mesh, its unit and a force"),
     ("grasp part.stl --unit mm --force 80 --out o", "--force 80: 80 N is out of the range of sensor coro"),
     ("grasp none.stl --unit mm --force 10 --out o", "none.stl: there is no such mesh file"),
-    ("grasp part.stl --unit mm --force 10 --mass 0 --out o", "--mass 0: an object weighs something"),
+    ("grasp part.stl --unit mm --force 10 --mass 0 --out o", "--mass 0: a mass is above 0"),
     ("grasp --replay part.stl --out o", "part.stl: not a readable NetCDF file"),
     ("grasp --replay first/events.nc --x 2 --out o", "--x 2.0: it has no effect on --replay"),
     ("grasp other.stl --replay first/events.nc --out o", "other.stl: it is not the mesh that first/events.nc was made with"),

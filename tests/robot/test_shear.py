@@ -24,7 +24,7 @@ def test_both_forces_are_those_asked_for(sensor, ball, shear):
     found = press_with_shear(sensor, ball, None, force_n=1.0, shear_n=np.array(shear), threads=1)
     assert found.result.normal_force_n[-1] == pytest.approx(1.0, rel=1e-3)
     np.testing.assert_allclose(found.shear_n, shear, atol=0.01 * np.linalg.norm(shear) + 1.1e-3)
-    assert found.way_mm @ np.array(shear) > 0          # the object goes where it pushes
+    assert found.slide_mm @ np.array(shear) > 0          # the object goes where it pushes
 
 
 def test_the_way_is_found_in_a_few_presses(sensor, ball, monkeypatch):

@@ -1,4 +1,4 @@
-"""`softtact calibrate`: one's own sensor from recordings of known presses."""
+"""`softtact calibrate`: a calibrated sensor from recordings of known presses."""
 
 import argparse
 import sys
@@ -30,7 +30,7 @@ def add(commands: argparse._SubParsersAction) -> None:
                               "each")
     command.add_argument("--finger", type=int, choices=(0, 1), default=0, help="which finger was pressed (default: 0)")
     command.add_argument("--baseline", choices=("auto", "subtracted", "kept"), default="auto",
-                         help="how the recorder wrote it (default: told by the lowest readings)")
+                         help="how the recorder wrote it (default: found from the lowest readings)")
     command.add_argument("--fit", default="placement,relaxation", metavar="NAMES",
                          help="what is unknown beside gains and zeros: some of placement,relaxation,modulus,cover,friction, or "
                               "none (default: placement,relaxation); cover and friction are of the foundation model; cover "
@@ -39,9 +39,9 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.add_argument("--sensor", default="coro", help="name or YAML file of the sensor (default: coro)")
     command.add_argument("--model", choices=("foundation", "elastic"), default="foundation", help="model of the presses")
     command.add_argument("--candidate", action="append", type=Path, metavar="OBJECT.stl",
-                         help="an object that could be pressed next: tells in which of five places it would help most; repeat it")
+                         help="an object that could be pressed next: shows in which of five places it would help most; repeat it")
     command.add_argument("--hyperelastic-check", action="store_true",
-                         help="press each object once by the hyperelastic model, too, and tell how far its counts lie from the "
+                         help="press each object once by the hyperelastic model, too, and show how far its counts lie from the "
                               "calibrated ones (a minute each)")
     command.add_argument("--out", required=True, type=Path, metavar="SENSOR.yaml", help="the calibrated sensor's file to write")
     command.add_argument("--report", type=Path, metavar="FILE.html", help="a page with residuals of each taxel")
@@ -61,7 +61,7 @@ def _calibrate(options):
     objects = [mesh for _, mesh, _, _ in given] + (options.candidate or [])
     meshes = {path: read_mesh(path, unit=options.unit) for path in dict.fromkeys(objects)}
     read = [_experiment(path, meshes[mesh], force, _place(place), options, spec) for path, mesh, force, place in given]
-    experiments, notes = [one for one, _ in read], [said for _, of_one in read for said in of_one]
+    experiments, notes = [one for one, _ in read], [note for _, notes_of_one in read for note in notes_of_one]
     problem = Problem(Presses(sensor, model=options.model), experiments, fitted)
     checks = check_recordings(problem)
     result = calibrate(problem)
@@ -77,7 +77,7 @@ def _calibrate(options):
 
 
 def _checked(options):
-    """(recording, mesh, force, place) of each recording, as they were written, once nothing that is read would be written over."""
+    """(recording, mesh, force, place) of each recording as stated; outputs that would overwrite an input are refused."""
     from softtact.files import refuse_overwriting
 
     check_folders(options.out, options.report)
@@ -91,7 +91,7 @@ def _checked(options):
 
 
 def _write(options, result, notes, advice):
-    """Write the calibrated sensor's file and, where asked for, the page; tell the notes."""
+    """Write the calibrated sensor's file and, where asked for, the page; print the notes."""
     from softtact.calibration.fit import write_calibrated
 
     write_calibrated(options.out, sensor_path(options.sensor), result)
@@ -104,7 +104,7 @@ def _write(options, result, notes, advice):
 
 
 def _for_each(name, values, count):
-    """One value for each recording, of as many or of one that serves all."""
+    """One value for each recording, from as many values or from one for all."""
     values = values or ["0,0,0"]
     if len(values) not in (1, count):
         raise InputError(f"--{name} was given {len(values)} times for {count} recordings; give it once for all, or once for each.")
@@ -128,7 +128,7 @@ def _place(text):
 
 
 def _experiment(path, mesh, force, place, options, spec):
-    """The `Experiment` of a recording, and sentences on what of it is clipped or dead."""
+    """The `Experiment` of a recording, and sentences on clipped or dead taxels."""
     from softtact.calibration.experiment import experiment
     from softtact.readout.recording import findings, with_force
     from softtact.readout.tsf85 import read_recording
@@ -144,18 +144,19 @@ def _experiment(path, mesh, force, place, options, spec):
     if not 0 < largest <= top:
         raise InputError(f"--force {force}: its largest force is {largest:g} N, and the sensor {spec.name} bears up to {top:g} N; "
                          "is it in grams or another unit? Give it in newtons.")
-    said = [one for one in findings(recording, largest=spec.largest_counts) if f"finger {options.finger}," in one]
-    return experiment(recording, mesh, finger=options.finger, force_n=held, place=place, largest_counts=spec.largest_counts), said
+    notes = [one for one in findings(recording, largest=spec.largest_counts) if f"finger {options.finger}," in one]
+    made = experiment(recording, mesh, finger=options.finger, force_n=held, place=place, largest_counts=spec.largest_counts)
+    return made, notes
 
 
 def _notes(problem, checks):
-    """Sentences on readings that were left out, and on what the recordings could not show."""
+    """Sentences on readings that are left out, and on what the recordings do not show."""
     for one, valid in zip(problem.experiments, problem.valid_n, strict=True):
         if one.force_of_bins.max() > valid:
             yield (f"{one.name}: readings above {valid:.3g} N are left out, for which the {problem.presses.model} model is not "
                    "valid.")
     if not any(check.tells_orientation for check in checks):
-        yield ("no press tells whether rows or columns are turned round; record one off the middle to be sure.")
+        yield ("no press shows whether rows or columns are turned round; record one off the middle to be sure.")
 
 
 def _summary(result, notes, advice, differences):
@@ -176,7 +177,8 @@ def _summary(result, notes, advice, differences):
 
 def _lines(summary):
     gains = [value for row in summary["gain"] for value in row]
-    yield f"common gain: {summary['common_gain']:.1f} counts at dC/C0 = 1; taxels' own {min(gains):.3f} to {max(gains):.3f} of it"
+    yield (f"common gain: {summary['common_gain']:.1f} counts at dC/C0 = 1; the taxels' gains are {min(gains):.3f} to "
+           f"{max(gains):.3f} of it")
     if summary["modulus_scale"] is not None:
         yield f"modulus scale: {summary['modulus_scale']:.3f}"
     if summary["cover_mm"] is not None:
@@ -188,10 +190,10 @@ def _lines(summary):
     for k, (x, y, angle) in enumerate(summary["places"], 1):
         yield f"press {k} lay at {x:.2f}, {y:.2f} mm, {angle:.1f} degrees"
     yield f"misfit: {summary['misfit_over_noise']:.2f} times the noise"
-    yield from (f"not told by these presses: {said}" for said in summary["not_identifiable"])
-    for said, counts in enumerate(summary["hyperelastic_difference_counts"] or (), 1):
-        yield (f"the hyperelastic model lies {counts:.1f} counts away from press {said} (root mean square)" if counts is not None
-               else f"press {said} was not checked: the hyperelastic model does not reach a force for which the other is valid")
+    yield from (f"left open by these presses: {sentence}" for sentence in summary["not_identifiable"])
+    for press, counts in enumerate(summary["hyperelastic_difference_counts"] or (), 1):
+        yield (f"the hyperelastic model lies {counts:.1f} counts away from press {press} (root mean square)" if counts is not None
+               else f"press {press} was not checked: the hyperelastic model does not reach a force for which the other is valid")
     for one in summary["next_press"][:3]:
         place = ", ".join(f"{value:g}" for value in one["place"])
         yield (f"next press: {one['object']} at {place} up to {one['force_n']:.3g} N adds {one['information_nats']:.2f} nats; "

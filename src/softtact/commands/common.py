@@ -1,4 +1,4 @@
-"""What several commands share: their common arguments, refusals before long work, and how a result is printed."""
+"""Common parts of the commands: arguments, refusals before long work, and the printing of a result."""
 
 import argparse
 import json
@@ -29,7 +29,7 @@ EXIT_TEXT = "exit status:\n" + "\n".join(f"  {status:<4}{meaning}" for status, m
 
 def add_command(commands: argparse._SubParsersAction, name: str, run: Callable[[argparse.Namespace], None], summary: str,
                 examples: str, *, json: bool = True) -> argparse.ArgumentParser:
-    """A new command `name` that calls run(options), with examples in its help; one with `json` can answer so."""
+    """A new command `name` that calls run(options), with examples in its help; `json` gives it the option --json."""
     command = commands.add_parser(name, help=summary, description=summary, epilog=f"examples:{examples.rstrip()}\n\n{EXIT_TEXT}",
                                   formatter_class=argparse.RawDescriptionHelpFormatter)
     command.set_defaults(run=run)
@@ -53,14 +53,14 @@ def add_mesh(command: argparse.ArgumentParser, *, several: bool = False) -> None
 
 
 def add_repair(command: argparse.ArgumentParser) -> None:
-    """The options of how a mesh that is no clean body is taken."""
+    """The option to repair a mesh that is no clean body."""
     command.add_argument("--repair", action=argparse.BooleanOptionalAction, default=True,
                          help="repair clear faults of the mesh (flat or small holes, doubled, turned or broken facets, "
                               "overlapping bodies) and name each repair on stderr; --no-repair refuses such a mesh")
 
 
 def read_object(options: argparse.Namespace, path: Path) -> "tuple[trimesh.Trimesh, list[str]]":
-    """A mesh of the command line (trimesh, mm) and the list of its repairs, which are also said on stderr."""
+    """A mesh of the command line (trimesh, mm) and the list of its repairs, which also go to stderr."""
     from softtact.geometry.meshes import read_mesh
     from softtact.geometry.repair import read_mended
 
@@ -78,7 +78,7 @@ def show(result: Any, *, as_json: bool, lines: Iterable[str]) -> None:
 
 
 def check_forces(forces: Iterable[float], spec: "AnySpec | SolidSpec") -> None:
-    """Refuse a force that the sensor does not bear, before a mesh is read or a solver loaded."""
+    """Refuse a force out of the sensor's range, before a mesh is read or a solver loaded."""
     low, high = spec.force_range_n
     for force in forces:
         if not low < force <= high:
@@ -101,7 +101,7 @@ def pose_of(options: argparse.Namespace) -> "Pose | None":
 
 
 def origin(options: argparse.Namespace, path: Path) -> dict[str, str]:
-    """What a press came from, as attributes of its file."""
+    """The inputs of a press, as attributes of its file."""
     import hashlib
 
     return {"mesh": path.name, "mesh_sha256": hashlib.sha256(path.read_bytes()).hexdigest(), "unit": options.unit,
@@ -109,7 +109,7 @@ def origin(options: argparse.Namespace, path: Path) -> dict[str, str]:
 
 
 def check_folders(*paths: Path | None) -> None:
-    """Refuse now what could not be written after a long press."""
+    """Refuse files that could not be written after a long press."""
     for path in paths:
         if path and not path.parent.is_dir():
             raise InputError(f"{path}: there is no folder {path.parent}; make it first.")
@@ -118,7 +118,7 @@ def check_folders(*paths: Path | None) -> None:
 
 
 def check_names(endings: Mapping[Path | None, tuple[str, ...]]) -> None:
-    """Refuse a file to write whose name does not end as one of those that it is written as: {path or None: endings}."""
+    """Refuse a file to write whose name has none of its known endings: {path or None: endings}."""
     for path, known in endings.items():
         if path and path.suffix.lower() not in known:
             raise InputError(f"{path}: the file is written as {' or '.join(known)}; give a name with such an ending.")

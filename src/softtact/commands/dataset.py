@@ -75,7 +75,7 @@ def _meshes(options):
     names = [path.stem for path in paths]
     for name, path in zip(names, paths, strict=True):
         if names.count(name) > 1:
-            raise InputError(f"{path}: two objects have the name {name}; rename one, for the data set tells them by it.")
+            raise InputError(f"{path}: two objects have the name {name}; rename one: the data set names its objects.")
     return {name: read_object(options, path)[0] for name, path in zip(names, paths, strict=True)}
 
 

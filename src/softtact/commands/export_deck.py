@@ -65,7 +65,7 @@ def _export_solid(options):
     body = sensor.body_with(mesh, pose, motion)
     export_solid(options.out, body, {"object": motion}, dialect=options.format, title=f"{options.mesh.name} on {spec.name}")
     result = {"deck": str(options.out), "format": options.format, "nodes": len(body.mesh.points),
-              "elements": {region: sum(len(nodes) for own, _, nodes in body.mesh.cells if own == region)
+              "elements": {region: sum(len(nodes) for name, _, nodes in body.mesh.cells if name == region)
                            for region in body.mesh.regions},
               "facets": {"object": len(body.surface_nodes("object"))},
               "steps": [f"step_{number}" for number in range(1, len(forces) + 1)], "repairs": repairs}

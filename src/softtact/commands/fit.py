@@ -40,7 +40,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     reading.add_argument("--layout", choices=LAYOUTS, default="plain",
                          help="how the files are laid out (default: plain, columns named in a header; literature: a folder)")
     reading.add_argument("--column", action="append", metavar="NAME=HEADER",
-                         help="a column's quantity and unit, and the file's own name of it; repeat it")
+                         help="a column's quantity and unit, and its header in the file; repeat it")
     reading.add_argument("--decimal", choices=(".", ","), default=".", help="decimal sign (default: the point)")
     reading.add_argument("--skip-rows", type=int, default=0, metavar="N", help="pass over N lines above the header")
     reading.add_argument("--sheet", metavar="NAME", help="sheet of an Excel workbook (.xlsx) that has several")
@@ -84,7 +84,7 @@ def _material(options):
     if Path(name).suffix not in YAML and (name not in known_names("materials") or Path(name).exists()):
         return None
     if len(options.curves) > 1 or _reading(options) != _READING:
-        raise InputError(f"{name}: a material's YAML names its own files and options; give it without others.")
+        raise InputError(f"{name}: a material's YAML names its files and options; give it without others.")
     return load_material(material_file(name))
 
 

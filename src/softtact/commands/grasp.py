@@ -1,4 +1,4 @@
-"""`softtact grasp`: a robot grasps an object between two sensors; what both feel at the events."""
+"""`softtact grasp`: a robot grasps an object between two sensors; maps and counts of both at the events."""
 
 import argparse
 import hashlib
@@ -24,7 +24,7 @@ EXAMPLES = """
 """
 _OF_GRASP = {"unit": None, "force": None, "x": 0.0, "y": 0.0, "angle": 0.0, "mass": None, "scene": None, "lift": True,
              "model": "auto", "policy": "error", "tolerance": 0.01, "sensor": "coro",
-             "shear": False}     # what a replay takes from its file
+             "shear": False}     # a replay takes these from its file
 
 
 def add(commands: argparse._SubParsersAction) -> None:
@@ -54,7 +54,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.add_argument("--tolerance", type=float, default=0.01, metavar="MM", help="for the policy error (default: 0.01)")
     command.add_argument("--workers", type=int, metavar="N", help="processes that press (default: one for each core)")
     command.add_argument("--replay", type=Path, metavar="events.nc",
-                         help="press again what a file holds, in place of a grasp; all other options of it come from the file")
+                         help="press the events of a file again, in place of a grasp; all other options come from the file")
     command.add_argument("--picture", action=argparse.BooleanOptionalAction, default=True,
                          help="draw the robot at the events beside maps and counts (default)")
     command.add_argument("--video", action="store_true", help="write the grasp as grasp.mp4")
@@ -91,9 +91,9 @@ def _new(options):
     spec = sensor_spec(options.sensor)
     check_forces([options.force], spec)
     if options.shear and options.model not in ("elastic", "hyperelastic"):
-        raise InputError(f"--shear: {options.model} does not move an object aside; name --model elastic or hyperelastic.")
+        raise InputError(f"--shear: {options.model} has no tangential motion; name --model elastic or hyperelastic.")
     if options.mass is not None and not options.mass > 0:
-        raise InputError(f"--mass {options.mass:g}: an object weighs something; give kg above 0.")
+        raise InputError(f"--mass {options.mass:g}: a mass is above 0; give it in kg.")
     settings = load_scene(options.scene)
     mesh, _ = read_object(options, options.mesh)
     scene = build_scene(mesh, spec, settings, Placement(options.x, options.y, options.angle), mass_kg=options.mass)
@@ -102,11 +102,11 @@ def _new(options):
              "sensor_asked_for": options.sensor, "requested_force_n": options.force, "x_mm": options.x, "y_mm": options.y,
              "angle_deg": options.angle, "mass_kg": scene.mass_kg, "model_asked_for": options.model, "policy": options.policy,
              "tolerance_mm": options.tolerance, "shear": int(options.shear), "scene": settings.model_dump_json()}
-    return _felt(mesh, record, facts, options.workers), scene, record
+    return _pressed(mesh, record, facts, options.workers), scene, record
 
 
 def _replayed(options):
-    """The same of a file: its record is pressed again."""
+    """(data set, scene, record) of a file, whose events are pressed again."""
     from softtact.robot.events import facts_of, read_events, record_of
     from softtact.robot.scene import Placement, build_scene
     from softtact.robot.settings import SceneSettings
@@ -130,11 +130,11 @@ def _replayed(options):
     settings = SceneSettings.model_validate_json(facts["scene"])
     scene = build_scene(mesh, sensor_spec(facts["sensor_asked_for"]), settings,
                         Placement(*(facts[name] for name in ("x_mm", "y_mm", "angle_deg"))), mass_kg=facts["mass_kg"])
-    return _felt(mesh, record, facts, options.workers), scene, record
+    return _pressed(mesh, record, facts, options.workers), scene, record
 
 
-def _felt(mesh, record, facts, workers):
-    """The data set of a record: what both sensors feel at its events."""
+def _pressed(mesh, record, facts, workers):
+    """The data set of a record, with maps and counts of both sensors at its events."""
     from softtact.robot.events import press_events, to_dataset
     from softtact.robot.settings import SceneSettings
 

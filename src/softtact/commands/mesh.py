@@ -51,13 +51,13 @@ def _mesh(options):
     write_mesh(mesh, options.out)
     result = {"mesh": str(options.out)} | result | {"regions": mesh.regions, "faces": {name: sum(map(len, facets.values()))
                                                                                       for name, facets in mesh.faces.items()}}
-    told = {name.replace("_", " "): short(value) for name, value in result.items() if name != "mesh" and value not in ([], {})}
-    lines = [f"{name}: {value}" for name, value in told.items()]
+    shown = {name.replace("_", " "): short(value) for name, value in result.items() if name != "mesh" and value not in ([], {})}
+    lines = [f"{name}: {value}" for name, value in shown.items()]
     show(result, as_json=options.json, lines=[*lines, f"written: {options.out}"])
 
 
 def _filled(options, rules):
-    """The mesh of a surface, and what is told of it."""
+    """The mesh of a surface, and the values that are reported of it."""
     from softtact.fem.body_mesh import MOST_ELEMENTS, body_report, mesh_body
     from softtact.fem.face_rules import face_rule, with_named_faces
     from softtact.geometry.tetrahedra import estimated_elements
@@ -84,7 +84,7 @@ def _filled(options, rules):
 
 
 def _taken(options, rules):
-    """The mesh of a file of elements, and what is told of it."""
+    """The mesh of a file of elements, and the values that are reported of it."""
     from softtact.fem.mesh_files import read_mesh_file
 
     for name in ("size", "envelope", "most_elements"):

@@ -73,18 +73,18 @@ def _lines(maps, counts, network, facts):
         yield from ("".join(f"{count:8.0f}" for count in row) for row in taxels)
 
 
-MOST = 8     # maps in one picture; of more, evenly chosen ones
+MOST = 8     # maps in one picture, evenly chosen
 
 
 def plot_prediction(maps: "Maps", counts: "np.ndarray", path: str | Path) -> None:
-    """Draw `Maps` and counts (n, row, column) to PNG or SVG: a column per map, in mm above, the counts below."""
+    """Draw `Maps` and counts (n, row, column) to PNG or SVG: a column for each map, in mm above, the counts below."""
     from softtact.reporting.style import pyplot, save
 
     plt = pyplot()
     shown = [round(k * (len(counts) - 1) / max(1, min(MOST, len(counts)) - 1)) for k in range(min(MOST, len(counts)))]
     extent, unit = _extent(maps)
     figure, axes = plt.subplots(2, len(shown), figsize=(1.2 + 2.3 * len(shown), 7.2), squeeze=False, layout="constrained")
-    most = max(1.0, float(counts.max()))          # the whole range of 2400 counts would leave light presses dark
+    most = max(1.0, float(counts.max()))          # on the whole range of 2400 counts light presses would be dark
     low, high = min(0.0, float(maps.maps_mm.min())), float(maps.maps_mm.max())
     for column, k in enumerate(shown):
         image = axes[0, column].imshow(maps.maps_mm[k], origin="lower", extent=extent, vmin=low, vmax=high, cmap="viridis")
@@ -99,7 +99,7 @@ def plot_prediction(maps: "Maps", counts: "np.ndarray", path: str | Path) -> Non
 
 
 def _extent(maps):
-    """The sides of a map for both rows of pictures: in mm where the file tells the grid, else counted in its points."""
+    """Sides of a map: in mm where the file has the grid, else in numbers of points."""
     if maps.x_mm is None or maps.y_mm is None:
         height, width = maps.maps_mm.shape[1:]
         return (0, width - 1, 0, height - 1), "points"

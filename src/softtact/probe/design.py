@@ -1,4 +1,4 @@
-"""The YAML file of a palpation sensor: an elastic beam on two supports with a soft filler between them, tissue and jaw above.
+"""The YAML file of a palpation sensor: an elastic beam on two supports with a soft filler between them, and tissue and jaw above.
 
 Lengths are in mm, forces in N, moduli in MPa. x runs along the beam from the left support's outer end, y up from the base.
 """
@@ -23,7 +23,7 @@ REGIONS = ("left support", "right support", "filler", "beam", "tissue")
 
 
 class Material(Section):
-    """A material by a law's constants and K, by mu and K of a neo-Hookean law, or by E and nu of one."""
+    """A material: constants of a law and K, or mu and K, or E and nu, of a neo-Hookean law."""
 
     law: str = "neo_hooke"
     parameters: dict[str, float] | None = Field(None, description="of the law, MPa or 1")
@@ -33,10 +33,10 @@ class Material(Section):
     poisson: float | None = Field(None, gt=-1, lt=0.5)
     stretch_window: tuple[Positive, Positive] | None = Field(None, description="lowest and highest principal stretch of its data")
     assumed: bool = False
-    source: str = Field(min_length=1, description="where the constants stand, or why they are assumed")
+    source: str = Field(min_length=1, description="source of the constants, or why they are assumed")
 
     @pydantic.model_validator(mode="after")
-    def _one_way(self):
+    def _stated_once(self):
         names = ("parameters", "shear_mpa", "bulk_mpa", "young_mpa", "poisson")
         given = {name for name in names if getattr(self, name) is not None}
         if given not in ({"parameters", "bulk_mpa"}, {"shear_mpa", "bulk_mpa"}, {"young_mpa", "poisson"}):
@@ -46,7 +46,7 @@ class Material(Section):
         return self
 
     def make(self) -> Law:
-        """The `Law`. Raises InputError for constants that make none."""
+        """The `Law`. Raises InputError for constants that a law does not allow."""
         if self.young_mpa is not None and self.poisson is not None:
             linear = LinearConstants(self.young_mpa, self.poisson)
             return make_law("neo_hooke", {"c10": linear.mu_mpa / 2}, bulk_modulus=linear.bulk_modulus_mpa)
@@ -95,14 +95,14 @@ class Film(Section):
 
 
 class Steps(Section):
-    """Equal steps up to a value."""
+    """Equal steps up to a final value."""
 
     to: Positive
     by: Positive
 
     @property
     def values(self) -> np.ndarray:
-        """The steps' ends; the last one is `to`."""
+        """The values at the ends of the steps; the last one is `to`."""
         return np.linspace(0, self.to, max(1, round(self.to / self.by)) + 1)[1:]
 
 
@@ -117,10 +117,10 @@ class Lump(Section):
 
 
 class Hardness(Section):
-    """The study of how relative hardness depends on load and on the tissue's height."""
+    """The study of relative hardness over load and tissue height."""
 
     tissue_heights: list[Positive] = Field(min_length=1)
-    shares: list[Annotated[float, Field(gt=0, le=1)]] = Field(min_length=2, description="of the jaw's way, used of a sweep")
+    shares: list[Annotated[float, Field(gt=0, le=1)]] = Field(min_length=2, description="of the jaw's displacement in a sweep")
     steps: int = Field(8, ge=4)
 
     @pydantic.model_validator(mode="after")
@@ -131,18 +131,18 @@ class Hardness(Section):
 
 
 class LumpSearch(Section):
-    """The study of a hidden lump: a table of film forces over its place, depth and stiffness, and what can be told from it."""
+    """The study of a hidden lump: a table of film forces over its place, depth and stiffness, and estimates from it."""
 
     tissue: str
     width: Positive
     height: Positive
     x: list[float] = Field(min_length=4, description="places along the left half; the right half is their mirror image")
     depth: list[Positive] = Field(min_length=4)
-    stiffness_ratio: list[Annotated[float, Field(gt=1)]] = Field(min_length=3, description="above 1, which is always solved")
-    jaw_mm: list[Positive] = Field(min_length=1, description="rising ways at which the films are read")
+    stiffness_ratio: list[Annotated[float, Field(gt=1)]] = Field(min_length=3, description="plain tissue, 1, is solved as well")
+    jaw_mm: list[Positive] = Field(min_length=1, description="rising displacements at which the films are read")
     noise_n: Positive = Field(description="standard deviation of a film's reading")
-    moves: list[float] = Field([0.0], min_length=1, description="by how many mm the sensor is moved back along the tissue for each "
-                               "press of a lump, from the first place on: a lump's x is larger by so much")
+    moves: list[float] = Field([0.0], min_length=1, description="displacement in mm of the sensor back along the tissue for each "
+                               "press, from the first place on: a lump's x is larger by it")
     trials: int = Field(20, ge=1)
     seed: int = Field(0, ge=0)
     assumed: bool = False
@@ -163,13 +163,13 @@ class MeshSizes(Section):
     along: Positive = 2.0
     tissue: Positive = 2.0
     base: Positive = 1.25
-    edge: Positive | None = Field(None, description="first elements beside the supports' inner edges, where the beam is bent most")
+    edge: Positive | None = Field(None, description="first elements beside the supports' inner edges, where the beam bends most")
     beam_layers: int = Field(2, ge=2, multiple_of=2, description="elements across the beam, an even number: its middle has nodes")
     depth_layers: int = Field(2, ge=1, description="elements across the depth of a solid")
 
 
 class PalpationDesign(Section):
-    """A palpation sensor, the tissues that it touches and the sweeps."""
+    """A palpation sensor, the tissues that it presses and the sweeps."""
 
     name: str = Field(pattern=r"^[a-z0-9_]+$")
     model: Literal["plane_strain", "solid"] = "plane_strain"
@@ -179,15 +179,15 @@ class PalpationDesign(Section):
     beam: Material
     tissues: dict[str, Material] = Field(min_length=1)
     jaw: Literal["bonded", "sliding"] = "bonded"
-    tissue_on_beam: Literal["bonded"] | Annotated[float, Field(ge=0)] = Field("bonded", description="or its friction")
-    beam_on_base: Literal["bonded"] | Annotated[float, Field(ge=0)] = Field("bonded", description="or its friction")
+    tissue_on_beam: Literal["bonded"] | Annotated[float, Field(ge=0)] = Field("bonded", description="or Coulomb's coefficient")
+    beam_on_base: Literal["bonded"] | Annotated[float, Field(ge=0)] = Field("bonded", description="likewise")
     films: dict[str, Film] = Field(min_length=1)
     load_n: Steps
     displacement_mm: Steps
     mesh: MeshSizes = MeshSizes()
     lump: Lump | None = None
-    variants: dict[str, dict[str, Any]] = Field(default_factory=dict, description="other values of these keys, by name")
-    variant_steps: int = Field(6, ge=3, description="steps of the jaw's way in a variant")
+    variants: dict[str, dict[str, Any]] = Field(default_factory=dict, description="designs with other values of some keys, by name")
+    variant_steps: int = Field(6, ge=3, description="steps of the jaw's displacement in a variant")
     hardness: Hardness | None = None
     search: LumpSearch | None = None
 
@@ -201,7 +201,8 @@ class PalpationDesign(Section):
                 raise ValueError(f"the film {name} from {film.start:g} to {film.end:g} mm does not lie on the {film.on}, which "
                                  f"reaches from {low:g} to {high:g} mm")
         if self.displacement_mm.to >= self.geometry.tissue_height:
-            raise ValueError(f"the jaw's way of {self.displacement_mm.to:g} mm is more than the tissue's height; make it smaller")
+            raise ValueError(f"the jaw's displacement of {self.displacement_mm.to:g} mm is more than the tissue's height; make it "
+                             "smaller")
         if self.lump:
             self._lump_fits(self.lump)
         if self.search and self.search.tissue not in self.tissues:
@@ -221,13 +222,13 @@ class PalpationDesign(Section):
                 "right support": (g.support_length + g.filler_length, g.length)}.get(part, (0.0, g.length))
 
     def tissue(self, name: str) -> Material:
-        """A tissue by its name; InputError lists those there are."""
+        """A tissue by its name. Raises InputError that lists the known ones."""
         if name not in self.tissues:
             raise InputError(f"There is no tissue {name!r}; there are {', '.join(self.tissues)}.")
         return self.tissues[name]
 
     def with_(self, **changes: Any) -> "PalpationDesign":
-        """The design with other values of its keys, checked again: a mapping changes a section's own keys, None leaves a key out.
+        """The design with other values of some keys, checked. A mapping changes keys of a section; None removes a key.
 
         Raises InputError where they do not fit.
         """
@@ -239,7 +240,7 @@ class PalpationDesign(Section):
 
 
 def _changed(values, changes):
-    """A mapping with other values, those of mappings within it changed likewise."""
+    """A mapping with other values, nested mappings changed likewise."""
     out = dict(values)
     for name, value in changes.items():
         if isinstance(value, dict) and isinstance(out.get(name), dict) and value:
@@ -252,13 +253,13 @@ def _changed(values, changes):
 
 
 def load_design(path: str | Path) -> PalpationDesign:
-    """Read a design's YAML; what is wrong is told in one sentence."""
+    """Read a design's YAML. Raises InputError, one sentence with file, field and remedy."""
     values = read_yaml(path, missing="there is no such design; config/probe.yaml is one.")
     design = validated(PalpationDesign, values, where=str(path))
     for name, material in ({"supports": design.supports, "filler": design.filler, "beam": design.beam} | design.tissues).items():
         try:
             material.make()
-        except InputError as error:     # of constants, which know no file
+        except InputError as error:     # the constants' checks do not know the file
             raise InputError(f"{path}: {name}: {error}") from None
     for name in design.variants:
         try:

@@ -1,14 +1,14 @@
 """A stiff lump hidden in the tissue: its place, depth and stiffness from the films, with their uncertainty, and its detection.
 
-The solver makes a table of the films' forces over (x, depth, log of the stiffness ratio); between its points a cubic spline gives
-the forces f(p) and their derivatives. Readings are compared with it by least squares, weighted with the films' noise s; the
-covariance of the estimate is s^2 (J^T J)^-1. A lump is seen where its forces differ from plain tissue's by more than noise does:
-chi2 = |f(p) - f_0|^2/s^2 beyond the 95 % point, with a probability of 95 % (non-central chi2 with |df|^2/s^2). The plain tissue is
-taken as known: it was read before.
+The solver makes a table of the films' forces over (x, depth, log of the stiffness ratio). A cubic spline between its points gives
+the forces f(p) and their derivatives. Readings are fitted by least squares, weighted with the films' noise s; the covariance of the
+estimate is s^2 (J^T J)^-1. A lump is detected where its forces differ from those of plain tissue f_0 by more than noise:
+chi2 = |f(p) - f_0|^2/s^2 beyond the 95 % point, with a probability of 95 % (non-central chi2 with |f(p) - f_0|^2/s^2). The forces
+of plain tissue are taken as known.
 
-The sensor may read the lump in several presses, moved along the tissue between them. One press tells a deep stiff lump hardly from
-a soft one near the jaw; the presses beside it tell how far the lump's forces spread, which grows with its depth. A move is taken as
-a lump that lies elsewhere in the same tissue: tissue is the same beyond the jaw's ends.
+The sensor may press several times, moved along the tissue between the presses. One press hardly distinguishes a deep stiff lump
+from a soft one near the jaw. The other presses show the width over which the lump's forces spread, which grows with its depth. A
+move is modelled as a lump at another place in the same tissue.
 """
 
 from collections.abc import Callable
@@ -27,11 +27,11 @@ from softtact.probe.sweep import palpate
 
 PARAMETERS = ("x_mm", "depth_mm", "log_ratio")
 _SURE = 0.95
-_STEP = 1e-3      # of a parameter's range, for derivatives of the table's spline
-_STARTS = 12      # best points of the table from which least squares set out, for two lumps may read alike
-_AS_GOOD = chi2.ppf(_SURE, 1)      # by how much the chi2 of another minimum may be larger for it to count
-_LEAST_CHANGE = 1e-3      # of the stiffness, and the number of ratios, that the map of detection tries
-_RATIOS = 200
+_STEP = 1e-3      # of a parameter's range, for differences of the spline
+_STARTS = 12      # best points of the table, where least squares start: two lumps may give almost the same readings
+_AS_GOOD = chi2.ppf(_SURE, 1)      # largest excess in chi2 of another minimum that counts
+_LEAST_CHANGE = 1e-3      # smallest rise of stiffness in the map of detection
+_RATIOS = 200     # stiffness ratios that the map of detection tries
 
 
 @dataclass(frozen=True)
@@ -41,15 +41,15 @@ class LumpTable:
     x_mm: np.ndarray
     depth_mm: np.ndarray
     stiffness_ratio: np.ndarray
-    """Rising values along each side of the table; the ratios begin with 1, tissue without a lump."""
+    """Rising values along the axes of the table; the ratios begin with 1, plain tissue."""
     force_n: np.ndarray
-    """(x, depth, stiffness, films) in N of one press; `films` are jaw's ways times films."""
+    """(x, depth, stiffness, readings) in N of one press: all films at each of the jaw's displacements."""
     unladen_n: np.ndarray
-    """(films,) of tissue without a lump."""
+    """(readings of a press,) of plain tissue."""
     noise_n: float
     """Standard deviation of a reading."""
     move_mm: np.ndarray = field(default_factory=lambda: np.zeros(1))
-    """(presses,) by how far a lump's x is larger in each press than in `lump`; the readings are those of all presses in turn."""
+    """(presses,) added to a lump's x in each press; the readings are those of all presses in turn."""
 
     def __post_init__(self) -> None:
         axes = (self.x_mm, self.depth_mm, np.log(self.stiffness_ratio))
@@ -60,7 +60,7 @@ class LumpTable:
 
     @property
     def plain_n(self) -> np.ndarray:
-        """(readings,) of tissue without a lump."""
+        """(readings,) of plain tissue."""
         return np.tile(self.unladen_n, len(self.move_mm))
 
     def forces(self, lump: np.ndarray) -> np.ndarray:
@@ -70,13 +70,13 @@ class LumpTable:
         presses = []
         for move in self.move_mm:
             at = within.copy()
-            at[..., 0] = np.clip(at[..., 0] + move, *ends)      # rounding must not leave the table
+            at[..., 0] = np.clip(at[..., 0] + move, *ends)      # round-off must not leave the table
             presses.append(self._spline(at))     # type: ignore[attr-defined]
         found = np.concatenate(presses, axis=-1)
         return found if lump.ndim > 1 else found[0]
 
     def jacobian(self, lump: np.ndarray) -> np.ndarray:
-        """(readings, 3) derivatives of `forces`, by differences within the table."""
+        """(readings, 3) derivatives of `forces` by the lump, from differences within the table."""
         columns = []
         for k, span in enumerate(self.high - self.low):     # type: ignore[attr-defined]
             step = np.zeros(3)
@@ -86,7 +86,7 @@ class LumpTable:
         return np.column_stack(columns)
 
     def points(self) -> np.ndarray:
-        """(m, 3) lumps of the table's points that lie within it in every press, and of the ends in x."""
+        """(m, 3) lumps at the table's points that lie within it in every press, and at the ends in x."""
         low, high = self.low[0], self.high[0]     # type: ignore[attr-defined]
         x = np.unique(np.clip(self.x_mm, low, high))
         axes = np.meshgrid(x, self.depth_mm, np.log(self.stiffness_ratio), indexing="ij")
@@ -95,26 +95,26 @@ class LumpTable:
 
 @dataclass(frozen=True)
 class FoundLump:
-    """A lump read off the films."""
+    """A lump estimated from the films' readings."""
 
     x_mm: float
     depth_mm: float
     stiffness_ratio: float
     deviation: np.ndarray
-    """(3,) standard deviations at this lump: mm, mm, and of the logarithm of the ratio; inf where the films do not tell."""
+    """(3,) standard deviations at this lump: mm, mm, and of the logarithm of the ratio; inf where no reading depends on it."""
     interval: np.ndarray
-    """(3, 2) 95 % intervals of the same: all lumps that fit as well within noise, each with 1.96 deviations, within the table."""
+    """(3, 2) 95 % intervals of the same, within the table: all lumps that fit as well within noise, with 1.96 deviations."""
     chi2: float
-    """Squared misfit over the noise; about the number of readings less 3 where lump and table are of one kind."""
+    """Squared misfit over the noise; about the number of readings less 3 where the table's model holds."""
     detected: bool
-    """Whether the readings differ from those of plain tissue beyond the 95 % point of noise."""
+    """Whether the readings differ from plain tissue's beyond the 95 % point of noise."""
 
 
 def lump_table(design: PalpationDesign, search: LumpSearch, *, threads: int = 1,
                tell: Callable[[str], None] = lambda text: None) -> LumpTable:
-    """Solve all lumps of a search. The table is mirrored to the right half, left and right film exchanged.
+    """Solve all lumps of a search. The right half of the table is the mirror image, left and right film exchanged.
 
-    A lump's forces are those of plain tissue plus what the lump changes on its own mesh, so that the mesh's change leaves no trace.
+    A lump's forces are those of plain tissue plus the change by the lump on one mesh, which removes the effect of the mesh.
     Raises InputError where the films are not symmetric about the middle, or a lump does not fit into the tissue.
     """
     mirror, middle = _mirror(design), design.geometry.middle
@@ -127,8 +127,8 @@ def lump_table(design: PalpationDesign, search: LumpSearch, *, threads: int = 1,
     ratios = [1.0, *search.stiffness_ratio]
     for number, (x, depth) in enumerate(product(search.x, search.depth), start=1):
         tell(f"place {number} of {len(search.x) * len(search.depth)} of a lump")
-        own = np.array([_solved(design, search, x, depth, ratio, threads) for ratio in ratios])
-        rows.append(plain + own - own[0])
+        forces = np.array([_solved(design, search, x, depth, ratio, threads) for ratio in ratios])
+        rows.append(plain + forces - forces[0])
     shape = (len(search.x), len(search.depth), len(ratios), len(search.jaw_mm), len(mirror))
     left = np.array(rows).reshape(shape)
     mirrored = search.x if search.x[-1] < middle - 1e-9 else search.x[:-1]
@@ -140,7 +140,7 @@ def lump_table(design: PalpationDesign, search: LumpSearch, *, threads: int = 1,
 
 
 def _check_moves(search, length):
-    """Lumps must lie within the table in every press."""
+    """Refuse moves by which no lump lies within the table in every press."""
     nearest, reach = search.x[0], max(search.moves) - min(search.moves)
     if length - 2 * nearest <= reach:
         raise InputError(f"search.moves reach {reach:g} mm, and the table of lumps {length - 2 * nearest:g} mm, from {nearest:g} "
@@ -162,10 +162,10 @@ def _mirror(design):
 
 
 def find_lump(table: LumpTable, readings_n: np.ndarray) -> FoundLump:
-    """The lump that fits readings (readings,) in N best, from several starts. Raises InputError for another number of readings."""
+    """The lump that fits readings (readings,) in N best, from several starts. Raises InputError for a wrong number of readings."""
     if readings_n.shape != table.plain_n.shape:
         raise InputError(f"There are {readings_n.size} readings, and the table has {table.plain_n.size}; give one for each "
-                         "press, way and film.")
+                         "press, displacement and film.")
     low, high = table.low, table.high     # type: ignore[attr-defined]
 
     def misfit(lump):
@@ -192,7 +192,7 @@ def _interval(table, fits):
 
 
 def deviations(table: LumpTable, lump: np.ndarray) -> np.ndarray:
-    """Standard deviations (3,) of an estimate at a lump (3,), from the noise; inf where the readings do not tell."""
+    """Standard deviations (3,) of an estimate at a lump (3,) by noise; inf where the readings do not depend on it."""
     J = table.jacobian(lump) / table.noise_n
     information = J.T @ J
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
@@ -203,7 +203,7 @@ def deviations(table: LumpTable, lump: np.ndarray) -> np.ndarray:
 
 
 def detection_map(table: LumpTable) -> pd.DataFrame:
-    """For each x and depth of the table the least stiffness ratio that is seen, inf where none of the table's is."""
+    """The least stiffness ratio that is detected for each x and depth; inf where none of the table's is."""
     needed = _noncentrality(len(table.plain_n)) * table.noise_n**2
     rows = []
     for x in np.unique(table.points()[:, 0]):
@@ -217,16 +217,16 @@ def detection_map(table: LumpTable) -> pd.DataFrame:
 
 
 def _noncentrality(readings):
-    """|df|^2/s^2 at which a lump is seen with the probability `_SURE`."""
+    """|f(p) - f_0|^2/s^2 at which a lump is detected with the probability `_SURE`."""
     bound = chi2.ppf(_SURE, readings)
     return float(brentq(lambda value: ncx2.sf(bound, readings, value) - _SURE, 1e-3, 1e4))
 
 
 def recovery(design: PalpationDesign, search: LumpSearch, table: LumpTable, *, threads: int = 1,
              tell: Callable[[str], None] = lambda text: None) -> pd.DataFrame:
-    """Lumps drawn within the table, solved, read with noise and found again: true, found and stated deviation of each.
+    """Random lumps within the table, solved, read with noise and estimated: the true and the found values of each.
 
-    The solver gives the readings, not the table, so that the table's own error counts. `alone_...`: found by the first press.
+    The readings come from the solver, not from the table, so they include the table's error. `alone_...`: found by the first press.
     """
     first = replace(table, move_mm=table.move_mm[:1])
     rng, rows = np.random.default_rng(search.seed), []
@@ -258,15 +258,15 @@ def _intervals(found, lump):
 
 
 def _changed(design, search, lump, threads):
-    """(films,) in N by which a lump (3,) changes the readings of a press."""
+    """Change (readings,) in N of a press by a lump (3,)."""
     x, depth, log_ratio = lump
     with_lump, without = (_solved(design, search, x, depth, ratio, threads) for ratio in (np.exp(log_ratio), 1.0))
     return with_lump - without
 
 
 def _solved(design, search, x, depth, ratio, threads):
-    """Readings (ways x films,) in N of a lump, or of plain tissue where its x is None."""
+    """Readings (displacements x films,) in N of a press on a lump, or on plain tissue where x is None."""
     lump = None if x is None else {"x": float(x), "depth": float(depth), "width": search.width, "height": search.height,
                                    "stiffness_ratio": float(ratio)}
-    own = design.with_(lump=lump, search=None)
-    return palpate(own, search.tissue, "displacement", values=np.array(search.jaw_mm), threads=threads).film_force_n.ravel()
+    changed = design.with_(lump=lump, search=None)
+    return palpate(changed, search.tissue, "displacement", values=np.array(search.jaw_mm), threads=threads).film_force_n.ravel()

@@ -1,7 +1,7 @@
 """Mesh and body of a palpation sensor with tissue and jaw, in plane strain or as a solid.
 
-Base (supports and filler), beam and tissue stand on one grid of lines. Bonded ones share their nodes; unilateral ones are meshes of
-their own that meet in contact pairs.
+Base (supports and filler), beam and tissue have one grid of lines. Bonded layers share their nodes; loose ones are separate meshes
+that meet in contact pairs.
 """
 
 import numpy as np
@@ -22,7 +22,7 @@ _ROUNDING_MM = 1e-9
 
 
 def lines(breaks: list[float], size: float) -> np.ndarray:
-    """Ends of elements no longer than `size` between rising places that are all among them."""
+    """Ends of elements no longer than `size`; all the rising `breaks` are among them."""
     kept = np.unique(np.round(breaks, 9))
     parts = [np.linspace(a, b, max(1, int(np.ceil((b - a) / size - 1e-6))) + 1)[:-1] for a, b in zip(kept, kept[1:], strict=False)]
     return np.concatenate([*parts, kept[-1:]])
@@ -55,7 +55,7 @@ def _stack(design, layers):
         low, high, divisions, grading = [*low, 0.0], [*high, g.depth], [*divisions, sizes.depth_layers], [*grading, None]
     mesh = box(low, high, divisions, grading=grading, thickness_mm=g.depth).with_regions(lambda middles: _regions(design, middles))
     faces = {f"{_LAYERS[layers[0]]} bottom": _at(1, y[0]), f"{_LAYERS[layers[-1]]} top": _at(1, y[-1])}
-    if layers == [0]:     # loose: stiff and soft parts of its top have contact pairs of their own
+    if layers == [0]:     # loose: its stiff and soft parts have separate contact pairs
         top, (left, right) = _at(1, y[-1]), design.span("filler")
         faces["filler top"] = lambda m: top(m) & (m[:, 0] > left) & (m[:, 0] < right)
         faces["support top"] = lambda m: top(m) & ((m[:, 0] < left) | (m[:, 0] > right))
@@ -63,7 +63,7 @@ def _stack(design, layers):
 
 
 def _edges(design):
-    """x of the supports' inner edges, and of finer lines beside them."""
+    """x of the supports' inner edges and of closer lines beside them."""
     first, (left, right) = design.mesh.edge, design.span("filler")
     if first is None:
         return [left, right]
@@ -107,7 +107,7 @@ def _regions(design, middles):
 
 
 def structure_laws(design: PalpationDesign, tissue: Law) -> dict[str, Law]:
-    """Laws by region, with a tissue's."""
+    """Laws by region, with that of a tissue."""
     laws = {"left support": design.supports.make(), "right support": design.supports.make(), "filler": design.filler.make(),
             "beam": design.beam.make(), "tissue": tissue}
     if design.lump is not None:
@@ -125,22 +125,22 @@ def stiffer(law: Law, ratio: float) -> Law:
 
 
 def structure_body(design: PalpationDesign, tissue: Law, *, threads: int = 1) -> SolidBody:
-    """The `SolidBody`: its base is held, the frame `jaw` carries the tissue's top and moves along y."""
+    """The `SolidBody`: the base is held; the frame `jaw` carries the tissue's top and moves along y."""
     mesh, laws = structure_mesh(design), structure_laws(design, tissue)
     g = design.geometry
     axes = "xyz" if design.jaw == "bonded" else "y"
     body = SolidBody(mesh, laws, held={"base bottom": "xyz" if design.model == "solid" else "xy"},
                      carried={JAW: ((g.middle, g.levels[3], 0.0), ["tissue top"], axes)}, threads=threads)
     if design.tissue_on_beam != "bonded":
-        _meet(body, design, "tissue bottom", "beam top", tissue, design.tissue_on_beam)
+        _add_contact(body, design, "tissue bottom", "beam top", tissue, design.tissue_on_beam)
     if design.beam_on_base != "bonded":
-        _meet(body, design, "filler top", "beam bottom", laws["filler"], design.beam_on_base)
-        _meet(body, design, "support top", "beam bottom", laws["left support"], design.beam_on_base)
+        _add_contact(body, design, "filler top", "beam bottom", laws["filler"], design.beam_on_base)
+        _add_contact(body, design, "support top", "beam bottom", laws["left support"], design.beam_on_base)
     return body
 
 
-def _meet(body, design, face, other, law, friction):
-    """A contact pair with the penalty of a law."""
+def _add_contact(body, design, face, other, law, friction):
+    """Add a contact pair whose penalty stiffness follows from a law."""
     young = small_strain_constants(law.mu0, law.bulk_modulus)["young_mpa"]
     body.add_pair(ContactPair(Surface.of(body.mesh.face(face)), Surface.of(body.mesh.face(other)), friction=friction,
                               stiffness=_PENALTY * young / design.mesh.along, reach_mm=0.5 * design.geometry.beam_height,

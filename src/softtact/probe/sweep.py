@@ -1,4 +1,10 @@
-"""Sweeps of a palpation sensor, and measures of hardness from them."""
+"""Sweeps of a palpation sensor, and measures of hardness from them.
+
+A sweep loads or moves the jaw step by step and gives the beam's deflection d and the films' forces. The paper's relative hardness
+is F/d. Beam and tissue are springs in series, so F/d depends mostly on the beam. The apparent modulus takes the tissue's
+compression c, the jaw's displacement less the beam's deflection, which an encoder in the jaw can measure: E_a = lim F/c x
+height/(length x depth) at rest, from F = a c + b c^2 fitted to a sweep, so that stiffening with strain goes into b.
+"""
 
 import time
 from collections.abc import Callable
@@ -22,17 +28,17 @@ if TYPE_CHECKING:
 
 
 Scenario = Literal["load", "displacement"]
-_REST_TERMS = 3           # of a polynomial of the deflection that gives the tangent at rest
+_REST_TERMS = 3           # of the polynomial of the deflection whose tangent at rest is taken
 
 
 @dataclass(frozen=True)
 class Palpation:
-    """A sweep; s steps."""
+    """A sweep of s steps."""
 
     scenario: Scenario
     tissue: str
     jaw_mm: np.ndarray
-    """(s,) way of the jaw, down."""
+    """(s,) displacement of the jaw, down."""
     force_n: np.ndarray
     """(s,) of the jaw on the tissue."""
     beam_deflection_mm: np.ndarray
@@ -42,7 +48,7 @@ class Palpation:
     films: tuple[str, ...]
     """Names of the films."""
     extrapolated_volume_fraction: np.ndarray
-    """(s,) share of a region strained beyond the data of its law; nan where no law tells."""
+    """(s,) largest share of a region's volume beyond the data of its law; nan without such data."""
     body: SolidBody
     """The body, at rest."""
     displacement_mm: np.ndarray
@@ -56,7 +62,6 @@ class Palpation:
                    "jaw_mm": self.jaw_mm, "force_n": self.force_n, "beam_deflection_mm": self.beam_deflection_mm}
         films = {f"film_{name.replace(' ', '_')}_n": force for name, force in zip(self.films, self.film_force_n.T, strict=True)}
         return pd.DataFrame(columns | films | {"extrapolated_volume_fraction": self.extrapolated_volume_fraction})
-
 
     def dataset(self) -> "xr.Dataset":
         """The curves with the films by name, for NetCDF."""
@@ -72,7 +77,7 @@ class Slope:
     """The relative hardness F/d of a sweep."""
 
     line_n_mm: float
-    """Slope in N/mm of the least-squares line with an intercept through rest and all steps, as a chart's trend line."""
+    """Slope in N/mm of the least-squares line through rest and all steps, with an intercept, like a chart's trend line."""
     intercept_n: float
     """Of that line."""
     secant_n_mm: tuple[float, float]
@@ -104,7 +109,7 @@ def palpate(design: PalpationDesign, tissue: str, scenario: Scenario, *, law: La
             threads: int = 1, tell: Callable[[str], None] = lambda text: None) -> Palpation:
     """Sweep the jaw over a tissue of a design by load (N) or displacement (mm).
 
-    law: in place of the tissue's;  values: rising ends of the steps, those of the design by default
+    law: in place of the tissue's;  values: rising values at the ends of the steps, by default the design's
     Raises InputError for an unknown tissue, ConvergenceError where a step is not reached.
     """
     began = time.perf_counter()
@@ -114,8 +119,8 @@ def palpate(design: PalpationDesign, tissue: str, scenario: Scenario, *, law: La
     if values is None:
         values = (design.load_n if scenario == "load" else design.displacement_mm).values
     motion = Motion()
-    for way, value in zip(np.diff(values, prepend=0.0), values, strict=True):
-        motion = motion.step(loads={"y": -float(value)}) if scenario == "load" else motion.step(ways={"y": -float(way)})
+    for change, value in zip(np.diff(values, prepend=0.0), values, strict=True):
+        motion = motion.step(loads={"y": -float(value)}) if scenario == "load" else motion.step(ways={"y": -float(change)})
     rows, films, outside, state = [], [], [], None
     for step in SolidPath(body, {JAW: motion}, tell=tell).run():
         state = step.state
@@ -132,9 +137,9 @@ def palpate(design: PalpationDesign, tissue: str, scenario: Scenario, *, law: La
 def _beam_middle(body, design):
     """The node in the middle of the beam's length, height and, of a solid, depth."""
     g = design.geometry
-    own = np.unique(np.concatenate([nodes.ravel() for region, nodes, _ in body.blocks if region == "beam"]))
+    beam = np.unique(np.concatenate([nodes.ravel() for region, nodes, _ in body.blocks if region == "beam"]))
     place = [g.middle, 0.5 * (g.levels[1] + g.levels[2]), 0.5 * g.depth if design.model == "solid" else 0.0]
-    return own[np.linalg.norm(body.points[own] - place, axis=1).argmin()]
+    return beam[np.linalg.norm(body.points[beam] - place, axis=1).argmin()]
 
 
 def apparent_modulus(force_n: np.ndarray, compression_mm: np.ndarray, *, height_mm: float, area_mm2: float) -> float:
@@ -147,13 +152,13 @@ def apparent_modulus(force_n: np.ndarray, compression_mm: np.ndarray, *, height_
 
 def hardness_table(design: PalpationDesign, settings: Hardness, *, threads: int = 1, tell: Callable[[str], None] = lambda text: None
                    ) -> pd.DataFrame:
-    """A row for each tissue, height and share of the jaw's way: the largest force, F/d there, and the index."""
+    """A row for each tissue, height and share of the jaw's displacement: the largest force, F/d there, and E_a."""
     rows = []
     for height in settings.tissue_heights:
-        own = design.with_(geometry={"tissue_height": height})
-        ways = np.linspace(0, design.displacement_mm.to, settings.steps + 1)[1:]
+        changed = design.with_(geometry={"tissue_height": height})
+        values = np.linspace(0, design.displacement_mm.to, settings.steps + 1)[1:]
         for tissue in design.tissues:
-            sweep = palpate(own, tissue, "displacement", values=ways, threads=threads, tell=tell)
+            sweep = palpate(changed, tissue, "displacement", values=values, threads=threads, tell=tell)
             for share in settings.shares:
                 count = round(share * settings.steps)
                 force, deflection = sweep.force_n[:count], sweep.beam_deflection_mm[:count]
@@ -166,16 +171,16 @@ def hardness_table(design: PalpationDesign, settings: Hardness, *, threads: int 
 
 @dataclass(frozen=True)
 class HardnessVerdict:
-    """What a table of `hardness_table` says of a measure of hardness."""
+    """How far a measure of hardness is a property of the tissue, from a `hardness_table`."""
 
     change_with_load: float
-    """Largest value over the least of a tissue of one height, less 1; the worst of them."""
+    """Largest value over the least, less 1, of a tissue of one height; the worst of all."""
     change_with_height: float
     """The same over heights, at the largest load."""
     contrast: float
-    """Least ratio, over heights, of the hardest tissue's largest-load value to the softest one's."""
+    """Value of the hardest tissue over that of the softest one at the largest load; the least over heights."""
     apart: bool
-    """Whether the values of any two tissues do not overlap, whatever load and height."""
+    """Whether the values of any two tissues do not overlap over all loads and heights."""
 
 
 def verdict(table: pd.DataFrame, column: str) -> HardnessVerdict:

@@ -1,4 +1,4 @@
-"""A calibration as a page: what was found and how surely, residuals of each taxel, what the presses do not tell."""
+"""The page of a calibration: estimates with deviations, residuals of each taxel, what the presses leave open."""
 
 import io
 from collections.abc import Sequence
@@ -24,11 +24,11 @@ def write_page(path: str | Path, result: CalibrationResult, *, notes: Sequence[s
     page = Page("Calibration of a sensor", problem.presses.sensor.spec.name, folder=Path(path).parent)
     page.text(f"From {'; '.join(one.name for one in problem.experiments)}, by the {problem.presses.model} model. The misfit is "
               f"{result.misfit:.2f} times the noise ({noise:.1f} counts a reading).")
-    page.box("What these presses do not tell.", result.not_identifiable)
+    page.box("What these presses leave open.", result.not_identifiable)
     page.box("What was left out.", notes)
     page.section("What was found", anchor="found")
     page.table(pd.DataFrame(_rows(result), columns=["number", "value", "standard deviation"]))
-    page.text("A misfit beyond noise counts as noise in these deviations; what the model itself has wrong is not in them.")
+    page.text("A misfit beyond noise counts as noise in these deviations; the error of the model is not in them.")
     page.section("Figures")
     for caption, figure in (
             ("Measured (points) and calibrated (lines) counts, summed over the taxels. Grey: forces beyond the model's validity, "
@@ -50,7 +50,7 @@ def _advised(one):
 
 
 def _rows(result):
-    """(name, value, deviation) of the numbers that are not each taxel's own."""
+    """(name, value, deviation) of the numbers that all taxels share."""
     scale, gain = result.linear.scale, result.linear.gain / result.linear.scale
     yield "common gain, counts at dC/C0 = 1", f"{scale:.1f}", f"{100 * result.deviation('ln scale'):.2f} %"
     yield ("gains over the common one, least to largest", f"{gain.min():.3f} to {gain.max():.3f}",

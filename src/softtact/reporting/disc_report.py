@@ -1,4 +1,4 @@
-"""The discs of a user's frames."""
+"""The discs of a user's camera frames: one table, an annotated picture of each frame, a summary."""
 
 import itertools
 import os
@@ -25,14 +25,14 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-COLOURS = {"whole": "#3fd0ff", "touching": "#ffb000", "clipped": "#ff4d6d"}   # apart in brightness and for the colour-blind
+COLOURS = {"whole": "#3fd0ff", "touching": "#ffb000", "clipped": "#ff4d6d"}   # differ in brightness, and for the colour-blind
 MOST_NUMBERS = 200   # discs; more numbers than that hide each other
 _WIDEST = 9.0        # inches
 
 
 def draw_discs(frame: np.ndarray, table: "pd.DataFrame", outlines: Sequence[np.ndarray], path: str | Path, *, pixel_mm: float,
                title: str) -> None:
-    """Write a PNG: the frame in mm, the outlines (list of (corners, 2) in mm), clipped and touching discs in their own colours."""
+    """Write a PNG: the frame in mm and the outlines (list of (corners, 2) in mm), coloured by kind: whole, touching, clipped."""
     light, plt = grey(frame), pyplot()
     sides = np.array(light.shape)[::-1] * pixel_mm   # x, y
     inches = sides / sides.max() * _WIDEST
@@ -57,7 +57,7 @@ def _draw_outlines(axes, outlines, kinds):
     from matplotlib.collections import LineCollection
 
     for kind, colour in COLOURS.items():
-        lines = [outline for outline, own in zip(outlines, kinds, strict=True) if own == kind]
+        lines = [outline for outline, of in zip(outlines, kinds, strict=True) if of == kind]
         if lines:
             axes.add_collection(LineCollection(lines, colors=colour, linewidths=1.0, label=f"{kind} ({len(lines)})"))
     if len(outlines):
@@ -71,7 +71,7 @@ def _draw_numbers(axes, table, kinds):
 
 
 def _draw_scale(axes, sides):
-    """A bar of a round length of about a fifth of the width, above the frame's upper right corner."""
+    """A scale bar of a round length near a fifth of the width, above the frame's upper right corner."""
     length = _round(0.2 * sides[0])
     y = -0.5 * sides[1] - 0.015 * sides.max()
     axes.plot([sides[0] / 2 - length, sides[0] / 2], [y, y], color="black", linewidth=3, solid_capstyle="butt", clip_on=False)
@@ -80,7 +80,7 @@ def _draw_scale(axes, sides):
 
 
 def _round(length):
-    """The largest of 1, 2, 5 times a power of ten that is not longer."""
+    """The largest of 1, 2 or 5 times a power of ten up to a length."""
     power = 10.0 ** np.floor(np.log10(length))
     return max(factor * power for factor in (1, 2, 5) if factor * power <= length)
 
@@ -96,12 +96,12 @@ def report_discs(frames: str | Path, out: str | Path, *, picture: str | Path | N
     """Write the table `out` (CSV) of all discs in the frames of a file or folder and their pictures; return the summary.
 
     picture: None for none; a PNG for a single frame, a folder for several; without an ending it becomes the one that fits
-    transfer: how values tell light, see `softtact.imaging.light.grey`; None is linear, with a warning where a file says otherwise
+    transfer: from values to light, see `softtact.imaging.light.grey`; None is linear, with a warning where a file states another
     The summary's warnings: {sentence: [names of frames]}
     """
     warned: dict[str, list[str]] = {}
     stream = _collecting(read_frames(frames, every=every), warned, encoding=transfer is None)
-    first = list(itertools.islice(stream, 2))   # tells one frame from several without reading them all
+    first = list(itertools.islice(stream, 2))   # one frame or several, without reading all
     target = _picture_path(picture, single=len(first) == 1)
     _refuse_overwriting(frames, out, target)
     tables, rows = [], []
@@ -118,33 +118,33 @@ def report_discs(frames: str | Path, out: str | Path, *, picture: str | Path | N
 
 
 def _collecting(frames, warned, *, encoding):
-    """The pairs (name, frame), whose readers' warnings go to `warned`; those of the values' encoding only on demand."""
+    """The pairs (name, frame); their readers' warnings go to `warned`, those on the values' encoding only if asked for."""
     while True:
-        with warnings.catch_warnings(record=True) as said:
+        with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", FrameWarning)
             pair = next(frames, None)
         if pair is None:
             return
-        _note(warned, said if encoding else [], pair[0])
+        _keep_warnings(warned, caught if encoding else [], pair[0])
         yield pair
 
 
 def _detect(name, frame, warned, **how):
     """Table and outlines of one frame; warnings go to `warned`."""
-    with warnings.catch_warnings(record=True) as said:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", FrameWarning)
         try:
             table, outlines = discs_and_outlines(frame, **how)
         except InputError as error:
             raise InputError(f"{name}: {error}") from None
-    _note(warned, said, name)
+    _keep_warnings(warned, caught, name)
     table.insert(0, "frame", name)
     return table, outlines
 
 
-def _note(warned, said, name):
-    """Keep the names of the frames that a sentence is said of; other warnings go their way."""
-    for warning in said:
+def _keep_warnings(warned, caught, name):
+    """Add a frame to the warnings {sentence: [frames]}; warnings of other kinds are issued."""
+    for warning in caught:
         if issubclass(warning.category, FrameWarning):
             warned.setdefault(str(warning.message), []).append(name)
         else:
@@ -159,7 +159,7 @@ def _row(name, table):
 
 
 def _picture_path(picture, *, single):
-    """Where the pictures go: a file for a single frame, a folder for several."""
+    """Path of the pictures: a file for a single frame, a folder for several."""
     if picture is None:
         return None
     picture = Path(picture)
@@ -173,7 +173,7 @@ def _picture_path(picture, *, single):
 
 
 def _refuse_overwriting(frames, out, target):
-    """Refuse a table or pictures that would take the place of frames."""
+    """Refuse a table or pictures that would overwrite frames."""
     files = image_files(frames)
     folder = target is not None and target.is_dir()
     refuse_overwriting(files, {"--out": Path(out), "--picture": None if folder else target})
@@ -188,7 +188,7 @@ def _file_name(name):
 
 @contextmanager
 def _pictures(target):
-    """A folder to draw in, whose pictures move to the target when all is done; None where there is no target."""
+    """A temporary folder whose pictures move to the target at the end; None where there is no target."""
     if target is None:
         yield None
         return

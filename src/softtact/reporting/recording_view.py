@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 _FRAMES = 6                   # of a strip
 _COLOURS = ("#1f4e79", "#e08214")
-_RATE_HZ, _MOST_FRAMES = 20, 600     # of a video, which plays in real time, or faster where it would have more frames
+_RATE_HZ, _MOST_FRAMES = 20, 600     # of a video in real time; a longer one plays faster
 
 
 def save_strip(recording: "xarray.Dataset", path: str | Path) -> None:
@@ -71,7 +71,7 @@ def _frames(recording: "xarray.Dataset") -> Iterator[np.ndarray]:
     figure.colorbar(images[-1], ax=axes, label="counts over the baseline", shrink=0.8)
     figure.suptitle(_label(recording, 0), fontsize=9)
     figure.canvas.draw()
-    figure.set_layout_engine("none")      # laid out once: anew for each frame would take a second each
+    figure.set_layout_engine("none")      # keep the layout: a new one would take a second for each frame
     for at in np.linspace(time[0], time[-1], number):
         reading = int(np.abs(time - at).argmin())
         for finger, image in enumerate(images):
@@ -109,15 +109,15 @@ def _limits(counts):
 
 
 def _label(recording, reading):
-    said = f"{recording.time.values[reading]:.2f} s"
+    time = f"{recording.time.values[reading]:.2f} s"
     if "force_n" not in recording:
-        return said
-    forces = dict.fromkeys(f"{force:.3g}" for force in recording.force_n.values[reading])     # once, where both feel the same
-    return f"{said}\n{' and '.join(forces)} N"
+        return time
+    forces = dict.fromkeys(f"{force:.3g}" for force in recording.force_n.values[reading])     # once for both
+    return f"{time}\n{' and '.join(forces)} N"
 
 
 def _draw_time(axis, recording, marked):
-    """Sums of counts over time, and the force where it is known; the lines that mark some times (n,)."""
+    """Draw sums of counts and, where known, the force over time; return the lines that mark some times (n,)."""
     time = recording.time.values
     for finger in range(recording.sizes["finger"]):
         axis.plot(time, recording.counts.values[:, finger].sum(axis=(1, 2)), color=_COLOURS[finger], lw=1, label=f"finger {finger}")

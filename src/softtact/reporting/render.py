@@ -1,4 +1,8 @@
-"""Views of solids for figures."""
+"""Views of solids for figures: rendered off screen by VTK, or drawn by matplotlib where that fails.
+
+VTK needs some OpenGL (its wheels bring a software one). A driver that fails may end the process or never answer, so VTK runs in a
+process of its own, `python -m softtact.reporting.render FOLDER`, with a limit of time. Log and figure name the renderer.
+"""
 
 import json
 import sys
@@ -26,7 +30,7 @@ _COMMAND = (sys.executable, "-m", "softtact.reporting.render")
 
 @dataclass(frozen=True)
 class Part:
-    """Triangles (m, 3) of points_mm (n, 3) in one colour; as lines: their edges alone;  edges: their colour, None without."""
+    """Triangles (m, 3) of points_mm (n, 3) in one colour; as_lines: only their edges;  edges: their colour, or None."""
 
     points_mm: np.ndarray
     triangles: np.ndarray
@@ -38,7 +42,7 @@ class Part:
 
 @dataclass(frozen=True)
 class View:
-    """Parts seen from a direction: `seen_from` (3,) points from the middle to the eye, `up` (3,) is upwards in the picture."""
+    """Parts seen from a direction: `seen_from` (3,) points from the middle to the eye, `up` (3,) is up in the picture."""
 
     parts: list = field(default_factory=list)
     seen_from: tuple = (0.6, -1.0, 0.8)
@@ -59,7 +63,7 @@ def rendered(views: Sequence[View], *, size: tuple[int, int] = (900, 675), timeo
 
 
 def _write(views, size, folder):
-    """views.json and arrays.npz, as `offscreen` reads them."""
+    """Write views.json and arrays.npz, which `main` reads."""
     arrays, listed = {}, []
     for v, view in enumerate(views):
         for p, part in enumerate(view.parts):
@@ -90,7 +94,7 @@ def tell_fallback(figure: "Figure", images: list[np.ndarray] | None) -> None:
 
 
 def _cropped(image, margin=8):
-    """The image without its white border but for a margin."""
+    """The image with its white border cut to a margin."""
     rows, columns = (np.flatnonzero((image < 250).any(axis=(1 - axis, 2))) for axis in (0, 1))
     if not len(rows):
         return image
@@ -98,7 +102,7 @@ def _cropped(image, margin=8):
 
 
 def _draw(axes, view):
-    """The view in matplotlib's 3-D axes: flat facets, farther ones first."""
+    """Draw the view in matplotlib's 3-D axes: flat facets, farther ones first."""
     from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
     points = np.vstack([part.points_mm for part in view.parts])
@@ -126,7 +130,7 @@ def _shaded(corners, part):
 
 
 def main(folder: str | Path) -> None:
-    """Read views.json and arrays.npz, write images.npz."""
+    """Render views.json and arrays.npz into images.npz, without a display."""
     import pyvista
 
     pyvista.OFF_SCREEN = True
@@ -141,16 +145,16 @@ def _image(pyvista, number, view, size, arrays):
     """One view as an image (h, w, 3)."""
     plotter = pyvista.Plotter(off_screen=True, window_size=size)
     plotter.set_background("white")
-    for p, look in enumerate(view["parts"]):
+    for p, style in enumerate(view["parts"]):
         triangles = arrays[f"triangles_{number}_{p}"]
         faces = np.hstack([np.full((len(triangles), 1), 3), triangles]).astype(np.int64)
         surface = pyvista.PolyData(arrays[f"points_{number}_{p}"], faces.ravel())
-        if look["as_lines"]:
-            plotter.add_mesh(surface.extract_all_edges(), color=look["colour"], line_width=1.8, opacity=look["opacity"])
+        if style["as_lines"]:
+            plotter.add_mesh(surface.extract_all_edges(), color=style["colour"], line_width=1.8, opacity=style["opacity"])
         else:
-            plotter.add_mesh(surface, color=look["colour"], opacity=look["opacity"], smooth_shading=look["edges"] is None,
-                             split_sharp_edges=look["edges"] is None, show_edges=look["edges"] is not None,
-                             edge_color=look["edges"] or "black", line_width=0.6, specular=0.25, specular_power=12, ambient=0.12)
+            plotter.add_mesh(surface, color=style["colour"], opacity=style["opacity"], smooth_shading=style["edges"] is None,
+                             split_sharp_edges=style["edges"] is None, show_edges=style["edges"] is not None,
+                             edge_color=style["edges"] or "black", line_width=0.6, specular=0.25, specular_power=12, ambient=0.12)
     plotter.enable_anti_aliasing("ssaa")
     plotter.camera_position = [view["seen_from"], (0.0, 0.0, 0.0), view["up"]]
     plotter.reset_camera()

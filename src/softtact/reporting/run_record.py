@@ -1,4 +1,4 @@
-"""What a study's jobs took: Snakemake's benchmark of each, summed by stage."""
+"""Time and memory of a study's jobs: Snakemake's benchmark of each, summed by stage."""
 
 import os
 import platform
@@ -13,7 +13,7 @@ COLUMNS = ["stage", "jobs", "total_s", "mean_s", "longest_s", "largest_memory_mb
 def run_record(folder: str | Path) -> pd.DataFrame:
     """A row for each stage with a benchmark below `folder`, and one of all: seconds of wall time, memory in MB.
 
-    Each job counts once, by its last run; a stage whose jobs are all from an earlier run is here, too. The report's own job is not.
+    Each job counts once, by its last run, also where that was an earlier run of the workflow. The report's job is left out.
     """
     rows = []
     for stage in sorted(path for path in Path(folder).glob("*") if path.is_dir() and path.name != "report"):
@@ -47,7 +47,7 @@ def _row(stage, seconds, memory):
 
 
 def _read(path):
-    """A benchmark's seconds and memory; a job too short to be looked at has no memory, one killed while it wrote them no row."""
+    """A benchmark's seconds and memory. A very short job has no memory; one that was killed while it wrote has no row."""
     if not path.stat().st_size:
         return pd.DataFrame({"s": [], "max_rss": []})
     frame = pd.read_csv(path, sep="\t", na_values=["NA", "-"])

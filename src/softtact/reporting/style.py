@@ -1,4 +1,4 @@
-"""How every figure looks and is written: legible sizes, two model colours that differ in grey too, files without dates."""
+"""Style of every figure: legible sizes, model colours that also differ in grey, files without dates."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.image import AxesImage
 
-# Dark blue, light orange and a green between: apart in grey as well.
+# Dark blue, light orange and a green between, which differ in grey, too.
 MODEL_COLOURS = {"hyperelastic": "#1f4e79", "elastic": "#e08214", "foundation": "#3f9c6d"}
 MODEL_NAMES = {name: name for name in MODEL_COLOURS}
 ARCHITECTURE_LINES = {"printed": "-", "searched": "-.", "compact": "--"}
@@ -32,17 +32,17 @@ def pyplot() -> ModuleType:
 
 
 def colour(model: str) -> str:
-    """A model's colour; grey for one that has none of its own."""
+    """A model's colour; grey where none is listed."""
     return MODEL_COLOURS.get(model, "0.4")
 
 
 def ssim_label(ssim: dict[str, Any] | None) -> str:
-    """Axis label of structural similarity with its choices {window, data_range}, if they are known."""
+    """Axis label of structural similarity with its settings {window, data_range}, if they are known."""
     return "SSIM" if ssim is None else f"SSIM (window {ssim['window']}, range {ssim['data_range']:g} counts)"
 
 
 def save(figure: "Figure", *paths: str | Path) -> None:
-    """Write a figure to PNG and SVG files, whole or not at all, the same bytes for the same figure."""
+    """Write a figure to PNG and SVG files, complete or not at all; the same figure gives the same bytes."""
     plt = pyplot()
     for path in map(Path, paths):
         kind = path.suffix[1:]

@@ -1,9 +1,14 @@
-"""A surface in colours that turns in a browser."""
+"""A coloured surface that turns in a browser: one self-contained piece of HTML, without a network, a library or a graphics card.
+
+Its script draws the triangles into a depth buffer. So nested surfaces are right in every browser, and a page may hold any number of
+views; browsers allow only few WebGL contexts.
+"""
 
 import base64
 import html
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -177,28 +182,37 @@ function (figure, data) {
 _DIGITS = 3      # of the numbers beside the colour bar
 
 
+@dataclass(frozen=True)
+class ColourScale:
+    """Colours of a view's values."""
+
+    limits: tuple[float, float] | None = None
+    """Values at the ends of the scale; by default the lowest and the highest."""
+    map_name: str = "viridis"
+    """Of matplotlib's colour map."""
+
+
 def html_view(points_mm: np.ndarray, triangles: np.ndarray, values: np.ndarray, *, title: str, unit: str,
-              labels: Sequence[str] | None = None, limits: tuple[float, float] | None = None, map_name: str = "viridis",
-              see_through: int = 0) -> str:
+              labels: Sequence[str] | None = None, scale: ColourScale = ColourScale(), see_through: int = 0) -> str:
     """A piece of HTML, a <figure> with its script: the surface turns by mouse, touch and arrow keys, and zooms.
 
-    points_mm: (n, 3), z upwards, or (states, n, 3): a slider goes through the states
-    triangles: (m, 3) indices of points, seen from both sides
-    values: (n,) or (states, n) in `unit`, coloured over `limits` (low, high; by default all of them); nan is grey
-    see_through: so many of the last triangles are the object, drawn see-through, and can be hidden
-    title: what is shown;  unit: stands at the colour bar;  labels: what each state is, at its slider
-    Several views may stand on a page. Nothing is loaded: it works from a file.
+    points_mm: (n, 3), z upwards, or (states, n, 3) with a slider for the states
+    triangles: (m, 3) indices of points, visible from both sides
+    values: (n,) or (states, n) in `unit`, which stands at the colour bar; nan is grey
+    labels: names of the states at the slider;  see_through: number of the last triangles that are the object: they are drawn
+    see-through and can be hidden
+    A page may hold several views. It loads nothing and works from a file.
     """
     points, triangles, values = _checked(points_mm, triangles, values)
     labels = [str(label) for label in labels] if labels is not None else [""] * max(len(points), len(values))
     if len(labels) != max(len(points), len(values)):
         raise InputError(f"The view {title!r} has {max(len(points), len(values))} states and {len(labels)} labels; name each.")
-    low, high = limits or _limits(values)
+    low, high = scale.limits or _limits(values)
     data = {"points": _packed(points, "<f4"), "triangles": _packed(triangles, "<u4"), "values": _packed(values, "<f4"),
             "count": points.shape[1], "pointStates": len(points), "valueStates": len(values), "labels": labels,
-            "seeThrough": see_through, "low": low, "high": high, "colours": _packed(_colours(map_name), "u1")}
+            "seeThrough": see_through, "low": low, "high": high, "colours": _packed(_colours(scale.map_name), "u1")}
     return (f'<figure class="view3d" data-title="{html.escape(title)}"><figcaption>{html.escape(title)}</figcaption>'
-            f"{_bar(low, high, unit, map_name)}"
+            f"{_bar(low, high, unit, scale.map_name)}"
             f"<script>\n({SCRIPT.strip()})(document.currentScript.parentElement, {_json(data)});\n</script></figure>")
 
 

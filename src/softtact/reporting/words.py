@@ -1,4 +1,4 @@
-"""What columns, predictors and verdicts are called in the report: words in place of the names in files."""
+"""Headings of columns, names of predictors and sets in the reports, in place of the names in files."""
 
 from softtact.evaluation.score_tables import ALL_FORCES
 
@@ -47,7 +47,7 @@ HEADERS = {
 
 
 def header(column: str) -> str:
-    """A column's heading in words; one that is not listed, as of a law or a force, with its unit and without underscores."""
+    """A column's heading; one that is not listed, like a law or a force, gets its unit and spaces for underscores."""
     if column in HEADERS:
         return HEADERS[column]
     for start, words in (("mae_share_", "mean error over the mean reading, "), ("ssim_", "SSIM, "), ("mae_counts_",

@@ -1,4 +1,12 @@
-"""The UR10 and its inverse kinematics."""
+"""The UR10: the Denavit-Hartenberg table of its maker, a small MJCF of primitives, and inverse kinematics.
+
+Source of the table: Universal Robots, "DH Parameters for calculations of kinematics and dynamics", UR10 (CB3). Each joint turns by
+its angle about z; then follow d along z, a along x and alpha about x. The links are capsules between the frames: they show the arm
+and give it inertia, and nothing collides with them.
+
+The inverse kinematics is damped least squares on MuJoCo's Jacobians: S. R. Buss, J.-S. Kim: Selectively damped least squares for
+inverse kinematics. J. Graphics Tools 10 (2005) 37-49, eq. 11.
+"""
 
 from typing import Any
 
@@ -11,20 +19,20 @@ from softtact.errors import InputError
 D_M = (0.1273, 0.0, 0.0, 0.163941, 0.1157, 0.0922)
 A_M = (0.0, -0.612, -0.5723, 0.0, 0.0, 0.0)
 ALPHA_RAD = (np.pi / 2, 0.0, 0.0, np.pi / 2, -np.pi / 2, 0.0)
-MASS_KG = (7.1, 12.7, 4.27, 2.0, 2.0, 0.365)     # of the same page; with balanced weights they matter for inertia alone
-# Above the object, the hand downwards: from where the inverse kinematics starts.
+MASS_KG = (7.1, 12.7, 4.27, 2.0, 2.0, 0.365)     # of the same page; weights are balanced, so these act by inertia alone
+# Hand above the object and downwards: where the inverse kinematics starts.
 HOME_RAD = tuple(np.radians([0.0, -90.0, -90.0, -90.0, 90.0, 0.0]))
 JOINTS = tuple(f"arm_{number}" for number in range(1, 7))
 _RADIUS_M = (0.075, 0.06, 0.05, 0.045, 0.045, 0.04)
-# Of the joints' servos: the weight of an object moves the hand by less than 0.1 mm; what lags is gone after some 0.05 s.
+# Of the joints' servos: an object's weight moves the hand by less than 0.1 mm; a lag decays in about 0.05 s.
 _STIFFNESS_NM, _DAMPING_NMS = 4e4, 1.5e3
 _GREY, _BLUE = (0.78, 0.79, 0.81, 1.0), (0.36, 0.55, 0.72, 1.0)
 
 
 def add_arm(spec: Any) -> Any:
-    """Add the arm with its servos to an `MjSpec`; return the body that turns with the last joint, and where its flange is.
+    """Add the arm with its servos to an `MjSpec`; return the flange, the body that rotates with the last joint.
 
-    Weights are balanced (gravcomp): servos of a position would sag by some mm under them.
+    Weights are balanced (gravcomp): position servos would sag by some mm under them.
     """
     import mujoco
 
@@ -50,10 +58,10 @@ _NEAR_M, _NEAR_RAD, _LARGEST_STEP = 1e-8, 1e-8, 0.3
 
 
 def inverse_kinematics(model: Any, position_m: np.ndarray, rotation: np.ndarray, *, start_rad: np.ndarray) -> np.ndarray:
-    """Joint angles (6,) in rad that bring the site `grip` to a position (3,) in m with a rotation (3, 3), in the world.
+    """Joint angles (6,) in rad at which the site `grip` has a position (3,) in m and a rotation (3, 3) in the world.
 
-    start_rad: (6,) where the search starts; the solution nearby is found
-    Raises InputError where the place is out of reach.
+    start_rad: (6,) where the iteration starts; it finds the solution nearby
+    Raises InputError where the position is out of reach.
     """
     data = mujoco.MjData(model)
     addresses = [model.joint(name).qposadr[0] for name in JOINTS]
@@ -65,13 +73,13 @@ def inverse_kinematics(model: Any, position_m: np.ndarray, rotation: np.ndarray,
         data.qpos[addresses] = angles
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
-        away = position_m - data.site_xpos[site]
+        offset = position_m - data.site_xpos[site]
         turn = Rotation.from_matrix(rotation @ data.site_xmat[site].reshape(3, 3).T).as_rotvec()
-        if np.linalg.norm(away) < _NEAR_M and np.linalg.norm(turn) < _NEAR_RAD:
+        if np.linalg.norm(offset) < _NEAR_M and np.linalg.norm(turn) < _NEAR_RAD:
             return (angles + np.pi) % (2 * np.pi) - np.pi
         mujoco.mj_jacSite(model, data, jacobian[:3], jacobian[3:], site)
         j = jacobian[:, freedoms]
-        step = j.T @ np.linalg.solve(j @ j.T + _DAMPING**2 * np.eye(6), np.concatenate([away, turn]))
+        step = j.T @ np.linalg.solve(j @ j.T + _DAMPING**2 * np.eye(6), np.concatenate([offset, turn]))
         angles += step * min(1.0, _LARGEST_STEP / np.abs(step).max())
     raise InputError(f"grip_at_m: the hand does not reach {np.round(position_m, 4).tolist()} m with its fingers down; give a place "
-                     "that is nearer to the robot.")
+                     "nearer to the robot.")

@@ -27,24 +27,24 @@ from softtact.robot.settings import load_scene
 from softtact.robot.taxels import STEP_MM, TaxelMemory
 
 ENVIRONMENT = "softtact/Grasp-v0"
-STEP_S = 0.01                 # of an action: 100 observations a second of the scene
-LIFT_MM, SLIDE_MM = 40.0, 8.0     # how high the hand goes, and how far to either side
+STEP_S = 0.01                 # of an action: 100 observations for each second of the scene
+LIFT_MM, SLIDE_MM = 40.0, 8.0     # largest lift, and largest slide to either side
 _LIFT_MM_S, _SLIDE_MM_S, _FINGER_MM_S = 50.0, 20.0, 20.0
-_BEGIN_MM, _OPEN_MM = 2.0, 0.2    # between object and pad at first; a grip below which the fingers open, as a share of it in mm
+_BEGIN_MM = 2.0               # between object and each pad at first
 _LETS_GO_MM, _DROPPED_MM = 0.5, 20.0
 _CLOSED_M = -0.1
-_SPREAD = {"x_mm": 2.0, "y_mm": 4.0, "angle_deg": 45.0}     # of where an object stands, to either side
+_SPREAD = {"x_mm": 2.0, "y_mm": 4.0, "angle_deg": 45.0}     # of the object's drawn placement, to either side
 
 
 class GraspEnv(gymnasium.Env):
-    """Close, slide, lift, 100 steps a second of the scene.
+    """Close, slide, lift: 100 steps for each second of the scene.
 
     Action (3,) in -1 to 1: grip (force of each pad from 0, open, to `largest_force_n`), lift (speed of the hand, up to 50 mm/s) and
-    slide (along the sensors' short side, up to 20 mm/s). The fixture lets go when the hand begins to rise; before, the hand can
+    slide (along the sensors' short side, up to 20 mm/s). The fixture lets go when the hand begins to rise; until then the hand can
     slide over the object.
     Observation: `tactile` (2, row, column) counts of the ideal readout, `force_n` (2, 3) on each sensor in its frame, `object_pose`
     (7,) in the left sensor's frame, mm and quaternion w, x, y, z.
-    Reward: height that the object gained, as a share of 40 mm. An episode ends when the object is lifted so high, or dropped.
+    Reward: height gained by the object, as a share of 40 mm. An episode ends when the object is lifted by 40 mm, or dropped.
     """
 
     metadata = {"render_modes": []}
@@ -52,11 +52,11 @@ class GraspEnv(gymnasium.Env):
     def __init__(self, mesh: trimesh.Trimesh | str | Path | None = None, *, unit: str | None = None, sensor: str = "coro",
                  model: str = "elastic", largest_force_n: float = 30.0, mass_kg: float | None = None,
                  scene: Mapping[str, Any] | None = None, place_step_mm: float = STEP_MM) -> None:
-        """mesh: trimesh in mm, or a file with its `unit`; by default a cylinder that stands with its flat ends on the pads
+        """mesh: trimesh in mm, or a file with its `unit`; by default a cylinder with its flat ends on the pads
 
         model: elastic or foundation;  scene: keys of a scene file, such as {"friction": 0.4}
-        place_step_mm: between the places that are pressed (`TaxelMemory`)
-        Raises InputError for a model that is too slow for this, and as `build_scene` does.
+        place_step_mm: grid of the places that are pressed (`TaxelMemory`)
+        Raises InputError for a model that is too slow, and as `build_scene` does.
         """
         if model not in ("elastic", "foundation"):
             raise InputError(f"model={model!r}: an environment needs a reading in milliseconds; use 'elastic' or 'foundation'.")
@@ -73,9 +73,9 @@ class GraspEnv(gymnasium.Env):
         self._joints: np.ndarray | None = None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], dict[str, Any]]:
-        """A new episode: the hand around the object, which stands in a drawn place.
+        """A new episode: the hand around the object, in a random placement.
 
-        options: x_mm, y_mm, angle_deg, in place of what is drawn
+        options: x_mm, y_mm, angle_deg, in place of random values
         """
         super().reset(seed=seed)
         for name in set(options or {}) - set(_SPREAD):
@@ -83,7 +83,7 @@ class GraspEnv(gymnasium.Env):
         drawn = {name: float(self.np_random.uniform(-side, side)) for name, side in _SPREAD.items()}
         placement = replace(Placement(**drawn), **(options or {}))
         self._scene = build_scene(self._mesh, self._sensor.spec, self._settings, placement, mass_kg=self._mass_kg)
-        self._begin()
+        self._place_hand()
         return self._observe(), self._info()
 
     def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
@@ -99,8 +99,8 @@ class GraspEnv(gymnasium.Env):
         ended = risen < -_DROPPED_MM or risen > 0.98 * LIFT_MM
         return self._observe(), float((risen - before) / LIFT_MM), bool(ended), False, self._info()
 
-    def _begin(self):
-        """The hand where it grips, at rest, with open fingers."""
+    def _place_hand(self):
+        """Put the hand at the grip, at rest, with open fingers."""
         scene: Scene = self._scene
         if self._joints is None:
             self._joints = inverse_kinematics(scene.model, np.asarray(self._settings.grip_at_m), DOWN, start_rad=np.array(HOME_RAD))
@@ -113,12 +113,12 @@ class GraspEnv(gymnasium.Env):
         for finger in FINGERS:
             self._data.joint(f"finger_{finger}").qpos[0] = self._half_mm * MM
         self._data.ctrl[self._arm], self._data.ctrl[self._fingers] = self._joints, self._half_mm * MM
-        self._aim, self._hand_mm = self._joints, np.zeros(2)     # the arm's servos; the hand aside and up
+        self._aim, self._hand_mm = self._joints, np.zeros(2)     # targets of the arm's servos; offset of the hand: slide, lift
         mujoco.mj_forward(scene.model, self._data)
         self._ground_mm = float(self._data.body("object").xpos[2] / MM)
 
     def _move_hand(self, lift, slide):
-        """Aim the arm's servos at where the hand is to be at the end of the step."""
+        """Set the arm's servos to the hand's place at the end of the step."""
         wanted = self._hand_mm + np.array([slide * _SLIDE_MM_S, lift * _LIFT_MM_S]) * STEP_S
         wanted = np.clip(wanted, [-SLIDE_MM, 0.0], [SLIDE_MM, LIFT_MM])
         if (wanted != self._hand_mm).any():
@@ -131,7 +131,7 @@ class GraspEnv(gymnasium.Env):
             self._data.eq_active[self._scene.model.equality("fixture").id] = 0
 
     def _move_fingers(self, share):
-        """Close with a share of the largest force, or open where there is none."""
+        """Close with a share of the largest force, or open where it is zero."""
         force = share * self.largest_force_n
         self._scene.model.actuator_forcerange[self._fingers] = (-max(force, 1.0), max(force, 1.0))
         if share == 0.0:

@@ -1,4 +1,9 @@
-"""A grasp's record, and the presses at its events."""
+"""A grasp's record without MuJoCo, and the presses of the true mesh on both sensors at its events, kept in `events.nc`.
+
+A press takes from the record the object's pose in the sensor's frame, the normal force and, where asked for, the shear force. So a
+file that is pressed again (`press_events` of `record_of`) gives the same maps. A press with shear solves for the tangential
+displacement at which friction carries the shear.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
@@ -28,7 +33,7 @@ EVENTS = ("contact", "grip", "lift")
 
 @dataclass(frozen=True)
 class GraspRecord:
-    """What a grasp did, row by row in time; a finger is 0 (left) or 1 (right)."""
+    """A grasp over time, one row for each record; a finger is 0 (left) or 1 (right)."""
 
     time_s: np.ndarray
     """(t,) in s."""
@@ -41,7 +46,7 @@ class GraspRecord:
     sensor_pose_world: np.ndarray
     """(t, finger, 7): x, y, z in mm and the quaternion w, x, y, z of each sensor in the robot's base frame."""
     object_pose_sensor: np.ndarray
-    """(t, finger, 7): the same of the object's mesh in each sensor's frame."""
+    """(t, finger, 7): pose of the object's mesh in each sensor's frame, likewise."""
     force_n: np.ndarray
     """(t, finger, 3) in N: the object's force on each sensor, in its frame; z is negative where it presses."""
     contact: np.ndarray
@@ -50,21 +55,21 @@ class GraspRecord:
     """(event,) rows of the events, in the order of `EVENTS`; without a lift there are two."""
 
 
-SHEAR_MODELS = ("elastic", "hyperelastic")     # those that move an object aside
-_FIRST_MM = 0.01        # of a way: short against any pad, so that next to nothing slides
-_CLOSE = 0.01           # of the shear, and
-_LEAST_N = 1e-3         # what the record tells forces to
-_MOST = 8               # presses
+SHEAR_MODELS = ("elastic", "hyperelastic")     # models with friction and tangential motion
+_FIRST_MM = 0.01        # first tangential displacement: small enough that almost nothing slips
+_TOLERANCE = 0.01       # of the shear, and
+_FORCE_N = 1e-3         # resolution of the record's forces
+_MOST_PRESSES = 8
 
 
 @dataclass(frozen=True)
 class ShearPress:
-    """A press with shear."""
+    """A press with a shear force."""
 
     result: "PressResult"
-    """Its two load steps: straight down, then aside."""
-    way_mm: np.ndarray
-    """(2,) along x and y, by which the object had to move aside."""
+    """Two load steps: straight down, then tangential."""
+    slide_mm: np.ndarray
+    """(2,) tangential displacement of the object along x and y that the shear needs."""
 
     @property
     def shear_n(self) -> np.ndarray:
@@ -83,7 +88,7 @@ def press_with_shear(sensor: "Sensor", mesh: trimesh.Trimesh, pose: Pose | None,
     """Press a mesh (mm) in a pose by a normal force and a shear force (2,), both in N, of the object on the sensor.
 
     model: elastic or hyperelastic;  the sensor's `friction.object` carries the shear
-    Raises InputError for another model and for a shear that friction does not carry, ConvergenceError where the way is not found.
+    Raises InputError for another model or a shear that friction does not carry, ConvergenceError where it is not reached.
     """
     shear, bound = np.asarray(shear_n, dtype=float), sensor.spec.friction.object * force_n
     if model not in SHEAR_MODELS:
@@ -93,32 +98,31 @@ def press_with_shear(sensor: "Sensor", mesh: trimesh.Trimesh, pose: Pose | None,
         raise InputError(f"A shear of {size:.3g} N slips under {force_n:g} N: friction carries less than {bound:.3g} N; state a "
                          "larger friction, or less shear.")
 
-    def pressed(way: np.ndarray) -> ShearPress:
-        motion = Motion().press(force_n=force_n).slide(x_mm=float(way[0]), y_mm=float(way[1]))
-        return ShearPress(sensor.press(mesh, pose=pose, motion=motion, model=model, label="", threads=threads), way)
+    def pressed(slide: np.ndarray) -> ShearPress:
+        motion = Motion().press(force_n=force_n).slide(x_mm=float(slide[0]), y_mm=float(slide[1]))
+        return ShearPress(sensor.press(mesh, pose=pose, motion=motion, model=model, label="", threads=threads), slide)
 
-    way = _FIRST_MM * shear / max(size, 1e-300)
-    found = pressed(way)
+    found = pressed(_FIRST_MM * shear / max(size, 1e-300))
     stiffness = float(found.shear_n @ shear) / max(size, 1e-300) / _FIRST_MM
     inverse = np.eye(2) / stiffness
-    for _ in range(_MOST):
-        off = shear - found.shear_n
-        if np.linalg.norm(off) <= _CLOSE * size + _LEAST_N:
+    for _ in range(_MOST_PRESSES):
+        missing = shear - found.shear_n
+        if np.linalg.norm(missing) <= _TOLERANCE * size + _FORCE_N:
             return found
-        step = inverse @ off
-        trial = pressed(found.way_mm + step)
+        step = inverse @ missing
+        trial = pressed(found.slide_mm + step)
         change = trial.shear_n - found.shear_n
         along = step @ inverse
         if abs(along @ change) > 1e-12:      # Broyden's good update of the inverse (Nocedal and Wright, section 11.1)
             inverse = inverse + np.outer(step - inverse @ change, along) / (along @ change)
         found = trial
-    missing = np.linalg.norm(shear - found.shear_n)
-    raise ConvergenceError(f"A shear of {size:.3g} N was not reached in {_MOST} presses, {missing:.3g} N are missing; it is near "
-                           "what friction carries: state a larger friction.")
+    rest = np.linalg.norm(shear - found.shear_n)
+    raise ConvergenceError(f"A shear of {size:.3g} N was not reached in {_MOST_PRESSES} presses, {rest:.3g} N are missing; it is "
+                           "near the limit of friction: state a larger friction.")
 
 
-_LEAST_SHEAR_N = 0.01     # below, shear is the scene's own rounding
-_FORCE_DIGITS = 3     # forces are pressed with to 1 mN: both fingers' then agree, and one call presses both
+_LEAST_SHEAR_N = 0.01     # smaller shears are round-off of the scene
+_FORCE_DIGITS = 3     # forces are rounded to 1 mN: then both fingers' are equal, and one call presses both
 NO_PRESS = "none"     # model of a finger that touches nothing
 _POSE = "mm; quaternion w, x, y, z"
 _OF_RECORD = {"time_s": (("time",), "s"), "phase": (("time",), "1"), "joint_rad": (("time", "joint"), "rad"),
@@ -134,30 +138,30 @@ _OF_MAPS = {"deformation_map_mm": (("event", "finger", "y", "x"), "mm"),
 
 @dataclass(frozen=True)
 class EventMaps:
-    """What both sensors feel at the events of a grasp."""
+    """Maps and counts of both sensors at the events of a grasp."""
 
     deformation_map_mm: np.ndarray
     """(event, finger, y, x) in mm; zero where a finger touches nothing."""
     tactile_map: np.ndarray
     """(event, finger, row, column) in counts: the taxels' ideal reading."""
     pressed_force_n: np.ndarray
-    """(event, finger) in N: sum of the pressure on the sensing surface that the model found, with what its shell carries."""
+    """(event, finger) in N: normal force that the model found on the sensing surface and the shell."""
     pressed_shear_n: np.ndarray
-    """(event, finger, 2) in N: shear along x and y that the press had; zero where none was asked for."""
+    """(event, finger, 2) in N: shear along x and y in the press; zero where none was asked for."""
     model: np.ndarray
-    """(event, finger): which model pressed, or `none`."""
+    """(event, finger): model of the press, or `none`."""
     selection_reason: np.ndarray
     """(event, finger): why this model."""
     within_validity: np.ndarray
-    """(event, finger): 0 where the press is not to be relied on."""
+    """(event, finger): 0 where the press is outside the model's validity."""
 
 
 def press_events(sensor: "Sensor", mesh: trimesh.Trimesh, record: GraspRecord, *, model: str = "auto", workers: int | None = None,
                  label: str = "grasp", friction: float | None = None, **options: Any) -> EventMaps:
     """Press the mesh on both sensors at each event of a record, by the model that is named or, with `auto`, chosen.
 
-    friction: Coulomb's coefficient of the object on the sensors, with which the record's shear forces are pressed, too, where they
-        are above 10 mN; the model must then be named, elastic or hyperelastic
+    friction: Coulomb's coefficient of the object on the sensors. With it the record's shear forces above 10 mN are pressed, too;
+        the model must then be named, elastic or hyperelastic
     options: policy, tolerance_mm, as for `Sensor.press`
     Raises InputError for a force out of the sensor's range, ConvergenceError as a press does.
     """
@@ -202,8 +206,9 @@ def pose_of(values: np.ndarray) -> Pose:
 
 
 def set_down(mesh: trimesh.Trimesh, pose: Pose) -> Pose:
-    """The pose with the mesh's lowest point on the sensing surface, where a press begins: how deep a pad of MuJoCo's sinks says
-    nothing.
+    """The pose with the mesh's lowest point on the sensing surface, where a press begins.
+
+    The depth to which MuJoCo's pads sink in has no meaning.
     """
     lowest = float(pose.apply(mesh.vertices)[:, 2].min())
     return Pose(pose.translation_mm - [0.0, 0.0, lowest], pose.rotation)
@@ -229,13 +234,13 @@ def write_events(path: str | Path, dataset: "xarray.Dataset") -> None:
 
 
 def facts_of(data: "xarray.Dataset") -> dict[str, Any]:
-    """What `to_dataset` was given as facts, from the data set of an `events.nc`."""
+    """The facts that `to_dataset` was given, from the data set of an `events.nc`."""
     kept = {name: value for name, value in data.attrs.items() if name not in (*PROVENANCE, "sensor")}
     return {name: value.item() if isinstance(value, np.generic) else value for name, value in kept.items()}
 
 
 def read_events(path: str | Path) -> "xarray.Dataset":
-    """The data set of an `events.nc`. Raises InputError that names the file and what it lacks."""
+    """The data set of an `events.nc`. Raises InputError that names the file and a missing array."""
     data = read_dataset(path)
     for name, (dims, _) in _OF_RECORD.items():
         if name not in data.variables or data[name].dims != dims:

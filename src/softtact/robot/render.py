@@ -1,4 +1,9 @@
-"""Pictures of a grasp."""
+"""Pictures of a grasp: the robot drawn off screen by MuJoCo, beside maps and counts of both sensors.
+
+MuJoCo needs EGL (on Debian libegl1, libegl-mesa0 and libgl1-mesa-dri). A driver that fails may end its process, so the robot is
+drawn in another process, `python -m softtact.robot.render FOLDER`. Where that fails, a sentence says so and there is no picture of
+the robot.
+"""
 
 import os
 import sys
@@ -28,9 +33,9 @@ _NO_PICTURE = "no picture of the robot: MuJoCo does not draw off screen here"
 
 def draw_rows(scene: Scene, record: GraspRecord, rows: Sequence[int], *, view: tuple[float, float, float] = CLOSE,
               size: tuple[int, int] = (480, 640), timeout_s: float = 120.0) -> np.ndarray | None:
-    """Images (row, height, width, 3) of rows of a record, or None where nothing can be drawn, which is said on stderr.
+    """Images (row, height, width, 3) of rows of a record, or None, with a sentence on stderr, where nothing can be drawn.
 
-    view: azimuth and elevation in degrees, distance in m, towards the hand, or the middle of the arm from afar
+    view: azimuth and elevation in degrees, distance in m, towards the hand or, beyond 1 m, the middle of the arm
     """
     states = np.array([state_of(scene, record, row) for row in rows])
     with tempfile.TemporaryDirectory(prefix="softtact-grasp-") as folder:
@@ -73,7 +78,7 @@ def state_of(scene: Scene, record: GraspRecord, row: int) -> np.ndarray:
 
 
 def _camera(record, row, view):
-    """A camera's six numbers: `view` and the point that it looks at."""
+    """A camera's six numbers: `view` and the point (3,) in m at its centre."""
     hand = record.sensor_pose_world[row, :, :3].mean(axis=0) * MM
     near = view[2] < 1.0
     return [*view, *(hand + [0, 0, 0.03] if near else [0.35, 0.0, 0.35])]
@@ -119,7 +124,7 @@ def draw_grasp(data: "xarray.Dataset", path: str | Path, *, images: np.ndarray |
 
 
 def main(folder: str | Path) -> None:
-    """Read scene.mjb and states.npz, write images.npz."""
+    """Draw the states of states.npz in the scene of scene.mjb and write images.npz, in a process of its own."""
     import mujoco
 
     folder = Path(folder)
@@ -138,7 +143,7 @@ def main(folder: str | Path) -> None:
 
 
 def _free_camera(mujoco, values):
-    """A free camera of azimuth and elevation in degrees, distance in m and the point (3,) that it looks at."""
+    """A free camera of azimuth and elevation in degrees, distance in m and the point (3,) in m at its centre."""
     camera = mujoco.MjvCamera()
     camera.azimuth, camera.elevation, camera.distance = values[:3]
     camera.lookat[:] = values[3:]

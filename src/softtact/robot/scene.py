@@ -1,13 +1,13 @@
 """The scene of a grasp in MuJoCo: arm, gripper, a sensor on both fingers, and the object in a fixture.
 
-Frames. Tool: z points out of the hand, x along the fingers' closing, from the left one to the right one. Sensor: as everywhere, z
-out of the pad towards the object, y along its long side, which is from the fingertip to the palm. The object's mesh stands in the
-left sensor's frame as `Sensor.press` places it by default, its bounding box centred; shifted by (x, y) and turned by an angle about
-z. So the left sensor feels the mesh's lower side, and the right one its upper side.
+Frames. Tool: z points out of the hand, x from the left finger to the right one. Sensor: z out of the pad towards the object, y
+along its long side, from the fingertip to the palm. In the left sensor's frame the object's mesh stands as `Sensor.press` places it
+by default, its bounding box centred, then shifted by (x, y) and rotated about z. So its lower side touches the left sensor, and its
+upper side the right one.
 
-The fixture is a carriage without friction along the closing: until it lets go, the object can follow the fingers, so that both
-press alike, and does nothing else. MuJoCo collides the object's convex hull with the pads. Force and pose come from there, never
-the shape of the contact: a press takes the true mesh.
+The fixture is a carriage that slides along the closing direction without friction. Until it lets go the object follows the fingers,
+so both press with the same force. MuJoCo collides the object's convex hull with the pads. It gives force and pose; the shape of the
+contact comes from a press of the true mesh.
 """
 
 from dataclasses import dataclass
@@ -35,8 +35,8 @@ _PAD_TIME_S, _FIXTURE_TIME_S = 0.004, 0.004     # time constants of MuJoCo's con
 # Of contacts: stiffness grows with the lighter body's mass, and 0.3 g must still bear 50 N between the pads.
 _STIFF = (0.99, 0.9999, 0.0001, 0.5, 2.0)
 _RIGID = (0.9999, 0.9999, 0.001, 0.5, 2.0)      # holds an object's weight within nanometres
-_TURNING = 10.0                 # weight of turns in a weld: 20 N that are 5 mm off the middle tilt an object by 0.03 mrad
-_TORSION_M = 0.005            # radius of the patch that resists turning: pads are soft, hulls touch in points
+_TURNING = 10.0                 # weight of rotations in a weld: 20 N at 5 mm from the middle tilt an object by 0.03 mrad
+_TORSION_M = 0.005            # radius of the patch that resists torsion: pads are soft, hulls touch in points
 _FINGER_N_PER_M, _FINGER_NS_PER_M, _FINGER_KG = 2e4, 120.0, 0.1
 _DARK, _PAD, _OBJECT, _FLOOR = (0.2, 0.2, 0.22, 1.0), (0.1, 0.55, 0.45, 1.0), (0.88, 0.5, 0.2, 1.0), (0.93, 0.93, 0.94, 1.0)
 _GREY, _FLOOR_M = (0.6, 0.6, 0.62, 1.0), -0.4
@@ -58,7 +58,7 @@ class Placement:
 
 @dataclass(frozen=True)
 class Scene:
-    """A compiled scene with what a grasp needs to know of it."""
+    """A compiled scene with its settings, and mass and width of the object."""
 
     model: Any
     """mujoco.MjModel"""
@@ -79,9 +79,9 @@ def build_scene(mesh: trimesh.Trimesh, spec: "AnySpec", settings: SceneSettings,
     """The `Scene` of an object (trimesh in mm) between two sensors.
 
     mass_kg: of the object; by default its volume times `density_kg_m3`
-    Raises InputError where the object is wider than the gripper opens, or an own MJCF lacks a name.
+    Raises InputError where the object is wider than the gripper opens, or a user's MJCF lacks a name.
     """
-    robot = _own_robot(settings) if settings.mjcf else _ur10_with_gripper(settings, spec)
+    robot = _user_robot(settings) if settings.mjcf else _ur10_with_gripper(settings, spec)
     width = float(np.ptp(mesh.bounds[:, 2]))
     if not settings.mjcf and width >= settings.stroke_mm - 2 * spec.thickness_mm:
         raise InputError(f"The object is {width:g} mm wide along z, and the pads open to "
@@ -92,20 +92,20 @@ def build_scene(mesh: trimesh.Trimesh, spec: "AnySpec", settings: SceneSettings,
 
 
 def to_mjcf(spec: "AnySpec", settings: SceneSettings) -> str:
-    """The robot without an object as MJCF text: a start for a user's own."""
+    """The robot without an object as MJCF text, from which a user's robot can start."""
     robot = _ur10_with_gripper(settings, spec)
     robot.compile()
     return str(robot.to_xml())
 
 
 def quaternion(rotation: Rotation) -> np.ndarray:
-    """(4,) w, x, y, z, the largest of them positive: half a turn then keeps its sign from row to row."""
+    """(4,) w, x, y, z, the largest positive, so the sign does not change from row to row at half a turn."""
     values = np.asarray(rotation.as_quat(scalar_first=True))
     return values * np.sign(values[np.abs(values).argmax()])
 
 
-def _own_robot(settings):
-    """A user's MJCF, which has all the names that a grasp asks for."""
+def _user_robot(settings):
+    """A user's MJCF; it must have all names that a grasp needs."""
     try:
         robot = mujoco.MjSpec.from_file(str(settings.mjcf))
     except (ValueError, OSError) as error:
@@ -139,7 +139,7 @@ def _ur10_with_gripper(settings, spec):
 def _set_options(robot, settings):
     option = robot.option
     option.timestep, option.integrator = settings.time_step_s, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    # Elliptic cones are Coulomb's; a ratio above 1 keeps an object from creeping out of a grip that holds it.
+    # Elliptic cones are Coulomb's; a ratio above 1 prevents creep of a held object.
     option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 10.0
 
 
@@ -159,7 +159,7 @@ def _add_gripper(robot, flange, settings, spec):
 
 
 def _add_finger(robot, hand, finger, side, reach, half_stroke, spec):
-    """A finger that slides; its joint is half of the opening. Each has its own motor: of one for both a pad gets half the force."""
+    """A sliding finger; its joint is half of the opening. Each finger has a motor: one for both would halve a pad's force."""
     x, y, thick = (0.5 * size * MM for size in (*spec.footprint_mm, spec.thickness_mm))
     body = hand.add_body(name=f"finger_{finger}", pos=(0, 0, reach), gravcomp=1.0)
     body.add_joint(name=f"finger_{finger}", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=(side, 0, 0), range=(0, half_stroke),

@@ -1,4 +1,7 @@
-"""Settings of a scene."""
+"""Settings of a scene, as a YAML file states them, and of MuJoCo's import.
+
+`softtact/robot/data/scene.yaml` ships; a user's file states some of its keys.
+"""
 
 import os
 from importlib import resources
@@ -20,13 +23,13 @@ class SceneSettings(Section):
     """The keys of a scene file. Reasons of what is assumed stand in the file."""
 
     mjcf: Path | None = None
-    """A user's own robot, or None for the UR10 and gripper of this package."""
+    """A user's robot, or None for the UR10 and gripper of this package."""
     time_step_s: Length
     """Of MuJoCo, in s."""
     grip_at_m: _Point
     """(3,) in m in the robot's base frame: where the middle of the grip is."""
     clearance_mm: Length
-    """How far above the grip the hand starts to come down."""
+    """Height above the grip where the descent begins."""
     flange_to_grip_mm: Length
     """From the arm's flange to the middle of the pads."""
     stroke_mm: PositiveFloat
@@ -40,45 +43,48 @@ class SceneSettings(Section):
     closing_force_n: Length
     """Largest force of a finger before the first contact."""
     ramp_s: Length
-    """How long the force grows after the first contact, in s."""
+    """Time in which the force rises after the first contact, in s."""
     steady_change: _Share
-    """Largest change of the force, as a share of it, of a grip that is held, ..."""
+    """Largest change of a steady grip's force, as a share of it ..."""
     steady_s: PositiveFloat
     """... within so many seconds."""
     lift_mm: Length
-    """How high the object is lifted."""
+    """Height of the lift."""
     lift_s: Length
-    """How long the lift takes, in s."""
+    """Duration of the lift, in s."""
     record_s: Length
     """Between two rows of a record, in s."""
 
 
 def load_scene(path: str | Path | None = None, **changes: Any) -> SceneSettings:
-    """The `SceneSettings` that ship, with the keys that a user's YAML file states in their place.
+    """The shipped `SceneSettings`, with the values that a user's YAML file states.
 
     changes: values by name, in place of the file's;  a relative `mjcf` is found beside its file
     Raises InputError that names file, field and value.
     """
     values = read_yaml(SHIPPED, missing="reinstall softtact.")
     if path is not None:
-        own = read_yaml(path, missing="there is no such scene file; correct the path.")
-        if not isinstance(own, dict):
+        stated = read_yaml(path, missing="there is no such scene file; correct the path.")
+        if not isinstance(stated, dict):
             raise InputError(f"{path}: a scene file must hold keys and values; see docs/how-to/grasp_in_simulation.md.")
-        if own.get("mjcf"):
-            own["mjcf"] = Path(path).parent / str(own["mjcf"])
-        values |= own
+        if stated.get("mjcf"):
+            stated["mjcf"] = Path(path).parent / str(stated["mjcf"])
+        values |= stated
     try:
         return SceneSettings(**values | changes)
     except ValidationError as error:
         fault = error.errors()[0]
         field = ".".join(map(str, fault["loc"]))
-        said = (f"the key is unknown; use one of {', '.join(SceneSettings.model_fields)}." if fault["type"] == "extra_forbidden"
-                else f"{fault['input']!r} is not usable: {fault['msg']}; correct it.")
-        raise InputError(f"{path or 'scene'}, at '{field}': {said}") from None
+        reason = (f"the key is unknown; use one of {', '.join(SceneSettings.model_fields)}." if fault["type"] == "extra_forbidden"
+                  else f"{fault['input']!r} is not usable: {fault['msg']}; correct it.")
+        raise InputError(f"{path or 'scene'}, at '{field}': {reason}") from None
 
 
 def import_mujoco() -> None:
-    """Import MuJoCo with its graphics off in this process; pictures are drawn in another one (`softtact.robot.render`)."""
+    """Import MuJoCo with its graphics off in this process; pictures are drawn in another one (`softtact.robot.render`).
+
+    A broken driver that MUJOCO_GL names would otherwise end the import, and with it the physics.
+    """
     wanted = os.environ.get("MUJOCO_GL")
     os.environ["MUJOCO_GL"] = "disable"
     try:

@@ -1,13 +1,13 @@
-"""Readings of a sensor for a loop that asks a hundred times a second: pressed once for a place, then taken from memory.
+"""Readings of a sensor for a loop of a hundred calls a second: each place is pressed once, and its maps are kept.
 
-A place is the object's x and y in the sensor's frame and its turn about z, on a grid. At a new place the true mesh is pressed
-through a ladder of forces, all at once. Between two forces its maps are interpolated (`Ladder`).
-Between places the object carries its map along: the map of a place is moved and turned as the object is, and scaled so that the
-sensor sinks by as much volume as there. What is bound to the sensor's edges does not move with the object; so along x, the way that
-a hand slides, the maps of the two places beside the object are weighted by how near they are. How far readings are off is in
-`benchmarks/environment.py`.
-Readings do not depend on what was asked for before.
-Tilt is left out: how far a held object tilts in the scene follows from MuJoCo's contacts, not from the rubber.
+A place is the object's x and y in the sensor's frame and its rotation about z, on a grid. At a new place the true mesh is pressed
+with several forces at once; between two forces its maps are interpolated (`Ladder`).
+
+Between places the map of the nearest one is moved and rotated with the object, and scaled to keep the volume by which the sensor
+sinks. The effect of the sensor's edges does not move with the object. So along x, where a hand slides, the maps of both places
+beside the object are interpolated. `benchmarks/environment.py` measures the error of the readings.
+
+Readings do not depend on earlier calls. Tilt is left out: a held object's tilt follows from MuJoCo's contacts, not from the rubber.
 """
 
 from dataclasses import dataclass, field
@@ -29,22 +29,22 @@ from softtact.press.sensor import Sensor
 from softtact.readout.calibrated import counts_of
 from softtact.robot.events import set_down
 
-# The mesh as each finger sees it, the right one from behind, where it turns the other way round.
+# The mesh in each finger's frame: the right finger is behind it, and rotations about z change their sign.
 _FACING = (Rotation.identity(), Rotation.from_euler("y", 180, degrees=True))
 _SENSE = (1.0, -1.0)
 _FORCES = 5              # of the ladder
 STEP_MM = 2.0            # of the grid of places: as exact in the elastic model as 1 mm
-_STEP_DEG = 2.0          # of the grid of turns, which hardly change while a hand slides
+_STEP_DEG = 2.0          # of the grid of rotations, which hardly change while a hand slides
 _SURFACES = 8            # undersides that are kept: some MB each of a fine mesh
-_AT_PLACE = 0.02         # of a step along x, from a place that is taken alone
-_MOST = 2.0              # times may a carried map be scaled: beyond, next to nothing of the object is over the sensor
+_AT_PLACE = 0.02         # of a step along x: nearer to a place, its map is taken alone
+_MOST = 2.0              # largest factor of a moved map: beyond, the object is hardly over the sensor
 
 
 @dataclass
 class TaxelMemory:
     """Counts of both sensors under one object.
 
-    model: elastic or foundation;  largest_force_n: up to which forces are asked for
+    model: elastic or foundation;  largest_force_n: limit of the forces
     step_mm: of the grid of places along x and y
     """
 
@@ -69,7 +69,7 @@ class TaxelMemory:
 
     @property
     def places(self) -> int:
-        """How many places were pressed."""
+        """Number of places that were pressed."""
         return len(self._ladders)
 
     def counts(self, finger: int, pose: np.ndarray, force_n: float) -> np.ndarray:
@@ -86,12 +86,12 @@ class TaxelMemory:
 
     @staticmethod
     def _place(finger, pose):
-        """x, y in mm and the turn about z in degrees (3,) of a pose; the swing, a tilt, is left out."""
+        """x, y in mm and the rotation about z in degrees (3,) of a pose; the tilt is left out."""
         seen = (_FACING[finger].inv() * Rotation.from_quat(pose[3:], scalar_first=True)).as_quat()
         return np.array([*pose[:2], np.degrees(2 * np.arctan2(seen[2], seen[3]))])
 
     def _beside(self, at):
-        """Numbers (3,) of the places to both sides of x, y and turn, and their shares; of one place where it is at x."""
+        """Numbers (3,) of the places on both sides along x, with their weights; one place where it is near."""
         steps = at / self._step
         nearest = np.round(steps).astype(int)
         beyond = steps[0] - nearest[0]
@@ -100,7 +100,7 @@ class TaxelMemory:
         return [(nearest, 1 - abs(beyond)), (nearest + [np.sign(beyond).astype(int), 0, 0], abs(beyond))]
 
     def _ladder(self, finger, number):
-        """The `Ladder` of a place by its numbers (3,), pressed where it is new."""
+        """The `Ladder` of a place by its numbers (3,), pressed at its first use."""
         key = finger, *(int(one) for one in number[:2]), int(number[2]) % round(360 / _STEP_DEG)
         if key not in self._ladders:
             self._ladders[key] = self._pressed(*key)
@@ -117,7 +117,7 @@ class TaxelMemory:
         return Ladder(self.forces_n, maps.astype(np.float32))
 
     def _surface(self, finger, turn):
-        """The underside of the object in the sensor's middle; of the last few turns it is kept."""
+        """The underside of the object in the sensor's middle; those of the last few rotations are kept."""
         if (finger, turn) not in self._surfaces:
             if len(self._surfaces) == _SURFACES:
                 self._surfaces.pop(next(iter(self._surfaces)))
@@ -126,7 +126,7 @@ class TaxelMemory:
         return self._surfaces[finger, turn]
 
     def _carried(self, pressed, here, there, sense):
-        """A map (y, x) of an object in one place (x, y, turn) as it is in another one nearby."""
+        """A map (y, x) of an object in one place (x, y, rotation), moved to another one nearby."""
         angle = sense * np.radians(here[2] - there[2])
         back = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])     # of y, x, from there to here
         offset = back @ (self._first_mm - there[1::-1]) + here[1::-1] - self._first_mm
