@@ -25,7 +25,7 @@ import trimesh
 import softtact
 from softtact.errors import SofttactError
 from softtact.geometry.pose import Pose
-from softtact.models.hyperelastic.presets import PRESETS
+from softtact.models.hyperelastic.mesh_settings import PRESETS
 
 COUNTS = {"easy": 70, "unseen": 35, "hard": 100}
 FORCES = {"easy": [2.0, 5.0, 10.0, 20.0, 35.0, 50.0], "unseen": [3.0, 8.0, 15.0, 30.0, 45.0], "hard": [2.0, 5.0, 10.0, 20.0]}

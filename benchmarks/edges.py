@@ -2,7 +2,7 @@
 
 A square and a round punch on 36 frusta, 1.5 N, wider from press to press, so that their edge crosses an element of the cover. Told
 is by how much indentation and map differ from those on elements an eighth as wide at the edge, all else alike: the numbers of
-`softtact/contact/face_edges.py` were chosen by the square one. Record: benchmarks/results/edges.json.
+`softtact/contact/edges.py` were chosen by the square one. Record: benchmarks/results/edges.json.
 """
 
 import mesh_error

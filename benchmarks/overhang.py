@@ -13,7 +13,7 @@ import trimesh
 
 import softtact
 from softtact.geometry.meshes import read_mesh
-from softtact.models.hyperelastic.presets import PRESETS
+from softtact.models.hyperelastic.mesh_settings import PRESETS
 from softtact.press.choice import rms
 from softtact.press.sensor import Sensor
 from softtact.sensors.edge import Edge

@@ -11,7 +11,7 @@ from support.calibration import Bench, small_sensor_file
 from softtact.calibration.fit import calibrate
 from softtact.calibration.ladder import FRICTIONS, Presses, friction_weights, with_friction
 from softtact.calibration.problem import Problem
-from softtact.models.hyperelastic.presets import PRESETS
+from softtact.models.hyperelastic.mesh_settings import PRESETS
 from softtact.press.sensor import load_sensor
 
 PUNCH = trimesh.creation.cylinder(radius=2.6, height=3)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from softtact.contact.coverage import covered
+from softtact.contact.edges import covered
 
 SQUARE = 0.05 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float)
 DOWN = np.array([0.0, 0.0, -1.0])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from softtact.contact.face_edges import ENDS, contact_compliance, own_areas
+from softtact.contact.edges import ENDS, contact_compliance, own_areas
 from softtact.contact.penalty import Contact
 from softtact.fem.quadrature import gauss
 

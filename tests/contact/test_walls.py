@@ -3,8 +3,8 @@
 import numpy as np
 import trimesh
 
+from softtact.contact.edges import face_walls
 from softtact.contact.height_field import HeightField
-from softtact.contact.walls import face_walls
 
 
 def facing(mesh, place, overlap):

@@ -12,7 +12,7 @@ from softtact.fem.graded_mesh import cover_mesh, split_depths
 from softtact.fem.quadrature import gauss
 from softtact.geometry.meshes import place
 from softtact.materials.laws.registry import make_law
-from softtact.models.hyperelastic.refinement import CURVED, EDGE, FAR, FLAT, NEAR, split_depths_of, zones
+from softtact.models.hyperelastic.build import CURVED, EDGE, FAR, FLAT, NEAR, split_depths_of, zones
 from softtact.models.hyperelastic.slab import Layer, Slab
 
 X, Y = np.array([-3.0, -1.5, -0.5, 1.0, 3.0]), np.array([-2.0, -1.0, 0.0, 2.0])

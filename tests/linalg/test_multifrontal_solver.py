@@ -13,8 +13,8 @@ from softtact.linalg.nested_dissection import dissect
 from softtact.linalg.symbolic import lay_out
 from softtact.linalg.workers import Workers
 from softtact.models.hyperelastic.newton import NewtonSettings
+from softtact.models.hyperelastic.newton_step import ContactFactor
 from softtact.models.hyperelastic.path import press_load_steps
-from softtact.models.hyperelastic.preconditioner import ContactFactor
 
 
 def operations(pattern, places):

@@ -7,10 +7,8 @@ import pytest
 from support.sensors import CORO
 
 from softtact.errors import InputError
-from softtact.models.hyperelastic.mesh_settings import MeshSettings
+from softtact.models.hyperelastic.mesh_settings import MeshSettings, frustum_scatter, mesh_settings, newton_settings, specimen_of
 from softtact.models.hyperelastic.newton import NewtonSettings
-from softtact.models.hyperelastic.presets import mesh_settings, newton_settings
-from softtact.models.hyperelastic.specimen import frustum_scatter, specimen_of
 from softtact.models.meshes import layered_mesh
 
 SCATTER = {"height_scatter": 0.01, "tip_scatter": 0.02, "thickness_scatter": 0.02, "specimen": 7}

@@ -25,8 +25,8 @@ from softtact.geometry.meshes import place
 from softtact.linalg.direct import make_solver
 from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic import newton_step, unit_cells
+from softtact.models.hyperelastic.body import BodyFriction
 from softtact.models.hyperelastic.build import build_sensor_body
-from softtact.models.hyperelastic.friction import BodyFriction
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.models.hyperelastic.path import press_load_steps
 from softtact.press.sensor import Sensor
@@ -389,7 +389,7 @@ def test_a_punch_with_friction_needs_more_force_than_one_without(record):
         forces.append(slab.slide(flat_punch(1.0), [depth], tolerance=1e-6).indentation_force)
     assert (np.diff(forces) > 0).all()
     error = record("punch that sticks over one that slides: force", expected=expected, source=source, got=forces[-1] / forces[0])
-    # The edge gives way along its normal, not along the object (`face_edges`): 4.0 % on four cells, 2.5 % on eight. Without
+    # The edge gives way along its normal, not along the object (`contact/edges`): 4.0 % on four cells, 2.5 % on eight. Without
     # it the ratio would be nearer, at 2.1 and 1.5 %, and both forces farther, by 7 to 9 %.
     assert error < 0.05
 

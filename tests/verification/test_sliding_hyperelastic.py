@@ -8,7 +8,7 @@ import trimesh
 
 from softtact.contact.motion import Motion
 from softtact.materials.laws.registry import make_law
-from softtact.models.hyperelastic.build_plain import build_plain_body
+from softtact.models.hyperelastic.build import build_plain_body
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.models.hyperelastic.path import press_motion

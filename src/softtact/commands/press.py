@@ -169,7 +169,7 @@ def _how(options, spec):
 
 def _quality(options):
     """The hyperelastic body's mesh and what counts as solved on it, by the names of `Sensor`."""
-    from softtact.models.hyperelastic.presets import PRESETS
+    from softtact.models.hyperelastic.mesh_settings import PRESETS
 
     mesh, solver = PRESETS[options.mesh_quality]
     return {"mesh": mesh(), "solver": solver()}

@@ -12,8 +12,7 @@ from softtact.models.elastic.compliance import elastic_slab, map_cells
 from softtact.models.foundation.compliance import foundation_slab
 from softtact.models.hyperelastic.build import build_sensor_body
 from softtact.models.hyperelastic.deformed_mesh import pressed_body
-from softtact.models.hyperelastic.presets import mesh_settings
-from softtact.models.hyperelastic.specimen import frustum_scatter, specimen_of
+from softtact.models.hyperelastic.mesh_settings import frustum_scatter, mesh_settings, specimen_of
 from softtact.sensors.frusta import SensorSpec
 
 

@@ -11,7 +11,7 @@ from softtact.contact.height_field import HeightField, SweptSurface
 from softtact.contact.motion import Motion
 from softtact.errors import ConvergenceError, ExtrapolationWarning
 from softtact.models.hyperelastic import path
-from softtact.models.hyperelastic.build_plain import lower_side
+from softtact.models.hyperelastic.build import lower_side
 from softtact.models.hyperelastic.deformed_mesh import pressed_body
 from softtact.press.making import Course, make_result, shell_of, timed
 from softtact.press.result import PressResult

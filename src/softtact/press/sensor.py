@@ -24,8 +24,7 @@ from softtact.materials.config import law_from_printed
 from softtact.materials.laws.base import Law
 from softtact.models.hyperelastic import newton
 from softtact.models.hyperelastic.body import LayeredBody
-from softtact.models.hyperelastic.build import build_sensor_body
-from softtact.models.hyperelastic.build_plain import build_plain_body
+from softtact.models.hyperelastic.build import build_plain_body, build_sensor_body
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.press.asked import check_loads, checked_forces, cores, given_forces, mesh_of, motion_of
 from softtact.press.cache import cached_compliance, cached_foundation, seconds_to_prepare_foundation

@@ -16,9 +16,8 @@ from softtact.geometry.meshes import place
 from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic.build import build_sensor_body
 from softtact.models.hyperelastic.deformed_mesh import pressed_body
-from softtact.models.hyperelastic.mesh_settings import MeshSettings
+from softtact.models.hyperelastic.mesh_settings import MeshSettings, mesh_settings
 from softtact.models.hyperelastic.newton import NewtonSettings, augment
-from softtact.models.hyperelastic.presets import mesh_settings
 from softtact.models.newton import Solution
 from softtact.press.sensor import Sensor
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from softtact.models.hyperelastic.linearised_contact import StepContact
+from softtact.models.hyperelastic.newton_step import StepContact
 
 
 class OneNode:

@@ -8,8 +8,7 @@ from support.sensors import CORO
 from support.six_frusta import LAW
 
 from softtact.linalg.workers import Workers
-from softtact.models.hyperelastic.body import LayeredBody
-from softtact.models.hyperelastic.local_equilibrium import balanced
+from softtact.models.hyperelastic.body import LayeredBody, balanced
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.press.sensor import Sensor
 
@@ -79,7 +78,7 @@ def test_steps_too_long_are_halved_until_the_energy_of_each_frustum_falls(body, 
     factors[THIRD] = 8.0      # on a parabola a step eight times too long raises the energy, and so do its half and its quarter
     monkeypatch.setattr(body.support, "own_step", lambda state, frusta, **options: (
         factors[frusta, None, None] * whole(state, frusta, **options)))
-    monkeypatch.setattr("softtact.models.hyperelastic.local_equilibrium._FARTHEST_MM", 1.0)
+    monkeypatch.setattr("softtact.models.hyperelastic.body._FARTHEST_MM", 1.0)
     now, _ = balanced(body.support, state, TOLERANCE_N)
     left = unbalanced(body.support, now)
     assert left[FIRST] <= TOLERANCE_N and now.energy < state.energy and (left[THIRD] < unbalanced(body.support, state)[THIRD])

@@ -16,8 +16,8 @@ from softtact.geometry.meshes import place
 from softtact.linalg.symmetric_product import SymmetricProduct
 from softtact.models.hyperelastic import newton_step
 from softtact.models.hyperelastic.body import _shifts
-from softtact.models.hyperelastic.newton_step import ContactStepper, LinearGaps
-from softtact.models.hyperelastic.preconditioner import ContactFactor
+from softtact.models.hyperelastic.newton_step import ContactFactor, ContactStepper
+from softtact.models.hyperelastic.states import LinearGaps
 
 UNKNOWNS, POINTS = 12, 8
 CONTACT = Contact(stiffness=3000.0, smoothing=1 / 3000)

@@ -7,7 +7,7 @@ import trimesh
 from softtact.contact.height_field import HeightField
 from softtact.materials.laws.registry import make_law
 from softtact.models.elastic.compliance import elastic_compliance
-from softtact.models.hyperelastic.build_plain import build_plain_body, lower_side
+from softtact.models.hyperelastic.build import build_plain_body, lower_side
 from softtact.models.hyperelastic.path import press_load_steps
 from softtact.press.sensor import Sensor
 from softtact.sensors.layers import LayersSpec

@@ -14,11 +14,10 @@ from softtact.linalg.direct import make_solver
 from softtact.linalg.multifrontal_solver import DissectedSolver
 from softtact.linalg.nodal_frames import NodeFrames
 from softtact.linalg.workers import Workers
-from softtact.models.hyperelastic import linearised_contact, preconditioner
-from softtact.models.hyperelastic.linearised_contact import StepContact
+from softtact.models.hyperelastic import newton_step
 from softtact.models.hyperelastic.newton import NewtonSettings
+from softtact.models.hyperelastic.newton_step import ContactFactor, DissectedContact, StepContact
 from softtact.models.hyperelastic.path import press_load_steps
-from softtact.models.hyperelastic.preconditioner import ContactFactor, DissectedContact
 
 WIDTH, LENGTH = 14, 9
 UNKNOWNS = 3 * 2 * WIDTH * LENGTH - 2     # the last node is held along y and z
@@ -104,8 +103,8 @@ def test_what_the_dissected_factor_solves_is_the_matrix_with_the_contact_and_its
 def test_a_contact_that_hardly_changed_keeps_its_factor_and_one_that_did_does_not(workers, monkeypatch):
     problem = Pressed()
     _, left = problem.factors(workers)
-    slope, calls, plain = problem.slopes[1], [], preconditioner.factor_in_place
-    monkeypatch.setattr(preconditioner, "factor_in_place", lambda *a, **k: calls.append(1) or plain(*a, **k))
+    slope, calls, plain = problem.slopes[1], [], newton_step.factor_in_place
+    monkeypatch.setattr(newton_step, "factor_in_place", lambda *a, **k: calls.append(1) or plain(*a, **k))
     assert left.renew(problem, slope) and len(calls) == 1
     assert left.follow(problem, slope * 1.0005) and len(calls) == 1
     assert left.follow(problem, slope * 1.01) and len(calls) == 2
@@ -170,7 +169,7 @@ def test_nodes_that_are_enough_stay_and_are_turned_to_the_normals_of_now():
                       for facing in (planes, replace(planes, normals=turn.apply(planes.normals))))
     kept = before.frames(None)
     now = turned.frames(kept)
-    soon = turned._frames_within(linearised_contact._SOON_MM, linearised_contact._BENT)
+    soon = turned._frames_within(newton_step._SOON_MM, newton_step._BENT)
     body.close()
     np.testing.assert_array_equal(now.last, kept.last)
     touched = np.isin(now.first, soon.first)

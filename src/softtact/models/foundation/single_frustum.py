@@ -3,7 +3,7 @@
 import numpy as np
 
 from softtact.models.hyperelastic.frusta import FrustumArray
-from softtact.models.hyperelastic.support import SupportState
+from softtact.models.hyperelastic.states import SupportState
 from softtact.models.newton import solve
 
 _STEP_MM = 0.01        # largest movement of the root at once

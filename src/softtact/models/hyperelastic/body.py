@@ -1,77 +1,136 @@
-"""The layered sensor as one body: slab (sheet and cover) tied to its `Support`, and one Newton step of it."""
+"""The layered sensor as one body: slab (sheet and cover) tied to its `Support`, its friction, and one Newton step of it.
 
-from dataclasses import dataclass, replace
+Between the steps of the whole sensor frusta find their balance one by one, with their roots held (`balanced`). Beside the object
+they rock on the rims of their tips, and under it they fold onto the board: a few of them change their contact within a step, and
+are then farther from balance than all else. Steps of the whole sensor would cost a thousand times what theirs do, and one frustum
+whose energy rises halves such a step for all. What each does here lowers its local energy, and so the whole one.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
 from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softtact.contact.history import ContactHistory
+from softtact.contact.friction import FrictionResponse, FrictionState
 from softtact.fem import kernels
 from softtact.linalg.multifrontal_solver import DissectedSolver
-from softtact.linalg.workers import Workers
-from softtact.models.hyperelastic.friction import BodyFriction
-from softtact.models.hyperelastic.linearised_contact import StepContact
-from softtact.models.hyperelastic.local_equilibrium import balanced
-from softtact.models.hyperelastic.newton_step import ContactStepper
-from softtact.models.hyperelastic.preconditioner import DissectedContact
-from softtact.models.hyperelastic.rigid_contact import ContactProjection, Surface
-from softtact.models.hyperelastic.slab import Slab, SlabState
-from softtact.models.hyperelastic.support import NoCells, Support, SupportState
+from softtact.linalg.workers import SERIAL, Workers, chunks
+from softtact.models.hyperelastic.newton_step import ContactStepper, DissectedContact, StepContact
+from softtact.models.hyperelastic.rigid_contact import TopContact
+from softtact.models.hyperelastic.slab import Slab
+from softtact.models.hyperelastic.states import BodyHistory, BodyState, BodyStep, ContactProjection, ObjectSurface, SupportState
+from softtact.models.hyperelastic.support import NoCells, Support
 from softtact.models.hyperelastic.unit_cells import SheetCells
+from softtact.models.newton import line_search_each
 from softtact.progress import Watch
 
 if TYPE_CHECKING:
     from softtact.fem.kernels_torch import DeviceKernels
 
+_STEPS = 6               # of Newton's method for a frustum; what is not in balance then is left to the next step of all
+_HALVINGS = 5
+_FARTHEST_MM = 0.05      # of a node in a step
+_SHARE = 0.3             # of the tolerance that a frustum keeps at most: what moves its root next must not use up all of it
+_AT_ONCE = 8             # frusta that a thread condenses at once
 _DAMPINGS = 4         # steps that are tried with ever more damping of the cells that they throw too far
 _FIRST_SHIFT = 0.001   # N/mm on every free unknown of the slab, then more until the tangent is positive definite ...
 _MORE, _LESS = 4.0, 0.25   # of the shift before: the next that is tried, and from where a later search begins
 _MOST_SHIFTS = 20     # ... but a tangent that is not even finite will never be
 
 
-@dataclass(frozen=True)
-class BodyHistory:
-    """The `ContactHistory` of the object on the slab's top, and of the support on the board."""
+def balanced(support: Support, state: SupportState, tolerance_n: float, *,
+             workers: Workers = SERIAL) -> tuple[SupportState, np.ndarray]:
+    """The `SupportState` after each frustum beyond the tolerance (N) went to its own balance, and which frusta did (k,).
 
-    top: ContactHistory
-    support: ContactHistory
+    These have their condensed tangents anew, on the way and not where they came to.
+    """
+    loose, moved = _loose(support, state, tolerance_n), np.zeros(support.count, dtype=bool)
+    for _ in range(_STEPS):
+        if not len(loose):
+            break
+        moved[loose] = True
+        state, lowered = _step(support, state, loose, workers)
+        loose = np.intersect1d(loose[lowered], _loose(support, state, _SHARE * tolerance_n))
+    return state, np.flatnonzero(moved)
 
 
-@dataclass(frozen=True)
-class BodyState:
-    """Slab and support at one displacement, and the potential energy (mJ) of both with their contacts and friction."""
+def _loose(support, state, tolerance_n):
+    """Numbers (k,) of the frusta with unbalanced forces of more than the tolerance."""
+    return np.flatnonzero(np.abs(support.inner_residual(state)).max(axis=1, initial=0.0) > tolerance_n)
 
-    slab: SlabState
-    support: SupportState
-    indentation: float
+
+def _step(support, state, frusta, workers):
+    """The state after a step of the frusta (k,), each halved until its own energy falls, and for which (k,) it did."""
+    workers.map(lambda part: support.condense(state, part), chunks(frusta, _AT_ONCE))
+    step = support.own_step(state, frusta, workers=workers)
+    step *= np.minimum(1.0, _FARTHEST_MM / np.maximum(np.abs(step).max(axis=(1, 2)), 1e-300))[:, None, None]
+    displacement, (energies, forces) = state.displacement.copy(), tuple(part.copy() for part in state.elastic)
+    before = support.potentials(displacement[frusta], (energies[frusta], None), frusta, state.history)
+
+    def accept(waiting, share):
+        here = frusta[waiting]
+        trial = state.displacement[here] + share * step[waiting]
+        elastic = support.rubber(trial, here, workers=workers)
+        if elastic is None:     # one of them is inside out
+            return np.zeros(len(waiting), dtype=bool)
+        lower = support.potentials(trial, elastic, here, state.history) < before[waiting]
+        displacement[here[lower]], energies[here[lower]], forces[here[lower]] = trial[lower], elastic[0][lower], elastic[1][lower]
+        return lower
+
+    lowered = line_search_each(accept, len(frusta), halvings=_HALVINGS)
+    return support.with_contact(displacement, (energies, forces), state.history), lowered
+
+
+class BodyFriction:
+    """What a press has to do about friction between Newton's runs; without any coefficient all of it does nothing."""
+
+    def __init__(self, top: TopContact, support: Support) -> None:
+        """top: the slab's `TopContact`, support: what is below the slab."""
+        self._top, self._support = top, support
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the last tangent."""
+        self._last: Sequence[FrictionResponse | None] = None, None             # friction on top and board at the last tangent
 
     @property
-    def energy(self) -> float:
-        return self.slab.energy + self.support.energy
+    def active(self) -> bool:
+        return self._top.friction is not None or self._support.friction is not None
 
-    @property
-    def history(self) -> BodyHistory:
-        """What the contacts remember, `BodyHistory`."""
-        return BodyHistory(self.slab.history, self.support.history)
+    def begin_step(self, state: BodyState, *, growth: float = 1.0) -> BodyHistory:
+        """History with the points held where a step starts from a `BodyState`, by pressures as they are to grow: a first guess."""
+        top = self._top.first_friction_state(state.slab, state.indentation)
+        support = self._support.first_friction_state(state.support)
+        return self._history(state, *(part and replace(part, pressure=growth * part.pressure) for part in (top, support)))
 
-    @property
-    def force(self) -> float:
-        """Force (N) that the object exerts downwards."""
-        return self.slab.indentation_force
+    def renewed(self, state: BodyState, *, halfway: bool = False) -> BodyHistory:
+        """History with friction up to date with the pressures of a `BodyState`, or half the way there."""
+        parts: list[FrictionState | None] = []
+        part: Any
+        of_part: Any
+        for part, of_part in ((self._top, state.slab), (self._support, state.support)):
+            if part.friction is None:
+                parts.append(None)
+                continue
+            renewed = part.renewed_friction_state(of_part)
+            parts.append(of_part.history.friction.halfway(renewed) if halfway else renewed)
+        return self._history(state, *parts)
 
+    @staticmethod
+    def _history(state, top, support):
+        history = state.history
+        return replace(history, top=history.top.held_by(top), support=history.support.held_by(support))
 
-@dataclass(frozen=True)
-class Step:
-    """A Newton step: slab (n, 3), support (f, nodes, 3) in mm, indentation in mm, and what the object's contact faces in it."""
-
-    slab: np.ndarray
-    support: np.ndarray
-    indentation: float
-    projection: ContactProjection
-
-    def largest(self) -> float:
-        return max(np.abs(self.slab).max(), np.abs(self.support).max(initial=0.0), abs(self.indentation))
+    def for_tangent(self, state: BodyState) -> BodyState:
+        """The state whose friction knows that of the last tangent (see `FrictionResponse.after`)."""
+        if not self.active:
+            return state
+        now = state.slab.friction_response, state.support.friction_response
+        self._last = top, support = [part and part.after(before) for part, before in zip(now, self._last, strict=True)]
+        return replace(state, slab=replace(state.slab, friction_response=top),
+                       support=replace(state.support, friction_response=support))
 
 
 def _shifts(last, again):
@@ -174,8 +233,8 @@ class LayeredBody:
         depth = state.indentation + by_mm
         return replace(state, slab=self.slab.update_normals(state.slab, state.slab.projection, depth), indentation=depth)
 
-    def newton_step(self, state: BodyState, force_n: float | None, surface: Surface | None = None, *, largest_mm: float = np.inf,
-                    kept_mm: float = 0.0) -> Step:
+    def newton_step(self, state: BodyState, force_n: float | None, surface: ObjectSurface | None = None, *,
+                    largest_mm: float = np.inf, kept_mm: float = 0.0) -> BodyStep:
         """The Newton step under a given force (N), or with the indentation kept where `force_n` is None.
 
         largest_mm: by which the object goes down at most;  kept_mm: cells that moved less since their last tangent keep it
@@ -200,10 +259,10 @@ class LayeredBody:
         full = np.zeros(3 * self.slab.nodes)
         full[self.slab.unknowns] = step
         slab, support = self.cells.recover(kept, full.reshape(-1, 3), workers=self.workers)
-        return Step(slab=slab, support=support, indentation=indentation_increment, projection=contact.projection)
+        return BodyStep(slab=slab, support=support, indentation=indentation_increment, projection=contact.projection)
 
     def _step_of_unknowns(self, state, residual, contact, force_n, largest_mm, *, again):
-        """Step of the global unknowns, and how far the object goes down; the tangent is made positive definite where it is not.
+        """BodyStep of the global unknowns, and how far the object goes down; the tangent is made positive definite where it is not.
 
         Not a number where that cannot be done, which fails Newton's method there.
         """

@@ -1,22 +1,95 @@
-"""Layered bodies of a sensor: the whole of it, one cell of an endless lattice, a piece of the dielectric."""
+"""Bodies of a sensor: the whole of it, one cell of an endless lattice, a piece of the dielectric, one or two plain layers.
+
+The cover's mesh is fine in steps from far from the object to under it, and finest at its edges (`zones`). A flat punch's edge that
+falls into an element holds the whole element flat: with faces of a pitch the punch acts up to half a pitch wider, and the map of
+one of 3 mm radius is 10 % low. And the sheet bulges into the pockets between frusta, which a face of a pitch cannot follow: 6 % of
+the map. Both are needed where the object presses, and nowhere else (benchmarks/mesh_error.py).
+
+Plain layers lie bonded on the board or free below, their sides held as the sensor's edge states. The lowest part is the slab's
+sheet, 27-node hexahedra on a regular grid; above lies its cover, refined under the object. Of a single layer the lower half is the
+sheet, of two layers the dielectric is.
+"""
 
 import itertools
 from collections.abc import Sequence
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.ndimage import maximum_filter, minimum_filter
 
 from softtact.contact.friction import coulomb
 from softtact.contact.penalty import Contact
-from softtact.fem.extruded_mesh import sheet_mesh_2d
+from softtact.fem.extruded_mesh import SheetMesh2D, grid_mesh_2d, merge, sheet_mesh_2d, with_centres
+from softtact.fem.graded_mesh import split_depths
 from softtact.fem.levels import with_level
+from softtact.fem.point_location import interpolation_2d
 from softtact.materials.laws.base import Law
 from softtact.models.hyperelastic.body import LayeredBody
 from softtact.models.hyperelastic.frusta import FrustumArray, FrustumGeometry
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
-from softtact.models.hyperelastic.refinement import FAR, NEAR, split_depths_of, zones
-from softtact.models.hyperelastic.rigid_contact import Surface
 from softtact.models.hyperelastic.slab import Layer, Slab
+from softtact.models.hyperelastic.slab_nodes import CoverSide
+from softtact.models.hyperelastic.states import ObjectSurface
+from softtact.models.hyperelastic.support import PlainSupport
 from softtact.sensors.frusta import SensorSpec
+from softtact.sensors.layers import LayersSpec
+
+REACH_MM = 1.0        # what stands higher above the object's lowest point is taken to stay off the cover
+AROUND_MM = 0.3       # the zone under the object ends so far from it
+NEAR_MM = 2.4         # and elements have at most the pitch's size so far around
+_STEEP = 1.2          # rise over run within an element above which there is an edge in it
+_SLANTED = 0.067      # rise over run within an element above which the underside is curved, not flat
+_SAMPLES = 4          # heights along each side of the smallest element
+FAR, NEAR, FLAT, CURVED, EDGE = range(5)
+_SHEET_SHARE = 0.5      # of a single layer that is meshed as the slab's sheet
+_SHEET_LAYERS = 2       # at least: a bonded layer's shear changes over its height
+
+
+def zones(surface: ObjectSurface, x_lines: np.ndarray, y_lines: np.ndarray, most: int) -> np.ndarray:
+    """FAR, NEAR, FLAT, CURVED or EDGE for each place of a grid (ny 2^most, nx 2^most) whose cells are split `most` times."""
+    height = _heights(surface, x_lines, y_lines, _SAMPLES << most)
+    side = min(np.diff(lines).max() for lines in (x_lines, y_lines)) / (1 << most)
+    # An edge on the line between two elements concerns both, so each sample is compared with those beside it. (Farther ones: 9000
+    # unknowns more under a wide punch at edges split four times, and the same map to 0.2 %.)
+    low = minimum_filter(height, 3)
+    rise = _in_places(maximum_filter(height, 3) - low, np.max)
+    reached = _in_places(low, np.min) < REACH_MM
+    touched = _in_places(height, np.min) < REACH_MM
+    under, near = (maximum_filter(touched, 2 * int(np.ceil(far / side - 1e-9)) + 1) for far in (AROUND_MM, NEAR_MM))
+    curved, edge = reached & (rise > _SLANTED * side), reached & (rise > _STEEP * side)
+    return np.max([NEAR * near, FLAT * under, CURVED * curved, EDGE * edge], axis=0)
+
+
+def _heights(surface, x_lines, y_lines, parts):
+    """Heights (y, x) in mm above the object's lowest point, in the middles of parts of the grid's cells."""
+    x, y = (_sampled(lines, parts) for lines in (x_lines, y_lines))
+    gx, gy = np.meshgrid(x, y)
+    height = surface(gx.ravel(), gy.ravel())[0].reshape(gx.shape)
+    return np.minimum(height - height.min(), 2 * REACH_MM)
+
+
+def _in_places(samples, choose):
+    """The least or largest of the samples in each smallest cell."""
+    rows, columns = samples.shape
+    return choose(samples.reshape(rows // _SAMPLES, _SAMPLES, columns // _SAMPLES, _SAMPLES), axis=(1, 3))
+
+
+def _sampled(lines, parts):
+    """Middles of equal parts of the intervals between lines."""
+    fine = np.interp(np.arange(2 * parts * (len(lines) - 1) + 1), 2 * parts * np.arange(len(lines)), lines)
+    return fine[1::2]
+
+
+def split_depths_of(zone: np.ndarray, shape: tuple[int, int], most: int) -> np.ndarray:
+    """How often each place is split for wanted levels (ny 2^most, nx 2^most), in a grid of `shape` (nx, ny)."""
+
+    def wanted(low, size, depth):
+        block = int(size * (1 << most))
+        i, j = (low * (1 << most)).astype(int).T
+        whole = zone.reshape(zone.shape[0] // block, block, zone.shape[1] // block, block).max(axis=(1, 3))
+        return whole[j // block, i // block] > depth
+
+    return split_depths(shape, wanted, most)
 
 
 def _lines(side, count, pitch, pitches):
@@ -37,7 +110,7 @@ def lattice(counts: Sequence[int], pitch: float) -> tuple[np.ndarray, np.ndarray
 
 def build_sensor_body(spec: SensorSpec, *, dielectric_law: Law | None, cover_law: Law | None, mesh: MeshSettings = MeshSettings(),
                       scatter: tuple[np.ndarray, np.ndarray] | None = None, contact: Contact | None = None, threads: int = 1,
-                      surface: Surface | None = None) -> LayeredBody:
+                      surface: ObjectSurface | None = None) -> LayeredBody:
     """The whole sensor. `scatter`: None or (heights factor (n,), tip diameter factor (n,)) of its frusta.
 
     surface: the underside of the object that is to be pressed, where the cover's mesh is to be fine; without it a pitch everywhere
@@ -63,7 +136,7 @@ def build_sensor_body(spec: SensorSpec, *, dielectric_law: Law | None, cover_law
                        threads=threads)
 
 
-def cover_splits(mesh: MeshSettings, surface: Surface | None, x_lines: np.ndarray, y_lines: np.ndarray,
+def cover_splits(mesh: MeshSettings, surface: ObjectSurface | None, x_lines: np.ndarray, y_lines: np.ndarray,
                  pitch: float) -> tuple[np.ndarray, np.ndarray]:
     """How often the cover's uppermost layers are split, from below (layers, ny 2^m, nx 2^m), and its zones.
 
@@ -152,3 +225,72 @@ def _frustum_array(spec, centres, neighbours, law, mesh, scatter, contact, *, bo
                       unprojected_penalty_ratio=mesh.unprojected_penalty_ratio, quartic_penalty_ratio=mesh.quartic_penalty_ratio,
                       trilinear=mesh.trilinear_pressure, refinement=mesh.refinement, rings=mesh.frustum_rings, core=mesh.core,
                       friction=coulomb(spec.friction.board))
+
+
+class SingleLayerSlab(Slab):
+    """A slab of one material: the electrode plane is its top, and both its parts are the same region."""
+
+    regions = ("sheet", "sheet")
+
+    def sampling(self, points: np.ndarray) -> sp.csr_matrix:
+        """Sparse matrix (p, nodes) that interpolates a nodal field of the top at points (p, 2)."""
+        mesh = self.cover_mesh
+        at = CoverSide(mesh, mesh.top, mesh.top_cells, self.x_lines, self.y_lines).interpolation(points)
+        at.resize(len(points), self.nodes)
+        return at
+
+
+def build_plain_body(spec: LayersSpec, *, dielectric_law: Law | None, cover_law: Law | None = None,
+                     mesh: MeshSettings = MeshSettings(), scatter: tuple | None = None, contact: Contact | None = None,
+                     threads: int = 1, surface: ObjectSurface | None = None, sides: str = "held") -> LayeredBody:
+    """The body of a `LayersSpec`; arguments as for `build_sensor_body`.
+
+    scatter: must be None, there are no frusta that could differ;  sides: see `Slab`, for pieces of a wider layer
+    """
+    if scatter is not None:
+        spec.need_frusta("a scatter of frusta", "leave height_scatter and tip_scatter out")
+    x_lines, y_lines = (_element_lines(side, spec.element_size_mm, mesh) for side in spec.footprint_mm)
+    sheet, cover = _layers(spec, dielectric_law, cover_law, mesh)
+    splits, _ = cover_splits(mesh, surface, x_lines, y_lines, 2 * spec.element_size_mm)
+    kind = Slab if spec.cover else SingleLayerSlab
+    slab = kind(sheet, cover, grid_without_cells(*(_fine(lines, mesh) for lines in (x_lines, y_lines))), x_lines, y_lines,
+                sides=sides, contact=contact or mesh.object_contact, splits=splits,
+                quartic_penalty_ratio=mesh.slab_quartic_penalty_ratio, friction=coulomb(spec.friction.object),
+                held_below_mm=spec.edge.held_below_mm)
+    if spec.base_held:
+        slab.hold(slab.bottom)
+    return LayeredBody(slab, PlainSupport(spec.support, contact or mesh.contact), threads=threads)
+
+
+def _layers(spec, dielectric_law, cover_law, mesh):
+    """The slab's sheet and cover as `Layer`s, z = 0 at the top."""
+    above = spec.cover.thickness_mm if spec.cover else (1 - _SHEET_SHARE) * spec.thickness_mm
+    heights = np.linspace(-spec.thickness_mm, -above, max(mesh.sheet_layers, _SHEET_LAYERS) + 1)
+    held = -spec.edge.held_below_mm
+    return (Layer(with_level(heights, held), dielectric_law),
+            Layer(with_level(above * (np.asarray(mesh.cover_heights) - 1), held), cover_law if spec.cover else dielectric_law))
+
+
+def _element_lines(side, element_mm, mesh):
+    """Lines of the cover's coarsest elements, as far as `far_pitches` pairs of elements apart."""
+    count = int(np.ceil(side / (2 * element_mm * mesh.far_pitches) - 1e-9))
+    return np.linspace(-0.5 * side, 0.5 * side, count + 1)
+
+
+def _fine(lines, mesh):
+    """Lines of the sheet's elements: two for each of the cover's pitches, so that it is as fine as what it carries."""
+    parts = 2 * mesh.far_pitches * 2**mesh.refinement
+    return np.interp(np.arange(parts * (len(lines) - 1) + 1), parts * np.arange(len(lines)), lines)
+
+
+def grid_without_cells(x_lines: np.ndarray, y_lines: np.ndarray) -> SheetMesh2D:
+    """The `SheetMesh2D` of a grid without frusta: no roots, no cells."""
+    grid, none = grid_mesh_2d(x_lines, y_lines), np.zeros((0, 4), dtype=np.int64)
+    return SheetMesh2D(merge(with_centres(grid.points[grid.quads])), np.zeros((0, 25), dtype=np.int64), 0, (none, np.zeros(3)))
+
+
+def lower_side(slab: Slab, points: np.ndarray) -> sp.csr_matrix:
+    """Sparse matrix (p, nodes) that interpolates a nodal field of the lower side at points (p, 2)."""
+    on_plan = interpolation_2d(slab.sheet_mesh_2d.mesh_2d, points).tocoo()
+    nodes = slab.bottom[on_plan.col]
+    return type(on_plan)((on_plan.data, (on_plan.row, nodes)), shape=(len(points), slab.nodes)).tocsr()

@@ -12,7 +12,8 @@ import numpy as np
 from softtact.fem.elements import HEX20, HEX27, WEDGE18
 
 if TYPE_CHECKING:
-    from softtact.models.hyperelastic.body import BodyState, LayeredBody
+    from softtact.models.hyperelastic.body import LayeredBody
+    from softtact.models.hyperelastic.states import BodyState
 
 REGIONS = ("frusta", "sheet", "cover")     # from below; their numbers are the cell data `layer`
 OBJECT_LAYER = 5                           # the number of a soft object's cells

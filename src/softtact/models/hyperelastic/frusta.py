@@ -7,15 +7,17 @@ tip and folding side on the PCB; the side on the symmetric plane towards each ne
 node: the two neighbours share it when their roots touch. The sheet's lower side on the frusta's sides is left out where roots
 are wider than tips: in the unit cell they come no nearer than 0.01 mm up to 1 MPa. Where tips are wider the sides fold onto the
 sheet; there it is a level plane that moves with the root's outermost node.
+
+Loops over the contact points of many bodies with the same local nodes.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numba import njit
 
 from softtact.contact.friction import Coulomb, FrictionState
 from softtact.contact.height_field import NO_CONTACT_MM
-from softtact.contact.history import ContactHistory
 from softtact.contact.penalty import Contact
 from softtact.fem.elements import HEX27, QUAD9, dofs_of
 from softtact.fem.extruded_mesh import CORE_RADIUS, disc_mesh_2d, extrude
@@ -27,11 +29,31 @@ from softtact.fem.substructuring import LayerwiseElimination
 from softtact.fem.tangent_cache import TangentCache
 from softtact.linalg.workers import SERIAL, Workers
 from softtact.materials.laws.base import Law
-from softtact.models.hyperelastic.point_loops import scatter_contact, weighted_component
-from softtact.models.hyperelastic.support import SupportState
+from softtact.models.hyperelastic.states import ContactHistory, SupportState
 
 BOARD, SHEET = -1, -2                                     # what a contact point faces where it is no neighbour in DIRECTIONS
 DIRECTIONS = ((0, 1.0), (1, 1.0), (0, -1.0), (1, -1.0))   # axis and sign of the four neighbours: +x, +y, -x, -y
+
+
+@njit(cache=True, nogil=True)
+def weighted_component(field: np.ndarray, nodes: np.ndarray, weights: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    """Weighted components (f, p) of nodal fields (f, nodes, 3) at points of nodes (p, k), weights (p, k), axis (p,)."""
+    out = np.zeros((field.shape[0], nodes.shape[0]))
+    for f in range(field.shape[0]):
+        for p in range(nodes.shape[0]):
+            for k in range(nodes.shape[1]):
+                out[f, p] += weights[p, k] * field[f, nodes[p, k], axis[p]]
+    return out
+
+
+@njit(cache=True, nogil=True)
+def scatter_contact(force: np.ndarray, magnitude: np.ndarray, nodes: np.ndarray, weights: np.ndarray, axis: np.ndarray) -> None:
+    """Add to nodal forces (f, nodes, 3) those of magnitudes (f, p) at the same points."""
+    for f in range(force.shape[0]):
+        for p in range(nodes.shape[0]):
+            if magnitude[f, p] != 0.0:
+                for k in range(nodes.shape[1]):
+                    force[f, nodes[p, k], axis[p]] += magnitude[f, p] * weights[p, k]
 
 
 @dataclass(frozen=True)

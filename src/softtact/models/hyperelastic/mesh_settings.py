@@ -1,13 +1,23 @@
-"""Resolution of the layered body, and what holds its elements."""
+"""Resolution of the layered body, what holds its elements, and the scatter of one specimen's sizes about the drawing's."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from softtact.contact.penalty import Contact
+from softtact.errors import InputError
 from softtact.fem.extruded_mesh import CORE_RADIUS
+from softtact.models.hyperelastic.newton import NewtonSettings
+from softtact.sensors.frusta import SensorSpec
+from softtact.unknown_names import unknown
 
 _OBJECT_SMOOTHING_MM = 1e-3
 _CORE_IN_ONE_RING = 0.6     # docs/notebook/2026-11-24-choice-of-the-meshes.md
+SCATTER_KEYS = ("height_scatter", "tip_scatter", "thickness_scatter", "specimen")
+_LARGEST_DEVIATION = 2.5     # standard deviations: a specimen beyond would not have passed inspection
+_SOLVER_KEYS = ("largest_penetration_mm",)
 
 
 @dataclass(frozen=True)
@@ -105,3 +115,58 @@ class MeshSettings:
         (docs/notebook/2026-11-23-folding-frusta.md).
         """
         return cls(quartic_penalty_ratio=400.0, slab_quartic_penalty_ratio=10.0)
+
+
+def frustum_scatter(spec: SensorSpec, values: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray] | None:
+    """Factors (heights, tip diameters) of a specimen's frusta, each near 1; None where no scatter is asked for."""
+    if not any(key in values for key in SCATTER_KEYS):
+        return None
+    count = int(np.prod(spec.frusta_counts))
+    rng = np.random.default_rng(int(values.get("specimen", 0)))
+    heights, tips = rng.standard_normal((2, count)).clip(-_LARGEST_DEVIATION, _LARGEST_DEVIATION)
+    return 1 + values.get("height_scatter", 0.0) * heights, 1 + values.get("tip_scatter", 0.0) * tips
+
+
+def specimen_of(spec: SensorSpec, values: Mapping[str, Any]) -> SensorSpec:
+    """The sensor with the thickness of sheet and cover of one specimen; the frusta's scatter is `frustum_scatter`'s."""
+    scatter = values.get("thickness_scatter", 0.0)
+    if not scatter:
+        return spec
+    sheet, cover = 1 + scatter * np.random.default_rng([int(values.get("specimen", 0)), 1]).standard_normal(2).clip(
+        -_LARGEST_DEVIATION, _LARGEST_DEVIATION)
+    dielectric = spec.dielectric.model_copy(update={"sheet_thickness_mm": spec.dielectric.sheet_thickness_mm * sheet})
+    return spec.model_copy(update={
+        "dielectric": dielectric, "cover": spec.cover.model_copy(update={"thickness_mm": spec.cover.thickness_mm * cover})})
+
+
+# Meshes by name, and what counts as solved on them.
+PRESETS = {"default": (MeshSettings, NewtonSettings), "draft": (MeshSettings.draft, NewtonSettings.draft),
+           "stable": (MeshSettings.stable, NewtonSettings), "fine": (MeshSettings.fine, NewtonSettings)}
+
+
+def mesh_settings(values: Mapping[str, Any]) -> MeshSettings:
+    """`MeshSettings` from a mapping: those of its `preset`, changed by what else it says.
+
+    The scatter's and the solver's keys are passed over, an unknown key is refused.
+    """
+    own = {key: value for key, value in values.items() if key not in ("preset", *SCATTER_KEYS, *_SOLVER_KEYS)}
+    unknown = sorted(set(own) - set(MeshSettings.__dataclass_fields__))
+    if unknown:
+        raise InputError(f"mesh: key {unknown[0]!r} is unknown; use one of {', '.join(MeshSettings.__dataclass_fields__)}.")
+    try:
+        changes = {key: tuple(value) if isinstance(value, list) else value for key, value in own.items()}
+        return replace(_preset(values)[0](), **changes)
+    except ValueError as problem:
+        raise InputError(f"mesh: {problem}.") from None
+
+
+def newton_settings(values: Mapping[str, Any]) -> NewtonSettings:
+    """`NewtonSettings` from the same mapping."""
+    return replace(_preset(values)[1](), **{key: values[key] for key in _SOLVER_KEYS if key in values})
+
+
+def _preset(values):
+    name = values.get("preset", "default")
+    if name not in PRESETS:
+        raise InputError(f"mesh: {unknown(name, PRESETS, kind='preset')}")
+    return PRESETS[name]

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from softtact.contact.walls import OVERRUN_MM
+from softtact.contact.edges import OVERRUN_MM
 from softtact.errors import ConvergenceError
-from softtact.models.hyperelastic.body import BodyState, LayeredBody
-from softtact.models.hyperelastic.rigid_contact import Surface
+from softtact.models.hyperelastic.body import LayeredBody
+from softtact.models.hyperelastic.states import BodyState, ObjectSurface
 from softtact.models.newton import Solution, lowers_potential, solve
 
 _STILL_MM = 1e-3       # after a step of less no point faces another facet but those that slide to and fro past an edge
@@ -74,7 +74,7 @@ class NewtonSettings:
         return cls(relative_tolerance=1e-3, largest_penetration_mm=4e-3, kept_tangent_mm=0.03)
 
 
-def first_touch(body: LayeredBody, surface: Surface, settings: NewtonSettings) -> BodyState:
+def first_touch(body: LayeredBody, surface: ObjectSurface, settings: NewtonSettings) -> BodyState:
     """Equilibrium at a small given indentation: under force control alone the free object has no stiffness."""
     slab, support = body.rest()
     projection = body.slab.project(slab, surface)
@@ -99,7 +99,7 @@ def _indented_until_contact(body, state, step_mm):
                            f"{_MOST_INCREMENTS * step_mm:g} mm; press with a finer cover (cover_splits) or with a larger object.")
 
 
-def augment(body: LayeredBody, surface: Surface, found: Solution, force: float | None, settings: NewtonSettings) -> Solution:
+def augment(body: LayeredBody, surface: ObjectSurface, found: Solution, force: float | None, settings: NewtonSettings) -> Solution:
     """The load step once more with its overlaps augmented, as long as they are deeper than allowed and become less."""
     iterations, spent, least, in_vain = 0, 0, np.inf, 0
     for _ in range(settings.max_augmentations):
@@ -137,7 +137,7 @@ def _scale(force, settings):
     return max(force or 0.0, settings.smallest_scale_n)
 
 
-def settle(body: LayeredBody, surface: Surface, state: BodyState, force: float | None, tolerance: float,
+def settle(body: LayeredBody, surface: ObjectSurface, state: BodyState, force: float | None, tolerance: float,
            settings: NewtonSettings) -> Solution:
     """The `Solution` under a force (N) or at the state's indentation; with friction until friction and pressures agree."""
     if not body.friction.active:

@@ -13,9 +13,9 @@ import numpy as np
 from softtact.contact.height_field import MovedSurface
 from softtact.contact.motion import Motion, MotionStep
 from softtact.errors import ConvergenceError, InputError, TimeLimitError
-from softtact.models.hyperelastic.body import BodyState, LayeredBody
+from softtact.models.hyperelastic.body import LayeredBody
 from softtact.models.hyperelastic.newton import DEEP, NewtonSettings, augment, first_touch, most_iterations, settle, tolerance_at
-from softtact.models.hyperelastic.rigid_contact import Surface
+from softtact.models.hyperelastic.states import BodyState, ObjectSurface
 
 DEFAULT = NewtonSettings()
 _CLEAR_MM = 0.1        # over the surface, from where on no contact law acts
@@ -146,7 +146,7 @@ class ToStop(ByMotion):
                 f"from {start:.0%} of the way on no increment found a balance")
 
 
-def press_load_steps(body: LayeredBody, surface: Surface, forces_n: Iterable[float], *, settings: NewtonSettings = DEFAULT,
+def press_load_steps(body: LayeredBody, surface: ObjectSurface, forces_n: Iterable[float], *, settings: NewtonSettings = DEFAULT,
                      touch_mm: float = 0.0, stop_mm: float = np.inf) -> Iterator[LoadStep]:
     """Yield a `LoadStep` for each force (N, increasing). Raises ConvergenceError naming the load step that was not reached.
 
@@ -199,7 +199,7 @@ def _untouched(body, surface, indentation):
     return replace(state, indentation=indentation)
 
 
-def press_motion(body: LayeredBody, surface: Surface, motion: Motion, touch_mm: float, *,
+def press_motion(body: LayeredBody, surface: ObjectSurface, motion: Motion, touch_mm: float, *,
                  settings: NewtonSettings = DEFAULT) -> Iterator[LoadStep]:
     """Yield a `LoadStep` for each step of a `Motion`. Raises ConvergenceError naming the step that was not reached.
 

@@ -1,60 +1,21 @@
 """Contact of a rigid object with the slab's top: quadrature points of the top faces, each before a plane of the object."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from softtact.contact.coverage import continues, covered
-from softtact.contact.face_edges import ROWS, contact_compliance, own_areas
+from softtact.contact.edges import OVERRUN_MM, ROWS, contact_compliance, continues, covered, face_walls, own_areas
 from softtact.contact.friction import Coulomb, FrictionResponse, FrictionState
 from softtact.contact.height_field import NO_CONTACT_MM
-from softtact.contact.history import ContactHistory
 from softtact.contact.penalty import Contact
-from softtact.contact.walls import OVERRUN_MM, face_walls
 from softtact.fem.elements import QUAD8
 from softtact.fem.graded_mesh import CoverMesh
 from softtact.fem.quadrature import gauss
+from softtact.models.hyperelastic.states import ContactHistory, ContactProjection, ObjectSurface, SlabState
 
-if TYPE_CHECKING:
-    from softtact.models.hyperelastic.slab import SlabState
-
-# Heights (n,) and outward normals (n, 3) of an object's underside over places x (n,), y (n,).
-Surface = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 _NEAR_MM, _LARGEST_SHIFT_MM = 0.2, 0.02   # points that may touch when the object is let down on the cover, and how far at once
-
-
-@dataclass(frozen=True)
-class ContactProjection:
-    """The planes of the object's facets that points face: anchors (p, 3) in mm at no indentation, outward normals (p, 3).
-
-    covered (p,): share of a point's own area that the object covers;  beside (p,): points that lie beside the object themselves
-    contact_compliance (p,): mm/MPa of a spring between point and plane, where an edge covers it in part (`contact/face_edges`)
-    overrun (p,): points that lay far under an edge where the planes were found
-    offset_mm (2,): way of the object along x and y from its place at first touch, at which the anchors are
-    A point keeps its plane during a step of Newton's method, so that each step lowers one potential.
-    """
-
-    anchors: np.ndarray
-    normals: np.ndarray
-    covered: np.ndarray
-    beside: np.ndarray
-    contact_compliance: np.ndarray
-    offset_mm: np.ndarray = field(default_factory=lambda: np.zeros(2))
-    overrun: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
-
-    def taking(self, other: "ContactProjection", points: np.ndarray) -> "ContactProjection":
-        """These planes, and those of another projection for some of the points (p,)."""
-        kept = {name: getattr(self, name).copy() for name in ("anchors", "normals", "covered", "beside", "contact_compliance")}
-        for name, values in kept.items():
-            values[points] = getattr(other, name)[points]
-        return replace(self, **kept, overrun=self.overrun | points)
-
-    def moved(self, way_mm: np.ndarray) -> "ContactProjection":
-        """The same planes after the object has moved by a way (2,) along x and y."""
-        return replace(self, anchors=self.anchors + [*way_mm, 0.0], offset_mm=self.offset_mm + way_mm)
 
 
 @dataclass(frozen=True)
@@ -96,7 +57,7 @@ class TopContact:
         """A nodal field (n, 3) at the points (p, 3)."""
         return np.matmul(self.values, field[self.faces]).reshape(-1, 3)
 
-    def project(self, displacement: np.ndarray, surface: Surface, indentation: float | None = None) -> ContactProjection:
+    def project(self, displacement: np.ndarray, surface: ObjectSurface, indentation: float | None = None) -> ContactProjection:
         """The object's facets above the points (see `ContactProjection`); a `MovedSurface` tells how far aside the object is.
 
         indentation: of the object in mm, if points that have run far under an edge are to face the wall beside them
@@ -128,7 +89,7 @@ class TopContact:
         """The points' `Contact` on the planes that they face."""
         return replace(history.contact, contact_compliance=projection.contact_compliance)
 
-    def contact_of(self, state: "SlabState") -> Contact:
+    def contact_of(self, state: SlabState) -> Contact:
         """The points' `Contact` in a `SlabState`."""
         return self.contact_on(state.projection, state.history)
 
@@ -137,15 +98,15 @@ class TopContact:
         offset = self.reference + self.at_points(displacement) - projection.anchors
         return np.einsum("pd,pd->p", projection.normals, offset) + indentation * projection.normals[:, 2]
 
-    def own_gaps(self, state: "SlabState") -> np.ndarray:
+    def own_gaps(self, state: SlabState) -> np.ndarray:
         """Gaps (p,) of the points that lie under the object, without what edges give way; of those beside it one that says so."""
         return np.where(state.projection.beside, NO_CONTACT_MM, self.contact_of(state).own_gaps(state.gaps))
 
-    def error(self, state: "SlabState") -> float:
+    def error(self, state: SlabState) -> float:
         """Deepest overlap, or widest gap under pressure, in mm of points that lie under the object."""
         return self.contact_of(state).error(np.where(state.projection.beside, NO_CONTACT_MM, state.gaps))
 
-    def augmented(self, state: "SlabState") -> ContactHistory:
+    def augmented(self, state: SlabState) -> ContactHistory:
         """The contact's history with each point held where it just touches the object."""
         return replace(state.history, contact=self.contact_of(state).augmented(state.gaps))
 
@@ -180,7 +141,7 @@ class TopContact:
         """Places (p, 3) of the points in the frame of the object, which goes down by `indentation` and aside with `projection`."""
         return self.reference + self.at_points(displacement) + [*-projection.offset_mm, indentation]
 
-    def first_friction_state(self, state: "SlabState", indentation: float) -> FrictionState | None:
+    def first_friction_state(self, state: SlabState, indentation: float) -> FrictionState | None:
         """The friction state in which a step starts from a `SlabState`, None without friction."""
         if self.friction is None:
             return None
@@ -189,7 +150,7 @@ class TopContact:
             return FrictionState.first(self.friction, place, state.gaps)
         return state.friction_response.next_step(state.gaps)
 
-    def renewed_friction_state(self, state: "SlabState") -> FrictionState:
+    def renewed_friction_state(self, state: SlabState) -> FrictionState:
         """The friction state with the pressures of a `SlabState`."""
         response: Any = state.friction_response
         return response.next_pass(state.gaps, self._pressure(state))
@@ -198,7 +159,7 @@ class TopContact:
         """Pressure (p,) in MPa under the contact as it is now, on what is covered of the points' areas."""
         return self.contact_of(state).response(state.gaps)[1]
 
-    def balanced(self, state: "SlabState", indentation: float, force_n: float) -> float:
+    def balanced(self, state: SlabState, indentation: float, force_n: float) -> float:
         """The indentation (mm) at which the object's force, friction aside, is `force_n` on the cover as it is.
 
         The force grows with the depth, from a square root's slope on: Newton's method with bounded steps.
@@ -215,22 +176,22 @@ class TopContact:
             shift -= np.clip(excess / max(stiffness, 1e-12), -_LARGEST_SHIFT_MM, _LARGEST_SHIFT_MM)
         return indentation + shift
 
-    def stiffness(self, state: "SlabState") -> np.ndarray:
+    def stiffness(self, state: SlabState) -> np.ndarray:
         """Stiffness (p,) in N/mm of the points along their normals."""
         return self.contact_of(state).response(state.gaps)[2] * self.area * state.projection.covered
 
-    def area_under_pressure(self, state: "SlabState") -> float:
+    def area_under_pressure(self, state: SlabState) -> float:
         """Area in mm2 of the points that carry pressure under the contact as it is now, as far as the object covers it.
 
         By the pressure, not by the gap: where overlaps were pressed apart, touching points have gaps near zero of either sign.
         """
         return float((self.area * state.projection.covered)[self.under_pressure(state)].sum())
 
-    def under_pressure(self, state: "SlabState") -> np.ndarray:
+    def under_pressure(self, state: SlabState) -> np.ndarray:
         """Which points (p,) carry pressure."""
         return self._pressure(state) * state.projection.covered > 0
 
-    def resultant(self, state: "SlabState") -> tuple[np.ndarray, np.ndarray]:
+    def resultant(self, state: SlabState) -> tuple[np.ndarray, np.ndarray]:
         """Force (3,) in N of the object on the surface, and its torque (3,) in N mm about the sensor frame's origin."""
         area = (self.area * state.projection.covered)[:, None]
         force = self._pressure(state)[:, None] * state.projection.normals * area
@@ -238,7 +199,7 @@ class TopContact:
             force = force - state.friction_response.traction * area
         return force.sum(axis=0), np.cross(self.reference + self.at_points(state.displacement), force).sum(axis=0)
 
-    def slip_at(self, state: "SlabState", places: np.ndarray) -> np.ndarray:
+    def slip_at(self, state: SlabState, places: np.ndarray) -> np.ndarray:
         """How far (n,) in mm the surface has slid along the object at places (n, 2); nan where it bears no pressure.
 
         Told by the nearest contact point, as far as its own area may reach; nan everywhere without friction.
@@ -252,7 +213,7 @@ class TopContact:
         slip[here] = state.friction_response.slid[nearest[here]]
         return slip
 
-    def pressure_of_faces(self, state: "SlabState") -> np.ndarray:
+    def pressure_of_faces(self, state: SlabState) -> np.ndarray:
         """Mean pressure (t,) in MPa on each face, under the contact as it is now."""
         area = self.area.reshape(len(self.faces), -1)
         force = self._pressure(state) * self.area * state.projection.covered
@@ -277,7 +238,7 @@ class TopContact:
         nodes = np.flatnonzero(np.trace(total, axis1=1, axis2=2) > 0)
         return nodes, total[nodes]
 
-    def friction_tangent(self, state: "SlabState") -> tuple[np.ndarray, np.ndarray, float]:
+    def friction_tangent(self, state: SlabState) -> tuple[np.ndarray, np.ndarray, float]:
         """Friction's blocks (t, 3 w, 3 w) of the faces, border (t, 3 w) and corner.
 
         The border is the derivative of the forces by the indentation, the corner the energy's second derivative by it.

@@ -12,8 +12,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from softtact.contact.friction import Coulomb, FrictionResponse
-from softtact.contact.history import ContactHistory
+from softtact.contact.friction import Coulomb
 from softtact.contact.penalty import Contact
 from softtact.fem.assembly import add_upper, upper_pattern, upper_positions
 from softtact.fem.extruded_mesh import SheetMesh2D, extrude
@@ -25,30 +24,11 @@ from softtact.fem.solid_block import HexBlock, SolidBlock, WedgeBlock, hanging_n
 from softtact.linalg.symmetric_product import SymmetricProduct
 from softtact.linalg.workers import SERIAL, Workers, chunks
 from softtact.materials.laws.base import Law
-from softtact.models.hyperelastic.newton_step import LinearGaps
-from softtact.models.hyperelastic.rigid_contact import ContactProjection, Surface, TopContact
+from softtact.models.hyperelastic.rigid_contact import TopContact
 from softtact.models.hyperelastic.slab_nodes import CoverSide, sheet_nodes, without_zeros
+from softtact.models.hyperelastic.states import ContactHistory, ContactProjection, LinearGaps, ObjectSurface, SlabState
 
 _AT_ONCE = 8     # elements whose tangents one thread makes positive at once; those that need it lie side by side
-
-
-@dataclass(frozen=True)
-class SlabState:
-    """energy (mJ), force (n, 3) in N, contact quantities at the top's points, displacement (n, 3).
-
-    elastic: energy and force of the rubber alone; projection: what the points face; indentation_force: the object's, N downwards;
-    history: of the contact, see `ContactHistory`;  friction_response: friction at the points, None without
-    """
-
-    elastic: tuple
-    energy: float
-    force: np.ndarray
-    gaps: np.ndarray
-    projection: ContactProjection
-    displacement: np.ndarray
-    indentation_force: float
-    history: ContactHistory
-    friction_response: FrictionResponse | None = None
 
 
 @dataclass(frozen=True)
@@ -196,7 +176,7 @@ class Slab:
         dofs = (3 * np.asarray(nodes)[:, None] + np.arange(3)).ravel()
         self.free = np.setdiff1d(self.free, dofs)
 
-    def project(self, displacement: np.ndarray, surface: Surface, indentation: float | None = None) -> ContactProjection:
+    def project(self, displacement: np.ndarray, surface: ObjectSurface, indentation: float | None = None) -> ContactProjection:
         """The object's facets above the top's points (see `ContactProjection`)."""
         return self.top.project(displacement, surface, indentation)
 

@@ -5,42 +5,21 @@
     none     the slab's lower side is free: it hangs in the sensor's shell, which holds its sides
 """
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
-from softtact.contact.friction import Coulomb, FrictionResponse, FrictionState
-from softtact.contact.history import ContactHistory
+from softtact.contact.friction import Coulomb, FrictionState
 from softtact.contact.penalty import Contact
 from softtact.linalg.workers import SERIAL, Workers
-
-if TYPE_CHECKING:
-    from softtact.models.hyperelastic.body import BodyState
-
-
-@dataclass(frozen=True)
-class SupportState:
-    """energy (mJ), force (f, nodes, 3) on the support's nodes, gaps (f, p) at its contact points, displacement (f, nodes, 3).
-
-    elastic: energies (f,) and force of the rubber alone;  history: of the contacts, see `ContactHistory`
-    friction_response: friction at the points on the board (f, b), None without
-    """
-
-    elastic: tuple
-    energy: float
-    force: np.ndarray
-    gaps: np.ndarray
-    displacement: np.ndarray
-    history: ContactHistory
-    friction_response: FrictionResponse | None = None
+from softtact.models.hyperelastic.states import BodyState, ContactHistory, SupportState
 
 
 class Support(Protocol):
     """What a `LayeredBody` asks of what is below its slab: `count` bodies of `nodes` nodes each, tied to the slab at `root`.
 
     A support with bodies also condenses them for the slab's cells (`SheetCells`) and balances them one by one
-    (`local_equilibrium`); both look at supports with a `count` above zero only.
+    (`body.balanced`); both look at supports with a `count` above zero only.
     """
 
     count: int
@@ -157,7 +136,7 @@ class NoCells:
     def positive_outer(self, *, workers: Workers = SERIAL) -> list[np.ndarray]:
         return []
 
-    def refresh(self, state: "BodyState", *, kept_mm: float = 0.0, workers: Workers = SERIAL) -> int:
+    def refresh(self, state: BodyState, *, kept_mm: float = 0.0, workers: Workers = SERIAL) -> int:
         return 0
 
     def damp(self, slab_step: np.ndarray, bed_step: np.ndarray) -> bool:
@@ -169,7 +148,7 @@ class NoCells:
     def forget(self, cells: np.ndarray | None = None) -> None:
         pass
 
-    def condensed_residual(self, state: "BodyState", *, workers: Workers = SERIAL) -> tuple[np.ndarray, None]:
+    def condensed_residual(self, state: BodyState, *, workers: Workers = SERIAL) -> tuple[np.ndarray, None]:
         return state.slab.force.copy(), None
 
     def recover(self, kept: None, slab_step: np.ndarray, *, workers: Workers = SERIAL) -> tuple[np.ndarray, np.ndarray]:

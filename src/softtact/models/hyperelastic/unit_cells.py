@@ -4,7 +4,6 @@ Cells repeat, so their inner unknowns are eliminated cell by cell, after the fru
 matrix are the cells' walls and the cover. Cells under parts of the cover that are split differently are of different kinds.
 """
 
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,9 +14,7 @@ from softtact.fem.tangent_cache import TangentCache
 from softtact.linalg.workers import SERIAL, Workers, chunks
 from softtact.models.hyperelastic.frusta import FrustumArray
 from softtact.models.hyperelastic.slab import CellGroup, Slab
-
-if TYPE_CHECKING:
-    from softtact.models.hyperelastic.body import BodyState
+from softtact.models.hyperelastic.states import BodyState
 
 _CHUNK = 8                          # cells that one thread condenses, or makes positive, at once
 _ELEMENTS_KEEP_MM = 0.004           # by which an element's nodes may move against each other before its tangent is found anew
@@ -59,7 +56,7 @@ class SheetCells:
         workers.map(lambda task: task[0].make_positive(task[1]), tasks)
         return [kind.positive_outer() for kind in kinds]
 
-    def refresh(self, state: "BodyState", *, kept_mm: float = 0.0, workers: Workers = SERIAL) -> int:
+    def refresh(self, state: BodyState, *, kept_mm: float = 0.0, workers: Workers = SERIAL) -> int:
         """Recompute the condensed tangents of the cells that moved by more than `kept_mm` or changed contact since their last one.
 
         Keeping the others is a quasi-Newton step: forces are always exact. Returns how many were recomputed.
@@ -125,7 +122,7 @@ class SheetCells:
         without = state.slab.friction_response is None and friction_response is None
         return slope, _REFRESH_SLOPE * self.support.contact.stiffness if without else _REFRESH_WITH_FRICTION
 
-    def condensed_residual(self, state: "BodyState", *, workers: Workers = SERIAL) -> tuple[np.ndarray, tuple[list, list]]:
+    def condensed_residual(self, state: BodyState, *, workers: Workers = SERIAL) -> tuple[np.ndarray, tuple[list, list]]:
         """Residual (n, 3) of the slab with all inner unknowns eliminated, and what `recover` needs again."""
         root_force, in_frusta = self.support.condensed_residual(state.support, workers=workers)
         residual = state.slab.force.copy()
@@ -212,7 +209,7 @@ class CellKind:
         self.elimination.recover(forward_solved, step)
         return step[:, self._inner_places]
 
-    def condense(self, state: "BodyState", support: FrustumArray, chosen: np.ndarray, damping: np.ndarray, *,
+    def condense(self, state: BodyState, support: FrustumArray, chosen: np.ndarray, damping: np.ndarray, *,
                  kept_mm: float = 0.0) -> None:
         """Recompute the condensed tangents of some of these cells (k,), counted among them, from those of their frusta.
 

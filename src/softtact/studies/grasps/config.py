@@ -17,7 +17,7 @@ from softtact.geometry.complexity import choose_model, score
 from softtact.geometry.meshes import place, read_mesh
 from softtact.geometry.pose import Pose
 from softtact.materials.config import law_from_printed
-from softtact.models.hyperelastic.presets import PRESETS
+from softtact.models.hyperelastic.mesh_settings import PRESETS
 from softtact.press.sensor import Sensor, load_sensor
 from softtact.sensors.fields import plain_value
 from softtact.sensors.library import material_file, sensor_file

@@ -8,7 +8,7 @@ from typing import Any
 from softtact.files import atomic_path
 from softtact.materials.cards import law_from_card, load_card
 from softtact.models.foundation.frustum_spring import frustum_law
-from softtact.models.hyperelastic.presets import mesh_settings
+from softtact.models.hyperelastic.mesh_settings import mesh_settings
 from softtact.sensors.specification import SensorSpec
 
 

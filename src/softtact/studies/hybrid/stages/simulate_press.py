@@ -12,8 +12,7 @@ from softtact.geometry.pose import Pose
 from softtact.materials.cards import law_from_card, load_card
 from softtact.models.elastic.compliance import Compliance
 from softtact.models.foundation.compliance import FoundationCompliance
-from softtact.models.hyperelastic.presets import mesh_settings, newton_settings
-from softtact.models.hyperelastic.specimen import frustum_scatter, specimen_of
+from softtact.models.hyperelastic.mesh_settings import frustum_scatter, mesh_settings, newton_settings, specimen_of
 from softtact.press.sensor import Sensor
 from softtact.sensors.specification import SensorSpec
 
