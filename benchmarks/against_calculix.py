@@ -31,7 +31,7 @@ from threadpoolctl import threadpool_limits
 
 from softtact.contact.height_field import HeightField
 from softtact.decks import keywords
-from softtact.decks.laws import law_card
+from softtact.decks.keywords import law_card
 from softtact.fem.elements import TET4
 from softtact.linalg.direct import PardisoSingle
 from softtact.linalg.workers import Workers

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from deck_study import Tables, run_ccx
 
-from softtact.decks.export import write_deck
+from softtact.decks.sensor import write_deck
 
 # Tables that CalculiX takes minutes for, by the digest of their deck. SOFTTACT_CALCULIX=run runs all decks, whatever is kept, and
 # SOFTTACT_CALCULIX=keep keeps what takes more than half a minute.

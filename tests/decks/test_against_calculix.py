@@ -15,7 +15,7 @@ from support.sensors import CORO
 
 from softtact.contact.height_field import HeightField
 from softtact.decks import keywords
-from softtact.decks.laws import law_card
+from softtact.decks.keywords import law_card
 from softtact.decks.model import deck_model
 from softtact.fem.elements import HEX20
 from softtact.fem.solid_block import HexBlock

@@ -9,7 +9,7 @@ from deck_study import Tables, needs_ccx
 from law_constants import PARAMETERS
 
 from softtact.decks import keywords
-from softtact.decks.laws import law_card
+from softtact.decks.keywords import law_card
 from softtact.errors import InputError
 from softtact.fem.elements import HEX20
 from softtact.materials.laws.registry import LAWS, make_law

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 import trimesh
 from support.laws import NEOPRENE, POLYURETHANE
+from support.read_deck import read_deck
 from support.sensors import CORO
 
 from softtact.contact.penalty import penalty
-from softtact.decks.export import deck_text, export_press, write_deck
-from softtact.decks.laws import law_card
+from softtact.decks.keywords import law_card
 from softtact.decks.model import deck_model
-from softtact.decks.read import read_deck
+from softtact.decks.sensor import deck_text, export_press, write_deck
 from softtact.errors import InputError
 from softtact.fem.elements import HEX20
 from softtact.geometry.meshes import place

@@ -5,13 +5,13 @@ import pytest
 import trimesh
 import yaml
 from deck_study import needs_ccx, run_ccx
+from support.read_deck import read_deck
 from support.tetrahedra import tetrahedra_box
 
 from softtact.cli import main
 from softtact.contact.motion import Motion
 from softtact.contact.pair import ContactPair
 from softtact.contact.surfaces import Surface
-from softtact.decks.read import read_deck
 from softtact.decks.solid import export_solid
 from softtact.errors import InputError
 from softtact.fem.mesh_files import write_mesh

@@ -12,7 +12,7 @@ import numpy as np
 
 from softtact.contact.motion import Motion
 from softtact.decks import keywords
-from softtact.decks.laws import law_card
+from softtact.decks.keywords import law_card
 from softtact.errors import InputError
 from softtact.fem.elements import HEX27
 from softtact.fem.solid_mesh import ELEMENTS

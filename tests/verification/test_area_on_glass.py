@@ -16,10 +16,10 @@ import pytest
 from test_frustum_on_glass import HARD, HEIGHT, LAW, ROOT, TIP, equilibrium, frustum
 
 from softtact.decks import keywords
-from softtact.decks.laws import law_card
+from softtact.decks.keywords import law_card
 from softtact.fem.extruded_mesh import grid_mesh_2d
 from softtact.materials.laws.registry import make_law
-from softtact.models.ftir.unit_cell import DARK_GAP_MM, GLASS_MESH, contact_area
+from softtact.models.ftir.specimen import DARK_GAP_MM, GLASS_MESH, contact_area
 
 LAWS = {"mooney_rivlin": LAW,
         "ogden2": make_law("ogden2", {"mu1": 0.1351, "alpha1": 1.4538, "mu2": 0.2223, "alpha2": -4.9910}, bulk_over_shear=20.0)}

@@ -18,7 +18,7 @@ from test_presses import TIGHT, sides_touch, small_spec, sphere, tilted_plate
 from softtact.contact.friction import SLIP_TOLERANCE_MM, Coulomb
 from softtact.contact.height_field import HeightField
 from softtact.decks import keywords
-from softtact.decks.laws import law_card
+from softtact.decks.keywords import law_card
 from softtact.errors import InputError
 from softtact.fem.extruded_mesh import extrude, grid_mesh_2d
 from softtact.geometry.meshes import place

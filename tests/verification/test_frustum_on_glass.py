@@ -15,7 +15,7 @@ from support.laws import POLYURETHANE as LAW
 
 from softtact.contact.penalty import Contact
 from softtact.decks import keywords
-from softtact.decks.laws import law_card
+from softtact.decks.keywords import law_card
 from softtact.fem.extruded_mesh import grid_mesh_2d
 from softtact.models.hyperelastic.frusta import FrustumArray, FrustumGeometry
 from softtact.models.hyperelastic.mesh_settings import MeshSettings

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support.probes import small_design
 
-from softtact.decks.laws import law_card
+from softtact.decks.keywords import law_card
 from softtact.probe.design import load_design
 from softtact.probe.structure import structure_laws, structure_mesh
 from softtact.probe.sweep import palpate, slope

@@ -84,7 +84,7 @@ def _export_layered(options):
     refuse_overwriting([options.mesh, sensor_path(options.sensor)], {"--out": options.out})
     mesh, repairs = read_object(options, options.mesh)
     check_over_sensor(place(mesh, pose=pose), spec.footprint_mm, name=str(options.mesh))
-    from softtact.decks.export import export_press
+    from softtact.decks.sensor import export_press
 
     model = export_press(softtact.load_sensor(options.sensor), mesh, pose=pose, force_n=forces, control=options.control,
                          dialect=options.format, path=options.out, name=options.mesh.name)

@@ -59,7 +59,7 @@ def _mesh(options):
 def _filled(options, rules):
     """The mesh of a surface, and the values that are reported of it."""
     from softtact.fem.body_mesh import MOST_ELEMENTS, body_report, mesh_body
-    from softtact.fem.face_rules import face_rule, with_named_faces
+    from softtact.fem.mesh_files import face_rule, with_named_faces
     from softtact.geometry.tetrahedra import estimated_elements
 
     if len(options.region or ()) > 1:

@@ -1,16 +1,58 @@
-"""What the decks of both programs share: keyword lines, rows of numbers, and the parts of a model that they write alike."""
+"""What the decks of both programs share: keyword lines, rows of numbers, and laws.
 
-from collections.abc import Callable, Iterable, Sequence
+Laws: both programs split the energy as we do, psi of the isochoric stretches plus U(J), and take U = sum (J-1)^(2i) / D_i. Our
+quadratic U is K/2 (J-1)^2, so D_1 = 2/K and the further D_i stand for "no term". Only Arruda-Boyce differs there:
+U = ((J^2 - 1)/2 - ln J) / D, which is our logarithmic U, and agrees with the quadratic one to second order in J - 1.
+The Ogden constants are those of Abaqus in all three: psi = sum 2 mu_k / alpha_k^2 (...).
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from softtact.contact.friction import Coulomb
-from softtact.contact.penalty import Contact
-from softtact.decks.laws import LawCard
-from softtact.decks.mesh import Tie
-from softtact.decks.model import DeckModel
+from softtact.errors import InputError
+from softtact.materials.laws.base import Law
 
+# Law: the form's parameters on the keyword line, our constants in the order of the data, number of D_i.
+_FORMS = {
+    "neo_hooke": ("NEO HOOKE", ("c10",), 1),
+    "mooney_rivlin": ("MOONEY-RIVLIN", ("c10", "c01"), 1),
+    "yeoh": ("YEOH", ("c10", "c20", "c30"), 3),
+    "reduced_polynomial2": ("REDUCED POLYNOMIAL, N=2", ("c10", "c20"), 2),
+    "arruda_boyce": ("ARRUDA-BOYCE", ("mu", "lambda_m"), 1),
+    "ogden1": ("OGDEN, N=1", ("mu1", "alpha1"), 1),
+    "ogden2": ("OGDEN, N=2", ("mu1", "alpha1", "mu2", "alpha2"), 2),
+    "ogden3": ("OGDEN, N=3", ("mu1", "alpha1", "mu2", "alpha2", "mu3", "alpha3"), 3),
+}
+_FOAMS = {"hyperfoam1": ("mu1", "alpha1", "nu1"), "hyperfoam2": ("mu1", "alpha1", "mu2", "alpha2", "nu1", "nu2")}
 _PER_LINE = 16     # both programs read up to 16 numbers a line
+
+
+@dataclass(frozen=True)
+class LawCard:
+    """`form`: what follows the keyword on its line; `constants` (MPa, 1, then the D_i in 1/MPa) in the order of the data."""
+
+    form: str
+    constants: tuple
+    keyword: str = "HYPERELASTIC"
+
+
+def law_card(law: Law | None, *, no_term: float, dialect: str) -> LawCard:
+    """The `LawCard` of a law. `no_term`: the D_i (1/MPa) with which the dialect leaves a volumetric term out."""
+    if law is not None and law.name in _FOAMS:
+        names = _FOAMS[law.name]
+        return LawCard(f"N={len(names) // 3}", tuple(law.parameters[name] for name in names), keyword="HYPERFOAM")
+    if law is None or law.name not in _FORMS:
+        name = getattr(law, "name", None)
+        raise InputError(f"The law {name!r} cannot be written for {dialect}; use one of {', '.join([*_FORMS, *_FOAMS])}.")
+    form, names, terms = _FORMS[law.name]
+    written = ("quadratic", *(("logarithmic",) if form == "ARRUDA-BOYCE" else ()))
+    if law.volumetric.name not in written:
+        raise InputError(f"The law {law.name!r} has the volumetric function {law.volumetric.name!r}, which {dialect} does not take;"
+                         f" use {' or '.join(written)}.")
+    volumetric = (2 / law.bulk_modulus, *[no_term] * (terms - 1))
+    return LawCard(form, (*(law.parameters[name] for name in names), *volumetric))
 
 
 def number(value: float) -> str:
@@ -25,10 +67,9 @@ def rows(values: Iterable[float], *, per_line: int = _PER_LINE) -> str:
     return ",\n".join(lines)
 
 
-def heading(model: DeckModel, program: str) -> list[str]:
+def heading(title: str, program: str, remarks: Iterable[str] = ()) -> list[str]:
     """Title, units and remarks."""
-    lines = ["*HEADING", f"{model.title}; units: mm, N, MPa", f"** softtact export for {program}"]
-    return lines + [f"** {remark}" for remark in model.remarks]
+    return ["*HEADING", f"{title}; units: mm, N, MPa", f"** softtact export for {program}", *(f"** {remark}" for remark in remarks)]
 
 
 def nodes(points: Iterable[np.ndarray], first: int, *, name: str | None = None) -> list[str]:
@@ -53,11 +94,11 @@ def surface(name: str, faces: Iterable[Sequence[int]]) -> list[str]:
     return [f"*SURFACE, NAME={name}, TYPE=ELEMENT"] + [f"{element}, S{face}" for element, face in faces]
 
 
-def equations(ties: Iterable[Tie]) -> list[str]:
-    """One *EQUATION for all ties: for each component 0 = -slave + sum(weights * masters)."""
-    return _equation([[(tie.slave + 1, component, -1.0), *((master + 1, component, weight)
-                                                           for master, weight in zip(tie.masters, tie.weights, strict=True))]
-                      for tie in ties for component in (1, 2, 3)])
+def equations(ties: Iterable[tuple[int, np.ndarray, np.ndarray]]) -> list[str]:
+    """One *EQUATION for all ties (slave, masters, weights), nodes from 0: each component 0 = -slave + sum(weights * masters)."""
+    return _equation([[(slave + 1, component, -1.0),
+                       *((master + 1, component, weight) for master, weight in zip(masters, weights, strict=True))]
+                      for slave, masters, weights in ties for component in (1, 2, 3)])
 
 
 def moving_along(nodes: Iterable[int], reference: int, component: int) -> list[str]:
@@ -74,50 +115,6 @@ def _equation(sums):
     return lines
 
 
-def held(model: DeckModel) -> list[str]:
-    """Data lines of *BOUNDARY for the rubber: node and one component."""
-    return [f"{node + 1}, {component + 1}, {component + 1}" for node, component in model.held]
-
-
 def material(name: str, card: LawCard) -> list[str]:
     """*MATERIAL with the constants of its law, eight a line."""
     return [f"*MATERIAL, NAME={name}", f"*{card.keyword}, {card.form}", rows(card.constants, per_line=8)]
-
-
-def rubber(model: DeckModel, kinds: dict[str, str], wedge: str, cards: dict[str, LawCard]) -> list[str]:
-    """Nodes, elements, sets, laws and surfaces of the rubber.
-
-    kinds: type of the bricks by part;  wedge: type of the wedges;  cards: `LawCard` by part
-    """
-    lines = nodes(model.points, 1, name="RUBBER")
-    for part in model.parts:
-        lines += elements(kinds[part.name], part.name, part.hex_elements + 1, part.hexes + 1)
-        if len(part.wedges):
-            lines += elements(wedge, part.name, part.wedge_elements + 1, part.wedges + 1)
-    for name, members in model.node_sets.items():
-        lines += node_set(name, np.asarray(members) + 1)
-    for part in model.parts:
-        lines += material(f"RUBBER_{part.name}", cards[part.name])
-        lines += [f"*SOLID SECTION, ELSET={part.name}, MATERIAL=RUBBER_{part.name}"]
-    for name, faces in model.surfaces.items():
-        lines += surface(name, np.asarray(faces) + [1, 0])
-    return lines
-
-
-def element_count(model: DeckModel) -> int:
-    """Number of the rubber's elements."""
-    return sum(len(part.elements) for part in model.parts)
-
-
-def contacts(model: DeckModel, behaviour: Callable[[Contact], list[str]], friction: Callable[[Coulomb], list[str]]) -> list[str]:
-    """Contact laws and pairs, slave surface first. A rigid body NAME has the surface NAME_SURFACE.
-
-    behaviour(settings): the lines of *SURFACE BEHAVIOR for a pair's `Contact`;  friction(law): of *FRICTION for its `Coulomb`
-    """
-    lines, rigid = [], {body.name for body in model.rigid}
-    for pair in model.contacts:
-        master = f"{pair.master}_SURFACE" if pair.master in rigid else pair.master
-        lines += [f"*SURFACE INTERACTION, NAME={pair.name}", *behaviour(pair.contact),
-                  *(friction(pair.friction) if pair.friction else ()),
-                  f"*CONTACT PAIR, INTERACTION={pair.name}, TYPE=SURFACE TO SURFACE", f"{pair.slave}, {master}"]
-    return lines

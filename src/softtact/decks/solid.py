@@ -2,11 +2,10 @@
 
     export_solid("press.inp", body, {"ball": Motion().step(ways={"z": -0.2})}, dialect="calculix")
 
-Elements   CalculiX: C3D10, C3D20R, C3D15, CPE8R, CAX8R, CPE6, CAX6, as they are. Abaqus: the same with a pressure of their own (H),
-           but for foams. Nodes in faces and bodies of our full quadratic elements are left out.
-Frames     move without turning: every node that a frame carries follows its reference node by *EQUATION, so that a way or a force
-           of the reference node drives it. A frame that turns is refused.
-Objects    rigid: R3D3 in Abaqus; in CalculiX, which shifts shells, each facet is the first face of a tetrahedron behind it.
+Elements   CalculiX: C3D10, C3D20R, C3D15, CPE8R, CAX8R, CPE6, CAX6, as they are. Abaqus: the same with a pressure in each element
+           (H), but for foams. Nodes in faces and bodies of our full quadratic elements are left out.
+Frames     move without turning: every node that a frame carries follows its reference node by *EQUATION, so that a displacement or
+           a force of the reference node drives it. A frame that turns is refused.
 Contact    surface to surface, linear penalty: `STIFFER` times that of the pair, because neither augments it as we do. Sticking
            friction is as stiff (CalculiX), or slips elastically by 1 um (Abaqus).
 Steps      those of the motions. A rigid object that is loaded first is brought to touch, in a step of its own.
@@ -23,23 +22,18 @@ from softtact.contact.facet_shapes import LINE2, QUAD8
 from softtact.contact.motion import FREEDOMS, Motion, MotionStep
 from softtact.contact.surfaces import Surface
 from softtact.decks import keywords
-from softtact.decks.calculix import tetrahedra_behind
-from softtact.decks.laws import law_card
+from softtact.decks.dialects import STIFF_MATERIAL, Dialect, contact_pair, dialect_of, linear_contact, tetrahedra_behind
 from softtact.errors import InputError
-from softtact.fem.elements import TET4, Element
+from softtact.fem.elements import Element
 from softtact.files import atomic_path
 from softtact.models.solid.body import SolidBody
 from softtact.models.solid.frames import Frame
 
-PROGRAMS = {"calculix": "CalculiX", "abaqus": "Abaqus"}
 STIFFER = 50.0
-_NO_TERM = {"calculix": 1e20, "abaqus": 0.0}     # of the D_i that leave a volumetric term out
 _ELASTIC_SLIP_MM = 1e-3
 _TOUCH_MM = 0.01
 _LOOKS = -0.1        # cosine between a facet's normal and one of a surface that it looks at
-_CORNERS = {3: 2, 6: 3, 8: 4, 9: 4}     # of a face of so many nodes
 _INCREMENTS = "0.1, 1, 1e-6, 0.25"
-_RIGID = ["*MATERIAL, NAME=RIGID", "*ELASTIC", "1000, 0.3"]     # of elements whose nodes are all prescribed
 
 
 @dataclass(frozen=True)
@@ -59,9 +53,7 @@ def export_solid(path: str | Path, body: SolidBody, motions: Mapping[str, Motion
     Raises InputError where the deck cannot say it: an unknown dialect, a law that the program lacks, a frame that turns, a freedom
     that is held after it was loaded, self-contact in CalculiX.
     """
-    if dialect not in PROGRAMS:
-        raise InputError(f"The format {dialect!r} is unknown; use one of {', '.join(PROGRAMS)}.")
-    lines = _Deck(body, dialect).lines(deck_steps(body, motions or {}, pressures or {}), title)
+    lines = _Deck(body, dialect_of(dialect)).lines(deck_steps(body, motions or {}, pressures or {}), title)
     with atomic_path(path) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="ascii", errors="replace")
 
@@ -120,8 +112,8 @@ def _touch(body, loads):
 class _Deck:
     """A body in a dialect."""
 
-    def __init__(self, body: SolidBody, dialect: str) -> None:
-        self.body, self.dialect = body, dialect
+    def __init__(self, body: SolidBody, writer: Dialect) -> None:
+        self.body, self.writer = body, writer
         self.parts = [part for part in body.mesh.parts() if len(part[2])]
         first = np.cumsum([1, *(len(nodes) for _, _, nodes in self.parts)])
         self.numbers = [np.arange(start, start + len(nodes)) for start, (_, _, nodes) in zip(first, self.parts, strict=False)]
@@ -133,21 +125,19 @@ class _Deck:
 
     def lines(self, steps, title):
         """All lines."""
-        program = PROGRAMS[self.dialect]
-        lines = ["*HEADING", f"{title}; units: mm, N, MPa", f"** softtact export for {program}"]
-        lines += self._rubber(program) + self._frames() + self._contacts(program)
+        lines = keywords.heading(title, self.writer.program) + self._rubber() + self._frames() + self._contacts()
         for number, step in enumerate(steps):
             lines += self._step(step, first=number == 0)
         return lines
 
-    def _rubber(self, program):
-        body = self.body
+    def _rubber(self):
+        body, writer = self.body, self.writer
         lines = ["*NODE, NSET=SOFT"] + [f"{k + 1}, " + ", ".join(map(keywords.number, body.points[k])) for k in self.used]
         for (region, element, nodes), numbers in zip(self.parts, self.numbers, strict=True):
             kind = self._kind(element, body.laws[region])
             lines += keywords.elements(kind, name_of(region), numbers, nodes[:, element.abaqus_nodes] + 1)
         for region in body.mesh.regions:
-            card = law_card(body.laws[region], no_term=_NO_TERM[self.dialect], dialect=program)
+            card = keywords.law_card(body.laws[region], no_term=writer.no_term, dialect=writer.program)
             lines += keywords.material(f"LAW_{name_of(region)}", card)
             lines += [f"*SOLID SECTION, ELSET={name_of(region)}, MATERIAL=LAW_{name_of(region)}"]
             lines += [keywords.number(body.mesh.thickness_mm)] if body.mesh.geometry == "plane_strain" else []
@@ -159,7 +149,7 @@ class _Deck:
         letters = {"solid": "C3D", "plane_strain": "CPE", "axisymmetric": "CAX"}[self.body.mesh.geometry]
         name = letters + (element.abaqus_name or "").removeprefix("C3D")
         name += "R" if name.endswith(("C3D20", "8")) else ""
-        return name + ("H" if self.dialect == "abaqus" and law.projected_modulus > 0 else "")
+        return name + (self.writer.hybrid if law.projected_modulus > 0 else "")
 
     def _held(self, axis):
         """Soft nodes that are held along an axis, and that no frame carries along it."""
@@ -182,7 +172,7 @@ class _Deck:
                 own = np.intersect1d(own, self.used)
             lines += keywords.node_set(f"{name}_NODES", own + 1)
             for axis in axes:
-                if "xyz"[axis] in frame.axes and (self.dialect == "calculix" or own.min() < self.soft):
+                if "xyz"[axis] in frame.axes and (not self.writer.facets_are_rigid or own.min() < self.soft):
                     new = own[(own >= len(taken)) | ~taken[np.minimum(own, len(taken) - 1), axis]]
                     lines += keywords.moving_along(new + 1, self.reference[k], axis + 1)
                     taken[new[new < len(taken)], axis] = True
@@ -194,20 +184,18 @@ class _Deck:
         lines += keywords.nodes(self.body.points[frame.nodes], int(frame.nodes[0]) + 1)
         numbers = np.arange(self.next_element, self.next_element + len(facets))
         self.next_element += len(facets)
-        if self.dialect == "abaqus":
-            k = self.body.frames.index(frame)
-            lines += keywords.elements("R3D3", name, numbers, facets + 1)
-            lines += [f"*RIGID BODY, REF NODE={self.reference[k]}, ELSET={name}", f"*SURFACE, NAME={name}_SURFACE, TYPE=ELEMENT",
-                      f"{name}, SPOS"]
+        reference = self.reference[self.body.frames.index(frame)]
+        if self.writer.facets_are_rigid:
+            lines += self.writer.rigid_facets(name, numbers, facets + 1, reference)
             return np.zeros(0, dtype=int)
         points, tetrahedra = tetrahedra_behind(self.body.points[frame.nodes], facets - frame.nodes[0])
         behind = np.arange(self.next_node - 1, self.next_node - 1 + len(facets))
         node = np.concatenate([frame.nodes, behind])
         self.next_node += len(facets)
         lines += keywords.nodes(points[len(frame.nodes):], int(behind[0]) + 1)
-        lines += keywords.elements(TET4.abaqus_name, name, numbers, node[tetrahedra] + 1) + _RIGID     # type: ignore[arg-type]
-        lines += [f"*SOLID SECTION, ELSET={name}, MATERIAL=RIGID"]
-        lines += keywords.surface(f"{name}_SURFACE", [(int(number), 1) for number in numbers])
+        elements = self.writer.rigid_facets(name, numbers, node[tetrahedra] + 1, reference)
+        first = elements.index(f"*SOLID SECTION, ELSET={name}, MATERIAL=RIGID")
+        lines += [*elements[:first], *STIFF_MATERIAL, *elements[first:]]
         return behind
 
     def _facing(self, facets):
@@ -222,26 +210,23 @@ class _Deck:
             raise InputError("A rigid object turns its back on the surface that it is to meet; turn its facets' normals outwards.")
         return facets[looks]
 
-    def _contacts(self, program):
+    def _contacts(self):
         lines = []
         for number, pair in enumerate(self.body.pairs, start=1):
             name = f"PAIR_{number}"
-            if pair.itself and self.dialect == "calculix":
-                raise InputError(f"The pair {pair.name!r} is a surface with itself, which {program} does not take; export it for "
-                                 "Abaqus.")
+            if pair.itself and not self.writer.facets_are_rigid:
+                raise InputError(f"The pair {pair.name!r} is a surface with itself, which {self.writer.program} does not take; "
+                                 "export it for Abaqus.")
             lines += keywords.surface(f"{name}_POINTS", self._faces(pair.surface))
             other = self._object_of(pair.other)
             if other is None and not pair.itself:
                 other = f"{name}_OTHER"
                 lines += keywords.surface(other, self._faces(pair.other))
-            stiffness = keywords.number(STIFFER * pair.stiffness)
-            lines += [f"*SURFACE INTERACTION, NAME={name}", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", stiffness]
+            stiffness = STIFFER * pair.stiffness
+            laws = linear_contact(stiffness)
             if pair.friction:
-                mu = keywords.number(pair.friction)
-                lines += ["*FRICTION", f"{mu}, {stiffness}"] if self.dialect == "calculix" else [
-                    f"*FRICTION, ELASTIC SLIP={keywords.number(_ELASTIC_SLIP_MM)}", mu]
-            lines += [f"*CONTACT PAIR, INTERACTION={name}, TYPE=SURFACE TO SURFACE",
-                      f"{name}_POINTS" + (f", {other}" if other else "")]
+                laws += self.writer.friction(pair.friction, stick_slope=stiffness, slip_mm=_ELASTIC_SLIP_MM)
+            lines += contact_pair(name, laws, f"{name}_POINTS", other)
         return lines
 
     def _object_of(self, surface: Surface) -> str | None:
@@ -255,7 +240,7 @@ class _Deck:
         if not self._sides:
             for (_, element, nodes), numbers in zip(self.parts, self.numbers, strict=True):
                 for side, face in enumerate(element.faces, start=1):
-                    rows = np.sort(nodes[:, face.nodes[:_CORNERS[len(face.nodes)]]], axis=1)
+                    rows = np.sort(nodes[:, face.nodes[:face.element.corners]], axis=1)
                     self._sides |= {tuple(row): (number, side) for row, number in zip(rows.tolist(), numbers.tolist(), strict=True)}
         count = np.where(surface.kinds >= LINE2, 2, np.where(surface.kinds >= QUAD8, 4, 3))
         keys = [tuple(sorted(own[:k])) for own, k in zip(surface.nodes.tolist(), count, strict=True)]
@@ -264,16 +249,13 @@ class _Deck:
         return [self._sides[key] for key in keys]
 
     def _step(self, step: DeckStep, *, first):
-        label = f", NAME={step.name}" if self.dialect == "abaqus" else ""
-        lines = [] if label else [f"** STEP: {step.name}"]
-        lines += [f"*STEP{label}, NLGEOM=YES, INC=1000" if label else "*STEP, NLGEOM, INC=1000", "*STATIC", _INCREMENTS]
-        lines += ["*BOUNDARY" if first else "*BOUNDARY, OP=NEW"]
+        lines = self.writer.step(step.name, _INCREMENTS, first=first)
         lines += [f"HELD_{axis + 1}, {axis + 1}, {axis + 1}" for axis in range(3) if len(self._held(axis))]
         plane = self.body.mesh.geometry != "solid"
         for (frame, axis), way in step.ways.items():
             if not (plane and axis == 2):
                 lines += [f"{self.reference[frame]}, {axis + 1}, {axis + 1}, {keywords.number(way)}"]
-        if self.dialect == "abaqus":
+        if self.writer.facets_are_rigid:
             lines += [f"{self.reference[k]}, 4, 6" for k, frame in enumerate(self.body.frames) if frame.nodes.min() >= self.soft]
         if step.loads:
             lines += ["*CLOAD"] + [f"{self.reference[frame]}, {axis + 1}, {keywords.number(value)}"
@@ -284,15 +266,13 @@ class _Deck:
         return [*lines, *self._output(), "*END STEP"]
 
     def _output(self):
-        names = [name_of(frame.name) for frame in self.body.frames]
-        if self.dialect == "abaqus":
-            lines = ["*OUTPUT, FIELD, FREQUENCY=1000", "*NODE OUTPUT", "U, RF", "*ELEMENT OUTPUT", "S, LE", "*CONTACT OUTPUT",
-                     "CSTRESS", "*OUTPUT, HISTORY, FREQUENCY=1"]
-            return lines + [line for name in names for line in (f"*NODE OUTPUT, NSET={name}_REFERENCE", "U, RF")]
-        lines = [line for name in names for line in (f"*NODE PRINT, NSET={name}_REFERENCE, FREQUENCY=1000", "U",
-                                                     f"*NODE PRINT, NSET={name}_NODES, TOTALS=ONLY, FREQUENCY=1000", "RF")]
-        return [*lines, "*NODE FILE, FREQUENCY=1000", "U, RF", "*EL FILE, FREQUENCY=1000", "S",
-                *(("*CONTACT FILE, FREQUENCY=1000", "CDIS, CSTR") if self.body.pairs else ())]
+        names, fields = [name_of(frame.name) for frame in self.body.frames], self.writer.fields
+        if self.writer.facets_are_rigid:
+            histories = [line for name in names for line in (f"*NODE OUTPUT, NSET={name}_REFERENCE", "U, RF")]
+            return [*fields, *self.writer.contact_fields, *histories]
+        tables = [line for name in names for line in (f"*NODE PRINT, NSET={name}_REFERENCE, FREQUENCY=1000", "U",
+                                                      f"*NODE PRINT, NSET={name}_NODES, TOTALS=ONLY, FREQUENCY=1000", "RF")]
+        return [*tables, *fields, *(self.writer.contact_fields if self.body.pairs else ())]
 
 
 def _normals(points, facets):
