@@ -11,7 +11,7 @@ import trimesh
 from glass_mesh import LAWS, SPEC
 
 from softtact.contact.height_field import HeightField
-from softtact.models.ftir.unit_cell import GLASS_MESH, contact_area, press_cell_on_glass
+from softtact.models.ftir.specimen import GLASS_MESH, contact_area, press_cell_on_glass
 from softtact.models.hyperelastic.build import build_patch
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.models.hyperelastic.path import press_load_steps

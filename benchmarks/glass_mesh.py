@@ -12,7 +12,7 @@ import record
 
 from softtact.contact.height_field import HeightField
 from softtact.materials.laws.registry import make_law
-from softtact.models.ftir.unit_cell import DARK_GAP_MM, GLASS_MESH, SETTINGS, contact_area, plate_over
+from softtact.models.ftir.specimen import DARK_GAP_MM, GLASS_MESH, SETTINGS, contact_area, plate_over
 from softtact.models.hyperelastic.build import build_unit_cell
 from softtact.models.hyperelastic.path import press_load_steps
 from softtact.sensors.library import sensor_file

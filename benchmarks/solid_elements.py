@@ -24,11 +24,10 @@ import record
 
 from softtact.fem.assembly import SymmetricPattern, add_upper
 from softtact.fem.elements import HEX27, TET10
-from softtact.fem.kernels import add_forces
+from softtact.fem.kernels import add_forces, project
 from softtact.fem.quadrature import tetrahedron_rule4, tetrahedron_rule15
 from softtact.fem.solid_block import SolidBlock
 from softtact.fem.structured_meshes import box, in_tetrahedra
-from softtact.fem.volume_kernels import project
 from softtact.linalg.direct import make_solver
 from softtact.materials.laws.registry import make_law
 

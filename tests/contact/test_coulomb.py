@@ -4,8 +4,15 @@ import numpy as np
 import pytest
 from half_space import disc_of_points, half_space
 
-from softtact.contact.coulomb import ContactCompliance, CoulombSettings, Increment, solve_block_by_block, solve_increment
-from softtact.contact.disc_constraints import into_discs, solve_in_discs
+from softtact.contact.coulomb import (
+    ContactCompliance,
+    CoulombSettings,
+    Increment,
+    into_discs,
+    solve_block_by_block,
+    solve_in_discs,
+    solve_increment,
+)
 from softtact.errors import ConvergenceError
 
 RADIUS, SPACING, DEPTH = 100.0, 0.25, 0.01       # mm: a contact 4 points in radius

@@ -5,7 +5,7 @@ import pytest
 from small_layer import flat_box, placed
 from test_object_points import GRID, object_points
 
-from softtact.contact.patches import patches_of
+from softtact.contact.node_grid import patches_of
 
 
 def plate(side=30.0, *, tilt_deg=0.0):

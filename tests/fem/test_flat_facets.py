@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from softtact.fem.flat_facets import fine_triangles, flat_triangles
+from softtact.fem.solid_mesh import fine_triangles, flat_triangles
 from softtact.fem.structured_meshes import box, cylinder, in_tetrahedra
 
 

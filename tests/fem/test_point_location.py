@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from softtact.fem.extruded_mesh import refine, sheet_mesh_2d
-from softtact.fem.point_location import interpolation_2d
+from softtact.fem.extruded_mesh import interpolation_2d, refine, sheet_mesh_2d
 
 CENTRES = np.array([(x, y) for y in (-0.6, 0.6) for x in (-1.2, 0.0, 1.2)])
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from softtact.fem.positive_tangents import make_positive
+from softtact.fem.static_condensation import make_positive
 
 
 def of_eigenvalues(*values):

@@ -5,8 +5,7 @@ import pytest
 
 from softtact.fem.extruded_mesh import extrude, sheet_mesh_2d
 from softtact.fem.solid_block import HexBlock
-from softtact.fem.static_condensation import Condensation, packed
-from softtact.fem.tangent_cache import TangentCache
+from softtact.fem.static_condensation import Condensation, TangentCache, packed
 from softtact.materials.laws.registry import make_law
 
 LAW = make_law("mooney_rivlin", {"c10": 0.17, "c01": 0.004}, bulk_modulus=7.0)

@@ -7,7 +7,7 @@ the share of its area that the object covers, continuous as it slides past the e
 Contact compliance   A row of points that is held makes the contact wider by a row, one that is free does not; that is how blunt a
 mesh is, and a flat punch's indentation jumps by a tenth when its edge passes a row. A row with a spring of (1/r - 1) times its
 compliance among the held ones stores the energy of an edge a share r of the way from the row before (as in
-`models/foundation/partial_contact`, for nodes). As a pressure on the covered share r of the row's area that is a contact compliance
+`models/foundation/dof_maps`, for nodes). As a pressure on the covered share r of the row's area that is a contact compliance
 of the row's compliance times the area times 1 - r. What is not derived, for the three rows of a Gauss rule across a face, was taken
 from a punch's edge that moves across it by tenths on the default mesh, against elements an eighth as wide (benchmarks/edges.py):
 where one row's share ends and the next one's begins, and the compliances. These differ by how far the row is from the last held
@@ -28,7 +28,11 @@ STEEP = 1.5        # rise over run above which two places of the underside are t
 FLAT_MM = 0.02     # ... if they differ by more than this
 _HALVINGS = 10     # the edge is found to a thousandth of the area's side
 ROWS = 3                                    # points across a face, at the places of Gauss's rule
-ENDS = np.array([-1.0, -0.28, 0.28, 1.0])   # of the rows' own strips, from one side of the face to the other (-1 to 1)
+ENDS = np.array([-1.0, -0.28, 0.28, 1.0])   # of the rows' strips, from one side of the face to the other (-1 to 1)
+# A row's compliance times its area, in widths of the face over the plane modulus: of the row that an edge comes to first
+# as it moves outwards, of the middle one, and of the last.
+_SOFTNESS = np.array([0.15, 0.3, 0.4])
+_NOWHERE = 1e-12                            # squared: below this no direction is more outwards than another
 OVERRUN_MM = 0.05      # overlap above which a wall is looked for
 _NEARER = 0.5          # of the overlap: a wall that is not so near is none; on a smooth side the facet itself is always nearer
 _DIRECTIONS = 32
@@ -85,14 +89,6 @@ def _crossings(starts, ends, start_under, end_under, base, foot, surface):
     out = starts.copy()
     out[rows, sides] = 0.5 * (inner + outer)
     return out
-
-
-# A row's own compliance times its own area, in widths of the face over the plane modulus: of the row that an edge comes to first
-# as it moves outwards, of the middle one, and of the last.
-_SOFTNESS = np.array([0.15, 0.3, 0.4])
-
-
-_NOWHERE = 1e-12                            # squared: below this no direction is more outwards than another
 
 
 def own_areas(half: np.ndarray, points: np.ndarray) -> np.ndarray:

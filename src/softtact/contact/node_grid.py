@@ -1,9 +1,23 @@
-"""The free nodes of a sensor's surface, as a grid of four like quarters: with those on its sides where these are free."""
+"""The free nodes of a sensor's surface, as a grid of four like quarters: with those on its sides where these are free.
 
-from collections.abc import Mapping
+`Stencil`   About the inverse of a surface's compliance: the forces on a node and its neighbours when all surface nodes are given
+their depth. A surface's stiffness reaches hardly further than its elements, so a few neighbours make a good preconditioner.
+`patches_of`   Patches of contact points that share a pressure: fewer unknowns where a contact is large.
+"""
+
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
+from numba import njit
+from scipy.ndimage import binary_erosion
+
+from softtact.contact.object_points import ObjectPoints
+
+_LEVEL_MM = 0.02     # range of heights among the points of a patch
+_WHOLE = 0.999        # covered share from which on a point may share a patch
+_MANY_POINTS = 800   # from which on patches save time; a small contact wants all of its points
 
 
 @dataclass(frozen=True)
@@ -89,3 +103,75 @@ class NodeGrid:
         place = self.from_middle(nodes)
         away = np.abs(place)
         return away[:, 1] * (len(self.x) // 2 + 1) + away[:, 0], np.where(place < 0, -1, 1)
+
+
+@dataclass(frozen=True)
+class Stencil:
+    """values (2, 2, 2 k + 1, 2 k + 1) in N/mm: by a node's row and column, even or odd from the middle, and its neighbour's offset.
+
+    Nodes at corners, mid-sides and centres of elements are of four kinds.
+    """
+
+    values: np.ndarray
+
+    def on(self, grid: NodeGrid, nodes: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+        """The stencil's action on values (n, levels) at some of a `NodeGrid`'s nodes (n,), all others being zero."""
+        reach = self.values.shape[2] // 2
+        j, i = np.divmod(nodes, grid.shape[1])
+        place = np.full((grid.shape[0] + 2 * reach, grid.shape[1] + 2 * reach), -1)
+        place[j + reach, i + reach] = np.arange(len(nodes))
+        kind = (j - grid.shape[0] // 2) % 2, (i - grid.shape[1] // 2) % 2
+        offsets = [(dj, di) for dj in range(2 * reach + 1) for di in range(2 * reach + 1)]
+        neighbours = np.stack([place[j + dj, i + di] for dj, di in offsets], axis=1)
+        weights = np.stack([self.values[(*kind, dj, di)] for dj, di in offsets], axis=1).astype(np.float32)
+        return lambda x: _apply(np.ascontiguousarray(x, dtype=np.float32), neighbours, weights)
+
+
+@njit(cache=True, nogil=True)
+def _apply(x, neighbours, weights):
+    out = np.zeros_like(x)
+    for n in range(len(neighbours)):
+        for k in range(neighbours.shape[1]):
+            m = neighbours[n, k]
+            if m >= 0:
+                for l in range(x.shape[1]):
+                    out[n, l] += weights[n, k] * x[m, l]
+    return out
+
+
+def patches_of(points: ObjectPoints, grid: NodeGrid, shared: bool, *, beside_edge: int = 0) -> sp.csr_matrix:
+    """Matrix (patches, c) of the points' shares in patches: four whole points of a square, level with each other, or one alone.
+
+    Squares are counted from the middle, where a row's and a column's points go in pairs, so that a symmetric contact stays so.
+    beside_edge: how many rows of points along the edge of all points keep a pressure of their own
+    """
+    label = np.arange(points.count)
+    if shared and points.count > _MANY_POINTS:
+        place = grid.from_middle(points.nodes)
+        full = np.where(place == 0, 1, 2).prod(axis=1)
+        _, square = np.unique(np.sign(place) * ((np.abs(place) + 1) // 2), axis=0, return_inverse=True)
+        square = square.ravel()
+        whole = np.minimum(points.covered, points.as_deep(0.0).covered) > _WHOLE
+        if beside_edge:
+            whole &= binary_erosion(_mask(points, grid), np.ones((3, 3)), iterations=beside_edge).ravel()[points.nodes]
+        count = np.bincount(square, weights=whole)
+        low, high = np.full(len(count), np.inf), np.full(len(count), -np.inf)
+        np.minimum.at(low, square, points.gap)
+        np.maximum.at(high, square, points.gap)
+        together = (count[square] == full) & (high - low <= _LEVEL_MM)[square]
+        label = np.where(together, points.count + square, label)
+    _, label = np.unique(label, return_inverse=True)
+    weight = pressure_weights(points, grid)
+    return sp.csr_matrix((weight / np.bincount(label, weights=weight)[label], (label, np.arange(points.count))))
+
+
+def _mask(points, grid):
+    """Which nodes (ny, nx) of the grid are points."""
+    there = np.zeros(grid.count, dtype=bool)
+    there[points.nodes] = True
+    return there.reshape(grid.shape)
+
+
+def pressure_weights(points: ObjectPoints, grid: NodeGrid) -> np.ndarray:
+    """Nodal forces (c,) of a uniform pressure on quadratic elements, whose corners are every second node from the middle."""
+    return np.where(grid.from_middle(points.nodes) % 2, 2.0, 1.0).prod(axis=1) * grid.share_inside(points.nodes)

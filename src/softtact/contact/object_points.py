@@ -3,7 +3,7 @@
 A node beside an edge of the object is neither held nor free. How far it is held follows from the share of its surroundings that
 the object covers, weighted by the node's hat function: from nothing, where the edge has come as far as the node before, to a half,
 where it is at the node, which is then held. The surroundings are kept as samples, so that the share can be asked for anew where
-the node has moved sideways (`ObjectPoints.covered_at`). `models/foundation/partial_contact` makes of it how soft a point is.
+the node has moved sideways (`ObjectPoints.covered_at`). `models/foundation/dof_maps` makes of it how soft a point is.
 """
 
 from dataclasses import dataclass, replace

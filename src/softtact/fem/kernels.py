@@ -1,12 +1,13 @@
-"""Compiled loops over elements: kinematics, internal forces and tangents. They take the records of `kernel_records`.
+"""Compiled loops over elements: kinematics, internal forces, tangents, and the projection and penalties of changes of volume.
 
-Symmetric tensors are stored as xx, yy, zz, xy, yz, zx. All kernels run on one core and release the GIL.
+They take and give named tuples of arrays, which numba passes to compiled code as they are. Symmetric tensors are stored as
+xx, yy, zz, xy, yz, zx. All kernels run on one core and release the GIL.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-
-from softtact.fem.kernel_records import Deformation, ElementArrays, VolumeResponse
 
 _ROW = np.array([0, 1, 2, 0, 1, 2])
 _COL = np.array([0, 1, 2, 1, 2, 0])
@@ -14,6 +15,63 @@ _VOIGT = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
 _PAIR = np.array([0, 2, 3])     # components (i, j >= i) are pair _PAIR[i] + j: 00 01 02 11 12 22
 _LANES = 16                     # numbers of single precision in the widest vector of a processor
 _AT_ONCE = 4                    # modes of the pressure that are added at once
+
+
+class ElementArrays(NamedTuple):
+    """Elements (e,) of one kind at rest. Many are translations of each other, so what depends on the shape is kept once for each.
+
+    gradients: (u, g, 3, m) of the shape functions of m nodes at g points, in 1/mm, of the u shapes that occur
+    volumes: (u, g) of the points, in mm3
+    shapes: (e,) which of the u shapes is an element's
+    basis: (g, p) functions on which changes of volume are projected
+    gram_inverse: (u, p, p) inverse of the integrals of their products, in 1/mm3
+    """
+
+    gradients: np.ndarray
+    volumes: np.ndarray
+    shapes: np.ndarray
+    basis: np.ndarray
+    gram_inverse: np.ndarray
+
+
+class Deformation(NamedTuple):
+    """Of elements at their points: deformation gradient F (e, g, 3, 3), C = F^T F (e*g, 6) and volume ratio J (e, g)."""
+
+    F: np.ndarray
+    C: np.ndarray
+    J: np.ndarray
+
+
+class VolumePenalties(NamedTuple):
+    """Moduli (MPa) of what holds changes of volume that the projection does not see: k and q of `solid_block`."""
+
+    unprojected: float
+    quartic: float
+
+
+class VolumeResponse(NamedTuple):
+    """How elements answer changes of volume.
+
+    energies: (e,) in mJ
+    pressure: (e, g) by which they change with J, in MPa, positive in tension
+    modulus: U'' in MPa where it is the same for every J
+    stiffness: (e, g) U'' at the projected J in MPa where it is not, else (0, 0)
+    unprojected: k in MPa
+    quartic: (e, g) second derivative in MPa of the quartic penalty by what the projection does not see, (0, 0) without it
+    """
+
+    energies: np.ndarray
+    pressure: np.ndarray
+    modulus: float
+    stiffness: np.ndarray
+    unprojected: float
+    quartic: np.ndarray
+
+    def of(self, part: slice) -> "VolumeResponse":
+        """The response of some of the elements."""
+        return self._replace(energies=self.energies[part], pressure=self.pressure[part],
+                             stiffness=self.stiffness[part] if self.stiffness.size else self.stiffness,
+                             quartic=self.quartic[part] if self.quartic.size else self.quartic)
 
 
 @njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})     # sums over nodes, several at once
@@ -318,3 +376,60 @@ def _sym(tensor, i, j):
     if i + j == 1:
         return tensor[3]
     return tensor[4] if i + j == 3 else tensor[5]
+
+
+@njit(cache=True, nogil=True)
+def project(field: np.ndarray, at_rest: ElementArrays) -> np.ndarray:
+    """Fields (e, g) of elements, projected on the functions of the pressure (e, g)."""
+    out = np.empty(field.shape)
+    for e in range(len(field)):
+        _project(field[e], at_rest.volumes[at_rest.shapes[e]], at_rest.basis, at_rest.gram_inverse[at_rest.shapes[e]], out[e])
+    return out
+
+
+@njit(cache=True, nogil=True)
+def add_penalties(J: np.ndarray, at_rest: ElementArrays, seen: np.ndarray, density: np.ndarray, pressure: np.ndarray,
+                  penalties: VolumePenalties) -> tuple[np.ndarray, np.ndarray]:
+    """Energies (e,) in mJ of changes of volume; second derivative (e, g) in MPa of the quartic penalty, or (0, 0).
+
+    seen, density, pressure (e, g): the projected J - 1, and the law's U and U' there, in MPa; the penalties are added to `pressure`
+    """
+    volumes, (elements, points) = at_rest.volumes, J.shape
+    k, q = penalties.unprojected, penalties.quartic
+    energies, quartic = np.zeros(elements), np.empty((elements, points) if q > 0 else (0, 0))
+    held, share = np.empty(points), np.empty(points)
+    for e in range(elements):
+        shape = at_rest.shapes[e]
+        for g in range(points):
+            j, own = J[e, g], density[e, g]
+            if k > 0:
+                pressure[e, g] += 0.5 * k * (j - 1.0 / j)
+                own += 0.25 * k * (j * j - 1.0 - 2.0 * np.log(j))
+            if q > 0:
+                unseen = j - 1.0 - seen[e, g]
+                held[g] = q * unseen * unseen * unseen
+                quartic[e, g] = 3.0 * q * unseen * unseen
+                own += 0.25 * held[g] * unseen
+            energies[e] += volumes[shape, g] * own
+        if q > 0:
+            _project(held, volumes[shape], at_rest.basis, at_rest.gram_inverse[shape], share)
+            pressure[e] += held - share
+    return energies, quartic
+
+
+@njit(cache=True, nogil=True)
+def _project(field, w, basis, gram_inverse, out):
+    """An element's field (g,) projected on the functions of the pressure, into `out` (g,)."""
+    points, modes = basis.shape
+    moments, amounts = np.zeros(modes), np.zeros(modes)
+    for g in range(points):
+        for p in range(modes):
+            moments[p] += w[g] * field[g] * basis[g, p]
+    for p in range(modes):
+        for q in range(modes):
+            amounts[q] += gram_inverse[p, q] * moments[p]     # symmetric: row by row
+    for g in range(points):
+        total = 0.0
+        for p in range(modes):
+            total += amounts[p] * basis[g, p]
+        out[g] = total

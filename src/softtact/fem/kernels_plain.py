@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from softtact.fem.kernel_records import Deformation, ElementArrays, VolumeResponse
+from softtact.fem.kernels import Deformation, ElementArrays, VolumeResponse
 
 _ROW, _COLUMN = np.array([0, 1, 2, 0, 1, 2]), np.array([0, 1, 2, 1, 2, 0])
 _VOIGT = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])

@@ -7,7 +7,7 @@ run in double precision but for the products of a tangent in single precision, a
 import numpy as np
 import torch
 
-from softtact.fem.kernel_records import Deformation, ElementArrays, VolumeResponse
+from softtact.fem.kernels import Deformation, ElementArrays, VolumeResponse
 
 _ROW, _COL = [0, 1, 2, 0, 1, 2], [0, 1, 2, 1, 2, 0]     # of xx, yy, zz, xy, yz, zx
 _VOIGT = [[0, 3, 5], [3, 1, 4], [5, 4, 2]]

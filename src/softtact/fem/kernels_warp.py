@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from softtact.fem.kernel_records import Deformation, ElementArrays, VolumeResponse
+from softtact.fem.kernels import Deformation, ElementArrays, VolumeResponse
 
 wp.config.log_level = wp.LOG_WARNING     # what it tells beside would stand in a command's output
 _AT_ONCE = 4096     # elements whose tangents are on the device at once: 1 GB of the largest elements

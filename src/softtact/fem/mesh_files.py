@@ -4,20 +4,21 @@ In our VTU files each region is an array of the cells called `region:NAME`, each
 belong to it, 0 on the others. The facets of faces are cells of their own. `geometry:KIND` holds the thickness in mm.
 Other formats: regions and faces are the named sets of cells (Abaqus) or the physical groups (Gmsh). Cells of the highest dimension
 are elements, those of one less name faces. Linear elements become quadratic.
+Faces are also named by rules in words: `z<0.1` or `x>-3 & x<3 & z>2`, of the middles of the outer facets in mm.
 """
 
 import contextlib
 import io
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softtact.errors import InputError
-from softtact.fem.face_rules import with_named_faces
 from softtact.fem.quadratic_nodes import QUADRATIC, raised
-from softtact.fem.solid_mesh import ELEMENTS, SolidMesh
+from softtact.fem.solid_mesh import ELEMENTS, FACETS, SolidMesh
 from softtact.files import atomic_path
 from softtact.geometry.meshes import UNIT_MM
 
@@ -25,10 +26,11 @@ if TYPE_CHECKING:
     import meshio
 
 _REGION, _FACE, _GEOMETRY = "region:", "face:", "geometry:"
-_FACET_CORNERS = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4, "line": 2, "line3": 2}
+_FACET_CORNERS = {"line": 2, "triangle": 3, "quad": 4} | {kind: element.corners for kind, element in FACETS.items()}
 _DIMENSION = {"line": 1, "triangle": 2, "quad": 2, "tetra": 3, "hexahedron": 3, "wedge": 3, "pyramid": 3}
 _TURNED_WEDGE = [3, 4, 5, 0, 1, 2]
 _EMPTY = ("meshio", "gmsh:", "medit", "avsucd")     # beginnings of names that programs give by themselves
+_TERM = re.compile(r"\s*([xyz])\s*([<>])\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*")
 
 
 def write_mesh(mesh: SolidMesh, path: str | Path, point_data: Mapping[str, np.ndarray] | None = None) -> None:
@@ -73,7 +75,7 @@ def read_mesh_file(path: str | Path, *, unit: str | None = None, geometry: str |
 
     unit: mm, cm, m, inch or in; only files of softtact, which are in mm, need none
     geometry, thickness_mm: plane_strain or axisymmetric of a mesh in the plane z = 0 whose file does not say
-    faces {name: rule}: further faces, see `face_rules`;  regions: which of the file's sets or groups of elements are regions, where
+    faces {name: rule}: further faces, see `face_rule`;  regions: which of the file's sets or groups of elements are regions, where
         it has others beside them
 
     Raises InputError that names the file and what is wrong: not readable, elements of a kind that is not taken, linear and
@@ -243,3 +245,20 @@ def _face(path, mesh, name, corners):
         raise InputError(f"{path}: {len(missing)} facets of the face {name!r} are not on the outside of the body (one at {x:.4g}, "
                          f"{y:.4g}, {z:.4g} mm); name outer facets only.")
     return found
+
+
+def face_rule(text: str) -> Callable[[np.ndarray], np.ndarray]:
+    """Which middles (f, 3) in mm a rule takes, (f,) bool: comparisons of x, y or z with numbers in mm, all of which hold.
+
+    Raises InputError that shows the form of a rule.
+    """
+    terms = [_TERM.fullmatch(part) for part in text.split("&")]
+    if not all(terms):
+        raise InputError(f"The rule {text!r} of a face is not understood; write comparisons in mm such as 'z<0.1' or 'x>-3 & x<3'.")
+    limits = [("xyz".index(term[1]), -1.0 if term[2] == "<" else 1.0, float(term[3])) for term in terms if term]
+    return lambda middles: np.all([sign * (middles[:, axis] - value) > 0 for axis, sign, value in limits], axis=0)
+
+
+def with_named_faces(mesh: SolidMesh, rules: Mapping[str, str]) -> SolidMesh:
+    """The mesh with faces {name: rule}. Raises InputError where a rule is not understood or a face would be empty."""
+    return mesh.with_faces(**{name: face_rule(text) for name, text in rules.items()})

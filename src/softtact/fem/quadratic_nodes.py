@@ -8,7 +8,6 @@ import scipy.sparse as sp
 from softtact.fem.elements import HEX27, QUAD9, TET10, TRI6, WEDGE18, Element
 
 QUADRATIC = {"tetra": TET10, "hexahedron": HEX27, "wedge": WEDGE18, "triangle": TRI6, "quad": QUAD9}
-_CORNERS = {"tetra": 4, "hexahedron": 8, "wedge": 6, "triangle": 3, "quad": 4}
 _LINEAR = {element.meshio_name: kind for kind, element in QUADRATIC.items()}
 
 
@@ -47,7 +46,7 @@ def shares_of_corners(count: int, parts: Iterable[tuple[Element, np.ndarray]]) -
         if element.meshio_name not in _LINEAR:
             return None
         kind = _LINEAR[element.meshio_name]
-        members, corners = _members(kind), nodes[:, element.vtk_order[:_CORNERS[kind]]]
+        members, corners = _members(kind), nodes[:, element.vtk_order[:element.corners]]
         new, first = np.unique(nodes, return_index=True)
         first = first[~known[new]]     # each node once, whatever elements share it
         known[new] = True
@@ -69,7 +68,7 @@ def _members(kind: str) -> np.ndarray:
     """Which corners (m, c) span the smallest face of the cell that holds each node of its quadratic element."""
     element = QUADRATIC[kind]
     sides = _sides(element)
-    corners = sides[element.vtk_order[:_CORNERS[kind]]]
+    corners = sides[element.vtk_order[:element.corners]]
     on_side = np.isclose(sides, 0)                                   # (m, s)
     return (np.isclose(corners, 0)[None] | ~on_side[:, None]).all(axis=2)
 

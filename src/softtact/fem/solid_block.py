@@ -28,8 +28,7 @@ import numpy as np
 
 from softtact.fem import kernels
 from softtact.fem.elements import HEX20, HEX27, WEDGE18, reference_gradients
-from softtact.fem.kernel_records import ElementArrays, VolumePenalties, VolumeResponse
-from softtact.fem.volume_kernels import add_penalties, project
+from softtact.fem.kernels import ElementArrays, VolumePenalties, VolumeResponse, add_penalties, project
 from softtact.linalg.workers import SERIAL, Workers, slices, unique_rows
 from softtact.materials.laws.base import Law
 from softtact.materials.laws.stretches import stretch_range

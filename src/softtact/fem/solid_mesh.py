@@ -1,6 +1,6 @@
 """A mesh of any body: nodes, elements by region, faces by name; spatial, in plane strain or axisymmetric.
 
-Plane meshes lie in z = 0. Of an axisymmetric body x is the radius and y the axis.
+Plane meshes lie in z = 0. Of an axisymmetric body x is the radius and y the axis. Curved facets can be had as flat triangles.
 """
 
 from collections.abc import Callable, Iterator
@@ -10,15 +10,17 @@ from functools import cached_property
 import numpy as np
 
 from softtact.errors import InputError
-from softtact.fem.elements import HEX20, HEX27, QUAD8, QUAD9, TET10, TRI6, WEDGE18, Element
+from softtact.fem.elements import HEX20, HEX27, LINE3, QUAD8, QUAD9, TET10, TRI6, WEDGE18, Element
 
 GEOMETRIES = ("solid", "plane_strain", "axisymmetric")
 ELEMENTS = {element.meshio_name: element for element in (TET10, HEX20, HEX27, WEDGE18, TRI6, QUAD8, QUAD9)}
 _FLIPPED = {6: [0, 2, 1, 5, 4, 3], 8: [0, 3, 2, 1, 7, 6, 5, 4], 9: [0, 3, 2, 1, 7, 6, 5, 4, 8]}  # a facet seen from its other side
-_CORNERS = {3: 2, 6: 3, 8: 4, 9: 4}  # of a facet of so many nodes
-
+FACETS = {element.meshio_name: element for element in (LINE3, TRI6, QUAD8, QUAD9)}
 Facets = dict[str, np.ndarray]
 """{meshio's name of a facet: nodes (f, k)}, seen counter-clockwise from outside."""
+_CUT = {"triangle6": [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]],
+        "quad8": [[0, 4, 7], [4, 1, 5], [5, 2, 6], [6, 3, 7], [4, 5, 6], [4, 6, 7]],
+        "quad9": [[0, 4, 8], [4, 1, 8], [1, 5, 8], [5, 2, 8], [2, 6, 8], [6, 3, 8], [3, 7, 8], [7, 0, 8]]}
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,7 @@ class SolidMesh:
     def _facets_where(self, name, rule):
         found = {}
         for kind, nodes in self.boundary.items():
-            middles = self.points[nodes[:, : _CORNERS[nodes.shape[1]]]].mean(axis=1)
+            middles = self.points[nodes[:, : FACETS[kind].corners]].mean(axis=1)
             if (here := np.asarray(rule(middles), dtype=bool)).any():
                 found[kind] = nodes[here]
         if not found:
@@ -149,10 +151,11 @@ def _boundary(cells):
                 own = own[:, _FLIPPED[own.shape[1]]]
             kinds.setdefault(face.element.meshio_name, []).append(own)
     facets = {kind: np.concatenate(own) for kind, own in kinds.items()}
-    width = max(_CORNERS[own.shape[1]] for own in facets.values())
+    corners = {kind: FACETS[kind].corners for kind in facets}
+    width = max(corners.values())
     keys = [
-        np.pad(np.sort(own[:, : _CORNERS[own.shape[1]]], axis=1), ((0, 0), (0, width - _CORNERS[own.shape[1]])), constant_values=-1)
-        for own in facets.values()
+        np.pad(np.sort(nodes[:, : corners[kind]], axis=1), ((0, 0), (0, width - corners[kind])), constant_values=-1)
+        for kind, nodes in facets.items()
     ]
     _, inverse, counts = np.unique(np.concatenate(keys), axis=0, return_inverse=True, return_counts=True)
     once, found, start = counts[inverse.ravel()] == 1, {}, 0
@@ -162,3 +165,41 @@ def _boundary(cells):
         if single.any():
             found[kind] = own[single]
     return found
+
+
+def flat_triangles(facets: Facets) -> np.ndarray:
+    """Triangles (t, 3) of nodes that stand for facets, seen as these are."""
+    return np.concatenate([nodes[:, _CUT[kind]].reshape(-1, 3) for kind, nodes in facets.items()])
+
+
+def fine_triangles(facets: Facets, points: np.ndarray, *, divisions: int = 4) -> np.ndarray:
+    """Corners (t, 3, 3) in mm of triangles with corners on curved facets, each of whose edges is cut into so many parts.
+
+    A facet of length h and radius of curvature R is missed by at most h^2 / (8 R divisions^2).
+    """
+    found = []
+    for kind, nodes in facets.items():
+        corners, triangles = _grid(kind, divisions)
+        places = np.einsum("cm,fmi->fci", FACETS[kind].shape(corners)[0], points[nodes])
+        found.append(places[:, triangles].reshape(-1, 3, 3))
+    return np.concatenate(found)
+
+
+def _grid(kind, n):
+    """Parent coordinates (c, 2) of a facet's corners when it is cut, and the triangles (t, 3) of these."""
+    i, j = (line.ravel() for line in np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij"))
+    number = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
+    a, b, c, d = number[:-1, :-1].ravel(), number[1:, :-1].ravel(), number[1:, 1:].ravel(), number[:-1, 1:].ravel()
+    lower, upper = np.column_stack([a, b, d]), np.column_stack([b, c, d])
+    if kind != "triangle6":
+        return 2 * np.column_stack([i, j]) / n - 1, np.vstack([lower, upper])
+    whole = (i + j)[upper].max(axis=1) <= n
+    inside = (i + j)[lower].max(axis=1) <= n
+    return np.column_stack([i, j]) / n, np.vstack([lower[inside], upper[whole]])
+
+
+def outer_triangles(mesh: SolidMesh) -> np.ndarray:
+    """Triangles (t, 3) of the mesh's outside, through the nodes in the middles of edges; of a plane mesh all of it."""
+    if mesh.geometry == "solid":
+        return flat_triangles(mesh.boundary)
+    return np.concatenate([flat_triangles({kind: nodes}) for _, kind, nodes in mesh.cells])

@@ -1,4 +1,4 @@
-"""Structured meshes of simple bodies: boxes, plates, rings, cylinders and spheres of full quadratic elements."""
+"""Structured meshes of simple bodies: boxes, plates, rings, cylinders and spheres of full quadratic elements; heights of layers."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -9,6 +9,8 @@ import numpy as np
 from softtact.errors import InputError
 from softtact.fem.elements import HEX27, QUAD9, TET10
 from softtact.fem.solid_mesh import Facets, SolidMesh
+
+_NEAR = 0.5     # of the layer it lies in: a level that is nearer to the new one is moved there, else the new one is put between
 
 
 def box(
@@ -127,3 +129,19 @@ def mirrored(mesh: SolidMesh, axis: int) -> SolidMesh:
         cells.append((region, element.meshio_name, nodes[:, order]))
     whole = replace(mesh, points=mesh.points * sign, cells=tuple(cells), faces={})
     return replace(whole, faces={name: _facets_within(whole.boundary, face) for name, face in mesh.faces.items()})
+
+
+def with_level(levels: np.ndarray, level: float) -> np.ndarray:
+    """Rising levels (n,) in mm, `level` among them: the nearest inner one moved there, or a new one.
+
+    Unchanged where `level` is not between the first and the last.
+    """
+    levels = np.asarray(levels, dtype=float)
+    if not levels[0] + 1e-9 < level < levels[-1] - 1e-9 or np.abs(levels - level).min() < 1e-9:
+        return levels
+    above = int(np.searchsorted(levels, level))
+    nearest = above if levels[above] - level < level - levels[above - 1] else above - 1
+    inner = 0 < nearest < len(levels) - 1
+    if inner and abs(levels[nearest] - level) <= _NEAR * (levels[above] - levels[above - 1]):
+        return np.concatenate([levels[:nearest], [level], levels[nearest + 1:]])
+    return np.insert(levels, above, level)

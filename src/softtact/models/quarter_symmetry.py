@@ -21,8 +21,8 @@ import scipy.sparse as sp
 from numba import njit
 
 from softtact.fem.elements import HEX27, dofs_of
-from softtact.fem.levels import with_level
 from softtact.fem.solid_block import HexBlock
+from softtact.fem.structured_meshes import with_level
 from softtact.linalg.dissected_inverse import inverse_between
 from softtact.materials.laws.registry import make_law
 

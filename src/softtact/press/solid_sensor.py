@@ -18,10 +18,8 @@ from softtact.contact.motion import Motion
 from softtact.contact.pair import ContactPair
 from softtact.contact.surfaces import Surface
 from softtact.errors import InputError
-from softtact.fem.face_rules import with_named_faces
-from softtact.fem.flat_facets import fine_triangles
-from softtact.fem.mesh_files import read_mesh_file
-from softtact.fem.solid_mesh import SolidMesh
+from softtact.fem.mesh_files import read_mesh_file, with_named_faces
+from softtact.fem.solid_mesh import SolidMesh, fine_triangles
 from softtact.geometry.pose import Pose
 from softtact.materials.laws.base import Law
 from softtact.models.solid.body import SolidBody

@@ -7,8 +7,8 @@ import meshio
 import numpy as np
 
 from softtact.errors import InputError
-from softtact.fem.flat_facets import outer_triangles
 from softtact.fem.mesh_files import read_mesh_file
+from softtact.fem.solid_mesh import outer_triangles
 from softtact.files import read_dataset
 from softtact.models.solid.result import read_solid_result
 from softtact.models.solid.result_files import KIND

@@ -9,14 +9,12 @@ import trimesh
 from foundation_study import BOX, PUNCH, SMALL, TILTED, assert_close, force_of, points_of
 from support.laws import LAWS
 
-from softtact.contact.node_grid import NodeGrid
-from softtact.contact.patches import pressure_weights
+from softtact.contact.node_grid import NodeGrid, pressure_weights
 from softtact.errors import ConvergenceError, InputError
 from softtact.models.foundation import solve
 from softtact.models.foundation.compliance import FoundationCompliance, foundation_compliance
-from softtact.models.foundation.dof_maps import Places, Sideways, lattice_places
+from softtact.models.foundation.dof_maps import Places, Sideways, SoftEdges, lattice_places
 from softtact.models.foundation.finite_displacement import membrane_loads
-from softtact.models.foundation.partial_contact import SoftEdges
 from softtact.models.foundation.solve import FoundationMaps, FoundationSettings, _Press, press_foundation
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.press.sensor import Sensor

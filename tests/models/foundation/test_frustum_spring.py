@@ -8,8 +8,7 @@ from support.laws import LAWS
 
 from softtact.models.foundation.compliance import foundation_compliance
 from softtact.models.foundation.dof_maps import lattice_places
-from softtact.models.foundation.frustum_spring import FrustumLaw, _root_stiffness, _stiffness_at_rest
-from softtact.models.foundation.single_frustum import SingleFrustum
+from softtact.models.foundation.frustum_spring import FrustumLaw, SingleFrustum, _root_stiffness, _stiffness_at_rest
 from softtact.models.hyperelastic.build import build_unit_cell
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 

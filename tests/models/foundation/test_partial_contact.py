@@ -10,7 +10,7 @@ from softtact.contact.height_field import HeightField
 from softtact.contact.underside import Underside
 from softtact.models.elastic.compliance import map_cells
 from softtact.models.foundation.compliance import foundation_compliance
-from softtact.models.foundation.partial_contact import SoftEdges, beyond, own_compliance
+from softtact.models.foundation.dof_maps import SoftEdges, beyond, own_compliance
 from softtact.models.foundation.solve import FoundationMaps, FoundationSettings, press_foundation
 
 pytestmark = pytest.mark.slow     # the compliance of two grids

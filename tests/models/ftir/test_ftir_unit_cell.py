@@ -9,8 +9,17 @@ from support.sensors import CORO
 
 from softtact.contact.height_field import HeightField
 from softtact.errors import ConvergenceError
-from softtact.models.ftir.specimen import Specimen, cell_family, press_specimen, scattered_specimen
-from softtact.models.ftir.unit_cell import GLASS_MESH, SETTINGS, contact_area, plate_over, press_cell_on_glass
+from softtact.models.ftir.specimen import (
+    GLASS_MESH,
+    SETTINGS,
+    Specimen,
+    cell_family,
+    contact_area,
+    plate_over,
+    press_cell_on_glass,
+    press_specimen,
+    scattered_specimen,
+)
 from softtact.models.hyperelastic.build import build_patch, build_unit_cell
 from softtact.models.hyperelastic.frusta import SHEET
 from softtact.models.hyperelastic.path import press_load_steps

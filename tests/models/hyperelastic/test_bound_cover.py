@@ -10,7 +10,7 @@ from support.laws import POLYURETHANE as LAW
 from support.sensors import CORO
 
 from softtact.contact.height_field import HeightField
-from softtact.decks.mesh import body_mesh
+from softtact.decks.model import body_mesh
 from softtact.errors import InputError
 from softtact.geometry.meshes import place
 from softtact.materials.laws.registry import make_law

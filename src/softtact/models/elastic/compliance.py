@@ -13,10 +13,8 @@ from typing import Any
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from softtact.contact.node_grid import NodeGrid
+from softtact.contact.node_grid import NodeGrid, Stencil, patches_of
 from softtact.contact.object_points import ObjectPoints
-from softtact.contact.patches import patches_of
-from softtact.contact.stencil import Stencil
 from softtact.contact.unilateral import ContactLoadSteps, press_elastic
 from softtact.files import read_arrays
 from softtact.models.quarter_symmetry import PARITIES, ElasticLayer, ParityBlocks, QuarterSlab

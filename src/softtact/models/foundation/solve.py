@@ -18,13 +18,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg as sla
 
+from softtact.contact.node_grid import patches_of
 from softtact.contact.object_points import ObjectPoints
-from softtact.contact.patches import patches_of
 from softtact.errors import ConvergenceError
 from softtact.models.foundation.compliance import FoundationCompliance
-from softtact.models.foundation.dof_maps import Places
+from softtact.models.foundation.dof_maps import Places, SoftEdges
 from softtact.models.foundation.finite_displacement import Effects, FiniteDisplacement
-from softtact.models.foundation.partial_contact import SoftEdges
 
 _LOOKS_AGAIN = 6     # at what the object covers where points have moved, once forces have settled; the last of them halfway only
 _STRAYED = 0.03      # of a step, and of the depth, by which points and object must have moved since to be looked at again

@@ -29,11 +29,11 @@ from softtact.progress import Watch
 if TYPE_CHECKING:
     from softtact.fem.kernels_torch import DeviceKernels
 
-_STEPS = 6               # of Newton's method for a frustum; what is not in balance then is left to the next step of all
-_HALVINGS = 5
+_FRUSTUM_STEPS = 6               # of Newton's method for a frustum; what is not in balance then is left to the next step of all
+_FRUSTUM_HALVINGS = 5
 _FARTHEST_MM = 0.05      # of a node in a step
 _SHARE = 0.3             # of the tolerance that a frustum keeps at most: what moves its root next must not use up all of it
-_AT_ONCE = 8             # frusta that a thread condenses at once
+_FRUSTA_AT_ONCE = 8             # frusta that a thread condenses at once
 _DAMPINGS = 4         # steps that are tried with ever more damping of the cells that they throw too far
 _FIRST_SHIFT = 0.001   # N/mm on every free unknown of the slab, then more until the tangent is positive definite ...
 _MORE, _LESS = 4.0, 0.25   # of the shift before: the next that is tried, and from where a later search begins
@@ -47,7 +47,7 @@ def balanced(support: Support, state: SupportState, tolerance_n: float, *,
     These have their condensed tangents anew, on the way and not where they came to.
     """
     loose, moved = _loose(support, state, tolerance_n), np.zeros(support.count, dtype=bool)
-    for _ in range(_STEPS):
+    for _ in range(_FRUSTUM_STEPS):
         if not len(loose):
             break
         moved[loose] = True
@@ -63,7 +63,7 @@ def _loose(support, state, tolerance_n):
 
 def _step(support, state, frusta, workers):
     """The state after a step of the frusta (k,), each halved until its own energy falls, and for which (k,) it did."""
-    workers.map(lambda part: support.condense(state, part), chunks(frusta, _AT_ONCE))
+    workers.map(lambda part: support.condense(state, part), chunks(frusta, _FRUSTA_AT_ONCE))
     step = support.own_step(state, frusta, workers=workers)
     step *= np.minimum(1.0, _FARTHEST_MM / np.maximum(np.abs(step).max(axis=(1, 2)), 1e-300))[:, None, None]
     displacement, (energies, forces) = state.displacement.copy(), tuple(part.copy() for part in state.elastic)
@@ -79,7 +79,7 @@ def _step(support, state, frusta, workers):
         displacement[here[lower]], energies[here[lower]], forces[here[lower]] = trial[lower], elastic[0][lower], elastic[1][lower]
         return lower
 
-    lowered = line_search_each(accept, len(frusta), halvings=_HALVINGS)
+    lowered = line_search_each(accept, len(frusta), halvings=_FRUSTUM_HALVINGS)
     return support.with_contact(displacement, (energies, forces), state.history), lowered
 
 

@@ -19,16 +19,14 @@ from scipy.ndimage import maximum_filter, minimum_filter
 
 from softtact.contact.friction import coulomb
 from softtact.contact.penalty import Contact
-from softtact.fem.extruded_mesh import SheetMesh2D, grid_mesh_2d, merge, sheet_mesh_2d, with_centres
+from softtact.fem.extruded_mesh import SheetMesh2D, grid_mesh_2d, interpolation_2d, merge, sheet_mesh_2d, with_centres
 from softtact.fem.graded_mesh import split_depths
-from softtact.fem.levels import with_level
-from softtact.fem.point_location import interpolation_2d
+from softtact.fem.structured_meshes import with_level
 from softtact.materials.laws.base import Law
 from softtact.models.hyperelastic.body import LayeredBody
 from softtact.models.hyperelastic.frusta import FrustumArray, FrustumGeometry
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
-from softtact.models.hyperelastic.slab import Layer, Slab
-from softtact.models.hyperelastic.slab_nodes import CoverSide
+from softtact.models.hyperelastic.slab import CoverSide, Layer, Slab
 from softtact.models.hyperelastic.states import ObjectSurface
 from softtact.models.hyperelastic.support import PlainSupport
 from softtact.sensors.frusta import SensorSpec

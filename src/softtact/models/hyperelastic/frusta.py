@@ -24,9 +24,8 @@ from softtact.fem.extruded_mesh import CORE_RADIUS, disc_mesh_2d, extrude
 from softtact.fem.kernels import add_forces
 from softtact.fem.quadrature import gauss
 from softtact.fem.solid_block import HexBlock
-from softtact.fem.static_condensation import Springs
+from softtact.fem.static_condensation import Springs, TangentCache
 from softtact.fem.substructuring import LayerwiseElimination
-from softtact.fem.tangent_cache import TangentCache
 from softtact.linalg.workers import SERIAL, Workers
 from softtact.materials.laws.base import Law
 from softtact.models.hyperelastic.states import ContactHistory, SupportState

@@ -137,8 +137,6 @@ def specimen_of(spec: SensorSpec, values: Mapping[str, Any]) -> SensorSpec:
     dielectric = spec.dielectric.model_copy(update={"sheet_thickness_mm": spec.dielectric.sheet_thickness_mm * sheet})
     return spec.model_copy(update={
         "dielectric": dielectric, "cover": spec.cover.model_copy(update={"thickness_mm": spec.cover.thickness_mm * cover})})
-
-
 # Meshes by name, and what counts as solved on them.
 PRESETS = {"default": (MeshSettings, NewtonSettings), "draft": (MeshSettings.draft, NewtonSettings.draft),
            "stable": (MeshSettings.stable, NewtonSettings), "fine": (MeshSettings.fine, NewtonSettings)}

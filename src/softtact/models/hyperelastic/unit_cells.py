@@ -8,9 +8,8 @@ matrix are the cells' walls and the cover. Cells under parts of the cover that a
 import numpy as np
 
 from softtact.fem.elements import dofs_of
-from softtact.fem.static_condensation import packed
+from softtact.fem.static_condensation import TangentCache, packed
 from softtact.fem.substructuring import LayerwiseElimination
-from softtact.fem.tangent_cache import TangentCache
 from softtact.linalg.workers import SERIAL, Workers, chunks
 from softtact.models.hyperelastic.frusta import FrustumArray
 from softtact.models.hyperelastic.slab import CellGroup, Slab

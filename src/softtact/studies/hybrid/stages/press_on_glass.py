@@ -15,8 +15,7 @@ from softtact.errors import InputError
 from softtact.files import write_dataset
 from softtact.materials.cards import law_from_card, load_card
 from softtact.materials.laws.registry import make_law
-from softtact.models.ftir.specimen import cell_family, press_specimen, scattered_specimen
-from softtact.models.ftir.unit_cell import glass_mesh, press_cell_on_glass
+from softtact.models.ftir.specimen import cell_family, glass_mesh, press_cell_on_glass, press_specimen, scattered_specimen
 from softtact.progress import progress
 from softtact.sensors.specification import SensorSpec
 
