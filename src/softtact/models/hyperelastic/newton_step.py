@@ -19,8 +19,8 @@ import scipy.sparse as sp
 from numba import njit
 
 from softtact.linalg.block_tridiagonal import BlockTridiagonalSolver
-from softtact.linalg.lapack import factor_in_place
 from softtact.linalg.direct import PardisoSolver, SuperLUSolver
+from softtact.linalg.lapack import factor_in_place
 from softtact.linalg.multifrontal_solver import Bordered, DissectedSolver
 from softtact.linalg.nodal_frames import NodeFrames
 from softtact.linalg.workers import SERIAL, Workers
