@@ -65,7 +65,7 @@ def make_mesh(unknowns):
 def make_body(mesh, threads):
     body = SolidBody(mesh, {"lower": LAW, "upper body": LAW}, held={"z0": "xyz"}, carried={"top": ((0, 0, 0), ["upper z1"])},
                      threads=threads)
-    body.add_pair(ContactPair(Surface.of(mesh.face("upper z0")), Surface.of(mesh.face("z1")), stiffness=PENALTY, reach_mm=0.3,
+    body.add(ContactPair(Surface.of(mesh.face("upper z0")), Surface.of(mesh.face("z1")), stiffness=PENALTY, reach_mm=0.3,
                               segments=True))
     return body
 

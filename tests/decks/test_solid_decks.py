@@ -18,7 +18,7 @@ from softtact.fem.mesh_files import write_mesh
 from softtact.fem.structured_meshes import box, cylinder, in_tetrahedra
 from softtact.materials.laws.registry import make_law
 from softtact.models.solid.body import SolidBody
-from softtact.models.solid.loads import FacePressure
+from softtact.models.solid.items import FacePressure
 from softtact.models.solid.path import SolidPath
 
 SIZE = (3.0, 3.0, 1.5)
@@ -33,7 +33,7 @@ def under_a_plate(law, divisions=(2, 2, 1), gap=0.0, friction=0.0, hexahedra=Fal
     mesh = box((0, 0, 0), SIZE, divisions) if hexahedra else tetrahedra_box(SIZE, divisions)
     plate = trimesh.creation.box((5, 5, 1), transform=trimesh.transformations.translation_matrix([1.5, 1.5, 2.0 + gap]))
     body = SolidBody(mesh, {"body": law}, held={"z0": "xyz"}, rigid={"plate": ((1.5, 1.5, 2.0 + gap), np.array(plate.triangles))})
-    body.add_pair(ContactPair(Surface.of(mesh.face("z1")), Surface.of({"triangle": body.surface_nodes("plate")}), stiffness=8.0,
+    body.add(ContactPair(Surface.of(mesh.face("z1")), Surface.of({"triangle": body.surface_nodes("plate")}), stiffness=8.0,
                               reach_mm=0.5, rigid=True, friction=friction))
     return body
 
@@ -41,7 +41,7 @@ def under_a_plate(law, divisions=(2, 2, 1), gap=0.0, friction=0.0, hexahedra=Fal
 @pytest.mark.parametrize("dialect", ["calculix", "abaqus"])
 def test_a_deck_says_what_was_meant(dialect, tmp_path):
     body = under_a_plate(rubber(), friction=0.3)
-    body.pressures.append(FacePressure(Surface.of(body.mesh.face("x0")), body.points, name="side"))
+    body.add(FacePressure(Surface.of(body.mesh.face("x0")), body.points, name="side"))
     motion = Motion().step(ways={"z": -0.1}).step(ways={"z": -0.2, "x": 0.05})
     export_solid(tmp_path / "press.inp", body, {"plate": motion}, {"side": [0.0, 0.02]}, dialect=dialect)
     deck = read_deck(tmp_path / "press.inp")

@@ -13,7 +13,6 @@ from softtact.errors import InputError, ShellWarning
 from softtact.fem.structured_meshes import box, cylinder
 from softtact.materials.laws.registry import make_law
 from softtact.press.soft_object import SoftObject
-from softtact.press.solid_pad import SolidPad
 from softtact.press.vtu import LAYERS, of_bodies, read_vtu
 from softtact.sensors.edge import Edge
 
@@ -103,33 +102,6 @@ def test_a_bar_wider_than_the_pad_comes_to_rest_on_the_shell_and_a_soft_one_bend
     with pytest.warns(ShellWarning, match="rests on the shell"):
         bends = low.press(bar(SOFT), force_n=2.0, label="")
     assert bends.shell_force_n[0] > 0.02 and bends.pad_force_n[0] + bends.shell_force_n[0] == pytest.approx(2.0, rel=1e-3)
-
-
-def test_frusta_stand_below_the_sheet_one_to_an_element_with_weights_that_make_a_mean():
-    sensor = softtact.load_sensor("coro")
-    pad = SolidPad(sensor)
-    springs = pad._springs()
-    assert len(springs.nodes) == 18 * 30
-    np.testing.assert_allclose(springs.weights.sum(axis=1), 1.0)
-    down = np.zeros_like(pad.mesh.points)
-    down[:, 2] = -0.1 - 0.01 * pad.mesh.points[:, 0]
-    expected = 0.1 + 0.01 * pad.mesh.points[springs.nodes].mean(axis=1)[:, 0]
-    np.testing.assert_allclose(springs.compressions(down), expected, atol=1e-12)
-    force, even = np.zeros_like(down), np.zeros_like(down)
-    springs.add_force(down, force)
-    even[:, 2] = -0.1
-    law, pushed = sensor.prepared("foundation").law, np.zeros_like(down)
-    springs.add_force(even, pushed)
-    one = np.interp(0.1, law.compression_mm, law.force_n)      # of a frustum's unit cell
-    assert -pushed[:, 2].sum() == pytest.approx(540 * one, rel=0.01)
-    h, v = 1e-6, np.random.default_rng(0).standard_normal(down.shape)
-    ahead, behind = np.zeros_like(down), np.zeros_like(down)
-    springs.add_force(down + h * v, ahead)
-    springs.add_force(down - h * v, behind)
-    nodes, matrices = springs.tangents(down)
-    product = np.zeros_like(down)
-    np.add.at(product, nodes, np.einsum("kij,kj->ki", matrices, v[nodes].reshape(len(nodes), -1)).reshape(*nodes.shape, 3))
-    np.testing.assert_allclose(product, (ahead - behind) / (2 * h), atol=1e-6 * np.abs(product).max())
 
 
 @pytest.mark.parametrize("height", [-3.0, 0.0, 40.0])

@@ -36,7 +36,7 @@ def pressed_by_roller(soft, law, roller_mesh, *, held, face="y1", stiffness, rea
     mesh = soft.joined(roller_mesh, prefix="on ")
     body = SolidBody(mesh, {"body": law, "on roller": law}, held=held,
                      carried={"roller": ((0, 0, 0), ["on boundary"])})
-    body.add_pair(ContactPair(Surface.of(mesh.face(face)), Surface.of(mesh.face("on y0")), stiffness=stiffness, reach_mm=reach_mm,
+    body.add(ContactPair(Surface.of(mesh.face(face)), Surface.of(mesh.face("on y0")), stiffness=stiffness, reach_mm=reach_mm,
                               friction=friction, segments=segments, rigid=True, axisymmetric=mesh.axisymmetric))
     return body
 

@@ -53,7 +53,7 @@ def slice_of(lower, upper, friction, stiffness, law):
     body = SolidBody(mesh, {"lower": RUBBER, "upper body": law},
                      held={"z0": "xyz", "y0": "y", "y1": "y", "upper y0": "y", "upper y1": "y"},
                      carried={"top": ((0, 0, 0), ["upper z1"])})
-    body.add_pair(ContactPair(Surface.of(mesh.face("upper z0")), Surface.of(mesh.face("z1")), stiffness=stiffness, reach_mm=0.4,
+    body.add(ContactPair(Surface.of(mesh.face("upper z0")), Surface.of(mesh.face("z1")), stiffness=stiffness, reach_mm=0.4,
                               friction=friction, segments=True))
     return body
 

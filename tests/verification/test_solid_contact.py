@@ -11,7 +11,7 @@ from softtact.contact.surfaces import Surface
 from softtact.fem.structured_meshes import box, in_tetrahedra, mirrored, square_to_disc
 from softtact.materials.laws.registry import make_law
 from softtact.models.solid.body import SolidBody
-from softtact.models.solid.loads import FacePressure
+from softtact.models.solid.items import FacePressure
 from softtact.models.solid.newton import SolidSettings
 from softtact.models.solid.path import SolidPath, last
 
@@ -29,7 +29,7 @@ def test_a_uniform_pressure_crosses_two_meshes_that_do_not_match(upper_kind, rec
     body = SolidBody(mesh, {"lower": RUBBER, "upper body": RUBBER},
                      held={"x0": "x", "y0": "y", "z0": "z", "upper x0": "x", "upper y0": "y"},
                      carried={"top": ((0, 0, 0), ["upper z1"], "z")})
-    body.add_pair(ContactPair(Surface.of(mesh.face("upper z0")), Surface.of(mesh.face("z1")), stiffness=20.0, reach_mm=0.3,
+    body.add(ContactPair(Surface.of(mesh.face("upper z0")), Surface.of(mesh.face("z1")), stiffness=20.0, reach_mm=0.3,
                               segments=True))
     step = last(SolidPath(body, {"top": Motion().step(ways={"z": stretch - 1})}, settings=TIGHT).run())
     expected, got = RUBBER.uniaxial_compressible(stretch), step.loads[0, 2]
@@ -58,9 +58,9 @@ def test_a_pressure_crosses_a_curved_interface_of_two_rings(record):
     mesh = ring(a, middle, (13, 3), "in").joined(ring(middle, b, (10, 3), "out"), prefix="o ")
     law = elastic(1.0, 0.3)
     body = SolidBody(mesh, {"in": law, "o out": law}, held={"x0": "x", "o x0": "x", "x1": "y", "o x1": "y"})
-    body.add_pair(ContactPair(Surface.of(mesh.face("y1")), Surface.of(mesh.face("o y0")), stiffness=50.0, reach_mm=0.2,
+    body.add(ContactPair(Surface.of(mesh.face("y1")), Surface.of(mesh.face("o y0")), stiffness=50.0, reach_mm=0.2,
                               segments=True))
-    body.pressures.append(FacePressure(Surface.of(mesh.face("y0")), body.points, name="inside"))
+    body.add(FacePressure(Surface.of(mesh.face("y0")), body.points, name="inside"))
     step = last(SolidPath(body, pressures={"inside": [pressure]}, settings=SolidSettings(penetration_mm=1e-6)).run())
     weight, found = step.state.histories[0].points.weight, step.state.contacts[0].pressure
     mean = weight @ found / weight.sum()
@@ -82,7 +82,7 @@ def two_spheres(count, first, depth=0.01, radii=(10.0, 6.0), young=(1.0, 0.6), p
     mesh = quarter_sphere(radii[0], count, first).joined(upper, prefix="u ")
     body = SolidBody(mesh, {"body": elastic(young[0], poisson), "u body": elastic(young[1], poisson)},
                      held={"x0": "x", "u x0": "x", "y0": "y"}, carried={"top": ((0, 0, 0), ["u y0"], "y")})
-    body.add_pair(ContactPair(Surface.of(mesh.face("u y1")), Surface.of(mesh.face("y1")), stiffness=10 / (first * radii[0]),
+    body.add(ContactPair(Surface.of(mesh.face("u y1")), Surface.of(mesh.face("y1")), stiffness=10 / (first * radii[0]),
                               reach_mm=0.5, segments=True, axisymmetric=True))
     settings = SolidSettings(penetration_mm=1e-3 * depth)
     step = last(SolidPath(body, {"top": Motion().step(ways={"y": -depth})}, settings=settings).run())

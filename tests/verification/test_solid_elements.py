@@ -13,7 +13,7 @@ from softtact.contact.surfaces import Surface, quadrature_points
 from softtact.fem.structured_meshes import box, in_tetrahedra, mirrored
 from softtact.materials.laws.registry import make_law
 from softtact.models.solid.body import SolidBody
-from softtact.models.solid.loads import FacePressure
+from softtact.models.solid.items import FacePressure
 from softtact.models.solid.newton import SolidSettings
 from softtact.models.solid.path import SolidPath, last
 
@@ -92,7 +92,7 @@ def test_a_tube_of_mooney_rivlin_swells_under_pressure_as_the_closed_form_says(r
     mesh = box((inner, 0), (outer, 0.5), (8, 1), geometry="axisymmetric")
     law = make_law("mooney_rivlin", {"c10": 0.08, "c01": 0.03}, bulk_over_shear=1e5)
     body = SolidBody(mesh, {"body": law}, held={"y0": "y", "y1": "y"})
-    body.pressures.append(FacePressure(Surface.of(mesh.face("x0")), body.points, axisymmetric=True, name="inside"))
+    body.add(FacePressure(Surface.of(mesh.face("x0")), body.points, axisymmetric=True, name="inside"))
     step = last(SolidPath(body, pressures={"inside": np.linspace(0, pressure_at(c), 6)[1:]}).run())
     got = step.state.displacement[mesh.face_nodes("x0"), 0].mean()
     assert brentq(lambda c: pressure_at(c) - step.state.pressures[0], 0, 5) == pytest.approx(c)
@@ -111,7 +111,7 @@ def two_blocks(geometry):
     sides = {"z0": "z", "z1": "z", "upper z0": "z", "upper z1": "z"} if high else {}
     body = SolidBody(mesh, {"lower": RUBBER, "upper body": RUBBER}, held={"y0": "xyz"[:2 + len(high)], **sides},
                      carried={"top": ((1, 1.6, 0), ["upper y1"])})
-    body.add_pair(ContactPair(Surface.of(mesh.face("upper y0")), Surface.of(mesh.face("y1")), stiffness=40.0, reach_mm=0.3,
+    body.add(ContactPair(Surface.of(mesh.face("upper y0")), Surface.of(mesh.face("y1")), stiffness=40.0, reach_mm=0.3,
                               thickness_mm=0.1))
     return body
 
@@ -133,7 +133,7 @@ def leaning_blocks(turn=UNTURNED, mirror=False, friction=0.0):
     mesh = (mirrored(mesh, 0) if mirror else mesh).moved(lambda x: x @ turn.T)
     body = SolidBody(mesh, {"lower": RUBBER, "upper body": RUBBER}, held={"z0": "xyz"},
                      carried={"top": (turn @ [-1 if mirror else 1, 1, 1.8], ["upper z1"])})
-    body.add_pair(ContactPair(Surface.of(mesh.face("upper z0")), Surface.of(mesh.face("z1")), stiffness=30.0, reach_mm=0.3,
+    body.add(ContactPair(Surface.of(mesh.face("upper z0")), Surface.of(mesh.face("z1")), stiffness=30.0, reach_mm=0.3,
                               friction=friction, segments=True))
     way = turn @ [-0.05 if mirror else 0.05, 0.03, -0.12]
     step = last(SolidPath(body, {"top": Motion().step(ways=dict(zip("xyz", 0.5 * way, strict=True))).step(
@@ -165,7 +165,7 @@ def test_bodies_in_contact_that_turn_together_keep_their_loads(friction, record)
     mesh = lower.joined(upper, prefix="upper ")
     body = SolidBody(mesh, {"lower": RUBBER, "upper body": RUBBER},
                      carried={"base": ((0, 0, 0), ["z0"]), "top": ((0, 0, 0), ["upper z1"])})
-    body.add_pair(ContactPair(Surface.of(mesh.face("upper z0")), Surface.of(mesh.face("z1")), stiffness=30.0, reach_mm=0.2,
+    body.add(ContactPair(Surface.of(mesh.face("upper z0")), Surface.of(mesh.face("z1")), stiffness=30.0, reach_mm=0.2,
                               friction=friction, segments=True))
     turn = {"rx": 0.0, "ry": 0.0, "rz": 10.0}
     base = Motion().step(ways={}).step(ways=turn).step(ways=turn).step(ways=turn)

@@ -51,7 +51,7 @@ def sheared_blocks(steps, friction):
     upper = upper.moved(lambda x: x + [1.3, 1, 0] + [0, 0.2, 0] * (x[:, :1] ** 2 * (1 - x[:, 1:2] / 0.8)))
     mesh = lower.joined(upper, prefix="upper ")
     body = SolidBody(mesh, {"lower": law, "upper body": law}, held={"y0": "xy"}, carried={"top": ((0, 0, 0), ["upper y1"])})
-    body.add_pair(ContactPair(Surface.of(mesh.face("upper y0")), Surface.of(mesh.face("y1")), stiffness=50.0, reach_mm=0.3,
+    body.add(ContactPair(Surface.of(mesh.face("upper y0")), Surface.of(mesh.face("y1")), stiffness=50.0, reach_mm=0.3,
                               friction=friction))
     motion = Motion()
     for _ in range(steps):

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from softtact.contact import surface_kernels as kernels
 from softtact.contact.facet_shapes import QUAD8
 from softtact.contact.facet_tree import refit
-from softtact.contact.pair_state import PairHistory, PairState
+from softtact.contact.pair_state import PairHistory, PairState, Totals
 from softtact.contact.segments import segment_points
 from softtact.contact.surface_places import frames_on, places, places_on
 from softtact.contact.surfaces import Surface, SurfacePoints, quadrature_points
@@ -52,6 +52,10 @@ class ContactPair:
     def itself(self) -> bool:
         """Whether a surface meets itself."""
         return self.surface is self.other
+
+    def supported_nodes(self) -> np.ndarray:
+        """None: contact holds nothing before it begins."""
+        return np.zeros(0, dtype=np.int64)
 
     def first(self, at_rest: np.ndarray) -> PairHistory:
         """The history before any load, nodes at rest (n, 3)."""
@@ -188,6 +192,30 @@ class ContactPair:
         if self.friction:
             anchor = history.anchor
             kernels.add_forces_of(force, points, anchor.facet, anchor.coordinates, other.nodes, other.kinds, state.friction)
+
+    def totals(self, history: PairHistory, state: PairState) -> Totals:
+        """The penalties' energy, and the sum of the contact forces' magnitudes."""
+        return Totals(penalty=state.energy, size=float(history.points.weight @ state.pressure))
+
+    def slides(self, history: PairHistory, state: PairState) -> bool:
+        """Whether points slide under pressure: the tangent then has the part of `add_coupling`."""
+        return bool(self.friction) and bool((state.slides & (state.pressure > 0)).any())
+
+    def dissipated_mj(self, history: PairHistory, state: PairState) -> float:
+        """What friction took since the step began."""
+        return float(history.points.weight @ (-(state.slip * state.friction).sum(axis=1) * state.slides))
+
+    def conservative(self, history: PairHistory) -> bool:
+        """Penalties have a potential."""
+        return True
+
+    def penetration_mm(self, state: PairState) -> float:
+        """Deepest overlap of single points."""
+        return state.penetration_mm()
+
+    def gap_mm(self, state: PairState) -> float:
+        """Least gap of the points; infinite where none is within reach of the other surface."""
+        return float(np.min(state.projection.gap, initial=np.inf))
 
     def add_coupling(self, history: PairHistory, state: PairState, change: np.ndarray, force: np.ndarray) -> None:
         """Add to nodal forces (n, 3) what sliding friction changes by the pressure that changes with the nodes' places (n, 3).

@@ -1,11 +1,23 @@
 """What a pair of surfaces in contact has at given places of all nodes, and what it remembers."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from softtact.contact.surface_kernels import Projection
 from softtact.contact.surfaces import SurfacePoints
+
+
+class Totals(NamedTuple):
+    """What an item adds to the sums of a state."""
+
+    strain_energy: float = 0.0
+    """In mJ."""
+    penalty: float = 0.0
+    """In mJ, of contact and friction."""
+    size: float = 0.0
+    """In N: what presses, for the scale of the residual."""
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,14 @@ from softtact.materials.laws.base import Law
 from softtact.models.elastic.compliance import Compliance, elastic_compliance
 from softtact.models.elastic.tangential import SurfaceCompliance, surface_compliance
 from softtact.models.foundation.compliance import FoundationCompliance, foundation_compliance
+from softtact.models.foundation.frustum_spring import FrustumLaw, frustum_law
 from softtact.progress import announce
-from softtact.sensors.frusta import SensorSpec
+from softtact.sensors.frusta import Friction, SensorSpec
 from softtact.sensors.specification import AnySpec
 
 _POINTS = 1881  # of the paper's map
 _FOUNDATION_TAKES = 30, 1.5     # seconds for that, and the power of a map's points with which they grow
+_FRUSTUM_TAKES = 20     # seconds
 _FORMAT = 12    # of the files; another one makes them again
 
 
@@ -52,6 +54,14 @@ def cached_foundation(spec: SensorSpec, laws: Mapping[str, Law], *, threads: int
                    f"({_about(spec, *_FOUNDATION_TAKES)})",
                    lambda: foundation_compliance(spec, dielectric_law=laws["dielectric"], cover_law=laws["cover"],
                                                  threads=threads))
+
+
+def cached_frustum_law(spec: SensorSpec, law: Law) -> FrustumLaw:
+    """The `FrustumLaw` of a sensor's frusta with bonded tips, by the values that it depends on."""
+    bonded = spec.model_copy(update={"tips_bonded": True, "friction": Friction()})
+    return _cached("frustum", [repr(spec.dielectric.frusta), spec.dielectric.sheet_thickness_mm, repr(law)], FrustumLaw,
+                   f"{spec.name}: computing the law of a frustum, once for frusta of this kind ({in_words(_FRUSTUM_TAKES)})",
+                   lambda: frustum_law(bonded, law))
 
 
 def seconds_to_prepare_foundation(spec: SensorSpec, laws: Mapping[str, Law]) -> float:

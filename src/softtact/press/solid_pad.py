@@ -1,22 +1,30 @@
-"""A sensor's layers as a solid of finite strain, its frusta as springs, and what a press of it by a soft object gives."""
+"""A sensor's layers as a solid of finite strain, its frusta as items below it, and what a press of it gives.
+
+The object is soft, a mesh of its own that joins the layers', or rigid, by its exact facets on a frame with six freedoms.
+"""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import trimesh
 
 from softtact.contact.pair import ContactPair
 from softtact.contact.surfaces import Surface
+from softtact.errors import InputError
 from softtact.fem.elements import QUAD9
 from softtact.fem.solid_mesh import SolidMesh
 from softtact.fem.structured_meshes import box
+from softtact.models.foundation.frustum_spring import FrustumLaw
 from softtact.models.hyperelastic.deformed_mesh import Cells, PressedBody
 from softtact.models.solid.body import SolidBody
+from softtact.models.solid.frusta import FrustumItem
 from softtact.models.solid.path import SolidLoadStep
-from softtact.models.solid.springs import FrustumSprings
+from softtact.press.cache import cached_frustum_law
 from softtact.press.making import make_result, shell_of
 from softtact.press.result import PressResult
 from softtact.press.soft_object import OBJECT, SoftObject
+from softtact.press.touching import way_to_touch
 
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
@@ -25,19 +33,24 @@ _PENALTY = 20.0  # times E / h of the softer of both surfaces
 _CELL_OF_LAYERS = 20  # elements along the shorter side of a sensor without frusta
 _REGION = {"dielectric": "sheet", "cover": "cover"}  # what files of pressed bodies call the layers
 _SHELL = "shell"  # the frame that never moves
-_ROOT_POINTS = 12  # along the diameter of a frustum's root, for its mean movement
+_ACROSS = 8  # elements across what a rigid object may touch, at least ...
+_MOST_PARTS = 3  # ... but no more in place of one
+_NEAR = 0.4  # of the layers' height over its lowest point: what of a rigid object may touch
+_DOWN = np.array([0.0, 0.0, -1.0])
 
 
 class SolidPad:
     """A sensor's layers as a mesh of HEX27: in plan one element for each frustum, or some twenty along the shorter side.
 
     Frame: that of the sensor, but z = 0 at the layers' lower side, and `height_mm` at the sensing surface.
+    fine (2, 2): least and largest x and y in mm of a part with smaller elements
     """
 
-    def __init__(self, sensor: "Sensor") -> None:
+    def __init__(self, sensor: "Sensor", *, fine: np.ndarray | None = None) -> None:
         self.sensor, self.shell, spec = sensor, shell_of(sensor), sensor.spec
         self._frusta = getattr(spec.dielectric, "frusta", None)
-        self._lines = [self._along(axis) for axis in range(2)]
+        lines = [self._along(axis) for axis in range(2)]
+        self._lines = lines if fine is None else [_split(line, *fine[:, axis]) for axis, line in enumerate(lines)]
         dielectric, cover = _layers(spec)
         self.height_mm, self._plane_mm = dielectric + cover, dielectric
         levels = self._levels(dielectric, cover, spec.edge.held_below_mm)
@@ -47,8 +60,18 @@ class SolidPad:
         mesh = box((*low, 0.0), (*high, self.height_mm), counts, grading=grading)
         self.mesh = mesh.with_regions(lambda x: np.where(x[:, 2] < dielectric, "dielectric", "cover"))
 
+    @classmethod
+    def under(cls, sensor: "Sensor", placed: trimesh.Trimesh) -> "SolidPad":
+        """The pad for a rigid object (mm, in its pose): finer below what of the object may touch it."""
+        coarse = cls(sensor)
+        triangles = coarse._touching(placed)
+        near = triangles[triangles[..., 2].min(axis=1) < coarse.height_mm * (1 + _NEAR)]
+        low, high = near.min(axis=(0, 1))[:2], near.max(axis=(0, 1))[:2]
+        half = 0.5 * np.asarray(sensor.spec.footprint_mm)
+        return cls(sensor, fine=np.clip([low, high], -half, half))
+
     def _along(self, axis: int) -> np.ndarray:
-        """Ends of the elements along an axis in mm."""
+        """Ends of the elements along an axis in mm, without finer ones."""
         side = self.sensor.spec.footprint_mm[axis]
         if self._frusta is None:
             size = min(self.sensor.spec.footprint_mm) / _CELL_OF_LAYERS
@@ -70,24 +93,20 @@ class SolidPad:
     def with_object(self, placed: SolidMesh, soft: SoftObject, *, threads: int) -> SolidBody:
         """Both as one `SolidBody`, the holder's frame `object`, the pair of both in contact, and that of object and shell."""
         spec, region = self.sensor.spec, placed.regions[0]
-        held_to = self.height_mm - spec.edge.held_below_mm
-        pad = self.mesh.with_faces(shell=lambda x: _on_rim(x, self._lines) & (x[:, 2] < held_to)) if held_to > 0 else self.mesh
+        pad, held = self._held()
         mesh = pad.joined(placed, prefix="object ")
         laws = {name: self.sensor.laws[name] for name in self.mesh.regions} | {f"object {region}": soft.law}
-        held = ({"shell": "xyz"} if held_to > 0 else {}) | ({"z0": "xyz"} if self._frusta is None and spec.base_held else {})
         top = placed.points[:, 2].max()
         middle = 0.5 * (placed.points.min(axis=0) + placed.points.max(axis=0))
         wide = self.shell.exists and (np.abs(placed.points[:, :2]) > 0.5 * np.asarray(spec.footprint_mm)).any()
         rests_on = {_SHELL: ((0.0, 0.0, self.height_mm), self.shell.top_mm(self.height_mm))} if wide else {}
         carried = {OBJECT: ((middle[0], middle[1], top), ["object held"], "xyz")}
         body = SolidBody(mesh, laws, held=held, threads=threads, carried=carried, rigid=rests_on)
-        if self._frusta is not None:
-            body.springs.append(self._springs())
         pressed, surface = Surface.of(mesh.face("object pressed")), Surface.of(mesh.face("z1"))
         size = pressed.size_mm(body.points)
         softer = min(3 * soft.law.mu0, *(3 * law.mu0 for law in self.sensor.laws.values()))
         friction = max(soft.friction, getattr(spec.friction, "object", 0.0))
-        body.add_pair(
+        body.add(
             ContactPair(
                 surface,
                 pressed,
@@ -98,21 +117,88 @@ class SolidPad:
             )
         )
         if wide:
-            top_side, own = Surface.of({"triangle": body.surface_nodes(_SHELL)}), _PENALTY * 3 * soft.law.mu0 / size
-            body.add_pair(ContactPair(pressed, top_side, stiffness=own, reach_mm=2 * size, rigid=True))
+            top_side, penalty = Surface.of({"triangle": body.surface_nodes(_SHELL)}), _PENALTY * 3 * soft.law.mu0 / size
+            body.add(ContactPair(pressed, top_side, stiffness=penalty, reach_mm=2 * size, rigid=True))
+        self._add_frusta(body)
         return body
 
-    def _springs(self) -> FrustumSprings:
-        """A spring under each element of the lower side that has a frustum."""
-        frusta = self._frusta
-        (faces,) = self.mesh.face("z0").values()
-        corners = self.mesh.points[faces]
-        low, high = corners.min(axis=1)[:, :2], corners.max(axis=1)[:, :2]
-        here = (np.abs(high - low - frusta.pitch_mm) < 1e-6 * frusta.pitch_mm).all(axis=1)  # type: ignore[union-attr]
-        faces, corners = faces[here], corners[here]
-        weights = _mean_over_disc(corners[0, :, :2], 0.5 * min(frusta.root_diameter_mm, frusta.pitch_mm))  # type: ignore[union-attr]
-        law = self.sensor.prepared("foundation").law
-        return FrustumSprings(faces, np.tile(weights, (len(faces), 1)), law)
+    def with_rigid(self, placed: trimesh.Trimesh, *, friction: float | None = None, threads: int) -> SolidBody:
+        """The pad and a rigid object (mm, in its pose) that just touches pad or shell, as one `SolidBody`.
+
+        Frame `object`: about the middle of the object's bounding box, with six freedoms.
+        friction: Coulomb's coefficient of object and surface, by default the sensor's
+        Raises InputError where the object misses the sensor.
+        """
+        triangles = self._touching(placed)
+        mesh, held = self._held()
+        ends = triangles.reshape(-1, 3)
+        rigid = {OBJECT: (0.5 * (ends.min(axis=0) + ends.max(axis=0)), triangles)}
+        if wide := self.shell.exists and bool((np.abs(ends[:, :2]) > 0.5 * np.asarray(self.sensor.spec.footprint_mm)).any()):
+            rigid[_SHELL] = ((0.0, 0.0, self.height_mm), self.shell.top_mm(self.height_mm))
+        body = SolidBody(mesh, self.sensor.laws, held=held, threads=threads, rigid=rigid)
+        surface, pressed = Surface.of(mesh.face("z1")), Surface.of({"triangle": body.surface_nodes(OBJECT)})
+        size = surface.size_mm(body.points)
+        penalty = _PENALTY * min(3 * law.mu0 for law in self.sensor.laws.values()) / size
+        if friction is None:
+            friction = getattr(self.sensor.spec.friction, "object", 0.0)
+        reach = min(2 * size, 0.5 * self.height_mm + size)
+        body.add(ContactPair(surface, pressed, stiffness=penalty, reach_mm=reach, friction=friction, rigid=True))
+        if wide:
+            top_side = Surface.of({"triangle": body.surface_nodes(_SHELL)})
+            body.add(ContactPair(pressed, top_side, stiffness=penalty, reach_mm=reach, segments=True, rigid=True, name="shell"))
+        self._add_frusta(body)
+        return body
+
+    def _touching(self, placed):
+        """Triangles (t, 3, 3) of a rigid object in the pad's frame, moved along z to where it just touches pad or shell."""
+        triangles = np.asarray(placed.triangles) + [0.0, 0.0, self.height_mm]
+        x, y = 0.5 * np.asarray(self.sensor.spec.footprint_mm)
+        a, b, c, d = ([sx * x, sy * y, self.height_mm] for sx, sy in ((-1, -1), (1, -1), (1, 1), (-1, 1)))
+        top = np.array([[a, b, c], [a, c, d]])
+        down = way_to_touch(triangles, top, _DOWN)
+        if not np.isfinite(down):
+            low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
+            raise InputError(
+                f"The object misses the sensor: it spans x {low[0]:.4g} to {high[0]:.4g} mm and y {low[1]:.4g} to {high[1]:.4g} "
+                f"mm, and nothing of it is over the {2 * x:g} x {2 * y:g} mm footprint about the origin; correct its pose."
+            )
+        if self.shell.exists:
+            down = min(down, way_to_touch(triangles, self.shell.top_mm(self.height_mm), _DOWN))
+        return triangles + down * _DOWN
+
+    def _held(self):
+        """The layers' mesh, and what holds it {face: axes}."""
+        held_to = self.height_mm - self.sensor.spec.edge.held_below_mm
+        mesh = self.mesh.with_faces(shell=lambda x: _on_rim(x, self._lines) & (x[:, 2] < held_to)) if held_to > 0 else self.mesh
+        base = self._frusta is None and self.sensor.spec.base_held
+        return mesh, ({"shell": "xyz"} if held_to > 0 else {}) | ({"z0": "xyz"} if base else {})
+
+    def _add_frusta(self, body: SolidBody) -> None:
+        """Frusta below the layers, an item for each pattern of elements over a frustum."""
+        if self._frusta is None:
+            return
+        spec, law = self.sensor.spec, self._frustum_law()
+        nodes, groups = self._nodes_at(0.0), {}
+        for cells in np.ndindex(*spec.frusta_counts):
+            parts = tuple(self._parts_over(axis, cell) for axis, cell in enumerate(cells))
+            key = tuple(len(part) - 1 for part in parts)
+            groups.setdefault(key, []).append(nodes[2 * parts[0][0] : 2 * parts[0][-1] + 1, 2 * parts[1][0] : 2 * parts[1][-1] + 1])
+        for key, above in groups.items():
+            above = np.array([part.ravel() for part in above])
+            root = law.spread @ _shapes_over(law.root_xy, self._frusta.pitch_mm, key)  # type: ignore[union-attr]
+            body.add(FrustumItem(above, root, law, bonded=spec.tips_bonded, friction=spec.friction.board))
+
+    def _frustum_law(self) -> FrustumLaw:
+        """Of bonded tips: where they may slide, the item lets them."""
+        known = self.sensor.prepared_models.get("frustum")
+        return known or cached_frustum_law(self.sensor.spec, self.sensor.laws["dielectric"])  # type: ignore[arg-type]
+
+    def _parts_over(self, axis: int, number: int) -> np.ndarray:
+        """Numbers of the ends of the elements over a frustum, by its number along an axis."""
+        pitch = self._frusta.pitch_mm  # type: ignore[union-attr]
+        low = (number - 0.5 * self.sensor.spec.frusta_counts[axis]) * pitch
+        low, high = (int(np.argmin(np.abs(self._lines[axis] - end))) for end in (low, low + pitch))
+        return np.arange(low, high + 1)
 
     def result(self, body: SolidBody, steps: list[SolidLoadStep], *, keep_body: bool = False) -> PressResult:
         """The `PressResult` of load steps; keep_body: with a `PressedBody` at each."""
@@ -123,11 +209,12 @@ class SolidPad:
         contact = [step.state.contacts[0] for step in steps]
         area = [float(own.weight[state.pressure > 0].sum()) for own, state in zip(points, contact, strict=True)]
         down = np.array([-step.state.poses[0].translation[2] for step in steps])
-        springs = body.springs[0] if body.springs else None
-        compression = [float(springs.compressions(step.state.displacement).max()) if springs else np.nan for step in steps]
+        frusta = [item for item in body.items if isinstance(item, FrustumItem)]
+        compression = [max((float(item.compressions(step.state.displacement).max()) for item in frusta), default=np.nan)
+                       for step in steps]  # fmt: skip
         seconds = np.array([step.wall_time_s for step in steps])
         share = np.array([step.extrapolated_volume_fraction for step in steps])
-        deepest = springs.limit_mm if springs else np.inf
+        deepest = frusta[0].limit_mm if frusta else np.inf
         valid = ~(np.array(compression) > deepest)
         numbers: dict[str, Any] = {
             "displacement_mm": sampled,
@@ -182,13 +269,13 @@ class SolidPad:
             where.append(cell)
             local.append(2 * (at[:, axis] - line[cell]) / (line[cell + 1] - line[cell]) - 1)
         values, _ = QUAD9.shape(np.column_stack(local))
-        numbers = self._plane_nodes()
+        numbers = self._nodes_at(self._plane_mm)
         offsets = (QUAD9.nodes + 1).round().astype(int)
         return values, numbers[2 * where[0][:, None] + offsets[:, 0], 2 * where[1][:, None] + offsets[:, 1]]
 
-    def _plane_nodes(self):
-        """Numbers (2 x + 1, 2 y + 1) of the nodes of the plane over the dielectric."""
-        on = np.flatnonzero(np.abs(self.mesh.points[:, 2] - self._plane_mm) < 1e-9)
+    def _nodes_at(self, height):
+        """Numbers (2 x + 1, 2 y + 1) of the nodes at a height in mm."""
+        on = np.flatnonzero(np.abs(self.mesh.points[:, 2] - height) < 1e-9)
         order = np.lexsort((self.mesh.points[on, 1], self.mesh.points[on, 0]))
         return on[order].reshape(2 * len(self._lines[0]) - 1, 2 * len(self._lines[1]) - 1)
 
@@ -204,16 +291,23 @@ def _on_rim(x, lines):
     return np.any([np.abs(np.abs(x[:, axis]) - line[-1]) < 1e-9 for axis, line in enumerate(lines)], axis=0)
 
 
-def _mean_over_disc(corners: np.ndarray, radius: float) -> np.ndarray:
-    """Weights (9,) of the nodes at corners (9, 2) of a face for the mean over a disc in its middle."""
-    middle, half = corners.mean(axis=0), 0.5 * np.ptp(corners, axis=0)
-    step = (np.arange(_ROOT_POINTS) + 0.5) / _ROOT_POINTS
-    angle = 2 * np.pi * (np.arange(4 * _ROOT_POINTS) + 0.5) / (4 * _ROOT_POINTS)
-    r, a = np.meshgrid(radius * np.sqrt(step), angle)  # rings of equal areas
-    local = np.column_stack([(r * np.cos(a)).ravel() / half[0], (r * np.sin(a)).ravel() / half[1]])
-    # The face may be seen from below: its own coordinates follow from those of its nodes.
-    own = np.rint((corners - middle) / half)
-    order = [int(np.flatnonzero((own == node).all(axis=1))[0]) for node in QUAD9.nodes]
-    weights = np.empty(9)
-    weights[order] = QUAD9.shape(local)[0].mean(axis=0)
-    return weights
+def _split(line: np.ndarray, low: float, high: float) -> np.ndarray:
+    """Ends of elements along an axis, those between `low` and `high` (mm) divided so that enough are across."""
+    sizes = np.diff(line)
+    parts = np.clip(np.ceil(sizes * _ACROSS / max(high - low, 1e-9) - 1e-9), 1, _MOST_PARTS).astype(int)
+    touched = (line[1:] > low) & (line[:-1] < high)
+    ends = [np.linspace(a, b, count + 1)[:-1] for a, b, count in zip(line, line[1:], np.where(touched, parts, 1), strict=False)]
+    return np.concatenate([*ends, line[-1:]])
+
+
+def _shapes_over(xy: np.ndarray, pitch: float, parts: tuple[int, ...]) -> np.ndarray:
+    """Shape functions (s, nodes) at places (s, 2) about the middle of a square of so many elements along x and y."""
+    along = []
+    for axis, count in enumerate(parts):
+        place = (xy[:, axis] / pitch + 0.5) * count
+        element = np.clip(np.floor(place).astype(int), 0, count - 1)
+        t, values = 2 * (place - element) - 1, np.zeros((len(xy), 2 * count + 1))
+        for node, value in enumerate((0.5 * t * (t - 1), 1 - t**2, 0.5 * t * (t + 1))):
+            np.add.at(values, (np.arange(len(xy)), 2 * element + node), value)
+        along.append(values)
+    return np.einsum("sa,sb->sab", *along).reshape(len(xy), -1)

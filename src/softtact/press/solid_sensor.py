@@ -124,7 +124,7 @@ class SolidSensor:
         ends = triangles.reshape(-1, 3)
         body = SolidBody(self.mesh, self.laws, held=self.spec.held, threads=threads, device=self.device,
                          rigid={OBJECT: (0.5 * (ends.min(axis=0) + ends.max(axis=0)), triangles)})
-        body.add_pair(self._pair(body, Surface.of({"triangle": body.surface_nodes(OBJECT)}), rigid=True))
+        body.add(self._pair(body, Surface.of({"triangle": body.surface_nodes(OBJECT)}), rigid=True))
         return body
 
     def _with_soft(self, soft: SoftObject, pose: Pose | None, direction: np.ndarray, threads: int) -> SolidBody:
@@ -135,7 +135,7 @@ class SolidSensor:
         mesh = self.mesh.joined(placed, prefix="object ")
         body = SolidBody(mesh, self.laws | {f"object {region}": soft.law}, held=self.spec.held, threads=threads, device=self.device,
                          carried={OBJECT: (0.5 * (points.min(axis=0) + points.max(axis=0)), ["object held"], "xyz")})
-        body.add_pair(self._pair(body, Surface.of(mesh.face("object pressed")), soft=soft))
+        body.add(self._pair(body, Surface.of(mesh.face("object pressed")), soft=soft))
         return body
 
     def _placed(self, points: np.ndarray, pose: Pose | None) -> np.ndarray:

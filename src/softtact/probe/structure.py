@@ -142,6 +142,6 @@ def structure_body(design: PalpationDesign, tissue: Law, *, threads: int = 1) ->
 def _add_contact(body, design, face, other, law, friction):
     """Add a contact pair whose penalty stiffness follows from a law."""
     young = small_strain_constants(law.mu0, law.bulk_modulus)["young_mpa"]
-    body.add_pair(ContactPair(Surface.of(body.mesh.face(face)), Surface.of(body.mesh.face(other)), friction=friction,
+    body.add(ContactPair(Surface.of(body.mesh.face(face)), Surface.of(body.mesh.face(other)), friction=friction,
                               stiffness=_PENALTY * young / design.mesh.along, reach_mm=0.5 * design.geometry.beam_height,
                               thickness_mm=design.geometry.depth, name=f"{face} on {other}"))

@@ -162,7 +162,7 @@ def press_at_finite_strains(skin: Skin, mesh: trimesh.Trimesh, centre_mm: tuple[
     face = Surface.of(layer.face("top"))
     size = face.size_mm(body.points)
     young = 9 * law.bulk_modulus * law.mu0 / (3 * law.bulk_modulus + law.mu0)
-    body.add_pair(
+    body.add(
         ContactPair(face, Surface.of({"triangle": body.surface_nodes(_OBJECT)}), stiffness=_PENALTY * young / size,
                     reach_mm=2 * size, friction=friction, rigid=True)
     )  # fmt: skip

@@ -25,7 +25,7 @@ def blocks(kind, *, bulk=5.0, friction=0.0):
     mesh = lower.joined(upper, prefix="upper ")
     body = SolidBody(mesh, {"lower": law(bulk), "upper body": law(bulk)}, held={"z0": "z", "x0": "xyz"},     # some nodes slide
                      carried={"top": ((0, 0, 0), ["upper z1"])})
-    body.add_pair(ContactPair(Surface.of(mesh.face("upper z0")), Surface.of(mesh.face("z1")), stiffness=50.0, reach_mm=0.3,
+    body.add(ContactPair(Surface.of(mesh.face("upper z0")), Surface.of(mesh.face("z1")), stiffness=50.0, reach_mm=0.3,
                               friction=friction))
     return body
 

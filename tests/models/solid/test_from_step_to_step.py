@@ -19,7 +19,7 @@ def block_under_a_plate():
     plate.apply_translation([0, 0, 1.5])
     body = SolidBody(mesh, {"body": make_law("neo_hooke", {"c10": 0.1})}, held={"z0": "xyz"},
                      rigid={"plate": ((0, 0, 1), plate.triangles)})
-    body.add_pair(ContactPair(Surface.of(mesh.face("z1")), Surface.of({"triangle": body.surface_nodes("plate")}), stiffness=20.0,
+    body.add(ContactPair(Surface.of(mesh.face("z1")), Surface.of({"triangle": body.surface_nodes("plate")}), stiffness=20.0,
                               reach_mm=0.5, rigid=True))
     return body
 
@@ -38,7 +38,7 @@ def test_a_soft_object_that_hangs_above_is_brought_to_touch_before_its_load_acts
     upper = box((-0.5, -0.5, 1 + gap), (0.5, 0.5, 2 + gap), (2, 2, 2))
     mesh, law = lower.joined(upper, prefix="upper "), make_law("neo_hooke", {"c10": 0.1})
     body = SolidBody(mesh, {"lower": law, "upper body": law}, held={"z0": "xyz"}, carried={"holder": ((0, 0, 2), ["upper z1"])})
-    body.add_pair(ContactPair(Surface.of(mesh.face("z1")), Surface.of(mesh.face("upper z0")), stiffness=20.0, reach_mm=0.5,
+    body.add(ContactPair(Surface.of(mesh.face("z1")), Surface.of(mesh.face("upper z0")), stiffness=20.0, reach_mm=0.5,
                               segments=True))
     (step,) = SolidPath(body, {"holder": Motion().press(force_n=0.05)}).run()
     assert step.loads[0, 2] == pytest.approx(-0.05, rel=1e-5)

@@ -38,7 +38,7 @@ def pressed(surface, other, *, segments):
     if surface:
         own = Surface.of(mesh.face(surface))
         against = own if surface == other else Surface.of(mesh.face(other))
-        body.add_pair(ContactPair(own, against, stiffness=20.0, reach_mm=0.2, segments=segments))
+        body.add(ContactPair(own, against, stiffness=20.0, reach_mm=0.2, segments=segments))
     return body, last(SolidPath(body, {"top": Motion().step(ways={"y": -0.15}).step(ways={"y": -0.15})}).run())
 
 
@@ -56,6 +56,6 @@ def test_a_slot_that_closes_bears_the_same_as_two_faces_that_are_told_to_meet():
 def test_a_body_that_does_not_touch_itself_is_left_alone():
     body = SolidBody(slotted(), {"body": RUBBER}, held={"bottom": "xy"}, carried={"top": ((0, 0, 0), ["top"])})
     surface = Surface.of(body.mesh.boundary)
-    body.add_pair(ContactPair(surface, surface, stiffness=20.0, reach_mm=0.2))
+    body.add(ContactPair(surface, surface, stiffness=20.0, reach_mm=0.2))
     (step,) = SolidPath(body, {"top": Motion().step(ways={"y": -0.01})}).run()
     assert step.state.contacts[0].pressure.max() == 0

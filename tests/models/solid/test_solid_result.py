@@ -28,7 +28,7 @@ def pressed():
     mesh = box((0, 0, 0), (2, 2, 1), (2, 2, 1), region="rubber")
     body = SolidBody(mesh, {"rubber": RUBBER}, held={"z0": "z", "x0": "x", "y0": "y"},
                      rigid={"plate": ((1, 1, 1.5), np.array(plate.triangles))})
-    body.add_pair(ContactPair(Surface.of(mesh.face("z1")), Surface.of({"triangle": body.surface_nodes("plate")}), stiffness=10.0,
+    body.add(ContactPair(Surface.of(mesh.face("z1")), Surface.of({"triangle": body.surface_nodes("plate")}), stiffness=10.0,
                               reach_mm=0.5, rigid=True, name="top"))
     return solid_result(SolidPath(body, {"plate": Motion().step(ways={"z": -0.1}).step(ways={"z": -0.1})}))
 

@@ -14,7 +14,7 @@ from softtact.materials.laws.registry import make_law
 from softtact.models.solid.blocks import region_blocks
 from softtact.models.solid.body import SolidBody
 from softtact.models.solid.frames import FramePose
-from softtact.models.solid.loads import FacePressure
+from softtact.models.solid.items import FacePressure, with_pressures
 
 RUBBER = make_law("mooney_rivlin", {"c10": 0.08, "c01": 0.03}, bulk_over_shear=20)
 
@@ -34,9 +34,9 @@ def two_blocks(friction, geometry="solid", seed=1):
     mesh = lower.joined(upper, prefix="upper ")
     body = SolidBody(mesh, {"lower": RUBBER, "upper body": RUBBER}, held={names[2]: "xyz"[:sum(plane)]},
                      carried={"top": ((0, 0, 0), ["upper " + names[3]])})
-    body.add_pair(ContactPair(Surface.of(mesh.face("upper " + names[1])), Surface.of(mesh.face(names[0])), stiffness=50.0,
+    body.add(ContactPair(Surface.of(mesh.face("upper " + names[1])), Surface.of(mesh.face(names[0])), stiffness=50.0,
                               reach_mm=0.3, friction=friction, axisymmetric=geometry == "axisymmetric"))
-    body.pressures.append(FacePressure(Surface.of(mesh.boundary), body.points, axisymmetric=geometry == "axisymmetric"))
+    body.add(FacePressure(Surface.of(mesh.boundary), body.points, axisymmetric=geometry == "axisymmetric"))
     return body, rng
 
 
@@ -46,7 +46,11 @@ def pressed_state(body, rng, ways):
     rest = body.rest()
     pose = FramePose().moved(np.array(ways, float))
     return body.evaluate(displacement - [0, 0.03, 0.05] * body.free_components * (body.points[:, 2:] + body.points[:, 1:2] > 1.02),
-                         (pose,), rest.histories, np.array([0.02]))
+                         (pose,), with_pressures(body.items, rest.item_histories, [0.02]))
+
+
+def without_pressure(body, state):
+    return body.with_histories(state, with_pressures(body.items, state.item_histories, [0.0]))
 
 
 def whole_matrix(body, state):
@@ -59,7 +63,7 @@ def test_the_tangent_of_bodies_in_frictionless_contact_is_the_derivative_of_the_
     body, rng = two_blocks(0.0, geometry)
     state = pressed_state(body, rng, [0.01, -0.03, -0.05 if geometry == "solid" else 0, 0, 0, 0])
     assert state.contacts[0].pressure.max() > 0.5, "the blocks touch"
-    state = body.evaluate(state.displacement, state.poses, state.histories, np.zeros(1))
+    state = without_pressure(body, state)
     matrix, v, h = whole_matrix(body, state), rng.standard_normal(len(body.free)), 1e-6
     ahead, behind = (body.residual(body.moved(state, s * h * v, [np.zeros(6)])) for s in (1, -1))
     expected = (ahead - behind) / (2 * h)
@@ -70,7 +74,7 @@ def test_the_tangent_of_bodies_in_frictionless_contact_is_the_derivative_of_the_
 def test_the_residual_is_the_derivative_of_the_potential_with_friction_but_for_turning_normals(geometry):
     body, rng = two_blocks(0.4, geometry)
     state = pressed_state(body, rng, [0.01, -0.03, -0.05 if geometry == "solid" else 0, 0, 0, 0])
-    state = body.evaluate(state.displacement, state.poses, state.histories, np.zeros(1))
+    state = without_pressure(body, state)
     v, h = rng.standard_normal(len(body.free)), 1e-6
     ahead, behind = (body.moved(state, s * h * v, [np.zeros(6)]).energy for s in (1, -1))
     assert state.contacts[0].slides.any()
@@ -80,7 +84,7 @@ def test_the_residual_is_the_derivative_of_the_potential_with_friction_but_for_t
 def test_with_its_coupling_the_tangent_of_sliding_friction_is_the_derivative_of_the_residual_but_for_turning_normals():
     body, rng = two_blocks(0.4)
     state = pressed_state(body, rng, [0.01, -0.03, -0.05, 0, 0, 0])
-    state = body.evaluate(state.displacement, state.poses, state.histories, np.zeros(1))
+    state = without_pressure(body, state)
     v, h = rng.standard_normal(len(body.free)), 1e-7
     ahead, behind = (body.residual(body.moved(state, s * h * v, [np.zeros(6)])) for s in (1, -1))
     change, coupling = np.zeros(body.points.size), np.zeros_like(body.points)
@@ -96,7 +100,7 @@ def test_with_its_coupling_the_tangent_of_sliding_friction_is_the_derivative_of_
 def test_a_solution_with_sliding_friction_is_that_of_the_matrix_and_its_coupling():
     body, rng = two_blocks(0.4)
     state = pressed_state(body, rng, [0.01, -0.03, -0.05, 0, 0, 0])
-    state = body.evaluate(state.displacement, state.poses, state.histories, np.zeros(1))
+    state = without_pressure(body, state)
     right = rng.standard_normal((len(body.free), 2))
     for k, found in enumerate(body.solve(state, right, turning=False).T):
         change, coupling = np.zeros(body.points.size), np.zeros_like(body.points)
@@ -111,11 +115,11 @@ def test_a_solution_with_sliding_friction_is_that_of_the_matrix_and_its_coupling
 def test_a_follower_pressure_on_a_closed_surface_has_no_resultant_and_a_symmetric_derivative():
     body, rng = two_blocks(0.0)
     x = body.points + 0.02 * rng.standard_normal(body.points.shape)
-    force = np.zeros_like(x)
-    body.pressures[0].add_force(x, 0.3, force)
+    face, force = body.pressures[0], np.zeros_like(x)
+    face.add_forces(0.3, face.evaluate(0.3, x), force)
     np.testing.assert_allclose(force.sum(axis=0), 0, atol=1e-12)
     np.testing.assert_allclose(np.cross(x, force).sum(axis=0), 0, atol=1e-12)
-    nodes, matrices = body.pressures[0].tangents(x, 0.3)
+    ((nodes, matrices),) = face.tangents(0.3, None, x)
     whole = np.zeros((x.size, x.size))
     for own, matrix in zip(nodes, matrices, strict=True):
         dofs = (3 * own[:, None] + np.arange(3)).ravel()
@@ -123,7 +127,7 @@ def test_a_follower_pressure_on_a_closed_surface_has_no_resultant_and_a_symmetri
     v, h, change = rng.standard_normal(x.shape), 1e-6, []
     for sign in (1, -1):
         moved = np.zeros_like(x)
-        body.pressures[0].add_force(x + sign * h * v, 0.3, moved)
+        face.add_forces(0.3, face.evaluate(0.3, x + sign * h * v), moved)
         change.append(moved)
     np.testing.assert_allclose(whole @ v.ravel(), ((change[0] - change[1]) / (2 * h)).ravel(), atol=1e-7)
 

@@ -1,15 +1,17 @@
 """Soft and rigid bodies on one set of nodes: their potential, what is out of balance, and the tangent.
 
 Unknown are the free displacements u and the loaded freedoms q of the frames. The residual is the derivative of the potential
-Pi(u, q) = energy of the regions + penalties of the contacts - work of pressures and loads; the tangent is its second derivative.
+Pi(u, q) = energy of the regions + those of the items (contacts, frusta, pressures; `items`) - work of loads; the tangent is its
+second derivative.
 Frames' freedoms border the matrix: their columns are directional derivatives of the residual, taken by a difference. Lengths in mm,
 forces in N, pressures in MPa.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -30,8 +32,7 @@ from softtact.models.solid.checks import bodies_of, refuse_loose
 from softtact.models.solid.corners import lift_from_corners
 from softtact.models.solid.device import find_device, sum_on
 from softtact.models.solid.frames import FramePose, make_frames
-from softtact.models.solid.loads import FacePressure
-from softtact.models.solid.springs import FrustumSprings
+from softtact.models.solid.items import FacePressure, Item, ItemState, PressureResponse
 from softtact.progress import Watch
 
 _CHUNK = 256  # elements whose dense tangents are in memory at once, for each thread
@@ -48,20 +49,36 @@ class SolidState:
     """(n, 3) of the nodes in mm, the frames' among them."""
     poses: tuple[FramePose, ...]
     """Of the frames."""
-    pressures: np.ndarray
-    """(f,) in MPa on the faces under pressure."""
-    histories: tuple[PairHistory, ...]
-    """What the pairs in contact remember."""
-    contacts: tuple[PairState, ...]
-    """The pairs' contact."""
+    items: tuple[ItemState, ...]
+    """History and response of each item."""
     force: np.ndarray
     """(n, 3) in N: derivative of the potential by the nodes' places; at held nodes what holds them."""
     energy: float
-    """In mJ: of the regions and the penalties."""
+    """In mJ: of regions and frusta, and the penalties."""
     strain_energy: float
-    """In mJ: of the regions."""
+    """In mJ: of regions and frusta."""
     size: float
     """In N: sum of what presses and holds, the scale of the residual."""
+
+    @property
+    def item_histories(self) -> tuple[Any, ...]:
+        """The history of each item."""
+        return tuple(item.history for item in self.items)
+
+    @property
+    def histories(self) -> tuple[PairHistory, ...]:
+        """Histories of the pairs in contact."""
+        return tuple(item.history for item in self.items if isinstance(item.history, PairHistory))
+
+    @property
+    def contacts(self) -> tuple[PairState, ...]:
+        """Contact of the pairs."""
+        return tuple(item.response for item in self.items if isinstance(item.response, PairState))
+
+    @property
+    def pressures(self) -> np.ndarray:
+        """(f,) in MPa on the faces under pressure."""
+        return np.array([item.response.pressure for item in self.items if isinstance(item.response, PressureResponse)])
 
 
 class SolidBody:
@@ -94,10 +111,8 @@ class SolidBody:
         self.points, self.frames, self._surfaces = make_frames(mesh, carried or {}, rigid or {})
         self.free_components = self._free(held or {})
         self.free = np.flatnonzero(self.free_components.ravel())
-        self.pairs: list[ContactPair] = []
-        self.pressures: list[FacePressure] = []
-        self.springs: list[FrustumSprings] = []
-        refuse_loose(mesh, self.free_components, held or {})
+        self.items: list[Item] = []
+        self._held_faces = list(held or {})
         lift = lift_from_corners(mesh, laws, self.free)
         self.solver = RefinedSolver(self.points[self.free // 3], lift=lift, workers=self.workers)
         self._pattern: SymmetricPattern | None = None
@@ -118,42 +133,57 @@ class SolidBody:
         free[n:] = False
         return free
 
-    def shifted_with(self, frame: int, way: np.ndarray) -> np.ndarray:
-        """The step (unknowns,) that shifts by a way (3,) in mm all bodies that this frame carries and nothing else holds."""
+    def shifted_with(self, frame: int, translation: np.ndarray) -> np.ndarray:
+        """The step (unknowns,) that shifts by (3,) in mm all bodies that this frame carries and nothing else holds."""
         body, carrier = bodies_of(self.mesh), self.frames[frame]
         bound = np.flatnonzero(~self.free_components[: len(body), : 3 if self.mesh.geometry == "solid" else 2].all(axis=1))
         elsewhere = np.setdiff1d(body[np.setdiff1d(bound, carrier.nodes)], -1)
         mine = np.setdiff1d(body[carrier.nodes[carrier.nodes < len(body)]], elsewhere)
         shift = np.zeros_like(self.points)
-        shift[: len(body)][np.isin(body, mine)] = way
+        shift[: len(body)][np.isin(body, mine)] = translation
         return shift.ravel()[self.free]
 
     def surface_nodes(self, frame: str) -> np.ndarray:
         """Facets (t, 3) of a rigid object, in nodes of this body."""
         return self._surfaces[frame]
 
-    def add_pair(self, pair: ContactPair) -> None:
-        """Let two surfaces meet; before the first state is made."""
-        self.pairs.append(pair)
+    def add(self, item: Item) -> None:
+        """Let a contact pair, frusta or a pressure act; before the first state is made."""
+        self.items.append(item)
+
+    @property
+    def pairs(self) -> list[ContactPair]:
+        """The items that are contact pairs."""
+        return [item for item in self.items if isinstance(item, ContactPair)]
+
+    @property
+    def pressures(self) -> list[FacePressure]:
+        """The items that are pressures on faces."""
+        return [item for item in self.items if isinstance(item, FacePressure)]
+
+    @property
+    def frictional(self) -> bool:
+        """Whether friction acts somewhere: the balance then has no potential."""
+        return any(item.friction for item in self.items)
 
     @contextmanager
     def frictionless(self) -> Iterator[None]:
-        """While this lasts, nothing rubs."""
-        before = [pair.friction for pair in self.pairs]
-        for pair in self.pairs:
-            pair.friction = 0.0
+        """While this lasts, friction acts nowhere."""
+        before = [item.friction for item in self.items]
+        for item in self.items:
+            item.friction = 0.0
         try:
             yield
         finally:
-            for pair, friction in zip(self.pairs, before, strict=True):
-                pair.friction = friction
+            for item, friction in zip(self.items, before, strict=True):
+                item.friction = friction
 
     def rest(self) -> SolidState:
-        """The state without displacement."""
-        histories = tuple(pair.first(self.points) for pair in self.pairs)
-        state = self.evaluate(
-            np.zeros_like(self.points), tuple(FramePose() for _ in self.frames), histories, np.zeros(len(self.pressures))
-        )
+        """The state without displacement. Raises InputError where nothing holds a body."""
+        supported = np.concatenate([np.zeros(0, dtype=int), *(item.supported_nodes() for item in self.items)])
+        refuse_loose(self.mesh, self.free_components, supported, self._held_faces)
+        histories = tuple(item.first(self.points) for item in self.items)
+        state = self.evaluate(np.zeros_like(self.points), tuple(FramePose() for _ in self.frames), histories)
         assert state is not None
         return state
 
@@ -161,64 +191,64 @@ class SolidBody:
         self,
         displacement: np.ndarray,
         poses: tuple[FramePose, ...],
-        histories: tuple[PairHistory, ...],
-        pressures: np.ndarray,
+        histories: tuple[Any, ...],
         before: SolidState | None = None,
         *,
         nearby: bool = False,
     ) -> SolidState | None:
         """`SolidState` with the frames' nodes where the poses (one a frame) put them; None where an element is inside out.
 
-        before: the state that this one follows on, with the same histories;  nearby: see `ContactPair.evaluate`
+        histories: of each item;  before: the state that this one follows on, with the same histories;  nearby: see `Item.evaluate`
         """
         displacement = displacement.copy()
         for frame, pose in zip(self.frames, poses, strict=True):
             axes = ["xyz".index(axis) for axis in frame.axes]
             displacement[frame.carried] = pose.displacement(frame, self.points)[:, axes]
-        force, energy = np.zeros_like(displacement), 0.0
+        force, strain_energy, penalty = np.zeros_like(displacement), 0.0, 0.0
         for _, nodes, block in self.blocks:
             state = block.evaluate(displacement[nodes], workers=self.workers)
             if state is None:
                 return None
-            energy += state.energy
+            strain_energy += state.energy
             add_forces(force, nodes, state.force.reshape(*nodes.shape, 3))
         size = float(np.abs(force[~self.free_components]).sum())
-        x, contacts, penalties = self.points + displacement, [], 0.0
-        for k, (pair, history) in enumerate(zip(self.pairs, histories, strict=True)):
-            contact = pair.evaluate(history, x, None if before is None else before.contacts[k], nearby=nearby)
-            pair.add_forces(history, contact, force)
-            penalties += contact.energy
-            size += float(history.points.weight @ contact.pressure)
-            contacts.append(contact)
-        for springs in self.springs:
-            stored, pushed = springs.add_force(displacement, force)
-            energy, size = energy + stored, size + pushed
-        for face, pressure in zip(self.pressures, pressures, strict=True):
-            size += face.add_force(x, float(pressure), force)
-        return SolidState(displacement, poses, pressures, histories, tuple(contacts), force, energy + penalties, energy, size)
+        x, items = self.points + displacement, []
+        for k, (item, history) in enumerate(zip(self.items, histories, strict=True)):
+            response = item.evaluate(history, x, None if before is None else before.items[k].response, nearby=nearby)
+            item.add_forces(history, response, force)
+            totals = item.totals(history, response)
+            strain_energy, penalty, size = strain_energy + totals.strain_energy, penalty + totals.penalty, size + totals.size
+            items.append(ItemState(history, response))
+        return SolidState(displacement, poses, tuple(items), force, strain_energy + penalty, strain_energy, size)
 
-    def again(self, state: SolidState, histories: tuple[PairHistory, ...]) -> SolidState:
-        """The same places with other histories; every point looks anew which facet it meets."""
-        found = self.evaluate(state.displacement, state.poses, histories, state.pressures)
+    def with_histories(self, state: SolidState, histories: Iterable[Any]) -> SolidState:
+        """The same places with other histories; every point of contact finds anew which facet it meets."""
+        found = self.evaluate(state.displacement, state.poses, tuple(histories))
         assert found is not None
         return found
+
+    def item_states(self, state: SolidState) -> Iterator[tuple[Item, Any, Any]]:
+        """(item, history, response) one after the other."""
+        return ((item, *both) for item, both in zip(self.items, state.items, strict=True))
 
     def moved(
         self,
         state: SolidState,
         step: np.ndarray,
-        ways: Sequence[np.ndarray],
+        frame_steps: Sequence[np.ndarray],
         *,
-        pressures: np.ndarray | None = None,
+        histories: tuple[Any, ...] | None = None,
         nearby: bool = False,
     ) -> SolidState | None:
-        """The state after a step (unknowns,) of the free displacements and ways (6,) of each frame."""
+        """The state after a step (unknowns,) of the free displacements and steps (6,) of each frame.
+
+        histories: of the items, where they are other than the state's
+        """
         displacement = state.displacement.copy()
         displacement.ravel()[self.free] += step
-        poses = tuple(pose.moved(way) for pose, way in zip(state.poses, ways, strict=True))
-        return self.evaluate(
-            displacement, poses, state.histories, state.pressures if pressures is None else pressures, state, nearby=nearby
-        )
+        poses = tuple(pose.moved(moved) for pose, moved in zip(state.poses, frame_steps, strict=True))
+        histories = state.item_histories if histories is None else histories
+        return self.evaluate(displacement, poses, histories, state, nearby=nearby)
 
     def residual(self, state: SolidState) -> np.ndarray:
         """Unbalanced forces (unknowns,) in N."""
@@ -234,11 +264,11 @@ class SolidBody:
         ).reshape(-1, 6)
 
     def border(self, state: SolidState, frame: int, freedom: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives of the residual (unknowns,) and of all frames' loads (frames, 6) along a way (6,) of a frame."""
+        """Derivatives of the residual (unknowns,) and of all frames' loads (frames, 6) along a direction (6,) of a frame."""
         size = float(np.abs(freedom).max())
-        ways = [np.zeros(6) for _ in self.frames]
-        ways[frame] = freedom * (_PROBE / size)
-        moved = self.moved(state, np.zeros(len(self.free)), ways, nearby=True)
+        steps = [np.zeros(6) for _ in self.frames]
+        steps[frame] = freedom * (_PROBE / size)
+        moved = self.moved(state, np.zeros(len(self.free)), steps, nearby=True)
         assert moved is not None
         return (
             (self.residual(moved) - self.residual(state)) * (size / _PROBE),
@@ -258,10 +288,7 @@ class SolidBody:
         Where friction slides, the tangent has a part beside the matrix: GMRES, with the factor as its preconditioner.
         turning: see `tangent`
         """
-        slides = any(
-            pair.friction and (contact.slides & (contact.pressure > 0)).any()
-            for pair, contact in zip(self.pairs, state.contacts, strict=True)
-        )
+        slides = any(item.slides(*both) for item, *both in self.item_states(state))
         found = self.solver.solve(self.tangent(state), right, factored=slides) if turning else None
         if found is None:
             found = self._definite(state, right, factored=slides)
@@ -271,8 +298,8 @@ class SolidBody:
         def coupling(x):
             change, force = np.zeros(self.points.size), np.zeros_like(self.points)
             change[self.free] = x
-            for pair, history, contact in zip(self.pairs, state.histories, state.contacts, strict=True):
-                pair.add_coupling(history, contact, change.reshape(-1, 3), force)
+            for item, *both in self.item_states(state):
+                item.add_coupling(*both, change.reshape(-1, 3), force)
             return force.ravel()[self.free]
 
         def whole(x):
@@ -306,15 +333,10 @@ class SolidBody:
         turning: with what pressures do as surfaces turn and bend, a part that may be negative
         """
         x = self.points + state.displacement
-        coupled = [
-            pair.tangents(history, contact, x, turning=turning)
-            for pair, history, contact in zip(self.pairs, state.histories, state.contacts, strict=True)
-        ]
-        coupled.append([face.tangents(x, float(p)) for face, p in zip(self.pressures, state.pressures, strict=True) if p])
-        coupled.append([springs.tangents(state.displacement) for springs in self.springs])
-        matrix = self._matrix_for([part for parts in coupled for part in parts])
+        coupled = [part for item, *both in self.item_states(state) for part in item.tangents(*both, x, turning=turning)]
+        matrix = self._matrix_for(coupled)
         self._add_blocks(matrix.data, state.displacement)
-        for nodes, matrices in (part for parts in coupled for part in parts):
+        for nodes, matrices in coupled:
             add_upper(matrix.data, matrices, self._pattern.positions(nodes))  # type: ignore[union-attr]
         return matrix
 

@@ -1,6 +1,6 @@
 """Which nodes hang together, and what is refused before anything is solved: bodies that nothing holds."""
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 
 import numpy as np
 import scipy.sparse as sp
@@ -20,13 +20,15 @@ def bodies_of(mesh: SolidMesh) -> np.ndarray:
     return np.where(used, label, -1)
 
 
-def refuse_loose(mesh: SolidMesh, free: np.ndarray, held: Mapping[str, str]) -> None:
+def refuse_loose(mesh: SolidMesh, free: np.ndarray, supported: np.ndarray, held: Sequence[str]) -> None:
     """Refuse a body of which every component of every node is free: it has no balance.
 
-    free (n, 3): which components are unknown, the mesh's nodes first;  held: the faces that are held, for the message
+    free (n, 3): which components are unknown, the mesh's nodes first;  supported: nodes that items tie to the ground
+    held: the faces that are held, for the message
     """
     dimensions, body = 3 if mesh.geometry == "solid" else 2, bodies_of(mesh)
     bound = np.logical_not(free[: len(body), :dimensions].all(axis=1))
+    bound[supported] = True
     for k in np.unique(body[body >= 0]):
         own = body == k
         if not bound[own].any():

@@ -78,14 +78,14 @@ class SolidPath:
         Raises ConvergenceError that names the step that was not reached; the steps before were yielded.
         """
         state = self.body.rest() if start is None else start
-        touched, work, dissipated = start is not None, 0.0, 0.0
+        in_contact, work, dissipated = start is not None, 0.0, 0.0
         steps: dict[str, MotionStep] = {}
         for number in range(self.steps):
             began = time.perf_counter()
             steps = {name: _still_loaded(steps.get(name), motion.steps[number]) for name, motion in self.motions.items()}
-            if not touched and any(step.loads for step in steps.values()):
-                state = self._brought_near(state, steps)
-            touched = True
+            if not in_contact and any(step.loads for step in steps.values()):
+                state = self._at_first_contact(state, steps)
+            in_contact = True
             values = np.array([self.pressures[face.name][number] for face in self.body.pressures])
             try:
                 state, counts, residual, done, lost = self._step(state, steps, values, f"step {number + 1} of {self.steps}")
@@ -104,11 +104,11 @@ class SolidPath:
         first = body.frame_loads(state), state.pressures
         while share < 1 - 1e-9:
             size = min(size, 1 - share)
-            begun = self._begun(state)
+            start = self._increment_start(state)
             part = name if size == 1 else f"{name}, {100 * share:.3g} to {100 * (share + size):.3g} % of it"
             target = replace(self._target(first, steps, pressures, share, size), name=part)
             try:
-                found, iterations, residual = balance(body, begun, target, self.settings)
+                found, iterations, residual = balance(body, start, target, self.settings)
             except TimeLimitError:
                 raise
             except ConvergenceError as error:
@@ -117,39 +117,35 @@ class SolidPath:
                 if size < self.settings.smallest_increment:
                     raise
                 continue
-            done, rubbed = self._energies(begun, found)
-            work, lost = work + done, lost + rubbed
+            done, dissipated = self._energies(start, found)
+            work, lost = work + done, lost + dissipated
             state, share = found, share + size
             counts = [counts[0] + iterations, counts[1] + 1]
             if iterations <= _FAST:
                 size *= 2
         return state, counts, residual, work, lost
 
-    def _begun(self, state):
-        """The state as an increment begins: anchors of friction, and the points of surfaces that were cut along each other."""
+    def _increment_start(self, state):
+        """The state from which an increment starts, with the items' histories advanced to it."""
         x = self.body.points + state.displacement
-        return self.body.again(
-            state,
-            tuple(
-                pair.begin_step(history, contact, x, self.body.points)
-                for pair, history, contact in zip(self.body.pairs, state.histories, state.contacts, strict=True)
-            ),
+        return self.body.with_histories(
+            state, (item.begin_step(*both, x, self.body.points) for item, *both in self.body.item_states(state))
         )
 
     def _target(self, first, steps, pressures, share, size):
         loads_before, pressures_before = first
-        ways, loads = [], []
+        frame_steps, loads = [], []
         for k, frame in enumerate(self.body.frames):
             step = steps.get(frame.name, MotionStep())
-            ways.append(size * step_vector(step.ways))
-            own = {FREEDOMS.index(name): value for name, value in step.loads.items()}
+            frame_steps.append(size * step_vector(step.ways))
+            wanted = {FREEDOMS.index(name): value for name, value in step.loads.items()}
             loads.append(
                 {
                     freedom: loads_before[k, freedom] + (share + size) * (value - loads_before[k, freedom])
-                    for freedom, value in own.items()
+                    for freedom, value in wanted.items()
                 }
             )
-        return Target(ways, loads, pressures_before + (share + size) * (pressures - pressures_before))
+        return Target(frame_steps, loads, pressures_before + (share + size) * (pressures - pressures_before))
 
     def _energies(self, before, after):
         """Work of frames and pressures, and what friction took, within an increment in mJ."""
@@ -160,34 +156,35 @@ class SolidPath:
             spin = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
             work += float(loads[k, :3] @ (new.translation - old.translation) + loads[k, 3:] @ spin)
         for face, one, two in zip(body.pressures, before.pressures, after.pressures, strict=True):
-            force = np.zeros_like(body.points)
-            face.add_force(body.points + 0.5 * (before.displacement + after.displacement), 0.5 * (one + two), force)
+            force, mean = np.zeros_like(body.points), 0.5 * (one + two)
+            x = body.points + 0.5 * (before.displacement + after.displacement)
+            face.add_forces(mean, face.evaluate(mean, x), force)
             work -= float((force * (after.displacement - before.displacement)).sum())
-        for history, contact in zip(after.histories, after.contacts, strict=True):
-            lost += float(history.points.weight @ (-(contact.slip * contact.friction).sum(axis=1) * contact.slides))
+        for item, *both in body.item_states(after):
+            lost += item.dissipated_mj(*both)
         return work, lost
 
-    def _brought_near(self, state, steps):
+    def _at_first_contact(self, state, steps):
         """The state with loaded frames moved along their forces until their surfaces just overlap."""
-        ways = [np.zeros(6) for _ in self.body.frames]
+        directions = [np.zeros(6) for _ in self.body.frames]
         for k, frame in enumerate(self.body.frames):
             step = steps.get(frame.name, MotionStep())
-            ways[k][:3] = [np.sign(step.loads.get(name, 0.0)) for name in FREEDOMS[:3]]
-            ways[k][:3] /= max(np.linalg.norm(ways[k][:3]), 1.0)
-        if not self.body.pairs or not any(way.any() for way in ways):
+            directions[k][:3] = [np.sign(step.loads.get(name, 0.0)) for name in FREEDOMS[:3]]
+            directions[k][:3] /= max(np.linalg.norm(directions[k][:3]), 1.0)
+        if not self.body.pairs or not any(direction.any() for direction in directions):
             return state
         for _ in range(200):
-            gap = min((float(np.min(contact.projection.gap, initial=np.inf)) for contact in state.contacts), default=np.inf)
+            gap = min(item.gap_mm(response) for item, _, response in self.body.item_states(state))
             if gap <= -0.5 * _OVERLAP_MM:
                 return state
             if not np.isfinite(gap):
                 raise InputError(
                     "The loaded object is out of reach of the surface that it is to touch; place it nearer, or correct its pose."
                 )
-            on = [way * (gap + _OVERLAP_MM) for way in ways]
-            moved = self.body.moved(state, sum(self.body.shifted_with(k, way[:3]) for k, way in enumerate(on)), on)
+            nearer = [direction * (gap + _OVERLAP_MM) for direction in directions]
+            moved = self.body.moved(state, sum(self.body.shifted_with(k, step[:3]) for k, step in enumerate(nearer)), nearer)
             assert moved is not None
-            state = self._begun(moved)
+            state = self._increment_start(moved)
         raise InputError("The loaded object does not come to touch along its load; correct its pose or its load.")
 
     def _described(self, state, counts, residual, work, dissipated, seconds):
@@ -206,7 +203,7 @@ class SolidPath:
             counts[0],
             counts[1],
             residual,
-            max((contact.penetration_mm() for contact in state.contacts), default=0.0),
+            max((item.penetration_mm(response) for item, _, response in self.body.item_states(state)), default=0.0),
             (float(least), float(largest)),
             (low, high),
             float(share),
