@@ -20,7 +20,7 @@ EXAMPLES = """
   softtact grasp part.stl --unit mm --force 20 --out results/grasp
   softtact grasp part.stl --unit mm --force 20 --x 2 --y -5 --angle 30 --model elastic --out results/turned
   softtact grasp part.stl --unit mm --force 50 --model elastic --video --out results/grasp
-  softtact grasp --replay results/grasp/events.nc --out results/again      # the same maps, without the robot
+  softtact grasp --replay results/grasp/events.nc --out results/replay     # the same maps, without the robot
 """
 _OF_GRASP = {"unit": None, "force": None, "x": 0.0, "y": 0.0, "angle": 0.0, "mass": None, "scene": None, "lift": True,
              "model": "auto", "policy": "error", "tolerance": 0.01, "sensor": "coro",
@@ -29,7 +29,7 @@ _OF_GRASP = {"unit": None, "force": None, "x": 0.0, "y": 0.0, "angle": 0.0, "mas
 
 def add(commands: argparse._SubParsersAction) -> None:
     """Add the command to the parser."""
-    command = add_command(commands, "grasp", _grasp, "Grasp an object with a UR10 and a 2F-85 gripper: what both sensors feel.",
+    command = add_command(commands, "grasp", _grasp, "Grasp an object with a UR10 and a 2F-85 gripper: maps of both sensors.",
                           EXAMPLES)
     command.add_argument("mesh", metavar="OBJECT", type=Path, nargs="?",
                          help="STL, OBJ or PLY file of a closed body; its z axis lies along the closing of the fingers")

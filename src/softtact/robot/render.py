@@ -1,8 +1,8 @@
 """Pictures of a grasp: the robot drawn off screen by MuJoCo, beside maps and counts of both sensors.
 
 MuJoCo needs EGL (on Debian libegl1, libegl-mesa0 and libgl1-mesa-dri). A driver that fails may end its process, so the robot is
-drawn in another process, `python -m softtact.robot.render FOLDER`. Where that fails, a sentence says so and there is no picture of
-the robot.
+drawn in another process, `python -m softtact.robot.offscreen FOLDER`. Where that fails, a sentence says so and there is no picture
+of the robot.
 """
 
 import os
@@ -42,7 +42,7 @@ def draw_rows(scene: Scene, record: GraspRecord, rows: Sequence[int], *, view: t
         mujoco.mj_saveModel(scene.model, str(Path(folder, "scene.mjb")), None)
         np.savez(Path(folder, "states.npz"), qpos=states, size=size, camera=[_camera(record, row, view) for row in rows])
         environment = os.environ | {"MUJOCO_GL": os.environ.get("MUJOCO_GL", "egl" if sys.platform == "linux" else "")}
-        images = drawn_apart([sys.executable, "-m", "softtact.robot.render"], Path(folder), sentence=_NO_PICTURE,
+        images = drawn_apart([sys.executable, "-m", "softtact.robot.offscreen"], Path(folder), sentence=_NO_PICTURE,
                              timeout_s=timeout_s, environment=environment)
     return None if images is None else images["images"]
 
@@ -121,34 +121,3 @@ def draw_grasp(data: "xarray.Dataset", path: str | Path, *, images: np.ndarray |
     for bar in bars:
         bar.ax.tick_params(labelsize=7)
     save(figure, path)
-
-
-def main(folder: str | Path) -> None:
-    """Draw the states of states.npz in the scene of scene.mjb and write images.npz, in a process of its own."""
-    import mujoco
-
-    folder = Path(folder)
-    model = mujoco.MjModel.from_binary_path(str(folder / "scene.mjb"))
-    data = mujoco.MjData(model)
-    with np.load(folder / "states.npz", allow_pickle=False) as states:
-        qpos, camera_of, (height, width) = states["qpos"], states["camera"], states["size"]
-    images = np.empty((len(qpos), height, width, 3), dtype=np.uint8)
-    with mujoco.Renderer(model, height=int(height), width=int(width)) as renderer:
-        for number, (position, camera) in enumerate(zip(qpos, camera_of, strict=True)):
-            data.qpos[:] = position
-            mujoco.mj_forward(model, data)
-            renderer.update_scene(data, camera=_free_camera(mujoco, camera))
-            images[number] = renderer.render()
-    np.savez(folder / "images.npz", images=images)
-
-
-def _free_camera(mujoco, values):
-    """A free camera of azimuth and elevation in degrees, distance in m and the point (3,) in m at its centre."""
-    camera = mujoco.MjvCamera()
-    camera.azimuth, camera.elevation, camera.distance = values[:3]
-    camera.lookat[:] = values[3:]
-    return camera
-
-
-if __name__ == "__main__":
-    main(sys.argv[1])

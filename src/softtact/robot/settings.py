@@ -81,7 +81,7 @@ def load_scene(path: str | Path | None = None, **changes: Any) -> SceneSettings:
 
 
 def import_mujoco() -> None:
-    """Import MuJoCo with its graphics off in this process; pictures are drawn in another one (`softtact.robot.render`).
+    """Import MuJoCo with its graphics off in this process; pictures are drawn in another one (`softtact.robot.offscreen`).
 
     A broken driver that MUJOCO_GL names would otherwise end the import, and with it the physics.
     """
