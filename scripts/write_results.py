@@ -25,6 +25,7 @@ from softtact.reporting.run_record import run_record, run_sentence
 from softtact.reporting.words import KINDS, PREDICTORS, SETS, header
 from softtact.studies.code_closure import code_closure
 from softtact.studies.hybrid.tables import machine
+from softtact.studies.jobs import stage_source, stages_of
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE, FOLDER = ROOT / "docs" / "results.md", ROOT / "docs" / "results"
@@ -53,8 +54,9 @@ CLAIMS, GAPS = "tables/claims.csv", "tables/gaps.csv"
 
 def sources() -> dict[str, str]:
     """Source file to the first 16 digits of its SHA-256, for all files that any stage of a study runs."""
-    stages = sorted(path.stem for path in (ROOT / "src" / "softtact" / "stages").glob("[!_]*.py"))
-    files = sorted({file for stage in stages for file in code_closure(f"softtact.stages.{stage}", source=ROOT / "src")})
+    source = ROOT / "src"
+    stages = [stage_source(stage, source=source) for stage in stages_of("hybrid", source=source)]
+    files = sorted({file for stage in stages for file in code_closure(stage, source=source)})
     return {str(Path(file).relative_to(ROOT)): digest(Path(file))[:16] for file in files}
 
 

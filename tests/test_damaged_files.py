@@ -53,7 +53,7 @@ def test_a_data_set_is_written_the_same_twice_and_read_as_it_was(tmp_path):
 FULL_DISK = """
 import resource, sys
 resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))     # as if the disk were full after 2 kB
-from softtact.studies.hybrid.stages.__main__ import main
+from softtact.studies.__main__ import main
 sys.exit(main(["score_complexity", *sys.argv[1:]]))
 """
 

@@ -16,9 +16,9 @@ from softtact.errors import InputError
 from softtact.files import parse_json, read_yaml, refuse_overwriting
 from softtact.sensors.library import material_file, sensor_file
 from softtact.sensors.specification import read_spec
+from softtact.studies.__main__ import main as stage_main
 from softtact.studies.hybrid.config import read_values
 from softtact.studies.hybrid.objects import read_catalogue
-from softtact.studies.hybrid.stages.__main__ import main as stage_main
 
 ROOT = Path(__file__).resolve().parents[1]
 OBJECT = ROOT / "config/objects/grasped/object_5.stl"

@@ -9,7 +9,8 @@ from softtact.studies.code_closure import code_closure
 
 SOURCE = Path(__file__).resolve().parents[2] / "src"
 # An edit of these reruns nothing.
-UNRELATED = {"cli.py", "studies/hybrid/config.py", "studies/code_closure.py", "studies/hybrid/stages/__main__.py"}
+UNRELATED = {"cli.py", "studies/hybrid/config.py", "studies/code_closure.py", "studies/__main__.py", "studies/jobs.py",
+             "studies/registry.py"}
 STAGES = sorted(path.stem for path in (SOURCE / "softtact/studies/hybrid/stages").glob("[!_]*.py"))
 
 

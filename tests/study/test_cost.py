@@ -10,8 +10,9 @@ import yaml
 from softtact.cli import main
 from softtact.errors import InputError
 from softtact.learning.settings import Search
-from softtact.studies.cost import cost_lines, epochs_of_a_trial, read_costs, study_costs
-from softtact.studies.hybrid.config import load_study, read_values
+from softtact.studies.cost import cost_lines, origin_of, read_costs
+from softtact.studies.hybrid.cost import costs_of_study, epochs_of_a_trial
+from softtact.studies.registry import open_study
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -22,12 +23,12 @@ def in_project(monkeypatch):
 
 
 def costs_of(name, results="no_such_folder"):
-    study = load_study(read_values(f"config/{name}.yaml"))
-    return study, {cost.stage: cost for cost in study_costs(study, read_costs(), results=results)}
+    opened = open_study(f"config/{name}.yaml")
+    return opened, {cost.stage: cost for cost in opened.costs(read_costs(), Path(results, opened.name))}
 
 
 def test_the_paper_study_costs_710_presses_of_each_model_and_days():
-    study, costs = costs_of("paper")
+    opened, costs = costs_of("paper")
     presses = {stage: cost for stage, cost in costs.items() if stage.startswith("simulate_press")}
     assert set(presses) == {f"simulate_press, {model}" for model in ("elastic", "foundation", "hyperelastic", "reference")}
     assert {(cost.jobs, cost.left) for cost in presses.values()} == {(710, 710)}
@@ -37,7 +38,7 @@ def test_the_paper_study_costs_710_presses_of_each_model_and_days():
     samples = 10_400 + 5_200 + 800 + 40_000
     assert costs["build_dataset"].disk_mb == pytest.approx(3 * samples * (57 * 33 + 28) * 4 / 1e6)
     assert sum(cost.hours for cost in costs.values()) > 48
-    lines = list(cost_lines(study, costs.values(), read_costs(), cores=2))
+    lines = list(cost_lines(opened.name, costs.values(), origin=origin_of(opened, read_costs()), cores=2))
     assert "days on 2 cores" in lines[-1] and len(lines) == len(costs) + 3
 
 
@@ -62,7 +63,8 @@ def test_finished_jobs_are_not_counted_and_the_studys_own_times_come_first(tmp_p
 
 def test_presses_that_share_a_job_share_its_time(tmp_path):
     """The default study presses some objects in two places; a fast model does so in one job."""
-    study, told = costs_of("config")
+    opened, told = costs_of("config")
+    study = opened.study
     jobs = study.press_jobs("elastic")
     assert sorted({len(items) for items in jobs}) == [1, 2] and sum(map(len, jobs)) == len(study.items())
     assert [len(items) for items in study.press_jobs("hyperelastic")] == [1] * len(study.items())
@@ -94,9 +96,9 @@ def test_the_command_tells_the_same_as_json(capsys):
 def test_a_configuration_that_is_not_there_and_an_archives_study_are_refused(capsys, tmp_path):
     assert main(["cost", "--configfile", "config/papr.yaml"]) == 1
     assert "config/papr.yaml: there is no such configuration" in capsys.readouterr().err
-    study, _ = costs_of("tiny")
+    opened, _ = costs_of("tiny")
     with pytest.raises(InputError, match="it reads the published archive"):
-        study_costs(replace(study, archive=tmp_path), read_costs())
+        costs_of_study(replace(opened, study=replace(opened.study, archive=tmp_path)), read_costs(), tmp_path)
 
 
 def test_every_measured_time_is_positive_and_says_where_it_comes_from():
@@ -109,10 +111,10 @@ def test_every_measured_time_is_positive_and_says_where_it_comes_from():
 @pytest.mark.parametrize("written", ["", "s\th:m:s\tmax_rss\n", "s\th:m:s\tmax_rss\n40"])
 def test_a_benchmark_that_a_killed_job_left_half_written_tells_nothing(tmp_path, written):
     """A run that goes on reads those of the run that was killed."""
-    study, without = costs_of("tiny", results=tmp_path)
-    for first, *more in study.press_jobs("hyperelastic"):
+    opened, without = costs_of("tiny", results=tmp_path)
+    for first, *more in opened.study.press_jobs("hyperelastic"):
         stage = "simulate_presses" if more else "simulate_press"
-        path = tmp_path / study.name / f"benchmarks/{stage}/{first.set}/{first.id}/hyperelastic.tsv"
+        path = tmp_path / opened.name / f"benchmarks/{stage}/{first.set}/{first.id}/hyperelastic.tsv"
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(written)
     _, costs = costs_of("tiny", results=tmp_path)

@@ -9,20 +9,28 @@ import yaml
 
 from softtact.cli import main
 from softtact.errors import InputError
+from softtact.geometry.meshes import place, read_mesh
 from softtact.geometry.pose import Pose
 from softtact.studies.cost import read_costs
 from softtact.studies.grasps.claims import claims_of_grasps
-from softtact.studies.grasps.config import cost_lines, load_grasp_study
+from softtact.studies.grasps.config import GraspStudy
+from softtact.studies.grasps.stages.summary import papers_model
+from softtact.studies.jobs import run_jobs
+from softtact.studies.registry import OpenStudy, open_study
 
 pytest.importorskip("mujoco", reason="pip install 'softtact[robot]'")
 ROOT = Path(__file__).resolve().parents[2]
-ONE = {"study": "one", "objects": ["object_3"], "positions": 1, "force_n": 10, "trials": 2, "model": "elastic",
+ONE = {"study": "one", "kind": "grasps", "objects": ["object_3"], "positions": 1, "force_n": 10, "trials": 2, "model": "elastic",
        "one_event": {"objects": [], "models": ["elastic"], "force_n": 10, "cover_law": "mooney_rivlin"}}
 
 
 @pytest.fixture(autouse=True)
 def in_project(monkeypatch):
     monkeypatch.chdir(ROOT)
+
+
+def load_grasp_study(path) -> GraspStudy:
+    return open_study(path).study
 
 
 def config(folder, **changes):
@@ -53,10 +61,10 @@ def test_what_is_done_is_not_done_again_and_other_settings_are(results):
     catalogue = str(ROOT / "config/objects/catalogue.yaml")
 
     def run(**changes):
-        from softtact.studies.grasps.run import run_study  # MuJoCo, which may be missing
-
         before = [path.stat().st_mtime_ns for path in kept]
-        run_study(load_grasp_study(config(results, catalogue=catalogue, **changes)), results / "out", workers=1)
+        opened = open_study(config(results, catalogue=catalogue, **changes))
+        jobs = [job for job in opened.jobs(results / "out") if job.stage in ("grasp", "read_grasp")]
+        run_jobs("grasps", jobs, results / "out")
         return [path.stat().st_mtime_ns > old for path, old in zip(kept, before, strict=True)]
 
     assert run() == [False, False] and run(trials=3) == [False, True] and run(trials=3, force_n=12) == [True, True]
@@ -77,10 +85,13 @@ def test_a_position_depends_on_the_seed_and_not_on_the_other_objects(tmp_path):
 
 
 def test_the_cost_is_told_before_the_work(tmp_path):
-    study = load_grasp_study("config/grasps.yaml")
-    first = next(cost_lines(study, tmp_path, read_costs(), cores=2))
+    opened = OpenStudy("grasps", load_grasp_study("config/grasps.yaml"))
+    stages = {cost.stage: cost for cost in opened.costs(read_costs(), tmp_path)}
+    assert stages["grasp"].jobs == stages["grasp"].left == 48
     # four of the twelve objects go to the hyperelastic model: 4 x 4 positions x 2 fingers x 2 events, and one of each two objects
-    assert "48 grasps, 48 left" in first and "66 hyperelastic" in first
+    pressed = [job.work.get("hyperelastic", 0) for job in opened.jobs(tmp_path)]
+    assert sum(pressed) == 66
+    assert sum(cost.hours for cost in stages.values()) > 66 * 46 / 3600
 
 
 @pytest.mark.parametrize(("changes", "said"), [({"objects": ["cion"]}, "'cion'"), ({"model": "best"}, "at 'model'"),
@@ -113,8 +124,10 @@ def test_claims_hold_by_their_rules_alone():
 def test_the_rule_is_asked_for_the_place_of_an_object_not_for_its_middle(tmp_path):
     # Off the middle the key's teeth are over the pad, and much of its smooth head is not.
     study = load_grasp_study(config(tmp_path, objects=["key"]))
-    entry = study.items[0].entry
-    aside = Pose.from_values([2.46, -4.96, 0, 0, 0, 148.44])
-    assert study.ruled_model(entry, "left") == "elastic"
-    assert study.ruled_at(entry, Pose.from_values([0, 0, 0, 0, 0, 0])) == "elastic"
-    assert study.ruled_at(entry, aside) == "hyperelastic"
+    mesh = read_mesh(study.items[0].entry.file, unit="mm")
+
+    def ruled(pose):
+        return papers_model(place(mesh, pose=pose), footprint_mm=study.spec.footprint_mm, reach_mm=study.spec.thickness_mm)
+
+    assert ruled(None) == ruled(Pose.from_values([0, 0, 0, 0, 0, 0])) == "elastic"
+    assert ruled(Pose.from_values([2.46, -4.96, 0, 0, 0, 148.44])) == "hyperelastic"

@@ -5,8 +5,9 @@ from support.recordings import write_recordings
 from support.studies import ROOT, merged
 
 from softtact.errors import InputError
-from softtact.studies.cost import read_costs, study_costs
+from softtact.studies.cost import read_costs
 from softtact.studies.hybrid.config import load_study
+from softtact.studies.registry import OpenStudy
 
 ITEMS = ["indenters/circle_m", "indenters/square", "indenters/donut_m", "unseen/ellipse", "grasps/object_5"]
 
@@ -38,7 +39,8 @@ def test_the_models_press_as_ever_and_the_virtual_sensors_reference_is_not_press
     study = study_of(entries)
     assert study.source == "recording of a TSF-85" and study.counts_per_relative_change is None
     assert study.learnt_from == ["elastic", "hyperelastic"] and study.pressed_with == ["elastic", "hyperelastic", "foundation"]
-    assert {cost.stage: cost.jobs for cost in study_costs(study, read_costs(), results="none")}["read_recordings"] == len(ITEMS)
+    jobs = {cost.stage: cost.jobs for cost in OpenStudy("hybrid", study).costs(read_costs(), "none")}
+    assert jobs["read_recordings"] == len(ITEMS)
 
 
 def test_several_recordings_of_an_item_are_its_trials(entries):

@@ -7,6 +7,8 @@ import time
 import pytest
 from project import Project
 
+from softtact.studies.jobs import stages_of
+
 SLOW_PRESSES = {"SOFTTACT_STUB_WAIT_S": "0.4"}
 
 
@@ -57,8 +59,8 @@ def test_sigkill_in_every_stage_is_survived_and_ends_with_the_same_files(finishe
         each.edit("config/tiny.yaml", "donut_m], presses: null", "donut_m], presses: 4")
     finished.snakemake()
     project.snakemake("--retries", "1", environment={"SOFTTACT_STUB_KILLED": str(killed)})
-    elsewhere = {"import_published", "read_recordings"}      # of studies with readings of a real sensor
-    stages = {path.stem for path in (project.folder / "src/softtact/studies/hybrid/stages").glob("[!_]*.py")} - elsewhere
+    elsewhere = {"hybrid.import_published", "hybrid.read_recordings"}      # of studies with readings of a real sensor
+    stages = set(stages_of("hybrid", source=project.folder / "src")) - elsewhere
     assert {path.name for path in killed.iterdir()} == stages
     assert results(project) == results(finished)
 

@@ -280,10 +280,16 @@ if CURVES:
             run_stage("draw_fig10_learning_curve")
 
 
+def code_file(stage):
+    """The file of a stage below src/."""
+    module = stage_source(f"{KIND}.{stage}").partition(":")[0]
+    return f"src/{module.replace('.', '/')}.py"
+
+
 def drawn_by(stage):
     """The source files that a figure's page links to: its stage, and what that draws with."""
     files = [path for path in code(stage) if ("/reporting/" in path or "/figures/" in path) and not path.endswith(("/style.py", "/render.py"))]
-    return [f"src/softtact/studies/hybrid/stages/{stage}.py", *files]
+    return [code_file(stage), *files]
 
 
 def data_of(rule):
@@ -305,7 +311,7 @@ SOURCES = {
         for name in (*FIGURES, *VIEWS)
     },
 }
-STAGES = sorted(path.stem for path in Path("src/softtact/studies/hybrid/stages").glob("[!_]*.py"))
+STAGES = [stage.partition(".")[2] for stage in stages_of(KIND, source=Path("src"))]
 
 
 rule report:

@@ -81,7 +81,7 @@ def _meshes(options):
 
 def _cost(plan, left, costs, cores):
     """What is left to press and how long it takes, in one sentence."""
-    spec, times = plan.sensor.spec, costs["grasps"]["press_s"]
+    spec, times = plan.sensor.spec, costs["grasps"]["seconds"]
     bound = "at most " if plan.model == "auto" else ""
     minutes = left * plan.fingers * times["hyperelastic" if plan.model == "auto" else plan.model] / 60 / cores
     each = 4 * spec.map_shape[0] * spec.map_shape[1] + 2 * spec.taxels.rows * spec.taxels.columns

@@ -24,83 +24,38 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def _grasps(options):
+    from softtact.commands.cost import show_costs
     from softtact.press.asked import cores
     from softtact.progress import announce
-    from softtact.studies.cost import read_costs
-    from softtact.studies.grasps.config import cost_lines, load_grasp_study
+    from softtact.studies.cost import cost_lines, origin_of, read_costs
+    from softtact.studies.registry import KINDS, OpenStudy
 
-    study = load_grasp_study(options.config)
-    folder = options.out or Path("results") / study.values.study
+    opened = OpenStudy("grasps", KINDS["grasps"].call("load", KINDS["grasps"].call("read", options.config), options.config))
+    folder = options.out or Path("results") / opened.name
     if folder.is_file():
         raise InputError(f"--out {folder}: it is a file; give a folder for the results.")
-    lines = list(cost_lines(study, folder, read_costs(), cores=options.workers or cores()))
+    workers, measured = options.workers or cores(), read_costs()
+    costs = opened.costs(measured, folder)
     if options.cost:
-        show({"cost": lines}, as_json=options.json, lines=lines)
+        show_costs(opened, costs, cores=workers, as_json=options.json)
         return
-    for line in lines:
+    for line in cost_lines(opened.name, costs, origin=origin_of(opened, measured), cores=workers):
         announce(line)
-    _run(study, folder, options)
+    _run(opened, folder, workers, as_json=options.json)
 
 
-def _run(study, folder, options):
+def _run(opened, folder, workers, *, as_json):
     from softtact.robot.settings import import_mujoco
 
     import_mujoco()
-    from softtact.files import read_dataset, write_csv
-    from softtact.studies.grasps.claims import claims_of_grasps
-    from softtact.studies.grasps.report import draw_objects, draw_one_event, write_grasps_report
-    from softtact.studies.grasps.run import run_study
+    import pandas as pd
 
-    grasps = run_study(study, folder, workers=options.workers)
-    values = study.values
-    compared = {name: read_dataset(folder / "one_event" / f"{name}.nc") for name in values.one_event.objects}
-    claims = claims_of_grasps(grasps, compared, force_n=values.force_n, policy=values.policy, model=values.model)
-    write_csv(folder / "tables/claims.csv", claims)
-    figures = []
-    events, readings = _first_of_each(grasps, folder)
-    if events:
-        figures.append((folder / "figures/objects.png", f"Each object's first position at the grip, {values.force_n:g} N: the "
-                        "hand, and for both sensors the deformation map and the virtual sensor's mean reading."))
-        draw_objects(figures[-1][0], events, readings, _pictures(study, events))
-    if compared:
-        figures.append((folder / "figures/one_event.png", f"One and the same event, {values.one_event.force_n:g} N, by several "
-                        "models: what the left sensor feels."))
-        draw_one_event(figures[-1][0], compared)
-    write_grasps_report(folder, study=values.study, grasps=grasps, claims=claims, figures=figures,
-                        config=values.model_dump_json(indent=2))
+    from softtact.studies.jobs import run_jobs
+
+    run_jobs(opened.kind, opened.jobs(folder), folder, threads=workers, label=opened.name)
+    grasps, claims = pd.read_csv(folder / "grasps.csv"), pd.read_csv(folder / "tables/claims.csv")
     failed = int((grasps.status != "done").sum())
     summary = {"grasps": len(grasps), "failed": failed, "report": str(folder / "report.html"),
                "claims": dict(zip(claims.claim, claims.verdict, strict=True))}
-    show(summary, as_json=options.json, lines=[*(f"{verdict:20} {claim}" for claim, verdict in summary["claims"].items()),
-                                               f"{len(grasps)} grasps, {failed} failed; open {summary['report']}"])
-
-
-def _first_of_each(grasps, folder):
-    """{object: events} and {object: readings} of the first position of each object that was done."""
-    from softtact.files import read_dataset
-    from softtact.robot.events import read_events
-
-    first = grasps[grasps.status == "done"].drop_duplicates("object")
-    events = {one.object: read_events(folder / "grasps" / one.grasp / "events.nc") for one in first.itertuples()}
-    return events, {one.object: read_dataset(folder / "grasps" / one.grasp / "readings.nc") for one in first.itertuples()}
-
-
-def _pictures(study, events):
-    """{object: image of the hand at the grip}, without any where MuJoCo does not draw."""
-    from softtact.geometry.meshes import read_mesh
-    from softtact.robot.events import record_of
-    from softtact.robot.render import draw_rows
-    from softtact.robot.scene import Placement, build_scene
-    from softtact.robot.settings import load_scene
-    from softtact.studies.grasps.config import entry_of
-
-    pictures = {}
-    for name, data in events.items():
-        entry, record = entry_of(study, name), record_of(data)
-        scene = build_scene(read_mesh(entry.file, unit=entry.unit), study.spec, load_scene(**study.values.scene),
-                            Placement(*(data.attrs[key] for key in ("x_mm", "y_mm", "angle_deg"))))
-        images = draw_rows(scene, record, [record.event_row[1]], view=(20.0, -20.0, 0.22), size=(300, 300))
-        if images is None:
-            return {}
-        pictures[name] = images[0]
-    return pictures
+    show(summary, as_json=as_json, lines=[*(f"{verdict:20} {claim}" for claim, verdict in summary["claims"].items()),
+                                          f"{len(grasps)} grasps, {failed} failed; open {summary['report']}"])

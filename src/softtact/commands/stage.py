@@ -13,13 +13,13 @@ EXAMPLES = r"""
 
 def add(commands: argparse._SubParsersAction) -> None:
     """Add the command to the parser."""
-    from softtact.studies.hybrid.stages.__main__ import add_arguments
+    from softtact.studies.__main__ import add_arguments
 
     add_arguments(add_command(commands, "stage", _stage, "Run one stage of the workflow on files, as its rule does.", EXAMPLES,
                               json=False))
 
 
 def _stage(options):
-    from softtact.studies.hybrid.stages.__main__ import run_stage
+    from softtact.studies.__main__ import run_stage
 
     run_stage(options)

@@ -1,55 +1,105 @@
-"""Which source files a module runs: its static imports inside `src/`, followed to the end.
+"""Which source files a stage runs: its static imports inside `src/`, followed to the end.
 
 Snakemake does not notice an edit inside an imported package. So every rule names the closure of its stage as an input,
-and an edit reruns just the stages that import the edited file.
+and an edit reruns just the stages that import the edited file. A study that runs without Snakemake keeps the closure's hash.
 """
 
 import ast
+from collections.abc import Iterable, Iterator
 from functools import cache
+from hashlib import sha256
 from pathlib import Path
 
+Import = ast.Import | ast.ImportFrom
+_FUNCTION = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
 
-def code_closure(module: str, *, source: str | Path = "src") -> list[str]:
-    """Sorted paths of `module`'s file and of everything below `source` that it imports, directly or not."""
+
+def code_closure(stage: str, *, source: str | Path = "src") -> list[str]:
+    """Sorted paths of a stage's file and of everything of its package below `source` that it imports, directly or not.
+
+    stage: `module`, or `module:function`, of which the function's own imports count, those of the module's functions that it
+        calls, and those at the module's level
+    """
+    module, _, function = stage.partition(":")
     source = Path(source)
-    found, waiting = set(), [_file(module, source)]
+    first = _file(module, source)
+    if first is None:
+        return []
+    found, waiting = {str(first)}, list(_reached(str(first), source, function))
     while waiting:
         path = waiting.pop()
-        if path is None or path in found:
-            continue
-        found.add(path)
-        waiting += [file for file in _imported_files(path, source)]
-    return sorted(str(path) for path in found)
+        if path not in found:
+            found.add(path)
+            waiting += _reached(path, source)
+    return sorted(found)
 
 
-def _imported_files(path, source):
-    """Files below `source` that the imports of `path` reach."""
-    for node in _imports(path.read_text(encoding="utf-8"), module_level=path.name == "__init__.py"):
-        if isinstance(node, ast.Import):
-            yield from (_file(alias.name, source) for alias in node.names)
-        else:
-            base = _absolute(node, path, source)
-            yield from (_file_of_name(base, alias.name, source) for alias in node.names)
+def code_digest(stage: str, *, source: str | Path = "src") -> str:
+    """Hash of the names and the contents of a stage's closure: of an installed package as of a project's `src/`."""
+    source = Path(source)
+    found = sha256()
+    for path in code_closure(stage, source=source):
+        found.update(f"{Path(path).relative_to(source).as_posix()} {_content_digest(path)}\n".encode())
+    return found.hexdigest()
 
 
 @cache
-def _imports(text, *, module_level):
-    """The import statements of a source text. Parsed once, since the closures of a workflow's rules have most files in common.
+def _content_digest(path: str) -> str:
+    return sha256(Path(path).read_bytes()).hexdigest()
 
-    A package's own functions import late and for its users only; its module level is what everyone runs. What stands under
-    `if TYPE_CHECKING:` is never run.
+
+@cache
+def _reached(file: str, source: Path, function: str = "") -> list[str]:
+    """Files of its package that a file imports. Found once: the closures of a workflow's rules have most files in common."""
+    path = Path(file)
+    text, package, reached = path.read_text(encoding="utf-8"), path.relative_to(source).parts[0], []
+    for node in _imports_of_function(text, function) if function else _imports_of_file(text, path):
+        if isinstance(node, ast.Import):
+            files = [_file(alias.name, source) for alias in node.names if alias.name.split(".")[0] == package]
+        else:
+            base = _absolute(node, path, source)
+            files = [_file_of_name(base, alias.name, source) for alias in node.names] if base.split(".")[0] == package else []
+        reached += [str(found) for found in files if found]
+    return reached
+
+
+def _imports_of_file(text: str, path: Path) -> list[Import]:
+    """The import statements that an import of the file may come to run.
+
+    A package's own functions import late and for its users only; its module level is what everyone runs.
     """
+    return _imports(_run(ast.parse(text).body, into_functions=path.name != "__init__.py"))
+
+
+def _imports_of_function(text: str, name: str) -> list[Import]:
+    """The import statements at a module's level, in a function of it, and in the module's functions and classes that this uses."""
     tree = ast.parse(text)
-    nodes = tree.body if module_level else list(ast.walk(tree))
-    unrun = {id(below) for node in nodes if _for_types_only(node) for child in node.body for below in ast.walk(child)}
-    return [node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom) and id(node) not in unrun]
+    defined = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)}
+    used: dict[str, ast.AST] = {}
+    waiting = [name]
+    while waiting:
+        node = defined.get(waiting.pop())
+        if node is not None and node.name not in used:
+            used[node.name] = node
+            waiting += [below.id for below in ast.walk(node) if isinstance(below, ast.Name)]
+    return _imports([*_run(tree.body, into_functions=False), *_run(used.values())])
 
 
-def _for_types_only(node):
-    return isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
+def _imports(nodes: Iterable[ast.AST]) -> list[Import]:
+    return [node for node in nodes if isinstance(node, Import)]
 
 
-def _file_of_name(package, name, source):
+def _run(nodes: Iterable[ast.AST], *, into_functions: bool = True) -> Iterator[ast.AST]:
+    """The nodes and all below them; what stands under `if TYPE_CHECKING:` is never run."""
+    for node in nodes:
+        yield node
+        if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
+            yield from _run(node.orelse, into_functions=into_functions)
+        elif into_functions or not isinstance(node, _FUNCTION):
+            yield from _run(ast.iter_child_nodes(node), into_functions=into_functions)
+
+
+def _file_of_name(package: str, name: str, source: Path) -> Path | None:
     """The file that `from package import name` runs: the submodule `name`, or else the package's own file.
 
     A package whose submodule is imported has its `__init__.py` left out: those files are empty here, and would tie
@@ -58,17 +108,17 @@ def _file_of_name(package, name, source):
     return _file(f"{package}.{name}", source) or _file(package, source)
 
 
-def _file(module, source):
+def _file(module: str, source: Path) -> Path | None:
     """The file of a dotted module name, or None outside `source`."""
     stem = source.joinpath(*module.split("."))
     candidates = (stem.with_name(stem.name + ".py"), stem / "__init__.py")
     return next((path for path in candidates if path.is_file()), None)
 
 
-def _absolute(node, path, source):
+def _absolute(node: ast.ImportFrom, path: Path, source: Path) -> str:
     """Dotted name of the package that a from-import names; leading dots count from the importing file's package."""
     if not node.level:
-        return node.module
+        return node.module or ""
     package = path.relative_to(source).parts[:-1]
     base = package[: len(package) - node.level + 1]
     return ".".join([*base, *([node.module] if node.module else [])])

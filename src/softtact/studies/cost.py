@@ -1,41 +1,32 @@
 """What a study costs before it starts: jobs, hours of one core, disk.
 
 Times of one job come from the study's own finished jobs (results/STUDY/benchmarks, wall time), else from `config/costs.yaml`, which
-says where and when they were measured. A job whose file is there counts as done. Epochs count in full, though patience may end a
-training sooner, and all networks of a search cost as the printed one: so `at most`.
+says where and when they were measured. A job whose files are there counts as done.
 """
 
-import itertools
-import math
-import operator
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean
 from typing import TYPE_CHECKING, Any
 
-from softtact.errors import InputError
 from softtact.files import read_yaml
-from softtact.studies.hybrid.config import Study, here_or_shipped
+from softtact.studies.configuration import here_or_shipped
+from softtact.studies.jobs import Job, paths_of
 
 if TYPE_CHECKING:
-    from softtact.learning.settings import Search
-
-BYTES = 4          # of a number in a data set; twice that in a press
-READING_NUMBERS = 2          # branches of a reading: the way up and the way down
+    from softtact.studies.registry import OpenStudy
 
 
 @dataclass(frozen=True)
 class Cost:
-    """Jobs of one stage: how many, how many of them are left, seconds of each, and MB that all of them leave on disk.
-
-    Presses count each for itself, also where a fast model presses an object's places in one job.
-    """
+    """Jobs of one stage: how many, how many of them are left, seconds of each, and MB that all of them leave on disk."""
 
     stage: str
     jobs: int
     left: int
     each_s: float
+    """In the mean over the jobs that are left."""
     disk_mb: float = 0.0
 
     @property
@@ -49,179 +40,63 @@ def read_costs(path: str | Path | None = None) -> dict[str, Any]:
     return read_yaml(here_or_shipped(path or "config/costs.yaml"), missing="there is no file of measured times; correct the path.")
 
 
-def study_costs(study: Study, measured: dict[str, Any], *, results: str | Path = "results") -> list[Cost]:
-    """[Cost] of a `Study`, in the order of its work. A study on the published archive presses nothing and is refused."""
-    if study.archive:
-        raise InputError(f"the study {study.name}: it reads the published archive, whose size is known after the import only; "
-                         "costs are told of studies that press.")
-    folder = Path(results, study.name)
-    costs = [*_presses(study, measured, folder), _readings(study, measured, folder), *_learning(study, measured, folder)]
-    return [*costs, Cost("all else", 1, int(not (folder / "report.html").exists()), measured["all_else_s"])]
+def origin_of(opened: "OpenStudy", measured: Mapping[str, Any]) -> str:
+    """Where and when the times of a kind of study were measured."""
+    return measured.get(opened.kind, measured)["origin"]
 
 
-def cost_lines(study: Study, costs: Sequence[Cost], measured: dict[str, Any], *, cores: int) -> Iterator[str]:
+def costs_of_jobs(opened: "OpenStudy", measured: Mapping[str, Any], folder: str | Path) -> list[Cost]:
+    """[Cost] of a study that lists its jobs, in their order.
+
+    measured: config/costs.yaml, with `seconds` and `mb` below the kind
+    """
+    stages: dict[str, list[Job]] = {}
+    for job in opened.jobs(folder):
+        stages.setdefault(job.stage, []).append(job)
+    times = measured[opened.kind]
+    return [_stage_cost(stage, jobs, times, Path(folder)) for stage, jobs in stages.items()]
+
+
+def _stage_cost(stage, jobs, times, folder):
+    left = [job for job in jobs if not all(Path(path).exists() for path in paths_of(job.made()))]
+    seconds = own_s(folder, f"{stage}/**/*.tsv") or mean(_job_s(job, times) for job in left or jobs)
+    return Cost(stage, len(jobs), len(left), seconds, len(jobs) * times["mb"].get(stage, times["mb"]["any"]))
+
+
+def _job_s(job, times):
+    """Seconds of a job by its work: `start` for each, and so many for each unit."""
+    return times["seconds"]["start"] + sum(count * times["seconds"][unit] for unit, count in job.work.items())
+
+
+def cost_lines(name: str, costs: Sequence[Cost], *, origin: str, cores: int) -> Iterator[str]:
     """The costs as a table for people."""
     width = max(len(cost.stage) for cost in costs)
-    yield f"{'cost of the study ' + study.name:{width}}{'jobs':>7}{'left':>7}{'s each':>9}{'core hours':>12}{'MB':>8}"
+    yield f"{'cost of the study ' + name:{width}}{'jobs':>7}{'left':>7}{'s each':>9}{'core hours':>12}{'MB':>8}"
     for cost in costs:
         yield f"{cost.stage:{width}}{cost.jobs:7}{cost.left:7}{cost.each_s:9.3g}{cost.hours:12.2f}{cost.disk_mb:8.0f}"
     hours = sum(cost.hours for cost in costs)
     yield (f"{'in all':{width}}{sum(cost.jobs for cost in costs):7}{sum(cost.left for cost in costs):7}{'':9}{hours:12.2f}"
            f"{sum(cost.disk_mb for cost in costs):8.0f}")
     yield (f"at most {_words(hours / cores)} on {cores} cores, without a GPU. Times are this study's own where it has run, else "
-           f"{measured['origin']}")
+           f"{origin}")
 
 
 def _words(hours):
     return f"{60 * hours:.0f} minutes" if hours < 2 else f"{hours:.0f} hours" if hours < 72 else f"{hours / 24:.1f} days"
 
 
-def _presses(study, measured, folder):
-    values = study.values
-    load_steps, grid = len(values.forces_n), math.prod(study.spec.map_shape)
-    for model in study.pressed_with:
-        files = [folder / "presses" / item.set / item.id / f"{model}.nc" for item in study.items()]
-        times, jobs = measured["presses"].get(model) or measured["presses"][values.models[model].kind], study.press_jobs(model)
-        seconds = _own_press_s(folder, model, jobs) or times["fixed_s"] * len(jobs) / len(files) + load_steps * times["load_step_s"]
-        yield Cost(f"simulate_press, {model}", len(files), _left(files), seconds, len(files) * load_steps * grid * 2 * BYTES / 1e6)
-
-
-def _readings(study, measured, folder):
-    files = [folder / "tactile" / item.set / f"{item.id}.nc" for item in study.items()]
-    stage = "read_virtual_sensor" if study.virtual else "read_recordings"
-    numbers = sum(map(study.readings_of, study.items())) * len(study.values.forces_n) * READING_NUMBERS
-    taxels = study.spec.taxels.rows * study.spec.taxels.columns
-    seconds = _own(folder, f"{stage}/*/*.tsv") or measured["reading_s"]     # of both: most of it is the start of a program
-    return Cost(stage, len(files), _left(files), seconds, numbers * taxels * 2 * BYTES / 1e6)
-
-
-@dataclass(frozen=True)
-class Sizes:
-    """Samples of each split: a map with its reading."""
-
-    train: int
-    validation: int
-    tests: int
-
-    @classmethod
-    def of(cls, study: Study) -> "Sizes":
-        """As many as the study has where all presses are within their models' validity."""
-        load_steps, dataset = len(study.values.forces_n), study.values.dataset
-        maps = {name: len(items) * load_steps for name, items in study.items_of.items()}
-        trained = round(dataset.train_fraction * maps["indenters"])
-        each = study.trials_of("indenters")
-        return cls(train=round(trained * (1 if dataset.training_trials == "mean" else each)),
-                   validation=round((maps["indenters"] - trained) * each),
-                   tests=round(sum(maps[name] * study.trials_of(name) for name in ("unseen", "grasps"))))
-
-
-def _learning(study, measured, folder):
-    values, sizes, models = study.values, Sizes.of(study), study.tested
-    numbers = math.prod(study.spec.map_shape) + study.spec.taxels.rows * study.spec.taxels.columns
-    disk = (sizes.train + sizes.validation + sizes.tests) * numbers * BYTES * len(study.learnt_from) / 1e6
-    times, own = measured["networks"], values.network.architecture
-    beside = "printed" if own == "compact" else "compact"
-    score = {kind: (sizes.validation + sizes.tests) * time["predict_map_s"] for kind, time in times.items()}
-    searched = min(sizes.train, values.search.maps or sizes.train)
-    search_s = values.search.trials * epochs_of_a_trial(values.search) * _epoch_s(times["printed"], searched, sizes)
-    start_s = measured["start_s"]
-
-    def stage(name, files, seconds, pattern, disk_mb=0.0):
-        files = [folder / file for file in files]
-        return Cost(name, len(files), _left(files), _own(folder, pattern) or start_s + seconds, disk_mb)
-
-    def learnt(name, among=models):
-        return [f"learning/{model}/{name}" for model in among]
-
-    return [
-        stage("build_dataset", ["dataset/manifest.csv"], disk / measured["write_mb_per_s"], "build_dataset/*.tsv", disk),
-        stage("search_hyperparameters", learnt("search.csv"), search_s, "search_hyperparameters/*.tsv"),
-        *([stage("find_learning_rate", learnt("rate.json"), _rates_s(times["printed"], values, sizes), "find_learning_rate/*.tsv")]
-          if "printed" in (own, beside) and values.training.learning_rate == "found" else []),
-        stage(f"train_cnn, {own}", learnt("model.pt"), _training_s(times[_form(own)], own, values, sizes), "train_cnn/*.tsv"),
-        stage(f"train_beside, {beside}", learnt(f"{beside}/model.pt"), _training_s(times[beside], beside, values, sizes),
-              "train_beside/*.tsv"),
-        stage("evaluate", ["evaluation/summary.csv"], len(models) * score[_form(own)], "evaluate/*.tsv"),
-        stage("compare_networks", ["tables/networks.csv"], len(models) * sum(score.values()), "compare_networks/*.tsv"),
-        *([stage("repeat_learning", learnt("seeds.csv"), _repeats_s(times, values, sizes), "repeat_learning/*.tsv")]
-          if values.learning.seeds > 1 else []),
-        *([stage("learning_curve", learnt("learning_curve.csv", study.learnt_from), _curve_s(times, values, sizes),
-                 "learning_curve/*.tsv")] if values.learning_curve.shares else []),
-    ]
-
-
-def _form(architecture):
-    """Whose times an architecture has: the searched one is of the printed form."""
-    return "printed" if architecture == "searched" else architecture
-
-
-def _epoch_s(time, train, sizes):
-    """Seconds of one epoch over `train` samples, with its validation."""
-    return train * time["train_map_s"] + sizes.validation * time["predict_map_s"]
-
-
-def epochs_of_a_trial(search: "Search") -> float:
-    """Epochs that Hyperband gives a trial in the mean: Optuna's brackets, in each of which one in `reduction_factor` goes on."""
-    factor = search.reduction_factor
-    rungs = [factor**k for k in range(search.max_epochs.bit_length()) if factor**k <= search.max_epochs]     # 1, 3, 9, ...
-    shares, means = [], []
-    for bracket in range(len(rungs)):
-        stops = [*rungs[bracket:], search.max_epochs]
-        means.append(stops[0] + sum((high - low) / factor**(k + 1) for k, (low, high) in enumerate(itertools.pairwise(stops))))
-        s = len(rungs) - 1 - bracket
-        shares.append(math.ceil(len(rungs) * factor**s / (s + 1)))
-    return sum(map(operator.mul, shares, means)) / sum(shares)
-
-
-def _training_s(time, architecture, values, sizes):
-    epochs = (architecture == "compact" and values.network.compact.epochs) or values.training.epochs
-    return epochs * _epoch_s(time, sizes.train, sizes)
-
-
-def _repeats_s(times, values, sizes):
-    each = (_training_s(times[_form(kind)], kind, values, sizes) for kind in values.learning.networks)
-    return values.learning.seeds * sum(each)
-
-
-def _rates_s(time, values, sizes):
-    return len(values.training.rates) * values.training.rate_epochs * _epoch_s(time, sizes.train, sizes)
-
-
-def _curve_s(times, values, sizes):
-    """Seconds of one model's learning curve: equal steps for each share, and all test maps read after each."""
-    total, batch = 0.0, values.training.batch
-    for kind in values.learning_curve.networks:
-        time = times[_form(kind)]
-        for share in values.learning_curve.shares:
-            part = max(1, round(share * sizes.train))
-            epochs = max(1, round(values.learning_curve.steps / math.ceil(part / batch)))
-            total += epochs * _epoch_s(time, part, sizes) + (sizes.validation + sizes.tests) * time["predict_map_s"]
-    return total
-
-
-def _left(files):
+def left_of(files: Sequence[Path]) -> int:
+    """How many of the files are not there."""
     return sum(not file.exists() for file in files)
 
 
-def _own(folder, pattern):
+def own_s(folder: Path, pattern: str) -> float | None:
     """Mean wall time of the study's own finished jobs, or None."""
-    times = [seconds for path in folder.glob(f"benchmarks/{pattern}") if (seconds := _wall_s(path)) is not None]
+    times = [seconds for path in folder.glob(f"benchmarks/{pattern}") if (seconds := wall_s(path)) is not None]
     return mean(times) if times else None
 
 
-def _own_press_s(folder, model, jobs):
-    """The same for one press of a model, several of which may share a job; jobs: [[Item]]."""
-    seconds, presses = 0.0, 0
-    for items in jobs:
-        stage = "simulate_press" if len(items) == 1 else "simulate_presses"
-        path = folder / "benchmarks" / stage / items[0].set / items[0].id / f"{model}.tsv"
-        took = _wall_s(path) if path.exists() else None
-        if took is not None:
-            seconds, presses = seconds + took, presses + len(items)
-    return seconds / presses if presses else None
-
-
-def _wall_s(path):
+def wall_s(path: Path) -> float | None:
     """Seconds of wall time in Snakemake's benchmark of a job; None of one that was killed while it wrote them."""
     names, *rows = [line.split("\t") for line in path.read_text(encoding="utf-8").splitlines()] or [[]]
     return float(rows[0][0]) if rows and len(rows[0]) == len(names) else None

@@ -57,6 +57,11 @@ def draw_objects(path: Path, events: Mapping[str, "xarray.Dataset"], readings: M
     pictures: {object: image (height, width, 3)}, empty where MuJoCo does not draw
     """
     names = list(events)[:2 * _MOST_COLUMNS]
+    if not names:
+        figure = pyplot().figure(figsize=(4, 1))
+        figure.text(0.5, 0.5, "no grasp was done", ha="center", va="center")
+        save(figure, path)
+        return
     blocks, columns = -(-len(names) // _MOST_COLUMNS), min(len(names), _MOST_COLUMNS)
     rows = (1 if pictures else 0) + 4
     figure = pyplot().figure(figsize=(2.3 * columns + 0.6, 2.0 * rows * blocks + 0.4), layout="constrained")

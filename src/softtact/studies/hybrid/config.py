@@ -5,15 +5,14 @@ that rules hand their stages plain values, and a comment in a YAML file reruns n
 (`softtact.sensors.library`); a file below config/ that the working folder does not have is the one that ships with the package.
 """
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from importlib import resources
 from itertools import groupby
 from pathlib import Path
 from statistics import mean
 from typing import Any
 
 from softtact.errors import InputError
-from softtact.files import read_yaml
 from softtact.materials.config import load_material
 from softtact.progress import announce
 from softtact.published.archive import SOURCE as PUBLISHED
@@ -23,12 +22,11 @@ from softtact.readout.ssim import check_window
 from softtact.readout.virtual_sensor import VirtualSensorSettings, make_specimen
 from softtact.sensors.library import is_shipped, material_file, sensor_file
 from softtact.sensors.specification import SensorSpec
-from softtact.studies.faults import refuse_unknown, validated
+from softtact.studies.configuration import SHIPPED, here_or_shipped, read_mapping, refuse_unknown, validated
 from softtact.studies.hybrid.keys import CENTRED, Recording, Values
 from softtact.studies.hybrid.objects import Item, check_shapes, items_of_set, make_item, read_catalogue
 from softtact.studies.hybrid.recordings import recordings_of
 
-SHIPPED = Path(str(resources.files("softtact.studies"))) / "data"     # what stands in the project's config/
 SETS = ("indenters", "unseen", "grasps")
 TOGETHER = 50     # presses of a fast model in one job at most: a minute's work, and a command line within the system's limit
 
@@ -129,17 +127,8 @@ class Study:
 
 def read_values(configfile: str | Path | None = None, *, default: str | Path = "config/config.yaml") -> dict[str, Any]:
     """The configuration mapping of a file over the default one, merged as Snakemake does it."""
-    values = _read_yaml(here_or_shipped(default))
-    return values if configfile is None else _merged(values, _read_yaml(here_or_shipped(configfile)))
-
-
-def here_or_shipped(path: str | Path) -> Path:
-    """A file as it is named or, where the working folder has no such file below config/, the one that ships with the package."""
-    path = Path(path)
-    if path.exists() or path.parts[:1] != ("config",):
-        return path
-    shipped = SHIPPED.joinpath(*path.parts[1:])
-    return shipped if shipped.exists() else path
+    values = read_mapping(default)
+    return values if configfile is None else _merged(values, read_mapping(configfile))
 
 
 def _merged(base, over):
@@ -147,16 +136,11 @@ def _merged(base, over):
                    for key, value in over.items()}
 
 
-def _read_yaml(path):
-    """A mapping of a YAML file; what is none is refused."""
-    values = read_yaml(path, missing="there is no such configuration; give the path of one, from the project's folder.")
-    if not isinstance(values, dict):
-        raise InputError(f"{path}: it holds no keys; write a configuration such as config/tiny.yaml.")
-    return values
+def load_study(values: Mapping[str, Any], path: Path | None = None) -> Study:
+    """The `Study` of a configuration mapping; the first fault becomes an `InputError` of one sentence.
 
-
-def load_study(values: dict[str, Any]) -> Study:
-    """The `Study` of a configuration mapping; the first fault becomes an `InputError` of one sentence."""
+    path: the file that it was read from; the files that a hybrid study names are relative to the working folder, not to this one
+    """
     checked = validated(Values, values, where="the configuration")
     spec = SensorSpec.from_yaml(_named("sensor", sensor_file, checked.sensor))
     _check_forces(checked, spec)

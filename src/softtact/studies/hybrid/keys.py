@@ -283,6 +283,7 @@ class Values(Section):
     """The whole configuration; `config/config.yaml` holds it with comments."""
 
     study: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$")]
+    kind: Literal["hybrid"] = Field("hybrid", exclude=True, description="of study; other kinds: skin, palpation, grasps")
     seed: Annotated[int, Field(ge=0)]
     sensor: str
     materials: list[Name]

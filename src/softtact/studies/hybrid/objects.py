@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from softtact.errors import InputError
 from softtact.files import read_yaml
-from softtact.studies.faults import refuse_unknown, validated
+from softtact.studies.configuration import refuse_unknown, validated
 from softtact.studies.hybrid.keys import CENTRED, CatalogueEntry, ItemSet
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import Any
 from softtact.errors import InputError
 from softtact.readout.recording import COLUMNS, ROWS
 from softtact.sensors.specification import SensorSpec
-from softtact.studies.faults import refuse_unknown
+from softtact.studies.configuration import refuse_unknown
 from softtact.studies.hybrid.keys import Data, Recording
 
 _AT = "the configuration, at 'data.recordings'"

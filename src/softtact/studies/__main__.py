@@ -1,13 +1,12 @@
 """Run one stage on files, as the workflow does.
 
 Example:
-    python -m softtact.studies.hybrid.stages fit_material --in curves=a.csv --in curves=b.csv --out card=x.json --settings '{...}'
+    python -m softtact.studies hybrid.fit_material --in curves=a.csv --in curves=b.csv --out card=x.json --settings '{...}'
 """
 
 import argparse
-import importlib
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from softtact.errors import InputError, SofttactError, missing_extra
@@ -19,23 +18,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         run_stage(options)
     except SofttactError as error:
-        return _said(options, error)
+        return _refused(options, error)
     except ModuleNotFoundError as error:
         sentence = missing_extra(error)
         if sentence is None:
             raise
-        return _said(options, sentence)
+        return _refused(options, sentence)
     return 0
 
 
-def _said(options, sentence):
+def _refused(options, sentence):
     print(f"softtact {options.stage}: {sentence}", file=sys.stderr)
     return 1
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
     """Declare a stage's command line on `parser`."""
-    parser.add_argument("stage", metavar="NAME", help="a module of softtact.studies.hybrid.stages, named as the workflow's rule")
+    parser.add_argument("stage", metavar="NAME",
+                        help="KIND.NAME, a stage of a kind of study named as the workflow's rule; of the hybrid study NAME alone")
     parser.add_argument("--in", dest="inputs", action="append", default=[], metavar="NAME=PATH",
                         help="an input file; the same name again, or NAME[]=PATH, makes a list")
     parser.add_argument("--out", dest="outputs", action="append", default=[], metavar="NAME=PATH",
@@ -46,21 +46,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
 
 
 def run_stage(options: argparse.Namespace) -> None:
-    """Import the stage module and call its `run`."""
+    """Import the stage and call it."""
     from softtact.files import refuse_overwriting
+    from softtact.studies.jobs import find_stage
 
-    run = find_stage(options.stage)
+    run = find_stage(options.stage if "." in options.stage else f"hybrid.{options.stage}")
     inputs, outputs = _named_paths(options.inputs, option="--in"), _named_paths(options.outputs, option="--out")
     refuse_overwriting((path for _, path in _flat(inputs)), dict(_flat(outputs)))
     run(inputs=inputs, outputs=outputs, settings=_settings(options.settings), threads=options.threads)
-
-
-def find_stage(name: str) -> Callable[..., None]:
-    """The `run` function of stage `name`."""
-    stages = sorted(path.stem for path in Path(__file__).parent.glob("[!_]*.py"))
-    if name not in stages:
-        raise InputError(f"there is no stage {name!r}; the stages are {', '.join(stages)}.")
-    return importlib.import_module(f"softtact.studies.hybrid.stages.{name}").run
 
 
 class _Named(dict):

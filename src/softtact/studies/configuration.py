@@ -1,14 +1,37 @@
-"""What is wrong with a configuration, in one sentence that names the field, the value and the remedy."""
+"""Reading a study's configuration; what is wrong with one, in a sentence that names the field, the value and the remedy."""
 
 from collections.abc import Collection
-from typing import TypeVar
+from importlib import resources
+from pathlib import Path
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
 from softtact.errors import InputError
+from softtact.files import read_yaml
 from softtact.unknown_names import first_fault, known_keys, unknown
 
+SHIPPED = Path(str(resources.files("softtact.studies"))) / "data"     # what stands in the project's config/
+
 _Checked = TypeVar("_Checked", bound=BaseModel)
+
+
+def here_or_shipped(path: str | Path) -> Path:
+    """A file as it is named or, where the working folder has no such file below config/, the one that ships with the package."""
+    path = Path(path)
+    if path.exists() or path.parts[:1] != ("config",):
+        return path
+    shipped = SHIPPED.joinpath(*path.parts[1:])
+    return shipped if shipped.exists() else path
+
+
+def read_mapping(path: str | Path) -> dict[str, Any]:
+    """The keys and values of a configuration file; what holds none is refused."""
+    missing = "there is no such configuration; give the path of one, from the project's folder."
+    values = read_yaml(here_or_shipped(path), missing=missing)
+    if not isinstance(values, dict):
+        raise InputError(f"{path}: it holds no keys; write a configuration such as config/tiny.yaml.")
+    return values
 
 
 def validated(model: type[_Checked], values: object, *, where: str) -> _Checked:

@@ -1,0 +1,175 @@
+"""A study as a list of jobs, each a stage on files: what a workflow's rules are made of, and what runs here without a workflow.
+
+A stage is `softtact.studies.KIND.stages.NAME` with a function `run(*, inputs, outputs, settings, threads)`, or a function NAME of
+a module in that package (or of the module `stages` itself).
+"""
+
+import contextlib
+import fcntl
+import importlib
+import json
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import softtact
+from softtact.errors import InputError
+from softtact.files import read_json, refuse_overwriting, write_json
+from softtact.progress import announce
+from softtact.studies.code_closure import code_digest
+
+SOURCE = Path(softtact.__file__).parents[1]
+RECORD = ".made.json"
+Paths = Mapping[str, "str | Sequence[str]"]
+
+
+@dataclass(frozen=True)
+class Job:
+    """A stage on files."""
+
+    stage: str
+    """Its name, which the rule, the log and the benchmark have, too."""
+    inputs: Paths
+    """{name: path or paths} of the files that it reads."""
+    outputs: Paths
+    """{name: path or paths} of the files that it writes; `{wildcard}` stands for what tells it from other jobs of the stage."""
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    """JSON values: just those that the stage uses, for only their change runs it again."""
+    wildcards: Mapping[str, str] = field(default_factory=dict)
+    """{wildcard: value} of the outputs' names."""
+    work: Mapping[str, float] = field(default_factory=dict)
+    """{unit: how many}: sizes from which config/costs.yaml tells its time."""
+    threads: int = 1
+    """Cores that it uses in a workflow."""
+
+    @property
+    def label(self) -> str:
+        """The job in words."""
+        return " ".join([self.stage, *self.wildcards.values()])
+
+    def made(self) -> dict[str, str | list[str]]:
+        """The outputs with the wildcards' values in place."""
+        def named(path):
+            return path.format(**self.wildcards)
+
+        return {name: named(paths) if isinstance(paths, str) else list(map(named, paths)) for name, paths in self.outputs.items()}
+
+
+def paths_of(named: Mapping[str, Any]) -> list[str]:
+    """The paths of named inputs or outputs, one after the other."""
+    return [path for paths in named.values() for path in ([paths] if isinstance(paths, str) else paths)]
+
+
+def stage_source(stage: str, *, source: Path = SOURCE) -> str:
+    """`module` or `module:function` of a stage KIND.NAME, found without importing it."""
+    kind, _, name = stage.partition(".")
+    place = source / "softtact/studies" / kind / "stages"
+    if (place / f"{name}.py").is_file() and not name.startswith("_"):
+        return f"softtact.studies.{kind}.stages.{name}"
+    for path in [place.with_suffix(".py"), *sorted(place.glob("[!_]*.py"))]:
+        if path.is_file() and name in _functions(path):
+            return ".".join(path.with_suffix("").relative_to(source).parts) + f":{name}"
+    known = ", ".join(stages_of(kind, source=source)) or "those of a kind of study"
+    raise InputError(f"there is no stage {stage!r}; the stages are {known}.")
+
+
+def stages_of(kind: str, *, source: Path = SOURCE) -> list[str]:
+    """The names KIND.NAME of all stages of a kind of study."""
+    place = source / "softtact/studies" / kind / "stages"
+    paths = [path for path in [place.with_suffix(".py"), *place.glob("[!_]*.py")] if path.is_file()]
+    names = {name for path in paths for name in (["run"] if "run" in _functions(path) else _functions(path))
+             for name in [path.stem if name == "run" else name]}
+    return sorted(f"{kind}.{name}" for name in names)
+
+
+def _functions(path: Path) -> list[str]:
+    """The public functions at a module's level."""
+    return re.findall(r"^def ([a-z]\w*)\(", path.read_text(encoding="utf-8"), flags=re.MULTILINE)
+
+
+def find_stage(stage: str) -> Callable[..., None]:
+    """The function of a stage KIND.NAME."""
+    module, _, function = stage_source(stage).partition(":")
+    return getattr(importlib.import_module(module), function or "run")
+
+
+def run_jobs(kind: str, jobs: Sequence[Job], folder: str | Path, *, threads: int = 1, label: str = "") -> None:
+    """Run in this process what is left of a study's jobs, in their order.
+
+    A job is left unless its outputs are there and were made of the same inputs, settings and code, of which `.made.json` in the
+    folder keeps a digest. One that fails ends the run; what was made before it is kept.
+    """
+    folder = Path(folder)
+    with held(folder):
+        record = _Record(folder)
+        for number, job in enumerate(jobs, start=1):
+            digest = _job_digest(kind, job)
+            if record.has(job, digest):
+                continue
+            announce(f"{label or folder.name}: {number}/{len(jobs)} {job.label}")
+            record.forget(job)
+            inputs, outputs = ({name: Path(paths) if isinstance(paths, str) else [Path(path) for path in paths]
+                                for name, paths in named.items()} for named in (job.inputs, job.made()))
+            refuse_overwriting(map(Path, paths_of(job.inputs)), {path: Path(path) for path in paths_of(job.made())})
+            find_stage(f"{kind}.{job.stage}")(inputs=inputs, outputs=outputs, settings=json.loads(json.dumps(job.settings)),
+                                              threads=threads)
+            record.keep(job, digest)
+
+
+class _Record:
+    """What the outputs of a folder's jobs were made of: {first output: digest}, in a file."""
+
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / RECORD
+        try:
+            self._digests = read_json(self._path)
+        except InputError:     # none yet, or damaged: everything is made again
+            self._digests = {}
+
+    def has(self, job: Job, digest: str) -> bool:
+        made = paths_of(job.made())
+        return self._digests.get(made[0]) == digest and all(Path(path).exists() for path in made)
+
+    def forget(self, job: Job) -> None:
+        if self._digests.pop(paths_of(job.made())[0], None) is not None:
+            write_json(self._path, self._digests)
+
+    def keep(self, job: Job, digest: str) -> None:
+        self._digests[paths_of(job.made())[0]] = digest
+        write_json(self._path, self._digests)
+
+
+def _job_digest(kind, job):
+    """Of all that a job's outputs follow from: its settings, the contents of its inputs, the code of its stage."""
+    found = sha256(code_digest(stage_source(f"{kind}.{job.stage}"), source=SOURCE).encode())
+    found.update(json.dumps([job.stage, job.settings], sort_keys=True).encode())
+    for name, paths in job.inputs.items():
+        found.update(name.encode())
+        for path in [paths] if isinstance(paths, str) else paths:
+            if not Path(path).is_file():
+                raise InputError(f"{path}: there is no such file, which {job.label} reads.")
+            found.update(sha256(Path(path).read_bytes()).digest())
+    return found.hexdigest()
+
+
+@contextlib.contextmanager
+def held(folder: str | Path) -> Iterator[None]:
+    """Keep a second run of a study out of its folder while the block runs.
+
+    The system drops this lock when its holder dies, however it dies; Snakemake's own would stay behind.
+    """
+    file = Path(folder, ".running")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        lock = file.open("w")
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written to ({error.strerror}); correct that.") from None
+    with lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise InputError(f"{folder}: another run of this study is at work; wait for its end.") from None
+        yield
