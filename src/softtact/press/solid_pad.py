@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import trimesh
 
+from softtact.contact.height_field import NO_CONTACT_MM, HeightField
 from softtact.contact.pair import ContactPair
 from softtact.contact.surfaces import Surface
 from softtact.errors import InputError
@@ -24,7 +25,6 @@ from softtact.press.cache import cached_frustum_law
 from softtact.press.making import make_result, shell_of
 from softtact.press.result import PressResult
 from softtact.press.soft_object import OBJECT, SoftObject
-from softtact.press.touching import way_to_touch
 
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
@@ -36,39 +36,31 @@ _SHELL = "shell"  # the frame that never moves
 _ACROSS = 8  # elements across what a rigid object may touch, at least ...
 _MOST_PARTS = 3  # ... but no more in place of one
 _NEAR = 0.4  # of the layers' height over its lowest point: what of a rigid object may touch
-_DOWN = np.array([0.0, 0.0, -1.0])
 
 
 class SolidPad:
     """A sensor's layers as a mesh of HEX27: in plan one element for each frustum, or some twenty along the shorter side.
 
     Frame: that of the sensor, but z = 0 at the layers' lower side, and `height_mm` at the sensing surface.
-    fine (2, 2): least and largest x and y in mm of a part with smaller elements
     """
 
-    def __init__(self, sensor: "Sensor", *, fine: np.ndarray | None = None) -> None:
+    def __init__(self, sensor: "Sensor") -> None:
         self.sensor, self.shell, spec = sensor, shell_of(sensor), sensor.spec
         self._frusta = getattr(spec.dielectric, "frusta", None)
-        lines = [self._along(axis) for axis in range(2)]
-        self._lines = lines if fine is None else [_split(line, *fine[:, axis]) for axis, line in enumerate(lines)]
         dielectric, cover = _layers(spec)
         self.height_mm, self._plane_mm = dielectric + cover, dielectric
+        self._build()
+
+    def _build(self, fine: np.ndarray | None = None) -> None:
+        """Mesh the layers; fine (2, 2): least and largest x and y in mm of a part with smaller elements."""
+        lines, (dielectric, cover), spec = [self._along(axis) for axis in range(2)], _layers(self.sensor.spec), self.sensor.spec
+        self._lines = lines if fine is None else [_split(line, *fine[:, axis]) for axis, line in enumerate(lines)]
         levels = self._levels(dielectric, cover, spec.edge.held_below_mm)
         counts = [len(self._lines[0]) - 1, len(self._lines[1]) - 1, len(levels) - 1]
         low, high = [line[0] for line in self._lines], [line[-1] for line in self._lines]
         grading = [(line - line[0]) / (line[-1] - line[0]) for line in self._lines] + [levels / levels[-1]]
         mesh = box((*low, 0.0), (*high, self.height_mm), counts, grading=grading)
         self.mesh = mesh.with_regions(lambda x: np.where(x[:, 2] < dielectric, "dielectric", "cover"))
-
-    @classmethod
-    def under(cls, sensor: "Sensor", placed: trimesh.Trimesh) -> "SolidPad":
-        """The pad for a rigid object (mm, in its pose): finer below what of the object may touch it."""
-        coarse = cls(sensor)
-        triangles = coarse._touching(placed)
-        near = triangles[triangles[..., 2].min(axis=1) < coarse.height_mm * (1 + _NEAR)]
-        low, high = near.min(axis=(0, 1))[:2], near.max(axis=(0, 1))[:2]
-        half = 0.5 * np.asarray(sensor.spec.footprint_mm)
-        return cls(sensor, fine=np.clip([low, high], -half, half))
 
     def _along(self, axis: int) -> np.ndarray:
         """Ends of the elements along an axis in mm, without finer ones."""
@@ -125,11 +117,13 @@ class SolidPad:
     def with_rigid(self, placed: trimesh.Trimesh, *, friction: float | None = None, threads: int) -> SolidBody:
         """The pad and a rigid object (mm, in its pose) that just touches pad or shell, as one `SolidBody`.
 
+        The pad's elements become smaller below what of the object may touch it.
         Frame `object`: about the middle of the object's bounding box, with six freedoms.
         friction: Coulomb's coefficient of object and surface, by default the sensor's
         Raises InputError where the object misses the sensor.
         """
         triangles = self._touching(placed)
+        self._build(self._part_below(triangles))
         mesh, held = self._held()
         ends = triangles.reshape(-1, 3)
         rigid = {OBJECT: (0.5 * (ends.min(axis=0) + ends.max(axis=0)), triangles)}
@@ -149,22 +143,25 @@ class SolidPad:
         self._add_frusta(body)
         return body
 
+    def _part_below(self, triangles):
+        """Least and largest x and y (2, 2) of what may touch an object's triangles (t, 3, 3)."""
+        below = _points_below(triangles, self.height_mm * (1 + _NEAR))[:, :2]
+        half = 0.5 * np.asarray(self.sensor.spec.footprint_mm)
+        return np.clip([below.min(axis=0), below.max(axis=0)], -half, half)
+
     def _touching(self, placed):
         """Triangles (t, 3, 3) of a rigid object in the pad's frame, moved along z to where it just touches pad or shell."""
-        triangles = np.asarray(placed.triangles) + [0.0, 0.0, self.height_mm]
-        x, y = 0.5 * np.asarray(self.sensor.spec.footprint_mm)
-        a, b, c, d = ([sx * x, sy * y, self.height_mm] for sx, sy in ((-1, -1), (1, -1), (1, 1), (-1, 1)))
-        top = np.array([[a, b, c], [a, c, d]])
-        down = way_to_touch(triangles, top, _DOWN)
-        if not np.isfinite(down):
+        triangles, underside = np.asarray(placed.triangles), HeightField(placed)
+        half = 0.5 * np.asarray(self.sensor.spec.footprint_mm)
+        down = underside.lowest_over(-half, half)
+        if not down < NO_CONTACT_MM:
             low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
             raise InputError(
                 f"The object misses the sensor: it spans x {low[0]:.4g} to {high[0]:.4g} mm and y {low[1]:.4g} to {high[1]:.4g} "
-                f"mm, and nothing of it is over the {2 * x:g} x {2 * y:g} mm footprint about the origin; correct its pose."
+                f"mm, and nothing of it is over the {2 * half[0]:g} x {2 * half[1]:g} mm footprint about the origin; correct its "
+                "pose."
             )
-        if self.shell.exists:
-            down = min(down, way_to_touch(triangles, self.shell.top_mm(self.height_mm), _DOWN))
-        return triangles + down * _DOWN
+        return triangles + [0.0, 0.0, self.height_mm - min(down, self.shell.stop_mm(underside))]
 
     def _held(self):
         """The layers' mesh, and what holds it {face: axes}."""
@@ -289,6 +286,14 @@ def _layers(spec) -> tuple[float, float]:
 
 def _on_rim(x, lines):
     return np.any([np.abs(np.abs(x[:, axis]) - line[-1]) < 1e-9 for axis, line in enumerate(lines)], axis=0)
+
+
+def _points_below(triangles: np.ndarray, height: float) -> np.ndarray:
+    """Corners of triangles (t, 3, 3) below a height, and where their edges cross it (n, 3)."""
+    start, end = triangles.reshape(-1, 3), np.roll(triangles, -1, axis=1).reshape(-1, 3)
+    cross = (start[:, 2] < height) != (end[:, 2] < height)
+    share = (height - start[cross, 2]) / (end[cross, 2] - start[cross, 2])
+    return np.vstack([start[start[:, 2] < height], start[cross] + share[:, None] * (end[cross] - start[cross])])
 
 
 def _split(line: np.ndarray, low: float, high: float) -> np.ndarray:
