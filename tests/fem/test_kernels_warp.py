@@ -11,9 +11,8 @@ from softtact.errors import InputError
 from softtact.fem.assembly import SymmetricPattern, add_upper
 from softtact.fem.structured_meshes import box, in_tetrahedra
 from softtact.materials.laws.registry import make_law
-from softtact.models.solid.blocks import region_blocks
+from softtact.models.solid.blocks import find_device, region_blocks
 from softtact.models.solid.body import SolidBody
-from softtact.models.solid.device import find_device
 from softtact.models.solid.path import SolidPath, last
 
 warp = pytest.importorskip("warp", reason="the extra `device` is not installed")
@@ -76,7 +75,7 @@ def test_an_unknown_device_and_a_gpu_that_is_not_there_are_refused():
 
 
 def test_what_warp_says_of_itself_does_not_stand_in_the_output():
-    lines = ["from softtact.models.solid.device import find_device; find_device('auto')",
+    lines = ["from softtact.models.solid.blocks import find_device; find_device('auto')",
              "from softtact.fem.kernels_warp import WarpKernels; WarpKernels('cpu')"]
     for line in lines:
         assert subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True).stdout == ""

@@ -1,12 +1,17 @@
-"""Elements of a solid's regions, each kind with the projection of its changes of volume that keeps it from locking."""
+"""A solid's regions: their elements, each kind with the projection of its changes of volume that keeps it from locking; where these
+are summed up, in compiled loops on the processor or by Warp's kernels; which bodies they make; and their corners' shares.
+"""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 
-from softtact.errors import InputError
+from softtact.errors import InputError, how_to_install
 from softtact.fem.elements import Element, reference_gradients
 from softtact.fem.kernels_plain import PlainLoops
+from softtact.fem.quadratic_nodes import shares_of_corners
 from softtact.fem.quadrature import Quadrature
 from softtact.fem.solid_block import SolidBlock
 from softtact.fem.solid_mesh import SolidMesh
@@ -15,6 +20,8 @@ from softtact.materials.laws.base import Law
 
 _COMPRESSIBLE = 8.0  # K / mu (Poisson's ratio 0.44) up to which tetrahedra and triangles need no projection
 _ROUNDING_MM = 1e-9  # elements whose nodes differ by less are of one shape
+_LARGE = 80_000  # unknowns: from here on a factor of the whole costs more
+_MOST_BULK = 100.0  # times the shear modulus: beyond, corners alone lock, and two levels take too many steps
 
 
 def region_blocks(mesh: SolidMesh, laws: Mapping[str, Law]) -> list[tuple[str, np.ndarray, SolidBlock]]:
@@ -101,3 +108,84 @@ def _pressure(element: Element, points: np.ndarray, law: Law) -> np.ndarray:
             return np.ones((len(points), 1))
         return np.eye(len(points))
     return np.column_stack([np.ones(len(points)), points])
+
+
+# --- where elements are summed up ---
+
+
+def find_device(name: str) -> str:
+    """`cpu`, `warp`, or Warp's name of a GPU; InputError where that is unknown, or not there."""
+    if name in ("cpu", "warp"):
+        return name
+    if name not in ("auto", "cuda"):
+        raise InputError(f"device={name!r} is unknown; write 'cpu', 'warp', 'cuda' or 'auto'.")
+    try:
+        import warp
+    except ModuleNotFoundError:
+        if name == "auto":
+            return "cpu"
+        raise InputError(f"device={name!r}: {how_to_install('warp')}") from None
+    warp.config.log_level = warp.LOG_WARNING     # what it tells beside would stand in a command's output
+    if warp.is_cuda_available():
+        return "cuda"
+    if name == "auto":
+        return "cpu"
+    raise InputError(f"device={name!r}: Warp finds no GPU here; write 'cpu', or leave it out.")
+
+
+def sum_on(blocks: Sequence[tuple[str, np.ndarray, SolidBlock]], device: str) -> None:
+    """Let Warp sum up the spatial elements."""
+    from softtact.fem.kernels_warp import WarpKernels
+
+    loops = WarpKernels("cpu" if device == "warp" else device)
+    for _, _, block in blocks:
+        if not isinstance(block.loops, PlainLoops):
+            block.loops = loops  # type: ignore[assignment]
+
+
+# --- bodies and corners ---
+
+
+def bodies_of(mesh: SolidMesh) -> np.ndarray:
+    """(n,) number of the body that each node of a mesh belongs to; nodes of no element are -1."""
+    n, cells = len(mesh.points), [nodes for _, _, nodes in mesh.cells]
+    pairs = np.concatenate([np.column_stack([np.repeat(nodes[:, 0], nodes.shape[1]), nodes.ravel()]) for nodes in cells])
+    _, label = connected_components(sp.coo_matrix((np.ones(len(pairs)), pairs.T), shape=(n, n)), directed=False)
+    used = np.zeros(n, dtype=bool)
+    used[pairs.ravel()] = True
+    return np.where(used, label, -1)
+
+
+def refuse_loose(mesh: SolidMesh, free: np.ndarray, supported: np.ndarray, held: Sequence[str]) -> None:
+    """Refuse a body of which every component of every node is free: it has no balance.
+
+    free (n, 3): which components are unknown, the mesh's nodes first;  supported: nodes that items tie to the ground
+    held: the faces that are held, for the message
+    """
+    dimensions, body = 3 if mesh.geometry == "solid" else 2, bodies_of(mesh)
+    bound = np.logical_not(free[: len(body), :dimensions].all(axis=1))
+    bound[supported] = True
+    for k in np.unique(body[body >= 0]):
+        own = body == k
+        if not bound[own].any():
+            x, y, z = mesh.points[own].mean(axis=0)
+            raise InputError(
+                f"Nothing holds the body around {x:.4g}, {y:.4g}, {z:.4g} mm; hold one of its faces or let a frame carry it "
+                f"(held are {', '.join(held) or 'none'})."
+            )
+
+
+def lift_from_corners(mesh: SolidMesh, laws: Mapping[str, Law], free: np.ndarray) -> sp.csr_matrix | None:
+    """Values (unknowns, c) at the free unknowns, numbered 3 to a node, from those at the free corners.
+
+    None where two levels do not serve (docs/notebook/2026-11-27-large-solids.md).
+    """
+    plane = mesh.geometry != "solid"  # whose factors take few operations
+    if plane or len(free) < _LARGE or any(law.bulk_modulus > _MOST_BULK * law.mu0 for law in laws.values()):
+        return None
+    shares = shares_of_corners(len(mesh.points), ((element, nodes) for _, element, nodes in mesh.parts()))
+    if shares is None:
+        return None
+    lift = sp.csr_matrix(sp.kron(shares, sp.identity(3)))
+    corners = free[lift.diagonal()[free] > 0]
+    return sp.csr_matrix(lift[free][:, corners]) if len(corners) else None

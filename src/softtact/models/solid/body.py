@@ -27,10 +27,7 @@ from softtact.fem.solid_mesh import SolidMesh
 from softtact.linalg.refined import RefinedSolver
 from softtact.linalg.workers import Workers, slices
 from softtact.materials.laws.base import Law
-from softtact.models.solid.blocks import region_blocks
-from softtact.models.solid.checks import bodies_of, refuse_loose
-from softtact.models.solid.corners import lift_from_corners
-from softtact.models.solid.device import find_device, sum_on
+from softtact.models.solid.blocks import bodies_of, find_device, lift_from_corners, refuse_loose, region_blocks, sum_on
 from softtact.models.solid.frames import FramePose, make_frames
 from softtact.models.solid.items import FacePressure, Item, ItemState, PressureResponse
 from softtact.progress import Watch
