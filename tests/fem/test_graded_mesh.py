@@ -13,7 +13,7 @@ from softtact.fem.quadrature import gauss
 from softtact.geometry.meshes import place
 from softtact.materials.laws.registry import make_law
 from softtact.models.hyperelastic.build import CURVED, EDGE, FAR, FLAT, NEAR, split_depths_of, zones
-from softtact.models.hyperelastic.slab import Layer, Slab
+from softtact.models.hyperelastic.slab import Layer, Slab, SlabMesh
 
 X, Y = np.array([-3.0, -1.5, -0.5, 1.0, 3.0]), np.array([-2.0, -1.0, 0.0, 2.0])
 HEIGHTS = [-1.5, -0.8, -0.3, 0.0]
@@ -56,8 +56,8 @@ def test_a_split_slab_passes_the_patch_test(caps):
     x, y = np.linspace(-3, 3, 5), np.linspace(-2, 2, 5)
     rng = np.random.default_rng(0)
     depth = split_depths((4, 4), lambda low, size, depth: rng.random(len(low)) < 0.4, 2)
-    slab = Slab(Layer(np.array([-2.0, -1.5]), LAW), Layer(np.array(HEIGHTS), LAW), mesh_2d, x, y, sides="held", contact=Contact(),
-                splits=np.stack([np.minimum(depth, cap) for cap in caps]))
+    slab = Slab(Layer(np.array([-2.0, -1.5]), LAW), Layer(np.array(HEIGHTS), LAW),
+                SlabMesh(mesh_2d, x, y, np.stack([np.minimum(depth, cap) for cap in caps])), sides="held", contact=Contact())
     gradient = np.array([[0.1, 0.05, 0.0], [-0.02, -0.08, 0.03], [0.04, 0.0, -0.1]])
     displacement = slab.points @ gradient.T
     planes = slab.project(displacement, lambda x, y: (np.full(len(x), 1e3), np.tile([0.0, 0.0, -1.0], (len(x), 1))))

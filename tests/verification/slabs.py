@@ -7,7 +7,7 @@ import numpy as np
 from softtact.contact.penalty import Contact
 from softtact.fem.extruded_mesh import SheetMesh2D, grid_mesh_2d, merge, with_centres
 from softtact.linalg.direct import make_solver
-from softtact.models.hyperelastic.slab import Layer, Slab
+from softtact.models.hyperelastic.slab import Layer, Slab, SlabMesh
 
 _LOOKED_UP = 10     # steps
 
@@ -60,7 +60,7 @@ class HeldSlab:
         """Grid lines x, y, z and a law for each layer of elements: of one law, or of one below and another above."""
         above = next((k for k, law in enumerate(laws) if law is not laws[0]), 1)
         layers = Layer(np.asarray(z)[:above + 1], laws[0]), Layer(np.asarray(z)[above:], laws[-1])
-        self.slab = Slab(*layers, _without_frusta(x, y), x, y, sides=sides,
+        self.slab = Slab(*layers, SlabMesh(_without_frusta(x, y), x, y), sides=sides,
                          contact=Contact(stiffness=stiffness, smoothing=smoothing))
         self._hold_the_base()
         self.slab.build_pattern(np.zeros(0, dtype=int), [], precision=np.float64)     # whole Newton steps to the last digit

@@ -83,11 +83,7 @@ def frustum(*, law=LAW, mesh=None, contact=HARD, **settings):
     mesh = mesh or MeshSettings(**settings)
     geometry = FrustumGeometry(centres=np.zeros((1, 2)), heights=np.array([HEIGHT]), tip_diameters=np.array([2 * TIP]),
                            root_diameter=2 * ROOT, neighbours=np.zeros((1, 4), dtype=bool))
-    return FrustumArray(geometry, law, heights=HEIGHT * np.asarray(mesh.frustum_heights), root_z_mm=HEIGHT, pcb_z_mm=0.0,
-                      tips_bonded=True, contact=contact, unprojected_penalty_ratio=mesh.unprojected_penalty_ratio,
-                      quartic_penalty_ratio=mesh.quartic_penalty_ratio,
-                      trilinear=mesh.trilinear_pressure,
-                      refinement=mesh.refinement, rings=mesh.frustum_rings, core=mesh.core)
+    return FrustumArray(geometry, law, mesh, height_mm=HEIGHT, root_z_mm=HEIGHT, tips_bonded=True, contact=contact)
 
 
 def bonded_forces(support, *, step_mm=0.01):

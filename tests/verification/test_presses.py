@@ -21,7 +21,7 @@ from softtact.models.hyperelastic.build import build_sensor_body, build_unit_cel
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.models.hyperelastic.path import press_load_steps
-from softtact.models.hyperelastic.slab import Slab
+from softtact.models.hyperelastic.slab import Slab, SlabMesh
 from softtact.press.sensor import Sensor
 from softtact.sensors.edge import Edge
 
@@ -59,8 +59,9 @@ def folding_body():
     """2 x 2 frusta whose slab glides on its sides, so that the frusta take the whole force and fold."""
     body = build_sensor_body(small_spec(2, 2, margin=0.0), dielectric_law=LAWS["dielectric"], cover_law=LAWS["cover"], mesh=COARSE)
     fixed = body.slab
-    slab = Slab(*fixed.layers, fixed.sheet_mesh_2d, fixed.x_lines, fixed.y_lines, sides="symmetric", contact=fixed.top.contact,
-                constrained_cell_edges=COARSE.constrained_cell_edges)
+    slab = Slab(*fixed.layers, SlabMesh(fixed.sheet_mesh_2d, fixed.x_lines, fixed.y_lines,
+                                       constrained_cell_edges=COARSE.constrained_cell_edges),
+                sides="symmetric", contact=fixed.top.contact)
     return LayeredBody(slab, body.support, body.cells.roots)
 
 

@@ -26,9 +26,9 @@ from softtact.materials.laws.base import Law
 from softtact.models.hyperelastic.body import LayeredBody
 from softtact.models.hyperelastic.frusta import FrustumArray, FrustumGeometry
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
-from softtact.models.hyperelastic.slab import CoverSide, Layer, Slab
+from softtact.models.hyperelastic.slab import CoverSide, Layer, Slab, SlabMesh
 from softtact.models.hyperelastic.states import ObjectSurface
-from softtact.models.hyperelastic.support import PlainSupport
+from softtact.models.hyperelastic.support import Support
 from softtact.sensors.frusta import SensorSpec
 from softtact.sensors.layers import LayersSpec
 
@@ -125,8 +125,8 @@ def build_sensor_body(spec: SensorSpec, *, dielectric_law: Law | None, cover_law
     mesh_2d = sheet_mesh_2d(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, spec.footprint_mm,
                             refinement=mesh.refinement,
                       rings=mesh.frustum_rings, core=mesh.core)
-    slab = Slab(sheet, cover, mesh_2d, x_lines, y_lines, sides="held", contact=contact or mesh.object_contact,
-                constrained_cell_edges=mesh.constrained_cell_edges or _far(zone, x_lines, y_lines), splits=splits,
+    plan = SlabMesh(mesh_2d, x_lines, y_lines, splits, mesh.constrained_cell_edges or _far(zone, x_lines, y_lines))
+    slab = Slab(sheet, cover, plan, sides="held", contact=contact or mesh.object_contact,
                 quartic_penalty_ratio=mesh.slab_quartic_penalty_ratio, friction=coulomb(spec.friction.object),
                 held_below_mm=held_below)
     return LayeredBody(slab, _frustum_array(spec, centres, neighbours, dielectric_law, mesh, scatter, contact),
@@ -184,9 +184,8 @@ def build_unit_cell(spec: SensorSpec, *, dielectric_law: Law | None, cover_law: 
     mesh_2d = sheet_mesh_2d(centre, (1, 1), frusta.pitch_mm, frusta.root_diameter_mm, (frusta.pitch_mm,) * 2,
                             refinement=mesh.refinement,
                       rings=mesh.frustum_rings, core=mesh.core)
-    slab = Slab(sheet, cover, mesh_2d, lines, lines, sides="symmetric", contact=mesh.contact,
-                constrained_cell_edges=mesh.constrained_cell_edges,
-                splits=splits, quartic_penalty_ratio=mesh.slab_quartic_penalty_ratio, friction=coulomb(spec.friction.object))
+    slab = Slab(sheet, cover, SlabMesh(mesh_2d, lines, lines, splits, mesh.constrained_cell_edges), sides="symmetric",
+                contact=mesh.contact, quartic_penalty_ratio=mesh.slab_quartic_penalty_ratio, friction=coulomb(spec.friction.object))
     support = _frustum_array(spec, centre, np.ones((1, 4), dtype=bool), dielectric_law, mesh,
                (np.array([height_factor]), np.array([tip_factor])), None, bottom=bottom)
     return LayeredBody(slab, support, slab.bottom[mesh_2d.roots])
@@ -200,9 +199,8 @@ def build_patch(spec: SensorSpec, counts: Sequence[int], *, dielectric_law: Law 
     lines = [frusta.pitch_mm * (np.arange(count + 1) - 0.5 * count) for count in counts]
     mesh_2d = sheet_mesh_2d(centres, counts, frusta.pitch_mm, frusta.root_diameter_mm, [np.ptp(line) for line in lines],
                       rings=mesh.frustum_rings, core=mesh.core)
-    slab = Slab(Layer(np.linspace(-thickness, 0.0, mesh.sheet_layers + 1), dielectric_law), Layer(np.zeros(1), None), mesh_2d,
-                *lines,
-                sides="free", contact=mesh.contact, constrained_cell_edges=mesh.constrained_cell_edges,
+    slab = Slab(Layer(np.linspace(-thickness, 0.0, mesh.sheet_layers + 1), dielectric_law), Layer(np.zeros(1), None),
+                SlabMesh(mesh_2d, *lines, constrained_cell_edges=mesh.constrained_cell_edges), sides="free", contact=mesh.contact,
                 quartic_penalty_ratio=mesh.slab_quartic_penalty_ratio)
     support = _frustum_array(spec, centres, neighbours, dielectric_law, mesh, None, None, bottom=-thickness)
     return LayeredBody(slab, support, slab.bottom[mesh_2d.roots])
@@ -214,15 +212,12 @@ def _frustum_array(spec, centres, neighbours, law, mesh, scatter, contact, *, bo
         bottom = -(spec.cover.thickness_mm + spec.dielectric.sheet_thickness_mm)
     height_factor, tip_factor = scatter or (np.ones(len(centres)), np.ones(len(centres)))
     heights = frusta.height_mm * height_factor
-    # Every cone is built with the same root; where its printed readings are swapped the tip is the wide end.
+    # Every cone is built with the same root; where its printed diameters are swapped the tip is the wide end.
     geometry = FrustumGeometry(centres=centres, heights=heights, tip_diameters=frusta.tip_diameter_mm * tip_factor,
                            root_diameter=frusta.root_diameter_mm, neighbours=neighbours,
                            wall_mm=0.5 * (frusta.pitch_mm - frusta.root_diameter_mm))
-    return FrustumArray(geometry, law, heights=np.asarray(mesh.frustum_heights) * frusta.height_mm, root_z_mm=bottom,
-                      pcb_z_mm=bottom - heights.max(), tips_bonded=spec.tips_bonded, contact=contact or mesh.contact,
-                      unprojected_penalty_ratio=mesh.unprojected_penalty_ratio, quartic_penalty_ratio=mesh.quartic_penalty_ratio,
-                      trilinear=mesh.trilinear_pressure, refinement=mesh.refinement, rings=mesh.frustum_rings, core=mesh.core,
-                      friction=coulomb(spec.friction.board))
+    return FrustumArray(geometry, law, mesh, height_mm=frusta.height_mm, root_z_mm=bottom, tips_bonded=spec.tips_bonded,
+                        contact=contact or mesh.contact, friction=coulomb(spec.friction.board))
 
 
 class SingleLayerSlab(Slab):
@@ -240,24 +235,30 @@ class SingleLayerSlab(Slab):
 
 def build_plain_body(spec: LayersSpec, *, dielectric_law: Law | None, cover_law: Law | None = None,
                      mesh: MeshSettings = MeshSettings(), scatter: tuple | None = None, contact: Contact | None = None,
-                     threads: int = 1, surface: ObjectSurface | None = None, sides: str = "held") -> LayeredBody:
+                     threads: int = 1, surface: ObjectSurface | None = None) -> LayeredBody:
     """The body of a `LayersSpec`; arguments as for `build_sensor_body`.
 
-    scatter: must be None, there are no frusta that could differ;  sides: see `Slab`, for pieces of a wider layer
+    scatter: must be None, there are no frusta that could differ
     """
     if scatter is not None:
         spec.need_frusta("a scatter of frusta", "leave height_scatter and tip_scatter out")
+    slab = plain_slab(spec, (dielectric_law, cover_law), mesh, contact=contact, surface=surface)
+    return LayeredBody(slab, Support(spec.support, contact or mesh.contact), threads=threads)
+
+
+def plain_slab(spec: LayersSpec, laws: tuple[Law | None, Law | None], mesh: MeshSettings = MeshSettings(), *,
+               contact: Contact | None = None, surface: ObjectSurface | None = None, sides: str = "held") -> Slab:
+    """The slab of plain layers with laws (dielectric, cover); sides: see `Slab`, for pieces of a wider layer."""
     x_lines, y_lines = (_element_lines(side, spec.element_size_mm, mesh) for side in spec.footprint_mm)
-    sheet, cover = _layers(spec, dielectric_law, cover_law, mesh)
     splits, _ = cover_splits(mesh, surface, x_lines, y_lines, 2 * spec.element_size_mm)
     kind = Slab if spec.cover else SingleLayerSlab
-    slab = kind(sheet, cover, grid_without_cells(*(_fine(lines, mesh) for lines in (x_lines, y_lines))), x_lines, y_lines,
-                sides=sides, contact=contact or mesh.object_contact, splits=splits,
-                quartic_penalty_ratio=mesh.slab_quartic_penalty_ratio, friction=coulomb(spec.friction.object),
-                held_below_mm=spec.edge.held_below_mm)
+    mesh_2d = grid_without_cells(*(_fine(lines, mesh) for lines in (x_lines, y_lines)))
+    slab = kind(*_layers(spec, *laws, mesh), SlabMesh(mesh_2d, x_lines, y_lines, splits), sides=sides,
+                contact=contact or mesh.object_contact, quartic_penalty_ratio=mesh.slab_quartic_penalty_ratio,
+                friction=coulomb(spec.friction.object), held_below_mm=spec.edge.held_below_mm)
     if spec.base_held:
         slab.hold(slab.bottom)
-    return LayeredBody(slab, PlainSupport(spec.support, contact or mesh.contact), threads=threads)
+    return slab
 
 
 def _layers(spec, dielectric_law, cover_law, mesh):

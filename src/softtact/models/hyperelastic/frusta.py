@@ -20,7 +20,7 @@ from softtact.contact.friction import Coulomb, FrictionState
 from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.contact.penalty import Contact
 from softtact.fem.elements import HEX27, QUAD9, dofs_of
-from softtact.fem.extruded_mesh import CORE_RADIUS, disc_mesh_2d, extrude
+from softtact.fem.extruded_mesh import disc_mesh_2d, extrude
 from softtact.fem.kernels import add_forces
 from softtact.fem.quadrature import gauss
 from softtact.fem.solid_block import HexBlock
@@ -28,7 +28,9 @@ from softtact.fem.static_condensation import Springs, TangentCache
 from softtact.fem.substructuring import LayerwiseElimination
 from softtact.linalg.workers import SERIAL, Workers
 from softtact.materials.laws.base import Law
+from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.models.hyperelastic.states import ContactHistory, SupportState
+from softtact.models.hyperelastic.support import Support
 
 BOARD, SHEET = -1, -2                                     # what a contact point faces where it is no neighbour in DIRECTIONS
 DIRECTIONS = ((0, 1.0), (1, 1.0), (0, -1.0), (1, -1.0))   # axis and sign of the four neighbours: +x, +y, -x, -y
@@ -70,18 +72,18 @@ class FrustumGeometry:
     wall_mm: float = 0.0
 
 
-class FrustumArray:
+class FrustumArray(Support):
     """All frusta of a sensor with one law. Local node numbers are those of `self.mesh`; roots are `self.root`."""
 
-    def __init__(self, geometry: FrustumGeometry, law: Law, *, heights: np.ndarray, root_z_mm: float, pcb_z_mm: float,
-                 tips_bonded: bool, contact: Contact, unprojected_penalty_ratio: float, quartic_penalty_ratio: float,
-                 trilinear: bool, refinement: int = 0, rings: int = 1, core: float = CORE_RADIUS, friction: Coulomb | None = None):
-        """unprojected_penalty_ratio, quartic_penalty_ratio, trilinear: see `blocks`
+    def __init__(self, geometry: FrustumGeometry, law: Law, mesh: MeshSettings, *, height_mm: float, root_z_mm: float,
+                 tips_bonded: bool, contact: Contact, friction: Coulomb | None = None) -> None:
+        """height_mm: of the drawing, whose layers of elements each frustum's height scales;  root_z_mm: height of the roots
 
-        friction: `Coulomb` of the frusta on the board, or None
+        The board lies under the longest frustum. friction: `Coulomb` of the frusta on the board, or None
         """
         self.geometry, self.contact, self.friction = geometry, contact, friction
-        mesh_2d = disc_mesh_2d(refinement, rings, core)
+        heights = np.asarray(mesh.frustum_heights) * height_mm
+        mesh_2d = disc_mesh_2d(mesh.refinement, mesh.frustum_rings, mesh.core)
         self.mesh = extrude(mesh_2d, heights)
         self.outer_faces = self._outer_faces(mesh_2d)
         self.count = len(geometry.heights)
@@ -89,10 +91,11 @@ class FrustumArray:
         self.root, self.tip = self.mesh.planes[-1], self.mesh.planes[0]
         self.coordinates = self._place(heights, root_z_mm)
         self._element_nodes = (self.nodes * np.arange(self.count)[:, None, None] + self.mesh.hexes).reshape(-1, 27)
-        self.block = HexBlock(self.per_element(self.coordinates), law, trilinear=trilinear,
-                              unprojected_penalty_ratio=unprojected_penalty_ratio, quartic_penalty_ratio=quartic_penalty_ratio)
+        self.block = HexBlock(self.per_element(self.coordinates), law, trilinear=mesh.trilinear_pressure,
+                              unprojected_penalty_ratio=mesh.unprojected_penalty_ratio,
+                              quartic_penalty_ratio=mesh.quartic_penalty_ratio)
         self._tangents = TangentCache(self.block)
-        self._contact_points(pcb_z_mm)
+        self._contact_points(root_z_mm - geometry.heights.max())
         self._number_unknowns(tips_bonded)
         self.elimination = self._elimination()
 
@@ -190,10 +193,6 @@ class FrustumArray:
             moving = (self.point_layer == k) & (self.point_neighbour != BOARD)
             planes.append(3 * self.point_nodes[moving, -1] + self.point_axis[moving])
         return LayerwiseElimination(self.count, eliminated, layers, coupled=planes)
-
-    def fresh_history(self) -> ContactHistory:
-        """The contacts' history before the first touch."""
-        return ContactHistory(self.contact)
 
     def evaluate(self, displacement: np.ndarray, history: ContactHistory | None = None, *,
                  workers: Workers = SERIAL) -> SupportState | None:

@@ -134,6 +134,23 @@ class Layer:
 
 
 @dataclass(frozen=True)
+class SlabMesh:
+    """The mesh of a slab in plan."""
+
+    mesh_2d: SheetMesh2D
+    """Of the sheet."""
+    x_lines: np.ndarray
+    """Lines of the cover's grid along x in mm."""
+    y_lines: np.ndarray
+    """The same along y."""
+    splits: np.ndarray | None = None
+    """(layers, ny 2^m, nx 2^m): how often the cover's uppermost layers are split where (see `cover_mesh`); the layers below these
+    keep to the sheet's plan. None: none does, and none is split."""
+    constrained_cell_edges: bool | Callable[[np.ndarray], np.ndarray] = True
+    """Whether edges between cells move as one curve: everywhere, nowhere, or where a function of places (n, 2) gives (n,) True."""
+
+
+@dataclass(frozen=True)
 class CellGroup:
     """Cells (c,) of the sheet under equal pieces of the cover.
 
@@ -161,17 +178,13 @@ class Slab:
     groups: list[tuple[np.ndarray, SolidBlock]]
     cell_groups: list[CellGroup]
 
-    def __init__(self, sheet: Layer, cover: Layer, sheet_mesh_2d: SheetMesh2D, x_lines: np.ndarray, y_lines: np.ndarray, *,
-                 sides: str, contact: Contact, constrained_cell_edges: bool | Callable[[np.ndarray], np.ndarray] = True,
-                 splits: np.ndarray | None = None, quartic_penalty_ratio: float = 0.0, friction: Coulomb | None = None,
-                 held_below_mm: float = 0.0) -> None:
-        """splits (layers, ny 2^m, nx 2^m): how often the cover's uppermost layers are split where (see `cover_mesh`); the layers
-        below these keep to the sheet's plan. None: none does, and none is split.
+    def __init__(self, sheet: Layer, cover: Layer, mesh: SlabMesh, *, sides: str, contact: Contact,
+                 quartic_penalty_ratio: float = 0.0, friction: Coulomb | None = None, held_below_mm: float = 0.0) -> None:
+        """quartic_penalty_ratio: see `solid_block`;  friction: `Coulomb` of the object on the top, or None
 
-        constrained_cell_edges: everywhere (True), nowhere (False), or where a function of places (n, 2) says so (n,)
-        quartic_penalty_ratio: see `solid_block`;  friction: `Coulomb` of the object on the top, or None
         held_below_mm: depth below the top, one of the layers' levels, from which `held` sides are held
         """
+        x_lines, y_lines, splits, sheet_mesh_2d = mesh.x_lines, mesh.y_lines, mesh.splits, mesh.mesh_2d
         if splits is None:
             splits = np.zeros((len(cover.heights) - 1, len(y_lines) - 1, len(x_lines) - 1), dtype=np.int64)
         self.x_lines, self.y_lines = np.asarray(x_lines), np.asarray(y_lines)
@@ -185,7 +198,7 @@ class Slab:
                                    self.x_lines, self.y_lines)
         above = self.underside.interpolation(sheet_mesh_2d.mesh_2d.points)
         self.sheet_nodes = sheet_nodes(self.sheet_mesh, sheet_mesh_2d, first=self.cover_mesh.free, above=above,
-                                       constrained=constrained_cell_edges)
+                                       constrained=mesh.constrained_cell_edges)
         self.points = np.vstack([self.cover_mesh.points[:self.cover_mesh.free], self.sheet_mesh.points[self.sheet_nodes.own]])
         self.nodes = len(self.points)
         self.bottom = self.sheet_nodes.number[self.sheet_mesh.planes[0]]

@@ -1,11 +1,12 @@
-"""What is below the slab and holds it: a lattice of frusta (`FrustumArray`), the board itself, or nothing (`PlainSupport`).
+"""What is below the slab and holds it: a lattice of frusta (`FrustumArray`), the board itself, or nothing (`Support`).
 
     frusta   each with its own unknowns, tied to the slab at its root, in contact with the board
     base     the slab's lower side is bonded to the board: the slab holds these nodes (`Slab.hold`), no unknown is left below
     none     the slab's lower side is free: it hangs in the sensor's shell, which holds its sides
 """
 
-from typing import Any, Protocol
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,68 +16,12 @@ from softtact.linalg.workers import SERIAL, Workers
 from softtact.models.hyperelastic.states import BodyState, ContactHistory, SupportState
 
 
-class Support(Protocol):
+class Support:
     """What a `LayeredBody` asks of what is below its slab: `count` bodies of `nodes` nodes each, tied to the slab at `root`.
 
-    A support with bodies also condenses them for the slab's cells (`SheetCells`) and balances them one by one
-    (`body.balanced`); both look at supports with a `count` above zero only.
+    This one has none: the board under a bonded slab, or nothing, without energy and contact. `FrustumArray` has bodies; it also
+    condenses them for the slab's cells (`SheetCells`) and balances them one by one (`body.balanced`).
     """
-
-    count: int
-    nodes: int
-    root: np.ndarray
-    friction: Coulomb | None
-
-    @property
-    def blocks(self) -> list:
-        """Blocks of its elements; none where it has no rubber of its own."""
-        ...
-
-    @property
-    def in_words(self) -> str:
-        """What it is, for messages."""
-        ...
-
-    def fresh_history(self) -> ContactHistory:
-        """The contacts' history before the first touch."""
-        ...
-
-    def evaluate(self, displacement: np.ndarray, history: ContactHistory | None = None, *, workers: Any = SERIAL
-                 ) -> SupportState | None:
-        """The state at displacement (f, nodes, 3); None if an element is inside out."""
-        ...
-
-    def reevaluate_contact(self, state: SupportState, history: ContactHistory) -> SupportState:
-        """The same displacements with another history of the contacts."""
-        ...
-
-    def inner_residual(self, state: SupportState) -> np.ndarray:
-        """Unbalanced forces (f, inner) in N of the unknowns that are not the slab's."""
-        ...
-
-    def contact_error(self, state: SupportState) -> float:
-        """Deepest overlap, or widest gap under pressure, in mm."""
-        ...
-
-    def augmented(self, state: SupportState) -> ContactHistory:
-        """The contacts' history with each point held where its surfaces just touch."""
-        ...
-
-    def first_friction_state(self, state: SupportState) -> FrictionState | None:
-        """The friction state in which a step starts, None without friction."""
-        ...
-
-    def most_compressed(self, state: SupportState) -> tuple[float, str] | None:
-        """Share of its height by which the most compressed body is shortened, and which one in words; None without bodies."""
-        ...
-
-    def largest_compression(self, displacement: np.ndarray) -> float:
-        """By how much (mm) the most compressed body is shortened; nan without bodies."""
-        ...
-
-
-class PlainSupport:
-    """The board under a bonded slab, or nothing: no bodies, no energy, no contact. Fulfils `Support`."""
 
     friction: Coulomb | None
     count, nodes, friction = 0, 1, None
@@ -84,44 +29,55 @@ class PlainSupport:
 
     def __init__(self, kind: str, contact: Contact | None = None) -> None:
         """kind: base or none;  contact: a penalty for the history that every support has; no point uses it"""
-        self.kind, self._contact = kind, contact or Contact(stiffness=1.0, smoothing=1.0)
+        self.kind, self.contact = kind, contact or Contact(stiffness=1.0, smoothing=1.0)
 
     @property
     def blocks(self) -> list:
+        """Blocks of its elements; none where it has no rubber."""
         return []
 
     @property
     def in_words(self) -> str:
+        """What it is, for messages."""
         return {"base": "bonded to the board", "none": "free below"}[self.kind]
 
     def fresh_history(self) -> ContactHistory:
-        return ContactHistory(self._contact)
+        """The contacts' history before the first touch."""
+        return ContactHistory(self.contact)
 
     def evaluate(self, displacement: np.ndarray, history: ContactHistory | None = None, *,
-                 workers: Workers = SERIAL) -> SupportState:
+                 workers: Workers = SERIAL) -> SupportState | None:
+        """The state at displacement (f, nodes, 3); None if an element is inside out. history: of the contacts, by default none"""
         nothing = np.zeros((0, self.nodes, 3))
         return SupportState(elastic=(np.zeros(0), nothing), energy=0.0, force=nothing, gaps=np.zeros((0, 1)),
                             displacement=displacement, history=history or self.fresh_history())
 
     def reevaluate_contact(self, state: SupportState, history: ContactHistory) -> SupportState:
-        return self.evaluate(state.displacement, history)
+        """The same displacements with another history of the contacts."""
+        return replace(state, history=history)
 
     def inner_residual(self, state: SupportState) -> np.ndarray:
+        """Unbalanced forces (f, inner) in N of the unknowns that are not the slab's."""
         return np.zeros((0, 1))
 
     def contact_error(self, state: SupportState) -> float:
+        """Deepest overlap, or widest gap under pressure, in mm."""
         return 0.0
 
     def augmented(self, state: SupportState) -> ContactHistory:
+        """The contacts' history with each point held where its surfaces just touch."""
         return state.history
 
-    def first_friction_state(self, state: SupportState) -> None:
+    def first_friction_state(self, state: SupportState) -> FrictionState | None:
+        """The friction state in which a step starts, None without friction."""
         return None
 
-    def most_compressed(self, state: SupportState) -> None:
+    def most_compressed(self, state: SupportState) -> tuple[float, str] | None:
+        """Share of its height by which the most compressed body is shortened, and which one in words; None without bodies."""
         return None
 
     def largest_compression(self, displacement: np.ndarray) -> float:
+        """By how much (mm) the most compressed body is shortened; nan without bodies."""
         return np.nan
 
 
@@ -152,4 +108,4 @@ class NoCells:
         return state.slab.force.copy(), None
 
     def recover(self, kept: None, slab_step: np.ndarray, *, workers: Workers = SERIAL) -> tuple[np.ndarray, np.ndarray]:
-        return slab_step, np.zeros((0, PlainSupport.nodes, 3))
+        return slab_step, np.zeros((0, Support.nodes, 3))
