@@ -9,10 +9,10 @@ from softtact.contact.height_field import HeightField
 from softtact.contact.underside import Underside
 from softtact.geometry.pose import Pose
 from softtact.models.elastic.compliance import surface_grid
-from softtact.models.quarter_symmetry import PARITIES, ElasticLayer, ParityBlocks, QuarterSlab
+from softtact.models.quarter_symmetry import PARITIES, LinearLayer, ParityBlocks, QuarterSlab
 
 SIDE, THICKNESS = 12.0, 2.5     # mm
-LAYER = ElasticLayer(THICKNESS, bulk_modulus=0.66, shear_modulus=0.55, shares=(0.5, 0.3, 0.2))     # E 1.29 MPa, nu 0.17
+LAYER = LinearLayer(THICKNESS, bulk_modulus=0.66, shear_modulus=0.55, shares=(0.5, 0.3, 0.2))     # E 1.29 MPa, nu 0.17
 
 
 @cache

@@ -5,10 +5,10 @@ import pytest
 from scipy.sparse.linalg import spsolve
 
 from softtact.models.elastic.compliance import surface_grid
-from softtact.models.quarter_symmetry import PARITIES, ElasticLayer, ParityBlocks, QuarterSlab
+from softtact.models.quarter_symmetry import PARITIES, LinearLayer, ParityBlocks, QuarterSlab
 
-SOFT = ElasticLayer(1.0, bulk_modulus=4.0, shear_modulus=0.3)
-STIFF = ElasticLayer(1.5, bulk_modulus=0.8, shear_modulus=0.5, shares=(0.6, 0.4))
+SOFT = LinearLayer(1.0, bulk_modulus=4.0, shear_modulus=0.3)
+STIFF = LinearLayer(1.5, bulk_modulus=0.8, shear_modulus=0.5, shares=(0.6, 0.4))
 FOOTPRINT, CELLS = (6.0, 4.0), (3, 2)
 ROUND_OFF = 1e-9      # relative, of two direct solutions whose conditions are some 1e5
 
@@ -94,7 +94,7 @@ def test_a_wide_thin_layer_yields_to_even_pressure_as_if_confined():
     """Depth = p t / (K + 4 mu / 3), the oedometer modulus: stress over strain where no strain is sideways (Hooke)."""
     for bulk, shear in [(4.0, 0.3), (0.66, 0.55), (0.1, 0.5)]:
         thickness, pressure = 1.0, 1e-3
-        slab = QuarterSlab((24.0, 24.0), [ElasticLayer(thickness, bulk, shear, (0.5, 0.5))], (8, 8), base_held=True)
+        slab = QuarterSlab((24.0, 24.0), [LinearLayer(thickness, bulk, shear, (0.5, 0.5))], (8, 8), base_held=True)
         load = np.zeros(slab.unknowns)
         load[dofs(slab.numbers[-1], 2)] = pressure * np.outer(*(_simpson(line) for line in (slab.y, slab.x))).ravel()
         free = slab.free((0, 0))

@@ -12,7 +12,7 @@ from tetrahedral_layer import layer_compliance
 from softtact.contact.penalty import penalty
 from softtact.contact.unilateral import active_set
 from softtact.materials.laws.registry import make_law
-from softtact.models.quarter_symmetry import ElasticLayer, QuarterSlab
+from softtact.models.quarter_symmetry import LinearLayer, QuarterSlab
 
 YOUNG, POISSON = 1.0, 0.3
 MODULUS = YOUNG / (1 - POISSON**2)      # E*, MPa
@@ -130,7 +130,7 @@ def elastic_depth(far):
     """
     cells = round(2 * far / A)
     z = graded(1.5 * A, 3, far, round(np.log(far / (1.5 * A)) / np.log(1.35)) + 1)
-    layer = ElasticLayer(far, YOUNG / (3 * (1 - 2 * POISSON)), YOUNG / (2 * (1 + POISSON)), tuple(np.diff(z)[::-1] / far))
+    layer = LinearLayer(far, YOUNG / (3 * (1 - 2 * POISSON)), YOUNG / (2 * (1 + POISSON)), tuple(np.diff(z)[::-1] / far))
     slab = QuarterSlab((2 * far, 2 * far), [layer], (cells, cells), base_held=True)
     x, y = np.meshgrid(slab.x[:-1], slab.y[:-1])
     near = np.hypot(x, y) < 1.3 * A

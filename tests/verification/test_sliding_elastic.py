@@ -14,8 +14,7 @@ from thick_layer import thick_layer
 
 from softtact.contact.coulomb import CoulombSettings
 from softtact.contact.motion import Motion
-from softtact.models.elastic.motion_press import move_on_layer
-from softtact.models.elastic.sliding import SlidingObject
+from softtact.models.elastic.sliding import SlidingObject, move_on_layer
 from softtact.models.elastic.tangential import surface_compliance
 
 pytestmark = pytest.mark.slow     # the compliance of two thick layers

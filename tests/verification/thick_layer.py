@@ -9,7 +9,7 @@ from softtact.fem.elements import HEX27
 from softtact.fem.solid_block import HexBlock
 from softtact.materials.laws.registry import make_law
 from softtact.models.elastic.tangential import SurfaceCompliance
-from softtact.models.quarter_symmetry import PARITIES, ElasticLayer, QuarterSlab
+from softtact.models.quarter_symmetry import PARITIES, LinearLayer, QuarterSlab
 
 
 class GradedSlab(QuarterSlab):
@@ -45,7 +45,7 @@ def thick_layer(a, far, *, cells, shear, poisson, reach=1.25):
     """
     lines = graded(1.5 * a, round(1.5 * cells), far, round(np.log(far / (1.5 * a)) / np.log(1.5)) + 1)
     bulk = 2 * shear * (1 + poisson) / (3 * (1 - 2 * poisson))
-    slab = GradedSlab(lines, ElasticLayer(far, bulk, shear, tuple(np.diff(lines)[::-1] / far)))
+    slab = GradedSlab(lines, LinearLayer(far, bulk, shear, tuple(np.diff(lines)[::-1] / far)))
     side = int(reach * 2 * cells) + 1
     kept = (3 * slab.top[:side, :side].ravel()[:, None] + np.arange(3)).ravel()
     lower, down, stiffness = np.tril_indices(len(kept)), np.tile([1.0, 1.0, -1.0], side**2), slab.stiffness

@@ -22,6 +22,8 @@ from softtact.errors import ConvergenceError
 _Force = TypeVar("_Force", float, np.ndarray)
 
 _AS_WIDE = 0.8    # share of the last load step's points from which on a load step starts with the last load step's forces, scaled
+# Points are looked for within so many times the expected depth, and so much more; those within RISE times the depth may touch.
+REACH, LEAST_REACH_MM, RISE = 1.3, 0.1, 1.15
 
 
 @dataclass(frozen=True)

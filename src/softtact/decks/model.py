@@ -171,7 +171,7 @@ class RigidSurface:
 
 
 @dataclass(frozen=True)
-class ContactPair:
+class SurfacePair:
     """Surface `slave` may not pass surface `master` (a rigid one or one of a part).
 
     `contact`: the penalty's stiffness (N/mm3) and smoothing depth (mm);  `friction`: the law along the surface, None without.
@@ -185,7 +185,7 @@ class ContactPair:
 
 
 @dataclass(frozen=True)
-class Step:
+class ObjectStep:
     """The object is lowered to `value` mm (`control` "indentation") or pushed with `value` N ("force")."""
 
     name: str
@@ -227,11 +227,11 @@ def deck_model(body: LayeredBody, placed: trimesh.Trimesh, *, forces_n: Sequence
     surfaces = _surfaces(body, mesh)
     rigid, contacts = [_object(body, surface), _board(body)], _contacts(body)
     if "FRUSTA_SIDES_ODD" in surfaces:
-        contacts.append(ContactPair("NEIGHBOURS", "FRUSTA_SIDES_EVEN", "FRUSTA_SIDES_ODD", support.contact))
+        contacts.append(SurfacePair("NEIGHBOURS", "FRUSTA_SIDES_EVEN", "FRUSTA_SIDES_ODD", support.contact))
     walls = _walls(body)
     if walls is not None:
         rigid.append(walls)
-        contacts.append(ContactPair("WALLS", "FRUSTA_SIDES", "WALLS", support.contact))
+        contacts.append(SurfacePair("WALLS", "FRUSTA_SIDES", "WALLS", support.contact))
     held = _held(body, mesh)
     return DeckModel(title=title, points=mesh.points, parts=mesh.parts, ties=mesh.ties, held=held,
                      node_sets=_node_sets(body, mesh, held), surfaces=surfaces, rigid=rigid, contacts=contacts,
@@ -331,8 +331,8 @@ def _board(body):
 
 
 def _contacts(body):
-    return [ContactPair("OBJECT_ON_TOP", "TOP", "OBJECT", body.slab.top.contact, body.slab.top.friction),
-            ContactPair("FRUSTA_ON_BOARD", "FRUSTA_FOOT", "BOARD", body.support.contact, body.support.friction)]
+    return [SurfacePair("OBJECT_ON_TOP", "TOP", "OBJECT", body.slab.top.contact, body.slab.top.friction),
+            SurfacePair("FRUSTA_ON_BOARD", "FRUSTA_FOOT", "BOARD", body.support.contact, body.support.friction)]
 
 
 def _walls(body):
@@ -363,12 +363,12 @@ def _steps(body, surface, forces_n, indentations_mm, touch_mm):
         raise ValueError("give either forces_n or indentations_mm")
     if forces_n is None:
         depths = np.atleast_1d(indentations_mm)
-        return [Step(f"INDENTATION_{k + 1}", "indentation", float(depth)) for k, depth in enumerate(depths)]
+        return [ObjectStep(f"INDENTATION_{k + 1}", "indentation", float(depth)) for k, depth in enumerate(depths)]
     clearance = body.slab.project(body.rest()[0], surface).anchors[:, 2].min()
     if clearance >= NO_CONTACT_MM:
         raise InputError("The object is nowhere over a point of the cover that feels contact; correct its pose or refine the mesh.")
-    touch = Step("TOUCH", "indentation", float(clearance + touch_mm))
-    return [touch] + [Step(f"FORCE_{k + 1}", "force", float(force)) for k, force in enumerate(np.atleast_1d(forces_n))]
+    touch = ObjectStep("TOUCH", "indentation", float(clearance + touch_mm))
+    return [touch] + [ObjectStep(f"FORCE_{k + 1}", "force", float(force)) for k, force in enumerate(np.atleast_1d(forces_n))]
 
 
 def _remarks(body):

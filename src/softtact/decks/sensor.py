@@ -17,7 +17,7 @@ import trimesh
 from softtact.contact.height_field import HeightField
 from softtact.decks import keywords
 from softtact.decks.dialects import STIFF_MATERIAL, Dialect, contact_pair, dialect_of, tetrahedra_behind
-from softtact.decks.model import DeckModel, RigidSurface, Step, deck_model
+from softtact.decks.model import DeckModel, ObjectStep, RigidSurface, deck_model
 from softtact.errors import InputError
 from softtact.files import atomic_path
 from softtact.geometry.meshes import check_over_sensor, place
@@ -118,7 +118,7 @@ def _contacts(model: DeckModel, writer: Dialect) -> list[str]:
     return lines
 
 
-def _drive(step: Step, reference: int | None) -> list[str]:
+def _drive(step: ObjectStep, reference: int | None) -> list[str]:
     """What moves or loads the object's reference node in a step."""
     value = keywords.number(-step.value)
     return [f"{reference}, 3, 3, {value}"] if step.control == "indentation" else ["*CLOAD", f"{reference}, 3, {value}"]

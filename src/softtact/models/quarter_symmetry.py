@@ -31,7 +31,7 @@ PARITIES = tuple(product((0, 1), repeat=2))
 
 
 @dataclass(frozen=True)
-class ElasticLayer:
+class LinearLayer:
     """thickness in mm, bulk and shear modulus in MPa; shares: thicknesses of its element layers from below, in sum 1."""
 
     thickness: float
@@ -47,7 +47,7 @@ class QuarterSlab:
     held_below_mm: depth below the top from which side faces are held, infinite: they are free; an element layer begins there
     """
 
-    def __init__(self, footprint_mm: Sequence[float], layers: Sequence[ElasticLayer], cells: Sequence[int], *,
+    def __init__(self, footprint_mm: Sequence[float], layers: Sequence[LinearLayer], cells: Sequence[int], *,
                  base_held: bool, held_below_mm: float = 0.0) -> None:
         self.layers = _element_layers(layers, held_below_mm)
         self.cells, self.base_held, self.held_below_mm = cells, base_held, held_below_mm
@@ -84,8 +84,8 @@ class QuarterSlab:
         """Whether the sides are held (2 layers + 1,) at each plane of nodes."""
         return self.heights <= -self.held_below_mm + _SAME_MM
 
-    def boundary_over(self, layer: ElasticLayer) -> int:
-        """Number of the boundary over an `ElasticLayer` of the stack, for `below_top`."""
+    def boundary_over(self, layer: LinearLayer) -> int:
+        """Number of the boundary over an `LinearLayer` of the stack, for `below_top`."""
         return 1 + max(number for number, (own, _) in enumerate(self.layers) if own is layer)
 
     @property

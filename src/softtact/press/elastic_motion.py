@@ -7,8 +7,7 @@ from trimesh import Trimesh
 
 from softtact.contact.height_field import HeightField
 from softtact.contact.motion import Motion
-from softtact.models.elastic.motion_press import ElasticMotion, check_motion, move_on_layer
-from softtact.models.elastic.sliding import SlidingState
+from softtact.models.elastic.sliding import ElasticMotion, SlidingState, check_motion, move_on_layer
 from softtact.press.cache import cached_surface_compliance
 from softtact.press.making import shell_of
 from softtact.progress import Watch

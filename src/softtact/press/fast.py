@@ -11,6 +11,7 @@ from softtact.contact.height_field import HeightField
 from softtact.contact.motion import Motion
 from softtact.contact.shell import pad_forces
 from softtact.contact.underside import Underside
+from softtact.contact.unilateral import LEAST_REACH_MM, REACH, RISE
 from softtact.errors import ConvergenceError, InputError
 from softtact.models.elastic.compliance import LayerPress, press_layer, rest_on_shell
 from softtact.models.foundation.solve import FoundationMaps, lifted, press_foundation
@@ -23,10 +24,8 @@ from softtact.progress import Watch
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
 
-_MARGIN, _LEAST_MARGIN_MM = 1.3, 0.1     # of the depth on springs, within which points are looked for at first
 _ROUND_OFF = 1e-6         # of a force
 _NEAR_MM = 0.1            # height over the sensing surface, or depth below it, from which an object is set down first
-_RISE = 1.15              # of the object's depth: points within may touch
 
 
 def press_elastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, course: Course) -> PressResult:
@@ -192,14 +191,14 @@ def _within_reach(underside, points_within, foundation_modulus, forces, deepest,
 
     Beside the object the surface rises, so points a little above its depth can touch, too.
     """
-    reach = _MARGIN * underside.depth_on_springs(forces[-1], foundation_modulus) + _LEAST_MARGIN_MM
+    reach = REACH * underside.depth_on_springs(forces[-1], foundation_modulus) + LEAST_REACH_MM
     while True:
         reach = min(reach, deepest)
         points = points_within(reach)
         found = solve(points)
-        if reach == deepest or _RISE * (depth_of(found) - underside.lowest_mm) <= reach:
+        if reach == deepest or RISE * (depth_of(found) - underside.lowest_mm) <= reach:
             return points, found
-        reach *= _MARGIN
+        reach *= REACH
 
 
 # What a result takes over from an `ElasticMotion`.

@@ -11,7 +11,7 @@ from softtact.contact.motion import Motion
 from softtact.contact.underside import Underside
 from softtact.errors import ConvergenceError, InputError
 from softtact.models.elastic.compliance import elastic_compliance, press_layer
-from softtact.models.elastic.motion_press import move_on_layer
+from softtact.models.elastic.sliding import move_on_layer
 from softtact.models.elastic.tangential import surface_compliance
 from softtact.press.sensor import load_sensor
 

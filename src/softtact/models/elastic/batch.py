@@ -2,7 +2,7 @@
 
 `press_layer` gathers a dense compliance among one object's points. Here all presses share the surface: a product is four dense
 matrices, one for each parity, of a quarter of the surface's nodes, with as many columns as there are. It takes some four times the
-operations, and is what a GPU is made for. The method is `contact.unilateral`'s own, on torch's arrays.
+operations, and is what a GPU is made for. The method is that of `contact.unilateral`, on torch's arrays.
 """
 
 from collections.abc import Iterator, Sequence

@@ -1,6 +1,6 @@
 """The elastic model: one linear layer, held at its base and as the sensor's edge says; contact on the known compliance of its top.
 
-Of a sensor that is free below the sides alone are held, and the compliance tells how its lower side moves, too.
+Of a sensor that is free below the sides alone are held, and the compliance holds the movements of its lower side, too.
 The vertical compliance of the top's nodes (mm/N) is computed once for a sensor (`elastic_compliance`), by quarters of the layer
 (`quarter_symmetry`). The nodes lie at half the map's spacing.
 """
@@ -17,10 +17,10 @@ from softtact.contact.node_grid import NodeGrid, Stencil, patches_of
 from softtact.contact.object_points import ObjectPoints
 from softtact.contact.unilateral import ContactLoadSteps, press_elastic
 from softtact.files import read_arrays
-from softtact.models.quarter_symmetry import PARITIES, ElasticLayer, ParityBlocks, QuarterSlab
+from softtact.models.quarter_symmetry import PARITIES, LinearLayer, ParityBlocks, QuarterSlab
 from softtact.progress import progress
-from softtact.sensors import fields
 from softtact.sensors.base import BaseSpec
+from softtact.sensors.fields import ElasticLayer
 
 _SHARES = (0.34, 0.3, 0.22, 0.14)     # of the layer's thickness, from below, that its element layers have
 _SINGLE = 2                            # rows of points along a contact's edge, where pressure is steep, that share none
@@ -93,7 +93,7 @@ def elastic_slab(spec: BaseSpec, *, cells: tuple[int, ...] | None = None) -> Qua
     """The `QuarterSlab` of a sensor's single elastic layer."""
     layer = spec.elastic_layer
     bulk, shear = layer.young_mpa / (3 * (1 - 2 * layer.poisson)), layer.young_mpa / (2 * (1 + layer.poisson))
-    return QuarterSlab(spec.footprint_mm, [ElasticLayer(spec.thickness_mm, bulk, shear, _SHARES)], cells or map_cells(spec),
+    return QuarterSlab(spec.footprint_mm, [LinearLayer(spec.thickness_mm, bulk, shear, _SHARES)], cells or map_cells(spec),
                        base_held=spec.base_held, held_below_mm=spec.edge.held_below_mm)
 
 
@@ -112,7 +112,7 @@ def elastic_compliance(spec: BaseSpec, *, threads: int = 1, cells: tuple[int, ..
                       lower=None if spec.base_held else ParityBlocks(both[:, count:]))
 
 
-def confined_modulus(layer: fields.ElasticLayer) -> float:
+def confined_modulus(layer: ElasticLayer) -> float:
     """Modulus (MPa) of an elastic layer that is compressed and cannot move sideways."""
     return layer.young_mpa * (1 - layer.poisson) / ((1 + layer.poisson) * (1 - 2 * layer.poisson))
 

@@ -1,6 +1,6 @@
 """The elastic layer's whole surface compliance: forces in x, y and z at the top's nodes against their displacements in x, y and z.
 
-What `compliance` knows of z alone, for motions that friction response the surface aside. By the same quarters and parities
+`compliance` has z alone; motions that drag the surface aside need all three. By the same quarters and parities
 (`quarter_symmetry`): a mirror in x turns the sign of u_x, and one in y that of u_y, so with D(s) = diag(s_x, s_y, 1) for a node
 with signs s
     G(i s, j t) = D(s) [ 1/4 sum_pq (s_x t_x)^p (s_y t_y)^q G_pq(i, j) ] D(t)
@@ -99,7 +99,7 @@ class FoldedBlock:
 
     @property
     def diagonal(self) -> np.ndarray:
-        """The nodes' own compliance (c, axes), where rows and columns are the same nodes and directions."""
+        """The compliance (c, axes) of each node under its force, where rows and columns are the same nodes and directions."""
         own = np.stack([np.diag(block) for block in self._blocks]).reshape(4, *self._rows.shape).sum(axis=0) / 4
         return own[self._rows._slot].astype(float)
 

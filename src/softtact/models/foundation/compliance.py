@@ -17,7 +17,7 @@ from softtact.files import read_arrays
 from softtact.materials.laws.base import Law
 from softtact.models.elastic.compliance import map_cells, surface_grid
 from softtact.models.foundation.frustum_spring import FrustumLaw, frustum_law
-from softtact.models.quarter_symmetry import PARITIES, ElasticLayer, ParityBlocks, QuarterSlab, picked
+from softtact.models.quarter_symmetry import PARITIES, LinearLayer, ParityBlocks, QuarterSlab, picked
 from softtact.progress import progress
 from softtact.sensors.frusta import SensorSpec
 
@@ -105,8 +105,8 @@ def _with_ground(frustum):
 
 def foundation_slab(spec: SensorSpec, dielectric_law: Law, cover_law: Law, *, cells: tuple[int, ...] | None = None) -> QuarterSlab:
     """The `QuarterSlab` of sheet and cover with two laws' linear constants."""
-    layers = [ElasticLayer(spec.dielectric.sheet_thickness_mm, dielectric_law.bulk_modulus, dielectric_law.mu0, SHEET_SHARES),
-              ElasticLayer(spec.cover.thickness_mm, cover_law.bulk_modulus, cover_law.mu0, COVER_SHARES)]
+    layers = [LinearLayer(spec.dielectric.sheet_thickness_mm, dielectric_law.bulk_modulus, dielectric_law.mu0, SHEET_SHARES),
+              LinearLayer(spec.cover.thickness_mm, cover_law.bulk_modulus, cover_law.mu0, COVER_SHARES)]
     return QuarterSlab(spec.footprint_mm, layers, cells or map_cells(spec), base_held=False,
                        held_below_mm=spec.edge.held_below_mm)
 
