@@ -32,7 +32,7 @@ def find_device(name: str, *, library: str = "torch") -> str:
             return "cpu"
         raise InputError(f"device={name!r}: {how_to_install(library)}") from None
     if library == "warp":
-        module.config.log_level = module.LOG_WARNING     # what it tells beside would stand in a command's output
+        module.config.log_level = module.LOG_WARNING     # its notices would stand in a command's output
     if module.is_cuda_available() if library == "warp" else module.cuda.is_available():
         return "cuda" if name == "auto" else name
     if name == "auto":

@@ -2,10 +2,10 @@
 
 Unknown are a normal force p >= 0 and a tangential force q (x, y) at each contact point, both on the surface, p downwards:
     gap  = gap0 - depth + N p + C q >= 0,   p gap = 0            (Signorini)
-    slip = T q + C' p - carried                                  the surface's way on the object within the increment
+    slip = T q + C' p - carried                                  the surface's slip on the object within the increment
     |q| <= mu p,   slip = 0 where |q| < mu p,   slip = -l q with l >= 0 where |q| = mu p       (Coulomb)
 with the parts N, C, T of the surface's compliance. `carried` is the surface's tangential displacement when the increment began and
-the object's way since, so a point that sticks goes where the object goes. History is in `carried` alone.
+the object's displacement since, so a point that sticks goes where the object goes. History is in `carried` alone.
 
 The normal problem for given q, and the tangential one for given p, are convex; they are solved in turns until both agree
 (Panagiotopoulos' process; Kalker's NORM and TANG), with Aitken's relaxation. Each is solved by active sets with conjugate
@@ -117,7 +117,7 @@ def _shortened(compliance, linear, bound, q, moved, change, moved_by, face):
         trial[rim] *= (bound[rim] / np.linalg.norm(trial[rim], axis=1))[:, None]
         trial = into_discs(trial, bound)
         if np.array_equal(trial, q + change):
-            return (trial, moved + moved_by), products     # no point left its disc: the quadratic's own minimum on the face
+            return (trial, moved + moved_by), products     # no point left its disc: the quadratic's minimum on the face
         trial_moved, products = compliance @ trial, products + 1
         if _energy(trial, trial_moved, linear) <= before + _ROUNDING * abs(before):
             return (trial, trial_moved), products
@@ -129,7 +129,7 @@ def _energy(q, moved, linear):
 
 
 def _largest_eigenvalue(compliance, own, *, iterations=20):
-    """Of T scaled by the points' own compliance `own` (c, 1), from above: the power method's with a margin."""
+    """The largest eigenvalue of T scaled by its diagonal `own` (c, 1), from above: the power method's with a margin."""
     x = np.sin(np.arange(2 * len(own)) + 1.0).reshape(-1, 2)
     for _ in range(iterations):
         x = (compliance @ (x / np.sqrt(own))) / np.sqrt(own)
@@ -199,7 +199,7 @@ class DenseBlock:
 
     @property
     def diagonal(self) -> np.ndarray:
-        """The points' own compliance (c, a)."""
+        """The compliance (c, a) of each point under its force."""
         return np.diag(self.matrix).reshape(self._shape)
 
 
@@ -214,7 +214,7 @@ class Increment:
     friction: float
     """Coulomb's coefficient; infinite: whatever touches sticks."""
     depth: float | None = None
-    """Prescribed depth in mm, or None where `load` tells."""
+    """Prescribed depth in mm, or None where `load` is prescribed."""
     load: float | None = None
     """Normal force in N that the surface is to carry."""
 
@@ -236,7 +236,7 @@ class CoulombContact:
     gap: np.ndarray
     """(c,) in mm; below 0 only by the tolerance."""
     slip: np.ndarray
-    """(c, 2) in mm: the surface's way on the object within the increment; exactly 0 where a point sticks."""
+    """(c, 2) in mm: the surface's slip on the object within the increment; exactly 0 where a point sticks."""
     sticks: np.ndarray
     """(c,): whether a point touches and does not slip."""
     turns: int
@@ -302,12 +302,12 @@ class _Relaxation:
 
 
 def _sticking(pulled, bound):
-    """Whether forces (c, 2) that the slip would still change lie within the discs: told by the slip, as |q| alone is rounded."""
+    """Whether forces (c, 2) that the slip would still change lie within the discs: judged by the slip, as |q| alone is rounded."""
     return (bound > 0) & (np.linalg.norm(pulled, axis=1) <= bound)
 
 
 def _first_guess(compliance, increment):
-    """Forces of springs side by side, each as stiff as the points' own compliance among their likes."""
+    """Forces of springs side by side, each as stiff as the diagonal of the compliance makes it."""
     lowest = increment.gap.min()
     if increment.load is None:
         return np.clip(increment.depth - increment.gap, 0.0, None) / compliance.normal.diagonal[:, 0]

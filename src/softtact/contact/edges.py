@@ -6,7 +6,7 @@ the share of its area that the object covers, continuous as it slides past the e
 
 Contact compliance   A row of points that is held makes the contact wider by a row, one that is free does not; that is how blunt a
 mesh is, and a flat punch's indentation jumps by a tenth when its edge passes a row. A row with a spring of (1/r - 1) times its
-compliance among the held ones stores the energy of an edge a share r of the way from the row before (as in
+compliance among the held ones stores the energy of an edge that has come a share r of the distance from the row before (as in
 `models/foundation/dof_maps`, for nodes). As a pressure on the covered share r of the row's area that is a contact compliance
 of the row's compliance times the area times 1 - r. What is not derived, for the three rows of a Gauss rule across a face, was taken
 from a punch's edge that moves across it by tenths on the default mesh, against elements an eighth as wide (benchmarks/edges.py):
@@ -92,7 +92,7 @@ def _crossings(starts, ends, start_under, end_under, base, foot, surface):
 
 
 def own_areas(half: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Corners (t, points, 4, 2) in mm of the points' own rectangles, from the points; half (t, 2): half the faces' sides in mm."""
+    """Corners (t, points, 4, 2) in mm of the points' rectangles, from the points; half (t, 2): half the faces' sides in mm."""
     i, j = (g.ravel() for g in np.meshgrid(np.arange(ROWS), np.arange(ROWS), indexing="ij"))
     places = np.stack([np.column_stack([ENDS[i + a], ENDS[j + b]]) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))], axis=1)
     return half[:, None, None] * (places - points[:, None])
@@ -101,7 +101,7 @@ def own_areas(half: np.ndarray, points: np.ndarray) -> np.ndarray:
 def contact_compliance(covered: np.ndarray, width: np.ndarray) -> np.ndarray:
     """Softness (t * points,) in mm of displacement per unit of pressure over the plane modulus E / (1 - nu^2).
 
-    covered (t * points,): share of each point's own area under the object;  width (t,): of the faces in mm
+    covered (t * points,): share of each point's area under the object;  width (t,): of the faces in mm
     """
     share = covered.reshape(-1, ROWS, ROWS)
     outwards = _outwards(share)

@@ -78,7 +78,7 @@ class FrictionState:
 
     anchor, start (p, d) in mm, in the rigid body's frame: where a point holds to, and where it was when the step began;
     start_gap (p,) in mm, then; pressure (p,) in MPa, which limits the friction; touching (p,): whether the anchor is set;
-    slid (p,) in mm: length of the way that a point has slid since it came to touch.
+    slid (p,) in mm: length of the path on which a point has slid since it came to touch.
     """
 
     law: Coulomb
@@ -108,7 +108,7 @@ class FrictionState:
 
 @dataclass(frozen=True)
 class FrictionResponse:
-    """Friction at one state: the friction state it comes from, positions and tangential ways from the anchors (p, d) in mm.
+    """Friction at one state: the friction state it comes from, positions and tangential slips from the anchors (p, d) in mm.
 
     normal (p, d): see `FrictionState.friction_response`
     share (p, d): the traction's part of its limit as Newton's method expected it, see `after`; None: as it is.
@@ -154,7 +154,7 @@ class FrictionResponse:
 
     @property
     def slid(self) -> np.ndarray:
-        """Length (p,) in mm of the way that the points have slid since they came to touch."""
+        """Length (p,) in mm of the path on which the points have slid since they came to touch."""
         length = np.linalg.norm(self.slip, axis=-1)
         return self.friction_state.slid + np.maximum(length - self.friction_state.law.slip_tolerance_mm, 0.0)
 

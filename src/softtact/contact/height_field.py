@@ -38,7 +38,7 @@ class HeightField:
         return points.min(axis=0) - 1e-9, points.max(axis=0) + 1e-9
 
     def moved(self, offset_mm: np.ndarray) -> Self:
-        """The object's after a way (3,) without a turn; the bins in which triangles are searched for are shared."""
+        """The object's after a displacement (3,) without a rotation; the bins in which triangles are searched for are shared."""
         other, way = copy.copy(self), np.asarray(offset_mm, dtype=float)
         other.triangles, other._origin, other.lowest_mm = self.triangles + way, self._origin + way[:2], self.lowest_mm + way[2]
         return other
@@ -80,12 +80,12 @@ class HeightField:
 
 @dataclass(frozen=True)
 class MovedSurface:
-    """An object's underside after a way along x and y."""
+    """An object's underside after a displacement along x and y."""
 
     surface: Callable
     """Heights (n,) and normals (n, 3) of the object's underside over points, as `HeightField`."""
     offset_mm: np.ndarray
-    """The way (2,)."""
+    """The displacement (2,)."""
 
     def __call__(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Heights (n,) and normals (n, 3) over points (n,), (n,) of the sensor."""
@@ -99,7 +99,7 @@ class SweptSurface:
     surface: Callable
     """Heights (n,) and normals (n, 3) of the object's underside over points, as `HeightField`."""
     offsets_mm: np.ndarray
-    """The ways (k, 2) from its first place."""
+    """The displacements (k, 2) from its first place."""
 
     def __call__(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Heights (n,) and normals (n, 3) over points (n,), (n,) of the sensor."""

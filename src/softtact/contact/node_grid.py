@@ -143,7 +143,7 @@ def patches_of(points: ObjectPoints, grid: NodeGrid, shared: bool, *, beside_edg
     """Matrix (patches, c) of the points' shares in patches: four whole points of a square, level with each other, or one alone.
 
     Squares are counted from the middle, where a row's and a column's points go in pairs, so that a symmetric contact stays so.
-    beside_edge: how many rows of points along the edge of all points keep a pressure of their own
+    beside_edge: how many rows of points along the edge of all points keep a separate pressure
     """
     label = np.arange(points.count)
     if shared and points.count > _MANY_POINTS:

@@ -31,7 +31,7 @@ class Contact:
     leaves none. It is the augmented Lagrangian method in terms of lengths: exact contact without a stiffer penalty, which
     Newton's method would have to follow in smaller steps. Simo and Laursen, Computers & Structures 42 (1992) 97.
 
-    softness (mm/MPa): of a spring in series with each point, whose shortening is no overlap and is not pressed apart.
+    softness (mm/MPa): of a spring in series with each point, whose shortening is no overlap and is not augmented.
     """
 
     stiffness: float = 3000.0

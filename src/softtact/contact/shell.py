@@ -1,6 +1,6 @@
 """Where an object that is wider than a sensor comes to rest: on the rigid shell around it (`sensors/edge`).
 
-The object moves straight down and does not turn, so a single number tells all: how far it can come down until its underside meets
+The object moves straight down and does not turn, so a single number is enough: how far it can come down until its underside meets
 the shell's top. From there on the pad keeps the force that it has, and the shell carries what is added.
 Left out: that a cover which bulges over the shell's top may touch it.
 """
@@ -14,9 +14,9 @@ from scipy.optimize import brentq
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
 from softtact.errors import ConvergenceError
 
-_BESIDE_MM = 1e-3      # an object that ends at the pad's own side does not lie on the shell
+_BESIDE_MM = 1e-3      # an object that ends at the pad's side does not lie on the shell
 _TOUCHING_MM = 1e-6    # from where it first touches: an object that rests so near to it presses nothing
-_FAR_MM = 10.0         # stands for a depth that is not found
+_FAR_MM = 10.0         # in place of a depth that is not found
 _EXACT = 1e-8          # of the largest force, to which that at rest is found
 
 
@@ -34,7 +34,7 @@ class Shell:
     def stop_mm(self, surface: HeightField, offset_mm: Sequence[float] | np.ndarray = (0.0, 0.0)) -> float:
         """How far (mm) an object can come down from where its `surface` is; infinite where it does not reach over the shell.
 
-        offset_mm: its way aside along x and y from there
+        offset_mm: its displacement along x and y from there
         """
         if not np.isfinite(self.below_mm):
             return np.inf
@@ -68,7 +68,7 @@ class Shell:
                       step: int) -> None:
         """Raise ConvergenceError where an object is lower than the shell lets it, after a motion's step of that number.
 
-        offset_mm (2,): its way aside;  indentation_mm: how far it has come down from its pose, touch_mm: did at first touch
+        offset_mm (2,): displacement aside;  indentation_mm: how far it has come down from its pose, touch_mm: did at first touch
         """
         depth, stop = indentation_mm - touch_mm, self.stop_mm(surface, offset_mm) - touch_mm
         if depth > stop + _BESIDE_MM:

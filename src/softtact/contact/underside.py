@@ -108,7 +108,7 @@ class Underside:
     def _above(self, nodes, heights, places):
         """Gaps (e,), slopes (e, 2) and windows of nodes on the planes of the facets over places (e, 2) in steps from them.
 
-        Facets too steep to stand for a node's surroundings count as load step at their place; none over a place: infinitely high.
+        Facets too steep to represent a node's surroundings count as level at their place; none over a place: infinitely high.
         """
         step, samples = self._grid.step, window_places()
         height, slope = self._facets(self._grid.points[nodes] + places * step)
@@ -136,7 +136,7 @@ class Underside:
 
 
 def _sampled(surface, grid):
-    """Heights (n, 9) at three by three samples of each node's own rectangle, up to its sides and the sensor's."""
+    """Heights (n, 9) at three by three samples of each node's rectangle, up to its sides and the sensor's."""
     side = np.linspace(-0.5, 0.5, 3)
     where = grid.points[:, None] + np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2) * grid.step * (1 - 1e-9)
     if grid.sides:

@@ -102,7 +102,7 @@ def press_elastic(compliance: np.ndarray, gap0: np.ndarray, forces_n: Sequence[f
 
 
 def not_settled(force_n: float, settings: ContactSettings = ContactSettings()) -> str:
-    """What is said of a load step that is not reached."""
+    """The error of a load step that is not reached."""
     return f"The elastic press did not settle its contact at {force_n:g} N in {settings.max_iterations} iterations."
 
 

@@ -38,7 +38,7 @@ STIFF_MATERIAL = ("*MATERIAL, NAME=RIGID", "*ELASTIC", "1000, 0.3")     # of ele
 
 @dataclass(frozen=True)
 class Dialect:
-    """What a program takes, and the lines that it takes in a form of its own."""
+    """What a program takes, and the lines that it takes in a different form than the other one."""
 
     program: str
     """The program's name."""
@@ -53,7 +53,7 @@ class Dialect:
     no_term: float
     """D_i in 1/MPa that leaves a volumetric term of a law out; CalculiX would replace a zero by a default."""
     hybrid: str
-    """What the type of an element with a pressure of its own ends with; nothing where there is none."""
+    """What the type of a hybrid element, which has a pressure as an unknown, ends with; nothing where there is none."""
     fields: tuple[str, ...]
     """Lines of a step that ask for displacements and stresses of all bodies."""
     contact_fields: tuple[str, ...]

@@ -162,7 +162,7 @@ def _parts(body, sheet, cover, frusta):
 
 @dataclass(frozen=True)
 class RigidSurface:
-    """Rigid triangles: points (n, 3), facets (m, 3) whose normals point at the rubber; `moves` along z, or stands still."""
+    """Rigid triangles: points (n, 3), facets (m, 3) whose normals point at the rubber; `moves` along z, or is fixed."""
 
     name: str
     points: np.ndarray
@@ -186,7 +186,7 @@ class SurfacePair:
 
 @dataclass(frozen=True)
 class ObjectStep:
-    """The object is lowered to `value` mm (`control` "indentation") or pushed with `value` N ("force")."""
+    """The object is moved down to `value` mm (`control` "indentation") or pushed with `value` N ("force")."""
 
     name: str
     control: str
@@ -366,7 +366,7 @@ def _steps(body, surface, forces_n, indentations_mm, touch_mm):
         return [ObjectStep(f"INDENTATION_{k + 1}", "indentation", float(depth)) for k, depth in enumerate(depths)]
     clearance = body.slab.project(body.rest()[0], surface).anchors[:, 2].min()
     if clearance >= NO_CONTACT_MM:
-        raise InputError("The object is nowhere over a point of the cover that feels contact; correct its pose or refine the mesh.")
+        raise InputError("The object lies over no contact point of the cover; correct its pose or refine the mesh.")
     touch = ObjectStep("TOUCH", "indentation", float(clearance + touch_mm))
     return [touch] + [ObjectStep(f"FORCE_{k + 1}", "force", float(force)) for k, force in enumerate(np.atleast_1d(forces_n))]
 

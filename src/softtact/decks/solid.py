@@ -8,7 +8,7 @@ Frames     move without turning: every node that a frame carries follows its ref
            a force of the reference node drives it. A frame that turns is refused.
 Contact    surface to surface, linear penalty: `STIFFER` times that of the pair, because neither augments it as we do. Sticking
            friction is as stiff (CalculiX), or slips elastically by 1 um (Abaqus).
-Steps      those of the motions. A rigid object that is loaded first is brought to touch, in a step of its own.
+Steps      those of the motions. A rigid object that is loaded first is moved to touch in a step before.
 """
 
 import re
@@ -32,7 +32,7 @@ from softtact.models.solid.frames import Frame
 STIFFER = 50.0
 _ELASTIC_SLIP_MM = 1e-3
 _TOUCH_MM = 0.01
-_LOOKS = -0.1        # cosine between a facet's normal and one of a surface that it looks at
+_FACING = -0.1       # cosine between a facet's normal and one of a surface that it faces
 _INCREMENTS = "0.1, 1, 1e-6, 0.25"
 
 
@@ -59,7 +59,7 @@ def export_solid(path: str | Path, body: SolidBody, motions: Mapping[str, Motion
 
 
 def deck_steps(body: SolidBody, motions: Mapping[str, Motion], pressures: Mapping[str, Sequence[float]]) -> list[DeckStep]:
-    """The steps of a deck; ways add up from rest."""
+    """The steps of a deck; displacements add up from rest."""
     counts = {len(motion.steps) for motion in motions.values()} | {len(values) for values in pressures.values()}
     names = [frame.name for frame in body.frames]
     if unknown := [name for name in motions if name not in names]:
@@ -104,7 +104,7 @@ def _touch(body, loads):
     gap = min((float(np.min(contact.projection.gap, initial=np.inf)) for contact in body.rest().contacts), default=np.inf)
     if len(rigid) > 1 or not np.isfinite(gap):
         raise InputError("A deck brings one loaded object to touch, along one axis, from within its pair's reach; place it "
-                         "nearer, or prescribe its way in a step before.")
+                         "nearer, or prescribe its displacement in a step before.")
     key, value = next(iter(rigid.items()))
     return {key: float(np.sign(value)) * (max(gap, 0.0) + _TOUCH_MM)}
 
@@ -199,16 +199,16 @@ class _Deck:
         return behind
 
     def _facing(self, facets):
-        """The facets (t, 3) of an object that look at a surface which meets it: the search of CalculiX also finds those behind."""
+        """The facets (t, 3) of an object that face a surface which meets it: the search of CalculiX also finds those behind."""
         own = _normals(self.body.points, facets)
         surfaces = [pair.surface for pair in self.body.pairs if np.isin(pair.other.nodes[0, :3], facets).all()]
         met = [np.unique(_normals(self.body.points, surface.nodes[:, :3]).round(3), axis=0) for surface in surfaces]
         if not met:
             return facets
-        looks = np.any([(own @ normals.T).min(axis=1) < _LOOKS for normals in met], axis=0)
-        if not looks.any():
+        faces = np.any([(own @ normals.T).min(axis=1) < _FACING for normals in met], axis=0)
+        if not faces.any():
             raise InputError("A rigid object turns its back on the surface that it is to meet; turn its facets' normals outwards.")
-        return facets[looks]
+        return facets[faces]
 
     def _contacts(self):
         lines = []

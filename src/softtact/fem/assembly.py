@@ -1,4 +1,4 @@
-"""The upper triangle of a symmetric matrix over a mesh: its pattern, and where each element's entries stand in it.
+"""The upper triangle of a symmetric matrix over a mesh: its pattern, and where each element's entries are in it.
 
 Built by nodes, not by unknowns: nine times less to sort. An unknown is a free component of a node, numbered node by node.
 """
@@ -79,7 +79,7 @@ def _node_graph(counts, offsets, members):
 
 @njit(cache=True, nogil=True)
 def _columns_before(starts, neighbours, counts):
-    """How many unknowns stand in a node's row before each of its neighbours."""
+    """How many unknowns a node's row has before each of its neighbours."""
     before = np.empty(len(neighbours), np.int64)
     for a in range(len(starts) - 1):
         total = 0
@@ -120,7 +120,7 @@ def _expand(number, counts, starts, neighbours):
 
 @njit(cache=True, nogil=True)
 def _place_of(value, low, high, wanted):
-    """Where in the rising values from low to high the wanted one stands."""
+    """The place of the wanted value among the rising ones from low to high."""
     while high - low > 1:
         middle = (low + high) // 2
         if value[middle] <= wanted:
@@ -157,7 +157,7 @@ def _positions(nodes, number, rank, starts, neighbours, before, indptr):
 
 @njit(cache=True, nogil=True, inline="always")
 def _entries_before(row, size):
-    """Where column 0 of a row would stand among the entries (i, j >= i) of a matrix, row by row."""
+    """The place that column 0 of a row would have among the entries (i, j >= i) of a matrix, row by row."""
     return row * size - row * (row - 1) // 2 - row
 
 

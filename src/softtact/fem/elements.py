@@ -136,7 +136,7 @@ class Element:
     quadrature: the full rule;  reduced: the rule with a point less along each side, None where it is not used
     faces: in Abaqus' order S1, S2, ...: of a solid its bottom, counter-clockwise seen from inside, then its top where it has one
         and its sides, counter-clockwise seen from outside; of a plane element its sides
-    meshio_name, vtk_order: the cell's name in meshio, and which of our nodes stands where in VTK's order: cells[:, vtk_order]
+    meshio_name, vtk_order: the cell's name in meshio, and our nodes in VTK's order: cells[:, vtk_order]
     abaqus_name, abaqus_nodes: the element of Abaqus and CalculiX of the same shape, and which of our nodes it has, in its order;
         dialects add letters to the name
     """

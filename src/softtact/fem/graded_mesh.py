@@ -1,7 +1,7 @@
-"""The cover's mesh: hexahedra of 20 nodes in layers, in each of which rectangles of a grid may be split in four, again and again.
+"""The cover's mesh: hexahedra of 20 nodes in layers, in each of which rectangles of a grid may be split in four, repeatedly.
 
 Where a small element meets a larger one its nodes follow the larger one's face. A quadratic serendipity face, cut in four, spans
-its own functions on each part; so the displacement is continuous, and nodes that follow are no unknowns.
+different functions on each part; so the displacement is continuous, and nodes that follow are no unknowns.
 """
 
 from collections.abc import Callable
@@ -63,7 +63,7 @@ class CoverMesh:
 def split_depths(shape: tuple[int, int], wanted: Callable[[np.ndarray, float, int], np.ndarray], most: int) -> np.ndarray:
     """How often each place of a grid is split (ny 2^most, nx 2^most), for a grid of `shape` (nx, ny).
 
-    `wanted(low, size, level)` tells of cells, by their lower corners (c, 2) and size in units of the grid, whether to split them.
+    `wanted(low, size, level)` gives which cells, by their lower corners (c, 2) and size in units of the grid, to split.
     """
     nx, ny = shape
     depth = np.zeros((ny << most, nx << most), dtype=np.int64)

@@ -268,7 +268,7 @@ def _add_modes(blocks, nodes, left, right):
 
 @njit(cache=True, nogil=True)
 def _add_volumetric(blocks, nodes, change, modes, volumes, volume, e):
-    """Blocks plus those of an element's projected changes of volume, and of the quartic penalty but for what stands at the points.
+    """Blocks plus those of an element's projected changes of volume, and of the quartic penalty but for its part at the points.
 
     change (g, 3 width): see `_volume_change`;  modes: basis (g, p) and inverse Gram matrix (p, p);  volume: `VolumeResponse`
     """
@@ -326,7 +326,7 @@ def tangent(deformed: Deformation, at_rest: ElementArrays, stress: np.ndarray, m
     stress (e*g, 6), moduli (e*g, 6, 6) in MPa: of the law without its volume
     Derivatives of the pressure by J, with P = basis . gram_inverse . integral(basis ...): P U'' P of rank p per element; of the
     unprojected penalty k (1 + 1/J^2) / 2 at each point; of the quartic one (1 - P) quartic (1 - P).
-    like: an array in whose precision the products are taken; what stands at a point is found in double precision
+    like: an array in whose precision the products are taken; what belongs to a single point is found in double precision
 
     The products run over blocks of components (i, j >= i): K_ij = G^T A_ij G with the gradients G (3 g, m), six blocks side by side
     in rows of whole vectors instead of one product with the strain-displacement matrix, which has a third of zeros.

@@ -60,7 +60,7 @@ class DeviceKernels:
         return self._there(values).reshape(*J.shape, *values.shape[1:])
 
     def _constant(self, array):
-        """An array that does not change, brought there once; it is kept, so that no other can have its identity."""
+        """An array that does not change, copied to the device once; it is kept, so that no other can have its identity."""
         if id(array) not in self._kept:
             self._kept[id(array)] = array, self._there(array)
         return self._kept[id(array)][1]

@@ -15,7 +15,7 @@ import warp as wp
 
 from softtact.fem.kernels import Deformation, ElementArrays, VolumeResponse
 
-wp.config.log_level = wp.LOG_WARNING     # what it tells beside would stand in a command's output
+wp.config.log_level = wp.LOG_WARNING     # its notices would stand in a command's output
 _AT_ONCE = 4096     # elements whose tangents are on the device at once: 1 GB of the largest elements
 _MOST_KEPT = 64     # arrays that stay on the device
 _real = wp.float64

@@ -85,7 +85,7 @@ def read_mesh_file(path: str | Path, *, unit: str | None = None, geometry: str |
     read = _read(path)
     own = any(name.startswith(_REGION) for name in read.cell_data)
     if unit is not None and unit not in UNIT_MM or unit is None and not own:
-        stated = "no unit is stated, and the file has none of its own" if unit is None else f"the unit {unit!r} is not known"
+        stated = "no unit is stated, and the file has none" if unit is None else f"the unit {unit!r} is not known"
         raise InputError(f"{path}: {stated}; state one of {', '.join(UNIT_MM)}.")
     dimensions = [_dimension(block.type) for block in read.cells]
     d = max(dimensions, default=0)
@@ -119,7 +119,7 @@ def _read(path: Path) -> "meshio.Mesh":
     if not path.is_file():
         raise InputError(f"{path}: there is no such mesh file.")
     try:
-        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):     # meshio tells errors itself
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):     # meshio prints errors itself
             return meshio.read(path)
     except (Exception, SystemExit) as error:     # meshio's readers fail in many ways, and end the program for an unknown format
         known = "give VTU, or another volume mesh that meshio reads, such as Gmsh or Abaqus"
@@ -227,7 +227,7 @@ def _refuse_inverted(path, mesh):
         if len(inverted):
             x, y, z = mesh.points[nodes[inverted[0]]].mean(axis=0)
             raise InputError(f"{path}: {len(inverted)} of {len(nodes)} elements of the region {region!r} are inverted (the first "
-                             f"is number {inverted[0]}, at {x:.4g}, {y:.4g}, {z:.4g} mm); number their nodes the other way round, "
+                             f"is number {inverted[0]}, at {x:.4g}, {y:.4g}, {z:.4g} mm); reverse the order of their nodes, "
                              "or mesh the body again.")
 
 

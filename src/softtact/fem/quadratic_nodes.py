@@ -1,4 +1,4 @@
-"""Quadratic elements from linear ones: nodes in the middles of edges, of quadrilateral faces and of hexahedra; and the way back."""
+"""Quadratic elements from linear ones: nodes in the middles of edges, of quadrilateral faces and of hexahedra; and back."""
 
 from collections.abc import Iterable, Sequence
 
@@ -15,7 +15,7 @@ def raised(points: np.ndarray, cells: Sequence[tuple[str, np.ndarray]]) -> tuple
     """Quadratic elements of linear cells [(meshio's name, corners (e, c))] at points (n, 3).
 
     Returns points (n', 3), nodes (e, m) of each of the cells, and the new number (n,) of each old point, -1 where no cell uses it.
-    New nodes stand in the means of the corners that they lie between.
+    New nodes lie in the means of the corners that they lie between.
     """
     members = [_members(kind) for kind, _ in cells]
     width = max(int(own.sum(axis=1).max()) for own in members)

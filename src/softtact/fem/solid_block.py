@@ -56,7 +56,7 @@ class SolidBlock:
     """Elements of one kind and one law, by their shape functions' gradients.
 
     gradients (u, g, m, 3) in 1/mm and volumes (u, g) in mm3 of the shapes that occur; shapes (e,): which is an element's, by
-    default each its own; points (g, 3) of the quadrature in parent coordinates; unprojected_penalty_ratio: k / mu;
+    default a different one for each; points (g, 3) of the quadrature in parent coordinates; unprojected_penalty_ratio: k / mu;
     quartic_penalty_ratio: q / mu; trilinear: project on trilinear instead of linear functions; basis (g, p): on these instead.
     Displacements come per element (e, m, 3) in mm. at_rest: all this as `ElementArrays`. loops: what sums over points and nodes,
     `kernels` or a `DeviceKernels`.
@@ -196,9 +196,9 @@ def _unlike(coordinates):
 
 
 def _distinct(numbers):
-    """The numbers of each row of (r, k), each once and rising, (r, w), short rows with their last one again; where each stands.
+    """The numbers of each row of (r, k), each once and rising, (r, w), short rows with the last repeated; and each one's place.
 
-    Negative ones count for nothing, and stand at -1 in the places (r, k).
+    Negative ones count for nothing, and have the place -1 in (r, k).
     """
     order = np.argsort(numbers, axis=1, kind="stable")
     rising = np.take_along_axis(numbers, order, axis=1)

@@ -168,7 +168,7 @@ def _boundary(cells):
 
 
 def flat_triangles(facets: Facets) -> np.ndarray:
-    """Triangles (t, 3) of nodes that stand for facets, seen as these are."""
+    """Triangles (t, 3) of nodes that approximate facets, with the same orientation."""
     return np.concatenate([nodes[:, _CUT[kind]].reshape(-1, 3) for kind, nodes in facets.items()])
 
 

@@ -174,7 +174,7 @@ def _set(bodies, damping, tangents, dofs, springs, store, blas):
 
 @njit(cache=True, nogil=True)
 def _add_element(matrix, tangent, dofs):
-    """Add a packed tangent to an upper triangle; an unknown may stand in several of an element's places."""
+    """Add a packed tangent to an upper triangle; an unknown may occur in several of an element's places."""
     first = 0
     for i in range(len(dofs)):
         row = dofs[i]
@@ -232,7 +232,7 @@ def _condense(matrix, rows, outer, blas):
 
 @njit(cache=True, nogil=True)
 def _make_outer_positive(outer, bodies, made, changed, blas):
-    """Fill in what is left of the bodies that are indefinite; a Cholesky factor tells soonest which are not."""
+    """Fill in what is left of the bodies that are indefinite; a Cholesky factorisation shows soonest which are not."""
     size = np.array([outer.shape[1], 0], dtype=np.int32)
     lower, count, info = address(blas.letters, 0), address(size, 0), address(size, 1)
     for b in range(len(bodies)):

@@ -16,7 +16,7 @@ from softtact.linalg.workers import SERIAL, Workers
 class Stage:
     """What is eliminated with a layer: a body's unknowns inner (i,), those that it leaves, outer (o,), and the matrices.
 
-    place (n + 1,): where a body's unknowns stand in the layer's matrix, -1: nowhere; the last entry is that of no unknown (-1)
+    place (n + 1,): where a body's unknowns are in the layer's matrix, -1: nowhere; the last entry is that of no unknown (-1)
     """
 
     inner: np.ndarray

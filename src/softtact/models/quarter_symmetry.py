@@ -2,7 +2,7 @@
 or from a depth on, or free.
 
 The body is symmetric in x and y, so a load falls into four parts that are even or odd in x and in y. Each needs only the quarter
-x > 0, y > 0 with its own conditions on the two planes of symmetry: four systems of a quarter of the size, and four blocks of
+x > 0, y > 0 with different conditions on the two planes of symmetry: four systems of a quarter of the size, and four blocks of
 compliance that hold a quarter of the numbers of the whole one.
 Parity (p, q): 0 even, 1 odd in x and y. With the blocks G_pq between places i, j of the quarter, and signs s, t of x and y:
     G(i s, j t) = 1/4 sum_pq (s_x t_x)^p (s_y t_y)^q G_pq(i, j)

@@ -59,7 +59,7 @@ def _folded(values, *, axis):
     """Sum and difference of the two halves of a side that is symmetric about its middle place, from there on."""
     middle = values.shape[axis] // 2
     upper, lower = values.narrow(axis, middle, middle + 1), values.narrow(axis, 0, middle + 1).flip(axis).clone()
-    lower.select(axis, 0).zero_()     # the middle place is its own mirror image
+    lower.select(axis, 0).zero_()     # the middle place mirrors itself
     return upper + lower, upper - lower
 
 

@@ -197,7 +197,7 @@ class SlidingObject:
     def _places(self, state, found, used, way):
         """Places (n, 2) of all nodes under the object after an increment that was solved with places `used`.
 
-        A node that came to touch keeps what was used where its own traction would carry it back out from under an edge.
+        A node that came to touch keeps what was used where its traction would carry it back out from under an edge.
         """
         position, points = state.position[:2] + way, self.compliance.grid.points
         if self.friction == 0:

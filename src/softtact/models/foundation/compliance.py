@@ -23,7 +23,7 @@ from softtact.sensors.frusta import SensorSpec
 
 SHEET_SHARES, COVER_SHARES = (1.0,), (0.45, 0.35, 0.2)
 _BLOCKS = ("surface", "sideways", "membrane", "lateral", "lateral_self")
-_GROUND = 2e-3  # of a frustum's stiffness at rest: a lifted one pulls by so much of it, single precision still tells 1e-5 mm
+_GROUND = 2e-3  # of a frustum's stiffness at rest: a lifted one pulls by so much of it, single precision still resolves 1e-5 mm
 
 
 @dataclass(frozen=True)

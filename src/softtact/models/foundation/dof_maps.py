@@ -20,7 +20,7 @@ import scipy.sparse as sp
 from softtact.contact.object_points import ObjectPoints
 from softtact.models.foundation.compliance import FoundationCompliance
 
-_AROUND, _DEEP = 6, 6     # nodes along an edge, and held behind it, among which a node's own compliance is found
+_AROUND, _DEEP = 6, 6     # nodes along an edge, and held behind it, among which a node's compliance is found
 _ROUNDED = 0.12           # of the depth: height on a rounded edge up to which the object acts as if it had no rounding
 _EVEN_MM = 1e-3           # that lies in a plane: heights over it are in single precision
 _MIDDLE_BEYOND = 0.26     # of a step, that an edge must be beyond an element's middle to hold it: so found on finer grids

@@ -13,7 +13,7 @@ r = -div(N grad w) on the frusta (initial stress; von Karman's plate). They pres
 Edges: the top moves sideways, and the object's edges meet other points of it (`soft_edges`). What moves sideways under a slope
 meets another height.
 
-Left out: what the slab's own strain adds at second order, that pieces of it turn otherwise than its mean slope, pressures that
+Left out: what the slab's strain adds at second order, that pieces of it turn otherwise than its mean slope, pressures that
 differ over the height, friction. Their effects:
 docs/notebook/2026-11-23-foundation-model.md.
 """
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from softtact.models.foundation.solve import FoundationSettings
 
 _STEP = 0.01         # of a force, for a difference quotient
-_SLOWLY = 5.0        # times as exact must what is followed half of the way only have settled
+_SLOWLY = 5.0        # times as exact must what is followed by half only have settled
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Effects:
     rise: np.ndarray
 
     def towards(self, other: "Effects", share: float, *, loads: np.ndarray | float, rise: float) -> "Effects":
-        """These with a share of the way to others gone, and other shares of the way to their loads and rise."""
+        """These moved towards others by a share of the difference, and by other shares for their loads and rise."""
         shares = (loads, share, 1.0, rise)
         return Effects(*(a + part * (b - a) for a, b, part in zip(astuple(self), astuple(other), shares, strict=True)))
 
@@ -84,7 +84,7 @@ class FiniteDisplacement:
 
     def renewed(self, effects: Effects, load: np.ndarray, down: np.ndarray, q: np.ndarray, *,
                 share: float) -> tuple[Effects, float]:
-        """The effects under a load, frusta down by `down` (b,) under their law's forces q (b,), or a share of the way there.
+        """The effects under a load, frusta down by `down` (b,) under their law's forces q (b,), or a share of the change to them.
 
         The rise goes half of the way, for all of it would swing: a force ends what lifts it. Returns the effects, and what was
         missing, as the largest change of a frustum's force in N.
@@ -101,8 +101,8 @@ class FiniteDisplacement:
         return effects.towards(found, share, loads=share * self._pace(q, roots), rise=0.5), float(missing)
 
     def _pace(self, q, roots):
-        """Share (b,) of the way that loads go at once: the more force a frustum has taken, the less is left to its law,
-        and where the law turns steep all of the way would swing.
+        """Share (b,) of their change that loads take at once: the more force a frustum has taken, the less is left to its law,
+        and where the law turns steep the whole change would swing.
         """
         if not self.settings.follow:
             return 1.0
@@ -139,7 +139,7 @@ class FiniteDisplacement:
         return -resisted.transpose(2, 1, 0).reshape(4, -1)
 
     def _own_compliance(self):
-        """What force and moment on the middle's frustum do to its own movement and tilt along x (2, 2)."""
+        """What force and moment on the middle's frustum do to its movement and tilt along x (2, 2)."""
         middle = np.ravel_multi_index([count // 2 for count in self.lattice], self.lattice)
         both = middle + self.frusta * np.arange(2)
         return self.lateral_self[np.ix_(both, both)].astype(float)
@@ -156,6 +156,6 @@ def membrane_loads(down: np.ndarray, forces: np.ndarray) -> np.ndarray:
 
 
 def _centred(values, axis):
-    """Half the difference of the neighbours along an axis, zero beyond the borders; minus its own transpose."""
+    """Half the difference of the neighbours along an axis, zero beyond the borders; minus its transpose."""
     padded = np.moveaxis(np.pad(values, [(1, 1) if k == axis else (0, 0) for k in range(2)]), axis, 0)
     return np.moveaxis(0.5 * (padded[2:] - padded[:-2]), 0, axis)

@@ -3,7 +3,7 @@
 The cell is the hyperelastic one: any law and geometry; board, folding sides and neighbours included. Of the stiffness K of the
 root's nodes (tip held, at rest) the part that a straight descent meets is taken out and replaced by the cell's force:
     K 1 = k b,  1.b = 1:    forces on the root = (K - k b b') u + b p(w),   w = b.u
-so that small displacements of any kind meet the frustum's own linear stiffness, and a compression w meets the cell's force p(w).
+so that small displacements of any kind meet the frustum's linear stiffness, and a compression w meets the cell's force p(w).
 Where the root moves sideways, the tip, held in the plane of the board, would lean, and is kept flat by a moment that the board
 can only give to a tip that is pressed: beyond, the frustum rocks on its tip's rim and lifts the root (`FrustumLaw.rise`).
 The root's nodes lie on another mesh than the slab's. They follow it in the mean, weighted so that the root's forces act on the slab
@@ -39,7 +39,7 @@ _STEP_MM = 0.01        # largest movement of the root at once
 _TOLERANCE_N = 1e-7    # of the forces inside, against some 1e-2 N on the root
 _ITERATIONS = 40
 _FIRST_N, _LEVELS_A_DECADE = 2e-3, 9
-_MORTAR_POINTS = 10      # along a side of a root's face: so dense that elements of a tenth of a pitch do not feel them singly
+_MORTAR_POINTS = 10      # along a side of a root's face: so dense that elements of a tenth of a pitch do not see them singly
 _MOVEMENT, _TILT, _LATERAL_LEVELS = 0.25, 0.1, 16   # of the height; about what 50 N do beside a punch's edge
 _PRESSURE_MPA = 2.0      # on the cell, up to which the law is asked for: about five times that of 50 N on a flat punch of 11 mm
 
@@ -54,7 +54,7 @@ class SingleFrustum:
     def move(self, movement: float, tilt: float, descent: float) -> np.ndarray | None:
         """Force and moment (2,) in N and N mm, along x, that hold the root at a movement and descent in mm and a tilt along x.
 
-        None where a step on the way finds no balance, and from then on.
+        None where a step to it finds no balance, and from then on.
         """
         target = np.array([movement, tilt, descent])
         far = np.abs((target - self._place) * [1.0, self._x.max(), 1.0]).max()

@@ -26,10 +26,10 @@ from softtact.models.foundation.dof_maps import Places, SoftEdges
 from softtact.models.foundation.finite_displacement import Effects, FiniteDisplacement
 
 _LOOKS_AGAIN = 6     # at what the object covers where points have moved, once forces have settled; the last of them halfway only
-_STRAYED = 0.03      # of a step, and of the depth, by which points and object must have moved since to be looked at again
-_PATIENCE = 8        # iterations, after which loads that swing are followed half of the way only
+_STRAYED = 0.03      # of a step, and of the depth: movements of points and object after which covered shares are found anew
+_PATIENCE = 8        # iterations, after which loads that swing are followed by half only
 _ABSURD_MM = 1e6     # where an iteration has run away; on its first few points an object may be thought to sink by metres
-_ROUGHLY = 100       # times the tolerance is enough for a force that is only on the way
+_ROUGHLY = 100       # times the tolerance is enough for a force between load steps
 _FIRST_PATCHES = 30
 _FREE, _SOFTEST = 1e6, 1e4     # mm/N: softness of a point that the object does not cover; from where on a patch cannot touch
 _SHORTER = 0.25      # share of a step to a force that is tried next where the step failed
@@ -52,7 +52,7 @@ class FoundationSettings:
     follow: bool = True
     rocking: bool = True
     patches: bool = True
-    same_slope: float = 0.05     # a step's error is cut to as much: a load step's second step needs no factor of its own
+    same_slope: float = 0.05     # a step's error is cut to as much: a load step's second step needs no further factor
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def lifted(compliance: FoundationCompliance, points: ObjectPoints, depth_mm: flo
 
 
 def _advance(press, path, target):
-    """Reach a force (N) from the end of a path of forces and states, by way of smaller ones where no step leads there at once.
+    """Reach a force (N) from the end of a path of forces and states, through smaller ones where no step leads there at once.
 
     Appends what it reaches to the path. At once is what nearly always works but from rest under a tilted object.
     """
@@ -170,7 +170,7 @@ class _Press:
     def load_step(self, state, force, *, rough=False):
         """Newton's method from a state, which is brought up to the load step; None if it is not reached, and iterations.
 
-        rough: on the way to another
+        rough: as a start for another
         """
         c, look, again = self.patch.shape[0], True, 0 if rough else _LOOKS_AGAIN
         moved, down_by = state.effects.moved, state.depth     # where the contact was looked at

@@ -1,7 +1,7 @@
 """The dielectric between a plate and glass (FTIR): one cell of its lattice, and all frusta, each with its height and tip.
 
 `press_cell_on_glass` gives force per frustum against contact area. Of a specimen it is asked who carries what, and each disc:
-the plate keeps its direction and each frustum stands in its own cell. Frustum i of height h_i is compressed by
+the plate keeps its direction and each frustum has a cell. Frustum i of height h_i is compressed by
 c_i = max(0, d - (h_max - h_i)) when the plate has gone down by d from its first touch, so
     sum_i F(c_i; h_i, t_i) = F_total
 is one equation for d. The cell's force F and area A come from `press_cell_on_glass` at a few heights and tip diameters.
@@ -39,7 +39,7 @@ GLASS_MESH = MeshSettings.converging(frustum_heights=(*np.linspace(0, 0.2, 11), 
                                      frustum_rings=4)
 # Where tips are wide the sides fold onto the sheet, and thin layers there turn inside out before the paper's 140 N.
 WIDE_TIP_MESH = MeshSettings.converging(frustum_heights=(0.0, 0.1, 0.3, 0.6, 0.9, 1.0))
-# Overlaps that are pressed apart ripple by as much as they are allowed to, and the dark area with them.
+# Augmented overlaps ripple by as much as they are allowed to, and the dark area with them.
 SETTINGS = NewtonSettings(max_augmentations=0, first_touch_mm=1e-3, smallest_scale_n=0.1, smallest_increment_n=1e-3)
 _GIVE_UP_N = 5e-3    # force step at which a curve that may end early ends: smaller ones cost minutes and win little
 _SAMPLES = 24        # points a side of a face at which contact is asked for

@@ -42,9 +42,9 @@ _MOST_SHIFTS = 20     # ... but a tangent that is not even finite will never be
 
 def balanced(support: Support, state: SupportState, tolerance_n: float, *,
              workers: Workers = SERIAL) -> tuple[SupportState, np.ndarray]:
-    """The `SupportState` after each frustum beyond the tolerance (N) went to its own balance, and which frusta did (k,).
+    """The `SupportState` after each frustum beyond the tolerance (N) went to its local equilibrium, and which frusta did (k,).
 
-    These have their condensed tangents anew, on the way and not where they came to.
+    Their condensed tangents are those of the last step's start, not of the state found.
     """
     loose, moved = _loose(support, state, tolerance_n), np.zeros(support.count, dtype=bool)
     for _ in range(_FRUSTUM_STEPS):
@@ -62,7 +62,7 @@ def _loose(support, state, tolerance_n):
 
 
 def _step(support, state, frusta, workers):
-    """The state after a step of the frusta (k,), each halved until its own energy falls, and for which (k,) it did."""
+    """The state after a step of the frusta (k,), each halved until its energy falls, and for which (k,) it did."""
     workers.map(lambda part: support.condense(state, part), chunks(frusta, _FRUSTA_AT_ONCE))
     step = support.own_step(state, frusta, workers=workers)
     step *= np.minimum(1.0, _FARTHEST_MM / np.maximum(np.abs(step).max(axis=(1, 2)), 1e-300))[:, None, None]
@@ -106,7 +106,7 @@ class BodyFriction:
         return self._history(state, *(part and replace(part, pressure=growth * part.pressure) for part in (top, support)))
 
     def renewed(self, state: BodyState, *, halfway: bool = False) -> BodyHistory:
-        """History with friction up to date with the pressures of a `BodyState`, or half the way there."""
+        """History with friction up to date with the pressures of a `BodyState`, or by half of the change."""
         parts: list[FrictionState | None] = []
         part: Any
         of_part: Any
@@ -133,17 +133,17 @@ class BodyFriction:
                        support=replace(state.support, friction_response=support))
 
 
-def _shifts(last, again):
+def _shifts(last, damped_before):
     """What is tried, one after the other, until a tangent is positive definite, so that every step lowers the energy.
 
     None: nothing;  0: the cells' modes of negative stiffness are made positive;  more: the cover's, too, and so many N/mm added
     last: what was enough for the tangent before, None where nothing was needed; where it was much, less of it is tried at once
-    again: the tangent before was the same but for damped cells; what was enough for it is where to begin
+    damped_before: the tangent before was the same but for damped cells; what was enough for it is where to begin
     """
-    first = max(_FIRST_SHIFT, (1.0 if again else _LESS) * (last or 0.0))
-    if first == _FIRST_SHIFT and not (again and last is not None):
+    first = max(_FIRST_SHIFT, (1.0 if damped_before else _LESS) * (last or 0.0))
+    if first == _FIRST_SHIFT and not (damped_before and last is not None):
         yield None
-    if first == _FIRST_SHIFT and not (again and last):
+    if first == _FIRST_SHIFT and not (damped_before and last):
         yield 0.0
     for number in range(_MOST_SHIFTS):
         yield first * _MORE**number
@@ -210,7 +210,7 @@ class LayeredBody:
     def balanced(self, state: BodyState, tolerance_n: float) -> BodyState:
         """The state with each frustum in balance over its root, where nothing else keeps the body from it.
 
-        A frustum that rocks or folds needs steps of its own; as long as sheet or cover do, too, it takes them with these. With
+        A frustum that rocks or folds needs separate steps; as long as sheet or cover do, too, it takes them with these. With
         friction on the board frusta wait for the steps of all: what holds them does not see one alone.
         """
         rest = max(tolerance_n, self._slab_residual(state))
@@ -244,31 +244,31 @@ class LayeredBody:
         """
         state = self.friction.for_tangent(state)
         for number in range(_DAMPINGS):
-            step = self._newton_step(state, force_n, surface, largest_mm, kept_mm, again=number > 0)
+            step = self._newton_step(state, force_n, surface, largest_mm, kept_mm, damped_before=number > 0)
             if not (np.isfinite(step.largest()) and self.cells.damp(step.slab, step.support)):
                 break
         return step
 
-    def _newton_step(self, state, force_n, surface, largest_mm, kept_mm, *, again):
-        """The step with the cells as they are damped now; again: it was found before with less damping."""
+    def _newton_step(self, state, force_n, surface, largest_mm, kept_mm, *, damped_before):
+        """The step with the cells as they are damped now; damped_before: it was found before with less damping."""
         self.cells.refresh(state, kept_mm=kept_mm, workers=self.workers)
         residual, kept = self.cells.condensed_residual(state, workers=self.workers)
         contact = StepContact(self.slab, state.slab, state.indentation, surface, largest_mm=largest_mm, workers=self.workers)
         step, indentation_increment = self._step_of_unknowns(state, residual.ravel()[self.slab.unknowns], contact, force_n,
-                                                             largest_mm, again=again)
+                                                             largest_mm, damped_before=damped_before)
         full = np.zeros(3 * self.slab.nodes)
         full[self.slab.unknowns] = step
         slab, support = self.cells.recover(kept, full.reshape(-1, 3), workers=self.workers)
         return BodyStep(slab=slab, support=support, indentation=indentation_increment, projection=contact.projection)
 
-    def _step_of_unknowns(self, state, residual, contact, force_n, largest_mm, *, again):
+    def _step_of_unknowns(self, state, residual, contact, force_n, largest_mm, *, damped_before):
         """BodyStep of the global unknowns, and how far the object goes down; the tangent is made positive definite where it is not.
 
         Not a number where that cannot be done, which fails Newton's method there.
         """
         excess, border = None if force_n is None else state.force - force_n, self.slab.friction_border(state.slab)
         positive = None
-        for shift in _shifts(self._shift, again):
+        for shift in _shifts(self._shift, damped_before):
             if shift is not None and positive is None:
                 positive = self.cells.positive_outer(workers=self.workers)
             step = self.stepper.step(self._rubber_tangent(state, shift, positive), residual, contact, friction_border=border,

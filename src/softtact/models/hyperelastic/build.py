@@ -155,7 +155,7 @@ def cover_splits(mesh: MeshSettings, surface: ObjectSurface | None, x_lines: np.
 
 
 def _far(zone, x_lines, y_lines):
-    """A function of places (n, 2) that tells (n,) which lie among FAR places of the grid only."""
+    """A function of places (n, 2): which (n,) lie among FAR places of the grid only."""
     x, y = (np.interp(np.arange(size + 1), np.linspace(0, size, len(lines)), lines)
             for size, lines in zip(zone.shape[::-1], (x_lines, y_lines), strict=True))
 

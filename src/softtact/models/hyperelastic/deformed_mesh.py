@@ -88,5 +88,5 @@ def _on_plan(slab):
 
 
 def _cells(element, nodes, region):
-    """`Cells` of elements whose nodes (e, w) are in their own order."""
+    """`Cells` of elements whose nodes (e, w) are in the element's order."""
     return Cells(element.meshio_name, nodes[:, element.vtk_order], region)

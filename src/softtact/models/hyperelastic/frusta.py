@@ -1,4 +1,4 @@
-"""The array of frusta between the sheet and the PCB: every frustum a finite-strain body of its own, tied to the sheet.
+"""The array of frusta between the sheet and the PCB: every frustum a separate finite-strain body, tied to the sheet.
 
 A frustum touches the rest of the sensor only through its root. So its inner unknowns are eliminated frustum by frustum, in
 each from the tip upwards layer by layer (static condensation, exact within Newton's method), and the global matrix

@@ -121,18 +121,18 @@ class NewtonSettings:
     """When a load step counts as reached, and how Newton's method goes there.
 
     relative_tolerance: largest unbalanced nodal force as a share of the force, at least of smallest_scale_n
-    largest_penetration_mm, max_augmentations: with deeper overlaps they are pressed apart and the load step is solved again, so
+    largest_penetration_mm, max_augmentations: deeper overlaps are augmented and the load step is solved anew, at most so
     often
     full_depth_mm: where the cover has come down by less, so much less may overlap: a micrometre is 4 % of a light press
     largest_step_mm: largest movement of a node in one iteration;  smallest_increment_n: force steps are halved down to this
     load_step_iterations: a load step ends where it took so many in all its increments, friction_iterations: with friction, and
     augmentations where they took so many: one that crawls would go on for hours
     first_touch_mm, first_touch_tolerance_n: overlap at which the press begins, and the residual that is good enough there
-    largest_way_mm: way of an object at once where a `Motion` moves it down or aside
+    largest_way_mm: displacement of an object in an increment where a `Motion` moves it down or aside
     max_iterations: of an increment, and as many again where by then no more than nearly_balanced, a share of the force, is left
     rough_tolerance: in place of relative_tolerance after rough_after iterations where frusta are pressed beyond `DEEP`: they fold
     on and on under the same force. Results flag such a load step.
-    projection_iterations: iterations that look anew which facet each point faces
+    projection_iterations: iterations that find anew which facet each point faces
     kept_tangent_mm: a cell that moved less since its last tangent keeps it
     With friction
     friction_tolerance: share of the tolerance;  friction_growth: how far a step's force may exceed the last one's
@@ -151,11 +151,11 @@ class NewtonSettings:
     largest_step_mm: float = 0.12
     smallest_increment_n: float = 0.02
     smallest_scale_n: float = 10.0
-    largest_way_mm: float = 0.05       # of a motion at once, down or aside: friction depends on the way
+    largest_way_mm: float = 0.05       # of a motion at once, down or aside: friction depends on the path
     first_touch_mm: float = 0.01
     first_touch_tolerance_n: float = 0.1   # a start for the first load step, not a result
     projection_iterations: int = 6
-    kept_tangent_mm: float = 0.016     # as many iterations as with 4 um, since frusta far from balance take steps of their own
+    kept_tangent_mm: float = 0.016     # as many iterations as with 4 um, since frusta far from balance take separate steps
     friction_tolerance: float = 0.3    # sliding is soft: with 1 the indentation is 0.4 % off at 1 N on 20 frusta, with this 0.01 %
     friction_growth: float = 2.0       # a single step to 4 N is 1.8 % off, two are less than 0.1 %
     friction_iterations: int = 300

@@ -13,14 +13,14 @@ from softtact.models.hyperelastic.states import BodyState, ObjectSurface
 from softtact.models.newton import Solution, lowers_potential, solve
 
 _STILL_MM = 1e-3       # after a step of less no point faces another facet but those that slide to and fro past an edge
-_MOST_INCREMENTS = 100  # of the first touch's depth, until a point of the cover feels the object
-# Pressing apart is in vain where so many passes that moved anything have not brought the overlap below this share of the least
+_MOST_INCREMENTS = 100  # of the first touch's depth, until a point of the cover touches the object
+# Augmentation is in vain where so many passes that moved anything have not brought the overlap below this share of the least
 # before. Passes that move nothing add up: the force of a single point at an edge is below the tolerance.
 _WORTH_A_PASS, _PASSES_IN_VAIN = 0.8, 3
 DEEP = 0.55        # of a frustum's height, or of the layers': from here on elements of the default mesh may be unstable
 FULL_POCKET = 0.8   # of a frustum's height: beyond, its pocket is full and contacts begin that the model leaves out
-_ROUGH_SOON = 8     # iterations after which a rough balance is taken there, or where one was before overlaps were pressed apart
-_NEARLY = 3.0      # times what is allowed may be left where points have run under an edge: to press these apart takes tens of steps
+_ROUGH_SOON = 8     # iterations after which a rough balance is taken there, or where one was before overlaps were augmented
+_NEARLY = 3.0      # times what is allowed may be left where points have run under an edge: to augment these takes tens of steps
 
 
 def first_touch(body: LayeredBody, surface: ObjectSurface, settings: NewtonSettings) -> BodyState:
@@ -39,12 +39,12 @@ def first_touch(body: LayeredBody, surface: ObjectSurface, settings: NewtonSetti
 
 
 def _indented_until_contact(body, state, step_mm):
-    """The state with the object a step lower, or more steps: a tip may lie between the points that feel contact."""
+    """The state with the object a step lower, or more steps: a tip may lie between the contact points."""
     for _ in range(_MOST_INCREMENTS):
         state = body.indented(state, step_mm)
         if state.force > 0:
             return state
-    raise ConvergenceError(f"None of the cover's contact points feels the object, though it was lowered by "
+    raise ConvergenceError(f"None of the cover's contact points touches the object, though it went down by "
                            f"{_MOST_INCREMENTS * step_mm:g} mm; press with a finer cover (cover_splits) or with a larger object.")
 
 

@@ -28,10 +28,10 @@ from softtact.models.hyperelastic.slab import Slab
 from softtact.models.hyperelastic.states import LinearGaps, ObjectSurface, SlabState
 
 _SOON_MM, _NEAR_MM = 0.01, 0.1     # gaps of points that may touch within a step or two, and within some load steps
-# Share of the squared normals that a node's own directions may leave out, when asked whether they are enough and when chosen.
+# Share of the squared normals that a node's directions may leave out, when asked whether they are enough and when chosen.
 _BENT, _SLIGHTLY_BENT = 0.02, 0.005
 _ALIKE = 0.002               # of all points' stiffness together: contacts that differ by less are taken for one
-_LEAST_CORNER = 1e-9         # N/mm: rounding must not turn the object's own stiffness negative
+_LEAST_CORNER = 1e-9         # N/mm: rounding must not turn the object's stiffness negative
 _INNER_STEPS = 12
 _FACINGS = 4                 # lookups of what the points face; an edge that slides over them moves forces from point to point
 _INNER_TOLERANCE = 0.1       # of the residual that the step is to cut
@@ -245,15 +245,15 @@ class ContactStepper:
     def step(self, rubber: sp.csr_matrix, residual: np.ndarray, contact: StepContact, *,
              friction_border: tuple[np.ndarray | float, float] = (0.0, 0.0), excess: float | None = None,
              largest: float = np.inf) -> tuple[np.ndarray, float] | None:
-        """Step (n,) in mm of the unknowns, and how far the object is lowered with it; None if A is not positive definite.
+        """Step (n,) in mm of the unknowns, and the indentation increment with it; None if A is not positive definite.
 
         rubber: A, upper triangle (csr), with friction;  residual (n,) in N
         contact: its `points` are `LinearGaps`, its `rubber_forces(rubber, step)` A times a step (n,), its `follow(step, indentation
-        increment)` looks up what the points face where a step leads, and says whether that was done; its `frames` are for
+        increment)` looks up what the points face where a step leads, and returns whether that was done; its `frames` are for
         `DissectedContact`
         friction_border: friction's border (n,) and corner in N/mm, between the unknowns and the object's indentation increment
         excess: the object's force less the wanted one in N; None holds the object where it is. A free object that touches
-        nothing finds no stiffness: it is lowered by nan.
+        nothing finds no stiffness: its increment is nan.
         largest: mm, by which a free object is moved at most; farther steps end there with the contact of that depth
         """
         problem = _StepProblem(rubber, contact, residual, friction_border, excess)
@@ -281,7 +281,7 @@ class ContactStepper:
             share = problem.best_share(at, direction)
             lowered = share * direction.x[-1]
             beyond = problem.free and not problem.held and abs(at.x[-1] + lowered) > largest
-            if beyond:       # the object stops on the way
+            if beyond:       # the object stops before its end
                 share = (np.copysign(largest, lowered) - at.x[-1]) / direction.x[-1]
             at = at.plus(share, direction)
             if beyond:

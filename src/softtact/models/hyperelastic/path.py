@@ -1,6 +1,6 @@
-"""The way of an object on the body: load steps by force, or by a `Motion`, in increments that adapt.
+"""The path of an object on the body: load steps by force, or by a `Motion`, in increments that adapt.
 
-A stage of the way leads from one load step to the next along a coordinate: the force where a press only grows, else the share of
+A stage of the path leads from one load step to the next along a coordinate: the force where a press only grows, else the share of
 the motion's step. An increment that finds no balance is halved, one that does is doubled.
 """
 
@@ -19,8 +19,8 @@ from softtact.models.hyperelastic.states import BodyState, ObjectSurface
 
 DEFAULT = NewtonSettings()
 _CLEAR_MM = 0.1        # over the surface, from where on no contact law acts
-_WAYS_WITHOUT_FRICTION = 3.0     # at once down to the shell, where the way does not matter but its end
-_SMALLEST_SHARE = 1 / 64     # of the way that an object may go at once, until a motion's step is given up
+_LONGER_WITHOUT_FRICTION = 3.0   # increments down to the shell, where the path does not matter but its end
+_SMALLEST_SHARE = 1 / 64     # of the displacement that an object may take at once, until a motion's step is given up
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class LoadStep:
 
 @dataclass(frozen=True)
 class Control:
-    """What holds the object: its force (N) or, where that is None, its indentation (mm); and its way (2,) aside in mm."""
+    """What holds the object: its force (N) or, where that is None, its indentation (mm); and its displacement (2,) aside in mm."""
 
     force: float | None
     indentation: float
@@ -63,7 +63,7 @@ class ByForce:
         return Control(force, 0.0, np.zeros(2))
 
     def reach(self, body: LayeredBody, start: float, settings: NewtonSettings) -> float:
-        """The largest force that one increment may go to: friction depends on the way, so with it forces grow by doubling."""
+        """The largest force that one increment may go to: friction depends on the path, so with it forces grow by doubling."""
         if not body.friction.active:
             return self.end
         growth = settings.friction_growth
@@ -114,7 +114,7 @@ class ByMotion:
                        self.before.offset_mm + share * (self.after.offset_mm - self.before.offset_mm))
 
     def reach(self, body: LayeredBody, start: float, settings: NewtonSettings) -> float:
-        """The largest share that one increment may go to, by the object's way and, as in a press by force, by its force."""
+        """The largest share that one increment may go to, by the object's displacement and, as under a force, by its force."""
         reach, more = start + self.at_once, (self.after.force or 0.0) - self.pressed_n
         if self.after.force is None or more <= 0:
             return reach
@@ -133,17 +133,17 @@ class ByMotion:
     def failure(self, start: float, coordinate: float) -> str:
         return f"Step {self.number} of the motion was not reached: from {start:.0%} of it on no increment found a balance"
 
-    remedy = "Make the step's way or load smaller"
+    remedy = "Make the step's displacement or load smaller"
 
 
 class ToStop(ByMotion):
-    """The way down to where something else carries the object."""
+    """The stage down to where something else carries the object."""
 
     remedy = "Ask for smaller forces"
 
     def failure(self, start: float, coordinate: float) -> str:
-        return (f"The object was not brought down to where it rests on the shell, {self.after.indentation:.3g} mm below its pose: "
-                f"from {start:.0%} of the way on no increment found a balance")
+        return (f"The object did not reach the shell on which it rests, {self.after.indentation:.3g} mm below its pose: "
+                f"from {start:.0%} of that on no increment found a balance")
 
 
 def press_load_steps(body: LayeredBody, surface: ObjectSurface, forces_n: Iterable[float], *, settings: NewtonSettings = DEFAULT,
@@ -151,7 +151,7 @@ def press_load_steps(body: LayeredBody, surface: ObjectSurface, forces_n: Iterab
     """Yield a `LoadStep` for each force (N, increasing). Raises ConvergenceError naming the load step that was not reached.
 
     touch_mm: indentation at first touch;  stop_mm: that at which something else carries the object, whose load steps from there on
-    have one state, and with it the body's own force
+    have one state, and with it the body's force
     """
     body.begin()
     if stop_mm <= touch_mm:
@@ -172,7 +172,7 @@ def _stopped_at(load_step, force):
 
 
 def _up_to(body, surface, state, reached, force, stop_mm, settings):
-    """The `LoadStep` of a force, and the same again where it is the one at which the object is stopped, else None."""
+    """The `LoadStep` of a force, and the same once more where the object is stopped at it, else None."""
     failed = None
     try:
         load_step = _advance(body, surface, state, reached, ByForce(force, settings.smallest_increment_n), settings)
@@ -185,7 +185,7 @@ def _up_to(body, surface, state, reached, force, stop_mm, settings):
             raise
         failed = error
     begin, end = (Control(None, depth, np.zeros(2)) for depth in (state.indentation, stop_mm))
-    way = settings.largest_way_mm * (1.0 if body.friction.active else _WAYS_WITHOUT_FRICTION)
+    way = settings.largest_way_mm * (1.0 if body.friction.active else _LONGER_WITHOUT_FRICTION)
     stopped = _advance(body, surface, state, 0.0, ToStop(begin, end, state.force, way, 1), settings)
     if failed is not None and stopped.state.force >= force:
         raise failed
@@ -263,7 +263,7 @@ def _advance(body, surface, state, reached, stage, settings):
             start = body.augmented(state, allowed_mm=0.0)     # what overlaps is no start: more of it comes with more force
         else:
             start = state
-        start, moved = _begun(body, surface, start, control, stage.growth(reached, at))
+        start, moved = _start_of_increment(body, surface, start, control, stage.growth(reached, at))
         found = settle(body, moved, start, control.force, tolerance_at(_force(control, state), settings), settings)
         iterations += found.iterations
         if found.state is not None and at >= stage.end:
@@ -284,7 +284,7 @@ def _force(control, state):
     return state.force if control.force is None else control.force
 
 
-def _begun(body, surface, state, control, growth):
+def _start_of_increment(body, surface, state, control, growth):
     """The state from which an increment goes on to a `Control`, and the surface of the object there."""
     state = body.reevaluate_contact(state, body.friction.begin_step(state, growth=growth))
     way = control.offset_mm - state.slab.projection.offset_mm

@@ -58,7 +58,7 @@ class TopContact:
         return np.matmul(self.values, field[self.faces]).reshape(-1, 3)
 
     def project(self, displacement: np.ndarray, surface: ObjectSurface, indentation: float | None = None) -> ContactProjection:
-        """The object's facets above the points (see `ContactProjection`); a `MovedSurface` tells how far aside the object is.
+        """The object's facets above the points (see `ContactProjection`); a `MovedSurface` has how far aside the object is.
 
         indentation: of the object in mm, if points that have run far under an edge are to face the wall beside them
         """
@@ -111,7 +111,7 @@ class TopContact:
         return replace(state.history, contact=self.contact_of(state).augmented(state.gaps))
 
     def touch(self, displacement: np.ndarray, projection: ContactProjection, indentation: float, history: ContactHistory) -> Touch:
-        """The contact with the object lowered by `indentation` mm."""
+        """The contact with the object `indentation` mm below its pose."""
         gaps, normals = self.gaps(displacement, projection, indentation), projection.normals
         density, pressure, _ = self.contact_on(projection, history).response(gaps)
         area = self.area * projection.covered
@@ -183,7 +183,7 @@ class TopContact:
     def area_under_pressure(self, state: SlabState) -> float:
         """Area in mm2 of the points that carry pressure under the contact as it is now, as far as the object covers it.
 
-        By the pressure, not by the gap: where overlaps were pressed apart, touching points have gaps near zero of either sign.
+        By the pressure, not by the gap: where overlaps were augmented, touching points have gaps near zero of either sign.
         """
         return float((self.area * state.projection.covered)[self.under_pressure(state)].sum())
 
@@ -202,7 +202,7 @@ class TopContact:
     def slip_at(self, state: SlabState, places: np.ndarray) -> np.ndarray:
         """How far (n,) in mm the surface has slid along the object at places (n, 2); nan where it bears no pressure.
 
-        Told by the nearest contact point, as far as its own area may reach; nan everywhere without friction.
+        Taken from the nearest contact point, as far as its area may reach; nan everywhere without friction.
         """
         slip, touching = np.full(len(places), np.nan), self.under_pressure(state)
         if state.friction_response is None or not touching.any():

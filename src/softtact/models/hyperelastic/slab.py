@@ -33,7 +33,7 @@ _AT_ONCE = 8     # elements whose tangents one thread makes positive at once; th
 
 @dataclass(frozen=True)
 class SheetNodes:
-    """Nodes (p,) of the sheet's mesh among those of a slab. The mesh's top follows the cover, the rest has its own unknowns.
+    """Nodes (p,) of the sheet's mesh among those of a slab. The mesh's top follows the cover, the rest has separate unknowns.
 
     masters (p, w), weights (p, w): numbers of the slab's nodes that each follows; unused places have weight 0
     own (k,): the nodes that follow no others;  number (p,): the slab's number of each of these, -1 for the others
@@ -59,7 +59,7 @@ def sheet_nodes(mesh: HexMesh, sheet_2d: SheetMesh2D, *, first: int, above: sp.c
                 constrained: bool | np.ndarray | Callable[[np.ndarray], np.ndarray]) -> SheetNodes:
     """`SheetNodes` of the sheet's mesh, lifted from a `SheetMesh2D`.
 
-    first: number of the first node of its own;  above (plane's points, cover's nodes): how its top follows the cover
+    first: number of the first node that is not the cover's;  above (plane's points, cover's nodes): how its top follows the cover
     constrained: where the edges between cells are curves: everywhere (True), nowhere, or where a function of places (n, 2) says
 
     Along such an edge, two elements a side, the sheet moves as one quadratic curve: the nodes at the quarters follow the corner,
@@ -289,7 +289,7 @@ class Slab:
 
     def evaluate(self, displacement: np.ndarray, projection: ContactProjection, indentation: float,
                  history: ContactHistory | None = None, *, workers: Workers = SERIAL) -> SlabState | None:
-        """Energy, forces and contact with the object lowered by `indentation` mm; None if an element is inside out.
+        """Energy, forces and contact with the object `indentation` mm below its pose; None if an element is inside out.
 
         history: of the contact, by default none
         """

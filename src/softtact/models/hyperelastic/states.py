@@ -33,10 +33,10 @@ ObjectSurface = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]
 class ContactProjection:
     """The planes of the object's facets that points face: anchors (p, 3) in mm at no indentation, outward normals (p, 3).
 
-    covered (p,): share of a point's own area that the object covers;  beside (p,): points that lie beside the object themselves
+    covered (p,): share of a point's area that the object covers;  beside (p,): points that lie beside the object themselves
     contact_compliance (p,): mm/MPa of a spring between point and plane, where an edge covers it in part (`contact/edges`)
     overrun (p,): points that lay far under an edge where the planes were found
-    offset_mm (2,): way of the object along x and y from its place at first touch, at which the anchors are
+    offset_mm (2,): displacement of the object along x and y from its place at first touch, at which the anchors are
     A point keeps its plane during a step of Newton's method, so that each step lowers one potential.
     """
 
@@ -56,7 +56,7 @@ class ContactProjection:
         return replace(self, **kept, overrun=self.overrun | points)
 
     def moved(self, way_mm: np.ndarray) -> "ContactProjection":
-        """The same planes after the object has moved by a way (2,) along x and y."""
+        """The same planes after the object has moved by (2,) in mm along x and y."""
         return replace(self, anchors=self.anchors + [*way_mm, 0.0], offset_mm=self.offset_mm + way_mm)
 
 
@@ -144,7 +144,7 @@ class BodyStep:
 class LinearGaps:
     """Contact points (p,) as they depend on a step: gaps (mm) at none, rows (p, n) of their change by each unknown.
 
-    indentation increment (p,): their change when the object is lowered by 1 mm;  area (p,) in mm2;  contact: a `Contact`
+    indentation increment (p,): their change when the object goes down by 1 mm;  area (p,) in mm2;  contact: a `Contact`
     """
 
     gaps: np.ndarray

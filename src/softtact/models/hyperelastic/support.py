@@ -1,6 +1,6 @@
 """What is below the slab and holds it: a lattice of frusta (`FrustumArray`), the board itself, or nothing (`Support`).
 
-    frusta   each with its own unknowns, tied to the slab at its root, in contact with the board
+    frusta   each with separate unknowns, tied to the slab at its root, in contact with the board
     base     the slab's lower side is bonded to the board: the slab holds these nodes (`Slab.hold`), no unknown is left below
     none     the slab's lower side is free: it hangs in the sensor's shell, which holds its sides
 """

@@ -136,7 +136,7 @@ class SheetCells:
                 workers: Workers = SERIAL) -> tuple[np.ndarray, np.ndarray]:
         """Newton steps of the slab (n, 3), its inner nodes filled in, and of the frusta (f, nodes, 3).
 
-        A cell's step is its answer to its walls' movement and its own way to balance. The latter is cut where it goes farther
+        A cell's step is its response to its walls' movement and its local step. The latter is cut where it goes farther
         than `_FARTHEST_MM`: a frustum that snaps into a new fold would else shorten the step of the whole sensor. Since each
         cell's inner matrix is positive definite, what is left still lowers the energy.
         """
