@@ -1,4 +1,4 @@
-"""What the study of hardness says of a measure, on numbers that are known."""
+"""Verdicts on measures of hardness, from known numbers."""
 
 import numpy as np
 import pandas as pd

@@ -14,7 +14,7 @@ X, DEPTH, RATIO = np.linspace(5, 62, 9), np.array([3.0, 6.0, 9.0, 12.0]), np.arr
 
 
 def forces(x, depth, log_ratio):
-    """Three made-up readings that tell x, depth and stiffness apart."""
+    """Three artificial readings that separate x, depth and stiffness."""
     size = log_ratio / depth
     return np.stack([1 + size * np.cos(x / 40), 1 + size * np.sin(x / 40), 0.3 * log_ratio + 0.1 * depth], axis=-1)
 

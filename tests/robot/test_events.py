@@ -1,4 +1,4 @@
-"""What the sensors feel at the events: presses of the true mesh with the scene's forces, mirrored where the grasp is."""
+"""Presses of the true mesh at the events with the scene's forces, mirrored where the grasp is."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""A grasp obeys statics: both pads press with the force asked for, the object stands where the hand is told to, friction holds."""
+"""A grasp obeys statics: both pads press with the wanted force, the object is at the commanded place, friction holds."""
 
 import numpy as np
 import pytest

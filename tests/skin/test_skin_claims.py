@@ -1,4 +1,4 @@
-"""The two papers' claims on robot skin, by the study's own rows."""
+"""The two papers' claims on robot skin, by the rows of the study."""
 
 import pytest
 

@@ -24,7 +24,7 @@ def linear(poisson, *, young_mpa=0.2):
 
 
 def test_the_law_follows_the_curve_and_tells_by_how_much_it_does_not():
-    """Of a straight line with nu = 0 the shear modulus is half of Young's; the foam's own curve bends, by 2.8e-3 at best."""
+    """Of a straight line with nu = 0 the shear modulus is half of Young's; the foam's curve bends, by 2.8e-3 at best."""
     law, off = compression_law(linear(0.0))
     assert off < 0.003 and law.mu0 == pytest.approx(0.1, rel=0.03)
     assert law.stretch_window == pytest.approx((0.725, 1.0))

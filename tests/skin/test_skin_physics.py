@@ -145,7 +145,7 @@ def test_the_authors_finite_elements_are_met():
 
 @pytest.mark.slow
 def test_another_program_finds_the_same_capacitance_of_a_deformed_skin():
-    """NGSolve: its own geometry, mesh, elements of order 3; the finest field mesh here. Within 0.2 %."""
+    """NGSolve with another geometry, mesh, and elements of order 3; the finest field mesh here. Within 0.2 %."""
     ngsolve = pytest.importorskip("ngsolve")
     from support.ngsolve_skin import ngsolve_capacitance
 

@@ -39,7 +39,7 @@ def cylinder():
 
 
 def test_a_straight_way_around_a_cylinder_comes_back(cylinder):
-    """Around the prism's own circumference, to 1e-6 of it."""
+    """Around the prism's circumference, to 1e-6 of it."""
     surface = GeodesicMesh(cylinder)
     start = surface.at(np.array([40.0, 1.0, 5.0]), np.array([0.0, 1.0, 0.0]))
     around = 128 * 2 * 40.0 * np.sin(np.pi / 128)
