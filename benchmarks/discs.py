@@ -14,7 +14,7 @@ from scipy.ndimage import gaussian_filter
 
 from softtact.imaging import outline
 from softtact.imaging.discs import PASSES, Scene, grey
-from softtact.imaging.frames import expose, illumination
+from softtact.imaging.frames import Camera, expose, illumination
 
 SUB = 8          # points per pixel side that tell a shape's coverage
 COUNT = 10       # discs along each side
@@ -28,8 +28,8 @@ def frame(diameter, *, ratio, levels, seed, snr=SNR):
     rng, pitch = np.random.default_rng(seed), int(np.ceil(1.5 * diameter + 10))
     cover = np.vstack([np.hstack([_ellipse(diameter, ratio, pitch, rng) for _ in range(COUNT)]) for _ in range(COUNT)])
     contrast = levels[1] - levels[0]
-    return expose(gaussian_filter(cover, BLUR), noise=contrast / snr, falloff=FALLOFF, seed=rng, background=levels[0],
-                  brightness=levels[1]), cover
+    camera = Camera(1.0, BLUR, noise=contrast / snr, falloff=FALLOFF, background=levels[0], brightness=levels[1])
+    return expose(gaussian_filter(cover, BLUR), camera, seed=rng), cover
 
 
 def _ellipse(diameter, ratio, side, rng):

@@ -24,7 +24,7 @@ from softtact.calibration.ladder import Presses
 from softtact.cli import main
 from softtact.fem.mesh_files import write_mesh
 from softtact.fem.structured_meshes import cylinder
-from softtact.imaging.frames import render_frame
+from softtact.imaging.frames import Camera, render_frame
 from softtact.learning.network import TactileNetwork, save_network
 from softtact.readout.tsf85 import write_recording
 
@@ -84,8 +84,8 @@ def desk(tmp_path_factory):
     with pd.ExcelWriter(folder / "machine.xlsx") as book:
         pd.DataFrame(table, columns=["stretch", "nominal_stress_mpa"]).to_excel(book, sheet_name="Test", index=False)
         pd.DataFrame({"operator": ["X"]}).to_excel(book, sheet_name="Notes")
-    frames = [render_frame([-0.8, 0.8], [0.2, -0.2], [area] * 2, footprint_mm=(4.2, 3.0), pixel_mm=0.03, blur_mm=0.05, noise=0.02,
-                           falloff=0.2, seed=0) for area in (0.2, 0.4)]
+    camera = Camera(pixel_mm=0.03, blur_mm=0.05, noise=0.02, falloff=0.2)
+    frames = [render_frame([-0.8, 0.8], [0.2, -0.2], [area] * 2, camera, footprint_mm=(4.2, 3.0), seed=0) for area in (0.2, 0.4)]
     iio.imwrite(folder / "press.mp4", np.repeat(np.stack(frames)[..., None], 3, axis=3), plugin="pyav", codec="libx264", fps=2)
     (folder / "frames").mkdir()
     iio.imwrite(folder / "frames/0.png", frames[0])

@@ -143,13 +143,13 @@ def test_a_video_needs_the_extra_and_a_picture_does_not(tmp_path):
     import numpy as np
     from skimage import io
 
-    from softtact.imaging.frames import render_frame
+    from softtact.imaging.frames import Camera, render_frame
 
     (tmp_path / "press.mp4").write_bytes(b"no matter")
     arguments = ["--pixel-mm", "0.03", "--out", str(tmp_path / "discs.csv")]
     status, _, complained = without("av", "detect-discs", str(tmp_path / "press.mp4"), *arguments)
     assert status == 1 and "press.mp4: This needs av" in complained and "pip install 'softtact[optics]'." in complained
-    frame = render_frame([0.0], [0.0], [0.4], footprint_mm=(3.0, 3.0), pixel_mm=0.03, blur_mm=0.05, noise=0.02, falloff=0.2, seed=0)
+    frame = render_frame([0.0], [0.0], [0.4], Camera(0.03, blur_mm=0.05, noise=0.02, falloff=0.2), footprint_mm=(3.0, 3.0), seed=0)
     io.imsave(tmp_path / "frame.png", np.asarray(frame))
     status, said, _ = without("av", "detect-discs", str(tmp_path / "frame.png"), *arguments)
     assert status == 0 and "discs: 1" in said

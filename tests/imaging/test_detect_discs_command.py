@@ -9,7 +9,7 @@ import pytest
 import tifffile
 
 from softtact.cli import main
-from softtact.imaging.frames import render_frame
+from softtact.imaging.frames import Camera, render_frame
 from softtact.imaging.reading import read_frame, read_frames
 
 PIXEL_MM = 0.05
@@ -17,8 +17,8 @@ AREAS = (0.0, 0.2, 0.4)   # of both discs in one frame after the other
 
 
 def frame(area, *, seed=0):
-    return render_frame([-0.8, 0.8], [0.2, -0.2], [area, area], footprint_mm=(4.0, 3.2), pixel_mm=PIXEL_MM, blur_mm=0.05,
-                        noise=0.02, falloff=0.2, seed=seed)
+    return render_frame([-0.8, 0.8], [0.2, -0.2], [area, area], Camera(PIXEL_MM, blur_mm=0.05, noise=0.02, falloff=0.2),
+                        footprint_mm=(4.0, 3.2), seed=seed)
 
 
 @pytest.fixture

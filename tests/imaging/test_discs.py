@@ -1,5 +1,7 @@
 """Discs rendered with known areas are found again, with the camera's faults; what is no disc is not found."""
 
+from dataclasses import replace
+
 import imageio.v3 as iio
 import numpy as np
 import pytest
@@ -9,10 +11,10 @@ from scipy.ndimage import gaussian_filter
 
 from softtact.errors import InputError
 from softtact.imaging.discs import COLUMNS, DTYPES, detect_discs
-from softtact.imaging.frames import BACKGROUND, BRIGHTNESS, expose, render_frame
+from softtact.imaging.frames import BACKGROUND, BRIGHTNESS, Camera, expose, render_frame
 from softtact.models.hyperelastic.build import lattice
 
-CAMERA = {"pixel_mm": 0.03, "blur_mm": 0.03, "noise": 0.02, "falloff": 0.3}
+CAMERA = Camera(pixel_mm=0.03, blur_mm=0.03, noise=0.02, falloff=0.3)
 NOISE_AT_FIVE = (BRIGHTNESS - BACKGROUND) / 5   # signal-to-noise 5
 BOUND = {12: 0.0205, 16: 0.0133, 24: 0.0072}    # of the area, at the centre's signal-to-noise of 5: Cramer and Rao
 DARKER = 1.12   # root mean square of the centre's light over a disc's, where 30 % is lost to the corners
@@ -22,14 +24,14 @@ def frame(area, *, counts=(6, 8), seed=0, pitch=1.2, **camera):
     centres, _ = lattice(counts, pitch)
     areas = np.broadcast_to(area, len(centres))
     size = tuple(pitch * count + 0.5 for count in counts)
-    return render_frame(*centres.T, areas, footprint_mm=size, seed=seed, **(CAMERA | camera)), centres
+    return render_frame(*centres.T, areas, replace(CAMERA, **camera), footprint_mm=size, seed=seed), centres
 
 
 def shapes(inside, *, noise=NOISE_AT_FIVE, side=160, seed=0):
     """(frame, area) of contacts where inside(x, y) in pixels from the centre; 30 % fall-off, blur of a pixel."""
     points = (np.arange(side * 8) + 0.5) / 8 - 0.5 * side
     cover = inside(*np.meshgrid(points, points)).astype(float).reshape(side, 8, side, 8).mean(axis=(1, 3))
-    return expose(gaussian_filter(cover, 1.0), noise=noise, falloff=0.3, seed=seed), cover.sum()
+    return expose(gaussian_filter(cover, 1.0), Camera(1.0, 1.0, noise=noise, falloff=0.3), seed=seed), cover.sum()
 
 
 def repeated(inside, *, pitch=32):
@@ -65,7 +67,7 @@ def test_the_stated_uncertainty_is_the_scatter():
 
 def test_area_is_found_within_half_a_percent_in_a_good_light():
     for area in [0.15, 0.283, 0.45]:
-        discs = detect_discs(frame(area)[0], pixel_mm=CAMERA["pixel_mm"])
+        discs = detect_discs(frame(area)[0], pixel_mm=CAMERA.pixel_mm)
         assert len(discs) == 48, area
         assert np.abs(discs.area_mm2 / area - 1).max() < 0.03, area
         assert discs.area_mm2.mean() == pytest.approx(area, rel=0.005), area
@@ -73,7 +75,7 @@ def test_area_is_found_within_half_a_percent_in_a_good_light():
 
 def test_area_does_not_depend_on_blur():
     for blur_mm in [0.0, 0.06, 0.09]:
-        discs = detect_discs(frame(0.283, blur_mm=blur_mm)[0], pixel_mm=CAMERA["pixel_mm"])
+        discs = detect_discs(frame(0.283, blur_mm=blur_mm)[0], pixel_mm=CAMERA.pixel_mm)
         assert discs.area_mm2.mean() == pytest.approx(0.283, rel=0.006), blur_mm
 
 
@@ -83,17 +85,17 @@ def test_every_frustum_of_the_sensor_is_found():
 
 def test_centres_are_found_to_a_tenth_of_a_pixel():
     picture, centres = frame(0.283)
-    found = detect_discs(picture, pixel_mm=CAMERA["pixel_mm"])[["x_mm", "y_mm"]].to_numpy()
+    found = detect_discs(picture, pixel_mm=CAMERA.pixel_mm)[["x_mm", "y_mm"]].to_numpy()
     nearest = np.linalg.norm(found[:, None] - centres[None], axis=2).min(axis=1)
-    assert nearest.max() < 0.1 * CAMERA["pixel_mm"]   # light that falls off within a disc moves it by 0.05
+    assert nearest.max() < 0.1 * CAMERA.pixel_mm   # light that falls off within a disc moves it by 0.05
 
 
 @settings(max_examples=10, deadline=None)
 @given(x=st.floats(-1, 1), y=st.floats(-1, 1))
 @example(x=0.58984375, y=0.0)     # whole steps of Gauss and Newton lead away from it
 def test_a_disc_moves_with_its_contact_and_keeps_its_area(x, y):
-    pixel = CAMERA["pixel_mm"]
-    picture = render_frame([x * pixel], [y * pixel], [0.283], footprint_mm=(2, 2), seed=0, **CAMERA | {"noise": 0.0})
+    pixel = CAMERA.pixel_mm
+    picture = render_frame([x * pixel], [y * pixel], [0.283], replace(CAMERA, noise=0.0), footprint_mm=(2, 2), seed=0)
     disc = detect_discs(picture, pixel_mm=pixel).iloc[0]
     assert (disc.x_mm / pixel, disc.y_mm / pixel) == (pytest.approx(x, abs=0.03), pytest.approx(y, abs=0.03))
     assert disc.area_mm2 == pytest.approx(0.283, rel=0.005)
@@ -110,8 +112,8 @@ def test_light_over_all_the_frame_and_the_seed_of_the_noise_do_not_matter_but_th
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(noise=st.floats(0, 0.5), falloff=st.floats(0, 0.95), background=st.floats(0, 1), seed=st.integers(0, 10**6))
 def test_an_empty_frame_has_no_discs_whatever_its_noise_and_light(noise, falloff, background, seed):
-    empty = render_frame([], [], [], footprint_mm=(200, 150), pixel_mm=1.0, blur_mm=1.0, noise=noise, falloff=falloff, seed=seed,
-                         background=background)
+    empty = render_frame([], [], [], Camera(1.0, 1.0, noise=noise, falloff=falloff, background=background),
+                         footprint_mm=(200, 150), seed=seed)
     assume(len(np.unique(empty)) != 2)      # of two values it is read as a mask, in which the higher one is a contact
     assert detect_discs(empty, pixel_mm=1.0).empty
 
@@ -119,8 +121,7 @@ def test_an_empty_frame_has_no_discs_whatever_its_noise_and_light(noise, falloff
 def test_the_blotches_of_a_compressed_empty_frame_are_no_discs():
     for quality in [75, 95]:
         for noise in [0.02, 0.1]:
-            empty = render_frame([], [], [], footprint_mm=(320, 240), pixel_mm=1.0, blur_mm=1.0, noise=noise, falloff=0.5,
-                                 seed=[0, 0])
+            empty = render_frame([], [], [], Camera(1.0, 1.0, noise=noise, falloff=0.5), footprint_mm=(320, 240), seed=[0, 0])
             packed = iio.imwrite("<bytes>", empty, extension=".jpg", quality=quality)
             assert detect_discs(iio.imread(packed, extension=".jpg"), pixel_mm=1.0).empty, noise
 
@@ -208,7 +209,7 @@ def test_dim_discs_beside_bright_ones_keep_their_own_brightness():
 
 
 def test_smaller_discs_are_left_out_on_demand():
-    picture = render_frame([-1, 1], [0, 0], [0.1, 0.4], footprint_mm=(4, 2), seed=0, **CAMERA)
+    picture = render_frame([-1, 1], [0, 0], [0.1, 0.4], CAMERA, footprint_mm=(4, 2), seed=0)
     assert detect_discs(picture, pixel_mm=0.03, smallest_mm=0.5).area_mm2.tolist() == [pytest.approx(0.4, rel=0.01)]
 
 

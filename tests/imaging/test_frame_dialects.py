@@ -13,7 +13,7 @@ from PIL import Image
 
 from softtact.errors import FrameWarning, InputError
 from softtact.imaging.discs import detect_discs
-from softtact.imaging.frames import render_frame
+from softtact.imaging.frames import Camera, render_frame
 from softtact.imaging.reading import read_frames
 
 FOOTPRINT = (64, 48)
@@ -24,8 +24,8 @@ def light(seed):
     """Light (rows, columns) from 0 to 1 of two discs of random place and size, and the frame in 8 bits."""
     rng = np.random.default_rng(seed)
     x, y = np.array([-15.0, 15.0]) + rng.uniform(-4, 4, 2), rng.uniform(-8, 8, 2)
-    frame = render_frame(x, y, rng.uniform(100, 300, 2), footprint_mm=FOOTPRINT, pixel_mm=1.0, blur_mm=1.0, noise=0.01, falloff=0.1,
-                         seed=seed)
+    camera = Camera(1.0, 1.0, noise=0.01, falloff=0.1)
+    frame = render_frame(x, y, rng.uniform(100, 300, 2), camera, footprint_mm=FOOTPRINT, seed=seed)
     return frame / 255.0, frame
 
 

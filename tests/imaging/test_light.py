@@ -6,12 +6,11 @@ import pytest
 
 from softtact.errors import FrameWarning, InputError
 from softtact.imaging.discs import detect_discs
-from softtact.imaging.frames import render_frame
+from softtact.imaging.frames import Camera, render_frame
 from softtact.imaging.light import grey
 
 AREAS = [140.0, 260.0]
-FRAME = render_frame([-13.2, 11.3], [4.1, -3.7], AREAS, footprint_mm=(64, 48), pixel_mm=1.0, blur_mm=1.0, noise=0.01, falloff=0.1,
-                     seed=0)
+FRAME = render_frame([-13.2, 11.3], [4.1, -3.7], AREAS, Camera(1.0, 1.0, noise=0.01, falloff=0.1), footprint_mm=(64, 48), seed=0)
 SHARE = FRAME / 255.0
 MASK = SHARE > 0.4
 
@@ -86,8 +85,8 @@ def test_light_that_alpha_holds_back_does_not_count():
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(("noise", "background"), [(0.002, 0.03), (0.004, 0.0), (0.02, 0.1)])
 def test_what_compression_leaves_in_a_dark_frame_is_neither_a_mask_nor_a_contact(noise, background):
-    dark = render_frame([], [], [], footprint_mm=(200, 150), pixel_mm=1.0, blur_mm=1.0, noise=noise, falloff=0.0, seed=0,
-                        background=background)
+    dark = render_frame([], [], [], Camera(1.0, 1.0, noise=noise, falloff=0.0, background=background),
+                        footprint_mm=(200, 150), seed=0)
     packed = iio.imread(iio.imwrite("<bytes>", dark, extension=".jpg", quality=75), extension=".jpg")
     assert detect_discs(packed, pixel_mm=1.0, lossy=True).empty
     assert detect_discs(packed.astype(np.uint16) << 8, pixel_mm=1.0, lossy=True).empty

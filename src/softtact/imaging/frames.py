@@ -6,6 +6,7 @@ Rows run along y, columns along x; the frame's centre is the origin. Coverage is
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
@@ -15,36 +16,48 @@ BRIGHTNESS = 0.85   # of full scale: a contact at the frame's centre
 _SUBROWS = 16       # lines per pixel along which a disc's chord is exact: coverage to 1e-4 of a disc of 4 pixels
 
 
-def render_frame(x_mm: np.ndarray, y_mm: np.ndarray, area_mm2: np.ndarray, *, footprint_mm: tuple[float, float], pixel_mm: float,
-                 blur_mm: float, noise: float, falloff: float, seed: int | Sequence[int], background: float = BACKGROUND,
-                 brightness: float = BRIGHTNESS) -> np.ndarray:
+@dataclass(frozen=True)
+class Camera:
+    """A camera behind the glass, with its lens and its light."""
+
+    pixel_mm: float
+    """Side of a pixel on the glass."""
+    blur_mm: float
+    """Standard deviation of the lens' blur."""
+    noise: float
+    """Standard deviation as a share of full scale, the same in every pixel."""
+    falloff: float
+    """Share of light lost from the frame's centre to its corners."""
+    background: float = BACKGROUND
+    """Share of full scale at the frame's centre without contact."""
+    brightness: float = BRIGHTNESS
+    """The same with contact."""
+
+    @property
+    def signal_to_noise(self) -> float:
+        """Contrast of a disc over the background at the frame's centre, before blur, over the noise of one pixel."""
+        return (self.brightness - self.background) / self.noise
+
+
+def render_frame(x_mm: np.ndarray, y_mm: np.ndarray, area_mm2: np.ndarray, camera: Camera, *, footprint_mm: tuple[float, float],
+                 seed: int | Sequence[int]) -> np.ndarray:
     """An 8-bit frame (rows along y, columns along x) of discs with given centres (n,) and areas (n,).
 
-    footprint_mm: sides (along x, along y) of what the camera sees; blur_mm: standard deviation of the lens' blur;
-    noise: standard deviation as a share of full scale, the same in every pixel;
-    falloff: share of light lost from the centre to the corners;
-    background, brightness: share of full scale at the frame's centre, without and with contact.
-    Noise that reaches below 0 or above 1 is cut off, as in a camera; `signal_to_noise` tells the ratio before that.
+    footprint_mm: sides (along x, along y) of what the camera sees
+    Noise that reaches below 0 or above 1 is cut off, as in a camera; `Camera.signal_to_noise` is the ratio before that.
     """
-    columns, rows = (int(round(side / pixel_mm)) for side in footprint_mm)
-    blur = blur_mm / pixel_mm
+    columns, rows = (int(round(side / camera.pixel_mm)) for side in footprint_mm)
+    blur = camera.blur_mm / camera.pixel_mm
     beyond = int(np.ceil(4 * blur)) + 1   # what lies just outside also shines into the frame
-    cover = coverage(x_mm, y_mm, area_mm2, shape=(rows + 2 * beyond, columns + 2 * beyond), pixel_mm=pixel_mm)
-    return expose(gaussian_filter(cover, blur)[beyond:-beyond, beyond:-beyond], noise=noise, falloff=falloff, seed=seed,
-                  background=background, brightness=brightness)
+    cover = coverage(x_mm, y_mm, area_mm2, shape=(rows + 2 * beyond, columns + 2 * beyond), pixel_mm=camera.pixel_mm)
+    return expose(gaussian_filter(cover, blur)[beyond:-beyond, beyond:-beyond], camera, seed=seed)
 
 
-def expose(cover: np.ndarray, *, noise: float, falloff: float, seed: int | Sequence[int], background: float = BACKGROUND,
-           brightness: float = BRIGHTNESS) -> np.ndarray:
-    """The 8-bit frame of a blurred coverage (rows, columns) of contacts of any shape; the rest as in `render_frame`."""
-    light = illumination(cover.shape, falloff) * (background + (brightness - background) * cover)
-    light += noise * np.random.default_rng(seed).standard_normal(light.shape)
+def expose(cover: np.ndarray, camera: Camera, *, seed: int | Sequence[int]) -> np.ndarray:
+    """The 8-bit frame of a coverage (rows, columns) of contacts of any shape that the lens has blurred already."""
+    light = illumination(cover.shape, camera.falloff) * (camera.background + (camera.brightness - camera.background) * cover)
+    light += camera.noise * np.random.default_rng(seed).standard_normal(light.shape)
     return np.round(255 * np.clip(light, 0, 1)).astype(np.uint8)
-
-
-def signal_to_noise(*, noise: float, background: float = BACKGROUND, brightness: float = BRIGHTNESS) -> float:
-    """Contrast of a disc over the background at the frame's centre, before blur, over the noise of one pixel."""
-    return (brightness - background) / noise
 
 
 def coverage(x_mm: np.ndarray, y_mm: np.ndarray, area_mm2: np.ndarray, *, shape: tuple[int, int], pixel_mm: float) -> np.ndarray:
