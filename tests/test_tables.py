@@ -45,7 +45,7 @@ def workbook(tmp_path):
     (HEADER + '"1,00","0,000"\n', {}, "row 2: '1,00' is not a number; .*state the decimal comma"),
     ("stretch;nominal_stress_mpa\n1.0;0\n", {"decimal": ","}, "row 2: '1.0' is not a number; its decimal sign was stated to be"),
     (HEADER + '1.0,"1,234.5"\n', {}, "row 2: '1,234.5' is not a number; .* no separator of thousands"),
-    ('"stretch","nominal_stress_mpa"\n"1",1.0,0.0\n"2",1.1,0.1\n', {}, "row 2: it has 3 fields .* rows' own names, as R"),
+    ('"stretch","nominal_stress_mpa"\n"1",1.0,0.0\n"2",1.1,0.1\n', {}, "row 2: it has 3 fields .* names of the rows, as R"),
     ("stretch,nominal_stress_mpa,stretch,nominal_stress_mpa\n1,0,1,0\n1.1,1,1.1,2\n", {}, "several columns hold the stretch"),
     ("stretch,nominal_stress_mpa,stretch.1,nominal_stress_mpa.1\n1,0,1,0\n1.1,1,1.1,2\n", {}, "several columns hold the stretch"),
     (HEADER + "1.0,0,\n1.1,0.1,\n", {}, "row 2: it has 3 fields .* none at its end that the header does not name"),

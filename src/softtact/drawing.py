@@ -1,4 +1,4 @@
-"""Pictures drawn in a process of their own: a driver of OpenGL that fails may end its process, or never answer."""
+"""Pictures drawn in a separate process: a driver of OpenGL that fails may end its process, or never answer."""
 
 import subprocess
 from collections.abc import Mapping, Sequence
@@ -22,8 +22,8 @@ def drawn_apart(command: Sequence[str], folder: Path, *, sentence: str, timeout_
         return None
     images = folder / "images.npz"
     if done.returncode or not images.exists():
-        said = done.stderr.strip().splitlines() or ["it said nothing"]
-        announce(f"{sentence} (status {done.returncode}: {said[-1]:.200}).")
+        lines = done.stderr.strip().splitlines() or ["without a message"]
+        announce(f"{sentence} (status {done.returncode}: {lines[-1]:.200}).")
         return None
     with np.load(images, allow_pickle=False) as kept:
         return dict(kept)

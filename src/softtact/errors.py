@@ -1,7 +1,4 @@
-"""What softtact raises. Each message is one sentence that names the thing, its value and the remedy.
-
-What the core does without: which extra brings which package, and what to say where one is missing.
-"""
+"""What softtact raises, each with one sentence that names the thing, its value and the remedy; which extra brings which package."""
 
 from typing import Any
 

@@ -84,7 +84,7 @@ def _not_written(path, error):
 
 
 class _OnceLoader(yaml.SafeLoader):
-    """PyYAML's safe loader, which refuses a key that stands twice in a mapping; PyYAML itself keeps the last in silence."""
+    """PyYAML's safe loader, which refuses a key that is there twice in a mapping; PyYAML itself keeps the last in silence."""
 
     def compose_mapping_node(self, anchor: Any) -> yaml.MappingNode:
         """The node of a mapping, before merges (`<<`) add keys that it may well override."""
@@ -105,7 +105,7 @@ class _OnceLoader(yaml.SafeLoader):
 def read_yaml(path: str | Path, *, missing: str) -> Any:
     """What a YAML file holds; `missing` says of a file that is not there what to do about it.
 
-    A key that stands twice in one mapping is refused.
+    A key that is there twice in one mapping is refused.
     """
     try:
         loader = _OnceLoader(Path(path).read_text(encoding="utf-8"))
@@ -134,7 +134,7 @@ def write_json(path: str | Path, obj: Any) -> None:
 
 
 def parse_json(text: str) -> Any:
-    """The object of a JSON text; a key that stands twice, of which Python would keep the last, raises ValueError, as faults do."""
+    """The object of a JSON text; a key that is there twice, of which Python would keep the last, raises ValueError as faults do."""
     def once(pairs):
         names = [name for name, _ in pairs]
         twice = next((name for name in names if names.count(name) > 1), None) if len(set(names)) < len(names) else None

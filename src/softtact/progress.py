@@ -14,7 +14,7 @@ _ON_SCREEN_S, _IN_A_LOG_S = 0.5, 10.0     # between two lines: on a screen one t
 def progress(iterable: Iterable[_Item], *, label: str, total: int | str | None = None, interval_s: float = 2.0) -> Iterator[_Item]:
     """Yield the items of `iterable`; write `label: 3/20, 12 s` on stderr at most every `interval_s` seconds.
 
-    An empty label writes nothing: the work is part of some other that tells its progress.
+    An empty label writes nothing: the work is part of some other that reports its progress.
     """
     total = total if total is not None else len(iterable)     # type: ignore[arg-type]
     start = shown = time.monotonic()
@@ -34,7 +34,7 @@ def announce(text: str) -> None:
 class Watch:
     """How far one long computation is, on one line of stderr, and when its time is over.
 
-    label: what is told first, an empty one tells nothing;  limit_s: wall-clock seconds from now on, or None
+    label: first words of the report, an empty one reports nothing;  limit_s: wall-clock seconds from now on, or None
     """
 
     def __init__(self, label: str = "", *, limit_s: float | None = None) -> None:

@@ -1,13 +1,11 @@
-"""Tables of a user's own files: CSV in the dialects that programs write, and sheets of Excel.
+"""Tables of users' files: CSV in the dialects that programs write, and sheets of Excel, which openpyxl reads (extra `excel`).
 
-A table is read as it says of itself, or refused; nothing in it is guessed.
-  encoding    UTF-8, UTF-16 with its mark, else Windows' own (cp1252)
+A table is read as it declares itself, or refused; nothing in it is guessed.
+  encoding    UTF-8, UTF-16 with its mark, else that of Windows (cp1252)
   separator   tab, semicolon or comma, whichever the header has, in this order; or what a first line `sep=;` states
   fields      each row as many as the header, so that a comma in a number, or the name of a row, shifts no column
-  numbers     a decimal point, or a comma where the caller says so; none of thousands, for 1,234 may be either
+  numbers     a decimal point, or a comma where the caller states so; none of thousands, for 1,234 may be either
   `#`         begins a line of notes
-
-Sheets of an Excel workbook as rows of cells; openpyxl reads them, which the extra `excel` brings.
 """
 
 import codecs
@@ -29,7 +27,7 @@ _NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)", flags=re.IGNORECASE)
 _NOT_CP1252 = set(b"\0\x81\x8d\x8f\x90\x9d")     # bytes that are no letter there
 _NAMES = {",": "commas", ";": "semicolons", "\t": "tabs"}
 _STATE = "state the decimal comma (--decimal ,)"
-_ROWS_TO_COMPARE = 5    # of fewer rows nothing can be told from how long their numbers are
+_ROWS_TO_COMPARE = 5    # of fewer rows the length of their numbers shows nothing
 WORKBOOKS = (".xlsx", ".xlsm")
 Cell = str | float
 
@@ -39,7 +37,7 @@ class Table:
     """A header and the rows below it.
 
     header: the columns' names;  rows: [(number in the file, from 1, cells)], text or, of Excel, numbers
-    notes: texts of the lines that begin with `#`;  decimal: `.` or `,`, or None: the point, and no way to state another
+    notes: texts of the lines that begin with `#`;  decimal: `.` or `,`, or None: the point, and no other can be stated
     """
 
     path: Path
@@ -49,9 +47,9 @@ class Table:
     decimal: str | None = None
 
     def positions(self, name: str) -> list[int]:
-        """Positions of the columns of this name, and of those that are called as programs call a name that stands twice."""
-        again = re.compile(re.escape(name) + r"([._]\d+| \(\d+\))")
-        return [at for at, own in enumerate(self.header) if own == name or (name in self.header and again.fullmatch(own))]
+        """Positions of the columns of this name, and of those that are called as programs call a name that is there twice."""
+        repeated = re.compile(re.escape(name) + r"([._]\d+| \(\d+\))")
+        return [at for at, text in enumerate(self.header) if text == name or (name in self.header and repeated.fullmatch(text))]
 
     def numbers(self, names: Sequence[str]) -> list[list[float]]:
         """[[values (n,)], ...] of the one column of each name; a cell that holds no finite number is refused by its row."""
@@ -70,9 +68,9 @@ def read_table(path: str | Path, *, what: str = "table", marker: str | None = No
     """The `Table` of a CSV file or of a sheet of Excel.
 
     what: what the table is, for a refusal
-    marker: a text in the header, which then may stand below other lines, as in the `layout` of that name; without it the header is
+    marker: a text in the header, which then may lie below other lines, as in the `layout` of that name; without it the header is
     the first line
-    decimal: `.` or `,` as the user stated it, or None: the point, and no way to state another
+    decimal: `.` or `,` as the user stated it, or None: the point, and no other can be stated
     skip_rows: lines above that are passed over;  sheet: the name of a workbook's sheet, where it has several
     Raises InputError that names file, row and remedy.
     """
@@ -229,7 +227,7 @@ def _header_at(path, lines, marker, layout):
 
 
 def _separator(header):
-    """The first of tab, semicolon and comma that stands in the header outside of quotes: below it a comma may be decimal."""
+    """The first of tab, semicolon and comma in the header outside of quotes: below it a comma may be decimal."""
     bare = re.sub(r'"[^"]*"', "", header.strip())
     return next((separator for separator in SEPARATORS if separator in bare), ",")
 
@@ -274,8 +272,8 @@ def _check_widths(table, separator):
         remedy = "is this the header, or a line above it? Pass over lines above the header" + " (--skip-rows N)" * (
             table.decimal is not None)
     elif len(wrong) == len(table.rows) and fields == width + 1 and any(cells[-1] for _, cells in wrong):
-        remedy = ("are the first the rows' own names, as R writes them? Give these a name in the header, or write the file without "
-                  "(row.names = FALSE)")
+        remedy = ("are the first the names of the rows, as R writes them? Give these a name in the header, or write the file "
+                  "without (row.names = FALSE)")
     elif separator == "commas" and fields > width and last:
         remedy = "are decimals written with commas? Write points" + f", or put semicolons between the fields and {_STATE}" * (
             table.decimal is not None)
@@ -315,7 +313,7 @@ def _of_sheet(path, records, *, what, marker, layout, decimal):
 
 
 def read_sheet(path: str | Path, *, sheet: str | None = None) -> list[tuple[int, list[Cell]]]:
-    """[(row number from 1, cells)] of a sheet: numbers as float, all else as text, "" where nothing stands.
+    """[(row number from 1, cells)] of a sheet: numbers as float, all else as text, "" of an empty cell.
 
     sheet: its name; without one the workbook's only sheet that holds anything
     Raises InputError that names the file and the remedy.
@@ -328,8 +326,8 @@ def read_sheet(path: str | Path, *, sheet: str | None = None) -> list[tuple[int,
         book = openpyxl.load_workbook(path, data_only=True)
         sheets = {page.title: page for page in book.worksheets}
     except Exception as error:     # the reader of the zip and its XML raises whatever its parts do
-        said = " ".join(str(error).split())[:120]
-        raise InputError(f"{path}: not a readable workbook ({said}); save it again as .xlsx, or as CSV.") from None
+        reason = " ".join(str(error).split())[:120]
+        raise InputError(f"{path}: not a readable workbook ({reason}); save it again as .xlsx, or as CSV.") from None
     page = sheets[_chosen(path, sheets, sheet)]
     return [(row, [_cell(path, cell) for cell in cells]) for row, cells in enumerate(page.iter_rows(), 1)]
 

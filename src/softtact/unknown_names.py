@@ -1,4 +1,4 @@
-"""What is to be said of a key or a name that is not known: the nearest right one."""
+"""The nearest known name for a key or a name that is unknown."""
 
 import difflib
 from collections.abc import Collection, Iterable
@@ -9,7 +9,7 @@ from pydantic_core import ErrorDetails
 
 
 def unknown(name: object, known: Collection[object], *, kind: str) -> str:
-    """What is to be said of a `kind` of thing called `name` that is not among the `known`."""
+    """That there is no `kind` of thing called `name`, with the nearest of the `known`."""
     near = difflib.get_close_matches(str(name), [str(right) for right in known], n=1)
     remedy = f"did you mean {near[0]!r}?" if near else f"known: {', '.join(map(str, known)) or 'none'}"
     return f"there is no {kind} {name!r}; {remedy}"
@@ -31,7 +31,7 @@ def known_keys(model: type[BaseModel], path: Iterable[Any]) -> list[str]:
 
 
 def first_fault(error: ValidationError) -> ErrorDetails:
-    """Of a pydantic ValidationError's faults the one to tell: a misspelt key before the right one that is missing for it."""
+    """Of a pydantic ValidationError's faults the one to report: a misspelt key before the right one that is missing for it."""
     return min(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
 
 

@@ -1,14 +1,12 @@
-"""Whether recordings can be of the presses that they are said to be of: noticed and said before anything is fitted.
+"""Whether recordings can be of the presses that they are stated to be of, checked before a fit; and which further press helps most.
 
 Each recording by itself is compared with the press at one common gain and zero, the object up to 1.5 mm beside its place. What then
 is not explained of the counts' variance is small for the right press: gains 20 % apart leave 4 %. A wrong one leaves more, and
 the same counts may fit clearly better turned round, from the other finger, or at a force in another unit.
 
-Which further press would tell most about a sensor: what each of some candidates would leave of the covariance.
-
-D-optimal: the press that shrinks the volume of what is uncertain most; the mean deviation of the gains afterwards, which A-optimal
-presses minimise, stands beside it (A. Atkinson, A. Donev, R. Tobias, Optimum Experimental Designs, 2007, ch. 10). The object is
-taken to lie exactly where it is said to.
+The best further press is D-optimal: of some candidates the one that most shrinks the volume of what is uncertain. Beside it is
+given the mean deviation of the gains afterwards, which A-optimal presses minimise (A. Atkinson, A. Donev, R. Tobias, Optimum
+Experimental Designs, 2007, ch. 10). The object is taken to lie exactly in its stated place.
 """
 
 from collections.abc import Sequence
@@ -50,12 +48,12 @@ class PressCheck:
 
 
 def check_recordings(problem: Problem) -> list[PressCheck]:
-    """A `PressCheck` of each experiment. Raises InputError where a recording is not of the press that it is said to be of."""
+    """A `PressCheck` of each experiment. Raises InputError where a recording is not of the stated press."""
     return [_check(problem, k, one) for k, one in enumerate(problem.experiments)]
 
 
 def check_result(result: CalibrationResult) -> None:
-    """Raises InputError where a number ran to the end of its range: what it was fitted to is not what it stands for."""
+    """Raises InputError where a number ran to the end of its range: its value is then that of the limit."""
     problem = result.problem
     low, high = problem.bounds
     for name, value, least, most in zip(problem.names, result.vector, low, high, strict=True):
@@ -149,7 +147,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Advice:
-    """What a candidate would tell. information: growth of half the logarithm of the information's determinant, in nats;
+    """What a candidate would add. information: growth of half the logarithm of the information's determinant, in nats;
     gain_deviation: mean over the taxels, of the common gain, that would be left;  largest_n: the force to press up to
     """
 
@@ -167,7 +165,7 @@ def quarters(name: str, mesh: trimesh.Trimesh, footprint_mm: Sequence[float]) ->
 
 
 def rank(result: CalibrationResult, candidates: Sequence[Candidate], *, largest_n: float) -> list[Advice]:
-    """An `Advice` for each candidate pressed up to a force (N), as far as the model is valid; the one that tells most first."""
+    """An `Advice` for each candidate pressed up to a force (N), as far as the model is valid; the most informative first."""
     return sorted((_advice(result, one, largest_n) for one in candidates), key=lambda advice: -advice.information)
 
 

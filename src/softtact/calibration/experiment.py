@@ -61,7 +61,7 @@ def experiment(recording: "xarray.Dataset", mesh: trimesh.Trimesh, *, finger: in
     """The `Experiment` of a recording and the object (mm) that one of its fingers was pressed with.
 
     force_n: of a weight that was laid on and held: it acts while the finger's counts are above half of their largest sum. Without
-    it the recording's own `force_n` is taken (`recording.with_force`).  largest_counts: at which the readout ends
+    it the recording's `force_n` is taken (`recording.with_force`).  largest_counts: at which the readout ends
     Raises InputError where the finger is not pressed, its force is not known, or nothing of the recording is at rest.
     """
     name = recording.attrs["file"] or "the recording"
@@ -95,7 +95,7 @@ def _means(count, most):
 
 
 def _noise(counts):
-    """Standard deviation of a reading: from the median step between readings, so that a press' own steps do not count."""
+    """Standard deviation of a reading: from the median step between readings, so that the steps of a press do not count."""
     if len(counts) < 3:
         return 0.0
     return float(np.median(_OF_MEDIAN * np.median(np.abs(np.diff(counts, axis=0)), axis=0)) / np.sqrt(2))
@@ -106,7 +106,7 @@ def _check_pressed(name, recording, finger, noise):
     least = _LEAST_COUNTS + 10 * noise
     if moved[finger] >= least:
         return
-    pressed = [str(one) for one, way in enumerate(moved) if way >= least]
+    pressed = [str(one) for one, distance in enumerate(moved) if distance >= least]
     raise InputError(f"{name}: finger {finger} moves by {moved[finger]:.0f} counts only"
                      + (f", and finger {pressed[0]} by {moved[int(pressed[0])]:.0f}: are the fingers swapped? Calibrate finger "
                         f"{pressed[0]} (--finger {pressed[0]})." if pressed else "; record a press that it feels."))

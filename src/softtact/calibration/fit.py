@@ -1,8 +1,7 @@
-"""From experiments to a calibrated sensor: best unknowns, their covariance, and what the presses do not tell.
+"""From experiments to a calibrated sensor: best unknowns, covariance, what the presses do not determine; and the sensor's file.
 
-The file of a calibrated sensor: a copy of the sensor's own with a block `calibration`, which `load_sensor` reads.
-
-How far the hyperelastic model, which a calibration takes too long to fit by, lies from the calibrated sensor.
+The file is a copy of that of the sensor with a block `calibration`, which `load_sensor` reads. A calibration by the hyperelastic
+model would take too long, so it is only compared with the calibrated sensor.
 """
 
 from collections.abc import Sequence
@@ -26,7 +25,7 @@ from softtact.sensors.edge import SidesBelow
 from softtact.sensors.specification import spec_from_dict
 
 _ROUNDS, _SETTLED = 6, 0.5       # of pressing anew, until that changes counts by less than half of a mean's noise
-_UNKNOWN = 0.5                   # of the prior's standard deviation: what is left above it, the presses do not tell
+_UNKNOWN = 0.5                   # of the prior's standard deviation: what is left above it, the presses do not determine
 _PARTS = 0.35                    # of a direction's length: what is named as a part of it
 _HEAD = "# Made by `softtact calibrate` from {source}. Counts: gain x counts_per_relative_change x dC/C0 + zero_counts.\n"
 
@@ -95,7 +94,7 @@ def _rounded(values, digits):
 
 
 def calibrate(problem: Problem, *, label: str = "calibration") -> CalibrationResult:
-    """Fit a `Problem`. Raises ConvergenceError where an object is still on its way after some rounds of pressing anew."""
+    """Fit a `Problem`. Raises ConvergenceError where an object still moves after some rounds of pressing anew."""
     vector = problem.mean.copy()
     for number in range(1, _ROUNDS + 1):
         vector = _descend(problem, vector)
@@ -158,8 +157,8 @@ def _result(problem, vector):
     names, jacobian, prior = sensitivities(problem, vector, best, np.concatenate(changes), inverse)
     information = jacobian.T @ jacobian / max(misfit, 1.0) ** 2
     covariance = np.linalg.inv(information + np.diag(prior**-2.0))
-    told = not_identifiable(names, information, covariance, prior, best.gain.shape)
-    return CalibrationResult(problem, vector, best, predicted, covariance, names, misfit, told)
+    unknown = not_identifiable(names, information, covariance, prior, best.gain.shape)
+    return CalibrationResult(problem, vector, best, predicted, covariance, names, misfit, unknown)
 
 
 def sensitivities(problem: Problem, vector: np.ndarray, best: Linear, change: np.ndarray,
@@ -181,19 +180,19 @@ def not_identifiable(names: Sequence[str], information: np.ndarray, covariance: 
                      shape: tuple[int, int]) -> list[str]:
     """Sentences on unknowns that presses with this information (q, q) leave about as uncertain as they were before.
 
-    A number by itself: more than half of its prior's deviation is left. Several together: a direction in which each of them is told
-    by others, but not all at once (an eigenvector of the information in units of the priors, with less than one of them).
+    A number by itself: more than half of its prior's deviation is left. Several together: a direction in which each of them is
+    known by others, but not all at once (an eigenvector of the information in units of the priors, with less than one of them).
     """
     left = np.sqrt(np.diag(covariance)) / prior
     open_taxels = [int(name.split()[1]) for name, share in zip(names, left, strict=True)
                    if name.startswith("gain ") and share > _UNKNOWN]
-    said = []
+    sentences = []
     if open_taxels:
-        said.append(f"the gain of {len(open_taxels)} of {shape[0] * shape[1]} taxels, which hardly feel these presses and keep the "
-                    f"common gain: {', '.join(map(str, open_taxels))}")
+        sentences.append(f"the gain of {len(open_taxels)} of {shape[0] * shape[1]} taxels, which hardly feel these presses and "
+                         f"keep the common gain: {', '.join(map(str, open_taxels))}")
     for name, share in zip(names, left, strict=True):
         if share > _UNKNOWN and not name.startswith(("gain ", "zero ")):
-            said.append(f"{in_words(name)}: {share:.0%} of what was uncertain before is left")
+            sentences.append(f"{in_words(name)}: {share:.0%} of what was uncertain before is left")
     keep = [k for k, name in enumerate(names) if not name.startswith(("gain ", "zero "))]
     inner = np.ix_(keep, keep)
     # What is left of the information on these once gains and zeros are free, too: the inverse of their part of the covariance.
@@ -202,8 +201,8 @@ def not_identifiable(names: Sequence[str], information: np.ndarray, covariance: 
     for value, vector in zip(values, vectors.T, strict=True):
         parts = [in_words(names[keep[k]]) for k in np.flatnonzero(np.abs(vector) > _PARTS)]
         if value < 1 and len(parts) > 1:
-            said.append(f"{' and '.join(parts)} apart from each other")
-    return said
+            sentences.append(f"{' and '.join(parts)} apart from each other")
+    return sentences
 
 
 def in_words(name: str) -> str:

@@ -3,11 +3,10 @@
 A press at any force is taken from a spline through these. Scaling all moduli by s divides all forces by s (equilibrium is linear in
 the stresses, and nothing else has the dimension of a stress), so that a softer sensor is the same one at a larger force.
 
-What the friction of an object changes of its press: by the hyperelastic model, for the fast models have none.
-
-Where they touch the object keeps the cover from slipping outwards, which changes a map by some per cent of its maximum. Most
-points stick from a coefficient of 0.2 on, so that presses straight down hardly tell larger ones apart. A press with friction
-depends on its way, so that as many load steps are taken as of the calibration's own presses.
+Friction changes a map by some per cent of its maximum, for where they touch the object keeps the cover from slipping outwards. It
+is computed by the hyperelastic model, because the fast models have none. Most points stick from a coefficient of 0.2 on, so that
+presses straight down hardly distinguish larger ones. A press with friction depends on its path, so that it takes as many load
+steps as the calibration's presses.
 """
 
 import warnings
@@ -28,7 +27,7 @@ from softtact.sensors.frusta import SensorSpec
 
 LEVELS = 9
 SOFTEST = 0.5            # modulus scale down to which forces are pressed
-REACH_LEVELS = 8         # of the first press, which only tells up to which force the model is valid
+REACH_LEVELS = 8         # of the first press, which only shows up to which force the model is valid
 COVERS = (0.8, 1.0, 1.25)     # of the cover's thickness, through which its effect is interpolated
 FRICTIONS = (0.0, 0.05, 0.1, 0.2, 0.6)     # coefficients of the object, between which its effect is interpolated
 
@@ -54,7 +53,7 @@ class Presses:
     def ladder(self, mesh: trimesh.Trimesh, place: Sequence[float], *, largest_n: float, cover: float = 1.0) -> Ladder:
         """The `Ladder` of an object at a place (x, y in mm, degrees) up to a force in N.
 
-        cover: thickness of the cover over the sensor's own. Forces that the model does not reach are left out.
+        cover: thickness of the cover over that of the sensor. Forces that the model does not reach are left out.
         """
         key = (id(mesh), *np.round(place, 6), round(largest_n, 6), cover)
         if key not in self.known:
@@ -65,7 +64,7 @@ class Presses:
     def reach(self, mesh: trimesh.Trimesh, place: Sequence[float], *, largest_n: float) -> tuple[float, float]:
         """Up to which force (N) the model is valid for an object at a place, in coarse steps, and the step after that.
 
-        Both are `largest_n` where it is valid all the way. Beyond validity a press may take minutes, so it ends there.
+        Both are `largest_n` where it is valid so far. Beyond validity a press may take minutes, so it ends there.
         """
         def stop(result: PressResult) -> None:
             if not result.within_validity[-1]:
@@ -93,9 +92,9 @@ class Presses:
         if cover not in self.variants:
             self.variants[cover] = self.sensor if cover == 1.0 else replace(
                 self.sensor, spec=with_cover(self.sensor.spec, cover), prepared_models={})
-        own = self.variants[cover]
-        low, high = own.spec.force_range_n
-        return replace(own, spec=own.spec.model_copy(update={"force_range_n": (low, max(high, largest_n))}))
+        presses = self.variants[cover]
+        low, high = presses.spec.force_range_n
+        return replace(presses, spec=presses.spec.model_copy(update={"force_range_n": (low, max(high, largest_n))}))
 
 
 def placed_at(mesh: trimesh.Trimesh, place: Sequence[float]) -> trimesh.Trimesh:
@@ -110,9 +109,9 @@ def placed_at(mesh: trimesh.Trimesh, place: Sequence[float]) -> trimesh.Trimesh:
 
 
 def with_cover(spec: SensorSpec, times: float) -> SensorSpec:
-    """A sensor with a cover of so many times its thickness, in the same shell: a thicker cover stands further out of it.
+    """A sensor with a cover of so many times its thickness, in the same shell: a thicker cover rises further out of it.
 
-    Raises InputError where the shell would stand out of a thinner one.
+    Raises InputError where the shell would rise above a thinner one.
     """
     thickness = times * spec.cover.thickness_mm
     update: dict[str, Any] = {"cover": spec.cover.model_copy(update={"thickness_mm": thickness})}

@@ -1,7 +1,7 @@
 """The unknowns of a calibration, and what the sensor would read for them.
 
-    counts = G (1 + e) dC/C0(felt map) + z          G common scale; e, z: each taxel's gain and zero
-    felt map = creep of the press' map at the force over the modulus scale, moved to where the object lies
+    counts = G (1 + e) dC/C0(map) + z               G common scale; e, z: each taxel's gain and zero
+    map = creep of the press' map at the force over the modulus scale, moved to where the object lies
 
 Gain and zero are linear and solved for within each step (variable projection; Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973)
 413). The others are followed by Gauss and Newton's method. Moving and turning an object changes its maps by the differences to
@@ -108,9 +108,9 @@ class Problem:
         if unknown:
             raise InputError(f"There is no unknown {unknown[0]!r} to calibrate; write some of {', '.join(FITTED)}.")
         reasons = {"cover": "knows no cover, so its thickness", "friction": "errs by more than friction changes, so that"}
-        for name, said in reasons.items():
+        for name, reason in reasons.items():
             if name in self.fitted and self.presses.model == "elastic":
-                raise InputError(f"The elastic model is one layer and {said} cannot be fitted; leave {name!r} out of --fit, or "
+                raise InputError(f"The elastic model is one layer and {reason} cannot be fitted; leave {name!r} out of --fit, or "
                                  "give --model foundation.")
 
     def _unknowns(self):
@@ -200,7 +200,7 @@ class Problem:
                 for k in range(len(self.experiments))]
 
     def _change(self, k, key, shares, times):
-        """dC/C0 of one experiment, from what is known where its own unknowns are the same."""
+        """dC/C0 of one experiment, from what is known where its unknowns are the same."""
         if key not in self._known[k]:
             if len(self._known[k]) > 2 * len(self.names) + 4:
                 self._known[k].clear()
@@ -211,7 +211,7 @@ class Problem:
     def _read(self, k, shares, times, scale, cover, friction, place):
         one, off = self.experiments[k], np.subtract(place, self._places[k])
 
-        def felt(ladder, maps):     # in the recording's bins
+        def binned(ladder, maps):     # in the recording's bins
             weights = one.bins @ lagged(ladder.weights(one.force_n / scale), one.time_s, shares=shares, time_constants_s=times)
             return np.tensordot(weights, maps, 1)
 
@@ -219,9 +219,9 @@ class Problem:
         for variant, share in (parabola(COVERS, cover) if "cover" in self.fitted else {1.0: 1.0}).items():
             ladder, moving = self._ladders[k][variant]
             pressed = ladder.maps_mm if moving is None else ladder.maps_mm + np.tensordot(off, moving, 1)
-            maps = maps + share * felt(ladder, pressed)
+            maps = maps + share * binned(ladder, pressed)
         for share, ladder in self.rubbed(k, friction):
-            maps = maps + share * felt(ladder, ladder.maps_mm)
+            maps = maps + share * binned(ladder, ladder.maps_mm)
         return relative_change(self.presses.sensor.spec, maps)
 
     def stacked(self) -> tuple[np.ndarray, np.ndarray]:

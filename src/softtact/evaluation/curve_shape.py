@@ -1,14 +1,13 @@
-"""Which simulated curves of contact area against force the paper's test allows, by its words alone.
+"""What curves and maps show: whether a curve of contact area meets the paper's words, and which features of an object stand out.
 
-Printed are: the area grew with the force, "but not necessarily linearly"; one circle was detected around each contact; real and
-simulated area differed by 0.008 mm2. So, stated as a rule, a curve is compatible when
+Printed of the area are: it grew with the force, "but not necessarily linearly"; one circle was detected around each contact; real
+and simulated area differed by 0.008 mm2. So, stated as a rule, a curve is compatible when
     it rises at every force;
     it grows by at least five times the paper's RMSE over the test, else the error would hide the growth;
     neighbouring discs stay two pixels of the camera apart, else they merge and no circle goes around one of them;
     no step's rate (area per force) exceeds four times the mean rate: growth in a jump would have been worth a word.
 The departure from a straight line is reported and excludes nothing.
-
-What deformation maps show of an object's features: how many stand out, and whether a lower one is seen beside a higher one.
+Of a deformation map are counted the features that stand out, and whether a lower one is seen beside a higher one.
 """
 
 from collections.abc import Iterable, Sequence
@@ -56,19 +55,19 @@ def measures(force_n: "np.ndarray | pd.Series", area_mm2: "np.ndarray | pd.Serie
 def objections(found: dict[str, float], *, pixel_mm: float) -> list[str]:
     """What speaks against a curve of these `measures`, in words; nothing where the paper allows it."""
     least_gap = LEAST_GAP_PIXELS * pixel_mm
-    said = []
+    reasons = []
     if not found["growth_mm2"] >= LEAST_GROWTH_MM2:
-        said.append(f"its area changes by {found['growth_mm2']:.3f} mm2, less than {LEAST_GROWTH_MM2:g} mm2 "
-                    "(five times the paper's RMSE)")
+        reasons.append(f"its area changes by {found['growth_mm2']:.3f} mm2, less than {LEAST_GROWTH_MM2:g} mm2 "
+                       "(five times the paper's RMSE)")
     elif not found["rising"]:
-        said.append("its area falls between two forces")
+        reasons.append("its area falls between two forces")
     if not found["disc_gap_mm"] >= least_gap:
-        said.append(f"its discs leave {max(found['disc_gap_mm'], 0):.3f} mm between them, less than {least_gap:g} mm "
-                    "(two pixels), so that no circles could be told apart")
+        reasons.append(f"its discs leave {max(found['disc_gap_mm'], 0):.3f} mm between them, less than {least_gap:g} mm "
+                       "(two pixels), so that no circles could be told apart")
     if found["largest_rate"] > LARGEST_RATE:
-        said.append(f"it grows in a jump ({found['largest_step_share']:.0%} of the growth in one step, at "
-                    f"{found['largest_rate']:.1f} times the mean rate)")
-    return said
+        reasons.append(f"it grows in a jump ({found['largest_step_share']:.0%} of the growth in one step, at "
+                       f"{found['largest_rate']:.1f} times the mean rate)")
+    return reasons
 
 
 def verdict(name: str, found: dict[str, float], *, pixel_mm: float) -> str:

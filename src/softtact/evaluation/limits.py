@@ -1,13 +1,12 @@
-"""What limits a score: the mechanical model, the number of maps, or the network with its training.
+"""What limits a score: the mechanical model, the number of maps, or the network with its training; and how much the gain matters.
 
 Three differences of mean SSIM, each with all else equal:
-model    the same network on the reference's own maps, which the sensor felt, less that on the model's (at all maps, equal steps)
+model    the same network on the reference's maps, which the sensor measured, less that on the model's (at all maps, equal steps)
 data     all maps less the next smaller share of them (the same network, equal steps)
-network  the best network on the same maps (the two that the study trains, and the curve's) less the study's own
+network  the best network on the same maps (the two that the study trains, and the curve's) less the study's
 The largest above `CLEAR` is named. A network that reads worse than the mean training reading at that force is not trained, and
 that is named before all else. Nothing here is chosen by these numbers.
-
-How much a score depends on the gain of the readings: SSIM's constants forgive what is wrong with faint maps.
+SSIM's constants forgive errors of faint maps, so that a score depends on the gain of the readings: `gain_table` shows how much.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,7 +31,7 @@ CLEAR = 0.01      # of mean SSIM: below, a difference is no more than another se
 COLUMNS = ["model", "set", "ssim", "paper", "sensor_ssim", "perfect_model_gain", "more_maps_gain", "other_network_gain", "limit",
            "sentence"]
 WORDS = {"model": "the mechanical model", "data": "the number of maps", "network": "the network or its training"}
-SHARES = (0.25, 0.5, 0.75, 1.0, 1.5)     # of the study's own gain
+SHARES = (0.25, 0.5, 0.75, 1.0, 1.5)     # of the study's gain
 PERCENTILE = 99.0
 
 
@@ -76,13 +75,13 @@ def _largest(gains):
 def _sentence(score, paper, curve, gains, limit, source, mean):
     against = "" if np.isnan(paper) else (f" ({'at least' if score >= paper else 'below'} the paper's {paper:g}, which is of other "
                                           "readings)" if source != PUBLISHED else f" (paper: {paper:g})")
-    told = [f"a perfect model would bring {gains['model']:+.3f}" if not np.isnan(gains["model"]) else "",
+    parts = [f"a perfect model would bring {gains['model']:+.3f}" if not np.isnan(gains["model"]) else "",
             f"going from {curve.maps.iloc[-2]} to {curve.maps.iloc[-1]} maps brought {gains['data']:+.3f}"
             if not np.isnan(gains["data"]) else "", f"the best network trained here {gains['network']:+.3f}"]
     if limit == "training":
         return f"SSIM {score:.3f}{against}: not trained, for the mean training reading at that force has {mean:.3f}."
     end = f"what limits first is {WORDS[limit]}" if limit in WORDS else f"none of the three stands out by more than {CLEAR:g}"
-    return f"SSIM {score:.3f}{against}: {', '.join(filter(None, told))}; {end}."
+    return f"SSIM {score:.3f}{against}: {', '.join(filter(None, parts))}; {end}."
 
 
 def gain_table(references: "Sequence[xarray.Dataset]", tested: "Mapping[str, Sequence[xarray.Dataset]]", *, spec: "SensorSpec",

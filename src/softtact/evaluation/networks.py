@@ -1,9 +1,7 @@
-"""Several networks on the same split: how well each reads, and what it costs.
+"""Several networks on the same split: how well each reads, what it costs, and what is left of its loss.
 
-How a training ended, and what is left of its loss: the sensor's noise, the data, the optimiser or the network.
-
-Judged by the losses alone, in this order:
-noise        the losses on validation and unseen indenters are within CLOSE of what the sensor's own trials differ by
+What is left is judged by the losses alone, in this order:
+noise        the losses on validation and unseen indenters are within CLOSE of what the sensor's trials differ by
 optimiser    the best validation loss still fell by more than STILL over the last quarter of the epochs: train for longer
 data         the loss on validation maps, or on unseen indenters, is more than GAP times the training loss: the network reads what
              it has seen and not the rest, so that more maps would bring the two together (validation maps alone are of indenters
@@ -60,7 +58,7 @@ def score_networks(networks: Sequence[Trained], splits: "dict[str, dict[str, Sam
 
 def compare_networks(networks: Sequence[Trained], scores: pd.DataFrame, ceiling: pd.DataFrame, table: pd.DataFrame, *,
                      maps_mm: np.ndarray, taxels: int, seed: int) -> pd.DataFrame:
-    """A row per network and set with COLUMNS: scores as in `summarise_scores`, what they stand beside, the training and times.
+    """A row per network and set with COLUMNS: scores as in `summarise_scores`, what they are compared with, the training and times.
 
     scores: of `score_networks`;  ceiling: of `score_sensor`;  table: `score_table` of all predictors
     maps_mm (n, y, x): one of them is timed;  taxels: their number, over which a loss is summed
@@ -79,7 +77,7 @@ def compare_networks(networks: Sequence[Trained], scores: pd.DataFrame, ceiling:
 
 
 def _beside(table, one):
-    """What stands beside a network's scores, by set: baselines and skill."""
+    """What a network's scores are compared with, by set: baselines and skill."""
     rows = table[(table.model == one.facts["model"]) & (table.force == ALL_FORCES)]
     wide = rows.pivot(index="set", columns="predictor", values="ssim")
     beside = pd.DataFrame({name: wide.get(predictor, np.nan) for name, predictor in BESIDE.items()}, index=wide.index)

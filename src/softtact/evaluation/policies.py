@@ -47,7 +47,7 @@ def _errors(press):
 
 def _row(press, paper_choice, calibrated, height_mm):
     errors = _errors(press)
-    told = expected_errors(press["elastic"], press["foundation"], height_mm=height_mm,
+    expected = expected_errors(press["elastic"], press["foundation"], height_mm=height_mm,
                            thickness_mm=press["foundation"].attrs["thickness_mm"], model=calibrated)
     name = press["elastic"].attrs["item"]
     row = {"set": press["elastic"].attrs["set"], "item": name, "paper_model": paper_choice[name],
@@ -56,7 +56,7 @@ def _row(press, paper_choice, calibrated, height_mm):
     for model in MODELS:
         row[f"{model}_error_mm"] = float(errors[model].max())
         row[f"{model}_time_s"] = float(press[model].wall_time_s.sum())
-    return row | {f"{model}_expected_mm": float(values.max()) for model, values in told.items()}
+    return row | {f"{model}_expected_mm": float(values.max()) for model, values in expected.items()}
 
 
 def choices(table: pd.DataFrame, tolerance_mm: float) -> dict[str, pd.Series]:
@@ -70,7 +70,7 @@ def choices(table: pd.DataFrame, tolerance_mm: float) -> dict[str, pd.Series]:
 
 
 def policy_table(table: pd.DataFrame, tolerances_mm: Iterable[float], *, sets: Sequence[str]) -> pd.DataFrame:
-    """A row per policy over the presses of some sets: shares of the models, errors accepted, time, and how well errors are told."""
+    """A row per policy over the presses of some sets: shares of the models, errors accepted, time, quality of the prediction."""
     table = table[table.set.isin(sets)]
     rows: dict[str, dict[str, Any]] = {}
     for tolerance in tolerances_mm:

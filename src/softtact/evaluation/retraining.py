@@ -1,4 +1,4 @@
-"""The same training again and again: on growing, nested subsets of the maps, and from other seeds.
+"""Series of trainings that share all but one thing: growing, nested subsets of the maps, or the seed.
 
 Another seed gives other first weights and another order of the maps; presses and split stay.
 """

@@ -1,16 +1,14 @@
 """What a score is worth: every predictor beside every other, by set and force, with its skill; and which network is not trained.
 
-skill           (score - best trivial) / (ceiling - best trivial) of mean SSIM: 0 is no better than the best predictor that looks up
-                a reading, 1 is the sensor's own repeatability
-skill_simple    the same over the best simple predictor: below 0, a formula of a few numbers reads better than the network
-The kinds of predictors are those of `baselines.KINDS`.
-
-Predictors without a network: what a network's score is worth is what it has over them.
-
+Predictors without a network show what a network has over them:
 trivial   `zeros`, `mean_reading` (of the training readings at that force), `nearest_map` (the reading of the nearest training map)
 simple    `ridge` on the taxels' mean deformations, `quadratic` (three numbers for all taxels), `gap_formula` (untrained:
           parallel plates at the map's gap)
 marks     `moved` and `halved`, the true reading one taxel off and at half its counts: no predictors, but what such an error scores
+Skills:
+skill           (score - best trivial) / (ceiling - best trivial) of mean SSIM: 0 is no better than the best predictor that looks up
+                a reading, 1 is the repeatability of the sensor
+skill_simple    the same over the best simple predictor: below 0, a formula of a few numbers reads better than the network
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -76,7 +74,7 @@ def make_predictors(train: "Samples", *, spec: "AnySpec", counts_per_relative_ch
 
 
 def moved_by_a_taxel(counts: np.ndarray) -> np.ndarray:
-    """Maps (n, row, column) one row further along y; the first row stands twice."""
+    """Maps (n, row, column) one row further along y; the first row is there twice."""
     return np.concatenate([counts[:, :1], counts[:, :-1]], axis=1)
 
 
@@ -220,12 +218,12 @@ def verdicts(table: pd.DataFrame, *, own: str, sets: Sequence[str] = ("validatio
     own: the architecture that the study's results rest on
     """
     bad = untrained(table, sets)
-    said = []
+    sentences = []
     for (model, predictor), rows in bad.groupby(["model", "predictor"], sort=False):
-        told = ", ".join(f"{row.set} {row.ssim:.3f} against {row.mean_reading:.3f}" for row in rows.itertuples())
-        said.append(f"Not trained: the {predictor} network of the {model} model reads worse than the mean training reading at that "
-                    f"force (SSIM on {told}); its scores say nothing about the model.")
-    return said + [_worth(table, model, own) for model in table.model.unique()]
+        means = ", ".join(f"{row.set} {row.ssim:.3f} against {row.mean_reading:.3f}" for row in rows.itertuples())
+        sentences.append(f"Not trained: the {predictor} network of the {model} model reads worse than the mean training reading at "
+                         f"that force (SSIM on {means}); its scores say nothing about the model.")
+    return sentences + [_worth(table, model, own) for model in table.model.unique()]
 
 
 def _worth(table, model, own):

@@ -1,13 +1,7 @@
-"""How well a network reads what it never saw, and how well the sensor repeats itself.
+"""How well a network reads what it never saw, how well the sensor repeats itself, and how long a map takes.
 
-How sure a mean score is: a bootstrap that respects what belongs together.
-
-Maps of one object are alike, and so are maps of one trial (one loading, one drift). So objects are drawn with replacement,
-then trials of each drawn object; a trial brings all its maps.
-
-Do the network and the sensor feel the contact in the same place? Overlap of the two contact patches on the taxels.
-
-How long a map takes: the solver's time from the press files, and the network's, measured here.
+Intervals of a mean are bootstrapped over what belongs together: maps of one object are alike, and so are maps of one trial (one
+loading, one drift). So objects are drawn with replacement, then trials of each drawn object; a trial brings all its maps.
 """
 
 import statistics
@@ -41,7 +35,7 @@ def score_samples(network: "torch.nn.Module", samples: Samples, *, ssim: dict[st
 
 
 def score_predictions(predicted: np.ndarray, samples: Samples, *, ssim: dict[str, Any]) -> pd.DataFrame:
-    """A row with SSIM_COLUMNS for each sample, of predicted counts (n, row, column) against the samples' own.
+    """A row with SSIM_COLUMNS for each sample, of predicted counts (n, row, column) against those of the samples.
 
     ssim_own_range: SSIM whose data range is the measured map's largest count;  mean_counts: of the measured map
     The rows of the split `validation` carry set = "validation": its items are indenters that training saw at other
@@ -141,7 +135,7 @@ def interval_of_mean(values: np.ndarray, items: "np.ndarray | pd.Series", trials
                      level: float = LEVEL, repeats: int = REPEATS) -> tuple[float, float]:
     """(low, high) of the mean of `values` (n,), by percentiles over `repeats` draws; items, trials (n,) say what belongs together.
 
-    With a single item nothing tells how items differ: (nan, nan). With few, plain percentiles are too narrow (by a third for
+    With a single item it is unknown how items differ: (nan, nan). With few, plain percentiles are too narrow (by a third for
     five), so they are taken farther out, to where Student's interval of a normal sample ends (expanded percentiles, Hesterberg
     2015).
     """

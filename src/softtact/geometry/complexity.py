@@ -8,7 +8,7 @@ CHo  unique edges of the overlap's convex hull
 Fine details add points but hardly change the hull, so NPt / CHt and NPo / CHo grow with them; a convex body that
 has its corners on the hull only stays at 2.
 
-*The overlap.* The paper does not define it. Its six NPo are only 3 to 9 % of NPt, too few for all that stands over
+*The overlap.* The paper does not define it. Its six NPo are only 3 to 9 % of NPt, too few for all that lies over
 the footprint, so the overlap is limited in height too: points over the footprint and at most `reach_mm` above the
 object's lowest facet there. The default reach is the thickness of the sensor's soft layers, the deepest that an object
 can sink: an evenly meshed sphere of 30 mm has 8.3 % of its points within it, the paper's sphere 8.7 %.
@@ -93,7 +93,7 @@ def hull_edges(points: np.ndarray) -> int:
         return 1
     try:
         facets = ConvexHull(points).simplices
-    except QhullError:  # flat, but not along an axis: look at it in its own plane or line
+    except QhullError:  # flat, but not along an axis: look at it in that plane or line
         return hull_edges(_in_own_plane(points))
     return 2 * len(facets) - 3 if points.shape[1] == 2 else _unique_edges(facets)
 

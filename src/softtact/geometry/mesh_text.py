@@ -22,7 +22,7 @@ def plain_text(path: Path, data: bytes) -> bytes:
 
 
 def line_at(data: bytes, offset: int) -> int:
-    """Number of the line, from 1, in which a byte of a text stands."""
+    """Number of the line, from 1, of a byte of a text."""
     return data.count(b"\n", 0, offset) + 1
 
 
@@ -41,6 +41,6 @@ def is_finite(word: bytes) -> bool:
 
 
 def no_number(path: Path, line: int, word: bytes) -> InputError:
-    """The refusal of a word that stands where a finite number is due."""
+    """The refusal of a word in the place of a finite number."""
     remedy = "write decimals with points" if b"," in word else "export the mesh again"
     return InputError(f"{path}: line {line}: {shown(word)} is no finite number; {remedy}.")

@@ -1,9 +1,7 @@
 """Meshes that users bring: read, checked, in mm, and placed over the sensor.
 
-What a solver would silently get wrong (open, inverted, overlapping or wrongly scaled meshes) is refused here, in one
-sentence with its remedy.
-
-Closed meshes as solids: their union, and whether one that faces inwards is a cavity of them.
+What a solver would silently get wrong (open, inverted, overlapping or wrongly scaled meshes) is refused here, in one sentence with
+its remedy. Unions of closed meshes, and whether one is a cavity of others, are manifold3d's.
 """
 
 from collections.abc import Sequence
@@ -55,7 +53,7 @@ def plausible_facets(path: Path, triangles: np.ndarray, *, unit: str, min_size_m
 
 def read_mesh(path: str | Path, *, unit: str, min_size_mm: float = MIN_SIZE_MM,
               max_size_mm: float = MAX_SIZE_MM) -> trimesh.Trimesh:
-    """Closed, outward-oriented mesh of a file, as a `trimesh.Trimesh` in mm in the file's own frame.
+    """Closed, outward-oriented mesh of a file, as a `trimesh.Trimesh` in mm in the frame of the file.
 
     path : STL (binary or text), OBJ or PLY
     unit : 'mm', 'cm', 'm', 'inch' or 'in'; the file itself does not say
@@ -167,7 +165,7 @@ def _load_facets(path: Path) -> np.ndarray:
 def _unit_factor(path: Path, unit: str | None) -> float:
     if unit not in UNIT_MM:
         stated = "no unit is stated" if unit is None else f"the unit {unit!r} is not known"
-        raise InputError(f"{path}: {stated}, and a mesh file has none of its own; state one of {', '.join(UNIT_MM)}.")
+        raise InputError(f"{path}: {stated}, and a mesh file holds none; state one of {', '.join(UNIT_MM)}.")
     return UNIT_MM[unit]
 
 
@@ -234,7 +232,7 @@ def _refuse_overlapping(path: Path, mesh: trimesh.Trimesh) -> None:
 
 
 def volume_of(mesh: trimesh.Trimesh) -> float:
-    """Volume of a closed mesh, negative of one that faces inwards; trimesh's own warns of a division by a volume of 0."""
+    """Volume of a closed mesh, negative of one that faces inwards; that of trimesh warns of a division by a volume of 0."""
     a, b, c = np.moveaxis(mesh.triangles - mesh.vertices.mean(axis=0), 1, 0)
     return float(np.einsum("kd,kd->", a, np.cross(b, c)) / 6)
 

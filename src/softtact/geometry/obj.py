@@ -26,7 +26,7 @@ _FACES = re.compile(rb"(?:[ \t]*+f(?:[ \t]++\d{1,18}+(?:/\d*+){0,2}+){3,}+[ \t]*
 
 
 def read_obj(path: Path) -> np.ndarray:
-    """Triangles (n, 3, 3) of an OBJ file in its own unit; InputError names the line that cannot be taken as it stands."""
+    """Triangles (n, 3, 3) of an OBJ file in its unit; InputError names the line that is refused."""
     data = plain_text(path, path.read_bytes()) + b"\n"
     if b"#" in data:
         data = re.sub(rb"#[^\n]*", b"", data)
@@ -136,7 +136,7 @@ class _Statements:
             raise self._refusal(f"{shown(word)} is no number of a vertex; {_AGAIN}")
         number = int(word.partition(b"/")[0])
         if number == 0 or number < -known:
-            begin = "vertices are counted from 1" if number == 0 else f"only {known} vertices stand before it"
+            begin = "vertices are counted from 1" if number == 0 else f"only {known} vertices come before it"
             raise self._refusal(f"a corner is vertex {number}, but {begin}; {_AGAIN}")
         return number if number > 0 else known + 1 + number
 
@@ -164,7 +164,7 @@ class _Statements:
         return polygons
 
     def _refuse_unused(self, polygons):
-        """Refuse vertices without faces where they tell that faces were lost."""
+        """Refuse vertices without faces where they show that faces were lost."""
         used = np.zeros(len(polygons.points), dtype=bool)
         used[polygons.corners[polygons.corners < len(used)]] = True
         if len(polygons.counts) == 0 or used.all():
@@ -176,5 +176,5 @@ class _Statements:
         faces = [tuple(sorted(face)) for face in np.split(polygons.corners, np.cumsum(polygons.counts)[:-1])]
         twice = len(faces) - len(set(faces))
         if twice:
-            raise InputError(f"{self.path}: {twice} faces stand there twice, and no face uses {(~used).sum()} of the vertices, so "
+            raise InputError(f"{self.path}: {twice} faces are there twice, and no face uses {(~used).sum()} of the vertices, so "
                              "each body seems to count its vertices from 1 anew; export the bodies as one mesh.")

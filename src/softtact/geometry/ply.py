@@ -67,7 +67,7 @@ class Rows:
 
 
 def read_ply(path: Path) -> np.ndarray:
-    """Triangles (n, 3, 3) of a PLY file in its own unit; InputError where the file does not hold what its header declares."""
+    """Triangles (n, 3, 3) of a PLY file in its unit; InputError where it does not hold what its header declares."""
     data = path.read_bytes()
     first = re.match(rb"ply[ \t]*(\r\n|\n|\r)", data)
     if first is None:
@@ -138,7 +138,7 @@ def _indices_of(path, header):
 
 
 class _Body:
-    """The rows of the elements, one after the other; a subclass knows where the next row's numbers stand."""
+    """The rows of the elements, one after the other; a subclass finds the numbers of the next row."""
 
     def rows(self, element: Element, wanted: tuple[str, ...]) -> Rows:
         """The wanted properties of all rows of the next element."""

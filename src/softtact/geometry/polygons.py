@@ -29,7 +29,7 @@ class Polygons:
     points : coordinates (n, 3) in the file's unit
     corners : numbers (m,) of points from 0, of one polygon after the other
     counts : corners (k,) of each polygon
-    places : where each polygon stands (k,), as a number of `place`
+    places : number of the `place` of each polygon (k,)
     place : 'line' of a text, 'face' of a binary file
     first : the number that the file gives its first point
     """
@@ -59,9 +59,9 @@ def facets_of(path: Path, polygons: Polygons) -> np.ndarray:
 def triangulated(points: np.ndarray, *, width: float = 0.0) -> np.ndarray:
     """Numbers (k, count - 2, 3) of the corners of the triangles of nearly flat polygons (k, count, 3).
 
-    width : of strips, in the unit of the points, that may be covered twice or the wrong way round
+    width : of strips, in the unit of the points, that may be covered twice or from behind
 
-    A polygon that covers more in this way has no triangulation; its triangles then look to the other side.
+    A polygon that covers more in this way has no triangulation; its triangles then face the other side.
     """
     sides = _sides(points)
     sizes = np.abs(points - points[:, :1]).max(axis=(1, 2))
@@ -98,8 +98,8 @@ def _is_convex(plane):
 def _ear_clipped(plane, tolerance):
     """Triangles (count - 2, 3) of one polygon (count, 2), or None where it covers more than a small area twice or turned over."""
     x, y = plane.T
-    own = 0.5 * np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))
-    if abs(CrossSection([plane], FillRule.NonZero).area() - own) > tolerance:
+    area = 0.5 * np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))
+    if abs(CrossSection([plane], FillRule.NonZero).area() - area) > tolerance:
         return None
     triangles = np.asarray(triangulate([plane], allow_convex=False))     # its short cut makes triangles without area
     return triangles if len(triangles) == len(plane) - 2 else None
@@ -116,7 +116,7 @@ def _triangles(path, polygons, which, corners, rounded):
     _refuse(path, polygons, which, _heights(points, sides) > np.maximum(bend * sizes, rounded),
             "leaves one plane so far that its surface is a guess; triangulate the mesh before its export")
     if points.shape[1] == 4:
-        triangles = _halves(points, sides, corners)
+        triangles = _split_quads(points, sides, corners)
     else:
         triangles = points[np.arange(len(points))[:, None, None], triangulated(points, width=rounded)]
     _refuse(path, polygons, which, _folded(triangles, sides, rounded * sizes), "crosses itself; mend it where the mesh was made")
@@ -144,7 +144,7 @@ def _areas(triangles):
 
 
 def _sides(points):
-    """Unit vectors (k, 3) along the vector areas of polygons (k, count, 3), to which their side looks; 0 where there is none."""
+    """Unit vectors (k, 3) along the vector areas of polygons (k, count, 3), to which they face; 0 where there is none."""
     spokes = points - points[:, :1]
     area = 0.5 * np.cross(spokes[:, 1:-1], spokes[:, 2:]).sum(axis=1)
     length = np.linalg.norm(area, axis=1, keepdims=True)
@@ -157,7 +157,7 @@ def _heights(points, sides):
     return np.abs(np.einsum("knd,kd->kn", points - points.mean(axis=1, keepdims=True), sides)).max(axis=1)
 
 
-def _halves(points, sides, corners):
+def _split_quads(points, sides, corners):
     """Quadrilaterals (k, 4, 3) as two triangles each (k, 2, 3, 3)."""
     options = points[:, _SPLITS]                                                       # (k, split, half, 3, 3)
     smaller = np.einsum("kshd,kd->ksh", _areas(options), sides).min(axis=2)            # (k, split)

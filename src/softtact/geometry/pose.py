@@ -1,9 +1,7 @@
-"""Where an object stands: a translation and a rotation of its reference point in the sensor frame.
+"""Pose of an object in the sensor frame: translation and rotation of its reference point, stated or drawn with a seed.
 
-Where on the sensor an object is pressed: turns and shifts drawn with a seed, in which what presses stays over the sensor.
-
-The object turns about z by any angle at which its pressing part fits the sensor as well as unturned, and lies anywhere in the
-room that is left. It is not tilted.
+A drawn pose turns the object about z by any angle at which its pressing part fits the sensor as well as unturned, and puts it
+anywhere in the room that is left. It does not tilt it.
 """
 
 from collections.abc import Sequence

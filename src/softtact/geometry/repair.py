@@ -1,12 +1,10 @@
-"""Mending of meshes whose body is beyond doubt; each step says what it did, and what would have to be guessed is refused.
+"""Repair of meshes whose body is beyond doubt; each step is reported, and what would have to be guessed is refused.
 
-Mended: facets without finite corners or without area, facets that are there twice, corners that lie apart by round-off or on an
-edge of a facet that lacks them, holes that are flat or small, facets that face the wrong way, bodies inside out, bodies that
-overlap. Not mended: large curved holes, edges where more than two walls meet, facets that lie on their neighbours, double-sided
-bodies, flat or empty meshes, sizes that no body on a sensor has.
+Repaired: facets without finite corners or without area, facets that are there twice, corners that lie apart by round-off or on an
+edge of a facet that lacks them (T-junctions), holes that are flat or small, facets that face against their neighbours, bodies
+inside out, bodies that overlap. Not repaired: large curved holes, edges where more than two walls meet, facets that lie on their
+neighbours, double-sided bodies, flat or empty meshes, sizes that no body on a sensor has.
 `meshes.read_mesh` then checks the result as it checks any mesh.
-
-T-junctions: a corner that lies on an open edge of a facet, whose neighbours have it and the facet itself has not.
 """
 
 from dataclasses import dataclass
@@ -49,9 +47,9 @@ class Mended:
 def read_mended(path: str | Path, *, unit: str, min_size_mm: float = MIN_SIZE_MM, max_size_mm: float = MAX_SIZE_MM) -> Mended:
     """Read a mesh as `read_mesh` does, and mend it where that leaves no doubt; else InputError with the reason."""
     path = Path(path)
-    said: list[str] = []
+    repairs: list[str] = []
     stored = load_sized(path, unit=unit)
-    triangles = _finite(stored, said)
+    triangles = _finite(stored, repairs)
     plausible_facets(path, triangles, unit=unit, min_size_mm=min_size_mm, max_size_mm=max_size_mm)
     mesh = merge_facets(triangles)
     if len(mesh.faces) == 0 or np.ptp(mesh.vertices, axis=0).min() == 0:
@@ -59,35 +57,35 @@ def read_mended(path: str | Path, *, unit: str, min_size_mm: float = MIN_SIZE_MM
     try:
         check_body(path, mesh)
     except InputError:
-        return Mended(_mended(path, mesh, said), said)
+        return Mended(_mended(path, mesh, repairs), repairs)
     refuse_folded(path, mesh)
-    return Mended(mesh, said)
+    return Mended(mesh, repairs)
 
 
-def _mended(path, mesh, said):
-    """The mesh after all steps, of which what was done is appended to `said`."""
+def _mended(path, mesh, repairs):
+    """The mesh after all steps, of which each is appended to `repairs`."""
     _refuse_double_sided(path, mesh)
     for step in (_join_corners, _split_at_corners, _without_doubles, _close_holes, _turn_facets, _turn_bodies):
-        mesh = step(mesh, said)
+        mesh = step(mesh, repairs)
     try:
-        refuse_folded(path, mesh)     # of the file's own facets: a union may leave slits that are thinner than round-off
-        mesh = _unite(mesh, said)
+        refuse_folded(path, mesh)     # of the facets as read: a union may leave slits that are thinner than round-off
+        mesh = _unite(mesh, repairs)
         check_body(path, mesh)
     except InputError as error:
-        done = f" (after: {'; '.join(said)})" if said else ""
+        done = f" (after: {'; '.join(repairs)})" if repairs else ""
         raise InputError(f"{error}{done}") from None
     return mesh
 
 
-def _finite(triangles, said):
+def _finite(triangles, repairs):
     """Facets (n, 3, 3) with finite corners."""
     good = np.isfinite(triangles).all(axis=(1, 2))
     if not good.all():
-        said.append(f"left out {_count(~good, 'facet')} whose coordinates are not finite numbers")
+        repairs.append(f"left out {_count(~good, 'facet')} whose coordinates are not finite numbers")
     return triangles[good]
 
 
-def _join_corners(mesh, said):
+def _join_corners(mesh, repairs):
     """Corners of open edges that lie apart by round-off become one."""
     rim = np.unique(_open_edges(mesh))
     if not len(rim):
@@ -107,11 +105,11 @@ def _join_corners(mesh, said):
     number = np.arange(len(mesh.vertices))
     number[rim] = first[group]
     moved = _count(number != np.arange(len(number)), "corner")
-    said.append(f"joined {moved} that lay within {_APART * _size(mesh):.2g} mm of others")
+    repairs.append(f"joined {moved} that lay within {_APART * _size(mesh):.2g} mm of others")
     return _of_faces(mesh.vertices, number[mesh.faces])
 
 
-def _split_at_corners(mesh, said):
+def _split_at_corners(mesh, repairs):
     """Facets get the corners of their neighbours that lie on their open edges."""
     edges = _open_edges(mesh)
     if not len(edges):
@@ -119,7 +117,7 @@ def _split_at_corners(mesh, said):
     faces, split = split_at_corners(mesh, edges, tolerance=_APART * _size(mesh))
     if not split:
         return mesh
-    said.append(f"split {_number(split, 'facet')} at corners of others that lie on the edges")
+    repairs.append(f"split {_number(split, 'facet')} at corners of others that lie on the edges")
     return _of_faces(mesh.vertices, faces)
 
 
@@ -141,13 +139,13 @@ def _refuse_double_sided(path, mesh):
                              "no inside; export the mesh with single-sided facets.")
 
 
-def _without_doubles(mesh, said):
+def _without_doubles(mesh, repairs):
     """Of facets with the same corners one is kept; two that face each other hold nothing between them, and both go."""
     mesh = _of_faces(mesh.vertices, mesh.faces)
     keep, _ = _doubles(mesh.faces)
     if len(keep) == len(mesh.faces):
         return mesh
-    said.append(f"left out {_number(len(mesh.faces) - len(keep), 'facet')} of those that were there twice")
+    repairs.append(f"left out {_number(len(mesh.faces) - len(keep), 'facet')} of those that were there twice")
     return _of_faces(mesh.vertices, mesh.faces[keep])
 
 
@@ -167,7 +165,7 @@ def _is_even(faces):
     return (a < b).astype(int) + (b < c) + (c < a) == 2
 
 
-def _close_holes(mesh, said):
+def _close_holes(mesh, repairs):
     """Flat holes, and small curved ones, are closed by a plane piece; of others the mesh stays open."""
     if _hangs_by_an_edge(mesh):
         return mesh
@@ -179,7 +177,7 @@ def _close_holes(mesh, said):
     if curved > _SMALL_HOLES * mesh.area:
         return mesh
     area = sum(area for _, area, _ in patches)
-    said.append(f"closed {_number(len(patches), 'hole')}, {area:.3g} mm2 or {area / (mesh.area + area):.2g} of the surface")
+    repairs.append(f"closed {_number(len(patches), 'hole')}, {area:.3g} mm2 or {area / (mesh.area + area):.2g} of the surface")
     return _of_faces(mesh.vertices, np.vstack([mesh.faces, *(faces for faces, _, _ in patches)]))
 
 
@@ -189,7 +187,7 @@ def _hangs_by_an_edge(mesh):
 
 
 def _rims(mesh):
-    """Closed loops of open edges, each an array of corners, against the way of the facets beside; empty where loops meet."""
+    """Closed loops of open edges, each an array of corners, against the direction of the facets beside; empty where loops meet."""
     edges = _open_edges(mesh)
     following = dict(zip(edges[:, 1], edges[:, 0], strict=True))
     if not len(edges) or len(following) < len(edges) or set(following) != set(following.values()):
@@ -225,7 +223,7 @@ def _patch(mesh, loop):
     return loop[faces], float(trimesh.triangles.area(mesh.vertices[loop[faces]]).sum()), height <= _FLAT_HOLE * _size(mesh)
 
 
-def _turn_facets(mesh, said):
+def _turn_facets(mesh, repairs):
     """Neighbouring facets face the same side."""
     if mesh.is_winding_consistent:
         return mesh
@@ -238,11 +236,11 @@ def _turn_facets(mesh, said):
         if changed[of].sum() > 0.5 * of.sum():
             turned.faces[of] = turned.faces[of][:, ::-1]
             changed[of] = ~changed[of]
-    said.append(f"turned {_count(changed, 'facet')} that faced against the neighbours")
+    repairs.append(f"turned {_count(changed, 'facet')} that faced against the neighbours")
     return _of_faces(turned.vertices, turned.faces)
 
 
-def _turn_bodies(mesh, said):
+def _turn_bodies(mesh, repairs):
     """Bodies inside out are turned; a cavity stays: it lies in a body."""
     if not mesh.is_watertight or not mesh.is_winding_consistent:
         return mesh
@@ -254,11 +252,12 @@ def _turn_bodies(mesh, said):
         return mesh
     for piece in wrong:
         piece.invert()
-    said.append(f"turned {_number(len(wrong), 'body')} inside out" if len(pieces) > 1 else "turned all facets: they faced inwards")
+    several = f"turned {_number(len(wrong), 'body')} inside out"
+    repairs.append(several if len(pieces) > 1 else "turned all facets: they faced inwards")
     return trimesh.util.concatenate(pieces) if len(pieces) > 1 else pieces[0]
 
 
-def _unite(mesh, said):
+def _unite(mesh, repairs):
     """Bodies that overlap or touch become one."""
     if not mesh.is_watertight or not mesh.is_winding_consistent or mesh.body_count < 2:
         return mesh
@@ -274,7 +273,7 @@ def _unite(mesh, said):
     for piece in pieces:
         if volume_of(piece) < 0:
             united = united - solid_of(piece, inverted=True)
-    said.append(f"united {_number(len(bodies), 'body')} that overlap or touch into {count}")
+    repairs.append(f"united {_number(len(bodies), 'body')} that overlap or touch into {count}")
     raw = united.to_mesh64()
     return merge_facets(raw.vert_properties[:, :3][raw.tri_verts])
 

@@ -1,7 +1,7 @@
 """STL files, binary and text: every facet that the file declares, or one sentence why not.
 
 Text: any number of solids, each from `solid` to `endsolid`, words in any case, parted by blanks and line ends alike. The facets'
-normals are not read: the order of the corners tells the side. Layout: Burns, Automated Fabrication (1993), section 6.5.
+normals are not read: the order of the corners gives the side. Layout: Burns, Automated Fabrication (1993), section 6.5.
 """
 
 import re
@@ -14,7 +14,7 @@ from softtact.geometry.mesh_text import is_finite, is_text, line_at, no_number, 
 
 _HEADER = 84     # bytes: 80 of any text, 4 of the number of facets
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-_BLANK = b" \t\r\n"     # may follow the last facet; bytes 0 there tell that something was put in before
+_BLANK = b" \t\r\n"     # may follow the last facet; bytes 0 there mean that something was inserted before
 _WORDS = [b"facet", b"normal", None, None, None, b"outer", b"loop", *3 * [b"vertex", float, float, float], b"endloop", b"endfacet"]
 _NUMBERS = [k for k, due in enumerate(_WORDS) if due is float]
 _PIECE = 1_000_000     # bytes of a text that are split into words at once
@@ -23,7 +23,7 @@ _AGAIN = "export the mesh again."
 
 
 def read_stl(path: Path) -> np.ndarray:
-    """Facets (n, 3, 3) of an STL file in its own unit; InputError where the file does not hold what it declares."""
+    """Facets (n, 3, 3) of an STL file in its unit; InputError where the file does not hold what it declares."""
     data = path.read_bytes()
     declared = int.from_bytes(data[80:_HEADER], "little")
     if len(data) != _HEADER + _FACET.itemsize * declared and is_text(data):

@@ -2,7 +2,7 @@
 
 fTetWild: Hu, Schneider, Wang, Zorin and Panozzo, ACM Trans. Graph. 39 (2020) 117, through the package `pytetwild`. It keeps the
 tetrahedra's outside within an envelope around the given surface. It takes its facets in random order, without a seed that could be
-set: a repetition gives another mesh, as good. Who wants the same numbers again keeps the mesh's file.
+set: a repetition gives another mesh, as good. For the same numbers keep the mesh's file.
 """
 
 import math
@@ -100,7 +100,7 @@ def _moved(points, tetrahedra, corners, places):
 
 def outer_corners(tetrahedra: np.ndarray) -> np.ndarray:
     """Corners (k,) of the facets that belong to one of the tetrahedra (e, 4) only."""
-    facets = np.concatenate([tetrahedra[:, own] for own in ([0, 1, 2], [0, 1, 3], [1, 2, 3], [2, 0, 3])])
+    facets = np.concatenate([tetrahedra[:, corners] for corners in ([0, 1, 2], [0, 1, 3], [1, 2, 3], [2, 0, 3])])
     _, first, uses = np.unique(np.sort(facets, axis=1), axis=0, return_index=True, return_counts=True)
     return np.unique(facets[first[uses == 1]])
 

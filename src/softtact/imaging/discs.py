@@ -35,10 +35,10 @@ DTYPES = {"disc": int, "x_mm": float, "y_mm": float, "area_mm2": float, "area_sd
           "signal_to_noise": float, "clipped": bool, "touching": bool, "measured_by": str}
 COLUMNS = list(DTYPES)
 SMALLEST_PIXELS = 6      # area; what is smaller is noise or a hot pixel
-SURE = 3.0               # standard deviations of its area; what has less is not told from noise
+SURE = 3.0               # standard deviations of its area; what has less may be noise
 _MISFIT, _RESIDUAL = 1.5, 0.08   # over noise and over contrast: beyond both, the contact has no such outline
 _GROUND = 0.4            # of the frame; what has no outline and fills that much is rather the ground
-PASSES = 3               # fits of every disc: alone, with what the others tell, and once more beside its neighbours' light
+PASSES = 3               # fits of every disc: alone, with what the others show, and once more beside its neighbours' light
 
 
 def detect_discs(frame: np.ndarray, *, pixel_mm: float, smallest_mm: float = 0.0, transfer: str = "linear",
@@ -55,7 +55,7 @@ def detect_discs(frame: np.ndarray, *, pixel_mm: float, smallest_mm: float = 0.0
     measured_by      outline, or light (summed) where the contact has no simple outline
 
     smallest_mm: discs of a smaller diameter are left out. A frame without discs gives an empty table.
-    transfer, lossy: how values tell light, see `softtact.imaging.light.grey`
+    transfer, lossy: how values grow with light, see `softtact.imaging.light.grey`
     Warns (`FrameWarning`) of what may be wrong with the frame.
     """
     return discs_and_outlines(frame, pixel_mm=pixel_mm, smallest_mm=smallest_mm, transfer=transfer, lossy=lossy)[0]
@@ -99,7 +99,7 @@ class Scene:
     """All the discs of one frame, fitted beside each other.
 
     Light and blur change slowly over a frame, so each disc's contrast, glass and blur are known from all the others as well,
-    as far as these agree: discs that differ in brightness keep their own. passes: 1 fits every disc alone.
+    as far as these agree: discs that differ in brightness keep theirs. passes: 1 fits every disc alone.
     """
 
     def __init__(self, image: np.ndarray, *, passes: int = PASSES) -> None:
@@ -115,7 +115,7 @@ class Scene:
     def _fit(self):
         self.start = self._starts()
         self.margin = int(np.ceil(3 * np.median(self.start[:, S]) + 3))
-        self.own = expand_labels(self.regions.labels, self.margin)
+        self.around = expand_labels(self.regions.labels, self.margin)
         prior, values = first_priors(self.start), self.start
         self.light = np.zeros_like(self.image)
         for number in range(self.passes):
@@ -172,11 +172,11 @@ class Scene:
                            limits=self.limits)
 
     def _pixels(self, k, *, alone):
-        """Window of the frame around a disc and the mask of the pixels in it that tell of this disc."""
+        """Window of the frame around a disc and the mask of the pixels in it that belong to this disc."""
         top, left, bottom, right = self.props[k].bbox
         window = tuple(slice(max(first - self.margin, 0), min(last + self.margin, size))
                        for first, last, size in zip((top, left), (bottom, right), self.image.shape, strict=True))
-        labels = (self.own if alone else self.regions.labels)[window]
+        labels = (self.around if alone else self.regions.labels)[window]
         return window, (labels == 0) | (labels == k + 1)
 
     def _all_light(self, values):

@@ -1,4 +1,4 @@
-"""Light from the values of a frame: what its channels mean, how bright full scale is, which pixels tell nothing.
+"""Light from the values of a frame: what its channels mean, how bright full scale is, which pixels show nothing.
 
 A camera's file rarely says where its full scale lies: 10 or 12 bits are stored in 16, masks as 0 and 1, light in floating point of
 any size. So full scale follows from the values that at least 3 x 3 pixels share, which one hot pixel does not change.
@@ -20,7 +20,7 @@ _FEW, _APART = 0.05, 4.0   # share of the pixels, and how many times brighter th
 _CONTRAST = 3.0          # standard deviations of the noise that a frame with more than noise spans; noise alone has 1.2
 _BEYOND = 2.0            # spans above and below the shared values; what is further off is a hot or dead pixel
 _SURE = 12.0             # standard deviations of the noise that a pixel may lie off in any frame
-_FRAYED = 0.2            # share of the pixels along the borders of a mask that stand alone
+_FRAYED = 0.2            # share of the pixels along the borders of a mask that are alone
 _DIM = 0.05              # floating-point frames below that are not stored on a scale from 0 to 1
 _SEEN = 8.0              # standard deviations of the slope of noise
 _FAINT = 1.5 / 255       # of full scale; more than rounding
@@ -76,7 +76,7 @@ def _checked(frame):
 def _colours_and_opacity(frame):
     """Channels of colour (rows, columns, 1 or 3) as float64, and the share of light (rows, columns) that alpha lets through.
 
-    Alpha that is the same everywhere tells nothing: some cameras leave it at 0.
+    Alpha that is the same everywhere means nothing: some cameras leave it at 0.
     """
     channels = frame[..., None] if frame.ndim == 2 else frame
     count, has_alpha = _CHANNELS[channels.shape[2]]

@@ -1,4 +1,4 @@
-"""The outline of one disc, fitted to the light of its pixels.
+"""The outline of one disc, fitted to the light of its pixels, and what all discs of a frame show of light and blur.
 
 Symbols (lengths in pixels)
     rho, phi     polar coordinates of a pixel about the disc's centre
@@ -12,11 +12,10 @@ Fit              Gauss-Newton on the squared residuals over the noise, plus what
 
 The harmonics cost a disc's area nothing: to first order its error does not depend on theirs.
 
-What all the discs of a frame tell of light and blur, which change slowly over it.
-
-Each fit's posterior precision less its prior's is what its own pixels tell. Summed over the discs these give the contrast, the
-brightness of the glass and the blur as polynomials of the place, also where one disc alone cannot tell a small bright contact from
-a larger dim one. Discs that differ by more than their errors keep their own values: the prior is as wide as they scatter.
+Light and blur change slowly over a frame. Each fit's posterior precision less its prior's is the information in its pixels. Summed
+over the discs it gives the contrast, the brightness of the glass and the blur as polynomials of the place, also where one disc
+alone does not distinguish a small bright contact from a larger dim one. Discs that differ by more than their errors keep their
+values: the prior is as wide as they scatter.
 """
 
 from collections.abc import Callable, Sequence
@@ -37,10 +36,10 @@ _HALVINGS, _WORSE = 8, 4.0      # of a step that makes the misfit so many times 
 _FAR = 5.0     # blurs from the outline: beyond, the light is that of glass or of the disc's middle
 _FLAT = 8.0    # blurs: a larger radius is locally straight, to 1e-3 of the contrast
 SHAPE_SD = np.repeat([0.15, 0.08, 0.08], 2)   # of the radius: harmonics 2 (an ellipse of 1.3 has 0.13), 3, 4
-FEWEST = 4            # discs; fewer tell nothing of each other
+FEWEST = 4            # discs; fewer show nothing of each other
 UNKNOWN = 1e6         # standard deviation of what is not known
 _SHARED = slice(0, 3)  # contrast, glass, blur
-_TOLD = 0.2           # of the contrast: a disc that knows its own to that much tells whether discs differ
+_CERTAIN = 0.2        # of the contrast: discs whose contrast is known to that much show whether discs differ
 _CHANGE = 0.3         # of the contrast and of the blur: by how much each term of the polynomial may change them
 
 
@@ -202,7 +201,7 @@ def corners(values: np.ndarray, *, count: int = 72) -> np.ndarray:
 
 
 def first_priors(start: np.ndarray) -> list[Prior]:
-    """`Prior` of each disc (discs, parameters) before any fit: the regions tell contrast and blur to about a half."""
+    """`Prior` of each disc (discs, parameters) before any fit: regions show contrast and blur to about a half."""
     sd = np.full(start.shape, UNKNOWN)
     sd[:, 0], sd[:, 2] = 0.5 * start[:, 0], 0.3 + 0.5 * start[:, 2]
     return _with_shape(start, sd)
@@ -232,7 +231,7 @@ def _with_shape(mean, sd):
 
 
 def _own(fits, priors):
-    """What each disc's own pixels tell: precision (discs, 3, 3) and precision times value (discs, 3)."""
+    """Information in each disc's pixels: precision (discs, 3, 3) and precision times value (discs, 3)."""
     before = np.array([np.diag(prior.sd[_SHARED] ** -2.0) for prior in priors])
     after = np.array([np.linalg.pinv(fit.covariance[_SHARED, _SHARED]) for fit in fits])
     pull = np.einsum("kij,kj->ki", after, [fit.values[_SHARED] for fit in fits])
@@ -250,13 +249,13 @@ def _solve(precision, pull, basis, *, scale):
 
 
 def _spread_over(precision, pull, shared):
-    """Standard deviation (3,) by which discs differ from the polynomials beyond their own errors."""
-    own = np.linalg.pinv(precision, hermitian=True)
-    variance = np.maximum(np.diagonal(own, axis1=1, axis2=2), 1e-12)
-    told = np.sqrt(variance[:, 0]) < _TOLD * np.abs(shared[:, 0])
-    if told.sum() < FEWEST:
-        return np.zeros(3)   # discs so small that none tells its own contrast
-    z = (np.einsum("kij,kj->ki", own, pull) - shared)[told] / np.sqrt(variance[told])
+    """Standard deviation (3,) by which discs differ from the polynomials beyond their errors."""
+    covariance = np.linalg.pinv(precision, hermitian=True)
+    variance = np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 1e-12)
+    certain = np.sqrt(variance[:, 0]) < _CERTAIN * np.abs(shared[:, 0])
+    if certain.sum() < FEWEST:
+        return np.zeros(3)   # discs so small that the contrast of none is known
+    z = (np.einsum("kij,kj->ki", covariance, pull) - shared)[certain] / np.sqrt(variance[certain])
     spread = (1.4826 * np.median(np.abs(z), axis=0)) ** 2
     by_chance = 1 + 2.3 / np.sqrt(len(z))   # one sd of that estimate above what errors alone give
-    return np.sqrt(np.maximum(spread - by_chance, 0.0) * np.median(variance[told], axis=0))
+    return np.sqrt(np.maximum(spread - by_chance, 0.0) * np.median(variance[certain], axis=0))

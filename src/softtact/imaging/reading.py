@@ -1,13 +1,8 @@
 """Frames from files: an image, a folder of images, the pages of a TIFF, a video. One frame is in memory at a time.
 
-Frames of PNG, JPEG, BMP and GIF files, at the depth and with the colours that the file holds.
-
-Frames of TIFF files: their pages, or the planes that ImageJ and others put behind a single page.
-
-Light grows with the values that this gives: white-is-zero is turned, palettes and inks become RGB (TIFF 6.0, Adobe 1992).
-Reduced copies (thumbnails, pyramids) are no frames.
-
-Frames of a video at the depth that it was coded with.
+Each comes at the depth and with the colours that the file holds, and its values grow with light: white-is-zero is turned,
+palettes and inks become RGB (TIFF 6.0, Adobe 1992). A TIFF's frames are its pages, or the planes that ImageJ and others put behind
+a single page; reduced copies (thumbnails, pyramids) are no frames.
 """
 
 import importlib.util
@@ -50,7 +45,7 @@ _ENOUGH = 0.9     # of the stated length; what ends before was cut off
 def read_frames(path: str | Path, *, every: int = 1) -> Iterator[tuple[str, np.ndarray]]:
     """Pairs (name, frame) of a file, or of the images in a folder in order of name; each `every`-th of them.
 
-    A frame is (rows, columns) or (rows, columns, channels) in the file's own depth, and its values grow with light. Frames of a
+    A frame is (rows, columns) or (rows, columns, channels) in the depth of the file, and its values grow with light. Frames of a
     video or an animation and pages of a TIFF are named after the file and their number, from 0: clip.mp4:00012.
     """
     files = image_files(path)
@@ -85,14 +80,14 @@ def read_frame(file: str | Path) -> np.ndarray:
 
 
 def _numbered(file, *, every):
-    """Pairs (name, frame) of one file; the only frame of an image bears the file's own name."""
+    """Pairs (name, frame) of one file; the only frame of an image bears the name of the file."""
     if not file.is_file():
         raise InputError(f"{file}: there is no such file.")
     with _in_one_sentence(file):
         number = -1
-        for number, (own, read) in enumerate(_reader(file)(file)):
+        for number, (label, read) in enumerate(_reader(file)(file)):
             if number % every == 0:
-                yield file.name if own is None else f"{file.name}:{own:05d}", read()
+                yield file.name if label is None else f"{file.name}:{label:05d}", read()
         if number < 0:
             raise ValueError("it holds no frame")
 
@@ -118,7 +113,7 @@ def _in_one_sentence(file):
 
 
 def _short(error):
-    """The first line of what a reader said."""
+    """The first line of a reader's message."""
     lines = str(error).splitlines()
     return lines[0].rstrip(".") if lines else type(error).__name__
 
@@ -214,16 +209,16 @@ def tiff_frames(file: Path) -> Iterator[tuple[int | None, Callable[[], np.ndarra
 
 def _series(stack):
     """The series of a file; what tifffile only logs, such as planes that are missing at the end, is raised."""
-    said: list[str] = []
+    faults: list[str] = []
     logger, handler = logging.getLogger("tifffile"), logging.Handler(logging.ERROR)
-    handler.emit = lambda record: said.append(record.getMessage())
+    handler.emit = lambda record: faults.append(record.getMessage())
     logger.addHandler(handler)
     try:
         series = stack.series
     finally:
         logger.removeHandler(handler)
-    if said:
-        raise ValueError(said[0].partition("> ")[2] or said[0])
+    if faults:
+        raise ValueError(faults[0].partition("> ")[2] or faults[0])
     return series
 
 
@@ -233,14 +228,14 @@ def _layout(page: tifffile.TiffPage | tifffile.TiffFrame) -> tifffile.TiffPage:
 
 
 def _frames_of(stack, page, series):
-    """Functions that read the frames of one page: its own, and what lies behind it without pages of its own."""
+    """Functions that read the frames of one page: its picture, and the planes behind it that have no pages."""
     key = _layout(page)
     check_size(key.imagewidth, key.imagelength)
     planes = series.size // page.size if series is not None and page.size else 1
     if planes == 1 and key.imagedepth == 1:
         return [partial(_read, stack, page)]
     if key.imagedepth > 1 or series.dataoffset is None:
-        raise ValueError(f"it holds {planes * key.imagedepth} planes in one page in a way that is not known")
+        raise ValueError(f"it holds {planes * key.imagedepth} planes in one page in an unknown layout")
     return [partial(_read_behind, stack, page, series.dataoffset + number * page.nbytes) for number in range(planes)]
 
 

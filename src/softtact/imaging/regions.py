@@ -18,14 +18,14 @@ from skimage.segmentation import find_boundaries, watershed
 if TYPE_CHECKING:
     from skimage.measure._regionprops import RegionProperties
 
-EDGE_SCALE = 1.5        # pixels; sd of the filter that looks for edges
+EDGE_SCALE = 1.5        # pixels; sd of the filter that finds edges
 EDGE_SIGNIFICANCE = 6.5  # sd of the noise: one pixel in 1e9 of an empty frame; skewed noise at black has a longer tail
-WIDEST_EDGE = 8.0       # pixels; sd of the widest blur at which contact is told from uneven light
+WIDEST_EDGE = 8.0       # pixels; sd of the widest blur at which contact is distinguished from uneven light
 FAINTEST = 0.02         # of full scale; less contrast is compression or striped electronics, not a disc
 _NEARBY = 6.0           # pixels; sd of the neighbourhood in which edges belong to one disc
 _SMOOTH = 1.0           # pixels; sd of the filter before the cut
 _FEWEST_PIXELS = 4      # above the cut; what has fewer cannot be measured
-_FAR, _ENOUGH = 4.0, 300   # pixels from any region, and how many of these tell the noise
+_FAR, _ENOUGH = 4.0, 300   # pixels from any region, and how many of these the noise needs
 _CONVEX = 0.93          # of the convex hull's area; a region that fills more of it has no waist
 _EDGED = 0.3            # share of a region's rim that must be a significant edge
 _COUNT = 1 / 255 / 12**0.5   # rounding to 8 bits is noise too
@@ -68,7 +68,7 @@ def find_regions(image: np.ndarray, *, noise: float) -> Regions:
 
 
 def _threshold(smooth, weights):
-    """Brightness (rows, columns) halfway between glass and disc: near an edge the edge's own, elsewhere a smooth surface's."""
+    """Brightness (rows, columns) halfway between glass and disc: near an edge that of the edge, elsewhere of a smooth surface."""
     where = np.nonzero(weights)
     surface = smooth_surface(where, smooth[where], weights=weights[where], shape=smooth.shape)(*np.indices(smooth.shape))
     near = gaussian_filter(weights * (smooth - surface), _NEARBY)
@@ -92,7 +92,7 @@ def _least_slope(smooth, noise):
 
 
 def steepest(contrast: float, *, blur: float) -> float:
-    """Slope in the middle of a blurred edge, seen by the filter that looks for it."""
+    """Slope in the middle of a blurred edge, as the filter that finds it sees it."""
     return contrast / np.sqrt(2 * np.pi * (blur**2 + EDGE_SCALE**2))
 
 
@@ -100,7 +100,7 @@ def smooth_surface(where: tuple[np.ndarray, np.ndarray], values: np.ndarray, *, 
                    stiffness: float = 1e-3) -> Callable[[float | np.ndarray, float | np.ndarray], np.ndarray]:
     """A function of (rows, columns): the polynomial of second order through `values` (n,) at the places `where` ((n,), (n,)).
 
-    stiffness: what keeps it flat where the values tell nothing, relative to the weights' sum
+    stiffness: what keeps it flat where there are no values, relative to the weights' sum
     """
     basis, mean = terms(*where, shape), np.average(values, weights=weights)
     normal = (basis * weights) @ basis.T + stiffness * weights.sum() * np.diag([0, 1, 1, 1, 1, 1])
@@ -143,10 +143,10 @@ def _split(labels):
     seeds, touching, count = np.zeros_like(labels), [], 0
     for region in regionprops(labels):
         inside = _seeds(region)
-        own = inside.max()
+        parts = inside.max()
         seeds[region.slice] += np.where(inside > 0, inside + count, 0)
-        count += own
-        touching += [own > 1] * own
+        count += parts
+        touching += [parts > 1] * parts
     if not any(touching):
         return labels, np.zeros(len(touching), dtype=bool)
     depth = distance_transform_edt(np.pad(labels > 0, 1, mode="edge"))[1:-1, 1:-1]

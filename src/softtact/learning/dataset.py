@@ -1,12 +1,10 @@
 """Data sets: deformation maps of each model paired with the sensor's readings, split so that nothing leaks.
 
 A *load step* is one press at one force. Load steps of the set `indenters` are shuffled with the seed and split into train and
-validation: each for itself (the paper's way), or all of a press, or of an object, together (`split_by`). `unseen` and `grasps` are
+validation: each for itself (as in the paper), or all of a press, or of an object, together (`split_by`). `unseen` and `grasps` are
 tests, whose objects training never sees. All trials of a load step are on one side, for they share its deformation map.
 All models share the split, and a load step is used only where it is within every model's validity: the networks see the
-same samples.
-
-One split of a data set in memory: what a network is trained on, or scored with.
+same samples. `Samples` is one split in memory: what a network is trained on, or scored with.
 """
 
 import hashlib
@@ -85,7 +83,7 @@ def check_converged(press: xarray.Dataset, path: str | Path) -> None:
 
 
 def check_items(items: Iterable[tuple[str, str]]) -> None:
-    """Refuse an item that stands twice, and an object in two sets: a test must not hold what training saw."""
+    """Refuse an item that is there twice, and an object in two sets: a test must not hold what training saw."""
     sets: dict[str, str]
     sets, seen = {}, set()
     for set_name, item in items:
@@ -147,7 +145,7 @@ def check_splits(load_steps: pd.DataFrame) -> None:
 def check_no_map_leaks(load_steps: pd.DataFrame, presses: _Presses, models: Sequence[str]) -> None:
     """Refuse a test whose deformation map is one of the training set: the same shape under two names.
 
-    A map of zeros, before an object touches, is every object's and tells nothing.
+    A map of zeros, before an object touches, is every object's and is left out.
     """
     usable = load_steps[load_steps.usable]
     for model in models:

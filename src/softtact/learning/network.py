@@ -6,7 +6,7 @@ weights, nearly all between the last pool and the hidden layer. The paper is sil
 ReLU by default.
 
 `compact`, built like the sensor: a count is the mean, over one electrode, of a rising function of the deformation (plates
-come closer), with a gain and an offset of its own. So: local features, their mean over each taxel, one look at the
+come closer), with a gain and an offset. So: local features, their mean over each taxel, one look at the
 neighbouring taxels, and an affine map per taxel. 60 thousand weights; away from the borders, where zeros are padded, only
 this affine map knows where a taxel lies.
 
@@ -124,11 +124,11 @@ def predict(network: nn.Module, maps_mm: np.ndarray, *, batch: int = 64) -> np.n
     Equal maps, of which repeated trials have many, are given to the network once.
     """
     device = next(network.parameters()).device
-    maps, own = np.unique(np.asarray(maps_mm, dtype=np.float32), axis=0, return_inverse=True)
+    maps, inverse = np.unique(np.asarray(maps_mm, dtype=np.float32), axis=0, return_inverse=True)
     network.eval()
     with torch.inference_mode():
         tactile = torch.cat([network(part.to(device)).cpu() for part in torch.from_numpy(maps).split(batch)]).numpy()
-    return tactile[own.ravel()]
+    return tactile[inverse.ravel()]
 
 
 def save_network(path: str | Path, network: nn.Module, *, facts: dict[str, Any]) -> None:

@@ -21,7 +21,7 @@ class Maps:
     """Deformation maps of one file.
 
     maps_mm (n, y, x);  force_n (n,), valid (n,) and model, where the file is a press', else None
-    x_mm (x,), y_mm (y,): the grid, where the file tells
+    x_mm (x,), y_mm (y,): the grid, where the file holds it
     """
 
     maps_mm: np.ndarray
@@ -68,9 +68,9 @@ def _read_press(path):
 def _read_npy(path):
     try:
         values = np.load(path, allow_pickle=False)
-    except Exception as error:     # the reader of the header raises what Python's own parser does
-        said = " ".join(str(error).split())[:120]
-        raise InputError(f"{path}: not an array of numbers ({said}); write it with numpy.save.") from None
+    except Exception as error:     # the reader of the header raises what Python's parser does
+        reason = " ".join(str(error).split())[:120]
+        raise InputError(f"{path}: not an array of numbers ({reason}); write it with numpy.save.") from None
     return _one_map(path, values)
 
 
@@ -88,21 +88,21 @@ def _one_map(path, values):
 
 
 def outside_training(maps: Maps, facts: dict[str, Any]) -> list[str]:
-    """Sentences on what the network has not seen in training; a network's file from before ranges were kept tells little."""
-    said = []
+    """Sentences on what the network has not seen in training; a network's file from before ranges were kept gives little."""
+    remarks = []
     if maps.model and maps.model != facts.get("model", maps.model):
-        said.append(f"the maps are of the model {maps.model} and the network was trained on {facts['model']}.")
+        remarks.append(f"the maps are of the model {maps.model} and the network was trained on {facts['model']}.")
     if maps.valid is not None and not maps.valid.all():
-        said.append(f"{(~maps.valid).sum()} of {len(maps.valid)} load steps are beyond what the press' model is valid for.")
+        remarks.append(f"{(~maps.valid).sum()} of {len(maps.valid)} load steps are beyond what the press' model is valid for.")
     known = facts.get("range", {})
     for name, values, unit in (("map_max_mm", maps.maps_mm.max(axis=(1, 2)), "mm deep at most"), ("force_n", maps.force_n, "N")):
         if values is not None and name in known:
             low, high = known[name]
             outside = (values < low * (1 - MARGIN)) | (values > high * (1 + MARGIN))
             if outside.any():
-                said.append(f"{outside.sum()} of {len(values)} maps lie outside the training maps' range, {low:.4g} to {high:.4g} "
-                            f"{unit} (the first with {values[outside][0]:.4g}); their counts are extrapolated.")
-    return said
+                remarks.append(f"{outside.sum()} of {len(values)} maps lie outside the training maps' range, {low:.4g} to "
+                               f"{high:.4g} {unit} (the first with {values[outside][0]:.4g}); their counts are extrapolated.")
+    return remarks
 
 
 def write_counts(path: Path, maps: Maps, counts: np.ndarray, *, facts: dict[str, Any]) -> None:

@@ -3,13 +3,12 @@
 Press n takes object n modulo their number, in a place and with a turn that are drawn by the seed, the object's name and n alone.
 All go through the same forces. With two fingers the object is also pressed from its other side, as in a grip.
 
-The forms that a finished data set of presses is kept in.
-
+Forms of a finished data set:
 hdf5      arrays by name: (press, force, finger, ...)
 netcdf    the same, labelled (xarray)
 lerobot   a row for each press and force, in HDF5, with the key names of LeRobot's data sets (`observation.tactile.left`,
           `observation.force`, `episode_index`, `frame_index`, `timestamp`); an episode is a press through its forces. LeRobot
-          itself keeps such keys in Parquet files; its own tools make those.
+          keeps such keys in Parquet files, which its tools make.
 """
 
 import os
@@ -39,7 +38,7 @@ _BLOCK = 32     # presses between two writings
 TO_DO, DONE, FAILED = 0, 1, 2
 FORMATS = {"hdf5": (".h5", ".hdf5"), "netcdf": (".nc",), "lerobot": (".h5", ".hdf5")}
 FINGERS = ("left", "right")
-_FPS = 10.0     # of the timestamps: a tenth of a second between two forces; a press has no time of its own
+_FPS = 10.0     # of the timestamps: a tenth of a second between two forces; a press has no time
 _DIMENSIONS = {"deformation_map_mm": ("press", "force", "finger", "y", "x"),
                "tactile_map": ("press", "force", "finger", "row", "column"), "indentation_mm": ("press", "force", "finger"),
                "within_validity": ("press", "force", "finger"), "status": ("press",), "force_n": ("force",),
@@ -93,7 +92,7 @@ def write_press_data(path: str | Path, plan: PressPlan, *, form: str = "hdf5", w
                      label: str = "presses") -> int:
     """Write a data set, or go on with one that stopped; return how many of its presses failed, which hold zeros and a status.
 
-    form: hdf5, netcdf or lerobot. While it grows it stands beside `path`, with the ending `.part`
+    form: hdf5, netcdf or lerobot. While it grows it lies beside `path`, with the ending `.part`
     Raises InputError for a form or an ending that is not known, and where another data set is there.
     """
     path = Path(path)
@@ -138,15 +137,15 @@ def _opened(path, mode):
     try:
         return h5py.File(path, mode, libver="latest")
     except OSError as error:
-        said = " ".join(str(error).split())[:120]
+        reason = " ".join(str(error).split())[:120]
         if mode == "a" and not path.exists():
-            raise OutputError(f"{path}: cannot be written ({said}); make its folder, or room on the disk.") from None
-        raise InputError(f"{path}: not readable as a data set that was begun ({said}); delete it and begin anew.") from None
+            raise OutputError(f"{path}: cannot be written ({reason}); make its folder, or room on the disk.") from None
+        raise InputError(f"{path}: not readable as an unfinished data set ({reason}); delete it and begin anew.") from None
 
 
 def _refuse_other(part, file, plan):
     if file.attrs.get("settings") != plan.settings:
-        raise InputError(f"{part}: a data set of other objects or settings was begun there; delete it, or give another name.")
+        raise InputError(f"{part}: a data set of other objects or settings is unfinished there; delete it, or give another name.")
 
 
 def _begin(file, plan):

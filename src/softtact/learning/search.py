@@ -1,6 +1,6 @@
 """Hyperparameter search: Optuna with its Hyperband pruner over layers, filters, hidden neurons and learning rate.
 
-The trials stand in a journal file. A search that was cut off takes it up, forgets the trial that was under way, and
+The trials are kept in a journal file. A search that was cut off takes it up, forgets the trial that was under way, and
 ends as it would have: each trial's draw depends on the seed and the trials finished before it.
 
 Several processes may share a journal, each doing what trials are left; all end with the same table. What is drawn then
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from softtact.learning.dataset import Samples
 
-WAIT_S = 1.0     # between two looks at what other processes have left to do
+WAIT_S = 1.0     # between two checks of what other processes have left
 
 optuna.logging.set_verbosity(optuna.logging.WARNING)
 
@@ -67,7 +67,7 @@ def claim_trial(study: optuna.Study, journal: Path, *, options: Search, seed: in
         drawn = len(study.trials)
         if drawn >= options.trials:
             return None
-        # A sampler's own state is not in the journal: a fresh one per trial makes resuming harmless.
+        # The state of a sampler is not in the journal: a fresh one per trial makes resuming harmless.
         study.sampler = make_sampler([seed, drawn])
         return study.ask()
 

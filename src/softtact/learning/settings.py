@@ -156,7 +156,7 @@ def chosen_network(network: Network, best: dict[str, Any] | None) -> dict[str, A
 
 
 def chosen_training(options: Training, network: Network, found: dict[str, Any] | None) -> Training:
-    """`options` with the learning rate as a number: the one found for this network, the stated one, or the compact network's own.
+    """`options` with the learning rate as a number: the one found for this network, the stated one, or that of the compact network.
 
     found: what the search, or for the printed network the trial of rates, wrote
     """

@@ -1,10 +1,8 @@
-"""The training loop: one network, from its first weights to its best ones.
+"""The training loop: one network, from its first weights to its best ones, and the learning rate that suits it.
 
 The order of the maps depends on the seed and the epoch only, and a checkpoint holds everything else: a training that
 was cut off ends with the same weights as one that was not. On a CPU, the same seed and the same number of threads give
-the same bytes.
-
-The learning rate of one network, found by short trainings of it: the rate of another architecture does not carry over.
+the same bytes. The learning rate is found by short trainings: the rate of another architecture does not carry over.
 """
 
 import math
@@ -75,7 +73,7 @@ def prepare_torch(*, threads: int, device: str = "cpu") -> torch.device:
 def start_run(train: "Samples", *, network: dict[str, Any], learning_rate: float, seed: int, device: torch.device | str) -> Run:
     """A `Run` with fresh weights; the training set's greatest map and count become the network's scales.
 
-    network: dict of the architecture (printed, if not said) and its options: filters, and dense, activation of the printed one
+    network: dict of the architecture (printed, if not stated) and its options: filters, and dense, activation of the printed one
     """
     torch.manual_seed(seed)
     options = dict(network)
@@ -90,7 +88,7 @@ def train_network(run: Run, train: "Samples", validation: "Samples", *, options:
                   checkpoint: Path | None, label: str = "training") -> Iterator[dict[str, Any]]:
     """Train `run` to the end of `options` (a `Training`), or until patience ends; yields a record per epoch.
 
-    checkpoint: file to resume from, if it belongs to this training, and to write on the way; None: neither
+    checkpoint: file to resume from, if it belongs to this training, and to write during it; None: neither
     ssim: window and data_range of the SSIM that the records carry
     """
     data = _tensors(train, run)
@@ -131,7 +129,7 @@ def train_epoch(run: Run, maps_mm: torch.Tensor, counts: torch.Tensor, *, rate: 
 
 
 def epoch_label(label: str, run: Run, options: "Training") -> str:
-    """What a line of progress says of the epoch under way."""
+    """Text of a line of progress on the present epoch."""
     so_far = f", validation loss {run.history[-1]['validation_loss']:.0f} counts" if run.history else ""
     return f"{label}, epoch {run.epoch + 1} of {options.epochs}{so_far}"
 

@@ -1,11 +1,10 @@
 """One small interface to sparse direct solvers for symmetric matrices: analyse once, factor often.
 
-PARDISO (MKL) where it is installed, dense blocks of LAPACK elsewhere. `solver.name` tells which one it was. A press has a solver of
-its own, which knows where the unknowns stand: `multifrontal_solver`.
+PARDISO (MKL) where it is installed, dense blocks of LAPACK elsewhere; `solver.name` is that of the one in use. A press takes
+`multifrontal_solver`, which knows the places of the unknowns.
 
-PARDISO's Cholesky in single precision: half the time and memory, for steps that are corrected by a residual in double precision.
-
-Enough where the matrix's condition stays well below 1e7; a residual that is not cut by such steps tells otherwise.
+PARDISO's Cholesky factor in single precision takes half the time and memory, for steps that are corrected by a residual in double
+precision. It suffices where the matrix's condition stays well below 1e7; else these steps do not reduce the residual.
 """
 
 import ctypes
@@ -32,7 +31,7 @@ def make_solver(*, threads: int = 1) -> "PardisoSolver | BlockTridiagonalSolver"
 
 
 def _pypardiso(mtype):
-    """A solver of pypardiso's, which looks for MKL in all folders each time, a second or so, unless told where it lies."""
+    """A solver of pypardiso's, which looks for MKL in all folders each time, a second or so, unless its place is given."""
     from pypardiso import PyPardisoSolver
 
     solver = PyPardisoSolver(mtype=mtype)
@@ -46,7 +45,7 @@ class PardisoSolver:
     name = "pardiso"
     precision: type[np.floating] = np.float64
     _POSITIVE, _FACTOR, _SOLVE, _ANALYSE_AND_FACTOR, _NO_MEMORY = 2, 22, 33, 12, -2
-    # Entries of iparm, counted from 0: own values, METIS on one thread (the same order whatever the number of threads), and no
+    # Entries of iparm, counted from 0: stated values, METIS on one thread (the same order whatever the number of threads), and no
     # iterative refinement, which makes a solve four times as long for digits that Newton's method does not need.
     _PARAMETERS = {0: 1, 1: 2, 7: 0, 17: -1, 18: -1}
     _FROM_ZERO = 34     # the entry of iparm that lets rows and columns be counted from 0
@@ -95,7 +94,7 @@ class PardisoSolver:
     def _call(self, phase, columns):
         """PARDISO's solution for columns (n, k), in Fortran's order, and its error.
 
-        On its own number of threads, whatever limit holds for the small products around it. Not by pypardiso's own call, which
+        On `threads` threads, whatever limit holds for the small products around it. Not by pypardiso's call, which
         copies the pattern twice each time: half of the time of a solve.
         """
         solver, upper = self._solver, self._upper
@@ -147,7 +146,7 @@ class PardisoSingle(PardisoSolver):
 
     def __init__(self, *, threads: int = 1, quick_analysis: bool = False) -> None:
         """quick_analysis: order by minimum degree: on a layer of small elements as little fill as dissection, in two thirds of
-        the time; on cells of many unknowns half as many operations again."""
+        the time; on cells of many unknowns half as many operations more."""
         point_at_mkl()
         super().__init__(threads=threads)
         self._solver.set_iparm(_SINGLE, 1)
@@ -161,7 +160,7 @@ class PardisoSingle(PardisoSolver):
 
 
 def point_at_mkl() -> None:
-    """Tell pypardiso where MKL is: its own search through the installation takes half a second for every solver.
+    """Give pypardiso the place of MKL: its search through the installation takes half a second for every solver.
 
     Where no package `mkl` is installed, it is left to that search, or to the solver that takes PARDISO's place.
     """

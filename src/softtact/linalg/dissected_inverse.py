@@ -2,7 +2,7 @@
 
 G = A K^-1 A' of a stiffness K and functionals A is the negative Schur complement of the bordered matrix [[K, A'], [A, 0]] on the
 border. So all of K is eliminated piece by piece of a dissection (`nested_dissection`), in dense fronts as in `multifrontal` but in
-double precision, and no factor is kept. A front carries the functionals of its own part of the body alone: no dense inverse and no
+double precision, and no factor is kept. A front carries the functionals of its part of the body alone: no dense inverse and no
 solution for each load. Of all matrices the upper triangle counts, row by row.
 Against PARDISO's Schur complement and LAPACK's inverse: docs/notebook/2026-11-27-compliance-of-large-pads.md.
 """
@@ -25,7 +25,7 @@ def inverse_between(upper: sp.csr_matrix, functionals: sp.csr_matrix, places: np
     """G = A K^-1 A' (m, m) of a matrix K (n, n) and functionals A (m, n); rows of A that are zero give zeros.
 
     upper: K's upper triangle (csr, sorted);  dtype: of the result, all is computed in double precision
-    places (n, 2 or 3): where each unknown stands, in plan where the body is wide and thin, or in space; in mm
+    places (n, 2 or 3): place of each unknown, in plan where the body is wide and thin, or in space; in mm
     Raises LinAlgError for a matrix that is not positive definite.
     """
     pieces = dissect(upper.indptr, upper.indices, places)
@@ -65,7 +65,7 @@ class _Front:
         return cls(*(np.zeros(shape) for shape in ((own, own), (own, bound), (bound, bound))))
 
     def eliminate(self) -> np.ndarray:
-        """The rest, less what the piece's own unknowns did to it."""
+        """The rest, less what the piece's unknowns did to it."""
         if not self.own.size:
             return self.rest
         factor, fault = lapack.dpotrf(self.own.T, lower=1, clean=0, overwrite_a=1)     # row by row is a lower one to Fortran

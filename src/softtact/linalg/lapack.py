@@ -1,18 +1,14 @@
-"""LAPACK and BLAS routines of scipy in single precision that compiled loops can call: thousands of small matrices without
-Python in between.
+"""Dense kernels in single precision: LAPACK and BLAS for compiled loops, products with one row, a Cholesky factor on all threads.
 
-A compiled function takes the addresses of the routines that it needs as arguments: numba caches it then, which it would not with an
-address in it. (Numba's own type for functions as arguments takes 20 us to recognise at every call; a number takes none.)
+Compiled loops call scipy's LAPACK and BLAS for thousands of small matrices without Python in between. A compiled function takes the
+addresses of the routines that it needs as arguments: numba caches it then, which it would not with an address in it. (Numba's type
+for functions as arguments takes 20 us to recognise at every call; a number takes none.)
 
-Loops over one row of a matrix in single precision or in 16 bits: what a triangular solve does, row by row.
+Loops over one row, in single precision or in 16 bits, are what a triangular solve does, row by row. As separate functions they
+become vector instructions and read at nearly memory's speed. Loops over several rows at once do not, and BLAS's triangular solves
+of some hundred unknowns take four times as long (docs/notebook/2026-11-25-linear-solver.md).
 
-In functions of their own they become vector instructions and read at nearly memory's speed. Loops over several rows at once do
-not, and BLAS's triangular solves of some hundred unknowns take four times as long
-(docs/notebook/2026-11-25-linear-solver.md).
-
-Cholesky's method for one dense matrix in single precision, block by block on all threads.
-
-SciPy's BLAS may use threads of its own or not, as its user has set it; here the caller's threads are used, on blocks of their own.
+SciPy's BLAS may start threads or not, as its user has set it; Cholesky's method uses the caller's threads, each on other blocks.
 """
 
 from collections.abc import Callable
@@ -34,7 +30,7 @@ def _address_of(module, name):
 
 
 class Routines(NamedTuple):
-    """The routines' addresses, and what they are told as memory that they can point at: letters L, N, R, T; factors 1, -1, 0."""
+    """The routines' addresses, and their constant arguments in memory: letters L, N, R, T; factors 1, -1, 0."""
 
     letters: np.ndarray
     factors: np.ndarray
@@ -65,7 +61,7 @@ def call(typing_context: Any, routine: types.Type, arguments: types.BaseTuple) -
 
 @njit(cache=True, nogil=True)
 def address(array: np.ndarray, place: int) -> np.uintp:
-    """Where an entry of a flat array stands in memory."""
+    """Address of an entry of a flat array."""
     return np.uintp(array.ctypes.data) + np.uintp(place * array.itemsize)
 
 

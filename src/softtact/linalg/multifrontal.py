@@ -1,6 +1,6 @@
 """Cholesky's method on the fronts of a dissection, in single precision: compiled loops around BLAS and LAPACK.
 
-A piece's front is a dense matrix over its own k unknowns and the b later ones that they are coupled with. Its panel are the first
+A piece's front is a dense matrix over its k unknowns and the b later ones that they are coupled with. Its panel are the first
 k rows (k, k + b), in the end the factor's; its update is what is left of the others (b, b), which later fronts take over (Duff and
 Reid, ACM Trans. Math. Softw. 9, 1983). Of both only the upper triangle counts, row by row; to Fortran that is a lower one.
 

@@ -1,4 +1,4 @@
-"""Cholesky's method for the matrix of a body of which it is known where each unknown stands, in plan or in space.
+"""Cholesky's method for the matrix of a body of which the places of the unknowns are known, in plan or in space.
 
 In single precision, and solved from 16 bits, for steps that are corrected by a residual in double precision. What it gains over a
 general solver: docs/notebook/2026-11-25-linear-solver.md.
@@ -23,7 +23,7 @@ from softtact.linalg.symbolic import lay_out, with_room
 from softtact.linalg.workers import SERIAL, Workers, slices
 
 _PARTS = 32              # of all operations: what takes less than such a share is one thread's, from its first piece to its last
-_SOLVED_APART = 4        # parts that are solved on threads of their own
+_SOLVED_APART = 4        # parts that are each solved on a thread
 _SLACK = 1.05            # of arrays, for the next pattern
 _SLOWER = 20             # an operation of a solution, which waits for memory, beside one of a factor
 _COLUMNS = 256           # of a large front that one thread couples at once
@@ -50,7 +50,7 @@ class DissectedSolver:
     _store: Any      # `Store`, None before the first factor
 
     def __init__(self, places: np.ndarray, *, workers: Workers = SERIAL) -> None:
-        """places (n, 2 or 3): where each unknown stands, in plan where the body is wide and thin, or in space; in mm"""
+        """places (n, 2 or 3): place of each unknown, in plan where the body is wide and thin, or in space; in mm"""
         self._places, self._workers, self._pattern, self._frames = places, workers, None, None
         self._store = None
 

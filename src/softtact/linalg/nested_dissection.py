@@ -1,11 +1,9 @@
-"""Nested dissection of a body by where its nodes stand: it is cut along lines or planes, again and again, and the cuts come last.
+"""Nested dissection of a body by the places of its nodes: it is cut along lines or planes, recursively, and the cuts come last.
 
 On a plane no order needs fewer operations, but for a factor (George, SIAM J. Numer. Anal. 10, 1973). A general ordering has to find
 the lines first: it takes five times as long for a third more operations on a wide and thin sensor's lattice
 (docs/notebook/2026-11-25-linear-solver.md). In space the cuts begin as planes and are then shortened node by node: on a body of
 irregular tetrahedra that saves more than half of the operations (docs/notebook/2026-11-26-solids-in-single-precision.md).
-
-Fewest nodes that part two sides of a graph, next to a cut that is known.
 
 A cut along a plane through irregular tetrahedra takes with it a layer of elements' nodes. Of the edges between the two sides, the
 fewest nodes that touch all of them are a cut, too, mostly one sheet of nodes; and which nodes of a cut count to either side may be
@@ -24,13 +22,13 @@ from scipy.sparse.csgraph import maximum_bipartite_matching
 _LEAST_SHARE = 0.1           # of the unknowns on either side of a cut
 _PRICE_OF_IMBALANCE = {2: 2.0, 3: 1.0}   # in plan, in space: a cut between unlike parts counts as so much longer
 _SMALLEST = 200              # unknowns: what has fewer is not cut; smaller ones have fewer operations, in slower pieces
-_GRID_MM = 1e-6              # columns of nodes stand where their places round to the same
+_GRID_MM = 1e-6              # nodes are one column where their places round to the same
 _ROUNDS = 8
 
 
 @dataclass(frozen=True)
 class Piece:
-    """A cut, or a part that was not cut again: unknowns (k,) that it eliminates, and the pieces that come before it."""
+    """A cut, or a part that was not cut further: unknowns (k,) that it eliminates, and the pieces that come before it."""
 
     own: np.ndarray
     before: tuple
@@ -39,7 +37,7 @@ class Piece:
 def dissect(indptr: np.ndarray, indices: np.ndarray, places: np.ndarray, *, without: np.ndarray | None = None) -> list[Piece]:
     """`Piece`s of a symmetric matrix, each behind those before it; the first cut is the last piece.
 
-    indptr, indices: pattern of its upper triangle (csr);  places (n, 2 or 3): where each unknown stands, in plan or in
+    indptr, indices: pattern of its upper triangle (csr);  places (n, 2 or 3): place of each unknown, in plan or in
     space, in mm;  without: unknowns (k,) that are to be in none
     """
     columns, column_of = np.unique(np.round(places / _GRID_MM).astype(np.int64), axis=0, return_inverse=True)

@@ -1,4 +1,4 @@
-"""Nodes of which one or more directions of their own are to be unknowns of their own: their coordinates are turned for that."""
+"""Nodes of which one or more directions are to be unknowns: their coordinates are turned into local frames."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -23,7 +23,7 @@ from softtact.linalg.workers import SERIAL, Workers
 
 _ENOUGH = 1e-3    # of the solution's energy norm: the last correction; what is left is that times what a solve leaves
 _WORTH = 0.6      # of a factor's time: solves with an old factor that take more are given up
-_MOST_STEPS = 30  # with its own factor; a matrix that takes more needs more digits
+_MOST_STEPS = 30  # with the factor of that matrix; one that takes more needs more digits
 _MOST_CYCLES = 30  # of two levels; a matrix that takes more is better factored
 
 
@@ -39,7 +39,7 @@ class RefinedSolver:
     _product: tuple[tuple[np.ndarray, np.ndarray], SymmetricProduct] | None     # of the last pattern
 
     def __init__(self, places: np.ndarray, *, lift: sp.csr_matrix | None = None, workers: Workers = SERIAL) -> None:
-        """places (n, 2 or 3): where each unknown stands, in mm;  lift (n, c): values at all of them from those at the
+        """places (n, 2 or 3): place of each unknown in mm;  lift (n, c): values at all of them from those at the
         corners of quadratic elements, where the systems are to be solved on these two levels"""
         self._workers, self._product = workers, None
         self._quick, self._exact = DissectedSolver(places, workers=workers), None
@@ -55,7 +55,7 @@ class RefinedSolver:
     def solve(self, upper: sp.csr_matrix, right: np.ndarray, *, doubt: bool = False, factored: bool = False) -> np.ndarray | None:
         """Solve a matrix, given by its upper triangle (csr, sorted, with its diagonal), for right-hand sides (n, k).
 
-        None if it is not positive definite;  doubt: whether to ask double precision before that is said;  factored: whether
+        None if it is not positive definite;  doubt: whether to ask double precision before that is concluded;  factored: whether
         `precondition` is to be as good as a factor
         """
         if self._exact is not None:
@@ -73,7 +73,7 @@ class RefinedSolver:
         return found
 
     def _with_levels(self, upper, right, doubt):
-        """None where there are none, or where they fail or take too many steps: they are not tried again then."""
+        """None where there are none, or where they fail or take too many steps: they are not tried later."""
         if self._levels is None:
             return None
         found, product = None, partial(self.product, upper)
@@ -156,18 +156,18 @@ class _Upkeep:
 
 def _conjugate_gradients(product, right, precondition, most):
     """The solution (n,), None if it is not good enough after so many steps; and the steps."""
-    found, rest, way, before, first = np.zeros_like(right), right.copy(), np.zeros_like(right), 1.0, 0.0
+    found, rest, direction, before, first = np.zeros_like(right), right.copy(), np.zeros_like(right), 1.0, 0.0
     for step in range(most):
         correction = precondition(rest)
         size = float(rest @ correction)     # square of the energy norm of what is off, as the factor sees it
         first = first or size
         if size > 0.0:
-            way = correction + (size / before) * way
-            pushed = product(way)
-            stiffness = float(way @ pushed)
+            direction = correction + (size / before) * direction
+            pushed = product(direction)
+            stiffness = float(direction @ pushed)
             if stiffness <= 0.0:
                 raise _Indefinite
-            found += (size / stiffness) * way
+            found += (size / stiffness) * direction
             rest -= (size / stiffness) * pushed
             before = size
         if size <= _ENOUGH**2 * first:

@@ -1,4 +1,4 @@
-"""Where everything of a sparse matrix' fronts stands: found once for a pattern."""
+"""Symbolic factorisation: the places of everything in a sparse matrix's fronts, found once for a pattern."""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,7 @@ def lay_out(indptr: np.ndarray, indices: np.ndarray, pieces: Sequence[Piece], *,
     """`Fronts` of a matrix whose upper triangle (csr) has this pattern, for `Piece`s of a dissection in the order of elimination.
 
     bordered: one more unknown, coupled with all and in the last piece; its column's entries come behind those of the pattern
-    Also the unknowns (n,) in that order. Where panels and updates stand while they are needed depends on who works on which when:
+    Also the unknowns (n,) in that order. Where panels and updates lie while they are needed depends on who works on which when:
     `with_room` gives them their places.
     """
     order = np.concatenate([piece.own for piece in pieces])
@@ -136,7 +136,7 @@ def _bound(pieces, own_at, entry_at, high):
 
 @njit(cache=True, nogil=True)
 def _later(p, end, high, passed_on, seen):
-    """The ranks from `end` on among two lists, each once; `seen` (n,) tells the last piece that met a rank."""
+    """The ranks from `end` on among two lists, each once; `seen` (n,): the last piece that met a rank."""
     out, count = np.empty(len(seen) - end, np.int64), 0
     for some in (high.astype(np.int64), passed_on):
         for k in some:
@@ -159,7 +159,7 @@ def _places_in_parents(pieces, bound, own_at):
 
 @njit(cache=True)
 def _targets(own_at, bound_at, bound, entry_at, low, high):
-    """Where in its piece's panel each entry stands, of the unknowns `low` and `high`."""
+    """Place of each entry in its piece's panel, of the unknowns `low` and `high`."""
     out, place = np.empty(len(low), np.int32), np.zeros(own_at[-1], np.int64)
     for p in range(len(own_at) - 1):
         first, own = own_at[p], own_at[p + 1] - own_at[p]

@@ -28,7 +28,7 @@ class TwoLevels:
     name = "two levels of nodes"
 
     def __init__(self, places: np.ndarray, lift: sp.csr_matrix, *, workers: Workers = SERIAL) -> None:
-        """places (n, 2 or 3): where each unknown stands, in mm;  lift (n, c): values at all unknowns from those at the c corners"""
+        """places (n, 2 or 3): place of each unknown in mm;  lift (n, c): values at all unknowns from those at the c corners"""
         self._lift, self._fall = lift, sp.csr_matrix(lift.T)
         own = sp.coo_matrix(lift)
         corner = own.data == 1.0     # shares of the middles are smaller

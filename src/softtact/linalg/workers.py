@@ -14,7 +14,7 @@ _Result = TypeVar("_Result")
 
 
 class Workers:
-    """Runs a function over items in order; with one thread in the caller's own."""
+    """Runs a function over items in order; with one thread in that of the caller."""
 
     def __init__(self, threads: int = 1) -> None:
         self.threads = threads
@@ -59,9 +59,9 @@ def chunks(numbers: np.ndarray, size: int) -> list[np.ndarray]:
 
 
 def unique_rows(table: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers (u,) of rows of a table (n, k) that stand for all, and for each row (n,) which of these it equals.
+    """Numbers (u,) of rows of a table (n, k) that represent all, and for each row (n,) which of these it equals.
 
-    Equal to 1e-9 of the largest entry; told apart by two random projections, which like rows share.
+    Equal to 1e-9 of the largest entry; distinguished by two random projections, which like rows share.
     """
     scale = max(np.abs(table).max(), 1e-300)
     directions = np.random.default_rng(0).standard_normal((table.shape[1], 2))

@@ -1,10 +1,8 @@
 """A material card made: the family of laws fitted, judged and compared (docs/reference/materials.md).
 
-Do the laws of one card tell the same story, where the data are and just outside?
-
-The difference of two laws on a path is the root mean square of the difference of their nominal stresses over that of their mean.
-
-How well a law fitted to some tests predicts one that it has not seen.
+Judged are how the laws of one card differ, where the data are and just outside, and how well a law that is fitted to some tests
+predicts another. The difference of two laws on a path is the root mean square of the difference of their nominal stresses over
+that of their mean.
 """
 
 import itertools
@@ -35,7 +33,7 @@ from softtact.progress import progress
 
 _SYSTEMATIC = 0.7   # neighbouring residuals so alike are the law's misfit; noise gives 0 +- 1/sqrt(points)
 _NOTABLE = 0.01     # relative error from which that is worth saying
-# Root mean square error over stress from which a card is said not to describe its curves. Published rubbers leave 1 to 17 %, and
+# Root mean square error over stress from which a card is taken not to describe its curves. Published rubbers leave 1 to 17 %, and
 # 25 to 46 % only where few constants follow a large range, or a coarse load cell a small one.
 LARGEST_ERROR = 0.25
 
@@ -56,7 +54,7 @@ class CardOptions:
     small_strain: strain up to which E is the slope of the uniaxial curve
     window: {mode: [min, max]} stretch (volume ratio) to use, all by default
     residual, weights, nonnegative, starts, seed: see `softtact.materials.fitting.FitOptions`
-    predict_left_out: fit each law also to all modes but one, and tell how it meets that one
+    predict_left_out: fit each law also to all modes but one, and report how it meets that one
     disagreement: difference of two laws' stresses, as a share, beyond which they are named
     """
 

@@ -15,7 +15,7 @@ from softtact.materials.linear import LinearConstants
 
 
 class _CardLaw(pydantic.BaseModel):
-    """What presses take of a card's law; the card tells more."""
+    """What presses take of a card's law; the card holds more."""
 
     model_config = pydantic.ConfigDict(strict=True)
     parameters: dict[str, pydantic.FiniteFloat]
@@ -60,7 +60,7 @@ def law_from_card(card: dict[str, Any], law: str | None = None) -> Law:
 
 
 def law_of_entry(name: str, entry: dict[str, Any]) -> Law:
-    """The `Law` of one entry of a card, without a window of its own."""
+    """The `Law` of one entry of a card, without a window."""
     if entry.get("bulk_modulus_mpa") is None and name not in FOAM_LAWS:
         raise InputError(f"The card's law {name} has no bulk_modulus_mpa; write the card again with `softtact fit`.")
     return make_law(name, entry["parameters"], bulk_modulus=entry.get("bulk_modulus_mpa"))

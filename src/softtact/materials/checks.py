@@ -1,10 +1,9 @@
-"""What makes a test curve unfit for a fit: refused with row and remedy, or, where it may be right, said in a remark.
+"""What makes a test curve unfit for a fit: refused with row and remedy, or, where it may be right, stated in a remark.
 
-What is odd in a test curve and may yet be right, each in a sentence, judged by what a rubber can be.
-
-The measure is the neo-Hookean law, stress = mu (l_1^2 - l_3^2) / stretch: whatever the rubber, at small strain the curve is that
-straight line through zero (nothing else is isotropic and incompressible), and in tension it softens from there before it stiffens.
-  unit of strain   the curve has the form of that law in percent, and not as a ratio, or the other way round
+Remarks judge by what a rubber can be. The measure is the neo-Hookean law, stress = mu (l_1^2 - l_3^2) / stretch: whatever the
+rubber, at small strain the curve is that straight line through zero (nothing else is isotropic and incompressible), and in tension
+it softens from there before it stiffens.
+  unit of strain   the curve has the form of that law in percent, and not as a ratio, or vice versa
   modulus          from silicone gels to hard polyurethane
   zero             a preload has stress at no strain, slack has strain at no stress
   sign             a compression test without a minus steepens from the start
@@ -32,7 +31,7 @@ MODULI_APART = 50.0
 SMALLEST_SOLID = 0.7    # volume ratio; a foam's goes below
 _MODULI_MPA = (0.001, 30.0)     # initial shear moduli of gels, and of hard polyurethane
 _COMMON_MPA = 10.0              # a silicone's curve is so straight up to a stretch of 2 that in percent it would be one of 20 MPa
-# Another reading of a curve is told of where it leaves less than this share of the error: real rubbers leave half or more of it.
+# Another reading of a curve is reported where it leaves less than this share of the error: real rubbers leave half or more of it.
 _MUCH_BETTER = 0.2
 _LARGEST_STRETCH = 25.0         # see `checks`
 _FAR = 4.0                      # stretch beyond which no rubber stays as straight as one does over some percent
@@ -48,7 +47,7 @@ def checked(path: str | Path, rows: np.ndarray, x: np.ndarray, y: np.ndarray, *,
     """Remarks (a tuple of sentences) on a curve; what cannot be right is refused.
 
     rows: (n,) numbers of the file's rows;  x, y: (n,) stretch and nominal stress, or volume ratio and pressure, in MPa
-    raw: (2, n) the same two columns as the file has them;  compression: the test was said to be written without a minus
+    raw: (2, n) the same two columns as the file has them;  compression: the test is stated to be written without a minus
     """
     _check_magnitude(path, rows, x, y, mode, raw)
     _check_sign(path, rows, x, y, mode, raw, compression)
@@ -81,11 +80,11 @@ def refuse_first(path: str | Path, rows: np.ndarray, values: np.ndarray, bad: np
 
 
 def _swapped(raw, mode):
-    """What to add to a refusal where the two columns, taken the other way round, would be a curve of stress and stretch."""
+    """What to add to a refusal where the two columns, swapped, would be a curve of stress and stretch."""
     y, x = raw
     plausible = mode != VOLUMETRIC and (x > 0.05).all() and np.abs(x - 1).min() < 0.3 and (
         (y * np.sign(x - 1)) >= -SIGN_TOLERANCE * np.abs(y).max()).all()
-    return " (the other way round the columns would make sense: are they swapped?)" if plausible else ""
+    return " (swapped, the columns would make sense; are they?)" if plausible else ""
 
 
 def _check_magnitude(path, rows, x, y, mode, raw):
@@ -134,7 +133,7 @@ def _check_units_within(path, rows, x, y):
         growth = np.abs(y[1:] / y[:-1]) / (strain[1:] / strain[:-1])
         growth = np.maximum(growth, 1 / growth)
     jump = (growth > UNIT_JUMP[0]) & (growth < UNIT_JUMP[1])
-    # Noise about zero jumps too, but back again: on both sides of a change of unit two rows agree.
+    # Noise about zero jumps too, but back: on both sides of a change of unit two rows agree.
     calm = np.concatenate([[False], growth[:-1] < 10]) & np.concatenate([growth[1:] < 10, [False]])
     refuse_first(path, rows[1:], y[1:], jump & calm,
                   "the stress jumps to {value} MPa, some 1000 times what the row before leads to: are units mixed? Give the whole"
@@ -149,7 +148,7 @@ def _of_volume(ratio):
 
 
 def remarks(stretch: np.ndarray, stress: np.ndarray, *, mode: str, compression: bool) -> Iterator[str]:
-    """Sentences on a curve of shape: stretch (n,), nominal stress (n,) in MPa; `compression`: it was said to be without a minus."""
+    """Sentences on a curve of shape: stretch (n,), nominal stress (n,) in MPa; `compression`: stated to be without a minus."""
     unit = _unit_of_strain(stretch, stress, mode) or _modulus(stretch, stress, mode)
     found = [unit, _positive_compression(stretch, stress, mode), _negative_tension(stretch, stress, mode) if compression else None]
     if not any(found):      # of a curve in another unit or of another sign, zero says nothing
@@ -198,7 +197,7 @@ def _as_stiff_as_rubber(mode, stretch, stress):
 
 
 def _all_but_noise(stretch, stress, other, mode):
-    """Whether a far curve follows Mooney's and Rivlin's law over other stretches but for its noise, and not over its own."""
+    """Whether a far curve follows Mooney's and Rivlin's law over other stretches but for its noise, and not over those measured."""
     if stretch.max() < _FAR or not _as_stiff_as_rubber(mode, other, stress):
         return False
     own, there = (_mooney_misfit(mode, x, stress) for x in (stretch, other))
@@ -248,7 +247,7 @@ def _positive_compression(stretch, stress, mode):
 
 
 def _negative_tension(stretch, stress, mode):
-    """A curve that was said to be of compression and softens from the start, as tension does."""
+    """A curve that is stated to be of compression and softens from the start, as tension does."""
     if stretch.max() > 1.001 or not stretch.min() < 0.95:
         return None
     as_compression = _misfit(_neo_hooke(mode, stretch), stress)

@@ -1,7 +1,7 @@
 """The YAML file of a material: typed, described in place, and turned into the settings of its two stages.
 
 material: neoprene
-curves:   where the test curves come from: `kind: synthetic` (made from a law) or `kind: measured` (one's own files)
+curves:   where the test curves come from: `kind: synthetic` (made from a law) or `kind: measured` (the user's files)
 fit:      how the laws are fitted
 printed:  constants published for it, {law: {parameters: ..., rmse_mpa: ...}}
 """
@@ -51,12 +51,12 @@ class SyntheticCurves(_Section):
 
 
 class MeasuredFile(_Section):
-    """One file of a user's own test; see `softtact.materials.readers`."""
+    """One file of a user's test; see `softtact.materials.readers`."""
 
     file: str = Field(description="path, relative to the YAML file")
     mode: Mode
     layout: Literal["plain", "soro_db", "stress_stretch"] = "plain"
-    columns: dict[str, str] = Field(default_factory=dict, description="declared name -> the file's own header")
+    columns: dict[str, str] = Field(default_factory=dict, description="declared name -> header in the file")
     sort: bool = Field(False, description="order the rows by stretch")
     compression: bool = Field(False, description="a compression test written without a minus")
     decimal: Literal[".", ","] = Field(".", description="the decimal sign")
@@ -65,7 +65,7 @@ class MeasuredFile(_Section):
 
 
 class MeasuredCurves(_Section):
-    """Curves from a user's own files."""
+    """Curves from a user's files."""
 
     kind: Literal["measured"]
     files: list[MeasuredFile] = Field(min_length=1)
@@ -110,7 +110,7 @@ class MaterialConfig(_Section):
     description: str = ""
     curves: Annotated[SyntheticCurves | MeasuredCurves, Field(discriminator="kind")]
     fit: FitSettings = FitSettings()
-    source: str = Field("", description="where the printed constants stand")
+    source: str = Field("", description="where the constants are printed")
     printed: dict[str, PrintedLaw] = Field(default_factory=dict)
 
     @property
@@ -122,7 +122,7 @@ class MaterialConfig(_Section):
 
     @property
     def measured_files(self) -> list[str]:
-        """Paths of the user's own files, in order; none for synthetic curves."""
+        """Paths of the user's files, in order; none for synthetic curves."""
         return [] if self.curves.kind == "synthetic" else [file.file for file in self.curves.files]
 
     @property
@@ -138,7 +138,7 @@ class MaterialConfig(_Section):
 
 
 def load_material(path: str | Path) -> MaterialConfig:
-    """Read a material's YAML into a `MaterialConfig`; what is wrong is told in one sentence."""
+    """Read a material's YAML into a `MaterialConfig`; what is wrong is stated in one sentence."""
     path = Path(path)
     known = ", ".join(sorted(file.stem for file in path.parent.glob("*.yaml"))) or "none"
     raw = read_yaml(path, missing=f"there is no such material; known beside it: {known}.")
@@ -163,8 +163,8 @@ def _fault(model, field, fault):
     """What is wrong with a field, and what to do."""
     if fault["type"] == "extra_forbidden":
         *parents, last = fault["loc"]
-        said = unknown(last, known_keys(model, parents), kind="key")
-        return f"the key {field} is unknown: {said}{'' if said.endswith('?') else '.'}"
+        fault = unknown(last, known_keys(model, parents), kind="key")
+        return f"the key {field} is unknown: {fault}{'' if fault.endswith('?') else '.'}"
     if fault["type"] == "missing":
         return f"the key {field} is missing; add it."
     reason = fault["msg"].removeprefix("Value error, ")

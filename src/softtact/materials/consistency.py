@@ -1,10 +1,9 @@
-"""Do the laws of one material agree with each other? What a stability check cannot see.
+"""Whether the laws of one material are stable, and agree with each other.
 
 Two laws can both be stable and both fit "their" data, and still describe different materials: a shear modulus six times
 as large, or five times the stress in compression. Each disagreement becomes a sentence with its numbers.
 
-Drucker stability of a law along the paths of simple tests.
-
+Drucker stability along the paths of simple tests:
 Symbols: l_a principal stretches of the incompressible material, t_a = l_a dpsi/dl_a, T_ab = dt_a/dln l_b.
 With direction 3 free of stress, Kirchhoff stresses and logarithmic strains of the loaded plane obey
   dtau_i = D_ij deps_j,  D_ij = T_ij - T_i3 - T_3j + T_33  (i, j = 1, 2).
@@ -22,7 +21,7 @@ from softtact.materials.laws.registry import make_law
 from softtact.materials.linear import LinearConstants
 
 SCAN = (0.1, 10.0)
-SCAN_POINTS = 461  # 1 % steps of stretch each way from 1
+SCAN_POINTS = 461  # 1 % steps of stretch to both sides of 1
 _BISECTIONS = 12   # of such a step: an end of the range is good to 3e-6
 PRINTED = "Printed constants: "    # begins a card's sentences on what a publication prints
 # Where the laws are compared: states that the sensor's layers reach under a fingertip's load.
@@ -114,9 +113,9 @@ def largest_parting_in_tension(laws: Mapping[str, Law]) -> tuple[float, str]:
     moduli = {name: law.mu0 for name, law in laws.items()}
     stress = np.array([law.nominal_stress("uniaxial", TENSION) for law in laws.values()])
     ratios = stress.max(axis=0) / stress.min(axis=0)
-    told = " against ".join(f"{value:.3g} MPa ({name})" for name, value in moduli.items())
+    values = " against ".join(f"{value:.3g} MPa ({name})" for name, value in moduli.items())
     return (max(float(ratios.max()), max(moduli.values()) / min(moduli.values())),
-            f"mu0 {told}; stresses in tension part by {1 - 1 / ratios.max():.0%} of the larger one at most, at stretch "
+            f"mu0 {values}; stresses in tension part by {1 - 1 / ratios.max():.0%} of the larger one at most, at stretch "
             f"{TENSION[ratios.argmax()]:.2f}")
 
 

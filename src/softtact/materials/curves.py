@@ -1,7 +1,4 @@
-"""Test curves: nominal stress against stretch, or pressure against volume, and the project's own CSV form of them.
-
-Windows of stretch: of the tests behind a law, and along a test's path; and which windows and weights have an effect.
-"""
+"""Test curves: nominal stress against stretch, or pressure against volume; their CSV form, and windows of stretch."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -139,8 +136,8 @@ def refuse_idle(window: Mapping[str, Sequence[float]], weights: Mapping[str, flo
     for name, what in (("window", window), ("weight", weights)):
         for mode in what:
             if mode not in MODES:
-                said = unknown(mode, MODES, kind="test mode")
-                raise InputError(f"The {name} of {mode!r}: {said}{'' if said.endswith('?') else '.'}")
+                fault = unknown(mode, MODES, kind="test mode")
+                raise InputError(f"The {name} of {mode!r}: {fault}{'' if fault.endswith('?') else '.'}")
             if mode not in modes:
                 raise InputError(f"The {name} of {mode} has no effect, for there is no {mode} curve; leave it out.")
     if VOLUMETRIC in weights:

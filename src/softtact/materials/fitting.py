@@ -22,7 +22,7 @@ RESIDUALS = ("absolute", "relative")
 # Relative residuals divide by the stress, and near stretch 1 by this share of the curve's largest one.
 _RELATIVE_FLOOR = 0.01
 # Most starts end in a few valleys: some steps show which, and only the best of them are followed to the ground.
-_ROUGH, _PROMISING, _FINAL = 10, 6, 100     # steps, starts, steps
+_COARSE, _PROMISING, _FINAL = 10, 6, 100     # steps, starts, steps
 _SINGULAR = 1e-7        # of the largest singular value: the constants' columns depend on each other
 _TAKES_PART = 0.1       # component of a unit vector of constants that the curves do not see
 _LOOSE_SHARE = 0.05     # of the initial shear modulus: a constant in MPa that is known so well is known, be it zero
@@ -33,7 +33,7 @@ class FitOptions:
     """How a law is fitted.
 
     residual: "absolute" (MPa) or "relative" (over the stress, or 1 % of the curve's largest where that is more)
-    weights: {mode: factor on the squared residuals}, 1 where not said
+    weights: {mode: factor on the squared residuals}, 1 where not stated
     nonnegative: keep the constants of unit MPa from being negative, which makes any law here stable everywhere
     starts: how many guesses of the nonlinear constants;  seed: of these guesses
     """
@@ -61,10 +61,10 @@ class LawFit:
     not_identifiable: names of the constants that these curves do not determine
     rmse_mpa: over all points;  rmse_by_mode_mpa: {mode: MPa}
     relative_error: root mean square of error over stress;  relative_error_by_mode: {mode: 1}
-    autocorrelation: of neighbouring residuals in a curve; near 1 the law's own misfit, near 0 the test's noise
+    autocorrelation: of neighbouring residuals in a curve; near 1 the misfit of the law, near 0 the test's noise
     aicc: Akaike's criterion corrected for few points; lower is better, constants without use cost
     at_bound: names of constants that ended on a bound of the search
-    record: the optimiser's own account: points, starts, those finished and agreeing, evaluations
+    record: of the optimiser: points, starts, those finished and agreeing, evaluations
     """
 
     law: str
@@ -151,14 +151,14 @@ def fit_law(name: str, curves: Sequence[Curve], **options: Any) -> LawFit:
             " give more points or choose a law with fewer constants."
         )
     problem = _Problem(kind, points, settings)
-    rough = [problem.polish(problem.start(guess), _ROUGH) for guess in _guesses(problem, settings)]
-    promising = sorted(rough, key=lambda solution: solution.cost)[:_PROMISING]
+    coarse = [problem.polish(problem.start(guess), _COARSE) for guess in _guesses(problem, settings)]
+    promising = sorted(coarse, key=lambda solution: solution.cost)[:_PROMISING]
     final = [problem.polish(solution.x, _FINAL) for solution in promising]
     best = min(final, key=lambda solution: solution.cost)
     record = {
-        "points": len(points.stress), "starts": len(rough), "finished": len(final),
+        "points": len(points.stress), "starts": len(coarse), "finished": len(final),
         "finished_agreeing": int(sum(solution.cost < best.cost * 1.001 + 1e-15 for solution in final)),
-        "evaluations": int(sum(solution.nfev for solution in rough + final)), "residual": settings.residual,
+        "evaluations": int(sum(solution.nfev for solution in coarse + final)), "residual": settings.residual,
     }  # fmt: skip
     return _report(problem, best.x, record)
 

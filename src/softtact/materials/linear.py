@@ -1,12 +1,9 @@
-"""Linear elastic constants of the small-strain model.
+"""Elastic constants at small strain, and the bulk modulus of a law from a volumetric test or from a stated ratio.
 
 Symbols: E Young's modulus (MPa), nu Poisson's ratio; mu = E / (2 (1 + nu)), K = E / (3 (1 - 2 nu)).
 E is the slope of the uniaxial curve at small strain. Stress curves alone hold nothing of nu: it has to be stated.
-
-The volume's part of a law: K from a volumetric test or from a stated ratio, and the small-strain constants that follow.
-
-Symbols: J volume ratio, p pressure, K bulk modulus (MPa); U(J) = K/2 (J - 1)^2, so p = K (1 - J) and D = 2/K.
-Small strain: E = 9 K mu0/(3 K + mu0), nu = (3 K - 2 mu0)/(6 K + 2 mu0).
+Of a law: J volume ratio, p pressure; U(J) = K/2 (J - 1)^2, so p = K (1 - J) and D = 2/K.
+E = 9 K mu0/(3 K + mu0), nu = (3 K - 2 mu0)/(6 K + 2 mu0).
 """
 
 from collections.abc import Iterator, Sequence
@@ -18,7 +15,7 @@ import numpy as np
 from softtact.errors import InputError
 from softtact.materials.curves import Curve, VolumetricCurve
 
-# A test of stiffness p/(1-J) that departs from one K by more than this is told: U has no second constant.
+# A test of stiffness p/(1-J) that departs from one K by more than this is reported: U has no second constant.
 _CURVED = 0.05
 
 

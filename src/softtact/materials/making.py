@@ -1,4 +1,4 @@
-"""A material's curve files: made from a law, or gathered from the user's own files in one form."""
+"""A material's curve files: made from a law, or gathered from the user's files in one form."""
 
 import zlib
 from collections.abc import Sequence
@@ -38,7 +38,7 @@ def curves_of(settings: dict[str, Any], *, measured: str | Path | Sequence[str |
 
 
 def _synthetic(material, settings):
-    """Curves from a law; each mode of each material has a noise of its own under the same seed."""
+    """Curves from a law; each mode of each material has another noise under the same seed."""
     options = validated(SyntheticCurves, settings, where=f"material {material}, curves")
     law = make_law(options.law, options.parameters or {}, bulk_over_shear=options.bulk_over_shear)
     return [

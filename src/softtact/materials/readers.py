@@ -2,18 +2,13 @@
 
 Layouts:
   plain          CSV (, ; or tab) or a sheet of Excel, with a header. The names of the columns declare quantity and unit: one of
-                 `STRETCHES` and one of `STRESSES`, or of `VOLUMES` and `PRESSURES` (`softtact.materials.columns`); `columns` maps
-                 these names to the file's own. `# key: value` lines may stand above (mode, kind, source, remark).
+                 `STRETCHES` and one of `STRESSES`, or of `VOLUMES` and `PRESSURES`; `columns` maps these names to those of the
+                 file. A quantity without a unit, such as `nominal_stress`, takes it from a row of units below the header; where
+                 both state a unit, they must agree. `# key: value` lines may come first (mode, kind, source, remark).
   soro_db        the Soft Robotics Materials Database: metadata lines, then `;`-separated columns. Uniaxial.
   stress_stretch two bare columns, nominal stress in MPa first, then stretch (digitised literature data)
   literature     a folder with UT, ET and PS (uniaxial, equibiaxial, planar), each with a stress_stretch.txt
-
-The order of a curve's rows: one loading branch, as the file has it or sorted; loading and unloading are not mixed.
-
-Which columns of a table hold a test curve: the names that declare quantity and unit, and a row of units below them.
-
-A name is a quantity with its unit, such as `nominal_stress_kpa`. A quantity without one, such as `nominal_stress`, takes it from a
-row of units below the header. Where both tell a unit, they must agree.
+A curve is one loading branch, as the file has it or sorted; loading and unloading are not mixed.
 """
 
 import math
@@ -90,7 +85,7 @@ def read_curve(path: str | Path, **options: Any) -> Curve | VolumetricCurve:
 
 def read_curves(paths: str | Path | Sequence[str | Path], *, mode: str | None = None, layout: str = "plain",
                 **options: Any) -> list[Curve | VolumetricCurve]:
-    """Read one or several files with the same options, fields of `Reading`; a path MODE=FILE states a file's own mode.
+    """Read one or several files with the same options, fields of `Reading`; a path MODE=FILE states the mode of one file.
 
     In the layout `literature` each path is a folder with a file per mode.
     """
@@ -108,7 +103,7 @@ def stated_files(paths: str | Path | Sequence[str | Path], *, mode: str | None =
     found = [pair for path in paths for pair in (_in_folder(path) if layout == "literature" else [_stated_mode(path, mode)])]
     own = layout == "literature" or not any(path == Path(given) for given, (path, _) in zip(paths, found, strict=False))
     if mode is not None and own:
-        raise InputError(f"the mode {mode} for all files has no effect, for each states its own; leave it out.")
+        raise InputError(f"the mode {mode} for all files has no effect, for each states one; leave it out.")
     return found
 
 
@@ -120,7 +115,7 @@ def _read(path, reading):
     rows, values, raw = _values(table, reading, mode)
     remarks = checked(path, rows, *values, mode=mode, raw=raw, compression=reading.compression)
     x, y = order(path, rows, *values, mode=mode, sort=reading.sort)
-    # A file that names its source is one of the project's own: what was odd in its origin is noted in it.
+    # A file that names its source is of the project: what is unusual in its origin is noted in it.
     record = {"kind": notes.get("kind", "measured"), "source": notes.get("source", Path(path).name),
               "remarks": _remarks(table) if "source" in notes else remarks}
     return VolumetricCurve(x, y, **record) if mode == VOLUMETRIC else Curve(mode, x, y, **record), table.header
@@ -181,7 +176,7 @@ def _mode(path, mode, notes):
 
 
 def _values(table, reading, mode):
-    """Rows' numbers (n,); stretch and stress, or volume ratio and pressure (2, n); and the file's own numbers (2, n)."""
+    """Rows' numbers (n,); stretch and stress, or volume ratio and pressure (2, n); and the numbers in the file (2, n)."""
     columns = _SORO if reading.layout == "soro_db" else reading.columns
     found, units = find_columns(table, mode=mode, columns=columns)
     raw = [(row, *(number(table.path, row, cells[column.at], decimal=table.decimal) for column in found))
@@ -216,7 +211,7 @@ def _with_minus(path, rows, x, y, name):
 
 
 def _refuse_unused(columns, headers):
-    """Refuse a name that `columns` maps to and that stands in no file's header."""
+    """Refuse a name that `columns` maps to and that no file's header holds."""
     for name, own in columns.items():
         if not any(own in header for header in headers):
             raise InputError(f"`columns` maps {name} to {own!r}, which no file has in its header ({', '.join(headers[0])}); "
@@ -227,7 +222,7 @@ def order(path: str | Path, rows: np.ndarray, x: np.ndarray, y: np.ndarray, *, m
           sort: bool) -> tuple[np.ndarray, np.ndarray]:
     """x and y in rising or falling order: as they are, or sorted.
 
-    A file with loading and unloading is refused either way, for a law has one stress at a stretch, and a sorted file would be
+    A file with loading and unloading is refused in both cases, for a law has one stress at a stretch, and a sorted file would be
     fitted in the middle between both.
     """
     name = "volume ratio" if mode == VOLUMETRIC else "stretch"
@@ -290,7 +285,7 @@ PRESSURES: dict[str, Callable[..., Any]] = {
     f"pressure_{unit}": lambda value, ratio, factor=factor: factor * value for unit, factor in _PER_MPA.items()}
 NAMES = (*STRETCHES, *STRESSES, *VOLUMES, *PRESSURES)
 
-_BASES = ("nominal_stress", "true_stress", "pressure")      # quantities that have no unit of their own
+_BASES = ("nominal_stress", "true_stress", "pressure")      # quantities whose name has no unit
 _PERCENT = {"engineering_strain": "engineering_strain_percent", "volumetric_strain": "volumetric_strain_percent"}
 # As they are written: a unit's letters are not folded, for mPa is no MPa.
 _UNITS = {"MPa": "mpa", "MPA": "mpa", "mpa": "mpa", "N/mm2": "mpa", "N/mm^2": "mpa", "N/mm\N{SUPERSCRIPT TWO}": "mpa",
@@ -307,9 +302,9 @@ class Declared:
 
 
 def find_columns(table: Table, *, mode: str, columns: Mapping[str, str]) -> tuple[list[Declared], int]:
-    """The two columns of a curve's table, stretch and stress, or volume and pressure; and how many rows of units stand below.
+    """The two columns of a curve's table, stretch and stress, or volume and pressure; and how many rows of units are below.
 
-    columns: {name: the file's own name of it}
+    columns: {name: that in the file}
     """
     unknown = sorted(set(columns) - {*NAMES, *_BASES})
     if unknown:

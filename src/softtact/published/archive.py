@@ -1,16 +1,13 @@
-"""Which files of the published archive lie in a folder, by their names.
+"""Which files of the published archive lie in a folder, by their names, how its taxels lie, and how many maps it holds.
 
     {Flat|Curved}_{Real|Simulation}_{Abaqus|Isaac}[_variant].csv      Flat: indenters, Curved: grasped objects
 
 The names are those that the repository's viewer opens (Lab-CORO/TactileDataset, GUI.py 12-18). Files of the share carry endings
 (`_V1`, `_V2`, `_V1_Noise`) and write Isaac as `Issac` too, so a file is known by how its name begins.
 
-How tax1 to tax28 lie under the map: nobody states it, but maps and readings tell.
-
-A taxel is pressed where the map over it is deep. So the mean depth over each taxel's share of the map is correlated with the
-counts, for each of the eight ways to number a grid row by row or column by column from any corner; the right one correlates best.
-
-What the archive holds against the three counts in print, which contradict each other.
+Nobody states how tax1 to tax28 lie under the map, but a taxel is pressed where the map over it is deep. So the mean depth over each
+taxel's share of the map is correlated with the counts, for each of the eight orders that number a grid row by row or column by
+column from any corner; the right one correlates best.
 """
 
 import re
@@ -25,7 +22,7 @@ from softtact.errors import InputError
 
 SOURCE = "published archive"
 WHERE = ("https://github.com/Lab-CORO/TactileDataset, whose README links to a share where each CSV is fetched by a click; "
-         "docs/how-to/published_archive.md tells the way")
+         "see docs/how-to/published_archive.md")
 SETS = {"flat": "Flat", "curved": "Curved"}
 MODELS = {"abaqus": "hyperelastic", "isaac": "elastic"}     # the paper's solver of each model
 SPELLINGS = {"abaqus": "abaqus", "isaac": "isaac", "issac": "isaac"}
@@ -79,7 +76,7 @@ class Archive:
 
 
 def describe(path: Path) -> ArchiveFile | None:
-    """The `ArchiveFile` that a path's name tells, or None."""
+    """The `ArchiveFile` of a path's name, or None."""
     found = _NAME.fullmatch(path.stem)
     if path.suffix.lower() != ".csv" or found is None:
         return None

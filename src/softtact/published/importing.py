@@ -151,7 +151,7 @@ def judge_arrangement(tables: Tables, *, shape: tuple[int, int], seed: int) -> d
 
 def press_dataset(tables: Tables, key: tuple[str, str], tests: Sequence[tuple[str, PairedTest]], *, model: str, sensor: BaseSpec,
                   sign: int) -> xarray.Dataset:
-    """Maps of one item and model as `simulate_press` would write them; `path` tells each map's test."""
+    """Maps of one item and model as `simulate_press` would write them; `path` names each map's test."""
     maps = sign * np.concatenate([tables.maps_mm(model, *test) for test in tests])
     ones = np.ones(len(maps), dtype=np.int8)
     return xarray.Dataset(
@@ -164,7 +164,7 @@ def press_dataset(tables: Tables, key: tuple[str, str], tests: Sequence[tuple[st
 
 def tactile_dataset(tables: Tables, key: tuple[str, str], tests: Sequence[tuple[str, PairedTest]], *, shape: tuple[int, int],
                     arrangement: str) -> xarray.Dataset:
-    """Readings of one item, one trial each: nothing in the archive tells which readings repeat which."""
+    """Readings of one item, one trial each: nothing in the archive states which readings repeat which."""
     counts = np.concatenate([tables.readings(*test) for test in tests])
     return xarray.Dataset(
         {"tactile_map": (("trial", "force", "row", "column"), arrange(counts, arrangement, shape=shape)[None], {"units": "counts"}),

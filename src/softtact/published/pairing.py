@@ -49,30 +49,31 @@ def pair(reals: Sequence[Table], simulated: dict[str, Table], *, outliers: Outli
     rows = {id(table): table.rows_of_tests() for table in tables}
     tests = []
     for path in dict.fromkeys(path for table in tables for path in table.paths):
-        own: dict[int, Any] = {id(table): rows[id(table)].get(path) for table in tables}
-        if _in_all(path, tables, own, outliers):
-            _check_readings(path, real, others, own, outliers)
+        rows_of: dict[int, Any] = {id(table): rows[id(table)].get(path) for table in tables}
+        if _in_all(path, tables, rows_of, outliers):
+            _check_readings(path, real, others, rows_of, outliers)
             for table in simulated.values():
-                _check_maps(path, real, table, own, outliers)
+                _check_maps(path, real, table, rows_of, outliers)
         if not outliers.leaves_out(path, files={table.file for table in tables}):
-            tests.append(PairedTest(path, object_name(path), own[id(real)], {model: own[id(t)] for model, t in simulated.items()}))
+            of_models = {model: rows_of[id(table)] for model, table in simulated.items()}
+            tests.append(PairedTest(path, object_name(path), rows_of[id(real)], of_models))
     return tests
 
 
-def _in_all(path, tables, own, outliers):
+def _in_all(path, tables, rows_of, outliers):
     """Whether each table has the test, and it names an object."""
-    here = [table for table in tables if own[id(table)] is not None]
-    first = here[0].line[own[id(here[0])][0]]
+    here = [table for table in tables if rows_of[id(table)] is not None]
+    first = here[0].line[rows_of[id(here[0])][0]]
     for table in tables:
-        if own[id(table)] is None:
+        if rows_of[id(table)] is None:
             outliers.leave_out(here[0].file, first, path, f"the test is not in {table.file}")
     if not object_name(path):
         outliers.leave_out(here[0].file, first, path, "the test names no object")
     return len(here) == len(tables)
 
 
-def _check_readings(path, real, others, own, outliers):
-    rows = own[id(real)]
+def _check_readings(path, real, others, rows_of, outliers):
+    rows = rows_of[id(real)]
     _check_common(path, real, rows, outliers)
     _check_range(path, real, rows, real.values, COUNTS, "counts", outliers)
     _check_range(path, real, rows, real.force_n[:, None], FORCES_N, "N", outliers)
@@ -82,7 +83,7 @@ def _check_readings(path, real, others, own, outliers):
                       f"readings above {PAPERS_COUNTS:g} counts, where the paper's figures end",
                  count=len(high))
     for other in others:
-        theirs = own[id(other)]
+        theirs = rows_of[id(other)]
         if not _alike(other.force_n[theirs], real.force_n[rows]) or not _alike(other.values[theirs], real.values[rows]):
             outliers.leave_out(other.file, other.line[theirs[0]], path, f"other readings than in {real.file}")
 
@@ -92,8 +93,8 @@ def _alike(ours, theirs):
     return ours.shape == theirs.shape and np.allclose(ours, theirs, rtol=1e-3, atol=1e-2, equal_nan=True)
 
 
-def _check_maps(path, real, table, own, outliers):
-    rows, readings = own[id(table)], len(own[id(real)])
+def _check_maps(path, real, table, rows_of, outliers):
+    rows, readings = rows_of[id(table)], len(rows_of[id(real)])
     _check_common(path, table, rows, outliers)
     _check_range(path, table, rows, table.values, (-LARGEST_DEFORMATION_MM, LARGEST_DEFORMATION_MM), "mm", outliers)
     if len(rows) % MAP_ROWS:
@@ -123,14 +124,14 @@ def _check_common(path, table, rows, outliers):
 
 
 def _check_range(path, table, rows, values, limits, unit, outliers):
-    own = values[rows]
-    outside = (own < limits[0]) | (own > limits[1])
+    checked = values[rows]
+    outside = (checked < limits[0]) | (checked > limits[1])
     if unit == "N":
-        outside |= ~np.isfinite(own)
+        outside |= ~np.isfinite(checked)
     per_row = outside.any(axis=1)
     if per_row.any():
         at = np.argmax(per_row)
-        worst = own[at][outside[at]][0]
+        worst = checked[at][outside[at]][0]
         raw = "; raw values of the converter?" if unit == "counts" and worst > limits[1] else ""
         outliers.leave_out(table.file, table.line[rows[at]], path,
                       f"{worst:g} {unit} is not within {limits[0]:g} to {limits[1]:g}{raw}", count=outside.sum())

@@ -1,12 +1,9 @@
 """One CSV of the archive as arrays: read in pieces, numbers as float32, a code for each test, never an object per cell.
 
-Outliers of the archive: each by file and row, counted, and with what was done about it.
-
-How a CSV of the archive is written: encoding, separator, decimal sign, and which column holds what, by the columns' names.
-
-Names that end in rising numbers (`tax1` to `tax28`, `x0` to `x32`), or that are numbers themselves, order the values, wherever
-their columns stand. A force's name says so. A file whose names do not tell is refused, for a column in the place of another would
-shift every taxel in silence.
+Encoding, separator, decimal sign and the order of the columns follow from the file. Names that end in rising numbers (`tax1` to
+`tax28`, `x0` to `x32`), or that are numbers themselves, order the values, wherever their columns are; a force has a name of its
+kind. A file whose names do not order its columns is refused, for a column in the place of another would shift every taxel in
+silence. Outliers are counted by file and row, with what was done about each.
 """
 
 import csv
@@ -63,7 +60,7 @@ class Outliers:
         self.findings.append(Finding(str(file), int(row), path, what, int(count), "left out"))
 
     def keep(self, file: str | Path, row: int, path: str, what: str, *, count: int = 1) -> None:
-        """A finding that is only told."""
+        """A finding that is only reported."""
         self.findings.append(Finding(str(file), int(row), path, what, int(count), "kept"))
 
     def left_out(self) -> list[str]:
@@ -119,7 +116,7 @@ class Table:
 
 
 def read_table(path: Path, *, columns: int, force: bool, outliers: Outliers) -> Table:
-    """The `Table` of a file with `columns` values a row, and a force column where `force`; oddities of the file go to `odd`."""
+    """The `Table` of a file with `columns` values a row, and a force column where `force`; what is unusual goes to `outliers`."""
     codes: dict[str, int] = {}
     texts: dict[int, str] = {}
     pieces = []
@@ -175,7 +172,7 @@ def _arrays(piece, layout, codes, texts):
 
 
 def _numbers(column, texts):
-    """A column as float64, nan where it holds no number; what stands there instead is remembered by its line."""
+    """A column as float64, nan where it holds no number; the text there is kept by its line."""
     if pd.api.types.is_numeric_dtype(column) and column.dtype != bool:
         return column.to_numpy(dtype=float)
     numbers = pd.to_numeric(column.astype(object), errors="coerce").to_numpy(dtype=float)
@@ -240,12 +237,12 @@ def read_layout(path: Path, *, columns: int, force: bool, outliers: Outliers) ->
 
 def _force_column(path, names, numbers):
     """Which column holds the force in N: the one whose name says so."""
-    told = {k: _FORCE.fullmatch(names[k]) for k in numbers}
-    named = [k for k, match in told.items() if match]
+    forces = {k: _FORCE.fullmatch(names[k]) for k in numbers}
+    named = [k for k, match in forces.items() if match]
     if len(named) != 1:
         raise InputError(f"{path}: {len(named)} columns are named as a force where one is needed (row 1 names "
                          f"{', '.join(names[k] for k in numbers)[:100]} ...); name the one of the normal force 'force'.")
-    match = told[named[0]]
+    match = forces[named[0]]
     unit = (match["suffix"] or match["unit"] or "N").strip()
     if unit not in ("N", "n"):
         raise InputError(f"{path}: the column {names[named[0]]!r} is in {unit}; convert it to N, and name it 'force'.")
@@ -256,7 +253,7 @@ def _in_order(path, names, numbers, outliers):
     """The columns of values by the numbers in their names; another order in the file is reported."""
     order = _numbers_of([names[k] for k in numbers])
     if order is None:
-        raise InputError(f"{path}: the names {names[numbers[0]]!r} to {names[numbers[-1]]!r} do not tell the order of the columns; "
+        raise InputError(f"{path}: the names {names[numbers[0]]!r} to {names[numbers[-1]]!r} do not order the columns; "
                          "name them with one word and numbers without a gap, such as tax1 to tax28 or x0 to x32.")
     ordered = [numbers[k] for k in sorted(range(len(numbers)), key=lambda k: order[k])]
     if ordered != numbers:
@@ -266,7 +263,7 @@ def _in_order(path, names, numbers, outliers):
 
 
 def _numbers_of(names):
-    """A number for each name, by which they are ordered; None where the names do not tell one."""
+    """A number for each name, by which they are ordered; None where the names hold none."""
     if all(_NUMBER.fullmatch(name) for name in names):     # positions, or numbers without a word
         values = [float(name.replace(",", ".")) for name in names]
         return values if len(set(values)) == len(names) else None
@@ -288,12 +285,12 @@ def _decimal(path, encoding, separator, path_at):
         maybe = maybe or (row, cell)
     if maybe is None:
         return "."
-    raise InputError(f"{path}, row {maybe[0]}: whether the comma of {maybe[1]!r} is a decimal one or of thousands is told by no "
+    raise InputError(f"{path}, row {maybe[0]}: whether the comma of {maybe[1]!r} is a decimal one or of thousands is shown by no "
                      "number of the file; write the numbers with decimal points.")
 
 
 def _signs(path, encoding, separator, path_at) -> Iterator[tuple[int, str]]:
-    """(row, text) of the numbers with a point or a comma in them. A row with other fields than the header tells nothing."""
+    """(row, text) of the numbers with a point or a comma in them. A row with other fields than the header is left out."""
     with open(path, encoding=encoding, newline="") as lines:
         width = None
         for row, cells in enumerate(csv.reader(lines, delimiter=separator), 1):

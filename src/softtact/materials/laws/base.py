@@ -25,7 +25,7 @@ TEST_PATHS = {
 
 @dataclass(frozen=True)
 class Parameter:
-    """A material constant: its name, its unit ("MPa" or "1") and where a fit looks for it.
+    """A material constant: its name, its unit ("MPa" or "1") and where a fit searches it.
 
     `low` and `high` bound the fit; for unit "MPa" they are multiples of the curves' stiffness. psi must be linear in
     its constants of unit "MPa": the fit solves them directly.
@@ -107,7 +107,7 @@ class Law:
 
     @property
     def plane_modulus(self) -> float:
-        """E / (1 - nu^2) for small strains, MPa: what stands against an indenter on a half-space."""
+        """E / (1 - nu^2) for small strains, MPa: the modulus of a half-space under an indenter."""
         return 4 * self.mu0 * (self.bulk_modulus + self.mu0 / 3) / (self.bulk_modulus + 4 * self.mu0 / 3)
 
     def isochoric(self, C6: np.ndarray, *, tangent: bool = True) -> IsochoricResponse:
