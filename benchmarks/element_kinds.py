@@ -13,7 +13,7 @@ from sensor_meshes import compressed, tetrahedra_of, wedges_of
 
 from softtact.fem.elements import HEX20, HEX27, QUAD8, QUAD9, TRI6, WEDGE18, reference_gradients
 from softtact.fem.quadrature import gauss, wedge_rule
-from softtact.fem.solid_block import SolidBlock
+from softtact.fem.solid_block import SolidBlock, pressure_modes
 
 _TET_EDGES = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
 _TET_FACES = np.array([[0, 1, 2, 4, 5, 6], [0, 1, 3, 4, 8, 7], [1, 2, 3, 5, 9, 8], [2, 0, 3, 6, 7, 9]])
@@ -101,7 +101,7 @@ def _linear(points):
 def _block(points, nodes, shape, rule, modes, law, **options):
     x, weights = rule
     gradients, volumes = reference_gradients(points[nodes], shape(x)[1], weights)
-    return SolidElements(nodes, SolidBlock(gradients, volumes, modes(x), law, **options))
+    return SolidElements(nodes, SolidBlock(gradients, volumes, pressure_modes(modes(x)), law, **options))
 
 
 @dataclass(frozen=True)

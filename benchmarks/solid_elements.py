@@ -26,7 +26,7 @@ from softtact.fem.assembly import SymmetricPattern, add_upper
 from softtact.fem.elements import HEX27, TET10
 from softtact.fem.kernels import add_forces, project
 from softtact.fem.quadrature import tetrahedron_rule4, tetrahedron_rule15
-from softtact.fem.solid_block import SolidBlock
+from softtact.fem.solid_block import SolidBlock, pressure_modes
 from softtact.fem.structured_meshes import box, in_tetrahedra
 from softtact.linalg.direct import make_solver
 from softtact.materials.laws.registry import make_law
@@ -47,7 +47,7 @@ class Body:
         grid = mesh if kind == "hex27" else in_tetrahedra(mesh)
         self.mesh, self.points, nodes = grid, grid.points, grid.cells[0][2]
         if kind == "hex27":
-            rule, basis = HEX27.quadrature, None
+            rule, basis = HEX27.quadrature, pressure_modes(HEX27.quadrature.points)
             slopes = HEX27.shape(rule.points)[1]
         elif kind == "tet15":
             rule = tetrahedron_rule15()
@@ -64,7 +64,7 @@ class Body:
             nodes = self._with_bubbles(nodes)
         self.nodes = nodes
         gradients = np.matmul(slopes[None], np.linalg.inv(jacobian))
-        self.block = SolidBlock(gradients, np.linalg.det(jacobian) * rule.weights, rule.points, LAW, basis=basis)
+        self.block = SolidBlock(gradients, np.linalg.det(jacobian) * rule.weights, basis, LAW)
         values = TET10.shape(rule.points)[0] if width == 10 else HEX27.shape(rule.points)[0]
         self.places = np.einsum("gm,emi->egi", values, self.points[nodes[:, :width]])
 

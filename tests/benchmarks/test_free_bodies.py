@@ -77,7 +77,7 @@ def test_tetrahedra_agree_with_solid_blocks_of_one_point():
             points, tets = block()
             fast = LinearTetrahedra(points, tets, LAWS[name], threads=threads)
             gradients = np.concatenate([-fast.gradients.sum(axis=1, keepdims=True), fast.gradients], axis=1)
-            slow = SolidElements(tets, SolidBlock(gradients[:, None], fast.volumes[:, None], np.zeros((1, 0)), LAWS[name]))
+            slow = SolidElements(tets, SolidBlock(gradients[:, None], fast.volumes[:, None], np.ones((1, 1)), LAWS[name]))
             held = np.zeros(points.shape, dtype=bool)
             held[:7], held[9, 1] = True, True
             bodies = [FreeBody(points, [part], held=held) for part in (fast, slow)]

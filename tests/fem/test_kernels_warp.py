@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from softtact.contact.motion import Motion
+from softtact.devices import find_device
 from softtact.errors import InputError
 from softtact.fem.assembly import SymmetricPattern, add_upper
 from softtact.fem.structured_meshes import box, in_tetrahedra
 from softtact.materials.laws.registry import make_law
-from softtact.models.solid.blocks import find_device, region_blocks
+from softtact.models.solid.blocks import region_blocks
 from softtact.models.solid.body import SolidBody
 from softtact.models.solid.path import SolidPath, last
 
@@ -67,15 +68,15 @@ def test_an_unknown_device_and_a_gpu_that_is_not_there_are_refused():
     import warp
 
     with pytest.raises(InputError, match="'tpu' is unknown"):
-        find_device("tpu")
+        find_device("tpu", library="warp")
     if not warp.is_cuda_available():
-        assert find_device("auto") == "cpu"
+        assert find_device("auto", library="warp") == "cpu"
         with pytest.raises(InputError, match="finds no GPU"):
-            find_device("cuda")
+            find_device("cuda", library="warp")
 
 
 def test_what_warp_says_of_itself_does_not_stand_in_the_output():
-    lines = ["from softtact.models.solid.blocks import find_device; find_device('auto')",
+    lines = ["from softtact.devices import find_device; find_device('auto', library='warp')",
              "from softtact.fem.kernels_warp import WarpKernels; WarpKernels('cpu')"]
     for line in lines:
         assert subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True).stdout == ""

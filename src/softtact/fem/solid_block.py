@@ -56,21 +56,20 @@ class SolidBlock:
     """Elements of one kind and one law, by their shape functions' gradients.
 
     gradients (u, g, m, 3) in 1/mm and volumes (u, g) in mm3 of the shapes that occur; shapes (e,): which is an element's, by
-    default a different one for each; points (g, 3) of the quadrature in parent coordinates; unprojected_penalty_ratio: k / mu;
-    quartic_penalty_ratio: q / mu; trilinear: project on trilinear instead of linear functions; basis (g, p): on these instead.
+    default a different one for each; basis (g, p): functions on which changes of volume are projected (`pressure_modes`);
+    unprojected_penalty_ratio: k / mu; quartic_penalty_ratio: q / mu.
     Displacements come per element (e, m, 3) in mm. at_rest: all this as `ElementArrays`. loops: what sums over points and nodes,
     `kernels` or a `DeviceKernels`.
     """
 
     loops = kernels
 
-    def __init__(self, gradients: np.ndarray, volumes: np.ndarray, points: np.ndarray, law: Law, *,
-                 shapes: np.ndarray | None = None, unprojected_penalty_ratio: float = 0.0, quartic_penalty_ratio: float = 0.0,
-                 trilinear: bool = False, basis: np.ndarray | None = None) -> None:
+    def __init__(self, gradients: np.ndarray, volumes: np.ndarray, basis: np.ndarray, law: Law, *,
+                 shapes: np.ndarray | None = None, unprojected_penalty_ratio: float = 0.0,
+                 quartic_penalty_ratio: float = 0.0) -> None:
         self.law = law
         self._unprojected_penalty_ratio, self._quartic_penalty_ratio = unprojected_penalty_ratio, quartic_penalty_ratio
-        volumes = np.ascontiguousarray(volumes)
-        basis = _pressure_modes(points, trilinear) if basis is None else np.ascontiguousarray(basis)
+        volumes, basis = np.ascontiguousarray(volumes), np.ascontiguousarray(basis)
         gram = np.einsum("eg,gp,gq->epq", volumes, basis, basis, optimize=True)
         self.at_rest = ElementArrays(np.ascontiguousarray(gradients.transpose(0, 1, 3, 2)), volumes,
                                      np.arange(len(gradients)) if shapes is None else shapes, basis, np.linalg.inv(gram))
@@ -181,7 +180,7 @@ def _joined_block(blocks):
     return whole
 
 
-def _pressure_modes(points, trilinear):
+def pressure_modes(points: np.ndarray, trilinear: bool = False) -> np.ndarray:
     """Functions of the pressure at parent points (g, 3): (g, 4), or (g, 8) if trilinear."""
     linear = np.column_stack([np.ones(len(points)), points])
     if not trilinear:
@@ -213,18 +212,21 @@ def _distinct(numbers):
 
 
 class _ElementBlock(SolidBlock):
-    """Elements of a kind at coordinates (e, m, 3) in mm, with their full quadrature or the reduced one."""
+    """Elements of a kind at coordinates (e, m, 3) in mm, with their full quadrature or the reduced one.
 
-    def __init__(self, element, coordinates, law, *, reduced=False, **options):
+    trilinear: changes of volume are projected on trilinear instead of linear functions
+    """
+
+    def __init__(self, element, coordinates, law, *, reduced=False, trilinear=False, **options):
         rule, (first, shapes) = element.reduced if reduced else element.quadrature, _unlike(coordinates)
         gradients, volumes = reference_gradients(coordinates[first], element.shape(rule.points)[1], rule.weights)
-        super().__init__(gradients, volumes, rule.points, law, shapes=shapes, **options)
+        super().__init__(gradients, volumes, pressure_modes(rule.points, trilinear), law, shapes=shapes, **options)
 
 
 class HexBlock(_ElementBlock):
     """Hexahedra HEX20 or HEX27 given by coordinates (e, 20 or 27, 3) in mm; options as `SolidBlock` has them.
 
-    reduced: 2 x 2 x 2 points instead of 3 x 3 x 3
+    reduced: 2 x 2 x 2 points instead of 3 x 3 x 3;  trilinear: functions of the pressure
     """
 
     def __init__(self, coordinates: np.ndarray, law: Law, **options: Any) -> None:

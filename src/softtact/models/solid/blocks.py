@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from softtact.errors import InputError, how_to_install
+from softtact.errors import InputError
 from softtact.fem.elements import Element, reference_gradients
 from softtact.fem.kernels_plain import PlainLoops
 from softtact.fem.quadratic_nodes import shares_of_corners
@@ -60,9 +60,7 @@ def element_block(mesh: SolidMesh, region: str, element: Element, nodes: np.ndar
     if d == 2:
         gradients = np.concatenate([gradients, np.zeros((*gradients.shape[:3], 1))], axis=3)
         volumes, hoop = _swept(mesh, corners[first], values, volumes)
-    block = SolidBlock(
-        gradients, volumes, _coordinates(rule.points), law, shapes=shapes, basis=_pressure(element, rule.points, law)
-    )
+    block = SolidBlock(gradients, volumes, _pressure(element, rule.points, law), law, shapes=shapes)
     if d == 2:
         block.loops = PlainLoops(hoop)  # type: ignore[assignment]
     return block
@@ -92,10 +90,6 @@ def _rule(element: Element) -> Quadrature:
     return element.reduced if element.meshio_name == "tetra10" else element.quadrature  # type: ignore[return-value]
 
 
-def _coordinates(points):
-    return np.column_stack([points, np.zeros((len(points), 3 - points.shape[1]))])
-
-
 def _pressure(element: Element, points: np.ndarray, law: Law) -> np.ndarray:
     """Functions (g, p) on which changes of volume are projected.
 
@@ -111,26 +105,6 @@ def _pressure(element: Element, points: np.ndarray, law: Law) -> np.ndarray:
 
 
 # --- where elements are summed up ---
-
-
-def find_device(name: str) -> str:
-    """`cpu`, `warp`, or Warp's name of a GPU; InputError where that is unknown, or not there."""
-    if name in ("cpu", "warp"):
-        return name
-    if name not in ("auto", "cuda"):
-        raise InputError(f"device={name!r} is unknown; write 'cpu', 'warp', 'cuda' or 'auto'.")
-    try:
-        import warp
-    except ModuleNotFoundError:
-        if name == "auto":
-            return "cpu"
-        raise InputError(f"device={name!r}: {how_to_install('warp')}") from None
-    warp.config.log_level = warp.LOG_WARNING     # what it tells beside would stand in a command's output
-    if warp.is_cuda_available():
-        return "cuda"
-    if name == "auto":
-        return "cpu"
-    raise InputError(f"device={name!r}: Warp finds no GPU here; write 'cpu', or leave it out.")
 
 
 def sum_on(blocks: Sequence[tuple[str, np.ndarray, SolidBlock]], device: str) -> None:

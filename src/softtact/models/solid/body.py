@@ -19,6 +19,7 @@ import scipy.sparse.linalg as spla
 
 from softtact.contact.pair import ContactPair
 from softtact.contact.pair_state import PairHistory, PairState
+from softtact.devices import find_device
 from softtact.errors import ConvergenceError, InputError
 from softtact.fem.assembly import SymmetricPattern, add_upper
 from softtact.fem.kernels import add_forces
@@ -27,7 +28,7 @@ from softtact.fem.solid_mesh import SolidMesh
 from softtact.linalg.refined import RefinedSolver
 from softtact.linalg.workers import Workers, slices
 from softtact.materials.laws.base import Law
-from softtact.models.solid.blocks import bodies_of, find_device, lift_from_corners, refuse_loose, region_blocks, sum_on
+from softtact.models.solid.blocks import bodies_of, lift_from_corners, refuse_loose, region_blocks, sum_on
 from softtact.models.solid.frames import FramePose, make_frames
 from softtact.models.solid.items import FacePressure, Item, ItemState, PressureResponse
 from softtact.progress import Watch
@@ -100,7 +101,7 @@ class SolidBody:
     ) -> None:
         self.mesh, self.laws = mesh, dict(laws)
         self.blocks = region_blocks(mesh, laws)
-        if (where := find_device(device)) != "cpu":
+        if (where := find_device(device, library="warp")) != "cpu":
             sum_on(self.blocks, where)
         self.workers, self.watch = Workers(threads), Watch()
         # What rounding hides of the energy is in proportion to modulus times volume, however small the strain.
