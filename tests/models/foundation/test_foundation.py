@@ -14,8 +14,7 @@ from softtact.errors import ConvergenceError, InputError
 from softtact.models.foundation import solve
 from softtact.models.foundation.compliance import FoundationCompliance, foundation_compliance
 from softtact.models.foundation.dof_maps import Places, Sideways, SoftEdges, lattice_places
-from softtact.models.foundation.finite_displacement import membrane_loads
-from softtact.models.foundation.solve import FoundationMaps, FoundationSettings, _Press, press_foundation
+from softtact.models.foundation.solve import FoundationMaps, FoundationSettings, _Press, membrane_loads, press_foundation
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.press.sensor import Sensor
 from softtact.sensors.edge import Edge
