@@ -1,5 +1,6 @@
-# `make`: the default study.  `make tiny`: the smallest study.  `make docs`: the documentation.
-# `make skin`, `make grasps`, `make probe`: a robot skin, grasps by a robot, a palpation sensor.  `make studies`: the smallest of all studies.
+# `make`: the default study.  `make tiny`: its smallest form.  `make docs`: the documentation.
+# `make skin`, `make grasps`, `make probe`: a robot skin, grasps by a robot, a palpation sensor; `make tiny-skin` and so on: their smallest forms.
+# `make everything`: all default studies.  `make studies`: the smallest forms of all.  `make overview`: Snakemake's report of them.
 # `make test`: the tests, in minutes.  `make test-slow`: those that take longer, CalculiX's and whole runs of the workflow among them.
 # `make results`: the results page in docs/, from a finished run of the default study.
 # `make numbers`: the measured numbers in docs/, from benchmarks/results/ and a count of the tests.
@@ -7,32 +8,28 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 BIN := .venv/bin
 SNAKEMAKE = $(BIN)/snakemake --cores all
 
-.PHONY: study tiny studies skin tiny-skin probe tiny-probe grasps tiny-grasps test test-slow lint advice bench docs numbers results clean
+DEFAULT_STUDIES = config skin probe grasps
+TINY_STUDIES = tiny tiny-skin tiny-probe tiny-grasps
+
+.PHONY: study everything studies overview $(TINY_STUDIES) skin probe grasps test test-slow lint advice bench docs numbers results clean
 
 study: .venv/installed
 	$(SNAKEMAKE)
 	@echo "Open results/default/report.html"
 
-tiny: .venv/installed
-	$(SNAKEMAKE) --configfile config/tiny.yaml
-	@echo "Open results/tiny/report.html"
-
-skin: .venv/installed
-	$(BIN)/softtact skin config/skin.yaml --out results/skin
-
-tiny-skin: .venv/installed
-	$(BIN)/softtact skin config/tiny_skin.yaml --out results/tiny_skin
-
-# Grasps by a robot: hours of presses at 50 N, which go on where they were interrupted.
-grasps tiny-grasps: .venv/installed
-	$(BIN)/softtact grasps config/$(subst -,_,$@).yaml
-
-# The palpation sensor of the fourth paper.
-probe tiny-probe: .venv/installed
-	$(BIN)/softtact palpate config/$(subst -,_,$@).yaml --out results/$(subst -,_,$@)
+$(TINY_STUDIES) skin probe grasps: .venv/installed
+	$(SNAKEMAKE) --configfile config/$(subst -,_,$@).yaml
 	@echo "Open results/$(subst -,_,$@)/report.html"
 
-studies: tiny tiny-skin tiny-grasps tiny-probe
+everything: study skin probe grasps
+
+studies: $(TINY_STUDIES)
+
+# One page of Snakemake for each study that is finished: its figures and tables with the rules that made them.
+overview: .venv/installed
+	for name in $(DEFAULT_STUDIES) $(subst -,_,$(TINY_STUDIES)); do \
+		folder=results/$$([ $$name = config ] && echo default || echo $$name); \
+		[ ! -e $$folder/report.html ] || $(SNAKEMAKE) --configfile config/$$name.yaml --report $$folder/overview.zip || exit 1; done
 
 # Two processes with one thread each: two threads in one process take nearly as long as one.
 test test-slow: export OMP_NUM_THREADS = 1
@@ -52,10 +49,12 @@ bench: .venv/installed
 lint: .venv/tested
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+	$(BIN)/snakefmt --check --compact-diff Snakefile workflow
 
-# Advice on the workflow. It always asks for a conda environment for each rule, which this project has none of, and so fails.
+# Advice on the workflow; what of it stays, and why, stands in workflow/README.md.
 advice: .venv/tested
-	$(BIN)/snakemake --lint
+	-for name in tiny tiny_skin tiny_probe tiny_grasps; do $(BIN)/snakemake --configfile config/$$name.yaml --lint; done
+	@sed -n '/^## Advice/,/^## /p' workflow/README.md
 
 # The workflow finds its own interpreter; the environment need not be activated.
 .venv/installed: pyproject.toml constraints.txt

@@ -89,6 +89,11 @@ def shown(path):
     return report(path, caption=caption, category=f"{STUDY.name}: {kind}s", labels={"file": place.name})
 
 
+def all_shown(named):
+    """The same of named outputs."""
+    return {name: shown(path) for name, path in named.items()}
+
+
 HELD = []  # open as long as this process lives
 
 

@@ -1,5 +1,6 @@
 # The dielectric pressed on glass: contact area against force, by mechanics and from an image.
 
+
 rule press_on_glass:
     input:
         code=code("press_on_glass"),
@@ -7,6 +8,13 @@ rule press_on_glass:
     output:
         state=f"{RESULTS}/ftir/contact_state.nc",
         virtual=f"{RESULTS}/ftir/virtual_dielectric.nc",
+    log:
+        log_of("press_on_glass"),
+    benchmark:
+        benchmark_of("press_on_glass")
+    resources:
+        mem_mb=lambda wildcards, attempt: 3000 * attempt,
+        runtime=60,
     params:
         files=files,
         settings=as_settings(
@@ -14,10 +22,6 @@ rule press_on_glass:
             **{key: value for key, value in plain(STUDY.values.ftir).items() if key not in ("camera", "measured")},
             seed=STUDY.values.seed,
         ),
-    log:
-        log_of("press_on_glass"),
-    benchmark:
-        benchmark_of("press_on_glass")
     shell:
         run_stage("press_on_glass")
 
@@ -29,34 +33,34 @@ rule detect_discs:
     output:
         images=directory(f"{RESULTS}/ftir/images"),
         discs=f"{RESULTS}/ftir/discs.csv",
-    params:
-        files=files,
-        settings=as_settings(camera=plain(STUDY.values.ftir.camera), seed=STUDY.values.seed),
     log:
         log_of("detect_discs"),
     benchmark:
         benchmark_of("detect_discs")
+    params:
+        files=files,
+        settings=as_settings(camera=plain(STUDY.values.ftir.camera), seed=STUDY.values.seed),
     shell:
         run_stage("detect_discs")
 
 
 rule validate_ftir:
     input:
+        **({"measured": STUDY.values.ftir.measured} if STUDY.values.ftir.measured else {}),
         code=code("validate_ftir"),
         state=rules.press_on_glass.output.state,
         virtual=rules.press_on_glass.output.virtual,
         discs=[rules.detect_discs.output.discs],
-        **({"measured": STUDY.values.ftir.measured} if STUDY.values.ftir.measured else {}),
     output:
         area=f"{RESULTS}/ftir/contact_area.csv",
         orientations=f"{RESULTS}/ftir/orientations.csv",
         summary=f"{RESULTS}/ftir/summary.json",
-    params:
-        files=files,
-        settings=as_settings(pixel_mm=STUDY.values.ftir.camera.pixel_mm),
     log:
         log_of("validate_ftir"),
     benchmark:
         benchmark_of("validate_ftir")
+    params:
+        files=files,
+        settings=as_settings(pixel_mm=STUDY.values.ftir.camera.pixel_mm),
     shell:
         run_stage("validate_ftir")

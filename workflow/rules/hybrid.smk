@@ -97,7 +97,9 @@ def everything(workflow):
     fixed = [path for rule in rules_asked for path in rule.output]
     models = () if STUDY.archive else STUDY.pressed_with
     sensor = [path for model in models for path in needs_of(model).values()]
-    materials = [path for name in STUDY.values.materials for path in (*data_of_material(name), *figure_files(f"material_{name}").values())]
+    materials = [
+        path for name in STUDY.values.materials for path in (*data_of_material(name), *figure_files(f"material_{name}").values())
+    ]
     learning = [path for name in ("model.pt", "history.csv", "timing.csv") for path in learned(name)]
     learning += [f"{RESULTS}/learning/{model}/{name}" for model in STUDY.tested for name in ("search.csv", "best.json")]
     readings = [] if STUDY.archive else [f"{RESULTS}/tactile/{item.set}/{item.id}.nc" for item in STUDY.items()]

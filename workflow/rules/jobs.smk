@@ -35,7 +35,10 @@ def settings_of(stage):
 
 def outputs_of(stage):
     """A stage's named outputs, those that people look at marked for `snakemake --report`."""
-    return {name: shown(paths) if isinstance(paths, str) else list(map(shown, paths)) for name, paths in first_job(stage).outputs.items()}
+    return {
+        name: shown(paths) if isinstance(paths, str) else list(map(shown, paths))
+        for name, paths in first_job(stage).outputs.items()
+    }
 
 
 def part_of(stage):
@@ -58,18 +61,18 @@ for _stage in JOBS:
             code=code(_stage),
         output:
             **outputs_of(_stage),
-        params:
-            files=files,
-            settings=settings_of(_stage),
-        wildcard_constraints:
-            **{name: "|".join(sorted({re.escape(dict(key)[name]) for key in JOBS[_stage]})) for name in first_job(_stage).wildcards},
         log:
             log_of(_stage, part_of(_stage)),
         benchmark:
             benchmark_of(_stage, part_of(_stage))
+        wildcard_constraints:
+            **{name: "|".join(sorted({re.escape(dict(key)[name]) for key in JOBS[_stage]})) for name in first_job(_stage).wildcards},
+        retries: RETRIES.get(_stage, 0)
         threads: first_job(_stage).threads
         resources:
             **RESOURCES.get(_stage, {}),
-        retries: RETRIES.get(_stage, 0)
+        params:
+            files=files,
+            settings=settings_of(_stage),
         shell:
             run_stage(_stage)

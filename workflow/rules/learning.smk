@@ -51,11 +51,15 @@ OWN = STUDY.values.network.architecture
 
 rule build_dataset:
     input:
-        code=code("build_dataset"),
         **samples_of(),
+        code=code("build_dataset"),
     output:
         **{split: dataset(split, STUDY.learnt_from) for split in SPLITS},
         manifest=f"{RESULTS}/dataset/manifest.csv",
+    log:
+        log_of("build_dataset"),
+    benchmark:
+        benchmark_of("build_dataset")
     params:
         files=files,
         settings=as_settings(
@@ -64,10 +68,6 @@ rule build_dataset:
             **plain(STUDY.values.dataset),
             seed=STUDY.values.seed,
         ),
-    log:
-        log_of("build_dataset"),
-    benchmark:
-        benchmark_of("build_dataset")
     shell:
         run_stage("build_dataset")
 
@@ -80,6 +80,14 @@ rule search_hyperparameters:
     output:
         search=f"{RESULTS}/learning/{{model}}/search.csv",
         best=f"{RESULTS}/learning/{{model}}/best.json",
+    log:
+        log_of("search_hyperparameters", "{model}"),
+    benchmark:
+        benchmark_of("search_hyperparameters", "{model}")
+    threads: STUDY.values.training.threads
+    resources:
+        mem_mb=lambda wildcards, attempt: 4000 * attempt,
+        runtime=720,
     params:
         files=files,
         settings=as_settings(
@@ -88,13 +96,8 @@ rule search_hyperparameters:
             ssim=plain(STUDY.values.ssim),
             device=STUDY.values.training.device,
             seed=STUDY.values.seed,
-            threads=STUDY.values.training.threads,     # of sums, on however few cores: the results depend on it
+            threads=STUDY.values.training.threads,  # of sums, on however few cores: the results depend on it
         ),
-    threads: STUDY.values.training.threads
-    log:
-        log_of("search_hyperparameters", "{model}"),
-    benchmark:
-        benchmark_of("search_hyperparameters", "{model}")
     shell:
         run_stage("search_hyperparameters")
 
@@ -107,6 +110,11 @@ rule find_learning_rate:
     output:
         rates=f"{RESULTS}/learning/{{model}}/rates.csv",
         rate=f"{RESULTS}/learning/{{model}}/rate.json",
+    log:
+        log_of("find_learning_rate", "{model}"),
+    benchmark:
+        benchmark_of("find_learning_rate", "{model}")
+    threads: STUDY.values.training.threads
     params:
         files=files,
         settings=as_settings(
@@ -116,11 +124,6 @@ rule find_learning_rate:
             seed=STUDY.values.seed,
             threads=STUDY.values.training.threads,
         ),
-    threads: STUDY.values.training.threads
-    log:
-        log_of("find_learning_rate", "{model}"),
-    benchmark:
-        benchmark_of("find_learning_rate", "{model}")
     shell:
         run_stage("find_learning_rate")
 
@@ -136,6 +139,14 @@ rule train_cnn:
         model=f"{RESULTS}/learning/{{model}}/model.pt",
         history=f"{RESULTS}/learning/{{model}}/history.csv",
         timing=f"{RESULTS}/learning/{{model}}/timing.csv",
+    log:
+        log_of("train_cnn", "{model}"),
+    benchmark:
+        benchmark_of("train_cnn", "{model}")
+    threads: STUDY.values.training.threads
+    resources:
+        mem_mb=lambda wildcards, attempt: 4000 * attempt,
+        runtime=720,
     params:
         files=files,
         settings=as_settings(
@@ -145,11 +156,6 @@ rule train_cnn:
             seed=STUDY.values.seed,
             threads=STUDY.values.training.threads,
         ),
-    threads: STUDY.values.training.threads
-    log:
-        log_of("train_cnn", "{model}"),
-    benchmark:
-        benchmark_of("train_cnn", "{model}")
     shell:
         run_stage("train_cnn")
 
@@ -165,6 +171,14 @@ rule train_beside:
         model=f"{RESULTS}/learning/{{model}}/{BESIDE}/model.pt",
         history=f"{RESULTS}/learning/{{model}}/{BESIDE}/history.csv",
         timing=f"{RESULTS}/learning/{{model}}/{BESIDE}/timing.csv",
+    log:
+        log_of("train_beside", "{model}"),
+    benchmark:
+        benchmark_of("train_beside", "{model}")
+    threads: STUDY.values.training.threads
+    resources:
+        mem_mb=lambda wildcards, attempt: 4000 * attempt,
+        runtime=720,
     params:
         files=files,
         settings=as_settings(
@@ -174,23 +188,18 @@ rule train_beside:
             seed=STUDY.values.seed,
             threads=STUDY.values.training.threads,
         ),
-    threads: STUDY.values.training.threads
-    log:
-        log_of("train_beside", "{model}"),
-    benchmark:
-        benchmark_of("train_beside", "{model}")
     shell:
         run_stage("train_cnn")
 
 
 rule evaluate:
     input:
+        **({} if STUDY.archive else {"presses": presses(STUDY.tested)}),
         code=code("evaluate"),
         networks=[f"{RESULTS}/learning/{model}/model.pt" for model in STUDY.tested],
         validation=dataset("validation"),
         unseen=dataset("unseen"),
         grasps=dataset("grasps"),
-        **({} if STUDY.archive else {"presses": presses(STUDY.tested)}),
     output:
         ssim=f"{RESULTS}/evaluation/ssim.csv",
         per_item=f"{RESULTS}/evaluation/items.csv",
@@ -198,24 +207,28 @@ rule evaluate:
         ceiling=f"{RESULTS}/evaluation/ceiling.csv",
         timing=f"{RESULTS}/evaluation/timing.csv",
         predictions=f"{RESULTS}/evaluation/predictions.nc",
-    params:
-        files=files,
-        settings=as_settings(ssim=plain(STUDY.values.ssim), seed=STUDY.values.seed),
     log:
         log_of("evaluate"),
     benchmark:
         benchmark_of("evaluate")
+    params:
+        files=files,
+        settings=as_settings(ssim=plain(STUDY.values.ssim), seed=STUDY.values.seed),
     shell:
         run_stage("evaluate")
 
 
 rule score_baselines:
     input:
-        code=code("score_baselines"),
         **{split: dataset(split) for split in SPLITS},
+        code=code("score_baselines"),
     output:
         baselines=f"{RESULTS}/evaluation/baselines.csv",
         taxels=f"{RESULTS}/evaluation/taxels.csv",
+    log:
+        log_of("score_baselines"),
+    benchmark:
+        benchmark_of("score_baselines")
     params:
         files=files,
         settings=as_settings(
@@ -223,10 +236,6 @@ rule score_baselines:
             counts_per_relative_change=STUDY.counts_per_relative_change,
             ssim=plain(STUDY.values.ssim),
         ),
-    log:
-        log_of("score_baselines"),
-    benchmark:
-        benchmark_of("score_baselines")
     shell:
         run_stage("score_baselines")
 
@@ -243,17 +252,17 @@ rule compare_networks:
         unseen=dataset("unseen"),
         grasps=dataset("grasps"),
     output:
-        networks=f"{RESULTS}/tables/networks.csv",
-        scores=f"{RESULTS}/tables/scores.csv",
-        levels=f"{RESULTS}/tables/levels.csv",
+        networks=shown(f"{RESULTS}/tables/networks.csv"),
+        scores=shown(f"{RESULTS}/tables/scores.csv"),
+        levels=shown(f"{RESULTS}/tables/levels.csv"),
         verdicts=f"{RESULTS}/evaluation/verdicts.json",
-    params:
-        files=files,
-        settings=as_settings(own=OWN, ssim=plain(STUDY.values.ssim), seed=STUDY.values.seed),
     log:
         log_of("compare_networks"),
     benchmark:
         benchmark_of("compare_networks")
+    params:
+        files=files,
+        settings=as_settings(own=OWN, ssim=plain(STUDY.values.ssim), seed=STUDY.values.seed),
     shell:
         run_stage("compare_networks")
 
@@ -261,10 +270,18 @@ rule compare_networks:
 rule learning_curve:
     input:
         unpack(curve_files),
-        code=code("learning_curve"),
         **{split: f"{RESULTS}/dataset/{{model}}/{split}.nc" for split in SPLITS},
+        code=code("learning_curve"),
     output:
         curve=f"{RESULTS}/learning/{{model}}/learning_curve.csv",
+    log:
+        log_of("learning_curve", "{model}"),
+    benchmark:
+        benchmark_of("learning_curve", "{model}")
+    threads: STUDY.values.training.threads
+    resources:
+        mem_mb=lambda wildcards, attempt: 4000 * attempt,
+        runtime=720,
     params:
         files=files,
         settings=lambda w: as_settings(
@@ -275,11 +292,6 @@ rule learning_curve:
             seed=STUDY.values.seed,
             threads=STUDY.values.training.threads,
         ),
-    threads: STUDY.values.training.threads
-    log:
-        log_of("learning_curve", "{model}"),
-    benchmark:
-        benchmark_of("learning_curve", "{model}")
     shell:
         run_stage("learning_curve")
 
@@ -287,10 +299,18 @@ rule learning_curve:
 rule repeat_learning:
     input:
         unpack(lambda wildcards: found_files(wildcards, STUDY.values.learning.networks)),
-        code=code("repeat_learning"),
         **{split: f"{RESULTS}/dataset/{{model}}/{split}.nc" for split in SPLITS},
+        code=code("repeat_learning"),
     output:
         seeds=f"{RESULTS}/learning/{{model}}/seeds.csv",
+    log:
+        log_of("repeat_learning", "{model}"),
+    benchmark:
+        benchmark_of("repeat_learning", "{model}")
+    threads: STUDY.values.training.threads
+    resources:
+        mem_mb=lambda wildcards, attempt: 4000 * attempt,
+        runtime=720,
     params:
         files=files,
         settings=as_settings(
@@ -301,11 +321,6 @@ rule repeat_learning:
             seed=STUDY.values.seed,
             threads=STUDY.values.training.threads,
         ),
-    threads: STUDY.values.training.threads
-    log:
-        log_of("repeat_learning", "{model}"),
-    benchmark:
-        benchmark_of("repeat_learning", "{model}")
     shell:
         run_stage("repeat_learning")
 
@@ -317,14 +332,14 @@ if SEEDS:
             code=code("gather_seeds"),
             seeds=SEEDS,
         output:
-            table=f"{RESULTS}/tables/seeds.csv",
-        params:
-            files=files,
-            settings=as_settings(),
+            table=shown(f"{RESULTS}/tables/seeds.csv"),
         log:
             log_of("gather_seeds"),
         benchmark:
             benchmark_of("gather_seeds")
+        params:
+            files=files,
+            settings=as_settings(),
         shell:
             run_stage("gather_seeds")
 
@@ -337,16 +352,16 @@ if CURVES:
             curves=CURVES,
             networks=rules.compare_networks.output.networks,
         output:
-            limits=f"{RESULTS}/tables/limits.csv",
+            limits=shown(f"{RESULTS}/tables/limits.csv"),
+        log:
+            log_of("find_limits"),
+        benchmark:
+            benchmark_of("find_limits")
         params:
             files=files,
             settings=as_settings(
                 own=STUDY.values.network.architecture, tested=STUDY.tested, reference=STUDY.values.reference, source=STUDY.source
             ),
-        log:
-            log_of("find_limits"),
-        benchmark:
-            benchmark_of("find_limits")
         shell:
             run_stage("find_limits")
 
@@ -359,7 +374,11 @@ if STUDY.virtual:
             references=[f"{RESULTS}/presses/grasps/{item}/{STUDY.values.reference}.nc" for item in STUDY.items_of["grasps"]],
             presses=[f"{RESULTS}/presses/grasps/{item}/{model}.nc" for model in STUDY.tested for item in STUDY.items_of["grasps"]],
         output:
-            gains=f"{RESULTS}/tables/gains.csv",
+            gains=shown(f"{RESULTS}/tables/gains.csv"),
+        log:
+            log_of("compare_gains"),
+        benchmark:
+            benchmark_of("compare_gains")
         params:
             files=files,
             settings=as_settings(
@@ -368,9 +387,5 @@ if STUDY.virtual:
                 ssim=plain(STUDY.values.ssim),
                 seed=STUDY.values.seed,
             ),
-        log:
-            log_of("compare_gains"),
-        benchmark:
-            benchmark_of("compare_gains")
         shell:
             run_stage("compare_gains")

@@ -1,18 +1,19 @@
 # Test curves -> fitted laws.
 
+
 rule make_curves:
     input:
         code=code("make_curves"),
         measured=lambda w: STUDY.materials[w.material].measured_files,
     output:
         curves=f"{RESULTS}/curves/{{material}}/{{mode}}.csv",
-    params:
-        files=files,
-        settings=lambda w: as_settings(**STUDY.materials[w.material].curve_settings),
     log:
         log_of("make_curves", "{material}/{mode}"),
     benchmark:
         benchmark_of("make_curves", "{material}/{mode}")
+    params:
+        files=files,
+        settings=lambda w: as_settings(**STUDY.materials[w.material].curve_settings),
     shell:
         run_stage("make_curves")
 
@@ -20,18 +21,16 @@ rule make_curves:
 rule fit_material:
     input:
         code=code("fit_material"),
-        curves=lambda w: [
-            f"{RESULTS}/curves/{w.material}/{mode}.csv" for mode in STUDY.materials[w.material].modes
-        ],
+        curves=lambda w: [f"{RESULTS}/curves/{w.material}/{mode}.csv" for mode in STUDY.materials[w.material].modes],
     output:
         card=f"{RESULTS}/materials/{{material}}.json",
-    params:
-        files=files,
-        settings=lambda w: as_settings(**STUDY.materials[w.material].fit_settings),
     log:
         log_of("fit_material", "{material}"),
     benchmark:
         benchmark_of("fit_material", "{material}")
+    params:
+        files=files,
+        settings=lambda w: as_settings(**STUDY.materials[w.material].fit_settings),
     shell:
         run_stage("fit_material")
 
@@ -42,14 +41,14 @@ rule draw_material:
         card=rules.fit_material.output.card,
         curves=rules.fit_material.input.curves,
     output:
-        png=f"{RESULTS}/figures/material_{{material}}.png",
+        png=shown(f"{RESULTS}/figures/material_{{material}}.png"),
         svg=f"{RESULTS}/figures/material_{{material}}.svg",
-    params:
-        files=files,
-        settings=as_settings(),
     log:
         log_of("draw_material", "{material}"),
     benchmark:
         benchmark_of("draw_material", "{material}")
+    params:
+        files=files,
+        settings=as_settings(),
     shell:
         run_stage("draw_material")

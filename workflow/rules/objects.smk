@@ -1,11 +1,16 @@
 # How complex each object is, and which model that asks for.
 
+
 rule score_complexity:
     input:
         code=code("score_complexity"),
         meshes=[item.file for item in STUDY.items()],
     output:
         table=f"{RESULTS}/objects/complexity.csv",
+    log:
+        log_of("score_complexity"),
+    benchmark:
+        benchmark_of("score_complexity")
     params:
         files=files,
         settings=as_settings(
@@ -14,9 +19,5 @@ rule score_complexity:
             reach_mm=STUDY.spec.thickness_mm,
             **plain(STUDY.values.complexity),
         ),
-    log:
-        log_of("score_complexity"),
-    benchmark:
-        benchmark_of("score_complexity")
     shell:
         run_stage("score_complexity")

@@ -12,14 +12,17 @@ rule simulate_press:
         object=lambda w: STUDY.items_of[w.set][w.item].file,
     output:
         press=f"{RESULTS}/presses/{{set}}/{{item}}/{{model}}.nc",
-    params:
-        files=files,
-        settings=lambda w: pressed_with(w.model, [STUDY.items_of[w.set][w.item]], STUDY.values.forces_n),
     log:
         log_of("simulate_press", "{set}/{item}/{model}"),
     benchmark:
         benchmark_of("simulate_press", "{set}/{item}/{model}")
     threads: 1
+    resources:
+        mem_mb=lambda wildcards, attempt: 3000 * attempt,
+        runtime=120,
+    params:
+        files=files,
+        settings=lambda w: pressed_with(w.model, [STUDY.items_of[w.set][w.item]], STUDY.values.forces_n),
     shell:
         f'{run_stage("simulate_press")} && {TOLD}'
 
@@ -39,14 +42,14 @@ for _model in STUDY.pressed_with:
                 object=_items[0].file,
             output:
                 press=[f"{RESULTS}/presses/{_item.set}/{_item.id}/{_model}.nc" for _item in _items],
-            params:
-                files=files,
-                settings=pressed_with(_model, _items, STUDY.values.forces_n),
             log:
                 log_of("simulate_presses", f"{_first}/{_model}"),
             benchmark:
                 benchmark_of("simulate_presses", f"{_first}/{_model}")
             threads: 1
+            params:
+                files=files,
+                settings=pressed_with(_model, _items, STUDY.values.forces_n),
             shell:
                 f'{run_stage("simulate_presses")} && {TOLD}'
 
@@ -62,14 +65,14 @@ rule repeat_press:
         object=FIRST.file,
     output:
         press=f"{RESULTS}/repeated/{{model}}.nc",
-    params:
-        files=files,
-        settings=lambda w: pressed_with(w.model, [FIRST], STUDY.values.forces_n),
     log:
         log_of("repeat_press", "{model}"),
     benchmark:
         benchmark_of("repeat_press", "{model}")
     threads: 1
+    params:
+        files=files,
+        settings=lambda w: pressed_with(w.model, [FIRST], STUDY.values.forces_n),
     shell:
         run_stage("simulate_press")
 
@@ -82,6 +85,10 @@ if STUDY.virtual:
             press=f"{RESULTS}/presses/{{set}}/{{item}}/{STUDY.values.reference}.nc",
         output:
             tactile=f"{RESULTS}/tactile/{{set}}/{{item}}.nc",
+        log:
+            log_of("read_virtual_sensor", "{set}/{item}"),
+        benchmark:
+            benchmark_of("read_virtual_sensor", "{set}/{item}")
         params:
             files=files,
             settings=lambda w: as_settings(
@@ -90,10 +97,6 @@ if STUDY.virtual:
                 trials=STUDY.trials_of(w.set),
                 seed=STUDY.values.seed,
             ),
-        log:
-            log_of("read_virtual_sensor", "{set}/{item}"),
-        benchmark:
-            benchmark_of("read_virtual_sensor", "{set}/{item}")
         shell:
             run_stage("read_virtual_sensor")
 
@@ -106,6 +109,11 @@ else:
             force_logs=lambda w: [one.force_log for one in STUDY.recordings[f"{w.set}/{w.item}"]],
         output:
             tactile=f"{RESULTS}/tactile/{{set}}/{{item}}.nc",
+        log:
+            log_of("read_recordings", "{set}/{item}"),
+        benchmark:
+            benchmark_of("read_recordings", "{set}/{item}")
+        priority: 1  # before the presses: an unusable recording is refused in the first minute
         params:
             files=files,
             settings=lambda w: as_settings(
@@ -116,11 +124,6 @@ else:
                 fingers=[one.finger for one in STUDY.recordings[f"{w.set}/{w.item}"]],
                 baselines=[one.baseline for one in STUDY.recordings[f"{w.set}/{w.item}"]],
             ),
-        log:
-            log_of("read_recordings", "{set}/{item}"),
-        benchmark:
-            benchmark_of("read_recordings", "{set}/{item}")
-        priority: 1     # before the presses: an unusable recording is refused in the first minute
         shell:
             run_stage("read_recordings")
 
@@ -133,14 +136,12 @@ rule press_section:
     output:
         body=f"{RESULTS}/section/pressed_sensor.vtu",
         summary=f"{RESULTS}/section/press.json",
-    params:
-        files=files,
-        settings=pressed_with(
-            STUDY.values.choice.models["hyperelastic"], [STUDY.section_item], [STUDY.values.section.force_n]
-        ),
     log:
         log_of("press_section"),
     benchmark:
         benchmark_of("press_section")
+    params:
+        files=files,
+        settings=pressed_with(STUDY.values.choice.models["hyperelastic"], [STUDY.section_item], [STUDY.values.section.force_n]),
     shell:
         run_stage("press_section")

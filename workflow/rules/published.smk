@@ -1,5 +1,6 @@
 # The archive that the paper's authors published, in place of presses and readings of the virtual sensor.
 
+
 rule import_published:
     input:
         code=code("import_published"),
@@ -11,6 +12,10 @@ rule import_published:
         inventory=f"{RESULTS}/published/inventory.json",
         counts=f"{RESULTS}/published/counts.csv",
         outliers=f"{RESULTS}/published/outliers.csv",
+    log:
+        log_of("import_published"),
+    benchmark:
+        benchmark_of("import_published")
     params:
         files=files,
         settings=as_settings(
@@ -19,9 +24,5 @@ rule import_published:
             sensor=STUDY.sensor,
             seed=STUDY.values.seed,
         ),
-    log:
-        log_of("import_published"),
-    benchmark:
-        benchmark_of("import_published")
     shell:
         run_stage("import_published")

@@ -1,9 +1,9 @@
 # Tables, one rule per figure, and the page that gathers them.
 
-GRASPS = [item for item in STUDY.items_of["grasps"].values() if item.first]   # each object once
-SHOWN = GRASPS[:6]      # in figure 7, as in print
-FROM_PRESSES = () if STUDY.archive else ("fig2_section", "fig7_maps", "fig8_policies")     # an archive has no press of our objects
-VIEWS = () if STUDY.archive else ("pressed_sensor",)      # HTML: they turn
+GRASPS = [item for item in STUDY.items_of["grasps"].values() if item.first]  # each object once
+SHOWN = GRASPS[:6]  # in figure 7, as in print
+FROM_PRESSES = () if STUDY.archive else ("fig2_section", "fig7_maps", "fig8_policies")  # an archive has no press of our objects
+VIEWS = () if STUDY.archive else ("pressed_sensor",)  # HTML: they turn
 FROM_CURVES = ("fig10_learning_curve",) if CURVES else ()
 FIGURES = sorted(
     ["fig4_complexity", "fig5_ftir", "fig6_ssim", *FROM_PRESSES, "fig9_networks", *FROM_CURVES],
@@ -25,22 +25,31 @@ if not STUDY.archive:
             presses=[f"{RESULTS}/presses/grasps/{item.id}/{model}.nc" for item in GRASPS for model in STUDY.tested],
         output:
             features=f"{RESULTS}/evaluation/features.csv",
+        log:
+            log_of("measure_features"),
+        benchmark:
+            benchmark_of("measure_features")
         params:
             files=files,
             settings=as_settings(
                 objects=[{"name": item.id, "unit": item.unit, "pose": item.pose} for item in GRASPS],
                 frustum_height_mm=STUDY.spec.dielectric.frusta.height_mm,
             ),
-        log:
-            log_of("measure_features"),
-        benchmark:
-            benchmark_of("measure_features")
         shell:
             run_stage("measure_features")
 
 
 rule make_tables:
     input:
+        **(
+            {}
+            if STUDY.archive
+            else {
+                "features": rules.measure_features.output.features,
+                "pressed": [f"{RESULTS}/presses/grasps/{GRASPS[0].id}/{model}.nc" for model in STUDY.tested],
+                "repeated": [f"{RESULTS}/repeated/{model}.nc" for model in STUDY.tested],
+            }
+        ),
         code=code("make_tables"),
         cards=[f"{RESULTS}/materials/{name}.json" for name in STUDY.values.materials],
         complexity=rules.score_complexity.output.table,
@@ -53,28 +62,19 @@ rule make_tables:
         scores=rules.compare_networks.output.scores,
         taxels=rules.score_baselines.output.taxels,
         searches=[f"{RESULTS}/learning/{model}/best.json" for model in STUDY.tested],
-        **(
-            {}
-            if STUDY.archive
-            else {
-                "features": rules.measure_features.output.features,
-                "pressed": [f"{RESULTS}/presses/grasps/{GRASPS[0].id}/{model}.nc" for model in STUDY.tested],
-                "repeated": [f"{RESULTS}/repeated/{model}.nc" for model in STUDY.tested],
-            }
-        ),
     output:
-        table1=f"{RESULTS}/tables/table1_materials.csv",
-        contradictions=f"{RESULTS}/tables/table1_contradictions.csv",
-        table2=f"{RESULTS}/tables/table2_complexity.csv",
-        table3=f"{RESULTS}/tables/table3_timing.csv",
-        claims=f"{RESULTS}/tables/claims.csv",
-    params:
-        files=files,
-        settings=as_settings(**plain(STUDY.values.complexity), source=STUDY.source, models=STUDY.tested, sensor=STUDY.spec.name),
+        table1=shown(f"{RESULTS}/tables/table1_materials.csv"),
+        contradictions=shown(f"{RESULTS}/tables/table1_contradictions.csv"),
+        table2=shown(f"{RESULTS}/tables/table2_complexity.csv"),
+        table3=shown(f"{RESULTS}/tables/table3_timing.csv"),
+        claims=shown(f"{RESULTS}/tables/claims.csv"),
     log:
         log_of("make_tables"),
     benchmark:
         benchmark_of("make_tables")
+    params:
+        files=files,
+        settings=as_settings(**plain(STUDY.values.complexity), source=STUDY.source, models=STUDY.tested, sensor=STUDY.spec.name),
     shell:
         run_stage("make_tables")
 
@@ -88,17 +88,16 @@ if not STUDY.archive:
             summary=rules.press_section.output.summary,
             object=STUDY.section_item.file,
         output:
-            **figure_files("fig2_section"),
-        params:
-            files=files,
-            settings=as_settings(sensor=STUDY.sensor, unit=STUDY.section_item.unit, pose=STUDY.section_item.pose),
+            **all_shown(figure_files("fig2_section")),
         log:
             log_of("draw_fig2_section"),
         benchmark:
             benchmark_of("draw_fig2_section")
+        params:
+            files=files,
+            settings=as_settings(sensor=STUDY.sensor, unit=STUDY.section_item.unit, pose=STUDY.section_item.pose),
         shell:
             run_stage("draw_fig2_section")
-
 
     rule draw_pressed_sensor:
         input:
@@ -107,14 +106,14 @@ if not STUDY.archive:
             summary=rules.press_section.output.summary,
             object=STUDY.section_item.file,
         output:
-            html=f"{RESULTS}/figures/pressed_sensor.html",
-        params:
-            files=files,
-            settings=as_settings(unit=STUDY.section_item.unit, pose=STUDY.section_item.pose),
+            html=shown(f"{RESULTS}/figures/pressed_sensor.html"),
         log:
             log_of("draw_pressed_sensor"),
         benchmark:
             benchmark_of("draw_pressed_sensor")
+        params:
+            files=files,
+            settings=as_settings(unit=STUDY.section_item.unit, pose=STUDY.section_item.pose),
         shell:
             run_stage("draw_pressed_sensor")
 
@@ -125,7 +124,11 @@ rule draw_fig4_complexity:
         complexity=rules.score_complexity.output.table,
         objects=[item.file for item in GRASPS],
     output:
-        **figure_files("fig4_complexity"),
+        **all_shown(figure_files("fig4_complexity")),
+    log:
+        log_of("draw_fig4_complexity"),
+    benchmark:
+        benchmark_of("draw_fig4_complexity")
     params:
         files=files,
         settings=as_settings(
@@ -134,30 +137,26 @@ rule draw_fig4_complexity:
             footprint_mm=STUDY.spec.footprint_mm,
             reach_mm=STUDY.spec.thickness_mm,
         ),
-    log:
-        log_of("draw_fig4_complexity"),
-    benchmark:
-        benchmark_of("draw_fig4_complexity")
     shell:
         run_stage("draw_fig4_complexity")
 
 
 rule compare_policies:
     input:
+        **{kind: presses([model]) for kind, model in STUDY.values.choice.models.items()},
         code=code("compare_policies"),
         complexity=rules.score_complexity.output.table,
-        **{kind: presses([model]) for kind, model in STUDY.values.choice.models.items()},
     output:
         presses=f"{RESULTS}/choice/presses.csv",
-        policies=f"{RESULTS}/tables/policies.csv",
+        policies=shown(f"{RESULTS}/tables/policies.csv"),
         calibration=f"{RESULTS}/choice/calibration.json",
-    params:
-        files=files,
-        settings=as_settings(sensor=STUDY.sensor, tolerances_mm=STUDY.values.choice.tolerances_mm),
     log:
         log_of("compare_policies"),
     benchmark:
         benchmark_of("compare_policies")
+    params:
+        files=files,
+        settings=as_settings(sensor=STUDY.sensor, tolerances_mm=STUDY.values.choice.tolerances_mm),
     shell:
         run_stage("compare_policies")
 
@@ -169,14 +168,14 @@ rule draw_fig5_ftir:
         orientations=rules.validate_ftir.output.orientations,
         summary=rules.validate_ftir.output.summary,
     output:
-        **figure_files("fig5_ftir"),
-    params:
-        files=files,
-        settings=as_settings(),
+        **all_shown(figure_files("fig5_ftir")),
     log:
         log_of("draw_fig5_ftir"),
     benchmark:
         benchmark_of("draw_fig5_ftir")
+    params:
+        files=files,
+        settings=as_settings(),
     shell:
         run_stage("draw_fig5_ftir")
 
@@ -188,14 +187,14 @@ rule draw_fig6_ssim:
         ceiling=rules.evaluate.output.ceiling,
         baselines=rules.score_baselines.output.baselines,
     output:
-        **figure_files("fig6_ssim"),
-    params:
-        files=files,
-        settings=as_settings(ssim=plain(STUDY.values.ssim)),
+        **all_shown(figure_files("fig6_ssim")),
     log:
         log_of("draw_fig6_ssim"),
     benchmark:
         benchmark_of("draw_fig6_ssim")
+    params:
+        files=files,
+        settings=as_settings(ssim=plain(STUDY.values.ssim)),
     shell:
         run_stage("draw_fig6_ssim")
 
@@ -208,7 +207,11 @@ rule draw_fig7_maps:
         objects=[item.file for item in SHOWN],
         presses=[f"{RESULTS}/presses/grasps/{item.id}/{model}.nc" for item in SHOWN for model in STUDY.tested],
     output:
-        **figure_files("fig7_maps"),
+        **all_shown(figure_files("fig7_maps")),
+    log:
+        log_of("draw_fig7_maps"),
+    benchmark:
+        benchmark_of("draw_fig7_maps")
     params:
         files=files,
         settings=as_settings(
@@ -216,10 +219,6 @@ rule draw_fig7_maps:
             trials=[STUDY.readings_of(item) for item in SHOWN],
             largest_counts=STUDY.spec.largest_counts,
         ),
-    log:
-        log_of("draw_fig7_maps"),
-    benchmark:
-        benchmark_of("draw_fig7_maps")
     shell:
         run_stage("draw_fig7_maps")
 
@@ -230,14 +229,14 @@ rule draw_fig8_policies:
         policies=rules.compare_policies.output.policies,
         presses=rules.compare_policies.output.presses,
     output:
-        **figure_files("fig8_policies"),
-    params:
-        files=files,
-        settings=as_settings(),
+        **all_shown(figure_files("fig8_policies")),
     log:
         log_of("draw_fig8_policies"),
     benchmark:
         benchmark_of("draw_fig8_policies")
+    params:
+        files=files,
+        settings=as_settings(),
     shell:
         run_stage("draw_fig8_policies")
 
@@ -248,14 +247,14 @@ rule draw_fig9_networks:
         networks=rules.compare_networks.output.networks,
         histories=learned("history.csv"),
     output:
-        **figure_files("fig9_networks"),
-    params:
-        files=files,
-        settings=as_settings(ssim=plain(STUDY.values.ssim)),
+        **all_shown(figure_files("fig9_networks")),
     log:
         log_of("draw_fig9_networks"),
     benchmark:
         benchmark_of("draw_fig9_networks")
+    params:
+        files=files,
+        settings=as_settings(ssim=plain(STUDY.values.ssim)),
     shell:
         run_stage("draw_fig9_networks")
 
@@ -268,27 +267,31 @@ if CURVES:
             curves=CURVES,
             ceiling=rules.evaluate.output.ceiling,
         output:
-            **figure_files("fig10_learning_curve"),
-        params:
-            files=files,
-            settings=as_settings(),
+            **all_shown(figure_files("fig10_learning_curve")),
         log:
             log_of("draw_fig10_learning_curve"),
         benchmark:
             benchmark_of("draw_fig10_learning_curve")
+        params:
+            files=files,
+            settings=as_settings(),
         shell:
             run_stage("draw_fig10_learning_curve")
 
 
 def code_file(stage):
     """The file of a stage below src/."""
-    module = stage_source(f"{KIND}.{stage}").partition(":")[0]
-    return f"src/{module.replace('.', '/')}.py"
+    name = stage_source(f"{KIND}.{stage}").partition(":")[0]
+    return f"src/{name.replace('.', '/')}.py"
 
 
 def drawn_by(stage):
     """The source files that a figure's page links to: its stage, and what that draws with."""
-    files = [path for path in code(stage) if ("/reporting/" in path or "/figures/" in path) and not path.endswith(("/style.py", "/render.py"))]
+    files = [
+        path
+        for path in code(stage)
+        if ("/reporting/" in path or "/figures/" in path) and not path.endswith(("/style.py", "/render.py"))
+    ]
     return [code_file(stage), *files]
 
 
@@ -306,16 +309,21 @@ def data_of_material(name):
 
 SOURCES = {
     **{f"material_{name}": {"data": data_of_material(name), "code": drawn_by("draw_material")} for name in STUDY.values.materials},
-    **{
-        name: {"data": data_of(getattr(rules, f"draw_{name}")), "code": drawn_by(f"draw_{name}")}
-        for name in (*FIGURES, *VIEWS)
-    },
+    **{name: {"data": data_of(getattr(rules, f"draw_{name}")), "code": drawn_by(f"draw_{name}")} for name in (*FIGURES, *VIEWS)},
 }
 STAGES = [stage.partition(".")[2] for stage in stages_of(KIND, source=Path("src"))]
 
 
 rule report:
     input:
+        **({"limits": rules.find_limits.output.limits} if CURVES else {}),
+        **({"seeds": rules.gather_seeds.output.table} if SEEDS else {}),
+        **(
+            {"inventory": rules.import_published.output.inventory, "counts": rules.import_published.output.counts}
+            if STUDY.archive
+            else {"policies": rules.compare_policies.output.policies}
+        ),
+        **({"gains": rules.compare_gains.output.gains} if STUDY.virtual else {}),
         code=code("report"),
         sources=sorted({path for stage in STAGES for path in code(stage)}),
         table1=rules.make_tables.output.table1,
@@ -328,15 +336,7 @@ rule report:
         scores=rules.compare_networks.output.scores,
         levels=rules.compare_networks.output.levels,
         verdicts=rules.compare_networks.output.verdicts,
-        **({"limits": rules.find_limits.output.limits} if CURVES else {}),
-        **({"seeds": rules.gather_seeds.output.table} if SEEDS else {}),
         ftir=rules.validate_ftir.output.summary,
-        **(
-            {"inventory": rules.import_published.output.inventory, "counts": rules.import_published.output.counts}
-            if STUDY.archive
-            else {"policies": rules.compare_policies.output.policies}
-        ),
-        **({"gains": rules.compare_gains.output.gains} if STUDY.virtual else {}),
         figures=[
             *(f"{RESULTS}/figures/material_{name}.png" for name in STUDY.values.materials),
             *(figure_files(name)["png"] for name in FIGURES[:1]),
@@ -344,12 +344,16 @@ rule report:
             *(figure_files(name)["png"] for name in FIGURES[1:]),
         ],
     output:
-        page=f"{RESULTS}/report.html",
+        page=shown(f"{RESULTS}/report.html"),
         sources=f"{RESULTS}/sources.html",
         config=f"{RESULTS}/config.yaml",
         named=f"{RESULTS}/config_named.yaml",
-        run=f"{RESULTS}/tables/run.csv",
-        gaps=f"{RESULTS}/tables/gaps.csv",
+        run=shown(f"{RESULTS}/tables/run.csv"),
+        gaps=shown(f"{RESULTS}/tables/gaps.csv"),
+    log:
+        log_of("report"),
+    benchmark:
+        benchmark_of("report")
     params:
         files=files,
         settings=as_settings(
@@ -365,9 +369,5 @@ rule report:
             config=plain(STUDY.values),
             named=STUDY.named(),
         ),
-    log:
-        log_of("report"),
-    benchmark:
-        benchmark_of("report")
     shell:
         run_stage("report")

@@ -1,19 +1,20 @@
 # What each model of the sensor needs once, before any press.
 
+
 rule mesh_sensor:
     input:
         code=code("mesh_sensor"),
     output:
         mesh=f"{RESULTS}/sensor/{{model}}/mesh.vtu",
+    log:
+        log_of("mesh_sensor", "{model}"),
+    benchmark:
+        benchmark_of("mesh_sensor", "{model}")
     params:
         files=files,
         settings=lambda w: as_settings(
             sensor=STUDY.sensor, model=w.model, kind=STUDY.values.models[w.model].kind, mesh=mesh_of(w.model)
         ),
-    log:
-        log_of("mesh_sensor", "{model}"),
-    benchmark:
-        benchmark_of("mesh_sensor", "{model}")
     shell:
         run_stage("mesh_sensor")
 
@@ -24,15 +25,15 @@ rule frustum_law:
         card_dielectric=card_of("dielectric"),
     output:
         law=f"{RESULTS}/sensor/{{model}}/frustum_law.npz",
+    log:
+        log_of("frustum_law", "{model}"),
+    benchmark:
+        benchmark_of("frustum_law", "{model}")
     params:
         files=files,
         settings=lambda w: as_settings(
             sensor=STUDY.sensor, law=STUDY.values.models[w.model].laws.get("dielectric"), mesh=mesh_of(w.model)
         ),
-    log:
-        log_of("frustum_law", "{model}"),
-    benchmark:
-        benchmark_of("frustum_law", "{model}")
     shell:
         run_stage("frustum_law")
 
@@ -43,15 +44,18 @@ rule precompute_compliance:
         code=code("precompute_compliance"),
     output:
         compliance=f"{RESULTS}/sensor/{{model}}/compliance.npz",
+    log:
+        log_of("precompute_compliance", "{model}"),
+    benchmark:
+        benchmark_of("precompute_compliance", "{model}")
+    threads: 1  # on more, the solver sums in another order: files would differ in the last digit
+    resources:
+        mem_mb=lambda wildcards, attempt: 3000 * attempt,
+        runtime=60,
     params:
         files=files,
         settings=lambda w: as_settings(
             sensor=STUDY.sensor, kind=STUDY.values.models[w.model].kind, laws=STUDY.values.models[w.model].laws
         ),
-    threads: 1    # on more, the solver sums in another order: files would differ in the last digit
-    log:
-        log_of("precompute_compliance", "{model}"),
-    benchmark:
-        benchmark_of("precompute_compliance", "{model}")
     shell:
         run_stage("precompute_compliance")
