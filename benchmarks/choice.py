@@ -19,7 +19,7 @@ from softtact.evaluation.policies import MODELS, policy_table, press_table, told
 from softtact.geometry.complexity import choose_model, score
 from softtact.geometry.meshes import place, read_mesh
 from softtact.reporting.style import save
-from softtact.sensors.edge import Edge
+from softtact.sensors.fields import Edge
 from softtact.studies.hybrid.figures.fig8_policies import draw
 
 MESH, FAST = "fine", MODELS[:2]

@@ -16,7 +16,7 @@ from softtact.geometry.meshes import read_mesh
 from softtact.models.hyperelastic.mesh_settings import PRESETS
 from softtact.press.choice import rms
 from softtact.press.sensor import Sensor
-from softtact.sensors.edge import Edge
+from softtact.sensors.fields import Edge
 
 ROOT = Path(__file__).resolve().parents[1]
 OBJECTS = {"box 19 x 10 mm, inside": lambda: trimesh.creation.box((19.0, 10.0, 6.0)),

@@ -24,7 +24,7 @@ from softtact.models.hyperelastic.build import build_sensor_body, build_unit_cel
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.models.hyperelastic.path import press_load_steps
-from softtact.sensors.edge import Edge, SidesBelow
+from softtact.sensors.fields import Edge, SidesBelow
 from softtact.sensors.frusta import Friction
 
 pytestmark = needs_ccx

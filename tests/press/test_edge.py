@@ -10,7 +10,7 @@ from softtact.errors import InputError, ShellWarning
 from softtact.materials.laws.registry import make_law
 from softtact.press.result import read_press
 from softtact.press.sensor import Sensor, load_sensor
-from softtact.sensors.edge import Edge, SidesBelow
+from softtact.sensors.fields import Edge, SidesBelow
 from softtact.sensors.frusta import SensorSpec
 from softtact.sensors.layers import LayersSpec
 

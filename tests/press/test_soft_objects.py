@@ -14,7 +14,7 @@ from softtact.fem.structured_meshes import box, cylinder
 from softtact.materials.laws.registry import make_law
 from softtact.press.soft_object import SoftObject
 from softtact.press.vtu import LAYERS, of_bodies, read_vtu
-from softtact.sensors.edge import Edge
+from softtact.sensors.fields import Edge
 
 SOFT = make_law("neo_hooke", {"c10": 0.035}, bulk_over_shear=20)
 STIFF = make_law("neo_hooke", {"c10": 200.0}, bulk_over_shear=5)

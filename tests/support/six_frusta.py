@@ -6,7 +6,7 @@ from support.laws import POLYURETHANE as LAW
 from support.sensors import CORO
 
 from softtact.models.hyperelastic.build import build_sensor_body
-from softtact.sensors.edge import Edge
+from softtact.sensors.fields import Edge
 
 # Its sides are held up to the surface: all of so small a sensor's cover is rim, and free it has modes ten times as soft.
 SMALL = CORO.model_copy(update={"footprint_mm": (3.6, 2.4), "map_shape": (5, 7), "edge": Edge(held="sides")})

@@ -23,7 +23,7 @@ from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.models.hyperelastic.path import press_load_steps
 from softtact.models.hyperelastic.slab import Slab, SlabMesh
 from softtact.press.sensor import Sensor
-from softtact.sensors.edge import Edge
+from softtact.sensors.fields import Edge
 
 BOUND = MeshSettings(cover_heights=(0.0, 0.5, 1.0), cover_splits=(0,), far_pitches=1, frustum_heights=(0.0, 0.35, 1.0))
 TIGHT = NewtonSettings(relative_tolerance=1e-8)

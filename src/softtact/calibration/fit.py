@@ -20,8 +20,7 @@ from softtact.files import atomic_path
 from softtact.progress import announce
 from softtact.readout.calibrated import relative_change
 from softtact.sensors.base import read_mapping
-from softtact.sensors.calibration import CalibrationBlock
-from softtact.sensors.edge import SidesBelow
+from softtact.sensors.fields import CalibrationBlock, SidesBelow
 from softtact.sensors.specification import spec_from_dict
 
 _ROUNDS, _SETTLED = 6, 0.5       # of pressing anew, until that changes counts by less than half of a mean's noise

@@ -22,7 +22,7 @@ from softtact.press.ladder import Ladder, even_in_root
 from softtact.press.result import PressResult
 from softtact.press.sensor import Sensor, load_sensor
 from softtact.progress import announce
-from softtact.sensors.edge import SidesBelow
+from softtact.sensors.fields import SidesBelow
 from softtact.sensors.frusta import SensorSpec
 
 LEVELS = 9

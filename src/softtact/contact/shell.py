@@ -1,4 +1,4 @@
-"""Where an object that is wider than a sensor comes to rest: on the rigid shell around it (`sensors/edge`).
+"""Where an object that is wider than a sensor comes to rest: on the rigid shell around it (`sensors/fields`).
 
 The object moves straight down and does not turn, so a single number is enough: how far it can come down until its underside meets
 the shell's top. From there on the pad keeps the force that it has, and the shell carries what is added.

@@ -9,9 +9,7 @@ from pydantic import Field, PositiveFloat, PositiveInt, ValidationError
 
 from softtact.errors import InputError
 from softtact.files import read_yaml
-from softtact.sensors.calibration import CalibrationBlock
-from softtact.sensors.edge import Edge, EdgeField
-from softtact.sensors.fields import ElasticLayer, Section, Taxels
+from softtact.sensors.fields import CalibrationBlock, Edge, EdgeField, ElasticLayer, Section, Taxels
 from softtact.unknown_names import first_fault, known_keys, unknown
 
 

@@ -1,7 +1,8 @@
-"""Kinds of values that sensor files are made of: plain, or stated with whether they are assumed and why."""
+"""What sensor files are made of: values, plain or stated with whether they are assumed and why, and the blocks that kinds share."""
 
-from typing import Annotated, Any, Generic, TypeVar
+from typing import Annotated, Any, Generic, Literal, TypeVar
 
+import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PositiveFloat, PositiveInt
 
 T = TypeVar("T")
@@ -56,3 +57,98 @@ class ElasticLayer(Section):
 
     young_mpa: PositiveFloat
     poisson: Annotated[float, Field(gt=-1.0, lt=0.5)]
+
+
+# --- what holds a sensor's rim ---
+#
+# A rigid shell around the sensor, up to a stated height, which also carries an object wider than the sensor:
+#     edge: {held: sides}                       the shell ends flush with the sensing surface: all of the side faces are held
+#     edge: {held: {sides_below_mm: 1.5}}       the shell ends 1.5 mm below it: side faces are held from there down, free above
+#     edge: {held: free}                        no shell: side faces are free
+# The shell is rigid and as wide as `shell_width_mm`. An object that reaches over it comes down until it meets the shell's top,
+# which carries whatever force is then added. So with `held: sides` a flat object wider than the sensor rests on the shell at first
+# touch.
+
+
+class SidesBelow(Section):
+    """A shell that holds the side faces from so far below the sensing surface on."""
+
+    sides_below_mm: Length
+
+
+def _held(value: Any) -> Any:
+    """Refuse what is none of the three in one sentence, where a union's own errors would name each of its members."""
+    if isinstance(value, SidesBelow) or value in ("sides", "free"):
+        return value
+    if not (isinstance(value, dict) and set(value) == {"sides_below_mm"}):
+        raise ValueError(f"it is {value!r}; write sides, free, or {{sides_below_mm: h}} with h in mm")
+    height = plain_value(value["sides_below_mm"])
+    if isinstance(height, bool) or not isinstance(height, int | float) or not 0 < height < np.inf:
+        raise ValueError(f"its sides_below_mm is {height!r}; give a height in mm above 0")
+    return value
+
+
+class Edge(Section):
+    """What holds the rim; `held` as above, `sides_below_mm` and `free` in its place are short for it."""
+
+    held: Annotated[Literal["sides", "free"] | SidesBelow, BeforeValidator(_held)] = "sides"
+    shell_width_mm: Length = 2.0
+
+    @property
+    def held_below_mm(self) -> float:
+        """Depth below the sensing surface from which side faces are held, which is that of the shell's top; infinite without."""
+        if isinstance(self.held, SidesBelow):
+            return self.held.sides_below_mm
+        return 0.0 if self.held == "sides" else np.inf
+
+    @property
+    def in_words(self) -> str:
+        """One clause for attributes of results."""
+        if isinstance(self.held, SidesBelow):
+            return f"sides held from {self.held.sides_below_mm:g} mm below the surface on"
+        return "sides held up to the surface" if self.held == "sides" else "sides free"
+
+
+def _short(value: Any) -> Any:
+    """`sides`, `free` and `{sides_below_mm: h}` in place of a whole `edge`."""
+    if isinstance(value, str):
+        return {"held": value}
+    if isinstance(value, dict) and "sides_below_mm" in value and "held" not in value:
+        return {"held": {"sides_below_mm": value["sides_below_mm"]}} | {k: v for k, v in value.items() if k != "sides_below_mm"}
+    return value
+
+
+EdgeField = Annotated[Edge, BeforeValidator(_short)]
+
+
+# --- what `softtact calibrate` found of one sensor ---
+
+
+Share = Annotated[float, Field(ge=0.0, lt=1.0)]
+
+
+class CalibrationBlock(Section):
+    """counts = gain x counts_per_relative_change x dC/C0 + zero_counts, each taxel's own; dC/C0 with the electrodes' edges and
+    neighbours as the virtual sensor has them.
+    """
+
+    gain: tuple[tuple[PositiveFloat, ...], ...] = Field(description="(rows, columns), as a share of the common one")
+    zero_counts: tuple[tuple[float, ...], ...] = Field(description="(rows, columns), over the baseline")
+    counts_per_relative_change: PositiveFloat
+    relaxation: tuple[Share, ...] = Field((), description="shares of the deformation that creep in late")
+    relaxation_s: tuple[PositiveFloat, ...] = Field((), description="their time constants")
+    modulus_scale: PositiveFloat = Field(1.0, description="of the moduli of all layers, over those of the materials' files")
+    noise_counts: float = Field(0.0, ge=0.0, description="of one reading, standard deviation")
+    source: str = ""
+    not_identifiable: tuple[str, ...] = ()
+    standard_deviations: dict[str, float] = {}
+
+    def fault(self, rows: int, columns: int) -> str | None:
+        """What does not fit a sensor of so many rows and columns of taxels, or each other; None where all does."""
+        for name in ("gain", "zero_counts"):
+            values = getattr(self, name)
+            if len(values) != rows or any(len(row) != columns for row in values):
+                return f"'calibration.{name}' has not {rows} rows of {columns} numbers, as the sensor has taxels"
+        if len(self.relaxation) != len(self.relaxation_s):
+            return "'calibration.relaxation' and 'calibration.relaxation_s' are not of one length"
+        return "'calibration.relaxation' sums to 1 or more" if sum(self.relaxation) >= 1 else None

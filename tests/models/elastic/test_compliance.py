@@ -14,7 +14,7 @@ from softtact.geometry.pose import Pose
 from softtact.models.elastic.compliance import Compliance, elastic_compliance, elastic_slab, map_cells, press_layer
 from softtact.press.cache import cached_compliance
 from softtact.press.sensor import Sensor
-from softtact.sensors.edge import Edge
+from softtact.sensors.fields import Edge
 
 SMALL = CORO.model_copy(update={"footprint_mm": (9.6, 9.6), "map_shape": (13, 13)})      # elements of 0.8 mm
 FORCES = np.array([0.5, 3.0])

@@ -17,7 +17,7 @@ from softtact.models.foundation.dof_maps import Places, Sideways, SoftEdges, lat
 from softtact.models.foundation.solve import FoundationMaps, FoundationSettings, _Press, membrane_loads, press_foundation
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.press.sensor import Sensor
-from softtact.sensors.edge import Edge
+from softtact.sensors.fields import Edge
 
 # --- the slab's blocks ---
 

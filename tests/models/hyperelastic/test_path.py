@@ -16,7 +16,7 @@ from softtact.models.hyperelastic.build import build_sensor_body
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.models.hyperelastic.path import press_load_steps, press_motion
 from softtact.press.sensor import Sensor
-from softtact.sensors.edge import Edge
+from softtact.sensors.fields import Edge
 
 SMALL = CORO.model_copy(update={"footprint_mm": (4.8, 4.8), "map_shape": (9, 9)})     # 4 x 4 frusta
 TIGHT = NewtonSettings(relative_tolerance=1e-6, largest_penetration_mm=1e-4)
