@@ -22,9 +22,8 @@ from softtact.calibration.experiment import experiment
 from softtact.calibration.fit import calibrate
 from softtact.calibration.ladder import Presses
 from softtact.calibration.problem import Problem
-from softtact.readout.calibrated import relative_change
-from softtact.readout.readout import amplified
-from softtact.readout.virtual_sensor import taxel_capacitance
+from softtact.readout.taxels import relative_change
+from softtact.readout.virtual_sensor import amplified, taxel_capacitance
 
 PLATE, BAR = trimesh.creation.box((26, 41, 4)), trimesh.creation.box((6, 20, 4))
 BALL = trimesh.creation.icosphere(subdivisions=4, radius=12.0)

@@ -12,11 +12,10 @@ import trimesh
 
 from softtact.calibration.ladder import Presses
 from softtact.press.sensor import Sensor
-from softtact.readout.calibrated import relative_change
 from softtact.readout.hysteresis import lagged
-from softtact.readout.readout import amplified, converted
 from softtact.readout.recording import FINGERS, make_recording
-from softtact.readout.virtual_sensor import VirtualSensorSettings, make_specimen, taxel_capacitance
+from softtact.readout.taxels import relative_change
+from softtact.readout.virtual_sensor import VirtualSensorSettings, amplified, converted, make_specimen, taxel_capacitance
 
 if TYPE_CHECKING:
     import xarray

@@ -17,8 +17,8 @@ from softtact.errors import EXTRAS, InputError, missing_extra
 from softtact.sensors.library import known_names, material_file, sensor_file
 
 ROOT = Path(__file__).resolve().parents[1]
-NAMES = ["ConvergenceError", "InputError", "Motion", "Pose", "PressResult", "Sensor", "SoftObject", "SolidSensor", "__version__",
-         "load_sensor", "load_solid_sensor", "mesh_body", "read_mesh", "read_press"]
+NAMES = ["ConvergenceError", "InputError", "Motion", "Pose", "PressResult", "Sensor", "SoftObject", "SolidResult", "SolidSensor",
+         "__version__", "load_sensor", "load_solid_sensor", "mesh_body", "read_mesh", "read_press"]
 ALONE = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}     # no path to these sources
 BROUGHT_BY_EXTRAS = sorted(set(EXTRAS) - {"pypardiso"})     # that one is tried where it is, and SciPy takes its place
 

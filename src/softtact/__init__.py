@@ -1,4 +1,4 @@
-"""Simulate a soft capacitive tactile sensor: press a mesh on it, read its deformation and its taxels."""
+"""Simulate a soft tactile sensor: press a mesh on it, read its deformation and what its readouts tell."""
 
 import importlib
 from typing import TYPE_CHECKING
@@ -9,26 +9,29 @@ if TYPE_CHECKING:
     from softtact.fem.body_mesh import mesh_body
     from softtact.geometry.meshes import read_mesh
     from softtact.geometry.pose import Pose
+    from softtact.press.objects import SoftObject
     from softtact.press.result import PressResult, read_press
-    from softtact.press.sensor import Sensor, load_sensor
-    from softtact.press.soft_object import SoftObject
-    from softtact.press.solid_sensor import SolidSensor, load_solid_sensor
+    from softtact.press.result import PressResult as SolidResult
+    from softtact.press.sensor import Sensor, load_sensor, load_solid_sensor
+    from softtact.press.sensor import Sensor as SolidSensor
 
 __version__ = "0.1.0"
-__all__ = ["ConvergenceError", "InputError", "Motion", "Pose", "PressResult", "Sensor", "SoftObject", "SolidSensor",
+__all__ = ["ConvergenceError", "InputError", "Motion", "Pose", "PressResult", "Sensor", "SoftObject", "SolidResult", "SolidSensor",
            "__version__", "load_sensor", "load_solid_sensor", "mesh_body", "read_mesh", "read_press"]
-_MODULES = {"ConvergenceError": "errors", "InputError": "errors", "Motion": "contact.motion", "Pose": "geometry.pose",
-            "PressResult": "press.result", "Sensor": "press.sensor", "load_sensor": "press.sensor",
-            "SoftObject": "press.soft_object", "SolidSensor": "press.solid_sensor", "load_solid_sensor": "press.solid_sensor",
-            "mesh_body": "fem.body_mesh",
-            "read_mesh": "geometry.meshes", "read_press": "press.result"}
+# {name: (module, its name there)}. SolidResult, SolidSensor and load_solid_sensor are names of version 0.1 for the same.
+_PLACES = {"ConvergenceError": ("errors",), "InputError": ("errors",), "Motion": ("contact.motion",), "Pose": ("geometry.pose",),
+           "PressResult": ("press.result",), "SolidResult": ("press.result", "PressResult"), "Sensor": ("press.sensor",),
+           "SolidSensor": ("press.sensor", "Sensor"), "SoftObject": ("press.objects",), "load_sensor": ("press.sensor",),
+           "load_solid_sensor": ("press.sensor",), "mesh_body": ("fem.body_mesh",), "read_mesh": ("geometry.meshes",),
+           "read_press": ("press.result",)}
 
 
 def __getattr__(name: str) -> object:
     # `import softtact` stays fast: a name's module loads when the name is first asked for.
-    if name not in _MODULES:
+    if name not in _PLACES:
         raise AttributeError(f"module 'softtact' has no attribute {name!r}")
-    value = getattr(importlib.import_module(f"softtact.{_MODULES[name]}"), name)
+    module, *other = _PLACES[name]
+    value = getattr(importlib.import_module(f"softtact.{module}"), other[0] if other else name)
     globals()[name] = value
     return value
 

@@ -9,7 +9,7 @@ from support.calibration import BAR, PLATE, small_sensor_file
 import softtact
 from softtact.calibration.ladder import placed_at
 from softtact.cli import main
-from softtact.readout.calibrated import relative_change
+from softtact.readout.taxels import relative_change
 from softtact.readout.tsf85 import read_recording, write_recording
 
 

@@ -9,6 +9,7 @@ import xarray
 import softtact
 from softtact.errors import InputError
 from softtact.press.result import PressResult, read_press
+from softtact.readout.registry import labelled
 
 
 def made_up_press():
@@ -16,7 +17,8 @@ def made_up_press():
     rng = np.random.default_rng(4)
     numbers = {name: rng.random(2) for name in ("indentation_mm", "contact_area_mm2", "penetration_mm", "frustum_compression_mm",
                                                 "wall_time_s", "extrapolated_volume_fraction", "expected_error_mm")}
-    return PressResult(deformation_map_mm=rng.random((2, 5, 3)), tactile_map=rng.random((2, 7, 4)),
+    return PressResult(deformation_map_mm=rng.random((2, 5, 3)),
+                       readings={"taxels": labelled(rng.random((2, 7, 4)), ("step", "row", "column"), units="counts")},
                        normal_force_n=np.array([5.0, 20.0]),
                        residual_n=np.full(2, np.nan), iterations=np.array([3, 4]), converged=np.ones(2, dtype=np.int8),
                        within_validity=np.array([1, 0], dtype=np.int8), x_mm=np.linspace(-11, 11, 3),
@@ -31,6 +33,8 @@ def assert_same(read, written):
         was, now = getattr(written, one.name), getattr(read, one.name)
         if isinstance(was, np.ndarray):
             assert now.dtype == was.dtype and now.shape == was.shape and now.tobytes() == was.tobytes(), one.name
+        elif one.name == "readings":
+            assert now.keys() == was.keys() and all(now[name].identical(was[name]) for name in was)
         else:
             assert type(now) is type(was) and now == was, one.name
 
@@ -56,8 +60,9 @@ def test_a_press_of_the_elastic_model_is_read_back_and_written_again_with_the_sa
 def test_every_field_is_written_but_the_bodies_and_every_array_has_units(tmp_path):
     made_up_press().write(tmp_path / "press.nc")
     with xarray.open_dataset(tmp_path / "press.nc", engine="h5netcdf") as data:
-        names = {one.name for one in fields(PressResult)} - {"bodies", "placed_object", "attributes", "x_mm", "y_mm"}
-        assert names | {"x", "y"} <= {*data.variables, *data.attrs}
+        names = {one.name for one in fields(PressResult)} - {"bodies", "placed_object", "attributes", "x_mm", "y_mm",
+                                                           "readings", "solid"}
+        assert names | {"x", "y", "tactile_map"} <= {*data.variables, *data.attrs}
         assert all(variable.attrs.get("units") for variable in data.variables.values())
         assert data.force_n.attrs["units"] == "N" and data.tactile_map.dims == ("step", "row", "column")
 

@@ -12,7 +12,7 @@ from softtact.contact.shell import Shell
 from softtact.errors import InputError, ShellWarning
 from softtact.fem.structured_meshes import box, cylinder
 from softtact.materials.laws.registry import make_law
-from softtact.press.soft_object import SoftObject
+from softtact.press.objects import SoftObject
 from softtact.press.vtu import LAYERS, of_bodies, read_vtu
 from softtact.sensors.fields import Edge
 

@@ -14,8 +14,9 @@ from softtact.errors import InputError, TimeLimitError
 from softtact.fem.mesh_files import write_mesh
 from softtact.fem.structured_meshes import box
 from softtact.materials.laws.registry import make_law
-from softtact.models.solid.result import read_solid_result
-from softtact.press.touching import first_direction, way_to_touch
+from softtact.press.kinds import solid_at_rest
+from softtact.press.objects import first_direction, way_to_touch
+from softtact.press.result import read_press
 
 RUBBER = make_law("neo_hooke", {"c10": 0.1}, bulk_over_shear=20)
 BLOCK = {"name": "block", "kind": "solid", "mesh": {"file": "block.vtu"},
@@ -47,7 +48,7 @@ def test_a_plate_finds_the_stress_of_the_uniaxial_test_and_readings_that_fill_th
     assert result.load("object")[0, 2] == pytest.approx(4 * nominal, rel=1e-2)      # an overlap of up to 1 um in 100
     assert 4 * result.reading_pressure_mpa[0, 0] == pytest.approx(-result.load("object")[0, 2], rel=1e-9)
     assert result.reading_displacement_mm[0, 0, 2] == pytest.approx(-0.1, abs=2e-3)
-    assert sensor.reading_points().area_mm2 == pytest.approx([4.0])
+    assert solid_at_rest(sensor).displacement(None)[0].area_mm2.sum() == pytest.approx(4.0)
 
 
 @pytest.mark.parametrize(("face", "way", "held"), [
@@ -139,7 +140,7 @@ def test_the_command_writes_shows_and_exports_it(folder, tmp_path, capsys):
     told = json.loads(capsys.readouterr().out)
     assert told["load"][0][2] == pytest.approx(-0.2, rel=1e-4)
     assert told["reading_pressure_mpa"][0][0] == pytest.approx(0.05, rel=1e-3)      # 0.2 N over 4 mm2
-    kept = read_solid_result(tmp_path / "press.nc")
+    kept = read_press(tmp_path / "press.nc")
     assert kept.attributes["mesh"] == "plate.stl" and len(kept.attributes["mesh_sha256"]) == 64
     assert kept.reading_pressure_mpa.shape == (1, 2)
     assert main(["press", *asked]) == 0
@@ -160,7 +161,7 @@ def test_several_objects_are_pressed_one_by_one_and_stand_in_one_table(folder, t
     rows = json.loads(capsys.readouterr().out)["objects"]
     assert [(row["object"], row["status"], row["model"]) for row in rows] == [("high", "done", "solid"), ("low", "done", "solid")]
     assert rows[0]["force_z_n"] == pytest.approx(-0.2, rel=1e-4)
-    assert (tmp_path / "low/press.vtu").stat().st_size and read_solid_result(tmp_path / "high/press.nc").steps == 1
+    assert (tmp_path / "low/press.vtu").stat().st_size and read_press(tmp_path / "high/press.nc").steps == 1
 
 
 def test_a_card_on_the_command_line_takes_the_place_of_a_regions_law(folder, capsys):
@@ -210,7 +211,7 @@ def test_what_cannot_be_pressed_is_refused_before_the_solver_starts(folder):
 
 
 @pytest.mark.parametrize(("options", "message"), [
-    (["--model", "elastic"], "--model elastic: the solid model alone presses"), (["--plot", "a.png"], "write --vtu"),
+    (["--model", "elastic"], "--model elastic: the solid model alone presses"), (["--full-scale"], "without taxels"),
     (["--tolerance", "0.02"], "--tolerance 0.02: it has no effect"), (["--mesh-quality", "fine"], "--mesh-quality fine: it")])
 def test_options_of_the_layered_models_are_refused(folder, options, message, capsys):
     assert main(["press", str(folder / "plate.stl"), "--unit", "mm", "--sensor", str(folder / "block.yaml"), "--force", "1",

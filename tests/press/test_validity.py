@@ -8,8 +8,8 @@ from support.laws import LAWS
 
 from softtact.errors import ConvergenceError
 from softtact.models.hyperelastic.newton import NewtonSettings
+from softtact.press.making import valid_elastic, valid_foundation, valid_hyperelastic
 from softtact.press.sensor import Sensor
-from softtact.press.validity import valid_elastic, valid_foundation, valid_hyperelastic
 
 GOOD = {"compression_mm": [0.1, 0.2, 0.3], "contact_error_mm": [0.0, 0.001, 0.001], "points": [9, 40, 80],
         "rough": [False, False, False], "depth_mm": [0.1, 0.2, 0.3], "forces_n": [5.0, 20.0, 50.0]}

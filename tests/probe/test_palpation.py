@@ -5,8 +5,8 @@ import pytest
 from support.probes import small_design
 
 from softtact.errors import InputError
-from softtact.probe.films import line_weights
 from softtact.probe.sweep import palpate, slope
+from softtact.readout.strip import line_weights
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from softtact.readout.readout import amplified, converted, random_walk
+from softtact.readout.virtual_sensor import amplified, converted, random_walk
 
 
 def test_gain_zero_and_their_drift_are_each_taxels_own():

@@ -72,8 +72,8 @@ def test_nonsense_is_called_so(benchmark):
     mesh, pose, forces = benchmark.random_press(0, "elastic")
     good = sensor.press(mesh, pose=pose, force_n=[*forces, 5.9], model="elastic", threads=1)
     assert benchmark.nonsense(good, sensor) == {} and benchmark.judged(good, sensor)[0] == "reached"
-    nan = good.tactile_map * float("nan")
-    assert "numbers that are not finite" in benchmark.nonsense(replace(good, tactile_map=nan), sensor)
+    nan = {"taxels": good.readings["taxels"] * float("nan")}
+    assert "numbers that are not finite" in benchmark.nonsense(replace(good, readings=nan), sensor)
     deeper = replace(good, deformation_map_mm=good.deformation_map_mm + 1)
     assert "a map deeper than the object" in benchmark.nonsense(deeper, sensor)
     assert "less depth at more force" in benchmark.nonsense(replace(good, indentation_mm=good.indentation_mm[::-1]), sensor)

@@ -20,7 +20,7 @@ from softtact.calibration.fit import CalibrationResult
 from softtact.calibration.problem import Problem
 from softtact.errors import InputError
 from softtact.press.ladder import Ladder
-from softtact.readout.calibrated import relative_change
+from softtact.readout.taxels import relative_change
 
 UNEXPLAINED = 0.1      # share of the variance, from which a recording is refused: gains 30 % apart, more than any sensor's
 _CLEARLY = 0.5         # of what is left, below which another reading of the same numbers is the better one

@@ -18,7 +18,7 @@ from softtact.calibration.problem import Linear, Problem
 from softtact.errors import ConvergenceError
 from softtact.files import atomic_path
 from softtact.progress import announce
-from softtact.readout.calibrated import relative_change
+from softtact.readout.taxels import relative_change
 from softtact.sensors.base import read_mapping
 from softtact.sensors.fields import CalibrationBlock, SidesBelow
 from softtact.sensors.specification import spec_from_dict

@@ -18,8 +18,8 @@ from softtact.calibration.experiment import Experiment
 from softtact.calibration.ladder import COVERS, FRICTIONS, SOFTEST, Presses, friction_weights, parabola, rubbing
 from softtact.errors import InputError
 from softtact.press.ladder import Ladder
-from softtact.readout.calibrated import relative_change
 from softtact.readout.hysteresis import lagged
+from softtact.readout.taxels import relative_change
 
 FITTED = ("placement", "relaxation", "modulus", "cover", "friction")
 HARDEST = 1 / SOFTEST

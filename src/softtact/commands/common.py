@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import trimesh
 
     from softtact.geometry.pose import Pose
-    from softtact.sensors.solid import SolidSpec
+    from softtact.sensors.base import Specification
     from softtact.sensors.specification import AnySpec
 
 UNITS = ("mm", "cm", "m", "inch", "in")
@@ -77,7 +77,7 @@ def show(result: Any, *, as_json: bool, lines: Iterable[str]) -> None:
     print(json.dumps(result, indent=2) if as_json else "\n".join(lines))
 
 
-def check_forces(forces: Iterable[float], spec: "AnySpec | SolidSpec") -> None:
+def check_forces(forces: Iterable[float], spec: "Specification") -> None:
     """Refuse a force out of the sensor's range, before a mesh is read or a solver loaded."""
     low, high = spec.force_range_n
     for force in forces:
@@ -154,6 +154,13 @@ def sensor_spec(name: str) -> "AnySpec":
     from softtact.sensors.specification import read_spec
 
     return read_spec(sensor_path(name))
+
+
+def any_sensor_spec(name: str) -> Any:
+    """The description of a sensor of any kind, without its solvers."""
+    from softtact.sensors.specification import read_any_spec
+
+    return read_any_spec(sensor_path(name))
 
 
 def short(value: object) -> str:

@@ -42,7 +42,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 def _dataset(options):
     from softtact.learning.press_data import PressPlan, check_name, presses_left, write_press_data
-    from softtact.press.asked import cores
+    from softtact.press.task import cores
     from softtact.progress import announce
     from softtact.studies.cost import read_costs
 

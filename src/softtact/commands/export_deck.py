@@ -4,11 +4,11 @@ import argparse
 from pathlib import Path
 
 import softtact
-from softtact.commands import press_solid
 from softtact.commands.common import (
     add_command,
     add_mesh,
     add_repair,
+    any_sensor_spec,
     check_folders,
     check_forces,
     pose_of,
@@ -42,9 +42,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def _export_deck(options):
-    if press_solid.is_solid(options.sensor):
-        return _export_solid(options)
-    return _export_layered(options)
+    return (_export_layered if any_sensor_spec(options.sensor).has_layers else _export_solid)(options)
 
 
 def _export_solid(options):
@@ -52,17 +50,18 @@ def _export_solid(options):
     from softtact.contact.motion import Motion
     from softtact.decks.solid import export_solid
     from softtact.files import refuse_overwriting
+    from softtact.press.solid import body_of
 
-    spec, forces, pose = press_solid.spec_of(options.sensor), sorted(set(options.force)), pose_of(options)
+    spec, forces, pose = any_sensor_spec(options.sensor), sorted(set(options.force)), pose_of(options)
     check_forces(forces, spec)
     check_folders(options.out)
     refuse_overwriting([options.mesh, sensor_path(options.sensor), *spec.paths], {"--out": options.out})
     mesh, repairs = read_object(options, options.mesh)
-    sensor, motion = softtact.load_solid_sensor(options.sensor), Motion().press(force_n=forces)
+    sensor, motion = softtact.load_sensor(options.sensor), Motion().press(force_n=forces)
     if options.control == "indentation":
         found = sensor.press(mesh, pose=pose, motion=motion, label="export-deck").frame_way_mm[:, 0, 2]
         motion = Motion().press(depth_mm=(-found).tolist())
-    body = sensor.body_with(mesh, pose, motion)
+    body = body_of(sensor, mesh, pose, motion)
     export_solid(options.out, body, {"object": motion}, dialect=options.format, title=f"{options.mesh.name} on {spec.name}")
     result = {"deck": str(options.out), "format": options.format, "nodes": len(body.mesh.points),
               "elements": {region: sum(len(nodes) for name, _, nodes in body.mesh.cells if name == region)

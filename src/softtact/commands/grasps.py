@@ -25,7 +25,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 def _grasps(options):
     from softtact.commands.cost import show_costs
-    from softtact.press.asked import cores
+    from softtact.press.task import cores
     from softtact.progress import announce
     from softtact.studies.cost import cost_lines, origin_of, read_costs
     from softtact.studies.registry import KINDS, OpenStudy

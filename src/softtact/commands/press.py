@@ -1,16 +1,17 @@
-"""`softtact press`: a mesh on the sensor, its maps and a summary."""
+"""`softtact press`: a mesh on a sensor of any kind, its maps or solids, and a summary."""
 
 import argparse
 import sys
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import softtact
-from softtact.commands import press_soft, press_solid
 from softtact.commands.common import (
     add_command,
     add_mesh,
     add_repair,
+    any_sensor_spec,
     check_folders,
     check_forces,
     check_names,
@@ -19,11 +20,15 @@ from softtact.commands.common import (
     pose_of,
     read_object,
     sensor_path,
-    sensor_spec,
     show,
 )
-from softtact.commands.press_each import LAYERED, Files, is_several, press_each
+from softtact.commands.press_each import ON_LAYERS, ON_SOLIDS, Files, is_several, press_each
 from softtact.errors import ConvergenceError, InputError
+
+if TYPE_CHECKING:
+    import trimesh
+
+    from softtact.press.objects import SoftObject
 
 EXAMPLES = """
   softtact press part.stl --unit mm --force 20
@@ -37,6 +42,7 @@ EXAMPLES = """
   softtact press ball.stl --unit mm --force 5 --sensor dome.yaml --out press.nc     # a sensor of kind solid
 """
 MODELS = ("auto", "elastic", "foundation", "hyperelastic", "solid")
+_HELD = 0.3     # default share of a soft object's height that is held
 
 
 def add(commands: argparse._SubParsersAction) -> None:
@@ -47,7 +53,8 @@ def add(commands: argparse._SubParsersAction) -> None:
     how = command.add_mutually_exclusive_group(required=True)
     how.add_argument("--force", type=float, action="append", metavar="N", help="force in N; repeat it for several load steps")
     how.add_argument("--motion", metavar="STEPS",
-                     help='steps between semicolons: ways in mm ("z -1.0" is down), "fz -20" a force in N, "x 1.0 in 10" ten steps')
+                     help='steps between semicolons: x, y, z in mm ("z -1.0" is down), rx, ry, rz in degrees, "fz -20" a force in '
+                          'N, "x 1.0 in 10" ten steps')
     command.add_argument("--model", choices=MODELS, default="auto",
                          help="a model by its name; auto (default) lets the policy choose")
     command.add_argument("--policy", choices=("error", "paper"), default="error",
@@ -62,7 +69,7 @@ def add(commands: argparse._SubParsersAction) -> None:
                          help="where the hyperelastic model sums up elements: cpu (default), cuda, or auto (a GPU if there is one)")
     command.add_argument("--card", action="append", metavar="LAYER=CARD.json",
                          help="a card of `softtact fit` for the dielectric or the cover, in place of the printed constants")
-    press_soft.add_options(command)
+    _add_soft(command)
     command.add_argument("--time-limit", type=float, metavar="S",
                          help="end after so many seconds; the load steps that were reached are written and shown")
     command.add_argument("--out", type=Path, metavar="FILE.nc",
@@ -76,31 +83,39 @@ def add(commands: argparse._SubParsersAction) -> None:
                          help="let the taxels' colours in --plot end at the readout's largest count, not at the data's")
 
 
+def _add_soft(command):
+    """The options of a soft object: its law, the size of its elements, and what holds it."""
+    soft = command.add_argument_group("soft objects")
+    soft.add_argument("--object-law", type=Path, metavar="CARD.json",
+                      help="card of `softtact fit` of the object, which then bends as the sensor does (model solid)")
+    soft.add_argument("--object-size", type=float, metavar="MM", help="length of the object's elements in mm")
+    soft.add_argument("--object-held", type=float, default=_HELD, metavar="SHARE",
+                      help=f"share of the object's height, from the top, that a rigid holder carries (default: {_HELD:g})")
+
+
 def _press(options):
     from softtact.files import refuse_overwriting
 
-    solid = press_solid.is_solid(options.sensor)
-    (press_solid.refuse_idle if solid else _refuse_idle)(options)
-    press_soft.check(options, solid=solid)
+    spec, pose = any_sensor_spec(options.sensor), pose_of(options)
+    _refuse_idle(options, spec)
+    _check_soft(options, spec)
     if options.time_limit is not None and not options.time_limit > 0:
         raise InputError(f"--time-limit {options.time_limit:g}: a press needs some time; give seconds above 0.")
-    spec, pose = press_solid.spec_of(options.sensor) if solid else sensor_spec(options.sensor), pose_of(options)
     how = _how(options, spec)
     several = is_several(options.mesh)
     if not several:
         check_folders(options.out, options.vtu, options.plot)
     cards = [path for _, path in pairs("--card", options.card)] + ([options.object_law] if options.object_law else [])
-    cards += spec.paths if solid else []
-    refuse_overwriting([*options.mesh, sensor_path(options.sensor), *cards],
+    refuse_overwriting([*options.mesh, sensor_path(options.sensor), *cards, *spec.paths],
                        {"--out": options.out, "--vtu": options.vtu, "--plot": options.plot})
     check_names({options.vtu: (".vtu",), options.plot: (".png", ".svg")})
     if not several:
         check_names({options.out: (".nc",)})
-    press = partial(press_solid.press_one if solid else _press_one, options=options, spec=spec, pose=pose, how=how, sensors={})
+    press = partial(_press_one, options=options, spec=spec, pose=pose, how=how, sensors=[])
     if several:
-        return press_each(options, press, press_solid.COLUMNS if solid else LAYERED)
+        return press_each(options, press, ON_LAYERS if spec.has_layers else ON_SOLIDS)
     summary, error = press(options.mesh[0], Files(options.out, options.vtu, options.plot))
-    show(summary, as_json=options.json, lines=press_solid.lines(summary) if solid else _press_lines(summary))
+    show(summary, as_json=options.json, lines=_lines_on_layers(summary) if spec.has_layers else _lines_on_solids(summary))
     if error:
         raise error
 
@@ -115,16 +130,19 @@ def _press_one(path, files, label="press", *, options, spec, pose, how, sensors)
     from softtact.geometry.meshes import check_over_sensor, place
 
     mesh, repairs = read_object(options, path)
-    check_over_sensor(place(mesh, pose=pose), spec.footprint_mm, name=str(path))
+    if spec.has_layers:
+        check_over_sensor(place(mesh, pose=pose), spec.footprint_mm, name=str(path))
     if not sensors:
-        sensors["own"] = replace(softtact.load_sensor(options.sensor, materials=_cards(options)), **_quality(options),
-                                 device=options.device)
-    sensor = replace(sensors["own"], attributes={"mesh_repairs": "; ".join(repairs), **origin(options, path)})
-    on_step = None if files.out is None else lambda result: result.write(files.out)
-    pressed, own = press_soft.arguments(options, mesh, keep_body=files.vtu is not None)
+        sensors.append(replace(softtact.load_sensor(options.sensor, materials=_cards(options, spec), device=options.device),
+                               **_quality(options)))
+    sensor = replace(sensors[0], attributes={"mesh_repairs": "; ".join(repairs), **origin(options, path)})
+    pressed = mesh if options.object_law is None else _soft_object(options, mesh)
+    error = None
     try:
-        result, error = sensor.press(pressed, pose=pose, **how, model=options.model, policy=options.policy, label=label,
-                                     tolerance_mm=options.tolerance, on_step=on_step, time_limit_s=options.time_limit, **own), None
+        result = sensor.press(pressed, pose=pose, **how, model=options.model, policy=options.policy, label=label,
+                              tolerance_mm=options.tolerance, time_limit_s=options.time_limit, keep_body=files.vtu is not None,
+                              keep_object=options.object_law is None,
+                              on_step=None if files.out is None else lambda result: result.write(files.out))
     except (ConvergenceError, KeyboardInterrupt) as stop:
         if getattr(stop, "result", None) is None:
             raise
@@ -133,22 +151,62 @@ def _press_one(path, files, label="press", *, options, spec, pose, how, sensors)
 
 
 # Options that have an effect on the hyperelastic model alone, on the laws that the elastic model has none of, or on the choice.
-_IDLE = {"card": ("elastic",), "mesh_quality": ("elastic", "foundation"), "device": ("elastic", "foundation"),
+_IDLE = {"card": ("elastic",), "mesh_quality": ("elastic", "foundation", "solid"), "device": ("elastic", "foundation"),
          "policy": MODELS[1:], "tolerance": MODELS[1:]}
 _DEFAULTS = {"card": None, "mesh_quality": "default", "device": "cpu", "policy": "error", "tolerance": 0.01}
+_REMEDIES = {"mesh_quality": "give a finer mesh to the sensor's file"}     # of what has no effect on sensors without layers
 
 
-def _refuse_idle(options):
-    """Refuse an option that would change nothing: in the model that is asked for by its name, or for want of another option."""
+def _refuse_idle(options, spec):
+    """Refuse an option that would change nothing: on the sensor, in the model that is asked for, or for want of another option."""
+    if not spec.has_layers:
+        if options.model not in ("auto", "solid"):
+            raise InputError(f"--model {options.model}: the solid model alone presses {options.sensor}, a sensor of kind "
+                             f"{spec.kind}; leave it out.")
+        for name in ("policy", "tolerance", "mesh_quality"):
+            if getattr(options, name) != _DEFAULTS[name]:
+                raise InputError(f"{_given(options, name)}: it has no effect on a sensor of kind {spec.kind}; "
+                                 f"{_REMEDIES.get(name, 'leave it out')}.")
     for name, models in _IDLE.items():
-        if options.model in models and getattr(options, name) != _DEFAULTS[name]:
-            given = " ".join(options.card) if name == "card" else getattr(options, name)
-            raise InputError(f"--{name.replace('_', '-')} {given}: it has no effect on the {options.model} model; "
+        if spec.has_layers and options.model in models and getattr(options, name) != _DEFAULTS[name]:
+            raise InputError(f"{_given(options, name)}: it has no effect on the {options.model} model; "
                              "leave it out, or choose another model.")
     if options.policy == "paper" and options.tolerance != _DEFAULTS["tolerance"]:
         raise InputError(f"--tolerance {options.tolerance:g}: it has no effect on the policy paper; leave one of the two out.")
-    if options.full_scale and not options.plot:
-        raise InputError("--full-scale: it has no effect without --plot; give --plot FILE.png, or leave it out.")
+    if options.full_scale and not (options.plot and spec.has_layers):
+        raise InputError("--full-scale: it has no effect without --plot; give --plot FILE.png, or leave it out." if spec.has_layers
+                         else "--full-scale: it has no effect on a sensor without taxels; leave it out.")
+
+
+def _given(options, name):
+    """An option as it was written."""
+    value = " ".join(options.card) if name == "card" else getattr(options, name)
+    return f"--{name.replace('_', '-')} {value}"
+
+
+def _check_soft(options, spec):
+    """Refuse options of a soft object that lack each other, or that the solid model does not know."""
+    if options.object_law is None:
+        if options.object_size is not None or options.object_held != _HELD:
+            raise InputError("--object-size and --object-held have no effect on a rigid object; add --object-law CARD.json.")
+        return
+    if options.object_size is None:
+        raise InputError(f"--object-law {options.object_law}: give --object-size MM, the length of the object's elements.")
+    if options.model not in ("auto", "solid"):
+        raise InputError(f"--model {options.model}: a soft object is pressed by the solid model alone; leave it out.")
+    for name in ("mesh_quality", "policy", *(["device"] if spec.has_layers else [])):
+        if getattr(options, name) != _DEFAULTS[name]:
+            raise InputError(f"{_given(options, name)}: it has no effect on a soft object; leave it out.")
+
+
+def _soft_object(options, mesh: "trimesh.Trimesh") -> "SoftObject":
+    """The `SoftObject` of a mesh (mm) with the law, size and held share of the command line."""
+    from softtact.fem.body_mesh import mesh_body
+    from softtact.materials.cards import law_from_card, load_card
+    from softtact.press.objects import SoftObject
+
+    body = mesh_body(mesh, size_mm=options.object_size)
+    return SoftObject(body, law_from_card(load_card(options.object_law)), held_share=options.object_held)
 
 
 def _how(options, spec):
@@ -186,37 +244,52 @@ def _written(result, files, options):
     if options.card and result.model == "elastic":
         print(f"softtact press: WARNING: --card {' '.join(options.card)} has no effect on the elastic model, which was chosen; "
               "name another model to use it.", file=sys.stderr)
-    return _press_summary(result) | {"written": [str(path) for path in (files.out, files.vtu, files.plot) if path]}
+    summary = _summary_on_layers(result) if result.deformation_map_mm is not None else _summary_on_solids(result)
+    others = {name: _or_none(reading.values) for name, reading in result.readings.items() if name not in ("taxels", "points")}
+    facts = {"repairs": [repair for repair in result.attributes["mesh_repairs"].split("; ") if repair], "readings": others}
+    return summary | facts | {"written": [str(path) for path in (files.out, files.vtu, files.plot) if path]}
 
 
-def _cards(options):
-    """{layer: Law} of the cards given on the command line."""
+def _cards(options, spec):
+    """{layer or region: Law} of the cards given on the command line."""
     from softtact.materials.cards import law_from_card, load_card
 
     laws = {}
     for layer, path in pairs("--card", options.card):
-        if layer not in ("dielectric", "cover"):
+        if spec.has_layers and layer not in ("dielectric", "cover"):
             raise InputError(f"--card {layer}={path}: the layer is {layer!r}; give dielectric or cover.")
         laws[layer] = law_from_card(load_card(path))
     return laws
 
 
-def _press_summary(result):
-    """What a press gave at each force, as plain JSON values."""
+def _summary_on_layers(result):
+    """What a press gave at each load step, as plain JSON values."""
     load_steps = {"normal_force_n": result.normal_force_n, "force_n": result.force_n, "indentation_mm": result.indentation_mm,
               "contact_area_mm2": result.contact_area_mm2,
-              "largest_deformation_mm": result.deformation_map_mm.max(axis=(1, 2)),
-              "tactile_map": result.tactile_map}
+              "largest_deformation_mm": result.deformation_map_mm.max(axis=(1, 2))}
+    load_steps |= {"tactile_map": result.tactile_map} if "taxels" in result.readings else {}
     names = ("penetration_mm", "frustum_compression_mm", "residual_n", "extrapolated_volume_fraction", "expected_error_mm",
              "within_validity",
              "iterations", "wall_time_s")
     load_steps |= {name: getattr(result, name) for name in names}
     load_steps |= {"torque_nmm": result.torque_nmm}
     facts = {name: getattr(result, name) for name in ("model", "solver", "selection_reason")}
-    facts["repairs"] = [repair for repair in result.attributes["mesh_repairs"].split("; ") if repair]
     facts["expected_error_interval"] = ([result.attributes[f"expected_error_times_{end}"] for end in ("low", "high")]
                                         if "expected_error_times_low" in result.attributes else None)
     return facts | {name: _or_none(values) for name, values in load_steps.items()}
+
+
+def _summary_on_solids(result):
+    """What a press on a sensor of kind solid gave at each load step, as plain JSON values."""
+    import numpy as np
+
+    values = {"load": result.load("object"), "way_mm": result.frame_way_mm[:, result.frames.index("object")],
+              "largest_displacement_mm": np.nanmax(np.linalg.norm(result.displacement_mm, axis=2), axis=1),
+              "largest_pressure_mpa": np.nanmax(result.contact_pressure_mpa, axis=(1, 2))}
+    names = ("volume_ratio_range", "stretch_range", "extrapolated_volume_fraction", "penetration_mm", "residual_n", "iterations",
+             "increments", "reading_points_mm", "reading_displacement_mm", "reading_pressure_mpa", "wall_time_s")
+    return {"model": result.model} | {name: _or_none(value) for name, value in
+                                      (values | {name: getattr(result, name) for name in names}).items()}
 
 
 def _or_none(values):
@@ -226,14 +299,15 @@ def _or_none(values):
     return [None if value != value else value for value in values.tolist()]
 
 
-def _press_lines(summary):
+def _lines_on_layers(summary):
     yield f"model: {summary['model']}, linear solver: {summary['solver']}"
     if summary["selection_reason"]:
         yield f"chosen because: {summary['selection_reason']}"
     yield f"{'force, N':>10}{'indentation, mm':>18}{'contact, mm2':>15}{'deepest, mm':>14}{'counts, sum':>14}"
-    names = ("normal_force_n", "indentation_mm", "contact_area_mm2", "largest_deformation_mm", "tactile_map")
-    for force, depth, area, deepest, counts in zip(*(summary[name] for name in names), strict=True):
-        yield f"{force:10.4g}{depth:18.4f}{area:15.1f}{deepest:14.4f}{sum(map(sum, counts)):14.0f}"
+    names = ("normal_force_n", "indentation_mm", "contact_area_mm2", "largest_deformation_mm")
+    counts = [f"{sum(map(sum, one)):14.0f}" for one in summary.get("tactile_map", [])] or ["-".rjust(14)] * len(summary["force_n"])
+    for force, depth, area, deepest, total in zip(*(summary[name] for name in names), counts, strict=True):
+        yield f"{force:10.4g}{depth:18.4f}{area:15.1f}{deepest:14.4f}{total}"
     yield from _quality_lines(summary)
 
 
@@ -260,4 +334,23 @@ def _quality_lines(summary):
         yield f"beyond what the model is valid for: {forces} N"
     if None not in summary["extrapolated_volume_fraction"]:
         yield f"strained beyond the data behind its law: {max(summary['extrapolated_volume_fraction']):.1%} of a layer"
+    yield from (f"written: {path}" for path in summary["written"])
+
+
+def _lines_on_solids(summary):
+    yield f"{'force x, y, z, N':>33}{'displacement x, y, z, mm':>33}{'most moved, mm':>16}{'pressure, MPa':>15}"
+    names = ("load", "way_mm", "largest_displacement_mm", "largest_pressure_mpa")
+    for load, way, moved, pressure in zip(*(summary[name] for name in names), strict=True):
+        yield "".join(f"{value:11.3g}" for value in (*load[:3], *way)) + f"{moved:16.4f}{pressure:15.4g}"
+    if summary["reading_points_mm"]:
+        yield "readings at the last step:"
+        yield f"{'point x, y, z, mm':>33}{'displacement x, y, z, mm':>33}{'pressure, MPa':>15}"
+        read = (summary[f"reading_{name}"][-1] for name in ("displacement_mm", "pressure_mpa"))
+        for point, moved, pressure in zip(summary["reading_points_mm"], *read, strict=True):
+            shown = "-" if pressure is None else f"{pressure:.4g}"
+            yield "".join(f"{value:11.3g}" for value in (*point, *moved)) + f"{shown:>15}"
+    yield f"iterations: {sum(summary['iterations'])}; deepest overlap in a contact: {1e3 * max(summary['penetration_mm']):.2g} um"
+    yield f"largest unbalanced force: {max(summary['residual_n']):.2g} N"
+    if None not in summary["extrapolated_volume_fraction"]:
+        yield f"strained beyond the data behind its law: {max(summary['extrapolated_volume_fraction']):.1%} of a region"
     yield from (f"written: {path}" for path in summary["written"])

@@ -32,11 +32,23 @@ def last(key: str) -> Callable[[dict[str, Any]], float]:
     return lambda summary: float(summary[key][-1])
 
 
-LAYERED = (Column("force_n", "force, N", "9.4g", last("normal_force_n")),
-           Column("indentation_mm", "indentation, mm", "17.4f", last("indentation_mm")),
-           Column("contact_area_mm2", "contact, mm2", "14.1f", last("contact_area_mm2")),
-           Column("largest_deformation_mm", "deepest, mm", "13.4f", last("largest_deformation_mm")),
-           Column("counts", "counts, sum", "13.0f", lambda summary: float(sum(map(sum, summary["tactile_map"][-1])))))
+def _counts(summary):
+    """Sum of the taxels' counts at the last load step; nan where there are none."""
+    return float(sum(map(sum, summary["tactile_map"][-1]))) if "tactile_map" in summary else float("nan")
+
+
+def _force(axis, place):
+    return Column(f"force_{axis}_n", f"force {axis}, N", "12.4g", lambda summary: float(summary["load"][-1][place]))
+
+
+ON_LAYERS = (Column("force_n", "force, N", "9.4g", last("normal_force_n")),
+             Column("indentation_mm", "indentation, mm", "17.4f", last("indentation_mm")),
+             Column("contact_area_mm2", "contact, mm2", "14.1f", last("contact_area_mm2")),
+             Column("largest_deformation_mm", "deepest, mm", "13.4f", last("largest_deformation_mm")),
+             Column("counts", "counts, sum", "13.0f", _counts))
+ON_SOLIDS = (*(_force(axis, place) for place, axis in enumerate("xyz")),
+             Column("largest_displacement_mm", "most moved, mm", "16.4f", last("largest_displacement_mm")),
+             Column("largest_pressure_mpa", "pressure, MPa", "15.4g", last("largest_pressure_mpa")))
 
 
 @dataclass(frozen=True)
@@ -54,10 +66,10 @@ def is_several(meshes: Sequence[Path]) -> bool:
 
 
 def press_each(options: argparse.Namespace, press: Callable[..., tuple[dict[str, Any], BaseException | None]],
-               columns: Sequence[Column] = LAYERED) -> None:
+               columns: Sequence[Column] = ON_LAYERS) -> None:
     """Press each object with press(path, files, label), which gives a summary and the error that ended it early or None.
 
-    columns: what the table of all objects tells beside their names, status and model
+    columns: what the table of all objects shows beside their names, status and model
     Raises the kind of error that the first failed one had, after all are done and the table is shown.
     """
     objects, rows, folder = _named(options.mesh), [], _folder(options)
@@ -139,7 +151,7 @@ def _tell(rows, folder, options, columns):
     show({"objects": table, "written": str(folder)}, as_json=options.json, lines=_lines(table, folder, columns))
 
 
-def _lines(table, folder, columns=LAYERED):
+def _lines(table, folder, columns=ON_LAYERS):
     width = max(len("object"), *(len(row["object"]) for row in table)) + 2
     titles = "".join(f"{column.title:>{column.style.partition('.')[0]}}" for column in columns)
     yield f"{'object':{width}}{'status':15}{'model':14}{titles}"

@@ -23,8 +23,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     """Add the command to the parser."""
     command = add_command(commands, "view", _view, "Show a pressed sensor from all sides, or play a recording.", EXAMPLES)
     command.add_argument("result", metavar="RESULT", type=Path,
-                         help="the .nc or .vtu file of softtact press, or of a press of solids (.npz, too), or the .csv of a "
-                              "recording of a TSF-85")
+                         help="the .nc or .vtu file of softtact press, or the .csv of a recording of a TSF-85")
     command.add_argument("--save", type=Path, metavar="FILE.png",
                          help="draw a picture, and open nothing; of a recording a strip of pictures, or .gif or .mp4")
     command.add_argument("--force-log", type=Path, metavar="FILE.csv",
@@ -36,8 +35,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 def _view(options):
     from softtact.files import refuse_overwriting
-    from softtact.reporting.press_view import save_picture, write_page
-    from softtact.reporting.solid_view import read_view
+    from softtact.reporting.press_view import read_view, save_picture, write_page
 
     check_folders(options.save, options.page)
     refuse_overwriting([options.result, options.force_log], {"--save": options.save, "--page": options.page})
@@ -80,12 +78,12 @@ def _view_recording(options):
         raise InputError(f"{options.result}: it holds the nodes of a simulation and no counts; give the file of its readings.")
     if options.force_log:
         recording = with_force(recording, options.force_log)
-    said = findings(recording)
-    for sentence in said:
+    found = findings(recording)
+    for sentence in found:
         print(f"softtact view: {sentence}", file=sys.stderr)
     (save_strip if picture.suffix.lower() == ".png" else save_video)(recording, picture)
     result = {"picture": str(picture), "readings": len(recording.time), "seconds": float(recording.time[-1] - recording.time[0]),
-              "largest_counts": float(recording.counts.max()), "findings": said}
+              "largest_counts": float(recording.counts.max()), "findings": found}
     show(result, as_json=options.json, lines=[
         f"{result['readings']} readings in {result['seconds']:.3g} s, up to {result['largest_counts']:g} counts",
         f"written: {picture}"])

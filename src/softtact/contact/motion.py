@@ -2,6 +2,7 @@
 
     Motion().press(force_n=[5, 20])                        # straight down by force, two steps
     Motion().press(depth_mm=1.0).slide(x_mm=1.0, steps=10) # down by depth, then aside, ten steps
+    Motion().press(force_n=10).turn(z_deg=15, steps=3)     # down by force, which stays, then about the vertical axis
     Motion.parse("z -1.0; x 1.0 in 10")                    # the same in one line
 
 Freedoms: x, y, z in mm and rx, ry, rz in degrees of the object in the sensor's frame (z out of the surface, so down is negative).
@@ -58,11 +59,19 @@ class Motion:
                                          for before, after in zip(reached, reached[1:], strict=False)))
 
     def slide(self, *, x_mm: float = 0.0, y_mm: float = 0.0, steps: int = 1) -> "Motion":
-        """Move the object aside by a way (mm) in equal steps; its depth, or its force, stays as it is."""
+        """Move the object aside (mm) in equal steps; its depth, or its force, stays as it is."""
+        return self._in_steps("slide", {"x": _finite("x_mm", x_mm), "y": _finite("y_mm", y_mm)}, steps)
+
+    def turn(self, *, x_deg: float = 0.0, y_deg: float = 0.0, z_deg: float = 0.0, steps: int = 1) -> "Motion":
+        """Turn the object about the axes through its reference point by angles (degrees) in equal steps; the rest stays as it
+        is."""
+        return self._in_steps("turn", {"rx": _finite("x_deg", x_deg), "ry": _finite("y_deg", y_deg),
+                                       "rz": _finite("z_deg", z_deg)}, steps)
+
+    def _in_steps(self, name: str, ways: dict[str, float], steps: int) -> "Motion":
         if steps < 1:
-            raise InputError(f"Motion.slide: steps={steps} is not possible; give 1 or more.")
-        ways = {"x": _finite("x_mm", x_mm) / steps, "y": _finite("y_mm", y_mm) / steps}
-        return Motion(self.steps + steps * (MotionStep(ways={name: way for name, way in ways.items() if way}),))
+            raise InputError(f"Motion.{name}: steps={steps} is not possible; give 1 or more.")
+        return Motion(self.steps + steps * (MotionStep({freedom: way / steps for freedom, way in ways.items() if way}),))
 
     def step(self, *, ways: dict[str, float] | None = None, loads: dict[str, float] | None = None) -> "Motion":
         """One step of any freedoms: ways (mm, degrees) from where it begins, loads (N, N mm) at its end."""
@@ -96,6 +105,16 @@ class Motion:
     def straight(self) -> bool:
         """Whether the object only goes up and down."""
         return not any(step.ways.keys() - {"z"} or step.loads.keys() - {"z"} for step in self.steps)
+
+    @property
+    def turns(self) -> bool:
+        """Whether the object turns, or carries a torque."""
+        return any({*step.ways, *step.loads} & set(FREEDOMS[3:]) for step in self.steps)
+
+    @property
+    def loaded_aside(self) -> bool:
+        """Whether the object is loaded along x or y."""
+        return any({*step.loads} & {"x", "y"} for step in self.steps)
 
     @property
     def aside_mm(self) -> np.ndarray:

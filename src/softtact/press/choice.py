@@ -11,6 +11,7 @@ Errors are root mean squares over the map, in mm, against the hyperelastic model
 
 import time
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -20,15 +21,19 @@ from trimesh import Trimesh
 from softtact.errors import ConvergenceError, InputError, ShellWarning, TimeLimitError
 from softtact.geometry.complexity import OVERLAP_THRESHOLD, TOTAL_THRESHOLD, choose_model, score
 from softtact.press.cache import in_words
-from softtact.press.making import Course
-from softtact.press.models import PRESSES
+from softtact.press.fast import press_elastic, press_on_foundation
+from softtact.press.hyperelastic import press_hyperelastic
+from softtact.press.reached import Reached
 from softtact.press.result import PressResult
+from softtact.press.task import Course
 
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
 
 POLICIES = ("error", "paper")
-TOLERANCE_MM = 0.01
+# The models that press straight down by force: from a placed object and forces to a `PressResult`.
+PRESSES: dict[str, Callable[["Sensor", Trimesh, np.ndarray, Course], PressResult]] = {
+    "elastic": press_elastic, "foundation": press_on_foundation, "hyperelastic": press_hyperelastic}
 # The numbers below come from random contacts on this sensor (benchmarks/expected_error.py, benchmarks/results/expected_error.json).
 CALIBRATED_ON = "coro"
 ELASTIC_RELATIVE = 0.45     # of its map's root mean square: the elastic model's error where no foundation model is beside it
@@ -195,7 +200,7 @@ def _fast_presses(sensor, placed, forces, course):
         try:
             with warnings.catch_warnings():      # the model that is taken tells of the shell once
                 warnings.simplefilter("ignore", ShellWarning)
-                pressed[name] = PRESSES[name](sensor, placed, forces, replace(course, on_step=None))
+                pressed[name] = PRESSES[name](sensor, placed, forces, replace(course, reached=Reached()))
         except TimeLimitError:
             raise
         except ConvergenceError as error:

@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,11 +15,12 @@ from softtact.contact.underside import Underside
 from softtact.contact.unilateral import LEAST_REACH_MM, REACH, RISE
 from softtact.errors import ConvergenceError, InputError
 from softtact.models.elastic.compliance import LayerPress, press_layer, rest_on_shell
+from softtact.models.elastic.sliding import ElasticMotion, SlidingState, check_motion, move_on_layer
 from softtact.models.foundation.solve import FoundationMaps, lifted, press_foundation
-from softtact.press.elastic_motion import press_motion
-from softtact.press.making import Course, make_result, shell_of, timed, warn_of_shell
+from softtact.press.cache import cached_surface_compliance
+from softtact.press.making import make_result, shell_of, valid_elastic, valid_foundation, warn_of_shell
 from softtact.press.result import PressResult
-from softtact.press.validity import valid_elastic, valid_foundation
+from softtact.press.task import Course
 from softtact.progress import Watch
 
 if TYPE_CHECKING:
@@ -116,22 +118,23 @@ def _on_foundation(sensor: "Sensor", surface: HeightField, forces: np.ndarray, c
     compliance = sensor.prepared("foundation")
     underside, touch, stop = Underside(surface, compliance.grid), first_touch_mm(sensor, surface), shell_stop_mm(sensor, surface)
     load_steps: list[Any] = []
-    times: list[float] = []
     watch = Watch(limit_s=course.time_limit_s)
 
     def record(load_step):
         watch.beat(f"{load_step.force_n:.4g} N")
         load_steps.append(load_step)
 
+    def so_far(points):
+        return _of_load_steps(sensor, compliance, points, load_steps, forces, course.reached.times, touch)
+
     def solve(points):
         load_steps.clear()
-        times.clear()
-        timed(map(record, _steps_on_pad(compliance, points, forces, stop, touch)), len(forces), course, times,
-              lambda: _of_load_steps(sensor, compliance, points, load_steps, forces, times, touch), start=start)
+        course.reached.follow(map(record, _steps_on_pad(compliance, points, forces, stop, touch)), len(forces),
+                              partial(so_far, points), label=course.label, start=start)
 
     points, _ = _within_reach(underside, underside.points, compliance.foundation_modulus, forces, sensor.spec.thickness_mm, solve,
                               lambda _: load_steps[-1].depth)
-    return _of_load_steps(sensor, compliance, points, load_steps, forces, times, touch)
+    return so_far(points)
 
 
 def _set_down(sensor: "Sensor", surface: HeightField) -> HeightField:
@@ -206,18 +209,43 @@ _OF_MOTION = ("displacement_mm", "force_n", "torque_nmm", "slip", "iterations", 
 
 
 def press_elastic_motion(sensor: "Sensor", placed: Trimesh, motion: Motion, course: Course) -> PressResult:
-    """Step by step with the elastic model, which has no body to keep; a ConvergenceError holds the steps before."""
+    """Step by step with the elastic model, which has no body to keep."""
     if not sensor.spec.base_held:
         raise InputError(f"{sensor.spec.name} has support 'none', which the elastic model presses straight down by force only; use "
                          "the hyperelastic model for this motion.")
     seconds: list[float] = []
     try:
-        moved = press_motion(sensor, placed, motion, seconds, label=course.label, threads=course.threads,
+        moved = move_elastic(sensor, placed, motion, seconds, label=course.label, threads=course.threads,
                              limit_s=course.time_limit_s)
     except ConvergenceError as error:
-        error.result = error.result and _of_motion(sensor, error.result, seconds)
+        if isinstance(before := error.result, ElasticMotion):
+            course.reached.keep(seconds, lambda: _of_motion(sensor, before, seconds))
         raise
     return _of_motion(sensor, moved, seconds)
+
+
+def move_elastic(sensor: "Sensor", placed: Trimesh, motion: Motion, seconds: list[float], *, label: str = "press",
+                 threads: int = 1, limit_s: float | None = None) -> ElasticMotion:
+    """The `ElasticMotion` of a mesh placed in the sensor's frame; into `seconds` goes the time that each step took.
+
+    Raises InputError for rotations, lateral loads, and an object that misses the sensor; ConvergenceError, with the steps before as
+    its `result`, where one is not reached.
+    """
+    check_motion(motion)
+    if "elastic_surface" not in sensor.prepared_models:
+        sensor.prepared_models["elastic_surface"] = cached_surface_compliance(sensor.spec, threads=threads)
+    compliance, spec = sensor.prepared_models["elastic_surface"], sensor.spec
+    shell, surface, start = shell_of(sensor), HeightField(placed), time.perf_counter()
+    watch = Watch(label, limit_s=limit_s)
+
+    def note(state: SlidingState) -> None:
+        shell.refuse_motion(surface, state.position[:2], state.position[2] + lowest, lowest, step=len(seconds) + 1)
+        watch.beat(f"step {len(seconds) + 1} of {len(motion.steps)}, {state.position[2]:.3f} mm deep")
+        seconds.append(time.perf_counter() - start - sum(seconds))
+
+    lowest = surface.first_touch_mm(spec.map_x_mm, spec.map_y_mm)
+    return move_on_layer(compliance, surface, motion, first_touch_mm=lowest, friction=spec.friction.object,
+                         deepest_mm=spec.thickness_mm, on_step=note)
 
 
 def _of_motion(sensor, moved, seconds):

@@ -13,10 +13,11 @@ from softtact.errors import ConvergenceError, ExtrapolationWarning
 from softtact.models.hyperelastic import path
 from softtact.models.hyperelastic.build import lower_side
 from softtact.models.hyperelastic.deformed_mesh import pressed_body
-from softtact.press.making import Course, make_result, shell_of, timed
+from softtact.press.making import make_result, shell_of, valid_hyperelastic
 from softtact.press.result import PressResult
-from softtact.press.validity import valid_hyperelastic
+from softtact.press.task import Course
 from softtact.progress import Watch, announce
+from softtact.readout.registry import Samples
 
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
@@ -38,10 +39,10 @@ def press_hyperelastic(sensor: "Sensor", placed: Trimesh, forces: np.ndarray | M
     if course.label:
         announce(f"{course.label}: {sensor.spec.parts_in_words}, {count} load steps of the hyperelastic model")
     body.watch = Watch(course.label, limit_s=course.time_limit_s)
-    record = _Record(sensor, body, touch, keep_body=course.keep_body)
+    record = _Record(sensor, body, touch, course)
     load_steps = map(record.take, _allowed(_load_steps(sensor, body, surface, forces, touch), sensor, surface, forces, touch))
     try:
-        timed(load_steps, count, replace(course, label=""), record.times, record.result)
+        course.reached.follow(load_steps, count, record.result)
         return record.result()
     finally:
         body.watch.end()
@@ -83,28 +84,29 @@ def _refuse_beyond_the_board(load_step, lowest_mm, thickness_mm):
 
 
 class _Record:
-    """What a press has reached: the numbers of its load steps, the seconds that each took, and bodies where they are kept."""
+    """The numbers of a press' load steps, and bodies where they are kept."""
 
-    def __init__(self, sensor, body, touch_mm, *, keep_body):
-        self._sensor, self._body, self._touch_mm, self._keep_body = sensor, body, touch_mm, keep_body
+    def __init__(self, sensor, body, touch_mm, course):
+        self._sensor, self._body, self._touch_mm, self._course = sensor, body, touch_mm, course
         self._grid = np.stack(np.meshgrid(sensor.spec.map_x_mm, sensor.spec.map_y_mm), axis=-1).reshape(-1, 2)
         self._sampling = body.slab.sampling(self._grid)
         self._lower = None if sensor.spec.base_held else lower_side(body.slab, self._grid)
         self._steps: list[dict[str, Any]] = []
         self._bodies: list[Any] = []
-        self.times: list[float] = []
 
     def take(self, load_step):
         """Read a load step; its time is noted by who asked for it."""
         maps = self._sampling, self._lower, self._grid
         self._steps.append(_read_load_step(self._body, maps, load_step, from_mm=self._touch_mm))
-        if self._keep_body:
+        if self._course.keep_body:
             self._bodies.append(pressed_body(self._body, load_step.state))
 
     def result(self):
         """The `PressResult` of the load steps whose time is noted: an interruption may come just before it is."""
-        sensor, steps = self._sensor, self._steps[:len(self.times)]
-        numbers = {name: np.array([load_step[name] for load_step in steps]) for name in steps[0]}
+        sensor, times = self._sensor, self._course.reached.times
+        steps = self._steps[:len(times)]
+        pressure = [load_step["pressure"] for load_step in steps]
+        numbers = {name: np.array([load_step[name] for load_step in steps]) for name in steps[0] if name != "pressure"}
         forces, displacement = numbers.pop("normal_force_n"), numbers["displacement_mm"]
         numbers["displacement_mm"] = displacement.reshape(len(steps), *sensor.spec.map_shape, 3)
         numbers["slip"] = numbers["slip"].reshape(len(steps), *sensor.spec.map_shape)
@@ -114,8 +116,8 @@ class _Record:
                                    contact_error_mm=numbers.pop("contact_error_mm"), points=points, rough=numbers.pop("rough"),
                                    frustum_mm=sensor.spec.frustum_height_mm, forces_n=forces,
                                    allowed_mm=sensor.solver.largest_penetration_mm)
-        made = make_result(sensor, "hyperelastic", self._body.method, -displacement[..., 2], forces, np.array(self.times),
-                           within_validity=valid, **numbers)
+        made = make_result(sensor, "hyperelastic", self._body.method, -displacement[..., 2], forces, np.array(times),
+                           within_validity=valid, pressure=pressure, **numbers)
         return replace(made, bodies=tuple(self._bodies[:len(steps)]))
 
 
@@ -148,4 +150,11 @@ def _read_load_step(body, maps, load_step, *, from_mm):
             "points": np.count_nonzero(top.under_pressure(slab)),
             "frustum_compression_mm": body.support.largest_compression(support.displacement), "residual_n": load_step.residual_n,
             "extrapolated_volume_fraction": body.share_outside_window(load_step.state), "iterations": load_step.iterations,
-            "rough": load_step.rough}
+            "rough": load_step.rough, "pressure": _pressure(top, slab)}
+
+
+def _pressure(top, slab):
+    """Samples of the contact pressure, a mean over each face of the sensing surface."""
+    count = len(top.faces)
+    places = top.reference.reshape(count, -1, 3).mean(axis=1) * [1.0, 1.0, 0.0]
+    return Samples(places, top.area.reshape(count, -1).sum(axis=1), top.pressure_of_faces(slab))

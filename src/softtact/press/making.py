@@ -1,40 +1,30 @@
-"""How the models' presses make a `PressResult`: what all of them share."""
+"""How presses on layers make a `PressResult`: maps, readings, and which load steps can be relied on.
 
-import time
+The rules of `PressResult.within_validity`: docs/reference/command_line.md, "What is flagged".
+"""
+
 import warnings
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softtact.contact.shell import Shell
-from softtact.errors import ConvergenceError, ShellWarning
+from softtact.errors import InputError, ShellWarning
+from softtact.models.hyperelastic.newton import FULL_POCKET
 from softtact.press.result import PressResult
-from softtact.progress import progress
-from softtact.readout.calibrated import counts_of
+from softtact.readout.registry import Samples, SurfaceMotion, readings_of
 
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
     from softtact.sensors.specification import AnySpec
 
-@dataclass(frozen=True)
-class Course:
-    """How a press goes about its work, apart from what it computes."""
-
-    label: str = "press"
-    """What its progress begins with; nothing is told where it is empty."""
-    threads: int = 1
-    """Of the linear algebra."""
-    keep_body: bool = False
-    """Whether the result holds the whole body's displacements at each load step, where the model has one."""
-    time_limit_s: float | None = None
-    """Wall-clock seconds, after which a press ends with what it has reached."""
-    on_step: Callable[[PressResult], None] | None = None
-    """Called with the result so far whenever a load step is reached."""
-
-
 _HARDLY = 1e-6     # of a force: a share of the shell that is not worth a warning
+_DEEPEST_LINEAR = 0.5       # of the layer's thickness: a linear layer does not know that it ends
+_HARDLY_COMPRESSED = 0.33   # of a frustum's height; the foundation model then errs by 2 % at most (docs/explanation/fast_models.md)
+_OVERLAP_LEFT = 3.0         # times the allowed overlap, or gap under pressure: above, the augmentations have failed
+_FEWEST_POINTS = 9          # of the cover that carry the object: fewer do not resolve where a spike touches, and how deep
 
 
 def shell_of(sensor: "Sensor") -> Shell:
@@ -48,19 +38,50 @@ def make_result(sensor: "Sensor", model: str, solver: str, maps: np.ndarray, for
     """A `PressResult` of maps (l, points) or (l, ny, nx) and numbers by the result's names.
 
     lower_maps among these: of the lower side where it moves; capacitance follows the change of thickness
+    pressure among these: `Samples` of the contact pressure at each load step, where the model tells it
     """
     spec, maps = sensor.spec, maps.reshape(len(forces), *sensor.spec.map_shape)
-    lower_maps = numbers.pop("lower_maps", None)
+    lower_maps, pressure = numbers.pop("lower_maps", None), numbers.pop("pressure", None)
     thinning = maps if lower_maps is None else maps - lower_maps.reshape(maps.shape)
     flags: dict[str, Any] = {"converged": np.ones(len(forces), dtype=np.int8),
                              "within_validity": np.asarray(numbers.pop("within_validity"), dtype=np.int8)}
     arrays: dict[str, Any] = {name: np.asarray(values) for name, values in numbers.items()}
     warn_of_shell(spec, forces, arrays.get("pad_force_n", forces))
-    return PressResult(deformation_map_mm=maps, tactile_map=counts_of(spec, thinning), normal_force_n=forces, wall_time_s=times,
-                       x_mm=spec.map_x_mm, y_mm=spec.map_y_mm, model=model, sensor=spec.name, solver=solver,
+    surface = layered_surface(spec, thinning, arrays.get("displacement_mm"), pressure)
+    return PressResult(deformation_map_mm=maps, readings=readings_of(sensor.readouts, surface), normal_force_n=forces,
+                       wall_time_s=times, x_mm=spec.map_x_mm, y_mm=spec.map_y_mm, model=model, sensor=spec.name, solver=solver,
                        largest_counts=spec.largest_counts,
                        attributes={"thickness_mm": spec.thickness_mm, "edge": spec.edge.in_words, **_friction(spec, model),
                                    **_calibration(spec), **sensor.attributes}, **flags, **arrays)
+
+
+def layered_surface(spec: "AnySpec", thinning_mm: np.ndarray, displacement_mm: np.ndarray | None = None,
+                    pressure: list[Samples] | None = None) -> SurfaceMotion:
+    """What the surface of layers did, by their thinning (l, ny, nx) in mm and the displacement (l, ny, nx, 3) of the map's
+    plane."""
+    if displacement_mm is None:
+        displacement_mm = -thinning_mm[..., None] * [np.nan, np.nan, 1.0]
+    return SurfaceMotion(spec=spec, steps=len(thinning_mm), thinning_mm=thinning_mm,
+                         displacement=_of_one_face(lambda: _on_map(spec, displacement_mm)),
+                         pressure=_of_one_face(lambda: pressure))
+
+
+def _of_one_face(samples: Callable[[], Any]) -> Callable[[str | None], Any]:
+    """Samples of a surface that has no other face."""
+    def of(face: str | None) -> Any:
+        if face is not None:
+            raise InputError(f"there is no face {face!r}: a sensor of layers has its sensing surface alone; leave 'face' out.")
+        return samples()
+
+    return of
+
+
+def _on_map(spec: "AnySpec", fields: np.ndarray) -> list[Samples]:
+    """Samples of fields (l, ny, nx, 3) at the points of the map, each of its share of the area."""
+    x, y = np.meshgrid(spec.map_x_mm, spec.map_y_mm)
+    sides = [np.convolve(np.pad(np.diff(line), 1), [0.5, 0.5], mode="valid") for line in (spec.map_y_mm, spec.map_x_mm)]
+    points = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+    return [Samples(points, np.outer(*sides).ravel(), one.reshape(-1, 3)) for one in fields]
 
 
 def _calibration(spec):
@@ -85,28 +106,48 @@ def _friction(spec, model):
     return spec.support_facts
 
 
-def timed(load_steps: Iterable[Any], count: int, course: Course, times: list[float], so_far: Callable[[], PressResult], *,
-          start: float | None = None) -> None:
-    """Go through load steps; into `times` go the seconds that each took, the solver's preparation counting to the first.
+# --- which load steps can be relied on ---
 
-    so_far: makes the result of those that were reached. A ConvergenceError and an interruption of the keyboard take it with them
-    as their `result`; it is None where none was reached.
+
+def valid_elastic(depth_mm: np.ndarray, *, thickness_mm: float) -> np.ndarray:
+    """Which load steps (l,) of an elastic press hold: depth_mm (l,) is how far the object's lowest point has come down."""
+    return depth_mm < _DEEPEST_LINEAR * thickness_mm
+
+
+def valid_foundation(compression_mm: np.ndarray, depth_mm: np.ndarray, *, frustum_mm: float, thickness_mm: float,
+                     law_limit_mm: float) -> np.ndarray:
+    """Which load steps (l,) of a foundation press hold, by its most compressed frustum (l,), frustum_mm high, and by how far the
+    object's lowest point has come down (l,): the slab is linear, too, and a corner sinks into it without end.
     """
-    last = start or time.perf_counter()
-    try:
-        for _ in progress(load_steps, label=course.label, total=count):
-            now = time.perf_counter()
-            times.append(now - last)
-            last = now
-            if course.on_step and len(times) < count:
-                course.on_step(_quietly(so_far))
-    except (ConvergenceError, KeyboardInterrupt) as error:
-        error.result = so_far() if times else None     # type: ignore[union-attr]
-        raise
+    return (compression_mm < min(law_limit_mm, _HARDLY_COMPRESSED * frustum_mm)) & (depth_mm < _DEEPEST_LINEAR * thickness_mm)
 
 
-def _quietly(make):
-    """A result whose warnings are left to the last one."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        return make()
+def valid_hyperelastic(*, compression_mm: np.ndarray, contact_error_mm: np.ndarray, points: np.ndarray, depth_mm: np.ndarray,
+                       rough: np.ndarray, forces_n: np.ndarray, frustum_mm: float, allowed_mm: float) -> np.ndarray:
+    """Which load steps (l,) of a hyperelastic press hold, by its most compressed frustum, contacts, balance and growth of depth.
+
+    contact_error_mm (l,): deepest overlap, or widest gap under pressure, of which `allowed_mm` were asked for
+    points (l,): of the cover that carry the object;  compression_mm, frustum_mm: nan without frusta, where nothing asks for them
+    rough (l,): whether more than the tolerance is left unbalanced;  forces_n (l,): where they do not grow, depths need not either
+    """
+    return (~rough & ~(compression_mm >= FULL_POCKET * frustum_mm) & (contact_error_mm < _OVERLAP_LEFT * allowed_mm)
+            & (points >= _FEWEST_POINTS) & ((np.diff(forces_n) <= 0).any() | _grows(depth_mm, slack_mm=allowed_mm)))
+
+
+def _grows(depth, *, slack_mm):
+    """Which of the depths (l,) are not above a later one, nor below an earlier one: of two such one is another equilibrium."""
+    deepest_before, least_after = np.maximum.accumulate(depth), np.minimum.accumulate(depth[::-1])[::-1]
+    return (depth >= deepest_before - slack_mm) & (depth <= least_after + slack_mm)
+
+
+def flag_buried(result: PressResult, top_mm: float) -> PressResult:
+    """The result with the load steps flagged at which the object's top has sunk below the surface at rest: no model feels that
+    side.
+    """
+    above = result.indentation_mm < top_mm
+    return replace(result, within_validity=result.within_validity & above.astype(np.int8))
+
+
+def flag_overloaded(result: PressResult, largest_n: float) -> PressResult:
+    """The result with the steps flagged at which a press by depth needs more force than the sensor bears."""
+    return replace(result, within_validity=result.within_validity & (result.normal_force_n <= largest_n).astype(np.int8))

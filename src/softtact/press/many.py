@@ -2,8 +2,9 @@
 
 import multiprocessing
 import time
+from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import repeat
 from typing import TYPE_CHECKING, Any
@@ -20,27 +21,64 @@ from softtact.geometry.meshes import check_over_sensor, place
 from softtact.geometry.pose import Pose
 from softtact.press.choice import models_to_prepare, with_expected_error
 from softtact.press.fast import elastic_result, first_touch_mm, shell_stop_mm
+from softtact.press.making import flag_buried
 from softtact.press.result import PressResult
-from softtact.press.validity import flag_buried
+from softtact.press.task import cores
 from softtact.progress import progress
 
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor
 
-_PREPARED: dict[str, tuple[str, ...]] = {"elastic": ("elastic",), "foundation": ("foundation",), "hyperelastic": ()}
+_PREPARED: dict[str, tuple[str, ...]] = {"elastic": ("elastic",), "foundation": ("foundation",)}
 
 
-def press_many(sensor: "Sensor", meshes: list[trimesh.Trimesh], poses: list[Pose | None], force_n: np.ndarray, *, model: str,
-               workers: int, device: str, label: str, options: dict[str, Any]) -> list[Any]:
-    """See `Sensor.press_many`."""
-    jobs = list(zip(meshes, poses, strict=True))
+@dataclass(frozen=True)
+class Batch:
+    """How many presses go about their work."""
+
+    force_n: np.ndarray
+    """(l,) in N: of each press."""
+    model: str
+    """By its name, or auto."""
+    workers: int
+    """Processes."""
+    device: str = "auto"
+    """cpu, cuda or auto."""
+    failures: str = "raise"
+    """`raise` or `keep`."""
+    label: str = "presses"
+    """What the progress begins with."""
+    options: dict[str, Any] = field(default_factory=dict)
+    """`policy` and `tolerance_mm`."""
+
+    @classmethod
+    def of(cls, force_n: np.ndarray, model: str, options: Mapping[str, Any]) -> "Batch":
+        """A batch with the options of `Sensor.press_many`."""
+        given = dict(options)
+        policy = {name: given.pop(name) for name in ("policy", "tolerance_mm") if name in given}
+        if given.get("failures", "raise") not in ("raise", "keep"):
+            raise InputError(f"failures={given['failures']!r} is unknown; write 'raise' or 'keep'.")
+        return cls(force_n, model, given.pop("workers", None) or cores(), options=policy, **given)
+
+
+def press_many(sensor: "Sensor", jobs: list[tuple[trimesh.Trimesh, Pose | None]], batch: Batch) -> list[PressResult]:
+    """Presses of (mesh, pose); see `Sensor.press_many`."""
+    results = _pressed_all(sensor, jobs, batch)
+    return raise_first(results) if batch.failures == "raise" else results
+
+
+def _pressed_all(sensor, jobs, batch):
+    model, device = batch.model, batch.device
     if jobs and on_gpu(device, model) and sensor.spec.base_held:     # the batch does not know how a free lower side moves
-        return press_batch(sensor, jobs, force_n, device="cuda" if device == "auto" else device, workers=workers, label=label)
-    names = models_to_prepare(sensor, policy=options.get("policy", "error")) if model == "auto" else _PREPARED.get(model, ())
-    for name in names:
+        return press_batch(sensor, jobs, batch.force_n, device="cuda" if device == "auto" else device, workers=batch.workers,
+                           label=batch.label)
+    prepared = _PREPARED.get(model, ())
+    if model == "auto":
+        prepared = models_to_prepare(sensor, policy=batch.options.get("policy", "error"))
+    for name in prepared:
         sensor.prepared(name)
-    act = partial(_pressed, force_n=force_n, model=model, options=options)
-    return list(progress(_each(sensor, act, jobs, workers), label=label, total=len(jobs)))
+    act = partial(_pressed, force_n=batch.force_n, model=model, options=batch.options)
+    return list(progress(_each(sensor, act, jobs, batch.workers), label=batch.label, total=len(jobs)))
 
 
 def on_gpu(device: str, model: str) -> bool:

@@ -1,4 +1,4 @@
-"""A picture of one press: deformation map and taxels at each load step."""
+"""A picture of one press: of each load step the deformation map, taxels, other readings, solids from a side, as it has them."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,38 +14,71 @@ if TYPE_CHECKING:
 
 _MOST_NUMBERS = 200      # taxels beyond which their counts are not written into the cells
 _LIGHT = 0.6             # share of the colour range from which on a number is written in black
+_HEIGHT = 2.6            # inches of a row that is no map
 
 
 def draw(result: "PressResult", *, full_scale: bool = False, figure: "Figure | None" = None) -> "Figure":
-    """A column per load step: the map in mm above, the ideal counts of the taxels below, with numbers in the cells.
+    """A column per load step, a row for each thing: the map in mm, the counts of the taxels with numbers in the cells, each other
+    reading, and of solids the nodes of their outside as they moved.
 
     full_scale: let the taxels' colours end at the readout's largest count; else at the largest one that is there
     figure: to draw into, by default a new one that no window shows
     """
     from matplotlib.figure import Figure
 
-    steps = len(result.normal_force_n)
-    half = [0.5 * (side[-1] - side[0]) for side in (result.x_mm, result.y_mm)]
-    extent = (-half[0], half[0], -half[1], half[1])
+    rows = list(_rows(result, full_scale))
     figure = figure or Figure()
-    figure.set_size_inches(1.2 + 2.3 * steps, 2.4 + 3.2 * half[1] / half[0])
+    plane = result.deformation_map_mm is not None
+    ratio = (result.y_mm[-1] - result.y_mm[0]) / (result.x_mm[-1] - result.x_mm[0]) if plane else 0.0
+    maps = sum(row in (_draw_map, _draw_taxels) for row, *_ in rows)
+    figure.set_size_inches(1.2 + 2.3 * result.steps, 2.4 + 1.6 * maps * ratio + _HEIGHT * (len(rows) - maps))
     figure.set_layout_engine("constrained")
-    axes = figure.subplots(2, steps, squeeze=False)
-    deepest = float(result.deformation_map_mm.max()) or 1.0
-    highest = result.largest_counts if full_scale else max(float(result.tactile_map.max()), 1.0)
-    for k, force in enumerate(result.normal_force_n):
-        image = axes[0, k].imshow(result.deformation_map_mm[k], origin="lower", extent=extent, vmin=0, vmax=deepest, cmap="viridis")
-        counts = axes[1, k].imshow(result.tactile_map[k], origin="lower", extent=extent, vmin=0, vmax=highest, cmap="viridis")
-        _write_counts(axes[1, k], result.tactile_map[k], half, highest)
-        axes[0, k].set_title(f"{force:.4g} N, depth {result.indentation_mm[k]:.3g} mm", fontsize=9)
-        for axis in axes[:, k]:
-            axis.set_xlabel("x (mm)")
-    for axis, name in zip(axes[:, 0], ("deformation", "taxels"), strict=True):
-        axis.set_ylabel(f"{name}: y (mm)")
-    figure.colorbar(image, ax=axes[0], label="towards the PCB (mm)")
-    figure.colorbar(counts, ax=axes[1], label="counts, ideal readout")
+    axes = figure.subplots(max(len(rows), 1), result.steps, squeeze=False)
+    for line, (row, name, label, *given) in zip(axes, rows, strict=False):
+        images = [row(result, axis, step, *given) for step, axis in enumerate(line)]
+        line[0].set_ylabel(name)
+        if images[-1] is not None:
+            figure.colorbar(images[-1], ax=line, label=label)
+    for step, force in enumerate(result.normal_force_n):
+        axes[0, step].set_title(f"{force:.4g} N, depth {result.indentation_mm[step]:.3g} mm", fontsize=9)
     figure.suptitle(f"{result.model} model, sensor {result.sensor}")
     return figure
+
+
+def _rows(result, full_scale):
+    """What draws each row, its name, what its colours mean, and what it takes beside result, axis and step."""
+    if result.deformation_map_mm is not None:
+        yield _draw_map, "deformation: y (mm)", "towards the PCB (mm)"
+    taxels = result.readings.get("taxels")
+    if taxels is not None and result.deformation_map_mm is not None and taxels.dims == ("step", "row", "column"):
+        highest = result.largest_counts if full_scale else max(float(result.tactile_map.max()), 1.0)
+        yield _draw_taxels, "taxels: y (mm)", "counts, ideal readout", highest
+    if result.solid is not None:
+        largest = float(np.linalg.norm(result.solid.displacement_mm, axis=2).max()) or 1.0
+        yield _draw_solid, "solids: z (mm)", "displacement (mm)", largest
+    for name, reading in result.readings.items():
+        if name != "taxels":
+            yield _draw_reading, name, "", reading
+
+
+def _half_sides(result):
+    half = [0.5 * (side[-1] - side[0]) for side in (result.x_mm, result.y_mm)]
+    return half, (-half[0], half[0], -half[1], half[1])
+
+
+def _draw_map(result, axis, step):
+    axis.set_xlabel("x (mm)")
+    deepest = float(result.deformation_map_mm.max()) or 1.0
+    return axis.imshow(result.deformation_map_mm[step], origin="lower", extent=_half_sides(result)[1], vmin=0, vmax=deepest,
+                       cmap="viridis")
+
+
+def _draw_taxels(result, axis, step, highest):
+    half, extent = _half_sides(result)
+    axis.set_xlabel("x (mm)")
+    image = axis.imshow(result.tactile_map[step], origin="lower", extent=extent, vmin=0, vmax=highest, cmap="viridis")
+    _write_counts(axis, result.tactile_map[step], half, highest)
+    return image
 
 
 def _write_counts(axis, counts, half, highest):
@@ -57,6 +90,34 @@ def _write_counts(axis, counts, half, highest):
     for (j, i), value in np.ndenumerate(counts):
         axis.text(x[i], y[j], f"{value:.0f}", ha="center", va="center", fontsize=6,
                   color="black" if value > _LIGHT * highest else "white")
+
+
+def _draw_solid(result, axis, step, largest):
+    """The nodes of the solids' outside from the side, far ones first."""
+    solid = result.solid
+    outside = np.unique(np.concatenate([nodes.ravel() for nodes in solid.mesh.boundary.values()]))
+    moved = solid.displacement_mm[step, outside]
+    x, y, z = (solid.mesh.points[outside] + moved).T
+    order = np.argsort(-y)
+    axis.set_aspect("equal")
+    axis.set_xlabel("x (mm)")
+    rigid = solid.object_points_mm + solid.object_displacement_mm[step]
+    axis.plot(rigid[:, 0], rigid[:, 2], ".", color="0.7", markersize=2)
+    return axis.scatter(x[order], z[order], c=np.linalg.norm(moved, axis=1)[order], s=6, vmin=0, vmax=largest, cmap="viridis")
+
+
+def _draw_reading(result, axis, step, reading):
+    """Values of a reading at a load step: an image of two or three dimensions, else lines."""
+    values = np.atleast_1d(reading.values[step])
+    if values.ndim > 1 and "quantity" not in reading.dims:
+        axis.imshow(values if values.ndim == 2 or values.shape[-1] in (3, 4) else values.mean(axis=-1), cmap="viridis")
+        return None
+    labels = reading["quantity"].values if "quantity" in reading.coords else [reading.attrs.get("units", "")]
+    for column, label in zip(values.reshape(-1, len(labels)).T, labels, strict=True):
+        axis.plot(column, "o-", markersize=3, label=label)
+    axis.set_xlabel(str(reading.dims[1]) if reading.ndim > 1 else "")
+    axis.legend(fontsize=6)
+    return None
 
 
 def save(figure: "Figure", path: str | Path) -> None:

@@ -1,5 +1,14 @@
-"""What a press gives: maps and numbers per load step, with names and units, and how they are kept in a file."""
+"""What a press gives, whatever the sensor and the model: numbers per load step, maps of the surface, fields of the bodies,
+readings.
 
+`PressResult.write` keeps it as NetCDF, `read_press` reads it back; `write_vtu` is for ParaView, `plot` draws what there is.
+Files hold arrays by the names of the fields of `PressResult`, with their units. `tactile_map` is the reading `taxels`; any other is
+called `reading_NAME`, and its dimensions and coordinates end in `_of_NAME`. The mesh of solids is `node_mm`, `cells_K` and
+`facets_K`; their nodes' displacement is `node_displacement_mm`, other fields of `SolidFields` have its names.
+"""
+
+import json
+from collections.abc import Callable
 from dataclasses import Field, dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -7,15 +16,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softtact.errors import InputError
-from softtact.files import PROVENANCE, read_dataset, write_dataset
-from softtact.press.placed_object import PlacedObject
-from softtact.press.vtu import of_bodies, of_map
+from softtact.fem.solid_mesh import SolidMesh
+from softtact.files import PROVENANCE, read_arrays, read_dataset, write_dataset
+from softtact.models.solid.result import SolidFields
+from softtact.press.objects import PlacedObject
+from softtact.readout.points import labelled_points
+from softtact.readout.registry import labelled
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
     from softtact.models.hyperelastic.deformed_mesh import PressedBody
+
+
+_ABSENT: Any = None      # of what a sensor or a model does not have
+_PLANE = {"plane": True}     # of sensors with a plane of maps
 
 
 def _array(units: str, *dimensions: str, coordinate: str | None = None) -> dict[str, Any]:
@@ -26,14 +42,19 @@ def _array(units: str, *dimensions: str, coordinate: str | None = None) -> dict[
 _FACT = {"fact": True}      # a field that stands in a file as an attribute
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class PressResult:
-    """One press, load step by load step. A field is one line here: its metadata say how it is written and read back."""
+    """One press, load step by load step. A field is one line here: its metadata say how it is written and read back.
 
-    deformation_map_mm: np.ndarray = field(metadata=_array("mm", "step", "y", "x"))
+    Maps are None where the sensor has no plane of them; `solid` where the press had no solids, or was not asked to keep them. The
+    fields of `solid` are attributes of the result, too: `result.volume_ratio`.
+    """
+
+    deformation_map_mm: np.ndarray = field(default=_ABSENT, metadata=_array("mm", "step", "y", "x") | _PLANE)
     """(step, y, x) in mm: how far the sensing surface moved towards the board, positive."""
-    tactile_map: np.ndarray = field(metadata=_array("counts", "step", "row", "column"))
-    """(step, row, column) in counts: the taxels' ideal reading, or that of a calibrated sensor long after the press."""
+    readings: "dict[str, xarray.DataArray]" = field(default_factory=dict)
+    """What each of the sensor's readouts reads, by their names in its file; `step` is the first dimension. `taxels`: (step, row,
+    column) in counts, the ideal reading, or that of a calibrated sensor long after the press."""
     normal_force_n: np.ndarray = field(metadata=_array("N", "step"))
     """(step,) in N: how hard the object was pressed, positive into the sensor; pad and shell together."""
     indentation_mm: np.ndarray = field(metadata=_array("mm", "step"))
@@ -57,31 +78,32 @@ class PressResult:
     """(step,) 0 where the numbers are not to be relied on; why: docs/reference/command_line.md, "What is flagged"."""
     wall_time_s: np.ndarray = field(metadata=_array("s", "step"))
     """(step,) in s: wall time of the load step; the solver's preparation counts to the first."""
-    x_mm: np.ndarray = field(metadata=_array("mm", "x", coordinate="x"))
+    x_mm: np.ndarray = field(default=_ABSENT, metadata=_array("mm", "x", coordinate="x") | _PLANE)
     """(x,) in mm: the map's columns in the sensor frame."""
-    y_mm: np.ndarray = field(metadata=_array("mm", "y", coordinate="y"))
+    y_mm: np.ndarray = field(default=_ABSENT, metadata=_array("mm", "y", coordinate="y") | _PLANE)
     """(y,) in mm: the map's rows in the sensor frame."""
     model: str = field(metadata=_FACT)
-    """Which model pressed: elastic, foundation, hyperelastic, or solid where the object is soft."""
+    """Which model pressed: elastic, foundation, hyperelastic or solid."""
     sensor: str = field(metadata=_FACT)
     """The sensor's name."""
     solver: str = field(metadata=_FACT)
     """The linear solver's name."""
-    pad_force_n: np.ndarray | None = field(default=None, metadata=_array("N", "step"))
+    pad_force_n: np.ndarray = field(default=_ABSENT, metadata=_array("N", "step"))
     """(step,) in N: what of `normal_force_n` the pad carries."""
-    shell_force_n: np.ndarray | None = field(default=None, metadata=_array("N", "step"))
+    shell_force_n: np.ndarray = field(default=_ABSENT, metadata=_array("N", "step"))
     """(step,) in N: what the rigid shell around the pad carries, where an object wider than the pad rests on it; else 0."""
-    force_n: np.ndarray | None = field(default=None, metadata=_array("N", "step", "axis"))
+    force_n: np.ndarray = field(default=_ABSENT, metadata=_array("N", "step", "axis"))
     """(step, 3) in N: the object's force on the sensor, pad and shell, along x, y, z; z is negative where it presses."""
-    torque_nmm: np.ndarray | None = field(default=None, metadata=_array("N mm", "step", "axis"))
+    torque_nmm: np.ndarray = field(default=_ABSENT, metadata=_array("N mm", "step", "axis"))
     """(step, 3) in N mm: the torque of that force about the origin of the sensor frame; nan where the model does not
     tell, and where the shell carries a part, whose place is not known."""
-    displacement_mm: np.ndarray | None = field(default=None, metadata=_array("mm", "step", "y", "x", "axis"))
-    """(step, y, x, 3) in mm: how the map's plane moved along x, y, z; nan in x and y where the model tells the map alone."""
-    slip: np.ndarray | None = field(default=None, metadata=_array("mm", "step", "y", "x"))
+    displacement_mm: np.ndarray = field(default=_ABSENT, metadata=_array("mm", "step", "y", "x", "axis") | _PLANE)
+    """(step, y, x, 3) in mm: how the map's plane moved along x, y, z; nan in x and y where the model tells the map alone.
+    Of a sensor without a plane `solid.displacement_mm` (step, node, 3)."""
+    slip: np.ndarray = field(default=_ABSENT, metadata=_array("mm", "step", "y", "x") | _PLANE)
     """(step, y, x) in mm: how far the surface slid along the object since it came to touch; nan where it does not touch, and where
     the model knows no friction."""
-    expected_error_mm: np.ndarray | None = field(default=None, metadata=_array("mm", "step"))
+    expected_error_mm: np.ndarray = field(default=_ABSENT, metadata=_array("mm", "step"))
     """(step,) in mm: error to expect against the hyperelastic model, root mean square over the map, of a fast model on frusta and
     where the model was chosen by it; else nan. How well it is told: docs/explanation/fast_models.md."""
     selection_reason: str = field(default="", metadata=_FACT)
@@ -91,22 +113,56 @@ class PressResult:
     attributes: dict[str, Any] = field(default_factory=dict)
     """More facts (numbers and texts): thickness_mm, friction, repairs of the mesh. They are written as attributes, too."""
     bodies: "tuple[PressedBody, ...]" = ()
-    """A `PressedBody` for each force where `Sensor.press` was asked to keep them, else none; not written with the maps."""
-
+    """A `PressedBody` of the layers for each step where `Sensor.press` was asked to keep them, else none; not written with the
+    maps."""
+    solid: SolidFields | None = None
+    """What the solids of a press by the solid model did: mesh, nodal displacement, stress and contact pressure, loads of frames."""
     placed_object: PlacedObject | None = None
-    """The object where it stands at each load step, where `Sensor.press` was asked to keep it; it is written with the maps."""
+    """The object where it is at each load step, where `Sensor.press` was asked to keep it; it is written with the maps."""
 
     def __post_init__(self) -> None:
-        steps, vertical = len(self.normal_force_n), np.array([0.0, 0.0, 1.0])
-        unknown = np.where(vertical == 0, np.nan, 1.0)
-        defaults = {"pad_force_n": lambda: self.normal_force_n, "shell_force_n": lambda: self.normal_force_n - self.pad_force_n,
-                    "force_n": lambda: -self.normal_force_n[:, None] * vertical, "torque_nmm": lambda: np.full((steps, 3), np.nan),
-                    "displacement_mm": lambda: -self.deformation_map_mm[..., None] * unknown,
-                    "slip": lambda: np.full(self.deformation_map_mm.shape, np.nan),
-                    "expected_error_mm": lambda: np.full(steps, np.nan)}
+        steps, down = len(self.normal_force_n), np.array([0.0, 0.0, 1.0])
+        defaults: dict[str, Callable[[], np.ndarray]] = {
+            "pad_force_n": lambda: self.normal_force_n, "shell_force_n": lambda: self.normal_force_n - self.pad_force_n,
+            "force_n": lambda: -self.normal_force_n[:, None] * down, "torque_nmm": lambda: np.full((steps, 3), np.nan),
+            "expected_error_mm": lambda: np.full(steps, np.nan)}
+        if self.deformation_map_mm is not None:
+            unknown = np.where(down == 0, np.nan, 1.0)
+            defaults |= {"displacement_mm": lambda: -self.deformation_map_mm[..., None] * unknown,
+                         "slip": lambda: np.full(self.deformation_map_mm.shape, np.nan)}
+        elif self.solid is not None:
+            defaults["displacement_mm"] = lambda: self.solid.displacement_mm      # type: ignore[union-attr]
         for name, default in defaults.items():
             if getattr(self, name) is None:
                 object.__setattr__(self, name, default())
+
+    def __getattr__(self, name: str) -> Any:
+        solid = self.__dict__.get("solid")
+        if name in _OF_POINTS and "readings" in self.__dict__:     # short names of version 0.1
+            return _OF_POINTS[name](self)
+        if solid is None or name.startswith("_") or not hasattr(solid, name):
+            raise AttributeError(f"this {type(self).__name__} has no {name!r}")
+        return getattr(solid, name)
+
+    @property
+    def steps(self) -> int:
+        """Number of load steps."""
+        return len(self.normal_force_n)
+
+    @property
+    def tactile_map(self) -> np.ndarray:
+        """(step, row, column) in counts: `readings["taxels"]`. Raises InputError where the sensor has no taxels."""
+        if "taxels" not in self.readings:
+            raise InputError(f"{self.sensor} has no readout 'taxels'; its readings are {', '.join(self.readings) or 'none'}.")
+        values: np.ndarray = self.readings["taxels"].values
+        return values
+
+    def load(self, frame: str) -> np.ndarray:
+        """Loads (s, 6) in N and N mm of a frame of the solids by its name, such as `object`."""
+        if self.solid is None:
+            raise InputError(f"This result of the {self.model} model keeps no frames; see force_n and torque_nmm, or press with "
+                             "model='solid' and keep_body=True.")
+        return self.solid.load(frame)
 
     def pressed_body(self, load_step: int = -1) -> "PressedBody":
         """The `PressedBody` at the load step of number `load_step`, by default the last one: nodes, cells and displacements."""
@@ -137,61 +193,43 @@ class PressResult:
         plt.show()
 
     def to_dataset(self) -> "xarray.Dataset":
-        """The result as an xarray dataset with dimensions step, y, x, axis, row, column and the units of each array."""
-        import xarray
-
-        arrays: dict[str, Any] = {}
-        coordinates: dict[str, Any] = {}
-        for one in _arrays():
-            kept = coordinates if one.metadata["coordinate"] else arrays
-            kept[_name(one)] = (one.metadata["dimensions"], getattr(self, one.name), {"units": one.metadata["units"]})
-        if self.placed_object is not None:
-            arrays |= self.placed_object.variables()
-        return xarray.Dataset(arrays, coords=coordinates, attrs={name: getattr(self, name) for name in _facts()} | self.attributes)
+        """The result as an xarray dataset with dimensions step, y, x, axis, row, column, node ... and the units of each array."""
+        return _dataset_of(self)
 
     def write(self, path: str | Path, *, settings: dict[str, Any] | None = None, seed: int | None = None) -> None:
-        """Write as NetCDF; `read_press` reads it back.
+        """Write as NetCDF (.nc); `read_press` reads it back.
 
         settings, seed: what the press came from, for the file's record of its provenance
         """
+        if Path(path).suffix.lower() != ".nc":
+            raise InputError(f"{path}: a result is written as .nc; give a name with such an ending.")
         write_dataset(path, self.to_dataset(), seed=seed, settings=settings or {})
 
     def write_vtu(self, path: str | Path) -> None:
-        """Write the pressed sensor as VTU: the solver's mesh where it was kept, else the map's surface (see `pressed_mesh`)."""
-        if self.bodies:
-            mesh = of_bodies(self.bodies, self.normal_force_n)
-        else:
-            mesh = of_map(self.deformation_map_mm, self.x_mm, self.y_mm, self.normal_force_n,
-                          thickness_mm=self.attributes["thickness_mm"])
-        if self.placed_object is not None:
-            mesh = mesh.with_object(self.placed_object)
-        mesh.write(path)
+        """Write the pressed sensor as VTU: the solver's mesh where it was kept, else the map's surface (see `press.vtu`)."""
+        from softtact.press import vtu
+
+        vtu.write(self, path)
 
 
-def read_press(path: str | Path) -> PressResult:
-    """The `PressResult` that `PressResult.write` wrote, to the bit; its bodies were not written and are none.
-
-    Raises InputError that names the file where it is missing or damaged, or holds no press.
-    """
-    data = read_dataset(path)
-    missing = [name for name in (*map(_name, _arrays()), *_facts()) if name not in data.variables and name not in data.attrs]
-    if missing:
-        raise InputError(f"{path}: it holds no whole press ({missing[0]!r} is missing); give a file that softtact press --out or "
-                         "PressResult.write made.")
-    for one in _arrays():
-        if data[_name(one)].dims != one.metadata["dimensions"]:
-            raise InputError(f"{path}: {_name(one)!r} has the dimensions {data[_name(one)].dims} in place of "
-                             f"{one.metadata['dimensions']}; write the press again.")
-    arrays: dict[str, Any] = {one.name: data[_name(one)].values for one in _arrays()}
-    attributes = {name: value.item() if isinstance(value, np.generic) else value for name, value in data.attrs.items()}
-    facts = {name: attributes.pop(name) for name in _facts()}
-    attributes = {name: value for name, value in attributes.items() if name not in PROVENANCE}
-    return PressResult(**arrays, **facts, attributes=attributes, placed_object=PlacedObject.of(data))
+# Names that results on sensors of kind solid had: of the readout `points`.
+_OF_POINTS: dict[str, Callable[[PressResult], np.ndarray]] = {
+    "reading_points_mm": lambda result: np.zeros((0, 3)) if "points" not in result.readings else np.column_stack(
+        [result.readings["points"][f"{axis}_mm"].values for axis in "xyz"]),
+    "reading_displacement_mm": lambda result: np.zeros((result.steps, 0, 3)) if "points" not in result.readings else (
+        result.readings["points"].values[..., 1:]),
+    "reading_pressure_mpa": lambda result: np.zeros((result.steps, 0)) if "points" not in result.readings else (
+        result.readings["points"].values[..., 0])}
 
 
-def _arrays() -> list[Field[Any]]:
-    """The fields of a result that stand as arrays in a file."""
-    return [one for one in fields(PressResult) if "dimensions" in one.metadata]
+_TAXELS, _DIMENSIONS_OF_TAXELS = "taxels", ("step", "row", "column")
+_IN_FILE = {"displacement_mm": "node_displacement_mm"}      # fields of `SolidFields` with another name in files
+_OLD_KIND = "softtact solid result"     # of files of solids of version 0.1
+
+
+def _arrays(of: type = PressResult) -> list[Field[Any]]:
+    """The fields of a result, or of `SolidFields`, that stand as arrays in a file."""
+    return [one for one in fields(of) if "dimensions" in one.metadata]
 
 
 def _facts() -> list[str]:
@@ -202,3 +240,150 @@ def _facts() -> list[str]:
 def _name(one: Field[Any]) -> str:
     """What an array is called in a file."""
     return one.metadata["coordinate"] or one.name
+
+
+def _dataset_of(result: PressResult) -> "xarray.Dataset":
+    """The data set of a result."""
+    import xarray
+
+    variables: dict[str, Any] = {}
+    coordinates: dict[str, Any] = {}
+    plane = result.deformation_map_mm is not None
+    for one in _arrays():
+        if getattr(result, one.name) is None or ("plane" in one.metadata and not plane):
+            continue
+        kept = coordinates if one.metadata["coordinate"] else variables
+        kept[_name(one)] = (one.metadata["dimensions"], getattr(result, one.name), {"units": one.metadata["units"]})
+        if one.name == "deformation_map_mm" and _is_tactile_map(result):
+            variables["tactile_map"] = (_DIMENSIONS_OF_TAXELS, result.tactile_map, {"units": "counts"})
+    if result.placed_object is not None:
+        variables |= result.placed_object.variables()
+    attributes = {name: getattr(result, name) for name in _facts()} | result.attributes
+    if result.solid is not None:
+        variables |= _of_solid(result.solid)
+        coordinates |= {"frame": np.array(result.solid.frames, dtype=str), "pair": np.array(result.solid.pairs, dtype=str),
+                        "load": ["fx", "fy", "fz", "mx", "my", "mz"], "xyz": ["x", "y", "z"]}
+        attributes |= {"geometry": result.solid.mesh.geometry, "mesh_thickness_mm": result.solid.mesh.thickness_mm}
+    data = xarray.Dataset(variables, coords=coordinates, attrs=attributes)
+    for name, reading in result.readings.items():
+        if not (name == _TAXELS and "tactile_map" in variables):
+            data = data.merge({f"reading_{name}": _told_apart(name, reading)})
+    return data
+
+
+def _is_tactile_map(result):
+    return _TAXELS in result.readings and result.readings[_TAXELS].dims == _DIMENSIONS_OF_TAXELS
+
+
+def _told_apart(name, reading):
+    """A reading whose dimensions, but for `step`, and coordinates are its own in a data set of several."""
+    names = {one: f"{one}_of_{name}" for one in (*reading.dims, *reading.coords) if one != "step"}
+    return reading.rename(names).assign_attrs(reading=name)
+
+
+def _of_solid(solid):
+    """Variables of what solids did."""
+    variables: dict[str, Any] = {
+        _IN_FILE.get(one.name, one.name): (one.metadata["dimensions"], getattr(solid, one.name), {"units": one.metadata["units"]})
+        for one in _arrays(SolidFields)}
+    variables["node_mm"] = (("node", "xyz"), solid.mesh.points, {"units": "mm"})
+    for k, (region, kind, nodes) in enumerate(solid.mesh.cells):
+        variables[f"cells_{k}"] = ((f"element_{k}", f"node_of_{kind}"), nodes, {"region": region, "kind": kind})
+    facets = ((name, kind, nodes) for name, face in solid.mesh.faces.items() for kind, nodes in face.items())
+    for k, (name, kind, nodes) in enumerate(facets):
+        variables[f"facets_{k}"] = ((f"facet_{k}", f"node_of_{kind}"), nodes, {"face": name, "kind": kind})
+    return variables
+
+
+def read_press(path: str | Path) -> PressResult:
+    """The `PressResult` that `PressResult.write` wrote, to the bit; `bodies` were not written and are none.
+
+    Files of version 0.1 are read, too: of sensors of layers, and of solids (.nc, .npz). Raises InputError that names the file where
+    it is missing or damaged, or holds no press.
+    """
+    data = _read_npz(path) if Path(path).suffix.lower() == ".npz" else read_dataset(path)
+    if data.attrs.get("kind") == _OLD_KIND:
+        data = _renewed(path, data)
+    elif "kind" in data.attrs and "deformation_map_mm" not in data:
+        raise InputError(f"{path}: it holds no whole press; give a file that softtact press --out or PressResult.write made.")
+    needed = [one for one in _arrays() if "plane" not in one.metadata or "deformation_map_mm" in data or "node_mm" not in data]
+    missing = [name for name in (*map(_name, needed), *_facts()) if name not in data.variables and name not in data.attrs]
+    if missing:
+        raise InputError(f"{path}: it holds no whole press ({missing[0]!r} is missing); give a file that softtact press --out or "
+                         "PressResult.write made.")
+    for one in needed:
+        if data[_name(one)].dims != one.metadata["dimensions"]:
+            raise InputError(f"{path}: {_name(one)!r} has the dimensions {data[_name(one)].dims} in place of "
+                             f"{one.metadata['dimensions']}; write the press again.")
+    values: dict[str, Any] = {one.name: data[_name(one)].values for one in needed}
+    attributes = {name: value.item() if isinstance(value, np.generic) else value for name, value in data.attrs.items()}
+    values |= {name: attributes.pop(name) for name in _facts()}
+    geometry, thickness = attributes.pop("geometry", "solid"), attributes.pop("mesh_thickness_mm", 1.0)
+    attributes = {name: value for name, value in attributes.items() if name not in PROVENANCE}
+    return PressResult(**values, readings=_readings_of(data), attributes=attributes, placed_object=PlacedObject.of(data),
+                       solid=_solid_of(data, geometry, thickness) if "node_mm" in data else None)
+
+
+def _readings_of(data):
+    readings = {}
+    if "tactile_map" in data:
+        readings[_TAXELS] = labelled(data["tactile_map"].values, _DIMENSIONS_OF_TAXELS, units="counts")
+    for name in (str(name) for name in data.data_vars if str(name).startswith("reading_")):
+        reading, end = data[name], f"_of_{data[name].attrs.get('reading')}"
+        names = {one: str(one).removesuffix(end) for one in (*reading.dims, *reading.coords) if str(one).endswith(end)}
+        reading = reading.rename(names).rename(None)
+        readings[reading.attrs.pop("reading")] = reading
+    return readings
+
+
+def _solid_of(data, geometry, thickness):
+    cells = [data[name] for name in data.data_vars if str(name).startswith("cells_")]
+    faces: dict[str, dict[str, np.ndarray]] = {}
+    for facets in (data[name] for name in data.data_vars if str(name).startswith("facets_")):
+        faces.setdefault(facets.attrs["face"], {})[facets.attrs["kind"]] = facets.values
+    mesh = SolidMesh(data["node_mm"].values, tuple((one.attrs["region"], one.attrs["kind"], one.values) for one in cells), faces,
+                     geometry, float(thickness))
+    return SolidFields(mesh=mesh, frames=tuple(map(str, data["frame"].values)), pairs=tuple(map(str, data["pair"].values)),
+                       **{one.name: data[_IN_FILE.get(one.name, one.name)].values for one in _arrays(SolidFields)})
+
+
+# --- files of solids of version 0.1 ---
+
+
+def _renewed(path, data):
+    """The data set of an old file of solids, with the names and numbers that results have now; what it does not tell is nan."""
+    missing = [one.name for one in _arrays(SolidFields) if one.name not in data.variables]
+    if missing:
+        raise InputError(f"{path}: it holds no whole press ({missing[0]!r} is missing); press again.")
+    steps, frames = data.sizes["step"], [str(name) for name in data["frame"].values]
+    place = frames.index("object") if "object" in frames else 0
+    force = data["frame_load"].values[:, place, :3] if frames else np.full((steps, 3), np.nan)
+    down = -data["frame_way_mm"].values[:, place, 2] if frames else np.full(steps, np.nan)
+    unknown = np.full(steps, np.nan)
+    numbers = {"normal_force_n": -force[:, 2], "pad_force_n": -force[:, 2], "shell_force_n": np.zeros(steps),
+               "indentation_mm": down, "contact_area_mm2": unknown, "frustum_compression_mm": unknown, "expected_error_mm": unknown,
+               "converged": np.ones(steps, np.int8), "within_validity": np.ones(steps, np.int8)}
+    points = {f"reading_{name}": data[f"reading_{name}"].values for name in ("points_mm", "displacement_mm", "pressure_mpa")}
+    renewed = data.drop_vars([*points, "step"], errors="ignore").rename(_IN_FILE)
+    renewed = renewed.assign({name: ("step", values) for name, values in numbers.items()},
+                             force_n=(("step", "axis"), force), torque_nmm=(("step", "axis"), np.full((steps, 3), np.nan)))
+    attributes = {"model": "solid", "sensor": "", "solver": "", "selection_reason": "", "largest_counts": 2400.0} | data.attrs
+    attributes["mesh_thickness_mm"] = attributes.pop("thickness_mm")
+    renewed.attrs = {name: value for name, value in attributes.items() if name != "kind"}
+    if len(points["reading_points_mm"]):
+        values = np.concatenate([points["reading_pressure_mpa"][..., None], points["reading_displacement_mm"]], axis=2)
+        reading = labelled_points(values, points["reading_points_mm"])
+        renewed = renewed.merge({"reading_points": _told_apart("points", reading)}, combine_attrs="override")
+    return renewed
+
+
+def _read_npz(path):
+    import xarray
+
+    with read_arrays(path) as data:
+        if "layout" not in data:
+            raise InputError(f"{path}: it holds no layout, so it is no press of solids; give a file that PressResult.write wrote.")
+        layout = json.loads(str(data["layout"]))
+        variables = {name: (one["dims"], data[name], one["attributes"]) for name, one in layout["arrays"].items()}
+    coordinates = {name: variables.pop(name) for name in layout["coordinates"]}
+    return xarray.Dataset(variables, coordinates, layout["attributes"])

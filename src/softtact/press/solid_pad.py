@@ -23,8 +23,8 @@ from softtact.models.solid.frusta import FrustumItem
 from softtact.models.solid.path import SolidLoadStep
 from softtact.press.cache import cached_frustum_law
 from softtact.press.making import make_result, shell_of
+from softtact.press.objects import OBJECT, SoftObject
 from softtact.press.result import PressResult
-from softtact.press.soft_object import OBJECT, SoftObject
 
 if TYPE_CHECKING:
     from softtact.press.sensor import Sensor

@@ -1,10 +1,11 @@
 """The pressed sensor as a mesh with displacements, for ParaView and `softtact view`.
 
-hyperelastic: the solver's own mesh, all of it (`Sensor.press(keep_body=True)`), and the object's pressure on the cover's faces.
-solid: layers and soft object, all of both; its frusta are springs, and are not drawn.
-elastic, foundation: the deformation map as a surface in the sensor's walls and bottom at rest; only the map's vertical
-displacement is known there, and no pressure on the map's grid.
-The object stands beside it where it was kept (`Sensor.press(keep_object=True)`).
+bodies kept by the hyperelastic model, or by the solid one on layers: the solver's own mesh, all of it, and the object's pressure on
+the faces of the sensing surface; frusta of the solid model are springs, and are not drawn
+solids: their mesh with its regions and faces, and at the nodes of each step displacement, J, von Mises stress and contact pressure
+else the deformation map as a surface in the sensor's walls and bottom at rest; only the map's vertical displacement is known there,
+and no pressure on the map's grid
+The object is beside them where it was kept (`Sensor.press(keep_object=True)`).
 """
 
 import re
@@ -16,11 +17,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from softtact.errors import InputError
+from softtact.fem.mesh_files import write_mesh
 from softtact.files import atomic_path
-from softtact.press.placed_object import PlacedObject
+from softtact.models.solid.result import SolidFields
+from softtact.press.objects import PlacedObject
 
 if TYPE_CHECKING:
     from softtact.models.hyperelastic.deformed_mesh import PressedBody
+    from softtact.press.result import PressResult
 
 LAYERS = {"frusta": 0, "sheet": 1, "cover": 2, "pressed face": 3, "wall at rest": 4, "object": 5}
 _DISPLACEMENT, _PRESSURE = "displacement_mm_", "contact_pressure_mpa_"     # with `PressedMesh._ends`
@@ -29,6 +33,23 @@ _LOAD_STEP = re.compile(r"displacement_mm_(.+?)N(?:_step(\d+))?")
 _FACES = {"hexahedron": ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
           "wedge": ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)), "quad": ((0, 1, 2, 3),),
           "tetra": ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)), "triangle": ((0, 1, 2),)}
+
+
+def write(result: "PressResult", path: str | Path) -> None:
+    """Write what a press' result holds of the sensor: bodies, else solids, else the map."""
+    if not result.bodies and result.solid is not None:
+        return _write_solid(result.solid, path)
+    mesh = of_bodies(result.bodies, result.normal_force_n) if result.bodies else of_map(
+        result.deformation_map_mm, result.x_mm, result.y_mm, result.normal_force_n, thickness_mm=result.attributes["thickness_mm"])
+    (mesh if result.placed_object is None else mesh.with_object(result.placed_object)).write(path)
+
+
+def _write_solid(solid: SolidFields, path: str | Path) -> None:
+    """Write a mesh of solids, with the fields of step K as arrays `..._stepK`."""
+    at_nodes = {"displacement_mm": solid.displacement_mm, "volume_ratio": solid.volume_ratio, "von_mises_mpa": solid.von_mises_mpa,
+                "contact_pressure_mpa": solid.pressed_mpa}
+    write_mesh(solid.mesh, path, {f"{name}_step{step}": one.astype(np.float32) for name, values in at_nodes.items()
+                                  for step, one in enumerate(values, start=1)})
 
 
 @dataclass(frozen=True)
@@ -75,8 +96,7 @@ class PressedMesh:
 
     def with_object(self, placed: PlacedObject) -> "PressedMesh":
         """The same with the object, as triangles of the layer `object` that move as one."""
-        count, steps = len(placed.points_mm), len(self.force_n)
-        moved = np.broadcast_to(placed.way_mm[:, None], (steps, count, 3))
+        moved = placed.displacement_mm
         return replace(self, points=np.vstack([self.points, placed.points_mm]),
                        cells=[*self.cells, ("triangle", placed.triangles + len(self.points), LAYERS["object"])],
                        displacement_mm=np.concatenate([self.displacement_mm, moved], axis=1))

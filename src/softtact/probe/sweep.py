@@ -20,8 +20,8 @@ from softtact.materials.laws.base import Law
 from softtact.models.solid.body import SolidBody
 from softtact.models.solid.path import SolidPath
 from softtact.probe.design import Hardness, PalpationDesign
-from softtact.probe.films import film_reader
 from softtact.probe.structure import JAW, structure_body
+from softtact.readout.strip import FilmReader
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -114,7 +114,7 @@ def palpate(design: PalpationDesign, tissue: str, scenario: Scenario, *, law: La
     """
     began = time.perf_counter()
     body = structure_body(design, law or design.tissue(tissue).make(), threads=threads)
-    readers = [film_reader(body, design, film) for film in design.films.values()]
+    readers = [FilmReader.on(body, film.on, film.side, (film.start, film.end)) for film in design.films.values()]
     middle = _beam_middle(body, design)
     if values is None:
         values = (design.load_n if scenario == "load" else design.displacement_mm).values

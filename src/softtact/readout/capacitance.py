@@ -53,7 +53,7 @@ def equivalent_air_gap(spec: "AnySpec", displacement_mm: float | np.ndarray) -> 
     """
     d: Any = spec.dielectric
     moved = np.minimum(displacement_mm, (1 - _LEAST_GAP) * spec.dielectric_thickness_mm)
-    if spec.kind == "layers":
+    if np.isnan(spec.frustum_height_mm):
         return (d.thickness_mm - moved) / d.relative_permittivity
     h = d.frusta.height_mm
     share = np.interp(1 - moved / h, *_pocket(d.frusta, d.relative_permittivity))     # 1 / eps once no air is left
@@ -66,7 +66,7 @@ def capacitance_per_area(spec: "AnySpec", displacement_mm: float | np.ndarray) -
 
 
 def ideal_counts(spec: "AnySpec", deformation_map_mm: np.ndarray, *, counts_per_relative_change: float = 1000.0) -> np.ndarray:
-    """Counts (..., rows, columns) of a ideal readout: proportional to dC / C0, limited to the converter's range."""
+    """Counts (..., rows, columns) of an ideal readout: proportional to dC / C0, limited to the converter's range."""
     rest = capacitance_per_area(spec, 0.0)
     change = taxel_means(spec, capacitance_per_area(spec, deformation_map_mm)) / rest - 1
     return np.clip(counts_per_relative_change * change, 0.0, spec.largest_counts)

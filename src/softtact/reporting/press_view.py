@@ -1,18 +1,25 @@
-"""A press to look at from all sides: its surface at each force, as a page that turns or as a picture."""
+"""A press to look at from all sides: its surface, or the outside of its solids, at each step, as a page that turns or as a
+picture."""
 
 import html
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
+import meshio
 import numpy as np
 
 from softtact.errors import InputError
+from softtact.fem.mesh_files import read_mesh_file
+from softtact.fem.solid_mesh import outer_triangles
 from softtact.files import atomic_path, read_dataset
-from softtact.press.placed_object import PlacedObject
+from softtact.press.objects import PlacedObject
+from softtact.press.result import read_press
 from softtact.press.vtu import of_map, read_vtu
 from softtact.reporting.view3d import html_view
 
-UNIT = "displacement towards the PCB (mm)"
+UNIT, UNIT_OF_SOLIDS = "displacement towards the PCB (mm)", "displacement (mm)"
+_STEP = re.compile(r"displacement_mm_step(\d+)")
 _EYE = (-0.9, -1.35, 1.0)     # from where a picture looks
 _PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
 <title>{title}</title><style>
@@ -41,26 +48,68 @@ class PressView:
 
 def read_view(path: str | Path) -> PressView:
     """The `PressView` of a press' NetCDF or VTU file."""
-    readers = {".nc": _read_map, ".vtu": read_vtu}
     path = Path(path)
-    if path.suffix.lower() not in readers:
+    ending = path.suffix.lower()
+    if ending not in (".nc", ".vtu", ".npz"):
         raise InputError(f"{path}: not a press that can be shown; give the .nc or .vtu file of softtact press, or the .csv of a "
                          "recording.")
-    mesh = readers[path.suffix.lower()](path)
+    if ending == ".vtu":
+        of_solids = path.is_file() and b'"region:' in path.read_bytes()
+        return _of_solids_vtu(path) if of_solids else _of_mesh(path, read_vtu(path))
+    if ending == ".npz" or "node_mm" in (data := read_dataset(path)) and "deformation_map_mm" not in data:
+        return _of_result(path)
+    return _of_mesh(path, _mesh_of_map(path, data))
+
+
+def _of_mesh(path, mesh):
+    """The view of a `PressedMesh`."""
     _, triangles, used = mesh.surface()
     _, object_triangles, of_object = mesh.surface(of_object=True)
     both = np.concatenate([used, of_object])
     moved = mesh.displacement_mm[:, both]
-    if not np.isfinite(moved).all():
-        raise InputError(f"{path}: some displacements are not finite numbers; press again.")
     values = -moved[..., 2]
     values[:, len(used):] = np.nan
-    return PressView(points_mm=mesh.points[both] + moved, triangles=triangles, values=values, title=path.name,
-                     labels=[f"{force:g} N" for force in mesh.force_n], object_triangles=object_triangles + len(used))
+    return _whole(path, PressView(points_mm=mesh.points[both] + moved, triangles=triangles, values=values, title=path.name,
+                                  labels=[f"{force:g} N" for force in mesh.force_n],
+                                  object_triangles=object_triangles + len(used)))
 
 
-def _read_map(path):
-    data = read_dataset(path)
+def _whole(path, view):
+    """The view, where all of its points are finite."""
+    if not np.isfinite(view.points_mm).all():
+        raise InputError(f"{path}: some displacements are not finite numbers; press again.")
+    return view
+
+
+def _of_result(path):
+    """The view of a file of solids."""
+    solid = read_press(path).solid
+    return _of_solids(path, solid.mesh, solid.displacement_mm, solid.object_points_mm + solid.object_displacement_mm,
+                      solid.object_triangles)
+
+
+def _of_solids_vtu(path):
+    """The view of a mesh of solids that `PressResult.write_vtu` wrote."""
+    mesh, point_data = read_mesh_file(path), meshio.vtu.read(path).point_data
+    steps = sorted((int(match[1]), name) for name in point_data if (match := _STEP.fullmatch(name)))
+    if not steps:
+        raise InputError(f"{path}: it holds a mesh and no displacements of it; give a file of PressResult.write_vtu.")
+    moved = np.stack([point_data[name] for _, name in steps]).astype(float)
+    return _of_solids(path, mesh, moved, np.zeros((len(moved), 0, 3)), np.zeros((0, 3), int))
+
+
+def _of_solids(path, mesh, moved, object_points, object_triangles):
+    used, triangles = np.unique(outer_triangles(mesh), return_inverse=True)
+    points = np.concatenate([mesh.points[used] + moved[:, used], object_points], axis=1)
+    values = np.full(points.shape[:2], np.nan)
+    values[:, :len(used)] = np.linalg.norm(moved[:, used], axis=2)
+    return _whole(path, PressView(points_mm=points, triangles=triangles.reshape(-1, 3), values=values, title=path.name,
+                                  unit=UNIT_OF_SOLIDS, labels=[f"step {number}" for number in range(1, len(moved) + 1)],
+                                  object_triangles=object_triangles + len(used)))
+
+
+def _mesh_of_map(path, data):
+    """The `PressedMesh` of a file's map."""
     missing = [name for name in ("deformation_map_mm", "normal_force_n", "x", "y") if name not in data.variables]
     if missing:
         raise InputError(f"{path}: it holds no {missing[0]!r}, so it is no press; give the file of softtact press --out.")

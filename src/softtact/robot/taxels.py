@@ -26,7 +26,7 @@ from softtact.linalg.workers import one_thread_each
 from softtact.press.fast import thinning_maps
 from softtact.press.ladder import Ladder, even_in_root
 from softtact.press.sensor import Sensor
-from softtact.readout.calibrated import counts_of
+from softtact.readout.taxels import counts_of
 from softtact.robot.events import set_down
 
 # The mesh in each finger's frame: the right finger is behind it, and rotations about z change their sign.

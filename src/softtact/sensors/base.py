@@ -1,28 +1,102 @@
-"""What every kind of sensor has: footprint, map, taxels, an elastic layer; and how its file is read."""
+"""What every kind of sensor has, and how its file is read; and what sensors of layers have besides: footprint, map, taxels."""
 
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from pydantic import Field, PositiveFloat, PositiveInt, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, PrivateAttr, ValidationError, model_serializer
 
 from softtact.errors import InputError
 from softtact.files import read_yaml
 from softtact.sensors.fields import CalibrationBlock, Edge, EdgeField, ElasticLayer, Section, Taxels
 from softtact.unknown_names import first_fault, known_keys, unknown
 
+DEFAULT_KIND = "frusta"     # of a file that states none
 
-class BaseSpec(Section):
-    """The part of a specification that does not depend on its `kind`, which each class states as a literal.
+
+class ReadoutEntry(BaseModel):
+    """A readout of a sensor: its `kind`, and what that kind takes."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+    kind: str = Field(description="one of the registered kinds: capacitance, points, strip")
+
+
+class Specification(Section):
+    """What a sensor of any kind has; each class states its `kind` as a literal.
+
+    readouts: what the sensor tells of a press, by names of one's own; by default those of its kind
+    """
+
+    name: str
+    force_range_n: tuple[float, PositiveFloat]
+    readouts: dict[str, ReadoutEntry] = {}
+    _folder: Path = PrivateAttr(Path())     # of the sensor's file, which its paths are relative to
+
+    @property
+    def stated_readouts(self) -> dict[str, ReadoutEntry]:
+        """The readouts of the file, or those that a sensor of this kind has without."""
+        return self.readouts
+
+    @property
+    def has_layers(self) -> bool:
+        """Whether it is made of layers with maps of their surface."""
+        return False
+
+    @property
+    def paths(self) -> list[Path]:
+        """All files that the sensor is read from beside its own."""
+        return []
+
+    def need_layers(self) -> None:
+        """Refuse what takes sensors of layers alone, where the sensor is none."""
+
+    def need_frusta(self, what: str, remedy: str) -> None:
+        """Refuse `what` with one sentence that ends in the remedy, where the sensor has no frusta."""
+
+    def _check(self, where: str) -> None:
+        """Refuse values that are right each by itself and wrong together."""
+        low, high = self.force_range_n
+        if low < 0 or low >= high:
+            raise InputError(f"{where}, at 'force_range_n': {[low, high]} is no range; write [least, largest] in N.")
+
+    @model_serializer(mode="wrap")
+    def _without_default_readouts(self, handler: Any) -> dict[str, Any]:
+        values: dict[str, Any] = handler(self)
+        return values if self.readouts else {name: value for name, value in values.items() if name != "readouts"}
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any], *, where: str = "sensor", folder: Path = Path()) -> Self:
+        """Validate a mapping; the first fault becomes one sentence that names `where` and the field.
+
+        folder: that paths among the values are relative to
+        """
+        kind = cls.model_fields["kind"].annotation.__args__[0]     # type: ignore[union-attr]
+        if values.get("kind", DEFAULT_KIND) != kind:
+            raise InputError(f"{where}, at 'kind': {values.get('kind', DEFAULT_KIND)!r} is not the kind that is needed here; give "
+                             f"a sensor of kind {kind}.")
+        try:
+            spec = cls.model_validate(values)
+        except ValidationError as error:
+            raise InputError(sentence(cls, first_fault(error), where)) from None
+        spec._folder = folder
+        spec._check(where)
+        return spec
+
+    @classmethod
+    def from_yaml(cls, path: str | Path) -> Self:
+        """Read a sensor file of this kind."""
+        return cls.from_dict(read_mapping(path), where=str(path), folder=Path(path).parent)
+
+
+class BaseSpec(Specification):
+    """What sensors of layers have, with frusta below or none.
 
     Frame: origin at the centre of the sensing surface, x and y along the sides, z outwards.
     """
 
-    name: str
     footprint_mm: tuple[PositiveFloat, PositiveFloat]
     map_shape: tuple[PositiveInt, PositiveInt]
-    force_range_n: tuple[float, PositiveFloat]
     largest_counts: PositiveFloat = Field(2400.0, description="of the readout's converter; pictures end there")
     taxels: Taxels
     elastic_layer: ElasticLayer
@@ -86,9 +160,6 @@ class BaseSpec(Section):
         return (f"{self.name}: {sides} mm, {self.parts_in_words}, {self.taxels.rows} x {self.taxels.columns} taxels, "
                 f"maps of {self.map_shape[0]} x {self.map_shape[1]} points")
 
-    def need_frusta(self, what: str, remedy: str) -> None:
-        """Refuse `what` with one sentence that ends in the remedy, where the sensor has no frusta."""
-
     def check_for(self, kind: str) -> None:
         """Refuse what a model of this kind (elastic, foundation, hyperelastic) cannot take: no frusta, or no middle row."""
         if kind == "foundation":
@@ -97,8 +168,18 @@ class BaseSpec(Section):
             raise InputError(f"{self.name}, at 'map_shape': {list(self.map_shape)} has no middle row and column, which the fast "
                              "models ask for; write odd numbers.")
 
+    @property
+    def has_layers(self) -> bool:
+        """Whether it is made of layers with maps of their surface."""
+        return True
+
+    @property
+    def stated_readouts(self) -> dict[str, ReadoutEntry]:
+        """The readouts of the file, by default the taxels' counts."""
+        return self.readouts or {"taxels": ReadoutEntry(kind="capacitance")}
+
     def _check(self, where: str) -> None:
-        """Refuse values that are right each by itself and wrong together."""
+        super()._check(where)
         below = self.edge.held_below_mm
         if np.isfinite(below) and below >= self.held_height_mm:
             raise InputError(f"{where}, at 'edge.held.sides_below_mm': {below:g} mm is not less than the height of the layers, "
@@ -109,30 +190,6 @@ class BaseSpec(Section):
         if not self.base_held and not np.isfinite(below):
             raise InputError(f"{where}, at 'edge.held': with support 'none' and free sides nothing holds the sensor; hold the "
                              "sides, or write support: base.")
-
-    @classmethod
-    def from_dict(cls, values: dict[str, Any], *, where: str = "sensor") -> Self:
-        """Validate a mapping; the first fault becomes one sentence that names `where` and the field."""
-        cls._check_kind(values, where)
-        try:
-            spec = cls.model_validate(values)
-        except ValidationError as error:
-            raise InputError(sentence(cls, first_fault(error), where)) from None
-        spec._check(where)
-        return spec
-
-    @classmethod
-    def _check_kind(cls, values: dict[str, Any], where: str) -> None:
-        """Refuse a sensor of another kind than this class."""
-        own = cls.model_fields["kind"].annotation.__args__[0]     # type: ignore[union-attr]
-        if values.get("kind", "frusta") != own:
-            raise InputError(f"{where}, at 'kind': {values.get('kind', 'frusta')!r} is not the kind that is needed here; give a "
-                             f"sensor of kind {own}.")
-
-    @classmethod
-    def from_yaml(cls, path: str | Path) -> Self:
-        """Read a sensor file of this kind."""
-        return cls.from_dict(read_mapping(path), where=str(path))
 
 
 def read_mapping(path: str | Path) -> dict[str, Any]:
@@ -148,8 +205,8 @@ def sentence(cls: type[Section], fault: Any, where: str) -> str:
     field = ".".join(str(part) for part in fault["loc"])
     if fault["type"] == "extra_forbidden":
         *parents, last = fault["loc"]
-        said = unknown(last, known_keys(cls, parents), kind="key")
-        return f"{where}{_at(parents)}: {said}{'' if said.endswith('?') else '.'}"
+        hint = unknown(last, known_keys(cls, parents), kind="key")
+        return f"{where}{_at(parents)}: {hint}{'' if hint.endswith('?') else '.'}"
     if fault["type"] == "missing":
         return f"{where}: the key '{field}' is missing; add it."
     return f"{where}: field '{field}' is not usable: {fault['msg']}; correct it."

@@ -7,24 +7,23 @@
     faces: {base: "z<0.01", skin: "z>0.01"}  # outer facets by rules, beside those that the mesh file names
     held: {base: xyz}
     contact: {face: skin, friction: 0.3}
-    readings: {points_mm: [[0, 0, 5], [2, 0, 4.5]], radius_mm: 1.0}
+    readouts: {tips: {kind: points, points_mm: [[0, 0, 5], [2, 0, 4.5]], radius_mm: 1.0}}
     force_range_n: [0, 20]
 """
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, NoReturn
 
-from pydantic import Field, PositiveFloat, PrivateAttr, ValidationError
+from pydantic import Field, PositiveFloat
 
 from softtact.errors import InputError
 from softtact.materials.cards import law_from_card, load_card
 from softtact.materials.config import law_from_printed
 from softtact.materials.laws.base import Law
 from softtact.materials.laws.registry import make_law
-from softtact.sensors.base import read_mapping, sentence
+from softtact.sensors.base import ReadoutEntry, Specification
 from softtact.sensors.fields import Coefficient, Length, Section
 from softtact.sensors.library import material_file
-from softtact.unknown_names import first_fault
 
 _SURFACES = (".stl", ".obj", ".ply")
 _SOURCES = ("material", "card", "law")
@@ -55,26 +54,23 @@ class ContactFace(Section):
 
 
 class ReadingPlaces(Section):
-    """Where readings are taken: means over the parts of a face that lie within a radius of points."""
+    """A readout of the kind points, in the short form of this kind of sensor."""
 
     points_mm: Annotated[tuple[tuple[float, float, float], ...], Field(min_length=1)]
     radius_mm: Length
     face: str | None = Field(None, description="by default the face of the contact")
 
 
-class SolidSpec(Section):
+class SolidSpec(Specification):
     """A soft body as a sensor. Frame: that of its mesh, in mm; objects come down along z unless a motion says otherwise."""
 
-    name: str
     kind: Literal["solid"]
     mesh: MeshFile
     regions: Annotated[dict[str, Region], Field(min_length=1)]
     faces: dict[str, str] = {}
     held: Annotated[dict[str, str], Field(min_length=1)]
     contact: ContactFace
-    readings: ReadingPlaces | None = None
-    force_range_n: tuple[float, PositiveFloat]
-    _folder: Path = PrivateAttr(Path())     # of the sensor's file, which its paths are relative to
+    readings: ReadingPlaces | None = Field(None, description="short for a readout of the name and the kind points")
 
     @property
     def mesh_path(self) -> Path:
@@ -85,6 +81,18 @@ class SolidSpec(Section):
     def paths(self) -> list[Path]:
         """All files that the sensor is read from beside its own."""
         return [self.mesh_path, *(self._folder / region.card for region in self.regions.values() if region.card)]
+
+    @property
+    def stated_readouts(self) -> dict[str, ReadoutEntry]:
+        """The readouts of the file, `readings` as one of the name `points` among them."""
+        if self.readings is None:
+            return self.readouts
+        return {"points": ReadoutEntry(kind="points", **self.readings.model_dump()), **self.readouts}
+
+    def need_layers(self) -> NoReturn:
+        """Refuse what takes sensors of layers alone."""
+        raise InputError(f"{self.name}, a sensor of kind solid: a solid has no layers and no taxels, which are needed here; press "
+                         "it with `softtact press` or `softtact.load_sensor`, or give a sensor of kind frusta or layers.")
 
     def law_of(self, name: str) -> Law:
         """The law of a region. Raises InputError where what it is made from does not give one."""
@@ -97,23 +105,8 @@ class SolidSpec(Section):
             return make_law(str(region.law), region.parameters or {})
         return make_law(str(region.law), region.parameters or {}, bulk_over_shear=region.bulk_over_shear)
 
-    @classmethod
-    def from_yaml(cls, path: str | Path) -> Self:
-        """Read a sensor file of this kind; the first fault becomes one sentence that names the file and the field."""
-        values = read_mapping(path)
-        if values.get("kind") != "solid":
-            raise InputError(f"{path}, at 'kind': {values.get('kind', 'frusta')!r} is not solid; press such a sensor with "
-                             "load_sensor, or write kind: solid.")
-        try:
-            spec = cls.model_validate(values)
-        except ValidationError as error:
-            raise InputError(sentence(cls, first_fault(error), str(path))) from None
-        spec._folder = Path(path).parent
-        spec._check(str(path))
-        return spec
-
     def _check(self, where: str) -> None:
-        """Refuse values that are right each by itself and wrong together."""
+        super()._check(where)
         if Path(self.mesh.file).suffix.lower() in _SURFACES:
             filled = Path(self.mesh.file).with_suffix(".vtu").name
             raise InputError(f"{where}, at 'mesh.file': {self.mesh.file} is a surface, and the body needs elements; run `softtact "
@@ -121,8 +114,9 @@ class SolidSpec(Section):
         for name, region in self.regions.items():
             if fault := _region_fault(region):
                 raise InputError(f"{where}, at 'regions.{name}': {fault}")
-        if self.force_range_n[0] < 0 or self.force_range_n[0] >= self.force_range_n[1]:
-            raise InputError(f"{where}, at 'force_range_n': {list(self.force_range_n)} is no range; write [least, largest] in N.")
+        if self.readings is not None and "points" in self.readouts:
+            raise InputError(f"{where}, at 'readings': it is short for a readout of the name 'points', which stands under "
+                             "'readouts', too; leave one of them out.")
 
 
 def _region_fault(region: Region) -> str | None:
@@ -138,8 +132,3 @@ def _region_fault(region: Region) -> str | None:
     if not plain and (region.parameters is not None or region.bulk_over_shear is not None):
         return f"'parameters' and 'bulk_over_shear' are of a law by itself; leave them out, or leave {given[0]!r} out."
     return None
-
-
-def kind_of(path: str | Path) -> Any:
-    """The `kind` that a sensor file states; `frusta` where it states none."""
-    return read_mapping(path).get("kind", "frusta")

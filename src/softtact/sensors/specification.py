@@ -2,44 +2,59 @@
 
     frusta   `SensorSpec`: a cover on a dielectric with frusta; a file without `kind` is of this one
     layers   `LayersSpec`: one or two plain layers
-    solid    `SolidSpec`: any body of elements; it has no maps and no taxels, and so is read by itself (`sensors.solid`)
-A new layered kind is a file with its class, and a line in `KINDS` and `AnySpec`.
+    solid    `SolidSpec`: any body of elements
+A new kind is a file with its class, a line in `KINDS`, and one in `press.kinds.KINDS`, which says how it is loaded and pressed.
 """
 
+from functools import reduce
+from operator import or_
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import Field, TypeAdapter
 
 from softtact.errors import InputError
-from softtact.sensors.base import BaseSpec, read_mapping
+from softtact.sensors.base import DEFAULT_KIND, BaseSpec, Specification, read_mapping
 from softtact.sensors.frusta import ORIENTATIONS, Friction, SensorSpec
 from softtact.sensors.layers import LayersSpec
 from softtact.sensors.solid import SolidSpec
 
-__all__ = ["KINDS", "ORIENTATIONS", "AnySpec", "BaseSpec", "Friction", "LayersSpec", "SensorSpec", "read_spec",
-           "sensor_schema", "spec_from_dict"]
+__all__ = ["KINDS", "ORIENTATIONS", "AnySpec", "BaseSpec", "Friction", "LayersSpec", "SensorSpec", "any_spec", "read_any_spec",
+           "read_spec", "sensor_schema", "spec_from_dict"]
 
-KINDS: dict[str, type[BaseSpec]] = {"frusta": SensorSpec, "layers": LayersSpec}
-AnySpec = SensorSpec | LayersSpec
+KINDS: dict[str, type[Specification]] = {"frusta": SensorSpec, "layers": LayersSpec, "solid": SolidSpec}
+AnySpec = SensorSpec | LayersSpec     # any of layers
+
+
+def read_any_spec(path: str | Path) -> Specification:
+    """The specification in a sensor file, of the class that its `kind` names; a fault names the file and the field."""
+    return any_spec(read_mapping(path), where=str(path), folder=Path(path).parent)
+
+
+def any_spec(values: dict[str, Any], *, where: str = "sensor", folder: Path = Path()) -> Specification:
+    """The specification of a mapping, of the class that its `kind` names; `folder`: that its paths are relative to."""
+    kind = values.get("kind", DEFAULT_KIND)
+    if kind not in KINDS:
+        *names, last = KINDS
+        raise InputError(f"{where}, at 'kind': {kind!r} is unknown; use {', '.join(names)} or {last}.")
+    return KINDS[kind].from_dict(values, where=where, folder=folder)
 
 
 def read_spec(path: str | Path) -> AnySpec:
-    """The specification in a sensor file, of the class that its `kind` names; a fault is told with the file and the field."""
-    return spec_from_dict(read_mapping(path), where=str(path))
+    """The specification in the file of a sensor of layers; InputError where it is of another kind."""
+    return _layered(read_any_spec(path))
 
 
 def spec_from_dict(values: dict[str, Any], *, where: str = "sensor") -> AnySpec:
-    """The specification of a mapping, of the class that its `kind` names."""
-    kind = values.get("kind", "frusta")
-    if kind == "solid":
-        raise InputError(f"{where}, at 'kind': a solid has no layers and no taxels, which are needed here; press it with `softtact "
-                         "press` or `softtact.load_solid_sensor`, or give a sensor of kind frusta or layers.")
-    if kind not in KINDS:
-        raise InputError(f"{where}, at 'kind': {kind!r} is unknown; use {', '.join(KINDS)} or solid.")
-    return KINDS[kind].from_dict(values, where=where)     # type: ignore[return-value]
+    """The specification of a mapping that describes a sensor of layers."""
+    return _layered(any_spec(values, where=where))
+
+
+def _layered(spec):
+    spec.need_layers()
+    return spec
 
 
 def sensor_schema() -> dict[str, Any]:
     """JSON schema of a sensor file: one of the kinds."""
-    return TypeAdapter(Annotated[AnySpec | SolidSpec, Field(discriminator="kind")]).json_schema()
+    return TypeAdapter(Annotated[reduce(or_, KINDS.values()), Field(discriminator="kind")]).json_schema()

@@ -1,34 +1,30 @@
-"""What a press of solids gives: labelled arrays of all load steps, kept in files of their own.
-
-    result = solid_result(SolidPath(body, {"ball": motion}))
-    result.write("press.nc")
-    result.write_vtu("press.vtu")
-    result = read_solid_result("press.nc")
-"""
+"""Fields of a press of solids: what all bodies, frames and pairs in contact did, at the nodes and load step by load step."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from softtact.errors import ConvergenceError, InputError
-from softtact.fem.mesh_files import write_mesh
-from softtact.fem.solid_mesh import SolidMesh
-from softtact.models.solid import result_files
-from softtact.models.solid.body import SolidBody
-from softtact.models.solid.fields import nodal_fields, pressure_at_nodes
-from softtact.models.solid.path import SolidLoadStep, SolidPath
-from softtact.models.solid.readings import ReadingPoints
+from softtact.contact.pair import ContactPair, PairHistory, PairState
+from softtact.errors import InputError
+from softtact.fem.elements import Element
+from softtact.fem.solid_mesh import ELEMENTS, SolidMesh
+from softtact.models.solid.body import SolidBody, SolidState
+from softtact.models.solid.path import SolidLoadStep
 
-if TYPE_CHECKING:
-    import xarray as xr
+_VOIGT = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
+_XYZ, _RANGE = "xyz", "least_largest"
+
+
+def _array(units: str, *dimensions: str) -> Any:
+    """A field that files hold as an array; its metadata say how."""
+    return field(metadata={"units": units, "dimensions": dimensions})
 
 
 @dataclass(frozen=True)
-class SolidResult:
-    """A press of solids: s load steps, n nodes of the mesh, f frames, p pairs in contact, r nodes of rigid objects."""
+class SolidFields:
+    """What solids did: s load steps, n nodes of the mesh, f frames, p pairs in contact, r nodes of rigid objects."""
 
     mesh: SolidMesh
     """All soft bodies at rest."""
@@ -36,59 +32,36 @@ class SolidResult:
     """Names of the frames."""
     pairs: tuple[str, ...]
     """Names of the pairs in contact."""
-    displacement_mm: np.ndarray
+    displacement_mm: np.ndarray = _array("mm", "step", "node", _XYZ)
     """(s, n, 3) of the nodes."""
-    frame_load: np.ndarray
+    frame_load: np.ndarray = _array("N, N mm", "step", "frame", "load")
     """(s, f, 6): force in N and torque in N mm of each frame on the bodies, about its reference point."""
-    frame_way_mm: np.ndarray
-    """(s, f, 3) of the frames' reference points."""
-    contact_pressure_mpa: np.ndarray
+    frame_way_mm: np.ndarray = _array("mm", "step", "frame", _XYZ)
+    """(s, f, 3): displacement of the frames' reference points."""
+    contact_pressure_mpa: np.ndarray = _array("MPa", "step", "pair", "node")
     """(s, p, n) per area at rest, positive in compression; 0 where the surface is open, nan off the pair's surface."""
-    volume_ratio: np.ndarray
+    volume_ratio: np.ndarray = _array("1", "step", "node")
     """(s, n) J."""
-    von_mises_mpa: np.ndarray
+    von_mises_mpa: np.ndarray = _array("MPa", "step", "node")
     """(s, n) of the Cauchy stress."""
-    penetration_mm: np.ndarray
-    """(s,) deepest overlap of surfaces in contact."""
-    residual_n: np.ndarray
-    """(s,) largest unbalanced force."""
-    iterations: np.ndarray
-    """(s,) Newton steps."""
-    increments: np.ndarray
+    increments: np.ndarray = _array("1", "step")
     """(s,) parts that a step was divided into."""
-    volume_ratio_range: np.ndarray
+    volume_ratio_range: np.ndarray = _array("1", "step", _RANGE)
     """(s, 2) least and largest J at the points of quadrature."""
-    stretch_range: np.ndarray
+    stretch_range: np.ndarray = _array("1", "step", _RANGE)
     """(s, 2) least and largest isochoric principal stretch at the same points."""
-    extrapolated_volume_fraction: np.ndarray
-    """(s,) share strained beyond the data of the laws, nan where they do not tell."""
-    work_mj: np.ndarray
+    work_mj: np.ndarray = _array("mJ", "step")
     """(s,) work of frames and pressures up to the step's end."""
-    dissipated_mj: np.ndarray
+    dissipated_mj: np.ndarray = _array("mJ", "step")
     """(s,) energy that friction took up to the step's end."""
-    strain_energy_mj: np.ndarray
+    strain_energy_mj: np.ndarray = _array("mJ", "step")
     """(s,) energy of the bodies."""
-    wall_time_s: np.ndarray
-    """(s,) time that the step took."""
-    object_points_mm: np.ndarray
+    object_points_mm: np.ndarray = _array("mm", "object_node", _XYZ)
     """(r, 3) nodes of rigid objects at rest."""
-    object_triangles: np.ndarray
+    object_triangles: np.ndarray = _array("1", "object_facet", "object_corner")
     """(t, 3) their facets."""
-    object_displacement_mm: np.ndarray
+    object_displacement_mm: np.ndarray = _array("mm", "step", "object_node", _XYZ)
     """(s, r, 3) of the same nodes."""
-    reading_points_mm: np.ndarray
-    """(k, 3) places of readings at rest; none where a body has no readings."""
-    reading_displacement_mm: np.ndarray
-    """(s, k, 3) mean displacement of the surface around them."""
-    reading_pressure_mpa: np.ndarray
-    """(s, k) mean contact pressure per area at rest around them; nan off the surface in contact."""
-    attributes: dict[str, Any] = field(default_factory=dict)
-    """Where the result comes from, in words and numbers; files keep it."""
-
-    @property
-    def steps(self) -> int:
-        """Number of load steps."""
-        return len(self.displacement_mm)
 
     def load(self, frame: str) -> np.ndarray:
         """Loads (s, 6) of a frame by its name. InputError lists the names where there is none of it."""
@@ -96,77 +69,40 @@ class SolidResult:
             raise InputError(f"The result has no frame {frame!r}; its frames are {', '.join(self.frames) or 'none'}.")
         return self.frame_load[:, self.frames.index(frame)]
 
-    def to_dataset(self) -> "xr.Dataset":
-        """All of it as one labelled data set, the mesh with its regions and faces among its arrays."""
-        return result_files.dataset_of(self)
-
-    def write(self, path: str | Path) -> None:
-        """Write as NetCDF (.nc) or as NumPy's arrays (.npz), by the path's ending; `read_solid_result` gives it back."""
-        result_files.write(self.to_dataset(), path)
-
-    def write_vtu(self, path: str | Path) -> None:
-        """Write the mesh as VTU, with displacement, J, von Mises stress and contact pressure of step K as arrays `..._stepK`."""
-        pressed = np.nanmax(np.where(np.isnan(self.contact_pressure_mpa), -np.inf, self.contact_pressure_mpa), axis=1,
+    @property
+    def pressed_mpa(self) -> np.ndarray:
+        """(s, n): contact pressure at the nodes, of the pair with the largest; nan off all of them."""
+        largest = np.nanmax(np.where(np.isnan(self.contact_pressure_mpa), -np.inf, self.contact_pressure_mpa), axis=1,
                             initial=-np.inf)
-        fields = {"displacement_mm": self.displacement_mm, "volume_ratio": self.volume_ratio, "von_mises_mpa": self.von_mises_mpa,
-                  "contact_pressure_mpa": np.where(np.isfinite(pressed), pressed, np.nan)}
-        write_mesh(self.mesh, path, {f"{name}_step{step + 1}": values[step].astype(np.float32)
-                                     for name, values in fields.items() for step in range(self.steps)})
+        return np.where(np.isfinite(largest), largest, np.nan)
 
 
-def solid_result(path: SolidPath) -> SolidResult:
-    """Solve all steps of a path.
-
-    Raises ConvergenceError that names the step that was not reached; its `result` holds the steps before, None where there is none.
-    """
-    steps: list[SolidLoadStep] = []
-    try:
-        for step in path.run():
-            steps.append(step)
-    except ConvergenceError as error:
-        raise ConvergenceError(str(error), result=gathered(path.body, steps) if steps else None) from None
-    return gathered(path.body, steps)
-
-
-def gathered(body: SolidBody, steps: Iterable[SolidLoadStep], readings: ReadingPoints | None = None) -> SolidResult:
-    """The `SolidResult` of load steps; `readings` are taken from the body's first pair in contact."""
+def gathered(body: SolidBody, steps: Iterable[SolidLoadStep]) -> SolidFields:
+    """The `SolidFields` of load steps."""
     steps = list(steps)
     if not steps:
         raise InputError("There is no load step to keep; solve one.")
     n = len(body.mesh.points)
     surfaces = [body.surface_nodes(frame.name) for frame in body.frames if frame.nodes.min() >= n]
     fields = [nodal_fields(body, step.state) for step in steps]
-    pressures = [[pressure_at_nodes(*own, n) for own in zip(body.pairs, step.state.histories, step.state.contacts, strict=True)]
+    pressures = [[pressure_at_nodes(*one, n) for one in zip(body.pairs, step.state.histories, step.state.contacts, strict=True)]
                  for step in steps]
 
     def each(value):
         return np.array([value(step) for step in steps])
 
-    return SolidResult(
+    return SolidFields(
         mesh=body.mesh, frames=tuple(frame.name for frame in body.frames), pairs=_names(body),
         displacement_mm=each(lambda step: step.state.displacement[:n]), frame_load=each(lambda step: step.loads),
         frame_way_mm=np.array([[pose.translation for pose in step.state.poses] for step in steps]).reshape(len(steps), -1, 3),
         contact_pressure_mpa=np.array(pressures).reshape(len(steps), -1, n),
         volume_ratio=np.array([J for J, _ in fields]), von_mises_mpa=np.array([mises for _, mises in fields]),
-        penetration_mm=each(lambda step: step.penetration_mm), residual_n=each(lambda step: step.residual_n),
-        iterations=each(lambda step: step.iterations), increments=each(lambda step: step.increments),
-        volume_ratio_range=each(lambda step: step.volume_ratio), stretch_range=each(lambda step: step.stretch),
-        extrapolated_volume_fraction=each(lambda step: step.extrapolated_volume_fraction),
-        work_mj=each(lambda step: step.work_mj), dissipated_mj=each(lambda step: step.dissipated_mj),
-        strain_energy_mj=each(lambda step: step.state.strain_energy), wall_time_s=each(lambda step: step.wall_time_s),
-        object_points_mm=body.points[n:], object_triangles=np.concatenate([np.zeros((0, 3), int), *(own - n for own in surfaces)]),
-        object_displacement_mm=each(lambda step: step.state.displacement[n:]), **_read(body, steps, readings))
-
-
-def _read(body, steps, readings):
-    """The readings of load steps by their names in `SolidResult`."""
-    if readings is None:
-        return {"reading_points_mm": np.zeros((0, 3)), "reading_displacement_mm": np.zeros((len(steps), 0, 3)),
-                "reading_pressure_mpa": np.zeros((len(steps), 0))}
-    moved = [readings.displacement_mm(step.state.displacement) for step in steps]
-    pressures = [readings.pressure_mpa(body.pairs[0], step.state.histories[0], step.state.contacts[0]) for step in steps]
-    return {"reading_points_mm": readings.points_mm, "reading_displacement_mm": np.array(moved),
-            "reading_pressure_mpa": np.array(pressures)}
+        increments=each(lambda step: step.increments), volume_ratio_range=each(lambda step: step.volume_ratio),
+        stretch_range=each(lambda step: step.stretch), work_mj=each(lambda step: step.work_mj),
+        dissipated_mj=each(lambda step: step.dissipated_mj), strain_energy_mj=each(lambda step: step.state.strain_energy),
+        object_points_mm=body.points[n:],
+        object_triangles=np.concatenate([np.zeros((0, 3), int), *(nodes - n for nodes in surfaces)]),
+        object_displacement_mm=each(lambda step: step.state.displacement[n:]))
 
 
 def _names(body):
@@ -175,9 +111,55 @@ def _names(body):
     return tuple(name if names.count(name) == 1 else f"{name} {number}" for number, name in enumerate(names, start=1))
 
 
-def read_solid_result(path: str | Path) -> SolidResult:
-    """The `SolidResult` of a file that `SolidResult.write` wrote. Raises InputError that names the file and what it lacks."""
-    dataset = result_files.read(path)
-    values = {name: dataset[name].values for name in result_files.DIMENSIONS}
-    return SolidResult(mesh=result_files.mesh_of(dataset), frames=tuple(map(str, dataset["frame"].values)),
-                       pairs=tuple(map(str, dataset["pair"].values)), attributes=result_files.facts_of(dataset), **values)
+def nodal_fields(body: SolidBody, state: SolidState) -> tuple[np.ndarray, np.ndarray]:
+    """Volume ratio J and von Mises stress of the Cauchy stress in MPa at the mesh's nodes (n,); nan where no element is.
+
+    In each element the values at the points of quadrature are fitted by a linear function, which gives those at its nodes; a node
+    has the mean of its elements, by their volumes.
+    """
+    n = len(body.mesh.points)
+    sums, weights = np.zeros((2, n)), np.zeros(n)
+    for element, (_, nodes, block) in zip(_elements(body.mesh), body.blocks, strict=True):
+        deformed = block.loops.deformation(state.displacement[nodes], block.at_rest)
+        S = block.law.isochoric(deformed.C, tangent=False).stress[:, _VOIGT].reshape(deformed.F.shape)
+        cauchy = np.einsum("egik,egkl,egjl->egij", deformed.F, S, deformed.F, optimize=True) / deformed.J[..., None, None]
+        mean = np.trace(cauchy, axis1=2, axis2=3) / 3
+        deviator = cauchy - mean[..., None, None] * np.eye(3)     # the stress of U(J) is hydrostatic: no part of it
+        mises = np.sqrt(1.5 * (deviator**2).sum(axis=(2, 3)))
+        to_nodes = _linear_fit(element, block.at_rest.volumes.shape[1])
+        volume = np.repeat(block.at_rest.volumes.sum(axis=1)[block.at_rest.shapes], nodes.shape[1])
+        weights += np.bincount(nodes.ravel(), volume, n)
+        for nodal, values in zip(sums, (deformed.J, mises), strict=True):
+            nodal += np.bincount(nodes.ravel(), volume * (values @ to_nodes.T).ravel(), n)
+    J, mises = np.where(weights > 0, sums / np.where(weights > 0, weights, 1.0), np.nan)
+    return J, np.maximum(mises, 0.0)      # an extrapolation may fall below
+
+
+def _elements(mesh: SolidMesh) -> list[Element]:
+    return [ELEMENTS[kind] for _, kind, nodes in mesh.cells if len(nodes)]
+
+
+def _linear_fit(element: Element, points: int) -> np.ndarray:
+    """Matrix (m, g) that takes values at the points of the rule of so many points to the nodes."""
+    rule = next(rule for rule in (element.quadrature, element.reduced) if rule is not None and len(rule.weights) == points)
+    return _linear(element.nodes) @ np.linalg.pinv(_linear(rule.points))
+
+
+def _linear(x):
+    return np.column_stack([np.ones(len(x)), x])
+
+
+def pressure_at_nodes(pair: ContactPair, history: PairHistory, state: PairState, count: int) -> np.ndarray:
+    """Contact pressure of a pair in MPa, per area at rest, at `count` nodes: 0 where its surface is open, nan off the surface.
+
+    A node has the mean of the points around it, by their areas and its shape function at them.
+    """
+    points = history.points
+    there = points.nodes >= 0
+    weight = np.where(there, np.abs(points.values[:, :points.nodes.shape[1]]), 0.0) * points.weight[:, None]
+    total = np.bincount(points.nodes[there], weight[there], count)
+    sums = np.bincount(points.nodes[there], (weight * state.pressure[:, None])[there], count)
+    out = np.full(count, np.nan)
+    on = pair.surface.used[pair.surface.used < count]
+    out[on] = sums[on] / np.where(total[on] > 0, total[on], 1.0)
+    return out

@@ -1,15 +1,36 @@
-"""The counts of a sensor whose `calibration` is known; those of an ideal readout where it is not."""
+"""The readout `capacitance`: counts of the taxels, those of an ideal readout or of a sensor whose `calibration` is known.
+
+    readouts: {taxels: {kind: capacitance}}
+"""
 
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from softtact.errors import InputError
 from softtact.readout.capacitance import ideal_counts
-from softtact.readout.readout import amplified
-from softtact.readout.virtual_sensor import taxel_capacitance
+from softtact.readout.registry import SurfaceMotion, labelled, register
+from softtact.readout.virtual_sensor import amplified, taxel_capacitance
+from softtact.sensors.base import BaseSpec
+from softtact.sensors.fields import Section
 
 if TYPE_CHECKING:
+    import xarray
+
     from softtact.sensors.specification import AnySpec
+
+
+@register("capacitance")
+class Capacitance(Section):
+    """Counts (step, row, column) of the sensor's taxels, long after the press and without noise."""
+
+    def read(self, surface: SurfaceMotion) -> "xarray.DataArray":
+        """See `Capacitance`. Raises InputError for a sensor without layers between electrodes."""
+        if surface.thinning_mm is None or not isinstance(surface.spec, BaseSpec):
+            raise InputError(f"{surface.spec.name} has no layers between electrodes, which the readout 'capacitance' reads; take "
+                             "points or strip.")
+        return labelled(counts_of(surface.spec, surface.thinning_mm), ("step", "row", "column"),     # type: ignore[arg-type]
+                        units="counts")
 
 
 def relative_change(spec: "AnySpec", displacement_mm: np.ndarray, *, shift_mm: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:

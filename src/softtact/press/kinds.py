@@ -1,0 +1,168 @@
+"""How sensors of each kind are loaded and pressed: one entry of `KINDS` for each kind of `sensors.specification.KINDS`.
+
+A kind from outside of the package: a class of specification and a `Kind`, each added to its registry under the kind's name.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import trimesh
+from threadpoolctl import threadpool_limits
+
+from softtact.contact.height_field import HeightField
+from softtact.errors import InputError
+from softtact.geometry.meshes import check_over_sensor, place
+from softtact.materials.config import law_from_printed
+from softtact.materials.laws.base import Law
+from softtact.models.hyperelastic.body import LayeredBody
+from softtact.models.hyperelastic.build import build_plain_body, build_sensor_body
+from softtact.press import choice
+from softtact.press.fast import press_elastic_motion
+from softtact.press.hyperelastic import press_hyperelastic
+from softtact.press.making import flag_buried, flag_overloaded, layered_surface
+from softtact.press.objects import placed_object
+from softtact.press.result import PressResult
+from softtact.press.solid import load_solid, press_body, press_pad, surface_of
+from softtact.press.task import PressTask, checked_forces
+from softtact.readout import points, strip, taxels  # registered as they are imported  # noqa: F401
+from softtact.readout.registry import SurfaceMotion
+from softtact.sensors.library import material_file
+from softtact.sensors.specification import AnySpec
+
+if TYPE_CHECKING:
+    from softtact.press.sensor import Sensor
+
+Press = Callable[["Sensor", PressTask], PressResult]
+MODELS = ("auto", "elastic", "foundation", "hyperelastic", "solid")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of sensor."""
+
+    load: Callable[[Any, dict[str, Law]], dict[str, Any]]
+    """From its specification, and laws in place of those of its file, to the fields of `Sensor`."""
+    models: Mapping[str, Press]
+    """What presses it, by the names of the models; `auto` among them."""
+    at_rest: "Callable[[Sensor], SurfaceMotion]"
+    """Its surface before any press, on which readouts are tried."""
+    body: Callable[..., LayeredBody] | None = None
+    """The body of the hyperelastic model, where that model presses it."""
+
+    def press(self, model: str, sensor: str) -> Press:
+        """What presses with a model by its name. Raises InputError that names those that can."""
+        if model in self.models:
+            return self.models[model]
+        if model not in MODELS:
+            raise InputError(f"Model {model!r} is unknown; use one of {', '.join(self.models)}.")
+        named = [name for name in self.models if name != "auto"]
+        raise InputError(f"model={model!r}: {sensor} is a sensor that {' or '.join(f'model={name!r}' for name in named)} presses; "
+                         "leave model out, or name that one.")
+
+
+# --- sensors of layers: `frusta` and `layers` ---
+
+
+def load_layers(spec: AnySpec, laws: dict[str, Law]) -> dict[str, Any]:
+    """Specification and laws of a sensor of layers; `laws`: {layer: Law}. A `calibration` scales the others of its file."""
+    for layer in sorted(set(laws) - set(spec.materials)):
+        raise InputError(f"{spec.name} has no layer {layer!r} for the material given; its layers are {', '.join(spec.materials)}.")
+    stiffness = 1.0
+    if spec.calibration is not None:
+        stiffness = spec.calibration.modulus_scale
+        layer_of_all = spec.elastic_layer.model_copy(update={"young_mpa": stiffness * spec.elastic_layer.young_mpa})
+        spec = spec.model_copy(update={"elastic_layer": layer_of_all})
+    for layer, material in spec.materials.items():
+        if layer not in laws:
+            laws[layer] = law_from_printed(material_file(material), "mooney_rivlin").scaled(stiffness)
+    return {"spec": spec, "laws": laws}
+
+
+def press_layers(sensor: "Sensor", task: PressTask, *, model: str) -> PressResult:
+    """A press of a rigid object by the elastic, the foundation or the hyperelastic model."""
+    if task.soft:
+        raise InputError(f"model={model!r}: a soft object is pressed by the solid model alone; use model='solid', or give a "
+                         "rigid mesh.")
+    if task.motion.forces_n is not None:
+        return _by_forces(sensor, task, choice.PRESSES[model], threads=task.course.threads if model == "elastic" else 1)
+    motions = {"elastic": press_elastic_motion, "hyperelastic": press_hyperelastic}
+    if model not in motions:
+        raise InputError(f"model={model!r}: the {model} model presses straight down by force only; use elastic, hyperelastic or "
+                         "solid for this motion, or give force_n.")
+    if task.motion.turns or task.motion.loaded_aside:
+        raise InputError(f"model={model!r}: the {model} model neither turns an object nor loads it aside; use model='solid' for "
+                         "this motion.")
+    return _by_motion(sensor, task, motions[model], threads=task.course.threads if model == "elastic" else 1)
+
+
+def press_layers_auto(sensor: "Sensor", task: PressTask) -> PressResult:
+    """A press by the model that fits: solid for soft objects and turns, hyperelastic for motions, else by a policy."""
+    if task.soft or task.motion.turns or task.motion.loaded_aside:
+        return press_pad(sensor, task)
+    if task.motion.forces_n is None:
+        return _by_motion(sensor, task, press_hyperelastic)
+    return _by_forces(sensor, task, partial(choice.press_auto, policy=task.policy, tolerance_mm=task.tolerance_mm))
+
+
+def _by_forces(sensor, task, press, *, threads=1):
+    """A press straight down by growing forces."""
+    forces = checked_forces(task.motion.forces_n, sensor.spec.force_range_n, sensor.spec.name)
+    placed, finish = _placed(sensor, task)
+    task.course.reached.finish = lambda result: finish(choice.with_expected_error(sensor, result))
+    # Dense products of some hundred rows would wait for each other on more threads, up to five times as long.
+    with threadpool_limits(limits=threads):
+        return task.course.reached.finish(press(sensor, placed, forces, task.course))
+
+
+def _by_motion(sensor, task, press, *, threads=1):
+    """A press that does more than go straight down by growing forces."""
+    placed, finish = _placed(sensor, task)
+    task.course.reached.finish = lambda result: finish(flag_overloaded(result, sensor.spec.force_range_n[1]))
+    with threadpool_limits(limits=threads):
+        return task.course.reached.finish(press(sensor, placed, task.motion, task.course))
+
+
+def _placed(sensor: "Sensor", task: PressTask) -> tuple[trimesh.Trimesh, Callable[[PressResult], PressResult]]:
+    """The object in its pose over the sensor, and what is done to each result: flags, and the object where that is kept."""
+    placed = place(task.pressed, pose=task.pose)      # type: ignore[arg-type]
+    check_over_sensor(placed, sensor.spec.footprint_mm)
+    touch = HeightField(placed).first_touch_mm(sensor.spec.map_x_mm, sensor.spec.map_y_mm)
+
+    def finish(result: PressResult) -> PressResult:
+        result = flag_buried(result, float(placed.bounds[1, 2]) - touch)
+        if not task.course.keep_object:
+            return result
+        return replace(result, placed_object=placed_object(placed, touch_mm=touch, indentation_mm=result.indentation_mm,
+                                                           aside_mm=task.motion.aside_mm))
+
+    return placed, finish
+
+
+def layers_at_rest(sensor: "Sensor") -> SurfaceMotion:
+    """The surface of layers that nothing presses."""
+    return layered_surface(sensor.spec, np.zeros((1, *sensor.spec.map_shape)))
+
+
+_LAYERS = Kind(load=load_layers, at_rest=layers_at_rest, models={
+    "auto": press_layers_auto, **{model: partial(press_layers, model=model) for model in choice.PRESSES}, "solid": press_pad})
+
+
+# --- sensors of kind solid ---
+
+
+def _load_solid(spec, laws):
+    elements, laws = load_solid(spec, laws)
+    return {"spec": spec, "laws": laws, "elements": elements}
+
+
+def solid_at_rest(sensor: "Sensor") -> SurfaceMotion:
+    """The surface of a solid that nothing presses."""
+    return surface_of(sensor, [np.zeros_like(sensor.elements.points)])      # type: ignore[union-attr]
+
+
+KINDS: dict[str, Kind] = {
+    "frusta": replace(_LAYERS, body=build_sensor_body), "layers": replace(_LAYERS, body=build_plain_body),
+    "solid": Kind(load=_load_solid, at_rest=solid_at_rest, models={"auto": press_body, "solid": press_body})}

@@ -1,0 +1,177 @@
+"""What is pressed: soft objects, which bend as the sensor does, rigid ones as they are placed, and where an object first
+touches."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import trimesh
+
+from softtact.contact.height_field import NO_CONTACT_MM, HeightField
+from softtact.contact.motion import FREEDOMS, Motion
+from softtact.contact.shell import Shell
+from softtact.errors import InputError
+from softtact.fem.solid_mesh import SolidMesh
+from softtact.geometry.pose import Pose
+from softtact.materials.laws.base import Law
+
+OBJECT = "object"  # the frame that moves what is pressed
+_MIRROR = np.diag([1.0, 1.0, -1.0])
+_VARIABLES = {"object_points_mm": ("points_mm", ("object_point", "axis"), "mm"),
+              "object_triangles": ("triangles", ("object_triangle", "corner"), "1"),
+              "object_way_mm": ("way_mm", ("step", "axis"), "mm")}
+_OF_TURN = {"object_turn": ("turn", ("step", "axis", "axis_at_rest"), "1"), "object_about_mm": ("about_mm", ("axis",), "mm")}
+
+
+@dataclass(frozen=True)
+class SoftObject:
+    """A soft object: what bends as the sensor does.
+
+    mesh: in mm, of one region;  law: its hyperelastic law;  held_share: share of its height, from the top, that a rigid holder
+    carries;  friction: Coulomb's coefficient against the sensing surface
+    """
+
+    mesh: SolidMesh
+    """The body in mm, of one region; `softtact.mesh_body` makes one of a closed surface."""
+    law: Law
+    """Its law."""
+    held_share: float = 0.3
+    """Share of its height, from the top down, whose surface a rigid holder carries."""
+    friction: float = 0.0
+    """Coulomb's coefficient against the sensing surface."""
+
+    def __post_init__(self) -> None:
+        if not 0 < self.held_share < 1:
+            raise InputError(
+                f"SoftObject: held_share={self.held_share:g} leaves nothing to hold or nothing to press; give a share "
+                "between 0 and 1."
+            )
+        if len(self.mesh.regions) != 1:
+            raise InputError(f"SoftObject: its mesh has the regions {', '.join(self.mesh.regions)}; give a mesh of one region.")
+
+    def placed(self, pose: Pose | None, height_mm: float, shell: Shell) -> SolidMesh:
+        """The body in the frame of the solid sensor, whose surface is at `height_mm`, where it just touches pad or shell.
+
+        pose: by default centred; its height does not count. Raises InputError where no node is over the pad.
+        """
+        points = self.mesh.points
+        middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        points = points - [middle[0], middle[1], 0.0] if pose is None else pose.apply(points)
+        over = (np.abs(points[:, :2]) <= 0.5 * np.asarray(shell.footprint_mm)).all(axis=1)
+        if not over.any():
+            raise InputError(_missing(points, shell.footprint_mm))
+        lift = height_mm - points[over, 2].min()
+        if (beside := shell.beneath(points)).any():
+            lift = max(lift, height_mm - shell.below_mm - points[beside, 2].min())
+        return self.with_faces(points + [0.0, 0.0, lift], np.array([0.0, 0.0, -1.0]))
+
+    def with_faces(self, points: np.ndarray, direction: np.ndarray) -> SolidMesh:
+        """The body with its nodes at points (n, 3), and faces `held`, its rear as seen along a unit vector (3,), and `pressed`."""
+        along = points @ direction
+        end = along.min() + self.held_share * np.ptp(along)
+        return self.mesh.moved(lambda _: points).with_faces(
+            held=lambda x: x @ direction < end, pressed=lambda x: x @ direction >= end
+        )
+
+
+def _missing(points: np.ndarray, footprint_mm: tuple[float, float]) -> str:
+    """What is said of an object of which no node is over the sensor."""
+    (x0, y0, _), (x1, y1, _) = points.min(axis=0), points.max(axis=0)
+    return (
+        f"The soft object misses the sensor: it spans x {x0:.4g} to {x1:.4g} mm and y {y0:.4g} to {y1:.4g} mm, and none of its "
+        f"nodes is over the {footprint_mm[0]:g} x {footprint_mm[1]:g} mm footprint about the origin; correct its pose."
+    )
+
+
+@dataclass(frozen=True)
+class PlacedObject:
+    """A rigid object in the sensor frame at each load step."""
+
+    points_mm: np.ndarray
+    """(n, 3) in mm: in its pose, before the press."""
+    triangles: np.ndarray
+    """(m, 3) numbers of points."""
+    way_mm: np.ndarray
+    """(step, 3) in mm: displacement along x, y, z from its pose of the point about which it turns."""
+    turn: np.ndarray | None = None
+    """(step, 3, 3): rotation from its pose; None where it does not turn."""
+    about_mm: np.ndarray | None = None
+    """(3,) in mm: the point about which it turns, in its pose."""
+
+    @property
+    def displacement_mm(self) -> np.ndarray:
+        """(step, n, 3) of its points."""
+        moved = np.broadcast_to(self.way_mm[:, None], (len(self.way_mm), *self.points_mm.shape))
+        if self.turn is None:
+            return moved
+        return moved + np.einsum("sij,nj->sni", self.turn - np.eye(3), self.points_mm - self.about_mm)
+
+    def variables(self) -> dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, str]]]:
+        """Variables of an xarray dataset; `of` reads them back."""
+        return {name: (dimensions, getattr(self, field), {"units": units})
+                for name, (field, dimensions, units) in (_VARIABLES | (_OF_TURN if self.turn is not None else {})).items()}
+
+    @classmethod
+    def of(cls, dataset: Mapping[Any, Any]) -> "PlacedObject | None":
+        """The object of a press' dataset; None where it was not kept."""
+        if not all(name in dataset for name in _VARIABLES):
+            return None
+        return cls(**{field: np.asarray(dataset[name])
+                      for name, (field, _, _) in (_VARIABLES | _OF_TURN).items() if name in dataset})
+
+
+def placed_object(placed: trimesh.Trimesh, *, touch_mm: float, indentation_mm: np.ndarray, aside_mm: np.ndarray) -> PlacedObject:
+    """The `PlacedObject` of a mesh in its pose, of the depths (step,) from first touch and the displacements (step, 2) aside.
+
+    touch_mm: how far it comes down from its pose until it touches
+    """
+    down = -(touch_mm + np.asarray(indentation_mm))
+    return PlacedObject(points_mm=np.asarray(placed.vertices, dtype=float), triangles=np.asarray(placed.faces, dtype=np.int64),
+                        way_mm=np.column_stack([aside_mm[:len(down)], down]))
+
+
+# --- where an object first touches ---
+
+
+def first_direction(motion: Motion) -> np.ndarray:
+    """Unit vector (3,) along which a motion's first step loads the object or, without a force, moves it; else down."""
+    for given in (motion.steps[0].loads, motion.steps[0].ways):
+        way = np.array([given.get(name, 0.0) for name in FREEDOMS[:3]])
+        if way.any():
+            return np.asarray(way / np.linalg.norm(way))
+    return np.array([0.0, 0.0, -1.0])
+
+
+def way_to_touch(coming: np.ndarray, surface: np.ndarray, direction: np.ndarray) -> float:
+    """Way (mm) along a unit vector (3,) after which triangles (t, 3, 3) first touch those of a surface (u, 3, 3), all in mm.
+
+    Facets are seen counter-clockwise from outside. It is negative where they overlap already; inf where they miss each other.
+    """
+    turned = _turn_down(direction)
+    coming, surface = coming @ turned.T, surface @ turned.T
+    from_above = _gap(coming, surface)
+    from_below = _gap(surface[:, ::-1] @ _MIRROR, coming[:, ::-1] @ _MIRROR)     # turned upside down, the surface comes down
+    return min(from_above, from_below)
+
+
+def _gap(coming, surface):
+    """Least height (mm) of the underside of triangles over the corners of others."""
+    base = np.array([0.0, 0.0, coming[..., 2].min()])
+    field = HeightField(trimesh.Trimesh(*_corners(coming - base), process=False))
+    points = np.unique((surface - base).reshape(-1, 3), axis=0)
+    height, _ = field(points[:, 0], points[:, 1])
+    return float(np.min((height - points[:, 2])[height < NO_CONTACT_MM], initial=np.inf))
+
+
+def _corners(triangles):
+    return triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)
+
+
+def _turn_down(direction):
+    """Rotation (3, 3) that takes a unit vector to -z."""
+    down = -np.asarray(direction, dtype=float)
+    aside = np.eye(3)[np.argmin(np.abs(down))]
+    x = np.cross(aside, down)
+    x /= np.linalg.norm(x)
+    return np.array([x, np.cross(down, x), down])

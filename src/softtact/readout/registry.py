@@ -1,0 +1,110 @@
+"""Readouts: what a sensor tells of what its surface did. One file each, registered by its kind.
+
+    @register("mean_depth")
+    @dataclass(frozen=True)
+    class MeanDepth:                                          # its fields are the keys of the entry in the sensor's file
+        scale: float = 1.0
+
+        def read(self, surface: SurfaceMotion) -> xarray.DataArray:
+            return labelled(self.scale * surface.thinning_mm.mean(axis=(1, 2)), ("step",), units="mm")
+
+A sensor's `readouts:` name them: {depth: {kind: mean_depth, scale: 2}}; `PressResult.readings["depth"]` is what it reads, and files
+hold it. A readout of one's own registers wherever it is imported before the sensor is loaded. A class of pydantic's, or a
+dataclass, checks its fields; `read` raises InputError for what does not fit the sensor: it is tried at rest when the sensor is
+loaded.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+import numpy as np
+from pydantic import BaseModel, ValidationError
+
+from softtact.errors import InputError
+from softtact.sensors.base import ReadoutEntry, Specification, sentence
+from softtact.unknown_names import first_fault, nearest
+
+if TYPE_CHECKING:
+    import xarray
+
+_KINDS: dict[str, type] = {}
+_Class = TypeVar("_Class", bound=type)
+
+
+@dataclass(frozen=True)
+class Samples:
+    """A field on a part of a surface, at points that stand for areas."""
+
+    points_mm: np.ndarray
+    """(k, 3) at rest."""
+    area_mm2: np.ndarray
+    """(k,) at rest."""
+    values: np.ndarray
+    """(k,) or (k, 3) of the field."""
+
+
+@dataclass(frozen=True)
+class SurfaceMotion:
+    """What a sensing surface did in a press: all that a readout can read, at each of its load steps."""
+
+    spec: Specification
+    """The sensor's."""
+    steps: int
+    """Number of load steps."""
+    displacement: Callable[[str | None], list[Samples]]
+    """Of a face by its name, or of the sensing surface: its displacement in mm at each step; nan along x and y where a model tells
+    the map alone."""
+    pressure: Callable[[str | None], list[Samples] | None]
+    """Of a face or the sensing surface: contact pressure in MPa per area at rest, positive in compression, at each step; None where
+    it is not known."""
+    gap: Callable[[str | None], list[Samples] | None] = lambda face: None
+    """Of a face or the sensing surface: gap in mm between it and the object along the normal, negative in penetration."""
+    thinning_mm: np.ndarray | None = None
+    """(step, y, x): by how much the layers are thinner at the points of the sensor's map; None where there are none."""
+
+
+class Readout(Protocol):
+    """What a sensor tells of what its surface did."""
+
+    def read(self, surface: SurfaceMotion) -> "xarray.DataArray":
+        """Labelled readings, `step` their first dimension, with their `units` as an attribute or as a coordinate."""
+
+
+def register(kind: str) -> Callable[[_Class], _Class]:
+    """Decorate the class of a readout with the kind that sensors' files call it by."""
+    def add(cls: _Class) -> _Class:
+        _KINDS[kind] = cls
+        return cls
+
+    return add
+
+
+def make_readout(name: str, entry: ReadoutEntry, *, where: str = "sensor") -> Readout:
+    """The readout of an entry of a sensor's file. Raises InputError that names the field: an unknown kind, a key that it lacks."""
+    place = f"{where}, at 'readouts.{name}'"
+    if entry.kind not in _KINDS:
+        known = sorted(_KINDS)
+        raise InputError(f"{place}: there is no kind {entry.kind!r}{nearest(entry.kind, known)}; use one of {', '.join(known)}.")
+    cls, given = _KINDS[entry.kind], dict(entry.model_extra or {})
+    try:
+        return cls(**given)  # type: ignore[no-any-return]
+    except ValidationError as error:
+        fault = first_fault(error)
+        raise InputError(sentence(cls, fault, place) if issubclass(cls, BaseModel) else f"{place}: {fault['msg']}.") from None
+    except TypeError as error:
+        raise InputError(f"{place}: {str(error).removeprefix(f'{cls.__name__}.__init__() ')}; correct its keys.") from None
+
+
+def readings_of(readouts: Mapping[str, Readout], surface: SurfaceMotion) -> "dict[str, xarray.DataArray]":
+    """{name: what each of the readouts reads}."""
+    return {name: readout.read(surface) for name, readout in readouts.items()}
+
+
+def labelled(values: np.ndarray, dimensions: Sequence[str], *, units: str | None = None,
+             coordinates: Mapping[str, Any] | None = None) -> "xarray.DataArray":
+    """Readings with names for their dimensions; units: of all of them, where they are not a coordinate."""
+    import xarray
+
+    return xarray.DataArray(values, dims=tuple(dimensions), coords=dict(coordinates or {}),
+                            attrs={} if units is None else {"units": units})
