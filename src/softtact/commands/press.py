@@ -74,7 +74,7 @@ def add(commands: argparse._SubParsersAction) -> None:
                          help="end after so many seconds; the load steps that were reached are written and shown")
     command.add_argument("--out", type=Path, metavar="FILE.nc",
                          help="write the maps as NetCDF, anew with each load step that is reached; of several meshes: the folder "
-                              "in which each gets a folder of its own with press.nc, --vtu and --plot")
+                              "in which each gets a folder with press.nc, --vtu and --plot")
     command.add_argument("--vtu", type=Path, metavar="FILE.vtu",
                          help="write the pressed sensor for ParaView and softtact view: the hyperelastic model's whole mesh, the "
                               "others' surface")
@@ -293,7 +293,7 @@ def _summary_on_solids(result):
 
 
 def _or_none(values):
-    """Numbers as lists; what a model does not tell, nan, as null: JSON has no nan."""
+    """Numbers as lists; what a model does not give, nan, as null: JSON has no nan."""
     if values.ndim > 1:
         return [_or_none(row) for row in values]
     return [None if value != value else value for value in values.tolist()]

@@ -118,7 +118,7 @@ def _folder(options):
     for name in ("vtu", "plot"):
         path = getattr(options, name)
         if path and path.parent != Path("."):
-            raise InputError(f"--{name} {path}: each of several objects gets its own in its folder; give a name without a folder.")
+            raise InputError(f"--{name} {path}: each of several objects gets one in its folder; give a name without a folder.")
     return options.out
 
 
@@ -132,8 +132,8 @@ def _row(name, path, folder, options, press, columns):
         summary, error = press(path, files, label=name)
     except (SofttactError, KeyboardInterrupt) as stop:
         return dict.fromkeys(_names(columns)) | {"object": name, "status": "failed", "message": str(stop)}, stop
-    told = {"object": name, "status": "stopped early" if error else "done", "model": summary["model"]}
-    return told | {column.name: column.of(summary) for column in columns} | {"message": str(error or "")}, error
+    row = {"object": name, "status": "stopped early" if error else "done", "model": summary["model"]}
+    return row | {column.name: column.of(summary) for column in columns} | {"message": str(error or "")}, error
 
 
 def _names(columns):

@@ -6,7 +6,7 @@
     Motion.parse("z -1.0; x 1.0 in 10")                    # the same in one line
 
 Freedoms: x, y, z in mm and rx, ry, rz in degrees of the object in the sensor's frame (z out of the surface, so down is negative).
-A motion starts where the object just touches the surface at rest. A prescribed freedom moves by a way from where the step begins;
+A motion starts where the object just touches the surface at rest. A prescribed freedom moves by so much from where the step begins;
 a loaded one takes the place at which the sensor's surface carries the step's force (N) or torque (N mm). What a step does not name
 stays as it is: a prescribed freedom where it is, a loaded one under its load.
 """
@@ -31,7 +31,7 @@ class MotionStep:
     """One step: ways of prescribed freedoms, loads of loaded ones."""
 
     ways: dict[str, float] = field(default_factory=dict)
-    """Freedom to way: mm or degrees, from where the step begins."""
+    """Freedom to displacement or rotation: mm or degrees, from where the step begins."""
     loads: dict[str, float] = field(default_factory=dict)
     """Freedom to load at the step's end: N or N mm on the sensor's surface; pressing down is a negative z."""
 

@@ -2,7 +2,7 @@
 
 `error`: the cheapest model that is within the tolerance in nine of ten presses and whose load steps all hold. Both fast models are
 pressed first, in about a second. What they disagree by is the elastic model's error, for the foundation model is nearer to the
-hyperelastic one by an order of magnitude; the foundation model's own grows with how far frusta are compressed and how deep the
+hyperelastic one by an order of magnitude; that of the foundation model grows with how far frusta are compressed and how deep the
 object is. A model that fails, or does not hold for a load step, falls through to the next; where the hyperelastic one does not hold
 either, the result says that none serves.
 `paper`: the hyperelastic model for an object with fine details, else the elastic one (`geometry.complexity`).
@@ -38,12 +38,12 @@ PRESSES: dict[str, Callable[["Sensor", Trimesh, np.ndarray, Course], PressResult
 CALIBRATED_ON = "coro"
 ELASTIC_RELATIVE = 0.45     # of its map's root mean square: the elastic model's error where no foundation model is beside it
 # True over expected error from the 10th to the 90th percentile: of the foundation model, objects left out in turn (of objects that
-# nothing was fitted to 7 % lie above); of the elastic model told by what both models disagree by; and, from the 5th to the 95th, of
+# nothing was fitted to 7 % lie above); of the elastic model from what both models disagree by; and, from the 5th to the 95th, of
 # the elastic model by itself (0.311 to 0.760 over 0.45).
 INTERVALS = {"foundation": (0.80, 1.64), "elastic": (0.98, 1.05), "elastic alone": (0.69, 1.68)}
 _POWER, _DEPTH_POWER = 3, 2      # of the compression and of the depth, with which the foundation model's relative error grows
 _LONGEST_S = 120.0     # of a preparation that nobody has asked for by its model's name
-_KNOWN = 0.5     # of a frustum's height: the error was calibrated up to a compression of 0.36, and is not told much beyond
+_KNOWN = 0.5     # of a frustum's height: the error was calibrated up to a compression of 0.36, and is not known much beyond
 
 
 @dataclass(frozen=True)
@@ -89,8 +89,8 @@ def foundation_error(foundation: PressResult, *, height_mm: float, thickness_mm:
     Infinite where frusta are compressed much further than in any press that the error was calibrated on.
     """
     compression = np.asarray(foundation.frustum_compression_mm) / height_mm
-    told = model(foundation.deformation_map_mm, compression, np.asarray(foundation.indentation_mm) / thickness_mm)
-    return np.where(compression < _KNOWN, told, np.inf)
+    expected = model(foundation.deformation_map_mm, compression, np.asarray(foundation.indentation_mm) / thickness_mm)
+    return np.where(compression < _KNOWN, expected, np.inf)
 
 
 def expected_errors(elastic: PressResult, foundation: PressResult, *, height_mm: float, thickness_mm: float,
@@ -113,9 +113,10 @@ def with_expected_error(sensor: "Sensor", result: PressResult) -> PressResult:
         return result
     if not np.isnan(np.asarray(result.expected_error_mm)).all():
         return _with_interval(result, result.model)
-    told = (ELASTIC_RELATIVE * rms(result.deformation_map_mm) if result.model == "elastic" else
-            foundation_error(result, height_mm=sensor.spec.frustum_height_mm, thickness_mm=sensor.spec.thickness_mm))
-    return _with_interval(replace(result, expected_error_mm=told), "elastic alone" if result.model == "elastic" else result.model)
+    expected = (ELASTIC_RELATIVE * rms(result.deformation_map_mm) if result.model == "elastic" else
+                foundation_error(result, height_mm=sensor.spec.frustum_height_mm, thickness_mm=sensor.spec.thickness_mm))
+    name = "elastic alone" if result.model == "elastic" else result.model
+    return _with_interval(replace(result, expected_error_mm=expected), name)
 
 
 def _with_interval(result, name):
@@ -126,7 +127,7 @@ def _with_interval(result, name):
 
 def press_auto(sensor: "Sensor", placed: Trimesh, forces: np.ndarray, course: Course, *, policy: str,
                tolerance_mm: float) -> PressResult:
-    """A press with the model that a policy takes; the result tells which, why, and with what error to expect."""
+    """A press with the model that a policy takes; the result holds which, why, and the error to expect."""
     if policy not in POLICIES:
         raise InputError(f"The policy {policy!r} is unknown; use one of {', '.join(POLICIES)}.")
     if policy == "paper":
@@ -151,6 +152,8 @@ def _by_counts(sensor, placed, forces, course):
 
 def models_to_prepare(sensor: "Sensor", *, policy: str) -> tuple[str, ...]:
     """Names of the fast models that a policy may press."""
+    if not sensor.spec.has_layers:
+        return ()
     return ("elastic",) if policy == "paper" else () if _why_not_fast(sensor) else ("elastic", "foundation")
 
 
@@ -161,25 +164,25 @@ def _why_not_fast(sensor):
     wait = sensor.seconds_to_prepare_foundation()
     if wait <= _LONGEST_S:
         return ""
-    return (f"the foundation model, which tells errors, would take {in_words(wait)} to prepare, once for {sensor.spec.name} "
+    return (f"the foundation model, from which errors follow, would take {in_words(wait)} to prepare, once for {sensor.spec.name} "
             "(a press by --model foundation does it)")
 
 
 def _by_error(sensor, placed, forces, tolerance_mm, course):
     start = time.monotonic()
-    pressed, said = _fast_presses(sensor, placed, forces, course)
+    pressed, remarks = _fast_presses(sensor, placed, forces, course)
     errors = _errors_of(sensor, pressed)
     for name, result in pressed.items():
         if not result.within_validity.all():
             errors[name] = np.full(len(forces), np.inf)
             first = result.normal_force_n[result.within_validity == 0][0]
-            said.append(f"the {name} model does not hold from {first:g} N on")
+            remarks.append(f"the {name} model does not hold from {first:g} N on")
     mostly = {name: INTERVALS[name][1] * values for name, values in errors.items()}
     model = cheapest(mostly, tolerance_mm)
-    told = [f"{name} {1e3 * values.max():.3g} (90 % below {1e3 * mostly[name].max():.3g}) um" for name, values in errors.items()
+    in_um = [f"{name} {1e3 * values.max():.3g} (90 % below {1e3 * mostly[name].max():.3g}) um" for name, values in errors.items()
             if np.isfinite(values).all()]
-    reason = "; ".join([f"expected errors: {', '.join(told)}; asked for {1e3 * tolerance_mm:.3g} um" if told else
-                        "no fast model tells an error", *said])
+    reason = "; ".join([f"expected errors: {', '.join(in_um)}; asked for {1e3 * tolerance_mm:.3g} um" if in_um else
+                        "no fast model tells an error", *remarks])
     if sensor.spec.name != CALIBRATED_ON:
         reason += f" (calibrated on presses of the sensor {CALIBRATED_ON}, not of {sensor.spec.name})"
     spent = sum(result.wall_time_s for result in pressed.values())
@@ -194,22 +197,22 @@ def _by_error(sensor, placed, forces, tolerance_mm, course):
 
 
 def _fast_presses(sensor, placed, forces, course):
-    """{model: result} of the fast models that reach all forces, and what is to be said of those that do not."""
-    pressed, said = {}, []
+    """{model: result} of the fast models that reach all forces, and a remark on each of those that do not."""
+    pressed, remarks = {}, []
     for name in ("elastic", "foundation"):
         try:
-            with warnings.catch_warnings():      # the model that is taken tells of the shell once
+            with warnings.catch_warnings():      # the model that is taken warns of the shell once
                 warnings.simplefilter("ignore", ShellWarning)
                 pressed[name] = PRESSES[name](sensor, placed, forces, replace(course, reached=Reached()))
         except TimeLimitError:
             raise
         except ConvergenceError as error:
-            said.append(f"the {name} model fails: {error}")
-    return pressed, said
+            remarks.append(f"the {name} model fails: {error}")
+    return pressed, remarks
 
 
 def _errors_of(sensor, pressed):
-    """{model: expected errors (l,) in mm} of the fast presses; the elastic model's is told by the foundation model's."""
+    """{model: expected errors (l,) in mm} of the fast presses; the elastic model's follows from the foundation model's."""
     if "foundation" not in pressed:
         return {}
     size = {"height_mm": sensor.spec.frustum_height_mm, "thickness_mm": sensor.spec.thickness_mm}

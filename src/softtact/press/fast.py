@@ -190,7 +190,7 @@ def _of_load_steps(sensor, compliance, points, load_steps, forces, times, touch_
 
 
 def _within_reach(underside, points_within, foundation_modulus, forces, deepest, solve, depth_of):
-    """Points as far as the object may come down, and what `solve` makes of them; again with more where it came down further.
+    """Points as far as the object may come down, and what `solve` makes of them; repeated with more where it came down further.
 
     Beside the object the surface rises, so points a little above its depth can touch, too.
     """

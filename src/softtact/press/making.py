@@ -38,7 +38,7 @@ def make_result(sensor: "Sensor", model: str, solver: str, maps: np.ndarray, for
     """A `PressResult` of maps (l, points) or (l, ny, nx) and numbers by the result's names.
 
     lower_maps among these: of the lower side where it moves; capacitance follows the change of thickness
-    pressure among these: `Samples` of the contact pressure at each load step, where the model tells it
+    pressure among these: `Samples` of the contact pressure at each load step, where the model gives it
     """
     spec, maps = sensor.spec, maps.reshape(len(forces), *sensor.spec.map_shape)
     lower_maps, pressure = numbers.pop("lower_maps", None), numbers.pop("pressure", None)
@@ -101,7 +101,7 @@ def warn_of_shell(spec: "AnySpec", forces: np.ndarray, on_pad: np.ndarray) -> No
 
 def _friction(spec, model):
     """Attributes that state the friction of a result."""
-    if model != "hyperelastic":
+    if model not in ("hyperelastic", "solid"):
         return {"friction": f"none: the {model} model knows no friction"}
     return spec.support_facts
 

@@ -1,4 +1,4 @@
-"""Many presses at once: over processes, each core on its own on what the sensor prepared once; or as one batch on a GPU."""
+"""Many presses at once: over processes, one a core, on what the sensor prepared once; or as one batch on a GPU."""
 
 import multiprocessing
 import time
@@ -22,6 +22,7 @@ from softtact.geometry.pose import Pose
 from softtact.press.choice import models_to_prepare, with_expected_error
 from softtact.press.fast import elastic_result, first_touch_mm, shell_stop_mm
 from softtact.press.making import flag_buried
+from softtact.press.objects import SoftObject
 from softtact.press.result import PressResult
 from softtact.press.task import cores
 from softtact.progress import progress
@@ -61,7 +62,7 @@ class Batch:
         return cls(force_n, model, given.pop("workers", None) or cores(), options=policy, **given)
 
 
-def press_many(sensor: "Sensor", jobs: list[tuple[trimesh.Trimesh, Pose | None]], batch: Batch) -> list[PressResult]:
+def press_many(sensor: "Sensor", jobs: list[tuple[trimesh.Trimesh | SoftObject, Pose | None]], batch: Batch) -> list[PressResult]:
     """Presses of (mesh, pose); see `Sensor.press_many`."""
     results = _pressed_all(sensor, jobs, batch)
     return raise_first(results) if batch.failures == "raise" else results

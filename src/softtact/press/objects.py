@@ -76,7 +76,7 @@ class SoftObject:
 
 
 def _missing(points: np.ndarray, footprint_mm: tuple[float, float]) -> str:
-    """What is said of an object of which no node is over the sensor."""
+    """The message for an object of which no node is over the sensor."""
     (x0, y0, _), (x1, y1, _) = points.min(axis=0), points.max(axis=0)
     return (
         f"The soft object misses the sensor: it spans x {x0:.4g} to {x1:.4g} mm and y {y0:.4g} to {y1:.4g} mm, and none of its "
@@ -137,9 +137,9 @@ def placed_object(placed: trimesh.Trimesh, *, touch_mm: float, indentation_mm: n
 def first_direction(motion: Motion) -> np.ndarray:
     """Unit vector (3,) along which a motion's first step loads the object or, without a force, moves it; else down."""
     for given in (motion.steps[0].loads, motion.steps[0].ways):
-        way = np.array([given.get(name, 0.0) for name in FREEDOMS[:3]])
-        if way.any():
-            return np.asarray(way / np.linalg.norm(way))
+        along = np.array([given.get(name, 0.0) for name in FREEDOMS[:3]])
+        if along.any():
+            return np.asarray(along / np.linalg.norm(along))
     return np.array([0.0, 0.0, -1.0])
 
 

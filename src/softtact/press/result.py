@@ -67,7 +67,7 @@ class PressResult:
     frustum_compression_mm: np.ndarray = field(metadata=_array("mm", "step"))
     """(step,) in mm: of the most compressed frustum; nan where the model has none."""
     residual_n: np.ndarray = field(metadata=_array("N", "step"))
-    """(step,) in N: largest unbalanced nodal force; nan where the model does not tell."""
+    """(step,) in N: largest unbalanced nodal force; nan where the model does not give it."""
     extrapolated_volume_fraction: np.ndarray = field(metadata=_array("1", "step"))
     """(step,) share of a layer's volume strained beyond the data its law was fitted to, the larger of the layers'; or nan."""
     iterations: np.ndarray = field(metadata=_array("1", "step"))
@@ -96,16 +96,16 @@ class PressResult:
     """(step, 3) in N: the object's force on the sensor, pad and shell, along x, y, z; z is negative where it presses."""
     torque_nmm: np.ndarray = field(default=_ABSENT, metadata=_array("N mm", "step", "axis"))
     """(step, 3) in N mm: the torque of that force about the origin of the sensor frame; nan where the model does not
-    tell, and where the shell carries a part, whose place is not known."""
+    give it, and where the shell carries a part, whose place is not known."""
     displacement_mm: np.ndarray = field(default=_ABSENT, metadata=_array("mm", "step", "y", "x", "axis") | _PLANE)
-    """(step, y, x, 3) in mm: how the map's plane moved along x, y, z; nan in x and y where the model tells the map alone.
+    """(step, y, x, 3) in mm: how the map's plane moved along x, y, z; nan in x and y where the model gives the map alone.
     Of a sensor without a plane `solid.displacement_mm` (step, node, 3)."""
     slip: np.ndarray = field(default=_ABSENT, metadata=_array("mm", "step", "y", "x") | _PLANE)
     """(step, y, x) in mm: how far the surface slid along the object since it came to touch; nan where it does not touch, and where
     the model knows no friction."""
     expected_error_mm: np.ndarray = field(default=_ABSENT, metadata=_array("mm", "step"))
     """(step,) in mm: error to expect against the hyperelastic model, root mean square over the map, of a fast model on frusta and
-    where the model was chosen by it; else nan. How well it is told: docs/explanation/fast_models.md."""
+    where the model was chosen by it; else nan. How well it is known: docs/explanation/fast_models.md."""
     selection_reason: str = field(default="", metadata=_FACT)
     """What made the choice of the model, where it was not the user's."""
     largest_counts: float = field(default=2400.0, metadata=_FACT)
@@ -276,7 +276,7 @@ def _is_tactile_map(result):
 
 
 def _told_apart(name, reading):
-    """A reading whose dimensions, but for `step`, and coordinates are its own in a data set of several."""
+    """A reading whose dimensions, but for `step`, and coordinates have names that no other has."""
     names = {one: f"{one}_of_{name}" for one in (*reading.dims, *reading.coords) if one != "step"}
     return reading.rename(names).assign_attrs(reading=name)
 
@@ -351,7 +351,7 @@ def _solid_of(data, geometry, thickness):
 
 
 def _renewed(path, data):
-    """The data set of an old file of solids, with the names and numbers that results have now; what it does not tell is nan."""
+    """The data set of an old file of solids, with the names and numbers that results have now; what it does not hold is nan."""
     missing = [one.name for one in _arrays(SolidFields) if one.name not in data.variables]
     if missing:
         raise InputError(f"{path}: it holds no whole press ({missing[0]!r} is missing); press again.")
@@ -365,8 +365,8 @@ def _renewed(path, data):
                "converged": np.ones(steps, np.int8), "within_validity": np.ones(steps, np.int8)}
     points = {f"reading_{name}": data[f"reading_{name}"].values for name in ("points_mm", "displacement_mm", "pressure_mpa")}
     renewed = data.drop_vars([*points, "step"], errors="ignore").rename(_IN_FILE)
-    renewed = renewed.assign({name: ("step", values) for name, values in numbers.items()},
-                             force_n=(("step", "axis"), force), torque_nmm=(("step", "axis"), np.full((steps, 3), np.nan)))
+    renewed = renewed.assign({name: ("step", values) for name, values in numbers.items()})
+    renewed = renewed.assign(force_n=(("step", "axis"), force), torque_nmm=(("step", "axis"), np.full((steps, 3), np.nan)))
     attributes = {"model": "solid", "sensor": "", "solver": "", "selection_reason": "", "largest_counts": 2400.0} | data.attrs
     attributes["mesh_thickness_mm"] = attributes.pop("thickness_mm")
     renewed.attrs = {name: value for name, value in attributes.items() if name != "kind"}

@@ -117,16 +117,16 @@ class Sensor:
         with task.course.reached.kept():
             return press(self, task)
 
-    def press_many(self, meshes: trimesh.Trimesh | Sequence[trimesh.Trimesh],
+    def press_many(self, meshes: trimesh.Trimesh | SoftObject | Sequence[trimesh.Trimesh | SoftObject],
                    poses: Sequence[Pose | np.ndarray | Sequence[float] | None] | None = None, *,
                    force_n: float | Sequence[float], model: str = "auto", **options: Unpack[BatchOptions]) -> list[PressResult]:
         """Press each of `meshes` in its pose, all through the same forces; a list of `PressResult`s in their order.
 
-        meshes: one for each press, or a single one for all poses;  poses: a `Pose` or None (centred) for each press
+        meshes: objects, one for each press, or a single one for all poses;  poses: a `Pose` or None (centred) for each press
         options: see `BatchOptions`
         """
         refuse_unknown(options, BatchOptions)
-        if isinstance(meshes, trimesh.Trimesh):
+        if isinstance(meshes, trimesh.Trimesh | SoftObject):
             meshes = [meshes] * (1 if poses is None else len(poses))
         places = [Pose.of(pose) for pose in ([None] * len(meshes) if poses is None else poses)]
         if len(meshes) != len(places):

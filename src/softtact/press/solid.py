@@ -26,7 +26,7 @@ from softtact.materials.laws.base import Law
 from softtact.models.solid.body import SolidBody
 from softtact.models.solid.path import SolidLoadStep, SolidPath
 from softtact.models.solid.result import gathered
-from softtact.press.making import flag_buried, flag_overloaded
+from softtact.press.making import flag_buried, flag_overloaded, layered_surface
 from softtact.press.objects import OBJECT, PlacedObject, SoftObject, first_direction, way_to_touch
 from softtact.press.reached import Reached
 from softtact.press.result import PressResult
@@ -76,6 +76,8 @@ def _on_pad(pad, body, rigid, course, steps):
     """The result of load steps, in the sensor's frame, with solids and a rigid object where they are kept."""
     down = np.array([0.0, 0.0, pad.height_mm])
     result = pad.result(body, steps, keep_body=course.keep_body)
+    if pad.sensor.spec.readouts:      # taxels alone, the default, need no pressure
+        result = replace(result, readings=_readings_on_pad(pad, body, result, steps))
     if course.keep_body:
         solid = gathered(body, steps)
         result = replace(result, solid=replace(solid, mesh=solid.mesh.moved(lambda x: x - down),
@@ -88,6 +90,15 @@ def _on_pad(pad, body, rigid, course, steps):
         points_mm=np.asarray(rigid.vertices, dtype=float), triangles=np.asarray(rigid.faces, dtype=np.int64),
         way_mm=np.array([pose.translation for pose in poses]) + lowered, turn=np.array([pose.rotation for pose in poses]),
         about_mm=body.frames[0].point - down - lowered))
+
+
+def _readings_on_pad(pad, body, result, steps):
+    """What readouts read where the contact pressure is known."""
+    down = np.array([0.0, 0.0, pad.height_mm])
+    contacts = [(step.state.histories[0].points, step.state.contacts[0]) for step in steps]
+    pressure = [Samples(places(points, body.points) - down, points.weight, state.pressure) for points, state in contacts]
+    surface = layered_surface(pad.sensor.spec, result.deformation_map_mm, result.displacement_mm, pressure)
+    return readings_of(pad.sensor.readouts, surface)
 
 
 # --- sensors of kind solid ---
@@ -161,13 +172,13 @@ def _placed(sensor: "Sensor", points: np.ndarray, pose: Pose | None) -> np.ndarr
 def _to_touch(sensor: "Sensor", triangles: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """The displacement (3,) in mm to where triangles (t, 3, 3) first touch the contact's face."""
     spec, mesh = sensor.spec, sensor.elements
-    way = way_to_touch(triangles, fine_triangles(mesh.face(spec.contact.face), mesh.points), direction)
-    if not np.isfinite(way):
+    distance = way_to_touch(triangles, fine_triangles(mesh.face(spec.contact.face), mesh.points), direction)
+    if not np.isfinite(distance):
         (x0, y0, z0), (x1, y1, z1) = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
         raise InputError(f"The object misses the face {spec.contact.face!r} of {spec.name}: it spans x {x0:.4g} to "
-                         f"{x1:.4g}, y {y0:.4g} to {y1:.4g}, z {z0:.4g} to {z1:.4g} mm, and its way along ({direction[0]:.3g}, "
+                         f"{x1:.4g}, y {y0:.4g} to {y1:.4g}, z {z0:.4g} to {z1:.4g} mm, and moving along ({direction[0]:.3g}, "
                          f"{direction[1]:.3g}, {direction[2]:.3g}) does not meet it; correct its pose or its motion.")
-    return way * direction
+    return distance * direction
 
 
 def _pair(sensor: "Sensor", body: SolidBody, other: Surface, *, soft: SoftObject | None = None) -> ContactPair:
@@ -234,23 +245,23 @@ def solid_result(path: SolidPath) -> PressResult:
 def run(body: SolidBody, frame: str, motion: Motion, gather: Callable[[list[SolidLoadStep]], PressResult],
         course: Course) -> PressResult:
     """What `gather` makes of the load steps of a body whose one frame is moved."""
-    def tell(text: str) -> None:
+    def say(text: str) -> None:
         if course.label:
             announce(f"{course.label}: {text}")
 
     count, steps, reached = len(motion.steps), list[SolidLoadStep](), course.reached
 
-    def told() -> Iterator[None]:
-        for step in SolidPath(body, {frame: motion}, tell=tell).run():
+    def announced() -> Iterator[None]:
+        for step in SolidPath(body, {frame: motion}, tell=say).run():
             steps.append(step)
             force = float(np.linalg.norm(step.loads[0, :3]))
-            tell(f"step {len(steps)} of {count}, {force:.4g} N, {step.iterations} iterations, {step.wall_time_s:.0f} s")
+            say(f"step {len(steps)} of {count}, {force:.4g} N, {step.iterations} iterations, {step.wall_time_s:.0f} s")
             yield
 
     body.watch = Watch(course.label, limit_s=course.time_limit_s)
-    tell(f"{len(body.free)} unknowns, {count} load steps of the solid model")
+    say(f"{len(body.free)} unknowns, {count} load steps of the solid model")
     try:
-        reached.follow(told(), count, lambda: gather(steps[:len(reached.times)]))
+        reached.follow(announced(), count, lambda: gather(steps[:len(reached.times)]))
     finally:
         body.watch.end()
     return gather(steps)

@@ -1,6 +1,6 @@
 """The pressed sensor as a mesh with displacements, for ParaView and `softtact view`.
 
-bodies kept by the hyperelastic model, or by the solid one on layers: the solver's own mesh, all of it, and the object's pressure on
+bodies kept by the hyperelastic model, or by the solid one on layers: the solver's whole mesh, and the object's pressure on
 the faces of the sensing surface; frusta of the solid model are springs, and are not drawn
 solids: their mesh with its regions and faces, and at the nodes of each step displacement, J, von Mises stress and contact pressure
 else the deformation map as a surface in the sensor's walls and bottom at rest; only the map's vertical displacement is known there,
@@ -68,7 +68,7 @@ class PressedMesh:
 
     def points_of(self, layer: str) -> np.ndarray:
         """Numbers of the points that the cells of a layer use, by its name in `LAYERS`. Raises InputError where it has none."""
-        used = [nodes.ravel() for _, nodes, own in self.cells if own == LAYERS[layer]]
+        used = [nodes.ravel() for _, nodes, number in self.cells if number == LAYERS[layer]]
         if not used:
             raise InputError(f"The pressed sensor has no cells of the layer {layer!r}; keep the body of a hyperelastic press.")
         return np.unique(np.concatenate(used))
@@ -131,8 +131,8 @@ def read_vtu(path: str | Path) -> PressedMesh:
     if not load_steps:
         raise InputError(f"{path}: it holds no pressed sensor (no displacements); give a file of softtact press --vtu.")
     layers = mesh.cell_data.get("layer", [np.zeros(len(block.data)) for block in mesh.cells])
-    cells = [(block.type, block.data[layer == own], int(own))     # a file has one block for all neighbouring cells of a kind
-             for block, layer in zip(mesh.cells, layers, strict=True) for own in np.unique(layer)]
+    cells = [(block.type, block.data[layer == number], int(number))     # a file has one block for all neighbouring cells of a kind
+             for block, layer in zip(mesh.cells, layers, strict=True) for number in np.unique(layer)]
     return PressedMesh(points=mesh.points, cells=cells, force_n=np.array([force for _, force, _ in load_steps]),
                        displacement_mm=np.stack([mesh.point_data[name] for _, _, name in load_steps]))
 

@@ -9,7 +9,7 @@ That every height is an equipotential makes this an upper bound; straight field 
 side) make a lower one (J. W. Strutt, Phil. Trans. 161, 1871; J. C. Maxwell, Treatise, 1873, art. 306 to 308). Why the upper one was
 taken, and how far the field of the cell lies from it: docs/explanation/virtual_sensor.md.
 
-The solid keeps its volume. The sheet is confined, so the frusta give all the way: each slice spreads as its height shrinks,
+The solid keeps its volume. The sheet is confined, so the frusta alone give: each slice spreads as its height shrinks,
 phi = min(1, k phi at rest), until the pocket between the frusta is full; what then still moves compresses solid.
 """
 

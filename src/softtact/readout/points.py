@@ -37,20 +37,20 @@ class Points(Section):
         near = self._near(moved[0])
         values = np.full((len(moved), len(self.points_mm), len(QUANTITIES)), np.nan)
         for step, samples in enumerate(moved):
-            values[step, :, 1:] = [samples.area_mm2[own] @ samples.values[own] / samples.area_mm2[own].sum() for own in near]
+            values[step, :, 1:] = [samples.area_mm2[part] @ samples.values[part] / samples.area_mm2[part].sum() for part in near]
         if pressed is not None:
-            areas = [moved[0].area_mm2[own].sum() for own in near]
+            areas = [moved[0].area_mm2[part].sum() for part in near]
             for step, samples in enumerate(pressed):      # the force over parts that fill the face is the whole force
                 within = cKDTree(samples.points_mm).query_ball_point(self.points_mm, self.radius_mm)
-                values[step, :, 0] = [samples.area_mm2[own] @ samples.values[own] / area
-                                      for own, area in zip(within, areas, strict=True)]
+                values[step, :, 0] = [samples.area_mm2[part] @ samples.values[part] / area
+                                      for part, area in zip(within, areas, strict=True)]
         return labelled_points(values, np.array(self.points_mm))
 
     def _near(self, samples: Samples) -> list[list[int]]:
         """Numbers of the samples within the radius of each point."""
         near = cKDTree(samples.points_mm).query_ball_point(self.points_mm, self.radius_mm)
-        for point, own in zip(self.points_mm, near, strict=True):
-            if not own:
+        for point, part in zip(self.points_mm, near, strict=True):
+            if not part:
                 raise InputError(f"readings: the face has nothing within {self.radius_mm:g} mm of the point "
                                  f"{', '.join(f'{value:g}' for value in point)} mm; correct the point, or give a larger radius_mm.")
         return list(near)

@@ -38,17 +38,17 @@ def readings_at(recording: "xarray.Dataset", forces_n: Sequence[float], *, finge
 
     largest_counts: at which the readout ends
     Raises InputError where the force does not reach one of `forces_n`, turns back by more than 2 % of its largest value on the way
-    up or down, or where a taxel is clipped in the readings that are used. Of dead taxels tells `recording.dead`.
+    up or down, or where a taxel is clipped in the readings that are used. Dead taxels: `recording.dead`.
     """
     if finger not in range(recording.sizes["finger"]):
         raise InputError(f"{_name(recording)}: it has no finger {finger}; give one of 0 to {recording.sizes['finger'] - 1}.")
     force = recording.force_n.values[:, finger]
     top = len(force) - 1 - int(np.argmax(force[::-1]))       # the last of equal ones: a hold belongs to the way up
     up, down = np.arange(top + 1), np.arange(top, len(force))[::-1]
-    loading, used = _branch(recording, up, forces_n, finger, turned="falls back", way="up")
+    loading, used = _branch(recording, up, forces_n, finger, turned="falls back", branch="up")
     unloading = None
     if force[down].min() <= forces_n[0]:
-        unloading, more = _branch(recording, down, forces_n, finger, turned="rises again", way="down")
+        unloading, more = _branch(recording, down, forces_n, finger, turned="rises again", branch="down")
         used = np.union1d(used, more)
     _refuse_clipped(recording, used, finger, largest_counts)
     return RecordedPress(loading, unloading)
@@ -58,11 +58,11 @@ def _name(recording):
     return recording.attrs["file"] or "the recording"
 
 
-def _branch(recording, order, forces_n, finger, *, turned, way):
+def _branch(recording, order, forces_n, finger, *, turned, branch):
     """Counts (force, row, column) at the forces over the readings `order`, whose force rises; and those readings that are used."""
     force = recording.force_n.values[order, finger]
     slack = _SLACK * force.max()
-    _refuse_turning(recording, order, force, slack, turned=turned, way=way)
+    _refuse_turning(recording, order, force, slack, turned=turned, branch=branch)
     levels, first, count = np.unique(isotonic_regression(force).x, return_index=True, return_counts=True)
     if not (levels[0] <= forces_n[0] and levels[-1] >= forces_n[-1] - slack):
         missed = forces_n[0] if levels[0] > forces_n[0] else forces_n[-1]
@@ -75,12 +75,12 @@ def _branch(recording, order, forces_n, finger, *, turned, way):
             order[:first[last] + count[last]])
 
 
-def _refuse_turning(recording, order, force, slack, *, turned, way):
+def _refuse_turning(recording, order, force, slack, *, turned, branch):
     """Refuse a force that turns back by more than the slack, by the row at which it does."""
     back = np.maximum.accumulate(force) - force > slack
     if back.any():
         at = int(np.argmax(back))
-        raise InputError(f"{_name(recording)}, row {row_of(recording, order[at])}: the force {turned} on the way {way} "
+        raise InputError(f"{_name(recording)}, row {row_of(recording, order[at])}: the force {turned} on the way {branch} "
                          f"({force[:at].max():.3g} and {force[at]:.3g} N); give a recording of one press, loaded once and let go "
                          "once.")
 

@@ -5,14 +5,14 @@ dynamic (time, finger), acceleration and angular_rate (time, finger, axis), forc
 first reading. Attributes: source, file, start_ms.
 
 Order of the taxels. The maker's protocol sends 28 numbers a finger row by row, 7 rows of 4 columns; taxel k is row k // 4, column
-k % 4. That row 0 lies at the lowest y and column 0 at the lowest x of the sensor frame, and that the frame of each finger is its
-own (z out of its own sensing surface), is printed nowhere and assumed. A press off the centre shows it: `softtact calibrate` tells
+k % 4. That row 0 lies at the lowest y and column 0 at the lowest x of the sensor frame, and that each finger has a frame, z out of
+its sensing surface, is printed nowhere and assumed. A press off the centre shows it: `softtact calibrate` says
 when a recording follows a press better with rows or columns turned round.
 """
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
 
@@ -32,20 +32,32 @@ _LATE_S = 0.05                      # by which a log of forces may begin late or
 _DIMENSIONS = {"counts": ("time", "finger", "row", "column"), "baseline": ("finger", "row", "column"),
                "dynamic": ("time", "finger"), "acceleration": ("time", "finger", "axis"),
                "angular_rate": ("time", "finger", "axis"), "force_n": ("time", "finger"), "row_of_file": ("time",)}
+_ORDER = ("counts", "dynamic", "acceleration", "angular_rate", "force_n", "row_of_file", "baseline")     # in data sets
 _UNITS = {"counts": "counts", "baseline": "counts", "dynamic": "raw", "acceleration": "raw", "angular_rate": "raw", "force_n": "N",
           "row_of_file": "1"}
 
 
+class RecordedArrays(TypedDict, total=False):
+    """What a recording may hold beside its counts."""
+
+    dynamic: np.ndarray
+    """(time, finger): raw, as the maker's electronics send it."""
+    acceleration: np.ndarray
+    """(time, finger, 3): raw, as the maker's electronics send it."""
+    angular_rate: np.ndarray
+    """(time, finger, 3): raw, as the maker's electronics send it."""
+    force_n: np.ndarray
+    """(time, finger): normal force on each finger in N."""
+    row_of_file: np.ndarray
+    """(time,): rows of the file, for messages."""
+
+
 def make_recording(time_s: np.ndarray | Sequence[float], counts: np.ndarray, *, source: str, baseline: np.ndarray | None = None,
-                   dynamic: np.ndarray | None = None, acceleration: np.ndarray | None = None,
-                   angular_rate: np.ndarray | None = None, force_n: np.ndarray | None = None,
-                   row_of_file: np.ndarray | None = None, start_ms: int = 0, file: str = "") -> "xarray.Dataset":
+                   start_ms: int = 0, file: str = "", **arrays: Unpack[RecordedArrays]) -> "xarray.Dataset":
     """A recording (see this module) of counts (time, finger, row, column) over the baseline at times (time,) in s.
 
     source: what the numbers are, as "simulated: softtact";  baseline (finger, row, column): raw counts at rest, 0 by default
-    dynamic (time, finger), acceleration, angular_rate (time, finger, 3): raw, as the maker's electronics send them
-    force_n (time, finger): normal force on each finger in N, where it is known
-    start_ms: of the recorder's clock at time 0;  row_of_file (time,): rows of the file, for messages
+    start_ms: of the recorder's clock at time 0;  file: that the recording comes from
     Raises InputError where shapes do not fit or time runs back.
     """
     import xarray
@@ -57,11 +69,10 @@ def make_recording(time_s: np.ndarray | Sequence[float], counts: np.ndarray, *, 
     if (np.diff(time) < 0).any():
         at = int(np.argmax(np.diff(time) < 0)) + 1
         raise InputError(f"A recording's time runs back at reading {at}, from {time[at - 1]:g} to {time[at]:g} s; sort it.")
-    given: dict[str, Any] = {"counts": counts, "dynamic": dynamic, "acceleration": acceleration, "angular_rate": angular_rate,
-                             "force_n": force_n, "row_of_file": row_of_file,
+    given: dict[str, Any] = {"counts": counts, **arrays,
                              "baseline": np.zeros(counts.shape[1:], dtype=int) if baseline is None else baseline}
-    variables = {name: (_DIMENSIONS[name], np.asarray(values), {"units": _UNITS[name]})
-                 for name, values in given.items() if values is not None}
+    variables = {name: (_DIMENSIONS[name], np.asarray(given[name]), {"units": _UNITS[name]})
+                 for name in _ORDER if given.get(name) is not None}
     try:
         return xarray.Dataset(variables, coords={"time": ("time", time, {"units": "s"})},
                               attrs={"source": source, "file": file, "start_ms": int(start_ms)})
@@ -91,21 +102,21 @@ def findings(recording: "xarray.Dataset", *, largest: float | None = None) -> li
     """A sentence for each clipped or dead taxel, with the file and its first row; arguments as for `clipped`."""
     at_end, stuck = clipped(recording, largest=largest), dead(recording)
     file, counts = recording.attrs["file"] or "the recording", recording.counts.values
-    said = []
+    found = []
     for finger, row, column in np.argwhere(at_end.any(axis=0)):
         first = int(np.argmax(at_end[:, finger, row, column]))
-        said.append(f"{file}, row {row_of(recording, first)}: {taxel_in_words(finger, row, column)} reads "
+        found.append(f"{file}, row {row_of(recording, first)}: {taxel_in_words(finger, row, column)} reads "
                     f"{counts[first, finger, row, column]:g} counts, the end of its range; "
                     f"{at_end[:, finger, row, column].sum()} readings of it are clipped.")
     for finger, row, column in np.argwhere(stuck):
-        said.append(f"{file}, row {row_of(recording, 0)}: {taxel_in_words(finger, row, column)} reads "
+        found.append(f"{file}, row {row_of(recording, 0)}: {taxel_in_words(finger, row, column)} reads "
                     f"{counts[0, finger, row, column]:g} counts in all {len(counts)} readings while others of its finger move; it "
                     "may be dead.")
-    return said
+    return found
 
 
 def row_of(recording: "xarray.Dataset", reading: int) -> int:
-    """Row of its file that a reading stands in, or its own number where there is no file."""
+    """Row of its file that a reading stands in, or its number where there is no file."""
     return int(recording.row_of_file[reading]) if "row_of_file" in recording else reading
 
 

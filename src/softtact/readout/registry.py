@@ -53,7 +53,7 @@ class SurfaceMotion:
     steps: int
     """Number of load steps."""
     displacement: Callable[[str | None], list[Samples]]
-    """Of a face by its name, or of the sensing surface: its displacement in mm at each step; nan along x and y where a model tells
+    """Of a face by its name, or of the sensing surface: its displacement in mm at each step; nan along x and y where a model gives
     the map alone."""
     pressure: Callable[[str | None], list[Samples] | None]
     """Of a face or the sensing surface: contact pressure in MPa per area at rest, positive in compression, at each step; None where

@@ -33,7 +33,7 @@ class Strip(Section):
     """The part of a face between two values of x and of y (and of z), at rest.
 
     Readings (step, quantity): the contact's normal force on it in N and its mean pressure in MPa, positive in compression; nan
-    where the model tells no pressure.
+    where the model gives no pressure.
     """
 
     x_mm: tuple[float, float]

@@ -36,9 +36,9 @@ _NODES = (25, 16)       # of the extension's mesh, rows along the longer side: a
 def read_recording(path: str | Path, *, baseline: str = "auto") -> "xarray.Dataset":
     """The recording (`softtact.readout.recording`) in a file of the maker's recorder, or of the authors' extension.
 
-    baseline: whether the recorder has `subtracted` it from the readings, or `kept` it in them; `auto` tells by the lowest readings,
-    and refuses a file that allows both. The extension's file of nodes gives `dz` (time, node_y, node_x) in place of counts.
-    Raises InputError that names the file, its row and the remedy.
+    baseline: whether the recorder has `subtracted` it from the readings, or `kept` it in them; `auto` decides by the lowest
+    readings, and refuses a file that allows both. The extension's file of nodes gives `dz` (time, node_y, node_x) in place of
+    counts. Raises InputError that names the file, its row and the remedy.
     """
     path = Path(path)
     if baseline not in BASELINES:

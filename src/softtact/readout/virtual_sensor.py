@@ -83,7 +83,7 @@ class VirtualSensorSettings:
         return cls(**off | kept | {"largest_counts": np.inf} | changes)
 
     def of_calibrated(self, spec: "SensorSpec") -> Self:
-        """These settings with the scale and the creep of a sensor's own `calibration`, where it has one."""
+        """These settings with the scale and the creep of a sensor's `calibration`, where it has one."""
         known = spec.calibration
         return self if known is None else dataclasses.replace(
             self, counts_per_relative_change=known.counts_per_relative_change, relaxation=known.relaxation,
@@ -151,7 +151,7 @@ def read_virtual_sensor(spec: "SensorSpec", deformation_map_mm: np.ndarray, *, f
 
 def read_branches(spec: "SensorSpec", deformation_map_mm: np.ndarray, *, force_n: Sequence[float] | np.ndarray, trials: int,
                   seed: int, item: str, settings: VirtualSensorSettings = VirtualSensorSettings()) -> Branches:
-    """`Branches` of counts for maps (force, y, x) in mm at rising forces (force,) in N; `item` tells presses apart."""
+    """`Branches` of counts for maps (force, y, x) in mm at rising forces (force,) in N; `item` keeps presses apart."""
     settings = settings.of_calibrated(spec)
     specimen = make_specimen(spec, seed=seed, settings=settings)
     history = staircase(np.asarray(force_n, dtype=float), rate_n_per_s=settings.rate_n_per_s, hold_s=settings.load_step_s,
@@ -251,7 +251,7 @@ def random_walk(steps: np.ndarray, size: float) -> np.ndarray:
 
 def amplified(counts: np.ndarray, *, gain: float | np.ndarray, offset: float | np.ndarray, gain_drift: float | np.ndarray = 0.0,
               offset_drift: float | np.ndarray = 0.0) -> np.ndarray:
-    """Counts (..., rows, columns) of taxels with their own gain and zero; each argument a number or (rows, columns)."""
+    """Counts (..., rows, columns) of taxels with a gain and a zero each; argument a number or (rows, columns)."""
     return gain * (1 + gain_drift) * counts + offset + offset_drift
 
 

@@ -28,7 +28,7 @@ figure {{margin: 0}}
 </style><body>{body}</body></html>
 """
 _SEEN_THROUGH = 0.3           # opacity of the object
-_SHEET_MM = 1.0               # height of the walls where a file does not tell the sensor's thickness
+_SHEET_MM = 1.0               # height of the walls where a file does not hold the sensor's thickness
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ class ReadoutEntry(BaseModel):
 class Specification(Section):
     """What a sensor of any kind has; each class states its `kind` as a literal.
 
-    readouts: what the sensor tells of a press, by names of one's own; by default those of its kind
+    readouts: what the sensor tells of a press, by names of choice; by default those of its kind
     """
 
     name: str
@@ -45,7 +45,7 @@ class Specification(Section):
 
     @property
     def paths(self) -> list[Path]:
-        """All files that the sensor is read from beside its own."""
+        """All files that the sensor is read from beside the sensor's."""
         return []
 
     def need_layers(self) -> None:

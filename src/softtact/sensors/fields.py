@@ -89,7 +89,7 @@ def _held(value: Any) -> Any:
 
 
 class Edge(Section):
-    """What holds the rim; `held` as above, `sides_below_mm` and `free` in its place are short for it."""
+    """What holds the rim: `held` is sides, free or {sides_below_mm: h}; each may also be given in place of the whole block."""
 
     held: Annotated[Literal["sides", "free"] | SidesBelow, BeforeValidator(_held)] = "sides"
     shell_width_mm: Length = 2.0
@@ -128,7 +128,7 @@ Share = Annotated[float, Field(ge=0.0, lt=1.0)]
 
 
 class CalibrationBlock(Section):
-    """counts = gain x counts_per_relative_change x dC/C0 + zero_counts, each taxel's own; dC/C0 with the electrodes' edges and
+    """counts = gain x counts_per_relative_change x dC/C0 + zero_counts, of each taxel; dC/C0 with the electrodes' edges and
     neighbours as the virtual sensor has them.
     """
 

@@ -16,27 +16,27 @@ ALIASES = {"sensors": {"tsf85": "coro"}, "materials": {}}     # a product's name
 YAML = (".yaml", ".yml")
 
 
-def sensor_file(name: str | Path, *, own: str | Path = OWN) -> Path:
+def sensor_file(name: str | Path, *, folder: str | Path = OWN) -> Path:
     """The YAML file of a sensor, given by its name or by the path of a YAML file.
 
-    own: the folder whose `sensors/` comes before what ships
+    folder: the folder whose `sensors/` comes before what ships
     Raises InputError, which lists the known names, where there is no sensor of that name.
     """
-    return _file("sensors", name, Path(own))
+    return _file("sensors", name, Path(folder))
 
 
-def material_file(name: str | Path, *, own: str | Path = OWN) -> Path:
+def material_file(name: str | Path, *, folder: str | Path = OWN) -> Path:
     """The YAML file of a material, given by its name or by the path of a YAML file.
 
-    own: the folder whose `materials/` comes before what ships
+    folder: the folder whose `materials/` comes before what ships
     Raises InputError, which lists the known names, where there is no material of that name.
     """
-    return _file("materials", name, Path(own))
+    return _file("materials", name, Path(folder))
 
 
-def known_names(kind: str, *, own: str | Path = OWN) -> list[str]:
+def known_names(kind: str, *, folder: str | Path = OWN) -> list[str]:
     """Sorted names of the `kind`, sensors or materials: a user's own, those that ship, and other names of those."""
-    files = [path for folder in _folders(kind, Path(own)) for path in folder.glob("*.yaml")]
+    files = [path for place in _folders(kind, Path(folder)) for path in place.glob("*.yaml")]
     return sorted({*(path.stem for path in files), *ALIASES[kind]})
 
 
@@ -45,17 +45,17 @@ def is_shipped(path: str | Path) -> bool:
     return Path(path).is_relative_to(SHIPPED)
 
 
-def _folders(kind: str, own: Path) -> tuple[Path, Path]:
-    return own / kind, SHIPPED / kind
+def _folders(kind: str, folder: Path) -> tuple[Path, Path]:
+    return folder / kind, SHIPPED / kind
 
 
-def _file(kind: str, name: str | Path, own: Path) -> Path:
+def _file(kind: str, name: str | Path, folder: Path) -> Path:
     if Path(name).suffix in YAML:
         return Path(name)
     for asked in (str(name), ALIASES[kind].get(str(name), str(name))):
-        for folder in _folders(kind, own):
-            if asked in {path.stem for path in folder.glob("*.yaml")}:     # by comparison: a name is no path
-                return folder / f"{asked}.yaml"
-    known = known_names(kind, own=own)
+        for place in _folders(kind, folder):
+            if asked in {path.stem for path in place.glob("*.yaml")}:     # by comparison: a name is no path
+                return place / f"{asked}.yaml"
+    known = known_names(kind, folder=folder)
     raise InputError(f"There is no {kind.removesuffix('s')} {str(name)!r}{nearest(name, known)}; known are {', '.join(known)}; "
-                     f"write one of them, the path of a YAML file, or put yours at {own / kind / f'{name}.yaml'}.")
+                     f"write one of them, the path of a YAML file, or put yours at {folder / kind / f'{name}.yaml'}.")

@@ -79,7 +79,7 @@ class SolidSpec(Specification):
 
     @property
     def paths(self) -> list[Path]:
-        """All files that the sensor is read from beside its own."""
+        """All files that the sensor is read from beside the sensor's."""
         return [self.mesh_path, *(self._folder / region.card for region in self.regions.values() if region.card)]
 
     @property
