@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, PrivateAttr, ValidationError, model_serializer
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, ValidationError, model_serializer
 
 from softtact.errors import InputError
 from softtact.files import read_yaml
@@ -31,7 +31,6 @@ class Specification(Section):
     name: str
     force_range_n: tuple[float, PositiveFloat]
     readouts: dict[str, ReadoutEntry] = {}
-    _folder: Path = PrivateAttr(Path())     # of the sensor's file, which its paths are relative to
 
     @property
     def stated_readouts(self) -> dict[str, ReadoutEntry]:
@@ -53,6 +52,9 @@ class Specification(Section):
 
     def need_frusta(self, what: str, remedy: str) -> None:
         """Refuse `what` with one sentence that ends in the remedy, where the sensor has no frusta."""
+
+    def _found_in(self, folder: Path) -> None:
+        """Take the folder of the sensor's file, where its paths are relative to that."""
 
     def _check(self, where: str) -> None:
         """Refuse values that are right each by itself and wrong together."""
@@ -79,7 +81,7 @@ class Specification(Section):
             spec = cls.model_validate(values)
         except ValidationError as error:
             raise InputError(sentence(cls, first_fault(error), where)) from None
-        spec._folder = folder
+        spec._found_in(folder)
         spec._check(where)
         return spec
 

@@ -14,7 +14,7 @@
 from pathlib import Path
 from typing import Annotated, Literal, NoReturn
 
-from pydantic import Field, PositiveFloat
+from pydantic import Field, PositiveFloat, PrivateAttr
 
 from softtact.errors import InputError
 from softtact.materials.cards import law_from_card, load_card
@@ -71,6 +71,7 @@ class SolidSpec(Specification):
     held: Annotated[dict[str, str], Field(min_length=1)]
     contact: ContactFace
     readings: ReadingPlaces | None = Field(None, description="short for a readout of the name and the kind points")
+    _folder: Path = PrivateAttr(Path())     # of the sensor's file, which its paths are relative to
 
     @property
     def mesh_path(self) -> Path:
@@ -88,6 +89,9 @@ class SolidSpec(Specification):
         if self.readings is None:
             return self.readouts
         return {"points": ReadoutEntry(kind="points", **self.readings.model_dump()), **self.readouts}
+
+    def _found_in(self, folder: Path) -> None:
+        self._folder = folder
 
     def need_layers(self) -> NoReturn:
         """Refuse what takes sensors of layers alone."""
