@@ -30,7 +30,7 @@ _ROUNDING_MM = 1e-6
 
 @register("strip")
 class Strip(Section):
-    """The part of a face between two values of x and of y (and of z), at rest.
+    """The part of a face from one value of x, of y (and of z) to below another, at rest.
 
     Readings (step, quantity): the contact's normal force on it in N and its mean pressure in MPa, positive in compression; nan
     where the model gives no pressure.
@@ -56,7 +56,7 @@ class Strip(Section):
 
     def _within(self, samples: Samples) -> np.ndarray:
         sides = (self.x_mm, self.y_mm, self.z_mm or (-np.inf, np.inf))
-        return np.all([(low <= column) & (column <= high) for (low, high), column in zip(sides, samples.points_mm.T, strict=True)],
+        return np.all([(low <= column) & (column < high) for (low, high), column in zip(sides, samples.points_mm.T, strict=True)],
                       axis=0)
 
 
