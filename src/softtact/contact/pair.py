@@ -2,7 +2,7 @@
 
 Normal: penalty with offsets (augmented Lagrange in terms of lengths): p = k max(0, offset - g), and an augmentation makes a point's
 last overlap its offset, so that the same pressure leaves none. Friction: the traction on the points' surface is that of the step's
-beginning minus k times the way that the point slid on the other surface since, held to mu p. Of its tangent, the part by which the
+beginning minus k times the slip on the other surface since, held to mu p. Of its tangent, the part by which the
 bound changes with the pressure is not symmetric; it is kept apart (`add_coupling`), so that the matrix is symmetric.
 References: Wriggers, Computational Contact Mechanics, 2nd ed. (2006), ch. 4 to 6; Simo and Laursen, Comput. Struct. 42 (1992) 97.
 """
@@ -24,7 +24,7 @@ _ROUNDING_MM = 1e-7  # surfaces that lie on each other from the start touch, wha
 _RIM = 0.02  # of a facet's size: how far a point beside the other surface's rim still meets it
 _BESIDE = 0.1  # of a facet's width: how far beside the facet that it meets a point may stand in a balanced state
 _YIELD = 1e-6  # a step begins with what slid before at its bound: it may stick as well
-_LEAST_COSINE = 0.1  # of the angle between opposite normals: walls that stand across a surface are not what it meets
+_LEAST_COSINE = 0.1  # of the angle between opposite normals: walls across a surface do not meet it
 
 
 @dataclass
@@ -84,9 +84,9 @@ class ContactPair:
 
     def _slip(self, points, anchor, projection, x):
         """Vectors (p, 3) in mm from the anchors to the points' feet on the other surface."""
-        way = places(points, x) - places_on(anchor.facet, anchor.coordinates, self.other.nodes, self.other.kinds, x)
-        way -= np.einsum("pi,pj,pj->pi", projection.normal, projection.normal, way)
-        return np.where((anchor.facet >= 0)[:, None], way, 0.0)
+        slip = places(points, x) - places_on(anchor.facet, anchor.coordinates, self.other.nodes, self.other.kinds, x)
+        slip -= np.einsum("pi,pj,pj->pi", projection.normal, projection.normal, slip)
+        return np.where((anchor.facet >= 0)[:, None], slip, 0.0)
 
     def _frames(self, anchor, x):
         """Directions (p, 2, 3) at the anchors, which turn with the other surface."""
@@ -178,7 +178,7 @@ class ContactPair:
         return (trial * (share * acts)[:, None], stiffness, slip, slides, float((history.points.weight * energy * acts).sum()))
 
     def add_forces(self, history: PairHistory, state: PairState, force: np.ndarray) -> None:
-        """Add to nodal forces (n, 3) in N what stands against the contact: the derivative of its potential."""
+        """Add the derivative of the contact's potential to nodal forces (n, 3) in N."""
         points, projection, other = history.points, state.projection, self.other
         kernels.add_forces_of(
             force,
@@ -220,14 +220,14 @@ class ContactPair:
     def add_coupling(self, history: PairHistory, state: PairState, change: np.ndarray, force: np.ndarray) -> None:
         """Add to nodal forces (n, 3) what sliding friction changes by the pressure that changes with the nodes' places (n, 3).
 
-        This part of the tangent is not symmetric, and stands in no matrix.
+        This part of the tangent is not symmetric and not in the matrix.
         """
         here = state.slides & (state.slope > 0) & (state.pressure > 0)
         if not self.friction or not here.any():
             return
         points, projection, other, anchor = history.points, state.projection, self.other, history.anchor
-        way = places(points, change) - places_on(projection.facet, projection.coordinates, other.nodes, other.kinds, change)
-        pressure = -state.slope * (way * projection.normal).sum(axis=1) * here
+        apart = places(points, change) - places_on(projection.facet, projection.coordinates, other.nodes, other.kinds, change)
+        pressure = -state.slope * (apart * projection.normal).sum(axis=1) * here
         direction = state.friction / np.maximum(self.friction * state.pressure, 1e-300)[:, None]
         kernels.add_forces_of(
             force,
@@ -292,7 +292,7 @@ class ContactPair:
         """The history with offsets that hold the surfaces where they just touch, in the mean and the slope over each facet.
 
         There are more points than displacements that could follow them: offsets of single points would leave few of them in touch,
-        and their pressures without order. Where an augmentation came to a stand, the penalty is doubled.
+        and their pressures without order. Where an augmentation hardly lowers the overlap, the penalty is doubled.
         """
         overlap, factor = self.overlap_mm(history, state), 1.0
         if overlap > 0.5 * history.overlap_mm:
@@ -307,7 +307,7 @@ class ContactPair:
     def overlap_mm(self, history: PairHistory, state: PairState) -> float:
         """Largest overlap (mm), or gap under pressure, of the surfaces, in the mean and the slope over each facet.
 
-        What single points of a rough surface overlap beyond that, no facet could follow: `PairState.penetration_mm` tells it.
+        What single points of a rough surface overlap beyond that, no facet could follow: `PairState.penetration_mm` has it.
         """
         off = self._linear(history, np.where(state.pressure > 0, state.pressure / history.stiffness - history.offset, 0.0))
         return float(np.abs(off).max(initial=0.0))
@@ -325,7 +325,7 @@ class ContactPair:
         return (basis * np.linalg.solve(gram, right[..., None])[points.facet, :, 0]).sum(axis=1)
 
     def settled(self, history: PairHistory, state: PairState, tolerance_mm: float) -> bool:
-        """Whether surfaces overlap by no more than the tolerance, and points that press stand over the facets that they meet."""
+        """Whether surfaces overlap by no more than the tolerance, and pressed points lie over the facets that they meet."""
         here = np.flatnonzero(state.pressure > 0)
         facets, (xi, eta) = state.projection.facet[here], state.projection.coordinates[here].T
         kinds = self.other.kinds[facets]

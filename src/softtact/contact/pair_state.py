@@ -36,9 +36,9 @@ class PairHistory:
     start: np.ndarray
     """(p, 3) in mm: by how much the anchors lay beside the points' feet when the step began; 0 but at a surface's end."""
     slid: np.ndarray
-    """(p,) in mm: ways that the points slid on the other surface, up to the step's beginning."""
+    """(p,) in mm: length of the points' slip on the other surface, up to the step's beginning."""
     stiffness: float
-    """Penalty in N/mm3: the pair's, or larger where its augmentations came to a stand."""
+    """Penalty in N/mm3: the pair's, or larger where augmentations hardly lowered the overlap."""
     overlap_mm: float = np.inf
     """Deepest overlap at the step's last augmentation; infinite before its first one."""
 
@@ -56,9 +56,9 @@ class PairState:
     friction: np.ndarray
     """(p, 3) in MPa: friction on the points' surface."""
     stiffness: np.ndarray
-    """(p, 3, 3) in N/mm3: how friction stands against slip."""
+    """(p, 3, 3) in N/mm3: friction's stiffness against slip."""
     slip: np.ndarray
-    """(p, 3) in mm: way of the points on the other surface within the step."""
+    """(p, 3) in mm: slip of the points on the other surface within the step."""
     slides: np.ndarray
     """(p,) whether friction is at its bound."""
     energy: float

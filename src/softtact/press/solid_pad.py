@@ -1,6 +1,6 @@
 """A sensor's layers as a solid of finite strain, its frusta as items below it, and what a press of it gives.
 
-The object is soft, a mesh of its own that joins the layers', or rigid, by its exact facets on a frame with six freedoms.
+The object is soft, with elements that join the layers', or rigid: its exact facets on a frame with six freedoms.
 """
 
 from dataclasses import replace
@@ -204,7 +204,7 @@ class SolidPad:
         on_shell = np.array([step.loads[1:, 2].sum() for step in steps])  # of the shell's frame, where there is one
         points = [step.state.histories[0].points for step in steps]
         contact = [step.state.contacts[0] for step in steps]
-        area = [float(own.weight[state.pressure > 0].sum()) for own, state in zip(points, contact, strict=True)]
+        area = [float(at.weight[state.pressure > 0].sum()) for at, state in zip(points, contact, strict=True)]
         down = np.array([-step.state.poses[0].translation[2] for step in steps])
         frusta = [item for item in body.items if isinstance(item, FrustumItem)]
         compression = [max((float(item.compressions(step.state.displacement).max()) for item in frusta), default=np.nan)

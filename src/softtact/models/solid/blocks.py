@@ -140,9 +140,9 @@ def refuse_loose(mesh: SolidMesh, free: np.ndarray, supported: np.ndarray, held:
     bound = np.logical_not(free[: len(body), :dimensions].all(axis=1))
     bound[supported] = True
     for k in np.unique(body[body >= 0]):
-        own = body == k
-        if not bound[own].any():
-            x, y, z = mesh.points[own].mean(axis=0)
+        nodes = body == k
+        if not bound[nodes].any():
+            x, y, z = mesh.points[nodes].mean(axis=0)
             raise InputError(
                 f"Nothing holds the body around {x:.4g}, {y:.4g}, {z:.4g} mm; hold one of its faces or let a frame carry it "
                 f"(held are {', '.join(held) or 'none'})."

@@ -41,7 +41,7 @@ class FramePose:
     """(3, 3), from rest."""
 
     def moved(self, step: np.ndarray) -> "FramePose":
-        """The pose after a step (6,): a way in mm and a rotation vector in radians, both in the fixed frame."""
+        """The pose after a step (6,): a translation in mm and a rotation vector in radians, both in the fixed frame."""
         return FramePose(self.translation + step[:3], Rotation.from_rotvec(step[3:]).as_matrix() @ self.rotation)
 
     def displacement(self, frame: Frame, points: np.ndarray) -> np.ndarray:
@@ -51,16 +51,14 @@ class FramePose:
 
     def loads(self, frame: Frame, points: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Force (N) and torque (N mm) about the reference point (6,) of nodal forces (n, 3) on the frame's nodes."""
-        own, arm = (
-            force[frame.nodes] * [axis in frame.axes for axis in "xyz"],
-            (points[frame.nodes] - frame.point) @ self.rotation.T,
-        )
-        return np.concatenate([own.sum(axis=0), np.cross(arm, own).sum(axis=0)])
+        carried = force[frame.nodes] * [axis in frame.axes for axis in "xyz"]
+        arm = (points[frame.nodes] - frame.point) @ self.rotation.T
+        return np.concatenate([carried.sum(axis=0), np.cross(arm, carried).sum(axis=0)])
 
 
-def step_vector(ways: dict[str, float]) -> np.ndarray:
-    """Ways of a step {freedom: mm or degrees} as (6,): mm and radians."""
-    out = np.array([ways.get(name, 0.0) for name in FREEDOMS])
+def step_vector(prescribed: dict[str, float]) -> np.ndarray:
+    """Prescribed freedoms of a step {freedom: mm or degrees} as (6,): mm and radians."""
+    out = np.array([prescribed.get(name, 0.0) for name in FREEDOMS])
     out[3:] = np.radians(out[3:])
     return out
 

@@ -13,7 +13,7 @@ from softtact.models.solid.body import SolidBody, SolidState
 from softtact.models.solid.frames import step_vector
 from softtact.models.solid.newton import SolidSettings, Target, balance
 
-_OVERLAP_MM = 1e-3  # by how much a loaded object is let into the surface before its load acts, so that something stands against it
+_OVERLAP_MM = 1e-3  # overlap of a loaded object with the surface before its load acts, so that contact resists it
 _FAST = 8  # iterations of an increment up to which the next one may be larger
 
 
@@ -38,7 +38,7 @@ class SolidLoadStep:
     stretch: tuple[float, float]
     """Least and largest isochoric principal stretch."""
     extrapolated_volume_fraction: float
-    """Share of a region's volume strained beyond the data of its law, the largest of the regions'; nan where no law tells."""
+    """Share of a region's volume strained beyond the data of its law, the largest of the regions'; nan where no law states any."""
     dissipated_mj: float
     """Energy in mJ that friction took up to this step's end."""
     work_mj: float
