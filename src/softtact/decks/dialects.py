@@ -83,23 +83,30 @@ class Dialect:
                  else [f"** STEP: {name}", "*STEP, NLGEOM, INC=1000"])
         return [*named, "*STATIC", increments, "*BOUNDARY" if first else "*BOUNDARY, OP=NEW"]
 
-    def rigid_facets(self, name: str, numbers: np.ndarray, nodes: np.ndarray, reference: int) -> list[str]:
-        """Elements (e,) of a rigid object with nodes (e, 3) or (e, 4) as they stand in the deck, and the surface NAME_SURFACE."""
+    def rigid_facets(self, name: str, numbers: np.ndarray, nodes: np.ndarray, reference: int, *,
+                     material: Sequence[str] = ()) -> list[str]:
+        """Elements (e,) of a rigid object with nodes (e, 3) or (e, 4) as numbered in the deck, and the surface NAME_SURFACE.
+
+        material: lines before the section of elements behind facets
+        """
         if self.facets_are_rigid:
             return [*keywords.elements("R3D3", name, numbers, nodes), f"*RIGID BODY, REF NODE={reference}, ELSET={name}",
                     f"*SURFACE, NAME={name}_SURFACE, TYPE=ELEMENT", f"{name}, SPOS"]
-        return [*keywords.elements(str(TET4.abaqus_name), name, numbers, nodes), f"*SOLID SECTION, ELSET={name}, MATERIAL=RIGID",
+        return [*keywords.elements(str(TET4.abaqus_name), name, numbers, nodes), *material,
+                f"*SOLID SECTION, ELSET={name}, MATERIAL=RIGID",
                 *keywords.surface(f"{name}_SURFACE", [(int(number), 1) for number in numbers])]
 
 
 _BRICK = str(HEX20.abaqus_name)
 DIALECTS = {
-    "calculix": Dialect("CalculiX", (f"{_BRICK}R", _BRICK), f"{_BRICK}R", f"{_BRICK}R", str(WEDGE18.abaqus_name), 1e20, "",
-                        ("*NODE FILE, FREQUENCY=1000", "U, RF", "*EL FILE, FREQUENCY=1000", "S"),
-                        ("*CONTACT FILE, FREQUENCY=1000", "CDIS, CSTR"), facets_are_rigid=False),
-    "abaqus": Dialect("Abaqus", (f"{_BRICK}RH", f"{_BRICK}H"), f"{_BRICK}RH", f"{_BRICK}H", f"{WEDGE18.abaqus_name}H", 0.0, "H",
-                      ("*OUTPUT, FIELD, FREQUENCY=1000", "*NODE OUTPUT", "U, RF", "*ELEMENT OUTPUT", "S, LE"),
-                      ("*CONTACT OUTPUT", "CSTRESS", "*OUTPUT, HISTORY, FREQUENCY=1"), facets_are_rigid=True)}
+    "calculix": Dialect(program="CalculiX", elements=(f"{_BRICK}R", _BRICK), slab=f"{_BRICK}R", frusta=f"{_BRICK}R",
+                        wedge=str(WEDGE18.abaqus_name), no_term=1e20, hybrid="", facets_are_rigid=False,
+                        fields=("*NODE FILE, FREQUENCY=1000", "U, RF", "*EL FILE, FREQUENCY=1000", "S"),
+                        contact_fields=("*CONTACT FILE, FREQUENCY=1000", "CDIS, CSTR")),
+    "abaqus": Dialect(program="Abaqus", elements=(f"{_BRICK}RH", f"{_BRICK}H"), slab=f"{_BRICK}RH", frusta=f"{_BRICK}H",
+                      wedge=f"{WEDGE18.abaqus_name}H", no_term=0.0, hybrid="H", facets_are_rigid=True,
+                      fields=("*OUTPUT, FIELD, FREQUENCY=1000", "*NODE OUTPUT", "U, RF", "*ELEMENT OUTPUT", "S, LE"),
+                      contact_fields=("*CONTACT OUTPUT", "CSTRESS", "*OUTPUT, HISTORY, FREQUENCY=1"))}
 
 
 def dialect_of(name: str) -> Dialect:

@@ -193,9 +193,7 @@ class _Deck:
         node = np.concatenate([frame.nodes, behind])
         self.next_node += len(facets)
         lines += keywords.nodes(points[len(frame.nodes):], int(behind[0]) + 1)
-        elements = self.writer.rigid_facets(name, numbers, node[tetrahedra] + 1, reference)
-        first = elements.index(f"*SOLID SECTION, ELSET={name}, MATERIAL=RIGID")
-        lines += [*elements[:first], *STIFF_MATERIAL, *elements[first:]]
+        lines += self.writer.rigid_facets(name, numbers, node[tetrahedra] + 1, reference, material=STIFF_MATERIAL)
         return behind
 
     def _facing(self, facets):
