@@ -22,17 +22,18 @@ _STYLE = """body{font:16px/1.5 system-ui,sans-serif;max-width:1080px;margin:2em 
 h1,h2{line-height:1.2}table{border-collapse:collapse;font-size:13px;margin:1em 0;display:block;overflow-x:auto}
 td,th{border-bottom:1px solid #ddd;padding:4px 8px;text-align:left;vertical-align:top}th{background:#f4f4f4}
 figure{margin:2em 0}img{max-width:100%}figcaption,.links{font-size:14px;color:#444}nav a{margin-right:1em}
-.box{background:#fff6e0;border-left:4px solid #e0a000;padding:.6em 1em}.reproduced{background:#d9f0d9}.not{background:#f7d7d7}
+.box{background:#fff6e0;border-left:4px solid #e0a000;padding:.6em 1em;margin:1em 0}
+.reproduced{background:#d9f0d9}.not{background:#f7d7d7}
 .contradicts{background:#ffe9c7}.needs{background:#e6e6f5}.undecided{background:#eee}
 .consistent{background:#e4eef8}summary{cursor:pointer}
 figure .links{margin-top:.4em}a{overflow-wrap:anywhere}
 pre{font-size:12px;line-height:1.35;background:#f8f8f8;padding:1em;overflow-x:auto}"""
 _TEMPLATE = Environment(autoescape=True, trim_blocks=True).from_string("""
-{%- macro addresses(pairs) %}
+{%- macro addresses(pairs) -%}
 {% for text, address in pairs %}<a href="{{ address }}">{{ text }}</a>{{ ", " if not loop.last }}{% endfor %}
-{% endmacro %}
+{%- endmacro %}
 {%- macro linked(groups, most=none) %}
-{% for label, pairs in groups if pairs %}{{ label ~ ": " if label }}{{ addresses(pairs[:most]) }}
+{% for label, pairs in groups if pairs %}{{ label ~ ": " if label }}{{ addresses(pairs[:most]) -}}
 {% if most and pairs|length > most %}<details><summary>and {{ pairs|length - most }} more files</summary>
 {{ addresses(pairs[most:]) }}</details>{% else %}.{% endif %}
 
@@ -48,7 +49,7 @@ _TEMPLATE = Environment(autoescape=True, trim_blocks=True).from_string("""
 {% elif part.kind == "text" %}
 <p>{{ part.text }} {{ linked(part.links) }}</p>
 {% elif part.kind == "box" %}
-<div class="box"><b>{{ part.title }}</b> {{ part.text }}
+<div class="box">{% if part.title %}<b>{{ part.title }}</b> {% endif %}{{ part.text }}
 {% if part.sentences %}<ul>{% for sentence in part.sentences %}<li>{{ sentence }}</li>{% endfor %}</ul>{% endif %}</div>
 {% elif part.kind == "figure" %}
 <figure id="{{ part.anchor }}">
