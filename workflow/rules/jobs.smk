@@ -75,4 +75,4 @@ for _stage in JOBS:
             files=files,
             settings=settings_of(_stage),
         shell:
-            run_stage(_stage)
+            run_stage("{rule}")  # by its name: a loop's variable is read when the job runs, and is the last stage then
