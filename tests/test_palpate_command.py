@@ -25,6 +25,13 @@ def test_the_command_writes_tables_pictures_fields_and_a_page(tmp_path, capsys):
     films = read_dataset(tmp_path / "out/dragon_skin_20_load.nc").film_force_n
     assert films.dims == ("step", "film") and films.shape == (2, 4)
     assert (tmp_path / "out/fields_dragon_skin_20.vtu").stat().st_size > 0
+    made = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("*.*") if path.is_file()}
+    design["load_n"] = {"to": 4, "by": 2}
+    (tmp_path / "design.yaml").write_text(yaml.safe_dump(design))
+    assert main(["palpate", str(tmp_path / "design.yaml"), "--out", str(tmp_path / "out")]) == 0
+    again = {str(path.relative_to(tmp_path / "out")) for path, time in made.items() if path.stat().st_mtime_ns > time}
+    assert {name for name in again if name.endswith(".nc")} == {f"{tissue}_load.nc" for tissue in design["tissues"]}
+    assert "report.html" in again and "figures/films.png" not in again
 
 
 def test_a_design_that_cannot_be_built_writes_nothing(tmp_path, capsys):

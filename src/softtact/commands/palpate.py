@@ -22,19 +22,18 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def _palpate(options):
-    from softtact.probe.design import load_design
-    from softtact.progress import Watch
-    from softtact.studies.hybrid.config import here_or_shipped
-    from softtact.studies.palpation.report import palpation_study
+    from softtact.studies.registry import open_study
 
     if options.threads < 1:
         raise InputError(f"--threads {options.threads}: give 1 or more.")
     if options.out.exists() and not options.out.is_dir():
         raise InputError(f"--out {options.out}: it is a file; give a folder.")
-    design = load_design(here_or_shipped(options.design))
-    watch = Watch("palpate")
-    summary = palpation_study(design, options.out, threads=options.threads, tell=watch.beat)
-    watch.end()
+    opened = open_study(options.design, kind="palpation")
+    from softtact.files import read_json
+    from softtact.studies.jobs import run_jobs
+
+    run_jobs("palpation", opened.jobs(options.out), options.out, threads=options.threads, label=opened.name)
+    summary = read_json(options.out / "summary.json")
     print(f"softtact palpate: wrote {options.out / 'report.html'}", file=sys.stderr)
     show(summary, as_json=options.json, lines=_lines(summary))
 

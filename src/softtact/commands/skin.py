@@ -35,45 +35,45 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def _skin(options):
-    from softtact.skin.design import read_design
-    from softtact.studies.hybrid.config import here_or_shipped
+    from softtact.studies.registry import open_study
 
-    path = here_or_shipped(options.design)
-    design = read_design(path)
+    opened = open_study(options.design, kind="skin")
     if options.threads < 1:
         raise InputError(f"--threads {options.threads}: give 1 or more.")
     if options.out.exists() and not options.out.is_dir():
         raise InputError(f"--out {options.out}: it is a file, and the results need a folder; choose another name.")
-    from softtact.studies.skin.run import run_design
+    from softtact.files import read_json
+    from softtact.studies.jobs import run_jobs
 
-    told = run_design(path, design, options.out, threads=options.threads)
-    for remark in told["remarks"]:
+    run_jobs("skin", opened.jobs(options.out), options.out, threads=options.threads, label=opened.study.design.skin)
+    summary = read_json(options.out / "summary.json") | {"out": str(options.out), "report": str(options.out / "report.html")}
+    for remark in summary["remarks"]:
         print(f"softtact skin: WARNING: {remark}", file=sys.stderr)
-    show(told, as_json=options.json, lines=_lines(told))
+    show(summary, as_json=options.json, lines=_lines(summary))
 
 
-def _lines(told):
+def _lines(summary):
     yield f"{'load':24}{'force, N':>10}{'deepest, mm':>13}{'taxel':>7}{'rise, fF':>10}{'counts':>8}"
-    for row in told["loads"]:
+    for row in summary["loads"]:
         yield (
             f"{row['load']:24}{row['force_n']:10.4g}{row['deepest_mm']:13.4f}{row['taxel']:7d}{row['delta_ff']:10.3f}"
             f"{row['counts']:8d}"
         )
-    if told.get("chosen"):
-        yield f"chosen: {_layer(told['chosen'])}"
-    if told.get("chosen_at_worst"):
-        yield f"chosen so that the worst batch meets the needs, too: {_layer(told['chosen_at_worst'])}"
-    if told.get("maps"):
-        maps = told["maps"]
+    if summary.get("chosen"):
+        yield f"chosen: {_layer(summary['chosen'])}"
+    if summary.get("chosen_at_worst"):
+        yield f"chosen so that the worst batch meets the needs, too: {_layer(summary['chosen_at_worst'])}"
+    if summary.get("maps"):
+        maps = summary["maps"]
         yield (f"a finger is felt from {maps['least_force_n']:.3g} N on at best, {maps['worst_force_n']:.3g} N at worst; "
                f"{maps['asked_n']:g} N is missed on {maps['share_not_felt']:.0%} of the places")
-    if told.get("link"):
-        link = told["link"]
+    if summary.get("link"):
+        link = summary["link"]
         yield (f"link: {link['modules']} modules, {link['elastomer_g']:.3g} g of elastomer, bend radius "
                f"{link['least_bend_radius_mm']:.3g} mm or more, gaps up to {link['widest_gap_mm']:.2g} mm, overlaps up to "
                f"{link['widest_overlap_mm']:.2g} mm; "
                f"{link['bent_too_much']} bend too much and are left out, {link['without_place']} found no place")
-    yield f"written: {told['report']}"
+    yield f"written: {summary['report']}"
 
 
 def _layer(best):

@@ -171,7 +171,8 @@ class MeshSizes(Section):
 class PalpationDesign(Section):
     """A palpation sensor, the tissues that it presses and the sweeps."""
 
-    name: str = Field(pattern=r"^[a-z0-9_]+$")
+    name: str = Field(pattern=r"^[a-z0-9_]+$", validation_alias=pydantic.AliasChoices("study", "name"))
+    kind: Literal["palpation"] = "palpation"
     model: Literal["plane_strain", "solid"] = "plane_strain"
     geometry: Geometry
     supports: Material
@@ -252,9 +253,8 @@ def _changed(values, changes):
     return out
 
 
-def load_design(path: str | Path) -> PalpationDesign:
-    """Read a design's YAML. Raises InputError, one sentence with file, field and remedy."""
-    values = read_yaml(path, missing="there is no such design; config/probe.yaml is one.")
+def check_design(values: object, path: str | Path) -> PalpationDesign:
+    """The design of keys and values that were read from a file. Raises InputError, one sentence with file, field and remedy."""
     design = validated(PalpationDesign, values, where=str(path))
     for name, material in ({"supports": design.supports, "filler": design.filler, "beam": design.beam} | design.tissues).items():
         try:
@@ -267,3 +267,8 @@ def load_design(path: str | Path) -> PalpationDesign:
         except InputError as error:
             raise InputError(f"{path}: variants.{name}: {error}") from None
     return design
+
+
+def load_design(path: str | Path) -> PalpationDesign:
+    """The design of a YAML file; faults as of `check_design`."""
+    return check_design(read_yaml(path, missing="there is no such design; config/probe.yaml is one."), path)

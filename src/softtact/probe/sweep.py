@@ -6,7 +6,6 @@ compression c, the jaw's displacement less the beam's deflection, which an encod
 height/(length x depth) at rest, from F = a c + b c^2 fitted to a sweep, so that stiffening with strain goes into b.
 """
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
@@ -17,7 +16,6 @@ import pandas as pd
 from softtact.contact.motion import Motion
 from softtact.errors import InputError
 from softtact.materials.laws.base import Law
-from softtact.models.solid.body import SolidBody
 from softtact.models.solid.path import SolidPath
 from softtact.probe.design import Hardness, PalpationDesign
 from softtact.probe.structure import JAW, structure_body
@@ -28,6 +26,7 @@ if TYPE_CHECKING:
 
 
 Scenario = Literal["load", "displacement"]
+_CURVES = ("jaw_mm", "force_n", "beam_deflection_mm", "extrapolated_volume_fraction")
 _REST_TERMS = 3           # of the polynomial of the deflection whose tangent at rest is taken
 
 
@@ -49,12 +48,8 @@ class Palpation:
     """Names of the films."""
     extrapolated_volume_fraction: np.ndarray
     """(s,) largest share of a region's volume beyond the data of its law; nan without such data."""
-    body: SolidBody
-    """The body, at rest."""
     displacement_mm: np.ndarray
-    """(n, 3) of its nodes at the last step."""
-    wall_time_s: float
-    """Time of the sweep."""
+    """(n, 3) of the mesh's nodes at the last step."""
 
     def table(self) -> pd.DataFrame:
         """A row for each step."""
@@ -64,12 +59,20 @@ class Palpation:
         return pd.DataFrame(columns | films | {"extrapolated_volume_fraction": self.extrapolated_volume_fraction})
 
     def dataset(self) -> "xr.Dataset":
-        """The curves with the films by name, for NetCDF."""
+        """The curves with the films by name, and the last displacement, for NetCDF."""
         import xarray
 
-        curves = {name: ("step", getattr(self, name)) for name in ("jaw_mm", "force_n", "beam_deflection_mm")}
-        return xarray.Dataset(curves | {"film_force_n": (("step", "film"), self.film_force_n)}, coords={"film": list(self.films)},
+        curves = {name: ("step", getattr(self, name)) for name in _CURVES}
+        last = {"displacement_mm": (("node", "axis"), self.displacement_mm, {"units": "mm", "long_name": "at the last step"})}
+        return xarray.Dataset(curves | last | {"film_force_n": (("step", "film"), self.film_force_n)},
+                              coords={"film": list(self.films), "axis": ["x", "y", "z"]},
                               attrs={"tissue": self.tissue, "scenario": self.scenario})
+
+    @classmethod
+    def of(cls, data: "xr.Dataset") -> "Palpation":
+        """The sweep of a `dataset`."""
+        return cls(data.attrs["scenario"], data.attrs["tissue"], **{name: data[name].values for name in (*_CURVES, "film_force_n")},
+                   films=tuple(map(str, data.film.values)), displacement_mm=data.displacement_mm.values)
 
 
 @dataclass(frozen=True)
@@ -112,7 +115,6 @@ def palpate(design: PalpationDesign, tissue: str, scenario: Scenario, *, law: La
     law: in place of the tissue's;  values: rising values at the ends of the steps, by default the design's
     Raises InputError for an unknown tissue, ConvergenceError where a step is not reached.
     """
-    began = time.perf_counter()
     body = structure_body(design, law or design.tissue(tissue).make(), threads=threads)
     readers = [FilmReader.on(body, film.on, film.side, (film.start, film.end)) for film in design.films.values()]
     middle = _beam_middle(body, design)
@@ -130,8 +132,8 @@ def palpate(design: PalpationDesign, tissue: str, scenario: Scenario, *, law: La
         tell(f"{tissue}, {scenario}: step {len(rows)} of {len(values)}, {rows[-1][1]:.3g} N")
     assert state is not None
     jaw, force, deflection = np.array(rows).T
-    return Palpation(scenario, tissue, jaw, force, deflection, np.array(films), tuple(design.films), np.array(outside), body,
-                     state.displacement, time.perf_counter() - began)
+    return Palpation(scenario, tissue, jaw, force, deflection, np.array(films), tuple(design.films), np.array(outside),
+                     state.displacement[:len(body.mesh.points)])
 
 
 def _beam_middle(body, design):

@@ -7,12 +7,10 @@ import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from softtact.files import digest, read_json, write_json
 from softtact.progress import progress
 from softtact.skin.analysis import Converter, LayerMeshSizes, Skin
 from softtact.skin.elastomers import Elastomer
@@ -24,7 +22,6 @@ FACTORS = ("elastomer", "thickness_mm", "radius_mm", "pitch_mm")
 OUTPUTS = ("counts_at_smallest_force", "strain", "crosstalk", "weight_g_module")
 SPECIMEN_MM = 6.0  # thickness of the tested specimens, which the printed t_min is a share of: the authors' published toolbox
 _SKINS = 8  # skins kept with their factors: one for each thickness of a table, for the next elastomer
-_FORMAT = 1  # of the kept rows of a search
 
 
 def printed_criteria(elastomers: Sequence[Elastomer], *, stress_mpa: float, area_mm2: float) -> pd.DataFrame:
@@ -141,11 +138,9 @@ class SearchSpace:
     """Of the module."""
 
 
-def search(elastomers: Mapping[str, Elastomer], space: SearchSpace, *, needs: Needs, converter: Converter,
-           weight_budget_g: float | None, folder: str | Path) -> pd.DataFrame:
-    """A row for each combination: that of `thickness_table`, crosstalk, whether another combination dominates it.
+def search(elastomers: Mapping[str, Elastomer], space: SearchSpace, *, needs: Needs, converter: Converter) -> pd.DataFrame:
+    """A row for each combination: that of `thickness_table` without a budget of weight, radius, pitch and crosstalk.
 
-    folder: where each row is kept as JSON; rows that are there are not computed again
     Raises InputError where a module has no place for taxels of a radius and pitch.
     """
     layouts = {(radius, pitch): module_layout(side_mm=space.side_mm, pitch_mm=pitch, radius_mm=radius,
@@ -154,15 +149,21 @@ def search(elastomers: Mapping[str, Elastomer], space: SearchSpace, *, needs: Ne
     combinations = list(itertools.product(elastomers.values(), space.thicknesses_mm, space.radii_mm, space.pitches_mm))
     rows = []
     for elastomer, thickness, radius, pitch in progress(combinations, label="designs"):
-        key = digest([_FORMAT, elastomer.model_dump(), thickness, radius, pitch, space.gap_mm, space.side_mm, vars(needs),
-                      vars(converter)])
-        path = Path(folder) / f"{key}.json"
-        if not path.exists():
-            beside = _crosstalk(thickness, radius, radius + space.gap_mm, pitch, elastomer.poisson)
-            row = _plain_row(elastomer, layouts[radius, pitch], thickness, needs=needs, converter=converter)
-            write_json(path, row | {"radius_mm": radius, "pitch_mm": pitch, "crosstalk": beside})
-        rows.append(read_json(path))
-    return _ranked(_with_budget(pd.DataFrame(rows), weight_budget_g))
+        table = thickness_table([elastomer], layouts[radius, pitch], needs=needs, thicknesses_mm=[thickness], converter=converter,
+                                weight_budget_g=None)
+        beside = _crosstalk(thickness, radius, radius + space.gap_mm, pitch, elastomer.poisson)
+        rows.append(table.assign(radius_mm=radius, pitch_mm=pitch, crosstalk=beside))
+    return pd.concat(rows, ignore_index=True)
+
+
+def ranked(table: pd.DataFrame, weight_budget_g: float | None) -> pd.DataFrame:
+    """A `search` with a budget of weight and its Pareto front over weight, counts, crosstalk and pitch; the best rows first."""
+    table = _with_budget(table, weight_budget_g)
+    costs = np.column_stack([table.weight_g_module, -table.counts_at_smallest_force, table.crosstalk.abs(), table.pitch_mm])
+    better = np.all(costs[None] <= costs[:, None], axis=2) & np.any(costs[None] < costs[:, None], axis=2)
+    table["not_dominated"] = ~better.any(axis=1)
+    order = ["meets_all", "not_dominated", "weight_g_module"]
+    return table.sort_values(order, ascending=[False, False, True]).reset_index(drop=True)
 
 
 def main_effects(table: pd.DataFrame) -> pd.DataFrame:
@@ -204,26 +205,11 @@ def _layer_row(elastomer, thickness, layout, needs, converter, spacing):
     }
 
 
-def _plain_row(elastomer, layout, thickness, *, needs, converter):
-    """The row of `thickness_table` of one thickness, as plain values."""
-    table = thickness_table([elastomer], layout, needs=needs, thicknesses_mm=[thickness], converter=converter, weight_budget_g=None)
-    return {name: value.item() if isinstance(value, np.generic) else value for name, value in table.iloc[0].items()}
-
-
 def _with_budget(table, weight_budget_g):
     """The table with the need of weight, and whether all needs are met."""
     table["in_budget"] = (table.weight_g_module <= weight_budget_g) if weight_budget_g is not None else True
     table["meets_all"] = table[["force_met", "strain_met", "range_met", "in_budget"]].all(axis=1)
     return table
-
-
-def _ranked(table):
-    """The table with its Pareto front over weight, counts, crosstalk and pitch; the best rows first."""
-    costs = np.column_stack([table.weight_g_module, -table.counts_at_smallest_force, table.crosstalk.abs(), table.pitch_mm])
-    better = (costs[None] <= costs[:, None]).all(axis=2) & (costs[None] < costs[:, None]).any(axis=2)
-    table["not_dominated"] = ~better.any(axis=1)
-    order = ["meets_all", "not_dominated", "weight_g_module"]
-    return table.sort_values(order, ascending=[False, False, True]).reset_index(drop=True)
 
 
 @dataclass(frozen=True)

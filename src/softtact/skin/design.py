@@ -2,9 +2,10 @@
 
 import dataclasses
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt, ValidationError, model_validator
 
@@ -209,6 +210,8 @@ class SkinDesign(Section):
     link: Link | None = None
     search: Search | None = None
     claims: bool = False
+    kind: Literal["skin"] = "skin"
+    study: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")] | None = None
 
     def layout(self) -> Layout:
         """The taxels of the module, or of the hexagonal patch of six."""
@@ -221,6 +224,11 @@ def read_design(path: str | Path) -> SkinDesign:
     values = read_yaml(path, missing="there is no such design; give the path of a YAML file, see docs/how-to/design_a_skin.md.")
     if not isinstance(values, dict):
         raise InputError(f"{path}: a design holds keys and values; see docs/how-to/design_a_skin.md.")
+    return check_design(values, path)
+
+
+def check_design(values: Mapping[str, Any], path: str | Path) -> SkinDesign:
+    """The design of keys and values that were read from a file; faults as of `read_design`."""
     try:
         design = SkinDesign.model_validate(values)
     except ValidationError as error:

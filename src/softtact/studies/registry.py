@@ -81,7 +81,10 @@ def checked_study(values: Mapping[str, Any], path: str | Path | None = None) -> 
     return OpenStudy(kind, KINDS[kind].call("load", values, None if path is None else here_or_shipped(path)))
 
 
-def open_study(path: str | Path) -> OpenStudy:
-    """The study of a configuration file, which ships with the package where the working folder has none of its name."""
-    kind = kind_of(read_mapping(path), where=str(path))
-    return checked_study(KINDS[kind].call("read", path), path)
+def open_study(path: str | Path, *, kind: str | None = None) -> OpenStudy:
+    """The study of a configuration file, which ships with the package where the working folder has none of its name.
+
+    kind: of a file that need not state it, because a command of that kind reads it
+    """
+    kind = kind or kind_of(read_mapping(path), where=str(path))
+    return OpenStudy(kind, KINDS[kind].call("load", KINDS[kind].call("read", path), here_or_shipped(path)))

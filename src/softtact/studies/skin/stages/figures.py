@@ -1,34 +1,33 @@
-"""The figures of a skin: displacement and taxels as in the papers, probes, the front, thickness, maps."""
+"""The figures of a skin: displacement and taxels as in the papers, probes, the front, thickness, maps, modules on a link.
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+Outputs of each are png and svg, of the link png alone.
+"""
+
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
+from softtact.files import read_dataset
 from softtact.reporting.style import pyplot, save
-from softtact.skin.layout import Layout
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from softtact.skin.analysis import Readings
-    from softtact.skin.maps import PatchMaps
+from softtact.studies.skin.settings import design_of
 
 _TICKS = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500)     # of counts, on a logarithmic scale
 _EXCITED = "autumn_r"  # yellow to red, as the papers colour taxels
 
 
-def draw_load(path: Path, layout: Layout, top_mm: np.ndarray, readings: "Readings", number: int, *, title: str) -> None:
+def draw_load(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Left the displacement of the upper side in mm, right each taxel by the counts that it rises.
 
-    top_mm: (node, 2), the nodes of the upper side;  number: of the load
+    inputs: readings (NetCDF), table (CSV);  settings: module, patch, load (its number), elastomer
     """
-    plt = pyplot()
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4.2), layout="constrained")
-    down = -readings.displacement_mm[number, :, 2]
-    shown = left.tricontourf(*top_mm.T, down, levels=20, cmap="viridis")
+    number, layout = settings["load"] - 1, design_of(settings).layout()
+    readings, row = read_dataset(inputs["readings"]).isel(load=number), pd.read_csv(inputs["table"]).iloc[number]
+    figure, (left, right) = pyplot().subplots(1, 2, figsize=(9, 4.2), layout="constrained")
+    down = -readings.displacement_mm.values[:, 2]
+    shown = left.tricontourf(*readings.node_mm.values.T, down, levels=20, cmap="viridis")
     figure.colorbar(shown, ax=left, label="displacement down (mm)")
-    counts = readings.counts[number]
+    counts = readings.counts.values
     discs = _taxels(right, layout, counts, cmap=_EXCITED, limits=(0, max(1, counts.max())))
     figure.colorbar(discs, ax=right, label="counts above rest")
     for centre, count in zip(layout.centres_mm, counts, strict=True):
@@ -36,13 +35,16 @@ def draw_load(path: Path, layout: Layout, top_mm: np.ndarray, readings: "Reading
             right.text(*centre, f"{count:d}", ha="center", va="center", fontsize=8)
     for axes in (left, right):
         _frame(axes, layout)
-    figure.suptitle(title, fontsize=9)
-    save(figure, path, path.with_suffix(".svg"))
+    figure.suptitle(f"{row.load}: {row.what}; {settings['elastomer']}", fontsize=9)
+    save(figure, *outputs.values())
 
 
-def draw_probes(path: Path, table: "pd.DataFrame") -> None:
-    """Rise of the pressed taxel against pressure, a panel for each probe, lines for a modulus that is off; dashed: extrapolated."""
-    plt = pyplot()
+def draw_probes(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
+    """Rise of the pressed taxel against pressure: a panel for each probe, a line for each error of the modulus.
+
+    inputs: table (CSV). Dotted: the elastomer's curve is extrapolated.
+    """
+    plt, table = pyplot(), pd.read_csv(inputs["table"])
     diameters = sorted(set(table.diameter_mm))
     figure, panels = plt.subplots(
         1, len(diameters), figsize=(2.6 * len(diameters) + 1, 3), layout="constrained", sharey=True, squeeze=False
@@ -58,13 +60,16 @@ def draw_probes(path: Path, table: "pd.DataFrame") -> None:
         panels[0][0].plot([], [], ":", color="grey", label="beyond the tested stress")
     panels[0][0].set_ylabel("rise of the capacitance (fF)")
     panels[0][0].legend(frameon=False, fontsize=8)
-    save(figure, path, path.with_suffix(".svg"))
+    save(figure, *outputs.values())
 
 
-def draw_front(path: Path, table: "pd.DataFrame", confidence: "pd.DataFrame") -> None:
-    """Left sensitivity against weight with the front in red squares, right how often each elastomer is on the front."""
-    plt = pyplot()
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9.5, 4), layout="constrained")
+def draw_front(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
+    """Left sensitivity against weight with the front in red squares, right how often each elastomer is on the front.
+
+    inputs: choice_printed, front_confidence (CSV)
+    """
+    table, confidence = pd.read_csv(inputs["choice_printed"]), pd.read_csv(inputs["front_confidence"])
+    figure, (left, right) = pyplot().subplots(1, 2, figsize=(9.5, 4), layout="constrained")
     left.plot(table.weight_g_module, table.sensitivity_per_kpa, "o", color="0.3")
     front = table[table.on_front]
     left.plot(front.weight_g_module, front.sensitivity_per_kpa, "s", mfc="none", mec="red", ms=11, label="Pareto optimal")
@@ -94,22 +99,25 @@ def draw_front(path: Path, table: "pd.DataFrame", confidence: "pd.DataFrame") ->
     right.set(xlabel="share of draws on the front (*: on the nominal front)", xlim=(0, 1))
     right.invert_yaxis()
     right.legend(frameon=False, loc="upper center", bbox_to_anchor=(0.5, 1.12), ncols=4, fontsize=7)
-    save(figure, path, path.with_suffix(".svg"))
+    save(figure, *outputs.values())
 
 
-def draw_thickness(path: Path, table: "pd.DataFrame", *, detected_counts: float, strain_limit: float) -> None:
-    """Counts at the smallest force and strain at the highest pressure against thickness, a line for each elastomer."""
-    plt = pyplot()
+def draw_thickness(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
+    """Counts at the smallest force and strain at the highest pressure against thickness, a line for each elastomer.
+
+    inputs: thickness (CSV);  settings: detected_counts, strain_limit
+    """
+    plt, table = pyplot(), pd.read_csv(inputs["thickness"])
     figure, (left, right) = plt.subplots(1, 2, figsize=(9.5, 3.6), layout="constrained")
     for colour, (name, rows) in zip(plt.get_cmap("tab10").colors, table.groupby("elastomer", sort=False), strict=False):
         left.loglog(rows.thickness_mm, rows.counts_at_smallest_force, ".-", color=colour)
         right.semilogx(rows.thickness_mm, rows.strain, ".-", color=colour, label=name)
-    left.axhline(detected_counts, color="0.5", ls="--")
-    right.axhline(strain_limit, color="0.5", ls="--")
+    left.axhline(settings["detected_counts"], color="0.5", ls="--")
+    right.axhline(settings["strain_limit"], color="0.5", ls="--")
     left.set(xlabel="thickness (mm)", ylabel="counts at the smallest force")
     right.set(xlabel="thickness (mm)", ylabel="mean strain at the highest pressure")
     left.set_yticks([ticks for ticks in _TICKS if ticks < 1.5 * table.counts_at_smallest_force.max()])
-    left.set_ylim(0.8 * min(detected_counts, table.counts_at_smallest_force.min()))
+    left.set_ylim(0.8 * min(settings["detected_counts"], table.counts_at_smallest_force.min()))
     for axis in (left.xaxis, left.yaxis, right.xaxis):
         axis.set_major_formatter("{x:g}")
         axis.set_minor_formatter("")
@@ -117,20 +125,24 @@ def draw_thickness(path: Path, table: "pd.DataFrame", *, detected_counts: float,
         axes.set_xticks(sorted(set(table.thickness_mm)))
         axes.minorticks_off()
     right.legend(frameon=False, fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
-    save(figure, path, path.with_suffix(".svg"))
+    save(figure, *outputs.values())
 
 
-def draw_maps(path: Path, layout: Layout, maps: "PatchMaps", crosstalk: "pd.DataFrame") -> None:
-    """Smallest detectable force, error of localisation, and crosstalk against pitch."""
-    plt = pyplot()
-    figure, (one, two, three) = plt.subplots(1, 3, figsize=(13, 3.9), layout="constrained")
+def draw_maps(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
+    """Smallest detectable force, error of localisation, and crosstalk against pitch.
+
+    inputs: detection, crosstalk (CSV);  settings: module, patch, force_n (of the finger)
+    """
+    maps, crosstalk, layout = pd.read_csv(inputs["detection"]), pd.read_csv(inputs["crosstalk"]), design_of(settings).layout()
+    places = maps[["x_mm", "y_mm"]].to_numpy(dtype=float)
+    figure, (one, two, three) = pyplot().subplots(1, 3, figsize=(13, 3.9), layout="constrained")
     for axes, values, label in (
-        (one, 1e3 * maps.smallest_force_n, "smallest detectable force (mN)"),
-        (two, maps.localisation_mm, f"error of localisation at {maps.force_n:.2g} N (mm)"),
+        (one, 1e3 * maps.smallest_force_n.to_numpy(), "smallest detectable force (mN)"),
+        (two, maps.localisation_mm.to_numpy(), f"error of localisation at {settings['force_n']:.2g} N (mm)"),
     ):
         low, high = np.nanpercentile(values[np.isfinite(values)], (0, 97))
         shown = axes.scatter(
-            *maps.places_mm.T, c=values, cmap="viridis", vmin=low, vmax=max(high, low * 1.01), marker="s", s=_size(maps)
+            *places.T, c=values, cmap="viridis", vmin=low, vmax=max(high, low * 1.01), marker="s", s=_size(places)
         )
         figure.colorbar(shown, ax=axes, label=label, extend="max")
         _outline_taxels(axes, layout)
@@ -140,24 +152,21 @@ def draw_maps(path: Path, layout: Layout, maps: "PatchMaps", crosstalk: "pd.Data
     beside = three.twinx()
     beside.semilogy(crosstalk.pitch_mm, crosstalk.localisation_mm, "s--", color="#e08214")
     beside.set_ylabel("error of localisation half-way (mm)", color="#e08214")
-    save(figure, path, path.with_suffix(".svg"))
+    save(figure, *outputs.values())
 
 
-def draw_link(path: Path, corners_mm: np.ndarray, positions_mm: np.ndarray, fits: np.ndarray) -> None:
-    """Modules on a link from two sides; red: bent below the least radius, or without place."""
-    plt = pyplot()
+def draw_link(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
+    """Modules on a link from two sides; red: bent below the least radius.  inputs: laid (NetCDF)."""
+    plt, laid = pyplot(), read_dataset(inputs["laid"])
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     figure = plt.figure(figsize=(9, 4.5), layout="constrained")
+    corners_mm, colours = laid.corner_mm.values, ["#9ecae1" if fit else "#e34a33" for fit in laid.fits.values]
     low, high = corners_mm.reshape(-1, 3).min(axis=0), corners_mm.reshape(-1, 3).max(axis=0)
     for place, turn in enumerate((-60, 60), start=1):
         axes: Any = figure.add_subplot(1, 2, place, projection="3d")
-        axes.add_collection3d(
-            Poly3DCollection(
-                list(corners_mm), facecolors=["#9ecae1" if fit else "#e34a33" for fit in fits], edgecolors="0.3", alpha=0.7
-            )
-        )
-        axes.scatter(*positions_mm.T, s=3, color="black")
+        axes.add_collection3d(Poly3DCollection(list(corners_mm), facecolors=colours, edgecolors="0.3", alpha=0.7))
+        axes.scatter(*laid.position_mm.values.T, s=3, color="black")
         axes.set(
             xlim=(low[0], high[0]),
             ylim=(low[1], high[1]),
@@ -168,7 +177,7 @@ def draw_link(path: Path, corners_mm: np.ndarray, positions_mm: np.ndarray, fits
         )
         axes.set_box_aspect(np.maximum(high - low, 1.0))
         axes.view_init(20, turn)
-    save(figure, path)
+    save(figure, outputs["png"])
 
 
 def _taxels(axes, layout, values, *, cmap, limits):
@@ -199,10 +208,7 @@ def _frame(axes, layout):
     axes.set(aspect="equal", xlabel="x (mm)", ylabel="y (mm)")
 
 
-def _size(maps):
+def _size(places):
     """Area of a mark in points, for marks that touch."""
-    return 0.9 * (230 / np.ptp(maps.places_mm, axis=0).max() * _spacing(maps.places_mm)) ** 2
-
-
-def _spacing(places):
-    return float(np.min(np.diff(np.unique(np.round(places[:, 0], 6))), initial=np.inf)) if len(places) > 1 else 1.0
+    spacing = float(np.min(np.diff(np.unique(np.round(places[:, 0], 6))), initial=np.inf)) if len(places) > 1 else 1.0
+    return 0.9 * (230 / np.ptp(places, axis=0).max() * spacing) ** 2

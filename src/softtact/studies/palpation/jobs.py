@@ -1,0 +1,152 @@
+"""The jobs of a study of a palpation sensor.
+
+    TISSUE_SCENARIO.nc, fields_TISSUE.vtu  a sweep of the jaw, and the last step for ParaView
+    sweeps/*.nc, hardness/*.csv            sweeps on a coarser mesh and under other assumptions, and for the study of hardness
+    lump/lumps.nc                          film forces over lumps
+    tables/*.csv, facts/*.json             what is made of them; sentences for people are made of the facts
+    figures/, summary.json, report.html
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from softtact.probe.design import PalpationDesign, check_design
+from softtact.studies.jobs import Job
+
+_COARSER = 2.0     # times the mesh's sizes: the second mesh that tells the mesh error
+_OF_STUDIES = {"variants", "variant_steps", "hardness", "search", "load_n", "displacement_mm"}     # a sweep does without
+
+
+@dataclass(frozen=True)
+class PalpationStudy:
+    """A checked design."""
+
+    design: PalpationDesign
+
+    @property
+    def name(self) -> str:
+        """Of its folder below results/."""
+        return self.design.name
+
+
+def load(values: Mapping[str, Any], path: str | Path | None) -> PalpationStudy:
+    """The study of a design's keys and values, read from a file; the first fault becomes an InputError of one sentence."""
+    return PalpationStudy(check_design(values, path or "design.yaml"))
+
+
+def jobs(study: PalpationStudy, folder: str | Path) -> list[Job]:
+    """All jobs of a study whose results lie in a folder, in an order in which they can run."""
+    design, folder = study.design, str(folder)
+    main, coarse, variants = _main_sweeps(design, folder), _coarse_sweeps(design, folder), _variant_sweeps(design, folder)
+    hardness = _hardness(design, folder)
+    kept = {"sweeps": main, "coarse": coarse, "variants": list(variants.values()), "hardness": hardness}
+    tables = {name: f"{folder}/tables/{name}.csv" for name in ("curves", "slopes", "claims", *(
+        name for name in ("hardness", "variants") if kept[name]))}
+    made = [*main, *coarse, *variants.values(), *hardness,
+            Job("tabulate", {name: [path for job in jobs for path in job.made().values()] for name, jobs in kept.items() if jobs},
+                tables | {"facts": f"{folder}/facts/sweeps.json"},
+                {"variants": [{"variant": variant, "tissue": tissue} for variant, tissue in variants]}),
+            *_figures(design, folder, main), *_search(design, folder)]
+    return [*made, _report(design, folder, made)]
+
+
+def _sweep(design: PalpationDesign, folder: str, name: str, tissue: str, scenario: str, steps: Sequence[float]) -> Job:
+    return Job("sweep", {}, {"sweep": f"{folder}/{{sweep}}.nc"},
+               {"design": _of_one_tissue(design, tissue), "scenario": scenario, "steps": list(map(float, steps))}, {"sweep": name},
+               {design.model: len(steps)})
+
+
+def _of_one_tissue(design: PalpationDesign, tissue: str) -> dict[str, Any]:
+    """The values that a sweep over a tissue uses of a design."""
+    values = design.model_dump(mode="json", exclude=_OF_STUDIES, exclude_none=True)
+    steps = {"to": 0.5 * design.geometry.tissue_height, "by": 1.0}     # the model asks for both, and a sweep states its own
+    return values | {"tissues": {tissue: values["tissues"][tissue]}, "load_n": steps, "displacement_mm": steps}
+
+
+def _main_sweeps(design, folder):
+    steps = {"displacement": design.displacement_mm.values, "load": design.load_n.values}
+    return [_sweep(design, folder, f"{tissue}_{scenario}", tissue, scenario, values)
+            for scenario, values in steps.items() for tissue in design.tissues]
+
+
+def _coarse_sweeps(design, folder):
+    """The sweeps of the displacement on elements that are larger."""
+    coarse = design.with_(mesh={name: _COARSER * getattr(design.mesh, name) for name in ("along", "tissue", "base")})
+    return [_sweep(coarse, folder, f"sweeps/coarse_{tissue}", tissue, "displacement", design.displacement_mm.values)
+            for tissue in design.tissues]
+
+
+def _variant_sweeps(design, folder):
+    """{(variant, tissue): job} under each variant's assumptions, and under the design's own, by fewer steps."""
+    if not design.variants:
+        return {}
+    found = {}
+    designs = {"as designed": design, **{name: design.variant(name) for name in design.variants}}
+    for number, (name, one) in enumerate(designs.items()):
+        steps = one.displacement_mm.to * (1 + np.arange(design.variant_steps)) / design.variant_steps
+        found |= {(name, tissue): _sweep(one, folder, f"sweeps/variant_{number}_{tissue}", tissue, "displacement", steps)
+                  for tissue in one.tissues}
+    return found
+
+
+def _hardness(design, folder):
+    if design.hardness is None:
+        return []
+    made = []
+    for height in design.hardness.tissue_heights:
+        settings = design.hardness.model_dump(mode="json") | {"tissue_heights": [height]}
+        made += [Job("measure_hardness", {}, {"rows": f"{folder}/hardness/{{sweep}}.csv"},
+                     {"design": _of_one_tissue(design, tissue) | {
+                         "hardness": settings, "displacement_mm": design.displacement_mm.model_dump(mode="json")}},
+                     {"sweep": f"{tissue}_{height:g}"}, {design.model: design.hardness.steps}) for tissue in design.tissues]
+    return made
+
+
+def _figures(design, folder, main):
+    """Figures, and fields for ParaView."""
+    sweeps = [job.made()["sweep"] for job in main]
+    moved = {tissue: f"{folder}/{tissue}_displacement.nc" for tissue in design.tissues}
+    body = {"design": _of_one_tissue(design, next(iter(design.tissues)))}
+    drawn = [Job("draw_shapes", {"sweeps": list(moved.values())}, _figure(folder, "fig2_shapes"), body),
+             Job("draw_curves", {"sweeps": sweeps, "slopes": f"{folder}/tables/slopes.csv"}, _figure(folder, "fig3_fig4_curves")),
+             Job("draw_films", {"sweeps": list(moved.values())}, _figure(folder, "films"))]
+    if design.hardness:
+        drawn.append(Job("draw_hardness", {"table": f"{folder}/tables/hardness.csv"}, _figure(folder, "hardness")))
+    return drawn + [Job("write_fields", {"sweep": path}, {"fields": f"{folder}/fields_{{tissue}}.vtu"}, body, {"tissue": tissue})
+                    for tissue, path in moved.items()]
+
+
+def _search(design, folder):
+    search = design.search
+    if search is None:
+        return []
+    body, values = _of_one_tissue(design, search.tissue), search.model_dump(mode="json")
+    without_noise = {name: value for name, value in values.items() if name not in ("trials", "seed")} | {"noise_n": 1.0}
+    lumps = {"lumps": f"{folder}/lump/lumps.nc"}
+    tables = {name: f"{folder}/tables/lump_{name}.csv" for name in ("detection", "recovery")}
+    steps, ratios = len(search.jaw_mm), len(search.stiffness_ratio) + 1
+    return [Job("solve_lumps", {}, lumps, {"design": body | {"search": without_noise}},
+                work={design.model: steps * ratios * len(search.x) * len(search.depth)}),
+            Job("find_lumps", lumps, tables | {"facts": f"{folder}/facts/lump.json"},
+                {"design": body | {"search": values}},
+                work={design.model: 2 * steps * search.trials * len(search.moves)}),
+            Job("draw_lump", tables, _figure(folder, "lump"))]
+
+
+def _report(design, folder, made):
+    """The page, from all that the other jobs made for people."""
+    paths = [path for job in made for path in job.made().values()]
+    chosen = {name: [path for path in paths if path.startswith(f"{folder}/{start}") and path.endswith(end)]
+              for name, start, end in (("tables", "tables/", ""), ("figures", "figures/", ".png"), ("facts", "facts/", ""),
+                                       ("fields", "fields_", ""))}
+    main = [f"{folder}/{tissue}_{scenario}.nc" for scenario in ("displacement", "load") for tissue in design.tissues]
+    return Job("report", chosen | {"sweeps": main}, {"page": f"{folder}/report.html", "summary": f"{folder}/summary.json"},
+               {"design": design.model_dump(mode="json", exclude_none=True)})
+
+
+def _figure(folder, name):
+    return {kind: f"{folder}/figures/{name}.{kind}" for kind in ("png", "svg")}

@@ -1,0 +1,96 @@
+"""The page of a palpation sensor, and all facts of its study in one file."""
+
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from softtact.files import digest, read_json, write_json
+from softtact.probe.design import PalpationDesign
+
+_CAPTIONS = {
+    "fig2_shapes": "Mesh and deformed shapes (the paper's figure 2); displacements are to scale.",
+    "fig3_fig4_curves": "Beam deflection under load (figure 3); force against deflection, trend lines (figure 4).",
+    "films": "Forces on the films as shares of the jaw's force. They need not add up to 1: films do not cover all.",
+    "hardness": "Left: the paper's relative hardness F/d. Right: our index, the apparent modulus at rest. Each point uses a sweep "
+                "up to its force.",
+    "lump": "Left: least stiffness ratio of a lump that the films tell from plain tissue with 95 % probability. Right: lumps that "
+            "the solver hid, found again from noisy films, with their 95 % intervals.",
+}
+_TITLES = {"slopes": "Slopes", "hardness": "Hardness over load and height", "variants": "Slopes under other assumptions",
+           "lump_detection": "Least stiffness ratio of a lump that is seen",
+           "lump_recovery": "Hidden lumps and what the films told of them"}
+
+
+def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
+    """Write the page, and all facts in one file.
+
+    inputs: tables, figures, facts, fields, sweeps (lists);  outputs: page, summary (JSON);  settings: design (all values)
+    """
+    from softtact.reporting.page import Page
+
+    design = PalpationDesign.model_validate(settings["design"])
+    facts: dict[str, Any] = {"lump": {}} | {name: value for path in inputs["facts"] for name, value in read_json(path).items()}
+    files = {path.stem: path for path in inputs["tables"]}
+    page = Page("Palpation sensor", design.name, folder=outputs["page"].parent)
+    page.text(_conditions(design, facts))
+    page.box("What is assumed.", _assumptions(design))
+    for sentence in [*_on_hardness(facts["hardness"]), *_on_lumps(facts)]:
+        page.text(sentence)
+    page.section("Figures")
+    for path in inputs["figures"]:
+        page.figure(path, _CAPTIONS[path.stem])
+    page.section("Tables")
+    for name, title in _TITLES.items():
+        if name in files:
+            page.table(pd.read_csv(files[name]), title, file=files[name])
+    page.claims(pd.read_csv(files["claims"], keep_default_na=False), file=files["claims"])
+    page.section("Files")
+    page.text("", links=[(label, [(Path(path).name, page.link(path)) for path in paths]) for label, paths in (
+        ("Curves", [files["curves"], *inputs["sweeps"]]), ("Fields for ParaView", inputs["fields"]))])
+    page.write(outputs["page"])
+    write_json(outputs["summary"], facts | {"design": design.name, "config_digest": digest(design.model_dump(mode="json"))})
+
+
+def _conditions(design: PalpationDesign, facts: dict[str, Any]) -> str:
+    """Model, interfaces and loads in sentences."""
+    model, beyond = design.model.replace("_", " "), facts["extrapolated_volume_fraction"]
+    return (f"{model[0].upper()}{model[1:]}, depth {design.geometry.depth:g} mm. Jaw {design.jaw}; tissue on beam: "
+            f"{design.tissue_on_beam}; beam on base: {design.beam_on_base} (a number: friction of a unilateral interface). Loads "
+            f"to {design.load_n.to:g} N by {design.load_n.by:g} N, jaw to {design.displacement_mm.to:g} mm by "
+            f"{design.displacement_mm.by:g} mm. " + ("" if beyond is None else
+                                                     f"At worst {beyond:.0%} of a region is strained beyond its law's data."))
+
+
+def _assumptions(design: PalpationDesign) -> list[str]:
+    """What a design marks as assumed, a sentence each."""
+    materials = {"supports": design.supports, "filler": design.filler, "beam": design.beam} | design.tissues
+    marked = [f"{name}: {material.source}" for name, material in materials.items() if material.assumed]
+    marked += [f"film {name}: {film.source}" for name, film in design.films.items() if film.assumed]
+    return [*marked, "jaw and interfaces: bonded or not as stated above; the paper prints neither"]
+
+
+def _on_hardness(verdicts):
+    for column in sorted(verdicts, reverse=True):     # the paper's measure first
+        found = verdicts[column]
+        yield (f"{column}: changes with load by up to {found['change_with_load']:.1%}, with the tissue's height by up to "
+               f"{found['change_with_height']:.1%}; hardest over softest tissue {found['contrast']:.2f} or more; tissues "
+               f"{'are' if found['apart'] else 'are not'} told apart whatever load and height.")
+
+
+def _on_lumps(facts):
+    if not facts["lump"]:
+        return
+    lump, presses, within = facts["lump"], facts["presses"], facts["lump"]["within_interval"]
+    least, largest = lump["least_ratio_seen"]
+    yield (f"Hidden lumps: median error {_errors(lump['median_error'])}, with {facts['noise_n']:g} N of noise on each film, in "
+           f"{presses} press{'es' if presses > 1 else ''} each (in the first alone: {_errors(lump['median_error_in_one_press'])}; "
+           f"the same guess for every lump: {_errors(lump['median_error_of_one_guess'])}); in their 95 % intervals lie "
+           f"{within['x_mm']:.0%} of x, {within['depth_mm']:.0%} of depth, {within['log_ratio']:.0%} of the ratio; half of the "
+           f"intervals of depth are wider than {lump['median_depth_interval_mm']:.1f} mm. A lump is seen from a ratio of "
+           f"{least:.2f} to {largest:.2f}, by its place, where the plain tissue is known.")
+
+
+def _errors(error):
+    """Median errors of a lump in words."""
+    return f"{error['x_mm']:.2f} mm in x, {error['depth_mm']:.2f} mm in depth, {error['stiffness_ratio']:.2f} in the ratio"
