@@ -6,7 +6,14 @@ import numpy as np
 import pandas as pd
 import pytest
 from formula_study import MODELS, Study
-from softtact.stages import (
+from support.sensors import CORO
+
+from softtact.errors import InputError
+from softtact.evaluation.scoring import SSIM_COLUMNS
+from softtact.files import read_dataset, read_json
+from softtact.learning.dataset import SPLITS, read_samples
+from softtact.learning.network import load_network, predict
+from softtact.studies.hybrid.stages import (
     build_dataset,
     compare_networks,
     draw_fig9_networks,
@@ -19,13 +26,6 @@ from softtact.stages import (
     search_hyperparameters,
     train_cnn,
 )
-from support.sensors import CORO
-
-from softtact.errors import InputError
-from softtact.evaluation.scoring import SSIM_COLUMNS
-from softtact.files import read_dataset, read_json
-from softtact.learning.dataset import SPLITS, read_samples
-from softtact.learning.network import load_network, predict
 
 SPACE = {"filters": [[2, 4], [2, 4], [2, 4]], "dense": [8, 24], "learning_rate": [1e-3, 1e-2]}
 SETTINGS = {"search": {"trials": 2, "max_epochs": 2, "batch": 8, "space": SPACE},
