@@ -6,11 +6,9 @@ import scipy.sparse as sp
 from support.plates import plate
 from support.six_frusta import six_frusta
 
-from softtact.linalg import nested_dissection
 from softtact.linalg.direct import make_solver
 from softtact.linalg.multifrontal_solver import DissectedSolver
-from softtact.linalg.nested_dissection import dissect
-from softtact.linalg.symbolic import lay_out
+from softtact.linalg.symbolic import dissect, lay_out
 from softtact.linalg.workers import Workers
 from softtact.models.hyperelastic.newton import NewtonSettings
 from softtact.models.hyperelastic.newton_step import ContactFactor
@@ -54,7 +52,7 @@ def test_every_unknown_is_in_one_piece_and_no_entry_joins_the_two_sides_of_a_cut
 def test_operations_grow_with_the_cube_of_a_plates_width_and_entries_with_its_area(monkeypatch):
     # Nested dissection of n x n points takes of the order of n^3 operations and n^2 log n entries (George 1973), rows one after
     # the other n^4 and n^3: 8 and 4 times, little more for the logarithm, against 16 and 8 for twice the width.
-    monkeypatch.setattr(nested_dissection, "_SMALLEST", 10)     # whole parts of 200 unknowns would outweigh all cuts
+    monkeypatch.setattr("softtact.linalg.symbolic._SMALLEST", 10)     # whole parts of 200 unknowns would outweigh all cuts
     small, large = (operations(*plate(n, n, layers=1)[1:]) for n in (64, 128))
     assert 7 < large[0] / small[0] < 10 and 4 < large[1] / small[1] < 5.5
 

@@ -6,8 +6,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import maximum_bipartite_matching
 from scipy.spatial import Delaunay
 
-from softtact.linalg.nested_dissection import dissect, least_cover, shortened
-from softtact.linalg.symbolic import lay_out
+from softtact.linalg.symbolic import dissect, lay_out, least_cover, shortened
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +54,7 @@ def test_a_body_of_irregular_tetrahedra_is_dissected_with_a_fifth_less_operation
     points, graph = cloud
     upper = sp.triu(graph, format="csr")
     upper.sort_indices()
-    monkeypatch.setattr("softtact.linalg.nested_dissection._SMALLEST", 20)     # whole parts of 200 would outweigh all cuts
+    monkeypatch.setattr("softtact.linalg.symbolic._SMALLEST", 20)     # whole parts of 200 would outweigh all cuts
 
     def operations():
         fronts, _ = lay_out(upper.indptr, upper.indices, dissect(upper.indptr, upper.indices, points))
@@ -63,6 +62,6 @@ def test_a_body_of_irregular_tetrahedra_is_dissected_with_a_fifth_less_operation
         return np.sum(own**3 / 3 + own**2 * bound + own * bound**2)
 
     with monkeypatch.context() as patched:
-        patched.setattr("softtact.linalg.nested_dissection.shortened", lambda graph, side, cost: side)
+        patched.setattr("softtact.linalg.symbolic.shortened", lambda graph, side, cost: side)
         plane = operations()
     assert operations() < 0.8 * plane     # the larger the body, the more: 0.4 of a ball of 49,000 unknowns

@@ -6,8 +6,7 @@ from small_archive import Archive, counts_of, dent
 
 from softtact.errors import InputError
 from softtact.published.archive import ARRANGEMENTS, PRINTED, arrange, correlations, counts_sentence, counts_table, find_archive
-from softtact.published.importing import files_table, found_counts, items_of, read_archive, sign_towards_pcb
-from softtact.published.pairing import object_name
+from softtact.published.importing import files_table, found_counts, items_of, object_name, read_archive, sign_towards_pcb
 
 BOTH = ["elastic", "hyperelastic"]
 MAPS = ("Flat", "hyperelastic")

@@ -16,7 +16,7 @@ from numba import njit
 from scipy.linalg import blas, lapack
 
 from softtact.linalg.multifrontal import runs_of
-from softtact.linalg.nested_dissection import Piece, dissect
+from softtact.linalg.symbolic import Piece, dissect
 from softtact.linalg.workers import threads_of_blas
 
 

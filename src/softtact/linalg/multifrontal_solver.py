@@ -17,9 +17,8 @@ import scipy.sparse as sp
 from softtact.linalg import multifrontal as kernels
 from softtact.linalg.lapack import ROUTINES
 from softtact.linalg.multifrontal import Store
-from softtact.linalg.nested_dissection import Piece, dissect
 from softtact.linalg.nodal_frames import NodeFrames
-from softtact.linalg.symbolic import lay_out, with_room
+from softtact.linalg.symbolic import Piece, dissect, lay_out, with_room
 from softtact.linalg.workers import SERIAL, Workers, slices
 
 _PARTS = 32              # of all operations: what takes less than such a share is one thread's, from its first piece to its last

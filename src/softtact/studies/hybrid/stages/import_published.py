@@ -13,6 +13,10 @@ from softtact.files import write_csv, write_dataset, write_json
 from softtact.progress import announce
 from softtact.published.archive import counts_sentence, counts_table, find_archive
 from softtact.published.importing import (
+    MAP_COLUMNS,
+    MAP_ROWS,
+    TAXELS,
+    PairedTest,
     Tables,
     files_table,
     found_counts,
@@ -23,7 +27,6 @@ from softtact.published.importing import (
     sign_towards_pcb,
     tactile_dataset,
 )
-from softtact.published.pairing import MAP_COLUMNS, MAP_ROWS, TAXELS, PairedTest
 from softtact.sensors.specification import SensorSpec
 
 if TYPE_CHECKING:
