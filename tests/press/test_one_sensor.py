@@ -16,7 +16,6 @@ from softtact.fem.structured_meshes import box
 from softtact.materials.laws.registry import make_law
 from softtact.models.elastic.compliance import elastic_compliance
 from softtact.models.elastic.tangential import surface_compliance
-from softtact.models.foundation.compliance import foundation_compliance
 from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.readout.registry import labelled, register
 from softtact.sensors.library import sensor_file
@@ -60,7 +59,7 @@ def written(folder, kind, **changes):
         values = BLOCK
     else:
         values = yaml.safe_load(sensor_file({"frusta": "coro", "layers": "pad4x4"}[kind]).read_text())
-        values |= {"footprint_mm": [2.4, 2.4], "map_shape": [5, 5]}
+        values |= {"footprint_mm": [2.4, 2.4], "map_shape": [5, 5], "friction": {"object": 0.3}}
     (folder / f"{kind}.yaml").write_text(yaml.safe_dump(values | changes))
     return folder / f"{kind}.yaml"
 
@@ -115,12 +114,9 @@ def test_a_soft_object_is_pressed_on_each_kind(sensors, kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_twist_by_its_text_turns_a_rigid_object_on_each_kind(sensors, kind):
     plate = trimesh.creation.box((1.0, 1.0, 0.5))
-    spec = sensors[kind].spec
     result = sensors[kind].press(plate, motion="z -0.03; rz 2", label="", keep_object=True)
     assert result.model == "solid" and result.steps == 2
-    friction = spec.contact.friction if kind == "solid" else spec.friction.object
-    torque = -np.sign(friction) * result.torque_nmm[1, 2]
-    assert torque > 1e-4 if friction else abs(result.torque_nmm[1, 2]) < 1e-4
+    assert abs(result.torque_nmm[0, 2]) < 1e-3 * result.torque_nmm[1, 2]      # friction drags the surface along
     if kind != "solid":
         turned = result.placed_object.displacement_mm[1, :, :2]
         arm = result.placed_object.points_mm[:, :2]
@@ -146,8 +142,7 @@ def test_a_model_refuses_what_it_cannot_bear_and_names_one_that_can(sensors):
 def test_what_was_reached_before_an_interruption_is_kept_by_each_model(sensors, kind, model):
     sensor, seen = sensors[kind], []
     if model == "foundation":
-        sensor.prepared_models["foundation"] = foundation_compliance(sensor.spec, dielectric_law=sensor.laws["dielectric"],
-                                                                     cover_law=sensor.laws["cover"])
+        sensor = softtact.load_sensor("coro")      # what its model starts from is in the user's cache
 
     def stop(result):
         seen.append(result)
@@ -187,7 +182,7 @@ def test_a_solids_short_form_of_points_is_the_readout_of_that_name(tmp_path):
 
 
 @pytest.mark.parametrize(("kind", "readouts", "message"), [
-    ("frusta", {"a": {"kind": "capacitanc"}}, "'readouts.a': there is no kind 'capacitanc' .did you mean 'capacitance'.; use one"),
+    ("frusta", {"a": {"kind": "capacitanc"}}, "'readouts.a': there is no kind 'capacitanc' \\(did you mean 'capacitance'"),
     ("frusta", {"a": {"kind": "points", "points_mm": [[0, 0, 0]]}}, "'readouts.a': the key 'radius_mm' is missing"),
     ("layers", {"a": {"kind": "points", "points_mm": [[9, 0, 0]], "radius_mm": 0.1}}, "nothing within 0.1 mm of the point 9, 0"),
     ("layers", {"a": {"kind": "strip", "x_mm": [0, 1], "y_mm": [0, 1], "face": "z1"}}, "there is no face 'z1'"),

@@ -52,14 +52,13 @@ def press_pad(sensor: "Sensor", task: PressTask) -> PressResult:
     Raises InputError where the object misses the sensor, ConvergenceError where a step is not reached.
     """
     course = task.course
+    pad = SolidPad(sensor)
     if isinstance(task.pressed, SoftObject):
-        pad = SolidPad(sensor)
         placed = task.pressed.placed(task.pose, pad.height_mm, pad.shell)
         body = pad.with_object(placed, task.pressed, threads=course.threads)
     else:
         rigid = place(task.pressed, pose=task.pose)
         check_over_sensor(rigid, sensor.spec.footprint_mm)
-        pad = SolidPad.under(sensor, rigid)
         body = pad.with_rigid(rigid, threads=course.threads)
         course.reached.finish = partial(_finished, sensor, rigid, task)
     gather = partial(_on_pad, pad, body, None if task.soft or not course.keep_object else rigid, course)
