@@ -8,7 +8,7 @@ from support.sensors import CORO
 
 from softtact.errors import InputError
 from softtact.files import read_dataset, read_json, write_json
-from softtact.studies.hybrid.stages import draw_fig5_ftir, press_on_glass, validate_ftir
+from softtact.studies.hybrid.stages import draw, press_on_glass, validate_ftir
 
 ROOT = Path(__file__).parents[2]
 SENSOR = CORO.model_dump(mode="json")
@@ -73,7 +73,7 @@ def test_the_summary_judges_both_orientations_and_tells_what_was_measured(presse
     assert area.area_total_mm2.to_numpy() == pytest.approx(540 * area.area_per_frustum_mm2.to_numpy(), rel=1e-5)
     assert area.area_image_mm2.to_numpy() == pytest.approx(area.area_measured_mm2.to_numpy(), rel=1e-4)
     assert list(orientations.columns[:3]) == ["orientation", "law", "force_n"] and len(orientations) == 2 * 4
-    draw_fig5_ftir.run(inputs=outputs, outputs={kind: tmp_path / f"fig5.{kind}" for kind in ("png", "svg")}, settings={})
+    draw.draw_fig5_ftir(inputs=outputs, outputs={kind: tmp_path / f"fig5.{kind}" for kind in ("png", "svg")}, settings={})
     assert "virtual dielectric (no measured curve was given)" in (tmp_path / "fig5.svg").read_text()
 
 

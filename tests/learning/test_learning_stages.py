@@ -16,7 +16,7 @@ from softtact.learning.network import load_network, predict
 from softtact.studies.hybrid.stages import (
     build_dataset,
     compare_networks,
-    draw_fig9_networks,
+    draw,
     evaluate,
     find_learning_rate,
     gather_seeds,
@@ -170,7 +170,7 @@ def test_both_architectures_stand_in_one_table_and_one_figure(finished):
     own = rows[rows.architecture == "printed"]
     assert own.ssim.tolist() == pytest.approx(summary.ssim.tolist(), rel=1e-5)
     pictures = {kind: folder / f"figures/fig9.{kind}" for kind in ("png", "svg")}
-    draw_fig9_networks.run(inputs={"networks": table, "histories": [run["history"] for run in runs]}, outputs=pictures,
+    draw.draw_fig9_networks(inputs={"networks": table, "histories": [run["history"] for run in runs]}, outputs=pictures,
                            settings=settings_of("ssim"))
     assert all(path.stat().st_size > 10_000 for path in pictures.values())
 

@@ -9,7 +9,7 @@ from softtact.files import read_json
 from softtact.materials.cards import law_from_card, load_card
 from softtact.materials.config import load_material
 from softtact.materials.readers import read_curve
-from softtact.studies.hybrid.stages import draw_material, fit_material, make_curves
+from softtact.studies.hybrid.stages import draw, fit_material, make_curves
 
 
 def as_passed(settings):
@@ -124,6 +124,6 @@ def test_the_picture_of_a_card_is_drawn_from_its_files(tmp_path, write_file):
     settings = {"material": "mine", "laws": ["neo_hooke", "yeoh"]}
     fit_material.run(inputs={"curves": curves}, outputs={"card": tmp_path / "card.json"}, settings=settings)
     pictures = {kind: tmp_path / f"card.{kind}" for kind in ("png", "svg")}
-    draw_material.run(inputs={"card": tmp_path / "card.json", "curves": curves}, outputs=pictures, settings={})
+    draw.draw_material(inputs={"card": tmp_path / "card.json", "curves": curves}, outputs=pictures, settings={})
     assert all(path.stat().st_size > 10_000 for path in pictures.values())
     assert all(word in pictures["svg"].read_text() for word in ("<svg", "</svg>"))

@@ -182,7 +182,7 @@ def test_the_page_holds_its_figures_and_links_its_data(tmp_path):
     inputs["figures"] = [folder / "figures" / f"{name}.png" for name in ("fig6_ssim", "fig5_ftir", "material_foam")]
     for path in inputs["figures"]:
         save(fig6_ssim.draw(SSIM, CEILING), path, path.with_suffix(".svg"))
-    source = {"data": [folder / "evaluation/ssim.csv"], "code": ["src/softtact/studies/hybrid/stages/draw_fig6_ssim.py"]}
+    source = {"data": [folder / "evaluation/ssim.csv"], "code": ["src/softtact/studies/hybrid/stages/draw.py"]}
     facts = {"study": "mine", "sensor": "pad: 30 x 20 mm", "indenters": 3, "unseen": 1, "grasps": 2, "forces_n": [10.0], "seed": 1,
              "presses": {"indenters": 4, "unseen": 1, "grasps": 2}, "trials": {"indenters": 2, "unseen": 2, "grasps": 50},
              "sources": {"fig6_ssim": source}, "config": {"reference": "felt", "tested": ["hyper"],
@@ -192,7 +192,7 @@ def test_the_page_holds_its_figures_and_links_its_data(tmp_path):
     assert page.count("data:image/png;base64,") == 3
     assert page.count("The words allow this.") == 1 and "Material foam: test curves" in page
     assert 'href="figures/fig6_ssim.svg"' in page and 'href="tables/table2.csv"' in page
-    assert 'href="evaluation/ssim.csv"' in page and 'href="sources.html#softtact/studies/hybrid/stages/draw_fig6_ssim.py"' in page
+    assert 'href="evaluation/ssim.csv"' in page and 'href="sources.html#softtact/studies/hybrid/stages/draw.py"' in page
     assert 'href="sources.html#config"' in page
     assert "pad: 30 x 20 mm. It is not the paper" in page
     for first, then in itertools.pairwise([

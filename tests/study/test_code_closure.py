@@ -6,12 +6,14 @@ from pathlib import Path
 import pytest
 
 from softtact.studies.code_closure import code_closure
+from softtact.studies.jobs import stage_source, stages_of
+from softtact.studies.registry import KINDS
 
 SOURCE = Path(__file__).resolve().parents[2] / "src"
 # An edit of these reruns nothing.
 UNRELATED = {"cli.py", "studies/hybrid/config.py", "studies/code_closure.py", "studies/__main__.py", "studies/jobs.py",
              "studies/registry.py"}
-STAGES = sorted(path.stem for path in (SOURCE / "softtact/studies/hybrid/stages").glob("[!_]*.py"))
+STAGES = [stage for kind in KINDS for stage in stages_of(kind, source=SOURCE)]
 
 
 @pytest.fixture
@@ -65,9 +67,9 @@ def test_circular_imports_end(package):
 
 def test_no_stage_depends_on_the_command_line_or_the_runner():
     for stage in STAGES:
-        closure = code_closure(f"softtact.studies.hybrid.stages.{stage}", source=SOURCE)
-        names = {str(Path(path).relative_to(SOURCE / "softtact")) for path in closure}
-        assert f"studies/hybrid/stages/{stage}.py" in names
+        module = stage_source(stage, source=SOURCE)
+        names = {str(Path(path).relative_to(SOURCE / "softtact")) for path in code_closure(module, source=SOURCE)}
+        assert f"{module.partition(':')[0].removeprefix('softtact.').replace('.', '/')}.py" in names
         assert not names & UNRELATED, stage
 
 

@@ -1,8 +1,8 @@
 """Stands in for `python -m softtact.studies`: writes small outputs that follow from the command line alone.
 
 Usage: stub_runner.py KIND.NAME --in name=path ... --out name=path ... --settings JSON --threads N
-A press waits SOFTTACT_STUB_WAIT_S seconds, to be caught in the middle. With SOFTTACT_STUB_KILLED=FOLDER each stage's first job
-kills itself after its first output, and leaves its name in the folder.
+A press, or the stage SOFTTACT_STUB_SLOW, waits SOFTTACT_STUB_WAIT_S seconds, to be caught in the middle. With
+SOFTTACT_STUB_KILLED=FOLDER each stage's first job kills itself after its first output, and leaves its name in the folder.
 """
 
 import hashlib
@@ -26,7 +26,7 @@ def main(arguments):
         if DAMAGED in found:
             sys.exit(f"{stage}: {path}: damaged; delete it and make it again.")
         digest.update(b"".join(found))
-    if stage in ("hybrid.simulate_press", "grasps.grasp"):
+    if stage == os.environ.get("SOFTTACT_STUB_SLOW", "hybrid.simulate_press"):
         time.sleep(float(os.environ.get("SOFTTACT_STUB_WAIT_S", "0")))
     for path in (Path(value.partition("=")[2]) for option, value in pairs if option == "--out"):
         write(path, f"{stage} {path.name} {digest.hexdigest()}\n")

@@ -1,13 +1,11 @@
 """What reruns after a change, read from Snakemake's own plan."""
 
-from pathlib import Path
-
 import pytest
 
 from softtact.studies.code_closure import code_closure
+from softtact.studies.jobs import stage_source, stages_of
 
-STAGES = Path(__file__).resolve().parents[2] / "src/softtact/studies/hybrid/stages"
-FIGURES = sorted(path.stem for path in STAGES.glob("draw_*.py"))
+FIGURES = [stage.partition(".")[2] for stage in stages_of("hybrid") if stage.startswith("hybrid.draw_")]
 SIMULATION = {"make_curves", "fit_material", "mesh_sensor", "precompute_compliance", "simulate_press"}
 LEARNING = {"search_hyperparameters", "train_cnn", "evaluate"}
 
@@ -117,5 +115,6 @@ def edit_source(project, path):
 def own_files(project, stage, *, but_not):
     """Source files that a stage imports and the named other stages do not."""
     folder = project.folder / "src"
-    closures = [set(code_closure(f"softtact.studies.hybrid.stages.{name}", source=folder)) for name in [stage, *but_not]]
+    stages = [stage_source(f"hybrid.{name}", source=folder) for name in [stage, *but_not]]
+    closures = [set(code_closure(name, source=folder)) for name in stages]
     return sorted(closures[0].difference(*closures[1:]))

@@ -1,0 +1,140 @@
+"""The studies that list their jobs, of every kind: what reruns after a change, the same bytes twice, a killed run that goes on."""
+
+import os
+import signal
+import time
+from dataclasses import dataclass
+
+import pytest
+from project import Project
+
+from softtact.studies.jobs import stage_source
+from softtact.studies.registry import KINDS
+
+
+@dataclass(frozen=True)
+class Case:
+    """A tiny study, and what an edit of its parts reruns."""
+
+    kind: str
+    config: str
+    value: tuple[str, str]
+    """What a text of the configuration is changed to."""
+    after_value: set[str]
+    source: str
+    """A file below src/softtact that some stages import."""
+    after_source: set[str]
+    object: str = ""
+    """A mesh."""
+    after_object: frozenset[str] = frozenset()
+    slow: str = ""
+    """A stage that the stub lets wait."""
+
+
+GRASPED = {"grasp", "read_grasp", "tabulate_grasps", "draw_grasped_objects", "report"}
+CASES = [
+    Case("grasps", "config/tiny_grasps.yaml", ("trials: 3", "trials: 4"), GRASPED - {"grasp"},
+         "robot/scene.py", GRASPED | {"one_event", "draw_one_event"},
+         "config/objects/grasped/object_3.stl", frozenset(GRASPED), "grasp"),
+]
+
+
+@pytest.fixture(scope="module", params=CASES, ids=lambda case: case.kind)
+def case(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def finished_study(case, tmp_path_factory):
+    """The case's tiny study, finished with stubs in place of the stages."""
+    project = Project.of_sources(tmp_path_factory.mktemp(case.kind))
+    project.configfile = case.config
+    project.snakemake()
+    return project
+
+
+@pytest.fixture
+def study(case, finished_study, tmp_path):
+    """The same, which a test may change."""
+    project = finished_study.copy(tmp_path / "project")
+    project.configfile = case.config
+    return project
+
+
+def files_of(project):
+    """{path: bytes} of all results; logs and benchmarks tell of the run, not of the study."""
+    folder = next(path for path in (project.folder / "results").iterdir() if path.is_dir())
+    paths = [path.relative_to(folder) for path in sorted(folder.rglob("*")) if path.is_file() and not path.name.startswith(".")]
+    return {str(path): (folder / path).read_bytes() for path in paths if path.parts[0] not in ("logs", "benchmarks")}
+
+
+def test_every_rule_is_a_stage_and_the_page_the_tables_and_the_claims_are_there(case, study):
+    for rule in {path.name for path in (next((study.folder / "results").iterdir()) / "logs").iterdir()}:
+        assert stage_source(f"{case.kind}.{rule}").startswith(f"softtact.studies.{case.kind}.stages")
+    assert {"report.html"} <= set(files_of(study))
+
+
+def test_a_second_run_does_nothing(study):
+    assert study.plan() == {}
+
+
+def test_a_changed_value_reruns_what_takes_it_and_what_depends_on_that(case, study):
+    study.edit(case.config, *case.value)
+    assert set(study.plan()) == case.after_value
+
+
+def test_a_comment_in_the_configuration_reruns_nothing(case, study):
+    with (study.folder / case.config).open("a") as config:
+        config.write("# a comment\n")
+    assert study.plan() == {}
+
+
+def test_an_edited_line_of_the_source_reruns_the_stages_that_import_it(case, study):
+    with (study.folder / "src/softtact" / case.source).open("a") as source:
+        source.write("\n# edited\n")
+    assert set(study.plan()) == case.after_source
+
+
+def test_a_changed_object_reruns_what_reads_it(case, study):
+    if not case.object:
+        pytest.skip("this study presses no mesh")
+    with (study.folder / case.object).open("ab") as mesh:
+        mesh.write(b" ")
+    plan = study.plan()
+    assert set(plan) == case.after_object
+    if case.kind == "grasps":
+        assert {job["item"] for job in plan["grasp"]} == {"object_3-0", "object_3-1"}     # of its two positions, of no other object
+
+
+def test_a_missing_file_is_made_again(study):
+    missing = next(path for path in study.folder.glob("results/*/tables/*.csv"))
+    content = missing.read_bytes()
+    missing.unlink()
+    study.snakemake()
+    assert missing.read_bytes() == content
+
+
+@pytest.mark.slow
+def test_one_and_two_cores_give_the_same_files(case, finished_study, tmp_path):
+    alone = Project.of_sources(tmp_path)
+    alone.configfile = case.config
+    alone.snakemake("--cores", "1")
+    assert files_of(alone) == files_of(finished_study)
+
+
+@pytest.mark.slow
+def test_a_killed_run_goes_on_and_ends_with_the_same_files(case, finished_study, tmp_path):
+    project = Project.of_sources(tmp_path)
+    project.configfile = case.config
+    run = project.start(environment={"SOFTTACT_STUB_WAIT_S": "0.5", "SOFTTACT_STUB_SLOW": f"{case.kind}.{case.slow}"})
+    end = time.monotonic() + 120
+    while not list(project.folder.glob("results/*/*/**/*.*")) and time.monotonic() < end:
+        time.sleep(0.05)
+    os.killpg(run.pid, signal.SIGKILL)
+    run.wait()
+    project.snakemake()
+    assert files_of(project) == files_of(finished_study)
+
+
+def test_every_kind_has_a_case():
+    assert {case.kind for case in CASES} | {"hybrid"} == set(KINDS)
