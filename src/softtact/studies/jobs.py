@@ -86,8 +86,8 @@ def stages_of(kind: str, *, source: Path = SOURCE) -> list[str]:
 
 
 def _functions(path: Path) -> list[str]:
-    """The public functions at a module's level."""
-    return re.findall(r"^def ([a-z]\w*)\(", path.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    """The stages among a module's functions."""
+    return re.findall(r"^def ([a-z]\w*)\(\*, inputs", path.read_text(encoding="utf-8"), flags=re.MULTILINE)
 
 
 def find_stage(stage: str) -> Callable[..., None]:

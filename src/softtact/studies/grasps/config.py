@@ -40,22 +40,23 @@ class OneEvent(Section):
 class GraspValues(Section):
     """The keys of config/grasps.yaml."""
 
-    study: Name
-    kind: Literal["grasps"] = Field(exclude=True)
-    seed: Annotated[int, Field(ge=0)]
-    sensor: str
-    catalogue: str
-    objects: Annotated[list[str], Field(min_length=1)]
-    positions: Annotated[PositiveInt, BeforeValidator(plain_value)]
+    study: Name = Field(description="its name, and its folder below results/")
+    kind: Literal["grasps"] = Field(exclude=True, description="of study")
+    seed: Annotated[int, Field(ge=0)] = Field(description="of drawn positions and of the virtual sensor")
+    sensor: str = Field(description="name or YAML file of the sensor on both fingers")
+    catalogue: str = Field(description="YAML file that lists the objects' meshes")
+    objects: Annotated[list[str], Field(min_length=1)] = Field(description="names of the catalogue")
+    positions: Annotated[PositiveInt, BeforeValidator(plain_value)] = Field(
+        description="of each object: the first centred, the others drawn")
     places: Annotated[Places, BeforeValidator(plain_value)]
-    force_n: PositiveFloat
-    trials: PositiveInt
-    model: Literal["auto", "elastic", "foundation", "hyperelastic"]
-    policy: Literal["paper", "error"]
-    mesh: Literal["draft", "default", "stable", "fine"]
+    force_n: PositiveFloat = Field(description="that both fingers press with")
+    trials: PositiveInt = Field(description="readings of each position by the virtual sensor of both fingers")
+    model: Literal["auto", "elastic", "foundation", "hyperelastic"] = Field(description="of the presses; auto: the policy's choice")
+    policy: Literal["paper", "error"] = Field(description="for a model: by the object's details, or by the expected error")
+    mesh: Literal["draft", "default", "stable", "fine"] = Field(description="preset of the hyperelastic model")
     one_event: OneEvent
-    virtual_sensor: dict[VirtualSensorKey, Any]
-    scene: dict[str, Any]
+    virtual_sensor: dict[VirtualSensorKey, Any] = Field(description="as of a hybrid study")
+    scene: dict[str, Any] = Field(description="keys of a scene file that differ from softtact/robot/data/scene.yaml")
 
 
 @dataclass(frozen=True)

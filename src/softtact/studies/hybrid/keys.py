@@ -282,22 +282,23 @@ class Dataset(Section):
 class Values(Section):
     """The whole configuration; `config/config.yaml` holds it with comments."""
 
-    study: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$")]
+    study: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", description="its name, and its folder below results/")]
     kind: Literal["hybrid"] = Field("hybrid", exclude=True, description="of study; other kinds: skin, palpation, grasps")
-    seed: Annotated[int, Field(ge=0)]
-    sensor: str
-    materials: list[Name]
+    seed: Annotated[int, Field(ge=0)] = Field(description="of drawn places, noise, splits and trainings")
+    sensor: str = Field(description="name or YAML file of the sensor")
+    materials: list[Name] = Field(description="names or YAML files of the materials whose laws are fitted")
     objects: Objects
     ftir: Ftir
     complexity: Complexity
     choice: Choice
     section: SectionPress
-    forces_n: Forces
-    models: dict[Name, Model]
+    forces_n: Forces = Field(description="load steps of every press; each gives a map")
+    models: dict[Name, Model] = Field(description="the mechanical models, by names of one's choice")
     tested: list[Name] = Field(min_length=1, description="models that a network is trained for")
-    reference: Name
-    virtual_sensor: dict[VirtualSensorKey, float | list[float]]
-    trials: PositiveInt
+    reference: Name = Field(description="the model that the virtual sensor feels with")
+    virtual_sensor: dict[VirtualSensorKey, float | list[float]] = Field(
+        description="sizes of its effects, in place of their defaults (docs/explanation/virtual_sensor.md)")
+    trials: PositiveInt = Field(description="readings of each press by the virtual sensor")
     data: Data = Data()
     dataset: Dataset
     search: Search
