@@ -1,9 +1,11 @@
-"""A `SolidBody` whose frames move without turning, as a deck of CalculiX (ccx 2.20): meshed bodies, laws, contacts, friction.
+"""A `SolidBody` whose frames are driven, as a deck of CalculiX (ccx 2.20): meshed bodies, laws, contacts, friction.
 
 Elements   C3D20R for hexahedra HEX27 (without the middles of faces and body), C3D15 for wedges, C3D10 for quadratic tetrahedra.
 Contact    SURFACE TO SURFACE with a linear pressure-overclosure of the pair's stiffness; the stick slope of friction is the same.
            ccx has no augmentation: overlaps are pressure over stiffness.
-Forces     *NODE PRINT gives the reaction of each frame's nodes as their total, sets FRAME1, FRAME2, ..., at each step's end.
+Frames     each of their nodes is prescribed: straight from step to step, so turn in small steps.
+Forces     *NODE PRINT gives the reaction of each frame's nodes as their total, sets FRAME1, FRAME2, ..., at each step's end; of
+           a frame that turns also node by node (`frame_load`).
 """
 
 from collections.abc import Mapping
@@ -17,6 +19,7 @@ from softtact.errors import InputError
 from softtact.fem.elements import HEX27
 from softtact.fem.solid_mesh import ELEMENTS
 from softtact.models.solid.body import SolidBody
+from softtact.models.solid.frames import FramePose, step_vector
 
 _NO_TERM = 1e20              # a zero D_i would be replaced by a default
 _AXES = "xyz"
@@ -28,7 +31,7 @@ def calculix_lines(body: SolidBody, motions: Mapping[str, Motion], *, increments
 
     increments: parts of each step to begin with;  fixed: keep to them;  reduced: C3D20R for hexahedra, else C3D20
     stiffness: penalty in N/mm3 of the deck's contacts, by default that of each pair
-    Raises InputError for plane bodies, rigid objects, pressures, and motions that turn or load a frame.
+    Raises InputError for plane bodies, objects without elements, pressures, and motions that load a frame.
     """
     _refuse(body, motions)
     number = _numbers(body)
@@ -49,11 +52,12 @@ def calculix_lines(body: SolidBody, motions: Mapping[str, Motion], *, increments
 
 
 def _refuse(body, motions):
-    if body.mesh.geometry != "solid" or body.pressures or any(pair.rigid for pair in body.pairs):
+    soft = len(body.mesh.points)
+    if body.mesh.geometry != "solid" or body.pressures or any((pair.other.used >= soft).any() for pair in body.pairs):
         raise InputError("Only spatial bodies without pressures and rigid objects can be written for CalculiX; mesh the object.")
     for name, motion in motions.items():
-        if any(step.loads or set(step.ways) - set(_AXES) for step in motion.steps):
-            raise InputError(f"The frame {name!r} turns or is loaded, which this deck does not take; give ways along x, y and z.")
+        if any(step.loads for step in motion.steps):
+            raise InputError(f"The frame {name!r} is loaded, which this deck does not take; give ways.")
 
 
 def _numbers(body):
@@ -105,11 +109,35 @@ def _step(body, motions, number, step, increments, fixed):
         held[frame.carried] = False
     lines += [f"{number[node]}, {axis + 1}, {axis + 1}" for node, axis in np.argwhere(held)]
     for frame in body.frames:
-        ways = motions.get(frame.name, Motion()).steps[:step + 1]
+        steps = motions.get(frame.name, Motion()).steps[:step + 1]
+        moved = pose_after(steps).displacement(frame, body.points)
         for axis in frame.axes:
-            way = sum(own.ways.get(axis, 0.0) for own in ways)
-            component = _AXES.index(axis) + 1
-            lines += [f"{n}, {component}, {component}, {keywords.number(way)}" for n in _used(number, frame.nodes)]
-    for k in range(1, len(body.frames) + 1):
+            component = _AXES.index(axis)
+            lines += [f"{number[n]}, {component + 1}, {component + 1}, {keywords.number(way)}"
+                      for n, way in zip(frame.nodes, moved[:, component], strict=True) if number[n] > 0]
+    for k, frame in enumerate(body.frames, 1):
         lines += [f"*NODE PRINT, NSET=FRAME{k}, TOTALS=ONLY, FREQUENCY=1000", "RF"]
+        if _turns(motions.get(frame.name, Motion())):
+            lines += [f"*NODE PRINT, NSET=FRAME{k}, FREQUENCY=1000", "RF"]
     return lines + ["*END STEP"]
+
+
+def _turns(motion):
+    return any(set(step.ways) - set(_AXES) for step in motion.steps)
+
+
+def pose_after(steps):
+    """`FramePose` after some steps of a motion from rest."""
+    pose = FramePose()
+    for step in steps:
+        pose = pose.moved(step_vector(step.ways))
+    return pose
+
+
+def frame_load(body, frame, pose, table):
+    """Force (N) and torque (N mm) (6,) of a frame about its reference point, of a table (nodes, 4): number and reaction."""
+    number, force = _numbers(body), np.zeros_like(body.points)
+    node_of = {int(own): node for node, own in enumerate(number) if own > 0}
+    for own, *reaction in table:
+        force[node_of[int(own)]] = reaction
+    return pose.loads(frame, body.points, force)
