@@ -19,15 +19,15 @@ import yaml
 import softtact
 from softtact import cli
 from softtact.cli import COMMANDS, main
-from softtact.commands import complexity
+from softtact.commands import mesh as mesh_command
 from softtact.commands import press as press_command
 from softtact.commands.common import EXIT_STATUS
 from softtact.commands.fit import LAYOUTS as LAYOUTS_OFFERED
 from softtact.errors import ConvergenceError, InputError
 from softtact.materials.readers import LAYOUTS
-from softtact.press.choice import TOLERANCE_MM
 from softtact.press.result import read_press
 from softtact.press.sensor import MODELS, Sensor
+from softtact.press.task import TOLERANCE_MM
 from softtact.sensors.library import material_file, sensor_file
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -88,7 +88,9 @@ def test_the_docs_hold_the_exit_statuses_as_they_are():
 def examples():
     """Each command of the examples in the helps, as its arguments."""
     for command in COMMANDS:
-        text = sys.modules[command.__name__].EXAMPLES.replace("\\\n", " ").replace(",\n      ", ", ")
+        named = vars(sys.modules[command.__name__]).items()      # a module of two commands has examples of each
+        text = "\n".join(value for name, value in named if name.endswith("EXAMPLES"))
+        text = text.replace("\\\n", " ").replace(",\n      ", ", ")
         for line in text.splitlines():
             arguments = shlex.split(line, comments=True) if line.strip().startswith("softtact ") else []
             yield from [arguments[1:]] if arguments else []
@@ -152,7 +154,7 @@ def test_what_stops_a_command_has_its_exit_status(refused, monkeypatch):
         def stop(options, fault=fault):
             raise fault
 
-        monkeypatch.setattr(complexity, "_complexity", stop)
+        monkeypatch.setattr(mesh_command, "_complexity", stop)
         got, sentence = refused("complexity", OBJECT, "--unit", "mm")
         assert got == status and sentence.startswith("softtact complexity: "), fault
 

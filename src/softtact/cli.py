@@ -14,7 +14,6 @@ import softtact
 from softtact.commands import (
     calibrate,
     completion,
-    complexity,
     cost,
     dataset,
     detect_discs,
@@ -33,7 +32,7 @@ from softtact.commands import (
 from softtact.commands.common import EXIT_TEXT
 from softtact.errors import ConvergenceError, SofttactError, missing_extra
 
-COMMANDS = (press, grasp, grasps, skin, palpate, dataset, view, calibrate, predict, complexity, fit, mesh, export_deck,
+COMMANDS = (press, grasp, grasps, skin, palpate, dataset, view, calibrate, predict, fit, mesh, export_deck,
             detect_discs, cost, stage, completion)
 EXAMPLES = """examples:
   softtact press part.stl --unit mm --force 5 --force 20 --out press.nc --vtu press.vtu --plot press.png

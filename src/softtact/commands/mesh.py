@@ -1,11 +1,27 @@
-"""`softtact mesh`: tetrahedra in a closed surface, or the elements of another program, as a body for the solid model."""
+"""Commands on a mesh file: `softtact mesh`, a body for the solid model, and `softtact complexity`, the counts of the paper's rule.
+
+A body is made of tetrahedra in a closed surface, or of the elements of another program.
+"""
 
 import argparse
 import sys
 import time
 from pathlib import Path
 
-from softtact.commands.common import UNITS, add_command, add_repair, check_folders, check_names, pairs, read_object, short, show
+from softtact.commands.common import (
+    UNITS,
+    add_command,
+    add_mesh,
+    add_repair,
+    check_folders,
+    check_names,
+    pairs,
+    pose_of,
+    read_object,
+    sensor_spec,
+    short,
+    show,
+)
 from softtact.errors import InputError
 
 EXAMPLES = """
@@ -13,13 +29,18 @@ EXAMPLES = """
   softtact mesh finger.stl --unit mm --size 0.8 --face "back=z<0.01" --face "tip=z>12" --out finger.vtu
   softtact mesh finger.msh --unit mm --out finger.vtu     # elements of Gmsh, Abaqus and others, their groups as regions and faces
 """
+COMPLEXITY_EXAMPLES = """
+  softtact complexity part.stl --unit mm
+  softtact complexity part.stl --unit mm --pose=0,0,0,0,0,90 --rule all --json
+"""
 _SURFACES = (".stl", ".obj", ".ply")
 _UNKNOWNS = 4.5                # for each element: measured 4.4 to 5.2
 _SECONDS = (0.5e-3, 2e-3)      # for each element, on one processor of 2023 with and without other work on it
 
 
 def add(commands: argparse._SubParsersAction) -> None:
-    """Add the command to the parser."""
+    """Add both commands to the parser."""
+    _add_complexity(commands)
     command = add_command(commands, "mesh", _mesh, "Fill a closed surface with quadratic tetrahedra, or take another program's "
                           "elements, for the solid model.", EXAMPLES)
     command.add_argument("mesh", metavar="BODY", type=Path,
@@ -37,6 +58,26 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.add_argument("--most-elements", type=int, metavar="N", help="refuse a size that would make more (default: 400000)")
     add_repair(command)
     command.add_argument("--out", type=Path, required=True, metavar="BODY.vtu", help="the mesh to write")
+
+
+def _add_complexity(commands):
+    command = add_command(commands, "complexity", _complexity, "Count a mesh's complexity and choose its model.",
+                          COMPLEXITY_EXAMPLES)
+    add_mesh(command)
+    command.add_argument("--rule", choices=("any", "all"), default="any",
+                         help="which of the two criteria the hyperelastic model takes (default: any)")
+
+
+def _complexity(options):
+    from softtact.geometry.complexity import choose_model, score_file
+
+    spec = sensor_spec(options.sensor)
+    counts = score_file(options.mesh, unit=options.unit, footprint_mm=spec.footprint_mm, pose=pose_of(options),
+                        reach_mm=spec.thickness_mm)
+    four = {"NPt": counts.NPt, "CHt": counts.CHt, "NPo": counts.NPo, "CHo": counts.CHo}
+    result = four | {"ratio_total": counts.ratio_total, "ratio_overlap": counts.ratio_overlap}
+    result["model"] = choose_model(**four, rule=options.rule)
+    show(result, as_json=options.json, lines=[f"{name:14}{short(value)}" for name, value in result.items()])
 
 
 def _mesh(options):
