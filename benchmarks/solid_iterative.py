@@ -22,11 +22,11 @@ from softtact.linalg.refined import RefinedSolver
 from softtact.linalg.two_levels import TwoLevels
 from softtact.linalg.workers import Workers
 from softtact.materials.laws.registry import make_law
-from softtact.models.solid import corners
+from softtact.models.solid import blocks
 from softtact.models.solid.path import SolidPath
 
 ENOUGH, ROUNDING, MOST = 1e-3, 1e-8, 400
-corners._LARGE, corners._MOST_BULK = 0, np.inf     # to see where they should lie
+blocks._LARGE, blocks._MOST_BULK = 0, np.inf     # to see where they should lie
 
 
 def last_system(unknowns, ratio, threads):
@@ -86,7 +86,7 @@ def row(unknowns, ratio, threads):
     body, upper, right = last_system(unknowns, ratio, threads)
     workers, places = Workers(threads), body.points[body.free // 3]
     product = partial(RefinedSolver(places, workers=workers).product, upper)
-    lift = corners.lift_from_corners(body.mesh, body.laws, body.free)
+    lift = blocks.lift_from_corners(body.mesh, body.laws, body.free)
 
     def factored():
         direct = DissectedSolver(places, workers=workers)

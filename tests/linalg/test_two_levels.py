@@ -11,7 +11,7 @@ from softtact.linalg import refined
 from softtact.linalg.refined import RefinedSolver
 from softtact.linalg.two_levels import TwoLevels
 from softtact.materials.laws.registry import make_law
-from softtact.models.solid import corners
+from softtact.models.solid import blocks
 from softtact.models.solid.body import SolidBody
 
 
@@ -19,12 +19,12 @@ def system(n, *, bulk=5.0):
     """(upper triangle, places, lift) of a bonded cube of tetrahedra, n to an edge."""
     law = make_law("neo_hooke", {"c10": 0.1}, bulk_over_shear=bulk)
     body = SolidBody(in_tetrahedra(box((0, 0, 0), (1, 1, 1), (n, n, n))), {"body": law}, held={"z0": "xyz"})
-    return body.tangent(body.rest()).copy(), body.points[body.free // 3], corners.lift_from_corners(body.mesh, body.laws, body.free)
+    return body.tangent(body.rest()).copy(), body.points[body.free // 3], blocks.lift_from_corners(body.mesh, body.laws, body.free)
 
 
 @pytest.fixture(autouse=True)
 def small_bodies_too(monkeypatch):
-    monkeypatch.setattr(corners, "_LARGE", 0)
+    monkeypatch.setattr(blocks, "_LARGE", 0)
 
 
 def whole(upper):
@@ -115,4 +115,4 @@ def test_in_doubt_a_matrix_whose_corners_have_no_factor_is_factored_whole(monkey
 def test_a_sheet_without_free_corners_has_no_second_level():
     body = partial(SolidBody, in_tetrahedra(box((0, 0, 0), (2, 2, 1), (2, 2, 1))), {"body": make_law("neo_hooke", {"c10": 0.1})})
     free = body(held={"z0": "xyz", "z1": "xyz"})
-    assert len(free.free) and corners.lift_from_corners(free.mesh, free.laws, free.free) is None
+    assert len(free.free) and blocks.lift_from_corners(free.mesh, free.laws, free.free) is None
