@@ -8,7 +8,7 @@ from softtact.contact.pair import ContactPair
 from softtact.contact.surfaces import Surface
 from softtact.fem.structured_meshes import box, in_tetrahedra
 from softtact.materials.laws.registry import make_law
-from softtact.models.solid import blocks
+from softtact.models.solid import blocks as regions
 from softtact.models.solid.body import SolidBody
 from softtact.models.solid.path import SolidPath, last
 
@@ -36,7 +36,7 @@ def test_two_levels_give_the_presses_of_a_factor(kind, friction, monkeypatch):
     motion = Motion().step(ways={"z": -0.1}).step(ways={"x": 0.1})
     steps = {}
     for large in (0, 10**9):
-        monkeypatch.setattr(blocks, "_LARGE", large)
+        monkeypatch.setattr(regions, "_LARGE", large)
         body = blocks(kind, friction=friction)
         assert ("two levels" in body.solver.name) == (large == 0)
         steps[large] = last(SolidPath(body, {"top": motion}).run())
@@ -50,7 +50,7 @@ def test_a_system_with_sliding_points_is_solved_with_a_factor_on_two_levels_too(
     motion, found = Motion().step(ways={"z": -0.1}).step(ways={"x": 0.1}), {}
     state = last(SolidPath(blocks("tetrahedra", friction=0.3), {"top": motion}).run()).state
     for large in (0, 10**9):
-        monkeypatch.setattr(blocks, "_LARGE", large)
+        monkeypatch.setattr(regions, "_LARGE", large)
         body = blocks("tetrahedra", friction=0.3)     # which has no factor yet
         found[large] = body.solve(state, np.ones((len(body.free), 1)))
     np.testing.assert_allclose(found[0], found[10**9], rtol=0, atol=1e-5 * np.abs(found[0]).max())     # GMRES leaves 1e-6
@@ -58,7 +58,7 @@ def test_a_system_with_sliding_points_is_solved_with_a_factor_on_two_levels_too(
 
 def test_small_bodies_nearly_incompressible_ones_and_plane_ones_keep_the_factor(monkeypatch):
     assert "dissected" in blocks("tetrahedra").solver.name
-    monkeypatch.setattr(blocks, "_LARGE", 0)
+    monkeypatch.setattr(regions, "_LARGE", 0)
     assert "dissected" in blocks("tetrahedra", bulk=150.0).solver.name
     plane = SolidBody(box((0, 0), (1, 1), (2, 2), geometry="plane_strain"), {"body": law(5.0)}, held={"y0": "xy"})
     assert "dissected" in plane.solver.name
