@@ -8,11 +8,10 @@ from softtact.evaluation.claim_rows import within
 from softtact.skin.elastomers import read_elastomers
 from softtact.skin.layout import module_layout
 from softtact.studies.grasps.claims import claims_of_grasps
-from softtact.studies.hybrid.claims import of_choice as claims_of_choice
-from softtact.studies.hybrid.claims.of_materials import claims_of_materials
-from softtact.studies.hybrid.claims.of_scores import claims_of_scores
-from softtact.studies.hybrid.claims.of_study import claims_of_study
-from softtact.studies.hybrid.claims.of_times import claims_of_times
+from softtact.studies.hybrid.claims import of_models
+from softtact.studies.hybrid.claims.of_models import claims_of_times
+from softtact.studies.hybrid.claims.of_readings import claims_of_scores, claims_of_study
+from softtact.studies.hybrid.claims.of_tests import claims_of_materials
 from softtact.studies.hybrid.tables import PRINTED_TIMES
 from softtact.studies.palpation.claims import claims_of_probe
 from softtact.studies.skin import claims as claims_of_skin
@@ -124,17 +123,17 @@ def test_grasps_are_counted_against_twelve_objects_and_two_thousand_trials(objec
 
 def test_a_family_whose_hulls_grow_at_its_end_refutes_that_they_stay(monkeypatch):
     counts = {"NPt": [10, 20, 30, 40], "CHt": [10, 10, 10, 15], "NPo": [10, 20, 30, 40], "CHo": [10, 10, 10, 10]}
-    monkeypatch.setattr(claims_of_choice, "detail_family", lambda **_: pd.DataFrame(counts))
-    assert claims_of_choice._rising_detail((22.0, 37.0))["verdict"] == "not reproduced"
+    monkeypatch.setattr(of_models, "detail_family", lambda **_: pd.DataFrame(counts))
+    assert of_models._rising_detail((22.0, 37.0))["verdict"] == "not reproduced"
     counts["CHt"][-1] = 14
-    row = claims_of_choice._rising_detail((22.0, 37.0))
+    row = of_models._rising_detail((22.0, 37.0))
     assert row["verdict"] == "reproduced" and "NPt 10 to 40, CHt 10 to 14" in row["ours"]
 
 
 @pytest.mark.parametrize("pits", [1, 3])
 def test_a_pitted_plate_has_its_pits(pits):
     """Its underside at height 0: all but pits^2 of the (2 pits + 1)^2 cells of a side of 16 mm."""
-    triangles = claims_of_choice._pitted_plate(pits)
+    triangles = of_models._pitted_plate(pits)
     low = triangles[(triangles[..., 2] == 0).all(axis=1)]
     area = 0.5 * np.linalg.norm(np.cross(low[:, 1] - low[:, 0], low[:, 2] - low[:, 0]), axis=1).sum()
     assert area == pytest.approx(256 * (1 - pits**2 / (2 * pits + 1) ** 2))

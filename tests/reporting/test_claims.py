@@ -7,8 +7,8 @@ import xarray
 
 from softtact.evaluation.curve_shape import feature_table
 from softtact.geometry.complexity import choose_model
-from softtact.studies.hybrid.claims.of_choice import detail_family
-from softtact.studies.hybrid.claims.table import claims
+from softtact.studies.hybrid.claims.of_models import detail_family
+from softtact.studies.hybrid.claims.table import Evidence, claims
 from softtact.studies.hybrid.tables import PRINTED_COUNTS, PRINTED_TIMES, table2_complexity, table3_timing
 
 
@@ -58,7 +58,7 @@ def table(**changes):
     arguments = {"cards": [card()], "complexity": complexity, "ftir": ftir(0.005, "measured curve"), "ssim": scores(0.1),
                  "timing": timing, "choose": choose, "printed_counts": PRINTED_COUNTS,
                  "printed_times": PRINTED_TIMES} | changes
-    return claims(**arguments).set_index("claim")
+    return claims(Evidence(**arguments)).set_index("claim")
 
 
 def verdict(frame, start):

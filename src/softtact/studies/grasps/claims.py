@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from softtact.evaluation.claim_rows import ARCHIVE, COLUMNS, UNDECIDED, row, verdict_of
-from softtact.studies.hybrid.claims.of_maps import KEPT, LOST
+from softtact.studies.hybrid.claims.of_models import KEPT, LOST
 
 if TYPE_CHECKING:
     import xarray

@@ -8,12 +8,16 @@ import pandas as pd
 from softtact.materials.consistency import PRINTED
 from softtact.reporting.run_record import machine
 
+Counts = tuple[int, int, int, int, str]
+Times = tuple[float, float, float, float]
+
 # Table 2 of the paper: NPt, CHt, NPo, CHo, and the pipeline that it chose.
-PRINTED_COUNTS = {"object_1": (1356, 231, 51, 36, "elastic"), "object_2": (13830, 15537, 1205, 3444, "elastic"),
-                  "object_3": (1932, 1348, 64, 105, "elastic"), "object_4": (5472, 1449, 164, 141, "elastic"),
-                  "object_5": (5628, 426, 242, 90, "hyperelastic"), "object_6": (28524, 1353, 984, 102, "hyperelastic")}
+PRINTED_COUNTS: dict[str, Counts] = {
+    "object_1": (1356, 231, 51, 36, "elastic"), "object_2": (13830, 15537, 1205, 3444, "elastic"),
+    "object_3": (1932, 1348, 64, 105, "elastic"), "object_4": (5472, 1449, 164, 141, "elastic"),
+    "object_5": (5628, 426, 242, 90, "hyperelastic"), "object_6": (28524, 1353, 984, 102, "hyperelastic")}
 # Table 3 of the paper, s: mean, min, max, sd.
-PRINTED_TIMES = {"hyperelastic": (162.1, 48.0, 1863.0, 110.9), "elastic": (37.4, 2.46, 157.6, 32.44)}
+PRINTED_TIMES: dict[str, Times] = {"hyperelastic": (162.1, 48.0, 1863.0, 110.9), "elastic": (37.4, 2.46, 157.6, 32.44)}
 
 
 def table1_materials(cards: Iterable[dict[str, Any]]) -> pd.DataFrame:

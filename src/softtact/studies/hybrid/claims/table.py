@@ -1,67 +1,84 @@
 """The paper's claims, each with its number, ours, and a verdict computed by the rule that stands beside it.
 
-`reproduced` is said of numbers of ours alone. Rows that hold the paper's numbers against each other are `consistent in print` or
-`contradicts itself`. A rule on a number has two sides: too large is as wrong as too small.
+`reproduced` is a verdict on numbers of ours alone. Rows that hold the paper's numbers against each other are `consistent in print`
+or `contradicts itself`. A rule on a number has two sides: too large is as wrong as too small.
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from softtact.evaluation.claim_rows import ARCHIVE, COLUMNS, MEASUREMENTS, row, verdict_of
+from softtact.evaluation.claim_rows import ARCHIVE, COLUMNS, MEASUREMENTS
 from softtact.evaluation.score_tables import untrained
 from softtact.published.archive import SOURCE as PUBLISHED
-from softtact.studies.hybrid.claims.in_print import Counts, Times, claims_in_print
-from softtact.studies.hybrid.claims.of_choice import claims_of_choice
-from softtact.studies.hybrid.claims.of_maps import claims_of_maps
-from softtact.studies.hybrid.claims.of_materials import claims_of_materials
-from softtact.studies.hybrid.claims.of_scores import VIRTUAL, claims_of_scores
-from softtact.studies.hybrid.claims.of_study import claims_of_study
-from softtact.studies.hybrid.claims.of_times import claims_of_times
+from softtact.studies.hybrid.claims.of_models import claims_of_choice, claims_of_maps, claims_of_times
+from softtact.studies.hybrid.claims.of_readings import PAPERS_SENSOR, VIRTUAL, claims_of_scores, claims_of_study
+from softtact.studies.hybrid.claims.of_tests import claims_in_print, claims_of_dielectric, claims_of_materials
+
+if TYPE_CHECKING:
+    from softtact.studies.hybrid.tables import Counts, Times
 
 
-def claims(*, cards: Sequence[dict[str, Any]], complexity: pd.DataFrame, ftir: dict[str, Any], ssim: pd.DataFrame,
-           timing: pd.DataFrame, choose: Callable[..., str], printed_counts: dict[str, Counts], printed_times: dict[str, Times],
-           source: str = VIRTUAL, sensor: str = "coro", summary: pd.DataFrame | None = None, per_item: pd.DataFrame | None = None,
-           ceiling: pd.DataFrame | None = None, features: pd.DataFrame | None = None, scores: pd.DataFrame | None = None,
-           searches: dict[str, dict[str, Any]] | None = None, repeated: dict[str, float] | None = None,
-           taxels: pd.DataFrame | None = None) -> pd.DataFrame:
-    """Data frame with `claim_rows.COLUMNS`; the arguments are what the study's files hold.
+@dataclass(frozen=True, kw_only=True)
+class Evidence:
+    """What the claims are judged on: the contents of the study's files, and the paper's printed numbers.
 
-    source: of the readings; only against the published archive's is a verdict given on the paper's numbers
-    sensor: its name;  searches: {model: best.json};  repeated: {model: difference of a press done twice, mm}
-    summary, per_item, ceiling, features, scores, taxels: tables of the evaluation, without which their claims are left open
+    The claims on a table that is None are left open.
     """
-    bad = None if scores is None else untrained(scores)
-    rows = [*claims_of_materials(cards), _ftir(ftir), *_curve_shapes(ftir),
-            *claims_of_choice(complexity, choose=choose, printed_counts=printed_counts, ssim=ssim, timing=timing, source=source),
-            *claims_of_maps(features, complexity),
-            *claims_of_scores(ssim, source=source, summary=summary, per_item=per_item, ceiling=ceiling, untrained=bad),
-            *claims_of_times(timing, printed_times),
-            *claims_of_study(searches=searches, repeated=repeated, taxels=taxels, sensor=sensor, untrained=bad, source=source),
-            *claims_in_print(printed_counts=printed_counts, printed_times=printed_times)]
+
+    cards: Sequence[dict[str, Any]]
+    """A material card for each material."""
+    complexity: pd.DataFrame
+    """A row for each object: its counts of points and hulls, and the chosen model."""
+    ftir: dict[str, Any]
+    """The summary of the dielectric's contact area on glass."""
+    ssim: pd.DataFrame
+    """A row for each map: SSIM and errors of its predicted reading."""
+    timing: pd.DataFrame
+    """A row for each map: seconds of solver and network."""
+    choose: Callable[..., str]
+    """The rule: the model for the counts (NPt, CHt, NPo, CHo)."""
+    printed_counts: "dict[str, Counts]"
+    """Of table 2, by object."""
+    printed_times: "dict[str, Times]"
+    """Of table 3, by model, in s."""
+    source: str = VIRTUAL
+    """Of the readings; a verdict on the paper's numbers needs the published archive's."""
+    sensor: str = PAPERS_SENSOR
+    """The sensor's name."""
+    summary: pd.DataFrame | None = None
+    """Mean SSIM of each model and set, with intervals."""
+    per_item: pd.DataFrame | None = None
+    """Mean SSIM of each model, set and item, with intervals."""
+    ceiling: pd.DataFrame | None = None
+    """SSIM of repeated readings of one press against each other."""
+    features: pd.DataFrame | None = None
+    """Features of each object's deformation map, by model."""
+    scores: pd.DataFrame | None = None
+    """The `score_table` of networks and trivial predictors."""
+    searches: dict[str, dict[str, Any]] | None = None
+    """The best trial of each model's search."""
+    repeated: dict[str, float] | None = None
+    """Largest difference in mm of the maps of a press done twice, by model."""
+    taxels: pd.DataFrame | None = None
+    """The largest reading of each taxel under the indenters."""
+
+
+def claims(evidence: Evidence) -> pd.DataFrame:
+    """Data frame with `claim_rows.COLUMNS`, a row for each claim."""
+    bad = None if evidence.scores is None else untrained(evidence.scores)
+    rows = [*claims_of_materials(evidence.cards), *claims_of_dielectric(evidence.ftir),
+            *claims_of_choice(evidence.complexity, choose=evidence.choose, printed_counts=evidence.printed_counts,
+                              ssim=evidence.ssim, timing=evidence.timing, source=evidence.source),
+            *claims_of_maps(evidence.features, evidence.complexity),
+            *claims_of_scores(evidence.ssim, source=evidence.source, summary=evidence.summary, per_item=evidence.per_item,
+                              ceiling=evidence.ceiling, untrained=bad),
+            *claims_of_times(evidence.timing, evidence.printed_times),
+            *claims_of_study(searches=evidence.searches, repeated=evidence.repeated, taxels=evidence.taxels,
+                             sensor=evidence.sensor, untrained=bad, source=evidence.source),
+            *claims_in_print(printed_counts=evidence.printed_counts, printed_times=evidence.printed_times)]
     frame = pd.DataFrame(rows, columns=COLUMNS)
     # The archive has maps and readings; stress-strain curves and camera frames of the paper are not in it.
-    return frame.replace({"verdict": {ARCHIVE: MEASUREMENTS}}) if source == PUBLISHED else frame
-
-
-def _ftir(ftir):
-    rmse, virtual = ftir["rmse_mm2_per_frustum"], ftir["source"].startswith("virtual")
-    verdict = ARCHIVE if virtual else verdict_of(rmse <= 0.008)
-    return row("Simulated and measured contact area of the dielectric agree", "sec. 4.1, fig. 5", "RMSE 0.008 mm2",
-                f"{rmse:.4f} mm2 per frustum against the {ftir['source']}", verdict,
-                "RMSE per frustum <= 0.008 mm2 against a measured curve", "ftir/summary.json",
-                uncertainty=f"of the disc detection: {ftir['rmse_image_mm2_per_frustum']:.4f} mm2 RMSE"
-                if "rmse_image_mm2_per_frustum" in ftir else "not told")
-
-
-def _curve_shapes(ftir):
-    """A row per orientation of the printed frustum: does the area grow as the paper's words have it, with any law?"""
-    for orientation in dict.fromkeys(record["orientation"] for record in ftir["orientations"]):
-        records = [record for record in ftir["orientations"] if record["orientation"] == orientation]
-        yield row(f"Frusta read as {orientation}: the contact area grows with the force, in discs", "sec. 4.1, fig. 5",
-                   "increases, not necessarily linearly", " ".join(record["sentence"] for record in records),
-                   verdict_of(any(record["allowed"] for record in records)),
-                   "with one law at least: rises at every force, by 0.04 mm2 or more, discs two pixels apart, no step steeper than "
-                   "four times the mean", "ftir/orientations.csv", uncertainty="none: one simulation of each law, without scatter")
+    return frame.replace({"verdict": {ARCHIVE: MEASUREMENTS}}) if evidence.source == PUBLISHED else frame

@@ -13,7 +13,7 @@ import pandas as pd
 from softtact.files import read_dataset, read_json, write_csv
 from softtact.geometry.complexity import choose_model
 from softtact.learning.dataset import object_of
-from softtact.studies.hybrid.claims.table import claims
+from softtact.studies.hybrid.claims.table import Evidence, claims
 from softtact.studies.hybrid.tables import (
     PRINTED_COUNTS,
     PRINTED_TIMES,
@@ -41,10 +41,10 @@ def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, 
     scores = {name: pd.read_csv(inputs[name]) for name in ("summary", "per_item", "ceiling", "features", "scores", "taxels")
               if name in inputs}
     searches = dict(zip(settings["models"], map(read_json, inputs["searches"]), strict=True))
-    write_csv(outputs["claims"], claims(cards=cards, complexity=complexity, ftir=read_json(inputs["ftir"]), ssim=ssim,
-                                        timing=timing, choose=choose, printed_counts=PRINTED_COUNTS, printed_times=PRINTED_TIMES,
-                                        source=settings["source"], sensor=settings["sensor"], searches=searches,
-                                        repeated=_differences(inputs), **scores))
+    write_csv(outputs["claims"], claims(Evidence(
+        cards=cards, complexity=complexity, ftir=read_json(inputs["ftir"]), ssim=ssim, timing=timing, choose=choose,
+        printed_counts=PRINTED_COUNTS, printed_times=PRINTED_TIMES, source=settings["source"], sensor=settings["sensor"],
+        searches=searches, repeated=_differences(inputs), **scores)))
 
 
 def _differences(inputs):

@@ -1,7 +1,7 @@
-"""Claims on how well the networks read: SSIM by set, object and model, and how the sensor repeats itself."""
+"""Claims on the readings: SSIM by set, object and model, how the sensor repeats itself; and what the study as a whole decides."""
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,11 @@ VIRTUAL = "virtual sensor"      # the usual source of readings; the paper's numb
 CLOSE = 0.05                    # of mean SSIM: what trainings of one network from different seeds and searches may part by, assumed
 FEW = 3                         # items below which a comparison of sets or networks says nothing
 SMOOTH, RELIEF, STEPPED = ["object_1", "object_2", "object_3"], ["object_4"], ["object_5", "object_6"]
+
+RANDOM_TRIALS = 10        # of a search, before Optuna's sampler looks at what it has found; searches of one seed share them
+LIKE = 2.0                # factor within which widths found by two searches are of a "similar range"; assumed
+PAPERS_SENSOR = "coro"
+INDENTERS = 49
 
 
 def claims_of_scores(ssim: "pd.DataFrame", *, source: str, summary: "pd.DataFrame | None", per_item: "pd.DataFrame | None",
@@ -194,3 +199,71 @@ def _repeats(ceiling, source):
     return row(claim, "sec. 4.2", printed, f"SSIM of trials against each other {mean:.4f}, {source}",
                verdict_of(mean < 0.999) if source == PUBLISHED else ARCHIVE, rule, evidence,
                uncertainty=f"standard error {error:.4f} over {len(ceiling)} load steps")
+
+
+def claims_of_study(*, searches: dict[str, dict[str, Any]] | None, repeated: dict[str, float] | None, taxels: "pd.DataFrame | None",
+                    sensor: str, source: str, untrained: "pd.DataFrame | None") -> Iterator[dict[str, str]]:
+    """A row for each.
+
+    searches: {model: best.json};  repeated: {model: largest difference of a press done twice, mm};  taxels: of `taxel_table`
+    untrained: of `score_tables.untrained`
+    """
+    yield _like_searches(searches)
+    yield _repeated(repeated)
+    yield _taxels(taxels, source)
+    yield _second_sensor(sensor, untrained, source)
+
+
+def _like_searches(searches):
+    claim, where = "The searches of both simulators converge to a like architecture", "sec. 3.3.2"
+    rule = (f"as many convolutions, and widths within a factor of {LIKE:g}, in the best trial of each; undecided up to "
+            f"{RANDOM_TRIALS} trials, which are the same random draws for both")
+    if not searches or not {"hyperelastic", "elastic"} <= set(searches):
+        return row(claim, where, "consistently", "no search of both models", UNDECIDED, rule, "learning/")
+    widths = {model: [*searches[model]["filters"], searches[model]["dense"]] for model in ("hyperelastic", "elastic")}
+    one, other = (np.array(values, dtype=float) for values in widths.values())
+    trials = min(searches[model].get("trials", 0) for model in widths)
+    holds = len(one) == len(other) and bool((np.maximum(one / other, other / one) <= LIKE).all())
+    told = "; ".join(f"{model} {', '.join(map(str, values[:-1]))} filters and {values[-1]} neurons" for model,
+                     values in widths.items())
+    return row(claim, where, "consistently", told,
+               verdict_of(holds) if trials > RANDOM_TRIALS else UNDECIDED, rule, "learning/",
+               uncertainty=f"one search of {trials} trials each; their losses are in search.csv")
+
+
+def _repeated(repeated):
+    claim, where = "Synthetic maps are deterministic", "sec. 4.2"
+    rule = "a press done twice gives the same map to the last bit, with each model"
+    if not repeated:
+        return row(claim, where, "deterministic", "no press was done twice", UNDECIDED, rule, "repeated/")
+    told = ", ".join(f"{model} {value:.3g} mm" for model, value in repeated.items())
+    return row(claim, where, "deterministic", f"largest difference of one object's maps: {told}",
+               verdict_of(not any(repeated.values())),
+               rule, "repeated/", uncertainty="none: one object pressed twice on one machine")
+
+
+def _taxels(taxels, source):
+    claim, where = "The indenters engage all taxels", "sec. 3.3.2"
+    rule = f"every taxel reads more than 30 counts under an indenter; undecided where fewer than {INDENTERS} do not engage all"
+    if taxels is None:
+        return row(claim, where, f"{INDENTERS} indenters", "no readings", UNDECIDED, rule, "evaluation/taxels.csv")
+    reached = int((taxels.largest_counts > 30).sum())
+    verdict = UNDECIDED if reached < len(taxels) and taxels.indenters.iloc[0] < INDENTERS else verdict_of(reached == len(taxels))
+    return row(claim, where, f"{INDENTERS} indenters",
+               f"{reached} of {len(taxels)} taxels, by {taxels.indenters.iloc[0]} indenters; the faintest one's largest reading is "
+               f"{taxels.largest_counts.min():.0f} counts, {source}", verdict, rule,
+               "evaluation/taxels.csv",
+               uncertainty="none: largest reading of each taxel")
+
+
+def _second_sensor(sensor, untrained, source):
+    claim, where, rule = ("The pipeline transfers to another sensor", "sec. 5",
+                          "on a sensor that is not the paper's, every network reads better than the mean reading at that force")
+    if sensor == PAPERS_SENSOR or untrained is None:
+        return row(claim, where, "future work",
+                   f"this study is of the paper's sensor ({sensor}); config/second_sensor.yaml is of another",
+                   UNDECIDED, rule, "evaluation/verdicts.json")
+    bad = ", ".join(sorted({f"{one.predictor} of {one.model}" for one in untrained.itertuples()}))
+    told = f"{bad} do not" if bad else "all networks do"
+    return row(claim, where, "future work", f"sensor {sensor}: {told}, {source}", verdict_of(untrained.empty), rule,
+               "evaluation/verdicts.json", uncertainty="one seed")
