@@ -1,11 +1,17 @@
-"""The nearest known name for a key or a name that is unknown."""
+"""Sections of files whose keys are all known, and the nearest known name for a key or a name that is not."""
 
 import difflib
 from collections.abc import Collection, Iterable
 from typing import Any, get_args
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
+
+
+class Section(BaseModel):
+    """A mapping of a file whose keys are all known."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 def unknown(name: object, known: Collection[object], *, kind: str) -> str:

@@ -9,6 +9,7 @@ import pydantic
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
 from softtact.errors import InputError
+from softtact.unknown_names import Section
 
 
 def _rising(bounds):
@@ -22,10 +23,8 @@ Share = Annotated[float, Field(gt=0.0, le=1.0)]
 Rates = Annotated[tuple[PositiveFloat, PositiveFloat], pydantic.AfterValidator(_rising)]
 
 
-class Section(pydantic.BaseModel):
-    """A mapping whose keys are all known."""
-
-    model_config = pydantic.ConfigDict(extra="forbid", frozen=True)
+class Settings(Section):
+    """A section that is read by itself, as stages do."""
 
     @classmethod
     def from_dict(cls, values: dict[str, Any], *, where: str) -> Self:
@@ -41,7 +40,7 @@ class Section(pydantic.BaseModel):
             raise InputError(f"{key}: {reason} (it is {fault['input']!r:.60}).") from None
 
 
-class Compact(Section):
+class Compact(Settings):
     """The small network that mirrors the sensor; it has no hidden layer and takes no part in the search."""
 
     filters: tuple[PositiveInt, PositiveInt, PositiveInt] = Field((16, 32, 64), description="full grid, halving, half grid")
@@ -49,7 +48,7 @@ class Compact(Section):
     epochs: PositiveInt | None = Field(None, description="at most; by default as many as in `training`")
 
 
-class Network(Section):
+class Network(Settings):
     """The network that a study's results rest on: the printed one, the search's best of its form, or the compact one.
 
     Beside it the other kind is trained on the same split, for comparison: compact, or printed where compact is chosen.
@@ -62,7 +61,7 @@ class Network(Section):
     compact: Compact = Compact()
 
 
-class SearchSpace(Section):
+class SearchSpace(Settings):
     """Ranges that the search draws from, [smallest, largest]; equal ends hold a value fixed."""
 
     layers: Widths | None = Field(None, description="convolutions, the first of `filters`; by default 2 up to as many as it has")
@@ -82,7 +81,7 @@ class SearchSpace(Section):
         return self.layers or (min(2, len(self.filters)), len(self.filters))
 
 
-class Search(Section):
+class Search(Settings):
     """Hyperparameter search: Optuna's sampler with its Hyperband pruner. The paper prints its result only."""
 
     trials: PositiveInt = 30
@@ -93,7 +92,7 @@ class Search(Section):
     space: SearchSpace = SearchSpace()
 
 
-class Training(Section):
+class Training(Settings):
     """The training of one network. The paper is silent on all of it but the loss."""
 
     epochs: PositiveInt = 60
@@ -110,7 +109,7 @@ class Training(Section):
     threads: PositiveInt = Field(2, description="of a training; on fewer cores as many threads, for the weights depend on it")
 
 
-class LearningCurve(Section):
+class LearningCurve(Settings):
     """SSIM against the number of training maps: the same training on growing shares of them."""
 
     shares: tuple[Share, ...] = Field((), description="of the training maps, rising; empty: no learning curve")
@@ -125,7 +124,7 @@ class LearningCurve(Section):
         return shares
 
 
-class Repeats(Section):
+class Repeats(Settings):
     """The same training from several seeds, on kept presses and one split: how much of a score is chance."""
 
     seeds: PositiveInt = Field(1,
@@ -133,7 +132,7 @@ class Repeats(Section):
     networks: tuple[Literal["printed", "searched", "compact"], ...] = Field(("compact",), min_length=1)
 
 
-class Ssim(Section):
+class Ssim(Settings):
     """Structural similarity of tactile maps."""
 
     window: int = Field(3, ge=3, description="side of the window in taxels, odd")

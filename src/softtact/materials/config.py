@@ -18,7 +18,7 @@ from softtact.materials.curves import refuse_idle
 from softtact.materials.laws.base import Law
 from softtact.materials.laws.registry import law_class, make_law
 from softtact.materials.linear import LinearConstants
-from softtact.unknown_names import first_fault, known_keys, unknown
+from softtact.unknown_names import Section, first_fault, known_keys, unknown
 
 Mode = Literal["uniaxial", "equibiaxial", "planar", "volumetric"]
 _Model = TypeVar("_Model", bound=pydantic.BaseModel)
@@ -33,11 +33,7 @@ def _rising(window):
 Window = Annotated[tuple[float, float], pydantic.AfterValidator(_rising)]
 
 
-class _Section(pydantic.BaseModel):
-    model_config = pydantic.ConfigDict(extra="forbid", frozen=True)
-
-
-class SyntheticCurves(_Section):
+class SyntheticCurves(Section):
     """Curves made from a law, with noise; for a study without test data."""
 
     kind: Literal["synthetic"]
@@ -50,7 +46,7 @@ class SyntheticCurves(_Section):
     bulk_over_shear: float = Field(20.0, gt=2 / 3, description="K / mu0 behind a volumetric curve")
 
 
-class MeasuredFile(_Section):
+class MeasuredFile(Section):
     """One file of a user's test; see `softtact.materials.readers`."""
 
     file: str = Field(description="path, relative to the YAML file")
@@ -64,14 +60,14 @@ class MeasuredFile(_Section):
     sheet: str | None = Field(None, description="of an Excel workbook that has several")
 
 
-class MeasuredCurves(_Section):
+class MeasuredCurves(Section):
     """Curves from a user's files."""
 
     kind: Literal["measured"]
     files: list[MeasuredFile] = Field(min_length=1)
 
 
-class FitSettings(_Section):
+class FitSettings(Section):
     """How the laws are fitted; see `softtact.materials.card_making.CardOptions`."""
 
     laws: Literal["all"] | list[str] = "all"
@@ -89,7 +85,7 @@ class FitSettings(_Section):
     seed: int = Field(0, ge=0)
 
 
-class PrintedLaw(_Section):
+class PrintedLaw(Section):
     """Constants as a publication prints them."""
 
     parameters: dict[str, float]
@@ -103,7 +99,7 @@ class FitStage(FitSettings):
     printed: dict[str, PrintedLaw] = Field(default_factory=dict)
 
 
-class MaterialConfig(_Section):
+class MaterialConfig(Section):
     """One material."""
 
     material: str = Field(pattern=r"^[a-z0-9_]+$")

@@ -16,13 +16,13 @@ from softtact.materials.config import validated
 from softtact.materials.laws.base import Law
 from softtact.materials.laws.registry import make_law
 from softtact.materials.linear import LinearConstants
-from softtact.sensors.fields import Section
+from softtact.sensors.fields import FiniteSection
 
 Positive = Annotated[float, Field(gt=0)]
 REGIONS = ("left support", "right support", "filler", "beam", "tissue")
 
 
-class Material(Section):
+class Material(FiniteSection):
     """A material: constants of a law and K, or mu and K, or E and nu, of a neo-Hookean law."""
 
     law: str = "neo_hooke"
@@ -56,7 +56,7 @@ class Material(Section):
         return law
 
 
-class Geometry(Section):
+class Geometry(FiniteSection):
     """Sizes in mm."""
 
     support_length: Positive
@@ -83,7 +83,7 @@ class Geometry(Section):
         return 0.0, self.support_height, beam, beam + self.tissue_height
 
 
-class Film(Section):
+class Film(FiniteSection):
     """A force-sensing film on the top or the bottom of a part."""
 
     on: Literal["left support", "right support", "filler", "beam"]
@@ -94,7 +94,7 @@ class Film(Section):
     source: str = Field(min_length=1)
 
 
-class Steps(Section):
+class Steps(FiniteSection):
     """Equal steps up to a final value."""
 
     to: Positive
@@ -106,7 +106,7 @@ class Steps(Section):
         return np.linspace(0, self.to, max(1, round(self.to / self.by)) + 1)[1:]
 
 
-class Lump(Section):
+class Lump(FiniteSection):
     """A rectangular inclusion in the tissue."""
 
     x: float = Field(description="of its middle")
@@ -116,7 +116,7 @@ class Lump(Section):
     stiffness_ratio: Positive = Field(description="its moduli over those of the tissue")
 
 
-class Hardness(Section):
+class Hardness(FiniteSection):
     """The study of relative hardness over load and tissue height."""
 
     tissue_heights: list[Positive] = Field(min_length=1)
@@ -130,7 +130,7 @@ class Hardness(Section):
         return self
 
 
-class LumpSearch(Section):
+class LumpSearch(FiniteSection):
     """The study of a hidden lump: a table of film forces over its place, depth and stiffness, and estimates from it."""
 
     tissue: str
@@ -157,7 +157,7 @@ class LumpSearch(Section):
         return self
 
 
-class MeshSizes(Section):
+class MeshSizes(FiniteSection):
     """Sides of the quadratic elements in mm."""
 
     along: Positive = 2.0
@@ -168,7 +168,7 @@ class MeshSizes(Section):
     depth_layers: int = Field(2, ge=1, description="elements across the depth of a solid")
 
 
-class PalpationDesign(Section):
+class PalpationDesign(FiniteSection):
     """A palpation sensor, the tissues that it presses and the sweeps."""
 
     name: str = Field(pattern=r"^[a-z0-9_]+$", validation_alias=pydantic.AliasChoices("study", "name"))

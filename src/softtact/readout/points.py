@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from softtact.errors import InputError
 from softtact.readout.registry import Samples, SurfaceMotion, labelled, register
-from softtact.sensors.fields import Length, Section
+from softtact.sensors.fields import FiniteSection, Length
 
 if TYPE_CHECKING:
     import xarray
@@ -20,7 +20,7 @@ QUANTITIES, UNITS = ("pressure", "x", "y", "z"), ("MPa", "mm", "mm", "mm")
 
 
 @register("points")
-class Points(Section):
+class Points(FiniteSection):
     """Means over the parts of a face that lie within a radius of points at rest, weighted by area.
 
     Readings (step, point, quantity): contact pressure in MPa, then displacement along x, y, z in mm; nan where it is not known, and

@@ -18,7 +18,7 @@ from softtact.errors import InputError
 from softtact.fem.kernels import add_forces
 from softtact.models.solid.body import SolidBody
 from softtact.readout.registry import Samples, SurfaceMotion, labelled, register
-from softtact.sensors.fields import Section
+from softtact.sensors.fields import FiniteSection
 
 if TYPE_CHECKING:
     import xarray
@@ -29,7 +29,7 @@ _ROUNDING_MM = 1e-6
 
 
 @register("strip")
-class Strip(Section):
+class Strip(FiniteSection):
     """The part of a face from one value of x, of y (and of z) to below another, at rest.
 
     Readings (step, quantity): the contact's normal force on it in N and its mean pressure in MPa, positive in compression; nan

@@ -12,7 +12,7 @@ from softtact.readout.capacitance import ideal_counts
 from softtact.readout.registry import SurfaceMotion, labelled, register
 from softtact.readout.virtual_sensor import amplified, taxel_capacitance
 from softtact.sensors.base import BaseSpec
-from softtact.sensors.fields import Section
+from softtact.sensors.fields import FiniteSection
 
 if TYPE_CHECKING:
     import xarray
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @register("capacitance")
-class Capacitance(Section):
+class Capacitance(FiniteSection):
     """Counts (step, row, column) of the sensor's taxels, long after the press and without noise."""
 
     def read(self, surface: SurfaceMotion) -> "xarray.DataArray":

@@ -12,14 +12,14 @@ from pydantic import BeforeValidator, Field, PositiveFloat, ValidationError
 
 from softtact.errors import InputError
 from softtact.files import read_yaml
-from softtact.sensors.fields import Length, Section, plain_value
+from softtact.sensors.fields import FiniteSection, Length, plain_value
 
 SHIPPED = Path(str(resources.files("softtact.robot"))) / "data" / "scene.yaml"
 _Point = Annotated[tuple[float, float, float], BeforeValidator(plain_value)]
 _Share = Annotated[float, Field(gt=0.0, lt=1.0)]
 
 
-class SceneSettings(Section):
+class SceneSettings(FiniteSection):
     """The keys of a scene file. Reasons of what is assumed stand in the file."""
 
     mjcf: Path | None = None

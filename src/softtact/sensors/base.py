@@ -9,8 +9,8 @@ from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, V
 
 from softtact.errors import InputError
 from softtact.files import read_yaml
-from softtact.sensors.fields import CalibrationBlock, Edge, EdgeField, ElasticLayer, Section, Taxels
-from softtact.unknown_names import first_fault, known_keys, unknown
+from softtact.sensors.fields import CalibrationBlock, Edge, EdgeField, ElasticLayer, FiniteSection, Taxels
+from softtact.unknown_names import Section, first_fault, known_keys, unknown
 
 DEFAULT_KIND = "frusta"     # of a file that states none
 
@@ -22,7 +22,7 @@ class ReadoutEntry(BaseModel):
     kind: str = Field(description="one of the registered kinds: capacitance, points, strip")
 
 
-class Specification(Section):
+class Specification(FiniteSection):
     """What a sensor of any kind has; each class states its `kind` as a literal.
 
     readouts: what the sensor tells of a press, by names of choice; by default those of its kind

@@ -3,7 +3,9 @@
 from typing import Annotated, Any, Generic, Literal, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PositiveFloat, PositiveInt
+from pydantic import BeforeValidator, ConfigDict, Field, PositiveFloat, PositiveInt
+
+from softtact.unknown_names import Section
 
 T = TypeVar("T")
 
@@ -20,13 +22,13 @@ def plain_value(field: Any) -> Any:
     return field
 
 
-class Section(BaseModel):
-    """A part of a sensor file: unknown keys are refused."""
+class FiniteSection(Section):
+    """A section whose numbers are all finite."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(allow_inf_nan=False)
 
 
-class Stated(Section, Generic[T]):
+class Stated(FiniteSection, Generic[T]):
     """A value with whether it is assumed, and why."""
 
     value: T
@@ -45,14 +47,14 @@ Coefficient = Annotated[_NotNegative, _or_stated(_NotNegative)]
 Flag = Annotated[bool, _or_stated(bool)]
 
 
-class Taxels(Section):
+class Taxels(FiniteSection):
     """Grid of electrodes on the PCB: `rows` along y, `columns` along x."""
 
     rows: PositiveInt
     columns: PositiveInt
 
 
-class ElasticLayer(Section):
+class ElasticLayer(FiniteSection):
     """Constants of the single linear layer that stands for all layers in the elastic model."""
 
     young_mpa: PositiveFloat
@@ -70,7 +72,7 @@ class ElasticLayer(Section):
 # touch.
 
 
-class SidesBelow(Section):
+class SidesBelow(FiniteSection):
     """A shell that holds the side faces from so far below the sensing surface on."""
 
     sides_below_mm: Length
@@ -88,7 +90,7 @@ def _held(value: Any) -> Any:
     return value
 
 
-class Edge(Section):
+class Edge(FiniteSection):
     """What holds the rim: `held` is sides, free or {sides_below_mm: h}; each may also be given in place of the whole block."""
 
     held: Annotated[Literal["sides", "free"] | SidesBelow, BeforeValidator(_held)] = "sides"
@@ -127,7 +129,7 @@ EdgeField = Annotated[Edge, BeforeValidator(_short)]
 Share = Annotated[float, Field(ge=0.0, lt=1.0)]
 
 
-class CalibrationBlock(Section):
+class CalibrationBlock(FiniteSection):
     """counts = gain x counts_per_relative_change x dC/C0 + zero_counts, of each taxel; dC/C0 with the electrodes' edges and
     neighbours as the virtual sensor has them.
     """

@@ -6,13 +6,13 @@ import numpy as np
 
 from softtact.errors import InputError
 from softtact.sensors.base import BaseSpec
-from softtact.sensors.fields import Coefficient, Flag, Length, Section
+from softtact.sensors.fields import Coefficient, FiniteSection, Flag, Length
 
 # How the frustum's two printed diameters are read: the narrow end, or (as the words of the text have it) the wide one as the tip.
 ORIENTATIONS = ("default", "as_printed")
 
 
-class Frusta(Section):
+class Frusta(FiniteSection):
     """Conical frusta below the sheet, on a square lattice centred on the sensor."""
 
     height_mm: Length
@@ -21,7 +21,7 @@ class Frusta(Section):
     pitch_mm: Length
 
 
-class Dielectric(Section):
+class Dielectric(FiniteSection):
     """Sheet with frusta; `relative_permittivity` of its solid."""
 
     material: str
@@ -30,14 +30,14 @@ class Dielectric(Section):
     relative_permittivity: Length = 3.5
 
 
-class Cover(Section):
+class Cover(FiniteSection):
     """Cover and conductive fabric as one layer."""
 
     material: str
     thickness_mm: Length
 
 
-class Friction(Section):
+class Friction(FiniteSection):
     """Coefficients of Coulomb friction of the object on the cover and of the frusta on the board, in the hyperelastic model."""
 
     object: Coefficient = 0.0

@@ -6,12 +6,12 @@ from pydantic import Field
 
 from softtact.errors import InputError
 from softtact.sensors.base import BaseSpec
-from softtact.sensors.fields import Coefficient, Length, Section
+from softtact.sensors.fields import Coefficient, FiniteSection, Length
 
 _ELEMENTS = 4     # through the thickness that the default size of elements in plan is taken from
 
 
-class PlainLayer(Section):
+class PlainLayer(FiniteSection):
     """A layer as thick everywhere; `relative_permittivity` counts in the lowest, the dielectric."""
 
     material: str
@@ -19,7 +19,7 @@ class PlainLayer(Section):
     relative_permittivity: Length = 3.5
 
 
-class ObjectFriction(Section):
+class ObjectFriction(FiniteSection):
     """Coefficient of Coulomb friction of the object on the sensing surface, in the hyperelastic model."""
 
     object: Coefficient = 0.0

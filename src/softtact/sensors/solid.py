@@ -22,21 +22,21 @@ from softtact.materials.config import law_from_printed
 from softtact.materials.laws.base import Law
 from softtact.materials.laws.registry import make_law
 from softtact.sensors.base import ReadoutEntry, Specification
-from softtact.sensors.fields import Coefficient, Length, Section
+from softtact.sensors.fields import Coefficient, FiniteSection, Length
 from softtact.sensors.library import material_file
 
 _SURFACES = (".stl", ".obj", ".ply")
 _SOURCES = ("material", "card", "law")
 
 
-class MeshFile(Section):
+class MeshFile(FiniteSection):
     """The body's elements: VTU, or any format that `softtact mesh` reads; `unit` where the file does not state one."""
 
     file: str
     unit: str | None = None
 
 
-class Region(Section):
+class Region(FiniteSection):
     """The law of a region: a material's printed constants, a card of `softtact fit`, or constants in MPa."""
 
     material: str | None = None
@@ -46,14 +46,14 @@ class Region(Section):
     bulk_over_shear: PositiveFloat | None = None
 
 
-class ContactFace(Section):
+class ContactFace(FiniteSection):
     """The face that objects meet, with Coulomb's coefficient."""
 
     face: str
     friction: Coefficient = 0.0
 
 
-class ReadingPlaces(Section):
+class ReadingPlaces(FiniteSection):
     """A readout of the kind points, in the short form of this kind of sensor."""
 
     points_mm: Annotated[tuple[tuple[float, float, float], ...], Field(min_length=1)]

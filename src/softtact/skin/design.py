@@ -12,7 +12,7 @@ from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, Pos
 from softtact.errors import ExtrapolationWarning, InputError
 from softtact.files import read_yaml
 from softtact.geometry.meshes import read_mesh
-from softtact.sensors.fields import Coefficient, Length, Section
+from softtact.sensors.fields import Coefficient, FiniteSection, Length
 from softtact.skin.analysis import CONVERTERS, Converter, LayerMeshSizes
 from softtact.skin.choice import Needs
 from softtact.skin.elastomers import Elastomer, find_elastomer, fingertip_area_mm2, read_elastomers
@@ -23,7 +23,7 @@ from softtact.unknown_names import first_fault, known_keys, unknown
 Share = Annotated[float, Field(ge=0.0, lt=1.0)]
 
 
-class Module(Section):
+class Module(FiniteSection):
     """The triangular module, all lengths in mm."""
 
     side_mm: Length = 30.0
@@ -39,7 +39,7 @@ class Module(Section):
                              guard_radius_mm=self.guard_radius_mm, centres_mm=self.centres_mm)
 
 
-class MeshChoice(Section):
+class MeshChoice(FiniteSection):
     """Sizes of the meshes, as `LayerMeshSizes` has them."""
 
     spacing_mm: PositiveFloat = 1.0
@@ -52,7 +52,7 @@ class MeshChoice(Section):
         return LayerMeshSizes(self.spacing_mm, self.layers, self.field_spacing_mm, self.field_layers)
 
 
-class ConverterChoice(Section):
+class ConverterChoice(FiniteSection):
     """A converter by its name, with stray capacitance and noise."""
 
     name: str = "paper"
@@ -68,7 +68,7 @@ class ConverterChoice(Section):
                                    noise_counts=self.noise_counts)
 
 
-class LoadChoice(Section):
+class LoadChoice(FiniteSection):
     """One load: a pressure on one of `diameter_mm`, `area_mm2` (an ellipse), `fingertip`, `mask`; or `mesh` with a force."""
 
     name: str
@@ -136,7 +136,7 @@ class LoadChoice(Section):
         return load
 
 
-class Probes(Section):
+class Probes(FiniteSection):
     """Capacitance against pressure under cylindrical probes, for errors of the modulus given as shares."""
 
     diameters_mm: tuple[PositiveFloat, ...] = (4.0, 5.0, 6.0, 10.0)
@@ -145,7 +145,7 @@ class Probes(Section):
     at_taxel: PositiveInt = 7
 
 
-class Choice(Section):
+class Choice(FiniteSection):
     """Requirements by which the elastomer and its thickness are chosen."""
 
     target_kpa: PositiveFloat = 10.0
@@ -163,7 +163,7 @@ class Choice(Section):
     seed: int = 0
 
 
-class Maps(Section):
+class Maps(FiniteSection):
     """Maps of detection and localisation over a patch."""
 
     spacing_mm: PositiveFloat = 1.0
@@ -173,7 +173,7 @@ class Maps(Section):
     crosstalk_probe_mm: PositiveFloat = 4.0
 
 
-class Link(Section):
+class Link(FiniteSection):
     """A robot's link that modules are laid on."""
 
     mesh: str
@@ -184,7 +184,7 @@ class Link(Section):
     least_radius_mm: Length = 10.0
 
 
-class Search(Section):
+class Search(FiniteSection):
     """Values of which a search takes all combinations."""
 
     elastomers: tuple[str, ...] | None = None
@@ -193,7 +193,7 @@ class Search(Section):
     pitches_mm: tuple[PositiveFloat, ...] = (4.5, 5.0, 6.0)
 
 
-class SkinDesign(Section):
+class SkinDesign(FiniteSection):
     """A whole design; a section that is left out is not computed."""
 
     skin: str

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from softtact.errors import ExtrapolationWarning, InputError
 from softtact.files import read_yaml
-from softtact.sensors.fields import Section
+from softtact.sensors.fields import FiniteSection
 from softtact.unknown_names import first_fault, nearest
 
 DATA = Path(str(resources.files("softtact.skin"))) / "data"
@@ -21,7 +21,7 @@ STRESS_MPA = 0.055  # highest stress of any test, the same place
 _BEYOND = 2.0  # times the highest tested stress: no curve is extrapolated further
 
 
-class Elastomer(Section):
+class Elastomer(FiniteSection):
     """One compound; strain(stress) is compressive and a polynomial."""
 
     name: str

@@ -13,8 +13,9 @@ from softtact.sensors.fields import plain_value
 from softtact.sensors.library import sensor_file
 from softtact.sensors.specification import AnySpec, read_spec
 from softtact.studies.configuration import here_or_shipped, read_mapping, refuse_unknown, validated
-from softtact.studies.hybrid.keys import CatalogueEntry, Law, Name, NotNegative, Section, VirtualSensorKey
+from softtact.studies.hybrid.keys import CatalogueEntry, Law, Name, NotNegative, VirtualSensorKey
 from softtact.studies.hybrid.objects import read_catalogue
+from softtact.unknown_names import Section
 
 DEFAULT = "config/grasps.yaml"
 _Models = Annotated[list[Literal["elastic", "foundation", "hyperelastic"]], Field(min_length=1)]

@@ -4,23 +4,14 @@ import itertools
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
-    Field,
-    PositiveFloat,
-    PositiveInt,
-    field_validator,
-    model_validator,
-)
+from pydantic import AfterValidator, Field, PositiveFloat, PositiveInt, field_validator, model_validator
 
 from softtact.learning.settings import LearningCurve, Network, Repeats, Search, Ssim, Training
 from softtact.materials.laws.registry import LAWS
 from softtact.published.archive import ARRANGEMENTS
 from softtact.readout.virtual_sensor import VirtualSensorSettings
 from softtact.sensors.specification import ORIENTATIONS
-from softtact.unknown_names import unknown
+from softtact.unknown_names import Section, unknown
 
 CENTRED = "centred"  # the pose that gives an item its object's plain name
 
@@ -52,12 +43,6 @@ FrustumOrientation = _one_of(ORIENTATIONS, kind="orientation")
 Arrangement = _one_of(ARRANGEMENTS, kind="arrangement")
 VirtualSensorKey = _one_of(VirtualSensorSettings.__dataclass_fields__, kind="key")
 Six = Annotated[list[float], Field(min_length=6, max_length=6)]
-
-
-class Section(BaseModel):
-    """A mapping of the configuration whose keys are all known."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class Camera(Section):

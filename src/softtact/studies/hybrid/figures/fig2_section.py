@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from softtact.sensors.specification import SensorSpec
-    from softtact.studies.hybrid.figures.section import Section
+    from softtact.studies.hybrid.figures.section import CutBody
 
 # Light to dark from the cover down: apart in grey, too.
 _COLOURS = {"cover": "#f2d6b3", "sheet": "#6fa8c9", "frusta": "#1f4e79"}
@@ -21,9 +21,9 @@ _NAMES = {"cover": "cover and fabric", "sheet": "dielectric's sheet", "frusta": 
 _CLOSE_PITCHES = 1.9      # on either side of the deepest place, in the close-ups
 
 
-def draw(section: "Section", outline: Sequence[np.ndarray], *, spec: "SensorSpec", summary: dict[str, Any],
+def draw(section: "CutBody", outline: Sequence[np.ndarray], *, spec: "SensorSpec", summary: dict[str, Any],
          y_mm: float) -> "Figure":
-    """Figure of a `Section`; outline: polygons (k, 2) of the object in its plane where the press took it."""
+    """Figure of a `CutBody`; outline: polygons (k, 2) of the object in its plane where the press took it."""
     plt = pyplot()
     figure = plt.figure(figsize=(11, 6.9), layout="constrained")
     rows = figure.add_gridspec(3, 2, height_ratios=(1, 1, 1.25))

@@ -21,7 +21,7 @@ _BESIDE_MM = 0.01     # a plane exactly through the frusta's axes would run alon
 
 
 @dataclass(frozen=True)
-class Section:
+class CutBody:
     """Polygons in a plane: rest_mm, pressed_mm lists of (k, 2), x and z; region (n,): their layers' numbers, by `LAYERS`."""
 
     rest_mm: list
@@ -46,8 +46,8 @@ def row_under_load(mesh: PressedMesh, spec: "SensorSpec") -> float:
     return float(rows[np.argmin(np.abs(rows - deepest))])
 
 
-def section(mesh: PressedMesh, y_mm: float, *, parts: int = 3) -> Section:
-    """The `Section` at y_mm of a `PressedMesh` at its largest force; each element cut into `parts` along each of its directions."""
+def section(mesh: PressedMesh, y_mm: float, *, parts: int = 3) -> CutBody:
+    """The `CutBody` at y_mm of a `PressedMesh` at its largest force; each element cut into `parts` along each of its directions."""
     import pyvista
 
     plane = y_mm + _BESIDE_MM
@@ -68,7 +68,7 @@ def section(mesh: PressedMesh, y_mm: float, *, parts: int = 3) -> Section:
             rest.append(at[:, [0, 2]])
             pressed.append((at + to)[:, [0, 2]])
             regions.append(region)
-    return Section(rest, pressed, np.array(regions))
+    return CutBody(rest, pressed, np.array(regions))
 
 
 def _refined(kind, points, displacement, parts):
