@@ -19,9 +19,7 @@ from softtact.studies.hybrid.stages import (
     draw,
     evaluate,
     find_learning_rate,
-    gather_seeds,
-    learning_curve,
-    repeat_learning,
+    retraining,
     score_baselines,
     search_hyperparameters,
     train_cnn,
@@ -180,8 +178,8 @@ def test_the_learning_curve_has_a_row_per_network_share_and_set_with_intervals_w
     curve = {"shares": [0.5, 1.0], "steps": 4, "networks": ["printed", "compact"]}
     files = {split: folder / f"dataset/elastic/{split}.nc" for split in SPLITS} | {"rate": folder / "learning/elastic/rate.json"}
     outputs = {"curve": folder / "learning/elastic/learning_curve.csv"}
-    learning_curve.run(inputs=files, outputs=outputs,
-                       settings=settings_of("training", "network", "ssim", "seed", learning_curve=curve))
+    retraining.learning_curve(inputs=files, outputs=outputs,
+                              settings=settings_of("training", "network", "ssim", "seed", learning_curve=curve))
     rows = pd.read_csv(outputs["curve"])
     train = len(read_samples(files["train"]))
     assert len(rows) == 2 * 2 * 3 and rows.maps.unique().tolist() == [train // 2, train]
@@ -237,14 +235,15 @@ def test_a_file_that_is_no_data_set_is_refused(finished):
 def test_the_same_training_from_several_seeds_shows_how_much_of_a_score_is_chance(finished):
     folder, inputs, _ = finished
     files = {split: folder / f"dataset/elastic/{split}.nc" for split in SPLITS} | {"rate": folder / "learning/elastic/rate.json"}
-    repeat_learning.run(inputs=files, outputs={"seeds": folder / "seeds.csv"},
-                        settings=settings_of("training", "network", "ssim", "seed", repeats={"seeds": 3, "networks": ["printed"]}))
+    retraining.repeat_learning(inputs=files, outputs={"seeds": folder / "seeds.csv"},
+                               settings=settings_of("training", "network", "ssim", "seed",
+                                                    repeats={"seeds": 3, "networks": ["printed"]}))
     rows = pd.read_csv(folder / "seeds.csv")
     assert sorted(rows.seed.unique()) == [3, 4, 5] and len(rows) == 3 * 3 and rows[rows["set"] == "grasps"].ssim.nunique() == 3
     own = pd.read_csv(finished[2]["summary"]).query("model == 'elastic'").set_index("set").ssim
     first = rows[rows.seed == 3].set_index("set").ssim
     assert first.to_dict() == pytest.approx(own[first.index].to_dict(), rel=1e-4)     # the study's own training is the first
-    gather_seeds.run(inputs={"seeds": [folder / "seeds.csv"]}, outputs={"table": folder / "spread.csv"}, settings={})
+    retraining.gather_seeds(inputs={"seeds": [folder / "seeds.csv"]}, outputs={"table": folder / "spread.csv"}, settings={})
     spread = pd.read_csv(folder / "spread.csv").set_index("set")
     assert spread.ssim_sd["grasps"] == pytest.approx(rows[rows["set"] == "grasps"].ssim.std(), rel=1e-3)
     assert (spread.seeds == 3).all()

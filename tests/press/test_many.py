@@ -15,7 +15,7 @@ from softtact.geometry.pose import Pose
 from softtact.models.elastic.compliance import elastic_compliance
 from softtact.press.many import press_batch
 from softtact.press.sensor import Sensor
-from softtact.studies.hybrid.stages import simulate_press, simulate_presses
+from softtact.studies.hybrid.stages import presses
 
 SMALL = CORO.model_copy(update={"footprint_mm": (7.2, 7.2), "map_shape": (13, 13)})
 MESHES = [trimesh.creation.cylinder(radius=1.5, height=2.0), trimesh.creation.icosphere(radius=4.0),
@@ -67,9 +67,9 @@ def stage(sensor, tmp_path):
 def test_an_objects_places_pressed_together_are_written_as_each_press_alone(stage, tmp_path):
     inputs, shared, items = stage
     together = [tmp_path / f"{item['name']}.nc" for item in items]
-    simulate_presses.run(inputs=inputs, outputs={"press": together}, settings={**shared, "items": items})
+    presses.simulate_presses(inputs=inputs, outputs={"press": together}, settings={**shared, "items": items})
     for path, item in zip(together, items, strict=True):
-        simulate_press.run(inputs=inputs, outputs={"press": tmp_path / "alone.nc"}, settings={**shared, "item": item})
+        presses.simulate_press(inputs=inputs, outputs={"press": tmp_path / "alone.nc"}, settings={**shared, "item": item})
         one, alone = read_dataset(path), read_dataset(tmp_path / "alone.nc")
         assert one.attrs == alone.attrs and one.attrs["item"] == item["name"] and one.attrs["model"] == "layer"
         np.testing.assert_allclose(one.deformation_map_mm, alone.deformation_map_mm, rtol=0, atol=1e-6)
@@ -82,10 +82,10 @@ def test_a_place_that_fails_is_named_and_no_press_of_its_job_is_written(stage, t
     items = [*items, {**items[1], "name": "punch-2", "pose": [50.0, 0, 1, 0, 0, 0]}]
     outputs = [tmp_path / f"{item['name']}.nc" for item in items]
     with pytest.raises(InputError, match="^indenters/punch-2/layer: The object misses the sensor"):
-        simulate_presses.run(inputs=inputs, outputs={"press": outputs}, settings={**shared, "items": items})
+        presses.simulate_presses(inputs=inputs, outputs={"press": outputs}, settings={**shared, "items": items})
     assert not any(path.exists() for path in outputs)
     with pytest.raises(InputError, match="2 outputs 'press' for 3 items; give one for each"):
-        simulate_presses.run(inputs=inputs, outputs={"press": outputs[:2]}, settings={**shared, "items": items})
+        presses.simulate_presses(inputs=inputs, outputs={"press": outputs[:2]}, settings={**shared, "items": items})
 
 
 # --- as one batch, on any device of torch ---

@@ -21,6 +21,7 @@ from softtact.errors import ConvergenceError, InputError
 from softtact.files import read_dataset
 
 SPLITS = ("train", "validation", "unseen", "grasps")
+TESTS = SPLITS[1:]     # those that scores are taken on
 TRAINING_SET = "indenters"
 OUT_OF_RANGE = "out_of_range"
 MEAN = -1  # in place of a trial's number: the mean over the trials

@@ -18,17 +18,19 @@ from softtact.progress import announce
 from softtact.published.archive import SOURCE as PUBLISHED
 from softtact.published.archive import Archive, find_archive
 from softtact.readout.recorded_press import SOURCE as RECORDED
+from softtact.readout.recording import COLUMNS, ROWS
 from softtact.readout.ssim import check_window
 from softtact.readout.virtual_sensor import VirtualSensorSettings, make_specimen
 from softtact.sensors.library import is_shipped, material_file, sensor_file
 from softtact.sensors.specification import SensorSpec
 from softtact.studies.configuration import SHIPPED, here_or_shipped, read_mapping, refuse_unknown, validated
-from softtact.studies.hybrid.keys import CENTRED, Recording, Values
+from softtact.studies.hybrid.keys import CENTRED, Data, Recording, Values
 from softtact.studies.hybrid.objects import Item, check_shapes, items_of_set, make_item, read_catalogue
-from softtact.studies.hybrid.recordings import recordings_of
 
 SETS = ("indenters", "unseen", "grasps")
 TOGETHER = 50     # presses of a fast model in one job at most: a minute's work, and a command line within the system's limit
+_AT = "the configuration, at 'data.recordings'"
+_TOLD = 8     # items without a recording that a refusal lists
 
 
 @dataclass(frozen=True)
@@ -153,7 +155,7 @@ def load_study(values: Mapping[str, Any], path: Path | None = None) -> Study:
     items_of = {name: items_of_set(name, getattr(checked.objects, name), catalogue, spec=spec, seed=checked.seed) for name in SETS}
     check_shapes(items_of)
     study = Study(checked, spec, materials, items_of, _section_item(checked, catalogue), _archive(checked),
-                  recordings_of(checked.data, items_of, spec))
+                  _recordings(checked.data, items_of, spec))
     _say_outside_paths(study)
     return study
 
@@ -193,6 +195,44 @@ def _archive(values):
     if values.data.source != "published":
         return None
     return find_archive(values.data.folder, models=values.tested, variant=values.data.variant)
+
+
+def _recordings(data: Data, items_of: Mapping[str, Mapping[str, Any]], spec: SensorSpec) -> dict[str, list[Recording]] | None:
+    """{SET/ITEM: recordings, its trials}, or None where the readings have another source.
+
+    Raises InputError for a sensor of another grid, an item that the study does not have, a file that is not there or stands twice,
+    and where an item has no recording.
+    """
+    if data.source != "recorded":
+        return None
+    if (spec.taxels.rows, spec.taxels.columns) != (ROWS, COLUMNS):
+        raise InputError(f"{_AT}: the sensor {spec.name} has {spec.taxels.rows} x {spec.taxels.columns} taxels, and the TSF-85 "
+                         f"{ROWS} x {COLUMNS}; name the sensor that was recorded, tsf85 say.")
+    items = [f"{name}/{item}" for name, of_set in items_of.items() for item in of_set]
+    for recording in data.recordings:
+        refuse_unknown(recording.item, items, kind="item", where=_AT)
+    _check_files(data.recordings)
+    found = {item: list(own) for item, own in groupby(sorted(data.recordings, key=lambda one: one.item), key=lambda one: one.item)}
+    missing = [item for item in items if item not in found]
+    if missing:
+        more = f" and {len(missing) - _TOLD} more" if len(missing) > _TOLD else ""
+        raise InputError(f"{_AT}: there is no recording of {', '.join(missing[:_TOLD])}{more}; add one of each, or take the items "
+                         "out of 'objects'.")
+    return {item: found[item] for item in items}
+
+
+def _check_files(recordings):
+    """Refuse a file that is not there, and a finger of a recording that would stand for two presses."""
+    seen: dict[tuple[Path, int], str] = {}
+    for recording in recordings:
+        for path in (recording.file, recording.force_log):
+            if not Path(path).is_file():
+                raise InputError(f"{_AT}: there is no file {path}, of {recording.item}; correct the path.")
+        own = Path(recording.file).resolve(), recording.finger
+        if own in seen:
+            raise InputError(f"{_AT}: finger {recording.finger} of {recording.file} stands for {seen[own]} and again for "
+                             f"{recording.item}; a recording is one press: leave it at one of them.")
+        seen[own] = recording.item
 
 
 def _check_forces(values, spec):

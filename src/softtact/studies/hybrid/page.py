@@ -1,4 +1,7 @@
-"""report.html: one file, figures inside, links from each to its data, its code and the configuration."""
+"""report.html: one file, figures inside, links from each to its data, its code and the configuration.
+
+The box at its head states what a study does not have that the paper has.
+"""
 
 from collections.abc import Iterable
 from functools import partial
@@ -9,10 +12,10 @@ import pandas as pd
 
 from softtact.evaluation.score_tables import ALL_FORCES, forces_of
 from softtact.files import read_json
+from softtact.published.archive import MAPS_OF_SETS
 from softtact.reporting.page import Page
 from softtact.reporting.run_record import run_sentence
 from softtact.reporting.words import KINDS, PREDICTORS, SETS, force_in_words
-from softtact.studies.hybrid.gaps import missing, recorded
 
 CAPTIONS = {
     "fig2_section": "Figure 2. Section through the sensor at rest and pressed: how the frusta fold. Curved elements are cut by "
@@ -53,14 +56,20 @@ TITLES = {"summary": "Scores with their 95 % interval, by set",
           "table2": "Table 2. Complexity and choice of model",
           "counts": "The archive's counts against those in print",
           "table3": "Table 3. Time per tactile map"}
-_STAGE_OF = {"policies": "compare_policies", "networks": "compare_networks", "levels": "compare_networks",
-             "counts": "import_published",
-             "summary": "evaluate", "gains": "compare_gains", "limits": "find_limits",
-             "seeds": "gather_seeds"}   # others: make_tables
+_MODULE_OF = {"policies": "compare_policies", "networks": "compare_networks", "levels": "compare_networks",
+              "counts": "import_published", "summary": "evaluate", "gains": "limits", "limits": "limits",
+              "seeds": "retraining"}     # others: make_tables
 _DRAWN_BY_MATPLOTLIB = "Views are rendered off screen by VTK; a figure says so where matplotlib drew them instead."
 _WITH_VIEWS = ("fig4_complexity", "fig7_maps")
 _FOLDERS = ("presses", "tactile", "dataset", "learning", "evaluation", "section", "tables", "figures", "logs")
 PAPERS_SENSOR = "coro: "     # how the line on it begins
+PAPERS_INDENTERS, PAPERS_OBJECTS = 49, 12
+_OWN_READINGS = ("Readings are own recordings of a real sensor, not the paper's, so none of its numbers is judged on them. That a "
+                 "recorded object is that of its mesh, that it lay where the study presses it, and the order of the taxels are "
+                 "taken as stated: nothing here checks them.")
+# Errors of the meshes' maps at 50 N: root mean square, and at single points (docs/explanation/discretisation.md).
+MESH_ERRORS = {"draft": "2 to 5 % of its largest value in the root mean square and up to 10 % at single points",
+               "default": "up to 2 % of its largest value in the root mean square and up to 5 % at single points"}
 
 
 def render_page(inputs: dict[str, Any], settings: dict[str, Any], *, folder: Path, run: pd.DataFrame) -> str:
@@ -139,7 +148,7 @@ def _show_tables(page, inputs):
     page.section("Tables")
     for name, title in TITLES.items():
         if name in inputs:
-            code = _code(f"softtact/studies/hybrid/stages/{_STAGE_OF.get(name, 'make_tables')}.py")
+            code = _code(f"softtact/studies/hybrid/stages/{_MODULE_OF.get(name, 'make_tables')}.py")
             page.table(_in_words(pd.read_csv(inputs[name])), title, file=inputs[name], links=[code, _CONFIGURATION])
 
 
@@ -184,6 +193,61 @@ def _synthetic(ftir, settings):
     return ("The paper's curves, camera frames and taxel readings are not published here. Stress-strain curves are made from "
             f"its printed constants with noise; the measured contact area is from: {ftir['source']}; {readings} and are not the "
             "paper's.")
+
+
+def missing(settings: dict[str, Any], *, archive: bool) -> list[str]:
+    """Sentences on a study, of its own presses or of the published archive; settings as of the stage `report`."""
+    return _beside_archive(settings) if archive else _of_presses(settings)
+
+
+def recorded(settings: dict[str, Any]) -> bool:
+    """Whether the readings are recordings of a real sensor."""
+    return settings.get("config", {}).get("data", {}).get("source") == "recorded"
+
+
+def _of_presses(settings):
+    return ["No robot and no gripper: a grasp is a rigid object pressed on one sensor along its normal with a stated force.",
+            *([_OWN_READINGS] if recorded(settings) else []), _places(settings), _sizes(settings), *_mesh(settings["config"]),
+            _seeds(settings)]
+
+
+def _beside_archive(settings):
+    return ["Nothing was pressed here: maps are the archive's.", _seeds(settings)]
+
+
+def _places(settings):
+    drawn = settings["presses"]["grasps"] - settings["grasps"]
+    more = f"; {drawn} more presses lie in places drawn with the seed" if drawn > 0 else ""
+    return f"Each grasped object is pressed centred, as its mesh lies{more}. The paper grasps in 40 places, 50 times each."
+
+
+def _sizes(settings):
+    load_steps, presses = len(settings["forces_n"]), settings["presses"]
+    maps = {name: count * load_steps for name, count in presses.items()}
+    grasps = round(presses["grasps"] * settings["trials"]["grasps"])
+    return (f"Sizes: {settings['indenters']} of the paper's {PAPERS_INDENTERS} indenters with {maps['indenters']:,} of "
+            f"{MAPS_OF_SETS[0]:,} maps to train and validate, {maps['unseen']:,} of {MAPS_OF_SETS[1]:,} unseen cases, "
+            f"{settings['grasps']} of {PAPERS_OBJECTS} objects with {grasps:,} of {MAPS_OF_SETS[2]:,} grasps (readings "
+            f"of {presses['grasps']} presses).")
+
+
+def _mesh(config):
+    """The error of the tested hyperelastic model's mesh, if it is one of those that were measured."""
+    presets = {name: model.get("mesh", {}).get("preset") or "default" for name, model in config.get("models", {}).items()
+               if name in config.get("tested", ()) and model.get("kind", "hyperelastic") == "hyperelastic"}
+    return [f"Mesh: the {preset} one of the {name} model puts its map off by {MESH_ERRORS[preset]}."
+            for name, preset in presets.items() if preset in MESH_ERRORS]
+
+
+def _seeds(settings):
+    repeats = settings.get("config", {}).get("learning", {})
+    specimen = "recorded sensor" if recorded(settings) else "virtual specimen"
+    if repeats.get("seeds", 1) > 1:
+        return (f"One {specimen} and one split, of seed {settings['seed']}. Intervals are over objects and trials. Of "
+                f"learning {repeats['seeds']} seeds were tried, for the network {' and '.join(repeats['networks'])}: see their "
+                "spread.")
+    return (f"One seed, {settings['seed']}: one {specimen}, one split, one training of each network. Intervals are over "
+            "objects and trials and hold nothing of what another seed would give.")
 
 
 def result_table(scores: pd.DataFrame) -> pd.DataFrame:

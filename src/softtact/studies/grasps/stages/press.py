@@ -1,4 +1,4 @@
-"""Objects in the robot's hand, and the presses of what touches the sensors."""
+"""Objects in the robot's hand, the presses of what touches the sensors, and the readings of these."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softtact.errors import ConvergenceError, InputError
-from softtact.files import write_dataset
+from softtact.files import read_dataset, write_dataset
 from softtact.geometry.meshes import place, read_mesh
 
 if TYPE_CHECKING:
@@ -44,6 +44,21 @@ def grasp(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str
         write_events(outputs["events"], to_dataset(record, maps, sensor, facts))
 
 
+def read_grasp(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
+    """Read both sensors at the event `grip` of one grasp: two specimens of the virtual sensor; nothing of a grasp that failed.
+
+    inputs: events (NetCDF), sensor (YAML);  outputs: readings (NetCDF);  settings: item, force_n, trials, seed, virtual_sensor
+    """
+    import xarray
+
+    from softtact.sensors.specification import read_spec
+
+    events = read_dataset(inputs["events"])
+    data = xarray.Dataset(attrs={"failed": events.attrs["failed"]}) if "failed" in events.attrs else _readings(
+        read_spec(inputs["sensor"]), events, settings)
+    write_dataset(outputs["readings"], data, seed=settings["seed"], settings=settings)
+
+
 def one_event(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Press one event of an object with several models: maps (model, y, x) of the left sensor.
 
@@ -74,6 +89,22 @@ def one_event(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict
                           attrs={"object": name, "force_n": force, "cover_law": settings["cover_law"],
                                  "time_s": float(record.time_s[row])})
     write_dataset(outputs["maps"], data, seed=None, settings=settings)
+
+
+def _readings(spec, events, settings):
+    """Data set (finger, trial, row, column) of the counts."""
+    import xarray
+
+    from softtact.readout.virtual_sensor import VirtualSensorSettings, read_virtual_sensor
+
+    choices = VirtualSensorSettings.from_dict(settings["virtual_sensor"])
+    names = [str(name) for name in events.finger.values]
+    counts = [read_virtual_sensor(spec, events.deformation_map_mm.values[GRIP, finger][None], force_n=[settings["force_n"]],
+                                  trials=settings["trials"], seed=2 * settings["seed"] + finger, item=f"{settings['item']}/{name}",
+                                  settings=choices)
+              for finger, name in enumerate(names)]
+    return xarray.Dataset({"tactile_map": (("finger", "trial", "row", "column"), np.stack(counts)[:, :, 0], {"units": "counts"})},
+                          coords={"finger": np.array(names, dtype=object)}, attrs={"source": "virtual sensor"})
 
 
 def study_sensor(path: Path, mesh: str, *, cover_law: str | None = None) -> "Sensor":

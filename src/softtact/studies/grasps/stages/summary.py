@@ -1,6 +1,6 @@
-"""What all grasps of a study tell together: their table, the paper's claims, figures, the report."""
+"""What all grasps of a study show together: their table, the paper's claims, figures, the report."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -8,11 +8,18 @@ import numpy as np
 import pandas as pd
 
 from softtact.files import read_dataset, write_csv
+from softtact.reporting.style import pyplot, save
 
 if TYPE_CHECKING:
     import trimesh
+    import xarray
+    from matplotlib.figure import Figure
 
 GRIP = 1     # number of the event `grip` in `softtact.robot.events.EVENTS`
+_MOST_COLUMNS = 6
+_SHOWN = ["grasp", "status", "x_mm", "y_mm", "angle_deg", "trials", "force_left_n", "force_right_n", "model_grip_left",
+          "model_grip_right", "deepest_left_mm", "deepest_right_mm", "counts_left", "counts_right", "trial_sd_left_counts",
+          "trial_sd_right_counts", "message"]
 
 
 def tabulate_grasps(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
@@ -45,31 +52,55 @@ def draw_grasped_objects(*, inputs: dict[str, Any], outputs: dict[str, Any], set
     inputs: events, readings, objects (lists, in the grasps' order), sensor (YAML), materials;  outputs: png
     settings: items, mesh, scene
     """
-    from softtact.studies.grasps.report import draw_objects
-
     events, readings, files = {}, {}, {}
     for item, *paths in zip(settings["items"], inputs["events"], inputs["readings"], inputs["objects"], strict=True):
         data = read_dataset(paths[0])
         if "failed" not in data.attrs and item["object"] not in events:
             events[item["object"]], readings[item["object"]] = data, read_dataset(paths[1])
             files[item["object"]] = (paths[2], item["unit"])
-    draw_objects(outputs["png"], events, readings, dict(_pictures(events, files, inputs["sensor"], settings)))
+    _draw_objects(outputs["png"], events, readings, dict(_pictures(events, files, inputs["sensor"], settings)))
 
 
 def draw_one_event(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Draw what several models make of one event.  inputs: compared (list);  outputs: png."""
-    from softtact.studies.grasps.report import draw_one_event as draw
+    """Draw the maps that several models make of one event: a row for each object, one scale a row.
 
-    draw(outputs["png"], _compared(inputs))
+    inputs: compared (list);  outputs: png
+    """
+    compared = _compared(inputs)
+    models = max(data.sizes["model"] for data in compared.values())
+    figure: Figure = pyplot().figure(figsize=(2.6 * models + 0.6, 3.4 * len(compared)), layout="constrained")
+    grid = figure.subplots(len(compared), models, squeeze=False)
+    for axes, (name, data) in zip(grid, compared.items(), strict=True):
+        extent = [float(data[axis][end]) for axis in ("x", "y") for end in (0, -1)]
+        deepest = float(data.deformation_map_mm.max())
+        for place, model, values, share in zip(axes, data.model.values, data.deformation_map_mm.values, data.lower_share.values,
+                                               strict=True):
+            image = place.imshow(values, origin="lower", extent=extent, vmin=0, vmax=deepest, cmap="viridis")
+            place.set_title(f"{name.replace('_', ' ')}, {model}\nlower feature: {share:z.2f} of the raised", fontsize=8)
+            place.set_xlabel("x (mm)"), place.set_ylabel("y (mm)")
+        figure.colorbar(image, ax=list(axes), label="towards the PCB (mm)", shrink=0.8)
+    save(figure, outputs["png"])
 
 
 def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
     """Write the page.  inputs: table, claims, figures (list);  outputs: page;  settings: study, captions, config."""
-    from softtact.studies.grasps.report import write_grasps_report
+    from softtact.reporting.page import Page
 
-    grasps, claims = pd.read_csv(inputs["table"]), pd.read_csv(inputs["claims"], keep_default_na=False)
-    write_grasps_report(outputs["page"].parent, study=settings["study"], grasps=grasps, claims=claims,
-                        figures=list(zip(inputs["figures"], settings["captions"], strict=True)), config=settings["config"])
+    grasps = pd.read_csv(inputs["table"])
+    page = Page("Grasps by a robot: the study", settings["study"], folder=outputs["page"].parent)
+    page.box("What is synthetic here.", "Robot and objects move in MuJoCo. Readings are the virtual sensor's, a simulation. No "
+             "score here is the paper's.")
+    page.text(_result(grasps))
+    page.section("Figures")
+    for path, caption in zip(inputs["figures"], settings["captions"], strict=True):
+        page.figure(path, caption)
+    page.claims(pd.read_csv(inputs["claims"], keep_default_na=False), file=inputs["claims"])
+    page.section("Grasps")
+    page.table(grasps[[name for name in _SHOWN if name in grasps]], file=inputs["table"],
+               links=[("Each grasp in time", [("grasps", "grasps")])])
+    page.section("Configuration")
+    page.code(settings["config"])
+    page.write(outputs["page"])
 
 
 def papers_model(placed: "trimesh.Trimesh", *, footprint_mm: tuple[float, float], reach_mm: float) -> str:
@@ -123,7 +154,61 @@ def _pictures(events, files, sensor: Path, settings) -> Iterator[tuple[str, np.n
         record = record_of(data)
         scene = build_scene(read_mesh(path, unit=unit), read_spec(sensor), load_scene(**settings["scene"]),
                             Placement(*(data.attrs[key] for key in ("x_mm", "y_mm", "angle_deg"))))
-        images = draw_rows(scene, record, [record.event_row[1]], view=(20.0, -20.0, 0.22), size=(300, 300))
+        images = draw_rows(scene, record, [record.event_row[GRIP]], view=(20.0, -20.0, 0.22), size=(300, 300))
         if images is None:
             return
         yield name, images[0]
+
+
+def _draw_objects(path: Path, events: Mapping[str, "xarray.Dataset"], readings: Mapping[str, "xarray.Dataset"],
+                 pictures: Mapping[str, np.ndarray]) -> None:
+    """Write a PNG with a column for each object at the grip: robot, maps of both sensors, the virtual sensor's mean readings.
+
+    pictures: {object: image (height, width, 3)}, empty where MuJoCo does not draw
+    """
+    names = list(events)[:2 * _MOST_COLUMNS]
+    if not names:
+        figure = pyplot().figure(figsize=(4, 1))
+        figure.text(0.5, 0.5, "no grasp was done", ha="center", va="center")
+        save(figure, path)
+        return
+    blocks, columns = -(-len(names) // _MOST_COLUMNS), min(len(names), _MOST_COLUMNS)
+    rows = (1 if pictures else 0) + 4
+    figure = pyplot().figure(figsize=(2.3 * columns + 0.6, 2.0 * rows * blocks + 0.4), layout="constrained")
+    grid = figure.subplots(rows * blocks, columns, squeeze=False)
+    for axes in grid.ravel():
+        axes.set_axis_off()
+    for number, name in enumerate(names):
+        block, column = divmod(number, _MOST_COLUMNS)
+        _draw_column(grid[block * rows:(block + 1) * rows, column], name, events[name], readings[name], pictures.get(name),
+                     with_picture=bool(pictures), figure=figure)
+    save(figure, path)
+
+
+def _draw_column(axes, name, data, read, picture, *, with_picture, figure):
+    first = 1 if with_picture else 0
+    if picture is not None:
+        axes[0].imshow(picture)
+    axes[0].set_title(name.replace("_", " "), fontsize=9)
+    extent = [float(data[axis][end]) for axis in ("x", "y") for end in (0, -1)]
+    for finger, side in enumerate(("left", "right")):
+        for offset, (values, unit) in enumerate(((data.deformation_map_mm.values[GRIP, finger], "mm"),
+                                                 (read.tactile_map.values[finger].mean(axis=0), "counts"))):
+            place = axes[first + 2 * finger + offset]
+            place.set_axis_on()
+            image = place.imshow(values, origin="lower", extent=extent, vmin=0, vmax=max(float(values.max()), 1e-9), cmap="viridis")
+            place.set_xticks([]), place.set_yticks([])
+            bar = figure.colorbar(image, ax=place, shrink=0.8, label=unit)
+            bar.ax.tick_params(labelsize=6)
+            place.set_ylabel(f"{side}, {data.model.values[GRIP, finger]}" if offset == 0 else f"{side}, mean reading", fontsize=6)
+
+
+def _result(grasps):
+    """How many grasps were done, and whether their models are valid, in sentences."""
+    done = grasps[grasps.status == "done"]
+    objects, trials = (done.object.nunique(), int(done.trials.sum())) if len(done) else (0, 0)
+    result = f"{len(done)} of {len(grasps)} grasps done, {objects} objects, {trials} trials."
+    invalid = int((done[["valid_left", "valid_right"]] != 1).to_numpy().sum()) if len(done) else 0
+    if invalid:
+        result += f" {invalid} presses at the grip are beyond what their model is valid for; their maps are not to be relied on."
+    return result

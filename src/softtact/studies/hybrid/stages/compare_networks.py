@@ -13,12 +13,10 @@ import pandas as pd
 from softtact.evaluation.networks import Trained, compare_networks, score_networks
 from softtact.evaluation.score_tables import level_table, score_table, verdicts
 from softtact.files import write_csv, write_json
-from softtact.learning.dataset import read_samples
+from softtact.learning.dataset import TESTS, read_samples
 from softtact.learning.network import load_network
 from softtact.learning.settings import Ssim
 from softtact.learning.training import prepare_torch
-
-TESTS = ("validation", "unseen", "grasps")
 
 
 def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:

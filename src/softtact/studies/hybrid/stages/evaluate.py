@@ -11,12 +11,10 @@ import pandas as pd
 
 from softtact.evaluation.scoring import predict_grasps, score_items, score_samples, score_sensor, summarise_scores, time_presses
 from softtact.files import read_dataset, write_csv, write_dataset
-from softtact.learning.dataset import read_samples
+from softtact.learning.dataset import TESTS, read_samples
 from softtact.learning.network import load_network, predict
 from softtact.learning.settings import Ssim
 from softtact.learning.training import prepare_torch
-
-TESTS = ("validation", "unseen", "grasps")
 
 
 def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:

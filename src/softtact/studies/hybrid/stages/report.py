@@ -13,8 +13,7 @@ import yaml
 
 from softtact.files import atomic_path, write_csv
 from softtact.reporting.run_record import run_record
-from softtact.studies.hybrid.gaps import missing
-from softtact.studies.hybrid.page import render_page, render_sources
+from softtact.studies.hybrid.page import missing, render_page, render_sources
 
 
 def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:

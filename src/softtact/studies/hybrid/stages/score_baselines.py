@@ -11,11 +11,9 @@ import pandas as pd
 
 from softtact.evaluation.score_tables import score_baselines, taxel_table
 from softtact.files import write_csv
-from softtact.learning.dataset import read_samples
+from softtact.learning.dataset import TESTS, read_samples
 from softtact.learning.settings import Ssim
 from softtact.sensors.specification import SensorSpec
-
-TESTS = ("validation", "unseen", "grasps")
 
 
 def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:

@@ -1,0 +1,36 @@
+"""What limits the scores: model, data or network; and the gain of the readings."""
+
+from typing import Any
+
+import pandas as pd
+
+from softtact.evaluation.limits import gain_table, limits
+from softtact.files import read_dataset, write_csv
+from softtact.learning.settings import Ssim
+from softtact.readout.virtual_sensor import VirtualSensorSettings
+from softtact.sensors.specification import SensorSpec
+
+
+def find_limits(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
+    """What limits each score, model, data or network: a row per model and set.
+
+    inputs: curves (list of learning_curve.csv), networks (CSV);  outputs: limits
+    settings: own (architecture), tested, reference (names of models), source (of the readings)
+    """
+    write_csv(outputs["limits"], limits(pd.concat(map(pd.read_csv, inputs["curves"])), pd.read_csv(inputs["networks"]), **settings))
+
+
+def compare_gains(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
+    """How much scores depend on the gain of the virtual sensor's readings: read the presses with each gain, a row for each.
+
+    inputs: references (list of presses), presses (list: the same with every tested model)
+    outputs: gains (CSV);  settings: sensor, virtual_sensor, ssim, seed
+    """
+    tested: dict[str, list[Any]] = {}
+    for press in map(read_dataset, inputs["presses"]):
+        tested.setdefault(press.attrs["model"], []).append(press)
+    table = gain_table([read_dataset(path) for path in inputs["references"]], tested,
+                       spec=SensorSpec.from_dict(settings["sensor"]), seed=settings["seed"],
+                       settings=VirtualSensorSettings.from_dict(settings["virtual_sensor"]),
+                       ssim=Ssim.from_dict(settings.get("ssim", {}), where="ssim").model_dump())
+    write_csv(outputs["gains"], table)
