@@ -1,19 +1,19 @@
 """One increment of a rigid object that presses and drags an elastic surface of known compliance, with Coulomb's exact law.
 
-Unknown are a normal force p >= 0 and a tangential force q (x, y) at each contact point, both on the surface, p downwards:
+The unknowns are a normal force p >= 0 and a tangential force q (x, y) at each contact point, both on the surface, p downwards:
     gap  = gap0 - depth + N p + C q >= 0,   p gap = 0            (Signorini)
     slip = T q + C' p - carried                                  the surface's slip on the object within the increment
     |q| <= mu p,   slip = 0 where |q| < mu p,   slip = -l q with l >= 0 where |q| = mu p       (Coulomb)
-with the parts N, C, T of the surface's compliance. `carried` is the surface's tangential displacement when the increment began and
-the object's displacement since, so a point that sticks goes where the object goes. History is in `carried` alone.
+with the parts N, C, T of the surface's compliance. `carried` is the surface's tangential displacement at the increment's start plus
+the object's displacement in the increment: a point that sticks moves with the object. The load history is in `carried` alone.
 
-The normal problem for given q, and the tangential one for given p, are convex; they are solved in turns until both agree
-(Panagiotopoulos' process; Kalker's NORM and TANG), with Aitken's relaxation. Each is solved by active sets with conjugate
-gradients on the set (`unilateral` has more levels at once, but loads only). `solve_block_by_block` is the plain method and the
-specification. The tangential one, minimise 1/2 q.T q + b.q over |q_i| <= bound_i, takes in each step the points inside their
-discs as free and those on the rim, pressed outwards, as free to turn; conjugate gradients find the minimum on these, and what
-leaves its disc is put back on the rim. Where that does not lower the energy, the step is shortened, and at last a projected
-gradient step is taken, which always does.
+The normal problem for given q, and the tangential one for given p, are convex; they are solved alternately until both converge
+(Panagiotopoulos' process; Kalker's NORM and TANG), with Aitken's relaxation. Each is solved by an active-set method with conjugate
+gradients on the set (`unilateral` solves many load steps at once, but only under prescribed forces). `solve_block_by_block` is the
+reference method. The tangential problem minimises 1/2 q.T q + b.q subject to |q_i| <= bound_i. In each iteration, points inside
+their discs are free, and points on the rim whose force pushes outwards may only turn. Conjugate gradients find the minimum on this
+face; forces that leave their disc are projected back on its rim. Where the energy does not decrease, the step is shortened;
+the last resort is a projected gradient step, which always decreases it.
 References: Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990), ch. 4; Panagiotopoulos, Ing.-Arch. 44 (1975) 421;
 Jourdan, Alart and Jean, Comput. Methods Appl. Mech. Engng 155 (1998) 31 (block Gauss-Seidel).
 Dostal and Kozubek, Optim. Methods Softw. 27 (2012) 1099 (separable round constraints).
@@ -27,7 +27,7 @@ import numpy as np
 from softtact.contact.unilateral import depth_on_springs
 from softtact.errors import ConvergenceError
 
-_ON_RIM = 1 - 1e-12     # share of a disc's radius from which on a force is on the rim
+_ON_RIM = 1 - 1e-12     # share of a disc's radius from which a force counts as being on the rim
 _SHORTENED = (1.0, 0.5, 0.25)
 _ROUNDING = 1e-13     # of an energy
 
@@ -38,24 +38,24 @@ def solve_in_discs(compliance: "Operator", linear: np.ndarray, bound: np.ndarray
 
     compliance: T, mm/N;  linear (c, 2): b in mm;  bound (c,): radii in N, 0 where there is no contact
     """
-    own = compliance.diagonal.max(axis=1, keepdims=True)
+    diagonal = compliance.diagonal.max(axis=1, keepdims=True)
     q, products = into_discs(q, bound), 1
     moved, safe = compliance @ q, None
     for _ in range(settings.max_iterations):
         slip = moved + linear
-        wrong = own * (q - into_discs(q - slip / own, bound))
+        wrong = diagonal * (q - into_discs(q - slip / diagonal, bound))
         largest = np.abs(wrong).max(initial=0.0)
         if largest <= settings.tolerance_mm:
             break
         face = _Face(q, slip, bound)
         least = max(0.1 * settings.tolerance_mm, 0.01 * largest)
-        change, moved_by, used = _on_face(compliance, face, slip, own, settings, least=least)
+        change, moved_by, used = _on_face(compliance, face, slip, diagonal, settings, least=least)
         products += used
         found, used = _shortened(compliance, linear, bound, q, moved, change, moved_by, face)
         products += used
         if found is None:
-            safe = safe or _largest_eigenvalue(compliance, own)
-            trial = into_discs(q - slip / (safe * own), bound)
+            safe = safe or _largest_eigenvalue(compliance, diagonal)
+            trial = into_discs(q - slip / (safe * diagonal), bound)
             found, products = (trial, compliance @ trial), products + 1
         q, moved = found
     else:
@@ -65,14 +65,14 @@ def solve_in_discs(compliance: "Operator", linear: np.ndarray, bound: np.ndarray
 
 
 def into_discs(q: np.ndarray, bound: np.ndarray) -> np.ndarray:
-    """Each of q (c, 2) moved to the nearest place of its disc of radius bound (c,)."""
+    """Each force of q (c, 2) projected on its disc of radius bound (c,)."""
     length = np.linalg.norm(q, axis=1)
     share = np.where(length > bound, bound / np.maximum(length, 1e-300), 1.0)
     return q * share[:, None]
 
 
 class _Face:
-    """Which points are free, which only turn, and how stiffly the latter are held to their rim."""
+    """The face of the feasible set: points that are free, points on the rim that may only turn, and the multipliers of these."""
 
     def __init__(self, q, slip, bound):
         length = np.linalg.norm(q, axis=1)
@@ -84,15 +84,15 @@ class _Face:
         self.multiplier = np.where(self.rim[:, None], outwards[:, None] / radius**2, 0.0)
 
     def project(self, x):
-        """What of x (c, 2) the points are free to do."""
+        """The part of x (c, 2) along the admissible directions of the face."""
         return x * self.free[:, None] + self.along * (self.along * x).sum(axis=1, keepdims=True)
 
 
-def _on_face(compliance, face, slip, own, settings, *, least):
+def _on_face(compliance, face, slip, diagonal, settings, *, least):
     """The change of q (c, 2) that minimises the energy on a face, T times it, and the number of products."""
     change, moved_by, products = np.zeros_like(slip), np.zeros_like(slip), 0
     residual = -face.project(slip)
-    scale = 1 / (own + face.multiplier)
+    scale = 1 / (diagonal + face.multiplier)
     direction = z = face.project(scale * residual)
     rho = (residual * z).sum()
     while np.abs(residual).max(initial=0.0) > least and products < settings.inner_iterations:
@@ -109,7 +109,7 @@ def _on_face(compliance, face, slip, own, settings, *, least):
 
 
 def _shortened(compliance, linear, bound, q, moved, change, moved_by, face):
-    """q and T q after the change, or a part of it, where that lowers the energy; else None. And the number of products."""
+    """q and T q after the change, or a part of it, if that lowers the energy, else None; and the number of products."""
     before, products = _energy(q, moved, linear), 0
     for share in _SHORTENED:
         trial = q + share * change
@@ -128,11 +128,11 @@ def _energy(q, moved, linear):
     return 0.5 * (q * moved).sum() + (q * linear).sum()
 
 
-def _largest_eigenvalue(compliance, own, *, iterations=20):
-    """The largest eigenvalue of T scaled by its diagonal `own` (c, 1), from above: the power method's with a margin."""
-    x = np.sin(np.arange(2 * len(own)) + 1.0).reshape(-1, 2)
+def _largest_eigenvalue(compliance, diagonal, *, iterations=20):
+    """Upper bound of the largest eigenvalue of T scaled by its `diagonal` (c, 1): power iteration with a margin."""
+    x = np.sin(np.arange(2 * len(diagonal)) + 1.0).reshape(-1, 2)
     for _ in range(iterations):
-        x = (compliance @ (x / np.sqrt(own))) / np.sqrt(own)
+        x = (compliance @ (x / np.sqrt(diagonal))) / np.sqrt(diagonal)
         size = np.linalg.norm(x)
         x /= size
     return 1.2 * float(size)
@@ -140,7 +140,7 @@ def _largest_eigenvalue(compliance, own, *, iterations=20):
 
 @dataclass(frozen=True)
 class CoulombSettings:
-    """When an increment counts as solved."""
+    """Tolerance and iteration limits of an increment."""
 
     tolerance_mm: float = 1e-7
     """Of gaps under pressure, overlaps, and slips of points that stick."""
@@ -153,7 +153,7 @@ class CoulombSettings:
 
 
 class Operator(Protocol):
-    """What acts on forces (c, axes) by `@`: `DenseBlock`, and whatever acts like it."""
+    """A linear operator that acts on forces (c, axes) by `@`, such as `DenseBlock`."""
 
     def __matmul__(self, force: np.ndarray) -> np.ndarray: ...
 
@@ -166,18 +166,18 @@ class Operator(Protocol):
 
 @dataclass(frozen=True)
 class ContactCompliance:
-    """The compliance in mm/N among contact points (c,), as operators that act on forces by `@`; directions are x, y and down."""
+    """Compliance in mm/N among contact points (c,) as operators that act on forces by `@`; the directions are x, y and down."""
 
     normal: Operator
-    """(c, 1) from (c, 1): `DenseBlock`, or what acts like it and has `diagonal` (c, axes) and `T`."""
+    """Normal displacements (c, 1) from normal forces (c, 1)."""
     coupling: Operator
-    """Down (c, 1) from x, y (c, 2)."""
+    """Normal displacements (c, 1) from tangential forces (c, 2)."""
     tangential: Operator
-    """x, y (c, 2) from x, y (c, 2)."""
+    """Tangential displacements (c, 2) from tangential forces (c, 2)."""
 
     @classmethod
     def dense(cls, matrix: np.ndarray) -> "ContactCompliance":
-        """Of a matrix (c, 3, c, 3): displacement directions at points, by force directions at points."""
+        """From a matrix (c, 3, c, 3): point and direction of the displacement, then point and direction of the force."""
         n, t = [2], [0, 1]
         return cls(*(DenseBlock(matrix[:, rows][:, :, :, columns]) for rows, columns in ((n, n), (n, t), (t, t))))
 
@@ -199,24 +199,24 @@ class DenseBlock:
 
     @property
     def diagonal(self) -> np.ndarray:
-        """The compliance (c, a) of each point under its force."""
+        """Displacement (c, a) of each point per unit force on that point."""
         return np.diag(self.matrix).reshape(self._shape)
 
 
 @dataclass(frozen=True)
 class Increment:
-    """What one increment asks for at contact points (c,)."""
+    """Gaps, displacements and loads prescribed for one increment at contact points (c,)."""
 
     gap: np.ndarray
     """The object's height (c,) in mm over the undeformed surface, at depth 0."""
     carried: np.ndarray
-    """(c, 2) in mm: where a sticking point's tangential displacement goes."""
+    """(c, 2) in mm: tangential displacement of a point that sticks."""
     friction: float
-    """Coulomb's coefficient; infinite: whatever touches sticks."""
+    """Coulomb's coefficient; infinite: every touching point sticks."""
     depth: float | None = None
     """Prescribed depth in mm, or None where `load` is prescribed."""
     load: float | None = None
-    """Normal force in N that the surface is to carry."""
+    """Prescribed normal force in N, or None where `depth` is prescribed."""
 
     def bound(self, normal: np.ndarray) -> np.ndarray:
         """The largest tangential forces (c,) in N at normal forces (c,)."""
@@ -242,7 +242,7 @@ class CoulombContact:
     turns: int
     """Turns of the normal and the tangential problem."""
     products: int
-    """Products with the compliance, all together."""
+    """Total number of products with the compliance."""
 
 
 def solve_increment(compliance: ContactCompliance, increment: Increment, *, normal: np.ndarray | None = None,
@@ -257,7 +257,7 @@ def solve_increment(compliance: ContactCompliance, increment: Increment, *, norm
     turns, products, raised, relaxation = 0, 0, (compliance.coupling @ q)[:, 0], _Relaxation()
     while turns < settings.max_turns:
         turns += 1
-        p, depth, own, used = _solve_normal(compliance.normal, increment.gap + raised, p, increment, settings)
+        p, depth, deflection, used = _solve_normal(compliance.normal, increment.gap + raised, p, increment, settings)
         products += used
         if not increment.friction:
             q, dragged, raised = np.zeros((count, 2)), np.zeros((count, 2)), np.zeros(count)
@@ -277,12 +277,11 @@ def solve_increment(compliance: ContactCompliance, increment: Increment, *, norm
     slip = compliance.coupling.T @ p[:, None] + dragged - increment.carried
     sticks = _sticking(q - slip / compliance.tangential.diagonal.max(axis=1, keepdims=True), increment.bound(p))
     slip[sticks] = 0.0
-    return CoulombContact(p, q, depth, increment.gap + raised + own - depth, slip, sticks, turns, products + 2)
+    return CoulombContact(p, q, depth, increment.gap + raised + deflection - depth, slip, sticks, turns, products + 2)
 
 
 class _Relaxation:
-    """Aitken's share of a change that a turn takes over: with much friction whole changes swing, ever wider.
-
+    """Aitken's relaxation factor: with high friction full changes oscillate with growing amplitude.
     Kuettler and Wall, Comput. Mech. 43 (2008) 61.
     """
 
@@ -292,7 +291,7 @@ class _Relaxation:
         self._share, self._last = self._MOST, None
 
     def of(self, change):
-        """The share to take of this turn's change (c,)."""
+        """The relaxation factor for this turn's change (c,)."""
         if self._last is not None:
             turned = change - self._last
             aitken = -self._share * (self._last @ turned) / max(turned @ turned, 1e-300)
@@ -302,12 +301,12 @@ class _Relaxation:
 
 
 def _sticking(pulled, bound):
-    """Whether forces (c, 2) that the slip would still change lie within the discs: judged by the slip, as |q| alone is rounded."""
+    """Which points stick: those whose trial forces (c, 2), corrected by the slip, lie within their discs; |q| alone is rounded."""
     return (bound > 0) & (np.linalg.norm(pulled, axis=1) <= bound)
 
 
 def _first_guess(compliance, increment):
-    """Forces of springs side by side, each as stiff as the diagonal of the compliance makes it."""
+    """Forces of independent springs whose stiffnesses are the inverse diagonal of the compliance."""
     lowest = increment.gap.min()
     if increment.load is None:
         return np.clip(increment.depth - increment.gap, 0.0, None) / compliance.normal.diagonal[:, 0]
@@ -317,7 +316,7 @@ def _first_guess(compliance, increment):
 
 
 def _solve_normal(compliance, gap, p, increment, settings):
-    """Forces p (c,), depth, what the points go down under p (c,), and the number of products; gap (c,): at depth 0 without p."""
+    """Forces p (c,), depth, deflections (c,) under p, and the number of products; gap (c,): at depth 0 without p."""
     active, products, depth = p > 0, 0, increment.depth
     for _ in range(settings.max_iterations):
         if increment.load is not None and not active.any():
@@ -325,52 +324,52 @@ def _solve_normal(compliance, gap, p, increment, settings):
         p = np.where(active, p, 0.0)
         if increment.load is not None:
             p[active] += (increment.load - p.sum()) / active.sum()
-        own = (compliance @ p[:, None])[:, 0]
-        p, own, used = _on_active_set(compliance, gap, p, own, active, increment.depth, settings)
+        deflection = (compliance @ p[:, None])[:, 0]
+        p, deflection, used = _on_active_set(compliance, gap, p, deflection, active, increment.depth, settings)
         products += used + 1
-        open_by = gap + own
+        open_by = gap + deflection
         if increment.load is not None:
             depth = open_by[active].mean()
         joining, leaving = ~active & (open_by - depth < -settings.tolerance_mm), active & (p < 0)
         if not joining.any() and not leaving.any():
-            return p, float(depth), own, products
+            return p, float(depth), deflection, products
         active = (active | joining) & ~leaving
     raise ConvergenceError(f"An increment of the elastic model did not settle its contact in {settings.max_iterations} active "
                            "sets; move the object in more steps.")
 
 
-def _on_active_set(compliance, gap, p, own, active, depth, settings):
-    """Conjugate gradients for gap + N p = depth on the set, with the sum of p kept where the depth is not prescribed."""
+def _on_active_set(compliance, gap, p, deflection, active, depth, settings):
+    """Conjugate gradients for gap + N p = depth on the active set; the sum of p is kept where the depth is not prescribed."""
     if not active.any():
-        return p, own, 0
+        return p, deflection, 0
     scale = np.where(active, 1 / compliance.diagonal[:, 0], 0.0)
 
     def project(residual):
         return residual - (scale @ residual) / scale.sum() * active if depth is None else residual
 
-    def reduced(p, own):
-        lacking = np.where(active, (0.0 if depth is None else depth) - gap - own, 0.0)
+    def reduced(p, deflection):
+        lacking = np.where(active, (0.0 if depth is None else depth) - gap - deflection, 0.0)
         return project(lacking)
 
-    residual = reduced(p, own)
+    residual = reduced(p, deflection)
     direction = z = scale * residual
     rho, products = residual @ z, 0
     while np.abs(residual).max() > 0.1 * settings.tolerance_mm and products < settings.inner_iterations:
         moved = (compliance @ direction[:, None])[:, 0]
         step = rho / (direction @ moved)
-        p, own, products = p + step * direction, own + step * moved, products + 1
+        p, deflection, products = p + step * direction, deflection + step * moved, products + 1
         residual = project(residual - step * np.where(active, moved, 0.0))
         z = scale * residual
         before, rho = rho, residual @ z
         direction = z + rho / before * direction
-    return p, own, products
+    return p, deflection, products
 
 
 def solve_block_by_block(matrix: np.ndarray, increment: Increment, *, tolerance_mm: float = 1e-9,
                          max_sweeps: int = 20000) -> CoulombContact:
-    """The same for a matrix (c, 3, c, 3), point by point (block Gauss-Seidel) at a prescribed depth; a few hundred points.
+    """The increment for a matrix (c, 3, c, 3) at a prescribed depth by block Gauss-Seidel; for a few hundred points.
 
-    At each point first the normal force, others kept, then the tangential one, projected on its disc.
+    At each point the normal force is updated first, then the tangential one, which is projected on its disc.
     """
     count = len(increment.gap)
     force, moved = np.zeros((count, 3)), np.zeros((count, 3))
@@ -378,19 +377,19 @@ def solve_block_by_block(matrix: np.ndarray, increment: Increment, *, tolerance_
     for sweep in range(1, max_sweeps + 1):
         largest = 0.0
         for i in range(count):
-            own, before = matrix[i, :, i], force[i].copy()
+            block, before = matrix[i, :, i], force[i].copy()
             gap = increment.gap[i] - increment.depth + moved[i, 2]
-            force[i, 2] = max(0.0, force[i, 2] - gap / own[2, 2])
-            slip = moved[i, :2] + own[:2, 2] * (force[i, 2] - before[2]) - increment.carried[i]
-            force[i, :2] = _in_disc(force[i, :2] - slip / max(own[0, 0], own[1, 1]), increment.friction * force[i, 2])
+            force[i, 2] = max(0.0, force[i, 2] - gap / block[2, 2])
+            slip = moved[i, :2] + block[:2, 2] * (force[i, 2] - before[2]) - increment.carried[i]
+            force[i, :2] = _in_disc(force[i, :2] - slip / max(block[0, 0], block[1, 1]), increment.friction * force[i, 2])
             change = force[i] - before
             moved += (columns[:, i] @ change).reshape(count, 3)
-            largest = max(largest, np.abs(own @ change).max())
+            largest = max(largest, np.abs(block @ change).max())
         if largest <= tolerance_mm:
             gap = increment.gap - increment.depth + moved[:, 2]
             slip = moved[:, :2] - increment.carried
-            own = np.einsum("iaia->ia", matrix[:, :2, :, :2]).max(axis=1, keepdims=True)
-            sticks = _sticking(force[:, :2] - slip / own, increment.bound(force[:, 2]))
+            diagonal = np.einsum("iaia->ia", matrix[:, :2, :, :2]).max(axis=1, keepdims=True)
+            sticks = _sticking(force[:, :2] - slip / diagonal, increment.bound(force[:, 2]))
             return CoulombContact(force[:, 2], force[:, :2], increment.depth,     # type: ignore[arg-type]
                                   gap, slip, sticks, sweep, sweep)
     raise ConvergenceError(f"The plain contact method did not settle in {max_sweeps} sweeps.")

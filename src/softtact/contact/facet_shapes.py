@@ -1,8 +1,8 @@
 """Facets of surfaces for compiled loops: shape functions with their second derivatives, and the closest point on a facet.
 
-A surface may hold facets of several kinds. Each has up to nine nodes, -1 behind the last one; lines are facets of a surface that is
-endless along z, so that plane and spatial contact are the same code: the second coordinate of a line moves along z, and no node
-takes part in it.
+A surface may have facets of several kinds with up to nine nodes, padded with -1. Lines are facets of a surface that is infinite
+along z, so that plane and spatial contact share one implementation: a line's second coordinate is along z, and the shape functions
+do not depend on it.
 """
 
 from typing import NamedTuple
@@ -21,7 +21,7 @@ _ITERATIONS, _CONVERGED, _LONGEST_STEP = 25, 1e-13, 0.5
 
 
 class ShapesAt(NamedTuple):
-    """Of a facet at a point: values (9,), derivatives (2, 9) and second derivatives (3, 9) by xi xi, eta eta, xi eta."""
+    """Shape functions of a facet at a point: values (9,), derivatives (2, 9), second derivatives (3, 9): xi xi, eta eta, xi eta."""
 
     values: np.ndarray
     slopes: np.ndarray
@@ -30,13 +30,13 @@ class ShapesAt(NamedTuple):
 
 @njit(cache=True, nogil=True)
 def room_for_shapes() -> ShapesAt:
-    """Arrays that `evaluate_shapes` fills."""
+    """Workspace that `evaluate_shapes` fills."""
     return ShapesAt(np.zeros(9), np.zeros((2, 9)), np.zeros((3, 9)))
 
 
 @njit(cache=True, nogil=True)
 def evaluate_shapes(kind: int, xi: float, eta: float, out: ShapesAt) -> None:
-    """Fill the shape functions of a facet of a kind at (xi, eta)."""
+    """Write the shape functions of a facet of the given kind at (xi, eta) into `out`."""
     N, d, c = out.values, out.slopes, out.curvatures
     N[:], d[:], c[:] = 0.0, 0.0, 0.0
     if kind == TRI3:
@@ -131,9 +131,8 @@ def unit_normal(tangents: np.ndarray, normal: np.ndarray) -> float:
 def clamp(kind: int, xi: float, eta: float) -> tuple[float, float]:
     """The nearest coordinates within a facet and a margin around it.
 
-    With the margin, a point that crosses the edge between two facets within Newton's iterations goes on to meet the one that it
-    met,
-    so that force and tangent are those of one smooth function.
+    The margin lets a point that crosses the edge between two facets within Newton's iterations keep its facet, so that force and
+    tangent are those of one smooth function.
     """
     if kind >= LINE2:
         return min(1 + 2 * MARGIN, max(-1 - 2 * MARGIN, xi)), 0.0
@@ -153,7 +152,7 @@ def clamp(kind: int, xi: float, eta: float) -> tuple[float, float]:
 def closest_on(kind: int, corners: np.ndarray, x: np.ndarray, xi: float, eta: float, shapes: ShapesAt) -> tuple[float, float]:
     """Coordinates of the point of a facet (nodes at `corners`, (9, 3)) that is closest to x (3,), from a first guess.
 
-    Newton's method, kept within the facet and its margin; `shapes` is a room for shape functions.
+    Newton's method, limited to the facet and its margin; `shapes` is a workspace for shape functions.
     """
     place, tangents, normal = np.empty(3), np.empty((2, 3)), np.empty(3)
     for _ in range(_ITERATIONS):

@@ -1,6 +1,6 @@
-"""The facet of a surface that is closest to a point: a tree of boxes around the facets, made once and refitted as they move.
+"""Search for the facet closest to a point: a bounding-volume hierarchy of the facets, built once and refitted as they move.
 
-Curved facets are searched by flat triangles between their nodes; the closest point on the facet itself is found after that.
+The search uses flat triangles between the nodes of curved facets; the closest point on the facet itself is found afterwards.
 """
 
 from typing import NamedTuple
@@ -33,7 +33,7 @@ _PLACES = {
 
 
 class FacetTree(NamedTuple):
-    """Triangles t of facets in a binary tree of boxes b; the children of a box stand beside each other."""
+    """Triangles t of facets in a binary tree of boxes b; the children of a box are adjacent."""
 
     corners: np.ndarray
     """(t, 3) nodes of the triangles, in the tree's order."""
@@ -55,9 +55,9 @@ def build_tree(nodes: np.ndarray, kinds: np.ndarray, x: np.ndarray) -> FacetTree
     """The tree of facets (f, 9) of kinds (f,), with nodes at x (n, 3) in mm."""
     parts_of: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     for kind in np.unique(kinds):
-        own, parts = np.flatnonzero(kinds == kind), np.array(_PARTS[int(kind)])
-        places_of_kind = np.tile(np.array(_PLACES[int(kind)], float)[parts], (len(own), 1, 1))
-        parts_of.append((nodes[own][:, parts].reshape(-1, 3), np.repeat(own, len(parts)), places_of_kind))
+        alike, parts = np.flatnonzero(kinds == kind), np.array(_PARTS[int(kind)])
+        places_of_kind = np.tile(np.array(_PLACES[int(kind)], float)[parts], (len(alike), 1, 1))
+        parts_of.append((nodes[alike][:, parts].reshape(-1, 3), np.repeat(alike, len(parts)), places_of_kind))
     corners, facets, places = (np.concatenate(arrays) for arrays in zip(*parts_of, strict=True))
     order, first, count = _divide(x[corners].mean(axis=1))
     tree = FacetTree(
@@ -75,7 +75,7 @@ def build_tree(nodes: np.ndarray, kinds: np.ndarray, x: np.ndarray) -> FacetTree
 
 @njit(cache=True, nogil=True)
 def _divide(centres):
-    """Order of the triangles, and the boxes' `first` and `count`: halves along the longest side, as deep as leaves are small."""
+    """Order of the triangles, and the boxes' `first` and `count`: boxes are halved along the longest side down to small leaves."""
     total = len(centres)
     order, boxes = np.arange(total), 2 * total + 1
     first, count = np.zeros(boxes, np.int64), np.zeros(boxes, np.int64)
@@ -86,9 +86,9 @@ def _divide(centres):
         if stop - start <= _LEAF:
             first[box], count[box] = start, stop - start
         else:
-            own = centres[order[start:stop]]
-            spread = np.array([own[:, i].max() - own[:, i].min() for i in range(3)])
-            order[start:stop] = order[start:stop][np.argsort(own[:, spread.argmax()])]
+            inside = centres[order[start:stop]]
+            spread = np.array([inside[:, i].max() - inside[:, i].min() for i in range(3)])
+            order[start:stop] = order[start:stop][np.argsort(inside[:, spread.argmax()])]
             middle = (start + stop) // 2
             begin[used], end[used], begin[used + 1], end[used + 1] = start, middle, middle, stop
             first[box] = used
@@ -100,7 +100,7 @@ def _divide(centres):
 @njit(cache=True, nogil=True)
 def refit(tree: FacetTree, x: np.ndarray) -> None:
     """Fit the boxes to nodes at x (n, 3) in mm."""
-    for box in range(len(tree.first) - 1, -1, -1):  # children stand behind their parents
+    for box in range(len(tree.first) - 1, -1, -1):  # children come after their parents
         first = tree.first[box]
         for i in range(3):
             low, high = np.inf, -np.inf
@@ -119,9 +119,9 @@ def nearest(
 ) -> tuple[int, float, float]:
     """The facet closest to a point (3,) within `reach` (mm), and a first guess of the coordinates there; -1 where there is none.
 
-    against (3,), least_cosine: the facet's normal n is to have -n . against >= least_cosine, with `against` the normal of the
-    surface
-    that the point lies on;  excluded (k,): nodes whose facets do not count, for a surface that meets itself; -1 counts for nothing
+    against (3,), least_cosine: only facets with normals n for which -n . against >= least_cosine count; `against` is the normal of
+    the point's surface
+    excluded (k,): nodes whose facets are left out, for self-contact; entries of -1 are ignored
     """
     best, found, xi, eta = reach * reach, -1, 0.0, 0.0
     stack, left = np.empty(_DEPTH, np.int64), 1

@@ -2,13 +2,13 @@
 
 Per area, with the slip vector s (mm, tangential), the coefficient mu and the pressure p (MPa):
     energy    mu p phi(|s|),   phi = s^2/e - s^3/(3 e^2) up to the slip tolerance e, then s - e/3
-    traction  mu p phi'(|s|) s/|s|, which the rubber has to overcome: it grows to mu p at |s| = e and stays there
+    traction  mu p phi'(|s|) s/|s|, opposite to the slip: it grows to mu p at |s| = e and then stays constant
     stiffness mu p [phi'/|s| (1 - dd) + phi'' dd] with d = s/|s|, never negative, as phi is convex
 phi' is that of Li et al., Incremental Potential Contact, ACM Trans. Graph. 39 (2020), sec. 5. As there, p is kept while the
-potential is minimised (p inside would make the tangent unsymmetric) and brought up to date afterwards, until both agree.
+potential is minimised (a variable p would make the tangent unsymmetric) and updated afterwards, until both converge.
 
-The slip counts from an anchor, a place on the rigid body, which stays where it is while the point sticks and follows a sliding
-point at the distance e: e is elastic slip, once, and does not add up from load step to load step.
+The slip is measured from an anchor on the rigid body. The anchor is fixed while the point sticks, and follows a sliding point at
+the distance e. So the elastic slip is at most e and does not accumulate from load step to load step.
 """
 
 from dataclasses import dataclass, replace
@@ -16,14 +16,14 @@ from types import EllipsisType
 
 import numpy as np
 
-# Points slide by 10 to 100 micrometres in a press. Half a micrometre lies well below, and makes sticking at 0.3 MPa and
-# mu = 0.3 less stiff (2 mu p / e = 360 N/mm3) than the contacts' penalties, so that the tangent's condition does not suffer.
+# Points slide by 10 to 100 micrometres in a press. Half a micrometre is well below, and the stick stiffness at 0.3 MPa and
+# mu = 0.3 (2 mu p / e = 360 N/mm3) is lower than the contacts' penalties, so the tangent stays well conditioned.
 SLIP_TOLERANCE_MM = 5e-4
 
 
 @dataclass(frozen=True)
 class Coulomb:
-    """Coefficient of friction, and the slip in mm at which a point has overcome it."""
+    """Coefficient of friction, and the slip in mm at which the traction reaches its limit."""
 
     coefficient: float
     slip_tolerance_mm: float = SLIP_TOLERANCE_MM
@@ -52,7 +52,7 @@ class Coulomb:
         return self._secant(slip)[..., None] * slip
 
     def next_share(self, slip: np.ndarray, share: np.ndarray, before: np.ndarray) -> np.ndarray:
-        """`share` one Newton step on: at slips `slip` (p, d), from `before`, cut to what friction can bear."""
+        """`share` extrapolated over one Newton step from `before` to `slip` (p, d), cut to the friction limit."""
         along = self._growth(before) * (_direction(before) * (slip - before)).sum(axis=-1)
         ahead = self._secant(before)[..., None] * (slip - along[..., None] * share)
         return ahead / np.maximum(1.0, np.linalg.norm(ahead, axis=-1, keepdims=True))
@@ -74,11 +74,11 @@ def _direction(slip):
 
 @dataclass(frozen=True)
 class FrictionState:
-    """How friction holds points (p,) on a rigid body during one step.
+    """Friction variables of points (p,) on a rigid body, constant during one step.
 
-    anchor, start (p, d) in mm, in the rigid body's frame: where a point holds to, and where it was when the step began;
-    start_gap (p,) in mm, then; pressure (p,) in MPa, which limits the friction; touching (p,): whether the anchor is set;
-    slid (p,) in mm: length of the path on which a point has slid since it came to touch.
+    anchor, start (p, d) in mm, in the rigid body's frame: the origin of the slip, and the position at the step's start;
+    start_gap (p,) in mm: gap at the step's start; pressure (p,) in MPa, which limits the friction; touching (p,): whether the
+    anchor is set; slid (p,) in mm: length of the sliding path since the point came into contact.
     """
 
     law: Coulomb
@@ -91,12 +91,12 @@ class FrictionState:
 
     @classmethod
     def first(cls, law: Coulomb, position: np.ndarray, gap: np.ndarray) -> "FrictionState":
-        """The friction state of a body at rest, which will hold every point to where it comes to touch."""
+        """The friction state of a body at rest: no point touches, and no anchor is set."""
         none = np.zeros(gap.shape)
         return cls(law, position, position, gap, none, np.zeros(gap.shape, dtype=bool), none)
 
     def friction_response(self, position: np.ndarray, normal: np.ndarray | None = None) -> "FrictionResponse":
-        """Friction on points at positions (p, d) before normals (p, d) of the rigid body; None: all d directions are tangential."""
+        """Friction at positions (p, d) on a rigid body with normals (p, d); None: all d directions are tangential."""
         way = position - self.anchor
         slip = way if normal is None else way - (way * normal).sum(axis=-1, keepdims=True) * normal
         return FrictionResponse(self, position, slip, normal)
@@ -108,10 +108,10 @@ class FrictionState:
 
 @dataclass(frozen=True)
 class FrictionResponse:
-    """Friction at one state: the friction state it comes from, positions and tangential slips from the anchors (p, d) in mm.
+    """Friction at one displacement: its friction state, positions and tangential slips from the anchors (p, d) in mm.
 
     normal (p, d): see `FrictionState.friction_response`
-    share (p, d): the traction's part of its limit as Newton's method expected it, see `after`; None: as it is.
+    share (p, d): the linearised ratio of the traction to its limit, see `after`; None: the ratio at this slip.
     """
 
     friction_state: FrictionState
@@ -127,7 +127,7 @@ class FrictionResponse:
 
     @property
     def traction(self) -> np.ndarray:
-        """MPa (p, d), against which the points slide."""
+        """MPa (p, d), opposite to the slip."""
         return self.friction_state.law.traction(self.slip, self.friction_state.pressure)
 
     def stiffness(self, points: np.ndarray | slice | EllipsisType = ...) -> np.ndarray:
@@ -142,11 +142,11 @@ class FrictionResponse:
         return self.friction_state.law.share(self.slip[points]) if self.share is None else self.share[points]
 
     def after(self, before: "FrictionResponse | None") -> "FrictionResponse":
-        """The same for the next tangent, where the last was taken at `before`.
+        """The response for the next tangent, if the last tangent was taken at `before`.
 
-        A point that slides has no stiffness along its way, so whole Newton steps throw it to and fro across the slip
-        tolerance. With the share as an unknown of its own, linearised too, they do not (Chan, Golub and Mulet, SIAM J. Sci.
-        Comput. 20 (1999) 1964): a third to a half of the iterations. At equilibrium the tangent is the same.
+        A sliding point has no stiffness along its path, so full Newton steps oscillate across the slip tolerance. A primal-dual
+        method, with the share as a separate linearised unknown, avoids this (Chan, Golub and Mulet, SIAM J. Sci.
+        Comput. 20 (1999) 1964): it needs a third to a half of the iterations. At equilibrium the tangent is the same.
         """
         if before is None or before.friction_state is not self.friction_state:
             return self
@@ -154,12 +154,12 @@ class FrictionResponse:
 
     @property
     def slid(self) -> np.ndarray:
-        """Length (p,) in mm of the path on which the points have slid since they came to touch."""
+        """Length (p,) in mm of the sliding path since the points came into contact."""
         length = np.linalg.norm(self.slip, axis=-1)
         return self.friction_state.slid + np.maximum(length - self.friction_state.law.slip_tolerance_mm, 0.0)
 
     def next_step(self, gap: np.ndarray) -> FrictionState:
-        """The friction state of a step that starts here, with gaps (p,): anchors follow what slid further than the tolerance."""
+        """The friction state of a step that starts here, with gaps (p,): anchors follow points that slid beyond the tolerance."""
         friction_state, length = self.friction_state, np.linalg.norm(self.slip, axis=-1, keepdims=True)
         kept = self.slip * np.minimum(1.0, friction_state.law.slip_tolerance_mm / np.maximum(length, 1e-300))
         touching = friction_state.pressure > 0
@@ -168,17 +168,17 @@ class FrictionResponse:
                        slid=np.where(touching, self.slid, 0.0))
 
     def next_pass(self, gap: np.ndarray, pressure: np.ndarray) -> FrictionState:
-        """The same step's friction state with newer pressures; a point that came to touch holds to where its path met the rigid
+        """The same step's friction state with updated pressures; the anchor of a new contact is where its path met the rigid
         body.
         """
         friction_state, new = self.friction_state, ~self.friction_state.touching & (pressure > 0)
-        way = np.where(new, np.maximum(friction_state.start_gap - gap, 1e-300), 1.0)
-        share = np.clip(np.where(new, friction_state.start_gap, 0.0) / way, 0.0, 1.0)[..., None]
+        approach = np.where(new, np.maximum(friction_state.start_gap - gap, 1e-300), 1.0)
+        share = np.clip(np.where(new, friction_state.start_gap, 0.0) / approach, 0.0, 1.0)[..., None]
         anchor = np.where(new[..., None], friction_state.start + share * (self.position - friction_state.start),
                           friction_state.anchor)
         return replace(friction_state, anchor=anchor, pressure=pressure, touching=friction_state.touching | new)
 
 
 def coulomb(coefficient: float) -> Coulomb | None:
-    """The law of a coefficient; None, and so no friction at all, where it is 0."""
+    """The law with a coefficient; None for a coefficient of 0: no friction."""
     return Coulomb(coefficient) if coefficient > 0 else None

@@ -16,7 +16,7 @@ NO_CONTACT_MM = 1e3   # height reported where the object is not above the point
 
 
 class HeightField:
-    """Height z (mm) and unit normal of an object's underside over points (x, y) in the object's placed position."""
+    """Height z (mm) and unit normal of the underside of a placed object over points (x, y)."""
 
     def __init__(self, mesh: trimesh.Trimesh, *, bins: int = 128) -> None:
         triangles = np.ascontiguousarray(mesh.triangles, dtype=float)
@@ -38,7 +38,7 @@ class HeightField:
         return points.min(axis=0) - 1e-9, points.max(axis=0) + 1e-9
 
     def moved(self, offset_mm: np.ndarray) -> Self:
-        """The object's after a displacement (3,) without a rotation; the bins in which triangles are searched for are shared."""
+        """The height field after a displacement (3,) of the object; both share the bins in which triangles are searched for."""
         other, way = copy.copy(self), np.asarray(offset_mm, dtype=float)
         other.triangles, other._origin, other.lowest_mm = self.triangles + way, self._origin + way[:2], self.lowest_mm + way[2]
         return other
@@ -54,9 +54,9 @@ class HeightField:
         return height, normal
 
     def first_touch_mm(self, x_mm: np.ndarray, y_mm: np.ndarray) -> float:
-        """Height (mm) of the underside's lowest point over a sensor whose map has columns x_mm and rows y_mm, its edges among them.
+        """Height (mm) of the underside's lowest point over a sensor whose map has columns x_mm and rows y_mm, edges included.
 
-        By the corners of facets over the sensor, and by the map's points where the object is wider; NO_CONTACT_MM beside it.
+        The lowest of the facets' corners over the sensor and of the heights over the map's points; NO_CONTACT_MM if none.
         """
         corners = self.triangles.reshape(-1, 3)
         over = ((corners[:, 0] >= x_mm[0]) & (corners[:, 0] <= x_mm[-1]) & (corners[:, 1] >= y_mm[0]) & (corners[:, 1] <= y_mm[-1]))
@@ -65,7 +65,7 @@ class HeightField:
 
     def lowest_over(self, low: np.ndarray, high: np.ndarray) -> float:
         """Height (mm) of the underside's lowest point over a rectangle with corners low (2,) and high (2,), exact to the triangles;
-        NO_CONTACT_MM where it is beside it.
+        NO_CONTACT_MM where the object is not above the rectangle.
         """
         xy = self.triangles[..., :2]
         near = ((xy.max(axis=1) >= low) & (xy.min(axis=1) <= high)).all(axis=1)
@@ -94,7 +94,7 @@ class MovedSurface:
 
 @dataclass(frozen=True)
 class SweptSurface:
-    """The lowest underside of an object over all places that a motion takes it to."""
+    """The lower envelope of an object's underside over all positions of a motion."""
 
     surface: Callable
     """Heights (n,) and normals (n, 3) of the object's underside over points, as `HeightField`."""
@@ -103,14 +103,14 @@ class SweptSurface:
 
     def __call__(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Heights (n,) and normals (n, 3) over points (n,), (n,) of the sensor."""
-        each = [self.surface(x - way[0], y - way[1]) for way in self.offsets_mm]
+        each = [self.surface(x - offset[0], y - offset[1]) for offset in self.offsets_mm]
         lowest = np.argmin([height for height, _ in each], axis=0)
         every = np.arange(len(x))
         return np.stack([height for height, _ in each])[lowest, every], np.stack([normal for _, normal in each])[lowest, every]
 
 
 def lowest_crossing_naive(x: np.ndarray, y: np.ndarray, mesh: trimesh.Trimesh) -> np.ndarray:
-    """The same heights by testing every triangle: the executable specification of `HeightField`."""
+    """The heights of a `HeightField` by testing every triangle: the reference implementation for tests."""
     heights = np.full(len(x), NO_CONTACT_MM)
     for triangle in mesh.triangles:
         (ax, ay, az), (bx, by, bz), (cx, cy, cz) = triangle

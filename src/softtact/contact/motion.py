@@ -1,4 +1,4 @@
-"""What an object does on a sensor: steps, in each of which every one of its six freedoms is prescribed or loaded.
+"""The motion of an object on a sensor: steps, in each of which every one of its six degrees of freedom is prescribed or loaded.
 
     Motion().press(force_n=[5, 20])                        # straight down by force, two steps
     Motion().press(depth_mm=1.0).slide(x_mm=1.0, steps=10) # down by depth, then aside, ten steps
@@ -6,9 +6,9 @@
     Motion.parse("z -1.0; x 1.0 in 10")                    # the same in one line
 
 Freedoms: x, y, z in mm and rx, ry, rz in degrees of the object in the sensor's frame (z out of the surface, so down is negative).
-A motion starts where the object just touches the surface at rest. A prescribed freedom moves by so much from where the step begins;
-a loaded one takes the place at which the sensor's surface carries the step's force (N) or torque (N mm). What a step does not name
-stays as it is: a prescribed freedom where it is, a loaded one under its load.
+A motion starts where the object just touches the surface at rest. A prescribed freedom moves by the given increment from the step's
+start; a loaded one takes the position at which the sensor's surface carries the step's force (N) or torque (N mm). A freedom that a
+step does not name keeps its state: a prescribed freedom its position, a loaded one its load.
 """
 
 import math
@@ -28,7 +28,7 @@ _HINT = 'write steps like "z -1.0; x 1.0 in 10" (mm, degrees) or "fz -20" (N), w
 
 @dataclass(frozen=True)
 class MotionStep:
-    """One step: ways of prescribed freedoms, loads of loaded ones."""
+    """One step: displacements of prescribed freedoms, loads of loaded ones."""
 
     ways: dict[str, float] = field(default_factory=dict)
     """Freedom to displacement or rotation: mm or degrees, from where the step begins."""
@@ -38,7 +38,7 @@ class MotionStep:
 
 @dataclass(frozen=True)
 class Motion:
-    """Steps of an object on a sensor; each method returns a longer motion, the motion itself stays as it is."""
+    """Steps of an object on a sensor; immutable: each method returns a longer motion."""
 
     steps: tuple[MotionStep, ...] = ()
     """The steps in their order; a result holds the state at the end of each."""
@@ -59,12 +59,12 @@ class Motion:
                                          for before, after in zip(reached, reached[1:], strict=False)))
 
     def slide(self, *, x_mm: float = 0.0, y_mm: float = 0.0, steps: int = 1) -> "Motion":
-        """Move the object aside (mm) in equal steps; its depth, or its force, stays as it is."""
+        """Move the object along x and y (mm) in equal steps at constant depth, or constant force."""
         return self._in_steps("slide", {"x": _finite("x_mm", x_mm), "y": _finite("y_mm", y_mm)}, steps)
 
     def turn(self, *, x_deg: float = 0.0, y_deg: float = 0.0, z_deg: float = 0.0, steps: int = 1) -> "Motion":
-        """Turn the object about the axes through its reference point by angles (degrees) in equal steps; the rest stays as it
-        is."""
+        """Turn the object about the axes through its reference point by angles (degrees) in equal steps; other freedoms keep
+        their state."""
         return self._in_steps("turn", {"rx": _finite("x_deg", x_deg), "ry": _finite("y_deg", y_deg),
                                        "rz": _finite("z_deg", z_deg)}, steps)
 
@@ -74,7 +74,7 @@ class Motion:
         return Motion(self.steps + steps * (MotionStep({freedom: way / steps for freedom, way in ways.items() if way}),))
 
     def step(self, *, ways: dict[str, float] | None = None, loads: dict[str, float] | None = None) -> "Motion":
-        """One step of any freedoms: ways (mm, degrees) from where it begins, loads (N, N mm) at its end."""
+        """One step of any freedoms: displacements (`ways`; mm, degrees) from the step's start, loads (N, N mm) at its end."""
         return self._with(MotionStep(dict(ways or {}), dict(loads or {})))
 
     def _with(self, step: MotionStep) -> "Motion":
@@ -87,7 +87,7 @@ class Motion:
 
     @property
     def depth_mm(self) -> float:
-        """Depth (mm) from first touch that the prescribed ways lead to; InputError after a step with a loaded z."""
+        """Depth (mm) from first touch after the prescribed displacements; InputError after a step with a loaded z."""
         depth = 0.0
         for step in self.steps:
             depth = math.nan if "z" in step.loads else depth - step.ways.get("z", 0.0)
@@ -97,13 +97,13 @@ class Motion:
 
     @property
     def forces_n(self) -> list[float] | None:
-        """The normal forces (N, positive) of a motion that only presses straight down by force; None for any other."""
+        """The normal forces (N, positive) of a motion that only presses straight down by force; None for other motions."""
         straight = all(set(step.loads) == {"z"} and not step.ways for step in self.steps)
         return [-step.loads["z"] for step in self.steps] if self.steps and straight else None
 
     @property
     def straight(self) -> bool:
-        """Whether the object only goes up and down."""
+        """Whether the object only moves along z."""
         return not any(step.ways.keys() - {"z"} or step.loads.keys() - {"z"} for step in self.steps)
 
     @property
@@ -118,11 +118,11 @@ class Motion:
 
     @property
     def aside_mm(self) -> np.ndarray:
-        """Ways (step, 2) in mm along x and y from where the motion begins to each step's end."""
+        """Displacements (step, 2) in mm along x and y from the motion's start to each step's end."""
         return np.cumsum([[step.ways.get("x", 0.0), step.ways.get("y", 0.0)] for step in self.steps], axis=0)
 
     def offsets_mm(self, *, at_most_mm: float = 0.5) -> np.ndarray:
-        """Ways (k, 2) in mm aside from where the motion begins, at every step's end and no farther apart than `at_most_mm`."""
+        """Displacements (k, 2) in mm along x and y from the motion's start, at every step's end and at most `at_most_mm` apart."""
         places = [np.zeros(2)]
         for end in self.aside_mm:
             count = max(1, math.ceil(np.linalg.norm(end - places[-1]) / at_most_mm))
@@ -131,9 +131,9 @@ class Motion:
 
     @classmethod
     def parse(cls, text: str) -> "Motion":
-        """A motion from one line: steps between semicolons, each of terms like `x 1.0`, `fz -20`; `in 10` divides its ways.
+        """A motion from one line: steps separated by semicolons, with terms like `x 1.0`, `fz -20`; `in 10`: in ten equal steps.
 
-        Raises InputError that names the step it does not understand.
+        Raises InputError that names a step it cannot parse.
         """
         motion = cls()
         for part in filter(None, (part.strip() for part in text.split(";"))):
@@ -149,7 +149,7 @@ class Motion:
     def _terms(self, part: str, terms: list[tuple[str, float]], count: int) -> "Motion":
         if unknown := [name for name, _ in terms if name not in FREEDOMS + LOADS]:
             raise InputError(f"motion: {unknown[0]!r} in the step {part!r} is no freedom; use one of "
-                             f"{', '.join(FREEDOMS)} for a way, {', '.join(LOADS)} for a load.")
+                             f"{', '.join(FREEDOMS)} for a displacement, {', '.join(LOADS)} for a load.")
         loads = {FREEDOMS[LOADS.index(name)]: value for name, value in terms if name in LOADS}
         ways, motion = {name: value / count for name, value in terms if name in FREEDOMS}, self
         for _ in range(count):

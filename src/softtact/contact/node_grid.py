@@ -1,8 +1,8 @@
-"""The free nodes of a sensor's surface, as a grid of four like quarters: with those on its sides where these are free.
+"""The free nodes of a sensor's surface as a grid that is symmetric about both axes; free sides belong to the grid.
 
-`Stencil`   About the inverse of a surface's compliance: the forces on a node and its neighbours when all surface nodes are given
-their depth. A surface's stiffness reaches hardly further than its elements, so a few neighbours make a good preconditioner.
-`patches_of`   Patches of contact points that share a pressure: fewer unknowns where a contact is large.
+`Stencil`   Approximate inverse of a surface's compliance: nodal forces at a node and its neighbours under prescribed displacements
+of all surface nodes. They decay within about an element, so a few neighbours make a good preconditioner.
+`patches_of`   Patches of contact points with one pressure: fewer unknowns where a contact is large.
 """
 
 from collections.abc import Callable, Mapping
@@ -17,14 +17,14 @@ from softtact.contact.object_points import ObjectPoints
 
 _LEVEL_MM = 0.02     # range of heights among the points of a patch
 _WHOLE = 0.999        # covered share from which on a point may share a patch
-_MANY_POINTS = 800   # from which on patches save time; a small contact wants all of its points
+_MANY_POINTS = 800   # number of points from which patches save time; a small contact needs all of its points
 
 
 @dataclass(frozen=True)
 class NodeGrid:
     """Free nodes of a surface on lines x (nx,), y (ny,) in mm, symmetric about 0; numbered x fastest.
 
-    sides: whether the outermost nodes lie on the surface's sides; else these are held and one step beyond
+    sides: whether the outermost nodes lie on the surface's free sides; otherwise the sides are fixed, one step beyond the grid
     """
 
     x: np.ndarray
@@ -37,7 +37,7 @@ class NodeGrid:
 
     @classmethod
     def of(cls, arrays: Mapping[str, np.ndarray]) -> "NodeGrid":
-        """The grid whose `arrays` these are."""
+        """The grid from its `arrays`."""
         return cls(arrays["x"], arrays["y"], bool(arrays["sides"]))
 
     @property
@@ -61,13 +61,13 @@ class NodeGrid:
 
     @property
     def every_second(self) -> "NodeGrid":
-        """The grid of every second node with the middle one: the map's, without its outer rows and columns where these are held."""
+        """The grid of every second node that contains the middle one: the map's points, without the fixed nodes on its sides."""
         first = self.first_of_second
         return NodeGrid(self.x[first::2], self.y[first::2], self.sides)
 
     @property
     def first_of_second(self) -> int:
-        """The place along both lines at which `every_second` begins."""
+        """Index along both lines at which `every_second` begins."""
         return 0 if self.sides else 1
 
     @property
@@ -77,29 +77,29 @@ class NodeGrid:
         return np.arange(self.count).reshape(self.shape)[first::2, first::2].ravel()
 
     def areas(self, nodes: np.ndarray) -> np.ndarray:
-        """Area (n,) in mm2 of the surface about each of nodes (n,): a rectangle of a step's sides, cut off at the surface's own."""
+        """Area (n,) in mm2 of the surface around nodes (n,): a rectangle of one step along x and y, within the surface's sides."""
         return np.prod(self.step) * self.share_inside(nodes)
 
     def share_inside(self, nodes: np.ndarray) -> np.ndarray:
-        """Which share (n,) of a node's rectangle lies on the surface: half at a side, a quarter at a corner, else all."""
+        """Share (n,) of a node's rectangle that lies on the surface: a half at a side, a quarter at a corner, else 1."""
         if not self.sides:
             return np.ones(len(nodes))
         j, i = np.divmod(nodes, len(self.x))
         return np.where((i == 0) | (i == len(self.x) - 1), 0.5, 1.0) * np.where((j == 0) | (j == len(self.y) - 1), 0.5, 1.0)
 
     def with_held_sides(self, fields: np.ndarray) -> np.ndarray:
-        """Fields (..., ny, nx) of this grid on the map's points: with a border of zeros where its sides are held."""
+        """Fields (..., ny, nx) of this grid on the map's points: with a border of zeros where the sides are fixed."""
         if self.sides:
             return fields
         return np.pad(fields, [(0, 0)] * (fields.ndim - 2) + [(1, 1), (1, 1)])
 
     def from_middle(self, nodes: np.ndarray) -> np.ndarray:
-        """How many steps (n, 2) in x and y nodes (n,) lie from the middle."""
+        """Offsets (n, 2) in steps along x and y from the middle to nodes (n,)."""
         j, i = np.divmod(nodes, len(self.x))
         return np.column_stack([i - len(self.x) // 2, j - len(self.y) // 2])
 
     def quarter(self, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Of nodes (n,): their numbers (n,) in the quarter x, y >= 0, from the middle, x fastest; and signs (n, 2) of x and y."""
+        """Numbers (n,) of nodes (n,) mirrored into the quarter x, y >= 0, from the middle, x fastest; signs (n, 2) of x and y."""
         place = self.from_middle(nodes)
         away = np.abs(place)
         return away[:, 1] * (len(self.x) // 2 + 1) + away[:, 0], np.where(place < 0, -1, 1)
@@ -107,15 +107,15 @@ class NodeGrid:
 
 @dataclass(frozen=True)
 class Stencil:
-    """values (2, 2, 2 k + 1, 2 k + 1) in N/mm: by a node's row and column, even or odd from the middle, and its neighbour's offset.
+    """values (2, 2, 2 k + 1, 2 k + 1) in N/mm: by the parities of a node's row and column from the middle, and the offset.
 
-    Nodes at corners, mid-sides and centres of elements are of four kinds.
+    The four parities are the nodes at corners, on the two kinds of mid-sides, and at centres of elements.
     """
 
     values: np.ndarray
 
     def on(self, grid: NodeGrid, nodes: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-        """The stencil's action on values (n, levels) at some of a `NodeGrid`'s nodes (n,), all others being zero."""
+        """The stencil's product with values (n, load steps) at nodes (n,) of a `NodeGrid`; all other nodes are zero."""
         reach = self.values.shape[2] // 2
         j, i = np.divmod(nodes, grid.shape[1])
         place = np.full((grid.shape[0] + 2 * reach, grid.shape[1] + 2 * reach), -1)
@@ -140,10 +140,10 @@ def _apply(x, neighbours, weights):
 
 
 def patches_of(points: ObjectPoints, grid: NodeGrid, shared: bool, *, beside_edge: int = 0) -> sp.csr_matrix:
-    """Matrix (patches, c) of the points' shares in patches: four whole points of a square, level with each other, or one alone.
+    """Matrix (patches, c) of the points' shares in patches: four fully covered points of a square at like heights, or one point.
 
-    Squares are counted from the middle, where a row's and a column's points go in pairs, so that a symmetric contact stays so.
-    beside_edge: how many rows of points along the edge of all points keep a separate pressure
+    Squares are counted in pairs of rows and columns from the middle, so that a symmetric contact remains symmetric.
+    beside_edge: number of rows of points along the edge of all points that keep a separate pressure
     """
     label = np.arange(points.count)
     if shared and points.count > _MANY_POINTS:
@@ -166,7 +166,7 @@ def patches_of(points: ObjectPoints, grid: NodeGrid, shared: bool, *, beside_edg
 
 
 def _mask(points, grid):
-    """Which nodes (ny, nx) of the grid are points."""
+    """Which nodes (ny, nx) of the grid are contact points."""
     there = np.zeros(grid.count, dtype=bool)
     there[points.nodes] = True
     return there.reshape(grid.shape)

@@ -1,9 +1,9 @@
-"""Where a rigid object can touch a grid of nodes, sharper than the grid: nodes, and how far the object covers their surroundings.
+"""Nodes of a grid that a rigid object can touch, with the covered share of their surroundings: a sub-grid resolution of edges.
 
-A node beside an edge of the object is neither held nor free. How far it is held follows from the share of its surroundings that
-the object covers, weighted by the node's hat function: from nothing, where the edge has come as far as the node before, to a half,
-where it is at the node, which is then held. The surroundings are kept as samples, so that the share can be asked for anew where
-the node has moved sideways (`ObjectPoints.covered_at`). `models/foundation/dof_maps` makes of it how soft a point is.
+A node beside an edge of the object is in partial contact. The degree follows from the share of its surroundings that the object
+covers, weighted by the node's hat function: zero where the edge is at the previous node, a half where it is at the node, which is
+then in full contact. The surroundings are stored as samples, so that the share can be evaluated after a lateral displacement of the
+node (`ObjectPoints.covered_at`). `models/foundation/dof_maps` derives the contact compliance from it.
 """
 
 from dataclasses import dataclass, replace
@@ -11,21 +11,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numba import njit
 
-SAMPLES = 8          # a step, around nodes near an edge
-REACH = 2            # steps on each side of a node that are sampled: a hat's, and a movement of one step
-LOWEST = 0.15        # height in steps over a node's plane up to which a sample can belong to it
-_TOUCHED = 0.7       # of the object's depth: what lies higher is not touched, an edge below it may be
+SAMPLES = 8          # samples per grid step around nodes near an edge
+REACH = 2            # grid steps sampled on each side of a node: the hat function's width and a displacement of one step
+LOWEST = 0.15        # height in steps over a node's plane up to which a sample belongs to the plane
+_TOUCHED = 0.7       # of the object's depth: higher facets are not touched, but a lower edge beside them may be
 
 
 @dataclass(frozen=True)
 class ObjectPoints:
-    """Nodes (c,) of a grid where an object can touch.
+    """Nodes (c,) of a grid that an object can touch.
 
-    gap (c,): the object's height over the undeformed surface in mm;  slope (c, 2): how it grows in x and y
-    edge (e,): places in `nodes` of those with an edge near them;  window (e, s, s): by how much their surroundings, sampled from 2
-    steps below to 2 steps above in y and x, lie higher than the plane of gap and slope, in mm
+    gap (c,): the object's height over the undeformed surface in mm;  slope (c, 2): its derivatives by x and y
+    edge (e,): indices in `nodes` of those near an edge;  window (e, s, s): height in mm of their surroundings over the plane of gap
+    and slope, sampled from 2 steps below to 2 steps above in y and x
     step (2,): of the grid in mm
-    beneath: where nodes near an edge have a lower part of the object beside that over them: `Beneath`, else None
+    beneath: `Beneath` of the nodes near an edge with a lower part of the object beside them; None without such nodes
     """
 
     nodes: np.ndarray
@@ -42,22 +42,22 @@ class ObjectPoints:
 
     @property
     def covered(self) -> np.ndarray:
-        """Share (c,) of each node's surroundings under the object, weighted by its hat function: of area step_x step_y in all."""
+        """Share (c,) of each node's surroundings under the object, weighted by its hat function of area step_x step_y."""
         return self.covered_at(np.zeros((2, self.count)), rounding_mm=LOWEST * self.step.min())
 
     def covered_at(self, moved: np.ndarray, *, rounding_mm: float) -> np.ndarray:
-        """The same where the nodes have moved sideways by `moved` (2, c) in mm, up to a step.
+        """`covered` after lateral displacements `moved` (2, c) in mm of the nodes, up to a grid step.
 
-        rounding_mm: by how much what counts may lie higher than the plane of a node's gap and slope
+        rounding_mm: height over the plane of a node's gap and slope up to which a sample counts
         """
         share = np.ones(self.count)
         share[self.edge] = hat_shares(self.window, moved[:, self.edge].T / self.step, rounding_mm)
         return share
 
     def as_deep(self, depth: float) -> "ObjectPoints":
-        """The points where the object has come down by `depth` (mm) since its first touch.
+        """The points for an object at `depth` (mm) below its first touch.
 
-        What lies higher over a node than that is not touched; the edge of what is lower beside it may be.
+        Higher facets over a node are not touched; the edge of a lower part beside the node may be.
         """
         if self.beneath is None:
             return self
@@ -71,7 +71,7 @@ class ObjectPoints:
         return replace(self, gap=gap, slope=slope, window=window, beneath=None)
 
     def outwards(self) -> np.ndarray:
-        """Squares (e, 2) of the x and y components of the direction in which an edge lies from the points near one."""
+        """Squares (e, 2) of the x and y components of the direction from the nodes near an edge to that edge."""
         places = window_places()
         weights = np.maximum(1 - np.abs(places), 0.0)
         share = (self.window <= LOWEST * self.step.min()) * (weights[:, None] * weights)
@@ -82,7 +82,7 @@ class ObjectPoints:
 
 @dataclass(frozen=True)
 class Beneath:
-    """For some of the nodes near edges, by their place (k,) among these: gap, slope and window over the plane of what is lower."""
+    """Gap, slope and window over the plane of a lower part of the object, for nodes near edges with indices `place` (k,)."""
 
     place: np.ndarray
     gap: np.ndarray
@@ -91,13 +91,13 @@ class Beneath:
 
 
 def window_places() -> np.ndarray:
-    """Samples' places (s,) along a side of a window, in steps from the node."""
+    """Coordinates (s,) of the samples along a side of a window, in steps from the node."""
     return (np.arange(2 * REACH * SAMPLES) + 0.5) / SAMPLES - REACH
 
 
 @njit(cache=True, nogil=True)
 def hat_shares(window: np.ndarray, moved: np.ndarray, highest: float) -> np.ndarray:
-    """Shares (e,), no higher than `highest`, under hats that have moved by (e, 2) steps."""
+    """Covered shares (e,) under hat functions moved by (e, 2) steps; samples higher than `highest` do not count."""
     size = window.shape[1]
     share = np.zeros(len(window))
     x, y = np.empty(size), np.empty(size)

@@ -27,11 +27,11 @@ def penalty(normal_gap: np.ndarray, *, stiffness: float | np.ndarray,
 class Contact:
     """Penalty stiffness in N/mm3 and smoothing depth in mm, and for each point the depth at which its pressure begins.
 
-    The offsets (mm, zero at first) hold the points out of each other: with a point's last overlap as its offset the same pressure
-    leaves none. It is the augmented Lagrangian method in terms of lengths: exact contact without a stiffer penalty, which
-    Newton's method would have to follow in smaller steps. Simo and Laursen, Computers & Structures 42 (1992) 97.
+    The offsets (mm, initially zero) are the multipliers of the augmented Lagrangian method as lengths. With a point's last overlap
+    as its offset, the same pressure leaves no overlap. So contact is exact without a stiffer penalty, for which Newton's method
+    would need smaller steps. Simo and Laursen, Computers & Structures 42 (1992) 97.
 
-    softness (mm/MPa): of a spring in series with each point, whose shortening is no overlap and is not augmented.
+    contact_compliance (mm/MPa): of a spring in series with each point; its shortening is no overlap and is not augmented.
     """
 
     stiffness: float = 3000.0
@@ -40,12 +40,12 @@ class Contact:
     contact_compliance: float | np.ndarray = 0.0
 
     def response(self, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """`penalty` of the points, the offset added to their overlap."""
+        """`penalty` of the points, with the offset added to their overlap."""
         return penalty(gaps - self.offset, stiffness=1.0 / (1.0 / self.stiffness + self.contact_compliance),
                        smoothing=self.smoothing)
 
-    def own_gaps(self, gaps: np.ndarray) -> np.ndarray:
-        """Gaps in mm without what the points' springs give way."""
+    def surface_gaps(self, gaps: np.ndarray) -> np.ndarray:
+        """Gaps in mm without the shortening of the springs in series."""
         return gaps + self.contact_compliance * self.response(gaps)[1] if np.any(self.contact_compliance) else gaps
 
     def at(self, points: np.ndarray | slice) -> "Contact":
@@ -55,8 +55,8 @@ class Contact:
 
     def error(self, gaps: np.ndarray) -> float:
         """Deepest overlap, or widest gap under pressure, in mm."""
-        return float(np.where(gaps < self.offset, np.abs(self.own_gaps(gaps)), 0.0).max(initial=0.0))
+        return float(np.where(gaps < self.offset, np.abs(self.surface_gaps(gaps)), 0.0).max(initial=0.0))
 
     def augmented(self, gaps: np.ndarray) -> "Contact":
-        """The contact with offsets that hold each point where its surfaces just touch."""
-        return replace(self, offset=np.maximum(0.0, self.offset - self.own_gaps(gaps)))
+        """The contact after one augmentation: offsets with which each point under pressure has no overlap."""
+        return replace(self, offset=np.maximum(0.0, self.offset - self.surface_gaps(gaps)))

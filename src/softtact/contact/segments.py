@@ -1,7 +1,7 @@
-"""Points of contact between meshes that do not match: every facet of one surface is cut along the facets of the other.
+"""Contact points between non-matching meshes: every facet of one surface is cut along the facets of the other.
 
-On each piece both surfaces' shape functions are polynomials, so that forces on both sides are integrated exactly where the surfaces
-are flat: a uniform pressure crosses the interface to round-off. Curved facets are cut as the flat polygons of their corners.
+On each segment the shape functions of both surfaces are polynomials, so the forces on both sides are integrated exactly where the
+surfaces are flat: the contact patch test is passed to round-off. Curved facets are cut as the flat polygons of their corners.
 Reference: Puso and Laursen, Comput. Methods Appl. Mech. Engng 193 (2004) 601, section 3 (segments of a mortar method).
 """
 
@@ -17,7 +17,7 @@ _TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]])  # of a quadrilateral's corners
 _TRIANGLE_PLACES = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 _QUAD_PLACES = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 _LINE_POINTS, _LINE_WEIGHTS = np.polynomial.legendre.leggauss(3)
-_SLIVER = 1e-10  # share of a facet below which a piece is nothing
+_SLIVER = 1e-10  # share of a facet below which a piece is ignored
 
 
 def segment_points(
@@ -60,8 +60,8 @@ def _triangles(surface):
 
 
 def _pieces(own, places, others, reach):
-    """Of triangles own (t, 3, 3) with coordinates (t, 3, 2): which (s,) each piece is of, and its corners' coordinates (s, 3,
-    2)."""
+    """Pieces s of triangles (t, 3, 3) with facet coordinates (t, 3, 2): the triangle (s,) of each piece, and its corners' facet
+    coordinates (s, 3, 2)."""
     low, high = others.min(axis=1), others.max(axis=1)
     order = np.argsort(low[:, 0], kind="stable")
     return _cut_all(own, places, others[order], low[order], high[order], float(np.max(high[:, 0] - low[:, 0], initial=0.0)), reach)
@@ -128,7 +128,7 @@ def _in_plane(triangle, origin, e, f):
 
 @njit(cache=True, nogil=True)
 def _faces(other, n, origin, reach):
-    """Whether a triangle looks against the normal n, and comes within reach of the plane through `origin`."""
+    """Whether a triangle's normal is opposite to n, and the triangle is within reach of the plane through `origin`."""
     p, q = other[1] - other[0], other[2] - other[0]
     turned = (p[1] * q[2] - p[2] * q[1]) * n[0] + (p[2] * q[0] - p[0] * q[2]) * n[1] + (p[0] * q[1] - p[1] * q[0]) * n[2]
     nearest = np.inf

@@ -1,8 +1,8 @@
-"""Where an object that is wider than a sensor comes to rest: on the rigid shell around it (`sensors/fields`).
+"""The rigid shell around a sensor (`sensors/fields`), on which an object wider than the sensor comes to rest.
 
-The object moves straight down and does not turn, so a single number is enough: how far it can come down until its underside meets
-the shell's top. From there on the pad keeps the force that it has, and the shell carries what is added.
-Left out: that a cover which bulges over the shell's top may touch it.
+The object moves straight down without rotation, so one number is enough: the descent at which its underside meets the shell's top.
+From there on the force on the pad is constant, and the shell carries the rest.
+Not modelled: contact of a cover that bulges over the shell's top.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,10 +14,10 @@ from scipy.optimize import brentq
 from softtact.contact.height_field import NO_CONTACT_MM, HeightField
 from softtact.errors import ConvergenceError
 
-_BESIDE_MM = 1e-3      # an object that ends at the pad's side does not lie on the shell
-_TOUCHING_MM = 1e-6    # from where it first touches: an object that rests so near to it presses nothing
-_FAR_MM = 10.0         # in place of a depth that is not found
-_EXACT = 1e-8          # of the largest force, to which that at rest is found
+_BESIDE_MM = 1e-3      # gap to the pad's side: an object that ends at the side does not lie on the shell
+_TOUCHING_MM = 1e-6    # from first touch: an object that rests on the shell within this descent exerts no force on the pad
+_FAR_MM = 10.0         # replaces a depth that was not found
+_EXACT = 1e-8          # tolerance of the pad's force where the object rests, relative to the largest force
 
 
 @dataclass(frozen=True)
@@ -29,29 +29,29 @@ class Shell:
     below_mm: float
     """Depth of its top below the pad's free surface; infinite where there is no shell."""
     width_mm: float
-    """How wide it is."""
+    """Width of its top."""
 
     def stop_mm(self, surface: HeightField, offset_mm: Sequence[float] | np.ndarray = (0.0, 0.0)) -> float:
-        """How far (mm) an object can come down from where its `surface` is; infinite where it does not reach over the shell.
+        """Descent (mm) of an object from the pose of `surface` to the shell; infinite where it does not reach over the shell.
 
-        offset_mm: its displacement along x and y from there
+        offset_mm: the object's displacement along x and y from that pose
         """
         if not np.isfinite(self.below_mm):
             return np.inf
         inner = 0.5 * np.asarray(self.footprint_mm) + _BESIDE_MM
-        outer, way = inner + self.width_mm, np.asarray(offset_mm)
+        outer, offset = inner + self.width_mm, np.asarray(offset_mm)
         boxes = [(-outer, [-inner[0], outer[1]]), ([inner[0], -outer[1]], outer),
                  ([-inner[0], -outer[1]], [inner[0], -inner[1]]), ([-inner[0], inner[1]], [inner[0], outer[1]])]
-        lowest = min(surface.lowest_over(low - way, high - way) for low, high in boxes)
+        lowest = min(surface.lowest_over(low - offset, high - offset) for low, high in boxes)
         return lowest + self.below_mm if lowest < NO_CONTACT_MM else np.inf
 
     @property
     def exists(self) -> bool:
-        """Whether there is one."""
+        """Whether the sensor has a shell."""
         return bool(np.isfinite(self.below_mm))
 
     def top_mm(self, height_mm: float = 0.0) -> np.ndarray:
-        """Its top as triangles (8, 3, 3), counter-clockwise from above, where the pad's free surface is at `height_mm`."""
+        """Triangles (8, 3, 3) of its top, counter-clockwise from above, for the pad's free surface at `height_mm`."""
         signs = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
         inner, z = 0.5 * np.asarray(self.footprint_mm) + _BESIDE_MM, np.full(4, height_mm - self.below_mm)
         low, high = (np.column_stack([signs * side, z]) for side in (inner, inner + self.width_mm))
@@ -59,16 +59,16 @@ class Shell:
         return np.concatenate([np.stack([high, high_next, low_next], axis=1), np.stack([high, low_next, low], axis=1)])
 
     def beneath(self, points_mm: np.ndarray) -> np.ndarray:
-        """Which of points (n, 2 or more) lie over it, by x and y (n,)."""
+        """Which (n,) of points (n, 2 or more) lie over the shell's top, by x and y."""
         inner = 0.5 * np.asarray(self.footprint_mm) + _BESIDE_MM
         x = np.abs(points_mm[:, :2])
         return self.exists & (x > inner).any(axis=1) & (x <= inner + self.width_mm).all(axis=1)
 
     def refuse_motion(self, surface: HeightField, offset_mm: np.ndarray, indentation_mm: float, touch_mm: float, *,
                       step: int) -> None:
-        """Raise ConvergenceError where an object is lower than the shell lets it, after a motion's step of that number.
+        """Raise ConvergenceError where an object is below the depth that the shell allows, after the given step of a motion.
 
-        offset_mm (2,): displacement aside;  indentation_mm: how far it has come down from its pose, touch_mm: did at first touch
+        offset_mm (2,): displacement along x and y;  indentation_mm, touch_mm: descent from the pose, now and at first touch
         """
         depth, stop = indentation_mm - touch_mm, self.stop_mm(surface, offset_mm) - touch_mm
         if depth > stop + _BESIDE_MM:
@@ -78,9 +78,9 @@ class Shell:
 
 
 def pad_forces(forces_n: np.ndarray, *, stop_mm: float, touch_mm: float, depth_of: Callable[[float], float]) -> np.ndarray:
-    """Forces (l,) in N that the pad carries of rising ones (l,): all of them, or as much as it does where the object rests.
+    """Forces (l,) in N that the pad carries of rising forces (l,): at most the force at which the object rests on the shell.
 
-    stop_mm, touch_mm: how far the object can come down, and does until first touch;  depth_of: how far it does under a force (N)
+    stop_mm, touch_mm: descent to the shell and to first touch;  depth_of: descent (mm) under a force (N)
     """
     if np.isinf(stop_mm):
         return forces_n
@@ -89,10 +89,10 @@ def pad_forces(forces_n: np.ndarray, *, stop_mm: float, touch_mm: float, depth_o
         return np.zeros(len(forces_n))
 
     def below(force):
-        """How far (mm) the object would be below where it rests; without force it just touches."""
+        """Distance (mm) of the object below the shell's top under a force; without a force it just touches the pad."""
         try:
             return (depth_of(force) if force > _EXACT * largest else touch_mm) - stop_mm
-        except ConvergenceError:      # of a force that the pad would not bear alone
+        except ConvergenceError:      # the pad alone cannot carry the force
             return _FAR_MM
 
     if below(largest) <= 0:

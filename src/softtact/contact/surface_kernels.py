@@ -1,4 +1,4 @@
-"""Compiled loops over the points of a surface that meets another one: gaps, forces, tangents, with every second derivative.
+"""Compiled loops over the points of a surface in contact with another one: gaps, forces and consistent tangents.
 
 With the closest point x_m(xi) on the other surface, its tangents a_k, normal n and curvature kappa_kl = n . d2x/dxi_k dxi_l:
     gap g = n . (x - x_m),   dg = n . (dx - dx_m),   D = M^-1 (a . (dx - dx_m) + g n . d(a)),   M_kl = a_k . a_l - g kappa_kl
@@ -27,11 +27,11 @@ from softtact.contact.surface_places import place_of_point
 from softtact.contact.surfaces import SurfacePoints
 
 _AT_EDGE = 1e-9
-_LEAVES = 8.0  # a point leaves a rim that it met so much farther out than where it would meet it: else it would come and go
+_LEAVES = 8.0  # hysteresis: a point in contact leaves a rim at so many times the distance at which contact begins
 
 
 class Projection(NamedTuple):
-    """The points' closest places on the other surface."""
+    """The points' closest-point projections on the other surface."""
 
     facet: np.ndarray
     """(p,) facet, -1 where none is within reach."""
@@ -42,7 +42,7 @@ class Projection(NamedTuple):
     normal: np.ndarray
     """(p, 3) outwards from the other surface."""
     inner: np.ndarray
-    """(p,) whether the place is inside its facet or the margin around it: at the margin's end the normal does not turn with it."""
+    """(p,) whether the projection is inside its facet or margin; at the margin's end the normal does not rotate with the point."""
 
 
 @njit(cache=True, nogil=True)
@@ -65,8 +65,8 @@ def project(
     rims (f, 4): which edges end the surface;  rim: how far (mm) beside such an edge a point still meets the plane of its facet
     reach: farthest distance in mm;  least_cosine: of the angle between the surfaces' opposite normals;  itself: leave out the
     facets that share a node with the point's own
-    before (p,), near (p, 2): facets and coordinates of before, which a point keeps as long as it stands over them: a point on the
-    edge between two facets would else change between them from iteration to iteration
+    before (p,), near (p, 2): last facets and coordinates, which a point keeps as long as its projection lies on them: otherwise a
+    point on the edge between two facets would alternate between them from iteration to iteration
     """
     count = len(points.facet)
     out = Projection(
@@ -94,10 +94,10 @@ def project(
 
 @njit(cache=True, nogil=True)
 def _beside2(out, p, own, nodes, kinds, x, room):
-    """Square (mm2) of how far beside its facet point p, at `own` (3,), stands.
+    """Squared tangential distance (mm2) of point p, at `own` (3,), from its facet.
 
-    A point behind its nearest facet's plane is inside only where it stands over that facet: beside it there may be walls, which the
-    search for facets leaves out, and the plane goes on where no surface is.
+    A point behind the plane of its nearest facet penetrates only if it projects on that facet. Beside the facet there may be walls,
+    which the search leaves out, and the plane continues beyond the surface.
     """
     facet, (xi, eta), total = out.facet[p], out.coordinates[p], 0.0
     kind = kinds[facet]
@@ -118,7 +118,7 @@ def _beside2(out, p, own, nodes, kinds, x, room):
 
 @njit(cache=True, nogil=True)
 def _meets(out, p, facet, xi, eta, own, nodes, kinds, rims, x, rim, room):
-    """Fill the projection of point p, at `own` (3,), on a facet; whether it stands over it and not beside the surface's rim."""
+    """Write the projection of point p, at `own` (3,), on a facet; returns whether it lies within the surface's rim."""
     corners, tangents, normal, place, kind = np.zeros((9, 3)), np.empty((2, 3)), np.empty(3), np.empty(3), kinds[facet]
     for a in range(NODES_OF[kind]):
         corners[a] = x[nodes[facet, a]]
@@ -167,9 +167,9 @@ def add_forces_of(
     kinds: np.ndarray,
     traction: np.ndarray,
 ) -> None:
-    """Take tractions (p, 3) in MPa that act on the points' surface from nodal forces (n, 3), and add them on the other one.
+    """Subtract tractions (p, 3) in MPa on the points' surface from nodal forces (n, 3), and add them on the other surface.
 
-    So that `force` holds what stands against them: the residual of a potential.
+    So `force` is the gradient of the contact potential: its contribution to the residual.
     """
     room = room_for_shapes()
     for p in range(len(facet)):
@@ -190,7 +190,7 @@ def add_forces_of(
 
 @njit(cache=True, nogil=True)
 def _forms(points, p, kind, room, width, coupled, rows):
-    """Shape values of both sides into rows (1, k) and the other side's slopes (2, k), nodes of the other side behind `width`."""
+    """Write both sides' shape values into row 0 of `rows`, the other side's derivatives into rows 1, 2, from column `width` on."""
     rows[:] = 0.0
     for a in range(NODES_OF[points.kind[p]]):
         rows[0, a] = points.values[p, a]
@@ -217,7 +217,7 @@ def add_pair_tangents(
     """Add the second derivative of the contact's energy to the matrices (pairs, k, k) of pairs of facets.
 
     pair (p,): the points' pairs, -1 for none;  pressure (p,) in MPa and its slope (p,) in N/mm3;  width: nodes of a facet of the
-    points' side, behind which those of the other side stand where `coupled`
+    points' side, after which those of the other side follow if `coupled`
     """
     room, corners, k = room_for_shapes(), np.zeros((9, 3)), out.shape[1] // 3
     rows, G, place, tangents, kappa = np.empty((3, k)), np.empty(3 * k), np.empty(3), np.empty((2, 3)), np.empty((2, 2))
@@ -281,9 +281,9 @@ def _add_square(matrix, factor, form):
     """The upper triangle of factor times form form^T."""
     for r in range(len(form)):
         if form[r] != 0.0:
-            own = factor * form[r]
+            scaled = factor * form[r]
             for c in range(r, len(form)):
-                matrix[r, c] += own * form[c]
+                matrix[r, c] += scaled * form[c]
 
 
 @njit(cache=True, nogil=True)
@@ -320,7 +320,7 @@ def add_friction_tangents(
     width: int,
     coupled: bool,
 ) -> None:
-    """Add w F^T (3 x 3 stiffness of a point, (p, 3, 3) in N/mm3) F of F = (shape values, minus those of the other side)."""
+    """Add w F^T stiffness F, with stiffnesses (p, 3, 3) in N/mm3 and F = (shape values, minus those of the other side)."""
     room, columns = room_for_shapes(), out.shape[1]
     k = columns // 3
     rows = np.empty((3, k))

@@ -1,4 +1,4 @@
-"""Compiled loops over the points of a surface: where they and their anchors on another surface are, and how that one turns."""
+"""Compiled loops over the points of a surface: positions of points and of anchors on another surface, and that surface's frames."""
 
 import numpy as np
 from numba import njit
@@ -25,7 +25,7 @@ def place_of_point(points: SurfacePoints, p: int, x: np.ndarray, place: np.ndarr
 
 @njit(cache=True, nogil=True)
 def places(points: SurfacePoints, x: np.ndarray) -> np.ndarray:
-    """Places (p, 3) in mm of the points, nodes at x (n, 3); of displacements, those of the points."""
+    """Positions (p, 3) in mm of the points with nodes at x (n, 3); for nodal displacements x, the points' displacements."""
     out, tangents = np.zeros((len(points.facet), 3)), np.empty((2, 3))
     for p in range(len(points.facet)):
         place_of_point(points, p, x, out[p], tangents)

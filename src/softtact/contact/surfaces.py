@@ -1,4 +1,4 @@
-"""Surfaces in contact: facets, points of quadrature on them, and where these points meet another surface."""
+"""Surfaces in contact: facets and the quadrature points on them."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,15 +15,15 @@ class Surface:
     """Facets on a set of nodes, normals outwards."""
 
     nodes: np.ndarray
-    """(f, 9) nodes of each facet, -1 behind its last one."""
+    """(f, 9) nodes of each facet, padded with -1."""
     kinds: np.ndarray
     """(f,) kinds, see `facet_shapes`."""
 
     @classmethod
     def of(cls, facets: dict[str, np.ndarray]) -> "Surface":
         """The surface of facets {meshio's name of the facet: nodes (f, k)}."""
-        nodes = [np.pad(own, ((0, 0), (0, MOST_NODES - own.shape[1])), constant_values=-1) for own in facets.values()]
-        kinds = [np.full(len(own), KIND_OF[name]) for name, own in facets.items()]
+        nodes = [np.pad(part, ((0, 0), (0, MOST_NODES - part.shape[1])), constant_values=-1) for part in facets.values()]
+        kinds = [np.full(len(part), KIND_OF[name]) for name, part in facets.items()]
         return cls(np.ascontiguousarray(np.concatenate(nodes)), np.concatenate(kinds))
 
     def tree(self, x: np.ndarray) -> FacetTree:
@@ -41,8 +41,7 @@ class Surface:
         return int(NODES_OF[self.kinds].max())
 
     def rims(self, x: np.ndarray) -> np.ndarray:
-        """(f, 4) which edges of each facet end the surface: none lies behind them, or one that turns away by more than 45 degrees.
-
+        """(f, 4) which edges of each facet end the surface: edges without a neighbour, or with one at an angle above 45 degrees.
         x (n, 3): the nodes at rest in mm
         """
         corners = np.where(self.kinds >= LINE2, 2, np.where(self.kinds >= QUAD8, 4, 3))
@@ -62,13 +61,13 @@ class Surface:
         return out
 
     def _normals(self, x: np.ndarray) -> np.ndarray:
-        """Unit normals (f, 3) of the corners' planes."""
+        """Unit normals (f, 3) of the planes through the facets' first corners."""
         a, b, c = (x[self.nodes[:, k]] for k in (0, 1, 2))
         normals = np.cross(b - a, np.array([0.0, 0.0, 1.0]) if self.is_line else c - a)
         return normals / np.linalg.norm(normals, axis=1)[:, None]
 
     def size_mm(self, x: np.ndarray) -> float:
-        """Mean length (mm) of the facets: the root of their area, or a line's length."""
+        """Mean size (mm) of the facets: the square root of the mean area, or the mean length of lines."""
         _, area = _at_rest(self, x, *_rules(self.kinds)[:3])
         mean = area.sum() / len(self.kinds)
         return float(mean if self.is_line else np.sqrt(mean))
@@ -93,15 +92,15 @@ class SurfacePoints(NamedTuple):
     slopes: np.ndarray
     """(p, 2, 9) their derivatives."""
     weight: np.ndarray
-    """(p,) area in mm2 (of a line: times the thickness or circumference) that the point stands for, at rest."""
+    """(p,) area in mm2 of the point at rest (for a line: length times thickness or circumference)."""
     coordinates: np.ndarray
     """(p, 2) on the facet."""
 
 
 def quadrature_points(surface: Surface, x: np.ndarray, *, axisymmetric: bool = False, thickness_mm: float = 1.0) -> SurfacePoints:
-    """Points of a rule of degree 4 or more on each facet, with nodes at rest at x (n, 3) in mm.
+    """Quadrature points of degree 4 or more on each facet, with nodes at rest at x (n, 3) in mm.
 
-    axisymmetric: a line's points stand for rings around the y axis;  thickness_mm: else for strips of this thickness
+    axisymmetric: a line's points represent rings around the y axis;  thickness_mm: otherwise strips of this thickness
     """
     return points_at(surface, x, *_rules(surface.kinds), axisymmetric=axisymmetric, thickness_mm=thickness_mm)
 
@@ -116,7 +115,7 @@ def points_at(
     axisymmetric: bool = False,
     thickness_mm: float = 1.0,
 ) -> SurfacePoints:
-    """Points at coordinates (p, 2) on facets (p,) that stand for shares (p,) of them, in parent coordinates."""
+    """Points at parent coordinates (p, 2) on facets (p,) with quadrature weights `share` (p,) in parent coordinates."""
     values, slopes = _shapes(surface.kinds[facet], coordinates)
     place, weight = _at_rest(surface, x, facet, coordinates, share)
     if surface.is_line:
@@ -151,10 +150,10 @@ def _rules(kinds):
     """Facets (p,), coordinates (p, 2) and shares (p,) of the points of the facets' rules."""
     facet, coordinates, share = [], [], []
     for kind in np.unique(kinds):
-        own, (points, weights) = np.flatnonzero(kinds == kind), _rule(int(kind))
-        facet.append(np.repeat(own, len(weights)))
-        coordinates.append(np.tile(points, (len(own), 1)))
-        share.append(np.tile(weights, len(own)))
+        alike, (points, weights) = np.flatnonzero(kinds == kind), _rule(int(kind))
+        facet.append(np.repeat(alike, len(weights)))
+        coordinates.append(np.tile(points, (len(alike), 1)))
+        share.append(np.tile(weights, len(alike)))
     return np.concatenate(facet), np.concatenate(coordinates), np.concatenate(share)
 
 

@@ -1,8 +1,8 @@
-"""An object's underside over a grid of nodes: where it can touch (`ObjectPoints`), edges and all.
+"""An object's underside over a grid of nodes: the points that it can touch (`ObjectPoints`), with its edges.
 
-A node near an edge gets the plane of a facet, and its surroundings' heights over that: of the facet over the node, or of that which
-is lowest near it, whichever explains more. Beside a kink, where a node is touched only once the object has come down far enough, it
-gets both (`Beneath`).
+A node near an edge gets the plane of a facet and the heights of its surroundings over it. The facet is the one over the node
+or the lowest one nearby, whichever plane contains more of the surroundings. Beside a kink, where a node is touched only at larger
+depth, the node gets both (`Beneath`).
 """
 
 from collections.abc import Callable
@@ -17,12 +17,12 @@ from softtact.contact.object_points import LOWEST, REACH, SAMPLES, Beneath, Obje
 from softtact.contact.unilateral import depth_on_springs
 from softtact.errors import InputError
 
-_SMOOTH = 0.6        # slope without an edge
-_KINK = 0.1          # change of slope from node to node that is an edge
-_FLAT = 0.05         # of a step, by which what lies in a plane may depart from it
-_MOSTLY = 2.0        # times as much must lie in the plane over a node as in that of what is lowest near it ...
-_ENOUGH = 0.9        # ... or so much of its surroundings
-_ALIKE = 0.99        # share in a plane from which on all of a node's surroundings lie in it
+_SMOOTH = 0.6        # largest slope of a surface without an edge
+_KINK = 0.1          # change of slope from node to node that counts as an edge
+_FLAT = 0.05         # of a step: tolerance of the height of samples in a plane
+_MOSTLY = 2.0        # the facet over a node is taken if its plane contains so many times the share of the lowest facet's plane ...
+_ENOUGH = 0.9        # ... or at least this share of the surroundings
+_ALIKE = 0.99        # share in a plane from which all of a node's surroundings count as lying in it
 _TRAPEZOID = np.array([0.25, 0.5, 0.25])
 
 
@@ -37,15 +37,15 @@ class Underside:
             raise InputError("The object misses every free point of the sensor's surface; move it over the sensor.")
 
     def depth_on_springs(self, force_n: float, foundation_modulus: float) -> float:
-        """How far (mm) the object sinks from its first touch into a support of springs of `foundation_modulus` N/mm3: a first
-        guess.
+        """First guess of the depth (mm) below first touch under a force: on a Winkler foundation of `foundation_modulus` N/mm3,
+        with the heights sampled around the nodes.
         """
         there = self._coarse < NO_CONTACT_MM
         area = np.broadcast_to(np.outer(_TRAPEZOID, _TRAPEZOID).ravel() * np.prod(self._grid.step), there.shape)[there]
         return depth_on_springs(self._coarse[there] - self.lowest_mm, area, force_n / foundation_modulus)
 
     def points(self, reach_mm: float) -> ObjectPoints:
-        """The `ObjectPoints` as far as the object is lower than `reach_mm` over its lowest point."""
+        """The `ObjectPoints` where the object is less than `reach_mm` above its lowest point."""
         near = self._near_edges()
         plain = np.setdiff1d(np.flatnonzero(self._middle < self.lowest_mm + reach_mm), near)
         nodes, gap, slope, window, beneath = self._beside_edges(near, reach_mm)
@@ -57,7 +57,7 @@ class Underside:
                             beneath=beneath)
 
     def nodes(self, reach_mm: float) -> ObjectPoints:
-        """The same with each node under the object held and all others free: blunter, but no node comes down below the object."""
+        """`points` without partial contact at edges: edges are less sharp, but no node is below the object."""
         height, slope = self._facets(self._grid.points)
         kept = np.flatnonzero(height < self.lowest_mm + reach_mm)
         if not len(kept):
@@ -71,12 +71,12 @@ class Underside:
         return self._coarse[:, self._coarse.shape[1] // 2]
 
     def _facets(self, places):
-        """Height (p,) of the object over places (p, 2), and slope (p, 2), none where it misses them."""
+        """Height (p,) of the object over places (p, 2), and slope (p, 2), zero beside the object."""
         height, normal = self._surface(*places.T)
         return height, np.where((height < NO_CONTACT_MM)[:, None], -normal[:, :2] / normal[:, 2:], 0.0)
 
     def _near_edges(self):
-        """Nodes with an edge within a hat's reach and a step's movement."""
+        """Nodes with an edge within the hat function's support or a displacement of one step beyond it."""
         shape, step = self._grid.shape, self._grid.step.min()
         low, high = (bound.reshape(shape) for bound in (self._coarse.min(axis=1), self._coarse.max(axis=1)))
         edges = (low < NO_CONTACT_MM) & (high - low > _SMOOTH * step)
@@ -90,14 +90,14 @@ class Underside:
         return np.flatnonzero(binary_dilation(edges, np.ones((3, 3)), iterations=REACH))
 
     def _beside_edges(self, near, reach_mm):
-        """Nodes near edges that the object may hold: numbers (e,), gaps, slopes and windows; and their `Beneath`."""
+        """Nodes near edges that the object may touch: numbers (e,), gaps, slopes and windows; and their `Beneath`."""
         heights = self._windows(near)
         over_node = self._above(near, heights, np.zeros((len(near), 2)))
         over_lowest = self._above(near, heights, _lowest_places(heights))
         still = np.zeros((len(near), 2))
         tolerance = _FLAT * self._grid.step.min()
-        own, lowest = (hat_shares(np.abs(found[2]), still, tolerance) for found in (over_node, over_lowest))
-        mostly = (own >= _MOSTLY * lowest) | (own >= _ENOUGH)
+        above, lowest = (hat_shares(np.abs(found[2]), still, tolerance) for found in (over_node, over_lowest))
+        mostly = (above >= _MOSTLY * lowest) | (above >= _ENOUGH)
         gap, slope, window = (np.where(mostly.reshape(-1, *(1,) * (a.ndim - 1)), a, b)
                               for a, b in zip(over_node, over_lowest, strict=True))
         kept = (window <= LOWEST * self._grid.step.min()).any(axis=(1, 2)) & (gap < self.lowest_mm + reach_mm)
@@ -108,7 +108,7 @@ class Underside:
     def _above(self, nodes, heights, places):
         """Gaps (e,), slopes (e, 2) and windows of nodes on the planes of the facets over places (e, 2) in steps from them.
 
-        Facets too steep to represent a node's surroundings count as level at their place; none over a place: infinitely high.
+        Facets too steep to represent a node's surroundings count as horizontal; without a facet the gap is NO_CONTACT_MM.
         """
         step, samples = self._grid.step, window_places()
         height, slope = self._facets(self._grid.points[nodes] + places * step)
@@ -136,7 +136,7 @@ class Underside:
 
 
 def _sampled(surface, grid):
-    """Heights (n, 9) at three by three samples of each node's rectangle, up to its sides and the sensor's."""
+    """Heights (n, 9) at three by three samples of each node's rectangle, cut off at the sensor's sides."""
     side = np.linspace(-0.5, 0.5, 3)
     where = grid.points[:, None] + np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2) * grid.step * (1 - 1e-9)
     if grid.sides:
@@ -145,7 +145,7 @@ def _sampled(surface, grid):
 
 
 def _lowest_places(heights):
-    """Where (e, 2), in steps from the node, windows are lowest within a hat's reach; of equals the nearest to the node."""
+    """Offsets (e, 2) in steps from the node to the lowest sample within the hat function's support; the nearest of equal ones."""
     places = window_places()
     x, y = np.meshgrid(places, places)
     within = np.maximum(np.abs(x), np.abs(y)) < 1

@@ -1,11 +1,11 @@
 """A rigid object pressed on an elastic surface of known compliance, all load steps at once.
 
-Unknown are the forces f >= 0 at the contact points:  gap = gap0 - depth + A f >= 0,  f gap = 0,  sum f = F,
-with the compliance A among the points. Primal-dual active sets, that is a semismooth Newton method: points that penetrate join,
-points that pull leave. The equations of a set are solved by conjugate gradients on the plane sum f = const, in single precision
-with the residual in double (iterative refinement). A product with A for twenty load steps takes seven times as long as for one,
-which is what makes the load steps cheap; many presses on a GPU are more columns still (`models/elastic/batch`). Many points that
-settle together suit this; few and changing ones `active_set`, which is the plain method and its specification.
+The unknowns are the forces f >= 0 at the contact points:  gap = gap0 - depth + A f >= 0,  f gap = 0,  sum f = F,
+with the compliance A among the points. Primal-dual active-set (semismooth Newton) method: points that penetrate join the set,
+points in tension leave it. The equations on a set are solved by conjugate gradients on the plane sum f = const, in single precision
+with the residual in double (iterative refinement). A product with A for twenty load steps takes only seven times as long as for
+one; many presses on a GPU add more columns (`models/elastic/batch`). The method suits many points whose contact states settle
+together; for few points use `active_set`, the reference method.
 References: Hintermueller, Ito and Kunisch, SIAM J. Optim. 13 (2003) 865; Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23
 (2001) 1376 (projected conjugate gradients); Johnson, Contact Mechanics, sec. 5.9.
 """
@@ -21,14 +21,14 @@ from softtact.errors import ConvergenceError
 
 _Force = TypeVar("_Force", float, np.ndarray)
 
-_AS_WIDE = 0.8    # share of the last load step's points from which on a load step starts with the last load step's forces, scaled
-# Points are looked for within so many times the expected depth, and so much more; those within RISE times the depth may touch.
+_AS_WIDE = 0.8    # least share of the last load step's points for which a load step starts from the last one's forces, scaled
+# Candidate points lie within REACH times the expected depth plus LEAST_REACH_MM; points within RISE times the depth may touch.
 REACH, LEAST_REACH_MM, RISE = 1.3, 0.1, 1.15
 
 
 @dataclass(frozen=True)
 class ContactSettings:
-    """tolerance_mm: of gaps under pressure and overlaps;  inner_*: of the conjugate gradients."""
+    """tolerance_mm: largest gap under pressure, and largest overlap;  inner_*: limits of the conjugate gradients."""
 
     tolerance_mm: float = 1e-6
     max_iterations: int = 60
@@ -38,7 +38,7 @@ class ContactSettings:
 
 @dataclass(frozen=True)
 class ContactLoadSteps:
-    """Load steps l: forces (c, l) in N, depth (l,) in mm, gaps (c, l) in mm, iterations (l,), settled (l,): which were reached."""
+    """Load steps l: forces (c, l) in N, depth (l,) in mm, gaps (c, l) in mm, iterations (l,), settled (l,): which converged."""
 
     force: np.ndarray
     depth: np.ndarray
@@ -53,7 +53,7 @@ class ContactLoadSteps:
 
 
 class ActingCompliance(Protocol):
-    """What `DenseCompliance` does, on arrays of one kind, NumPy's or torch's."""
+    """The interface of `DenseCompliance`, for NumPy or torch arrays."""
 
     def double(self, force: Any) -> Any: ...
 
@@ -63,7 +63,7 @@ class ActingCompliance(Protocol):
 
 
 class DenseCompliance:
-    """What a matrix (c, c) in mm/N does to forces (c, l), in double and in single precision."""
+    """A compliance matrix (c, c) in mm/N that acts on forces (c, l), in double and in single precision."""
 
     def __init__(self, matrix: np.ndarray) -> None:
         self._double, self._single = (matrix.astype(kind, copy=False) for kind in (np.float64, np.float32))
@@ -77,7 +77,7 @@ class DenseCompliance:
         return self._single @ force
 
     def precondition(self, x: np.ndarray) -> np.ndarray:
-        """About the inverse of `single`: nothing is known of a matrix."""
+        """Approximate inverse of `single`: the identity, as nothing is known about a dense matrix."""
         return x
 
 
@@ -102,7 +102,7 @@ def press_elastic(compliance: np.ndarray, gap0: np.ndarray, forces_n: Sequence[f
 
 
 def not_settled(force_n: float, settings: ContactSettings = ContactSettings()) -> str:
-    """The error of a load step that is not reached."""
+    """The error message of a load step that did not converge."""
     return f"The elastic press did not settle its contact at {force_n:g} N in {settings.max_iterations} iterations."
 
 
@@ -120,7 +120,7 @@ def press_columns(compliance: ActingCompliance, gap0: Any, forces_n: Any, depth:
 
 @dataclass
 class _State:
-    """Forces f (c, m) of all columns, which of them act, depths, gaps, iterations, and which columns have settled."""
+    """Of all columns: forces f (c, m), the active set, depths, gaps, iterations, and which columns have converged."""
 
     f: np.ndarray
     active: np.ndarray
@@ -131,7 +131,7 @@ class _State:
 
 
 class _Press:
-    """The method on columns m, whose presses and last load steps are `press` and `last` (m,)."""
+    """The method on columns m; `press` (m,): the press of each column, `last` (m,): the column of its last load step."""
 
     def __init__(self, compliance, gap0, forces, settings):
         self.xp = array_namespace(gap0)
@@ -151,7 +151,7 @@ class _Press:
         return ContactLoadSteps(force=state.f, depth=state.depth, gap=state.gap, iterations=state.iterations, settled=state.settled)
 
     def _first(self, depth, area):
-        """Forces of springs side by side under the object, as deep as each force asks for."""
+        """First guess: forces of independent springs under the object, at the depth that balances each force."""
         xp = self.xp
         pressed = xp.clip(depth - self.gap0[:, self.press], min=0.0) * area[:, None]
         pressed *= self.forces / xp.sum(pressed, axis=0)
@@ -159,7 +159,7 @@ class _Press:
                       iterations=xp.zeros_like(self.columns), settled=self.columns < 0)
 
     def _scale_down(self, state, below):
-        """Start the load steps below the last one with its forces, scaled, where the contact is about as wide at first guess."""
+        """Start the lower load steps from the last one's scaled forces, where the first guess has about as many active points."""
         xp, last = self.xp, self.last[below]
         points = xp.sum(xp.astype(state.active, xp.int64), axis=0)
         like = points[below] > _AS_WIDE * points[last]
@@ -168,7 +168,7 @@ class _Press:
         state.active[:, below] = state.active[:, last]
 
     def _settle(self, state, columns):
-        """Iterate on some columns until each has settled, or has had its iterations."""
+        """Iterate on some columns until each has converged or reached the iteration limit."""
         for _ in range(self.settings.max_iterations):
             state.settled[columns] = self._evaluate(state, columns)
             columns = columns[~state.settled[columns]]
@@ -177,7 +177,7 @@ class _Press:
             self._newton(state, columns)
 
     def _evaluate(self, state, columns):
-        """Gaps of some columns, with points joined that penetrate and left that pull; which of the columns have settled."""
+        """Update the gaps and active sets of some columns; returns which of these columns have converged."""
         xp, tolerance = self.xp, self.settings.tolerance_mm
         f, active, forces = state.f[:, columns], state.active[:, columns], self.forces[columns]
         gap = self.gap0[:, self.press[columns]] + self.compliance.double(f)
@@ -189,7 +189,7 @@ class _Press:
         return ~unsettled & (xp.abs(xp.sum(f, axis=0) - forces) <= 1e-9 * forces)
 
     def _newton(self, state, columns):
-        """One step of the forces of some columns; what acts no more loses its force."""
+        """One Newton step of the forces of some columns; points that left the active set lose their force."""
         xp, single, precondition = self.xp, self.compliance.single, self.compliance.precondition
         active, before = state.active[:, columns], state.f[:, columns]
         f = xp.where(active, before, 0.0)
@@ -205,10 +205,10 @@ class _Press:
 
 
 def depth_on_springs(gap: np.ndarray, area: np.ndarray, force_over_modulus: _Force) -> _Force:
-    """Depth at which springs side by side, under gaps (c,) >= 0 that begin at 0 and of areas (c,), take a force over their
-    foundation_modulus.
+    """Depth at which independent springs (Winkler foundation) carry a force; the first guess of an elastic press.
 
-    force_over_modulus: area times depth, a number or (l,); a first guess for what an object does on a surface.
+    gap (c,): >= 0 in mm, the least is 0;  area (c,): of the springs
+    force_over_modulus: force over foundation modulus, that is area times depth, a number or (l,)
     """
     order = np.argsort(gap)
     weight, moment = np.cumsum(area[order]), np.cumsum((area * gap)[order])
@@ -218,7 +218,7 @@ def depth_on_springs(gap: np.ndarray, area: np.ndarray, force_over_modulus: _For
 
 def projected_conjugate_gradients(apply: Callable[[Any], Any], precondition: Callable[[Any], Any], mask: Any, right: Any,
                                   total: Any, settings: ContactSettings) -> Any:
-    """x (c, m), zero where mask (c, m) is, with sum x = total (m,) and apply(x) - right constant where it is not."""
+    """x (c, m), zero outside the mask (c, m), with sum x = total (m,) and apply(x) - right constant within the mask."""
     xp = array_namespace(mask)
     right = xp.astype(right, xp.float32)
     along = precondition(mask)
@@ -253,7 +253,7 @@ def _dot(a, b):
 
 @dataclass(frozen=True)
 class ElasticLoadStep:
-    """One load step: forces (c,) in N, displacement (c,) of the points in mm, indentation in mm."""
+    """One load step: nodal forces (c,) in N, displacement (c,) of the points in mm, indentation in mm."""
 
     force_n: float
     nodal_force: np.ndarray
@@ -265,10 +265,10 @@ class ElasticLoadStep:
 
 def active_set(compliance: np.ndarray, gap0: np.ndarray, forces_n: Iterable[float], *,
                max_iterations: int = 200) -> Iterator[ElasticLoadStep]:
-    """Yield an `ElasticLoadStep` for each force: the plain method, load step by load step, with direct solutions.
+    """Yield an `ElasticLoadStep` for each force: the reference method, load step by load step, with direct solutions.
 
-    Solve the touching points' equations, drop those that pull, add those that penetrate; the set of one force starts the next.
-    """
+    It solves the equations of the active points, drops points in tension and adds points that penetrate. The active set of one
+    force is the first guess for the next."""
     active = gap0 <= gap0.min() + 1e-9
     for force in forces_n:
         load_step, active = _solve_load_step(compliance, gap0, active, float(force), max_iterations)

@@ -288,7 +288,7 @@ class LayeredBody:
 
     def penetration(self, state: BodyState) -> float:
         """Deepest penetration in mm, of the object into the cover or of frusta into the board or each other."""
-        return float(max(0.0, -self.slab.top.own_gaps(state.slab).min(), -state.support.gaps.min(initial=np.inf)))
+        return float(max(0.0, -self.slab.top.surface_gaps(state.slab).min(), -state.support.gaps.min(initial=np.inf)))
 
     def descent(self, state: BodyState) -> float:
         """How far the cover has come down where it did most, in mm."""

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from softtact.contact.edges import OVERRUN_MM, ROWS, contact_compliance, continues, covered, face_walls, own_areas
+from softtact.contact.edges import OVERRUN_MM, ROWS, contact_compliance, continues, covered, face_walls, point_areas
 from softtact.contact.friction import Coulomb, FrictionResponse, FrictionState
 from softtact.contact.height_field import NO_CONTACT_MM
 from softtact.contact.penalty import Contact
@@ -51,7 +51,7 @@ class TopContact:
         self.area = (np.linalg.det(edges) * weights).ravel()
         self.reference = self.at_points(mesh.points)
         half = 0.5 * np.ptp(mesh.points[mesh.top[:, :4]][..., :2], axis=1)
-        self._own_area, self._give = own_areas(half, points).reshape(-1, 4, 2), 2.0 * np.sqrt(half.prod(axis=1)) / plane_modulus
+        self._rectangles, self._give = point_areas(half, points).reshape(-1, 4, 2), 2.0 * np.sqrt(half.prod(axis=1)) / plane_modulus
 
     def at_points(self, field: np.ndarray) -> np.ndarray:
         """A nodal field (n, 3) at the points (p, 3)."""
@@ -65,7 +65,7 @@ class TopContact:
         position = self.reference + self.at_points(displacement)
         height, normals = surface(position[:, 0], position[:, 1])
         anchors = np.column_stack([position[:, :2], height])
-        share, foot = covered(position[:, None, :2] + self._own_area, surface)     # type: ignore[arg-type]
+        share, foot = covered(position[:, None, :2] + self._rectangles, surface)     # type: ignore[arg-type]
         # A point beside the object whose area reaches under it faces the plane there.
         base, foot_normals = surface(*foot.T)
         beside = ~continues(height, position[:, :2], base, foot)
@@ -98,9 +98,9 @@ class TopContact:
         offset = self.reference + self.at_points(displacement) - projection.anchors
         return np.einsum("pd,pd->p", projection.normals, offset) + indentation * projection.normals[:, 2]
 
-    def own_gaps(self, state: SlabState) -> np.ndarray:
+    def surface_gaps(self, state: SlabState) -> np.ndarray:
         """Gaps (p,) of the points that lie under the object, without what edges give way; of those beside it one that says so."""
-        return np.where(state.projection.beside, NO_CONTACT_MM, self.contact_of(state).own_gaps(state.gaps))
+        return np.where(state.projection.beside, NO_CONTACT_MM, self.contact_of(state).surface_gaps(state.gaps))
 
     def error(self, state: SlabState) -> float:
         """Deepest overlap, or widest gap under pressure, in mm of points that lie under the object."""
