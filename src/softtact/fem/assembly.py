@@ -1,7 +1,7 @@
-"""The upper triangle of a symmetric matrix over a mesh: its pattern, and where each element's entries are in it.
+"""The upper triangle of a symmetric matrix over a mesh: its sparsity pattern, and the positions of each element's entries.
 
-Built by nodes, not by unknowns: nine times less to sort. An unknown is a free component of a node, numbered node by node.
-"""
+The pattern is built from the graph of the nodes, with a ninth of the entries to sort. Unknowns are the free components of nodes,
+numbered node by node."""
 
 from collections.abc import Sequence
 
@@ -11,9 +11,9 @@ from numba import njit
 
 
 class SymmetricPattern:
-    """Pattern of the unknowns that meet in an element.
+    """Pattern of the unknowns that share an element.
 
-    free (n, 3): which components of the nodes are unknown; elements: arrays (e, m) of node numbers, one per kind.
+    free (n, 3): which components of the nodes are unknowns; elements: arrays (e, m) of node numbers, one per kind.
     """
 
     def __init__(self, free: np.ndarray, elements: Sequence[np.ndarray]) -> None:
@@ -31,13 +31,13 @@ class SymmetricPattern:
         return sp.csr_matrix((np.zeros(len(self.indices)), self.indices, self.indptr), shape=(self.size, self.size))
 
     def positions(self, nodes: np.ndarray) -> np.ndarray:
-        """Places (e, k (k + 1) / 2) in the values of the entries (i, j >= i) of elements (e, m), k = 3 m; -1 where held."""
+        """Positions (e, k (k + 1) / 2) of the entries (i, j >= i) of elements (e, m) in the values, k = 3 m; -1 where fixed."""
         return _positions(np.ascontiguousarray(nodes), self.number, self._rank, self._starts, self._neighbours, self._before,
                           self.indptr)
 
 
 def _ragged(elements):
-    """Node numbers of elements of all kinds in one array, and where each element begins."""
+    """Node numbers of elements of all kinds in one array, and the offset of each element."""
     sizes = np.concatenate([np.full(len(nodes), nodes.shape[1]) for nodes in elements])
     return np.concatenate([[0], np.cumsum(sizes)]), np.concatenate([nodes.ravel() for nodes in elements])
 
@@ -79,7 +79,7 @@ def _node_graph(counts, offsets, members):
 
 @njit(cache=True, nogil=True)
 def _columns_before(starts, neighbours, counts):
-    """How many unknowns a node's row has before each of its neighbours."""
+    """Number of unknowns in a node's row before each of its neighbours."""
     before = np.empty(len(neighbours), np.int64)
     for a in range(len(starts) - 1):
         total = 0
@@ -91,7 +91,7 @@ def _columns_before(starts, neighbours, counts):
 
 @njit(cache=True, nogil=True)
 def _expand(number, counts, starts, neighbours):
-    """indptr and indices (int32) of the unknowns from the graph of the nodes."""
+    """indptr and indices (int32) of the unknowns' pattern from the graph of the nodes."""
     size = counts.sum()
     indptr = np.zeros(size + 1, np.int32)
     for a in range(len(counts)):
@@ -120,7 +120,7 @@ def _expand(number, counts, starts, neighbours):
 
 @njit(cache=True, nogil=True)
 def _place_of(value, low, high, wanted):
-    """The place of the wanted value among the rising ones from low to high."""
+    """Index of the wanted value among the rising values from low to high (binary search)."""
     while high - low > 1:
         middle = (low + high) // 2
         if value[middle] <= wanted:
@@ -157,7 +157,7 @@ def _positions(nodes, number, rank, starts, neighbours, before, indptr):
 
 @njit(cache=True, nogil=True, inline="always")
 def _entries_before(row, size):
-    """The place that column 0 of a row would have among the entries (i, j >= i) of a matrix, row by row."""
+    """The position that column 0 of a row would have among the entries (i, j >= i) of a matrix, row by row."""
     return row * size - row * (row - 1) // 2 - row
 
 
@@ -176,7 +176,7 @@ def add_upper(values: np.ndarray, matrices: np.ndarray, positions: np.ndarray) -
 
 
 def upper_pattern(members: Sequence[np.ndarray], size: int) -> tuple[np.ndarray, np.ndarray]:
-    """indptr, indices of the upper triangle of all unknowns that meet in an element; members (e, k), -1 where held."""
+    """indptr, indices of the upper triangle of all unknowns that share an element; members (e, k), -1 where fixed."""
     starts = np.cumsum([0, *map(len, members)])
     rows = np.concatenate([np.repeat(np.arange(first, first + len(dofs)), dofs.shape[1])
                            for first, dofs in zip(starts, members, strict=False)])
@@ -190,9 +190,9 @@ def upper_pattern(members: Sequence[np.ndarray], size: int) -> tuple[np.ndarray,
 
 @njit(cache=True, nogil=True)
 def upper_positions(indptr: np.ndarray, indices: np.ndarray, dofs: np.ndarray) -> np.ndarray:
-    """Places (e, k (k + 1) / 2) in the values of the upper triangle for entries (i, j >= i) of matrices of unknowns (e, k).
+    """Positions (e, k (k + 1) / 2) in the upper triangle's values of the entries (i, j >= i) of element matrices, unknowns (e, k).
 
-    -1 where one is held.
+    -1 where one is fixed.
     """
     elements, size = dofs.shape
     out = np.full((elements, size * (size + 1) // 2), -1, np.int32)

@@ -1,9 +1,9 @@
-"""A body of quadratic tetrahedra from any closed surface, and how good it is.
+"""A body of quadratic tetrahedra from any closed surface, and measures of its quality.
 
     mesh = mesh_body("finger.stl", unit="mm", size_mm=0.8).with_faces(back=lambda middles: middles[:, 2] < 0.01)
 
-The corners come from `geometry.tetrahedra`. Nodes in the middles of the outer edges are moved onto the given surface, so that the
-elements follow it to third order of their size, wherever that leaves all elements valid.
+The corners come from `geometry.tetrahedra`. Mid-side nodes of the outer edges are moved onto the given surface wherever all
+elements remain valid, so that the elements approximate it to third order of their size.
 """
 
 from dataclasses import asdict, dataclass
@@ -21,22 +21,22 @@ from softtact.geometry.meshes import UNIT_MM, check_body, plausible_facets, read
 from softtact.geometry.tetrahedra import ClosestPoints, check_fillable, fill, quality
 
 MOST_ELEMENTS = 400_000      # about 1.7 million unknowns
-_ENVELOPE = 0.05             # of the size: how far fTetWild's outside may be from the surface; less makes it refine what is curved
+_ENVELOPE = 0.05             # of the size: tolerance of fTetWild's surface; smaller values refine curved parts
 _LEAST_JACOBIAN = 0.3        # of the straight element's: least determinant at any point of a curved one
-_MOST_VOLUME_ERROR = 0.05    # what loses more of its body has lost parts of it
-_QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])     # linear triangles of a quadratic one's nodes
+_MOST_VOLUME_ERROR = 0.05    # a larger loss of volume means that parts of the body are missing
+_QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])     # linear triangles between a quadratic triangle's nodes
 
 
 @dataclass(frozen=True)
 class BodyReport:
-    """How a mesh of tetrahedra fits its surface, and how good its elements are."""
+    """Deviation of a mesh of tetrahedra from its surface, and quality of its elements."""
 
     elements: int
     """Number of tetrahedra."""
     nodes: int
-    """Number of nodes, those in the middles of edges among them."""
+    """Number of nodes, mid-side nodes included."""
     unknowns: int
-    """Three for each node, before any face is held."""
+    """Three for each node, without boundary conditions."""
     volume_mm3: float
     """Volume of the elements."""
     volume_error: float
@@ -46,11 +46,11 @@ class BodyReport:
     deviation_rms_mm: float
     """Root mean square distance of the mesh's outside from the surface."""
     least_quality: float
-    """Least mean ratio of the elements' corners: 1 of a regular tetrahedron, 0 of a flat one."""
+    """Least mean ratio of the elements' corners: 1 for a regular tetrahedron, 0 for a flat one."""
     mean_quality: float
-    """Mean of the same."""
+    """Average of the elements' mean ratios."""
     least_jacobian: float
-    """Least determinant of the Jacobian in an element over that of the straight one: 1 of straight elements."""
+    """Least determinant of the Jacobian in an element over that of the straight one: 1 for straight elements."""
 
     def as_dict(self) -> dict[str, Any]:
         """The fields by name."""
@@ -62,14 +62,14 @@ def mesh_body(surface: str | Path | trimesh.Trimesh, *, size_mm: float, unit: st
     """A `SolidMesh` of quadratic tetrahedra (tetra10) that fill a closed surface.
 
     surface: an STL, OBJ or PLY file, or a `trimesh.Trimesh`
-    size_mm: edge length aimed at
-    unit: of the surface: mm, cm, m, inch or in; a file needs it, a Trimesh is in mm without it
-    region: name of the mesh's one region; `SolidMesh.with_regions` divides it, `SolidMesh.with_faces` names faces
-    envelope_mm: how far the outside may be from the surface before its nodes are moved onto it, by default a twentieth of the size;
-        details smaller than that are lost, and a smaller one makes smaller elements where the surface is curved
-    most_elements: what would have more is refused;  threads: of the mesher
+    size_mm: target edge length
+    unit: of the surface: mm, cm, m, inch or in; required for a file; a Trimesh is in mm by default
+    region: name of the mesh's only region; `SolidMesh.with_regions` divides it, `SolidMesh.with_faces` names faces
+    envelope_mm: tolerance of the mesh's surface before its nodes are moved onto the given one, by default a twentieth of the size;
+        smaller details are lost, and a smaller tolerance makes smaller elements where the surface is curved
+    most_elements: larger meshes are refused;  threads: of the mesher
 
-    A repetition gives another mesh, as good (see `geometry.tetrahedra`): write the mesh, and keep the file.
+    A repeated call gives a different mesh of like quality (see `geometry.tetrahedra`): write the mesh, and keep the file.
     Raises InputError where the surface is open, intersects itself or is of an implausible size, where elements would be larger than
     the body or too many, and where the mesh loses more than 5 % of the body. It needs the extra `mesh`.
     """
@@ -89,7 +89,7 @@ def mesh_body(surface: str | Path | trimesh.Trimesh, *, size_mm: float, unit: st
 
 
 def closed_surface(surface: str | Path | trimesh.Trimesh, *, unit: str | None = None) -> tuple[trimesh.Trimesh, str]:
-    """A surface (mm) that bounds a body, checked, and what messages call it."""
+    """A checked surface (mm) that bounds a body, and its name in messages."""
     if not isinstance(surface, trimesh.Trimesh):
         return read_mesh(surface, unit=unit), str(surface)     # type: ignore[arg-type]
     name = Path("The surface")
@@ -117,7 +117,7 @@ def body_report(mesh: SolidMesh, surface: trimesh.Trimesh) -> BodyReport:
     given = np.asarray(surface.vertices)
     lost = np.linalg.norm(given - outside(given), axis=1).max()
     ratio, volume = quality(mesh.points[nodes[:, :4]]), mesh.volume_mm3()
-    curved = nodes[np.isin(nodes, facets[:, 3:]).any(axis=1)]     # inside, edges are straight
+    curved = nodes[np.isin(nodes, facets[:, 3:]).any(axis=1)]     # inner edges are straight
     used = len(np.unique(nodes))
     return BodyReport(elements=len(nodes), nodes=used, unknowns=3 * used, volume_mm3=volume,
                       volume_error=volume / volume_of(surface) - 1, deviation_mm=float(max(away.max(), lost)),
@@ -126,7 +126,7 @@ def body_report(mesh: SolidMesh, surface: trimesh.Trimesh) -> BodyReport:
 
 
 def _curved(mesh: SolidMesh, closest: ClosestPoints) -> np.ndarray:
-    """The mesh's points with the nodes in the middles of outer edges on the surface, but where an element would fold."""
+    """The mesh's points with the mid-side nodes of outer edges on the surface, except where an element would be inverted."""
     nodes, middles = mesh.cells[0][2], np.unique(mesh.boundary["triangle6"][:, 3:])
     points = mesh.points.copy()
     points[middles] = closest(points[middles])

@@ -1,10 +1,10 @@
-"""The elements in use, a record each: nodes, shape functions, faces, quadrature, and their names and orders in other programs.
+"""The elements: nodes, shape functions, faces, quadrature, and their names and node orders in other programs.
 
-The 20-node hexahedron is cheap, and keeps its order where it is a parallelepiped. The full quadratic elements, HEX27 and WEDGE18,
-are a plane element at the bottom, the top and the middle; they stay quadratic where they are distorted (Arnold, Boffi and Falk,
-Math. Comp. 71 (2002) 909).
+The 20-node hexahedron is cheap, and keeps its order of convergence as a parallelepiped. The full quadratic elements HEX27 and
+WEDGE18 have the nodes of a plane element at the bottom, the top and the middle; they keep the order also when distorted (Arnold,
+Boffi and Falk, Math. Comp. 71 (2002) 909).
 
-A shape function gives values (n, m) and derivatives (n, m, d) at points (n, d) in parent coordinates.
+A shape function returns values (n, m) and derivatives (n, m, d) at points (n, d) in parent coordinates.
 """
 
 from collections.abc import Callable
@@ -107,7 +107,7 @@ def linear_simplex(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def lifted(points: np.ndarray, *, base: Callable) -> tuple[np.ndarray, np.ndarray]:
-    """Products of a plane element's functions `base` with the quadratic ones in height, of its bottom, top and middle nodes."""
+    """Products of a plane element's functions `base` with quadratic ones along the height, for bottom, top and middle nodes."""
     points = np.asarray(points, dtype=float)
     values, slopes = base(points[:, :2])
     (z, dz), order = _along(points[:, 2]), [2, 1, 0]
@@ -121,7 +121,7 @@ def lifted(points: np.ndarray, *, base: Callable) -> tuple[np.ndarray, np.ndarra
 
 @dataclass(frozen=True, eq=False)
 class Face:
-    """A face: the element that it is, and which nodes of the whole element (k,) are its own, in that element's order."""
+    """A face: its element type, and its nodes (k,) among those of the parent element, in the order of that type."""
 
     element: "Element"
     nodes: np.ndarray
@@ -136,8 +136,8 @@ class Element:
     quadrature: the full rule;  reduced: the rule with a point less along each side, None where it is not used
     faces: in Abaqus' order S1, S2, ...: of a solid its bottom, counter-clockwise seen from inside, then its top where it has one
         and its sides, counter-clockwise seen from outside; of a plane element its sides
-    meshio_name, vtk_order: the cell's name in meshio, and our nodes in VTK's order: cells[:, vtk_order]
-    abaqus_name, abaqus_nodes: the element of Abaqus and CalculiX of the same shape, and which of our nodes it has, in its order;
+    meshio_name, vtk_order: the cell's name in meshio, and the permutation to VTK's node order: cells[:, vtk_order]
+    abaqus_name, abaqus_nodes: the corresponding element of Abaqus and CalculiX, and its nodes among these, in its order;
         dialects add letters to the name
     """
 
@@ -153,7 +153,7 @@ class Element:
 
     @cached_property
     def corners(self) -> int:
-        """How many corners it has; in VTK's order they are its first nodes."""
+        """Number of corners; in VTK's order they are the first nodes."""
         if self.nodes.shape[1] < 3:
             return len(self.faces) or 2
         return len(np.unique(np.concatenate([face.nodes[:face.element.corners] for face in self.faces])))
@@ -177,7 +177,7 @@ class Element:
 def reference_gradients(coordinates: np.ndarray, derivatives: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Gradients in the reference configuration.
 
-    coordinates (e, m, d) in mm, derivatives (g, m, d), weights (g,); d = 3, or 2 of plane elements.
+    coordinates (e, m, d) in mm, derivatives (g, m, d), weights (g,); d = 3, or 2 for plane elements.
     Returns gradients (e, g, m, d) in 1/mm and volumes (e, g) in mm3 (mm2). Raises ValueError on an inverted element.
     """
     jacobian = np.einsum("emi,gmj->egij", coordinates, derivatives, optimize=True)
@@ -267,7 +267,7 @@ HEX20 = Element(
 
 
 def _side(a, b, middle, plane):
-    """Nodes of the side over the edge from a to b of a plane element of so many nodes, in the order of QUAD9."""
+    """Nodes in the order of QUAD9 of the side over the edge from a to b of a plane element with `plane` nodes."""
     low, high, between = 0, plane, 2 * plane
     return [a + low, b + low, b + high, a + high, middle + low, b + between, middle + high, a + between, middle + between]
 
@@ -327,10 +327,10 @@ TET10 = Element(np.vstack([TET4.nodes, 0.5 * (TET4.nodes[[0, 1, 2, 0, 1, 2]] + T
                 quadratic_tetrahedron, tetrahedron_rule15(), "tetra10", np.arange(10),
                 _faces(TRI6, [[0, 1, 2, 4, 5, 6], [0, 1, 3, 4, 8, 7], [1, 2, 3, 5, 9, 8], [2, 0, 3, 6, 7, 9]]),
                 reduced=tetrahedron_rule4(), abaqus_name="C3D10", abaqus_nodes=np.arange(10))
-"""Quadratic tetrahedron: TET4 and the middles of its edges 01, 12, 20, 03, 13, 23. Its reduced rule of four points integrates
-the energy of straight elements at small strain exactly, and is the usual one."""
+"""Quadratic tetrahedron: TET4 and the mid-sides of its edges 01, 12, 20, 03, 13, 23. Its reduced rule of four points integrates
+the small-strain energy of straight elements exactly, and is the usual one."""
 
 
 def dofs_of(nodes: np.ndarray) -> np.ndarray:
-    """Unknowns (..., 3 k) of nodes (..., k): x, y and z of one node side by side."""
+    """Unknowns (..., 3 k) of nodes (..., k): x, y and z of each node in a row."""
     return (3 * nodes[..., None] + np.arange(3)).reshape(*nodes.shape[:-1], -1)

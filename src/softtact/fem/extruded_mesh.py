@@ -1,4 +1,4 @@
-"""Meshes made by lifting a plan of quadratic quadrilaterals and triangles through levels of height; where points lie in a plan."""
+"""Meshes extruded from a 2-D mesh of quadratic quadrilaterals and triangles; interpolation in a 2-D mesh."""
 
 import itertools
 from collections.abc import Callable, Sequence
@@ -10,9 +10,9 @@ from scipy.spatial import cKDTree
 
 from softtact.fem.elements import QUAD8, QUAD9, TRI6
 
-_SAME = 1e-7   # mm: nodes nearer than this are one
+_SAME = 1e-7   # mm: nodes closer than this are merged
 NO_TRIANGLES = np.zeros((0, 6, 2))
-_NEAREST = 16        # elements, by their middles, in which a point of the plan is looked for
+_NEAREST = 16        # elements with the nearest centres in which a point is searched for
 _NEWTON_STEPS = 30
 _INSIDE = 1e-6       # in parent coordinates, of which an element spans 2 or 1
 _AT_POINT = 1e-9         # mm
@@ -21,9 +21,9 @@ _STARTS = np.linspace(0.0, 1.0, 9)
 
 @dataclass(frozen=True)
 class Mesh2D:
-    """points (n, 2), of which the first `corners` are element corners; quads (q, 8 or 9), triangles (t, 6).
+    """points (n, 2) in mm, of which the first `corners` are element corners; quads (q, 8 or 9), triangles (t, 6).
 
-    Elements list corners, mid-sides, and the 9-node quad its centre.
+    An element's nodes are its corners, then its mid-sides, and for the 9-node quad its centre.
     """
 
     points: np.ndarray
@@ -32,7 +32,7 @@ class Mesh2D:
     triangles: np.ndarray = field(default_factory=lambda: np.zeros((0, 6), dtype=np.int64))
 
     def outer_sides(self) -> tuple[np.ndarray, ...]:
-        """Quads (k,) and their sides (k,), numbered as in `QUAD9.faces`, that belong to no other element."""
+        """Quads (k,) and the numbers (k,) of their sides, as in `QUAD9.faces`, that no other element shares."""
         sides = np.sort(self.quads[:, QUAD9.sides[:, :2]], axis=2)     # by their corners
         others = np.sort(self.triangles[:, TRI6.sides[:, :2]], axis=2)
         _, where, counts = np.unique(np.vstack([sides.reshape(-1, 2), others.reshape(-1, 2)]), axis=0, return_inverse=True,
@@ -44,7 +44,7 @@ class Mesh2D:
 class HexMesh:
     """points (n, 3) in mm; hexes (e, 20 or 27), wedges (w, 18), layer by layer from below.
 
-    `planes` (levels, plan points): node numbers between the layers.
+    `planes` (heights, points of the 2-D mesh): node numbers between the layers.
     """
 
     points: np.ndarray
@@ -59,14 +59,14 @@ class HexMesh:
 
     @property
     def inner_planes(self) -> np.ndarray:
-        """Node numbers (2 layers, plan points) of the planes below the top, those in the middle of layers among them.
+        """Node numbers (2 layers, points of the 2-D mesh) of all planes below the top, including the layers' middle planes.
 
-        Only of a mesh whose layers have all the plan's points in their middle.
+        Only for a mesh whose middle planes have all points of the 2-D mesh (27-node hexahedra).
         """
         return np.vstack([self.planes[:-1], *(self.middle(k) for k in range(self.layers))])
 
     def middle(self, index: int) -> np.ndarray:
-        """Node numbers (plan points,) in the middle of one layer, of a mesh that has them all."""
+        """Node numbers (points of the 2-D mesh,) in the middle plane of one layer, of a mesh with full middle planes."""
         count = self.planes.shape[1]
         return self.planes.size + index * count + np.arange(count)
 
@@ -80,7 +80,7 @@ class HexMesh:
 
 
 def extrude(mesh_2d: Mesh2D, heights: Sequence[float] | np.ndarray, *, scale: Callable[[float], float] | None = None) -> HexMesh:
-    """Lift a plan mesh through `levels` (increasing z in mm); `scale(z)` multiplies the plan's coordinates.
+    """Extrude a 2-D mesh through `heights` (increasing z in mm); `scale(z)` multiplies the coordinates x and y.
 
     8-node quads become 20-node hexahedra, 9-node quads 27-node ones, triangles 18-node wedges.
     """
@@ -132,7 +132,7 @@ def grid_mesh_2d(x_lines: np.ndarray, y_lines: np.ndarray) -> Mesh2D:
 
 
 def merge(quads: np.ndarray, triangles: np.ndarray = NO_TRIANGLES) -> Mesh2D:
-    """Plan mesh of elements given by their nodes' coordinates, quads (q, 9, 2) and triangles (t, 6, 2) in mm."""
+    """2-D mesh of elements given by their nodes' coordinates: quads (q, 9, 2) and triangles (t, 6, 2) in mm."""
     corners = np.vstack([quads[:, :4].reshape(-1, 2), triangles[:, :3].reshape(-1, 2)])
     others = np.vstack([quads[:, 4:].reshape(-1, 2), triangles[:, 3:].reshape(-1, 2)])
     corner_points, corner = _unique(corners)
@@ -145,7 +145,7 @@ def merge(quads: np.ndarray, triangles: np.ndarray = NO_TRIANGLES) -> Mesh2D:
 
 
 def with_centres(quads: np.ndarray) -> np.ndarray:
-    """8-node quads (q, 8, 2) with their centres as ninth nodes (the 8-node map's centre, so that the shape is the same)."""
+    """9-node quads (q, 9, 2) from 8-node quads (q, 8, 2); the ninth node is the centre of the 8-node map, so the shape is kept."""
     centre = QUAD8.shape(np.zeros((1, 2)))[0] @ quads
     return np.concatenate([quads, centre], axis=1)
 
@@ -156,7 +156,7 @@ def _unique(points):
 
 
 def refine(mesh_2d: Mesh2D, times: int = 1) -> Mesh2D:
-    """Split every element of a plan mesh into four, on the same curves."""
+    """Split every element of a 2-D mesh into four, on the same curves."""
     for _ in range(times):
         mesh_2d = merge(_split(mesh_2d.points[mesh_2d.quads], QUAD9.shape, QUAD9.nodes, _QUAD_CHILDREN),
                      _split(mesh_2d.points[mesh_2d.triangles], TRI6.shape, TRI6.nodes, _TRIANGLE_CHILDREN))
@@ -176,9 +176,9 @@ def _split(nodes, shape, parent, children):
 
 _AXES = np.deg2rad([0, 90, 180, 270])
 _DIAGONALS = _AXES + np.pi / 4
-CORE_RADIUS = 0.5   # of the inner square's corners: all five quads of similar size
-# A quadratic arc over 90 degrees with its mid-side node on the circle encloses 1.2 % too little. The ends stay on the circle, where
-# frusta touch; the middle moves out to this radius, so that the disc's area is exactly pi: 8/3 sqrt(2) m - 2/3 = pi.
+CORE_RADIUS = 0.5   # of the inner square's corners: all five quads have similar sizes
+# A quadratic arc over 90 degrees with its mid-side node on the circle encloses 1.2 % too little area. The ends stay on the circle,
+# where frusta touch; the middle is moved out to this radius m, so that the disc's area is exactly pi: 8/3 sqrt(2) m - 2/3 = pi.
 DISC_MIDDLE_RADIUS = (np.pi + 2 / 3) * 3 / (8 * np.sqrt(2))
 
 
@@ -197,9 +197,9 @@ def _ring_quads(inner, inner_mid, outer, outer_mid):
 
 
 def disc_quads(rings: int = 1, core: float = CORE_RADIUS) -> np.ndarray:
-    """Unit disc as an O-grid of a square core and `rings` rings of four quads (1 + 4 rings, 9, 2), the thinner the farther out.
+    """Unit disc as an O-grid of a square core and `rings` rings of four quads (1 + 4 rings, 9, 2); outer rings are thinner.
 
-    Corners of the outer sides lie at 0, 90, 180 and 270 degrees.
+    The corners of the outer sides are at 0, 90, 180 and 270 degrees.
     """
     inner = _ring(core, _AXES)
     inner_mid = _ring(0.5 * core * (np.cos(np.pi / 4) + 0.5), _DIAGONALS)
@@ -218,7 +218,7 @@ def disc_mesh_2d(refinement: int = 0, rings: int = 1, core: float = CORE_RADIUS)
 def cell_mesh_2d(pitch: float, diameter: float, rings: int = 1, core: float = CORE_RADIUS) -> tuple[np.ndarray, np.ndarray]:
     """One cell of a lattice of discs: quads (q, 9, 2) and triangles (4, 6, 2) in mm, the first quads being `disc_quads`.
 
-    Along each side of the cell lie two elements. Where the discs of neighbours do not touch a ring of quads surrounds the disc.
+    Each side of the cell has two elements. If neighbouring discs do not touch, a ring of quads surrounds the disc.
     """
     half, radius = 0.5 * pitch, 0.5 * diameter
     quads = [radius * disc_quads(rings, core)]
@@ -236,11 +236,11 @@ def cell_mesh_2d(pitch: float, diameter: float, rings: int = 1, core: float = CO
 
 @dataclass(frozen=True)
 class SheetMesh2D:
-    """Plan of the sheet over a lattice of frusta: its quads and triangles cell by cell, then the strips at the edges.
+    """2-D mesh of the sheet over a lattice of frusta: quads and triangles cell by cell, then the strips at the edges.
 
-    roots (f, disc nodes): each frustum's own, in the order of `disc_mesh_2d`; cell_quads: how many quads a cell has.
-    quarters: nodes (k, 4) at the quarters of the cells' walls, each with the nearer corner, the middle and the farther
-    corner, and the three weights of a quadratic curve through these; none in a refined plan.
+    roots (f, disc nodes): nodes of each frustum's root in the order of `disc_mesh_2d`; cell_quads: number of quads of a cell.
+    quarters: nodes (k, 4) at the quarter points of the cells' edges, each with the nearer corner, the middle and the farther
+    corner, and the three weights of the quadratic curve through these; none in a refined mesh.
     """
 
     mesh_2d: Mesh2D
@@ -272,7 +272,7 @@ def _quarters(mesh_2d, centres, pitch, refinement):
 
 
 def _find(points, wanted):
-    """Numbers (n,) of the points that lie at the wanted places."""
+    """Numbers (n,) of the points at the wanted places."""
     from scipy.spatial import cKDTree
 
     distance, index = cKDTree(points).query(wanted)
@@ -282,7 +282,7 @@ def _find(points, wanted):
 
 
 def _strips(counts, pitch, footprint):
-    """Quads (q, 9, 2) between the lattice and the footprint's edges, two along each pitch; none where there is no room."""
+    """Quads (q, 9, 2) between the lattice and the footprint's edges, two for each pitch; none where there is no room."""
     lines = []
     for side, count in zip(footprint, counts, strict=True):
         inner = 0.5 * pitch * (np.arange(2 * count + 1) - count)
@@ -295,9 +295,9 @@ def _strips(counts, pitch, footprint):
 
 
 def interpolation_2d(mesh_2d: Mesh2D, points: np.ndarray) -> sp.csr_matrix:
-    """Sparse matrix (p, plan points) that interpolates a nodal field of a full quadratic `Mesh2D` at points (p, 2) in mm.
+    """Sparse matrix (p, mesh points) that interpolates a nodal field of a full quadratic `Mesh2D` at points (p, 2) in mm.
 
-    Raises ValueError for a point outside the plan.
+    Raises ValueError for a point outside the mesh.
     """
     rows, nodes, values = [], [], []
     missing = np.arange(len(points))
@@ -334,7 +334,7 @@ class _Triangles:
 
 
 def _search(kind, elements, corners, points):
-    """Which points (p,) lie in elements of a kind; of those found the element (f,) and the shape values (f, w)."""
+    """Which points (p,) lie in elements of a kind, and for those the element (f,) and the shape values (f, w)."""
     _, near = cKDTree(corners.mean(axis=1)).query(points, k=min(_NEAREST, len(elements)))
     near = near.reshape(len(points), -1)
     element, values = np.full(len(points), -1), np.zeros((len(points), elements.shape[1]))
@@ -352,8 +352,8 @@ def _search(kind, elements, corners, points):
 def _parent(kind, corners, points):
     """Parent coordinates (p, 2) of points (p, 2), each in its element (p, w, 2), by Newton's method.
 
-    It starts from the nearest of many places: triangles between touching circles have a cusp, into which no path leads from
-    far away.
+    It starts from the nearest of many start points: triangles between touching circles have a cusp, into which Newton's
+    method does not converge from afar.
     """
     at_starts = np.einsum("sa,pad->psd", kind.shape(kind.starts)[0], corners)
     parent = kind.starts[((at_starts - points[:, None]) ** 2).sum(axis=2).argmin(axis=1)]

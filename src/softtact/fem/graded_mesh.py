@@ -1,7 +1,7 @@
-"""The cover's mesh: hexahedra of 20 nodes in layers, in each of which rectangles of a grid may be split in four, repeatedly.
+"""The cover's mesh: layers of 20-node hexahedra on a grid, in each of which cells can be split into four, repeatedly.
 
-Where a small element meets a larger one its nodes follow the larger one's face. A quadratic serendipity face, cut in four, spans
-different functions on each part; so the displacement is continuous, and nodes that follow are no unknowns.
+Where a small element meets a larger one, its hanging nodes are constrained to the larger one's face. A quarter of a serendipity
+face reproduces the functions of the whole face; so the displacement is continuous, and hanging nodes are not unknowns.
 """
 
 from collections.abc import Callable
@@ -13,16 +13,16 @@ import scipy.sparse as sp
 from softtact.fem.elements import HEX20
 from softtact.fem.extruded_mesh import grid_mesh_2d
 
-_ROUNDS = 20   # nodes may follow nodes that follow others; each round resolves one generation
+_ROUNDS = 20   # masters of hanging nodes may hang themselves; each round resolves one level
 
 
 @dataclass(frozen=True)
 class CoverMesh:
     """points (n, 3) in mm, of which the free ones come first; hexes (e, 20), layer by layer from below.
 
-    follow (n, free): displacements of all points from those of the free ones
-    top, bottom (t, 8): faces in the order of QUAD8_NODES;  bottom_cells, top_cells (ny 2^m, nx 2^m): which of
-    these is where
+    follow (n, free): matrix of the hanging-node constraints: displacements of all points from those of the free ones
+    top, bottom (t, 8): faces in the order of QUAD8_NODES;  bottom_cells, top_cells (ny 2^m, nx 2^m): index of the face
+    on each cell of the finest grid
     """
 
     points: np.ndarray
@@ -35,7 +35,7 @@ class CoverMesh:
 
     @property
     def free(self) -> int:
-        """Number of points that follow no others; they are the first ones."""
+        """Number of free points, which are the first ones; the others are hanging nodes."""
         return self.follow.shape[1]
 
     @property
@@ -51,7 +51,7 @@ class CoverMesh:
         return nodes[nodes < self.free]
 
     def masters(self) -> tuple[np.ndarray, np.ndarray]:
-        """Free points (n, w) that each point follows, and with which weights (n, w); unused places have weight 0."""
+        """Master nodes (n, w) of each point and their weights (n, w); unused entries have weight 0."""
         width = int(np.diff(self.follow.indptr).max())
         nodes, weights = np.zeros((len(self.points), width), dtype=np.int64), np.zeros((len(self.points), width))
         row = np.repeat(np.arange(len(self.points)), np.diff(self.follow.indptr))
@@ -61,9 +61,9 @@ class CoverMesh:
 
 
 def split_depths(shape: tuple[int, int], wanted: Callable[[np.ndarray, float, int], np.ndarray], most: int) -> np.ndarray:
-    """How often each place of a grid is split (ny 2^most, nx 2^most), for a grid of `shape` (nx, ny).
+    """Split depths (ny 2^most, nx 2^most) on the finest grid, for a grid of `shape` (nx, ny).
 
-    `wanted(low, size, level)` gives which cells, by their lower corners (c, 2) and size in units of the grid, to split.
+    `wanted(low, size, depth)` returns which cells to split, given their lower corners (c, 2) and size in units of the grid.
     """
     nx, ny = shape
     depth = np.zeros((ny << most, nx << most), dtype=np.int64)
@@ -79,8 +79,8 @@ def split_depths(shape: tuple[int, int], wanted: Callable[[np.ndarray, float, in
 def cover_mesh(x_lines: np.ndarray, y_lines: np.ndarray, heights: np.ndarray, splits: np.ndarray) -> CoverMesh:
     """Hexahedra between `heights` (k + 1,) in mm over a grid.
 
-    levels (k, ny 2^m, nx 2^m): how often the cells are split where, layer by layer from below.
-    Of a single height a mesh of faces alone.
+    splits (k, ny 2^m, nx 2^m): split depth of each cell of the finest grid, layer by layer from below.
+    A single height gives a mesh of faces only.
     """
     if len(heights) == 1:
         return _faces_alone(x_lines, y_lines, heights[0])
@@ -115,7 +115,7 @@ def _faces_alone(x_lines, y_lines, height):
 
 
 def _owners(leaves, shape):
-    """Which of a layer's cells is at each place of the finest grid."""
+    """Index of a layer's cell at each cell of the finest grid."""
     owner = np.empty(shape, dtype=np.int64)
     for number, (x, y, block) in enumerate(leaves):
         owner[y // 2:y // 2 + block, x // 2:x // 2 + block] = number
@@ -139,7 +139,7 @@ def _leaves(depth, most):
 
 
 def _hanging(places, hexes, low, half, cells):
-    """Nodes (h,) that lie on an element without being its nodes; the largest such element's nodes (h, 20) and weights (h, 20)."""
+    """Hanging nodes (h,): on an element without belonging to it; the largest such element's nodes (h, 20) and weights (h, 20)."""
     starts = np.cumsum([0, *map(len, cells)])
     extent = (low + 2 * half).max(axis=0)
     owner = np.stack([starts[k] + _owners(leaves, (extent[1] // 2, extent[0] // 2)) for k, leaves in enumerate(cells)])
@@ -162,7 +162,7 @@ def _hanging(places, hexes, low, half, cells):
 
 
 def _resolve(count, rows, masters, weights):
-    """Which nodes are free (n,), and the matrix (n, free) by which all follow these."""
+    """Which nodes are free (n,), and the constraint matrix (n, free) from the free nodes to all nodes."""
     free = np.ones(count, dtype=bool)
     free[rows] = False
     small = np.abs(weights) < 1e-12

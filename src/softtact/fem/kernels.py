@@ -1,6 +1,6 @@
-"""Compiled loops over elements: kinematics, internal forces, tangents, and the projection and penalties of changes of volume.
+"""Compiled loops over elements: kinematics, internal forces, tangents, and the projection and penalties of the volume change.
 
-They take and give named tuples of arrays, which numba passes to compiled code as they are. Symmetric tensors are stored as
+They take and return named tuples of arrays, which numba passes to compiled code unchanged. Symmetric tensors are stored as
 xx, yy, zz, xy, yz, zx. All kernels run on one core and release the GIL.
 """
 
@@ -13,17 +13,17 @@ _ROW = np.array([0, 1, 2, 0, 1, 2])
 _COL = np.array([0, 1, 2, 1, 2, 0])
 _VOIGT = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
 _PAIR = np.array([0, 2, 3])     # components (i, j >= i) are pair _PAIR[i] + j: 00 01 02 11 12 22
-_LANES = 16                     # numbers of single precision in the widest vector of a processor
+_LANES = 16                     # single precision numbers in the widest vector register of a processor
 _AT_ONCE = 4                    # modes of the pressure that are added at once
 
 
 class ElementArrays(NamedTuple):
-    """Elements (e,) of one kind at rest. Many are translations of each other, so what depends on the shape is kept once for each.
+    """Elements (e,) of one kind at rest. Many are translations of each other, so data that depend on the shape are stored once.
 
-    gradients: (u, g, 3, m) of the shape functions of m nodes at g points, in 1/mm, of the u shapes that occur
+    gradients: (u, g, 3, m) of the shape functions of m nodes at g points, in 1/mm, for the u different shapes
     volumes: (u, g) of the points, in mm3
-    shapes: (e,) which of the u shapes is an element's
-    basis: (g, p) functions on which changes of volume are projected
+    shapes: (e,) index of each element's shape among the u shapes
+    basis: (g, p) functions on which the volume change is projected
     gram_inverse: (u, p, p) inverse of the integrals of their products, in 1/mm3
     """
 
@@ -35,7 +35,7 @@ class ElementArrays(NamedTuple):
 
 
 class Deformation(NamedTuple):
-    """Of elements at their points: deformation gradient F (e, g, 3, 3), C = F^T F (e*g, 6) and volume ratio J (e, g)."""
+    """Deformation gradient F (e, g, 3, 3), C = F^T F (e*g, 6) and volume ratio J (e, g) at the elements' points."""
 
     F: np.ndarray
     C: np.ndarray
@@ -43,21 +43,21 @@ class Deformation(NamedTuple):
 
 
 class VolumePenalties(NamedTuple):
-    """Moduli (MPa) of what holds changes of volume that the projection does not see: k and q of `solid_block`."""
+    """Moduli (MPa) of the penalties on the volume change outside the projection: k and q of `solid_block`."""
 
     unprojected: float
     quartic: float
 
 
 class VolumeResponse(NamedTuple):
-    """How elements answer changes of volume.
+    """The volumetric response of elements.
 
     energies: (e,) in mJ
-    pressure: (e, g) by which they change with J, in MPa, positive in tension
-    modulus: U'' in MPa where it is the same for every J
-    stiffness: (e, g) U'' at the projected J in MPa where it is not, else (0, 0)
+    pressure: (e, g) derivative of the energy density by J in MPa, positive in tension
+    modulus: U'' in MPa if it does not depend on J
+    stiffness: (e, g) U'' in MPa at the projected J if it depends on J, else (0, 0)
     unprojected: k in MPa
-    quartic: (e, g) second derivative in MPa of the quartic penalty by what the projection does not see, (0, 0) without it
+    quartic: (e, g) second derivative in MPa of the quartic penalty by the unprojected part of J, (0, 0) without the penalty
     """
 
     energies: np.ndarray
@@ -76,7 +76,7 @@ class VolumeResponse(NamedTuple):
 
 @njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})     # sums over nodes, several at once
 def _gradient(along, slopes):
-    """Derivatives by x, y, z of one component of the displacement (m,) from the shape functions' gradients (3, m) at a point."""
+    """Derivatives by x, y, z of one displacement component with nodal values (m,); slopes (3, m): shape gradients at a point."""
     by_x, by_y, by_z = 0.0, 0.0, 0.0
     for a in range(len(along)):
         by_x += along[a] * slopes[0, a]
@@ -118,7 +118,7 @@ def deformation(displacement: np.ndarray, at_rest: ElementArrays) -> Deformation
 
 @njit(cache=True, nogil=True)
 def add_forces(total: np.ndarray, nodes: np.ndarray, forces: np.ndarray) -> None:
-    """Add elements' forces (e, m, 3) to those of all nodes (n, 3); nodes (e, m)."""
+    """Add element forces (e, m, 3) to the nodal forces (n, 3); nodes (e, m)."""
     for e in range(len(nodes)):
         for a in range(nodes.shape[1]):
             for i in range(3):
@@ -148,11 +148,11 @@ def internal_force(deformed: Deformation, at_rest: ElementArrays, stress: np.nda
     elements, points = J.shape
     nodes = gradients.shape[3]
     force = np.empty((elements, 3 * nodes))
-    own = np.empty((3, nodes))
+    nodal = np.empty((3, nodes))
     S = np.empty((3, 3))
     P = np.empty((3, 3))
     for e in range(elements):
-        own[:] = 0.0
+        nodal[:] = 0.0
         for g in range(points):
             n = e * points + g
             w, pj = volumes[shapes[e], g], pressure[e, g] * J[e, g]
@@ -168,10 +168,10 @@ def internal_force(deformed: Deformation, at_rest: ElementArrays, stress: np.nda
             for i in range(3):
                 x, y, z = P[i, 0], P[i, 1], P[i, 2]
                 for a in range(nodes):
-                    own[i, a] += x * slopes[0, a] + y * slopes[1, a] + z * slopes[2, a]
+                    nodal[i, a] += x * slopes[0, a] + y * slopes[1, a] + z * slopes[2, a]
         for a in range(nodes):
             for i in range(3):
-                force[e, 3 * a + i] = own[i, a]
+                force[e, 3 * a + i] = nodal[i, a]
     return force
 
 
@@ -196,7 +196,7 @@ def _elasticity(A, f, S, D):
 def _moduli(D, S, stress, moduli, inverse, w, pj, local):
     """Stress S (3, 3) and material tangent D (6, 6) at a point, both times its volume w.
 
-    pj: pressure times J;  local: dp/dJ J^2 of what acts at the point alone
+    pj: pressure times J;  local: J^2 dp/dJ of the terms that depend on this point's J alone
     """
     for k in range(6):
         value = w * (stress[k] + pj * inverse[k])
@@ -211,15 +211,15 @@ def _moduli(D, S, stress, moduli, inverse, w, pj, local):
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
 def _volume_change(change, f, inverse, slopes, scale):
-    """How the volume at a point changes with the nodes' displacements: scale F C^-1 : G into `change`, component by component."""
+    """Write the derivatives of a point's volume by the nodal displacements, scale F C^-1 : G, into `change`, by components."""
     number, (by_x, by_y, by_z), width = slopes.dtype.type, (slopes[0], slopes[1], slopes[2]), slopes.shape[1]
     for i in range(3):
         x = number(scale * (f[i, 0] * inverse[0] + f[i, 1] * inverse[3] + f[i, 2] * inverse[5]))
         y = number(scale * (f[i, 0] * inverse[3] + f[i, 1] * inverse[1] + f[i, 2] * inverse[4]))
         z = number(scale * (f[i, 0] * inverse[5] + f[i, 1] * inverse[4] + f[i, 2] * inverse[2]))
-        own = change[i * width:(i + 1) * width]
+        part = change[i * width:(i + 1) * width]
         for a in range(width):
-            own[a] = x * by_x[a] + y * by_y[a] + z * by_z[a]
+            part[a] = x * by_x[a] + y * by_y[a] + z * by_z[a]
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
@@ -228,16 +228,16 @@ def _times_gradients(right, A, slopes):
     by_x, by_y, by_z, width = slopes[0], slopes[1], slopes[2], slopes.shape[1]
     for k in range(3):
         for pair in range(6):
-            x, y, z, own = A[k, pair, 0], A[k, pair, 1], A[k, pair, 2], right[k, pair * width:(pair + 1) * width]
+            x, y, z, part = A[k, pair, 0], A[k, pair, 1], A[k, pair, 2], right[k, pair * width:(pair + 1) * width]
             for a in range(width):
-                own[a] = x * by_x[a] + y * by_y[a] + z * by_z[a]
+                part[a] = x * by_x[a] + y * by_y[a] + z * by_z[a]
 
 
 @njit(cache=True, nogil=True, fastmath={"contract"})
 def _add_products(blocks, G, right):
     """Blocks (even, 6 width) plus G^T (A_ij G) of two points: gradients G (6, width), A_ij G (6, 6 width).
 
-    Two points and two nodes at once, so that what is loaded serves twice: twice as fast as BLAS on matrices so small.
+    It handles two points and two nodes at once, so that each loaded number is used twice: twice as fast as BLAS for small matrices.
     """
     g0, g1, g2, g3, g4, g5 = G[0], G[1], G[2], G[3], G[4], G[5]
     r0, r1, r2, r3, r4, r5 = right[0], right[1], right[2], right[3], right[4], right[5]
@@ -261,14 +261,14 @@ def _add_modes(blocks, nodes, left, right):
             r0, r1, r2, r3 = r0[start:], r1[start:], r2[start:], r3[start:]
             for a in range(nodes):
                 w, x, y, z = left[m, start + a], left[m + 1, start + a], left[m + 2, start + a], left[m + 3, start + a]
-                own = blocks[a, (_PAIR[i] + i) * width:(_PAIR[i] + 3) * width]
-                for b in range(len(own)):
-                    own[b] += w * r0[b] + x * r1[b] + y * r2[b] + z * r3[b]
+                row = blocks[a, (_PAIR[i] + i) * width:(_PAIR[i] + 3) * width]
+                for b in range(len(row)):
+                    row[b] += w * r0[b] + x * r1[b] + y * r2[b] + z * r3[b]
 
 
 @njit(cache=True, nogil=True)
 def _add_volumetric(blocks, nodes, change, modes, volumes, volume, e):
-    """Blocks plus those of an element's projected changes of volume, and of the quartic penalty but for its part at the points.
+    """Add the blocks of an element's projected volume change and of the quartic penalty, without the latter's pointwise part.
 
     change (g, 3 width): see `_volume_change`;  modes: basis (g, p) and inverse Gram matrix (p, p);  volume: `VolumeResponse`
     """
@@ -326,10 +326,10 @@ def tangent(deformed: Deformation, at_rest: ElementArrays, stress: np.ndarray, m
     stress (e*g, 6), moduli (e*g, 6, 6) in MPa: of the law without its volume
     Derivatives of the pressure by J, with P = basis . gram_inverse . integral(basis ...): P U'' P of rank p per element; of the
     unprojected penalty k (1 + 1/J^2) / 2 at each point; of the quartic one (1 - P) quartic (1 - P).
-    like: an array in whose precision the products are taken; what belongs to a single point is found in double precision
+    like: an array in whose precision the products are taken; quantities at single points are computed in double precision
 
-    The products run over blocks of components (i, j >= i): K_ij = G^T A_ij G with the gradients G (3 g, m), six blocks side by side
-    in rows of whole vectors instead of one product with the strain-displacement matrix, which has a third of zeros.
+    The products use blocks of components (i, j >= i): K_ij = G^T A_ij G with the gradients G (3 g, m), six blocks side by side in
+    rows of full vector registers, instead of one product with the strain-displacement matrix, of which a third are zeros.
     """
     F, C, J = deformed.F, deformed.C, deformed.J
     gradients, volumes, shapes = at_rest.gradients, at_rest.volumes, at_rest.shapes
@@ -347,16 +347,16 @@ def tangent(deformed: Deformation, at_rest: ElementArrays, stress: np.ndarray, m
     for e in range(elements):
         blocks[:], right[:] = 0.0, 0.0
         for g in range(points):
-            n, j, w, own = e * points + g, J[e, g], volumes[shapes[e], g], G[3 * g:3 * g + 3]
+            n, j, w, slopes = e * points + g, J[e, g], volumes[shapes[e], g], G[3 * g:3 * g + 3]
             inverse = inverse_symmetric(C[n])
             local = 0.5 * unprojected * (j * j + 1.0)
             if penalised:
                 local += quartic[e, g] * j * j
             _moduli(D, S, stress[n], moduli[n], inverse, w, pressure[e, g] * j, local)
             _elasticity(A, F[e, g], S, D)
-            own[:, :nodes] = gradients[shapes[e], g]
-            _volume_change(change[g], F[e, g], inverse, own, w * j)
-            _times_gradients(right[3 * (g % 2):], A, own)
+            slopes[:, :nodes] = gradients[shapes[e], g]
+            _volume_change(change[g], F[e, g], inverse, slopes, w * j)
+            _times_gradients(right[3 * (g % 2):], A, slopes)
             if g % 2 == 1:
                 _add_products(blocks, G[3 * g - 3:], right)
         if points % 2 == 1:
@@ -390,7 +390,7 @@ def project(field: np.ndarray, at_rest: ElementArrays) -> np.ndarray:
 @njit(cache=True, nogil=True)
 def add_penalties(J: np.ndarray, at_rest: ElementArrays, seen: np.ndarray, density: np.ndarray, pressure: np.ndarray,
                   penalties: VolumePenalties) -> tuple[np.ndarray, np.ndarray]:
-    """Energies (e,) in mJ of changes of volume; second derivative (e, g) in MPa of the quartic penalty, or (0, 0).
+    """Volumetric energies (e,) in mJ; second derivative (e, g) in MPa of the quartic penalty, or (0, 0) without it.
 
     seen, density, pressure (e, g): the projected J - 1, and the law's U and U' there, in MPa; the penalties are added to `pressure`
     """
@@ -401,16 +401,16 @@ def add_penalties(J: np.ndarray, at_rest: ElementArrays, seen: np.ndarray, densi
     for e in range(elements):
         shape = at_rest.shapes[e]
         for g in range(points):
-            j, own = J[e, g], density[e, g]
+            j, energy = J[e, g], density[e, g]
             if k > 0:
                 pressure[e, g] += 0.5 * k * (j - 1.0 / j)
-                own += 0.25 * k * (j * j - 1.0 - 2.0 * np.log(j))
+                energy += 0.25 * k * (j * j - 1.0 - 2.0 * np.log(j))
             if q > 0:
                 unseen = j - 1.0 - seen[e, g]
                 held[g] = q * unseen * unseen * unseen
                 quartic[e, g] = 3.0 * q * unseen * unseen
-                own += 0.25 * held[g] * unseen
-            energies[e] += volumes[shape, g] * own
+                energy += 0.25 * held[g] * unseen
+            energies[e] += volumes[shape, g] * energy
         if q > 0:
             _project(held, volumes[shape], at_rest.basis, at_rest.gram_inverse[shape], share)
             pressure[e] += held - share

@@ -1,7 +1,7 @@
-"""The loops over elements written plainly, with a whole strain operator: plane strain, axisymmetric and spatial elements at once.
+"""Reference implementation of the loops over elements with a full strain operator, for plane strain, axisymmetric and spatial ones.
 
 F = 1 + sum_a u_a (x) G_a + (sum_a u_a,x H_a) e3 (x) e3, with the gradients G_a of the shape functions and, of an axisymmetric
-element, H_a = N_a / X: x is the radius, y the axis. What `kernels` computes faster for spatial elements is held against this.
+element, H_a = N_a / X: x is the radius, y the axis. `kernels` is faster for spatial elements and is tested against this module.
 """
 
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ _VOIGT = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
 
 @dataclass(frozen=True)
 class PlainLoops:
-    """The same functions as `kernels` has; hoop (u, g, m): H_a in 1/mm of the shapes that occur, zeros unless axisymmetric."""
+    """The functions of `kernels`; hoop (u, g, m): H_a in 1/mm of the u different shapes, zero unless axisymmetric."""
 
     hoop: np.ndarray
 
     def _operator(self, at_rest: ElementArrays) -> np.ndarray:
-        """dF (e, g, 3, 3, m, 3) by the displacements of the nodes."""
+        """Derivatives (e, g, 3, 3, m, 3) of F by the nodal displacements."""
         gradients = at_rest.gradients[at_rest.shapes]  # (e, g, 3, m)
         out = np.zeros((*gradients.shape[:2], 3, 3, gradients.shape[3], 3))
         for i in range(3):
@@ -71,7 +71,7 @@ class PlainLoops:
 
 
 def material_tensor(deformed: Deformation, moduli: np.ndarray, volume: VolumeResponse) -> np.ndarray:
-    """dS_ij / dE_kl (e, g, 3, 3, 3, 3) in MPa at the points, the pressure kept; from the law's moduli (e*g, 6, 6)."""
+    """dS_ij / dE_kl (e, g, 3, 3, 3, 3) in MPa at the points at constant pressure, from the law's moduli (e*g, 6, 6)."""
     refuse_quartic(volume)
     J, inverse = deformed.J, _inverses(deformed.C)[:, _VOIGT].reshape(*deformed.J.shape, 3, 3)
     pj, local = volume.pressure * J, 0.5 * volume.unprojected * (J**2 + 1)
@@ -82,13 +82,13 @@ def material_tensor(deformed: Deformation, moduli: np.ndarray, volume: VolumeRes
 
 
 def refuse_quartic(volume: VolumeResponse) -> None:
-    """Refuse a penalty that these loops do not know."""
+    """Refuse the quartic penalty, which these loops do not implement."""
     if volume.quartic.size:
         raise NotImplementedError("The quartic penalty is for spatial elements of sensors on frusta.")
 
 
 def mode_moduli(at_rest: ElementArrays, volume: VolumeResponse) -> np.ndarray:
-    """By what the elements' projected changes of volume are multiplied: (e, p, p) in MPa/mm3."""
+    """Moduli (e, p, p) in MPa/mm3 of the elements' projected volume change."""
     gram = at_rest.gram_inverse[at_rest.shapes]
     if not volume.stiffness.size:
         return volume.modulus * gram

@@ -1,7 +1,7 @@
-"""The loops of `kernels` as batched products on a device of torch: what elements do goes to a GPU, what laws do stays.
+"""The loops of `kernels` as batched products on a torch device: elements are evaluated on a GPU, material laws on the processor.
 
-A law sees C of all points (6 numbers each) and gives stress and moduli (6 and 36), so that there is one text of every law. Sums
-run in double precision but for the products of a tangent in single precision, as in `kernels`; both agree to rounding.
+A law takes C at all points (6 numbers each) and returns stress and moduli (6 and 36), so each law has one implementation. Sums are
+in double precision, except for the products of a tangent in single precision, as in `kernels`; both agree to rounding.
 """
 
 import numpy as np
@@ -14,7 +14,7 @@ _VOIGT = [[0, 3, 5], [3, 1, 4], [5, 4, 2]]
 
 
 class DeviceKernels:
-    """`deformation`, `internal_force` and `tangent` with the arguments of `kernels`: arrays, but for F, which stays there."""
+    """`deformation`, `internal_force` and `tangent` with the arguments of `kernels`; F remains on the device."""
 
     def __init__(self, device: str | torch.device) -> None:
         self.device = torch.device(device)
@@ -49,18 +49,18 @@ class DeviceKernels:
         return _back(volumetric + _products(A.to(precision), G.to(precision)))
 
     def _some(self, values):
-        """The values, None where there are none."""
+        """The values on the device; None if there are none."""
         return self._there(values) if values.size else None
 
     def _there(self, values):
         return torch.as_tensor(values, device=self.device)
 
     def _per_point(self, values, J):
-        """A law's answer (e * g, ...) as (e, g, ...)."""
+        """A law's result (e * g, ...) as (e, g, ...)."""
         return self._there(values).reshape(*J.shape, *values.shape[1:])
 
     def _constant(self, array):
-        """An array that does not change, copied to the device once; it is kept, so that no other can have its identity."""
+        """A constant array, copied to the device once; it is kept so that no other array can get its identity."""
         if id(array) not in self._kept:
             self._kept[id(array)] = array, self._there(array)
         return self._kept[id(array)][1]
@@ -119,7 +119,7 @@ def _products(A, G):
 
 
 def _volumetric(change, basis, gram_inverse, w, stiffness, quartic):
-    """The pressure's part of K, see `kernels._add_volumetric`, from how the points' volumes change with the nodes (e, g, 3 m).
+    """The volumetric part of K, see `kernels._add_volumetric`; change (e, g, 3 m): derivatives of the points' volumes.
 
     stiffness: U'', a number or at the points (e, g);  quartic: (e, g), or None
     """

@@ -1,12 +1,12 @@
 """The loops over elements as Warp kernels in double precision, on the processor or a GPU: the same functions as `kernels` has.
 
-Each thread has one point, or one pair of nodes, so that nothing is written twice; only the entries of the matrix are added up by
-atomic operations. Constants are written as float64, for a bare number in a kernel may be of single precision. Laws are evaluated on
-the processor between the kernels; of a tangent only the matrix's values come back from the device.
+Each thread has one point, or one pair of nodes, so that no result is written twice; only the matrix entries are summed by atomic
+operations. Constants are written as float64, because a bare number in a kernel may be of single precision. Laws are evaluated on
+the processor between the kernels; for a tangent only the matrix's values are copied back from the device.
 """
 
 # mypy: ignore-errors
-# (Warp reads a kernel's annotations by itself; for mypy they are no types.)
+# (Warp interprets a kernel's annotations; mypy does not accept them as types.)
 
 from typing import Any
 
@@ -15,9 +15,9 @@ import warp as wp
 
 from softtact.fem.kernels import Deformation, ElementArrays, VolumeResponse
 
-wp.config.log_level = wp.LOG_WARNING     # its notices would stand in a command's output
-_AT_ONCE = 4096     # elements whose tangents are on the device at once: 1 GB of the largest elements
-_MOST_KEPT = 64     # arrays that stay on the device
+wp.config.log_level = wp.LOG_WARNING     # keeps Warp's notices out of a command's output
+_AT_ONCE = 4096     # elements whose tangents are on the device at once: 1 GB for the largest elements
+_MOST_KEPT = 64     # constant arrays that are kept on the device
 _real = wp.float64
 _R3, _R4 = wp.array3d(dtype=_real), wp.array4d(dtype=_real)
 
@@ -30,7 +30,7 @@ def _symmetric(t: wp.array2d(dtype=_real), n: int) -> wp.mat33d:
 
 @wp.func
 def _voigt(p: int, k: int):
-    """Where entry p, k of a symmetric tensor is stored."""
+    """Index of entry p, k of a symmetric tensor in its stored form."""
     if p == k:
         return p
     return wp.where(p + k == 1, 3, wp.where(p + k == 3, 4, 5))
@@ -112,7 +112,7 @@ def _elasticity(F: wp.array2d(dtype=wp.mat33d), S: wp.array2d(dtype=wp.mat33d), 
 @wp.kernel
 def _changes(F: wp.array2d(dtype=wp.mat33d), volumes: wp.array2d(dtype=_real), gradients: _R4,
              shapes: wp.array(dtype=wp.int32), basis: wp.array2d(dtype=_real), seen: _R4):
-    """How the projected volume of each mode changes with the nodes' displacements."""
+    """Derivatives of the projected volume of each mode by the nodal displacements."""
     e, p, a = wp.tid()
     s = shapes[e]
     total = wp.vec3d()
@@ -127,7 +127,7 @@ def _changes(F: wp.array2d(dtype=wp.mat33d), volumes: wp.array2d(dtype=_real), g
 
 @wp.kernel
 def _blocks(A: _R4, gradients: _R4, shapes: wp.array(dtype=wp.int32), seen: _R4, inner: _R3, upper: int, K: _R3):
-    """The block of two nodes of an element's tangent; upper: leave those below the diagonal out."""
+    """The block of two nodes of an element's tangent; upper: blocks below the diagonal are left out."""
     e, a, b = wp.tid()
     if upper == 1 and b < a:
         return
@@ -176,7 +176,7 @@ class WarpKernels:
         return wp.array(np.ascontiguousarray(values), dtype=dtype, device=self.device)
 
     def _constant(self, values: np.ndarray, dtype: Any = _real) -> Any:
-        """An array that does not change, which stays on the device."""
+        """A constant array, which is kept on the device."""
         if id(values) not in self._kept:
             if len(self._kept) >= _MOST_KEPT:
                 self._kept.clear()

@@ -1,10 +1,10 @@
 """Meshes of solids in files: VTU with regions and faces by name, and any mesh format that meshio reads.
 
-In our VTU files each region is an array of the cells called `region:NAME`, each face one called `face:NAME`: 1 on the cells that
-belong to it, 0 on the others. The facets of faces are cells of their own. `geometry:KIND` holds the thickness in mm.
-Other formats: regions and faces are the named sets of cells (Abaqus) or the physical groups (Gmsh). Cells of the highest dimension
-are elements, those of one less name faces. Linear elements become quadratic.
-Faces are also named by rules in words: `z<0.1` or `x>-3 & x<3 & z>2`, of the middles of the outer facets in mm.
+In softtact's VTU files each region is a cell array `region:NAME`, each face a cell array `face:NAME`: 1 on the cells that belong to
+it, 0 on the others. The facets of faces are additional cells. `geometry:KIND` holds the thickness in mm.
+In other formats regions and faces are the named cell sets (Abaqus) or the physical groups (Gmsh). Cells of the highest dimension
+are elements, those of one dimension less name faces. Linear elements are converted to quadratic ones.
+Faces can also be defined by rules such as `z<0.1` or `x>-3 & x<3 & z>2` for the centres of the outer facets in mm.
 """
 
 import contextlib
@@ -34,9 +34,9 @@ _TERM = re.compile(r"\s*([xyz])\s*([<>])\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?
 
 
 def write_mesh(mesh: SolidMesh, path: str | Path, point_data: Mapping[str, np.ndarray] | None = None) -> None:
-    """Write a mesh as VTU, its regions and faces by name; `read_mesh_file` gives it back.
+    """Write a mesh as VTU with its named regions and faces; `read_mesh_file` reads it.
 
-    point_data {name: (n,) or (n, k)}: at the nodes
+    point_data {name: (n,) or (n, k)}: nodal fields
     """
     import meshio
 
@@ -71,15 +71,15 @@ def _all_facets(mesh):
 
 def read_mesh_file(path: str | Path, *, unit: str | None = None, geometry: str | None = None, thickness_mm: float = 1.0,
                    faces: Mapping[str, str] | None = None, regions: Sequence[str] | None = None) -> SolidMesh:
-    """The `SolidMesh` of a file: VTU as `write_mesh` makes it, or any format that meshio reads (Gmsh, Abaqus, VTK, MED, ...).
+    """The `SolidMesh` of a file: VTU written by `write_mesh`, or any format that meshio reads (Gmsh, Abaqus, VTK, MED, ...).
 
-    unit: mm, cm, m, inch or in; only files of softtact, which are in mm, need none
-    geometry, thickness_mm: plane_strain or axisymmetric of a mesh in the plane z = 0 whose file does not say
-    faces {name: rule}: further faces, see `face_rule`;  regions: which of the file's sets or groups of elements are regions, where
-        it has others beside them
+    unit: mm, cm, m, inch or in; required except for files of softtact, which are in mm
+    geometry, thickness_mm: plane_strain or axisymmetric, for a mesh in the plane z = 0 whose file does not state it
+    faces {name: rule}: further faces, see `face_rule`;  regions: the file's element sets or groups that are regions, if it has
+        other sets too
 
-    Raises InputError that names the file and what is wrong: not readable, elements of a kind that is not taken, linear and
-    quadratic ones together, inverted elements, an element in no region or in two, a facet of a face inside the body.
+    Raises InputError that names the file and the problem: unreadable file, unsupported element type, mixed linear and
+    quadratic elements, inverted elements, an element in no region or in two, a facet of a face inside the body.
     """
     path = Path(path)
     read = _read(path)
@@ -123,8 +123,8 @@ def _read(path: Path) -> "meshio.Mesh":
             return meshio.read(path)
     except (Exception, SystemExit) as error:     # meshio's readers fail in many ways, and end the program for an unknown format
         known = "give VTU, or another volume mesh that meshio reads, such as Gmsh or Abaqus"
-        told = " ".join(str(error).split())[:120] or type(error).__name__
-        raise InputError(f"{path}: not readable as a mesh of elements ({told}); {known}.") from None
+        problem = " ".join(str(error).split())[:120] or type(error).__name__
+        raise InputError(f"{path}: not readable as a mesh of elements ({problem}); {known}.") from None
 
 
 def _dimension(kind):
@@ -132,7 +132,7 @@ def _dimension(kind):
 
 
 def _sets(read) -> dict[str, list[np.ndarray]]:
-    """{name: which cells of each block (e,) belong to it} of regions and faces alike."""
+    """{name: flags (e,) of each block's cells that belong to it} for regions and faces."""
     lengths = [len(block.data) for block in read.cells]
     found: dict[str, list[np.ndarray]] = {}
     for name, arrays in read.cell_data.items():
@@ -156,7 +156,7 @@ def _flags(members, count):
 
 
 def _region_names(path, sets, elements, wanted):
-    """The sets that are regions: those wanted, or all that hold elements."""
+    """The sets that are regions: those in `wanted`, or else all sets with elements."""
     known = [name for name, flags in sets.items() if any(flags[k].any() for k in elements)]
     if unknown := [name for name in wanted or () if name not in known]:
         raise InputError(f"{path}: it has no set or group of elements {unknown[0]!r}; it has {', '.join(known) or 'none'}.")
@@ -172,40 +172,40 @@ def _regions_of(path, sets, count):
         out[flags], uses = name, uses + flags
     if (uses != 1).any():
         first = int((uses != 1).argmax())
-        told = "in no region" if uses[first] == 0 else f"in {uses[first]} regions"
-        raise InputError(f"{path}: element {first} is {told}, of the sets {', '.join(sets)}; name those sets that are the regions, "
-                         "each element in one of them.")
+        found = "in no region" if uses[first] == 0 else f"in {uses[first]} regions"
+        raise InputError(f"{path}: element {first} is {found}, of the sets {', '.join(sets)}; name those sets that are the "
+                         "regions, each element in one of them.")
     return out
 
 
 def _quadratic(path, points, cells):
-    """Points, [(kind, nodes in our order)] of quadratic elements, and the new number (n,) of each point of the file."""
+    """Points, [(kind, nodes in softtact's order)] of quadratic elements, and the new number (n,) of each point of the file."""
     kinds = {kind for kind, _ in cells}
     if kinds <= ELEMENTS.keys():
         back = {kind: np.argsort(ELEMENTS[kind].vtk_order) for kind in kinds}
         return points, [(kind, nodes[:, back[kind]]) for kind, nodes in cells], np.arange(len(points))
     if not kinds <= QUADRATIC.keys():
         odd = sorted(kinds - ELEMENTS.keys() - QUADRATIC.keys()) or sorted(kinds)
-        told = "does not take" if kinds - ELEMENTS.keys() - QUADRATIC.keys() else "does not mix"
-        raise InputError(f"{path}: it has elements {', '.join(odd)}, which softtact {told}; mesh the body with all linear or all "
-                         f"quadratic ones of {', '.join([*QUADRATIC, *ELEMENTS])}.")
+        refusal = "does not take" if kinds - ELEMENTS.keys() - QUADRATIC.keys() else "does not mix"
+        raise InputError(f"{path}: it has elements {', '.join(odd)}, which softtact {refusal}; mesh the body with all linear or "
+                         f"all quadratic ones of {', '.join([*QUADRATIC, *ELEMENTS])}.")
     turned = [(kind, _upright(points, nodes) if kind == "wedge" else nodes) for kind, nodes in cells]
     new, nodes, number = raised(points, turned)
     return new, [(QUADRATIC[kind].meshio_name, own) for (kind, _), own in zip(turned, nodes, strict=True)], number
 
 
 def _upright(points, wedges):
-    """Wedges (e, 6) with the triangle first from which the other lies on the side of its normal: formats differ in this."""
+    """Wedges (e, 6) whose first triangle has its normal towards the second one; the order differs between file formats."""
     a, b, c, top = (points[wedges[:, k]] for k in range(4))
     below = np.einsum("ei,ei->e", np.cross(b - a, c - a), top - a) < 0
     return np.where(below[:, None], wedges[:, _TURNED_WEDGE], wedges)
 
 
 def _geometry(path, read, geometry, thickness_mm, d, points) -> tuple[str, float]:
-    told: dict[str, Any] = {name.removeprefix(_GEOMETRY): arrays for name, arrays in read.cell_data.items()
+    stated: dict[str, Any] = {name.removeprefix(_GEOMETRY): arrays for name, arrays in read.cell_data.items()
                             if name.startswith(_GEOMETRY)}
-    if told:
-        kind, arrays = next(iter(told.items()))
+    if stated:
+        kind, arrays = next(iter(stated.items()))
         return kind, float(np.concatenate([np.ravel(own) for own in arrays])[0])
     if d == 3:
         return "solid", 1.0
@@ -248,7 +248,7 @@ def _face(path, mesh, name, corners):
 
 
 def face_rule(text: str) -> Callable[[np.ndarray], np.ndarray]:
-    """Which middles (f, 3) in mm a rule takes, (f,) bool: comparisons of x, y or z with numbers in mm, all of which hold.
+    """A function of facet centres (f, 3) in mm that returns which (f,) satisfy a rule: comparisons of x, y or z with numbers in mm.
 
     Raises InputError that shows the form of a rule.
     """

@@ -1,4 +1,4 @@
-"""Quadratic elements from linear ones: nodes in the middles of edges, of quadrilateral faces and of hexahedra; and back."""
+"""Conversion of linear elements to quadratic ones by nodes at the centres of edges, quadrilateral faces and hexahedra, and back."""
 
 from collections.abc import Iterable, Sequence
 
@@ -15,7 +15,7 @@ def raised(points: np.ndarray, cells: Sequence[tuple[str, np.ndarray]]) -> tuple
     """Quadratic elements of linear cells [(meshio's name, corners (e, c))] at points (n, 3).
 
     Returns points (n', 3), nodes (e, m) of each of the cells, and the new number (n,) of each old point, -1 where no cell uses it.
-    New nodes lie in the means of the corners that they lie between.
+    A new node is at the mean of the corners of its edge, face or element.
     """
     members = [_members(kind) for kind, _ in cells]
     width = max(int(own.sum(axis=1).max()) for own in members)
@@ -35,10 +35,10 @@ def raised(points: np.ndarray, cells: Sequence[tuple[str, np.ndarray]]) -> tuple
 
 
 def shares_of_corners(count: int, parts: Iterable[tuple[Element, np.ndarray]]) -> sp.csr_matrix | None:
-    """Values at so many nodes from those at the corners of elements [(element, nodes (e, m))]: (count, count), others' rows empty.
+    """Matrix (count, count) that interpolates nodal values from the corners of elements [(element, nodes (e, m))].
 
-    A node takes the mean of the corners that it lies between, itself where it is one. None where an element, like HEX20, has no
-    node in the middle of some of its faces.
+    A node takes the mean of the corners of its edge, face or element; a corner keeps its value; rows of other nodes are empty.
+    None for elements such as HEX20 that have faces without a centre node.
     """
     rows, columns, values = [np.empty(0, int)], [np.empty(0, int)], [np.empty(0)]
     known = np.zeros(count, dtype=bool)
@@ -48,7 +48,7 @@ def shares_of_corners(count: int, parts: Iterable[tuple[Element, np.ndarray]]) -
         kind = _LINEAR[element.meshio_name]
         members, corners = _members(kind), nodes[:, element.vtk_order[:element.corners]]
         new, first = np.unique(nodes, return_index=True)
-        first = first[~known[new]]     # each node once, whatever elements share it
+        first = first[~known[new]]     # each node once, also if several elements share it
         known[new] = True
         at, member = members.shape[0], members[first % members.shape[0]]
         own = corners[first // at]
@@ -59,7 +59,7 @@ def shares_of_corners(count: int, parts: Iterable[tuple[Element, np.ndarray]]) -
 
 
 def _keys(corners, members, width):
-    """The corners (e, m, width), rising behind -1, that each node of an element lies between."""
+    """The corners (e, m, width) of the edge, face or element of each node, in rising order after entries of -1."""
     keys = np.where(members[None], corners[:, None, :], -1)
     return np.sort(keys, axis=2)[..., -width:]
 

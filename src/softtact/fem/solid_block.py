@@ -1,20 +1,20 @@
 """A block of elements of one material: energy, internal force and tangent at finite strain.
 
-The law's volumetric energy U(J), with the modulus K - k, sees J only through its projection on some functions in each element:
-linear ones (four modes: discontinuous linear pressure), or trilinear ones (eight). The pressure needs no unknown of its own, and
-the tangent stays symmetric (Sussman and Bathe, Computers & Structures 26 (1987) 357). With linear functions the element does not
-lock for any bulk modulus (Q2/P-1 is stable); trilinear ones do not pass that test, and are 1 to 3 % stiffer at K = 20 mu.
+The law's volumetric energy U(J), with the modulus K - k, depends on J only through its projection on functions in each element:
+linear ones (four modes: discontinuous linear pressure) or trilinear ones (eight). The pressure is not an additional unknown, and
+the tangent is symmetric (Sussman and Bathe, Computers & Structures 26 (1987) 357). With linear functions the element does not
+lock for any bulk modulus (Q2/P-1 is stable); trilinear ones are not stable in this sense, and are 1 to 3 % stiffer at K = 20 mu.
 
-Volume changes that the functions do not see have no stiffness but the shear's. Where the pressure is several mu that is too
-little: elements collapse to J = 0.1, where no further step converges. Frusta under sharp or deep objects are pressed so far.
-Two terms hold them:
-* k/4 (J^2 - 1 - 2 ln J) sees J at every point; alone it would be a material of Poisson's ratio 0.38 with k = 4 mu, far from
-  locking.
-* q/4 (J - its projection)^4 is nothing for small deviations, which are an element's error, and stops large ones: an element
-  that gives way settles beside where it was, where without it it would collapse.
-What both cost and save: docs/notebook/2026-11-23-folding-frusta.md.
+Volume changes outside the projection are resisted only by the shear stiffness. At pressures of several mu that is not enough:
+elements collapse to J = 0.1, and no further step converges. Frusta under sharp or deep objects reach such pressures.
+Two penalties prevent this:
+* k/4 (J^2 - 1 - 2 ln J) acts on J at every point; alone it is the volumetric law of a material of Poisson's ratio 0.38 for
+  k = 4 mu, far from locking.
+* q/4 (J - its projection)^4 vanishes for small deviations, which are discretisation errors, and limits large ones: an element
+  that buckles finds a new equilibrium nearby instead of collapsing.
+Their effects and cost: docs/notebook/2026-11-23-folding-frusta.md.
 
-Frusta want full quadrature (27 points): with 8 points they soften by spurious modes once they fold (13 % more compression
+Frusta need full quadrature (27 points): with 8 points spurious modes soften them once they fold (13 % more compression
 at 0.4 MPa) and Newton's method stalls.
 """
 
@@ -34,13 +34,13 @@ from softtact.materials.laws.base import Law
 from softtact.materials.laws.stretches import stretch_range
 
 _NONE = np.zeros((0, 0))
-_POINTS_AT_ONCE = 20_000     # of a law, in each thread
-_AT_ONCE = 400   # elements whose fields at the points are in memory at once, mostly in the processor's cache
+_POINTS_AT_ONCE = 20_000     # points at which a thread evaluates a law at once
+_AT_ONCE = 400   # elements evaluated at once, so that their fields mostly fit into the processor's cache
 
 
 @dataclass(frozen=True)
 class BlockState:
-    """What one evaluation leaves: the elements' energies (e,) in mJ, force (e, 3 m) in N, and displacement."""
+    """The result of one evaluation: the elements' energies (e,) in mJ, forces (e, 3 m) in N, and displacement."""
 
     energies: np.ndarray
     force: np.ndarray
@@ -55,11 +55,11 @@ class BlockState:
 class SolidBlock:
     """Elements of one kind and one law, by their shape functions' gradients.
 
-    gradients (u, g, m, 3) in 1/mm and volumes (u, g) in mm3 of the shapes that occur; shapes (e,): which is an element's, by
-    default a different one for each; basis (g, p): functions on which changes of volume are projected (`pressure_modes`);
+    gradients (u, g, m, 3) in 1/mm and volumes (u, g) in mm3 of the u different shapes; shapes (e,): each element's index among
+    them, by default a different one for each; basis (g, p): functions on which the volume change is projected (`pressure_modes`);
     unprojected_penalty_ratio: k / mu; quartic_penalty_ratio: q / mu.
-    Displacements come per element (e, m, 3) in mm. at_rest: all this as `ElementArrays`. loops: what sums over points and nodes,
-    `kernels` or a `DeviceKernels`.
+    Displacements are given per element (e, m, 3) in mm. at_rest: the arrays as `ElementArrays`. loops: the implementation of the
+    sums over points and nodes, `kernels` or a `DeviceKernels`.
     """
 
     loops = kernels
@@ -92,7 +92,7 @@ class SolidBlock:
 
     def evaluate(self, displacement: np.ndarray, elements: np.ndarray | slice = slice(None), *,
                  workers: Workers = SERIAL) -> BlockState | None:
-        """Energies and internal forces of the chosen elements; None if one is turned inside out (J <= 0 at a quadrature point)."""
+        """Energies and internal forces of the chosen elements; None if one is inverted (J <= 0 at a quadrature point)."""
         shapes = self.at_rest.shapes[elements]
         parts = workers.map(lambda part: self._evaluate(displacement[part], self.at_rest._replace(shapes=shapes[part])),
                             slices(len(shapes), _AT_ONCE))
@@ -125,7 +125,7 @@ class SolidBlock:
 
     def add_tangent(self, values: np.ndarray, positions: np.ndarray, displacement: np.ndarray, *,
                     workers: Workers = SERIAL) -> None:
-        """Add the tangent of all elements to a matrix's values, see `assembly.add_upper`; of loops that sum it up on a device."""
+        """Add the tangent of all elements to a matrix's values, see `assembly.add_upper`; only with loops that sum on a device."""
         deformed = self.loops.deformation(displacement, self.at_rest)
         parts = workers.map(lambda part: self.law.isochoric(deformed.C[part], tangent=True),
                             slices(len(deformed.C), _POINTS_AT_ONCE))
@@ -139,8 +139,8 @@ class SolidBlock:
         return float(self.at_rest.volumes.sum(axis=1)[self.at_rest.shapes].sum())
 
     def volume_outside(self, displacement: np.ndarray, window: tuple[float, float]) -> float:
-        """Volume (mm3) in which a principal stretch lies outside of `window` (lowest, highest): an isochoric one, or of a foam's
-        law a whole one.
+        """Volume (mm3) in which a principal stretch is outside of `window` (lowest, highest): the isochoric stretch, or the total
+        one for a law of foams.
         """
         low, high = stretch_range(self.loops.deformation(displacement, self.at_rest).C, isochoric=self.law.projected_modulus > 0)
         return float(self.at_rest.volumes[self.at_rest.shapes].ravel() @ ((low < window[0]) | (high > window[1])))
@@ -151,7 +151,7 @@ class SolidBlock:
         seen = project(J - 1.0, at_rest)
         if not projected.linear and not seen.min() > projected.least_change:
             return None
-        # U' of a projected J is that of all points; unless it is linear, only its projection changes the nodes' forces.
+        # U' at the projected J; unless U' is linear in J, only its projection contributes to the nodal forces.
         pressure = projected.pressure(seen) if projected.linear else project(projected.pressure(seen), at_rest)
         energies, quartic = add_penalties(J, at_rest, seen, projected.energy(seen), pressure, penalties)
         stiffness = _NONE if projected.linear else projected.stiffness(seen)
@@ -159,9 +159,9 @@ class SolidBlock:
 
 
 def joined(parts: Iterable[tuple[np.ndarray, SolidBlock]]) -> list[tuple[np.ndarray, SolidBlock]]:
-    """The same elements in as few blocks as there are kinds of them; parts and result: [(nodes (e, m), block)].
+    """The elements merged into one block for each kind; parts and result: [(nodes (e, m), block)].
 
-    The kind is the law, the numbers of nodes and of points; the parts' blocks come to use their share of the new ones' arrays.
+    A kind is a law with a number of nodes and of points; the original blocks then use views of the merged blocks' arrays.
     """
     kinds: dict[tuple, list[tuple[np.ndarray, SolidBlock]]] = {}
     for nodes, block in parts:
@@ -190,14 +190,14 @@ def pressure_modes(points: np.ndarray, trilinear: bool = False) -> np.ndarray:
 
 
 def _unlike(coordinates):
-    """Elements (u,) of all different shapes among coordinates (e, m, 3), and for each (e,) which of these is its own."""
+    """One element (u,) of each different shape among coordinates (e, m, 3), and the index (e,) of each element's shape."""
     return unique_rows((coordinates - coordinates[:, :1]).reshape(len(coordinates), -1))
 
 
 def _distinct(numbers):
-    """The numbers of each row of (r, k), each once and rising, (r, w), short rows with the last repeated; and each one's place.
+    """The distinct numbers of each row of (r, k) in rising order (r, w), short rows padded with the last; and indices (r, k).
 
-    Negative ones count for nothing, and have the place -1 in (r, k).
+    Negative numbers are ignored and have the index -1.
     """
     order = np.argsort(numbers, axis=1, kind="stable")
     rising = np.take_along_axis(numbers, order, axis=1)
@@ -212,9 +212,9 @@ def _distinct(numbers):
 
 
 class _ElementBlock(SolidBlock):
-    """Elements of a kind at coordinates (e, m, 3) in mm, with their full quadrature or the reduced one.
+    """Elements of a kind at coordinates (e, m, 3) in mm, with full or reduced quadrature.
 
-    trilinear: changes of volume are projected on trilinear instead of linear functions
+    trilinear: the volume change is projected on trilinear instead of linear functions
     """
 
     def __init__(self, element, coordinates, law, *, reduced=False, trilinear=False, **options):
@@ -242,7 +242,7 @@ class WedgeBlock(_ElementBlock):
 
 def hanging_node_constraints(masters: np.ndarray, weights: np.ndarray, elements: np.ndarray,
                              block: SolidBlock) -> tuple[np.ndarray, SolidBlock]:
-    """Nodes (e, w) that elements (e, m) hang on, and the block in terms of these."""
+    """Master nodes (e, w) of elements (e, m) with hanging nodes, and the block with shape functions of the masters."""
     masters, weights = masters[elements], weights[elements]
     nodes, column = _distinct(np.where(np.abs(weights) > 1e-12, masters, -1).reshape(len(elements), -1))
     follow = np.zeros((*elements.shape, nodes.shape[1]))

@@ -1,6 +1,6 @@
 """A mesh of any body: nodes, elements by region, faces by name; spatial, in plane strain or axisymmetric.
 
-Plane meshes lie in z = 0. Of an axisymmetric body x is the radius and y the axis. Curved facets can be had as flat triangles.
+Plane meshes lie in z = 0. In an axisymmetric body x is the radius and y the axis. Curved facets can be converted to flat triangles.
 """
 
 from collections.abc import Callable, Iterator
@@ -66,11 +66,11 @@ class SolidMesh:
 
     @cached_property
     def boundary(self) -> Facets:
-        """All facets that belong to one element only."""
+        """All facets that belong to exactly one element."""
         return _boundary([(ELEMENTS[kind], nodes) for _, kind, nodes in self.cells])
 
     def face(self, name: str) -> Facets:
-        """The face of a name; `boundary` is the whole surface. InputError lists the names where there is none of it."""
+        """The face with that name; `boundary` is the whole surface. InputError lists the known names if it is unknown."""
         if name == "boundary" and name not in self.faces:
             return self.boundary
         if name not in self.faces:
@@ -82,9 +82,9 @@ class SolidMesh:
         return np.unique(np.concatenate([nodes.ravel() for nodes in self.face(name).values()]))
 
     def with_faces(self, **where: Callable[[np.ndarray], np.ndarray]) -> "SolidMesh":
-        """The mesh with faces by name: those facets of the boundary whose middles (f, 3) in mm `where` says are (f,) of it.
+        """The mesh with named faces: the facets of the boundary whose centres (f, 3) in mm satisfy the rule `where` (f,).
 
-        InputError where a face is empty.
+        Raises InputError if a face is empty.
         """
         named = {name: self._facets_where(name, rule) for name, rule in where.items()}
         return replace(self, faces=self.faces | named)
@@ -100,7 +100,7 @@ class SolidMesh:
         return found
 
     def with_regions(self, rule: Callable[[np.ndarray], np.ndarray]) -> "SolidMesh":
-        """The mesh with the regions (e,) (names) that `rule` gives for the middles (e, 3) in mm of its elements."""
+        """The mesh with the region names (e,) that `rule` returns for the centres (e, 3) in mm of its elements."""
         cells = []
         for _, kind, nodes in self.cells:
             names = np.asarray(rule(self.points[nodes].mean(axis=1)))
@@ -112,7 +112,7 @@ class SolidMesh:
         return replace(self, points=np.ascontiguousarray(transform(self.points), dtype=float))
 
     def joined(self, other: "SolidMesh", *, prefix: str = "") -> "SolidMesh":
-        """Both meshes as one, their nodes apart; `prefix` before the other's names of regions and faces."""
+        """Both meshes as one without merged nodes; `prefix` precedes the other's names of regions and faces."""
         if other.geometry != self.geometry:
             raise InputError(f"A mesh of the geometry {other.geometry!r} cannot join one of {self.geometry!r}.")
         shift = len(self.points)
@@ -142,7 +142,7 @@ class SolidMesh:
 
 
 def _boundary(cells):
-    """Facets of elements [(element, nodes (e, m))] that occur once, outwards."""
+    """Facets of elements [(element, nodes (e, m))] that occur once, oriented outwards."""
     kinds: dict[str, list[np.ndarray]] = {}
     for element, nodes in cells:
         for number, face in enumerate(element.faces):
@@ -173,9 +173,9 @@ def flat_triangles(facets: Facets) -> np.ndarray:
 
 
 def fine_triangles(facets: Facets, points: np.ndarray, *, divisions: int = 4) -> np.ndarray:
-    """Corners (t, 3, 3) in mm of triangles with corners on curved facets, each of whose edges is cut into so many parts.
+    """Corners (t, 3, 3) in mm of triangles on curved facets, each of whose edges is cut into `divisions` parts.
 
-    A facet of length h and radius of curvature R is missed by at most h^2 / (8 R divisions^2).
+    Their deviation from a facet of length h and radius of curvature R is at most h^2 / (8 R divisions^2).
     """
     found = []
     for kind, nodes in facets.items():
@@ -186,7 +186,7 @@ def fine_triangles(facets: Facets, points: np.ndarray, *, divisions: int = 4) ->
 
 
 def _grid(kind, n):
-    """Parent coordinates (c, 2) of a facet's corners when it is cut, and the triangles (t, 3) of these."""
+    """Parent coordinates (c, 2) of the corners of a subdivided facet, and the triangles (t, 3) between them."""
     i, j = (line.ravel() for line in np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij"))
     number = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
     a, b, c, d = number[:-1, :-1].ravel(), number[1:, :-1].ravel(), number[1:, 1:].ravel(), number[:-1, 1:].ravel()
@@ -199,7 +199,7 @@ def _grid(kind, n):
 
 
 def outer_triangles(mesh: SolidMesh) -> np.ndarray:
-    """Triangles (t, 3) of the mesh's outside, through the nodes in the middles of edges; of a plane mesh all of it."""
+    """Triangles (t, 3) of the mesh's surface, with the mid-side nodes as corners; for a plane mesh, of the whole mesh."""
     if mesh.geometry == "solid":
         return flat_triangles(mesh.boundary)
     return np.concatenate([flat_triangles({kind: nodes}) for _, kind, nodes in mesh.cells])

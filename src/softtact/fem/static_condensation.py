@@ -1,13 +1,13 @@
-"""Static condensation: inner unknowns of many small bodies eliminated one body at a time, exact within Newton's method.
+"""Static condensation: elimination of the inner unknowns of many small bodies, body by body, exact within Newton's method.
 
-The matrix (n + m, n + m) of a body lists n inner unknowns first, then m outer ones that others share. Only its upper triangle is
-filled, row by row; to Fortran that is a lower triangle column by column.
+The matrix (n + m, n + m) of a body has n inner unknowns first, then m outer ones, which are shared. Only its upper triangle is
+filled, row by row; for Fortran this is a lower triangle, column by column.
 
-`TangentCache` keeps an element's tangent until its nodes have moved against each other: most cells are condensed again because a
-frustum's contact changed, and their elements' tangents, half of the work, are still good then. `make_positive` takes the modes of
-negative stiffness out of tangents, for where rubber folds, steps are to go on lowering the energy.
+`TangentCache` keeps an element's tangent until its nodes have moved relative to each other: most cells are condensed anew because a
+frustum's contact changed, while their elements' tangents, half of the cost, are still valid. `make_positive` removes the modes of
+negative stiffness from tangents, so that Newton steps still decrease the energy where rubber folds.
 Reference: H. Chen et al., Stabler Neo-Hookean Simulation: Absolute Eigenvalue Filtering for Projected Newton, SIGGRAPH 2024: for
-nearly incompressible elements absolute values leave shorter paths than zeros in place of negative eigenvalues.
+nearly incompressible elements, absolute values of negative eigenvalues need fewer steps than zeros.
 """
 
 from collections.abc import Iterable
@@ -23,17 +23,17 @@ from softtact.linalg.workers import SERIAL, Workers, slices
 _AT_ONCE = 60                # bodies that one thread reduces or recovers at once
 _SMALLEST_STIFFNESS = 0.02   # N/mm of a mode of a folding body; the softest mode of a frustum at rest has 0.03
 _ROUNDING = float(np.finfo(np.float32).eps)
-_NOTHING = 2e-5     # of the largest stiffness: rounding of a tangent in single precision, whose rigid motions have none
+_NOTHING = 2e-5     # of the largest stiffness: rounding errors of the zero eigenvalues (rigid motions) in single precision
 
 class Springs(NamedTuple):
-    """Stiffness (b, s) in N/mm of weighted sums of unknowns: places (s, c) in the matrix, -1 where held, weights (s, c)."""
+    """Stiffness (b, s) in N/mm of weighted sums of unknowns: rows `places` (s, c) of the matrix, -1 where fixed, weights (s, c)."""
 
     stiffness: np.ndarray
     places: np.ndarray
     weights: np.ndarray
 
     def with_others(self, others: "Springs") -> "Springs":
-        """These springs and the others, which act on as many unknowns or more."""
+        """The union of both; the others must act on at least as many unknowns per spring."""
         more = ((0, 0), (0, others.places.shape[1] - self.places.shape[1]))
         return Springs(np.hstack([self.stiffness, others.stiffness]),
                        np.vstack([np.pad(self.places, more, constant_values=-1), others.places]),
@@ -41,8 +41,8 @@ class Springs(NamedTuple):
 
 
 class _Store(NamedTuple):
-    """Of n inner and m outer unknowns: rows (bodies, n, n + m), the factor L' and the coupling L^-1 K_inner,outer side by side;
-    outer (bodies, m, m), the condensed matrices; modified (bodies,), where the inner matrix was not positive definite.
+    """For n inner and m outer unknowns: rows (bodies, n, n + m), the factor L' and the coupling L^-1 K_inner,outer side by side;
+    outer (bodies, m, m), the condensed matrices; modified (bodies,), whether the inner matrix was not positive definite.
     """
 
     rows: np.ndarray
@@ -53,16 +53,16 @@ class _Store(NamedTuple):
 class Condensation:
     """Bodies of n inner and m outer unknowns; `outer` (bodies, m, m) are their condensed matrices.
 
-    element_dofs: for each group of like elements the places (k, w) of their unknowns in a body's matrix, -1 where held.
-    All in single precision: it serves steps that are corrected by a residual in double precision.
+    element_dofs: for each group of like elements the rows (k, w) of their unknowns in a body's matrix, -1 where fixed.
+    All in single precision: it is used for steps that are corrected by a residual in double precision.
     """
 
     def __init__(self, bodies: int, inner: int, outer: int, element_dofs: Iterable[np.ndarray]) -> None:
         self._dofs = tuple(np.ascontiguousarray(dofs) for dofs in element_dofs)
         self._store = _Store(rows=np.zeros((bodies, inner, inner + outer), dtype=np.float32),
                              outer=np.zeros((bodies, outer, outer), dtype=np.float32), modified=np.zeros(bodies, dtype=bool))
-        self._judged = np.zeros(bodies, dtype=bool)     # whether `make_positive` has seen a body since it was set ...
-        self._positive: dict[int, np.ndarray] = {}      # ... and what it left of the indefinite ones
+        self._judged = np.zeros(bodies, dtype=bool)     # whether `make_positive` has checked a body since it was set ...
+        self._positive: dict[int, np.ndarray] = {}      # ... and its positive definite matrices of the indefinite bodies
 
     @property
     def outer(self) -> np.ndarray:
@@ -73,13 +73,13 @@ class Condensation:
             damping: np.ndarray | None = None) -> None:
         """Assemble, factor and condense the matrices of the given bodies (b,).
 
-        tangents: for each group of elements (b, k, w (w + 1) / 2) in N/mm, as `packed` has them;  springs: `Springs` of these
+        tangents: for each group of elements (b, k, w (w + 1) / 2) in N/mm, in the form of `packed`;  springs: `Springs` of these
         bodies;  damping: stiffness (b,) in N/mm to add on each inner unknown, which shortens steps along soft modes (Levenberg and
         Marquardt)
 
-        Where folding made a matrix indefinite its eigenvalues are made positive: with |matrix| every Newton step lowers the
-        energy, and goes as far along a mode of negative stiffness as along one of positive; at equilibrium only the rate
-        of convergence depends on it. Nocedal and Wright, Numerical Optimization, sec. 3.4.
+        Where folding made a matrix indefinite, the absolute values of its eigenvalues are used: every Newton step then
+        decreases the energy, with the same step length along modes of negative and positive stiffness. The equilibrium does not
+        depend on it, only the rate of convergence. Nocedal and Wright, Numerical Optimization, sec. 3.4.
         """
         springs = springs or Springs(np.zeros((len(bodies), 0)), np.zeros((0, 1), dtype=np.int64), np.zeros((0, 1)))
         damping = np.zeros(len(bodies)) if damping is None else damping
@@ -90,17 +90,18 @@ class Condensation:
 
     def residual(self, inner: np.ndarray, *, bodies: np.ndarray | None = None,
                  workers: Workers = SERIAL) -> tuple[np.ndarray, np.ndarray]:
-        """What inner residuals (b, n) of some bodies (b,), or of all, leave on their outer unknowns (b, m), and the part to keep
-        for `recover`."""
-        half, bodies = np.array(inner, dtype=np.float32, order="C"), self._chosen(bodies)
-        passed_on = np.empty((len(half), self.outer.shape[1]), dtype=np.float32)
-        workers.map(lambda part: _reduce(self._store.rows, bodies[part], half[part], passed_on[part]), slices(len(half), _AT_ONCE))
-        return passed_on, half
+        """Contributions (b, m) of the inner residuals (b, n) of some bodies (b,), or of all, to the outer residual, and the
+        forward-solved right-hand sides that `recover` needs."""
+        forward_solved, bodies = np.array(inner, dtype=np.float32, order="C"), self._chosen(bodies)
+        passed_on = np.empty((len(forward_solved), self.outer.shape[1]), dtype=np.float32)
+        workers.map(lambda part: _reduce(self._store.rows, bodies[part], forward_solved[part], passed_on[part]),
+                    slices(len(forward_solved), _AT_ONCE))
+        return passed_on, forward_solved
 
-    def recover(self, half: np.ndarray, outer_step: np.ndarray, *, bodies: np.ndarray | None = None,
+    def recover(self, forward_solved: np.ndarray, outer_step: np.ndarray, *, bodies: np.ndarray | None = None,
                 workers: Workers = SERIAL) -> np.ndarray:
-        """Newton step (b, n) of the inner unknowns of some bodies (b,), or of all, for that of their outer ones (b, m)."""
-        step, bodies = half.astype(np.float32), self._chosen(bodies)     # a copy; a half that was cut is in double precision
+        """Newton step (b, n) of the inner unknowns of some bodies (b,), or of all, for the step (b, m) of their outer ones."""
+        step, bodies = forward_solved.astype(np.float32), self._chosen(bodies)     # a copy; scaled ones are in double precision
         outer = np.ascontiguousarray(outer_step, dtype=np.float32)
         workers.map(lambda part: _recover(self._store.rows, bodies[part], step[part], outer[part]), slices(len(step), _AT_ONCE))
         return -step
@@ -110,20 +111,20 @@ class Condensation:
 
     @property
     def not_judged(self) -> np.ndarray:
-        """Bodies (b,) that `make_positive` has not seen as they are set now."""
+        """Bodies (b,) that `make_positive` has not checked since they were last set."""
         return np.flatnonzero(~self._judged)
 
     def make_positive(self, bodies: np.ndarray) -> None:
-        """Prepare `positive_outer` of some bodies (b,); many threads may, each with its own."""
+        """Prepare `positive_outer` of some bodies (b,); several threads may do so for different bodies."""
         made, changed = np.empty((len(bodies), *self.outer.shape[1:]), dtype=np.float32), np.zeros(len(bodies), dtype=bool)
         _make_outer_positive(self.outer, bodies, made, changed, ROUTINES)
         self._positive.update({int(bodies[k]): made[k].copy() for k in np.flatnonzero(changed)})
         self._judged[bodies] = True
 
     def positive_outer(self) -> np.ndarray:
-        """The condensed matrices with the eigenvalues of those that are indefinite made positive, as in `set`.
+        """The condensed matrices, the indefinite ones with the absolute values of their eigenvalues, as in `set`.
 
-        With zeros in their place a step would go as far along these modes as all else lets it.
+        With zeros instead, only the rest of the body would limit a step along these modes.
         """
         self.make_positive(self.not_judged)
         out = self.outer.copy()
@@ -133,7 +134,7 @@ class Condensation:
 
     @property
     def modified(self) -> int:
-        """How many bodies had modes of negative stiffness."""
+        """Number of bodies with modes of negative stiffness."""
         return int(self._store.modified.sum())
 
 
@@ -174,7 +175,7 @@ def _set(bodies, damping, tangents, dofs, springs, store, blas):
 
 @njit(cache=True, nogil=True)
 def _add_element(matrix, tangent, dofs):
-    """Add a packed tangent to an upper triangle; an unknown may occur in several of an element's places."""
+    """Add a packed tangent to an upper triangle; several nodes of an element may have the same unknown."""
     first = 0
     for i in range(len(dofs)):
         row = dofs[i]
@@ -207,7 +208,7 @@ def _add_springs(matrix, stiffness, places, weights):
 
 @njit(cache=True, nogil=True)
 def _condense(matrix, rows, outer, blas):
-    """Fill a body's rows and outer matrix; True where its inner matrix was not positive definite."""
+    """Fill a body's rows and outer matrix; returns whether its inner matrix was not positive definite."""
     n, m = len(rows), len(outer)
     size, letters, factors = np.array([n, m, n + m, 0], dtype=np.int32), blas.letters, blas.factors
     L, N, R, T = address(letters, 0), address(letters, 1), address(letters, 2), address(letters, 3)
@@ -232,7 +233,7 @@ def _condense(matrix, rows, outer, blas):
 
 @njit(cache=True, nogil=True)
 def _make_outer_positive(outer, bodies, made, changed, blas):
-    """Fill in what is left of the bodies that are indefinite; a Cholesky factorisation shows soonest which are not."""
+    """Make the condensed matrices of the indefinite bodies positive definite; a Cholesky factorisation finds these quickly."""
     size = np.array([outer.shape[1], 0], dtype=np.int32)
     lower, count, info = address(blas.letters, 0), address(size, 0), address(size, 1)
     for b in range(len(bodies)):
@@ -250,21 +251,21 @@ def _made_positive(matrix):
         for j in range(i):
             matrix[i, j] = matrix[j, i]
     values, vectors = np.linalg.eigh(matrix)
-    # What a layer close to instability left to this one may be so stiff that, rounded, softer modes would be negative again.
+    # The previous layer's contribution may be so stiff near an instability that rounding makes softer modes negative.
     least = max(_SMALLEST_STIFFNESS, len(matrix) * _ROUNDING * np.abs(values).max())
     return ((vectors * np.maximum(np.abs(values), least)) @ vectors.T).astype(np.float32)
 
 
 @njit(cache=True, nogil=True)
-def _reduce(rows, bodies, half, passed_on):
+def _reduce(rows, bodies, forward_solved, passed_on):
     n, whole = rows.shape[1], np.zeros(rows.shape[2], np.float32)
     for b in range(len(bodies)):
-        whole[:n], whole[n:] = half[b], 0.0
+        whole[:n], whole[n:] = forward_solved[b], 0.0
         for i in range(n):
             row = rows[bodies[b], i]
             whole[i] /= row[i]
             add_row(row[i + 1:], -whole[i], whole[i + 1:])
-        half[b], passed_on[b] = whole[:n], whole[n:]
+        forward_solved[b], passed_on[b] = whole[:n], whole[n:]
 
 
 @njit(cache=True, nogil=True)
@@ -279,7 +280,7 @@ def _recover(rows, bodies, step, outer_step):
 
 
 class TangentCache:
-    """Of the elements (e,) of a `SolidBlock`; in single precision, upper triangles as `packed` has them."""
+    """The last tangents of the elements (e,) of a `SolidBlock`: upper triangles in the form of `packed`, in single precision."""
 
     def __init__(self, block: SolidBlock) -> None:
         elements, nodes = len(block.at_rest.shapes), block.at_rest.gradients.shape[3]
@@ -290,10 +291,10 @@ class TangentCache:
     def at(self, displacement: np.ndarray, elements: np.ndarray, *, kept_mm: float) -> np.ndarray:
         """Tangents (b, w) of elements (b,) whose nodes' displacement (b, m, 3) is given.
 
-        kept_mm: elements whose nodes moved by no more than that since their last tangent keep it, but for what all nodes share
+        kept_mm: elements whose nodes moved by at most that much since their last tangent, without the translation, keep it
         """
         shape = (displacement - displacement.mean(axis=1, keepdims=True)).astype(np.float32)
-        same = np.abs(shape - self._found_at[elements]).max(axis=(1, 2)) <= kept_mm     # not so where none was found: nan
+        same = np.abs(shape - self._found_at[elements]).max(axis=(1, 2)) <= kept_mm     # False without a tangent: nan
         if not same.all():
             anew = elements[~same]
             self._tangents[anew] = packed(self._block.tangent(displacement[~same], anew, precision=np.float32))
@@ -301,14 +302,14 @@ class TangentCache:
         return self._tangents[elements]
 
     def forget(self) -> None:
-        """Let each element's next tangent be found anew."""
+        """Discard all tangents, so that each is recomputed at its next use."""
         self._found_at[:] = np.nan
 
 
 def make_positive(tangents: np.ndarray) -> int:
-    """Give the indefinite ones among symmetric tangents (e, k, k), in single precision, |eigenvalues|; in place.
+    """Replace the eigenvalues of indefinite symmetric tangents (e, k, k), in single precision, by their absolute values, in place.
 
-    Returns how many were. Those that are not even finite stay, for no factor will be found of them.
+    Returns the number of indefinite ones. Tangents that are not finite are left unchanged; their factorisation fails later.
     """
     return int(_make_positive(tangents, np.empty(tangents.shape[1:], dtype=np.float32), ROUTINES))
 

@@ -10,7 +10,7 @@ from softtact.errors import InputError
 from softtact.fem.elements import HEX27, QUAD9, TET10
 from softtact.fem.solid_mesh import Facets, SolidMesh
 
-_NEAR = 0.5     # of the layer it lies in: a level that is nearer to the new one is moved there, else the new one is put between
+_NEAR = 0.5     # of the layer's thickness: an existing level within this distance is moved to the new one, else one is inserted
 
 
 def box(
@@ -58,9 +58,9 @@ def _line(low, high, count, shares):
 
 
 def square_to_disc(xy: np.ndarray) -> np.ndarray:
-    """Places (n, 2) of a square [-1, 1]^2 moved onto the unit disc, its sides onto the circle.
+    """Map points (n, 2) of the square [-1, 1]^2 to the unit disc, its sides to the circle.
 
-    Elliptical grid mapping: smooth, and the four corners come to the circle's diagonals. (Nowell; Fong, arXiv:1509.06344.)
+    Elliptical grid mapping: smooth; the four corners are mapped to the circle's diagonals. (Nowell; Fong, arXiv:1509.06344.)
     """
     x, y = xy.T
     return np.column_stack([x * np.sqrt(1 - 0.5 * y * y), y * np.sqrt(1 - 0.5 * x * x)])
@@ -88,7 +88,7 @@ def cylinder(
 def in_tetrahedra(mesh: SolidMesh) -> SolidMesh:
     """A mesh of hexahedra HEX27 with each one cut into six quadratic tetrahedra on the same nodes; faces keep their names.
 
-    The diagonals run from each element's first corner to the opposite one (Kuhn), so that those of neighbours agree in meshes made
+    The diagonals run from each element's first corner to the opposite one (Kuhn), so that neighbours conform in meshes made
     from a grid. Raises InputError for other elements.
     """
     if other := [kind for _, kind, _ in mesh.cells if kind != HEX27.meshio_name]:
@@ -99,7 +99,7 @@ def in_tetrahedra(mesh: SolidMesh) -> SolidMesh:
 
 
 def _kuhn() -> np.ndarray:
-    """Nodes (6, 10) of HEX27 that are those of its six tetrahedra."""
+    """Local nodes (6, 10) of HEX27 that are the nodes of its six tetrahedra."""
     number = {tuple(place): k for k, place in enumerate((HEX27.nodes + 1).round().astype(int).tolist())}
     shares = np.column_stack([1 - TET10.nodes.sum(axis=1), TET10.nodes])      # of the four corners at the ten nodes
     out = []
@@ -112,19 +112,19 @@ def _kuhn() -> np.ndarray:
 
 
 def _facets_within(boundary: Facets, face: Facets) -> Facets:
-    """Those facets of a boundary of which each node is one of a face."""
+    """The facets of a boundary all of whose nodes belong to a face."""
     own = np.unique(np.concatenate([nodes.ravel() for nodes in face.values()]))
     found = {kind: nodes[np.isin(nodes, own).all(axis=1)] for kind, nodes in boundary.items()}
     return {kind: nodes for kind, nodes in found.items() if len(nodes)}
 
 
 def mirrored(mesh: SolidMesh, axis: int) -> SolidMesh:
-    """The mesh mirrored at the plane through the origin across an axis (0, 1, 2); faces keep their names."""
+    """The mesh mirrored at the plane through the origin normal to an axis (0, 1, 2); faces keep their names."""
     sign = np.ones(3)
     sign[axis] = -1.0
     cells = []
     for region, element, nodes in mesh.parts():
-        exchanged = element.nodes[:, [1, 0, 2][:element.nodes.shape[1]]]      # two parent coordinates, which turns an element round
+        exchanged = element.nodes[:, [1, 0, 2][:element.nodes.shape[1]]]      # swapped parent coordinates reverse the orientation
         order = np.abs(element.nodes[:, None] - exchanged[None]).sum(axis=2).argmin(axis=1)
         cells.append((region, element.meshio_name, nodes[:, order]))
     whole = replace(mesh, points=mesh.points * sign, cells=tuple(cells), faces={})
@@ -132,9 +132,9 @@ def mirrored(mesh: SolidMesh, axis: int) -> SolidMesh:
 
 
 def with_level(levels: np.ndarray, level: float) -> np.ndarray:
-    """Rising levels (n,) in mm, `level` among them: the nearest inner one moved there, or a new one.
+    """Rising levels (n,) in mm that contain `level`: the nearest inner level is moved to it, or it is inserted.
 
-    Unchanged where `level` is not between the first and the last.
+    Unchanged if `level` is not between the first and the last.
     """
     levels = np.asarray(levels, dtype=float)
     if not levels[0] + 1e-9 < level < levels[-1] - 1e-9 or np.abs(levels - level).min() < 1e-9:

@@ -1,6 +1,6 @@
-"""Inner unknowns of many like bodies eliminated layer by layer: what a layer leaves is one more element of the next.
+"""Elimination of the inner unknowns of many like bodies layer by layer: a layer's Schur complement is an element of the next layer.
 
-Layers meet in their common planes only, so this takes half the operations and memory of one dense matrix for each body.
+Layers share only their common planes, so this takes half the operations and memory of one dense matrix for each body.
 """
 
 from collections.abc import Iterable, Sequence
@@ -14,9 +14,9 @@ from softtact.linalg.workers import SERIAL, Workers
 
 @dataclass(frozen=True)
 class Stage:
-    """What is eliminated with a layer: a body's unknowns inner (i,), those that it leaves, outer (o,), and the matrices.
+    """The elimination of one layer: a body's eliminated unknowns inner (i,), its remaining ones outer (o,), and the matrices.
 
-    place (n + 1,): where a body's unknowns are in the layer's matrix, -1: nowhere; the last entry is that of no unknown (-1)
+    place (n + 1,): row of each of a body's unknowns in the layer's matrix, -1 if absent; the last entry is for no unknown (-1)
     """
 
     inner: np.ndarray
@@ -26,14 +26,14 @@ class Stage:
 
 
 class LayerwiseElimination:
-    """Bodies with unknowns numbered from 0 to n - 1 in each; `outer` are those that are left in the end, in rising order."""
+    """Bodies with unknowns numbered from 0 to n - 1 in each; `outer` are the ones that remain at the end, in rising order."""
 
     def __init__(self, bodies: int, inner: np.ndarray, layers: Sequence[Sequence[np.ndarray]], *,
                  coupled: Sequence[np.ndarray] | None = None) -> None:
         """inner (n,): whether an unknown is eliminated
 
-        layers: layer by layer the unknowns (k, w) of each group of like elements, -1 where held
-        coupled: unknowns that springs of a layer act on, beside those of its elements; layer by layer
+        layers: layer by layer the unknowns (k, w) of each group of like elements, -1 where fixed
+        coupled: layer by layer the unknowns that its springs act on, in addition to those of its elements
         """
         coupled = [np.zeros(0, dtype=np.int64)] * len(layers) if coupled is None else coupled
         members = [_members([*groups, also]) for groups, also in zip(layers, coupled, strict=True)]
@@ -51,19 +51,19 @@ class LayerwiseElimination:
 
     @property
     def matrices(self) -> np.ndarray:
-        """What is left of each body: (bodies, m, m), m as in `outer`."""
+        """Schur complement (bodies, m, m) of each body on the m `outer` unknowns."""
         return self.last.outer
 
     @property
     def last(self) -> Condensation:
-        """The layer of which `matrices` are what is left."""
+        """The last layer, whose Schur complements are `matrices`."""
         return self.stages[-1].condensed
 
     def set(self, bodies: np.ndarray, layers: Iterable[tuple[Sequence[np.ndarray], Springs | None]], *,
             damping: np.ndarray | None = None) -> None:
-        """Eliminate anew in the given bodies (b,).
+        """Repeat the elimination in the given bodies (b,).
 
-        layers: for each layer the tangents of its groups and its `Springs` or None; one layer is asked for after the other
+        layers: for each layer the tangents of its groups and its `Springs` or None, taken one after the other
         For these and the damping see `Condensation.set`.
         """
         carried: list[np.ndarray] = []
@@ -72,8 +72,8 @@ class LayerwiseElimination:
             carried = [packed(stage.condensed.outer[bodies][:, None])]
 
     def residual(self, force: np.ndarray, *, bodies: np.ndarray | None = None, workers: Workers = SERIAL) -> list[np.ndarray]:
-        """Pass the inner forces (b, n) of some bodies (b,), or of all, on to the outer unknowns, in place; returns what `recover`
-        needs."""
+        """Eliminate the inner forces (b, n) of some bodies (b,), or of all, in place; returns the forward-solved right-hand sides
+        that `recover` needs."""
         forward_solved = []
         for stage in self.stages:
             passed_on, half = stage.condensed.residual(force[:, stage.inner], bodies=bodies, workers=workers)
@@ -83,7 +83,7 @@ class LayerwiseElimination:
 
     def recover(self, forward_solved: Sequence[np.ndarray], step: np.ndarray, *, bodies: np.ndarray | None = None,
                 workers: Workers = SERIAL) -> None:
-        """Fill in the inner unknowns of a Newton step (b, n) of some bodies, or of all, whose outer ones are given, in place."""
+        """Compute the inner unknowns of a Newton step (b, n) of some bodies, or of all, from the outer ones, in place."""
         for stage, half in zip(self.stages[::-1], forward_solved[::-1], strict=True):
             step[:, stage.inner] = stage.condensed.recover(half, step[:, stage.outer], bodies=bodies, workers=workers)
 

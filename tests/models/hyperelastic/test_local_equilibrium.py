@@ -73,10 +73,10 @@ def test_a_state_is_the_same_as_one_evaluated_there(body):
 
 
 def test_steps_too_long_are_halved_until_the_energy_of_each_frustum_falls(body, monkeypatch):
-    whole, state = body.support.own_step, bent(body, by_mm={FIRST: 0.01, THIRD: -0.02}).support
+    whole, state = body.support.local_step, bent(body, by_mm={FIRST: 0.01, THIRD: -0.02}).support
     factors = np.ones(body.support.count)
     factors[THIRD] = 8.0      # on a parabola a step eight times too long raises the energy, and so do its half and its quarter
-    monkeypatch.setattr(body.support, "own_step", lambda state, frusta, **options: (
+    monkeypatch.setattr(body.support, "local_step", lambda state, frusta, **options: (
         factors[frusta, None, None] * whole(state, frusta, **options)))
     monkeypatch.setattr("softtact.models.hyperelastic.body._FARTHEST_MM", 1.0)
     now, _ = balanced(body.support, state, TOLERANCE_N)

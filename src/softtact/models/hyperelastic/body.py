@@ -1,9 +1,9 @@
 """The layered sensor as one body: slab (sheet and cover) tied to its `Support`, its friction, and one Newton step of it.
 
-Between the steps of the whole sensor frusta find their balance one by one, with their roots held (`balanced`). Beside the object
-they rock on the rims of their tips, and under it they fold onto the board: a few of them change their contact within a step, and
-are then farther from balance than all else. Steps of the whole sensor would cost a thousand times what theirs do, and one frustum
-whose energy rises halves such a step for all. What each does here lowers its local energy, and so the whole one.
+Between global Newton steps, each frustum is brought to local equilibrium with its root fixed (`balanced`). Frusta beside the object
+rock on the rims of their tips, and those under it fold onto the board: a few change their contact state within a step and then
+have the largest residuals. A global step costs a thousand times as much as a step of these, and one frustum whose energy increases
+would halve it for all. Each local step decreases the frustum's energy, and so the total one.
 """
 
 from collections.abc import Sequence
@@ -29,22 +29,22 @@ from softtact.progress import Watch
 if TYPE_CHECKING:
     from softtact.fem.kernels_torch import DeviceKernels
 
-_FRUSTUM_STEPS = 6               # of Newton's method for a frustum; what is not in balance then is left to the next step of all
+_FRUSTUM_STEPS = 6               # Newton steps for a frustum; a remaining imbalance is left to the next global step
 _FRUSTUM_HALVINGS = 5
-_FARTHEST_MM = 0.05      # of a node in a step
-_SHARE = 0.3             # of the tolerance that a frustum keeps at most: what moves its root next must not use up all of it
+_FARTHEST_MM = 0.05      # largest movement of a node in a step
+_SHARE = 0.3             # of the tolerance: largest residual of a frustum, as a later movement of its root adds to it
 _FRUSTA_AT_ONCE = 8             # frusta that a thread condenses at once
-_DAMPINGS = 4         # steps that are tried with ever more damping of the cells that they throw too far
-_FIRST_SHIFT = 0.001   # N/mm on every free unknown of the slab, then more until the tangent is positive definite ...
-_MORE, _LESS = 4.0, 0.25   # of the shift before: the next that is tried, and from where a later search begins
-_MOST_SHIFTS = 20     # ... but a tangent that is not even finite will never be
+_DAMPINGS = 4         # steps that are tried with increasing damping of the cells that move too far
+_FIRST_SHIFT = 0.001   # N/mm on every free unknown of the slab, increased until the tangent is positive definite ...
+_MORE, _LESS = 4.0, 0.25   # factors of the last shift: for the next trial, and for the start of a later search
+_MOST_SHIFTS = 20     # ... up to this number: a tangent that is not finite never becomes positive definite
 
 
 def balanced(support: Support, state: SupportState, tolerance_n: float, *,
              workers: Workers = SERIAL) -> tuple[SupportState, np.ndarray]:
-    """The `SupportState` after each frustum beyond the tolerance (N) went to its local equilibrium, and which frusta did (k,).
+    """The `SupportState` with each frustum beyond the tolerance (N) in local equilibrium, and the numbers (k,) of these frusta.
 
-    Their condensed tangents are those of the last step's start, not of the state found.
+    Their condensed tangents are those at the last step's start, not at the returned state.
     """
     loose, moved = _loose(support, state, tolerance_n), np.zeros(support.count, dtype=bool)
     for _ in range(_FRUSTUM_STEPS):
@@ -57,14 +57,14 @@ def balanced(support: Support, state: SupportState, tolerance_n: float, *,
 
 
 def _loose(support, state, tolerance_n):
-    """Numbers (k,) of the frusta with unbalanced forces of more than the tolerance."""
+    """Numbers (k,) of the frusta with residuals above the tolerance."""
     return np.flatnonzero(np.abs(support.inner_residual(state)).max(axis=1, initial=0.0) > tolerance_n)
 
 
 def _step(support, state, frusta, workers):
-    """The state after a step of the frusta (k,), each halved until its energy falls, and for which (k,) it did."""
+    """The state after a step of the frusta (k,), each halved until its energy decreases; and for which (k,) it did."""
     workers.map(lambda part: support.condense(state, part), chunks(frusta, _FRUSTA_AT_ONCE))
-    step = support.own_step(state, frusta, workers=workers)
+    step = support.local_step(state, frusta, workers=workers)
     step *= np.minimum(1.0, _FARTHEST_MM / np.maximum(np.abs(step).max(axis=(1, 2)), 1e-300))[:, None, None]
     displacement, (energies, forces) = state.displacement.copy(), tuple(part.copy() for part in state.elastic)
     before = support.potentials(displacement[frusta], (energies[frusta], None), frusta, state.history)
@@ -73,7 +73,7 @@ def _step(support, state, frusta, workers):
         here = frusta[waiting]
         trial = state.displacement[here] + share * step[waiting]
         elastic = support.rubber(trial, here, workers=workers)
-        if elastic is None:     # one of them is inside out
+        if elastic is None:     # an element is inverted
             return np.zeros(len(waiting), dtype=bool)
         lower = support.potentials(trial, elastic, here, state.history) < before[waiting]
         displacement[here[lower]], energies[here[lower]], forces[here[lower]] = trial[lower], elastic[0][lower], elastic[1][lower]
@@ -84,15 +84,15 @@ def _step(support, state, frusta, workers):
 
 
 class BodyFriction:
-    """What a press has to do about friction between Newton's runs; without any coefficient all of it does nothing."""
+    """Updates of the friction states between Newton's runs; without friction they do nothing."""
 
     def __init__(self, top: TopContact, support: Support) -> None:
-        """top: the slab's `TopContact`, support: what is below the slab."""
+        """top: the slab's `TopContact`;  support: below the slab."""
         self._top, self._support = top, support
         self.reset()
 
     def reset(self) -> None:
-        """Forget the last tangent."""
+        """Discard the friction of the last tangent."""
         self._last: Sequence[FrictionResponse | None] = None, None             # friction on top and board at the last tangent
 
     @property
@@ -100,13 +100,13 @@ class BodyFriction:
         return self._top.friction is not None or self._support.friction is not None
 
     def begin_step(self, state: BodyState, *, growth: float = 1.0) -> BodyHistory:
-        """History with the points held where a step starts from a `BodyState`, by pressures as they are to grow: a first guess."""
+        """History at the start of a step from a `BodyState`; its pressures, scaled by `growth`, are a first guess."""
         top = self._top.first_friction_state(state.slab, state.indentation)
         support = self._support.first_friction_state(state.support)
         return self._history(state, *(part and replace(part, pressure=growth * part.pressure) for part in (top, support)))
 
     def renewed(self, state: BodyState, *, halfway: bool = False) -> BodyHistory:
-        """History with friction up to date with the pressures of a `BodyState`, or by half of the change."""
+        """History with friction updated to the pressures of a `BodyState`, or to halfway between the old and new ones."""
         parts: list[FrictionState | None] = []
         part: Any
         of_part: Any
@@ -124,7 +124,7 @@ class BodyFriction:
         return replace(history, top=history.top.held_by(top), support=history.support.held_by(support))
 
     def for_tangent(self, state: BodyState) -> BodyState:
-        """The state whose friction knows that of the last tangent (see `FrictionResponse.after`)."""
+        """The state whose friction is linearised from the last tangent (see `FrictionResponse.after`)."""
         if not self.active:
             return state
         now = state.slab.friction_response, state.support.friction_response
@@ -134,11 +134,11 @@ class BodyFriction:
 
 
 def _shifts(last, damped_before):
-    """What is tried, one after the other, until a tangent is positive definite, so that every step lowers the energy.
+    """Shifts to try in turn until a tangent is positive definite, so that every step decreases the energy.
 
-    None: nothing;  0: the cells' modes of negative stiffness are made positive;  more: the cover's, too, and so many N/mm added
-    last: what was enough for the tangent before, None where nothing was needed; where it was much, less of it is tried at once
-    damped_before: the tangent before was the same but for damped cells; what was enough for it is where to begin
+    None: unchanged;  0: the cells' negative eigenvalues are made positive;  more: the cover's too, and a shift in N/mm is added
+    last: the shift of the last tangent, None if none was needed; the search starts from a part of it
+    damped_before: the last tangent differed only in the damping of cells; the search starts from its shift
     """
     first = max(_FIRST_SHIFT, (1.0 if damped_before else _LESS) * (last or 0.0))
     if first == _FIRST_SHIFT and not (damped_before and last is not None):
@@ -153,7 +153,7 @@ class LayeredBody:
     """Slab on a `Support`, pressed from above by a rigid object. Lengths in mm, z = 0 at the top at rest."""
 
     def __init__(self, slab: Slab, support: Support, roots: np.ndarray | None = None, *, threads: int = 1) -> None:
-        """`roots` (f, k): the slab's nodes that are the frusta's root nodes; none for a support without bodies."""
+        """roots (f, k): the slab's nodes that are the frusta's root nodes; None for a support without bodies."""
         self.slab, self.support = slab, support
         self.workers, self.watch = Workers(threads), Watch()
         self.friction = BodyFriction(slab.top, support)
@@ -161,10 +161,10 @@ class LayeredBody:
         slab.build_pattern(self.cells.eliminated, self.cells.outer_dofs)
         self.solver = DissectedSolver(slab.points[slab.unknowns // 3, :2], workers=self.workers)
         self.stepper = ContactStepper(DissectedContact(self.solver, workers=self.workers))
-        self._shift: float | None = None     # that made the last tangent positive definite
+        self._shift: float | None = None     # the one that made the last tangent positive definite
 
     def sum_with(self, loops: "ModuleType | DeviceKernels") -> None:
-        """Let elements be summed by `loops`: `kernels`, as from the start, or `device_kernels`."""
+        """Use `loops` for the sums over elements: `kernels`, the default, or `device_kernels`."""
         for block in self.slab.blocks + self.support.blocks:
             block.loops = loops
 
@@ -175,7 +175,7 @@ class LayeredBody:
         return self.solver.name if loops is kernels else f"{self.solver.name}; elements on {loops.device}"
 
     def close(self) -> None:
-        """Free the factors, and end the threads."""
+        """Free the factors and end the threads."""
         self.solver.close()
         self.workers.close()
 
@@ -188,7 +188,7 @@ class LayeredBody:
         return BodyHistory(self.slab.top.fresh_history(), self.support.fresh_history())
 
     def begin(self) -> None:
-        """Forget all tangents and factors of an earlier press: what is kept decides the last digits of a result."""
+        """Discard all tangents and factors of an earlier press, since they would change the last digits of a result."""
         self.cells.reset()
         self.stepper.reset()
         self._shift = None
@@ -196,22 +196,22 @@ class LayeredBody:
 
     def evaluate(self, slab_displacement: np.ndarray, support_displacement: np.ndarray, indentation: float,
                  projection: ContactProjection, history: BodyHistory | None = None) -> BodyState | None:
-        """State at given displacements, by default without a history of the contacts; None where an element is inside out."""
+        """State at given displacements, by default without a history of the contacts; None if an element is inverted."""
         history = history or self.fresh_history()
         slab = self.slab.evaluate(slab_displacement, projection, indentation, history.top, workers=self.workers)
         support = None if slab is None else self.support.evaluate(support_displacement, history.support, workers=self.workers)
         return None if slab is None or support is None else BodyState(slab=slab, support=support, indentation=indentation)
 
     def reevaluate_contact(self, state: BodyState, history: BodyHistory) -> BodyState:
-        """The same displacements with another history of the contacts: the rubber is not evaluated anew."""
+        """The same displacements with another history of the contacts; the rubber is not evaluated again."""
         return BodyState(slab=self.slab.update_normals(state.slab, state.slab.projection, state.indentation, history.top),
                          support=self.support.reevaluate_contact(state.support, history.support), indentation=state.indentation)
 
     def balanced(self, state: BodyState, tolerance_n: float) -> BodyState:
-        """The state with each frustum in balance over its root, where nothing else keeps the body from it.
+        """The state with each frustum in local equilibrium, if only frusta are out of balance.
 
-        A frustum that rocks or folds needs separate steps; as long as sheet or cover do, too, it takes them with these. With
-        friction on the board frusta wait for the steps of all: what holds them does not see one alone.
+        A frustum that rocks or folds takes separate steps, unless sheet or cover are out of balance too. With friction on the
+        board there are no separate steps, as the friction state is updated for all frusta together.
         """
         rest = max(tolerance_n, self._slab_residual(state))
         if self.support.friction is not None or self._support_residual(state) <= rest:
@@ -221,26 +221,26 @@ class LayeredBody:
         return replace(state, support=support)
 
     def update_normals(self, state: BodyState, projection: ContactProjection) -> BodyState:
-        """The same state with the object's contact on other planes."""
+        """The state with another contact projection on the object."""
         return replace(state, slab=self.slab.update_normals(state.slab, projection, state.indentation))
 
     def indented_to(self, state: BodyState, force_n: float) -> BodyState:
-        """The state with the object at the depth where its force is `force_n`: the least energy over the indentation."""
+        """The state at the indentation that minimises the energy for fixed nodes: there the object's force is `force_n`."""
         return self.indented(state, self.slab.top.balanced(state.slab, state.indentation, force_n) - state.indentation)
 
     def indented(self, state: BodyState, by_mm: float) -> BodyState:
-        """The state with the object lower by so much."""
+        """The state with the object lower by `by_mm`."""
         depth = state.indentation + by_mm
         return replace(state, slab=self.slab.update_normals(state.slab, state.slab.projection, depth), indentation=depth)
 
     def newton_step(self, state: BodyState, force_n: float | None, surface: ObjectSurface | None = None, *,
                     largest_mm: float = np.inf, kept_mm: float = 0.0) -> BodyStep:
-        """The Newton step under a given force (N), or with the indentation kept where `force_n` is None.
+        """The Newton step under a given force (N), or at constant indentation if `force_n` is None.
 
-        largest_mm: by which the object goes down at most;  kept_mm: cells that moved less since their last tangent keep it
+        largest_mm: largest descent of the object;  kept_mm: cells that moved less since their last tangent keep it
 
-        With a surface the step's contact is with the facets that the points face where it leads, else with those of the state.
-        Where nothing touches, a force finds no stiffness: the step is then not finite.
+        With a surface, the step uses the contact projection at its end, otherwise that of the state. Without any contact a
+        free object has no stiffness: the step is then not finite.
         """
         state = self.friction.for_tangent(state)
         for number in range(_DAMPINGS):
@@ -250,7 +250,7 @@ class LayeredBody:
         return step
 
     def _newton_step(self, state, force_n, surface, largest_mm, kept_mm, *, damped_before):
-        """The step with the cells as they are damped now; damped_before: it was found before with less damping."""
+        """The step with the present damping of the cells; damped_before: it was already computed with less damping."""
         self.cells.refresh(state, kept_mm=kept_mm, workers=self.workers)
         residual, kept = self.cells.condensed_residual(state, workers=self.workers)
         contact = StepContact(self.slab, state.slab, state.indentation, surface, largest_mm=largest_mm, workers=self.workers)
@@ -262,9 +262,9 @@ class LayeredBody:
         return BodyStep(slab=slab, support=support, indentation=indentation_increment, projection=contact.projection)
 
     def _step_of_unknowns(self, state, residual, contact, force_n, largest_mm, *, damped_before):
-        """BodyStep of the global unknowns, and how far the object goes down; the tangent is made positive definite where it is not.
+        """Step of the global unknowns and of the object's indentation; an indefinite tangent is made positive definite.
 
-        Not a number where that cannot be done, which fails Newton's method there.
+        nan if that is impossible, so that Newton's method fails.
         """
         excess, border = None if force_n is None else state.force - force_n, self.slab.friction_border(state.slab)
         positive = None
@@ -279,7 +279,7 @@ class LayeredBody:
         return np.full(len(residual), np.nan), np.nan
 
     def _rubber_tangent(self, state, shift, positive):
-        """The rubber's tangent with a shift, see `_shifts`; positive: what the cells leave with their modes made positive."""
+        """The rubber's tangent with a shift, see `_shifts`; positive: the cells' condensed matrices made positive definite."""
         if shift is None:
             return self.slab.rubber_tangent(state.slab, self.cells.outer, workers=self.workers)
         rubber = self.slab.rubber_tangent(state.slab, positive, positive=shift > 0, workers=self.workers)
@@ -291,7 +291,7 @@ class LayeredBody:
         return float(max(0.0, -self.slab.top.surface_gaps(state.slab).min(), -state.support.gaps.min(initial=np.inf)))
 
     def descent(self, state: BodyState) -> float:
-        """How far the cover has come down where it did most, in mm."""
+        """Largest descent of the cover's top in mm."""
         return float(-state.slab.displacement[:, 2].min())
 
     def contact_error(self, state: BodyState) -> float:
@@ -299,11 +299,11 @@ class LayeredBody:
         return max(self.slab.top.error(state.slab), self.support.contact_error(state.support))
 
     def at_edge(self, state: BodyState) -> bool:
-        """Whether points of the cover have run far under an edge of the object."""
+        """Whether points of the cover are far under an edge of the object."""
         return bool(state.slab.projection.overrun.any())
 
     def augmented(self, state: BodyState, *, allowed_mm: float) -> BodyState:
-        """The state with the points that overlap held where their surfaces just touch, wherever an overlap is more than allowed."""
+        """The state after one augmentation of each contact with an overlap of more than `allowed_mm`."""
         top, support = state.slab.history, state.support.history
         if self.slab.top.error(state.slab) > allowed_mm:
             top = self.slab.top.augmented(state.slab)
@@ -312,7 +312,7 @@ class LayeredBody:
         return self.reevaluate_contact(state, BodyHistory(top, support))
 
     def most_compressed(self, state: BodyState) -> tuple[float, str]:
-        """The largest share of its height by which a frustum, or without any the layers, are shortened; and which in words."""
+        """Largest compression of a frustum relative to its height, or of the layers without frusta; and where, in words."""
         of_support = self.support.most_compressed(state.support)
         if of_support is not None:
             return of_support
@@ -320,9 +320,9 @@ class LayeredBody:
         return share, f"the surface has come down by {share:.0%} of the layers' thickness"
 
     def share_outside_window(self, state: BodyState) -> float:
-        """Share of a law's volume that is strained beyond what the law was fitted to, the largest over the laws.
+        """Share of a law's volume that is strained beyond the range of the law's fit, the largest over the laws.
 
-        nan where no law knows what it was fitted to.
+        nan if no law states the range of its fit.
         """
         volumes: dict[int, tuple[float, float]] = {}
         for nodes, block in self.slab.solids:
@@ -345,14 +345,14 @@ class LayeredBody:
         return np.abs(self.support.inner_residual(state.support)).max(initial=0.0)
 
     def slab_force(self, state: BodyState) -> np.ndarray:
-        """Forces (n, 3) on the slab's nodes, those of the frusta's roots among them."""
+        """Forces (n, 3) on the slab's nodes, including those of the frusta on their roots."""
         total = state.slab.force.copy()
         np.add.at(total, self.cells.roots.ravel(), state.support.force[:, self.support.root].reshape(-1, 3))
         return total
 
 
 def _add_volumes(volumes, block, displacement):
-    """Add a block's volume outside its law's window, and its whole volume, to those of the same law."""
+    """Add a block's volume outside its law's range, and its total volume, to those of the same law."""
     if block.law.stretch_window is not None:
         outside, whole = volumes.get(id(block.law), (0.0, 0.0))
         volumes[id(block.law)] = outside + block.volume_outside(displacement, block.law.stretch_window), whole + block.volume

@@ -1,14 +1,14 @@
 """The array of frusta between the sheet and the PCB: every frustum a separate finite-strain body, tied to the sheet.
 
-A frustum touches the rest of the sensor only through its root. So its inner unknowns are eliminated frustum by frustum, in
-each from the tip upwards layer by layer (static condensation, exact within Newton's method), and the global matrix
-knows the roots only. Contact, all unilateral:
-tip and folding side on the PCB; the side on the symmetric plane towards each neighbour, which moves with the root's outermost
-node: the two neighbours share it when their roots touch. The sheet's lower side on the frusta's sides is left out where roots
-are wider than tips: in the unit cell they come no nearer than 0.01 mm up to 1 MPa. Where tips are wider the sides fold onto the
-sheet; there it is a level plane that moves with the root's outermost node.
+A frustum is connected to the rest of the sensor only through its root. So its inner unknowns are eliminated frustum by frustum,
+layer by layer from the tip upwards (static condensation, exact within Newton's method), and the global matrix contains only the
+roots. All contact is unilateral:
+tip and folding side on the PCB; the side on the symmetry plane towards each neighbour, which moves with the root's outermost
+node, shared by both neighbours if their roots touch. Contact of the sheet's lower side with the frusta's sides is left out if roots
+are wider than tips: in the unit cell their distance is at least 0.01 mm up to 1 MPa. If tips are wider, the sides fold onto the
+sheet, which is then a horizontal plane that moves with the root's outermost node.
 
-Loops over the contact points of many bodies with the same local nodes.
+The compiled loops run over the contact points of many bodies with the same local nodes.
 """
 
 from dataclasses import dataclass, replace
@@ -32,7 +32,7 @@ from softtact.models.hyperelastic.mesh_settings import MeshSettings
 from softtact.models.hyperelastic.states import ContactHistory, SupportState
 from softtact.models.hyperelastic.support import Support
 
-BOARD, SHEET = -1, -2                                     # what a contact point faces where it is no neighbour in DIRECTIONS
+BOARD, SHEET = -1, -2                                     # contact partners of a point other than a neighbour in DIRECTIONS
 DIRECTIONS = ((0, 1.0), (1, 1.0), (0, -1.0), (1, -1.0))   # axis and sign of the four neighbours: +x, +y, -x, -y
 
 
@@ -49,7 +49,7 @@ def weighted_component(field: np.ndarray, nodes: np.ndarray, weights: np.ndarray
 
 @njit(cache=True, nogil=True)
 def scatter_contact(force: np.ndarray, magnitude: np.ndarray, nodes: np.ndarray, weights: np.ndarray, axis: np.ndarray) -> None:
-    """Add to nodal forces (f, nodes, 3) those of magnitudes (f, p) at the same points."""
+    """Add forces of magnitudes (f, p) at points, given as in `weighted_component`, to nodal forces (f, nodes, 3)."""
     for f in range(force.shape[0]):
         for p in range(nodes.shape[0]):
             if magnitude[f, p] != 0.0:
@@ -77,9 +77,9 @@ class FrustumArray(Support):
 
     def __init__(self, geometry: FrustumGeometry, law: Law, mesh: MeshSettings, *, height_mm: float, root_z_mm: float,
                  tips_bonded: bool, contact: Contact, friction: Coulomb | None = None) -> None:
-        """height_mm: of the drawing, whose layers of elements each frustum's height scales;  root_z_mm: height of the roots
+        """height_mm: nominal height; the element layers scale with each frustum's height;  root_z_mm: height of the roots
 
-        The board lies under the longest frustum. friction: `Coulomb` of the frusta on the board, or None
+        The board touches the longest frustum. friction: `Coulomb` of the frusta on the board, or None
         """
         self.geometry, self.contact, self.friction = geometry, contact, friction
         heights = np.asarray(mesh.frustum_heights) * height_mm
@@ -100,7 +100,7 @@ class FrustumArray(Support):
         self.elimination = self._elimination()
 
     def _place(self, heights, root_z):
-        """Nodal coordinates (n, nodes, 3): the unit disc scaled by the cone's radius, the height by each frustum's own."""
+        """Nodal coordinates (n, nodes, 3): the unit disc scaled by the cone's radius, heights by those of the frusta."""
         g = self.geometry
         fraction = self.mesh.points[:, 2] / heights[-1]
         radius = 0.5 * (g.tip_diameters[:, None] * (1 - fraction) + g.root_diameter * fraction)
@@ -154,10 +154,10 @@ class FrustumArray(Support):
         self.point_area = self._areas(np.array([r[0] for r in records]).reshape(-1, len(weights), 9)[:, 0], slopes, weights)
         absent = (self.point_neighbour[None] >= 0) & ~self.geometry.neighbours[:, self.point_neighbour]
         self.point_area[absent] = 0.0
-        self.gap0[absent] = NO_CONTACT_MM    # a frustum at the lattice's edge may bulge; that is no overlap
+        self.gap0[absent] = NO_CONTACT_MM    # a frustum at the lattice's edge has no neighbour to touch
 
     def _nearest_direction(self):
-        """Which of DIRECTIONS (f,) each outer face looks into most."""
+        """Index (f,) of the one of DIRECTIONS that is closest to each outer face's normal."""
         middle = self.mesh.points[self.outer_faces].mean(axis=1)
         return np.argmax([sign * middle[:, axis] for axis, sign in DIRECTIONS], axis=0)
 
@@ -172,7 +172,7 @@ class FrustumArray(Support):
         return (np.linalg.norm(normal, axis=-1) * weights).reshape(self.count, -1)
 
     def _number_unknowns(self, tips_bonded):
-        """Local order of the unknowns: inner ones first, then the root's; held ones get -1."""
+        """Local order of the unknowns: inner ones first, then the root's; fixed ones get -1."""
         number = np.zeros((self.nodes, 3), dtype=np.int64)
         if tips_bonded:
             number[self.tip, :2] = -1
@@ -181,7 +181,7 @@ class FrustumArray(Support):
         self.root_dofs = (3 * self.root[:, None] + np.arange(3)).ravel()
 
     def _elimination(self):
-        """Layer by layer from the tip up: each leaves the nodes above, and the root's that carry the planes at its points."""
+        """Elimination layer by layer from the tip upwards; root nodes that move the contact planes of a layer remain."""
         eliminated = np.zeros(3 * self.nodes, dtype=bool)
         eliminated[self.inner] = True
         moves = eliminated.copy()
@@ -205,7 +205,7 @@ class FrustumArray(Support):
 
     def rubber(self, displacement: np.ndarray, frusta: np.ndarray | slice = slice(None), *,
                workers: Workers = SERIAL) -> tuple | None:
-        """Energies (k,) in mJ and nodal forces (k, nodes, 3) of the rubber of the given frusta, or of all; None if inside out."""
+        """Energies (k,) in mJ and nodal forces (k, nodes, 3) of the rubber of the given frusta, or of all; None if inverted."""
         elements = np.arange(len(self._element_nodes)).reshape(self.count, -1)[frusta].ravel()
         body = self.block.evaluate(self.per_element(displacement), elements, workers=workers)
         if body is None:
@@ -215,7 +215,7 @@ class FrustumArray(Support):
         return body.energies.reshape(len(displacement), -1).sum(axis=1), force
 
     def potentials(self, displacement: np.ndarray, elastic: tuple, frusta: np.ndarray, history: ContactHistory) -> np.ndarray:
-        """Energies (k,) in mJ of the given frusta with their contacts, from the `rubber`'s; without friction's."""
+        """Energies (k,) in mJ of the given frusta with their contacts, from those of `rubber`; without friction."""
         energy, _, _ = history.contact.at(frusta).response(self.gap0[frusta] + self._along(displacement))
         return elastic[0] + (energy * self.point_area[frusta]).sum(axis=1)
 
@@ -247,12 +247,12 @@ class FrustumArray(Support):
         return self.point_nodes[:b], self.point_weights[:b], np.full(b, axis)
 
     def _on_board(self, displacement):
-        """Places (n, b, 2) of the points in the board's plane."""
+        """Positions (n, b, 2) of the points in the board's plane."""
         position = self.coordinates + displacement
         return np.stack([weighted_component(position, *self._board_points(axis)) for axis in (0, 1)], axis=-1)
 
     def first_friction_state(self, state: SupportState) -> FrictionState | None:
-        """The friction state in which a step starts from a `SupportState`, None without friction."""
+        """The friction state of a step that starts from a `SupportState`, None without friction."""
         if self.friction is None:
             return None
         gaps = state.gaps[:, :self.board_points]
@@ -274,7 +274,7 @@ class FrustumArray(Support):
         return state.history.contact.error(state.gaps)
 
     def augmented(self, state: SupportState) -> ContactHistory:
-        """The contacts' history with each point held where its surfaces just touch."""
+        """The contacts' history after one augmentation."""
         return replace(state.history, contact=state.history.contact.augmented(state.gaps))
 
     def condense(self, state: SupportState, frusta: np.ndarray, damping: np.ndarray | None = None, *, kept_mm: float = 0.0) -> None:
@@ -290,16 +290,16 @@ class FrustumArray(Support):
         self.elimination.set(frusta, layers, damping=damping)
 
     def forget(self) -> None:
-        """Let the next `condense` find the tangents of all elements anew."""
+        """Discard the cached tangents of all elements, so that the next `condense` recomputes them."""
         self._tangents.forget()
 
     @property
     def root_stiffness(self) -> np.ndarray:
-        """What the condensed frusta leave on their roots (n, 3 r, 3 r) in N/mm, r nodes each."""
+        """Condensed stiffnesses (n, 3 r, 3 r) in N/mm of the frusta at their roots of r nodes."""
         return self.elimination.matrices
 
     def _springs(self, k, frusta, slope, friction):
-        """The k-th layer's contact points in frusta (b,), stiffnesses from `slope` (b, p) in N/mm and from `friction`, if any."""
+        """`Springs` of the k-th layer's contact points in frusta (b,): `slope` (b, p) in N/mm, and `friction` if there is any."""
         at, place = np.flatnonzero(self.point_layer == k), self.elimination.stages[k].place
         springs = Springs(slope[:, at], place[3 * self.point_nodes[at] + self.point_axis[at, None]], self.point_weights[at])
         if friction is None:
@@ -309,7 +309,7 @@ class FrustumArray(Support):
     def _friction_springs(self, at, place, stiffness, frusta):
         """Friction at points on the board, of stiffness (b, all points on the board, 2, 2) in N/mm3.
 
-        Three springs a point make its symmetric 2 x 2 matrix: along x, along y, and on the sum of both components.
+        Three springs at each point represent its symmetric 2 x 2 matrix: along x, along y, and on the sum of both components.
         """
         K = stiffness[:, at] * self.point_area[frusta][:, at, None, None]
         both = K[..., 0, 1]
@@ -326,7 +326,7 @@ class FrustumArray(Support):
         return tangents.reshape(*elements.shape, -1)
 
     def condensed_residual(self, state: SupportState, *, workers: Workers = SERIAL) -> tuple[np.ndarray, list[np.ndarray]]:
-        """Root forces (n, 75) after the inner residual has been eliminated, and what `inner_step` needs again."""
+        """Root forces (n, 75) after elimination of the inner residual, and the forward-solved right-hand sides of `inner_step`."""
         force = state.force.reshape(self.count, -1).copy()
         forward_solved = self.elimination.residual(force, workers=workers)
         return force[:, self.root_dofs], forward_solved
@@ -338,8 +338,8 @@ class FrustumArray(Support):
         self.elimination.recover(forward_solved, step, workers=workers)
         return step.reshape(self.count, self.nodes, 3)
 
-    def own_step(self, state: SupportState, frusta: np.ndarray, *, workers: Workers = SERIAL) -> np.ndarray:
-        """Newton step (k, nodes, 3) of the given frusta by their last condensed tangents, with their roots held."""
+    def local_step(self, state: SupportState, frusta: np.ndarray, *, workers: Workers = SERIAL) -> np.ndarray:
+        """Newton step (k, nodes, 3) of the given frusta with fixed roots, by their last condensed tangents."""
         force, step = state.force[frusta].reshape(len(frusta), -1), np.zeros((len(frusta), 3 * self.nodes))
         forward_solved = self.elimination.residual(force, bodies=frusta, workers=workers)
         self.elimination.recover(forward_solved, step, bodies=frusta, workers=workers)
@@ -350,15 +350,15 @@ class FrustumArray(Support):
         return state.force.reshape(self.count, -1)[:, self.inner]
 
     def compression(self, displacement: np.ndarray) -> np.ndarray:
-        """Mean shortening (n,) of each frustum in mm: root against tip."""
+        """Mean compression (n,) of each frustum in mm: displacement of the root relative to the tip."""
         return displacement[:, self.tip, 2].mean(axis=1) - displacement[:, self.root, 2].mean(axis=1)
 
     def largest_compression(self, displacement: np.ndarray) -> float:
-        """By how much (mm) the most compressed frustum is shortened."""
+        """Largest compression (mm) of a frustum."""
         return self.compression(displacement).max()
 
     def most_compressed(self, state: SupportState) -> tuple[float, str]:
-        """Share of its height by which the most compressed frustum is shortened, and which one in words."""
+        """Largest compression of a frustum relative to its height, and which frustum in words."""
         share = self.compression(state.displacement) / self.geometry.heights
         worst = int(np.argmax(share))
         x, y = self.geometry.centres[worst]

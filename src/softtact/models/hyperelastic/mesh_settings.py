@@ -1,4 +1,4 @@
-"""Resolution of the layered body, what counts as solved on it, and the scatter of one specimen's sizes about the drawing's."""
+"""Resolution of the layered body, settings of Newton's method, and the scatter of one specimen's sizes about the drawing's."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -23,21 +23,21 @@ _SOLVER_KEYS = ("largest_penetration_mm",)
 class MeshSettings:
     """Resolution of the layered body.
 
-    cover_heights: heights of the cover's element layers as shares of its thickness; cover_splits: how often the elements, a pitch
-    wide, of its uppermost layers are split in plan: at the object's edges, and the lowest of them under the object where it lies on
-    the sheet. Layers below these, for which cover_splits has no number, keep to the sheet's plan;
+    cover_heights: heights of the cover's element layers as shares of its thickness; cover_splits: split depths of the elements, a
+    pitch wide, of its uppermost layers along x and y: at the object's edges, and in the lowest of these layers all over the area
+    under the object if it lies on the sheet. Layers below these, without a number in cover_splits, share the sheet's 2-D mesh;
     far_pitches: pitches (1, 2, 4) that an element far from the object spans; contact_stiffness: N/mm3 of the contacts' penalty,
     a third of it takes a quarter fewer iterations and leaves three times the overlap; sheet_layers: elements through the sheet;
     frustum_heights: heights of the frustum's element layers as shares of its height; unprojected_penalty_ratio,
-    quartic_penalty_ratio: what holds volume changes in the frusta that their elements' pressure does not see, over mu (see
+    quartic_penalty_ratio: moduli over mu of the penalties on the frusta's volume change outside the projection (see
     `solid_block`);
-    slab_quartic_penalty_ratio: the latter in sheet and cover, where frusta are pressed to two thirds of their height;
-    trilinear_pressure: or linear, which is softer by 2 % for small movements, and fails under deep objects.
-    refinement: how often all elements are split in plan. frustum_rings: rings of elements around a frustum's core, the
-    thinner the farther out; frustum_core: corners of this square core over the radius, by default 0.6 in one ring, which so
-    follows the rim, else 0.5: wider ones give way earlier where frusta are pressed flat. constrained_cell_edges: along all walls
+    slab_quartic_penalty_ratio: the quartic one in sheet and cover, for frusta pressed to two thirds of their height;
+    trilinear_pressure: or linear, which is softer by 2 % for small displacements, and fails under deep objects.
+    refinement: number of splits of all elements along x and y. frustum_rings: rings of elements around a frustum's core, outer
+    ones thinner; frustum_core: corners of this square core over the radius, by default 0.6 with one ring, which then
+    resolves the rim, else 0.5: wider cores buckle earlier where frusta are pressed flat. constrained_cell_edges: along all edges
     between cells, not only far from the object, the sheet moves as one
-    quadratic curve: half a factor's operations, and 2 to 2.5 % of the map; without effect where refined.
+    quadratic curve: half of a factorisation's operations, 2 to 2.5 % change of the map; no effect on refined meshes.
     """
 
     sheet_layers: int = 1
@@ -60,19 +60,19 @@ class MeshSettings:
             raise ValueError(f"cover_splits has {len(self.cover_splits)} entries for the {len(self.cover_heights) - 1} layers of "
                              "cover_heights; give a number for each, or for the uppermost ones")
         if self.cover_splits[0] > 1:
-            raise ValueError(f"cover_splits begins with {self.cover_splits[0]}; give 0 or 1, for a layer finer than what is below "
-                             "hangs freely there, and the map is wrong by up to a third")
+            raise ValueError(f"cover_splits begins with {self.cover_splits[0]}; give 0 or 1: the nodes of a layer that is finer "
+                             "than the one below are not tied to it, and the map is wrong by up to a third")
 
     @property
     def core(self) -> float:
-        """The core's corners over the radius of a frustum's disc."""
+        """Radius of the core's corners over that of a frustum's disc."""
         if self.frustum_core is not None:
             return self.frustum_core
         return _CORE_IN_ONE_RING if self.frustum_rings == 1 else CORE_RADIUS
 
     @property
     def bound_layers(self) -> int:
-        """How many of the cover's layers, the lowest ones, keep to the sheet's plan."""
+        """Number of the cover's lowest layers that share the sheet's 2-D mesh."""
         return len(self.cover_heights) - 1 - len(self.cover_splits)
 
     @property
@@ -82,19 +82,19 @@ class MeshSettings:
 
     @property
     def object_contact(self) -> Contact:
-        """The object's penalty: softer where it is lightly pressed, a third fewer factors under a wide punch and 0.3 um deeper."""
+        """The object's penalty: softer at low pressure; a third fewer factorisations under a wide punch, 0.3 um more overlap."""
         return Contact(stiffness=self.contact_stiffness, smoothing=_OBJECT_SMOOTHING_MM)
 
     @classmethod
     def draft(cls) -> "MeshSettings":
-        """For quick studies: a layer less in frusta, a cover tied to the sheet, walls as one curve; see `NewtonSettings.draft`."""
+        """For quick studies: a layer less in frusta, cover tied to the sheet, constrained edges; see `NewtonSettings.draft`."""
         return cls(frustum_heights=(0.0, 0.35, 1.0), constrained_cell_edges=True, cover_splits=(0, 1), contact_stiffness=1000.0)
 
     @classmethod
     def fine(cls) -> "MeshSettings":
         """Within 2 % of the map's maximum at every point under punch, sphere and ridges, for twice the default's time.
 
-        The cover has a layer more and is finer at edges, frusta have two rings. Under a punch as wide as two frusta 3 %
+        The cover has one more layer and is finer at edges, frusta have two rings. Under a punch as wide as two frusta 3 %
         (docs/explanation/discretisation.md).
         """
         return cls(cover_heights=(0.0, 0.4, 0.75, 1.0), cover_splits=(1, 2), frustum_rings=2, frustum_core=0.6,
@@ -102,15 +102,15 @@ class MeshSettings:
 
     @classmethod
     def converging(cls, *, unprojected_penalty_ratio: float = 0.1, **changes: Any) -> "MeshSettings":
-        """To be refined: linear pressure, which does not lock, and little else; single frusta and cells, but no whole sensor."""
+        """For mesh convergence studies of single frusta and cells, not for a whole sensor: linear pressure, which does not lock."""
         return cls(unprojected_penalty_ratio=unprojected_penalty_ratio, quartic_penalty_ratio=0.0, trilinear_pressure=False,
                    **changes)
 
     @classmethod
     def stable(cls) -> "MeshSettings":
-        """For frusta pressed to more than 60 % of their height, where on the default mesh elements give way and many steps fail.
+        """For frusta compressed by more than 60 % of their height, where elements of the default mesh buckle and many steps fail.
 
-        A sphere to 50 N; under a flat punch the map is within 1.4 % of its maximum of the default mesh's
+        Tested with a sphere up to 50 N; under a flat punch the map differs from the default mesh's by 1.4 % of its maximum
         (docs/notebook/2026-11-23-folding-frusta.md).
         """
         return cls(quartic_penalty_ratio=400.0, slab_quartic_penalty_ratio=10.0)
@@ -118,28 +118,28 @@ class MeshSettings:
 
 @dataclass(frozen=True)
 class NewtonSettings:
-    """When a load step counts as reached, and how Newton's method goes there.
+    """Convergence criteria of a load step, and limits of Newton's method.
 
     relative_tolerance: largest unbalanced nodal force as a share of the force, at least of smallest_scale_n
-    largest_penetration_mm, max_augmentations: deeper overlaps are augmented and the load step is solved anew, at most so
+    largest_penetration_mm, max_augmentations: load steps with deeper overlaps are augmented and solved again, at most so
     often
-    full_depth_mm: where the cover has come down by less, so much less may overlap: a micrometre is 4 % of a light press
+    full_depth_mm: for a smaller descent of the cover the allowed overlap is reduced in proportion: 1 um is 4 % of a light press
     largest_step_mm: largest movement of a node in one iteration;  smallest_increment_n: force steps are halved down to this
-    load_step_iterations: a load step ends where it took so many in all its increments, friction_iterations: with friction, and
-    augmentations where they took so many: one that crawls would go on for hours
-    first_touch_mm, first_touch_tolerance_n: overlap at which the press begins, and the residual that is good enough there
-    largest_way_mm: displacement of an object in an increment where a `Motion` moves it down or aside
-    max_iterations: of an increment, and as many again where by then no more than nearly_balanced, a share of the force, is left
-    rough_tolerance: in place of relative_tolerance after rough_after iterations where frusta are pressed beyond `DEEP`: they fold
-    on and on under the same force. Results flag such a load step.
-    projection_iterations: iterations that find anew which facet each point faces
+    load_step_iterations: limit of all iterations of a load step;  friction_iterations: the same with friction, and for
+    augmentations; a load step that converges slowly would take hours
+    first_touch_mm, first_touch_tolerance_n: overlap at which the press begins, and the tolerance of its residual
+    largest_way_mm: largest displacement of an object in an increment of a `Motion`
+    max_iterations: of an increment, doubled if the residual is then at most nearly_balanced, a share of the force
+    rough_tolerance: replaces relative_tolerance after rough_after iterations if frusta are compressed beyond `DEEP`: there they
+    continue to fold at constant force. Results flag such a load step.
+    projection_iterations: number of iterations that update the contact projection
     kept_tangent_mm: a cell that moved less since its last tangent keeps it
     With friction
-    friction_tolerance: share of the tolerance;  friction_growth: how far a step's force may exceed the last one's
-    friction_passes, whole_passes: how often it is brought up to date with its pressures, and how often with all of the difference
+    friction_tolerance: share of the tolerance;  friction_growth: largest ratio of a step's force to the last one's
+    friction_passes, whole_passes: number of updates of the friction's pressures, and of those that take the full difference
     """
 
-    relative_tolerance: float = 3e-4   # of a nodal force; 1e-4 changes the indentation by 3e-4 of itself, the map by 0.03 % (rms)
+    relative_tolerance: float = 3e-4   # with 1e-4 the indentation changes by 3e-4 of its value, the map by 0.03 % (rms)
     largest_penetration_mm: float = 1e-3
     full_depth_mm: float = 0.2
     max_augmentations: int = 20
@@ -153,23 +153,23 @@ class NewtonSettings:
     smallest_scale_n: float = 10.0
     largest_way_mm: float = 0.05       # of a motion at once, down or aside: friction depends on the path
     first_touch_mm: float = 0.01
-    first_touch_tolerance_n: float = 0.1   # a start for the first load step, not a result
+    first_touch_tolerance_n: float = 0.1   # only the start of the first load step, not a result
     projection_iterations: int = 6
-    kept_tangent_mm: float = 0.016     # as many iterations as with 4 um, since frusta far from balance take separate steps
-    friction_tolerance: float = 0.3    # sliding is soft: with 1 the indentation is 0.4 % off at 1 N on 20 frusta, with this 0.01 %
-    friction_growth: float = 2.0       # a single step to 4 N is 1.8 % off, two are less than 0.1 %
+    kept_tangent_mm: float = 0.016     # as many iterations as with 4 um, since frusta far from equilibrium take separate steps
+    friction_tolerance: float = 0.3    # sliding is soft: indentation error 0.4 % with 1, 0.01 % with 0.3, at 1 N on 20 frusta
+    friction_growth: float = 2.0       # error of a single step to 4 N 1.8 %, of two steps less than 0.1 %
     friction_iterations: int = 300
     friction_passes: int = 30
     whole_passes: int = 3
 
     @classmethod
     def draft(cls) -> "NewtonSettings":
-        """For `MeshSettings.draft()`, whose map is off by a tenth at edges: half the time, and the map changes by 0.1 % (rms)."""
+        """For `MeshSettings.draft()`, whose map has errors of 10 % at edges: half the time; the map changes by 0.1 % (rms)."""
         return cls(relative_tolerance=1e-3, largest_penetration_mm=4e-3, kept_tangent_mm=0.03)
 
 
 def frustum_scatter(spec: SensorSpec, values: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray] | None:
-    """Factors (heights, tip diameters) of a specimen's frusta, each near 1; None where no scatter is asked for."""
+    """Factors (heights, tip diameters) of a specimen's frusta, each near 1; None if no scatter is requested."""
     if not any(key in values for key in SCATTER_KEYS):
         return None
     count = int(np.prod(spec.frusta_counts))
@@ -188,15 +188,15 @@ def specimen_of(spec: SensorSpec, values: Mapping[str, Any]) -> SensorSpec:
     dielectric = spec.dielectric.model_copy(update={"sheet_thickness_mm": spec.dielectric.sheet_thickness_mm * sheet})
     return spec.model_copy(update={
         "dielectric": dielectric, "cover": spec.cover.model_copy(update={"thickness_mm": spec.cover.thickness_mm * cover})})
-# Meshes by name, and what counts as solved on them.
+# Presets by name: mesh settings with their Newton settings.
 PRESETS = {"default": (MeshSettings, NewtonSettings), "draft": (MeshSettings.draft, NewtonSettings.draft),
            "stable": (MeshSettings.stable, NewtonSettings), "fine": (MeshSettings.fine, NewtonSettings)}
 
 
 def mesh_settings(values: Mapping[str, Any]) -> MeshSettings:
-    """`MeshSettings` from a mapping: those of its `preset`, changed by what else it says.
+    """`MeshSettings` from a mapping: those of its `preset`, changed by its other keys.
 
-    The scatter's and the solver's keys are passed over, an unknown key is refused.
+    Keys of the scatter and the solver are ignored, an unknown key is refused.
     """
     own = {key: value for key, value in values.items() if key not in ("preset", *SCATTER_KEYS, *_SOLVER_KEYS)}
     unknown = sorted(set(own) - set(MeshSettings.__dataclass_fields__))

@@ -1,7 +1,7 @@
-"""The path of an object on the body: load steps by force, or by a `Motion`, in increments that adapt.
+"""The path of an object on the body: load steps by force, or by a `Motion`, in adaptive increments.
 
-A stage of the path leads from one load step to the next along a coordinate: the force where a press only grows, else the share of
-the motion's step. An increment that finds no balance is halved, one that does is doubled.
+A stage of the path leads from one load step to the next along a coordinate: the force of a press by force, else the share of
+the motion's step. An increment that does not converge is halved, one that does is doubled.
 """
 
 from collections.abc import Iterable, Iterator
@@ -18,9 +18,9 @@ from softtact.models.hyperelastic.newton import DEEP, NewtonSettings, augment, f
 from softtact.models.hyperelastic.states import BodyState, ObjectSurface
 
 DEFAULT = NewtonSettings()
-_CLEAR_MM = 0.1        # over the surface, from where on no contact law acts
-_LONGER_WITHOUT_FRICTION = 3.0   # increments down to the shell, where the path does not matter but its end
-_SMALLEST_SHARE = 1 / 64     # of the displacement that an object may take at once, until a motion's step is given up
+_CLEAR_MM = 0.1        # height over the surface from which no contact acts
+_LONGER_WITHOUT_FRICTION = 3.0   # factor of increments without friction, where the result does not depend on the path
+_SMALLEST_SHARE = 1 / 64     # of the largest displacement in an increment; below it a motion's step fails
 
 
 @dataclass(frozen=True)
@@ -32,20 +32,20 @@ class LoadStep:
     state: BodyState
     """Displacements, contacts and their history."""
     iterations: int
-    """Newton steps in all of its increments."""
+    """Total number of Newton steps in its increments."""
     residual_n: float
     """Largest unbalanced nodal force."""
     penetration_mm: float
-    """Deepest overlap left."""
+    """Deepest remaining overlap."""
     rough: bool = False
-    """Whether it is balanced no better than `NewtonSettings.rough_tolerance` asks for."""
+    """Whether it only satisfies the tolerance `NewtonSettings.rough_tolerance`."""
     elsewhere_n: float = 0.0
-    """What of the force something else than the body carries."""
+    """Part of the force that the shell carries instead of the body."""
 
 
 @dataclass(frozen=True)
 class Control:
-    """What holds the object: its force (N) or, where that is None, its indentation (mm); and its displacement (2,) aside in mm."""
+    """Control of the object: its force (N) or, if that is None, its indentation (mm); its displacement (2,) along x, y in mm."""
 
     force: float | None
     indentation: float
@@ -54,7 +54,7 @@ class Control:
 
 @dataclass(frozen=True)
 class ByForce:
-    """A stage straight down to a force; its coordinate is the force (N)."""
+    """A stage straight down up to a force; its coordinate is the force (N)."""
 
     end: float
     smallest: float
@@ -63,7 +63,7 @@ class ByForce:
         return Control(force, 0.0, np.zeros(2))
 
     def reach(self, body: LayeredBody, start: float, settings: NewtonSettings) -> float:
-        """The largest force that one increment may go to: friction depends on the path, so with it forces grow by doubling."""
+        """The largest force at an increment's end: with friction the result depends on the path, so forces at most double."""
         if not body.friction.active:
             return self.end
         growth = settings.friction_growth
@@ -73,7 +73,7 @@ class ByForce:
         return coordinate / start if start > 0 else 1.0
 
     def pressed(self, start: float, state: BodyState) -> bool:
-        """Whether the object already presses where an increment starts; a first touch is no result."""
+        """Whether the object already presses at an increment's start; a first touch does not count."""
         return start > 0
 
     def failure(self, start: float, coordinate: float) -> str:
@@ -85,20 +85,20 @@ class ByForce:
 
 @dataclass(frozen=True)
 class ByMotion:
-    """A step of a motion; its coordinate is the share of it that is done."""
+    """A step of a motion; its coordinate is the completed share of the step."""
 
     before: Control
     after: Control
     pressed_n: float
-    """Normal force where the step begins."""
+    """Normal force at the step's start."""
     largest_way_mm: float
     number: int
-    """Of the step, from 1 on."""
+    """Number of the step, from 1 on."""
     end: float = 1.0
 
     @property
     def at_once(self) -> float:
-        """The share of the step in which the object goes as far as it may at once."""
+        """The share of the step with the largest displacement that is allowed in an increment."""
         way = float(np.linalg.norm(self.after.offset_mm - self.before.offset_mm))
         if self.after.force is None:
             way = max(way, abs(self.after.indentation - self.before.indentation))
@@ -114,7 +114,7 @@ class ByMotion:
                        self.before.offset_mm + share * (self.after.offset_mm - self.before.offset_mm))
 
     def reach(self, body: LayeredBody, start: float, settings: NewtonSettings) -> float:
-        """The largest share that one increment may go to, by the object's displacement and, as under a force, by its force."""
+        """The largest share at an increment's end, limited by the object's displacement and by the growth of its force."""
         reach, more = start + self.at_once, (self.after.force or 0.0) - self.pressed_n
         if self.after.force is None or more <= 0:
             return reach
@@ -126,7 +126,7 @@ class ByMotion:
         return state.force > 0
 
     def growth(self, start: float, coordinate: float) -> float:
-        """Of the force, where it is known: a first guess of the pressures that friction acts by."""
+        """Growth of the force if it is prescribed: a first guess of the pressures that limit friction."""
         before, after = self.control(start).force, self.control(coordinate).force
         return after / before if before and after else 1.0
 
@@ -137,7 +137,7 @@ class ByMotion:
 
 
 class ToStop(ByMotion):
-    """The stage down to where something else carries the object."""
+    """The stage down to the shell on which the object rests."""
 
     remedy = "Ask for smaller forces"
 
@@ -150,8 +150,8 @@ def press_load_steps(body: LayeredBody, surface: ObjectSurface, forces_n: Iterab
                      touch_mm: float = 0.0, stop_mm: float = np.inf) -> Iterator[LoadStep]:
     """Yield a `LoadStep` for each force (N, increasing). Raises ConvergenceError naming the load step that was not reached.
 
-    touch_mm: indentation at first touch;  stop_mm: that at which something else carries the object, whose load steps from there on
-    have one state, and with it the body's force
+    touch_mm: indentation at first touch;  stop_mm: indentation at which the object rests on the shell; load steps from there on
+    share one state, with a constant force on the body
     """
     body.begin()
     if stop_mm <= touch_mm:
@@ -167,12 +167,12 @@ def press_load_steps(body: LayeredBody, surface: ObjectSurface, forces_n: Iterab
 
 
 def _stopped_at(load_step, force):
-    """The load step of a force of which the body carries no more than it does there."""
+    """The load step of a larger force after the object came to rest on the shell: the body's force is that of `load_step`."""
     return replace(load_step, force_n=force, elsewhere_n=force - load_step.state.force)
 
 
 def _up_to(body, surface, state, reached, force, stop_mm, settings):
-    """The `LoadStep` of a force, and the same once more where the object is stopped at it, else None."""
+    """The `LoadStep` of a force, and the load step at which the object rests on the shell, or None."""
     failed = None
     try:
         load_step = _advance(body, surface, state, reached, ByForce(force, settings.smallest_increment_n), settings)
@@ -180,20 +180,20 @@ def _up_to(body, surface, state, reached, force, stop_mm, settings):
             return load_step, None
     except TimeLimitError:
         raise
-    except ConvergenceError as error:      # of a force that the body would not bear alone
+    except ConvergenceError as error:      # the body alone may not carry the force
         if np.isinf(stop_mm):
             raise
         failed = error
     begin, end = (Control(None, depth, np.zeros(2)) for depth in (state.indentation, stop_mm))
-    way = settings.largest_way_mm * (1.0 if body.friction.active else _LONGER_WITHOUT_FRICTION)
-    stopped = _advance(body, surface, state, 0.0, ToStop(begin, end, state.force, way, 1), settings)
+    largest = settings.largest_way_mm * (1.0 if body.friction.active else _LONGER_WITHOUT_FRICTION)
+    stopped = _advance(body, surface, state, 0.0, ToStop(begin, end, state.force, largest, 1), settings)
     if failed is not None and stopped.state.force >= force:
         raise failed
     return stopped, stopped
 
 
 def _untouched(body, surface, indentation):
-    """The body at rest under an object that does not press it, at an indentation."""
+    """The undeformed body under an object without contact, at an indentation."""
     slab, support = body.rest()
     state = body.evaluate(slab, support, indentation - _CLEAR_MM, body.slab.project(slab, surface))
     return replace(state, indentation=indentation)
@@ -203,7 +203,7 @@ def press_motion(body: LayeredBody, surface: ObjectSurface, motion: Motion, touc
                  settings: NewtonSettings = DEFAULT) -> Iterator[LoadStep]:
     """Yield a `LoadStep` for each step of a `Motion`. Raises ConvergenceError naming the step that was not reached.
 
-    touch_mm: the indentation at which the object just touches the surface at rest, from where depths count
+    touch_mm: the indentation at which the object just touches the surface at rest, the zero of depths
     """
     body.begin()
     control, state = Control(None, float(touch_mm), np.zeros(2)), None
@@ -218,19 +218,19 @@ def press_motion(body: LayeredBody, surface: ObjectSurface, motion: Motion, touc
 
 
 def check_motion(motion: Motion) -> None:
-    """Refuse what the hyperelastic model cannot do: turn the object, or load it sideways."""
+    """Refuse motions that the hyperelastic model does not support: rotations, and loads along x or y."""
     for number, step in enumerate(motion.steps, start=1):
         other = [name for name in step.ways if name not in "xyz"] + [name for name in step.loads if name != "z"]
         if other:
             raise InputError(f"Motion, step {number}: the hyperelastic model moves an object along x, y and z and loads it along "
-                             f"z; it cannot prescribe or load {other[0]!r} so; leave that out.")
+                             f"z; it cannot prescribe or load {other[0]!r}; leave that out.")
         if step.loads.get("z", -1.0) >= 0:
             raise InputError(f"Motion, step {number}: the load z is {step.loads['z']:g} N, which does not press; give a negative "
                              "one.")
 
 
 def _start(body, surface, step, control, settings):
-    """State and `Control` from which the first step begins: at rest, or in a first touch under a load."""
+    """State and `Control` at the start of the first step: at rest, or at first touch under a load."""
     if "z" in step.loads:
         state = first_touch(body, surface, settings)
         return state, replace(control, indentation=state.indentation)
@@ -250,17 +250,17 @@ def _after(before: Control, step: MotionStep) -> Control:
 
 
 def _advance(body, surface, state, reached, stage, settings):
-    """Reach the stage's end, halving the increment where Newton's method fails and growing it again where it succeeds.
+    """Reach the stage's end; the increment is halved where Newton's method fails and doubled where it succeeds.
 
-    A step starts from the last state: displacements continued along the path, whole or in part, start in worse contact and took
-    as many iterations or more, once the step itself is exact in the contact (benchmarks/mesh_error.py's bodies, ten load steps).
+    An increment starts from the last converged state. Extrapolated displacements start with worse contact states and took as many
+    iterations or more, since the Newton step is exact in the contact (benchmarks/mesh_error.py's bodies, ten load steps).
     """
     iterations, increment = 0, stage.end - reached
     while True:
         at = min(stage.end, reached + increment, stage.reach(body, reached, settings))
         control = stage.control(at)
         if settings.max_augmentations and stage.pressed(reached, state):
-            start = body.augmented(state, allowed_mm=0.0)     # what overlaps is no start: more of it comes with more force
+            start = body.augmented(state, allowed_mm=0.0)     # overlaps at the start would grow with the force
         else:
             start = state
         start, moved = _start_of_increment(body, surface, start, control, stage.growth(reached, at))
@@ -285,7 +285,7 @@ def _force(control, state):
 
 
 def _start_of_increment(body, surface, state, control, growth):
-    """The state from which an increment goes on to a `Control`, and the surface of the object there."""
+    """The start state of an increment that ends at a `Control`, and the object's surface at its end."""
     state = body.reevaluate_contact(state, body.friction.begin_step(state, growth=growth))
     way = control.offset_mm - state.slab.projection.offset_mm
     if way.any():

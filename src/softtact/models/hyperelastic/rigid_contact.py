@@ -1,4 +1,4 @@
-"""Contact of a rigid object with the slab's top: quadrature points of the top faces, each before a plane of the object."""
+"""Contact of a rigid object with the slab's top: quadrature points of the top faces, each projected on a plane of the object."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -15,14 +15,14 @@ from softtact.fem.graded_mesh import CoverMesh
 from softtact.fem.quadrature import gauss
 from softtact.models.hyperelastic.states import ContactHistory, ContactProjection, ObjectSurface, SlabState
 
-_NEAR_MM, _LARGEST_SHIFT_MM = 0.2, 0.02   # points that may touch when the object is let down on the cover, and how far at once
+_NEAR_MM, _LARGEST_SHIFT_MM = 0.2, 0.02   # gaps of points that `balanced` considers; its largest step of the object
 
 
 @dataclass(frozen=True)
 class Touch:
     """Contact at one displacement: energy (mJ), forces (t, w, 3) in N on the faces' nodes, gaps (p,) in mm of the points.
 
-    indentation_force: the object's, N downwards;  friction_response: friction at the points, None without
+    indentation_force: the object's force, N downwards;  friction_response: at the points, None without friction
     """
 
     energy: float
@@ -33,15 +33,15 @@ class Touch:
 
 
 class TopContact:
-    """The points of a `CoverMesh`'s top faces, flattened (p = t * points): areas (p,) in mm2, places (p, 3) in mm at rest.
+    """The contact points of a `CoverMesh`'s top faces (p = t * points): areas (p,) in mm2, reference positions (p, 3) in mm.
 
-    faces (t, w): the free nodes that a face hangs on, values (t, points, w): their shape values at its points.
+    faces (t, w): the free nodes that determine a face, values (t, points, w): their shape values at its points.
     """
 
     def __init__(self, mesh: CoverMesh, contact: Contact, *, plane_modulus: float, friction: Coulomb | None = None) -> None:
         """contact: `Contact`, the law of the points;  friction: `Coulomb` of the object on them, or None.
 
-        plane_modulus: E / (1 - nu^2) in MPa of what the object presses on
+        plane_modulus: E / (1 - nu^2) in MPa of the material under the object
         """
         self.contact, self.friction = contact, friction
         points, weights = gauss(ROWS, 2)
@@ -58,15 +58,15 @@ class TopContact:
         return np.matmul(self.values, field[self.faces]).reshape(-1, 3)
 
     def project(self, displacement: np.ndarray, surface: ObjectSurface, indentation: float | None = None) -> ContactProjection:
-        """The object's facets above the points (see `ContactProjection`); a `MovedSurface` has how far aside the object is.
+        """The `ContactProjection` of the points; a `MovedSurface` has the object's displacement along x and y.
 
-        indentation: of the object in mm, if points that have run far under an edge are to face the wall beside them
+        indentation: of the object in mm, if points far under an edge are to be projected on the nearby wall
         """
         position = self.reference + self.at_points(displacement)
         height, normals = surface(position[:, 0], position[:, 1])
         anchors = np.column_stack([position[:, :2], height])
         share, foot = covered(position[:, None, :2] + self._rectangles, surface)     # type: ignore[arg-type]
-        # A point beside the object whose area reaches under it faces the plane there.
+        # A point beside the object whose area is partly covered is projected on the plane of its lowest corner.
         base, foot_normals = surface(*foot.T)
         beside = ~continues(height, position[:, :2], base, foot)
         anchors[beside] = np.column_stack([foot, base])[beside]
@@ -86,7 +86,7 @@ class TopContact:
         return ContactHistory(self.contact)
 
     def contact_on(self, projection: ContactProjection, history: ContactHistory) -> Contact:
-        """The points' `Contact` on the planes that they face."""
+        """The points' `Contact` with the covered areas and compliances of a projection."""
         return replace(history.contact, contact_compliance=projection.contact_compliance)
 
     def contact_of(self, state: SlabState) -> Contact:
@@ -94,20 +94,20 @@ class TopContact:
         return self.contact_on(state.projection, state.history)
 
     def gaps(self, displacement: np.ndarray, projection: ContactProjection, indentation: float) -> np.ndarray:
-        """Normal gaps (p,) in mm between the points and the planes they face."""
+        """Normal gaps (p,) in mm between the points and their planes."""
         offset = self.reference + self.at_points(displacement) - projection.anchors
         return np.einsum("pd,pd->p", projection.normals, offset) + indentation * projection.normals[:, 2]
 
     def surface_gaps(self, state: SlabState) -> np.ndarray:
-        """Gaps (p,) of the points that lie under the object, without what edges give way; of those beside it one that says so."""
+        """Gaps (p,) of the points under the object without the springs at edges; NO_CONTACT_MM for points beside it."""
         return np.where(state.projection.beside, NO_CONTACT_MM, self.contact_of(state).surface_gaps(state.gaps))
 
     def error(self, state: SlabState) -> float:
-        """Deepest overlap, or widest gap under pressure, in mm of points that lie under the object."""
+        """Deepest overlap, or widest gap under pressure, in mm of points under the object."""
         return self.contact_of(state).error(np.where(state.projection.beside, NO_CONTACT_MM, state.gaps))
 
     def augmented(self, state: SlabState) -> ContactHistory:
-        """The contact's history with each point held where it just touches the object."""
+        """The contact's history after one augmentation."""
         return replace(state.history, contact=self.contact_of(state).augmented(state.gaps))
 
     def touch(self, displacement: np.ndarray, projection: ContactProjection, indentation: float, history: ContactHistory) -> Touch:
@@ -123,12 +123,12 @@ class TopContact:
         return self._with_friction(touch, history.friction, displacement, projection, indentation)
 
     def _with_friction(self, touch, friction_state, displacement, projection, indentation):
-        """The contact with friction's energy and forces, on the covered share of area as the pressure's."""
+        """The contact with friction's energy and forces, which act on the covered area like the pressure."""
         area = self.area * projection.covered
         place = self._in_object(displacement, projection, indentation)
         friction_response = friction_state.friction_response(place, projection.normals)
         pull = friction_response.traction * area[:, None]
-        # Raising the indentation lifts the points in the object's frame, so the slips' vertical part resists it.
+        # The indentation moves the points upwards in the object's frame, so vertical slip components resist it.
         return replace(touch, energy=touch.energy + float(friction_response.energy @ area),
                        force=touch.force + self._on_nodes(pull),
                        indentation_force=touch.indentation_force + float(pull[:, 2].sum()), friction_response=friction_response)
@@ -138,11 +138,11 @@ class TopContact:
         return np.matmul(self.values.transpose(0, 2, 1), forces.reshape(len(self.faces), -1, 3))
 
     def _in_object(self, displacement, projection, indentation):
-        """Places (p, 3) of the points in the frame of the object, which goes down by `indentation` and aside with `projection`."""
+        """Positions (p, 3) of the points in the object's frame, for its indentation and the projection's displacement."""
         return self.reference + self.at_points(displacement) + [*-projection.offset_mm, indentation]
 
     def first_friction_state(self, state: SlabState, indentation: float) -> FrictionState | None:
-        """The friction state in which a step starts from a `SlabState`, None without friction."""
+        """The friction state of a step that starts from a `SlabState`, None without friction."""
         if self.friction is None:
             return None
         if state.friction_response is None:
@@ -156,13 +156,13 @@ class TopContact:
         return response.next_pass(state.gaps, self._pressure(state))
 
     def _pressure(self, state):
-        """Pressure (p,) in MPa under the contact as it is now, on what is covered of the points' areas."""
+        """Pressure (p,) in MPa on the covered part of the points' areas."""
         return self.contact_of(state).response(state.gaps)[1]
 
     def balanced(self, state: SlabState, indentation: float, force_n: float) -> float:
-        """The indentation (mm) at which the object's force, friction aside, is `force_n` on the cover as it is.
+        """The indentation (mm) at which the object's force without friction is `force_n`, at fixed nodes.
 
-        The force grows with the depth, from a square root's slope on: Newton's method with bounded steps.
+        Newton's method with bounded steps; the force increases monotonically with the depth.
         """
         near = np.flatnonzero(state.gaps < _NEAR_MM)
         down, area = -state.projection.normals[near, 2], (self.area * state.projection.covered)[near]
@@ -181,9 +181,9 @@ class TopContact:
         return self.contact_of(state).response(state.gaps)[2] * self.area * state.projection.covered
 
     def area_under_pressure(self, state: SlabState) -> float:
-        """Area in mm2 of the points that carry pressure under the contact as it is now, as far as the object covers it.
+        """Covered area in mm2 of the points under pressure.
 
-        By the pressure, not by the gap: where overlaps were augmented, touching points have gaps near zero of either sign.
+        The criterion is the pressure, not the gap: after augmentations, gaps in contact are near zero with either sign.
         """
         return float((self.area * state.projection.covered)[self.under_pressure(state)].sum())
 
@@ -200,9 +200,9 @@ class TopContact:
         return force.sum(axis=0), np.cross(self.reference + self.at_points(state.displacement), force).sum(axis=0)
 
     def slip_at(self, state: SlabState, places: np.ndarray) -> np.ndarray:
-        """How far (n,) in mm the surface has slid along the object at places (n, 2); nan where it bears no pressure.
+        """Sliding path (n,) in mm of the surface on the object at places (n, 2); nan where there is no pressure.
 
-        Taken from the nearest contact point, as far as its area may reach; nan everywhere without friction.
+        Taken from the nearest contact point within the extent of its area; nan everywhere without friction.
         """
         slip, touching = np.full(len(places), np.nan), self.under_pressure(state)
         if state.friction_response is None or not touching.any():
@@ -214,20 +214,20 @@ class TopContact:
         return slip
 
     def pressure_of_faces(self, state: SlabState) -> np.ndarray:
-        """Mean pressure (t,) in MPa on each face, under the contact as it is now."""
+        """Mean pressure (t,) in MPa on each face."""
         area = self.area.reshape(len(self.faces), -1)
         force = self._pressure(state) * self.area * state.projection.covered
         return force.reshape(area.shape).sum(axis=1) / area.sum(axis=1)
 
     def normal_shapes(self, projection: ContactProjection) -> np.ndarray:
-        """Change (t, points, 3 w) of the points' gaps by the faces' unknowns."""
+        """Derivatives (t, points, 3 w) of the points' gaps by the faces' unknowns."""
         normal = projection.normals.reshape(*self.values.shape[:2], 3)
         return np.einsum("tga,tgd->tgad", self.values, normal).reshape(*normal.shape[:2], -1)
 
     def projected_nodes(self, gaps: np.ndarray, projection: ContactProjection, within_mm: float) -> tuple[np.ndarray, np.ndarray]:
-        """Free nodes (k,) of faces with points under the object whose gaps are less, and how the planes before each lie.
+        """Free nodes (k,) of faces with points under the object and gaps of less than `within_mm`, and their normals' moments.
 
-        That is the sum (k, 3, 3) of n n' over the normals, in mm2 of the points' areas.
+        The latter are sums (k, 3, 3) of n n' over the points' normals n, weighted by their areas in mm2.
         """
         near = (gaps < within_mm) & (projection.covered > 0)
         weight = (self.area * projection.covered * near).reshape(len(self.faces), -1)
@@ -239,9 +239,9 @@ class TopContact:
         return nodes, total[nodes]
 
     def friction_tangent(self, state: SlabState) -> tuple[np.ndarray, np.ndarray, float]:
-        """Friction's blocks (t, 3 w, 3 w) of the faces, border (t, 3 w) and corner.
+        """Friction's tangent blocks (t, 3 w, 3 w) of the faces, border (t, 3 w) and corner.
 
-        The border is the derivative of the forces by the indentation, the corner the energy's second derivative by it.
+        The border is the derivative of the nodal forces by the indentation, the corner the energy's second derivative by it.
         """
         area = (self.area * state.projection.covered)[:, None, None]
         response: Any = state.friction_response
@@ -253,7 +253,7 @@ class TopContact:
 
 
 def _of_free_nodes(follow, faces, values):
-    """Free nodes (t, w) that faces (t, 8) hang on, and values (t, g, 8) in terms of these (t, g, w)."""
+    """Free nodes (t, w) that determine faces (t, 8), and the shape values (t, g, 8) in terms of these (t, g, w)."""
     if (faces < follow.shape[1]).all():
         return faces, values
     rows = [follow[face] for face in faces]

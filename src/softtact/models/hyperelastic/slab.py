@@ -1,9 +1,9 @@
 """Sheet and cover as one slab over the frusta, with the contact of a rigid object on its top (`TopContact`).
 
-The sheet's elements meet the frusta's roots node by node. The cover knows nothing of the frusta, so its hexahedra may be
-coarser in plan: the nodes of what is below follow its lower side. Where sheet and cover meet, the field still changes from
-frustum to frustum, and such a tie costs several per cent of the map; so the cover's lowest layers may keep to the sheet's plan.
-`SheetNodes` has which of the slab's nodes the sheet's are or follow, `CoverSide` the side of the cover that its top lies on."""
+The sheet's mesh conforms with the frusta's roots. The cover's hexahedra are independent of the frusta and may be coarser along x
+and y: the nodes below are tied to its lower side. At the interface of sheet and cover the displacement still varies from frustum to
+frustum, so such a tie changes the map by several per cent; therefore the cover's lowest layers can share the sheet's 2-D mesh.
+`SheetNodes` relates the sheet's nodes to the slab's, `CoverSide` is a side of the cover to which nodes are tied."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -28,15 +28,15 @@ from softtact.models.hyperelastic.rigid_contact import TopContact
 from softtact.models.hyperelastic.states import ContactHistory, ContactProjection, LinearGaps, ObjectSurface, SlabState
 
 _NO_WEIGHT = 1e-12
-_AT_ONCE = 8     # elements whose tangents one thread makes positive at once; those that need it lie side by side
+_AT_ONCE = 8     # elements whose tangents one thread makes positive at once; indefinite ones are often neighbours
 
 
 @dataclass(frozen=True)
 class SheetNodes:
-    """Nodes (p,) of the sheet's mesh among those of a slab. The mesh's top follows the cover, the rest has separate unknowns.
+    """Nodes (p,) of the sheet's mesh among those of a slab. The mesh's top is tied to the cover, the rest has separate unknowns.
 
-    masters (p, w), weights (p, w): numbers of the slab's nodes that each follows; unused places have weight 0
-    own (k,): the nodes that follow no others;  number (p,): the slab's number of each of these, -1 for the others
+    masters (p, w), weights (p, w): the slab's nodes that determine each node; unused entries have weight 0
+    own (k,): the nodes that are not constrained;  number (p,): the slab's number of each of these, -1 for the others
     """
 
     masters: np.ndarray
@@ -45,7 +45,7 @@ class SheetNodes:
     number: np.ndarray
 
     def like_cells(self, cells: np.ndarray) -> list[np.ndarray]:
-        """Numbers of like cells, kind by kind, of cells with nodes (c, k): those whose nodes follow others in the same way."""
+        """Numbers of like cells, kind by kind, of cells with nodes (c, k): those with the same pattern of constraints."""
         used = np.abs(self.weights) > _NO_WEIGHT
         kinds: dict[bytes, list[int]] = {}
         for number, cell in enumerate(cells):
@@ -57,13 +57,13 @@ class SheetNodes:
 
 def sheet_nodes(mesh: HexMesh, sheet_2d: SheetMesh2D, *, first: int, above: sp.csr_matrix,
                 constrained: bool | np.ndarray | Callable[[np.ndarray], np.ndarray]) -> SheetNodes:
-    """`SheetNodes` of the sheet's mesh, lifted from a `SheetMesh2D`.
+    """`SheetNodes` of the sheet's mesh, extruded from a `SheetMesh2D`.
 
-    first: number of the first node that is not the cover's;  above (plane's points, cover's nodes): how its top follows the cover
-    constrained: where the edges between cells are curves: everywhere (True), nowhere, or where a function of places (n, 2) says
+    first: number of the first node that is not the cover's;  above (plane's points, cover's nodes): tie of its top to the cover
+    constrained: constrained cell edges: everywhere (True), nowhere, or where a function of places (n, 2) returns True
 
-    Along such an edge, two elements a side, the sheet moves as one quadratic curve: the nodes at the quarters follow the corner,
-    the middle and the next corner. (Free quarters: half as many unknowns again, and 1 % softer.)
+    Along such an edge of two elements the sheet moves as one quadratic curve: the nodes at the quarter points are determined by the
+    corner, the middle and the next corner. (Free quarter points: 50 % more unknowns, and 1 % softer.)
     """
     top, planes = mesh.planes[-1], mesh.inner_planes
     curve, curve_weights = sheet_2d.quarters
@@ -92,7 +92,7 @@ class CoverSide:
     """The lower or the upper side of a `CoverMesh` between grid lines (mm)."""
 
     def __init__(self, mesh: CoverMesh, faces: np.ndarray, cells: np.ndarray, x_lines: np.ndarray, y_lines: np.ndarray) -> None:
-        """faces (t, 8): of the side;  cells (ny 2^m, nx 2^m): which of them is where"""
+        """faces (t, 8): of the side;  cells (ny 2^m, nx 2^m): index of the face on each cell of the finest grid"""
         self._mesh, self._faces, self._cells, self._lines = mesh, faces, cells, (x_lines, y_lines)
 
     def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -113,13 +113,13 @@ class CoverSide:
 
 
 def _place(value, lines, fine):
-    """Which interval of lines, each cut into `fine` equal parts, values (p,) lie in."""
+    """Index of the interval that contains each value (p,), for intervals between lines cut into `fine` equal parts."""
     grid = np.interp(np.arange(fine * (len(lines) - 1) + 1), fine * np.arange(len(lines)), lines)
     return np.clip(np.searchsorted(grid, value - 1e-9) - 1, 0, len(grid) - 2)
 
 
 def without_zeros(matrix: sp.spmatrix) -> sp.csr_matrix:
-    """A sparse matrix without what is round-off of 0, as csr."""
+    """A sparse matrix as csr without entries that are zero to rounding."""
     matrix.data[np.abs(matrix.data) < _NO_WEIGHT] = 0.0
     matrix.eliminate_zeros()
     return matrix.tocsr()
@@ -135,26 +135,26 @@ class Layer:
 
 @dataclass(frozen=True)
 class SlabMesh:
-    """The mesh of a slab in plan."""
+    """The mesh of a slab along x and y."""
 
     mesh_2d: SheetMesh2D
     """Of the sheet."""
     x_lines: np.ndarray
-    """Lines of the cover's grid along x in mm."""
+    """Coordinates x in mm of the cover's grid lines."""
     y_lines: np.ndarray
-    """The same along y."""
+    """Coordinates y in mm of the cover's grid lines."""
     splits: np.ndarray | None = None
-    """(layers, ny 2^m, nx 2^m): how often the cover's uppermost layers are split where (see `cover_mesh`); the layers below these
-    keep to the sheet's plan. None: none does, and none is split."""
+    """(layers, ny 2^m, nx 2^m): split depths of the cover's uppermost layers (see `cover_mesh`); the layers below these share
+    the sheet's 2-D mesh. None: all layers are on the grid, and none is split."""
     constrained_cell_edges: bool | Callable[[np.ndarray], np.ndarray] = True
-    """Whether edges between cells move as one curve: everywhere, nowhere, or where a function of places (n, 2) gives (n,) True."""
+    """Constrained cell edges: everywhere, nowhere, or where a function of places (n, 2) returns (n,) True."""
 
 
 @dataclass(frozen=True)
 class CellGroup:
-    """Cells (c,) of the sheet under equal pieces of the cover.
+    """Cells (c,) of the sheet under like parts of the cover.
 
-    layers: layer by layer from below like elements: nodes (c * elements, w), cell by cell, and their block
+    layers: for each layer from below its elements: nodes (c * elements, w), cell by cell, and their block
     """
 
     cells: np.ndarray
@@ -162,16 +162,16 @@ class CellGroup:
 
     @property
     def parts(self) -> list[tuple[np.ndarray, SolidBlock]]:
-        """Those of all layers."""
+        """Nodes and blocks of all layers."""
         return [part for layer in self.layers for part in layer]
 
 
 class Slab:
-    """Sheet (its plan a `SheetMesh2D`) under a cover on a grid; a cover of one level is the sheet's top without a cover.
+    """Sheet on a `SheetMesh2D` under a cover on a grid; a cover with a single height is the sheet's top without a cover.
 
-    sheet_mesh: the sheet (`sheet_layers`) and the cover's layers that keep to its plan;  cover_mesh: the cover's other layers
-    Nodes: cover_mesh's first, then sheet_mesh's without its top. `bottom`: those under the sheet, in the plan's order.
-    sheet_nodes: `SheetNodes`, what the nodes of sheet_mesh follow;  underside: the cover's, on which the sheet's top lies
+    sheet_mesh: the sheet (`sheet_layers`) and the cover's layers that share its 2-D mesh;  cover_mesh: the cover's other layers
+    Nodes: cover_mesh's first, then sheet_mesh's without its top. `bottom`: nodes under the sheet in the 2-D mesh's order.
+    sheet_nodes: `SheetNodes`, the constraints of sheet_mesh's nodes;  underside: of the cover, to which the sheet's top is tied
     """
 
     regions = ("sheet", "cover")     # of the deformed mesh that the two parts belong to
@@ -182,7 +182,7 @@ class Slab:
                  quartic_penalty_ratio: float = 0.0, friction: Coulomb | None = None, held_below_mm: float = 0.0) -> None:
         """quartic_penalty_ratio: see `solid_block`;  friction: `Coulomb` of the object on the top, or None
 
-        held_below_mm: depth below the top, one of the layers' levels, from which `held` sides are held
+        held_below_mm: depth below the top, one of the layers' heights, from which `held` sides are fixed
         """
         x_lines, y_lines, splits, sheet_mesh_2d = mesh.x_lines, mesh.y_lines, mesh.splits, mesh.mesh_2d
         if splits is None:
@@ -205,7 +205,7 @@ class Slab:
         self.groups, self.cell_groups = [], []   # (nodes, block) outside of cells; a `CellGroup` for each kind of cell
         self._add_cover(cover.law)
         self._add_sheet(sheet_mesh_2d, [sheet.law] * self.sheet_layers + [cover.law] * bound)
-        self._joined = joined(self.solids)     # to evaluate a hundred small blocks takes twice as long
+        self._joined = joined(self.solids)     # evaluating a hundred small blocks takes twice as long
         self._number_unknowns(sides, held_below_mm)
         pressed = cover.law or sheet.law     # None in bodies at rest, of which only the mesh is wanted
         self.top = TopContact(self.cover_mesh, contact, plane_modulus=pressed.plane_modulus if pressed else np.inf,
@@ -213,14 +213,14 @@ class Slab:
 
     @cached_property
     def uses(self) -> np.ndarray:
-        """In how many cells, groups of other elements and top faces each node occurs (n,); 1: a cell's own."""
+        """Number (n,) of cells, groups of other elements and top faces that contain each node; 1: inside one cell."""
         cells = [np.unique(np.hstack([nodes.reshape(len(group.cells), -1) for nodes, _ in group.parts])[k])
                  for group in self.cell_groups for k in range(len(group.cells))]
         others = [np.unique(nodes) for nodes, _ in self.groups] + [np.unique(self.top.faces)]
         return np.bincount(np.concatenate([*cells, *others]), minlength=self.nodes)
 
     def _add_cover(self, law):
-        """Groups of the cover's elements, those among larger ones apart: they hang on more nodes than their own."""
+        """Groups of the cover's elements; those with hanging nodes form separate groups, as they have more master nodes."""
         mesh = self.cover_mesh
         if not len(mesh.hexes):
             return
@@ -235,7 +235,7 @@ class Slab:
         return HexBlock(self.cover_mesh.points[hexes], law, reduced=True, quartic_penalty_ratio=self._quartic_penalty_ratio)
 
     def _add_sheet(self, mesh_2d, laws):
-        """Like elements (nodes, block): those of the strips around, and those of each kind of cell, cell by cell; a law a layer."""
+        """Like elements (nodes, block): of the strips around the lattice, and of each kind of cell; a law per layer."""
         mesh, cells = self.sheet_mesh, len(mesh_2d.roots)
         in_cells = cells * mesh_2d.cell_quads
         layers = [(mesh.layer(k), mesh.wedge_layer(k), law) for k, law in enumerate(laws)]
@@ -265,7 +265,7 @@ class Slab:
         return [block for _, block in self.solids + self._joined]
 
     def _number_unknowns(self, sides, held_below_mm):
-        """Free unknowns: all but the sides, which are `held` (sensor shell), `symmetric` (unit cell) or also `free`."""
+        """Free unknowns: all except on the sides, which are `held` (sensor shell), `symmetric` (unit cell) or `free`."""
         x, y, z = self.points.T
         on_x = (np.abs(x - self.x_lines[0]) < 1e-9) | (np.abs(x - self.x_lines[-1]) < 1e-9)
         on_y = (np.abs(y - self.y_lines[0]) < 1e-9) | (np.abs(y - self.y_lines[-1]) < 1e-9)
@@ -279,17 +279,17 @@ class Slab:
         self.free = np.flatnonzero(~held.ravel())
 
     def hold(self, nodes: np.ndarray) -> None:
-        """Hold nodes (k,) in all directions, before `build_pattern`."""
+        """Fix nodes (k,) in all directions; to be called before `build_pattern`."""
         dofs = (3 * np.asarray(nodes)[:, None] + np.arange(3)).ravel()
         self.free = np.setdiff1d(self.free, dofs)
 
     def project(self, displacement: np.ndarray, surface: ObjectSurface, indentation: float | None = None) -> ContactProjection:
-        """The object's facets above the top's points (see `ContactProjection`)."""
+        """The `ContactProjection` of the top's points on the object."""
         return self.top.project(displacement, surface, indentation)
 
     def evaluate(self, displacement: np.ndarray, projection: ContactProjection, indentation: float,
                  history: ContactHistory | None = None, *, workers: Workers = SERIAL) -> SlabState | None:
-        """Energy, forces and contact with the object `indentation` mm below its pose; None if an element is inside out.
+        """Energy, forces and contact with the object `indentation` mm below its pose; None if an element is inverted.
 
         history: of the contact, by default none
         """
@@ -305,7 +305,7 @@ class Slab:
 
     def update_normals(self, state: SlabState, projection: ContactProjection, indentation: float,
                        history: ContactHistory | None = None) -> SlabState:
-        """The same displacements under another projection, and with another history of the contact if there is one."""
+        """The state with another contact projection, and with another history of the contact if one is given."""
         return self._with_contact(state.displacement, state.elastic, projection, indentation, history or state.history)
 
     def _with_contact(self, displacement, elastic, projection, indentation, history):
@@ -317,9 +317,9 @@ class Slab:
                          friction_response=touch.friction_response)
 
     def build_pattern(self, eliminated: np.ndarray, cells: list[np.ndarray], *, precision: type[np.floating] = np.float32) -> None:
-        """Fix the global matrix: its unknowns are the free but the `eliminated` ones; `cells` [(c, k)]: what cells leave.
+        """Build the global matrix' pattern without the `eliminated` unknowns; cells [(c, k)]: unknowns that cells leave.
 
-        precision: of its values; single is enough for steps that a residual in double precision corrects
+        precision: of its values; single is enough for steps that are corrected by a residual in double precision
         """
         keep = np.setdiff1d(self.free, eliminated)
         self.unknowns = keep
@@ -334,7 +334,7 @@ class Slab:
         self._top_positions = upper_positions(indptr, indices, self._top_dofs)
         self._matrix = sp.csr_matrix((np.zeros(len(indices), dtype=precision), indices, indptr), shape=(len(keep),) * 2)
         self.product = SymmetricProduct(indptr, indices)
-        self._values_at: np.ndarray | None = None     # displacement of what `_beside_cells` keeps, by whether it is made positive
+        self._values_at: np.ndarray | None = None     # displacement of the cached values of `_beside_cells`
         self._values: dict[bool, np.ndarray] = {}
 
     def tangent(self, state: SlabState, condensed: list[np.ndarray], *, workers: Workers = SERIAL) -> sp.csr_matrix:
@@ -359,7 +359,7 @@ class Slab:
         return matrix
 
     def _beside_cells(self, displacement, positive, workers):
-        """What the elements outside of cells add to the matrix' values; a step tries several tangents that differ by the cells."""
+        """Contribution of elements outside of cells to the matrix' values, cached for several tangents of one step."""
         if self._values_at is not displacement:
             self._values_at, self._values = displacement, {}
         if positive not in self._values:
@@ -374,7 +374,7 @@ class Slab:
 
     def linear_gaps(self, displacement: np.ndarray, projection: ContactProjection, indentation: float,
                     history: ContactHistory) -> LinearGaps:
-        """The gaps of the object's contact points as they depend on a step of the global unknowns, a `LinearGaps`."""
+        """The `LinearGaps` of the object's contact points for a step of the global unknowns."""
         shapes, gaps = self.top.normal_shapes(projection), self.top.gaps(displacement, projection, indentation)
         free = np.broadcast_to(self._top_dofs[:, None] >= 0, shapes.shape)
         points = np.broadcast_to(np.arange(len(gaps)).reshape(*shapes.shape[:2], 1), shapes.shape)[free]
@@ -384,11 +384,11 @@ class Slab:
                           area=self.top.area * projection.covered, contact=self.top.contact_on(projection, history))
 
     def unknowns_of(self, nodes: np.ndarray) -> np.ndarray:
-        """The global matrix' unknowns (k, 3) of nodes (k,), -1 where a movement is none."""
+        """The global matrix' unknowns (k, 3) of nodes (k,), -1 where a component is not an unknown."""
         return self._number[nodes]
 
     def friction_border(self, state: SlabState) -> tuple[np.ndarray, float]:
-        """How friction ties the unknowns to the indentation: derivative (unknowns,) of their residual by it, and its own."""
+        """Friction's coupling to the indentation: derivatives by it of the residual (unknowns,) and of the object's force."""
         if state.friction_response is None:
             return np.zeros(len(self.unknowns)), 0.0
         _, of_faces, corner = self.top.friction_tangent(state)

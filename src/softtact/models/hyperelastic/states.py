@@ -1,4 +1,4 @@
-"""What a press knows at one displacement, and what its contacts remember: plain records, which the files beside share.
+"""States of a hyperelastic press and histories of its contacts: records that the modules of this package share.
 """
 
 from collections.abc import Callable
@@ -13,15 +13,15 @@ from softtact.contact.penalty import Contact
 
 @dataclass(frozen=True)
 class ContactHistory:
-    """The history of one contact. It belongs to a state and never changes: a step forward gives a new one."""
+    """The history of one contact. It belongs to a state and is immutable: each step creates a new one."""
 
     contact: Contact
     """Law of the points with their multipliers, as offsets in mm (augmented Lagrange)."""
     friction: FrictionState | None = None
-    """How friction holds the points during a step; None without friction, or before the first touch."""
+    """Friction variables during a step; None without friction, or before the first touch."""
 
     def held_by(self, friction: FrictionState | None) -> "ContactHistory":
-        """The same multipliers with another friction state."""
+        """This history with another friction state and the same multipliers."""
         return replace(self, friction=friction)
 
 
@@ -31,13 +31,13 @@ ObjectSurface = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]
 
 @dataclass(frozen=True)
 class ContactProjection:
-    """The planes of the object's facets that points face: anchors (p, 3) in mm at no indentation, outward normals (p, 3).
+    """The contact projection: planes of the object's facets, anchors (p, 3) in mm at zero indentation, outward normals (p, 3).
 
-    covered (p,): share of a point's area that the object covers;  beside (p,): points that lie beside the object themselves
-    contact_compliance (p,): mm/MPa of a spring between point and plane, where an edge covers it in part (`contact/edges`)
-    overrun (p,): points that lay far under an edge where the planes were found
-    offset_mm (2,): displacement of the object along x and y from its place at first touch, at which the anchors are
-    A point keeps its plane during a step of Newton's method, so that each step lowers one potential.
+    covered (p,): share of a point's area that the object covers;  beside (p,): points that are not under the object
+    contact_compliance (p,): mm/MPa of a spring between point and plane, where an edge covers the area in part (`contact/edges`)
+    overrun (p,): points that were far under an edge when the projection was computed
+    offset_mm (2,): displacement of the object along x and y from its position at first touch, included in the anchors
+    A point keeps its plane during a Newton step, so that each step decreases one potential.
     """
 
     anchors: np.ndarray
@@ -49,14 +49,14 @@ class ContactProjection:
     overrun: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     def taking(self, other: "ContactProjection", points: np.ndarray) -> "ContactProjection":
-        """These planes, and those of another projection for some of the points (p,)."""
+        """This projection with the planes of another one for some of the points (p,)."""
         kept = {name: getattr(self, name).copy() for name in ("anchors", "normals", "covered", "beside", "contact_compliance")}
         for name, values in kept.items():
             values[points] = getattr(other, name)[points]
         return replace(self, **kept, overrun=self.overrun | points)
 
     def moved(self, way_mm: np.ndarray) -> "ContactProjection":
-        """The same planes after the object has moved by (2,) in mm along x and y."""
+        """The planes after a displacement (2,) in mm of the object along x and y."""
         return replace(self, anchors=self.anchors + [*way_mm, 0.0], offset_mm=self.offset_mm + way_mm)
 
 
@@ -64,8 +64,8 @@ class ContactProjection:
 class SlabState:
     """energy (mJ), force (n, 3) in N, contact quantities at the top's points, displacement (n, 3).
 
-    elastic: energy and force of the rubber alone; projection: what the points face; indentation_force: the object's, N downwards;
-    history: of the contact, see `ContactHistory`;  friction_response: friction at the points, None without
+    elastic: energy and force of the rubber alone; projection: of the points on the object; indentation_force: the object's force, N
+    downwards; history: of the contact, see `ContactHistory`;  friction_response: at the points, None without friction
     """
 
     elastic: tuple
@@ -84,7 +84,7 @@ class SupportState:
     """energy (mJ), force (f, nodes, 3) on the support's nodes, gaps (f, p) at its contact points, displacement (f, nodes, 3).
 
     elastic: energies (f,) and force of the rubber alone;  history: of the contacts, see `ContactHistory`
-    friction_response: friction at the points on the board (f, b), None without
+    friction_response: at the points on the board (f, b), None without friction
     """
 
     elastic: tuple
@@ -118,7 +118,7 @@ class BodyState:
 
     @property
     def history(self) -> BodyHistory:
-        """What the contacts remember, `BodyHistory`."""
+        """The `BodyHistory` of both contacts."""
         return BodyHistory(self.slab.history, self.support.history)
 
     @property
@@ -129,7 +129,7 @@ class BodyState:
 
 @dataclass(frozen=True)
 class BodyStep:
-    """A Newton step: slab (n, 3), support (f, nodes, 3) in mm, indentation in mm, and what the object's contact faces in it."""
+    """A Newton step: slab (n, 3), support (f, nodes, 3) in mm, indentation in mm, and the contact projection that it assumes."""
 
     slab: np.ndarray
     support: np.ndarray
@@ -142,9 +142,9 @@ class BodyStep:
 
 @dataclass(frozen=True)
 class LinearGaps:
-    """Contact points (p,) as they depend on a step: gaps (mm) at none, rows (p, n) of their change by each unknown.
+    """Linearised gaps of contact points (p,): gaps (mm) before the step, rows (p, n): their derivatives by the unknowns.
 
-    indentation increment (p,): their change when the object goes down by 1 mm;  area (p,) in mm2;  contact: a `Contact`
+    indentation_increment (p,): their derivatives by the object's indentation;  area (p,) in mm2;  contact: a `Contact`
     """
 
     gaps: np.ndarray
@@ -154,9 +154,9 @@ class LinearGaps:
     contact: Contact
 
     def pressure(self, change: np.ndarray | float) -> np.ndarray:
-        """Forces (p,) in N that the points carry after their gaps have changed, positive in compression."""
+        """Contact forces (p,) in N after a change of the gaps, positive in compression."""
         return self.area * self.contact.response(self.gaps + change)[1]
 
     def slope(self, change: np.ndarray | float) -> np.ndarray:
-        """Stiffness (p,) in N/mm of the points after their gaps have changed."""
+        """Contact stiffness (p,) in N/mm after a change of the gaps."""
         return self.area * self.contact.response(self.gaps + change)[2]

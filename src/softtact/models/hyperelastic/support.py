@@ -1,8 +1,8 @@
-"""What is below the slab and holds it: a lattice of frusta (`FrustumArray`), the board itself, or nothing (`Support`).
+"""The support of the slab: a lattice of frusta (`FrustumArray`), the board itself, or nothing (`Support`).
 
     frusta   each with separate unknowns, tied to the slab at its root, in contact with the board
-    base     the slab's lower side is bonded to the board: the slab holds these nodes (`Slab.hold`), no unknown is left below
-    none     the slab's lower side is free: it hangs in the sensor's shell, which holds its sides
+    base     the slab's lower side is bonded to the board: its nodes are fixed (`Slab.hold`), with no unknowns below
+    none     the slab's lower side is free: it is held by its sides in the sensor's shell
 """
 
 
@@ -17,10 +17,10 @@ from softtact.models.hyperelastic.states import BodyState, ContactHistory, Suppo
 
 
 class Support:
-    """What a `LayeredBody` asks of what is below its slab: `count` bodies of `nodes` nodes each, tied to the slab at `root`.
+    """Interface of a `LayeredBody` to its support: `count` bodies of `nodes` nodes each, tied to the slab at `root`.
 
-    This one has none: the board under a bonded slab, or nothing, without energy and contact. `FrustumArray` has bodies; it also
-    condenses them for the slab's cells (`SheetCells`) and balances them one by one (`body.balanced`).
+    This class has no bodies: the board under a bonded slab, or nothing, without energy and contact. `FrustumArray` has bodies; it
+    also condenses them for the slab's cells (`SheetCells`) and finds their local equilibria (`body.balanced`).
     """
 
     friction: Coulomb | None
@@ -33,12 +33,12 @@ class Support:
 
     @property
     def blocks(self) -> list:
-        """Blocks of its elements; none where it has no rubber."""
+        """Blocks of its elements; none without bodies."""
         return []
 
     @property
     def in_words(self) -> str:
-        """What it is, for messages."""
+        """Its description in messages."""
         return {"base": "bonded to the board", "none": "free below"}[self.kind]
 
     def fresh_history(self) -> ContactHistory:
@@ -47,7 +47,7 @@ class Support:
 
     def evaluate(self, displacement: np.ndarray, history: ContactHistory | None = None, *,
                  workers: Workers = SERIAL) -> SupportState | None:
-        """The state at displacement (f, nodes, 3); None if an element is inside out. history: of the contacts, by default none"""
+        """The state at displacement (f, nodes, 3); None if an element is inverted. history: of the contacts, by default none"""
         nothing = np.zeros((0, self.nodes, 3))
         return SupportState(elastic=(np.zeros(0), nothing), energy=0.0, force=nothing, gaps=np.zeros((0, 1)),
                             displacement=displacement, history=history or self.fresh_history())
@@ -57,7 +57,7 @@ class Support:
         return replace(state, history=history)
 
     def inner_residual(self, state: SupportState) -> np.ndarray:
-        """Unbalanced forces (f, inner) in N of the unknowns that are not the slab's."""
+        """Unbalanced forces (f, inner) in N of the inner unknowns."""
         return np.zeros((0, 1))
 
     def contact_error(self, state: SupportState) -> float:
@@ -65,24 +65,24 @@ class Support:
         return 0.0
 
     def augmented(self, state: SupportState) -> ContactHistory:
-        """The contacts' history with each point held where its surfaces just touch."""
+        """The contacts' history after one augmentation."""
         return state.history
 
     def first_friction_state(self, state: SupportState) -> FrictionState | None:
-        """The friction state in which a step starts, None without friction."""
+        """The friction state at a step's start, None without friction."""
         return None
 
     def most_compressed(self, state: SupportState) -> tuple[float, str] | None:
-        """Share of its height by which the most compressed body is shortened, and which one in words; None without bodies."""
+        """Largest compression of a body relative to its height, and which body in words; None without bodies."""
         return None
 
     def largest_compression(self, displacement: np.ndarray) -> float:
-        """By how much (mm) the most compressed body is shortened; nan without bodies."""
+        """Largest compression (mm) of a body; nan without bodies."""
         return np.nan
 
 
 class NoCells:
-    """In place of `SheetCells` for a slab without bodies below it: nothing is eliminated, every unknown is global."""
+    """Replaces `SheetCells` for a slab without bodies below it: nothing is eliminated, every unknown is global."""
 
     outer_dofs: list[np.ndarray]
     outer: list[np.ndarray]
