@@ -1,8 +1,8 @@
-"""What the foundation model knows of a sensor: sheet and cover as a linear slab, on frusta with their unit cell's nonlinear law.
+"""The foundation model of a sensor: sheet and cover as a linear slab, on frusta with their unit cell's nonlinear law.
 
-The slab's movements under unit forces at its top and at the frusta are computed once, from one quarter of it
-(`quarter_symmetry`). The frusta's linear stiffness against all but compression is part of the slab; their compression is a movement
-of its own, against which the press sets the law (`foundation_press`).
+The slab's displacements under unit forces at its top and at the frusta are computed once, from one quarter of it
+(`quarter_symmetry`). The frusta's linear stiffness, except against compression, is part of the slab; their compression is a
+separate displacement, to which a press applies the nonlinear law (`press_foundation`).
 """
 
 from dataclasses import dataclass, replace
@@ -23,19 +23,19 @@ from softtact.sensors.frusta import SensorSpec
 
 SHEET_SHARES, COVER_SHARES = (1.0,), (0.45, 0.35, 0.2)
 _BLOCKS = ("surface", "sideways", "membrane", "lateral", "lateral_self")
-_GROUND = 2e-3  # of a frustum's stiffness at rest: a lifted one pulls by so much of it, single precision still resolves 1e-5 mm
+_GROUND = 2e-3  # of a frustum's stiffness at rest, also for lifted frusta: so small, yet single precision still resolves 1e-5 mm
 
 
 @dataclass(frozen=True)
 class FoundationCompliance:
-    """What the slab on its frusta does under downwards forces, by parity (see `quarter_symmetry`), and the law of the frusta.
+    """Compliance of the slab on its frusta under downward forces, by parity (see `quarter_symmetry`), and the law of the frusta.
 
     surface: among the grid's nodes in the quarter (a,), the frusta (b,) and the electrode plane at the map's points (c,), without
-        sides where the grid is so
-    sideways: of the grid's every second node, in x and in y (2 c,), from the nodes and frusta (a + b,)
-    membrane: forces N_xx, N_yy, N_xy of the frusta's cells (3 b,) in N/mm, from the same
-    lateral: movement and tilt of the frusta's roots along x, then along y (4 b,), from all of these (a + b + c)
-    lateral_self: the same, from unit forces and moments of the same kind (4 b)
+        the sides if the grid is without them
+    sideways: displacements of every second node of the grid in x and in y (2 c,), from forces on nodes and frusta (a + b,)
+    membrane: membrane forces N_xx, N_yy, N_xy of the frusta's cells (3 b,) in N/mm, from the same forces
+    lateral: displacement and tilt of the frusta's roots along x, then along y (4 b,), from forces at all of these (a + b + c)
+    lateral_self: displacement and tilt of the roots, from unit lateral forces and moments on the roots (4 b)
     grid: the nodes;  counts: frusta along x and y;  foundation_modulus: pressure per depth in N/mm3 of the layer at rest
     """
 
@@ -70,7 +70,7 @@ def foundation_compliance(spec: SensorSpec, *, dielectric_law: Law, cover_law: L
                           cells: tuple[int, ...] | None = None, threads: int = 1) -> FoundationCompliance:
     """The `FoundationCompliance` of a sensor with its two laws.
 
-    frustum: its `FrustumLaw`, or None to compute it;  cells: elements along the quarter's sides, by default the map's steps there
+    frustum: its `FrustumLaw`, or None to compute it;  cells: elements along the quarter's sides, by default the map's steps
     """
     spec.check_for("foundation")
     frustum = frustum or frustum_law(spec, dielectric_law)
@@ -98,7 +98,7 @@ def foundation_compliance(spec: SensorSpec, *, dielectric_law: Law, cover_law: L
 
 
 def _with_ground(frustum):
-    """A frustum's law without a linear part, and that part's stiffness in N/mm: with free sides nothing else carries the slab."""
+    """A frustum's law without a small linear part, and that part's stiffness in N/mm, which supports a slab with free sides."""
     ground = _GROUND * frustum.force_n[1] / frustum.compression_mm[1]
     return replace(frustum, force_n=frustum.force_n - ground * frustum.compression_mm), ground
 
@@ -119,7 +119,7 @@ def _quarter_lattice(spec):
 
 
 def _roots(slab, centres, frustum):
-    """Displacements of all roots' nodes (3 b m, unknowns); those on a plane of symmetry count as in the quarter."""
+    """Displacements of all roots' nodes (3 b m, unknowns); frusta on a plane of symmetry count by their part in the quarter."""
     at = slab.interpolation(np.abs((centres[:, None] + frustum.root_xy).reshape(-1, 2)))
     roots = sp.kron(sp.kron(sp.eye(len(centres)), frustum.spread, format="csr") @ at, sp.eye(3), format="csr")
     roots.resize(roots.shape[0], slab.unknowns)
@@ -144,15 +144,15 @@ def _membrane(slab, spec, centres):
 
 
 def _lateral_movement(roots, frustum, centres):
-    """Movement and tilt of the roots along x, then along y (4 b, unknowns), of the displacements of all their nodes."""
+    """Displacement and tilt of the roots along x, then along y (4 b, unknowns), from the displacements of all their nodes."""
     return sp.vstack([sp.kron(sp.eye(len(centres)), row[None]) @ roots for row in frustum.lateral])
 
 
 def _of_parity(slab, stiffness, descents, followed, rows, parity, threads):
-    """Blocks of one parity: surface (loaded + c, loaded), sideways (2 c, loaded), followed (f, loaded + c), for downwards forces;
-    and `followed` (f, f) for forces of their own.
+    """Blocks of one parity: surface (loaded + c, loaded), sideways (2 c, loaded), followed (f, loaded + c), for downward forces;
+    and `followed` (f, f) for the forces conjugate to these.
 
-    rows: numbers of the unknowns on the top, in the electrode plane, and of the top sideways (2 c)
+    rows: numbers of the vertical unknowns on the top and in the electrode plane, and of the top's lateral unknowns (2 c)
     """
     top, plane, sideways = (picked(numbers, slab.unknowns) for numbers in rows)
     whole = slab.responses(stiffness, sp.vstack([top, descents, plane, sideways, followed], format="csr"), parity, threads=threads,
@@ -164,7 +164,7 @@ def _of_parity(slab, stiffness, descents, followed, rows, parity, threads):
 
 
 def _stacked(parts, count):
-    """Arrays (count, ...) in single precision of tuples of arrays that come one after the other: none is kept twice."""
+    """Arrays (count, ...) in single precision from an iterator over tuples of arrays, without keeping the originals."""
     out: list[np.ndarray] = []
     for number, blocks in enumerate(parts):
         out = out or [np.empty((count, *block.shape), dtype=np.float32) for block in blocks]
@@ -174,7 +174,7 @@ def _stacked(parts, count):
 
 
 def _foundation_modulus(spec, frustum, cover_law):
-    """Pressure per depth (N/mm3) of frusta and layers one after the other, at small depths."""
+    """Foundation modulus (N/mm3) of frusta and layers in series at small depths."""
     frusta = frustum.compression_mm[1] / frustum.force_n[1] * spec.dielectric.frusta.pitch_mm**2
     layers = (spec.thickness_mm - spec.dielectric.frusta.height_mm) / (cover_law.bulk_modulus + 4 / 3 * cover_law.mu0)
     return 1.0 / (frusta + layers)

@@ -1,14 +1,14 @@
-"""Where a press of the foundation model acts: its nodes and frusta among the compliance of a quarter.
+"""Maps between the nodes and frusta of a press of the foundation model and the compliance of a quarter.
 
-`SoftEdges` has how soft a contact is at nodes beside an edge of the object, so that an edge counts where it is and not at the
-next node.
+`SoftEdges` computes the contact compliance of nodes beside an edge of the object, so that the contact ends at the edge and not at
+the next node.
 
-A node that is held makes the contact wider by one step, one that is free does not. In between, with its force a share r of what
-would hold it, the contact's energy lies between by that share, which is that of an edge r steps beyond the node before. So a
-spring of 1/r - 1 times the node's own compliance among the held ones stands for an edge there (a cut cell, in other methods).
-On a rounded edge contact ends where the surface, falling away with the root of the distance, meets it: the height up to which it
-counts as flat is a share of the depth. Two numbers are not derived: where a held middle of an element puts the edge, taken from
-finer grids of the same model; and that share, chosen by the sixteen presses of
+A node in contact widens the contact by one step. With a share r of its full contact force, the contact's energy is interpolated by
+that share; this is the energy of an edge r steps beyond the previous node. So a spring of 1/r - 1 times the compliance of the node,
+among nodes in contact, represents an edge there (compare cut cells in other methods).
+On a rounded edge contact ends where the free surface, which falls with the square root of the distance, meets it: the height up to
+which the edge counts as flat is a share of the depth. Two numbers are calibrated: the edge's position for a contact that ends at an
+element's middle node, from finer grids of the same model; and that share, from the sixteen presses of
 docs/notebook/2026-11-23-foundation-model.md.
 """
 
@@ -20,14 +20,14 @@ import scipy.sparse as sp
 from softtact.contact.object_points import ObjectPoints
 from softtact.models.foundation.compliance import FoundationCompliance
 
-_AROUND, _DEEP = 6, 6     # nodes along an edge, and held behind it, among which a node's compliance is found
-_ROUNDED = 0.12           # of the depth: height on a rounded edge up to which the object acts as if it had no rounding
-_EVEN_MM = 1e-3           # that lies in a plane: heights over it are in single precision
-_MIDDLE_BEYOND = 0.26     # of a step, that an edge must be beyond an element's middle to hold it: so found on finer grids
+_AROUND, _DEEP = 6, 6     # nodes along an edge, and in contact behind it, for the computation of a node's compliance
+_ROUNDED = 0.12           # of the depth: height on a rounded edge up to which the rounding is ignored
+_EVEN_MM = 1e-3           # tolerance of heights in a plane, which are in single precision
+_MIDDLE_BEYOND = 0.26     # of a step: distance of an edge beyond an element's middle node in full contact, from finer grids
 
 
 class Places:
-    """A press' nodes and frusta in the quarter's numbers and signs, and the matrices between them and what a press asks for."""
+    """Numbers in the quarter and signs of a press' nodes and frusta, and the compliance matrices of a press."""
 
     def __init__(self, compliance: FoundationCompliance, points: ObjectPoints) -> None:
         self.compliance, grid = compliance, compliance.grid
@@ -43,7 +43,7 @@ class Places:
         return self.compliance.surface.between(self.columns, self.signs, self.columns, self.signs)
 
     def maps(self, load: np.ndarray, lateral: np.ndarray) -> np.ndarray:
-        """Deformation maps (l, ny, nx) in mm under loads (n + b, l) and lateral ones of frusta (4 b, l), with held sides."""
+        """Deformation maps (l, ny, nx) in mm, fixed sides included, under loads (n + b, l) and lateral loads of frusta (4 b, l)."""
         coarse = self.compliance.grid.every_second
         numbers, signs = coarse.quarter(np.arange(coarse.count))
         rows = self.compliance.surface.between(self._map_start + numbers, signs, self.columns, self.signs)
@@ -52,7 +52,7 @@ class Places:
         return coarse.with_held_sides(down.T.reshape(-1, *coarse.shape).astype(float))
 
     def sideways(self, nodes: np.ndarray) -> np.ndarray:
-        """Movement in x and y (2 k, n + b) of some nodes (k,) of the grid of every second node."""
+        """Lateral displacements (2 k, n + b) in x and y of nodes (k,) of the grid of every second node."""
         numbers, signs = self.compliance.grid.every_second.quarter(nodes)
         block = self.compliance.sideways
         quarter = block.blocks.shape[1] // 2
@@ -60,22 +60,22 @@ class Places:
                           * signs[:, axis:axis + 1].astype(np.float32) for axis in (0, 1)])
 
     def lateral(self) -> np.ndarray:
-        """Movement and tilt along x, then along y (4 b, n + b), of all frusta's roots."""
+        """Displacement and tilt along x, then along y (4 b, n + b), of all frusta's roots."""
         return self._lateral(self.columns, self.signs)
 
     def _lateral(self, columns, signs):
-        """The same from unit forces downwards at places by their numbers (k,) in the quarter and signs (k, 2)."""
+        """`lateral` from unit downward forces at places with numbers (k,) in the quarter and signs (k, 2)."""
         return np.vstack([self.compliance.lateral.between(rows, self.frustum_signs, columns, signs) * sign[:, None]
                           for rows, sign in self._lateral_rows()])
 
     def lateral_self(self) -> np.ndarray:
-        """The same (4 b, 4 b) from unit forces and moments of the frusta along x, then along y."""
+        """`lateral` (4 b, 4 b) from unit forces and moments on the frusta along x, then along y."""
         block, kinds = self.compliance.lateral_self, list(self._lateral_rows())
         return np.block([[block.between(rows, self.frustum_signs, columns, self.frustum_signs) * np.outer(sign, other)
                           for columns, other in kinds] for rows, sign in kinds])
 
     def _lateral_rows(self):
-        """Movement and tilt along x, then along y: their rows (b,) of all frusta among the quarter's, and signs (b,)."""
+        """Rows (b,) of all frusta's displacements and tilts along x, then along y, among the quarter's; and signs (b,)."""
         quarter = self.compliance.lateral.blocks.shape[1] // 4
         for kind in range(4):
             yield kind * quarter + self.frusta, self.frustum_signs[:, kind // 2].astype(np.float32)
@@ -90,7 +90,7 @@ class Places:
 
 
 def lattice_places(counts: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
-    """Of all frusta, x fastest: their numbers in the quarter (b,), from the middle, and signs (b, 2)."""
+    """Numbers (b,) in the quarter, counted from the middle, and signs (b, 2) of all frusta, x fastest."""
     i, j = (grid.ravel() for grid in np.meshgrid(*(np.arange(count) for count in counts)))
     half = [count // 2 for count in counts]
     away = [np.where(k >= h, k - h, h - 1 - k) for k, h in zip((i, j), half, strict=True)]
@@ -98,7 +98,7 @@ def lattice_places(counts: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
 
 
 class Sideways:
-    """Movement of the points in x and y, interpolated between the nodes around them of the grid of every second node."""
+    """Lateral displacements of the points in x and y, interpolated on the grid of every second node."""
 
     def __init__(self, compliance: FoundationCompliance, points: ObjectPoints, places: Places) -> None:
         grid, coarse = compliance.grid, compliance.grid.every_second
@@ -119,12 +119,12 @@ class Sideways:
         self._nodes = places.sideways(used)
 
     def __call__(self, load: np.ndarray) -> np.ndarray:
-        """Movement (2, c) in mm under a load (n + b,)."""
+        """Displacements (2, c) in mm under a load (n + b,)."""
         return np.stack([self._between @ part for part in (self._nodes @ load).reshape(2, -1)])
 
 
 class SoftEdges:
-    """How soft points on a `FoundationCompliance`'s grid are beside edges."""
+    """Contact compliance beside edges of points on a `FoundationCompliance`'s grid."""
 
     def __init__(self, compliance: FoundationCompliance) -> None:
         self._grid = compliance.grid
@@ -132,9 +132,9 @@ class SoftEdges:
         self._last = None
 
     def __call__(self, points: ObjectPoints, moved: np.ndarray, depth: float) -> np.ndarray:
-        """Softness (c,) in mm/N of `ObjectPoints` that have moved sideways by `moved` (2, c) in mm; infinite where not covered.
+        """Contact compliance (c,) in mm/N of `ObjectPoints` with lateral displacements `moved` (2, c) in mm; infinite if uncovered.
 
-        depth: how far the object has come down since its first touch, in mm
+        depth: of the object below its first touch in mm
         """
         contact_compliance = np.zeros(points.count)
         own, held_at = self._of_nodes(points)
@@ -144,7 +144,7 @@ class SoftEdges:
         return contact_compliance
 
     def _of_nodes(self, points):
-        """Compliance (e,) of the nodes near edges among held ones, and how many steps (e,) behind them an edge holds them."""
+        """Compliance (e,) of the nodes near edges among nodes in contact, and distance (e,) in steps of an edge in full contact."""
         if self._last is None or self._last[0] is not points:
             middle = self._grid.from_middle(points.nodes[points.edge]) % 2
             outwards = points.outwards()
@@ -154,14 +154,14 @@ class SoftEdges:
 
 
 def beyond(covered: np.ndarray) -> np.ndarray:
-    """How many steps, up to 2, a straight edge lies beyond the node before those of which it covers a share (c,) of the hat."""
+    """Distance (c,) in steps, up to 2, of a straight edge beyond the previous node, from its shares (c,) of the hat functions."""
     inner = np.sqrt(2 * np.minimum(covered, 0.5))
     return np.where(covered < 0.5, inner, 2 - np.sqrt(2 * np.clip(1 - covered, 0.0, 0.5)))
 
 
 def own_compliance(compliance: FoundationCompliance, axis: int) -> np.ndarray:
-    """Compliance (2,) in mm/N of a row of nodes across an axis (0: x), pushed alike beside rows that are held, in the sensor's
-    middle: of rows of elements' corners, and of their middles.
+    """Compliance (2,) in mm/N of a row of nodes across an axis (0: x) under equal forces beside fixed rows, in the sensor's
+    middle: for rows through elements' corners and through their middles.
     """
     grid = compliance.grid
     along, across = (min(_AROUND, (count - 3) // 2) for count in (grid.shape[axis], grid.shape[1 - axis]))

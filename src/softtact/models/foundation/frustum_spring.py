@@ -1,14 +1,14 @@
-"""What one frustum does to the sheet above it: its unit cell's nonlinear law, and its linear stiffness against all else.
+"""Force of one frustum on the sheet: its unit cell's nonlinear law of compression, and its linear stiffness otherwise.
 
-The cell is the hyperelastic one: any law and geometry; board, folding sides and neighbours included. Of the stiffness K of the
-root's nodes (tip held, at rest) the part that a straight descent meets is taken out and replaced by the cell's force:
+The cell is the hyperelastic one, for any law and geometry, with board, folding sides and neighbours. In the stiffness K of the
+root's nodes (tip fixed, at rest) the part against a uniform descent is replaced by the cell's force:
     K 1 = k b,  1.b = 1:    forces on the root = (K - k b b') u + b p(w),   w = b.u
-so that small displacements of any kind meet the frustum's linear stiffness, and a compression w meets the cell's force p(w).
-Where the root moves sideways, the tip, held in the plane of the board, would lean, and is kept flat by a moment that the board
-can only give to a tip that is pressed: beyond, the frustum rocks on its tip's rim and lifts the root (`FrustumLaw.rise`).
-The root's nodes lie on another mesh than the slab's. They follow it in the mean, weighted so that the root's forces act on the slab
-as the traction of which they are the nodal forces (mortar coupling; Wohlmuth, SIAM J. Numer. Anal. 38 (2000) 989). Tied to the
-slab at single points instead, they were point loads, under which a slab gives way the more the finer its elements are.
+So the frustum resists small displacements of any kind by its linear stiffness, and a compression w by the cell's force p(w).
+If the root moves sideways, a tip that is only fixed in the board's plane would tilt. A moment from the board keeps it flat; it is
+limited by the tip's force: beyond the limit, the frustum rocks on its tip's rim and lifts the root (`FrustumLaw.rise`).
+The meshes of root and slab do not match. The root's nodes follow weighted means of the slab's displacement, so that the root's
+forces act on the slab as the traction with these nodal forces (mortar coupling; Wohlmuth, SIAM J. Numer. Anal. 38 (2000) 989).
+A tie at single points would apply point loads, whose displacements grow without bound as the slab's elements are refined.
 """
 
 from dataclasses import dataclass
@@ -36,25 +36,25 @@ from softtact.models.newton import solve
 from softtact.sensors.frusta import SensorSpec
 
 _STEP_MM = 0.01        # largest movement of the root at once
-_TOLERANCE_N = 1e-7    # of the forces inside, against some 1e-2 N on the root
+_TOLERANCE_N = 1e-7    # of the inner forces; forces on the root are about 1e-2 N
 _ITERATIONS = 40
 _FIRST_N, _LEVELS_A_DECADE = 2e-3, 9
-_MORTAR_POINTS = 10      # along a side of a root's face: so dense that elements of a tenth of a pitch do not see them singly
+_MORTAR_POINTS = 10      # along a side of a root's face: dense enough for elements of a tenth of a pitch
 _MOVEMENT, _TILT, _LATERAL_LEVELS = 0.25, 0.1, 16   # of the height; about what 50 N do beside a punch's edge
-_PRESSURE_MPA = 2.0      # on the cell, up to which the law is asked for: about five times that of 50 N on a flat punch of 11 mm
+_PRESSURE_MPA = 2.0      # largest pressure on the cell: about five times that of 50 N on a flat punch of 11 mm
 
 
 class SingleFrustum:
-    """The only frustum of a `FrustumArray`, from its state at rest on; each `move` goes on from the last."""
+    """The only frustum of a `FrustumArray`, first at rest; each `move` continues from the last state."""
 
     def __init__(self, support: FrustumArray) -> None:
         self.support, self._displacement, self._place = support, np.zeros((1, support.nodes, 3)), np.zeros(3)
         self._x = support.coordinates[0][support.root, 0] - support.geometry.centres[0][0]
 
     def move(self, movement: float, tilt: float, descent: float) -> np.ndarray | None:
-        """Force and moment (2,) in N and N mm, along x, that hold the root at a movement and descent in mm and a tilt along x.
+        """Reaction force and moment (2,) of the root in N and N mm along x, at a displacement, a tilt along x and a descent (mm).
 
-        None where a step to it finds no balance, and from then on.
+        None if a step does not converge, and for all later calls.
         """
         target = np.array([movement, tilt, descent])
         far = np.abs((target - self._place) * [1.0, self._x.max(), 1.0]).max()
@@ -66,7 +66,7 @@ class SingleFrustum:
         return None if self._displacement is None else self._forces()
 
     def _step(self, place):
-        """Move the root, the inside along the tangent, and let it settle."""
+        """Move the root, predict the inner nodes by the tangent, and find the equilibrium."""
         root = np.zeros((len(self._x), 3))
         root[:, 0], root[:, 2] = place[0], place[1] * self._x - place[2]
         move = (root - self._displacement[0, self.support.root]).reshape(1, -1)
@@ -79,12 +79,12 @@ class SingleFrustum:
         return self.support.inner_step(forward_solved, move)
 
     def _settled(self, displacement):
-        """Displacements (1, nodes, 3) in balance, the root's kept; None if there are none."""
+        """Displacements (1, nodes, 3) in equilibrium with a fixed root; None if Newton's method does not converge."""
         state = self.support.evaluate(displacement)
         found = None if state is None else solve(self, state, max_iterations=_ITERATIONS).state
         return None if found is None else found.displacement
 
-    # The frustum with its root held, as a `Problem` of Newton's method.
+    # The frustum with a fixed root as a `Problem` of Newton's method.
 
     def prepared(self, state: SupportState, iteration: int) -> SupportState:
         return state
@@ -120,14 +120,14 @@ class SingleFrustum:
 
 @dataclass(frozen=True)
 class FrustumLaw:
-    """force_n (f,) of one frustum at compressions compression_mm (f,), both from 0 on; beyond, the last slope goes on.
+    """force_n (f,) of one frustum at compressions compression_mm (f,), both from 0 on; extrapolated with the last slope.
 
     root_xy (s, 2) in mm: points of the root about the axis;  spread (m, s): displacements of the root's nodes from those there
-    rest (3 m, 3 m) in N/mm: stiffness against all else;  descent (3 m,): b
-    lateral (4, 3 m): movement (mm) and tilt of the root along x, then along y, of its nodes' displacements
-    stiffness (g, 3): at compressions lateral_at_mm (g,), against movement (N/mm), between it and tilt (N), against tilt (N mm)
-    lean in 1/mm: of a free tip, over the root's movement sideways;  upright in N mm: stiffness of the tip against leaning
-    tip_radius_mm: of the rim that a frustum rocks on
+    rest (3 m, 3 m) in N/mm: linear stiffness except against compression;  descent (3 m,): b
+    lateral (4, 3 m): displacement (mm) and tilt of the root along x, then along y, from its nodes' displacements
+    stiffness (g, 3): at compressions lateral_at_mm (g,), of displacement (N/mm), coupling to tilt (N), of tilt (N mm)
+    lean in 1/mm: tilt of a free tip per lateral displacement of the root;  upright in N mm: stiffness of the tip against tilt
+    tip_radius_mm: of the rim on which a frustum rocks
     """
 
     force_n: np.ndarray
@@ -166,15 +166,15 @@ class FrustumLaw:
         return np.where(force < self.force_n[-1], self._curve_slope(np.minimum(force, self.force_n[-1])), self._last_slope)
 
     def rise(self, sideways: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """How far roots that have moved `sideways` (mm) are lifted by frusta that rock under forces >= 0 (N), in mm.
+        """Lift in mm of roots at lateral displacements `sideways` (mm) by frusta that rock under forces >= 0 (N).
 
-        A rigid tip of radius e on a board without tension: its moment is at most e times the force, and what it leans beyond
-        what this moment holds back, turns it about its rim.
+        A rigid tip of radius e on a board without tension: its moment is at most e times the force. The tilt in excess of the
+        one that this moment prevents rotates the tip about its rim.
         """
         return self.tip_radius_mm * np.maximum(self.lean * sideways - self.tip_radius_mm * force / self.upright, 0.0)
 
     def stiffening(self, force: np.ndarray) -> tuple[np.ndarray, ...]:
-        """By how much frusta under forces (b,) in N are stiffer than at rest against (movement, tilt), (b, 2, 2), and that matrix'
+        """Additional stiffness (b, 2, 2) of (displacement, tilt) of frusta under forces (b,) in N relative to rest, and its
         derivative by their compression, per mm.
         """
         place = np.clip(self.extension(force), 0.0, self.lateral_at_mm[-1])
@@ -211,9 +211,9 @@ class FrustumLaw:
 
 
 def frustum_law(spec: SensorSpec, law: Law, *, mesh: MeshSettings | None = None, pressure_mpa: float = _PRESSURE_MPA) -> FrustumLaw:
-    """The `FrustumLaw` of a sensor's frusta of a hyperelastic law, from its unit cell up to a pressure, or as far as it goes.
+    """The `FrustumLaw` of a sensor's frusta with a hyperelastic law, from its unit cell up to a pressure, or until it fails.
 
-    mesh: `MeshSettings` of the cell; by default frusta of two rings, which one cell can afford (of one: 2 % too stiff)
+    mesh: `MeshSettings` of the cell; by default frusta of two rings (of one ring: 2 % too stiff)
     """
     body = build_unit_cell(spec, dielectric_law=law, mesh=mesh or MeshSettings(frustum_rings=2))
     support = body.support
@@ -236,9 +236,9 @@ def frustum_law(spec: SensorSpec, law: Law, *, mesh: MeshSettings | None = None,
 
 
 def _root_mortar(support):
-    """Points (s, 2) of a frustum's root about its axis, and weights (m, s): from a field there to its root nodes' values.
+    """Points (s, 2) of a frustum's root about its axis, and weights (m, s) from a field there to values at the root's nodes.
 
-    The values are those whose quadratic interpolation over the root has the same products with its shape functions as the field.
+    The values are the L2 projection of the field on the root's quadratic shape functions.
     """
     place = np.full(support.nodes, -1)
     place[support.root] = np.arange(len(support.root))
@@ -255,7 +255,7 @@ def _root_mortar(support):
 
 
 def _root_stiffness(support):
-    """Stiffness (3 m, 3 m) of a frustum's root nodes at rest, the tip standing on the board."""
+    """Stiffness (3 m, 3 m) of a frustum's root nodes at rest, with the tip fixed on the board."""
     return _condensed(_stiffness_at_rest(support), np.setdiff1d(support.inner, 3 * support.tip + 2), support.root_dofs)
 
 
@@ -270,15 +270,15 @@ def _stiffness_at_rest(support):
 
 
 def _condensed(stiffness, inner, outer):
-    """Stiffness of the unknowns `outer` once those of `inner` follow them."""
+    """Stiffness of the unknowns `outer` after static condensation of `inner`."""
     coupling = stiffness[np.ix_(inner, outer)]
     return stiffness[np.ix_(outer, outer)] - coupling.T @ np.linalg.solve(stiffness[np.ix_(inner, inner)], coupling)
 
 
 def _tip(support):
-    """Lean of a free tip over the root's movement sideways (1/mm), its stiffness against leaning (N mm), and its radius (mm).
+    """Tilt of a free tip per lateral displacement of the root (1/mm), its stiffness against tilt (N mm), and its radius (mm).
 
-    Both by the tip's vertical movements z = x: the work-conjugate moment of a tip that stays plane.
+    For vertical displacements z = x of the tip: the moment is work-conjugate to the tilt of a plane tip.
     """
     x = support.coordinates[0][support.tip, 0] - support.geometry.centres[0][0]
     vertical = 3 * support.tip + 2
@@ -292,7 +292,7 @@ def _tip(support):
 
 
 def _lateral(support, mass):
-    """Movement and tilt along x, then along y, of a root's nodal displacements (4, 3 m): the plane nearest to them in its area."""
+    """Displacement and tilt along x, then along y, from a root's nodal displacements (4, 3 m): least-squares fit on its area."""
     xy = support.coordinates[0][support.root, :2] - support.geometry.centres[0]
     rows = []
     for axis, sideways in enumerate(np.eye(3)[:2]):
@@ -303,10 +303,10 @@ def _lateral(support, mass):
 
 
 def _lateral_stiffness(support, largest_mm):
-    """Compressions (g,) in mm, and a root's stiffness (g, 3) there against movement, between it and tilt, and against tilt.
+    """Compressions (g,) in mm, and a root's stiffness (g, 3) there: of displacement, coupling to tilt, and of tilt.
 
-    Not for the smallest of movements but for those of a frustum beside an edge: between them contacts begin. Where a frustum
-    cannot be pressed so far under a rigid root, the stiffness ends there.
+    They are secants for displacements as of a frustum beside an edge, since contacts begin in between. The table ends where a
+    frustum cannot be compressed further under a rigid root.
     """
     movement, descents = _MOVEMENT * support.geometry.heights[0], np.linspace(0.0, largest_mm, _LATERAL_LEVELS)
     moved, tilted = ([frustum.move(*place, descent) for descent in descents] for frustum, place in
@@ -316,7 +316,7 @@ def _lateral_stiffness(support, largest_mm):
 
 
 def _cell_curve(spec, body, descent, largest_n):
-    """Forces and compressions (f,) of the cell under a plate, from 0 up to `largest_n`, or as far as it can be pressed."""
+    """Forces and compressions (f,) of the cell under a plate, from 0 up to `largest_n`, or to the last converged load step."""
     plate = trimesh.creation.box((4 * spec.dielectric.frusta.pitch_mm,) * 2 + (1.0,))
     plate.apply_translation([0, 0, 0.5])
     forces = np.geomspace(_FIRST_N, largest_n, int(np.ceil(_LEVELS_A_DECADE * np.log10(largest_n / _FIRST_N))))

@@ -1,13 +1,13 @@
 """Bodies of a sensor: the whole of it, one cell of an endless lattice, a piece of the dielectric, one or two plain layers.
 
-The cover's mesh is fine in steps from far from the object to under it, and finest at its edges (`zones`). A flat punch's edge that
-falls into an element holds the whole element flat: with faces of a pitch the punch acts up to half a pitch wider, and the map of
-one of 3 mm radius is 10 % low. And the sheet bulges into the pockets between frusta, which a face of a pitch cannot follow: 6 % of
-the map. Both are needed where the object presses, and nowhere else (benchmarks/mesh_error.py).
+The cover's mesh is refined in steps towards the object, and finest at the object's edges (`zones`). If a flat punch's edge is in
+an element, the whole element stays flat: with faces of a pitch the punch acts up to half a pitch wider, and the map of a punch of
+3 mm radius is 10 % low. Also, the sheet bulges into the pockets between frusta, which a face of a pitch cannot resolve: 6 % of
+the map. Fine elements are needed only where the object presses (benchmarks/mesh_error.py).
 
-Plain layers lie bonded on the board or free below, their sides held as the sensor's edge states. The lowest part is the slab's
-sheet, 27-node hexahedra on a regular grid; above lies its cover, refined under the object. Of a single layer the lower half is the
-sheet, of two layers the dielectric is.
+Plain layers are bonded to the board or free below; their sides are fixed as the sensor's edge states. The lowest part is the slab's
+sheet, 27-node hexahedra on a regular grid; above is its cover, refined under the object. The sheet is the lower half of a single
+layer, or the dielectric of two layers.
 """
 
 import itertools
@@ -32,11 +32,11 @@ from softtact.models.hyperelastic.support import Support
 from softtact.sensors.frusta import SensorSpec
 from softtact.sensors.layers import LayersSpec
 
-REACH_MM = 1.0        # what stands higher above the object's lowest point is taken to stay off the cover
-AROUND_MM = 0.3       # the zone under the object ends so far from it
-NEAR_MM = 2.4         # and elements have at most the pitch's size so far around
-_STEEP = 1.2          # rise over run within an element above which there is an edge in it
-_SLANTED = 0.067      # rise over run within an element above which the underside is curved, not flat
+REACH_MM = 1.0        # parts of the object higher than this above its lowest point are assumed not to touch the cover
+AROUND_MM = 0.3       # width of the margin around the object that belongs to the zone under it
+NEAR_MM = 2.4         # width of the margin in which elements have at most the size of a pitch
+_STEEP = 1.2          # slope within an element above which it contains an edge
+_SLANTED = 0.067      # slope within an element above which the underside counts as curved, not flat
 _SAMPLES = 4          # heights along each side of the smallest element
 FAR, NEAR, FLAT, CURVED, EDGE = range(5)
 _SHEET_SHARE = 0.5      # of a single layer that is meshed as the slab's sheet
@@ -47,8 +47,8 @@ def zones(surface: ObjectSurface, x_lines: np.ndarray, y_lines: np.ndarray, most
     """FAR, NEAR, FLAT, CURVED or EDGE for each place of a grid (ny 2^most, nx 2^most) whose cells are split `most` times."""
     height = _heights(surface, x_lines, y_lines, _SAMPLES << most)
     side = min(np.diff(lines).max() for lines in (x_lines, y_lines)) / (1 << most)
-    # An edge on the line between two elements concerns both, so each sample is compared with those beside it. (Farther ones: 9000
-    # unknowns more under a wide punch at edges split four times, and the same map to 0.2 %.)
+    # An edge on the line between two elements concerns both, so each sample is compared with its neighbours. (Samples farther away
+    # add 9000 unknowns under a wide punch with edges split four times, and change the map by 0.2 %.)
     low = minimum_filter(height, 3)
     rise = _in_places(maximum_filter(height, 3) - low, np.max)
     reached = _in_places(low, np.min) < REACH_MM
@@ -59,7 +59,7 @@ def zones(surface: ObjectSurface, x_lines: np.ndarray, y_lines: np.ndarray, most
 
 
 def _heights(surface, x_lines, y_lines, parts):
-    """Heights (y, x) in mm above the object's lowest point, in the middles of parts of the grid's cells."""
+    """Heights (y, x) in mm above the object's lowest point at the centres of parts of the grid's cells."""
     x, y = (_sampled(lines, parts) for lines in (x_lines, y_lines))
     gx, gy = np.meshgrid(x, y)
     height = surface(gx.ravel(), gy.ravel())[0].reshape(gx.shape)
@@ -67,7 +67,7 @@ def _heights(surface, x_lines, y_lines, parts):
 
 
 def _in_places(samples, choose):
-    """The least or largest of the samples in each smallest cell."""
+    """Minimum or maximum of the samples in each smallest cell."""
     rows, columns = samples.shape
     return choose(samples.reshape(rows // _SAMPLES, _SAMPLES, columns // _SAMPLES, _SAMPLES), axis=(1, 3))
 
@@ -79,7 +79,7 @@ def _sampled(lines, parts):
 
 
 def split_depths_of(zone: np.ndarray, shape: tuple[int, int], most: int) -> np.ndarray:
-    """How often each place is split for wanted levels (ny 2^most, nx 2^most), in a grid of `shape` (nx, ny)."""
+    """Split depths on the finest grid for zones (ny 2^most, nx 2^most), in a grid of `shape` (nx, ny)."""
 
     def wanted(low, size, depth):
         block = int(size * (1 << most))
@@ -91,7 +91,7 @@ def split_depths_of(zone: np.ndarray, shape: tuple[int, int], most: int) -> np.n
 
 
 def _lines(side, count, pitch, pitches):
-    """Grid lines: the frusta's lattice, one for `pitches` of them, and a strip to each edge where one is left."""
+    """Grid lines: one for every `pitches` pitches of the frusta's lattice, and those of strips at the edges if there are any."""
     half = 0.5 * count * pitch
     inner = pitch * np.append(np.arange(0, count, pitches), count) - half
     margin = 0.5 * side - half
@@ -99,7 +99,7 @@ def _lines(side, count, pitch, pitches):
 
 
 def lattice(counts: Sequence[int], pitch: float) -> tuple[np.ndarray, np.ndarray]:
-    """Centres (n, 2) of a frustum lattice around the origin and who has a neighbour in +x, +y, -x, -y (n, 4)."""
+    """Centres (n, 2) of a frustum lattice around the origin, and which frusta have neighbours in +x, +y, -x, -y (n, 4)."""
     nx, ny = counts
     i, j = (grid.ravel() for grid in np.meshgrid(np.arange(nx), np.arange(ny)))
     centres = pitch * np.column_stack([i - 0.5 * (nx - 1), j - 0.5 * (ny - 1)])
@@ -111,7 +111,7 @@ def build_sensor_body(spec: SensorSpec, *, dielectric_law: Law | None, cover_law
                       surface: ObjectSurface | None = None) -> LayeredBody:
     """The whole sensor. `scatter`: None or (heights factor (n,), tip diameter factor (n,)) of its frusta.
 
-    surface: the underside of the object that is to be pressed, where the cover's mesh is to be fine; without it a pitch everywhere
+    surface: underside of the pressed object, for the refinement of the cover's mesh; without it elements are a pitch wide
     """
     frusta, counts = spec.dielectric.frusta, spec.frusta_counts
     bottom = -(spec.cover.thickness_mm + spec.dielectric.sheet_thickness_mm)
@@ -136,10 +136,10 @@ def build_sensor_body(spec: SensorSpec, *, dielectric_law: Law | None, cover_law
 
 def cover_splits(mesh: MeshSettings, surface: ObjectSurface | None, x_lines: np.ndarray, y_lines: np.ndarray,
                  pitch: float) -> tuple[np.ndarray, np.ndarray]:
-    """How often the cover's uppermost layers are split, from below (layers, ny 2^m, nx 2^m), and its zones.
+    """Split depths of the cover's uppermost layers, from below (layers, ny 2^m, nx 2^m), and its zones.
 
-    What is below follows their lower side, which must not be finer: it would hang freely between the nodes. Where it lies on the
-    sheet itself it is split wherever the object presses, to follow the sheet between the frusta.
+    The mesh below is tied to their lower side, which must not be finer, as its additional nodes would be free. A lower side
+    directly on the sheet is split wherever the object presses, to resolve the sheet between the frusta.
     """
     far = int(np.log2(mesh.far_pitches)) + mesh.refinement
     most = far + max(mesh.cover_splits)
@@ -155,7 +155,7 @@ def cover_splits(mesh: MeshSettings, surface: ObjectSurface | None, x_lines: np.
 
 
 def _far(zone, x_lines, y_lines):
-    """A function of places (n, 2): which (n,) lie among FAR places of the grid only."""
+    """A function of places (n, 2) that returns which (n,) of them have only FAR cells around them."""
     x, y = (np.interp(np.arange(size + 1), np.linspace(0, size, len(lines)), lines)
             for size, lines in zip(zone.shape[::-1], (x_lines, y_lines), strict=True))
 
@@ -172,7 +172,7 @@ def _far(zone, x_lines, y_lines):
 
 def build_unit_cell(spec: SensorSpec, *, dielectric_law: Law | None, cover_law: Law | None = None,
                     mesh: MeshSettings = MeshSettings(), height_factor: float = 1.0, tip_factor: float = 1.0) -> LayeredBody:
-    """One frustum of an endless lattice with its share of the sheet, and of the cover where a law for it is given."""
+    """One frustum of an infinite lattice with its part of the sheet, and of the cover if a law for it is given."""
     frusta = spec.dielectric.frusta
     lines = 0.5 * frusta.pitch_mm * np.linspace(-1, 1, 2**mesh.refinement + 1)
     splits = np.minimum(mesh.cover_splits, 1)[:, None, None] * np.ones((2 * len(lines) - 2,) * 2, dtype=int) if cover_law else None
@@ -193,7 +193,7 @@ def build_unit_cell(spec: SensorSpec, *, dielectric_law: Law | None, cover_law: 
 
 def build_patch(spec: SensorSpec, counts: Sequence[int], *, dielectric_law: Law | None,
                 mesh: MeshSettings = MeshSettings()) -> LayeredBody:
-    """A piece of the dielectric alone, `counts` frusta along x and y with free borders half a pitch from the outer ones' axes."""
+    """A piece of the dielectric alone with `counts` frusta along x and y, and free sides half a pitch from the outer axes."""
     frusta, thickness = spec.dielectric.frusta, spec.dielectric.sheet_thickness_mm
     centres, neighbours = lattice(counts, frusta.pitch_mm)
     lines = [frusta.pitch_mm * (np.arange(count + 1) - 0.5 * count) for count in counts]
@@ -212,7 +212,7 @@ def _frustum_array(spec, centres, neighbours, law, mesh, scatter, contact, *, bo
         bottom = -(spec.cover.thickness_mm + spec.dielectric.sheet_thickness_mm)
     height_factor, tip_factor = scatter or (np.ones(len(centres)), np.ones(len(centres)))
     heights = frusta.height_mm * height_factor
-    # Every cone is built with the same root; where its printed diameters are swapped the tip is the wide end.
+    # Every cone is built with the same root; if its diameters are swapped, the tip is the wide end.
     geometry = FrustumGeometry(centres=centres, heights=heights, tip_diameters=frusta.tip_diameter_mm * tip_factor,
                            root_diameter=frusta.root_diameter_mm, neighbours=neighbours,
                            wall_mm=0.5 * (frusta.pitch_mm - frusta.root_diameter_mm))
@@ -238,7 +238,7 @@ def build_plain_body(spec: LayersSpec, *, dielectric_law: Law | None, cover_law:
                      threads: int = 1, surface: ObjectSurface | None = None) -> LayeredBody:
     """The body of a `LayersSpec`; arguments as for `build_sensor_body`.
 
-    scatter: must be None, there are no frusta that could differ
+    scatter: must be None, since there are no frusta
     """
     if scatter is not None:
         spec.need_frusta("a scatter of frusta", "leave height_scatter and tip_scatter out")
@@ -248,7 +248,7 @@ def build_plain_body(spec: LayersSpec, *, dielectric_law: Law | None, cover_law:
 
 def plain_slab(spec: LayersSpec, laws: tuple[Law | None, Law | None], mesh: MeshSettings = MeshSettings(), *,
                contact: Contact | None = None, surface: ObjectSurface | None = None, sides: str = "held") -> Slab:
-    """The slab of plain layers with laws (dielectric, cover); sides: see `Slab`, for pieces of a wider layer."""
+    """The slab of plain layers with laws (dielectric, cover);  sides: see `Slab`, for parts of a wider layer."""
     x_lines, y_lines = (_element_lines(side, spec.element_size_mm, mesh) for side in spec.footprint_mm)
     splits, _ = cover_splits(mesh, surface, x_lines, y_lines, 2 * spec.element_size_mm)
     kind = Slab if spec.cover else SingleLayerSlab
@@ -271,13 +271,13 @@ def _layers(spec, dielectric_law, cover_law, mesh):
 
 
 def _element_lines(side, element_mm, mesh):
-    """Lines of the cover's coarsest elements, as far as `far_pitches` pairs of elements apart."""
+    """Grid lines of the cover's coarsest elements, at most `far_pitches` pairs of elements apart."""
     count = int(np.ceil(side / (2 * element_mm * mesh.far_pitches) - 1e-9))
     return np.linspace(-0.5 * side, 0.5 * side, count + 1)
 
 
 def _fine(lines, mesh):
-    """Lines of the sheet's elements: two for each of the cover's pitches, so that it is as fine as what it carries."""
+    """Grid lines of the sheet's elements: two for each of the cover's, so that the sheet is as fine as the cover above it."""
     parts = 2 * mesh.far_pitches * 2**mesh.refinement
     return np.interp(np.arange(parts * (len(lines) - 1) + 1), parts * np.arange(len(lines)), lines)
 

@@ -1,6 +1,6 @@
-"""The layered body under load as nodes, cells and displacements: what a section or a file for ParaView is made of.
+"""The deformed mesh of the layered body: nodes, cells and displacements for sections and files for ParaView.
 
-The cells are eliminated during a press, but every state of it holds the displacements of all nodes, frusta's inner ones too.
+Cells are condensed during a press, but every state has the displacements of all nodes, including the frusta's inner ones.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ OBJECT_LAYER = 5                           # the number of a soft object's cells
 
 @dataclass(frozen=True)
 class Cells:
-    """Like elements: nodes (e, w) in VTK's order, their kind by meshio's name, and the region of REGIONS that they are of."""
+    """Like elements: nodes (e, w) in VTK's order, their type by meshio's name, and their region among REGIONS."""
 
     kind: str
     nodes: np.ndarray
@@ -32,12 +32,12 @@ class Cells:
 class PressedBody:
     """Sheet, cover and frusta: points_mm (n, 3) at rest, displacement_mm (n, 3) in single precision, cells a tuple of `Cells`.
 
-    Of a press of a soft object (model `solid`) the frusta are springs and have no cells; the object's have the region `object`.
+    In a press of a soft object (model `solid`) the frusta are springs without cells; the object's cells have the region `object`.
 
     top (t, 8): the cover's upper faces;  pressure_mpa (t,): the object's mean pressure on each, positive in compression
 
-    The sensor's frame: z = 0 is the top at rest, a displacement towards the PCB has a negative z. A frustum's root repeats nodes
-    of the sheet, and the lower side of the cover's part on a grid repeats places of what is below; both move alike.
+    The sensor's frame: z = 0 is the top at rest, a displacement towards the PCB has a negative z. A frustum's root duplicates nodes
+    of the sheet, and the lower side of the cover's part on a grid duplicates points of the mesh below; both move alike.
     """
 
     points_mm: np.ndarray
@@ -71,14 +71,14 @@ def pressed_body(body: "LayeredBody", state: "BodyState | None" = None) -> Press
 
 
 def _frusta(support, first):
-    """`Cells` of the frusta, whose nodes begin with number `first`; none where there are none."""
+    """`Cells` of the frusta, whose nodes begin with number `first`; empty without frusta."""
     if support.count:
         hexes = support.mesh.hexes[None] + first + (np.arange(support.count) * support.nodes)[:, None, None]
         yield _cells(HEX27, hexes.reshape(-1, 27), "frusta")
 
 
 def _on_plan(slab):
-    """`Cells` of the sheet, and of the cover's layers that keep to its plan."""
+    """`Cells` of the sheet, and of the cover's layers that share its 2-D mesh."""
     mesh = slab.sheet_mesh
     for region, layers in zip(slab.regions, (range(slab.sheet_layers), range(slab.sheet_layers, mesh.layers)), strict=True):
         for element, of_layer in ((HEX27, mesh.layer), (WEDGE18, mesh.wedge_layer)):

@@ -1,4 +1,4 @@
-"""Balance of the body under an object that is held by a force or at an indentation: Newton's method and augmentations."""
+"""Equilibrium of the body under an object with prescribed force or indentation: Newton's method and augmentations."""
 
 from dataclasses import replace
 from typing import Any
@@ -12,19 +12,19 @@ from softtact.models.hyperelastic.mesh_settings import NewtonSettings
 from softtact.models.hyperelastic.states import BodyState, ObjectSurface
 from softtact.models.newton import Solution, lowers_potential, solve
 
-_STILL_MM = 1e-3       # after a step of less no point faces another facet but those that slide to and fro past an edge
+_STILL_MM = 1e-3       # after smaller steps only points that oscillate across an edge would change their facet
 _MOST_INCREMENTS = 100  # of the first touch's depth, until a point of the cover touches the object
-# Augmentation is in vain where so many passes that moved anything have not brought the overlap below this share of the least
-# before. Passes that move nothing add up: the force of a single point at an edge is below the tolerance.
+# Augmentation stops after so many augmentations that took Newton steps without reducing the overlap below this share of the least
+# one so far. Those without Newton steps do not count: the force of a single point at an edge is below the tolerance.
 _WORTH_A_PASS, _PASSES_IN_VAIN = 0.8, 3
-DEEP = 0.55        # of a frustum's height, or of the layers': from here on elements of the default mesh may be unstable
-FULL_POCKET = 0.8   # of a frustum's height: beyond, its pocket is full and contacts begin that the model leaves out
-_ROUGH_SOON = 8     # iterations after which a rough balance is taken there, or where one was before overlaps were augmented
-_NEARLY = 3.0      # times what is allowed may be left where points have run under an edge: to augment these takes tens of steps
+DEEP = 0.55        # of a frustum's height, or of the layers': beyond, elements of the default mesh may be unstable
+FULL_POCKET = 0.8   # of a frustum's height: beyond, its pocket is full and contacts occur that are not modelled
+_ROUGH_SOON = 8     # iterations after which the rough tolerance applies beyond `DEEP`, or if it applied before an augmentation
+_NEARLY = 3.0      # factor of the allowed overlap if points are under an edge: their augmentation takes tens of steps
 
 
 def first_touch(body: LayeredBody, surface: ObjectSurface, settings: NewtonSettings) -> BodyState:
-    """Equilibrium at a small given indentation: under force control alone the free object has no stiffness."""
+    """Equilibrium at a small prescribed indentation: under force control a free object without contact has no stiffness."""
     slab, support = body.rest()
     projection = body.slab.project(slab, surface)
     start = _indented_until_contact(body, body.evaluate(slab, support, projection.anchors[:, 2].min(), projection),
@@ -39,7 +39,7 @@ def first_touch(body: LayeredBody, surface: ObjectSurface, settings: NewtonSetti
 
 
 def _indented_until_contact(body, state, step_mm):
-    """The state with the object a step lower, or more steps: a tip may lie between the contact points."""
+    """The state with the object lowered in steps until a point touches it: a tip may be between the contact points."""
     for _ in range(_MOST_INCREMENTS):
         state = body.indented(state, step_mm)
         if state.force > 0:
@@ -49,7 +49,7 @@ def _indented_until_contact(body, state, step_mm):
 
 
 def augment(body: LayeredBody, surface: ObjectSurface, found: Solution, force: float | None, settings: NewtonSettings) -> Solution:
-    """The load step once more with its overlaps augmented, as long as they are deeper than allowed and become less."""
+    """Repeat the load step with augmented contact as long as overlaps are deeper than allowed and decrease."""
     iterations, spent, least, in_vain = 0, 0, np.inf, 0
     for _ in range(settings.max_augmentations):
         overlap = body.contact_error(found.state) if found.state is not None else 0.0
@@ -64,7 +64,7 @@ def augment(body: LayeredBody, surface: ObjectSurface, found: Solution, force: f
         if force is not None:
             start = body.indented_to(start, force)
         tolerance = tolerance_at(force, settings)
-        if found.residual_n > tolerance:     # rough it is, and will be again
+        if found.residual_n > tolerance:     # the rough tolerance applied, and will apply again
             settings = replace(settings, rough_after=_ROUGH_SOON)
         found = settle(body, surface, start, force, tolerance, settings)
         spent = found.iterations
@@ -73,12 +73,12 @@ def augment(body: LayeredBody, surface: ObjectSurface, found: Solution, force: f
 
 
 def most_iterations(body: LayeredBody, settings: NewtonSettings) -> int:
-    """How many iterations a load step may take."""
+    """Largest number of iterations of a load step."""
     return settings.friction_iterations if body.friction.active else settings.load_step_iterations
 
 
 def tolerance_at(force: float | None, settings: NewtonSettings) -> float:
-    """Largest unbalanced force (N) that is left at a force (N)."""
+    """Tolerance (N) of the residual at a force (N)."""
     return settings.relative_tolerance * _scale(force, settings)
 
 
@@ -93,7 +93,7 @@ def settle(body: LayeredBody, surface: ObjectSurface, state: BodyState, force: f
         return _newton(body, surface, state, force, tolerance, settings)
     tolerance, iterations = settings.friction_tolerance * tolerance, 0
     for k in range(settings.friction_passes):
-        if k == 1:     # a point at an edge would face now one facet, now the other, and no pass agree with the one before
+        if k == 1:     # otherwise the projection of a point at an edge would alternate between facets
             settings = replace(settings, projection_iterations=0)
         found = _newton(body, surface, state, force, tolerance, settings)
         iterations += found.iterations
@@ -103,7 +103,7 @@ def settle(body: LayeredBody, surface: ObjectSurface, state: BodyState, force: f
         residual = body.residual_norm(own, force)
         if residual <= tolerance:
             return Solution(own, iterations, residual)
-        if k >= settings.whole_passes:     # what is left now swings: more friction, less pressure, less friction
+        if k >= settings.whole_passes:     # a remaining change oscillates: more friction, less pressure, less friction
             own = body.reevaluate_contact(found.state, body.friction.renewed(found.state, halfway=True))
         state = own
     return Solution(None, iterations, found.residual_n)
@@ -115,10 +115,10 @@ def _newton(body, surface, state, force, tolerance, settings):
 
 
 class _Press:
-    """The body's balance under a force (N), or at its indentation where that is None, as a `Problem`.
+    """Equilibrium of the body under a force (N), or at its indentation if that is None, as a `Problem`.
 
-    The points' facing planes are found anew before and within each of the first steps. A point that slides to and fro past an
-    edge sees the object's height jump each time; so the planes are kept later on, and where no step lowers the potential.
+    The contact projection is updated before and within each of the first steps. For a point that oscillates across an edge the
+    object's height would jump each time; so the projection is kept later on, and where no step decreases the potential.
     """
 
     def __init__(self, body, surface, force, tolerance, settings):
@@ -133,7 +133,7 @@ class _Press:
         return self._turned_back(state, anew)
 
     def _turned_back(self, state, anew):
-        """The state with the points that have run far under an edge, while they kept the planes beside it, facing it."""
+        """The state with updated planes for points that are far under an edge but kept the planes beside it."""
         gaps = self.body.slab.top.gaps(state.slab.displacement, anew, state.indentation)
         far = anew.overrun & (np.abs(gaps - state.slab.gaps) > OVERRUN_MM)
         return self.body.update_normals(state, state.slab.projection.taking(anew, far)) if far.any() else state
@@ -155,7 +155,7 @@ class _Press:
     def step(self, state):
         surface = self.surface if self.projected else None
         step = self._newton_step(state, surface)
-        if np.isnan(step.indentation) and not state.force > 0:     # a free object that lost its touch on the way
+        if np.isnan(step.indentation) and not state.force > 0:     # a free object that lost contact
             state = _indented_until_contact(self.body, state, self.settings.first_touch_mm)
             step = self._newton_step(state, surface)
         return self.body.update_normals(state, step.projection), step if np.isfinite(step.largest()) else None
@@ -173,7 +173,7 @@ class _Press:
         return None if trial is None else self.body.balanced(trial, self.tolerance)
 
     def better(self, trial, state, residual):
-        """Close to equilibrium the potential no longer resolves the difference; there a smaller residual decides."""
+        """Whether the potential decreases or, where rounding hides the difference near equilibrium, the residual."""
         before = self._potential(state)
         lower = lowers_potential(before, self._potential(trial), abs(state.energy) + abs(before))
         return self.residual(trial) < residual if lower is None else lower
@@ -191,7 +191,7 @@ class _Press:
         self.fresh = False
 
     def recovered(self, state):
-        """A new tangent of the cells that hardly moved may help; a step that projects anew need not lower the energy."""
+        """Retry with new tangents of all cells and a constant contact projection, for which a step decreases the energy."""
         if self.fresh and not self.projected:
             return False
         self.body.cells.forget()

@@ -1,15 +1,14 @@
-"""Newton steps that are linear in the rubber and exact in the object's contact, with one factor of the rubber for many of them.
+"""Newton steps that are linear in the rubber and exact in the object's contact, with one factorisation of the rubber for many.
 
-Where an object touches changes far more within a step than how the rubber resists: a tangent that has lost a contact point
-lets it fly into the object. So a step s minimises r.s + s.A s/2 + Phi(gaps + B s), with the rubber's tangent A, the residual r
-and the contact's energy Phi: a convex problem whose Newton systems A + B'.W.B, bordered by the object's indentation increment,
-are solved by conjugate gradients.
+Within a step the contact changes far more than the rubber's tangent: with a linearised contact, a point that lost contact in the
+tangent would move deep into the object. So a step s minimises r.s + s.A s/2 + Phi(gaps + B s), with the rubber's tangent A, the
+residual r and the contact's energy Phi: a convex problem whose Newton systems A + B'.W.B, bordered by the object's indentation
+increment, are solved by conjugate gradients.
 
-They are preconditioned by the rubber of an earlier step with the contact of now. The contact changes some seven times within a
-step and much, A hardly in several steps: so conjugate gradients take one to three iterations, the other way round twenty.
-The surface nodes' movements along the object's normals and the indentation increment come last in the elimination. What is left on
-them is a dense matrix, small beside the whole; the contact changes that matrix alone, as far as its normals are the nodes' own.
-"""
+The preconditioner is the rubber's tangent of an earlier step with the current contact. The contact changes about seven times within
+a step, A hardly in several steps: so conjugate gradients take one to three iterations (with the roles exchanged, twenty).
+The surface nodes' displacements along the object's normals and the indentation increment are eliminated last. Their Schur
+complement is a small dense matrix; a change of contact affects this matrix alone, as far as normals lie in the nodes' frames."""
 
 from dataclasses import dataclass, replace
 
@@ -28,24 +27,24 @@ from softtact.models.hyperelastic.slab import Slab
 from softtact.models.hyperelastic.states import LinearGaps, ObjectSurface, SlabState
 
 _SOON_MM, _NEAR_MM = 0.01, 0.1     # gaps of points that may touch within a step or two, and within some load steps
-# Share of the squared normals that a node's directions may leave out, when asked whether they are enough and when chosen.
+# Share of the squared normals that a node's frame may neglect: when a frame is checked, and when it is chosen.
 _BENT, _SLIGHTLY_BENT = 0.02, 0.005
-_ALIKE = 0.002               # of all points' stiffness together: contacts that differ by less are taken for one
-_LEAST_CORNER = 1e-9         # N/mm: rounding must not turn the object's stiffness negative
+_ALIKE = 0.002               # of the sum of all points' stiffnesses: contacts that differ by less count as equal
+_LEAST_CORNER = 1e-9         # N/mm: keeps the object's stiffness positive despite rounding
 _INNER_STEPS = 12
-_FACINGS = 4                 # lookups of what the points face; an edge that slides over them moves forces from point to point
-_INNER_TOLERANCE = 0.1       # of the residual that the step is to cut
-_FORCING = 0.3               # conjugate gradients end when the preconditioned residual has fallen to this share, or the residual
-                             # itself is as small as the gradient has to be in the end, which costs no further solve to see ...
-_MOST_ITERATIONS = 6         # ... or when they would take more than so many; then a new factor follows
-_JUDGED_AFTER = 3            # iterations after which it is judged how many it would take
+_FACINGS = 4                 # updates of the contact projection; an edge that slides over points shifts forces between them
+_INNER_TOLERANCE = 0.1       # of the residual that the step is to reduce
+_FORCING = 0.3               # conjugate gradients stop when the preconditioned residual has fallen to this share, or the residual
+                             # itself is as small as the final gradient has to be, which needs no further solve to check ...
+_MOST_ITERATIONS = 6         # ... or when they would take more than this; then a new factorisation follows
+_JUDGED_AFTER = 3            # iterations after which the number of iterations is estimated
 
 
 class StepContact:
-    """The object's contact in the course of a step from a `SlabState`; `planes` and `points` are what it is at present.
+    """The object's contact during a step from a `SlabState`; `planes` and `points` are its current projection and gaps.
 
-    surface: looked up anew where the step leads; None: the points keep the planes that they face
-    largest_mm: to which a step is cut: where a longer one leads far under an edge, points face what they do where it is cut
+    surface: for contact projections at the step's end; None: the points keep their planes
+    largest_mm: largest movement in a step; the projection of a longer step is taken where the step is cut
     """
 
     def __init__(self, slab: Slab, state: SlabState, indentation: float, surface: ObjectSurface | None = None, *,
@@ -59,9 +58,9 @@ class StepContact:
                                                                              self._indentation, self._state.history)
 
     def frames(self, kept: NodeFrames | None) -> NodeFrames:
-        """`NodeFrames` of the nodes whose contact with the object may change, along the normals that they face.
+        """`NodeFrames` along the contact normals, of the nodes whose contact with the object may change.
 
-        kept: frames of before, whose nodes and numbers of vectors stay if they are enough for the nodes that may touch soon
+        kept: earlier frames, whose nodes and numbers of vectors are kept if they suffice for the nodes that may touch soon
         """
         now = self._frames_within(_SOON_MM, _BENT)
         if kept is not None and kept.covers(now):
@@ -69,22 +68,22 @@ class StepContact:
         return self._frames_within(_NEAR_MM, _SLIGHTLY_BENT)
 
     def _frames_within(self, within_mm, bent):
-        """Of nodes with gaps of less; wanted are vectors along which the normals' squares exceed a share `bent` of the most."""
+        """Frames of nodes with smaller gaps; vectors are needed if the squared normals along them exceed the share `bent`."""
         nodes, normals = self._slab.top.projected_nodes(self.points.gaps, self.projection, within_mm)
         unknowns = self._slab.unknowns_of(nodes)
         free = (unknowns >= 0).all(axis=1)
         size, turns = np.linalg.eigh(normals[free])
         upright = (size[:, 1] < 1e-9 * size[:, 2]) & (np.abs(turns[:, 2, 2]) > 1 - 1e-9)
-        turns[upright] = np.eye(3)     # to the last digit, which spares the turning
+        turns[upright] = np.eye(3)     # exact, which saves the rotation
         return NodeFrames(first=unknowns[free, 0], turns=turns, wanted=(size > bent * size[:, 2:]).sum(axis=1),
                           others=unknowns[~free][unknowns[~free] >= 0])
 
     def rubber_forces(self, rubber: sp.csr_matrix, step: np.ndarray) -> np.ndarray:
-        """Forces (unknowns,) of the rubber's tangent against a step (unknowns,) in mm."""
+        """Product (unknowns,) of the rubber's tangent with a step (unknowns,) in mm."""
         return self._slab.product(rubber.data, step, workers=self._workers)
 
     def follow(self, step: np.ndarray, indentation_increment: float) -> bool:
-        """Look up what the points face after a step (unknowns,) in mm of the slab; True if there is a surface to ask."""
+        """Update the contact projection for a step (unknowns,) in mm of the slab; returns whether there is a surface."""
         if self._surface is None:
             return False
         share = min(1.0, self._largest_mm / max(np.abs(step).max(), abs(indentation_increment), 1e-30))
@@ -95,20 +94,20 @@ class StepContact:
         return True
 
     def _projected(self, step, indentation_increment):
-        """What the points face after a step."""
+        """The contact projection after a step."""
         displacement = self._state.displacement.copy()
         displacement.ravel()[self._slab.unknowns] += step
         return self._slab.project(displacement, self._surface, self._indentation + indentation_increment)
 
 
 class ContactFactor:
-    """With any solver of `linear_solvers`: a new factor for each contact."""
+    """With any direct solver: a new factorisation for each contact."""
 
     def __init__(self, solver: PardisoSolver | BlockTridiagonalSolver | SuperLUSolver | DissectedSolver) -> None:
         self.solver = solver
 
     def reset(self) -> None:
-        """Nothing is kept from one factor to the next."""
+        """Nothing is kept between factorisations."""
 
     def renew(self, problem: "_StepProblem", slope: np.ndarray) -> bool:
         """Factor with the rubber's tangent and the points' stiffness (p,) of now; False if that is not positive definite."""
@@ -124,7 +123,7 @@ class ContactFactor:
         return True
 
     def follow(self, problem: "_StepProblem", slope: np.ndarray) -> bool:
-        """Take over the points' stiffness alone; False if that cannot be done."""
+        """Update the points' stiffness without a factorisation; False if that is impossible."""
         return self.renew(problem, slope)
 
     def solve(self, right: np.ndarray, *, held: bool) -> np.ndarray:
@@ -137,7 +136,7 @@ class ContactFactor:
 
 
 class DissectedContact:
-    """With a `DissectedSolver`, which leaves what the contact changes for last."""
+    """With a `DissectedSolver`, which eliminates the unknowns of the contact last."""
 
     _frames: NodeFrames | None
     _points: LinearGaps | None
@@ -148,7 +147,7 @@ class DissectedContact:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the nodes' frames, which a factor otherwise takes over from the last one."""
+        """Discard the nodes' frames, which a factorisation otherwise takes from the last one."""
         self._frames, self._points, self._slope = None, None, None
 
     def renew(self, problem: "_StepProblem", slope: np.ndarray) -> bool:
@@ -161,7 +160,7 @@ class DissectedContact:
         return self.follow(problem, slope)
 
     def follow(self, problem: "_StepProblem", slope: np.ndarray) -> bool:
-        """Take over the points' stiffness (p,) alone, as far as it acts on what was left; False if not positive definite."""
+        """Update the points' stiffness (p,) in the Schur complement only; False if it is not positive definite."""
         if self._slope is not None and np.abs(slope - self._slope).sum() <= _ALIKE * slope.sum():
             return True
         left, border, corner = self._left_with(problem.points, slope)
@@ -190,7 +189,7 @@ class DissectedContact:
         return scipy.linalg.lapack.strtrs(self._lower, right.astype(np.float32), lower=True)[0]
 
     def _left_with(self, points, slope):
-        """What is left with points of a stiffness (p,): the upper triangle on the k movements, the object's column and corner."""
+        """The Schur complement with points of a stiffness (p,): upper triangle of k displacements, object's column and corner."""
         if self._points is not points:
             self._points, self._rows = points, points.rows @ self._frames.movements(self.solver.unknowns)
         left = self.solver.left
@@ -214,10 +213,10 @@ def _add_points(out, indptr, indices, data, slope):
 
 @dataclass(frozen=True)
 class _Move:
-    """A step or a direction x (n,) or (n + 1,), and what depends on it linearly.
+    """A step or a direction x (n,) or (n + 1,), and its linear functions.
 
     change (p,): of the gaps in mm;  elastic (n,) or (n + 1,): the rubber's forces in N
-    Steps are sums of directions, so both are found once for each direction, the costliest thing in it but for the factor's use.
+    Steps are sums of directions, so both are computed once for each direction; only the solve costs more.
     """
 
     x: np.ndarray
@@ -225,12 +224,12 @@ class _Move:
     elastic: np.ndarray
 
     def plus(self, share, other):
-        """This and a share of another."""
+        """The sum of this and a share of another."""
         return _Move(self.x + share * other.x, self.change + share * other.change, self.elastic + share * other.elastic)
 
 
 class ContactStepper:
-    """Steps of one body; keeps the last factor for the next step. factor: a `ContactFactor` or `DissectedContact`."""
+    """Steps of one body; keeps the last factorisation for the next step. factor: a `ContactFactor` or `DissectedContact`."""
 
     def __init__(self, factor: ContactFactor | DissectedContact) -> None:
         self.factor = factor
@@ -238,7 +237,7 @@ class ContactStepper:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the last factor."""
+        """Discard the last factorisation."""
         self._factored = False
         self.factor.reset()
 
@@ -248,13 +247,13 @@ class ContactStepper:
         """Step (n,) in mm of the unknowns, and the indentation increment with it; None if A is not positive definite.
 
         rubber: A, upper triangle (csr), with friction;  residual (n,) in N
-        contact: its `points` are `LinearGaps`, its `rubber_forces(rubber, step)` A times a step (n,), its `follow(step, indentation
-        increment)` looks up what the points face where a step leads, and returns whether that was done; its `frames` are for
+        contact: its `points` are `LinearGaps`; `rubber_forces(rubber, step)` is A times a step (n,); `follow(step,
+        indentation_increment)` updates the contact projection for a step, and returns whether it did; its `frames` are for
         `DissectedContact`
         friction_border: friction's border (n,) and corner in N/mm, between the unknowns and the object's indentation increment
-        excess: the object's force less the wanted one in N; None holds the object where it is. A free object that touches
-        nothing finds no stiffness: its increment is nan.
-        largest: mm, by which a free object is moved at most; farther steps end there with the contact of that depth
+        excess: the object's force minus the prescribed one in N; None for a prescribed indentation. A free object without
+        contact has no stiffness: its increment is nan.
+        largest: largest movement of a free object in mm; longer steps end there with the contact at that depth
         """
         problem = _StepProblem(rubber, contact, residual, friction_border, excess)
         at = problem.move(problem.rest())
@@ -271,7 +270,7 @@ class ContactStepper:
         return None if at is None else problem.parts(at.x)
 
     def _least(self, problem, at, largest):
-        """The step of least energy, from one on, until its gradient is small enough; None if A is not positive definite."""
+        """Minimise the energy from a first step until the gradient is small enough; None if A is not positive definite."""
         for _ in range(_INNER_STEPS):
             if problem.solved(at):
                 break
@@ -289,13 +288,13 @@ class ContactStepper:
         return at
 
     def _direction(self, problem, at):
-        """Newton's step of the convex problem, with the present factor if it still serves."""
+        """Newton's step of the convex problem, with the present factorisation if it is still good enough."""
         slope, gradient = problem.points.slope(at.change), problem.gradient(at)
         if self._factored and self.factor.follow(problem, slope):
             direction, good, positive = self._conjugate_gradients(problem, slope, -gradient)
             if good:
                 return direction
-            if not positive:     # no factor of this matrix would be found
+            if not positive:     # the factorisation of this matrix would fail
                 return None
         self.factors += 1
         self._factored = self.factor.renew(problem, slope)
@@ -305,8 +304,8 @@ class ContactStepper:
         return direction if good or direction.x.any() else None
 
     def _conjugate_gradients(self, problem, slope, right):
-        """Approximate solution of the Newton system, whether it is as good as wanted, and whether the matrix is positive
-        definite as far as was seen; given up where it would take too long."""
+        """Approximate solution of the Newton system, whether it converged, and whether the matrix was positive definite along
+        all directions; stopped early if it would take too many iterations."""
         found, r = problem.nowhere(), right
         z = self.factor.solve(r, held=problem.held)
         p, size = z, r @ z
@@ -333,12 +332,12 @@ class ContactStepper:
 
 
 class _StepProblem:
-    """The convex problem of one step, in the unknowns and, where the object is free, its indentation increment behind them."""
+    """The convex problem of one step in the unknowns, followed by the indentation increment if the object is free."""
 
     def __init__(self, rubber, contact, residual, friction_border, excess):
         self.rubber, self.contact, self.friction_border = rubber, contact, friction_border
         self.size, self.free, self.held = len(residual), excess is not None, False
-        # What the points face may change under way: the residual less the contact's share in it stays.
+        # The projection may change during the step: the residual without the contact's part is constant.
         residual = np.append(residual, excess) if self.free else residual
         self.residual = residual + self._spread(self.points.pressure(0.0))
 
@@ -358,22 +357,22 @@ class _StepProblem:
         return _Move(x, self._change(x), self._elastic(x))
 
     def projected_anew(self, move):
-        """The same step after the points came to face something else."""
+        """The same step after an update of the contact projection."""
         return replace(move, change=self._change(move.x))
 
     def judge(self, at):
-        """Let the gradient at a step decide which gradient is small enough."""
+        """Set the tolerance of the gradient from the gradient at a step."""
         self._enough = _INNER_TOLERANCE * np.abs(self.gradient(at)).max()
 
     def solved(self, at):
         return self.small(self.gradient(at))
 
     def small(self, gradient):
-        """Whether a gradient is as small as the step's is to be in the end."""
+        """Whether a gradient is within the tolerance."""
         return np.abs(gradient).max() <= self._enough
 
     def hold(self, at):
-        """Keep a free object where it is: no longer is its force to be balanced, only those of the body."""
+        """Fix a free object: from now on only the body's forces have to be balanced, not the object's."""
         self.held = True
         self.judge(at)
 
@@ -404,13 +403,13 @@ class _StepProblem:
         return self._of_unknowns(along.elastic + self._spread(slope * along.change))
 
     def _of_unknowns(self, forces):
-        """Forces as they are, without the object's where it is held."""
+        """The forces, without the object's if it is fixed."""
         if self.held:
             forces[-1] = 0.0
         return forces
 
     def best_share(self, at, direction):
-        """The share of the direction, at most all of it, with the least energy along it."""
+        """The share in (0, 1] of the direction that minimises the energy along it."""
         linear, curvature = (self.residual + at.elastic) @ direction.x, direction.x @ direction.elastic
 
         def slope(share):

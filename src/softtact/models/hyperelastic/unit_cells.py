@@ -1,7 +1,7 @@
-"""The sheet over each frustum together with the frustum: one cell of the lattice, seen by the rest through its walls and its top.
+"""Cells of the lattice, each a frustum with the sheet over it, connected to the rest through the cell's walls and top.
 
-Cells repeat, so their inner unknowns are eliminated cell by cell, after the frustum's own. What is left for the global
-matrix are the cells' walls and the cover. Cells under parts of the cover that are split differently are of different kinds.
+The cells' inner unknowns are eliminated cell by cell, after those of their frusta. The global matrix contains only the cells' walls
+and the cover. Cells under differently split parts of the cover are of different kinds.
 """
 
 
@@ -16,10 +16,10 @@ from softtact.models.hyperelastic.slab import CellGroup, Slab
 from softtact.models.hyperelastic.states import BodyState
 
 _CHUNK = 8                          # cells that one thread condenses, or makes positive, at once
-_ELEMENTS_KEEP_MM = 0.004           # by which an element's nodes may move against each other before its tangent is found anew
-_REFRESH_SLOPE = 0.2                # a cell keeps no tangent where a contact point's stiffness changed by this share of the penalty
-_REFRESH_WITH_FRICTION = 20.0       # ... or, with friction, by this many N/mm3: with 100 light presses creep and fail
-# A cell is thrown too far where its inner nodes go so far beyond this multiple of its walls' step, or its walls farther than that.
+_ELEMENTS_KEEP_MM = 0.004           # relative movement of an element's nodes up to which it keeps its tangent
+_REFRESH_SLOPE = 0.2                # change of a contact point's stiffness, relative to the penalty, that renews a cell's tangent
+_REFRESH_WITH_FRICTION = 20.0       # ... with friction, in N/mm3: with 100 light presses converge too slowly
+# A cell moves too far if its inner nodes move by this distance more than this multiple of its walls' step, or its walls farther.
 _FARTHEST_MM, _FARTHEST_RATIO, _FARTHEST_OUTER_MM = 0.05, 2.0, 0.4
 _LEAST_DAMPING, _DAMPING_GROWTH = 0.05, 4.0     # N/mm on each unknown; a frustum's softest mode has 0.03 at rest
 
@@ -56,9 +56,9 @@ class SheetCells:
         return [kind.positive_outer() for kind in kinds]
 
     def refresh(self, state: BodyState, *, kept_mm: float = 0.0, workers: Workers = SERIAL) -> int:
-        """Recompute the condensed tangents of the cells that moved by more than `kept_mm` or changed contact since their last one.
+        """Recompute the condensed tangents of cells that moved by more than `kept_mm` or changed contact since the last one.
 
-        Keeping the others is a quasi-Newton step: forces are always exact. Returns how many were recomputed.
+        Keeping the others makes a quasi-Newton step: the forces are always exact. Returns the number of recomputed tangents.
         """
         stale = self._stale(state, kept_mm)
         frusta = chunks(np.flatnonzero(stale), _CHUNK)
@@ -70,9 +70,9 @@ class SheetCells:
         return int(stale.sum())
 
     def damp(self, slab_step: np.ndarray, bed_step: np.ndarray) -> bool:
-        """Damp the cells that a step throws too far, for which it is to be found again: whether there are any; free the others.
+        """Damp the cells that a step moves too far, undamp the others; returns whether there are any, so that the step is repeated.
 
-        A frustum about to snap into a new fold has a soft mode: its step would be of no use, and shorten that of all others.
+        A frustum that is about to snap through has a soft mode: its long step would be useless and shorten that of all others.
         """
         inner, outer = self._movement(slab_step, bed_step)
         thrown = (inner > _FARTHEST_MM + _FARTHEST_RATIO * outer) | (outer > _FARTHEST_OUTER_MM)
@@ -83,12 +83,12 @@ class SheetCells:
         return bool(thrown.any())
 
     def reset(self) -> None:
-        """Forget everything of an earlier press: tangents and damping."""
+        """Discard the tangents and damping of an earlier press."""
         self.forget()
         self._damping, self._damped_with = np.zeros(self.count), np.zeros(self.count)
 
     def forget(self, cells: np.ndarray | None = None) -> None:
-        """Let the next `refresh` recompute the given cells, or all, then also the tangents that their elements keep."""
+        """Make the next `refresh` recompute the given cells, or all; in the latter case also the elements' cached tangents."""
         if cells is None:
             self._tangent_at = None
             self.support.forget()
@@ -114,7 +114,7 @@ class SheetCells:
         return stale
 
     def _slope(self, state):
-        """Stiffnesses (f, q) in N/mm3 of the contact points with friction's, and by how much they may change."""
+        """Stiffnesses (f, q) in N/mm3 of the contact points and of friction, and their allowed changes."""
         slope, friction_response = self.support.contact_slope(state.support), state.support.friction_response
         if friction_response is not None:
             slope = np.hstack([slope, friction_response.stiffness().reshape(self.count, -1)])
@@ -122,7 +122,7 @@ class SheetCells:
         return slope, _REFRESH_SLOPE * self.support.contact.stiffness if without else _REFRESH_WITH_FRICTION
 
     def condensed_residual(self, state: BodyState, *, workers: Workers = SERIAL) -> tuple[np.ndarray, tuple[list, list]]:
-        """Residual (n, 3) of the slab with all inner unknowns eliminated, and what `recover` needs again."""
+        """Residual (n, 3) of the slab with all inner unknowns eliminated, and the forward-solved right-hand sides for `recover`."""
         root_force, in_frusta = self.support.condensed_residual(state.support, workers=workers)
         residual = state.slab.force.copy()
         np.add.at(residual, self.roots.ravel(), root_force.reshape(-1, 3))
@@ -136,9 +136,9 @@ class SheetCells:
                 workers: Workers = SERIAL) -> tuple[np.ndarray, np.ndarray]:
         """Newton steps of the slab (n, 3), its inner nodes filled in, and of the frusta (f, nodes, 3).
 
-        A cell's step is its response to its walls' movement and its local step. The latter is cut where it goes farther
-        than `_FARTHEST_MM`: a frustum that snaps into a new fold would else shorten the step of the whole sensor. Since each
-        cell's inner matrix is positive definite, what is left still lowers the energy.
+        A cell's step is the sum of its response to its walls' movement and its local step. The latter is cut if it exceeds
+        `_FARTHEST_MM`: otherwise a frustum that snaps through would shorten the step of the whole sensor. Since each
+        cell's inner matrix is positive definite, the shortened step still decreases the energy.
         """
         slab, frusta = self._recovered(kept, slab_step, workers)
         if max(np.abs(slab).max(), np.abs(frusta).max()) <= _FARTHEST_MM:
@@ -153,7 +153,7 @@ class SheetCells:
         return self._recovered(cut, slab_step, workers)
 
     def _movement(self, slab, frusta):
-        """How far (f,) in mm a step moves each cell's inner nodes at most, and its walls."""
+        """Largest movement (f,) in mm of each cell's inner nodes in a step, and of its walls."""
         inner, outer, flat = np.abs(frusta.reshape(self.count, -1)).max(axis=1), np.zeros(self.count), slab.reshape(-1)
         for kind in self.kinds:
             inner[kind.cells] = np.maximum(inner[kind.cells], np.abs(flat[kind.inner_dofs]).max(axis=1, initial=0.0))
@@ -161,7 +161,7 @@ class SheetCells:
         return inner, outer
 
     def _recovered(self, kept, slab_step, workers):
-        """The steps of slab and frusta for what cells and frusta keep of their residuals, and for the walls' step."""
+        """The steps of slab and frusta for the walls' step, from the forward-solved right-hand sides of cells and frusta."""
         in_frusta, in_cells = kept
         flat = slab_step.copy().reshape(-1)
         steps = workers.map(lambda both: both[0].inner_step(both[1], flat), list(zip(self.kinds, in_cells, strict=True)))
@@ -189,13 +189,13 @@ class CellKind:
         self._inner_places = np.flatnonzero(inner)
 
     def _inner(self, slab):
-        """Which unknowns (n,) are of nodes in one cell only, in every cell; the others stay global."""
+        """Which unknowns (n,) belong, in every cell, to nodes of that cell only; the others stay global."""
         free = np.zeros(3 * slab.nodes, dtype=bool)
         free[slab.free] = True
         return (np.repeat(slab.uses[self.nodes] == 1, 3, axis=1) & free[dofs_of(self.nodes)]).all(axis=0)
 
     def residual(self, flat: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
-        """What the slab's forces (all unknowns,) on inner unknowns leave on the outer ones (c, k), and what `inner_step` needs."""
+        """Condensed forces (c, k) on the outer unknowns from the slab's forces (all unknowns,), and the data for `inner_step`."""
         force = np.zeros((len(self.cells), 3 * self.nodes.shape[1]))
         force[:, self._inner_places] = flat[self.inner_dofs]
         forward_solved = self.elimination.residual(force)
@@ -210,7 +210,7 @@ class CellKind:
 
     def condense(self, state: BodyState, support: FrustumArray, chosen: np.ndarray, damping: np.ndarray, *,
                  kept_mm: float = 0.0) -> None:
-        """Recompute the condensed tangents of some of these cells (k,), counted among them, from those of their frusta.
+        """Recompute the condensed tangents of some cells, by their indices (k,) in this kind, from those of their frusta.
 
         damping: of all cells, in N/mm;  kept_mm: see `TangentCache`
         """
@@ -220,7 +220,7 @@ class CellKind:
         self.elimination.set(chosen, layers, damping=damping[self.cells[chosen]])
 
     def forget(self) -> None:
-        """Let the next `condense` find the tangents of all elements anew."""
+        """Discard the cached tangents of all elements, so that the next `condense` recomputes them."""
         for layer in self._layers:
             for _, kept in layer:
                 kept.forget()
