@@ -116,6 +116,11 @@ def place(mesh: trimesh.Trimesh, *, pose: Pose | None = None) -> trimesh.Trimesh
     return placed
 
 
+def read_placed(path: str | Path, *, unit: str, pose: Sequence[float] | None) -> trimesh.Trimesh:
+    """The mesh of a file in the sensor frame; pose: six values as of `Pose.from_values`, or None for the centred one."""
+    return place(read_mesh(path, unit=unit), pose=None if pose is None else Pose.from_values(pose))
+
+
 def default_pose(mesh: trimesh.Trimesh) -> Pose:
     """Pose that centres the mesh's bounding box over the sensor and lets its lowest point touch."""
     (x0, y0, z0), (x1, y1, _) = mesh.bounds

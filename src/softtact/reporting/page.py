@@ -2,7 +2,7 @@
 
 import base64
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -126,6 +126,19 @@ class Page:
         """A table with its columns in words and numbers in four digits; file: of the same as CSV."""
         html = frame.rename(columns=header).to_html(index=False, na_rep="", border=0, float_format=lambda value: f"{value:.4g}")
         self._add("table", title=title, html=Markup(html), links=[*_csv(file and self.link(file)), *links])
+
+    def figures(self, captioned: Iterable[tuple[Path, str]]) -> None:
+        """The section of a study's figures: file and caption of each."""
+        self.section("Figures")
+        for path, caption in captioned:
+            self.figure(path, caption)
+
+    def tables(self, titles: Mapping[str, str], files: Mapping[str, Path], *, most_rows: int | None = None) -> None:
+        """The section of a study's tables: of {name: title} those among the files {name: CSV}, each with its first rows."""
+        self.section("Tables")
+        for name, title in titles.items():
+            if name in files:
+                self.table(pd.read_csv(files[name]).iloc[:most_rows], title, file=files[name])
 
     def claims(self, claims: pd.DataFrame, *, title: str = "The paper's claims", file: str | Path, links: Links = ()) -> None:
         """The section of a study's claims by `evaluation.claim_rows`, coloured by their verdicts, linked to their evidence."""

@@ -8,6 +8,7 @@ import contextlib
 import fcntl
 import importlib
 import json
+import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -61,6 +62,22 @@ class Job:
 def paths_of(named: Mapping[str, Any]) -> list[str]:
     """The paths of named inputs or outputs, one after the other."""
     return [path for paths in named.values() for path in ([paths] if isinstance(paths, str) else paths)]
+
+
+def figure_files(folder: str, name: str) -> dict[str, str]:
+    """The outputs of a job that draws a figure of a study whose results lie in a folder."""
+    return {kind: f"{folder}/figures/{name}.{kind}" for kind in ("png", "svg")}
+
+
+def from_here(path: str | Path) -> str:
+    """A path relative to the working folder where it lies below it: the place of that folder is no reason to run a job again."""
+    path = Path(path)
+    return os.path.relpath(path) if path.resolve().is_relative_to(Path.cwd().resolve()) else str(path)
+
+
+def files_made(jobs: Sequence[Job], start: str, end: str = "") -> list[str]:
+    """Of all outputs of some jobs the paths that start and end so, in their order."""
+    return [path for job in jobs for path in paths_of(job.made()) if path.startswith(start) and path.endswith(end)]
 
 
 def stage_source(stage: str, *, source: Path = SOURCE) -> str:
@@ -164,7 +181,7 @@ def held(folder: str | Path) -> Iterator[None]:
     file = Path(folder, ".running")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
-        lock = file.open("w")
+        lock = file.open("a")     # which leaves the time of the file
     except OSError as error:
         raise InputError(f"{folder}: cannot be written to ({error.strerror}); correct that.") from None
     with lock:

@@ -6,7 +6,6 @@
     tables/claims.csv, figures/, report.html
 """
 
-import os
 from collections import Counter
 from functools import lru_cache
 from pathlib import Path
@@ -18,7 +17,7 @@ from softtact.geometry.meshes import place, read_mesh
 from softtact.sensors.library import material_file, sensor_file
 from softtact.studies.grasps.config import GraspStudy
 from softtact.studies.grasps.stages.summary import papers_model
-from softtact.studies.jobs import Job
+from softtact.studies.jobs import Job, from_here
 
 _OF_READINGS = {"force_n", "trials", "seed", "virtual_sensor"}
 _SIDES = (np.diag([1.0, 1.0, 1.0, 1.0]), np.diag([-1.0, 1.0, -1.0, 1.0]))     # the mesh as the left and the right sensor see it
@@ -28,8 +27,8 @@ def jobs(study: GraspStudy, folder: str | Path) -> list[Job]:
     """All jobs of a study whose results lie in a folder, in an order in which they can run."""
     values = study.values
     grasps, readings = f"{folder}/grasps/{{item}}/events.nc", f"{folder}/grasps/{{item}}/readings.nc"
-    sensor = {"sensor": _below_here(sensor_file(values.sensor))}
-    pressing = sensor | {"materials": [_below_here(material_file(name)) for name in study.spec.materials.values()],
+    sensor = {"sensor": from_here(sensor_file(values.sensor))}
+    pressing = sensor | {"materials": [from_here(material_file(name)) for name in study.spec.materials.values()],
                          **({"mjcf": str(values.scene["mjcf"])} if values.scene.get("mjcf") else {})}
     common = values.model_dump(mode="json", include={"mesh", "scene"})
     made: list[Job] = []
@@ -74,12 +73,6 @@ def _summary(study, folder, sensor, pressing, made):
 def _placed(item):
     """An object in a position, as stages take it."""
     return {"object": item.entry.name, "unit": item.entry.unit, "x_mm": item.x_mm, "y_mm": item.y_mm, "angle_deg": item.angle_deg}
-
-
-def _below_here(path):
-    """A path relative to the working folder where it lies below it: where that folder lies is no reason to run anything again."""
-    path = Path(path)
-    return os.path.relpath(path) if path.resolve().is_relative_to(Path.cwd().resolve()) else str(path)
 
 
 def _presses(study, entry):

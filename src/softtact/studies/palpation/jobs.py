@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from softtact.probe.design import PalpationDesign, check_design
-from softtact.studies.jobs import Job
+from softtact.studies.jobs import Job, figure_files, files_made
 
 _COARSER = 2.0     # times the mesh's sizes: the second mesh that tells the mesh error
 _OF_STUDIES = {"variants", "variant_steps", "hardness", "search", "load_n", "displacement_mm"}     # a sweep does without
@@ -111,11 +111,12 @@ def _figures(design, folder, main):
     sweeps = [job.made()["sweep"] for job in main]
     moved = {tissue: f"{folder}/{tissue}_displacement.nc" for tissue in design.tissues}
     body = {"design": _of_one_tissue(design, next(iter(design.tissues)))}
-    drawn = [Job("draw_shapes", {"sweeps": list(moved.values())}, _figure(folder, "fig2_shapes"), body),
-             Job("draw_curves", {"sweeps": sweeps, "slopes": f"{folder}/tables/slopes.csv"}, _figure(folder, "fig3_fig4_curves")),
-             Job("draw_films", {"sweeps": list(moved.values())}, _figure(folder, "films"))]
+    drawn = [Job("draw_shapes", {"sweeps": list(moved.values())}, figure_files(folder, "fig2_shapes"), body),
+             Job("draw_curves", {"sweeps": sweeps, "slopes": f"{folder}/tables/slopes.csv"},
+                 figure_files(folder, "fig3_fig4_curves")),
+             Job("draw_films", {"sweeps": list(moved.values())}, figure_files(folder, "films"))]
     if design.hardness:
-        drawn.append(Job("draw_hardness", {"table": f"{folder}/tables/hardness.csv"}, _figure(folder, "hardness")))
+        drawn.append(Job("draw_hardness", {"table": f"{folder}/tables/hardness.csv"}, figure_files(folder, "hardness")))
     return drawn + [Job("write_fields", {"sweep": path}, {"fields": f"{folder}/fields_{{tissue}}.vtu"}, body, {"tissue": tissue})
                     for tissue, path in moved.items()]
 
@@ -134,19 +135,13 @@ def _search(design, folder):
             Job("find_lumps", lumps, tables | {"facts": f"{folder}/facts/lump.json"},
                 {"design": body | {"search": values}},
                 work={design.model: 2 * steps * search.trials * len(search.moves)}),
-            Job("draw_lump", tables, _figure(folder, "lump"))]
+            Job("draw_lump", tables, figure_files(folder, "lump"))]
 
 
 def _report(design, folder, made):
     """The page, from all that the other jobs made for people."""
-    paths = [path for job in made for path in job.made().values()]
-    chosen = {name: [path for path in paths if path.startswith(f"{folder}/{start}") and path.endswith(end)]
-              for name, start, end in (("tables", "tables/", ""), ("figures", "figures/", ".png"), ("facts", "facts/", ""),
-                                       ("fields", "fields_", ""))}
+    chosen = {name: files_made(made, f"{folder}/{start}", end) for name, start, end in (
+        ("tables", "tables/", ""), ("figures", "figures/", ".png"), ("facts", "facts/", ""), ("fields", "fields_", ""))}
     main = [f"{folder}/{tissue}_{scenario}.nc" for scenario in ("displacement", "load") for tissue in design.tissues]
     return Job("report", chosen | {"sweeps": main}, {"page": f"{folder}/report.html", "summary": f"{folder}/summary.json"},
                {"design": design.model_dump(mode="json", exclude_none=True)})
-
-
-def _figure(folder, name):
-    return {kind: f"{folder}/figures/{name}.{kind}" for kind in ("png", "svg")}

@@ -8,7 +8,6 @@
 """
 
 import dataclasses
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
@@ -16,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from softtact.skin.design import Choice, PreparedDesign, SkinDesign, bears, check_design, needs_of, prepare, reaches
-from softtact.studies.jobs import Job
+from softtact.studies.jobs import Job, figure_files, files_made, from_here
 
 _TABLES = {
     "choose_layer": ("choice_printed", "front_confidence", "thickness", "choice"),
@@ -44,8 +43,7 @@ class SkinStudy:
 
     def path(self, file: str) -> str:
         """A file that the design names, as a path from the working folder where it lies below that."""
-        path = self.folder / file
-        return os.path.relpath(path) if path.resolve().is_relative_to(Path.cwd().resolve()) else str(path)
+        return from_here(self.folder / file)
 
 
 def load(values: Mapping[str, Any], path: str | Path | None) -> SkinStudy:
@@ -91,7 +89,7 @@ def _loads(study, folder):
                {"readings": f"{folder}/readings.nc", "table": f"{folder}/tables/loads.csv", "facts": f"{folder}/facts/loads.json"},
                _skin(study) | {"loads": settings, "converter": _converter(study)}, work={"field": _fields(study, len(settings))})
     drawn = [Job("draw_load", {"readings": f"{folder}/readings.nc", "table": f"{folder}/tables/loads.csv"},
-                 _figure(folder, "load_{load}"),
+                 figure_files(folder, "load_{load}"),
                  _plain(design, "module", "patch") | {"load": number, "elastomer": design.elastomer}, {"load": str(number)})
              for number in range(1, len(settings) + 1)]
     return [*made, read, *drawn]
@@ -101,7 +99,7 @@ def _probes(study, folder):
     table = {"table": f"{folder}/tables/probes.csv"}
     return [Job("compute_probes", {}, table, _skin(study) | _plain(study.design, "probes"),
                 work={"field": _fields(study, 6 * len(study.design.probes.diameters_mm))}),
-            Job("draw_probes", table, _figure(folder, "probes"))]
+            Job("draw_probes", table, figure_files(folder, "probes"))]
 
 
 def _choice(study, folder):
@@ -112,8 +110,8 @@ def _choice(study, folder):
                 _plain(study.design, "module", "choice") | {"elastomers": _elastomers(study), "converter": _converter(study),
                                                             "known": known, "bearable": bearable},
                 work={"cell": len(choice.thicknesses_mm) * len(bearable)}),
-            Job("draw_front", {name: made[name] for name in ("choice_printed", "front_confidence")}, _figure(folder, "front")),
-            Job("draw_thickness", {"thickness": made["thickness"]}, _figure(folder, "thickness"),
+            Job("draw_front", {name: made[name] for name in ("choice_printed", "front_confidence")}, figure_files(folder, "front")),
+            Job("draw_thickness", {"thickness": made["thickness"]}, figure_files(folder, "thickness"),
                 choice.model_dump(mode="json", include={"detected_counts", "strain_limit"}))]
 
 
@@ -123,7 +121,7 @@ def _maps(study, folder):
     return [Job("map_patch", {}, made | {"facts": f"{folder}/facts/maps.json"},
                 _skin(study) | _plain(design, "maps") | {"converter": _converter(study), "needs": needs},
                 work={"field": _fields(study, 1), "cell": len(design.maps.pitches_mm)}),
-            Job("draw_maps", made, _figure(folder, "maps"),
+            Job("draw_maps", made, figure_files(folder, "maps"),
                 _plain(design, "module", "patch") | {"force_n": 1e-3 * design.maps.pressure_kpa * design.maps.finger_mm2})]
 
 
@@ -156,12 +154,10 @@ def _link(study, folder):
 
 def _report(study, folder, made):
     """The page, from all that the other jobs made for people."""
-    paths = [path for job in made for path in job.made().values()]
-    shown = {"tables": [path for path in paths if path.startswith(f"{folder}/tables/")],
-             "figures": [path for path in paths if path.endswith(".png")],
-             "facts": [path for path in paths if path.startswith(f"{folder}/facts/")],
-             "exports": [path for path in paths if path.startswith(f"{folder}/exports/")], "readings": f"{folder}/readings.nc"}
-    return Job("report", shown, {"page": f"{folder}/report.html", "summary": f"{folder}/summary.json"},
+    shown = {name: files_made(made, f"{folder}/{name}/", ".png" if name == "figures" else "")
+             for name in ("tables", "figures", "facts", "exports")}
+    return Job("report", shown | {"readings": f"{folder}/readings.nc"},
+               {"page": f"{folder}/report.html", "summary": f"{folder}/summary.json"},
                {"design": study.design.model_dump(mode="json")})
 
 
@@ -184,10 +180,6 @@ def _converter(study):
 
 def _tables(stage, folder):
     return {name: f"{folder}/tables/{name}.csv" for name in _TABLES[stage]}
-
-
-def _figure(folder, name):
-    return {kind: f"{folder}/figures/{name}.{kind}" for kind in ("png", "svg")}
 
 
 def _fields(study, times):

@@ -67,6 +67,7 @@ def one_event(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict
     """
     import xarray
 
+    from softtact.contact.height_field import HeightField
     from softtact.evaluation.curve_shape import feature_masks
     from softtact.robot.events import pose_of, set_down
 
@@ -79,7 +80,7 @@ def one_event(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict
     pressed = [sensor.press(mesh, pose=pose, force_n=[force], model=model, label=f"{name}, {model}", threads=threads)
                for model in models]
     maps = [result.deformation_map_mm[0] for result in pressed]
-    raised, lower = feature_masks(_heights(spec, mesh, pose))
+    raised, lower = feature_masks(HeightField(place(mesh, pose=pose)).on_grid(spec.map_x_mm, spec.map_y_mm))
     shares = [float(one[lower].mean() / one[raised].mean()) if lower.any() else np.nan for one in maps]
     data = xarray.Dataset({"deformation_map_mm": (("model", "y", "x"), np.stack(maps), {"units": "mm"}),
                            "lower_share": ("model", shares, {"units": "1"}),
@@ -138,12 +139,3 @@ def _closed(scene, force_n):
     from softtact.robot.grasp import GraspRun
 
     return GraspRun(scene).run(force_n, lift=False)
-
-
-def _heights(spec, mesh, pose):
-    """Heights (y, x) of the object's underside over the map's points, nan beside it."""
-    from softtact.contact.height_field import NO_CONTACT_MM, HeightField
-
-    x, y = np.meshgrid(spec.map_x_mm, spec.map_y_mm)
-    heights = np.asarray(HeightField(place(mesh, pose=pose))(x.ravel(), y.ravel())[0], dtype=float).reshape(x.shape)
-    return np.where(heights < NO_CONTACT_MM, heights, np.nan)

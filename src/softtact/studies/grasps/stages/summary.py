@@ -91,9 +91,7 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
     page.box("What is synthetic here.", "Robot and objects move in MuJoCo. Readings are the virtual sensor's, a simulation. No "
              "score here is the paper's.")
     page.text(_result(grasps))
-    page.section("Figures")
-    for path, caption in zip(inputs["figures"], settings["captions"], strict=True):
-        page.figure(path, caption)
+    page.figures(zip(inputs["figures"], settings["captions"], strict=True))
     page.claims(pd.read_csv(inputs["claims"], keep_default_na=False), file=inputs["claims"])
     page.section("Grasps")
     page.table(grasps[[name for name in _SHOWN if name in grasps]], file=inputs["table"],

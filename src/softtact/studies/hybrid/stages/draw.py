@@ -172,11 +172,9 @@ def _outline(mesh, y, depth):
 
 def _placed(path, entry):
     """The mesh of a file, with the unit and in the pose of a mapping; without a pose centred over the sensor."""
-    from softtact.geometry.meshes import place, read_mesh
-    from softtact.geometry.pose import Pose
+    from softtact.geometry.meshes import read_placed
 
-    pose = None if entry["pose"] is None else Pose.from_values(entry["pose"])
-    return place(read_mesh(path, unit=entry["unit"]), pose=pose)
+    return read_placed(path, unit=entry["unit"], pose=entry["pose"])
 
 
 def _object(name, mesh, chosen, presses, predictions):

@@ -37,13 +37,8 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
     page.box("What is assumed.", _assumptions(design))
     for sentence in [*_on_hardness(facts["hardness"]), *_on_lumps(facts)]:
         page.text(sentence)
-    page.section("Figures")
-    for path in inputs["figures"]:
-        page.figure(path, _CAPTIONS[path.stem])
-    page.section("Tables")
-    for name, title in _TITLES.items():
-        if name in files:
-            page.table(pd.read_csv(files[name]), title, file=files[name])
+    page.figures((path, _CAPTIONS[path.stem]) for path in inputs["figures"])
+    page.tables(_TITLES, files)
     page.claims(pd.read_csv(files["claims"], keep_default_na=False), file=files["claims"])
     page.section("Files")
     page.text("", links=[(label, [(Path(path).name, page.link(path)) for path in paths]) for label, paths in (

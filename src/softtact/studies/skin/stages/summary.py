@@ -52,22 +52,17 @@ def report(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[st
 
     design = SkinDesign.model_validate(settings["design"])
     files = {path.stem: path for path in inputs["tables"]}
-    tables = {name: pd.read_csv(path, keep_default_na=name != "claims") for name, path in files.items()}
     facts = _all_facts(inputs["facts"])
     write_json(outputs["summary"], {"skin": design.skin} | facts)
     page = Page("Robot skin", design.skin, folder=outputs["page"].parent)
     page.text(_facts(design))
     page.box("Read with care.", facts["remarks"])
     page.box("", _result(design, facts))
-    page.section("Figures")
-    for path in inputs["figures"]:
-        page.figure(path, _caption(path, tables["loads"]))
-    page.section("Tables")
-    for name, title in _TITLES.items():
-        if name in tables:
-            page.table(tables[name].head(_MOST_ROWS), title, file=files[name])
-    if "claims" in tables:
-        page.claims(tables["claims"], title="The papers' claims", file=files["claims"])
+    loads = pd.read_csv(files["loads"])
+    page.figures((path, _caption(path, loads)) for path in inputs["figures"])
+    page.tables(_TITLES, files, most_rows=_MOST_ROWS)
+    if "claims" in files:
+        page.claims(pd.read_csv(files["claims"], keep_default_na=False), title="The papers' claims", file=files["claims"])
     page.section("Files")
     page.text("Arrays with units, and the taxels for other programs.",
               links=[("", [(path.name, page.link(path)) for path in (inputs["readings"], *inputs["exports"])])])
