@@ -17,7 +17,7 @@ _FUNCTION = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
 def code_closure(stage: str, *, source: str | Path = "src") -> list[str]:
     """Sorted paths of a stage's file and of everything of its package below `source` that it imports, directly or not.
 
-    stage: `module`, or `module:function`, of which the function's own imports count, those of the module's functions that it
+    stage: `module`, or `module:function`, of which the function's imports count, those of the module's functions that it
         calls, and those at the module's level
     """
     module, _, function = stage.partition(":")
@@ -66,7 +66,7 @@ def _reached(file: str, source: Path, function: str = "") -> list[str]:
 def _imports_of_file(text: str, path: Path) -> list[Import]:
     """The import statements that an import of the file may come to run.
 
-    A package's own functions import late and for its users only; its module level is what everyone runs.
+    A package's functions import late and for its users only; its module level is what everyone runs.
     """
     return _imports(_run(ast.parse(text).body, into_functions=path.name != "__init__.py"))
 
@@ -100,7 +100,7 @@ def _run(nodes: Iterable[ast.AST], *, into_functions: bool = True) -> Iterator[a
 
 
 def _file_of_name(package: str, name: str, source: Path) -> Path | None:
-    """The file that `from package import name` runs: the submodule `name`, or else the package's own file.
+    """The file that `from package import name` runs: the submodule `name`, or else the package's file.
 
     A package whose submodule is imported has its `__init__.py` left out: those files are empty here, and would tie
     every stage to every package.

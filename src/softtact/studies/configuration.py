@@ -11,7 +11,7 @@ from softtact.errors import InputError
 from softtact.files import read_yaml
 from softtact.unknown_names import first_fault, known_keys, unknown
 
-SHIPPED = Path(str(resources.files("softtact.studies"))) / "data"     # what stands in the project's config/
+SHIPPED = Path(str(resources.files("softtact.studies"))) / "data"     # a copy of the project's config/
 
 _Checked = TypeVar("_Checked", bound=BaseModel)
 
@@ -56,7 +56,7 @@ def _fault_sentence(model, fault, *, where):
 
 
 def refuse_unknown(name: str, known: Collection[str], *, kind: str, where: str) -> None:
-    """Raise an `InputError` that tells the nearest right name if `name` is not among the `known` ones."""
+    """Raise an `InputError` that names the nearest right one if `name` is not among the `known` ones."""
     if name not in known:
         raise InputError(_sentence(f"{where}: {unknown(name, known, kind=kind)}"))
 

@@ -1,7 +1,7 @@
 """What a study costs before it starts: jobs, hours of one core, disk.
 
-Times of one job come from the study's own finished jobs (results/STUDY/benchmarks, wall time), else from `config/costs.yaml`, which
-says where and when they were measured. A job whose files are there counts as done.
+Times of one job come from the study's finished jobs (results/STUDY/benchmarks, wall time), else from `config/costs.yaml`, which
+states where and when they were measured. A job whose files are there counts as done.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -59,7 +59,7 @@ def costs_of_jobs(opened: "OpenStudy", measured: Mapping[str, Any], folder: str 
 
 def _stage_cost(stage, jobs, times, folder):
     left = [job for job in jobs if not all(Path(path).exists() for path in paths_of(job.made()))]
-    seconds = own_s(folder, f"{stage}/**/*.tsv") or mean(_job_s(job, times) for job in left or jobs)
+    seconds = finished_s(folder, f"{stage}/**/*.tsv") or mean(_job_s(job, times) for job in left or jobs)
     return Cost(stage, len(jobs), len(left), seconds, len(jobs) * times["mb"].get(stage, times["mb"]["any"]))
 
 
@@ -90,8 +90,8 @@ def left_of(files: Sequence[Path]) -> int:
     return sum(not file.exists() for file in files)
 
 
-def own_s(folder: Path, pattern: str) -> float | None:
-    """Mean wall time of the study's own finished jobs, or None."""
+def finished_s(folder: Path, pattern: str) -> float | None:
+    """Mean wall time of the study's finished jobs, or None."""
     times = [seconds for path in folder.glob(f"benchmarks/{pattern}") if (seconds := wall_s(path)) is not None]
     return mean(times) if times else None
 

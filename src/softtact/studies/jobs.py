@@ -36,13 +36,13 @@ class Job:
     inputs: Paths
     """{name: path or paths} of the files that it reads."""
     outputs: Paths
-    """{name: path or paths} of the files that it writes; `{wildcard}` stands for what tells it from other jobs of the stage."""
+    """{name: path or paths} of the files that it writes; `{wildcard}` distinguishes it from other jobs of the stage."""
     settings: Mapping[str, Any] = field(default_factory=dict)
-    """JSON values: just those that the stage uses, for only their change runs it again."""
+    """JSON values: just those that the stage uses, for only their change reruns it."""
     wildcards: Mapping[str, str] = field(default_factory=dict)
     """{wildcard: value} of the outputs' names."""
     work: Mapping[str, float] = field(default_factory=dict)
-    """{unit: how many}: sizes from which config/costs.yaml tells its time."""
+    """{unit: how many}: sizes from which config/costs.yaml gives its time."""
     threads: int = 1
     """Cores that it uses in a workflow."""
 
@@ -143,7 +143,7 @@ class _Record:
         self._path = folder / RECORD
         try:
             self._digests = read_json(self._path)
-        except InputError:     # none yet, or damaged: everything is made again
+        except InputError:     # none yet, or damaged: all jobs run
             self._digests = {}
 
     def has(self, job: Job, digest: str) -> bool:
@@ -176,7 +176,7 @@ def _job_digest(kind, job):
 def held(folder: str | Path) -> Iterator[None]:
     """Keep a second run of a study out of its folder while the block runs.
 
-    The system drops this lock when its holder dies, however it dies; Snakemake's own would stay behind.
+    The system drops this lock when its holder dies, however it dies; Snakemake's would stay behind.
     """
     file = Path(folder, ".running")
     try:

@@ -56,12 +56,12 @@ def _missed(name, data):
     rule = f"deformation there below {LOST:g} of the raised features' with the elastic model, above {KEPT:g} with the other"
     shares = dict(zip(data.model.values.tolist(), data.lower_share.values.tolist(), strict=True))
     evidence = f"one_event/{name}.nc"
-    told = (f"share of the raised features at {data.attrs['force_n']:g} N on a cover of the printed {data.attrs['cover_law']} "
+    shown = (f"share of the raised features at {data.attrs['force_n']:g} N on a cover of the printed {data.attrs['cover_law']} "
             f"constants: {', '.join(f'{model} {share:.2f}' for model, share in shares.items())}")
     if not {"elastic", "hyperelastic"} <= set(shares) or not np.isfinite(list(shares.values())).all():
-        return row(claim, "fig. 1", "by eye", f"{told}; needs both models, and an object with a feature 0.5 mm lower", UNDECIDED,
+        return row(claim, "fig. 1", "by eye", f"{shown}; needs both models, and an object with a feature 0.5 mm lower", UNDECIDED,
                    rule, evidence)
-    return row(claim, "fig. 1", "by eye", told,
+    return row(claim, "fig. 1", "by eye", shown,
                verdict_of(shares["elastic"] < LOST and shares["hyperelastic"] > KEPT), rule, evidence,
                uncertainty="none: one event, one mesh of the model")
 

@@ -1,6 +1,6 @@
 """A study's configuration, checked before any work starts.
 
-`load_study` is the one way in. It also reads the files that the configuration names (sensor, materials, objects), so
+`load_study` is the entry. It also reads the files that the configuration names (sensor, materials, objects), so
 that rules hand their stages plain values, and a comment in a YAML file reruns nothing. A sensor or a material is found by its name
 (`softtact.sensors.library`); a file below config/ that the working folder does not have is the one that ships with the package.
 """
@@ -30,7 +30,7 @@ from softtact.studies.hybrid.objects import Item, check_shapes, items_of_set, ma
 SETS = ("indenters", "unseen", "grasps")
 TOGETHER = 50     # presses of a fast model in one job at most: a minute's work, and a command line within the system's limit
 _AT = "the configuration, at 'data.recordings'"
-_TOLD = 8     # items without a recording that a refusal lists
+_LISTED = 8     # items without a recording that a refusal names
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Study:
 
     @property
     def virtual(self) -> bool:
-        """Whether the readings are the virtual sensor's, which feels the reference's presses."""
+        """Whether the readings are the virtual sensor's, which reads the reference's presses."""
         return self.archive is None and self.recordings is None
 
     @property
@@ -64,7 +64,7 @@ class Study:
 
     @property
     def learnt_from(self) -> list[str]:
-        """The models whose maps data sets are made of: those under test, and the reference where the virtual sensor felt it."""
+        """The models whose maps data sets are made of: those under test, and the reference where the virtual sensor reads it."""
         return list(dict.fromkeys([*self.tested, self.values.reference])) if self.virtual else self.tested
 
     @property
@@ -156,20 +156,20 @@ def load_study(values: Mapping[str, Any], path: Path | None = None) -> Study:
     check_shapes(items_of)
     study = Study(checked, spec, materials, items_of, _section_item(checked, catalogue), _archive(checked),
                   _recordings(checked.data, items_of, spec))
-    _say_outside_paths(study)
+    _report_outside_paths(study)
     return study
 
 
 def _named(key, find, name):
-    """The file of a name in the configuration, as `find` of the library gives it; a refusal says where the name stands."""
+    """The file of a name in the configuration, as `find` of the library gives it; a refusal names the key."""
     try:
         return find(name)
     except InputError as error:
         raise InputError(f"the configuration, at {key!r}: {str(error)[0].lower()}{str(error)[1:]}") from None
 
 
-def _say_outside_paths(study):
-    """Say on stderr which files of the configuration lie outside the folder that the study runs in."""
+def _report_outside_paths(study):
+    """Report on stderr which files of the configuration lie outside the folder that the study runs in."""
     values = study.values
     named = [("objects.catalogue", values.objects.catalogue), *((f"object {item.object}", item.file) for item in study.items()),
              *((f"material {name}", path) for name, config in study.materials.items() for path in config.measured_files),
@@ -200,8 +200,8 @@ def _archive(values):
 def _recordings(data: Data, items_of: Mapping[str, Mapping[str, Any]], spec: SensorSpec) -> dict[str, list[Recording]] | None:
     """{SET/ITEM: recordings, its trials}, or None where the readings have another source.
 
-    Raises InputError for a sensor of another grid, an item that the study does not have, a file that is not there or stands twice,
-    and where an item has no recording.
+    Raises InputError for a sensor of another grid, an item that the study does not have, a missing file or one listed twice, and
+    where an item has no recording.
     """
     if data.source != "recorded":
         return None
@@ -212,27 +212,28 @@ def _recordings(data: Data, items_of: Mapping[str, Mapping[str, Any]], spec: Sen
     for recording in data.recordings:
         refuse_unknown(recording.item, items, kind="item", where=_AT)
     _check_files(data.recordings)
-    found = {item: list(own) for item, own in groupby(sorted(data.recordings, key=lambda one: one.item), key=lambda one: one.item)}
+    in_order = sorted(data.recordings, key=lambda one: one.item)
+    found = {item: list(same) for item, same in groupby(in_order, key=lambda one: one.item)}
     missing = [item for item in items if item not in found]
     if missing:
-        more = f" and {len(missing) - _TOLD} more" if len(missing) > _TOLD else ""
-        raise InputError(f"{_AT}: there is no recording of {', '.join(missing[:_TOLD])}{more}; add one of each, or take the items "
-                         "out of 'objects'.")
+        more = f" and {len(missing) - _LISTED} more" if len(missing) > _LISTED else ""
+        raise InputError(f"{_AT}: there is no recording of {', '.join(missing[:_LISTED])}{more}; add one of each, or take the "
+                         "items out of 'objects'.")
     return {item: found[item] for item in items}
 
 
 def _check_files(recordings):
-    """Refuse a file that is not there, and a finger of a recording that would stand for two presses."""
+    """Refuse a file that is not there, and a finger of a recording that is listed for two presses."""
     seen: dict[tuple[Path, int], str] = {}
     for recording in recordings:
         for path in (recording.file, recording.force_log):
             if not Path(path).is_file():
                 raise InputError(f"{_AT}: there is no file {path}, of {recording.item}; correct the path.")
-        own = Path(recording.file).resolve(), recording.finger
-        if own in seen:
-            raise InputError(f"{_AT}: finger {recording.finger} of {recording.file} stands for {seen[own]} and again for "
+        press = Path(recording.file).resolve(), recording.finger
+        if press in seen:
+            raise InputError(f"{_AT}: finger {recording.finger} of {recording.file} stands for {seen[press]} and again for "
                              f"{recording.item}; a recording is one press: leave it at one of them.")
-        seen[own] = recording.item
+        seen[press] = recording.item
 
 
 def _check_forces(values, spec):
@@ -244,7 +245,7 @@ def _check_forces(values, spec):
 
 
 def _materials(values, spec):
-    """{name: MaterialConfig} of the listed materials, among which the sensor's own must be."""
+    """{name: MaterialConfig} of the listed materials, among which the sensor's must be."""
     for layer in (spec.dielectric, spec.cover):
         if layer.material not in values.materials:
             raise InputError(f"the configuration, at 'materials': sensor {spec.name} is made of {layer.material!r}, "
@@ -266,7 +267,7 @@ def _check_models(values, spec):
 
 
 def _check_sensor(values, spec):
-    """Refuse now a sensor that a model or a network of the study would refuse after hours, or one with readings of its own."""
+    """Refuse now a sensor that a model or a network of the study would refuse after hours, or one that is calibrated."""
     if spec.calibration is not None:
         raise InputError(f"the configuration, at 'sensor': {spec.name} is calibrated, and a study draws its specimens and "
                          "their gain by 'virtual_sensor'; name the sensor that it was calibrated from.")
@@ -280,7 +281,7 @@ def _check_sensor(values, spec):
 
 
 def _with_range(values, spec):
-    """The configuration with the sensor's range of counts as that of the SSIM, unless it says another."""
+    """The configuration with the sensor's range of counts as that of the SSIM, unless it states another."""
     if "data_range" in values.ssim.model_fields_set:
         return values
     return values.model_copy(update={"ssim": values.ssim.model_copy(update={"data_range": spec.largest_counts})})

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from softtact.errors import InputError
-from softtact.studies.cost import Cost, left_of, own_s, wall_s
+from softtact.studies.cost import Cost, finished_s, left_of, wall_s
 from softtact.studies.hybrid.config import Study
 
 if TYPE_CHECKING:
@@ -40,8 +40,9 @@ def _presses(study, measured, folder):
     for model in study.pressed_with:
         files = [folder / "presses" / item.set / item.id / f"{model}.nc" for item in study.items()]
         times, jobs = measured["presses"].get(model) or measured["presses"][values.models[model].kind], study.press_jobs(model)
-        seconds = _own_press_s(folder, model, jobs) or times["fixed_s"] * len(jobs) / len(files) + load_steps * times["load_step_s"]
+        expected_s = times["fixed_s"] * len(jobs) / len(files) + load_steps * times["load_step_s"]
         disk_mb = len(files) * load_steps * grid * 2 * BYTES / 1e6
+        seconds = _finished_press_s(folder, model, jobs) or expected_s
         yield Cost(f"simulate_press, {model}", len(files), left_of(files), seconds, disk_mb)
 
 
@@ -50,7 +51,7 @@ def _readings(study, measured, folder):
     stage = "read_virtual_sensor" if study.virtual else "read_recordings"
     numbers = sum(map(study.readings_of, study.items())) * len(study.values.forces_n) * READING_NUMBERS
     taxels = study.spec.taxels.rows * study.spec.taxels.columns
-    seconds = own_s(folder, f"{stage}/*/*.tsv") or measured["reading_s"]     # of both: most of it is the start of a program
+    seconds = finished_s(folder, f"{stage}/*/*.tsv") or measured["reading_s"]     # of both: most of it is the start of a program
     return Cost(stage, len(files), left_of(files), seconds, numbers * taxels * 2 * BYTES / 1e6)
 
 
@@ -78,8 +79,8 @@ def _learning(study, measured, folder):
     values, sizes, models = study.values, Sizes.of(study), study.tested
     numbers = math.prod(study.spec.map_shape) + study.spec.taxels.rows * study.spec.taxels.columns
     disk = (sizes.train + sizes.validation + sizes.tests) * numbers * BYTES * len(study.learnt_from) / 1e6
-    times, own = measured["networks"], values.network.architecture
-    beside = "printed" if own == "compact" else "compact"
+    times, chosen = measured["networks"], values.network.architecture
+    beside = "printed" if chosen == "compact" else "compact"
     score = {kind: (sizes.validation + sizes.tests) * time["predict_map_s"] for kind, time in times.items()}
     searched = min(sizes.train, values.search.maps or sizes.train)
     search_s = values.search.trials * epochs_of_a_trial(values.search) * _epoch_s(times["printed"], searched, sizes)
@@ -87,7 +88,7 @@ def _learning(study, measured, folder):
 
     def stage(name, files, seconds, pattern, disk_mb=0.0):
         files = [folder / file for file in files]
-        return Cost(name, len(files), left_of(files), own_s(folder, pattern) or start_s + seconds, disk_mb)
+        return Cost(name, len(files), left_of(files), finished_s(folder, pattern) or start_s + seconds, disk_mb)
 
     def learnt(name, among=models):
         return [f"learning/{model}/{name}" for model in among]
@@ -96,11 +97,12 @@ def _learning(study, measured, folder):
         stage("build_dataset", ["dataset/manifest.csv"], disk / measured["write_mb_per_s"], "build_dataset/*.tsv", disk),
         stage("search_hyperparameters", learnt("search.csv"), search_s, "search_hyperparameters/*.tsv"),
         *([stage("find_learning_rate", learnt("rate.json"), _rates_s(times["printed"], values, sizes), "find_learning_rate/*.tsv")]
-          if "printed" in (own, beside) and values.training.learning_rate == "found" else []),
-        stage(f"train_cnn, {own}", learnt("model.pt"), _training_s(times[_form(own)], own, values, sizes), "train_cnn/*.tsv"),
+          if "printed" in (chosen, beside) and values.training.learning_rate == "found" else []),
+        stage(f"train_cnn, {chosen}", learnt("model.pt"), _training_s(times[_form(chosen)], chosen, values, sizes),
+              "train_cnn/*.tsv"),
         stage(f"train_beside, {beside}", learnt(f"{beside}/model.pt"), _training_s(times[beside], beside, values, sizes),
               "train_beside/*.tsv"),
-        stage("evaluate", ["evaluation/summary.csv"], len(models) * score[_form(own)], "evaluate/*.tsv"),
+        stage("evaluate", ["evaluation/summary.csv"], len(models) * score[_form(chosen)], "evaluate/*.tsv"),
         stage("compare_networks", ["tables/networks.csv"], len(models) * sum(score.values()), "compare_networks/*.tsv"),
         *([stage("repeat_learning", learnt("seeds.csv"), _repeats_s(times, values, sizes), "repeat_learning/*.tsv")]
           if values.learning.seeds > 1 else []),
@@ -158,8 +160,8 @@ def _curve_s(times, values, sizes):
     return total
 
 
-def _own_press_s(folder, model, jobs):
-    """The same for one press of a model, several of which may share a job; jobs: [[Item]]."""
+def _finished_press_s(folder, model, jobs):
+    """Mean wall time of a model's finished presses, or None; several presses may share a job; jobs: [[Item]]."""
     seconds, presses = 0.0, 0
     for items in jobs:
         stage = "simulate_press" if len(items) == 1 else "simulate_presses"

@@ -55,7 +55,7 @@ class Camera(Section):
 
 
 class GlassMesh(Section):
-    """Resolution of the frustum on glass; what is not said is the default for its shape."""
+    """Resolution of the frustum on glass; what is not stated is the default for its shape."""
 
     frustum_heights: Annotated[list[float], AfterValidator(_rising)] | None = Field(
         None, description="heights of its layers of elements, from 0 to 1")
@@ -156,7 +156,7 @@ class CatalogueEntry(Section):
 
 
 class Mesh(Section):
-    """Resolution of a model's mesh, and the scatter of its frusta; what is not said is the model's own default."""
+    """Resolution of a model's mesh, and the scatter of its frusta; what is not stated is the model's default."""
 
     preset: Literal["default", "draft", "stable", "fine"] | None = Field(
         None, description="mesh and tolerances, which the other keys change (docs/explanation/discretisation.md)")
@@ -192,7 +192,7 @@ class Mesh(Section):
 
 
 class OwnFriction(Section):
-    """A model's own coefficients of Coulomb friction, in place of the sensor's."""
+    """A model's coefficients of Coulomb friction, in place of the sensor's."""
 
     object: NotNegative = Field(0.0, description="of the object on the cover")
     board: NotNegative = Field(0.0, description="of the frusta on the board; needs tips that are not held")

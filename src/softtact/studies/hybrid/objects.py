@@ -67,7 +67,7 @@ def make_item(entry: CatalogueEntry, pose_name: str, pose: list[float] | None, *
 
 
 def check_shapes(items_of: dict[str, dict[str, Item]]) -> None:
-    """Refuse a mesh that stands in two sets, be it under two names: a test must not hold a shape that training saw."""
+    """Refuse a mesh in two sets, even under two names: a test must not hold a shape that training saw."""
     seen: dict[bytes, Item] = {}
     for item in (item for items in items_of.values() for item in items.values() if item.first):
         other = seen.setdefault(Path(item.file).read_bytes(), item)
@@ -77,7 +77,7 @@ def check_shapes(items_of: dict[str, dict[str, Item]]) -> None:
 
 
 def _dealt(chosen, objects, *, where):
-    """How many poses are drawn for each object of a set, so that there are as many presses as it says."""
+    """How many poses are drawn for each object of a set, so that there are as many presses as it states."""
     listed = objects * len(chosen.poses)
     more = (chosen.presses or listed) - listed
     if more < 0:

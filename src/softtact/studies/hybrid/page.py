@@ -64,9 +64,10 @@ _WITH_VIEWS = ("fig4_complexity", "fig7_maps")
 _FOLDERS = ("presses", "tactile", "dataset", "learning", "evaluation", "section", "tables", "figures", "logs")
 PAPERS_SENSOR = "coro: "     # how the line on it begins
 PAPERS_INDENTERS, PAPERS_OBJECTS = 49, 12
-_OWN_READINGS = ("Readings are own recordings of a real sensor, not the paper's, so none of its numbers is judged on them. That a "
-                 "recorded object is that of its mesh, that it lay where the study presses it, and the order of the taxels are "
-                 "taken as stated: nothing here checks them.")
+_RECORDED_READINGS = (
+    "Readings are own recordings of a real sensor, not the paper's, so none of its numbers is judged on them. That a "
+    "recorded object is that of its mesh, that it lay where the study presses it, and the order of the taxels are taken as stated: "
+    "nothing here checks them.")
 # Errors of the meshes' maps at 50 N: root mean square, and at single points (docs/explanation/discretisation.md).
 MESH_ERRORS = {"draft": "2 to 5 % of its largest value in the root mean square and up to 10 % at single points",
                "default": "up to 2 % of its largest value in the root mean square and up to 5 % at single points"}
@@ -99,7 +100,7 @@ SOURCES_PAGE = "sources.html"
 
 
 def render_sources(paths: Iterable[str | Path], *, study: str, config: str, named: str, page: str) -> str:
-    """The page of the configuration (YAML texts) and of source files below src/, each under its own anchor."""
+    """The page of the configuration (YAML texts) and of source files below src/, each under an anchor."""
     sources = Page("Configuration and code of the study", study, folder=".")
     sources.text("As they were when the report was made.", links=[("", [("Report", page)])])
     sources.section("Configuration", anchor="config")
@@ -156,18 +157,19 @@ _CONFIGURATION = ("", [("Configuration", f"{SOURCES_PAGE}#config")])
 
 
 def _facts(settings):
-    said = {name: f"{settings[name]} {words} in {settings['presses'][name]} places, each read {settings['trials'][name]:.3g} times"
-            for name, words in (("indenters", "indenters"), ("unseen", "unseen ones"), ("grasps", "objects"))}
+    sets = (("indenters", "indenters"), ("unseen", "unseen ones"), ("grasps", "objects"))
+    pressed = [f"{settings[name]} {words} in {settings['presses'][name]} places, each read {settings['trials'][name]:.3g} times"
+               for name, words in sets]
     forces = ", ".join(f"{force:g}" for force in settings["forces_n"])
     reader = "from recordings of a TSF-85 (tactile/)" if recorded(settings) else "by the virtual sensor"
     another = "It is not the paper's sensor: the paper's numbers and claims below are another sensor's. "
     return (f"Sensor {settings['sensor']}. {'' if settings['sensor'].startswith(PAPERS_SENSOR) else another}"
-            f"Pressed at {forces} N with each model and read {reader}: {'; '.join(said.values())}. "
+            f"Pressed at {forces} N with each model and read {reader}: {'; '.join(pressed)}. "
             f"Seed {settings['seed']}.")
 
 
 def _archive_facts(settings, archive):
-    """What stands for the presses of a study on the published archive."""
+    """What replaces the presses of a study on the published archive."""
     items = archive["items"]
     return (f"Maps and readings are those of the published archive: {archive['tests_used']} of {archive['tests']} tests of "
             f"{len(items['indenters'])} indenters, {len(items['unseen'])} held-out ones (our choice: the paper does not name its "
@@ -196,7 +198,7 @@ def _synthetic(ftir, settings):
 
 
 def missing(settings: dict[str, Any], *, archive: bool) -> list[str]:
-    """Sentences on a study, of its own presses or of the published archive; settings as of the stage `report`."""
+    """Sentences on a study of presses, or of the published archive; settings as of the stage `report`."""
     return _beside_archive(settings) if archive else _of_presses(settings)
 
 
@@ -207,7 +209,7 @@ def recorded(settings: dict[str, Any]) -> bool:
 
 def _of_presses(settings):
     return ["No robot and no gripper: a grasp is a rigid object pressed on one sensor along its normal with a stated force.",
-            *([_OWN_READINGS] if recorded(settings) else []), _places(settings), _sizes(settings), *_mesh(settings["config"]),
+            *([_RECORDED_READINGS] if recorded(settings) else []), _places(settings), _sizes(settings), *_mesh(settings["config"]),
             _seeds(settings)]
 
 
@@ -269,7 +271,7 @@ def _summary(summary):
 
 
 def _in_words(frame):
-    """A table with what stands in files by name, in words."""
+    """A table with the names of its file in words."""
     frame = _summary(frame) if {"ssim_low", "ssim_high"} <= set(frame) else frame
     words = {"predictor": PREDICTORS, "kind": KINDS, "set": SETS}
     return frame.assign(**{name: frame[name].map(lambda value, known=known: known.get(value, value))

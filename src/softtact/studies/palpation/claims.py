@@ -14,7 +14,7 @@ def claims_of_probe(curves: pd.DataFrame, slopes: pd.DataFrame, hardness: pd.Dat
     """Data frame with `claim_rows.COLUMNS` from the tables of `softtact palpate`.
 
     curves: a row for each step;  slopes: for each tissue and scenario;  hardness: over load and height, or None
-    mesh_error: what the numbers of ours are worth, in words
+    mesh_error: the error of our numbers by the mesh, in words
     """
     rows = [_slope(slopes, tissue, printed, mesh_error) for tissue, printed in PRINTED_N_MM.items()]
     rows += [_slope(slopes, f"{tissue}{_MEASURED}", printed, mesh_error) for tissue, printed in PRINTED_N_MM.items()
@@ -32,13 +32,13 @@ def _moved(slopes, tissue):
 
 
 def _slope(slopes, tissue, printed, mesh_error):
-    own = _moved(slopes, tissue)
+    fit = _moved(slopes, tissue)
     rule = f"slope of the trend line within {_NEAR:.0%} of the printed one, both sides"
-    if own is None:
+    if fit is None:
         return row(f"F/d of {tissue}", "sec. IV, fig. 4", f"{printed} N/mm", "not run", UNDECIDED, rule, "tables/slopes.csv")
-    off = own.line_n_mm / printed - 1
-    ours = (f"{own.line_n_mm:.2f} N/mm ({off:+.1%}); F/d from {own.secant_least_n_mm:.2f} to {own.secant_largest_n_mm:.2f}, "
-            f"tangent at rest {own.initial_n_mm:.2f}")
+    off = fit.line_n_mm / printed - 1
+    ours = (f"{fit.line_n_mm:.2f} N/mm ({off:+.1%}); F/d from {fit.secant_least_n_mm:.2f} to {fit.secant_largest_n_mm:.2f}, "
+            f"tangent at rest {fit.initial_n_mm:.2f}")
     return row(f"F/d of {tissue}", "sec. IV, fig. 4", f"{printed} N/mm", ours, verdict_of(abs(off) <= _NEAR), rule,
                "tables/slopes.csv",
                uncertainty=mesh_error)
@@ -56,12 +56,12 @@ def _larger_deflection(curves):
 
 
 def _order(slopes, mesh_error):
-    own = [_moved(slopes, name) for name in _SOFT_FIRST]
+    fits = [_moved(slopes, name) for name in _SOFT_FIRST]
     claim, paper = "F/d ranks the rubbers by hardness", "Ecoflex 00-30 below Dragon Skin 20"
     rule = "slope of the trend line of the harder rubber larger"
-    if any(part is None for part in own):
+    if any(part is None for part in fits):
         return row(claim, "sec. IV", paper, "not run", UNDECIDED, rule, "tables/slopes.csv")
-    soft, hard = (part.line_n_mm for part in own)
+    soft, hard = (part.line_n_mm for part in fits)
     return row(claim, "sec. IV", paper, f"{soft:.2f} and {hard:.2f} N/mm", verdict_of(bool(soft < hard)), rule, "tables/slopes.csv",
                uncertainty=mesh_error)
 
@@ -69,9 +69,9 @@ def _order(slopes, mesh_error):
 def _property(slopes, mesh_error):
     moved = slopes[(slopes.scenario == "displacement") & slopes.tissue.isin(_SOFT_FIRST)]
     change = (moved.secant_largest_n_mm / moved.secant_least_n_mm - 1).max()
-    said = "; ".join(f"{own.tissue}: {own.secant_least_n_mm:.2f} to {own.secant_largest_n_mm:.2f} N/mm"
-                     for own in moved.itertuples())
-    return row("F/d is a property of the tissue, whatever the load", "eq. 3, 4", "a constant of the material", said,
+    ranges = "; ".join(f"{one.tissue}: {one.secant_least_n_mm:.2f} to {one.secant_largest_n_mm:.2f} N/mm"
+                       for one in moved.itertuples())
+    return row("F/d is a property of the tissue, whatever the load", "eq. 3, 4", "a constant of the material", ranges,
                verdict_of(change <= _CONSTANT), f"F/d of a tissue changes by {_CONSTANT:.0%} at most over the sweep",
                "tables/slopes.csv",
                uncertainty=mesh_error)
@@ -94,8 +94,8 @@ def _one_load(curves):
 def _height(hardness):
     last = hardness[hardness.jaw_mm == hardness.jaw_mm.max()]
     change = last.groupby("tissue").relative_hardness_n_mm.agg(lambda values: values.max() / values.min() - 1)
-    said = "; ".join(f"{name}: changes by {value:.1%}" for name, value in change.items())
-    return row("F/d does not depend on the tissue's height", "eq. 3", "not claimed: C is for one geometry", said,
+    changes = "; ".join(f"{name}: changes by {value:.1%}" for name, value in change.items())
+    return row("F/d does not depend on the tissue's height", "eq. 3", "not claimed: C is for one geometry", changes,
                verdict_of(bool(change.max() <= _CONSTANT)),
                f"F/d at the same way of the jaw changes by {_CONSTANT:.0%} at most over the heights", "tables/hardness.csv",
                uncertainty="the same mesh sizes")

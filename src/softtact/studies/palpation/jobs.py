@@ -17,7 +17,7 @@ import numpy as np
 from softtact.probe.design import PalpationDesign, check_design
 from softtact.studies.jobs import Job, figure_files, files_made
 
-_COARSER = 2.0     # times the mesh's sizes: the second mesh that tells the mesh error
+_COARSER = 2.0     # times the mesh's sizes: the second mesh, for the mesh error
 _OF_STUDIES = {"variants", "variant_steps", "hardness", "search", "load_n", "displacement_mm"}     # a sweep does without
 
 
@@ -63,7 +63,7 @@ def _sweep(design: PalpationDesign, folder: str, name: str, tissue: str, scenari
 def _of_one_tissue(design: PalpationDesign, tissue: str) -> dict[str, Any]:
     """The values that a sweep over a tissue uses of a design."""
     values = design.model_dump(mode="json", exclude=_OF_STUDIES, exclude_none=True)
-    steps = {"to": 0.5 * design.geometry.tissue_height, "by": 1.0}     # the model asks for both, and a sweep states its own
+    steps = {"to": 0.5 * design.geometry.tissue_height, "by": 1.0}     # the model needs both; the settings hold a sweep's steps
     return values | {"tissues": {tissue: values["tissues"][tissue]}, "load_n": steps, "displacement_mm": steps}
 
 
@@ -81,7 +81,7 @@ def _coarse_sweeps(design, folder):
 
 
 def _variant_sweeps(design, folder):
-    """{(variant, tissue): job} under each variant's assumptions, and under the design's own, by fewer steps."""
+    """{(variant, tissue): job} under each variant's assumptions, and under the design's, by fewer steps."""
     if not design.variants:
         return {}
     found = {}

@@ -176,12 +176,12 @@ def _of_neighbours(layout: Layout, foam: Elastomer, threads: int) -> Iterator[di
 def _in_print(elastomers: Mapping[str, Elastomer]) -> Iterator[dict[str, str]]:
     tips = read_yaml(DATA / "fingertips.yaml", missing="the package is not complete; install it again.")
     means = {task: (np.mean(values["areas_mm2"]), values["average_mm2"]) for task, values in tips.items()}
-    agree = all(abs(own - printed) <= 0.05 for own, printed in means.values())
+    agree = all(abs(mean - printed) <= 0.05 for mean, printed in means.values())
     yield row(
         "The averages of table I are those of its rows",
         "first, table I",
         ", ".join(f"{printed:g}" for _, printed in means.values()),
-        ", ".join(f"{own:.2f}" for own, _ in means.values()) + " mm2, of nine rows; the later paper tells of twelve subjects",
+        ", ".join(f"{mean:.2f}" for mean, _ in means.values()) + " mm2, of nine rows; the later paper tells of twelve subjects",
         CONSISTENT if agree else CONTRADICTION,
         "within rounding",
         "tables/claims.csv",

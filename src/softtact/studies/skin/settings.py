@@ -1,4 +1,4 @@
-"""What a stage's settings stand for: parts of a design by their names, materials and converter by their fields."""
+"""Objects from a stage's settings: parts of a design by their names, materials and converter by their fields."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -115,7 +115,7 @@ def _compared(inputs):
 
 
 def _facts(data, readings, mesh, spec):
-    """What a row of the table says of a grasp that was done."""
+    """The values of a row of the table, for a grasp that was done."""
     from softtact.geometry.meshes import place
     from softtact.robot.events import pose_of, set_down
 

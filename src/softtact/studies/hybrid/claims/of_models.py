@@ -50,7 +50,7 @@ def claims_of_choice(complexity: pd.DataFrame, *, choose: Callable[..., str], pr
 
 
 def _sent_to_the_printed_models(complexity, printed_counts):
-    """Only objects whose counts are those of table 2 test the claim; others are objects of our own with the same names."""
+    """Only objects whose counts are those of table 2 test the claim; others are objects of this study with the same names."""
     ours = complexity.set_index("object")
     known = [name for name in printed_counts if name in ours.index]
     alike = [name for name in known if set(_COUNTS) <= set(ours) and
@@ -58,20 +58,20 @@ def _sent_to_the_printed_models(complexity, printed_counts):
     agree = {name: ours.model[name] == printed_counts[name][4] for name in known}
     claim = "The objects of figure 7 are sent to the printed models"
     rule = f"at least {FEW} objects with table 2's four counts within {ALIKE:.0%}, all choices equal"
-    told = (f"objects with the printed counts: {len(alike)}; of our own objects of the printed kinds, with other meshes, "
+    shown = (f"objects with the printed counts: {len(alike)}; of our own objects of the printed kinds, with other meshes, "
             f"{sum(agree.values())} of {len(known)} get the printed model")
     verdict = verdict_of(all(agree[name] for name in alike)) if len(alike) >= FEW else UNDECIDED
-    return row(claim, "table 2", "1-4 elastic, 5-6 hyperelastic", told, verdict, rule, "tables/table2_complexity.csv",
+    return row(claim, "table 2", "1-4 elastic, 5-6 hyperelastic", shown, verdict, rule, "tables/table2_complexity.csv",
                uncertainty="none: counts")
 
 
 def _rising_detail(footprint_mm):
     family = detail_family(footprint_mm=footprint_mm)
     growth = {name: family[name].iloc[-1] / family[name].iloc[0] for name in _COUNTS}
-    told = ", ".join(f"{name} {family[name].iloc[0]} to {family[name].iloc[-1]}" for name in _COUNTS)
+    shown = ", ".join(f"{name} {family[name].iloc[0]} to {family[name].iloc[-1]}" for name in _COUNTS)
     holds = max(growth["CHt"], growth["CHo"]) < 1.5 and min(growth["NPt"], growth["NPo"]) > 3
     return row("With rising detail NPt and NPo grow, while CHt and CHo stay", "sec. 3.3.1, fig. 4", "two objects",
-               f"plates with {FAMILY[0]}, then up to {FAMILY[-1]} pits along a side: {told}", verdict_of(holds),
+               f"plates with {FAMILY[0]}, then up to {FAMILY[-1]} pits along a side: {shown}", verdict_of(holds),
                "over our family of plates NPt and NPo grow more than threefold, CHt and CHo by less than half", "tables/claims.csv",
                uncertainty="none: counts")
 
@@ -110,7 +110,7 @@ def _hybrid(complexity, ssim, timing, source):
     if scores is None or times is None:
         return [row(claim, "title, sec. 5", "a trade-off", f"no press of both models, {source}", UNDECIDED, rule,
                     "evaluation/ssim.csv")]
-    told = ", ".join(f"{name} SSIM {scores[name]:.3f} in {times[name]:.2f} s a map" for name in ("hybrid", "hyperelastic",
+    shown = ", ".join(f"{name} SSIM {scores[name]:.3f} in {times[name]:.2f} s a map" for name in ("hybrid", "hyperelastic",
                                                                                                  "elastic"))
     better, worse = max(scores["hyperelastic"], scores["elastic"]), min(scores["hyperelastic"], scores["elastic"])
     level = better - worse <= LEVEL
@@ -118,7 +118,7 @@ def _hybrid(complexity, ssim, timing, source):
                                                     or scores["hybrid"] > worse + LEVEL) and times["hybrid"] < times["hyperelastic"]
     open_ = level or scores["objects"] < FEW or not 0 < scores["hyper_objects"] < scores["objects"]
     alike = " Both models read alike here, so that accuracy decides nothing." if level else ""
-    return [row(claim, "title, sec. 5", "a trade-off", f"{told}, {source}.{alike}",
+    return [row(claim, "title, sec. 5", "a trade-off", f"{shown}, {source}.{alike}",
                 UNDECIDED if open_ else verdict_of(holds), rule, "evaluation/ssim.csv",
                 uncertainty=f"{scores['objects']} objects, {scores['hyper_objects']} of them sent to the hyperelastic model")]
 
@@ -159,10 +159,10 @@ def _lower_feature(table, name):
     elastic, hyper = (table.loc[(name, model)] for model in ("elastic", "hyperelastic"))
     if not elastic.lower_points:
         return row(claim, "sec. 4.2, fig. 7", "by eye", "this object has no feature 0.5 mm lower", UNDECIDED, rule, _FEATURES)
-    told = ", ".join(f"{model} {one.lower_share:.2f} ({one.lower_mm:.3f} of {one.raised_mm:.3f} mm)"
+    shown = ", ".join(f"{model} {one.lower_share:.2f} ({one.lower_mm:.3f} of {one.raised_mm:.3f} mm)"
                      for model, one in (("elastic", elastic), ("hyperelastic", hyper)))
     spread = [one.lower_sd_mm / one.raised_mm for one in (elastic, hyper)]
-    return row(claim, "sec. 4.2, fig. 7", "by eye", f"share of the raised features at {hyper.force_n:g} N: {told}",
+    return row(claim, "sec. 4.2, fig. 7", "by eye", f"share of the raised features at {hyper.force_n:g} N: {shown}",
                verdict_of(elastic.lower_share < LOST and hyper.lower_share > KEPT), rule, _FEATURES,
                uncertainty=f"sd over {elastic.lower_points:.0f} points of the map: {spread[0]:.2f} and {spread[1]:.2f}")
 
@@ -173,8 +173,8 @@ def _reliefs(table):
     if not _known(table, [RELIEF]):
         return row(claim, "sec. 4.2, fig. 7", "by eye", "not pressed here", UNDECIDED, _PRESSES, _FEATURES)
     counts = {model: int(table.loc[(RELIEF, model)].features) for model in ("elastic", "hyperelastic")}
-    return row(claim, "sec. 4.2, fig. 7", "by eye", _told(counts), verdict_of(len(set(counts.values())) == 1 < counts["elastic"]),
-               rule, _FEATURES, uncertainty=_COUNTED)
+    return row(claim, "sec. 4.2, fig. 7", "by eye", _counted(counts),
+               verdict_of(len(set(counts.values())) == 1 < counts["elastic"]), rule, _FEATURES, uncertainty=_COUNTED)
 
 
 def _fewer_details(table, complexity):
@@ -184,7 +184,7 @@ def _fewer_details(table, complexity):
     if len(detailed) < 2:
         return row(claim, "sec. 4.2, fig. 7", "by eye", f"such objects in this study: {len(detailed)}", UNDECIDED, rule, _FEATURES)
     counts = {name: tuple(int(table.loc[(name, model)].features) for model in ("elastic", "hyperelastic")) for name in detailed}
-    return row(claim, "sec. 4.2, fig. 7", "by eye", "features, elastic and hyperelastic: " + _told(counts),
+    return row(claim, "sec. 4.2, fig. 7", "by eye", "features, elastic and hyperelastic: " + _counted(counts),
                verdict_of(all(few < many for few, many in counts.values())), rule, _FEATURES, uncertainty=_COUNTED)
 
 
@@ -198,7 +198,7 @@ def _tenfold(table, complexity):
     if min(len(above), len(below)) < 2:
         return row(claim, "sec. 4.2, table 2", "by eye", f"objects above: {len(above)}, below: {len(below)}", UNDECIDED, rule,
                    _FEATURES)
-    return row(claim, "sec. 4.2, table 2", "by eye", f"features above: {_told(above)}; below: {_told(below)}",
+    return row(claim, "sec. 4.2, table 2", "by eye", f"features above: {_counted(above)}; below: {_counted(below)}",
                verdict_of(min(above.values()) > max(below.values())), rule, _FEATURES, uncertainty=_COUNTED)
 
 
@@ -213,7 +213,8 @@ def _large_strain(features):
                verdict_of(shares.min() > LARGE_STRAIN), rule, _FEATURES, uncertainty=f"range over {len(shares)} objects")
 
 
-def _told(counts):
+def _counted(counts):
+    """Counts of features by object or model, in words."""
     return ", ".join(f"{name.replace('_', ' ')} {value[0]} and {value[1]}" if isinstance(value, tuple)
                      else f"{name.replace('_', ' ')} {value}" for name, value in counts.items())
 

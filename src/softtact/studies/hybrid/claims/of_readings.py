@@ -85,9 +85,9 @@ def _smooth_read_better(ssim, source):
         return row(claim, "sec. 4.2", "by eye", f"{len(means)} of 5 objects are in this study", UNDECIDED, rule,
                    "evaluation/ssim.csv")
     smooth, stepped = means.loc[SMOOTH], means.loc[STEPPED]
-    told = ", ".join(f"{model} {smooth[model].mean():.3g} against {stepped[model].mean():.3g}" for model in ("hyperelastic",
+    shown = ", ".join(f"{model} {smooth[model].mean():.3g} against {stepped[model].mean():.3g}" for model in ("hyperelastic",
                                                                                                              "elastic"))
-    return row(claim, "sec. 4.2", "by eye", f"mean error over the mean reading: {told}, {source}",
+    return row(claim, "sec. 4.2", "by eye", f"mean error over the mean reading: {shown}, {source}",
                verdict_of(all(smooth[model].mean() < stepped[model].mean() for model in ("hyperelastic", "elastic"))), rule,
                "evaluation/ssim.csv", uncertainty=f"largest of the smooth ones {smooth.to_numpy().max():.3g}, least of the others "
                f"{stepped.to_numpy().min():.3g}; 5 objects")
@@ -183,8 +183,8 @@ def _falls(ssim, source, summary):
     if not np.isfinite(list(means.values())).all() or min(_items(ssim, name) for name in sets) < FEW:
         return row(claim, "sec. 4.2", printed, f"a model, or a set of {FEW} items, is missing, {source}", UNDECIDED, rule,
                    "evaluation/summary.csv")
-    told = "; ".join(f"{model} {', '.join(f'{value:.2f}' for value in values)}" for model, values in means.items())
-    return row(claim, "sec. 4.2", printed, f"{told}, {source}",
+    shown = "; ".join(f"{model} {', '.join(f'{value:.2f}' for value in values)}" for model, values in means.items())
+    return row(claim, "sec. 4.2", printed, f"{shown}, {source}",
                verdict_of(all(first > second > third for first, second, third in means.values())), rule, "evaluation/summary.csv",
                uncertainty="grasps: " + " and ".join(_interval(summary, model=model, set="grasps") for model in means))
 
@@ -224,9 +224,9 @@ def _like_searches(searches):
     one, other = (np.array(values, dtype=float) for values in widths.values())
     trials = min(searches[model].get("trials", 0) for model in widths)
     holds = len(one) == len(other) and bool((np.maximum(one / other, other / one) <= LIKE).all())
-    told = "; ".join(f"{model} {', '.join(map(str, values[:-1]))} filters and {values[-1]} neurons" for model,
+    shown = "; ".join(f"{model} {', '.join(map(str, values[:-1]))} filters and {values[-1]} neurons" for model,
                      values in widths.items())
-    return row(claim, where, "consistently", told,
+    return row(claim, where, "consistently", shown,
                verdict_of(holds) if trials > RANDOM_TRIALS else UNDECIDED, rule, "learning/",
                uncertainty=f"one search of {trials} trials each; their losses are in search.csv")
 
@@ -236,8 +236,8 @@ def _repeated(repeated):
     rule = "a press done twice gives the same map to the last bit, with each model"
     if not repeated:
         return row(claim, where, "deterministic", "no press was done twice", UNDECIDED, rule, "repeated/")
-    told = ", ".join(f"{model} {value:.3g} mm" for model, value in repeated.items())
-    return row(claim, where, "deterministic", f"largest difference of one object's maps: {told}",
+    shown = ", ".join(f"{model} {value:.3g} mm" for model, value in repeated.items())
+    return row(claim, where, "deterministic", f"largest difference of one object's maps: {shown}",
                verdict_of(not any(repeated.values())),
                rule, "repeated/", uncertainty="none: one object pressed twice on one machine")
 
@@ -264,6 +264,6 @@ def _second_sensor(sensor, untrained, source):
                    f"this study is of the paper's sensor ({sensor}); config/second_sensor.yaml is of another",
                    UNDECIDED, rule, "evaluation/verdicts.json")
     bad = ", ".join(sorted({f"{one.predictor} of {one.model}" for one in untrained.itertuples()}))
-    told = f"{bad} do not" if bad else "all networks do"
-    return row(claim, where, "future work", f"sensor {sensor}: {told}, {source}", verdict_of(untrained.empty), rule,
+    shown = f"{bad} do not" if bad else "all networks do"
+    return row(claim, where, "future work", f"sensor {sensor}: {shown}, {source}", verdict_of(untrained.empty), rule,
                "evaluation/verdicts.json", uncertainty="one seed")

@@ -18,9 +18,9 @@ def draw(curves: "pd.DataFrame", ceiling: "pd.DataFrame") -> "Figure":
     figure, panels = plt.subplots(1, len(sets), figsize=(3.6 * len(sets), 4.2), sharey=True, squeeze=False, layout="constrained")
     for axes, name in zip(panels[0], sets, strict=True):
         _draw_set(axes, curves[curves["set"] == name])
-        own = ceiling[ceiling["set"] == name].ssim.mean()
-        if own == own:     # a sensor that was read once has none
-            axes.axhline(own, color="k", lw=1, ls=":", label="sensor against itself")
+        repeated = ceiling[ceiling["set"] == name].ssim.mean()
+        if repeated == repeated:     # a sensor that was read once has none
+            axes.axhline(repeated, color="k", lw=1, ls=":", label="sensor against itself")
         axes.set(title=name, xlabel="training maps with their readings", xscale="log")
         sizes = sorted(curves.maps.unique())
         axes.set_xticks(sizes, sizes, rotation=45)

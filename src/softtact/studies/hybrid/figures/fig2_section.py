@@ -58,8 +58,8 @@ def _draw_layers(axes, polygons, region):
     from matplotlib.collections import PolyCollection
 
     for name in REGIONS:
-        own = [polygon for polygon, where in zip(polygons, region, strict=True) if where == LAYERS[name]]
-        axes.add_collection(PolyCollection(own, facecolor=_COLOURS[name], edgecolor="0.75" if name == "frusta" else "0.5",
+        of_layer = [polygon for polygon, where in zip(polygons, region, strict=True) if where == LAYERS[name]]
+        axes.add_collection(PolyCollection(of_layer, facecolor=_COLOURS[name], edgecolor="0.75" if name == "frusta" else "0.5",
                                            linewidths=0.1, zorder=2))
 
 

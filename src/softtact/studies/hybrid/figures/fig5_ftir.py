@@ -8,9 +8,9 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-_MODEL, _MEASURED = "#1f4e79", "#e08214"     # apart in grey and to the colour-blind; markers tell them too
+_MODEL, _MEASURED = "#1f4e79", "#e08214"     # apart in grey and to the colour-blind; markers differ, too
 _STROKES = (("--", 1.0), ((0, (1, 4)), 2.4), ("-", 0.7), ("-.", 1.0))     # two that coincide are both seen
-_FAR = 1.5                                   # times the largest area of the main curves: drawn in a panel of its own above
+_FAR = 1.5                                   # times the largest area of the main curves: drawn in a separate panel above
 
 
 def draw(area: "pd.DataFrame", summary: dict[str, Any], *, orientations: "pd.DataFrame | None" = None) -> "Figure":

@@ -1,4 +1,4 @@
-"""Figure 6: SSIM per grasped object for each model, with box plots over maps and trials, the sensor's own ceiling, and the
+"""Figure 6: SSIM per grasped object for each model, with box plots over maps and trials, the sensor's ceiling, and the
 predictors without a network.
 """
 
@@ -41,8 +41,8 @@ def draw(ssim: "pd.DataFrame", ceiling: "pd.DataFrame", baselines: "pd.DataFrame
 def _draw_baselines(axis, rows, items):
     """A mark for each predictor and item."""
     models = sorted(rows.model.unique())
-    own = rows[rows.model == (SHOWN_MODEL if SHOWN_MODEL in models else models[0])]
-    means = own.groupby(["predictor", "item"]).ssim.mean()
+    shown = rows[rows.model == (SHOWN_MODEL if SHOWN_MODEL in models else models[0])]
+    means = shown.groupby(["predictor", "item"]).ssim.mean()
     for name, mark in BASELINES.items():
         if name in means.index.get_level_values("predictor"):
             axis.plot(np.arange(len(items)), means[name].reindex(items), mark, color="#b03060", ms=6 if mark != "_" else 16,
@@ -53,16 +53,16 @@ def _draw_set(axis, rows, ceiling, name):
     items, models = sorted(rows.item.unique()), sorted(rows.model.unique(), reverse=True)
     width = 0.8 / len(models)
     for m, model in enumerate(models):
-        own = rows[rows.model == model]
-        groups = [own[own.item == item].ssim.to_numpy() for item in items]
+        of_model = rows[rows.model == model]
+        groups = [of_model[of_model.item == item].ssim.to_numpy() for item in items]
         at = np.arange(len(items)) + (m - 0.5 * (len(models) - 1)) * width
         axis.bar(at, [g.mean() if len(g) else 0 for g in groups], width, color=colour(model), alpha=0.55,
                  label=model)
         axis.boxplot(groups, positions=at, widths=0.6 * width, manage_ticks=False, showfliers=False,
                      medianprops={"color": "k"})
-    own = [ceiling[ceiling.item == item].ssim.mean() for item in items]
-    if np.isfinite(own).any():     # an archive does not say which readings repeat which
-        axis.plot(np.arange(len(items)), own, "k_", ms=14, label="sensor against itself")
+    repeated = [ceiling[ceiling.item == item].ssim.mean() for item in items]
+    if np.isfinite(repeated).any():     # an archive does not state which readings repeat which
+        axis.plot(np.arange(len(items)), repeated, "k_", ms=14, label="sensor against itself")
     axis.set_xticks(range(len(items)), [i.replace("_", " ") for i in items], rotation=60, ha="right")
     means = ", ".join(f"{rows[rows.model == model].ssim.mean():.2f}" for model in models)
     axis.set_title(f"{name}\nn = {len(rows) // len(models)}, means {means}", fontsize=9)

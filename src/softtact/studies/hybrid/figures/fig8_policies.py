@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 CALIBRATION_SET = "indenters"
 _BELOW = {"xytext": (0, -8), "ha": "center", "va": "top"}
 _ABOVE = {"xytext": (5, 5), "ha": "left", "va": "bottom"}
-# Mark, colour, meaning and where its texts stand, of each kind of policy; below and above, so that near ones stay apart.
+# Mark, colour, meaning and position of its texts, of each kind of policy; below and above, so that near ones stay apart.
 _KINDS = {"always": ("s", "0.45", "always the same model", _BELOW), "paper": ("D", "#b22222", "the paper's rule", _ABOVE),
           "error": ("o", "#1f7a4d", "by expected error, tolerance of", _ABOVE)}
 
@@ -52,7 +52,7 @@ def _places(policies, *, width):
 
 
 def _in_short(names):
-    """What tells policies of one kind apart: a model, or tolerances in rising order."""
+    """What distinguishes policies of one kind: a model, or tolerances in rising order."""
     if not names[0].startswith("error"):
         return ", ".join(name.removeprefix("always ") for name in names if name != "paper")
     return ", ".join(f"{tolerance:g}" for tolerance in sorted(float(name.split()[1]) for name in names)) + " um"

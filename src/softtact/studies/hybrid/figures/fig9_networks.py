@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-# An architecture is told by hatch and line, a model by its colour: apart in grey too.
+# Hatch and line mark the architecture, colour the model: they differ in grey, too.
 HATCHES = {"printed": "", "searched": "..", "compact": "////"}
 NO_INTERVAL = "one item:\nno interval"
 

@@ -13,7 +13,7 @@ from softtact.reporting.style import pyplot, save
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# The best laws get a line of their own; more would hide each other. Colours that differ in grey, and line styles beside them.
+# The best laws get a line each; more would hide each other. Colours that differ in grey, and line styles beside them.
 _LINES = (("#000000", "-"), ("#1f77b4", "--"), ("#e08214", "-."), ("#3f9c6d", ":"), ("#b2abd2", (0, (3, 1, 1, 1, 1, 1))))
 _BEYOND = 0.15      # of the window: so far beyond it go data and lines
 _MODE_COLOURS = {"uniaxial": "#1f4e79", "equibiaxial": "#e08214", "planar": "#3f9c6d"}

@@ -1,6 +1,6 @@
 """A section through the pressed sensor: the material that lies in a plane y = const at rest, and where the press takes it.
 
-The curved elements are cut into small straight ones by their own shape functions, with their displacements; a plane of VTK's
+The curved elements are cut into small straight ones by their shape functions, with their displacements; a plane of VTK's
 then cuts these. No picture is rendered here.
 """
 

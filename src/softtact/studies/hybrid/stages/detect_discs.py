@@ -1,7 +1,7 @@
 """Frames of the virtual dielectric's contact, and the discs found in them.
 
 inputs: states (virtual_dielectric.nc);  outputs: images (folder), discs (CSV)
-settings: camera {pixel_mm, blur_mm, noise, falloff}, sensor footprint is the frusta's own extent, seed
+settings: camera {pixel_mm, blur_mm, noise, falloff}, seed; the footprint is the extent of the frusta
 """
 
 from typing import Any

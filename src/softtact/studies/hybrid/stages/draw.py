@@ -95,7 +95,7 @@ def draw_fig5_ftir(*, inputs: Named, outputs: Named, settings: Named, threads: i
 
 
 def draw_fig6_ssim(*, inputs: Named, outputs: Named, settings: Named, threads: int = 1) -> None:
-    """Figure 6: SSIM of each object, whose presses in several places stand together.
+    """Figure 6: SSIM of each object, the presses in several places together.
 
     inputs: ssim, ceiling, baselines;  settings: ssim {window, data_range}
     """

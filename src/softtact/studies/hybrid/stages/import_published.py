@@ -32,15 +32,15 @@ from softtact.sensors.specification import SensorSpec
 if TYPE_CHECKING:
     from softtact.published.table import Outliers
 
-TOLD = 20   # findings in the log; all stand in the table
+LISTED = 20   # findings in the log; the table has all
 
 
 def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Read, pair and check the archive, say what is odd, and write what is usable."""
+    """Read, pair and check the archive, report outliers, and write what is usable."""
     sensor = SensorSpec.from_dict(settings["sensor"])
     check_sensor(sensor)
     tables = read_archive(find_archive(settings["folder"], models=settings["models"], variant=settings["variant"]))
-    tell(tables.outliers)
+    announce_outliers(tables.outliers)
     tests = sum(map(len, tables.paths().values()))
     tables.outliers.refuse(tests, outliers=settings["outliers"], largest_share=settings["largest_outlier_share"])
     items = items_of(tables, unseen=settings["unseen"], without=settings["without"])
@@ -60,12 +60,12 @@ def check_sensor(sensor: SensorSpec) -> None:
                          f"{TAXELS} taxels and maps of {MAP_ROWS} x {MAP_COLUMNS}: use the sensor 'coro'.")
 
 
-def tell(outliers: "Outliers") -> None:
-    """What is odd, on the screen and in the log."""
-    for finding in outliers.findings[:TOLD]:
+def announce_outliers(outliers: "Outliers") -> None:
+    """Write the outliers to the screen and the log."""
+    for finding in outliers.findings[:LISTED]:
         announce(f"{finding} ({finding.done})")
-    if len(outliers.findings) > TOLD:
-        announce(f"and {len(outliers.findings) - TOLD} more outliers")
+    if len(outliers.findings) > LISTED:
+        announce(f"and {len(outliers.findings) - LISTED} more outliers")
 
 
 def inventory(tables: Tables, items: dict[tuple[str, str], list[tuple[str, PairedTest]]], *, tests: int, sensor: SensorSpec,

@@ -1,4 +1,4 @@
-"""Test curves of a material, one CSV per mode: made from a law, or gathered from the user's own files."""
+"""Test curves of a material, one CSV per mode: made from a law, or gathered from the user's files."""
 
 from typing import Any
 

@@ -51,6 +51,6 @@ def _differences(inputs):
     """{model: largest difference in mm of the maps of a press done twice}; None where nothing was pressed."""
     if "repeated" not in inputs:
         return None
-    again, first = (list(map(read_dataset, inputs[name])) for name in ("repeated", "pressed"))
+    second, first = (list(map(read_dataset, inputs[name])) for name in ("repeated", "pressed"))
     return {one.attrs["model"]: float(abs(one.deformation_map_mm.values - other.deformation_map_mm.values).max())
-            for one, other in zip(again, first, strict=True)}
+            for one, other in zip(second, first, strict=True)}

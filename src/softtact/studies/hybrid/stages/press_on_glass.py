@@ -2,8 +2,7 @@
 
 inputs: card;  outputs: state, virtual
 settings: sensor, forces_n, orientations, laws, constants (printed, fitted), orientation, law, virtual_law, height_scatter,
-tip_scatter,
-    mesh, seed
+    tip_scatter, mesh, seed
 """
 
 from typing import Any

@@ -24,7 +24,7 @@ _AXES = ("trial", "force", "row", "column")
 
 
 def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Write the counts at the study's forces on the way up and, where all recordings have it, on the way down."""
+    """Write the counts at the study's forces while the force rises and, where all recordings have it, while it falls."""
     spec, forces = SensorSpec.from_dict(settings["sensor"]), settings["forces_n"]
     recordings = inputs["recordings"]
     presses = [_read(path, log, forces, finger=finger, baseline=baseline, largest_counts=spec.largest_counts)

@@ -13,7 +13,7 @@ from softtact.sensors.specification import SensorSpec
 
 
 def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Read `trials` presses and write their counts on the way up, and on the way down."""
+    """Read `trials` presses and write their counts while the force rises and while it falls."""
     press = read_dataset(inputs["press"])
     item = f"{press.attrs['set']}/{press.attrs['item']}"
     counts = read_branches(SensorSpec.from_dict(settings["sensor"]), press.deformation_map_mm.values,

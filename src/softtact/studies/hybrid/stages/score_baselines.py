@@ -1,4 +1,4 @@
-"""Scores of the predictors without a network, which every score stands beside.
+"""Scores of the predictors without a network, with which every score is compared.
 
 inputs: train, validation, unseen, grasps (one per model each)
 outputs: baselines (CSV, a row for each sample and predictor), taxels (CSV, how far each taxel is excited by the indenters)

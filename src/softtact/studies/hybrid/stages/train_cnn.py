@@ -2,7 +2,7 @@
 
 inputs: train, validation, best (of the search), and rate where the printed network's is found by a trial
 outputs: model (the best epoch's weights), history, and timing where asked for; a checkpoint lies beside them meanwhile
-settings: training, network (its `architecture` says which is trained), ssim, seed, threads (by default those of the job)
+settings: training, network (its `architecture` names the trained one), ssim, seed, threads (by default those of the job)
 """
 
 from typing import Any
@@ -41,7 +41,7 @@ def run(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, 
 
 
 def write_results(outputs: dict[str, Any], training: Run, *, facts: dict[str, Any]) -> None:
-    """Write the best weights and the history; wall times, which no two runs share, go to a file of their own."""
+    """Write the best weights and the history; wall times, which no two runs share, go to a separate file."""
     best = training.best
     training.network.load_state_dict(best["weights"])
     save_network(outputs["model"], training.network,

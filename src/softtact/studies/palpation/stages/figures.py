@@ -30,11 +30,11 @@ def _plane_triangles(mesh: SolidMesh) -> tuple[np.ndarray, np.ndarray]:
     """Triangles (t, 3) of all elements (of a solid: of the section z = 0), and the four corners (e, 4) of each element."""
     triangles, corners = [], []
     for _, element, nodes in mesh.parts():
-        own = element.nodes
-        if own.shape[1] == 3:
+        local = element.nodes
+        if local.shape[1] == 3:
             front = np.abs(mesh.points[nodes][..., 2]).min(axis=1) < 1e-9
-            nodes, own = nodes[front][:, own[:, 2] < -0.5], own[own[:, 2] < -0.5, :2]
-        order = np.lexsort((own[:, 0], own[:, 1]))       # rows of rising y, each of rising x
+            nodes, local = nodes[front][:, local[:, 2] < -0.5], local[local[:, 2] < -0.5, :2]
+        order = np.lexsort((local[:, 0], local[:, 1]))       # rows of rising y, each of rising x
         grid = nodes[:, order]
         triangles.append(grid[:, np.array(_GRID)].reshape(-1, 3))
         corners.append(grid[:, [0, 2, 8, 6]])
@@ -80,8 +80,8 @@ def _shade_regions(ax, mesh):
 
     shades = {"tissue": "#f3d9c9", "beam": "#7f7f7f", "filler": "#cfe2f3", "lump": "#b34a4a"}
     for region, element, nodes in mesh.parts():
-        own = SolidMesh(mesh.points, ((region, element.meshio_name, nodes),), geometry=mesh.geometry)
-        _, corners = _plane_triangles(own)
+        part = SolidMesh(mesh.points, ((region, element.meshio_name, nodes),), geometry=mesh.geometry)
+        _, corners = _plane_triangles(part)
         ax.add_collection(PolyCollection(mesh.points[corners][..., :2], facecolors=shades.get(region, "#d9d9d9"), zorder=0))
 
 
@@ -99,11 +99,11 @@ def draw_curves(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: di
         if sweep.scenario == "load":
             left.plot(sweep.force_n, sweep.beam_deflection_mm, marker, ms=4, mfc="none", color=colour, label=_words(sweep.tissue))
             continue
-        own = slopes[(slopes.tissue == sweep.tissue) & (slopes.scenario == sweep.scenario)].iloc[0]
+        fit = slopes[(slopes.tissue == sweep.tissue) & (slopes.scenario == sweep.scenario)].iloc[0]
         right.plot(sweep.beam_deflection_mm, sweep.force_n, marker, ms=4, mfc="none", color=colour,
-                   label=f"{_words(sweep.tissue)}: {own.line_n_mm:.1f} N/mm, at rest {own.initial_n_mm:.1f}")
+                   label=f"{_words(sweep.tissue)}: {fit.line_n_mm:.1f} N/mm, at rest {fit.initial_n_mm:.1f}")
         ends = np.array([0.0, sweep.beam_deflection_mm[-1]])
-        right.plot(ends, own.intercept_n + own.line_n_mm * ends, "-", lw=0.8, color=colour)
+        right.plot(ends, fit.intercept_n + fit.line_n_mm * ends, "-", lw=0.8, color=colour)
     left.set(xlabel="load on the jaw, N", ylabel="deflection of the beam's middle, mm", title="Load (the paper's figure 3)")
     right.set(xlabel="deflection of the beam's middle, mm", ylabel="force on the jaw, N",
               title="Jaw moved (the paper's figure 4)")
@@ -136,8 +136,8 @@ def draw_hardness(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: 
     tissues, styles = list(dict.fromkeys(table.tissue)), ("-", "--", ":", "-.")
     heights = sorted(set(table.tissue_height_mm))
     for ax, (column, title) in zip(axes, titles.items(), strict=True):
-        for (tissue, height), own in table.groupby(["tissue", "tissue_height_mm"], sort=False):
-            ax.plot(own.force_n, own[column], styles[heights.index(height) % len(styles)], marker="o", ms=3,
+        for (tissue, height), rows in table.groupby(["tissue", "tissue_height_mm"], sort=False):
+            ax.plot(rows.force_n, rows[column], styles[heights.index(height) % len(styles)], marker="o", ms=3,
                     color=_COLOURS[tissues.index(tissue) % len(_COLOURS)], label=f"{_words(tissue)}, {height:g} mm")
         ax.set(xlabel="largest force of the sweep, N", ylabel=title, xscale="log", yscale="log",
                title=f"changes with load by up to {verdict(table, column).change_with_load:.0%}")

@@ -29,7 +29,7 @@ def solve_lumps(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: di
 
 
 def find_lumps(*, inputs: dict[str, Any], outputs: dict[str, Any], settings: dict[str, Any], threads: int = 1) -> None:
-    """Find hidden lumps again from noisy films.
+    """Find hidden lumps from noisy forces on the films.
 
     inputs: lumps (NetCDF);  outputs: detection, recovery (CSV), facts (JSON);  settings: design
     """

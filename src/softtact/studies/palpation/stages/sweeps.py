@@ -104,7 +104,7 @@ def _slope_row(found: Palpation) -> dict[str, Any]:
 
 @contextmanager
 def _watch(label):
-    """What tells progress now and then while a block runs."""
+    """A function that reports progress while a block runs."""
     watch = Watch(label)
     try:
         yield watch.beat

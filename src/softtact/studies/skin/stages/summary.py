@@ -1,4 +1,4 @@
-"""What all jobs of a skin's study tell together: the papers' claims, and the report."""
+"""The results of all jobs of a skin's study: the papers' claims, and the report."""
 
 from pathlib import Path
 from typing import Any
