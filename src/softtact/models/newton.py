@@ -1,7 +1,7 @@
-"""Newton's method with line search, once for all models.
+"""Newton's method with line search for all models.
 
-A model describes its balance as a `Problem`: what is out of balance, the step of its tangent, and whether a trial is better.
-What belongs to a model alone (a new projection of the contact, kept tangents, a factor for several steps) stays in its problem.
+A model describes its equilibrium as a `Problem`: the residual, the Newton step, and whether a trial state is better.
+Features of a single model (updates of the contact projection, cached tangents and factorisations) are in its problem.
 Reference: Nocedal and Wright, Numerical Optimization, 2nd ed., ch. 3.
 """
 
@@ -11,14 +11,14 @@ from typing import Any, Protocol
 
 import numpy as np
 
-HALVINGS = 10     # of a step, until it is given up
+HALVINGS = 10     # of a step, before the line search fails
 
 
 class Problem(Protocol):
-    """A balance to be found. States and steps are the model's own."""
+    """An equilibrium problem. The types of states and steps are those of the model."""
 
     def prepared(self, state: Any, iteration: int) -> Any:
-        """The state as an iteration sees it."""
+        """The state at an iteration's start, with updates such as a new contact projection."""
 
     def residual(self, state: Any) -> float:
         """Largest unbalanced force in N."""
@@ -27,30 +27,30 @@ class Problem(Protocol):
         """Whether the state is good enough."""
 
     def step(self, state: Any) -> tuple[Any, Any]:
-        """The state from which a step leads, and the step; None where the tangent gives none."""
+        """The state from which a step starts, and the step; None if it cannot be computed."""
 
     def first_share(self, step: Any) -> float:
         """The share of a step that is tried first."""
 
     def moved(self, state: Any, step: Any, share: float) -> Any:
-        """The state after a share of a step; None where there is none, as with an element inside out."""
+        """The state after a share of a step; None if it is invalid, for example with an inverted element."""
 
     def better(self, trial: Any, state: Any, residual: float) -> bool:
-        """Whether a trial is nearer to the balance than the state with its residual (N)."""
+        """Whether a trial is closer to equilibrium than the state with its residual (N)."""
 
     def accepted(self, state: Any, trial: Any) -> None:
-        """Take note that a trial has taken the state's place."""
+        """Called after a trial has replaced the state."""
 
     def recovered(self, state: Any) -> bool:
-        """Whether another step may lead on from a state whose step was of no use: say, with a new tangent."""
+        """Called after a failed line search: whether another step may help, for example with a new tangent."""
 
 
 @dataclass(frozen=True)
 class Solution:
-    """What Newton's method found."""
+    """The result of Newton's method."""
 
     state: Any
-    """The balanced state; None where none was found."""
+    """The equilibrium state; None if it was not found."""
     iterations: int
     """Steps that were taken."""
     residual_n: float
@@ -58,9 +58,9 @@ class Solution:
 
 
 def solve(problem: Problem, state: Any, *, max_iterations: int, nearly_n: float = 0.0) -> Solution:
-    """Balance of a problem, from a state on; `Solution.state` is None where it was not reached in so many iterations.
+    """Solve a problem from a start state; `Solution.state` is None without convergence in `max_iterations`.
 
-    nearly_n: where no larger force is unbalanced after these, as many follow
+    nearly_n: if the residual is at most this after these iterations, as many more follow
     """
     residual = float("inf")
     for iteration in range(2 * max_iterations):
@@ -81,7 +81,7 @@ def solve(problem: Problem, state: Any, *, max_iterations: int, nearly_n: float 
 
 
 def line_search(problem: Problem, state: Any, step: Any, residual: float) -> Any:
-    """The first better trial among the shares 1, 1/2, 1/4 ... of the first share of a step; None where none is better."""
+    """Backtracking: the first better trial among 1, 1/2, 1/4 ... of the first share of a step; None if none is better."""
     share = problem.first_share(step)
     for _ in range(HALVINGS):
         trial = problem.moved(state, step, share)
@@ -92,10 +92,10 @@ def line_search(problem: Problem, state: Any, step: Any, residual: float) -> Any
 
 
 def line_search_each(accept: Callable[[np.ndarray, float], np.ndarray], count: int, *, halvings: int) -> np.ndarray:
-    """The same for many small problems at once, each with a share of its own: which (count,) found a better trial.
+    """Backtracking for many small problems at once, each with a separate share: which (count,) found a better trial.
 
-    accept(waiting, share): tries a share of the steps of the problems with these numbers (k,), keeps what is better, and says
-    which (k,) it was
+    accept(waiting, share): tries a share of the steps of the problems with these numbers (k,), keeps better trials, and returns
+    which (k,) were better
     """
     waiting = np.arange(count)
     for halving in range(halvings):
@@ -106,9 +106,9 @@ def line_search_each(accept: Callable[[np.ndarray, float], np.ndarray], count: i
 
 
 def lowers_potential(before: float, after: float, scale: float) -> bool | None:
-    """Whether a potential falls; None where rounding hides the difference, so that the residuals have to decide.
+    """Whether a potential decreases; None if rounding hides the difference, so that the residuals have to decide.
 
-    scale: size of the terms that the potential is the sum of
+    scale: size of the terms whose sum is the potential
     """
     resolution = 1e-11 * scale
     change = after - before

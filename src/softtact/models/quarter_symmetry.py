@@ -1,9 +1,9 @@
-"""Linear layers under a rectangle: how the top moves under forces, from one quarter of the body. Side faces are held, from the top
-or from a depth on, or free.
+"""Compliance of linear layers under a rectangle, from one quarter of the body. Side faces are fixed, from the top or from a depth
+on, or free.
 
-The body is symmetric in x and y, so a load falls into four parts that are even or odd in x and in y. Each needs only the quarter
+The body is symmetric in x and y, so a load is the sum of four parts that are even or odd in x and in y. Each needs only the quarter
 x > 0, y > 0 with different conditions on the two planes of symmetry: four systems of a quarter of the size, and four blocks of
-compliance that hold a quarter of the numbers of the whole one.
+compliance with a quarter of the entries of the whole matrix.
 Parity (p, q): 0 even, 1 odd in x and y. With the blocks G_pq between places i, j of the quarter, and signs s, t of x and y:
     G(i s, j t) = 1/4 sum_pq (s_x t_x)^p (s_y t_y)^q G_pq(i, j)
 Elements: 27-node hexahedra with a discontinuous linear pressure (`solid_block`), which do not lock for nearly incompressible
@@ -75,7 +75,7 @@ class QuarterSlab:
     def below_top(self, boundary: int) -> np.ndarray:
         """Numbers (ny, nx) of the nodes in the plane over so many element layers that lie below those of the `top`.
 
-        Some may be on sides that are held there: `compliance` says that they do not move.
+        Some may be on sides that are fixed there: their compliance is zero.
         """
         return self.numbers[2 * boundary] if not self.side_held[-1] else self.numbers[2 * boundary, :-1, :-1]
 
@@ -135,7 +135,7 @@ class QuarterSlab:
                              shape=(len(points), len(self.x) * len(self.y)))
 
     def mean_forces(self, cells_of: Callable[[np.ndarray, np.ndarray], np.ndarray], count: int) -> list[sp.csr_matrix]:
-        """Membrane forces in N/mm, over cells of the plan, as functionals of the displacement: three matrices (count, unknowns).
+        """Membrane forces in N/mm of cells in the x-y plane as functionals of the displacement: three matrices (count, unknowns).
 
         cells_of(x, y): number of the cell at points of the quarter, -1 where there is none. The forces are the integrals over the
         height, averaged over the cell, of s_xx, s_yy and s_xy.
@@ -161,7 +161,7 @@ class QuarterSlab:
 
     def responses(self, stiffness: sp.csr_matrix, functionals: sp.csr_matrix, parity: tuple[int, ...], *, threads: int = 1,
                   dtype: type = np.float64) -> np.ndarray:
-        """What functionals (m, unknowns) of displacements do under unit loads that work on each of them (m, m), in one parity."""
+        """Values (m, m) of functionals (m, unknowns) of the displacement under their conjugate unit loads, in one parity."""
         free = self.free(parity)
         upper = sp.triu(stiffness, format="csr")[free][:, free]
         upper.sort_indices()
@@ -170,7 +170,7 @@ class QuarterSlab:
 
 
 def picked(some: np.ndarray, count: int) -> sp.csr_matrix:
-    """The functionals (k, count) that pick some unknowns (k,), by their numbers, of so many."""
+    """The functionals (k, count) that select unknowns (k,) by their numbers."""
     return sp.csr_matrix((np.ones(len(some)), some, np.arange(len(some) + 1)), shape=(len(some), count))
 
 
@@ -218,9 +218,9 @@ class ParityBlocks:
         """Displacements (l, 2 ny - 1, 2 nx - 1) over the whole rectangle under loads (c, l) at places as for `between`.
 
         shape: (rows, columns) of the quarter's nodes, whose numbers are those of the blocks' first places
-        every: only every so many-th of these nodes, the middle among them: ny along y and nx along x
+        every: stride along x and y among these nodes, starting at the middle: ny along y and nx along x
 
-        Parity by parity: the rectangle's matrix, four times as large as the quarter's blocks, is not put together.
+        Computed parity by parity, without the rectangle's matrix, which is four times as large as the quarter's blocks.
         """
         signs = np.where(column_signs < 0, -1.0, 1.0)
         (ny, nx), places = shape, self.blocks.shape[2]

@@ -1,8 +1,8 @@
 """Many presses of the elastic model at once: a column for each press and load step, on a GPU or on any device of torch.
 
-`press_layer` gathers a dense compliance among one object's points. Here all presses share the surface: a product is four dense
-matrices, one for each parity, of a quarter of the surface's nodes, with as many columns as there are. It takes some four times the
-operations, and is what a GPU is made for. The method is that of `contact.unilateral`, on torch's arrays.
+`press_layer` gathers a dense compliance among one object's points. Here all presses share the surface: a product uses four dense
+matrices, one for each parity, on a quarter of the surface's nodes and all columns. It takes about four times the operations, but
+suits a GPU. The method is that of `contact.unilateral`, with torch's arrays.
 """
 
 from collections.abc import Iterator, Sequence
@@ -45,7 +45,7 @@ class DeviceSurface:
         return 0.25 * _unfolded(even_y, odd_y, axis=0).reshape(rows * columns, -1)
 
     def precondition(self, x: torch.Tensor) -> torch.Tensor:
-        """About the inverse of `single`: the compliance's stencil."""
+        """Approximate inverse of `single`: the compliance's stencil."""
         rows, columns = self.shape
         reach = max(offset for offset, _ in self._offsets)
         around = torch.nn.functional.pad(x.reshape(rows, columns, -1), (0, 0, reach, reach, reach, reach))

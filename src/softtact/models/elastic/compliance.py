@@ -1,8 +1,8 @@
-"""The elastic model: one linear layer, held at its base and as the sensor's edge says; contact on the known compliance of its top.
+"""The elastic model: one linear layer, fixed at its base and as the sensor's edge states; contact by the compliance of its top.
 
-Of a sensor that is free below the sides alone are held, and the compliance holds the movements of its lower side, too.
-The vertical compliance of the top's nodes (mm/N) is computed once for a sensor (`elastic_compliance`), by quarters of the layer
-(`quarter_symmetry`). The nodes lie at half the map's spacing.
+In a sensor that is free below only the sides are fixed, and the compliance includes the displacements of the lower side.
+The vertical compliance of the top's nodes (mm/N) is computed once for a sensor (`elastic_compliance`), from quarters of the layer
+(`quarter_symmetry`). The nodes are at half the map's spacing.
 """
 
 from collections.abc import Sequence
@@ -30,10 +30,10 @@ _MARGIN = 8                           # nodes about these that it is computed wi
 
 @dataclass(frozen=True)
 class Compliance:
-    """What the top does under downwards forces, in mm/N: blocks by parity among the grid's nodes of a quarter.
+    """Compliance of the top under downward forces in mm/N: blocks by parity among a quarter's nodes of the grid.
 
-    foundation_modulus: pressure per depth in N/mm3 under a wide punch;  stencil: about the inverse
-    lower: what the lower side does, like `blocks`; None where it is held
+    foundation_modulus: pressure per depth in N/mm3 under a wide punch;  stencil: approximate inverse
+    lower: displacements of the lower side, like `blocks`; None if it is fixed
     """
 
     grid: NodeGrid
@@ -67,7 +67,7 @@ class Compliance:
         return self._maps(self.blocks, points, force)
 
     def lower_maps(self, points: ObjectPoints, force: np.ndarray) -> np.ndarray | None:
-        """The same of the lower side; None where it is held."""
+        """Deformation maps of the lower side; None if it is fixed."""
         return None if self.lower is None else self._maps(self.lower, points, force)
 
     def _maps(self, blocks, points, force):
@@ -113,7 +113,7 @@ def elastic_compliance(spec: BaseSpec, *, threads: int = 1, cells: tuple[int, ..
 
 
 def confined_modulus(layer: ElasticLayer) -> float:
-    """Modulus (MPa) of an elastic layer that is compressed and cannot move sideways."""
+    """Modulus (MPa) of an elastic layer in uniaxial compression without lateral strain."""
     return layer.young_mpa * (1 - layer.poisson) / ((1 + layer.poisson) * (1 - 2 * layer.poisson))
 
 
@@ -180,7 +180,7 @@ def press_layer(compliance: Compliance, points: ObjectPoints, forces_n: Sequence
 
 
 def rest_on_shell(compliance: Compliance, points: ObjectPoints, count: int, depth_mm: float) -> LayerPress:
-    """The `LayerPress` of so many load steps of an object that something else carries: the layer is at rest."""
+    """The `LayerPress` of `count` load steps of an object that rests on the shell: the layer is undeformed."""
     gap = np.tile((points.gap - depth_mm)[:, None], count)
     contact = ContactLoadSteps(force=np.zeros_like(gap), depth=np.full(count, depth_mm), gap=gap,
                                iterations=np.zeros(count, dtype=int), settled=np.ones(count, dtype=bool))

@@ -1,15 +1,14 @@
 """A rigid object that presses the elastic layer and drags it with Coulomb friction, increment by increment, along a `Motion`.
 
-What a state holds is all that there is of history: the forces at the top's nodes, their tangential displacements, and each node's
-place under the object. A node that sticks keeps its place there; under a sliding or a free one the object moves by its
-displacement less what friction drags the surface along. The tangential displacement that the pressure alone causes does not move
-the places, as in a press straight down (`compliance`): without friction that is what comes out here, too. The object's underside
-is evaluated at those places, exact to its triangles. Normal forces act along z, and torques are about the undeformed surface: the
-model is linear.
+The history consists of the forces at the top's nodes, their tangential displacements, and each node's position under the object. A
+node that sticks keeps this position; for a sliding or a free node the position changes by the object's displacement minus the
+surface's tangential displacement by friction. The tangential displacement by pressure alone does not change the positions, as in
+a press straight down (`compliance`); without friction the results of both agree. The object's underside is evaluated at these
+positions, exact to its triangles. Normal forces act along z, and torques refer to the undeformed surface: the model is linear.
 
-The model moves the object along x, y and z. With friction a step is divided so that the object moves aside by at most half of the
-nodes' spacing in an increment (no node is passed over, and each takes hold where it comes to touch), and down by an eighth of it.
-Without friction there is no history, and each step is one increment.
+The model moves the object along x, y and z. With friction a step is divided into increments with lateral displacements of at most
+half of the nodes' spacing (so that the object skips no node, and each node sticks where it comes into contact), and with descents
+of at most an eighth of it. Without friction there is no history, and each step is one increment.
 """
 
 from collections.abc import Callable

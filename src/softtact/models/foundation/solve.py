@@ -1,31 +1,31 @@
 """A press in the foundation model: the object on the slab, the slab on the frusta, load step by load step.
 
-Unknown are the object's forces f >= 0 on patches of the cover and the frusta's forces q >= 0:
-    gap  = gap0 - depth + E u + k f >= 0,     f gap = 0,  sum f = F       (k: softness beside edges, `SoftEdges`)
-    w    = extension(q),                      w <= 0 where q = 0          (w: how far the slab comes down on a frustum)
+The unknowns are the object's forces f >= 0 on patches of the cover and the frusta's forces q >= 0:
+    gap  = gap0 - depth + E u + k f >= 0,     f gap = 0,  sum f = F       (k: contact compliance beside edges, `SoftEdges`)
+    w    = extension(q),                      w <= 0 where q = 0          (w: descent of the slab at a frustum)
     u, w = G [E' f; -(q + r)]
-Active sets and Newton's method, each step solved directly. Where the contact is large, four points that the object covers whole
-share a patch and its uniform pressure, which leaves some hundred unknowns, at 0.1 to 0.4 % of the map
+Active-set and Newton's method, each step solved directly. In large contacts, four points that the object covers completely
+share a patch of uniform pressure, which leaves about a hundred unknowns and changes the map by 0.1 to 0.4 %
 (docs/notebook/2026-11-23-foundation-model.md).
-Frusta rock, lean and stiffen, and slab and object move sideways: what finite displacement adds to these equations is followed from
-step to step (`FiniteDisplacement`), e the frusta's rise and l lateral forces on their roots:
+Frusta rock, tilt and stiffen, and slab and object move sideways: these effects of finite displacements are updated from step to
+step (`FiniteDisplacement`), with e the lift by rocking frusta and l lateral forces on their roots:
     extension(q) = w + e,       u, w = G [E' f; -(q + r)] + L' l
 
-What finite displacement adds
-Rocking: where the sheet moves sideways, a frustum that is hardly pressed leans on the rim of its tip and lifts the sheet
+Effects of finite displacements
+Rocking: where the sheet moves sideways, a frustum under a small force tilts on the rim of its tip and lifts the sheet
 (`FrustumLaw.rise`).
-Pressed frusta (`FrustumLaw.stiffening`): against a root's movement u and tilt t they are the stiffer the more they are compressed,
+Stiffening (`FrustumLaw.stiffening`): the stiffness against a root's displacement u and tilt t increases with the compression c,
     K(c) = K(0) + dK(c):    force and moment -dK (u, t), and 1/2 (u, t) dK'(c) (u, t) more force against compression.
 Pressure: the slab's second variation under the pressure p between object and board is, for rubber of constant volume,
-1/2 p du_i/dx_j du_j/dx_i. A uniform pressure leaves its boundary terms only, and of these the free object's top has none. At
-the board's side they are forces p t and moments p u on roots that tilt and move: pressure pushes what slopes sideways.
-Slopes: membrane forces, N the integrals over the height of s_xx, s_yy and s_xy, pull or push where the slab slopes: loads
-r = -div(N grad w) on the frusta (initial stress; von Karman's plate). They press the deepest parts deeper and lift the slab beside.
-Edges: the top moves sideways, and the object's edges meet other points of it (`SoftEdges`). What moves sideways under a slope
-meets another height.
+1/2 p du_i/dx_j du_j/dx_i. For a uniform pressure only boundary terms remain, which vanish on the top under a free object. On
+the board's side they are forces p t and moments p u on roots that tilt and move: pressure pushes inclined surfaces sideways.
+Slopes: membrane forces N, the integrals of s_xx, s_yy and s_xy over the height, act where the slab is inclined: loads
+r = -div(N grad w) on the frusta (initial stress; von Karman's plate). They push the deepest parts down and lift the slab beside.
+Edges: the top moves sideways, so the object's edges touch other points of it (`SoftEdges`), and points under an inclined facet
+get another gap.
 
-Left out: what the slab's strain adds at second order, that pieces of it turn otherwise than its mean slope, pressures that
-differ over the height, friction. Their effects:
+Not modelled: second-order strains of the slab, local rotations that differ from its mean slope, pressures that vary over the
+height, friction. Their effects:
 docs/notebook/2026-11-23-foundation-model.md.
 """
 
@@ -43,42 +43,42 @@ from softtact.models.foundation.compliance import FoundationCompliance
 from softtact.models.foundation.dof_maps import Places, Sideways, SoftEdges
 
 _STEP = 0.01         # of a force, for a difference quotient
-_SLOWLY = 5.0        # times as exact must what is followed by half only have settled
-_REPEATS = 6         # of finding what the object covers where points have moved, once forces have settled; the last by half only
-_STRAYED = 0.03      # of a step, and of the depth: movements of points and object after which covered shares are found anew
-_PATIENCE = 8        # iterations, after which loads that swing are followed by half only
-_ABSURD_MM = 1e6     # where an iteration has run away; on its first few points an object may be thought to sink by metres
-_ROUGHLY = 100       # times the tolerance is enough for a force between load steps
+_SLOWLY = 5.0        # factor of stricter convergence where updates are relaxed by half
+_REPEATS = 6         # updates of the covered shares after convergence of the forces; the last one relaxed by half
+_STRAYED = 0.03      # of a grid step, and of the depth: movements of points and object that require an update of covered shares
+_PATIENCE = 8        # iterations after which updates of oscillating loads are relaxed by half
+_ABSURD_MM = 1e6     # depth at which an iteration counts as diverged; with few active points it may reach metres
+_ROUGHLY = 100       # factor of the tolerance for intermediate forces between load steps
 _FIRST_PATCHES = 30
-_FREE, _SOFTEST = 1e6, 1e4     # mm/N: softness of a point that the object does not cover; from where on a patch cannot touch
-_SHORTER = 0.25      # share of a step to a force that is tried next where the step failed
-_SHORTEST = 0.004    # share of the force itself: steps that are still shorter are not tried
+_FREE, _SOFTEST = 1e6, 1e4     # mm/N: contact compliance of an uncovered point; from which a patch cannot touch
+_SHORTER = 0.25      # share of a force step that is tried after the step failed
+_SHORTEST = 0.004    # of the force: shorter steps are not tried
 
 
 @dataclass(frozen=True)
 class FoundationSettings:
-    """When a load step counts as reached.
+    """Convergence criteria of a load step, and options of the model.
 
-    tolerance: largest change of a frustum's force in the last step, of the whole force;  gap_mm: overlap that joins a contact
-    follow: whether the effects of finite displacement are taken in;  rocking: whether frusta rock
-    patches: whether four points share one
-    same_slope: share by which frusta's compliances may change before a step's matrix is factored anew, if no contact changed
+    tolerance: largest change of a frustum's force in the last step over the total force;  gap_mm: overlap that activates a point
+    follow: whether the effects of finite displacements are included;  rocking: whether frusta rock
+    patches: whether four points share a patch
+    same_slope: relative change of the frusta's compliances up to which a factorisation is reused, if no contact changed
     """
 
-    tolerance: float = 5e-5     # a hundredth changes the map by 0.03 % at most (root mean square)
-    gap_mm: float = 3e-5     # single precision leaves 1e-5
+    tolerance: float = 5e-5     # a hundredth of it changes the map by at most 0.03 % (root mean square)
+    gap_mm: float = 3e-5     # the error of single precision is 1e-5
     max_iterations: int = 60
     follow: bool = True
     rocking: bool = True
     patches: bool = True
-    same_slope: float = 0.05     # a step's error is cut to as much: a load step's second step needs no further factor
+    same_slope: float = 0.05     # a step reduces the error to this share, so a load step's second step needs no factorisation
 
 
 @dataclass(frozen=True)
 class Effects:
     """loads (b,): N upwards on the frusta;  lateral (4, b): forces (N) and moments (N mm) on roots along x, then along y
 
-    moved (2, c): movement of the points sideways in mm;  rise (b,): of roots on rocking frusta in mm
+    moved (2, c): lateral displacements of the points in mm;  rise (b,): lift of roots by rocking frusta in mm
     """
 
     loads: np.ndarray
@@ -87,12 +87,12 @@ class Effects:
     rise: np.ndarray
 
     def towards(self, other: "Effects", share: float, *, loads: np.ndarray | float, rise: float) -> "Effects":
-        """These moved towards others by a share of the difference, and by other shares for their loads and rise."""
+        """Relaxation towards other effects by a share of the difference, with separate shares for loads and rise."""
         shares = (loads, share, 1.0, rise)
         return Effects(*(a + part * (b - a) for a, b, part in zip(astuple(self), astuple(other), shares, strict=True)))
 
     def continued(self, before: "Effects", share: float) -> "Effects":
-        """These continued by a share of how they differ from those before."""
+        """Extrapolation from earlier effects by a share of the difference."""
         loads, lateral, moved, rise = (b + share * (b - a) for a, b in zip(astuple(before), astuple(self), strict=True))
         return Effects(loads, lateral, moved, np.maximum(rise, 0.0))
 
@@ -102,7 +102,7 @@ class FiniteDisplacement:
 
     def __init__(self, compliance: FoundationCompliance, points: ObjectPoints, places: Places,
                  settings: FoundationSettings) -> None:
-        """settings: `FoundationSettings`, of which `follow` and `rocking` count"""
+        """settings: `FoundationSettings`, of which only `follow` and `rocking` are used"""
         self.law, self.settings, self.lattice = compliance.law, settings, compliance.counts[::-1]
         self.frusta, self.points = len(places.frusta), points
         if settings.follow or settings.rocking:
@@ -112,22 +112,22 @@ class FiniteDisplacement:
             self.sideways, self._own = Sideways(compliance, points, places), self._own_compliance()
 
     def none(self) -> Effects:
-        """Those of the unloaded sensor."""
+        """The effects in the unloaded sensor: zero."""
         b = self.frusta
         return Effects(np.zeros(b), np.zeros((4, b)), np.zeros((2, self.points.count)), np.zeros(b))
 
     def down(self, effects: Effects) -> np.ndarray:
-        """How far nodes and frusta (n + b,) come down under lateral loads of the frusta, in mm."""
+        """Descent (n + b,) in mm of nodes and frusta under lateral loads on the frusta."""
         if not self.settings.follow:
             return np.zeros(self.points.count + self.frusta, dtype=np.float32)
         return effects.lateral.ravel().astype(np.float32) @ self.lateral
 
     def renewed(self, effects: Effects, load: np.ndarray, down: np.ndarray, q: np.ndarray, *,
                 share: float) -> tuple[Effects, float]:
-        """The effects under a load, frusta down by `down` (b,) under their law's forces q (b,), or a share of the change to them.
+        """The effects under a load, with descents `down` (b,) of the frusta under their law's forces q (b,), relaxed by `share`.
 
-        The rise goes half of the way, for all of it would swing: a force ends what lifts it. Returns the effects, and what was
-        missing, as the largest change of a frustum's force in N.
+        The rise is relaxed by half, as full updates would oscillate: a force ends the rocking that causes it. Returns the effects
+        and their remaining change, as the largest change of a frustum's force in N.
         """
         found, missing, load = effects, 0.0, load.astype(np.float32)
         roots: Any = self._roots(effects, load) if self.settings.follow or self.settings.rocking else None
@@ -141,8 +141,8 @@ class FiniteDisplacement:
         return effects.towards(found, share, loads=share * self._pace(q, roots), rise=0.5), float(missing)
 
     def _pace(self, q, roots):
-        """Share (b,) of their change that loads take at once: the more force a frustum has taken, the less is left to its law,
-        and where the law turns steep the whole change would swing.
+        """Relaxation factors (b,) of the loads: additional forces on a frustum reduce the force of its law, and full updates would
+        oscillate where the law becomes steep.
         """
         if not self.settings.follow:
             return 1.0
@@ -151,7 +151,7 @@ class FiniteDisplacement:
         return 1.0 / (1.0 + np.maximum(slope, 0.0))
 
     def _roots(self, effects, load):
-        """Movement in mm and tilt of roots along x and along y (b, axis, movement or tilt)."""
+        """Displacement in mm and tilt of roots along x and along y (b, axis, displacement or tilt)."""
         moved = self.lateral @ load
         if self.settings.follow:
             moved += self.lateral_self @ effects.lateral.ravel().astype(np.float32)
@@ -165,13 +165,13 @@ class FiniteDisplacement:
         return Effects(loads, self._lateral(effects.lateral, pressed, roots), self.sideways(load), effects.rise)
 
     def _stiffened(self, q, roots):
-        """Stiffness (b, 2, 2) of roots beyond the linear one, and how much more force than their law's (b,) frusta take in N."""
+        """Additional stiffness (b, 2, 2) of roots beyond the linear one, and forces (b,) in N of frusta beyond their law."""
         more, growth = self.law.stiffening(q)
         return more, 0.5 * np.einsum("bai,bij,baj->b", roots, growth, roots)
 
     def _lateral(self, present, stiffness, roots):
-        """Forces and moments (4, b) with which roots of a stiffness (b, 2, 2) beyond the linear one resist, implicit in each root's
-        own answer: pressed frusta are stiffer than the slab about them.
+        """Forces and moments (4, b) of the additional stiffness (b, 2, 2) of roots, implicit in each root's local response, as
+        compressed frusta are stiffer than the slab around them.
         """
         present = present.reshape(2, 2, -1).transpose(2, 0, 1)
         free = roots - present @ self._own.T
@@ -179,17 +179,17 @@ class FiniteDisplacement:
         return -resisted.transpose(2, 1, 0).reshape(4, -1)
 
     def _own_compliance(self):
-        """What force and moment on the middle's frustum do to its movement and tilt along x (2, 2)."""
+        """Compliance (2, 2) of the central frustum's displacement and tilt along x to force and moment on it."""
         middle = np.ravel_multi_index([count // 2 for count in self.lattice], self.lattice)
         both = middle + self.frusta * np.arange(2)
         return self.lateral_self[np.ix_(both, both)].astype(float)
 
 
 def membrane_loads(down: np.ndarray, forces: np.ndarray) -> np.ndarray:
-    """Loads on the frusta (ny, nx), upwards in N, of membrane forces (3, ny, nx) in N/mm in a slab that has come down by `down`
-    (ny, nx) in mm: the gradient of 1/2 sum N_ab w_a w_b over the cells; beyond the lattice the slab is held.
+    """Loads on the frusta (ny, nx), upwards in N, from membrane forces (3, ny, nx) in N/mm in a slab with descents `down`
+    (ny, nx) in mm: the gradient of 1/2 sum N_ab w_a w_b over the cells; beyond the lattice the slab is fixed.
 
-    Slopes w_a are taken over two pitches: the slab, thicker than a pitch, turns as a whole only over such lengths.
+    Slopes w_a are taken over two pitches: the slab is thicker than a pitch and rotates as a whole only over such lengths.
     """
     x, y = _centred(down, 1), _centred(down, 0)
     return -_centred(forces[0] * x + forces[2] * y, 1) - _centred(forces[1] * y + forces[2] * x, 0)
@@ -206,7 +206,7 @@ class FoundationLoadStep:
     """One load step.
 
     load (n + b,): N at nodes and frusta;  lateral (4, b): see `Effects`;  touching (c,): points under pressure
-    compression (b,): of frusta in mm, negative where one is lifted;  penetration in mm: of patches as a whole, softness included
+    compression (b,): of frusta in mm, negative if lifted;  penetration in mm: of whole patches, with their contact compliance
     """
 
     force_n: float
@@ -231,7 +231,7 @@ def press_foundation(compliance: FoundationCompliance, points: ObjectPoints, for
 
 
 def lifted(compliance: FoundationCompliance, points: ObjectPoints, depth_mm: float) -> FoundationLoadStep:
-    """The `FoundationLoadStep` of an object that something else carries so deep: the sensor is at rest."""
+    """The `FoundationLoadStep` of an object that rests on the shell at this depth without touching the sensor."""
     frusta = int(np.prod(compliance.counts))
     return FoundationLoadStep(force_n=0.0, depth=depth_mm, load=np.zeros(points.count + frusta), lateral=np.zeros((4, frusta)),
                               touching=np.zeros(points.count, dtype=bool), compression=np.zeros(frusta), penetration=0.0,
@@ -239,9 +239,9 @@ def lifted(compliance: FoundationCompliance, points: ObjectPoints, depth_mm: flo
 
 
 def _advance(press, path, target):
-    """Reach a force (N) from the end of a path of forces and states, through smaller ones where no step leads there at once.
+    """Reach a force (N) from the end of a path of forces and states, through intermediate forces if a direct step fails.
 
-    Appends what it reaches to the path. At once is what nearly always works but from rest under a tilted object.
+    Appends the reached forces and states to the path. Direct steps rarely fail, except from rest under a tilted object.
     """
     force, spent = target, 0
     while True:
@@ -267,16 +267,16 @@ class FoundationMaps:
         self._places = Places(compliance, points)
 
     def __call__(self, load_steps: Sequence[FoundationLoadStep]) -> np.ndarray:
-        """Maps (l, ny, nx) of some `FoundationLoadStep`s, with the held edges."""
+        """Maps (l, ny, nx) of some `FoundationLoadStep`s, with the fixed edges."""
         return self._places.maps(np.stack([load_step.load for load_step in load_steps], axis=1),
                                  np.stack([load_step.lateral.ravel() for load_step in load_steps], axis=1))
 
 
 @dataclass
 class _State:
-    """Which patches and frusta act, the forces q (b,) of the frusta's law in N, and the effects of finite displacement.
+    """Active sets of patches and frusta, the forces q (b,) of the frusta's law in N, and the effects of finite displacements.
 
-    depth: of the object since its first touch, in mm
+    depth: of the object below its first touch in mm
     """
 
     touching: np.ndarray
@@ -287,7 +287,7 @@ class _State:
 
 
 def _continued(path, force):
-    """The state at a force, guessed on the line through the last two of a path, or its only one."""
+    """First guess of the state at a force: linear extrapolation from the last two states of a path, or its only one."""
     second, now = path[-1]
     if len(path) == 1:
         return replace(now)
@@ -308,21 +308,21 @@ class _Press:
         self.finite = FiniteDisplacement(compliance, points, places, settings)
 
     def first(self):
-        """Where a press begins: the lowest patches touch."""
+        """The start of a press: the lowest patches touch."""
         gap = self.patch @ self.points.gap
         return _State(gap <= np.sort(gap)[:_FIRST_PATCHES][-1], np.ones(self.frusta, dtype=bool), np.zeros(self.frusta),
                       self.finite.none(), 0.0)
 
     def load_step(self, state, force, *, rough=False):
-        """Newton's method from a state, which is brought up to the load step; None if it is not reached, and iterations.
+        """Newton's method from a state, which is updated to the load step; returns it, or None on failure, and the iterations.
 
-        rough: as a start for another
+        rough: with the tolerance of intermediate forces
         """
         c, look, repeats = self.patch.shape[0], True, 0 if rough else _REPEATS
-        moved, down_by = state.effects.moved, state.depth     # where the contact was looked at
+        moved, down_by = state.effects.moved, state.depth     # at the last update of the contact
         enough = (_ROUGHLY if rough else 1.0) * self.settings.tolerance * force
         for iteration in range(1, self.settings.max_iterations + 1):
-            if look:      # followed from step to step, points at edges would swing
+            if look:      # updated in every step, points at edges would oscillate
                 share = 0.5 if iteration > 1 and repeats < _REPEATS // 2 else 1.0
                 moved, down_by = moved + share * (state.effects.moved - moved), down_by + share * (state.depth - down_by)
                 gap0, look = self._contact(state, moved, down_by), False
@@ -353,9 +353,9 @@ class _Press:
         return None, iteration
 
     def _contact(self, state, moved, depth):
-        """Gaps (c,) of patches where their points have moved sideways by `moved` (2, c) and the object has come down by `depth`.
+        """Gaps (c,) of patches for lateral displacements `moved` (2, c) of their points and the object at `depth`.
 
-        Patches beside which the object ends are softer, and those that it has left cannot touch.
+        Patches at an edge of the object get a contact compliance, and those that it has left cannot touch.
         """
         points = self.points.as_deep(depth)
         contact_compliance = self.patch.power(2) @ np.minimum(self.edges(points, moved, depth), _FREE)
@@ -366,14 +366,14 @@ class _Press:
         return self.patch @ (points.gap + (points.slope.T * moved).sum(axis=0))
 
     def _elsewhere(self, state, moved, depth):
-        """Whether points have moved on, or the object come down, since the contact was looked at, by what counts."""
+        """Whether points or the object have moved beyond the tolerance since the last update of the contact."""
         steps = np.abs(state.effects.moved - moved).max() / self.points.step.min()
         return steps > _STRAYED or abs(state.depth - depth) > _STRAYED * abs(state.depth)
 
     def _solve(self, gap0, already, state, force):
-        """Forces of patches (c,) and frusta (b,), and the depth, of the present active sets with the law's tangent.
+        """Forces of patches (c,) and frusta (b,), and the depth, for the current active sets with the law's tangent.
 
-        already (c + b,): what else has moved patches down and frusta up
+        already (c + b,): displacements of patches downwards and frusta upwards from other causes
         """
         c, law, matrix, slope = len(gap0), self.law, self.slab.matrix, self.law.slope(state.q)
         if self._factored is None or not self._factored.serves(state, slope, self.settings.same_slope):
@@ -389,14 +389,14 @@ class _Press:
 
     @staticmethod
     def _take(state, q):
-        """Take over the frusta's forces; the largest change of one in N."""
+        """Store the frusta's forces; returns the largest change in N."""
         pressing = np.maximum(q, 0.0)
         change = float(np.abs(pressing - state.q).max())
         state.q = pressing
         return change
 
     def _same_sets(self, state, f, q, gap, down):
-        """Let patches and frusta join that overlap, and leave that pull; whether none did."""
+        """Add patches and frusta that overlap to the active sets, remove those in tension; returns whether none changed."""
         small = self.settings.gap_mm
         touching = np.where(state.touching, f >= 0, self.possible & (gap < -small))
         standing = np.where(state.standing, q >= 0, down + state.effects.rise > small)
@@ -420,17 +420,17 @@ class _Slab:
         self._hard = np.diag(self.matrix)[:c].copy()
 
     def soften(self, contact_compliance):
-        """Let a spring of softness (c,) in mm/N act in series with each patch."""
+        """Add a spring of compliance (c,) in mm/N in series with each patch."""
         place = np.arange(len(contact_compliance))
         self.matrix[place, place] = self._hard + contact_compliance
 
     def seen(self, down):
-        """How far patches move down and frusta up (c + b,) where nodes and frusta come down (n + b,)."""
+        """Displacements (c + b,) of patches downwards and frusta upwards from descents (n + b,) of nodes and frusta."""
         nodes = self._patch.shape[1]
         return np.concatenate([self._patch @ down[:nodes], -down[nodes:]])
 
     def load(self, forces):
-        """Forces (n + b,) downwards on nodes and frusta of those (c + b,) on patches downwards and on frusta upwards."""
+        """Downward forces (n + b,) on nodes and frusta from forces (c + b,) on patches downwards and on frusta upwards."""
         patches = self._patch.shape[0]
         return np.concatenate([self._patch.T @ forces[:patches], -forces[patches:]])
 
@@ -451,7 +451,7 @@ class _Factored:
         self.per_depth = self.solve(np.arange(len(self.rows)) < len(a))
 
     def serves(self, state, slope, share):
-        """Whether the sets are still these, and the slopes within a share of these."""
+        """Whether the active sets are unchanged, and the slopes within a share of those of the factorisation."""
         same = np.array_equal(state.touching, self._touching) and np.array_equal(state.standing, self._standing)
         return same and bool((np.abs(slope - self.slope) <= share * self.slope).all())
 

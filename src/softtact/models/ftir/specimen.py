@@ -1,8 +1,8 @@
 """The dielectric between a plate and glass (FTIR): one cell of its lattice, and all frusta, each with its height and tip.
 
-`press_cell_on_glass` gives force per frustum against contact area. Of a specimen it is asked who carries what, and each disc:
-the plate keeps its direction and each frustum has a cell. Frustum i of height h_i is compressed by
-c_i = max(0, d - (h_max - h_i)) when the plate has gone down by d from its first touch, so
+`press_cell_on_glass` computes force per frustum against contact area. For a specimen, the forces and contact discs of all frusta
+are computed under a plate without rotation, with one cell per frustum. Frustum i of height h_i is compressed by
+c_i = max(0, d - (h_max - h_i)) when the plate is at a depth d below its first touch, so
     sum_i F(c_i; h_i, t_i) = F_total
 is one equation for d. The cell's force F and area A come from `press_cell_on_glass` at a few heights and tip diameters.
 """
@@ -31,8 +31,8 @@ from softtact.sensors.frusta import SensorSpec
 # A gap this wide ends total reflection: the evanescent wave's intensity falls to 1/e in lambda / (4 pi sqrt(n^2 sin^2 theta - 1)),
 # for green light (0.53 um) in acrylic (n = 1.49) 0.13 um at 45 degrees and 0.05 um at 60 degrees.
 DARK_GAP_MM = 1e-4
-_SPARE = 1.25            # cells are pressed so much farther than the mean frustum: the tallest carries more
-_LEVELS = 14            # of force, at which a cell is solved
+_SPARE = 1.25            # largest force on a cell over that of the mean frustum: the tallest frustum carries more
+_LEVELS = 14            # forces at which a cell is solved
 # Where tips are narrow their sides fold onto the glass: thin layers in the lowest third and thin rings at the rim
 # (docs/notebook/2026-11-22-mesh-on-glass.md).
 GLASS_MESH = MeshSettings.converging(frustum_heights=(*np.linspace(0, 0.2, 11), 0.24, 0.28, 0.33, 0.4, 0.5, 0.7, 1.0),
@@ -79,7 +79,7 @@ def press_cell_on_glass(spec: SensorSpec, law: Law, forces_n: Sequence[float] | 
 
 
 def glass_mesh(spec: SensorSpec, **changes: Any) -> MeshSettings:
-    """The `MeshSettings` that a frustum of this shape needs; changes are made where its sides fold onto the glass."""
+    """The `MeshSettings` for a frustum of this shape; `changes` apply if its sides fold onto the glass."""
     frusta = spec.dielectric.frusta
     return replace(GLASS_MESH, **changes) if frusta.tip_diameter_mm < frusta.root_diameter_mm else WIDE_TIP_MESH
 
@@ -135,13 +135,13 @@ def scattered_specimen(spec: SensorSpec, *, height_scatter: float, tip_scatter: 
 class CellFamily:
     """Force and contact area of a cell by its compression, for frusta near the nominal shape.
 
-    Five cells are solved: the nominal one and two each with other heights and other tips. Between them each quantity is a
-    parabola in the height factor and one in the tip factor, at equal compression per height; their product term is left out.
+    Five cells are solved: the nominal one, two with other heights and two with other tips. Each quantity is interpolated by
+    a parabola in the height factor and one in the tip factor, at equal compression per height, without a product term.
     """
 
     def __init__(self, spec: SensorSpec, law: Law, *, largest_n: float, height_spread: float, tip_spread: float,
                  mesh: MeshSettings | None = None) -> None:
-        """largest_n: mean force per frustum that will be asked for;  spreads: farthest factors from 1 on either side."""
+        """largest_n: largest mean force per frustum;  spreads: largest deviations of the factors from 1 on either side."""
         self.height_mm, self.spreads = spec.dielectric.frusta.height_mm, (height_spread, tip_spread)
 
         def solve(height_factor=1.0, tip_factor=1.0):
